@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace terrace::stream {
+
+/// What is thrown for bad data and failed input or output: never for misuse (that asserts).
+/// `what()` is one line: "FILE: WHERE: cause; remedy". Every part but file and cause may be empty.
+class Error : public std::runtime_error {
+ public:
+  struct Parts {
+    std::string file;    ///< the file as the caller named it
+    std::string where;   ///< "line 12", "byte 4096", "tile 3,4", "cluster 0/17"
+    std::string cause;   ///< what is wrong
+    std::string remedy;  ///< what the user can do
+  };
+
+  explicit Error(Parts parts);
+
+  [[nodiscard]] const Parts& parts() const noexcept { return parts_; }
+
+ private:
+  Parts parts_;
+};
+
+/// An Error for a failed system call: the cause ends with the text of `error_number` (errno).
+Error system_error(std::string file, std::string action, int error_number, std::string remedy = {});
+
+}  // namespace terrace::stream

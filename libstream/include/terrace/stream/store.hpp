@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "terrace/stream/point.hpp"
+#include "terrace/stream/source.hpp"
+
+/// The store: a folder that holds every input point exactly once in a hierarchy of clusters, each
+/// readable on its own. FORMAT.md describes the bytes.
+///
+/// Level 0 is full resolution; levels grow coarser upward to the *top*. A cluster of level L has
+/// one *representative*, a point whose highest level is above L, and *members*, the points whose
+/// highest level is exactly L. A point of highest level h heads one cluster on every level below h
+/// and carries their h ordinals (its *children*, level 0 first). The points of the top level, which
+/// no cluster represents, are the *root*: cluster 0 of the top level, without a representative.
+
+namespace terrace::stream {
+
+/// Names a cluster for the life of the store: level in the upper 8 bits, ordinal in the lower 56.
+enum class ClusterId : std::uint64_t {};
+
+constexpr ClusterId cluster_id(unsigned level, std::uint64_t ordinal) {
+  return ClusterId{(std::uint64_t{level} << 56) | ordinal};
+}
+constexpr unsigned level_of(ClusterId id) {
+  return static_cast<unsigned>(static_cast<std::uint64_t>(id) >> 56);
+}
+constexpr std::uint64_t ordinal_of(ClusterId id) {
+  return static_cast<std::uint64_t>(id) & ((std::uint64_t{1} << 56) - 1);
+}
+
+/// What is known of a cluster over all its descendants down to level 0, representative included.
+/// `box` is in stored coordinates; `error` is a bound, never too small, on the ground distance in
+/// metres from the representative to a descendant.
+struct ClusterSummary {
+  Box3 box;
+  double error = 0.0;
+  std::uint64_t descendants = 0;  ///< number of level-0 points below, representative included
+
+  friend bool operator==(const ClusterSummary&, const ClusterSummary&) = default;
+};
+
+/// A clustered block on its way into the store. Points are numbered within the block.
+/// Cluster c has the points order[first[c]] ... order[first[c + 1] - 1], its representative among
+/// them. `children` has `level` ordinals per point, level 0 first. `payload` has the attribute
+/// values of each point, packed in the order of the schema, Schema::payload_size() bytes per point.
+struct ClusteredBlock {
+  unsigned level = 0;
+  std::span<const Point3> positions;  ///< stored coordinates
+  std::span<const std::byte> payload;
+  std::span<const std::uint64_t> children;
+  std::span<const std::uint32_t> first;
+  std::span<const std::uint32_t> order;
+  std::span<const std::uint32_t> representatives;  ///< point number, one per cluster
+  std::span<const ClusterSummary> summaries;       ///< one per cluster
+};
+
+/// What a store says of its points and how it was made. No time, path or host is ever in it.
+struct Schema {
+  bool grid = false;
+  std::array<Channel, 3> coordinates;
+  std::vector<Channel> attributes;
+  WorldTransform world;
+  Crs crs;
+  std::string vertical;  ///< "ellipsoidal", "orthometric", or empty: unknown
+  std::uint64_t columns = 0, rows = 0;
+  std::uint64_t nodata = 0;  ///< cells left out; set before finish()
+  std::string format;        ///< of the source
+  /// Parameters of the clustering, in this order, as name and value (already printed).
+  std::vector<std::pair<std::string, std::string>> parameters;
+
+  [[nodiscard]] std::size_t payload_size() const;
+};
+
+/// Writes a store. It appears under its name, whole and synced, when finish() returns, and not
+/// before: a writer that dies or throws leaves nothing that opens.
+class StoreWriter {
+ public:
+  /// An encoded block, on its way from encode() to append().
+  class Encoded;
+  struct EncodedDeleter {
+    void operator()(Encoded*) const;
+  };
+  using EncodedPtr = std::unique_ptr<Encoded, EncodedDeleter>;
+
+  /// Throws: Error if `path` exists (unless `replace`, and it is a store) or cannot be written.
+  StoreWriter(const std::filesystem::path& path, Schema schema, bool replace = false);
+  ~StoreWriter();
+  StoreWriter(const StoreWriter&) = delete;
+  StoreWriter& operator=(const StoreWriter&) = delete;
+
+  /// The costly half: may be called by several threads at once. Copies what it needs.
+  [[nodiscard]] EncodedPtr encode(const ClusteredBlock& block) const;
+  /// The ordered half: one thread at a time, blocks of one level in the order that makes the
+  /// ordinals. The first cluster of the block gets ordinal `returned value`, the others follow.
+  std::uint64_t append(EncodedPtr block);
+  /// Number of clusters appended to `level` so far.
+  [[nodiscard]] std::uint64_t clusters(unsigned level) const;
+
+  [[nodiscard]] Schema& schema();
+
+  /// Writes the points of the top level (as a block of one cluster whose representative is
+  /// UINT32_MAX), syncs and publishes. Returns the bytes of the store.
+  std::uint64_t finish(const ClusteredBlock& root);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// A cluster read back. `positions` are the members in the order that gives their ids; vectors are
+/// reused from call to call.
+struct ClusterPoints {
+  std::vector<Point3> positions;
+  std::vector<std::byte> payload;       ///< Schema::payload_size() bytes per member
+  std::vector<std::uint64_t> children;  ///< `level` ordinals per member, level 0 first
+  bool has_representative = false;      ///< false for the root only
+  Point3 representative{};
+  std::vector<std::byte> representative_payload;
+
+  [[nodiscard]] std::size_t size() const { return positions.size(); }
+};
+
+/// The index entry of a cluster.
+struct ClusterRecord {
+  ClusterSummary summary;    ///< as stored: box exact or grown outward, error rounded up
+  std::uint64_t offset = 0;  ///< of its bytes in the level's file
+  std::uint32_t bytes = 0;
+  std::uint32_t points = 0;  ///< members
+};
+
+struct LevelInfo {
+  unsigned level = 0;
+  std::uint64_t points = 0;    ///< whose highest level is this or above
+  std::uint64_t members = 0;   ///< whose highest level is exactly this
+  std::uint64_t clusters = 0;  ///< stored at this level
+  std::uint64_t bytes = 0;     ///< clusters and index
+  std::uint64_t index_bytes = 0;
+};
+
+struct Problem {
+  std::string file;
+  std::uint64_t offset = 0;
+  std::string what;
+};
+
+/// A store opened for reading. All const members may be called by several threads at once.
+class Store {
+ public:
+  /// Throws: Error if there is no store, a newer version, or a damaged manifest.
+  static Store open(const std::filesystem::path& path);
+  Store(Store&&) noexcept;
+  Store& operator=(Store&&) noexcept;
+  ~Store();
+
+  [[nodiscard]] const Schema& schema() const;
+  [[nodiscard]] int version() const;
+  [[nodiscard]] const std::filesystem::path& path() const;
+  [[nodiscard]] unsigned top() const;
+  [[nodiscard]] std::span<const LevelInfo> levels() const;  ///< level 0 first
+  [[nodiscard]] std::uint64_t points() const;
+  [[nodiscard]] std::uint64_t bytes() const;
+  /// Of all points, in stored coordinates.
+  [[nodiscard]] const Box3& bounds() const;
+  /// Mean of stored coordinate 2 over all points.
+  [[nodiscard]] double mean_height() const;
+  [[nodiscard]] ClusterId root() const;
+
+  /// Throws: Error on a bad page or an ordinal that is not there.
+  [[nodiscard]] ClusterRecord record(ClusterId id) const;
+  /// Throws: Error on damage (checksum, counts), never a wrong point.
+  void read(ClusterId id, ClusterPoints& out) const;
+  /// Every cluster of `level` in order of ordinals; reads sequentially.
+  void for_each(unsigned level,
+                const std::function<void(ClusterId, const ClusterRecord&, const ClusterPoints&)>&
+                    visit) const;
+  /// Checks every byte and invariant and reports each fault; true if there is none.
+  bool verify(const std::function<void(const Problem&)>& report) const;
+
+ private:
+  struct Impl;
+  explicit Store(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace terrace::stream
