@@ -4,11 +4,10 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <numeric>
-#include <random>
 #include <stdexcept>
 
-#include "morton.hpp"
+#include "block_state.hpp"
+#include "engine.hpp"
 #include "scaling.hpp"
 #include "terrace/cluster/local_search.hpp"
 
@@ -17,6 +16,26 @@ namespace {
 
 constexpr std::size_t kFullBelow = 2500;
 
+bool available(SimdPath path) {
+#ifdef TERRACE_CLUSTER_X86
+  if (path == SimdPath::avx2) return __builtin_cpu_supports("avx2") != 0;
+  if (path == SimdPath::avx512) {
+    return __builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512dq") != 0;
+  }
+#endif
+  return path == SimdPath::portable;
+}
+
+EngineFunction engine_of(SimdPath path) {
+#ifdef TERRACE_CLUSTER_X86
+  if (path == SimdPath::avx2) return run_engine_avx2;
+  if (path == SimdPath::avx512) return run_engine_avx512;
+#else
+  (void)path;
+#endif
+  return run_engine_portable;
+}
+
 double distance(const Point3& a, const Point3& b) {
   const double x = a[0] - b[0];
   const double y = a[1] - b[1];
@@ -24,17 +43,36 @@ double distance(const Point3& a, const Point3& b) {
   return std::sqrt(x * x + y * y + z * z);
 }
 
+/// A facility at the same place as one of lower number has no clients.
+void drop_empty_facilities(BlockState& state) {
+  for (std::uint32_t j = 0; j < state.facility_count; ++j) state.size[j] = 0;
+  for (std::uint32_t i = 0; i < state.count; ++i) ++state.size[state.nearest[i]];
+  std::uint32_t kept = 0;
+  for (std::uint32_t j = 0; j < state.facility_count; ++j) {
+    state.near[j] = kept;
+    if (state.size[j] != 0) state.facility[kept++] = state.facility[j];
+  }
+  if (kept == state.facility_count) return;
+  state.facility_count = kept;
+  for (std::uint32_t i = 0; i < state.count; ++i) state.nearest[i] = state.near[state.nearest[i]];
+}
+
 }  // namespace
 
 struct BlockClusterer::Impl {
-  std::vector<Point3> points;
-  std::vector<std::uint32_t> codes, order;
+  EngineFunction engine;
+  CurveSorter sorter;
+  BlockState state;
 };
 
 BlockClusterer::BlockClusterer(SimdPath path) : impl_(std::make_unique<Impl>()) {
-  if (path == SimdPath::avx2 || path == SimdPath::avx512) {
-    throw std::invalid_argument("this SIMD path is not available on this machine");
+  if (path == SimdPath::automatic) path = best_simd_path();
+  if (!available(path)) {
+    throw std::invalid_argument(
+        "this processor lacks the instructions of the SIMD path asked for; "
+        "SimdPath::automatic takes the best there is");
   }
+  impl_->engine = engine_of(path);
 }
 BlockClusterer::~BlockClusterer() = default;
 BlockClusterer::BlockClusterer(BlockClusterer&&) noexcept = default;
@@ -44,68 +82,53 @@ void BlockClusterer::run(std::span<const Point3> points, std::span<const double>
                          const BlockOptions& options, BlockClustering& result) {
   assert(weights.empty() || weights.size() == points.size());
   result.facilities.clear();
-  result.assignment.assign(points.size(), 0);
+  result.assignment.resize(points.size());
   result.facility_cost = result.connection_cost = 0.0;
   if (points.empty()) return;
 
+  BlockState& state = impl_->state;
   const Scaling scaling(points);
-  impl_->points.resize(points.size());
-  impl_->codes.resize(points.size());
-  impl_->order.resize(points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const Point3 p = scaling.scaled(points[i]);
-    impl_->points[i] = p;
-    const auto cell = [](double v) { return static_cast<std::uint32_t>(v * 1023.0); };
-    impl_->codes[i] = morton_code(cell(p[0]), cell(p[1]), cell(p[2]));
-  }
-  std::iota(impl_->order.begin(), impl_->order.end(), 0u);
-  std::stable_sort(impl_->order.begin(), impl_->order.end(), [&](std::uint32_t a, std::uint32_t b) {
-    return impl_->codes[a] < impl_->codes[b];
-  });
+  impl_->sorter.load(points, weights, scaling, state);
+  state.facility_cost = static_cast<float>(options.facility_cost * scaling.diagonal);
 
-  std::vector<std::uint32_t>& facilities = result.facilities;
-  if (points.size() < kFullBelow || options.effort == Effort::full) {
-    local_search(points, weights, options.facility_cost, SearchLength::log2_full, options.seed,
-                 result);
-    std::stable_sort(facilities.begin(), facilities.end(), [&](std::uint32_t a, std::uint32_t b) {
-      return impl_->codes[a] < impl_->codes[b];
-    });
+  SearchPlan plan;
+  plan.seed = options.seed;
+  const auto count = points.size();
+  if (count < kFullBelow || options.effort == Effort::full) {
+    plan.random_candidates =
+        static_cast<std::uint32_t>(candidate_count(SearchLength::log2_full, count));
+  } else if (options.effort == Effort::fast) {
+    plan.stride = 3;
+  } else if (options.effort == Effort::standard) {
+    plan.stride = 1;
   } else {
-    constexpr std::size_t kStride = 100;
-    for (std::size_t i = kStride / 2; i < points.size(); i += kStride) {
-      facilities.push_back(impl_->order[i]);
-    }
+    plan.stride = 1;
+    plan.sweeps = 3;
   }
+  impl_->engine(state, plan);
 
-  // Nearest facility, the lowest number among equals; duplicates of a facility are dropped.
-  std::vector<std::uint32_t> used(facilities.size(), 0);
-  result.connection_cost = 0.0;
+  drop_empty_facilities(state);
+  for (std::uint32_t i = 0; i < state.count; ++i) {
+    result.assignment[state.original[i]] = state.nearest[i];
+  }
+  for (std::uint32_t j = 0; j < state.facility_count; ++j) {
+    result.facilities.push_back(state.original[state.facility[j]]);
+  }
+  double connections = 0.0;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    std::uint32_t nearest = 0;
-    double least = distance(impl_->points[i], impl_->points[facilities[0]]);
-    for (std::uint32_t j = 1; j < facilities.size(); ++j) {
-      const double d = distance(impl_->points[i], impl_->points[facilities[j]]);
-      if (d < least) {
-        least = d;
-        nearest = j;
-      }
-    }
-    result.assignment[i] = nearest;
-    used[nearest] = 1;
-    result.connection_cost += (weights.empty() ? 1.0 : weights[i]) * least;
+    const double d = distance(scaling.scaled(points[i]),
+                              scaling.scaled(points[result.facilities[result.assignment[i]]]));
+    connections += weights.empty() ? d : weights[i] * d;
   }
-  std::uint32_t kept = 0;
-  for (std::size_t j = 0; j < facilities.size(); ++j) {
-    const bool keep = used[j] != 0;
-    used[j] = kept;
-    if (keep) facilities[kept++] = facilities[j];
-  }
-  facilities.resize(kept);
-  for (std::uint32_t& a : result.assignment) a = used[a];
   result.facility_cost = scaling.unscaled(options.facility_cost * scaling.diagonal);
-  result.connection_cost = scaling.unscaled(result.connection_cost);
+  result.connection_cost = scaling.unscaled(connections);
 }
 
-SimdPath best_simd_path() { return SimdPath::portable; }
+SimdPath best_simd_path() {
+  for (const SimdPath path : {SimdPath::avx512, SimdPath::avx2}) {
+    if (available(path)) return path;
+  }
+  return SimdPath::portable;
+}
 
 }  // namespace terrace::cluster

@@ -38,7 +38,7 @@ Scaling::Scaling(std::span<const Point3> points) {
   }
   plain = exponent > -1000 && exponent < 1000;
   factor = plain ? std::ldexp(1.0, -exponent) : 1.0;
-  const Point3 extent = scaled(high);
+  extent = scaled(high);
   diagonal = std::sqrt(extent[0] * extent[0] + extent[1] * extent[1] + extent[2] * extent[2]);
 }
 

@@ -13,6 +13,7 @@ namespace terrace::cluster {
 struct Scaling {
   Point3 corner{};      ///< least coordinates
   int exponent = 0;     ///< the longest side lies in [2^(exponent-1), 2^exponent)
+  Point3 extent{};      ///< of the bounding box, scaled
   double diagonal = 0;  ///< of the bounding box, scaled
   bool plain = true;    ///< factor is a normal number and the differences are finite
   double factor = 1.0;  ///< 2^-exponent, if plain

@@ -22,7 +22,7 @@ std::vector<Named> ordinary_blocks(std::uint64_t seed) {
   std::vector<Named> blocks;
   blocks.push_back({"dem", inputs::dem_tiles(100, 100, 30.0, 2.65, random)});
   blocks.push_back({"small dem", inputs::dem_tiles(40, 40, 30.0, 2.65, random)});
-  blocks.push_back({"scan", inputs::scan(6000, 80, random)});
+  blocks.push_back({"scan", inputs::scan(2, 60, random)});
   blocks.push_back({"cube", inputs::cube(5000, random)});
   blocks.push_back({"small cube", inputs::cube(100, random)});
   return blocks;

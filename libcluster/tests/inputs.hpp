@@ -33,21 +33,28 @@ inline std::vector<Point3> cube(std::size_t count, std::mt19937_64& random) {
   return points;
 }
 
-/// A bumpy closed surface scanned along parallel swaths of `width` points, from pole to pole.
-inline std::vector<Point3> scan(std::size_t count, std::size_t width, std::mt19937_64& random) {
-  std::vector<Point3> points;
-  points.reserve(count);
-  const std::size_t rows = (count + width - 1) / width;
+/// A bumpy closed surface scanned in parallel swaths from pole to pole, one after another, each
+/// `width` points wide and as long as makes the points about equally dense along and across.
+/// width * width * swaths * swaths / 2 points. Requires: width even.
+inline std::vector<Point3> scan(std::size_t swaths, std::size_t width, std::mt19937_64& random) {
   constexpr double kPi = 3.14159265358979323846;
-  for (std::size_t i = 0; i < count; ++i) {
-    const double u = static_cast<double>(i % width) / static_cast<double>(width);
-    const double v = (static_cast<double>(i / width) + 0.5) / static_cast<double>(rows);
-    const double a = 2.0 * kPi * (u + 0.3 * uniform(random) / static_cast<double>(width));
-    const double b = kPi * v;
-    const double r = 1.0 + 0.1 * std::sin(5 * a) * std::sin(4 * b) +
-                     0.03 * std::sin(23 * a + 17 * b) + 0.0005 * bell(random);
-    points.push_back(
-        {r * std::sin(b) * std::cos(a), r * std::sin(b) * std::sin(a), r * std::cos(b)});
+  const std::size_t around = swaths * width;
+  const std::size_t rows = around / 2;
+  std::vector<Point3> points;
+  points.reserve(around * rows);
+  for (std::size_t swath = 0; swath < swaths; ++swath) {
+    for (std::size_t row = 0; row < rows; ++row) {
+      for (std::size_t k = 0; k < width; ++k) {
+        const double u = static_cast<double>(swath * width + k) + 0.3 * uniform(random);
+        const double v = static_cast<double>(row) + 0.3 * uniform(random);
+        const double a = 2 * kPi * u / static_cast<double>(around);
+        const double b = kPi * v / static_cast<double>(rows);
+        const double r = 1.0 + 0.1 * std::sin(5 * a) * std::sin(4 * b) +
+                         0.03 * std::sin(23 * a + 17 * b) + 0.0005 * bell(random);
+        points.push_back(
+            {r * std::sin(b) * std::cos(a), r * std::sin(b) * std::sin(a), r * std::cos(b)});
+      }
+    }
   }
   return points;
 }
