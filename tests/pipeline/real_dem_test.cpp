@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Every elevation raster of the real-data folder goes through the whole chain (build, verify, read
-// back) and must give back every sample. The oracle is GDAL: gdal_translate writes the raster as raw
-// samples. Without TERRACE_DATA or GDAL the tests are skipped and say so.
-#include <gtest/gtest.h>
-
+// back) and must give back every sample. The oracle is GDAL: gdal_translate writes the raster as
+// raw samples. Without TERRACE_DATA or GDAL the tests are skipped and say so.
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
@@ -12,9 +10,11 @@
 #include <fstream>
 #include <iterator>
 #include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
 #include <terrace/stream/source.hpp>
 #include <terrace/stream/store.hpp>
-#include <vector>
 
 #include "store_build.hpp"
 #include "temporary_folder.hpp"
@@ -31,16 +31,26 @@ double value_at(const std::vector<char>& raw, ScalarType type, std::size_t i) {
     return static_cast<double>(value);
   };
   switch (type) {
-    case ScalarType::i8: return read(std::int8_t{});
-    case ScalarType::u8: return read(std::uint8_t{});
-    case ScalarType::i16: return read(std::int16_t{});
-    case ScalarType::u16: return read(std::uint16_t{});
-    case ScalarType::i32: return read(std::int32_t{});
-    case ScalarType::u32: return read(std::uint32_t{});
-    case ScalarType::i64: return read(std::int64_t{});
-    case ScalarType::u64: return read(std::uint64_t{});
-    case ScalarType::f32: return read(float{});
-    case ScalarType::f64: return read(double{});
+    case ScalarType::i8:
+      return read(std::int8_t{});
+    case ScalarType::u8:
+      return read(std::uint8_t{});
+    case ScalarType::i16:
+      return read(std::int16_t{});
+    case ScalarType::u16:
+      return read(std::uint16_t{});
+    case ScalarType::i32:
+      return read(std::int32_t{});
+    case ScalarType::u32:
+      return read(std::uint32_t{});
+    case ScalarType::i64:
+      return read(std::int64_t{});
+    case ScalarType::u64:
+      return read(std::uint64_t{});
+    case ScalarType::f32:
+      return read(float{});
+    case ScalarType::f64:
+      return read(double{});
   }
   return 0;
 }
@@ -77,7 +87,8 @@ void expect_every_sample(const fs::path& raster, const fs::path& scratch) {
   std::vector<bool> seen(cells, false);
   std::uint64_t wrong = 0, twice = 0;
   const auto check = [&](const stream::Point3& p) {
-    const auto cell = static_cast<std::size_t>(p[1]) * schema.columns + static_cast<std::size_t>(p[0]);
+    const auto cell =
+        static_cast<std::size_t>(p[1]) * schema.columns + static_cast<std::size_t>(p[0]);
     ASSERT_LT(cell, cells);
     twice += seen[cell] ? 1 : 0;
     seen[cell] = true;
@@ -97,8 +108,8 @@ void expect_every_sample(const fs::path& raster, const fs::path& scratch) {
   for (std::size_t cell = 0; cell < cells; ++cell) {
     if (seen[cell]) continue;
     const double value = value_at(raw, schema.coordinates[2].type, cell);
-    const bool is_nodata = !std::isfinite(value) ||
-                           std::abs(value - nodata) <= std::abs(nodata) * 1e-6;
+    const bool is_nodata =
+        !std::isfinite(value) || std::abs(value - nodata) <= std::abs(nodata) * 1e-6;
     lost += is_nodata ? 0 : 1;
   }
   EXPECT_EQ(lost, 0u) << "valid samples that the store lacks";
@@ -129,7 +140,9 @@ void expect_every_sample_in(const fs::path& folder) {
 }
 
 TEST_F(RealDem, GivesBackEverySample) { expect_every_sample_in(folder_); }
-TEST_F(RealDem, GivesBackEverySampleOfEveryEncoding) { expect_every_sample_in(folder_ / "encodings"); }
+TEST_F(RealDem, GivesBackEverySampleOfEveryEncoding) {
+  expect_every_sample_in(folder_ / "encodings");
+}
 
 }  // namespace
 }  // namespace terrace

@@ -100,7 +100,8 @@ std::size_t payload_size(const stream::SourceInfo& info) {
 double cell_aspect(const Ground& ground, const stream::SourceInfo& info) {
   stream::Box3 raster;
   raster.include(stream::Point3{0, 0, 0});
-  raster.include(stream::Point3{static_cast<double>(info.columns), static_cast<double>(info.rows), 0});
+  raster.include(
+      stream::Point3{static_cast<double>(info.columns), static_cast<double>(info.rows), 0});
   const GroundMap map = ground.map(raster);
   const auto length = [&map](std::size_t axis) {
     return std::sqrt(map[axis] * map[axis] + map[3 + axis] * map[3 + axis]);

@@ -18,11 +18,11 @@ struct BuildRequest {
   std::vector<std::string> inputs;
   std::filesystem::path store;
   bool replace = false;
-  std::string input_format;            ///< empty: told by content
-  std::optional<stream::Crs> crs;      ///< replaces the source's
-  std::string vertical;                ///< "ellipsoidal", "orthometric" or empty
+  std::string input_format;        ///< empty: told by content
+  std::optional<stream::Crs> crs;  ///< replaces the source's
+  std::string vertical;            ///< "ellipsoidal", "orthometric" or empty
   std::size_t block_points = 10000;
-  double facility_cost = 1.0;          ///< times the diagonal of a block
+  double facility_cost = 1.0;  ///< times the diagonal of a block
   cluster::Effort effort = cluster::Effort::standard;
   double z_weight = 1.0;
   int band = 1;

@@ -6,9 +6,10 @@
 #include <cstddef>
 #include <limits>
 #include <string>
+#include <utility>
+
 #include <terrace/stream/error.hpp>
 #include <terrace/tri/multiresolution.hpp>
-#include <utility>
 
 #include "interrupt.hpp"
 #include "region_overlap.hpp"
@@ -18,8 +19,8 @@
 namespace terrace::tools {
 namespace {
 
-/// Peak bytes per vertex: the triangulation and its bulk build, the model's bookkeeping, and the mesh
-/// that comes out (vertex, level, two triangles).
+/// Peak bytes per vertex: the triangulation and its bulk build, the model's bookkeeping, and the
+/// mesh that comes out (vertex, level, two triangles).
 constexpr std::uint64_t kBytesPerVertex = 66 + 20 + 32 + 24 + 4 + 1 + 2 * 12;
 
 /// The box in stored coordinates around a box in the CRS. Heights are left free where `world` is.
@@ -63,9 +64,9 @@ void check_memory(const stream::Store& store, const Detail& detail, std::uint64_
   if (!detail.region && detail.focuses.empty()) {
     points = store.levels()[detail.level].points;
   } else {
-    for_each_wanted_record(store, detail, [&](stream::ClusterId, const stream::ClusterRecord& record) {
-      points += record.points;
-    });
+    for_each_wanted_record(
+        store, detail,
+        [&](stream::ClusterId, const stream::ClusterRecord& record) { points += record.points; });
   }
   constexpr std::uint64_t kMostVertices = (std::uint64_t{1} << 29) - 2;
   const std::uint64_t needed = points * kBytesPerVertex + (std::uint64_t{32} << 20);
@@ -73,7 +74,8 @@ void check_memory(const stream::Store& store, const Detail& detail, std::uint64_
   throw stream::Error({.file = store.path().string(),
                        .where = {},
                        .cause = "a mesh of " + std::to_string(points) + " points needs " +
-                                std::to_string((needed >> 20) + 1) + "M of memory, --memory allows " +
+                                std::to_string((needed >> 20) + 1) +
+                                "M of memory, --memory allows " +
                                 std::to_string(memory_bytes >> 20) + "M",
                        .remedy = "take a coarser --level or a smaller --region"});
 }
@@ -84,8 +86,8 @@ TriangleMesh mesh_of_model(const tri::Multiresolution2<Coord>& model, const Plac
   const auto& triangulation = model.triangulation();
   const auto position = [&](tri::VertexId v) {
     const auto p = triangulation.point(v);
-    return world_point(placement, {static_cast<double>(p[0]), static_cast<double>(p[1]),
-                                   model.height(v)});
+    return world_point(placement,
+                       {static_cast<double>(p[0]), static_cast<double>(p[1]), model.height(v)});
   };
   const std::array<double, 6>& m = placement.world.xy;
   const bool mirrored = m[0] * m[4] - m[1] * m[3] < 0;
@@ -112,7 +114,8 @@ TriangleMesh mesh_of_model(const tri::Multiresolution2<Coord>& model, const Plac
   for (const tri::TriangleId t : triangulation.all_triangles()) {
     auto corners = triangulation.vertices(t);
     if (mirrored) std::swap(corners[1], corners[2]);
-    if (region && !touches(*region, {position(corners[0]), position(corners[1]), position(corners[2])})) {
+    if (region &&
+        !touches(*region, {position(corners[0]), position(corners[1]), position(corners[2])})) {
       continue;
     }
     mesh.triangles.push_back({number_of(corners[0]), number_of(corners[1]), number_of(corners[2])});

@@ -9,8 +9,8 @@
 
 namespace terrace::tools {
 
-/// Hands the finished blocks of libcluster's hierarchy builder to libstream's store writer: encoded on
-/// the thread that clustered them, appended in order. The two libraries do not know each other.
+/// Hands the finished blocks of libcluster's hierarchy builder to libstream's store writer: encoded
+/// on the thread that clustered them, appended in order. The two libraries do not know each other.
 class StoreSink final : public cluster::HierarchySink {
  public:
   /// The writer must outlive the sink.

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <CLI/CLI.hpp>
-
 #include <algorithm>
 #include <cstdint>
 #include <filesystem>
@@ -9,6 +7,8 @@
 #include <string>
 #include <utility>
 #include <vector>
+
+#include <CLI/CLI.hpp>
 
 #include "crs.hpp"
 #include "error.hpp"
@@ -108,17 +108,20 @@ class BuildCommand final : public Command {
     std::filesystem::remove_all(request_.store);
 
     // A raster's number of valid cells is not known before it is read: the trial's share is taken.
-    const double valid = static_cast<double>(trial.points) /
-                         static_cast<double>(std::max<std::uint64_t>(1, trial.points + trial.nodata));
-    double points = info.points ? static_cast<double>(*info.points) * (info.grid ? valid : 1.0) : -1.0;
+    const double valid =
+        static_cast<double>(trial.points) /
+        static_cast<double>(std::max<std::uint64_t>(1, trial.points + trial.nodata));
+    double points =
+        info.points ? static_cast<double>(*info.points) * (info.grid ? valid : 1.0) : -1.0;
     const bool whole = trial.points < kTrialPoints;
     if (whole) points = static_cast<double>(trial.points);
     const double scale = points / static_cast<double>(trial.points);
     Summary summary;
     if (points < 0) {
       summary.json = {{"points", nullptr}, {"store_bytes", nullptr}, {"seconds", nullptr}};
-      summary.text = "the number of points is not known before the end of the input; a million take " +
-                     readable_seconds(seconds) + " and " + readable_bytes(trial.store_bytes) + "\n";
+      summary.text =
+          "the number of points is not known before the end of the input; a million take " +
+          readable_seconds(seconds) + " and " + readable_bytes(trial.store_bytes) + "\n";
     } else {
       const auto bytes = static_cast<std::uint64_t>(static_cast<double>(trial.store_bytes) * scale);
       summary.json = {{"points", static_cast<std::uint64_t>(points)},

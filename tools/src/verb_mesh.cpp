@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <CLI/CLI.hpp>
-
 #include <algorithm>
 #include <cstddef>
 #include <memory>
@@ -8,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include <CLI/CLI.hpp>
 #include <terrace/stream/mesh_writer.hpp>
 #include <terrace/stream/store.hpp>
 
@@ -61,14 +60,14 @@ class MeshCommand final : public Command {
     constexpr std::size_t kPiece = 65536;
     stream::Box3 bounds;
     for (const stream::Point3& p : mesh.vertices) bounds.include(p);
-    const auto writer = stream::open_mesh_writer(
-        output_,
-        {.vertices = mesh.vertices.size(),
-         .triangles = mesh.triangles.size(),
-         .attributes = {"level"},
-         .comments = {},
-         .bounds = bounds.empty() ? std::nullopt : std::optional(bounds)},
-        {.format = format_, .replace = replace});
+    const auto writer =
+        stream::open_mesh_writer(output_,
+                                 {.vertices = mesh.vertices.size(),
+                                  .triangles = mesh.triangles.size(),
+                                  .attributes = {"level"},
+                                  .comments = {},
+                                  .bounds = bounds.empty() ? std::nullopt : std::optional(bounds)},
+                                 {.format = format_, .replace = replace});
     std::vector<float> levels;
     const std::span vertices(mesh.vertices);
     for (std::size_t at = 0; at < vertices.size(); at += kPiece) {

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <CLI/CLI.hpp>
-
 #include <cstddef>
 #include <cstring>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include <CLI/CLI.hpp>
 #include <terrace/stream/point_writer.hpp>
 #include <terrace/stream/store.hpp>
 
@@ -25,7 +24,10 @@ namespace {
 class PointOutput {
  public:
   PointOutput(const stream::Store& store, const Detail& detail, stream::PointWriter& writer)
-      : schema_(store.schema()), placement_(placement_of(schema_)), detail_(detail), writer_(writer) {
+      : schema_(store.schema()),
+        placement_(placement_of(schema_)),
+        detail_(detail),
+        writer_(writer) {
     for (const stream::Channel& channel : schema_.attributes) {
       stream::Column column;
       column.type = channel.type;
@@ -81,8 +83,10 @@ class PointsCommand final : public Command {
     app.add_option("--format", format_, "xyz, csv, ply, ply-ascii; else by the file's ending");
     app.add_option("--level", level_, "points of this level and above: a number or top")
         ->capture_default_str();
-    app.add_option("--region", region_, "only points inside: minx,miny,maxx,maxy or a GeoJSON file");
-    app.add_option("--focus", focuses_, "BOX:L, points of level L and above inside the box; repeatable")
+    app.add_option("--region", region_,
+                   "only points inside: minx,miny,maxx,maxy or a GeoJSON file");
+    app.add_option("--focus", focuses_,
+                   "BOX:L, points of level L and above inside the box; repeatable")
         ->allow_extra_args(false);
     not_yet(app, {"--max-points", "--region-crs", "--to-crs", "--overlay"});
   }

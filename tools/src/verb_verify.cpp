@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <CLI/CLI.hpp>
-
 #include <cstdint>
 #include <memory>
 #include <string>
 
+#include <CLI/CLI.hpp>
 #include <terrace/stream/store.hpp>
 
 #include "units.hpp"
@@ -28,15 +27,13 @@ class VerifyCommand final : public Command {
     const bool ok = store.verify([&](const stream::Problem& problem) {
       problems.push_back(
           {{"file", problem.file}, {"offset", problem.offset}, {"what", problem.what}});
-      summary.text += problem.file + ": byte " + std::to_string(problem.offset) + ": " +
-                      problem.what + "\n";
+      summary.text +=
+          problem.file + ": byte " + std::to_string(problem.offset) + ": " + problem.what + "\n";
     });
     std::uint64_t clusters = 0;
     for (const stream::LevelInfo& level : store.levels()) clusters += level.clusters;
-    summary.json = {{"ok", ok},
-                    {"problems", problems},
-                    {"clusters", clusters},
-                    {"points", store.points()}};
+    summary.json = {
+        {"ok", ok}, {"problems", problems}, {"clusters", clusters}, {"points", store.points()}};
     summary.text += std::string(ok ? "sound: " : "damaged: ") + with_commas(store.points()) +
                     " points in " + with_commas(clusters) + " clusters, " +
                     readable_bytes(store.bytes()) + ", checked in " +
