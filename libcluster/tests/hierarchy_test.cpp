@@ -39,7 +39,7 @@ std::vector<Input> all_inputs() {
   std::mt19937_64 random(20240601);
   std::vector<Input> inputs;
   inputs.push_back({"cube", inputs::cube(1500, random)});
-  inputs.push_back({"scan", inputs::scan(1500, 40, random)});
+  inputs.push_back({"scan", inputs::scan(6, 10, random)});
   inputs.push_back({"terrain", inputs::dem_tiles(32, 8, 30.0, 10.0, random)});
 
   std::vector<Point3> points(700, Point3{3.25, -7.5, 1e6});
@@ -105,7 +105,7 @@ TEST(Hierarchy, NoPointsGiveAnEmptyRoot) {
 
 TEST(Hierarchy, SameForAnyNumberOfThreads) {
   std::mt19937_64 random(7);
-  const std::vector<Point3> points = inputs::scan(6000, 100, random);
+  const std::vector<Point3> points = inputs::scan(11, 10, random);
   HierarchyOptions options;
   options.block_size = 60;
   RecordingSink one;
