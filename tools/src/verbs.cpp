@@ -31,7 +31,7 @@ std::span<const Verb> verbs() {
        nullptr},
       {"match", "match points in pairs, or build the binary tree",
        "terrace match places.csv -o pairs.csv", nullptr},
-      {"render", "draw a picture", "terrace render mesh.ply --wire -o mesh.png", nullptr},
+      {"render", "draw a picture", "terrace render mesh.ply --wire -o mesh.png", make_render},
       {"view", "open the interactive viewer", "terrace view dem.terrace", nullptr},
       {"publish", "write a folder for any web server", "terrace publish dem.terrace -o public",
        nullptr},

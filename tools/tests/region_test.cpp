@@ -87,7 +87,8 @@ TEST(Region, RefusesHostileGeoJson) {
   }
 }
 
-__extension__ using Wide = __int128;
+// The typedef form: GCC's __extension__ silences -Wpedantic only before a declaration like this.
+__extension__ typedef __int128 Wide;
 
 // Law: the orientation of nearly collinear points is that of their exact integers.
 TEST(Orientation, IsExactNearALine) {
@@ -101,8 +102,7 @@ TEST(Orientation, IsExactNearALine) {
     const std::int64_t bx = ax + 3 * dx, by = ay + 3 * dy;
     const std::int64_t cx = ax + 7 * dx + static_cast<std::int64_t>(random() % 3) - 1,
                        cy = ay + 7 * dy;
-    const __int128 exact =
-        static_cast<__int128>(bx - ax) * (cy - ay) - static_cast<__int128>(by - ay) * (cx - ax);
+    const Wide exact = Wide{bx - ax} * (cy - ay) - Wide{by - ay} * (cx - ax);
     const auto d = [](std::int64_t v) { return static_cast<double>(v); };
     EXPECT_EQ(orientation({d(ax), d(ay)}, {d(bx), d(by)}, {d(cx), d(cy)}), exact > 0   ? 1
                                                                            : exact < 0 ? -1
