@@ -10,7 +10,7 @@ std::span<const Verb> verbs() {
   static const std::array<Verb, 18> kVerbs{{
       {"build", "stream the inputs once and write a store", "terrace build dem.tif -o dem.terrace",
        nullptr},
-      {"info", "tell what a store or a file holds", "terrace info dem.tif --json", nullptr},
+      {"info", "tell what a store or a file holds", "terrace info dem.tif --json", make_info},
       {"verify", "check every checksum and invariant", "terrace verify dem.terrace", nullptr},
       {"points", "write the points of a level, a region, or mixed levels",
        "terrace points dem.terrace --level 2 -o coarse.ply", nullptr},
