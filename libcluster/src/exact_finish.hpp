@@ -21,6 +21,13 @@ class ExactFinish {
              const Scaling& scaling, double facility_cost, BlockClustering& clustering);
 
  private:
+  struct Costs {
+    double sum = 0.0, greatest = 0.0;
+    std::uint32_t where = 0;  ///< the point of the greatest
+  };
+  [[nodiscard]] Costs costs(std::span<const Point3> points, std::span<const double> weights,
+                            const Scaling& scaling, const BlockClustering& clustering) const;
+
   std::vector<Point3> facilities_;  // scaled
 };
 
