@@ -3,11 +3,12 @@
 
 #include <algorithm>
 #include <cassert>
-#include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "block_state.hpp"
 #include "engine.hpp"
+#include "exact_finish.hpp"
 #include "scaling.hpp"
 #include "terrace/cluster/local_search.hpp"
 
@@ -36,13 +37,6 @@ EngineFunction engine_of(SimdPath path) {
   return run_engine_portable;
 }
 
-double distance(const Point3& a, const Point3& b) {
-  const double x = a[0] - b[0];
-  const double y = a[1] - b[1];
-  const double z = a[2] - b[2];
-  return std::sqrt(x * x + y * y + z * z);
-}
-
 /// A facility at the same place as one of lower number has no clients.
 void drop_empty_facilities(BlockState& state) {
   for (std::uint32_t j = 0; j < state.facility_count; ++j) state.size[j] = 0;
@@ -57,12 +51,46 @@ void drop_empty_facilities(BlockState& state) {
   for (std::uint32_t i = 0; i < state.count; ++i) state.nearest[i] = state.near[state.nearest[i]];
 }
 
+double mean_of(std::span<const double> weights) {
+  if (weights.empty()) return 1.0;
+  // Divided before they are added: the sum itself may exceed the range of double.
+  const double share = 1.0 / static_cast<double>(weights.size());
+  double mean = 0.0;
+  for (const double w : weights) mean += w * share;
+  return std::max(mean, std::numeric_limits<double>::min());
+}
+
+SearchPlan plan_of(const BlockOptions& options, std::size_t count) {
+  SearchPlan plan;
+  plan.seed = options.seed;
+  const Effort effort = count < kFullBelow ? Effort::full : options.effort;
+  switch (effort) {
+    case Effort::fast:
+      plan.spacing = 2;
+      break;
+    case Effort::standard:
+      plan.polish = 2;
+      break;
+    case Effort::fine:
+      plan.sweeps = 3;
+      plan.polish = 3;
+      break;
+    case Effort::full:
+      plan.random_candidates =
+          static_cast<std::uint32_t>(candidate_count(SearchLength::log2_full, count));
+      plan.polish = 3;
+      break;
+  }
+  return plan;
+}
+
 }  // namespace
 
 struct BlockClusterer::Impl {
   EngineFunction engine;
   CurveSorter sorter;
   BlockState state;
+  ExactFinish finish;
 };
 
 BlockClusterer::BlockClusterer(SimdPath path) : impl_(std::make_unique<Impl>()) {
@@ -81,46 +109,36 @@ BlockClusterer& BlockClusterer::operator=(BlockClusterer&&) noexcept = default;
 void BlockClusterer::run(std::span<const Point3> points, std::span<const double> weights,
                          const BlockOptions& options, BlockClustering& result) {
   assert(weights.empty() || weights.size() == points.size());
+  assert(points.size() < (std::size_t{1} << 24));
+  assert(options.facility_cost > 0);
   result.facilities.clear();
-  result.assignment.resize(points.size());
+  result.assignment.assign(points.size(), 0);
   result.facility_cost = result.connection_cost = 0.0;
   if (points.empty()) return;
-
-  BlockState& state = impl_->state;
   const Scaling scaling(points);
-  impl_->sorter.load(points, weights, scaling, state);
-  state.facility_cost = static_cast<float>(options.facility_cost * scaling.diagonal);
-
-  SearchPlan plan;
-  plan.seed = options.seed;
-  const auto count = points.size();
-  if (count < kFullBelow || options.effort == Effort::full) {
-    plan.random_candidates =
-        static_cast<std::uint32_t>(candidate_count(SearchLength::log2_full, count));
-  } else if (options.effort == Effort::fast) {
-    plan.stride = 3;
-  } else if (options.effort == Effort::standard) {
-    plan.stride = 1;
-  } else {
-    plan.stride = 1;
-    plan.sweeps = 3;
+  if (scaling.diagonal == 0.0) {
+    result.facilities.push_back(0);
+    return;
   }
-  impl_->engine(state, plan);
 
+  // With weights of mean 1 no sum of theirs leaves the range of float. A facility cost beyond the
+  // sum of all distances means one facility, however far beyond it is.
+  const double mean_weight = mean_of(weights);
+  const double facility_cost = options.facility_cost * scaling.diagonal;
+  BlockState& state = impl_->state;
+  state.facility_cost = static_cast<float>(std::min(facility_cost / mean_weight, 1e8));
+  impl_->sorter.load(points, weights, mean_weight, scaling, state);
+  impl_->engine(state, plan_of(options, points.size()));
   drop_empty_facilities(state);
+
   for (std::uint32_t i = 0; i < state.count; ++i) {
     result.assignment[state.original[i]] = state.nearest[i];
   }
   for (std::uint32_t j = 0; j < state.facility_count; ++j) {
     result.facilities.push_back(state.original[state.facility[j]]);
   }
-  double connections = 0.0;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const double d = distance(scaling.scaled(points[i]),
-                              scaling.scaled(points[result.facilities[result.assignment[i]]]));
-    connections += weights.empty() ? d : weights[i] * d;
-  }
-  result.facility_cost = scaling.unscaled(options.facility_cost * scaling.diagonal);
+  const double connections = impl_->finish.run(points, weights, scaling, facility_cost, result);
+  result.facility_cost = scaling.unscaled(facility_cost);
   result.connection_cost = scaling.unscaled(connections);
 }
 

@@ -97,11 +97,12 @@ struct BlockState {
   Column<float> spare_[6];
 };
 
-/// Puts the points on the curve. Both entries of a result with the same points are the same bytes.
+/// Brings the points of a block into the order of a space-filling curve and into single precision.
 class CurveSorter {
  public:
-  void load(std::span<const Point3> points, std::span<const double> weights, const Scaling& scaling,
-            BlockState& state);
+  /// Fills the points of `state`, weights divided by their mean, and makes room for the groups.
+  void load(std::span<const Point3> points, std::span<const double> weights, double mean_weight,
+            const Scaling& scaling, BlockState& state);
 
  private:
   Column<float> x_, y_, z_;

@@ -70,7 +70,7 @@ struct CurveTable {
 }  // namespace
 
 void CurveSorter::load(std::span<const Point3> points, std::span<const double> weights,
-                       const Scaling& scaling, BlockState& state) {
+                       double mean_weight, const Scaling& scaling, BlockState& state) {
   const auto count = static_cast<std::uint32_t>(points.size());
   const std::uint32_t padded = round_to_lanes(count);
   for (Column<float>* column :
@@ -125,8 +125,8 @@ void CurveSorter::load(std::span<const Point3> points, std::span<const double> w
     std::fill_n(static_cast<float*>(state.w), count, 1.0f);
   } else {
     for (std::uint32_t i = 0; i < count; ++i) {
-      // A weight beyond this makes the point a facility in any case.
-      state.w[i] = static_cast<float>(std::min(weights[state.original[i]], 1e20));
+      const double weight = weights[state.original[i]] / mean_weight;
+      state.w[i] = static_cast<float>(std::max(weight, 1e-30));
     }
   }
   for (std::uint32_t i = count; i < padded; ++i) {

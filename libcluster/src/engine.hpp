@@ -7,13 +7,13 @@
 
 namespace terrace::cluster {
 
-/// How long and how the engine searches.
+/// How long the engine searches.
 struct SearchPlan {
-  std::uint32_t random_candidates = 0;  ///< the thesis's search, if not 0
-  std::uint32_t sweeps = 1;             ///< over the groups of the curve
-  std::uint32_t stride = 2;             ///< a sweep visits every stride-th group
-  std::uint32_t polish = 1;             ///< rounds of moving facilities and reassigning
-  std::uint64_t seed = 1;
+  std::uint32_t random_candidates = 0;  ///< if not 0, instead of sweeps
+  std::uint32_t sweeps = 1;             ///< along the curve
+  std::uint32_t spacing = 1;            ///< a factor: 2 considers half as many points per sweep
+  std::uint32_t polish = 1;             ///< rounds of moving facilities and assigning all points
+  std::uint64_t seed = 1;               ///< of the random candidates
 };
 
 /// Clusters the block: fills facilities (in curve order) and nearest.

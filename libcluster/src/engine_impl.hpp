@@ -13,23 +13,16 @@ class Engine {
   void run(const SearchPlan& plan) {
     measure_groups();
     seed();
-    assign();
-    s_.build_segments();
-    for (std::uint32_t j = 0; j < s_.facility_count; ++j) {
-      summarise(j);
-      recentre(j);
-    }
+    partition();
+    for (std::uint32_t j = 0; j < s_.facility_count; ++j) recentre(j);
     if (plan.random_candidates > 0) {
       search_random(plan);
     } else {
-      for (std::uint32_t k = 0; k < plan.sweeps; ++k) sweep(k, plan);
+      for (std::uint32_t round = 0; round < plan.sweeps; ++round) sweep(round, plan);
     }
-    for (std::uint32_t k = 0; k < plan.polish; ++k) {
-      if (k > 0) {
-        assign();
-        s_.build_segments();
-        for (std::uint32_t j = 0; j < s_.facility_count; ++j) summarise(j);
-      }
+    open_overpriced();
+    for (std::uint32_t round = 0; round < plan.polish; ++round) {
+      if (round > 0) partition();
       for (std::uint32_t j = 0; j < s_.facility_count; ++j) recentre(j);
     }
     s_.sort_facilities();
@@ -44,6 +37,13 @@ class Engine {
     const V dy = y - cy;
     const V dz = z - cz;
     return dx * dx + dy * dy + dz * dz;
+  }
+
+  /// Gives every point to its nearest facility and makes the segments anew.
+  void partition() {
+    assign();
+    s_.build_segments();
+    for (std::uint32_t j = 0; j < s_.facility_count; ++j) summarise(j);
   }
 
   void measure_groups() {
@@ -126,9 +126,22 @@ class Engine {
           connection[best - 1] > 0 ? connection[best + 1] / connection[best - 1] : 4;
       float factor = 0.7f + 0.3f * (growth - 2.3f) / 0.73f;
       factor = factor < 0.7f ? 0.7f : factor > 1.0f ? 1.0f : factor;
-      count *= factor * seed_factor;
+      count *= factor;
     }
-    if (best == 0 && s_.facility_cost * 2 < connection[0] * (kLanes / points)) count = points / 4;
+    if (best == 0 && levels > 1 && connection[0] > 0) {
+      // Below sixteen points per run the growth is taken to go on.
+      const float growth = connection[1] / connection[0];
+      float runs = connection[0];
+      float least_total = total[0];
+      while (growth > 1 && length > 1) {
+        runs /= growth;
+        const float next = s_.facility_cost * 2 * count + runs;
+        if (!(next < least_total)) break;
+        least_total = next;
+        length *= 0.5f;
+        count *= 2;
+      }
+    }
     auto wanted = static_cast<std::uint32_t>(count + 0.5f);
     wanted = wanted < 1 ? 1 : wanted > s_.count ? s_.count : wanted;
     s_.facility_count = 0;
@@ -435,19 +448,40 @@ class Engine {
     if (gain(s_.x[point], s_.y[point], s_.z[point]) > 0) open(point);
   }
 
+  /// Considers points at equal distances along the curve, about three per facility or more.
   void sweep(std::uint32_t round, const SearchPlan& plan) {
-    // Visits the groups by steps near the golden section of their number, so that changes in one
-    // place are seldom judged right after each other.
-    const std::uint32_t groups = s_.group_count;
-    std::uint32_t step = static_cast<std::uint32_t>(static_cast<float>(groups) * 0.618034f);
-    while (common_divisor(step < 1 ? 1 : step, groups) != 1) ++step;
-    std::uint32_t group = round * 7919u % groups;
-    const std::uint32_t visits = (groups + plan.stride - 1) / plan.stride;
+    std::uint32_t spacing = s_.count / (3 * s_.facility_count);
+    spacing = plan.spacing * (spacing < 1 ? 1 : spacing > kLanes ? kLanes : spacing);
+    const std::uint32_t visits = (s_.count + spacing - 1) / spacing;
+    // In steps near the golden section of their number, so that what a change has touched is
+    // seldom judged right afterwards.
+    auto step = static_cast<std::uint32_t>(static_cast<float>(visits) * 0.618034f);
+    if (step == 0) step = 1;
+    while (common_divisor(step, visits) != 1) ++step;
+    const std::uint32_t offset = (spacing / 2 + 5 * round) % spacing;
+    std::uint32_t visit = 0;
     for (std::uint32_t k = 0; k < visits; ++k) {
-      const std::uint32_t point = group * kLanes + (kLanes / 2 + 5 * round) % kLanes;
+      const std::uint32_t point = visit * spacing + offset;
       consider(point < s_.count ? point : s_.count - 1);
-      group = (group + step) % groups;
+      visit = (visit + step) % visits;
     }
+  }
+
+  /// Points that pay more than a facility costs had better be one.
+  void open_overpriced() {
+    std::uint32_t found = 0;
+    const V limit = V::broadcast(s_.facility_cost);
+    for (std::uint32_t j = 0; j < s_.facility_count; ++j) {
+      const std::uint32_t end = s_.begin[j] + round_to_lanes(s_.size[j]);
+      for (std::uint32_t i = s_.begin[j]; i < end; i += kLanes) {
+        const Mask overpriced = less(limit, V::load(s_.pw + i) * V::load(s_.pd + i));
+        for (std::uint32_t bits = overpriced.bits(); bits != 0; bits &= bits - 1) {
+          const std::uint32_t place = i + static_cast<std::uint32_t>(__builtin_ctz(bits));
+          s_.nearest[found++] = static_cast<std::uint32_t>(s_.pp[place]);
+        }
+      }
+    }
+    for (std::uint32_t k = 0; k < found; ++k) consider(s_.nearest[k]);
   }
 
   void search_random(const SearchPlan& plan) {
@@ -473,7 +507,6 @@ class Engine {
   }
 
   BlockState& s_;
-  float seed_factor = 1.0f;
 };
 
 }  // namespace terrace::cluster
