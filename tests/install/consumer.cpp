@@ -19,36 +19,37 @@ using namespace terrace;
 
 namespace {
 
+// Calls use with the block in the store's words.
+template <class Use>
+auto with_stored(const cluster::FinishedBlock& b, Use use) {
+  std::vector<stream::ClusterSummary> summaries;
+  for (const cluster::Summary& s : b.summaries) {
+    summaries.push_back({{s.box.min, s.box.max}, s.error, s.descendants});
+  }
+  return use(stream::ClusteredBlock{b.level, b.positions, b.payload, b.children, b.first, b.order,
+                                    b.representatives, summaries});
+}
+
 class StoreSink : public cluster::HierarchySink {
  public:
   explicit StoreSink(stream::StoreWriter& writer) : writer_(writer) {}
 
   std::unique_ptr<Prepared> prepare(const cluster::FinishedBlock& block) override {
     auto encoded = std::make_unique<Encoded>();
-    encoded->block = convert(block, [&](const auto& b) { return writer_.encode(b); });
+    encoded->block = with_stored(block, [&](const auto& b) { return writer_.encode(b); });
     return encoded;
   }
   void commit(unsigned, std::unique_ptr<Prepared> prepared) override {
     writer_.append(std::move(static_cast<Encoded&>(*prepared).block));
   }
   void root(const cluster::FinishedBlock& block) override {
-    convert(block, [&](const auto& b) { return writer_.finish(b); });
+    with_stored(block, [&](const auto& b) { return writer_.finish(b); });
   }
 
  private:
   struct Encoded : Prepared {
     stream::StoreWriter::EncodedPtr block;
   };
-
-  template <class Use>
-  static auto convert(const cluster::FinishedBlock& b, Use use) {
-    std::vector<stream::ClusterSummary> summaries;
-    for (const cluster::Summary& s : b.summaries) {
-      summaries.push_back({{s.box.min, s.box.max}, s.error, s.descendants});
-    }
-    return use(stream::ClusteredBlock{b.level, b.positions, b.payload, b.children, b.first, b.order,
-                                      b.representatives, summaries});
-  }
 
   stream::StoreWriter& writer_;
 };

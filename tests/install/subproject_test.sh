@@ -32,7 +32,8 @@ cat >"$folder/use_cluster.cpp" <<'CODE'
 #include <terrace/cluster/block.hpp>
 int main() {
   terrace::cluster::BlockClustering result;
-  terrace::cluster::BlockClusterer().run(std::array{terrace::cluster::Point3{1, 2, 3}}, {}, {}, result);
+  const std::vector<terrace::cluster::Point3> points{{1, 2, 3}};
+  terrace::cluster::BlockClusterer().run(points, {}, {}, result);
   return result.facilities.size() == 1 ? 0 : 1;
 }
 CODE
