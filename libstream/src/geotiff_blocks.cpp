@@ -136,7 +136,7 @@ bool GeoTiffBlocks::read_block(const Part& part, const CellBuffer& out) {
 bool GeoTiffBlocks::read_plain(const Part& part, std::uint64_t offset, std::uint64_t bytes,
                                const CellBuffer& out) {
   const std::uint64_t row_bytes = layout_.row_bytes();
-  const std::uint32_t rows = layout_.rows_of(part.down);
+  const std::uint32_t rows = layout_.rows_in_image(part.down);
   if (bytes / row_bytes < rows) {
     fail(part, offset,
          "has " + std::to_string(bytes) + " bytes where " + std::to_string(rows) + " rows of " +
@@ -227,8 +227,7 @@ const std::vector<std::byte>& GeoTiffBlocks::decoded(const Part& part, std::uint
   if (decoded_ == number && !block_.empty()) return block_;
   decoded_.reset();
   decode(part, offset, bytes);
-  const std::uint32_t rows =
-      std::min(layout_.rows_of(part.down), layout_.rows - part.down * layout_.block_rows);
+  const std::uint32_t rows = layout_.rows_in_image(part.down);
   const std::uint32_t columns =
       std::min(layout_.block_columns, layout_.columns - part.across * layout_.block_columns);
   if ((part.rows == rows && part.columns == columns) || block_.size() > cache_bytes_) {
@@ -251,7 +250,8 @@ const std::vector<std::byte>& GeoTiffBlocks::decoded(const Part& part, std::uint
 }
 
 void GeoTiffBlocks::decode(const Part& part, std::uint64_t offset, std::uint64_t bytes) {
-  const std::uint64_t due = layout_.row_bytes() * layout_.rows_of(part.down);
+  // Of a tile that hangs over the lower edge, some writers leave out the rows beyond.
+  const std::uint64_t due = layout_.row_bytes() * layout_.rows_in_image(part.down);
   if (bytes > kMostGrowth * due + kMostOverhead) {
     fail(part, offset,
          "claims " + std::to_string(bytes) + " bytes for " + std::to_string(due) +

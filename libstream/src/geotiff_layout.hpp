@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -27,14 +28,13 @@ struct GeoTiffLayout {
 
   /// Samples of one pixel that lie side by side in a block.
   [[nodiscard]] std::uint32_t samples_per_pixel() const { return separate ? 1 : bands; }
-  /// Stored bytes of a row of a block, and of a block with `rows_of` rows.
+  /// Stored bytes of a row of a block.
   [[nodiscard]] std::uint64_t row_bytes() const {
     return (std::uint64_t{block_columns} * samples_per_pixel() * bits + 7) / 8;
   }
-  /// Rows that the block at `down` really has: the last strip is short, the last tile is not.
-  [[nodiscard]] std::uint32_t rows_of(std::uint32_t down) const {
-    if (tiled || std::uint64_t{down + 1} * block_rows <= rows) return block_rows;
-    return rows - down * block_rows;
+  /// Rows of the block at `down` that are rows of the raster: the last block may hang over.
+  [[nodiscard]] std::uint32_t rows_in_image(std::uint32_t down) const {
+    return std::min(block_rows, rows - down * block_rows);
   }
   /// The number of a block in the file's tables.
   [[nodiscard]] std::uint32_t block(std::uint32_t across, std::uint32_t down) const {
