@@ -11,11 +11,17 @@
 #include "portable_math.hpp"
 
 namespace terrace::tools {
+namespace {
+
+/// Neither snow nor shadow.
+constexpr std::array<float, 3> kBackground{0.90F, 0.92F, 0.94F};
+
+}  // namespace
 
 Canvas::Canvas(std::uint32_t width, std::uint32_t height)
     : width_(width * kOversampling),
       height_(height * kOversampling),
-      colours_(std::size_t{width_} * height_, std::array<float, 3>{1, 1, 1}),
+      colours_(std::size_t{width_} * height_, kBackground),
       depths_(std::size_t{width_} * height_, -std::numeric_limits<float>::infinity()) {}
 
 std::vector<std::uint8_t> Canvas::resolve() const {

@@ -122,8 +122,16 @@ Fractal::Fractal(const FractalOptions& options) : seed_(options.seed) {
   for (unsigned octave = 0; octave < kOctaves; ++octave) {
     amplitude_[octave] = static_cast<float>(weight[octave] * factor);
   }
+  roughness_ = std::sqrt(wanted);
   deviation_ = factor * std::sqrt(field);
   bound_ = factor * largest;
+}
+
+void Fractal::scale(double factor) {
+  for (float& amplitude : amplitude_) amplitude = static_cast<float>(amplitude * factor);
+  roughness_ *= factor;
+  deviation_ *= factor;
+  bound_ *= factor;
 }
 
 Fractal::Rows::Rows(const Fractal& fractal, std::uint32_t first_column, std::uint32_t width)

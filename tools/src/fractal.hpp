@@ -37,6 +37,10 @@ class Fractal {
   /// Requires 0 < hurst < 1 and roughness >= 0.
   explicit Fractal(const FractalOptions& options);
 
+  /// Multiplies all heights.
+  void scale(double factor);
+  /// RMS step over the whole plane, before any rounding.
+  [[nodiscard]] double roughness() const { return roughness_; }
   /// Standard deviation of the heights over the whole plane.
   [[nodiscard]] double deviation() const { return deviation_; }
   /// No height is farther than this from 0.
@@ -69,6 +73,7 @@ class Fractal {
  private:
   std::uint64_t seed_;
   std::array<float, kOctaves> amplitude_{};  ///< largest value of each lattice's noise
+  double roughness_ = 0.0;
   double deviation_ = 0.0;
   double bound_ = 0.0;
 };
