@@ -2,28 +2,23 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
-#include <vector>
 
-#include "region.hpp"
+#include "detail.hpp"
 #include "scene.hpp"
 #include "terrace/stream/store.hpp"
 
 namespace terrace::tools {
 
-/// What part of a store is wanted, and how finely.
-struct StoreSelection {
-  std::optional<unsigned> level;  ///< everywhere; nothing: the top
-  std::vector<Focus> focuses;     ///< finer there
-};
+/// The 2D Delaunay triangulation of what `detail` wants: rasters in column and row, exactly; other
+/// points in x and y. Positions are in the store's CRS, triangles counter-clockwise seen from above,
+/// levels the highest of each vertex's point. With a region, the triangles that reach into it, whole.
+/// memory_bytes: what the work may take. Throws: stream::Error on a damaged store, or when the
+/// points would not fit, saying what they need.
+TriangleMesh mesh_of_store(const stream::Store& store, const Detail& detail,
+                           std::uint64_t memory_bytes);
 
-/// The points of a store's selection as a cloud: positions in *stored* coordinates, levels filled
-/// (the highest level of each point). Clusters are expanded as a whole, so some points outside the
-/// focuses come along. Throws: stream::Error on damage; UsageError for a level that is not there.
-TriangleMesh points_of_store(const stream::Store& store, const StoreSelection& selection);
-
-/// The same points triangulated in the plane of stored coordinates 0 and 1 (2D Delaunay).
-TriangleMesh mesh_of_store(const stream::Store& store, const StoreSelection& selection);
+/// The same points without triangles.
+TriangleMesh points_of_store(const stream::Store& store, const Detail& detail);
 
 /// The finest level with at most `most_points` points; the top if none has so few.
 unsigned level_within(const stream::Store& store, std::uint64_t most_points);

@@ -9,14 +9,14 @@ std::span<const Verb> verbs() {
   // In the order in which they are met at work. A verb without a factory is refused.
   static const std::array<Verb, 18> kVerbs{{
       {"build", "stream the inputs once and write a store", "terrace build dem.tif -o dem.terrace",
-       nullptr},
+       make_build},
       {"info", "tell what a store or a file holds", "terrace info dem.tif --json", make_info},
-      {"verify", "check every checksum and invariant", "terrace verify dem.terrace", nullptr},
+      {"verify", "check every checksum and invariant", "terrace verify dem.terrace", make_verify},
       {"points", "write the points of a level, a region, or mixed levels",
-       "terrace points dem.terrace --level 2 -o coarse.ply", nullptr},
+       "terrace points dem.terrace --level 2 -o coarse.ply", make_points},
       {"mesh", "write a triangle mesh with local detail",
        "terrace mesh dem.terrace --level top --focus 500000,5000000,510000,5010000:0 -o mesh.ply",
-       nullptr},
+       make_mesh},
       {"surface", "write a 3D surface", "terrace surface scan.terrace -o scan.ply", nullptr},
       {"tile", "write terrain tiles for web globes", "terrace tile dem.terrace -o tiles", nullptr},
       {"sample", "answer heights and slopes at points",

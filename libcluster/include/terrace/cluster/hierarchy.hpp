@@ -14,33 +14,47 @@
 
 /// The streaming cluster hierarchy: one pass over points of any number in constant memory, by
 /// divide and conquer over blocks, every level kept. Source: J. Skála, Algorithms for manipulating
-/// large geometric data, 4.3, 7.1.2, 7.2.
+/// large geometric data, 4.3, 7.1.2, 7.2. Departs from it in: blocks are clustered in parallel;
+/// distances are ground distances; a level that fits one block becomes the top without being
+/// clustered; a facility cost that is too low to reduce a block is raised.
+///
+/// Points come to level 0. Each block of a level is clustered on its own; the representative of
+/// each cluster, an input point, goes on to the level above, where it heads that cluster. So every
+/// input point ends in exactly one place: as a member, not a representative, of a cluster on the
+/// highest level that it reached, or as a point of the root.
 
 namespace terrace::cluster {
 
-/// A closed axis-aligned box; min > max when empty.
+/// A closed axis-aligned box; min = +infinity and max = -infinity when empty.
 struct Bounds {
   Point3 min, max;
   friend bool operator==(const Bounds&, const Bounds&) = default;
 };
 
 /// A linear map, row-major: ground = map * position. Clustering measures distances on the ground
-/// (metres); positions stay as they came.
+/// (metres); positions stay as they came. Entries must be finite and not all zero. A map may be
+/// singular: a row of zeros leaves that direction out of all distances.
 using GroundMap = std::array<double, 9>;
 
 /// Over all descendants of a cluster down to level 0, representative included.
 /// error: never less than the ground distance from the representative to a descendant; exact (the
-/// largest distance) at level 0, above it the smaller of what the triangle inequality and the box
-/// give.
+/// largest distance, rounded up) at level 0, above it the smaller of what the triangle inequality
+/// and the box give. Distances are by the map of the block; those within the levels below, which
+/// the triangle inequality adds up, by the maps of the blocks there.
 struct Summary {
   Bounds box;                     ///< of the positions as they came
   double error = 0.0;             ///< ground units
   std::uint64_t descendants = 0;  ///< level-0 points
+  friend bool operator==(const Summary&, const Summary&) = default;
 };
+
+/// Stands for the representative that the root does not have.
+inline constexpr std::uint32_t kNoRepresentative = 0xffffffff;
 
 /// A finished block as the sink sees it. Points are numbered within the block. Cluster c has the
 /// points order[first[c]] ... order[first[c + 1] - 1], representative among them, in ascending
 /// number. children has `level` ordinals per point: the clusters that it heads on levels 0, 1, ...
+/// The spans are good until the call returns.
 struct FinishedBlock {
   unsigned level = 0;
   std::uint64_t block = 0;  ///< ordinal of the block on its level
@@ -56,7 +70,9 @@ struct FinishedBlock {
 /// Receives the hierarchy. `prepare` is called by several threads at once, as soon as a block is
 /// clustered; `commit` by one thread at a time, in the order of blocks within each level, with what
 /// prepare returned. Cluster ordinals follow from that order: the first block's clusters are 0, 1,
-/// ... An exception from either ends the build and comes out of push() or finish().
+/// ... Blocks of different levels are committed as they come, in no fixed order between them. An
+/// exception from either ends the build and comes out of push() or finish(), once, when no call to
+/// the sink is running any more.
 class HierarchySink {
  public:
   /// Whatever the sink makes of a block before its turn has come.
@@ -67,16 +83,22 @@ class HierarchySink {
   virtual ~HierarchySink() = default;
   virtual std::unique_ptr<Prepared> prepare(const FinishedBlock& block) = 0;
   virtual void commit(unsigned level, std::unique_ptr<Prepared> prepared) = 0;
-  /// The points of the top level, once, at the end: one cluster without a representative
-  /// (representatives[0] is UINT32_MAX), order = 0, 1, ...
+  /// The points of the top level, once, at the end, from finish(): one cluster without a
+  /// representative (representatives[0] is kNoRepresentative, its error is 0), order = 0, 1, ...
+  /// Without any input it has no points and an empty box.
   virtual void root(const FinishedBlock& block) = 0;
 };
 
 struct HierarchyOptions {
-  std::size_t block_size = 10000;  ///< most points clustered together
+  std::size_t block_size = 10000;  ///< most points clustered together; 2 to 2^24 - 1
+  /// Each block has a seed of its own, mixed from this one, its level and its ordinal. Of the
+  /// points of a block at most half, rounded up, become representatives, else there might be no
+  /// end to the levels: where the facility cost is too low for that, it is raised for that block.
   BlockOptions block;
   std::size_t payload_size = 0;  ///< bytes that travel with each point
-  unsigned threads = 1;          ///< any number gives the same hierarchy
+  /// Threads that work, the caller's included: it clusters blocks while it would have to wait. Any
+  /// number gives the same hierarchy; 1 (or 0) does all in the caller's thread and makes none.
+  unsigned threads = 1;
   /// The ground map for a block with these bounds; empty: the identity. Called from any thread.
   std::function<GroundMap(const Bounds&)> ground;
   SimdPath simd = SimdPath::automatic;
@@ -85,29 +107,38 @@ struct HierarchyOptions {
 struct HierarchyResult {
   std::uint64_t points = 0;
   unsigned top = 0;
-  /// Per level: number of points whose highest level is this or above, and of clusters.
+  /// Per level, 0 to top: the number of points whose highest level is this or above, and of
+  /// clusters. The root counts as one cluster.
   std::vector<std::uint64_t> level_points, level_clusters;
 };
 
-/// Builds the hierarchy. Memory: a few blocks per thread and one per level.
+/// Builds the hierarchy. Memory: a few blocks per thread and one per level. The result depends on
+/// the input, the options but threads and simd, and the seed alone.
 class HierarchyBuilder {
  public:
-  /// The sink must outlive the builder. Requires block_size >= 2.
+  /// The sink must outlive the builder.
+  /// Throws: std::invalid_argument if block_size or facility_cost is out of range or the SIMD path
+  /// is not available.
   HierarchyBuilder(HierarchyOptions options, HierarchySink& sink);
-  /// Stops without finishing: the sink gets no more calls.
+  /// Stops without finishing: waits for the blocks that are being clustered at this moment; then
+  /// the sink gets no more calls.
   ~HierarchyBuilder();
   HierarchyBuilder(const HierarchyBuilder&) = delete;
   HierarchyBuilder& operator=(const HierarchyBuilder&) = delete;
 
   /// Appends points. A batch that fits into one block is never torn: if it does not fit into what
   /// is left of the present block, that block is closed first. (So tiles of a raster stay whole.) A
-  /// batch larger than a block is cut into blocks.
+  /// larger batch is a plain stream: it fills the present block, and is cut wherever one is full.
   /// Throws: std::invalid_argument on a coordinate that is not finite, naming its index in the
-  /// batch (the builder is unchanged); what the sink threw.
+  /// batch, and on a payload of another size than payload_size bytes per point (the builder is
+  /// unchanged); what the sink or `ground` threw, and std::invalid_argument on a ground map that is
+  /// not finite, is zero, or makes distances beyond 1e150 (the builder has ended then, and takes no
+  /// more calls: they throw std::logic_error).
   void push(std::span<const Point3> positions, std::span<const std::byte> payload = {});
 
   /// Clusters what is left, from level 0 upward; the top is the first level that fits one block.
   /// Weights go up as counts of level-0 points and are scaled to mean 1 in each block's own copy.
+  /// Throws: as push(). To be called once.
   HierarchyResult finish();
 
  private:

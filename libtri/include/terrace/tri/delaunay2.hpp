@@ -2,9 +2,10 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <memory>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -12,21 +13,106 @@
 ///
 /// The triangulation is a function of the point set alone. Ties of cocircular points are broken by
 /// a symbolic perturbation: points are lifted to the paraboloid and raised infinitesimally, the
-/// lexicographically larger (x, then y) infinitely more. Collapse after expand gives back the very
-/// triangles, in any order of operations.
+/// lexicographically larger (x, then y) infinitely more (O. Devillers, M. Teillaud, "Perturbations
+/// for Delaunay and weighted Delaunay 3D triangulations", doi:10.1016/j.comgeo.2010.09.010). So
+/// collapse after expand gives back the very triangles, in any order of operations.
+///
+/// x grows to the right and y upwards; "left" and "counter-clockwise" are meant in this frame.
 
 namespace terrace::tri {
 
-/// 32-bit handles. A vertex handle stays valid until its vertex is removed, a triangle handle until
-/// an operation removes the triangle; both numbers are then used again.
+/// 32-bit handles: numbers of slots. A vertex handle stays valid until its vertex is removed, a
+/// triangle handle until an operation removes the triangle; both slots are then used again, the
+/// last freed one first. So data kept in plain arrays indexed by slot stays dense.
 enum class VertexId : std::uint32_t {};
 enum class TriangleId : std::uint32_t {};
 inline constexpr VertexId kNoVertex{0xFFFFFFFFu};
 inline constexpr TriangleId kNoTriangle{0xFFFFFFFFu};
 
+/// The slot of a handle, to index arrays.
+[[nodiscard]] constexpr std::uint32_t slot(VertexId vertex) {
+  return static_cast<std::uint32_t>(vertex);
+}
+[[nodiscard]] constexpr std::uint32_t slot(TriangleId triangle) {
+  return static_cast<std::uint32_t>(triangle);
+}
+
+/// Where a point lies, see Delaunay2::locate().
+enum class Place : std::uint8_t {
+  kVertex,   ///< equal to a vertex
+  kEdge,     ///< inside an edge, hull edges included
+  kInside,   ///< inside a triangle
+  kOutside,  ///< outside the convex hull; anything but kVertex while there is no triangle
+};
+
+struct Location {
+  Place place = Place::kOutside;
+  /// kVertex, kEdge, kInside: a triangle that contains the point (of two at an edge, either);
+  /// kOutside: a triangle at a hull edge that the point sees. kNoTriangle while there is none.
+  TriangleId triangle = kNoTriangle;
+  /// kEdge, kOutside: the edge lies opposite to vertices(triangle)[edge].
+  std::uint8_t edge = 0;
+  /// kVertex: that vertex. Otherwise a vertex of the triangle, useful as a hint; kNoVertex in an
+  /// empty triangulation.
+  VertexId vertex = kNoVertex;
+};
+
+/// The living slots of a triangulation as an input range, in the order of their numbers. Any change
+/// of the triangulation invalidates it.
+template <class Triangulation, class Id>
+class AliveRange {
+ public:
+  class Iterator {
+   public:
+    using value_type = Id;
+    using difference_type = std::ptrdiff_t;
+    using iterator_category = std::input_iterator_tag;
+    using pointer = const Id*;
+    using reference = Id;
+
+    Iterator() = default;
+    Iterator(const Triangulation* owner, std::uint32_t at, std::uint32_t end)
+        : owner_(owner), at_(at), end_(end) {
+      skip_free();
+    }
+    Id operator*() const { return Id{at_}; }
+    Iterator& operator++() {
+      ++at_;
+      skip_free();
+      return *this;
+    }
+    Iterator operator++(int) {
+      Iterator before = *this;
+      ++*this;
+      return before;
+    }
+    bool operator==(const Iterator& other) const { return at_ == other.at_; }
+
+   private:
+    void skip_free() {
+      while (at_ < end_ && !owner_->alive(Id{at_})) ++at_;
+    }
+    const Triangulation* owner_ = nullptr;
+    std::uint32_t at_ = 0;
+    std::uint32_t end_ = 0;
+  };
+
+  AliveRange(const Triangulation& owner, std::uint32_t slots) : owner_(&owner), slots_(slots) {}
+  [[nodiscard]] Iterator begin() const { return Iterator(owner_, 0, slots_); }
+  [[nodiscard]] Iterator end() const { return Iterator(owner_, slots_, slots_); }
+
+ private:
+  const Triangulation* owner_;
+  std::uint32_t slots_;
+};
+
 /// Coord = std::int32_t: exact for coordinates of at most 30 bits (0 <= c < 2^30); integer
-/// arithmetic only, the same on every machine.
-/// Coord = double: any finite coordinates; exact predicates, no point is ever moved.
+/// arithmetic only, the same on every machine. About 60 bytes per vertex.
+/// Coord = double: any finite coordinates; exact predicates, no point is ever moved. -0.0 and 0.0
+/// are equal. About 68 bytes per vertex.
+///
+/// No points, one, two, or all on one line are ordinary states: they have vertices and no triangle.
+/// At most 2^29 - 2 vertices. Const functions may be called from several threads at once.
 template <class Coord>
 class Delaunay2 {
  public:
@@ -34,29 +120,45 @@ class Delaunay2 {
 
   Delaunay2();
   ~Delaunay2();
+  /// A moved-from triangulation can only be destroyed or assigned to.
   Delaunay2(Delaunay2&&) noexcept;
   Delaunay2& operator=(Delaunay2&&) noexcept;
 
+  // ---- Changing -------------------------------------------------------------------------------
+  // All throw std::invalid_argument naming the index of a coordinate that is not finite or out of
+  // range, and std::length_error beyond 2^29 - 2 vertices; the object is then unchanged.
+  // std::bad_alloc leaves an object that can only be cleared or destroyed.
+
   struct Insertion {
-    VertexId vertex;
-    bool created;  ///< false: a vertex of equal coordinates was there and is `vertex`
+    VertexId vertex = kNoVertex;
+    bool created = false;  ///< false: a vertex of equal coordinates was there and is `vertex`
   };
 
   /// Adds points to an empty triangulation, fast. Returns the vertex of each point, equal points
-  /// the same. Throws: std::invalid_argument naming the index of a coordinate that is not finite or
-  /// out of range; the object is then unchanged. O(n log n).
+  /// the same. O(n log n); besides the result 20 bytes per point for sorting, freed before the
+  /// triangles are made.
   std::vector<VertexId> build(std::span<const Point> points);
-  /// Adds the complete grid x0, x0 + step, ... (columns x rows) to an empty triangulation; vertex
-  /// of (i, j) is returned-first + j * columns + i.
+  /// Adds the complete grid x0, x0 + step, ... (columns x rows) to an empty triangulation, written
+  /// directly in canonical form: O(n), no predicate. The vertex of column i, row j is the returned
+  /// one + j * columns + i. step > 0. Doubles: x0 + i * step is computed with one rounding each for
+  /// product and sum; where these would not be exact, std::invalid_argument (use build()).
   VertexId build_grid(Coord x0, Coord y0, Coord step, std::uint32_t columns, std::uint32_t rows);
   /// hint: a vertex near the point, for the walk; kNoVertex: the last one used.
   Insertion insert(const Point& point, VertexId hint = kNoVertex);
+  /// Inserts in the given order (spatially sorted is fastest), each point the hint of the next.
+  /// results: as many as points, or none. Nothing is inserted if one point is invalid.
   void insert(std::span<const Point> points, std::span<Insertion> results,
               VertexId hint = kNoVertex);
   void remove(VertexId vertex);
-  /// Removes a set (all different) by enlarging one hole, thesis 8.1; much faster than one by one
-  /// when the set is compact.
+  /// Removes a set (all different) by enlarging one hole (J. Skala, thesis, section 8.1); much
+  /// faster than one by one when the set is compact, not slower when it is not.
   void remove(std::span<const VertexId> vertices);
+  /// Removes everything and gives the memory back; a journal goes on.
+  void clear();
+  /// Room for this many vertices without moving memory.
+  void reserve(std::size_t vertices);
+
+  // ---- Reading --------------------------------------------------------------------------------
 
   [[nodiscard]] std::size_t vertex_count() const;
   /// Finite triangles. 0 while all points are collinear.
@@ -65,13 +167,79 @@ class Delaunay2 {
   [[nodiscard]] std::array<VertexId, 3> vertices(TriangleId triangle) const;  ///< counter-clockwise
   /// Neighbour opposite to vertices()[i]; kNoTriangle beyond the hull.
   [[nodiscard]] std::array<TriangleId, 3> neighbours(TriangleId triangle) const;
+  /// A triangle at the vertex; kNoTriangle while there is none. O(1).
+  [[nodiscard]] TriangleId triangle_at(VertexId vertex) const;
+  /// Vertices joined to this one by an edge, counter-clockwise, a hull vertex's from its next on
+  /// the hull to its previous. While all points are collinear: those before and after on the line.
+  void adjacent(VertexId vertex, std::vector<VertexId>& result) const;
 
-  // More of the public surface (locate, nearest, iteration, change observation, memory) is to be
-  // added by the owner of this header.
+  /// Handles of vertices and triangles are below these numbers; they never shrink but by clear().
+  /// Not all slots below are alive: free ones, and those that the structure uses for itself.
+  [[nodiscard]] std::uint32_t vertex_slots() const;
+  [[nodiscard]] std::uint32_t triangle_slots() const;
+  [[nodiscard]] bool alive(VertexId vertex) const;      ///< any handle; false for kNoVertex
+  [[nodiscard]] bool alive(TriangleId triangle) const;  ///< any handle; false for kNoTriangle
+  [[nodiscard]] AliveRange<Delaunay2, VertexId> all_vertices() const {
+    return {*this, vertex_slots()};
+  }
+  [[nodiscard]] AliveRange<Delaunay2, TriangleId> all_triangles() const {
+    return {*this, triangle_slots()};
+  }
+
+  /// Finds a point by a remembering stochastic walk (O. Devillers, S. Pion, M. Teillaud, "Walking
+  /// in a triangulation", doi:10.1142/S0129054102001047) from the hint. The point must be valid as
+  /// for insert(). About sqrt(n) steps from afar, a few from nearby.
+  [[nodiscard]] Location locate(const Point& point, VertexId hint = kNoVertex) const;
+  /// The vertex nearest to the point, of several the lexicographically smallest; kNoVertex when
+  /// empty. Exact. Costs a walk.
+  [[nodiscard]] VertexId nearest(const Point& point, VertexId hint = kNoVertex) const;
+
+  /// A hash of the set of triangles by their coordinates, or of the points while there is no
+  /// triangle: the same for equal point sets whatever their history. O(n).
+  [[nodiscard]] std::uint64_t hash() const;
+  /// Bytes of memory held, unused capacity included.
+  [[nodiscard]] std::size_t memory_bytes() const;
+
+  // ---- Observing ------------------------------------------------------------------------------
+
+  /// The net difference between two moments: what was there at the first and is not at the second,
+  /// and the reverse. A slot used again appears on both sides: apply removals first.
+  struct Changes {
+    std::vector<VertexId> removed_vertices;
+    std::vector<Point> removed_points;  ///< of removed_vertices, in parallel
+    std::vector<VertexId> added_vertices;
+    std::vector<TriangleId> removed_triangles;
+    /// The vertices of removed_triangles as they were, in parallel.
+    std::vector<std::array<VertexId, 3>> removed_corners;
+    std::vector<TriangleId> added_triangles;
+    void clear();
+  };
+
+  /// Starts to record changes, from nothing if it was recording already. While recording, a change
+  /// costs some nanoseconds per triangle, and 2 bits per vertex beside the records are held.
+  void start_journal();
+  void stop_journal();
+  /// The changes since start_journal() or the last call; recording goes on. `changes` is
+  /// overwritten, its capacity used again. Requires a started journal. O(number of slots touched).
+  void take_changes(Changes& changes);
 
  private:
+  friend struct Delaunay2Access;
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
+
+template <class Coord>
+void Delaunay2<Coord>::Changes::clear() {
+  removed_vertices.clear();
+  removed_points.clear();
+  added_vertices.clear();
+  removed_triangles.clear();
+  removed_corners.clear();
+  added_triangles.clear();
+}
+
+extern template class Delaunay2<std::int32_t>;
+extern template class Delaunay2<double>;
 
 }  // namespace terrace::tri

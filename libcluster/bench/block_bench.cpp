@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+// Block clustering: points per second for each effort and instruction set, and the cost Q relative
+// to the reference search. Blocks of 10 000 points (TERRACE_BENCH_SMALL: 2 500), of
+//   dem   square tiles of a fractal elevation model, cells of 30 m, neighbours differ by 2.65 m
+//   scan  patches 500 points wide of a bumpy closed surface
+//   shuf  the scan shuffled: each block is a coarse copy of the whole surface
+//   cube  uniform in a cube
+// Counters: Q_tenth and Q_full are percent above (below, if negative) the reference search from
+// Meyerson's start with 0.1 m and with m ceil(log2 m) iterations, mean over blocks (Q_full: over
+// the first of them, as it takes seconds a block); clusters per block, and the median of their
+// sizes.
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <optional>
+#include <stdexcept>
+
+#include <benchmark/benchmark.h>
+
+#include "../tests/inputs.hpp"
+#include "terrace/cluster/block.hpp"
+#include "terrace/cluster/local_search.hpp"
+
+namespace {
+
+using namespace terrace::cluster;
+
+const bool kSmall = std::getenv("TERRACE_BENCH_SMALL") != nullptr;
+const std::size_t kSide = kSmall ? 50 : 100;
+const std::size_t kBlockSize = kSide * kSide;
+const std::size_t kBlocks = kSmall ? 2 : 16;
+const std::size_t kFullBlocks = kSmall ? 1 : 2;
+constexpr std::uint64_t kSeed = 20;
+
+constexpr std::array kInputs{"dem", "scan", "shuf", "cube"};
+constexpr std::array kEfforts{"fast", "standard", "fine", "full"};
+constexpr std::array kPaths{SimdPath::portable, SimdPath::avx2, SimdPath::avx512};
+constexpr std::array kPathNames{"portable", "avx2", "avx512"};
+
+struct Input {
+  std::vector<std::vector<Point3>> blocks;
+  std::vector<double> tenth, full;  // costs of the reference search
+};
+
+Input make_input(std::size_t which) {
+  std::mt19937_64 random(kSeed);
+  std::vector<Point3> points;
+  if (which == 0) {
+    points = inputs::dem_tiles(4 * kSide, kSide, 30.0, 2.65, random);
+  } else if (which == 3) {
+    points = inputs::cube(kBlocks * kBlockSize, random);
+  } else {
+    points = kSmall ? inputs::scan(2, 100, random) : inputs::scan(4, 500, random);
+    if (which == 2) inputs::shuffle(points, random);
+  }
+  Input input;
+  const std::size_t all = points.size() / kBlockSize;
+  for (std::size_t b = 0; b < kBlocks; ++b) {
+    const auto first = points.begin() + static_cast<std::ptrdiff_t>(b * all / kBlocks * kBlockSize);
+    input.blocks.emplace_back(first, first + static_cast<std::ptrdiff_t>(kBlockSize));
+    BlockClustering clustering;
+    local_search(input.blocks.back(), {}, 1.0, SearchLength::tenth, b + 1, clustering);
+    input.tenth.push_back(clustering.cost());
+    if (b >= kFullBlocks) continue;
+    local_search(input.blocks.back(), {}, 1.0, SearchLength::log2_full, b + 1, clustering);
+    input.full.push_back(clustering.cost());
+  }
+  return input;
+}
+
+/// Made on first use: a filter pays for what it selects.
+const Input& input_of(std::size_t which) {
+  static std::array<std::optional<Input>, kInputs.size()> inputs;
+  if (!inputs[which]) inputs[which] = make_input(which);
+  return *inputs[which];
+}
+
+void report_quality(benchmark::State& state, const Input& input, BlockClusterer& clusterer,
+                    Effort effort) {
+  double tenth = 0.0;
+  double full = 0.0;
+  std::vector<std::size_t> sizes;
+  BlockClustering clustering;
+  for (std::size_t b = 0; b < input.blocks.size(); ++b) {
+    clusterer.run(input.blocks[b], {}, {.effort = effort, .seed = b + 1}, clustering);
+    tenth += clustering.cost() / input.tenth[b];
+    if (b < input.full.size()) full += clustering.cost() / input.full[b];
+    std::vector<std::size_t> block_sizes(clustering.facilities.size(), 0);
+    for (const std::uint32_t cluster : clustering.assignment) ++block_sizes[cluster];
+    sizes.insert(sizes.end(), block_sizes.begin(), block_sizes.end());
+  }
+  const auto percent = [](double sum, std::size_t count) {
+    return 100.0 * (sum / static_cast<double>(count) - 1.0);
+  };
+  state.counters["Q_tenth_%"] = percent(tenth, input.tenth.size());
+  state.counters["Q_full_%"] = percent(full, input.full.size());
+  state.counters["clusters"] =
+      static_cast<double>(sizes.size()) / static_cast<double>(input.blocks.size());
+  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+  std::nth_element(sizes.begin(), middle, sizes.end());
+  state.counters["median_size"] = static_cast<double>(*middle);
+}
+
+void cluster_blocks(benchmark::State& state, std::size_t which, Effort effort, SimdPath path) {
+  std::optional<BlockClusterer> clusterer;
+  try {
+    clusterer.emplace(path);
+  } catch (const std::invalid_argument&) {
+    state.SkipWithError("this processor lacks the instructions");
+    return;
+  }
+  const Input& input = input_of(which);
+  BlockClustering clustering;
+  std::size_t b = 0;
+  std::size_t points = 0;
+  for ([[maybe_unused]] const auto iteration : state) {
+    clusterer->run(input.blocks[b], {}, {.effort = effort, .seed = b + 1}, clustering);
+    benchmark::DoNotOptimize(clustering.assignment.data());
+    points += input.blocks[b].size();
+    b = (b + 1) % input.blocks.size();
+  }
+  state.SetItemsProcessed(static_cast<std::int64_t>(points));
+  report_quality(state, input, *clusterer, effort);
+}
+
+/// The reference search of 0.1 m iterations, for scale.
+void reference(benchmark::State& state, std::size_t which) {
+  const Input& input = input_of(which);
+  BlockClustering clustering;
+  for ([[maybe_unused]] const auto iteration : state) {
+    local_search(input.blocks[0], {}, 1.0, SearchLength::tenth, 1, clustering);
+    benchmark::DoNotOptimize(clustering.assignment.data());
+  }
+  state.SetItemsProcessed(static_cast<std::int64_t>(state.iterations() * kBlockSize));
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  for (std::size_t which = 0; which < kInputs.size(); ++which) {
+    const std::string input = kInputs[which];
+    for (std::size_t path = kPaths.size(); path-- > 0;) {
+      for (std::size_t effort = 0; effort < kEfforts.size(); ++effort) {
+        if (kPaths[path] == SimdPath::portable && effort != 1) continue;
+        const std::string name = input + "/" + kEfforts[effort] + "/" + kPathNames[path];
+        benchmark::RegisterBenchmark(name.c_str(), cluster_blocks, which,
+                                     static_cast<Effort>(effort), kPaths[path]);
+      }
+    }
+    benchmark::RegisterBenchmark((input + "/reference search 0.1 m").c_str(), reference, which);
+  }
+  benchmark::Initialize(&argc, argv);
+  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
+  benchmark::RunSpecifiedBenchmarks();
+  return 0;
+}

@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "scaling.hpp"
+#include "terrace/cluster/point.hpp"
+
+namespace terrace::cluster {
+
+/// A grow-only array, aligned for vectors, whose capacity is a multiple of sixteen. Only its
+/// storage is managed: the owner says how much of it counts. Defined for float and std::uint32_t.
+template <class T>
+class Column {
+ public:
+  Column() = default;
+  Column(const Column&) = delete;
+  Column& operator=(const Column&) = delete;
+  ~Column();
+  /// Makes room for `count` elements; the first `kept` survive.
+  void reserve(std::size_t count, std::size_t kept = 0);
+  [[nodiscard]] std::size_t capacity() const { return capacity_; }
+  void swap(Column& other) noexcept;
+  operator T*() { return data_; }
+  operator const T*() const { return data_; }
+
+ private:
+  T* data_ = nullptr;
+  std::size_t capacity_ = 0;
+};
+
+/// Floats are processed sixteen at a time.
+inline constexpr std::uint32_t kLanes = 16;
+inline constexpr std::uint32_t round_to_lanes(std::uint32_t n) {
+  return (n + kLanes - 1) & ~(kLanes - 1);
+}
+
+/// A coordinate beyond all points; its square is finite.
+inline constexpr float kFarAway = 1e18f;
+
+/// A block under clustering, in the unit of its box, single precision.
+///
+/// The points lie along a space-filling curve, so that sixteen neighbours in memory (a *group*) are
+/// neighbours in space. Each facility owns a *segment* of the pool with a copy of its clients, so
+/// that gains are computed over contiguous memory. Segments begin and end at multiples of sixteen;
+/// surplus lanes have weight 0 and distance 0 and so never count.
+struct BlockState {
+  // Points, in curve order. Surplus lanes repeat the last point with weight 0.
+  std::uint32_t count = 0;
+  float facility_cost = 0;
+  Column<float> x, y, z, w;
+  Column<std::uint32_t> original;  ///< number of the point in the block
+  Column<std::uint32_t> nearest;   ///< facility, as of the last assignment
+  Column<float> distance;          ///< and the squared distance to it, then the distance
+
+  // Groups: a ball around sixteen points of the curve.
+  std::uint32_t group_count = 0;
+  Column<float> group_x, group_y, group_z, group_radius;
+
+  // Facilities. Surplus lanes are far away.
+  std::uint32_t facility_count = 0;
+  Column<std::uint32_t> facility;        ///< the point, by its place on the curve
+  Column<float> fx, fy, fz;              ///< its position
+  Column<float> reach;                   ///< squared: candidates farther away spare nothing here
+  Column<float> furthest;                ///< longest connection
+  Column<float> load, spent;             ///< sums of w and of w d
+  Column<float> mean_x, mean_y, mean_z;  ///< centre of mass of the clients
+  Column<std::uint32_t> begin, size;     ///< the segment
+
+  // Pool of segments.
+  std::uint32_t pool_used = 0;
+  Column<float> px, py, pz, pw, pd;
+  Column<float> pp;  ///< the client's place on the curve, as a float (exact below 2^24)
+
+  // Facilities near the candidate at hand.
+  std::uint32_t near_count = 0;
+  Column<std::uint32_t> near, closes;
+  Column<float> scratch;
+  Column<float> scratch_pool;
+
+  /// Room for `facilities` facilities.
+  void reserve_facilities(std::uint32_t facilities);
+  /// Room for `more` more floats at the end of the pool; may move all segments.
+  void reserve_pool(std::uint32_t more);
+  /// Appends a facility without clients.
+  std::uint32_t add_facility(std::uint32_t point);
+  /// Removes facility j; the last one takes its number.
+  void remove_facility(std::uint32_t j);
+  /// Fills the pool from `nearest` and `distance`; drops facilities without clients.
+  void build_segments();
+  /// Brings the facilities into the order of the curve.
+  void sort_facilities();
+
+ private:
+  Column<float> spare_[6];
+};
+
+/// Brings the points of a block into the order of a space-filling curve and into single precision.
+class CurveSorter {
+ public:
+  /// Fills the points of `state`, weights divided by their mean, and makes room for the groups.
+  void load(std::span<const Point3> points, std::span<const double> weights, double mean_weight,
+            const Scaling& scaling, BlockState& state);
+
+ private:
+  Column<float> x_, y_, z_;
+  Column<std::uint32_t> key_, other_key_, order_, other_order_;
+};
+
+}  // namespace terrace::cluster

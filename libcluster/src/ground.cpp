@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ground.hpp"
+
+#include <array>
+#include <stdexcept>
+#include <string>
+
+namespace terrace::cluster {
+namespace {
+
+// Points are taken four at a time: twelve independent lanes that the compiler turns into vectors.
+constexpr std::size_t kGroup = 4;
+
+}  // namespace
+
+Bounds bounds_of(std::span<const Point3> positions) {
+  Bounds box = empty_bounds();
+  std::size_t i = 0;
+  if (positions.size() >= kGroup) {
+    std::array<double, 3 * kGroup> low, high;
+    low.fill(std::numeric_limits<double>::infinity());
+    high.fill(-std::numeric_limits<double>::infinity());
+    for (; i + kGroup <= positions.size(); i += kGroup) {
+      for (std::size_t j = 0; j < 3 * kGroup; ++j) {
+        const double x = positions[i + j / 3][j % 3];
+        low[j] = x < low[j] ? x : low[j];
+        high[j] = x > high[j] ? x : high[j];
+      }
+    }
+    for (std::size_t j = 0; j < kGroup; ++j) {
+      include(box, Point3{low[3 * j], low[3 * j + 1], low[3 * j + 2]});
+      include(box, Point3{high[3 * j], high[3 * j + 1], high[3 * j + 2]});
+    }
+  }
+  for (; i < positions.size(); ++i) include(box, positions[i]);
+  return box;
+}
+
+std::size_t first_not_finite(std::span<const Point3> positions) {
+  // 0 * x is zero for finite x and NaN for all others; a NaN stays in the sum.
+  std::array<double, 3 * kGroup> sum{};
+  std::size_t i = 0;
+  for (; i + kGroup <= positions.size(); i += kGroup) {
+    for (std::size_t j = 0; j < 3 * kGroup; ++j) sum[j] += 0.0 * positions[i + j / 3][j % 3];
+  }
+  double total = 0.0;
+  for (const double s : sum) total += s;
+  for (; i < positions.size(); ++i) {
+    for (const double x : positions[i]) total += 0.0 * x;
+  }
+  if (total == 0.0) return positions.size();
+  const auto bad = std::find_if(positions.begin(), positions.end(), [](const Point3& p) {
+    return !(std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]));
+  });
+  return static_cast<std::size_t>(bad - positions.begin());
+}
+
+void check_ground_map(const GroundMap& map, const Bounds& box, unsigned level,
+                      std::uint64_t block) {
+  const auto fail = [&](const std::string& what) {
+    throw std::invalid_argument("block " + std::to_string(block) + " of level " +
+                                std::to_string(level) + ": " + what);
+  };
+  const bool finite =
+      std::all_of(map.begin(), map.end(), [](double entry) { return std::isfinite(entry); });
+  if (!finite) fail("the ground map has an entry that is not finite");
+  if (std::all_of(map.begin(), map.end(), [](double entry) { return entry == 0.0; })) {
+    fail("the ground map is zero, so that all distances would be");
+  }
+  if (!(ground_extent(map, box) <= 1e150)) {
+    fail("its ground extent is beyond 1e150; check the coordinates and the ground map");
+  }
+}
+
+void to_ground(std::span<const Point3> positions, const Point3& origin, const GroundMap& map,
+               std::span<Point3> out) {
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    out[i] = mapped(map, difference(positions[i], origin));
+  }
+}
+
+}  // namespace terrace::cluster

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <span>
+
+#include "terrace/cluster/hierarchy.hpp"
+#include "terrace/cluster/point.hpp"
+
+/// Arithmetic on positions, boxes and ground maps. Private to the hierarchy.
+
+namespace terrace::cluster {
+
+constexpr GroundMap kIdentityMap{1, 0, 0, 0, 1, 0, 0, 0, 1};
+
+constexpr Bounds empty_bounds() {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  return {{kInfinity, kInfinity, kInfinity}, {-kInfinity, -kInfinity, -kInfinity}};
+}
+
+inline void include(Bounds& box, const Point3& p) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    box.min[axis] = p[axis] < box.min[axis] ? p[axis] : box.min[axis];
+    box.max[axis] = p[axis] > box.max[axis] ? p[axis] : box.max[axis];
+  }
+}
+
+inline void include(Bounds& box, const Bounds& other) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    box.min[axis] = std::min(box.min[axis], other.min[axis]);
+    box.max[axis] = std::max(box.max[axis], other.max[axis]);
+  }
+}
+
+inline Point3 difference(const Point3& a, const Point3& b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+
+inline Point3 mapped(const GroundMap& m, const Point3& v) {
+  return {m[0] * v[0] + m[1] * v[1] + m[2] * v[2], m[3] * v[0] + m[4] * v[1] + m[5] * v[2],
+          m[6] * v[0] + m[7] * v[1] + m[8] * v[2]};
+}
+
+inline double squared_length(const Point3& v) { return v[0] * v[0] + v[1] * v[1] + v[2] * v[2]; }
+
+/// The sum of the ground extents of a box, every entry of the map taken as positive: no vector
+/// between two points of the box is longer on the ground, and nothing is squared.
+inline double ground_extent(const GroundMap& m, const Bounds& box) {
+  const Point3 size = difference(box.max, box.min);
+  double sum = 0.0;
+  for (std::size_t row = 0; row < 3; ++row) {
+    for (std::size_t axis = 0; axis < 3; ++axis) sum += std::abs(m[3 * row + axis]) * size[axis];
+  }
+  return sum;
+}
+
+Bounds bounds_of(std::span<const Point3> positions);
+
+/// The index of the first point with a coordinate that is not finite, or positions.size().
+std::size_t first_not_finite(std::span<const Point3> positions);
+
+/// Throws std::invalid_argument, naming the block, if the map is not finite or zero, or if ground
+/// distances within the box are beyond 1e150 (their squares would overflow).
+void check_ground_map(const GroundMap& map, const Bounds& box, unsigned level, std::uint64_t block);
+
+/// out[i] = map * (positions[i] - origin).
+void to_ground(std::span<const Point3> positions, const Point3& origin, const GroundMap& map,
+               std::span<Point3> out);
+
+}  // namespace terrace::cluster

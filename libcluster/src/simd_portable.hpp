@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+/// Sixteen floats in plain C++. The operations and their meaning are the same in simd_avx2.hpp and
+/// simd_avx512.hpp, to the bit: IEEE arithmetic without contraction, one fixed tree of reductions,
+/// min and max that give the second operand when neither is less.
+
+namespace terrace::cluster::simd {
+
+struct Portable {
+  struct Mask {
+    std::uint32_t lanes;
+    [[nodiscard]] std::uint32_t bits() const { return lanes; }
+  };
+
+  float v[16];
+
+  template <class Function>
+  static Portable each(Function function) {
+    Portable r;
+    for (int i = 0; i < 16; ++i) r.v[i] = function(i);
+    return r;
+  }
+  template <class Function>
+  static Mask each_bit(Function function) {
+    std::uint32_t bits = 0;
+    for (int i = 0; i < 16; ++i) bits |= (function(i) ? 1u : 0u) << i;
+    return {bits};
+  }
+
+  static Portable load(const float* from) {
+    return each([=](int i) { return from[i]; });
+  }
+  static Portable broadcast(float value) {
+    return each([=](int) { return value; });
+  }
+  /// 0, 1, ... 15
+  static Portable iota() {
+    return each([](int i) { return static_cast<float>(i); });
+  }
+  void store(float* to) const {
+    for (int i = 0; i < 16; ++i) to[i] = v[i];
+  }
+
+  /// Whole numbers from 0 to 2^24
+  void store_as_integers(std::uint32_t* to) const {
+    for (int i = 0; i < 16; ++i) to[i] = static_cast<std::uint32_t>(v[i]);
+  }
+
+  friend Portable operator+(Portable a, Portable b) {
+    return each([&](int i) { return a.v[i] + b.v[i]; });
+  }
+  friend Portable operator-(Portable a, Portable b) {
+    return each([&](int i) { return a.v[i] - b.v[i]; });
+  }
+  friend Portable operator*(Portable a, Portable b) {
+    return each([&](int i) { return a.v[i] * b.v[i]; });
+  }
+  friend Portable operator/(Portable a, Portable b) {
+    return each([&](int i) { return a.v[i] / b.v[i]; });
+  }
+  friend Portable min(Portable a, Portable b) {
+    return each([&](int i) { return a.v[i] < b.v[i] ? a.v[i] : b.v[i]; });
+  }
+  friend Portable max(Portable a, Portable b) {
+    return each([&](int i) { return a.v[i] > b.v[i] ? a.v[i] : b.v[i]; });
+  }
+  friend Portable sqrt(Portable a) {
+    return each([&](int i) { return std::sqrt(a.v[i]); });
+  }
+  friend Mask less(Portable a, Portable b) {
+    return each_bit([&](int i) { return a.v[i] < b.v[i]; });
+  }
+  friend Mask operator&(Mask a, Mask b) { return {a.lanes & b.lanes}; }
+  friend Mask operator~(Mask m) { return {~m.lanes & 0xffffu}; }
+  /// a where the mask is set, b elsewhere
+  friend Portable select(Mask m, Portable a, Portable b) {
+    return each([&](int i) { return ((m.lanes >> i) & 1u) != 0 ? a.v[i] : b.v[i]; });
+  }
+  friend float sum(Portable a) {
+    for (int half = 8; half > 0; half /= 2) {
+      for (int i = 0; i < half; ++i) a.v[i] = a.v[i] + a.v[i + half];
+    }
+    return a.v[0];
+  }
+  friend float least(Portable a) {
+    for (int half = 8; half > 0; half /= 2) {
+      for (int i = 0; i < half; ++i) a.v[i] = a.v[i] < a.v[i + half] ? a.v[i] : a.v[i + half];
+    }
+    return a.v[0];
+  }
+  friend float largest(Portable a) {
+    for (int half = 8; half > 0; half /= 2) {
+      for (int i = 0; i < half; ++i) a.v[i] = a.v[i] > a.v[i + half] ? a.v[i] : a.v[i + half];
+    }
+    return a.v[0];
+  }
+  /// Stores the lanes of the mask densely. May write all of to[0 .. 15].
+  friend void compress(float* to, Mask m, Portable a) {
+    for (int i = 0; i < 16; ++i) {
+      if (((m.lanes >> i) & 1u) != 0) *to++ = a.v[i];
+    }
+  }
+};
+
+}  // namespace terrace::cluster::simd

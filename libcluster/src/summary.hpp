@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "terrace/cluster/hierarchy.hpp"
+
+/// The summaries of clusters. Private to the hierarchy.
+
+namespace terrace::cluster {
+
+/// Of a cluster of level 0: members are point numbers, `representative` among them.
+Summary summarise_points(std::span<const Point3> positions, std::span<const std::uint32_t> members,
+                         std::uint32_t representative, const GroundMap& map);
+
+/// Of a cluster above: heads[i] is the summary of the cluster that point i heads one level below.
+Summary summarise_heads(std::span<const Point3> positions, std::span<const Summary> heads,
+                        std::span<const std::uint32_t> members, std::uint32_t representative,
+                        const GroundMap& map);
+
+}  // namespace terrace::cluster

@@ -1,0 +1,332 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "terrace/tri/multiresolution.hpp"
+
+/// The templates of multiresolution.hpp; include that.
+
+namespace terrace::tri {
+namespace detail {
+
+/// The first coordinates of a position as the triangulation takes them. False if it cannot: not
+/// finite, or for integers not one of 30 bits.
+template <class Point>
+bool to_point(const Point3& position, Point& point) {
+  using Coord = typename Point::value_type;
+  static_assert(std::tuple_size_v<Point> <= 3);
+  for (std::size_t i = 0; i < point.size(); ++i) {
+    const double value = position[i];
+    if constexpr (std::is_integral_v<Coord>) {
+      if (!(value >= 0.0 && value < double{1 << 30})) return false;
+      point[i] = static_cast<Coord>(value);
+      if (static_cast<double>(point[i]) != value) return false;
+    } else {
+      if (!std::isfinite(value)) return false;
+      point[i] = static_cast<Coord>(value) + Coord{0};  // -0 becomes 0
+    }
+  }
+  return true;
+}
+
+}  // namespace detail
+
+template <DynamicTriangulation Triangulation>
+MultiresolutionModel<Triangulation>::MultiresolutionModel(ClusterSource& source,
+                                                          const Detail& start, ModelOptions options)
+    : tree_(source), deltas_(options.deltas) {
+  const ClusterTree::Take take_points = take();
+  tree_.read_root(take_points);
+  // What is staged stays staged: the whole model goes if this fails.
+  static_cast<void>(tree_.plan(judge(start), take_points));
+  check_room();
+  build_clusters();
+  if (deltas_) triangulation_.start_journal();
+}
+
+template <DynamicTriangulation Triangulation>
+auto MultiresolutionModel<Triangulation>::expand(ClusterId cluster) -> const Delta& {
+  const ChildRef place = find(cluster);
+  if (tree_.child_slot(place) != ClusterTree::kNoSlot) return apply({});
+  return apply(tree_.plan_expand(place, take()));
+}
+
+template <DynamicTriangulation Triangulation>
+auto MultiresolutionModel<Triangulation>::collapse(ClusterId cluster) -> const Delta& {
+  const Slot there = tree_.child_slot(find(cluster));
+  return apply(there == ClusterTree::kNoSlot ? ClusterTree::Plan{} : tree_.plan_collapse(there));
+}
+
+template <DynamicTriangulation Triangulation>
+auto MultiresolutionModel<Triangulation>::refine(const Box3& region, unsigned level)
+    -> const Delta& {
+  return change_region(region, level, true, false);
+}
+
+template <DynamicTriangulation Triangulation>
+auto MultiresolutionModel<Triangulation>::coarsen(const Box3& region, unsigned level)
+    -> const Delta& {
+  return change_region(region, level, false, true);
+}
+
+template <DynamicTriangulation Triangulation>
+auto MultiresolutionModel<Triangulation>::set_region(const Box3& region, unsigned level)
+    -> const Delta& {
+  return change_region(region, level, true, true);
+}
+
+template <DynamicTriangulation Triangulation>
+auto MultiresolutionModel<Triangulation>::set_detail(const Detail& detail) -> const Delta& {
+  return apply(tree_.plan(judge(detail), take()));
+}
+
+template <DynamicTriangulation Triangulation>
+auto MultiresolutionModel<Triangulation>::change_region(const Box3& region, unsigned level,
+                                                        bool refine, bool coarsen) -> const Delta& {
+  const auto judge_child = [&](ChildRef child, unsigned child_level, bool expanded) {
+    if (child_level < level ? !(expanded && coarsen) : !(expanded || refine)) return Verdict::keep;
+    const Box3& box = tree_.record(child).box;
+    if (!intersects(region, box)) return Verdict::keep;
+    if (child_level >= level) return refine ? Verdict::expand : Verdict::visit;
+    return contains(region, box) ? Verdict::collapse : Verdict::visit;
+  };
+  return apply(tree_.plan(judge_child, take()));
+}
+
+template <DynamicTriangulation Triangulation>
+ClusterTree::Judge MultiresolutionModel<Triangulation>::judge(const Detail& detail) {
+  return [this, &detail](ChildRef child, unsigned child_level, bool) {
+    if (child_level > detail.level) return Verdict::expand;
+    Verdict verdict = child_level == detail.level ? Verdict::expand_alone : Verdict::collapse;
+    for (const Focus& focus : detail.focuses) {
+      if (child_level < focus.level || !intersects(focus.box, tree_.record(child).box)) continue;
+      if (child_level > focus.level) return Verdict::expand;
+      verdict = Verdict::expand_alone;
+    }
+    return verdict;
+  };
+}
+
+template <DynamicTriangulation Triangulation>
+ClusterTree::Take MultiresolutionModel<Triangulation>::take() {
+  stage_.clusters.clear();
+  stage_.points.clear();
+  stage_.heights.clear();
+  return [this](Slot cluster, ClusterId id, std::span<const Point3> positions) {
+    const std::size_t first = stage_.points.size();
+    stage_.points.resize(first + positions.size());
+    stage_.heights.resize(first + positions.size());
+    for (std::size_t i = 0; i < positions.size(); ++i) {
+      if (!detail::to_point(positions[i], stage_.points[first + i])) {
+        throw HierarchyError(
+            id, "member " + std::to_string(i) + " lies at " + std::to_string(positions[i][0]) +
+                    ", " + std::to_string(positions[i][1]) + ", " +
+                    std::to_string(positions[i][2]) +
+                    ", which the triangulation cannot take; coordinates must be " +
+                    (std::is_integral_v<typename Point::value_type> ? "integers from 0 to 2^30 - 1"
+                                                                    : "finite"));
+      }
+      stage_.heights[first + i] = positions[i][2];
+    }
+    stage_.clusters.push_back({cluster, first});
+  };
+}
+
+template <DynamicTriangulation Triangulation>
+void MultiresolutionModel<Triangulation>::check_room() const {
+  const std::size_t there = triangulation_.vertex_count();
+  if (stage_.points.size() <= kMaxVertices - there) return;
+  throw std::length_error("the step would add " + std::to_string(stage_.points.size()) +
+                          " points to " + std::to_string(there) +
+                          " vertices, more than 2^29 - 2; ask for less detail");
+}
+
+template <DynamicTriangulation Triangulation>
+auto MultiresolutionModel<Triangulation>::apply(const ClusterTree::Plan& plan) -> const Delta& {
+  try {
+    if (!plan.staged.empty()) check_room();
+  } catch (...) {
+    tree_.cancel(plan);
+    throw;
+  }
+  delta_.reassigned.clear();
+  created_.clear();
+  // Collapsing first keeps the peak low. With expanding first, vertices of points present before
+  // and after would stay, but those are few.
+  for (const Slot cluster : plan.collapsed) remove_cluster(cluster);
+  if (!plan.staged.empty()) insert_clusters(deltas_ && !plan.collapsed.empty());
+  finish_delta();
+  return delta_;
+}
+
+template <DynamicTriangulation Triangulation>
+void MultiresolutionModel<Triangulation>::remove_cluster(Slot cluster) {
+  gone_.clear();
+  const std::span<const VertexId> vertices = tree_.vertices(cluster);
+  for (std::uint32_t i = 0; i < vertices.size(); ++i) {
+    const VertexOwners::Change change = owners_.remove(vertices[i], {cluster, i}, tree_);
+    if (change == VertexOwners::Change::last) {
+      gone_.push_back(vertices[i]);
+    } else {
+      note(change, vertices[i]);
+    }
+  }
+  triangulation_.remove(gone_);
+  points_ -= vertices.size();
+  tree_.release(cluster);
+}
+
+template <DynamicTriangulation Triangulation>
+void MultiresolutionModel<Triangulation>::insert_clusters(bool list_created) {
+  for (const Staged& staged : stage_.clusters) {
+    const std::span<VertexId> vertices = tree_.vertices(staged.slot);
+    const std::size_t size = vertices.size();
+    inserted_.resize(size);
+    triangulation_.insert(std::span<const Point>(stage_.points).subspan(staged.first, size),
+                          inserted_, tree_.head_vertex(staged.slot));
+    for (std::uint32_t i = 0; i < size; ++i) {
+      const VertexId vertex = inserted_[i].vertex;
+      vertices[i] = vertex;
+      const VertexOwners::Change change =
+          owners_.add(vertex, {staged.slot, i}, stage_.heights[staged.first + i], tree_);
+      note(change, vertex);
+      if (list_created && change == VertexOwners::Change::first) created_.push_back(vertex);
+    }
+    points_ += size;
+  }
+  // Scratch of one cluster is worth keeping, that of a whole level is not.
+  if (stage_.points.capacity() > kKeptPoints) stage_ = {};
+}
+
+template <DynamicTriangulation Triangulation>
+void MultiresolutionModel<Triangulation>::build_clusters() {
+  const std::vector<VertexId> built = triangulation_.build(stage_.points);
+  stage_.points = {};
+  owners_.reserve(triangulation_.vertex_count() + 1);
+  for (const Staged& staged : stage_.clusters) {
+    const std::span<VertexId> vertices = tree_.vertices(staged.slot);
+    for (std::uint32_t i = 0; i < vertices.size(); ++i) {
+      vertices[i] = built[staged.first + i];
+      owners_.add(vertices[i], {staged.slot, i}, stage_.heights[staged.first + i], tree_);
+    }
+  }
+  points_ = built.size();
+  stage_ = {};
+}
+
+template <DynamicTriangulation Triangulation>
+void MultiresolutionModel<Triangulation>::note(VertexOwners::Change change, VertexId vertex) {
+  if (change == VertexOwners::Change::other && deltas_) delta_.reassigned.push_back(vertex);
+}
+
+template <DynamicTriangulation Triangulation>
+void MultiresolutionModel<Triangulation>::finish_delta() {
+  if (!deltas_) return;
+  triangulation_.take_changes(delta_.changes);
+  const auto& added = delta_.changes.added_vertices;
+  const auto& removed = delta_.changes.removed_vertices;
+  std::vector<VertexId>& reassigned = delta_.reassigned;
+  // A vertex that went with one point and came back with another has stayed, if it came back in its
+  // old slot.
+  if (created_.size() > added.size()) {
+    reassigned.insert(reassigned.end(), created_.begin(), created_.end());
+  }
+  if (reassigned.empty()) return;
+  // Only those that stayed are meant, each once.
+  marks_.resize(owners_.slots());
+  const auto mark = [&](const auto& vertices, bool value) {
+    for (const VertexId vertex : vertices) marks_[static_cast<std::uint32_t>(vertex)] = value;
+  };
+  mark(added, true);
+  mark(removed, true);
+  std::erase_if(reassigned, [&](VertexId vertex) {
+    const bool other = marks_[static_cast<std::uint32_t>(vertex)];
+    marks_[static_cast<std::uint32_t>(vertex)] = true;
+    return other;
+  });
+  mark(added, false);
+  mark(removed, false);
+  mark(reassigned, false);
+}
+
+template <DynamicTriangulation Triangulation>
+PointId MultiresolutionModel<Triangulation>::point_id(VertexId vertex) const {
+  const VertexOwners::Owner owner = owners_.standing(vertex);
+  return {tree_.id(owner.slot), owner.index};
+}
+
+template <DynamicTriangulation Triangulation>
+unsigned MultiresolutionModel<Triangulation>::level(VertexId vertex) const {
+  return tree_.level(owners_.standing(vertex).slot);
+}
+
+template <DynamicTriangulation Triangulation>
+void MultiresolutionModel<Triangulation>::heads(VertexId vertex,
+                                                std::vector<ClusterId>& clusters) const {
+  clusters.clear();
+  owners_.for_each(vertex, [&](VertexOwners::Owner owner) {
+    for (unsigned below = tree_.level(owner.slot); below-- > 0;) {
+      clusters.push_back(tree_.headed_by(owner.slot, owner.index, below));
+    }
+  });
+}
+
+template <DynamicTriangulation Triangulation>
+ChildRef MultiresolutionModel<Triangulation>::find(ClusterId cluster) const {
+  if (const auto place = tree_.find(cluster)) return *place;
+  throw std::invalid_argument(to_string(cluster) +
+                              " is not there: the cluster above it is not expanded");
+}
+
+template <DynamicTriangulation Triangulation>
+std::vector<ClusterId> MultiresolutionModel<Triangulation>::expanded() const {
+  std::vector<ClusterId> ids;
+  ids.reserve(tree_.expanded_count());
+  tree_.for_each_expanded([&](Slot cluster) { ids.push_back(tree_.id(cluster)); });
+  std::sort(ids.begin(), ids.end());
+  return ids;
+}
+
+template <DynamicTriangulation Triangulation>
+bool MultiresolutionModel<Triangulation>::is_expanded(ClusterId cluster) const {
+  const auto place = tree_.find(cluster);
+  return place && tree_.child_slot(*place) != ClusterTree::kNoSlot;
+}
+
+template <DynamicTriangulation Triangulation>
+bool MultiresolutionModel<Triangulation>::can_expand(ClusterId cluster) const {
+  const auto place = tree_.find(cluster);
+  return place && tree_.child_slot(*place) == ClusterTree::kNoSlot;
+}
+
+template <DynamicTriangulation Triangulation>
+void MultiresolutionModel<Triangulation>::children(ClusterId cluster,
+                                                   std::vector<ClusterId>& clusters) const {
+  Slot there = ClusterTree::kRoot;
+  if (cluster != tree_.id(ClusterTree::kRoot)) there = tree_.child_slot(find(cluster));
+  if (there == ClusterTree::kNoSlot) {
+    throw std::invalid_argument(to_string(cluster) + " is not expanded");
+  }
+  clusters.clear();
+  const std::uint32_t count = tree_.child_count(there);
+  for (std::uint32_t i = 0; i < count; ++i) clusters.push_back(tree_.child_id({there, i}));
+}
+
+template <DynamicTriangulation Triangulation>
+VertexId MultiresolutionModel<Triangulation>::head_vertex(ClusterId cluster) const {
+  return tree_.head_vertex(find(cluster));
+}
+
+template <DynamicTriangulation Triangulation>
+const ClusterRecord& MultiresolutionModel<Triangulation>::record(ClusterId cluster) {
+  return tree_.record(find(cluster));
+}
+
+template <DynamicTriangulation Triangulation>
+std::size_t MultiresolutionModel<Triangulation>::memory_bytes() const {
+  return tree_.memory() + owners_.memory() + gone_.capacity() * sizeof(VertexId) +
+         created_.capacity() * sizeof(VertexId) + marks_.capacity() / 8 +
+         inserted_.capacity() * sizeof(inserted_[0]) + stage_.points.capacity() * sizeof(Point) +
+         stage_.heights.capacity() * sizeof(double);
+}
+
+}  // namespace terrace::tri

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <map>
+
+#include <gtest/gtest.h>
+
+#include "multiresolution_hierarchy.hpp"
+#include "terrace/tri/multiresolution_map.hpp"
+#include "terrace/tri/multiresolution_source.hpp"
+
+namespace terrace::tri::test {
+namespace {
+
+TEST(ClusterId, HoldsLevelAndOrdinal) {
+  const std::uint64_t last = (std::uint64_t{1} << 56) - 1;
+  for (const unsigned level : {0u, 1u, 200u, 255u}) {
+    for (const std::uint64_t ordinal : {std::uint64_t{0}, std::uint64_t{77}, last}) {
+      const ClusterId id = cluster_id(level, ordinal);
+      EXPECT_EQ(level_of(id), level);
+      EXPECT_EQ(ordinal_of(id), ordinal);
+    }
+  }
+  EXPECT_EQ(to_string(cluster_id(3, 12)), "cluster 12 of level 3");
+}
+
+TEST(PointId, HigherLevelThenSmallerIdStands) {
+  const PointId coarse{cluster_id(2, 9), 5}, fine{cluster_id(0, 1), 0};
+  EXPECT_TRUE(stands_before(coarse, fine));
+  EXPECT_FALSE(stands_before(fine, coarse));
+  EXPECT_TRUE(stands_before({cluster_id(1, 3), 8}, {cluster_id(1, 4), 0}));
+  EXPECT_TRUE(stands_before({cluster_id(1, 3), 7}, {cluster_id(1, 3), 8}));
+  EXPECT_FALSE(stands_before(coarse, coarse));
+}
+
+TEST(Box, IsClosed) {
+  const Box3 a{{0, 0, 0}, {2, 2, 2}};
+  EXPECT_TRUE(intersects(a, {{2, 2, 2}, {3, 3, 3}}));
+  EXPECT_FALSE(intersects(a, {{2.5, 0, 0}, {3, 2, 2}}));
+  EXPECT_TRUE(intersects(a, box2(1, 1, 1, 1)));
+  EXPECT_FALSE(intersects(a, box2(3, 1, 4, 1)));
+  EXPECT_FALSE(intersects(a, {{1, 1, 3}, {1, 1, 2.5}})) << "an empty box";
+  EXPECT_TRUE(contains(a, a));
+  EXPECT_TRUE(contains(box2(0, 0, 2, 2), a));
+  EXPECT_FALSE(contains(a, box2(0, 0, 1, 1)));
+}
+
+// Against std::map, with ids that differ little, so that runs of places form and dissolve.
+TEST(ClusterMap, BehavesLikeAMap) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    SCOPED_TRACE(testing::Message() << "seed " << seed);
+    std::mt19937_64 random(seed);
+    ClusterMap map;
+    EXPECT_EQ(map.find(cluster_id(0, 0)), nullptr);
+    std::map<ClusterId, std::uint32_t> oracle;
+    const std::size_t range = 10 + below(random, 2000);
+    const double grow = 0.4 + 0.2 * unit(random);
+    for (std::uint32_t step = 0; step < 5000; ++step) {
+      const ClusterId id =
+          cluster_id(static_cast<unsigned>(below(random, 3)), below(random, range) << (seed % 9));
+      if (unit(random) < grow) {
+        map.reserve(map.size() + 1);
+        ASSERT_EQ(map.insert(id, {step, 7}), oracle.emplace(id, step).second);
+      } else if (oracle.erase(id) != 0) {
+        map.erase(id);
+      }
+      ASSERT_EQ(map.size(), oracle.size());
+      const ChildRef* found = map.find(id);
+      ASSERT_EQ(found != nullptr, oracle.count(id) == 1);
+      if (step % 500 != 0) continue;
+      for (const auto& [key, value] : oracle) {
+        ASSERT_NE(map.find(key), nullptr);
+        ASSERT_EQ(*map.find(key), (ChildRef{value, 7}));
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace terrace::tri::test

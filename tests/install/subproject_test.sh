@@ -1,0 +1,63 @@
+#!/bin/sh
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Each library, copied into the subprojects of a stranger's project, is found there by its name,
+# builds without its tests, and links. The stranger has options of the most ordinary names.
+# Usage: subproject_test.sh SOURCE
+set -eu
+source=$1
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
+mkdir "$folder/subprojects"
+
+cat >"$folder/meson_options.txt" <<'OPTIONS'
+option('tests', type : 'boolean', value : true)
+option('bench', type : 'boolean', value : true)
+option('fuzz', type : 'boolean', value : true)
+OPTIONS
+cat >"$folder/meson.build" <<'BUILD'
+project('stranger', 'cpp', default_options : ['cpp_std=c++20'])
+BUILD
+for library in stream cluster matching tri; do
+  mkdir "$folder/subprojects/terrace-$library"
+  (cd "$source/lib$library" && tar -c --exclude './build*' .) | tar -x -C "$folder/subprojects/terrace-$library"
+  cat >>"$folder/meson.build" <<BUILD
+executable('use_$library', 'use_$library.cpp', dependencies : dependency('terrace-$library'))
+BUILD
+done
+cat >"$folder/use_stream.cpp" <<'CODE'
+#include <terrace/stream/source.hpp>
+int main() { return terrace::stream::size_of(terrace::stream::ScalarType::f64) == 8 ? 0 : 1; }
+CODE
+cat >"$folder/use_cluster.cpp" <<'CODE'
+#include <terrace/cluster/block.hpp>
+int main() {
+  terrace::cluster::BlockClustering result;
+  const std::vector<terrace::cluster::Point3> points{{1, 2, 3}};
+  terrace::cluster::BlockClusterer().run(points, {}, {}, result);
+  return result.facilities.size() == 1 ? 0 : 1;
+}
+CODE
+cat >"$folder/use_matching.cpp" <<'CODE'
+#include <terrace/matching/assignment.hpp>
+int main() { return terrace::matching::assign(std::vector<double>{3.0}, 1, 1).cost == 3.0 ? 0 : 1; }
+CODE
+cat >"$folder/use_tri.cpp" <<'CODE'
+#include <terrace/tri/delaunay2.hpp>
+int main() {
+  terrace::tri::Delaunay2<int> triangulation;
+  triangulation.insert({1, 2});
+  return triangulation.vertex_count() == 1 ? 0 : 1;
+}
+CODE
+
+# Unoptimised: what is tested is the building, not the result.
+meson setup "$folder/build" "$folder" --buildtype=plain >"$folder/log" 2>&1 || { cat "$folder/log"; exit 1; }
+ninja -C "$folder/build" use_stream use_cluster use_matching use_tri >"$folder/log" 2>&1 ||
+  { tail -n 50 "$folder/log"; exit 1; }
+if find "$folder/build/subprojects" -name '*_tests' | grep .; then
+  echo 'a subproject built its tests'
+  exit 1
+fi
+for library in stream cluster matching tri; do
+  "$folder/build/use_$library" || { echo "use_$library failed"; exit 1; }
+done

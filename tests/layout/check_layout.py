@@ -1,0 +1,165 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Checks the rules of ARCHITECTURE.md: who may know whom, licences, lists of files.
+
+check_layout.py ROOT    prints one line per breach; exit status 1 if there is one.
+"""
+
+import os
+import re
+import sys
+
+LIBRARIES = ['stream', 'cluster', 'matching', 'tri']
+LICENCES = {
+    'libstream': 'Apache-2.0',
+    'libcluster': 'Apache-2.0',
+    'libmatching': 'Apache-2.0',
+    'libtri': 'GPL-3.0-or-later',
+    'tools': 'GPL-3.0-or-later',
+    'tests': 'GPL-3.0-or-later',
+}
+
+# What may be included where: a pattern of the name, and the folders that may name it. Public headers
+# are stricter still, see check_public_header().
+TESTS = ['tests', 'libstream/tests', 'libcluster/tests', 'libmatching/tests', 'libtri/tests']
+BENCHES = ['tests/bench', 'libstream/bench', 'libcluster/bench', 'libmatching/bench', 'libtri/bench']
+IN_TRI = ['libtri/src', 'libtri/tests', 'libtri/bench', 'libtri/fuzz', 'tests/bench']
+IN_STREAM = ['libstream/src', 'libstream/tests', 'libstream/bench', 'libstream/fuzz']
+RESTRICTED = [
+    (r'CGAL/|boost/|gmp(xx)?\.h|mpfr\.h', IN_TRI),
+    (r'GeographicLib/', ['tools']),
+    (r'tiff(io|io\.hxx|conf|vers)?\.h|png\.h|zlib\.h|zstd\.h|libdeflate\.h', IN_STREAM),
+    (r'lemon/', ['libmatching/src', 'libmatching/tests', 'libmatching/bench']),
+    (r'cuda', ['libcluster/src', 'libcluster/tests', 'libcluster/bench']),
+    (r'CLI/', ['tools']),
+    (r'nlohmann/', ['tools', 'tests'] + IN_STREAM),
+    (r'gtest/|gmock/', TESTS + ['tools']),
+    (r'benchmark/', BENCHES),
+]
+
+INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
+SOURCE_ENDINGS = ('.cpp', '.hpp', '.h', '.cu', '.cpp.in', '.py', '.sh')
+# CUDA kernels and such aside, these folders hold what a Meson list must name, with the ending that
+# the list leaves out.
+LISTED = [('include/terrace/{}', '.hpp', 'src/meson.build', ''),
+          ('tests', '_test.cpp', 'tests/meson.build', ''),
+          ('bench', '_bench.cpp', 'bench/meson.build', '_bench.cpp'),
+          ('fuzz', '_fuzz.cpp', 'fuzz/meson.build', '.cpp'),
+          ('examples', '.cpp', 'examples/meson.build', '.cpp')]
+
+
+def files_below(root, folder):
+    """Paths relative to root; build folders, links and hidden folders are left out."""
+    for path, folders, names in os.walk(os.path.join(root, folder)):
+        folders[:] = sorted(f for f in folders
+                            if not f.startswith(('.', 'build')) and f != '__pycache__')
+        for name in sorted(names):
+            yield os.path.relpath(os.path.join(path, name), root)
+
+
+def below(path, folder):
+    return path.startswith(folder + '/')
+
+
+def read(root, path):
+    with open(os.path.join(root, path), encoding='utf-8') as file:
+        return file.read()
+
+
+def library_of(path):
+    """'tri' for libtri/...; None elsewhere."""
+    room = path.split('/')[0]
+    return room[3:] if room[:3] == 'lib' and room[3:] in LIBRARIES else None
+
+
+def check_include(path, bracket, name):
+    """The breaches of one #include line."""
+    library = library_of(path)
+    if library:
+        for other in LIBRARIES:
+            if other != library and name.startswith(f'terrace/{other}/'):
+                yield f'includes its sibling\'s <{name}>'
+        if bracket == '"':
+            target = os.path.normpath(os.path.join(os.path.dirname(path), name))
+            if target.startswith('..') or not below(target, f'lib{library}'):
+                if '..' in name.split('/'):
+                    yield f'includes "{name}", a file outside its library'
+    for pattern, folders in RESTRICTED:
+        if re.match(pattern, name) and not any(below(path, folder) for folder in folders):
+            yield f'includes <{name}>, which only {", ".join(folders)} may'
+    if library and below(path, f'lib{library}/include'):
+        own = name.startswith(f'terrace/{library}/')
+        if not own and not (bracket == '<' and re.fullmatch(r'[a-z_0-9]+', name)):
+            yield f'is a public header and includes <{name}>; it may use the standard library only'
+
+
+def check_sources(root):
+    for room, licence in LICENCES.items():
+        for path in files_below(root, room):
+            name = os.path.basename(path)
+            if not name.endswith(SOURCE_ENDINGS) and name not in ('meson.build', 'meson_options.txt'):
+                continue
+            lines = read(root, path).split('\n')
+            first = lines[1] if lines[0].startswith('#!') and len(lines) > 1 else lines[0]
+            found = re.search(r'SPDX-License-Identifier: (\S+)', first)
+            if not found:
+                yield f'{path}: has no SPDX line at its head; expected {licence}'
+            elif found.group(1) != licence:
+                yield f'{path}: its SPDX line says {found.group(1)}, not {licence}'
+            if not name.endswith(('.cpp', '.hpp', '.h', '.cu', '.cpp.in')):
+                continue
+            for number, line in enumerate(lines, 1):
+                match = INCLUDE.match(line)
+                if match:
+                    for breach in check_include(path, *match.groups()):
+                        yield f'{path}:{number}: {breach}'
+
+
+def check_meson(root):
+    for library in LIBRARIES:
+        room = f'lib{library}'
+        for path in files_below(root, room):
+            if os.path.basename(path) != 'meson.build':
+                continue
+            for name in re.findall(r"(?:dependency|subproject)\(\s*'([^']+)'", read(root, path)):
+                sibling = name.startswith('terrace') and name != f'terrace-{library}'
+                if sibling or name == 'GeographicLib' or (name in ('gmp', 'mpfr') and library != 'tri'):
+                    yield f'{path}: depends on {name}'
+        for folder, ending, list_path, cut in LISTED:
+            folder = folder.format(library)
+            if not os.path.isdir(os.path.join(root, room, folder)):
+                continue
+            listed = read(root, f'{room}/{list_path}')
+            for name in sorted(os.listdir(os.path.join(root, room, folder))):
+                if name.endswith(ending):
+                    entry = name[:-len(cut)] if cut else name
+                    if f"'{entry}'" not in listed:
+                        yield f'{room}/{folder}/{name}: is not in the list of {room}/{list_path}'
+
+
+def check_rooms(root):
+    for library in LIBRARIES:
+        link = os.path.join(root, 'subprojects', f'terrace-{library}')
+        if not os.path.islink(link) or os.readlink(link) != f'../lib{library}':
+            yield f'subprojects/terrace-{library}: is not a link to ../lib{library}'
+        for name in ('LICENSE', 'README.md', 'meson.build', 'meson_options.txt'):
+            if not os.path.isfile(os.path.join(root, f'lib{library}', name)):
+                yield f'lib{library}/{name}: is missing'
+
+
+def breaches(root):
+    yield from check_rooms(root)
+    yield from check_sources(root)
+    yield from check_meson(root)
+
+
+def main():
+    found = list(breaches(sys.argv[1]))
+    for breach in found:
+        print(breach)
+    print(f'{len(found)} breaches of the layout')
+    return 1 if found else 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

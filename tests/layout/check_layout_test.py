@@ -1,0 +1,89 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The layout check finds every kind of breach, each in a small tree that is sound without it."""
+
+import os
+import tempfile
+import unittest
+
+import check_layout
+
+
+def write(root, path, text):
+    os.makedirs(os.path.dirname(os.path.join(root, path)), exist_ok=True)
+    with open(os.path.join(root, path), 'w', encoding='utf-8') as file:
+        file.write(text)
+
+
+def make_tree(root):
+    os.mkdir(os.path.join(root, 'subprojects'))
+    for library in check_layout.LIBRARIES:
+        room = f'lib{library}'
+        spdx = f'SPDX-License-Identifier: {check_layout.LICENCES[room]}\n'
+        for name in ('LICENSE', 'README.md'):
+            write(root, f'{room}/{name}', 'text\n')
+        for name in ('meson.build', 'meson_options.txt'):
+            write(root, f'{room}/{name}', '# ' + spdx)
+        write(root, f'{room}/src/meson.build', f"# {spdx}names = ['a.hpp']\n")
+        write(root, f'{room}/tests/meson.build', f"# {spdx}files('a_test.cpp')\n")
+        write(root, f'{room}/bench/meson.build', f"# {spdx}names = ['a']\n")
+        write(root, f'{room}/include/terrace/{library}/a.hpp', f'// {spdx}#include <vector>\n')
+        write(root, f'{room}/src/a.cpp', f'// {spdx}#include "terrace/{library}/a.hpp"\n')
+        write(root, f'{room}/tests/a_test.cpp', f'// {spdx}#include <gtest/gtest.h>\n#include "../src/a.hpp"\n')
+        write(root, f'{room}/bench/a_bench.cpp', f'// {spdx}#include <benchmark/benchmark.h>\n')
+        os.symlink(f'../{room}', os.path.join(root, 'subprojects', f'terrace-{library}'))
+    gpl = 'SPDX-License-Identifier: GPL-3.0-or-later\n'
+    write(root, 'tools/src/main.cpp', f'// {gpl}#include <terrace/tri/a.hpp>\n#include <CLI/CLI.hpp>\n')
+    write(root, 'tests/run.sh', f'#!/bin/sh\n# {gpl}')
+
+
+class CheckLayout(unittest.TestCase):
+    def breaches(self, change):
+        with tempfile.TemporaryDirectory() as root:
+            make_tree(root)
+            change(root)
+            return list(check_layout.breaches(root))
+
+    def test_sound_tree_has_none(self):
+        self.assertEqual(self.breaches(lambda root: None), [])
+        # Build folders and what lies in them are nobody's source.
+        self.assertEqual(self.breaches(lambda root: write(root, 'libtri/build-x/a.cpp', '')), [])
+
+    def test_each_breach_is_found(self):
+        apache = '// SPDX-License-Identifier: Apache-2.0\n'
+        gpl = '// SPDX-License-Identifier: GPL-3.0-or-later\n'
+        cases = [
+            ('libcluster/src/b.cpp', apache + '#include "terrace/stream/a.hpp"\n', 'sibling'),
+            ('libtri/tests/b.cpp', gpl + '#  include <terrace/stream/a.hpp>\n', 'sibling'),
+            ('libtri/src/b.cpp', gpl + '#include "../../tools/src/units.hpp"\n', 'outside its library'),
+            ('libtri/include/terrace/tri/a.hpp', gpl + '#include <CGAL/Gmpq.h>\n', 'which only'),
+            ('libtri/include/terrace/tri/a.hpp', gpl + '#include <nlohmann/json.hpp>\n', 'public header'),
+            ('libstream/src/b.cpp', apache + '#include <gmpxx.h>\n', 'which only'),
+            ('tools/src/b.cpp', gpl + '#include <tiffio.h>\n', 'which only'),
+            ('libtri/src/b.cpp', gpl + '#include <GeographicLib/UTMUPS.hpp>\n', 'which only'),
+            ('libcluster/src/b.cpp', apache + '#include <lemon/matching.h>\n', 'which only'),
+            ('libcluster/src/b.cpp', '#include <vector>\n', 'no SPDX line'),
+            ('libcluster/src/b.cpp', gpl, 'not Apache-2.0'),
+            ('libtri/src/b.cpp', apache, 'not GPL-3.0-or-later'),
+            ('tests/b.py', '#!/usr/bin/env python3\n\n# SPDX-License-Identifier: GPL-3.0-or-later\n',
+             'no SPDX line'),
+            ('libtri/include/terrace/tri/b.hpp', gpl, 'is not in the list'),
+            ('libtri/tests/b_test.cpp', gpl, 'is not in the list'),
+            ('libtri/bench/b_bench.cpp', gpl, 'is not in the list'),
+            ('libtri/meson.build', gpl.replace('//', '#') + "dependency('terrace-stream')\n", 'depends on'),
+            ('libcluster/meson.build', apache.replace('//', '#') + "dependency('gmp')\n", 'depends on'),
+        ]
+        for path, text, expected in cases:
+            with self.subTest(path=path, expected=expected):
+                found = self.breaches(lambda root: write(root, path, text))
+                self.assertTrue(any(path in b and expected in b for b in found), found)
+
+    def test_rooms_are_complete(self):
+        found = self.breaches(lambda root: os.remove(os.path.join(root, 'libtri/LICENSE')))
+        self.assertEqual(found, ['libtri/LICENSE: is missing'])
+        found = self.breaches(lambda root: os.remove(os.path.join(root, 'subprojects/terrace-tri')))
+        self.assertEqual(len(found), 1)
+
+
+if __name__ == '__main__':
+    unittest.main()

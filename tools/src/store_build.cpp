@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "store_build.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <utility>
+
+#include <terrace/cluster/hierarchy.hpp>
+#include <terrace/stream/error.hpp>
+#include <terrace/stream/store.hpp>
+
+#include "ground.hpp"
+#include "interrupt.hpp"
+#include "store_sink.hpp"
+#include "units.hpp"
+#include "world.hpp"
+
+namespace terrace::tools {
+namespace {
+
+constexpr std::array<std::pair<const char*, cluster::Effort>, 4> kEfforts{
+    {{"fast", cluster::Effort::fast},
+     {"default", cluster::Effort::standard},
+     {"fine", cluster::Effort::fine},
+     {"full", cluster::Effort::full}}};
+
+stream::Schema schema_of(const stream::SourceInfo& info, const BuildRequest& request) {
+  stream::Schema schema;
+  schema.grid = info.grid;
+  schema.coordinates = info.coordinates;
+  schema.attributes = info.attributes;
+  schema.world = info.world;
+  schema.crs = info.crs;
+  schema.vertical = request.vertical;
+  schema.columns = info.columns;
+  schema.rows = info.rows;
+  schema.format = info.format;
+  schema.parameters = {{"block", std::to_string(request.block_points)},
+                       {"facility_cost", number_text(request.facility_cost)},
+                       {"effort", name_of(request.effort)},
+                       {"z_weight", number_text(request.z_weight)},
+                       {"seed", std::to_string(request.seed)}};
+  return schema;
+}
+
+/// Attribute values of each point side by side, in the order of the schema.
+void pack(const stream::PointBlock& block, std::size_t payload_size,
+          std::vector<std::byte>& payload) {
+  payload.resize(block.size() * payload_size);
+  std::size_t at = 0;
+  for (const stream::Column& column : block.attributes) {
+    const std::size_t size = stream::size_of(column.type);
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      std::memcpy(payload.data() + i * payload_size + at, column.bytes.data() + i * size, size);
+    }
+    at += size;
+  }
+}
+
+/// How the peak resident set is shared out. The estimate of what is fixed is generous; a test holds
+/// the whole to --memory.
+struct MemoryPlan {
+  std::uint64_t source = 0;
+  std::size_t blocks_ahead = 0;
+
+  MemoryPlan(const BuildRequest& request, std::size_t payload_size) {
+    const std::uint64_t point = sizeof(stream::Point3) + payload_size + 64;
+    const std::uint64_t block = request.block_points * point;
+    // Blocks being clustered or waiting their turn, one forming per level, and those that the store
+    // writer holds back to train its tables.
+    const std::uint64_t fixed =
+        (std::uint64_t{48} << 20) + (8 * request.threads + 8) * block +
+        64 * request.block_points * (sizeof(stream::Point3) + payload_size + 16);
+    const std::uint64_t least = fixed + (std::uint64_t{16} << 20);
+    if (request.memory_bytes < least) {
+      throw stream::Error({.file = request.store.string(),
+                           .where = {},
+                           .cause = "--memory " + std::to_string(request.memory_bytes >> 20) +
+                                    "M is not enough: blocks of " +
+                                    std::to_string(request.block_points) + " points on " +
+                                    std::to_string(request.threads) + " threads need " +
+                                    std::to_string((least >> 20) + 1) + "M",
+                           .remedy = "raise --memory or lower --block or --threads"});
+    }
+    blocks_ahead = 4;
+    source = (request.memory_bytes - fixed) / 2;
+  }
+};
+
+std::size_t payload_size(const stream::SourceInfo& info) {
+  std::size_t bytes = 0;
+  for (const stream::Channel& channel : info.attributes) bytes += stream::size_of(channel.type);
+  return bytes;
+}
+
+/// Height of a cell over its width on the ground, in the middle of the raster.
+double cell_aspect(const Ground& ground, const stream::SourceInfo& info) {
+  stream::Box3 raster;
+  raster.include(stream::Point3{0, 0, 0});
+  raster.include(
+      stream::Point3{static_cast<double>(info.columns), static_cast<double>(info.rows), 0});
+  const GroundMap map = ground.map(raster);
+  const auto length = [&map](std::size_t axis) {
+    return std::sqrt(map[axis] * map[axis] + map[3 + axis] * map[3 + axis]);
+  };
+  return length(1) / length(0);
+}
+
+}  // namespace
+
+std::optional<cluster::Effort> effort_of(const std::string& name) {
+  for (const auto& [text, effort] : kEfforts) {
+    if (name == text) return effort;
+  }
+  return std::nullopt;
+}
+
+std::string name_of(cluster::Effort effort) {
+  return kEfforts[static_cast<std::size_t>(effort)].first;
+}
+
+BuildOutcome build_store(const BuildRequest& request, const BuildProgress& progress) {
+  stream::SourceOptions source_options;
+  source_options.format = request.input_format;
+  source_options.block_points = request.block_points;
+  source_options.memory_bytes = request.memory_bytes / 8;
+  source_options.band = request.band;
+  source_options.crs = request.crs;
+  auto source = stream::open_source(request.inputs, source_options);
+  const stream::SourceInfo& info = source->info();
+  const Ground ground(placement_of(info), request.z_weight);
+  BuildOutcome outcome;
+  if (!ground.assumption().empty()) outcome.notes.push_back(ground.assumption());
+  const MemoryPlan memory(request, payload_size(info));
+  if (info.grid) {
+    // Tiles are to be square on the ground: only now is it known what a cell measures there.
+    source_options.cell_aspect = cell_aspect(ground, info);
+    source_options.memory_bytes = memory.source;
+    source = stream::open_source(request.inputs, source_options);
+  }
+  source = stream::read_ahead(std::move(source), memory.blocks_ahead);
+
+  const stream::Schema schema = schema_of(source->info(), request);
+  stream::StoreWriter writer(request.store, schema, request.replace);
+  StoreSink sink(writer);
+  cluster::HierarchyOptions options;
+  options.block_size = request.block_points;
+  options.block.facility_cost = request.facility_cost;
+  options.block.effort = request.effort;
+  options.block.seed = request.seed;
+  options.payload_size = schema.payload_size();
+  options.threads = request.threads;
+  options.ground = [&ground](const cluster::Bounds& bounds) {
+    return ground.map({bounds.min, bounds.max});
+  };
+  cluster::HierarchyBuilder builder(options, sink);
+
+  stream::PointBlock block;
+  std::vector<std::byte> payload;
+  stream::Progress so_far;
+  while (source->next(block)) {
+    pack(block, options.payload_size, payload);
+    builder.push(block.positions, payload);
+    so_far = source->progress();
+    check_interrupt();
+    if (progress) progress(so_far);
+    if (request.most_points != 0 && so_far.points >= request.most_points) break;
+  }
+  so_far = source->progress();
+  if (so_far.points == 0) {
+    throw stream::Error({.file = request.inputs.front(),
+                         .where = {},
+                         .cause = "there is not one point with data in it" +
+                                  (so_far.nodata == 0 ? std::string()
+                                                      : " (" + std::to_string(so_far.nodata) +
+                                                            " cells, all nodata)"),
+                         .remedy = "check the file and its nodata value"});
+  }
+  writer.schema().nodata = so_far.nodata;
+  const cluster::HierarchyResult result = builder.finish();
+  outcome.points = result.points;
+  outcome.nodata = so_far.nodata;
+  outcome.store_bytes = sink.store_bytes();
+  outcome.top = result.top;
+  outcome.level_points = result.level_points;
+  outcome.level_clusters = result.level_clusters;
+  return outcome;
+}
+
+}  // namespace terrace::tools

@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "store_mesh.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include <terrace/stream/error.hpp>
+#include <terrace/tri/multiresolution.hpp>
+
+#include "interrupt.hpp"
+#include "region_overlap.hpp"
+#include "store_source.hpp"
+#include "world.hpp"
+
+namespace terrace::tools {
+namespace {
+
+/// Peak bytes per vertex: the triangulation and its bulk build, the model's bookkeeping, and the
+/// mesh that comes out (vertex, level, two triangles).
+constexpr std::uint64_t kBytesPerVertex = 66 + 20 + 32 + 24 + 4 + 1 + 2 * 12;
+
+/// The box in stored coordinates around a box in the CRS. Heights are left free where `world` is.
+tri::Box3 stored_box(const Placement& placement, const stream::Box3& world) {
+  const std::array<double, 6>& m = placement.world.xy;
+  const double determinant = m[0] * m[4] - m[1] * m[3];
+  stream::Box3 stored;
+  for (unsigned corner = 0; corner < 4; ++corner) {
+    const double x = (corner & 1 ? world.max : world.min)[0] - m[2];
+    const double y = (corner & 2 ? world.max : world.min)[1] - m[5];
+    stored.include(stream::Point3{(m[4] * x - m[1] * y) / determinant,
+                                  (m[0] * y - m[3] * x) / determinant, 0});
+  }
+  const stream::Channel& z = placement.coordinates[2];
+  double low = (world.min[2] - z.offset) / z.scale, high = (world.max[2] - z.offset) / z.scale;
+  if (low > high) std::swap(low, high);
+  // The division rounds: one part in 2^40 outward, so that no point at the border is lost.
+  const auto outward = [](double value, double sign) {
+    return value + sign * (std::abs(value) * 0x1p-40 + 0x1p-40);
+  };
+  return {{outward(stored.min[0], -1), outward(stored.min[1], -1), outward(low, -1)},
+          {outward(stored.max[0], 1), outward(stored.max[1], 1), outward(high, 1)}};
+}
+
+tri::Detail in_stored_coordinates(const Detail& detail, const Placement& placement) {
+  tri::Detail stored;
+  if (detail.region) {
+    stored.focuses.push_back({stored_box(placement, detail.region->box()), detail.level});
+  } else {
+    stored.level = detail.level;
+  }
+  for (const FinerRegion& focus : detail.focuses) {
+    stored.focuses.push_back({stored_box(placement, focus.region.box()), focus.level});
+  }
+  return stored;
+}
+
+/// Counts what `detail` wants from the index alone and refuses what cannot fit.
+void check_memory(const stream::Store& store, const Detail& detail, std::uint64_t memory_bytes) {
+  std::uint64_t points = 0;
+  if (!detail.region && detail.focuses.empty()) {
+    points = store.levels()[detail.level].points;
+  } else {
+    for_each_wanted_record(
+        store, detail,
+        [&](stream::ClusterId, const stream::ClusterRecord& record) { points += record.points; });
+  }
+  constexpr std::uint64_t kMostVertices = (std::uint64_t{1} << 29) - 2;
+  const std::uint64_t needed = points * kBytesPerVertex + (std::uint64_t{32} << 20);
+  if (needed <= memory_bytes && points <= kMostVertices) return;
+  throw stream::Error({.file = store.path().string(),
+                       .where = {},
+                       .cause = "a mesh of " + std::to_string(points) + " points needs " +
+                                std::to_string((needed >> 20) + 1) +
+                                "M of memory, --memory allows " +
+                                std::to_string(memory_bytes >> 20) + "M",
+                       .remedy = "take a coarser --level or a smaller --region"});
+}
+
+template <class Coord>
+TriangleMesh mesh_of_model(const tri::Multiresolution2<Coord>& model, const Placement& placement,
+                           const std::optional<Region>& region) {
+  const auto& triangulation = model.triangulation();
+  const auto position = [&](tri::VertexId v) {
+    const auto p = triangulation.point(v);
+    return world_point(placement,
+                       {static_cast<double>(p[0]), static_cast<double>(p[1]), model.height(v)});
+  };
+  const std::array<double, 6>& m = placement.world.xy;
+  const bool mirrored = m[0] * m[4] - m[1] * m[3] < 0;
+
+  TriangleMesh mesh;
+  constexpr auto kUnused = std::numeric_limits<std::uint32_t>::max();
+  std::vector<std::uint32_t> number(triangulation.vertex_slots(), kUnused);
+  const auto number_of = [&](tri::VertexId v) {
+    std::uint32_t& n = number[tri::slot(v)];
+    if (n == kUnused) {
+      n = static_cast<std::uint32_t>(mesh.positions.size());
+      mesh.positions.push_back(position(v));
+      mesh.levels.push_back(static_cast<std::uint8_t>(model.level(v)));
+    }
+    return n;
+  };
+  if (!region) {
+    mesh.positions.reserve(triangulation.vertex_count());
+    mesh.levels.reserve(triangulation.vertex_count());
+    mesh.triangles.reserve(triangulation.triangle_count());
+    // Points without a triangle (fewer than three, or all on one line) are written all the same.
+    for (const tri::VertexId v : triangulation.all_vertices()) number_of(v);
+  }
+  for (const tri::TriangleId t : triangulation.all_triangles()) {
+    auto corners = triangulation.vertices(t);
+    if (mirrored) std::swap(corners[1], corners[2]);
+    if (region &&
+        !touches(*region, {position(corners[0]), position(corners[1]), position(corners[2])})) {
+      continue;
+    }
+    mesh.triangles.push_back({number_of(corners[0]), number_of(corners[1]), number_of(corners[2])});
+  }
+  return mesh;
+}
+
+template <class Coord>
+TriangleMesh mesh_of(const stream::Store& store, const Detail& detail) {
+  StoreSource source(store);
+  const Placement placement = placement_of(store.schema());
+  const tri::Multiresolution2<Coord> model(source, in_stored_coordinates(detail, placement),
+                                           {.deltas = false});
+  check_interrupt();
+  return mesh_of_model(model, placement, detail.region);
+}
+
+}  // namespace
+
+TriangleMesh mesh_of_store(const stream::Store& store, const Detail& detail,
+                           std::uint64_t memory_bytes) {
+  check_memory(store, detail, memory_bytes);
+  return store.schema().grid ? mesh_of<std::int32_t>(store, detail)
+                             : mesh_of<double>(store, detail);
+}
+
+TriangleMesh points_of_store(const stream::Store& store, const Detail& detail) {
+  const Placement placement = placement_of(store.schema());
+  TriangleMesh cloud;
+  for_each_wanted(store, detail, [&](stream::ClusterId id, const stream::ClusterRecord&,
+                                     const stream::ClusterPoints& points) {
+    check_interrupt();
+    for (const stream::Point3& p : points.positions) {
+      const stream::Point3 place = world_point(placement, p);
+      if (detail.region && !detail.region->contains(place)) continue;
+      cloud.positions.push_back(place);
+      cloud.levels.push_back(static_cast<std::uint8_t>(stream::level_of(id)));
+    }
+  });
+  return cloud;
+}
+
+unsigned level_within(const stream::Store& store, std::uint64_t most_points) {
+  for (const stream::LevelInfo& level : store.levels()) {
+    if (level.points <= most_points) return level.level;
+  }
+  return store.top();
+}
+
+}  // namespace terrace::tools

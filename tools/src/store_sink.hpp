@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include <terrace/cluster/hierarchy.hpp>
+#include <terrace/stream/store.hpp>
+
+namespace terrace::tools {
+
+/// Hands the finished blocks of libcluster's hierarchy builder to libstream's store writer: encoded
+/// on the thread that clustered them, appended in order. The two libraries do not know each other.
+class StoreSink final : public cluster::HierarchySink {
+ public:
+  /// The writer must outlive the sink.
+  explicit StoreSink(stream::StoreWriter& writer) : writer_(writer) {}
+
+  std::unique_ptr<Prepared> prepare(const cluster::FinishedBlock& block) override;
+  void commit(unsigned level, std::unique_ptr<Prepared> prepared) override;
+  /// Finishes the store: it stands under its name when this returns.
+  void root(const cluster::FinishedBlock& block) override;
+
+  /// Bytes of the published store; 0 before root().
+  [[nodiscard]] std::uint64_t store_bytes() const { return store_bytes_; }
+
+ private:
+  stream::StoreWriter& writer_;
+  std::uint64_t store_bytes_ = 0;
+};
+
+}  // namespace terrace::tools

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <cstdint>
+#include <filesystem>
+#include <limits>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "crs.hpp"
+#include "error.hpp"
+#include "store_build.hpp"
+#include "units.hpp"
+#include "verbs.hpp"
+
+namespace terrace::tools {
+namespace {
+
+/// The trial run behind --dry-run reads this many points and scales up.
+constexpr std::uint64_t kTrialPoints = 1'000'000;
+
+class BuildCommand final : public Command {
+ public:
+  void define(CLI::App& app) override {
+    app.add_option("INPUT", request_.inputs,
+                   "rasters (several form a mosaic) or point files; - is standard input")
+        ->required();
+    add_output(app, output_, "the store to write");
+    app.add_option("--input-format", request_.input_format, "instead of telling it by content");
+    app.add_option("--crs", crs_, "EPSG:n, assigned in place of what the source says");
+    app.add_option("--vertical", request_.vertical, "what heights refer to")
+        ->check(CLI::IsMember({"ellipsoidal", "orthometric"}));
+    app.add_option("--band", request_.band, "of rasters, from 1")->check(CLI::PositiveNumber);
+    app.add_option("--block", block_, "most points clustered together")->capture_default_str();
+    app.add_option("--facility-cost", request_.facility_cost,
+                   "times the diagonal of a block: larger makes larger clusters")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    app.add_option("--effort", effort_, "how long to search for good clusters")
+        ->check(CLI::IsMember({"fast", "default", "fine", "full"}))
+        ->capture_default_str();
+    app.add_option("--z-weight", request_.z_weight, "how much heights count in a distance")
+        ->check(CLI::NonNegativeNumber)
+        ->capture_default_str();
+    app.add_flag("--dry-run", dry_run_, "only tell points, disk and time, from a trial");
+    not_yet(app, {"--metric", "--order", "--resume", "--append"});
+  }
+
+  Summary run(const CommonOptions& common) override {
+    request_.store = output_;
+    request_.replace = common.force;
+    request_.effort = *effort_of(effort_);
+    if (!crs_.empty()) request_.crs = parse_crs(crs_);
+    if (block_ < 2 || block_ > 1'000'000) {
+      throw UsageError("--block must be between 2 and 1000000, not " + std::to_string(block_));
+    }
+    request_.block_points = block_;
+    request_.seed = common.seed;
+    request_.threads = common.threads;
+    request_.memory_bytes = common.memory_or(kStreamingMemory);
+    if (output_ == "-") throw UsageError("a store is a folder: it cannot go to standard output");
+    return dry_run_ ? estimate(common) : build(common);
+  }
+
+ private:
+  Summary build(const CommonOptions& common) {
+    const Stopwatch watch;
+    BuildOutcome outcome;
+    {
+      ProgressMeter meter(common.progress, "points");
+      outcome = build_store(request_, [&meter](const stream::Progress& progress) {
+        meter.update(progress.points, progress.fraction);
+      });
+    }
+    for (const std::string& note : outcome.notes) common.say(note);
+    const double seconds = watch.seconds();
+    const double rate = static_cast<double>(outcome.points) / seconds;
+    Summary summary;
+    summary.json = {{"points", outcome.points},
+                    {"nodata", outcome.nodata},
+                    {"seconds", seconds},
+                    {"points_per_second", rate},
+                    {"peak_rss_bytes", peak_rss_bytes()},
+                    {"store_bytes", outcome.store_bytes},
+                    {"levels", outcome.top + 1}};
+    summary.text = with_commas(outcome.points) + " points (" + with_commas(outcome.nodata) +
+                   " cells without data left out) in " + readable_seconds(seconds) + ", " +
+                   readable_rate(rate) + "\n" + output_ + ": " + std::to_string(outcome.top + 1) +
+                   " levels, " + readable_bytes(outcome.store_bytes) + ", peak memory " +
+                   readable_bytes(peak_rss_bytes()) + "\n";
+    return summary;
+  }
+
+  /// Builds a store of the first points beside the target, weighs it and removes it.
+  Summary estimate(const CommonOptions& common) {
+    const auto source = stream::open_source(request_.inputs, {.format = request_.input_format});
+    const stream::SourceInfo& info = source->info();
+    const std::filesystem::path target = request_.store;
+    request_.store = target.string() + ".dry-run-" + std::to_string(common.seed);
+    request_.replace = true;
+    request_.most_points = kTrialPoints;
+    const Stopwatch watch;
+    const BuildOutcome trial = build_store(request_);
+    const double seconds = watch.seconds();
+    std::filesystem::remove_all(request_.store);
+
+    // A raster's number of valid cells is not known before it is read: the trial's share is taken.
+    const double valid =
+        static_cast<double>(trial.points) /
+        static_cast<double>(std::max<std::uint64_t>(1, trial.points + trial.nodata));
+    double points =
+        info.points ? static_cast<double>(*info.points) * (info.grid ? valid : 1.0) : -1.0;
+    const bool whole = trial.points < kTrialPoints;
+    if (whole) points = static_cast<double>(trial.points);
+    const double scale = points / static_cast<double>(trial.points);
+    Summary summary;
+    if (points < 0) {
+      summary.json = {{"points", nullptr}, {"store_bytes", nullptr}, {"seconds", nullptr}};
+      summary.text =
+          "the number of points is not known before the end of the input; a million take " +
+          readable_seconds(seconds) + " and " + readable_bytes(trial.store_bytes) + "\n";
+    } else {
+      const auto bytes = static_cast<std::uint64_t>(static_cast<double>(trial.store_bytes) * scale);
+      summary.json = {{"points", static_cast<std::uint64_t>(points)},
+                      {"store_bytes", bytes},
+                      {"seconds", seconds * scale}};
+      summary.text = "about " + with_commas(static_cast<std::uint64_t>(points)) + " points, " +
+                     readable_bytes(bytes) + " of disk, " + readable_seconds(seconds * scale) +
+                     "; nothing was written\n";
+    }
+    return summary;
+  }
+
+  BuildRequest request_;
+  std::string output_, crs_, effort_ = "default";
+  std::uint64_t block_ = 10000;
+  bool dry_run_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_build() { return std::make_unique<BuildCommand>(); }
+
+}  // namespace terrace::tools

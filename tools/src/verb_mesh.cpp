@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <terrace/stream/mesh_writer.hpp>
+#include <terrace/stream/store.hpp>
+
+#include "detail.hpp"
+#include "output.hpp"
+#include "store_mesh.hpp"
+#include "units.hpp"
+#include "verbs.hpp"
+
+namespace terrace::tools {
+namespace {
+
+class MeshCommand final : public Command {
+ public:
+  void define(CLI::App& app) override {
+    app.add_option("STORE", store_, "where the points come from")->required();
+    add_output(app, output_, "the file to write: .ply, .obj, .glb");
+    app.add_option("--format", format_, "ply, ply-ascii, obj, glb; else by the file's ending");
+    app.add_option("--level", level_, "detail outside the focuses: a number or top")
+        ->capture_default_str();
+    app.add_option("--region", region_,
+                   "only triangles that reach inside: minx,miny,maxx,maxy or a GeoJSON file");
+    app.add_option("--focus", focuses_, "BOX:L, all points of level L inside the box; repeatable")
+        ->allow_extra_args(false);
+    not_yet(app, {"--max-error", "--quality", "--max-points", "--duplicates", "--fill", "--metric",
+                  "--smooth", "--overlay", "--base", "--region-crs", "--to-crs"});
+  }
+
+  Summary run(const CommonOptions& common) override {
+    const Stopwatch watch;
+    const stream::Store store = stream::Store::open(store_);
+    const Detail detail = Detail::parse(store, level_, region_, focuses_);
+    const bool replace = may_replace(output_, common.force);
+    const TriangleMesh mesh =
+        mesh_of_store(store, detail, common.memory_or(machine_memory_bytes() / 2));
+    write(mesh, replace);
+
+    Summary summary;
+    summary.json = {{"vertices", mesh.positions.size()},
+                    {"triangles", mesh.triangles.size()},
+                    {"seconds", watch.seconds()},
+                    {"peak_rss_bytes", peak_rss_bytes()}};
+    summary.text = output_ + ": " + with_commas(mesh.positions.size()) + " vertices, " +
+                   with_commas(mesh.triangles.size()) + " triangles in " +
+                   readable_seconds(watch.seconds()) + "\n";
+    return summary;
+  }
+
+ private:
+  void write(const TriangleMesh& mesh, bool replace) const {
+    constexpr std::size_t kPiece = 65536;
+    stream::Box3 bounds;
+    for (const stream::Point3& p : mesh.positions) bounds.include(p);
+    const auto writer =
+        stream::open_mesh_writer(output_,
+                                 {.vertices = mesh.positions.size(),
+                                  .triangles = mesh.triangles.size(),
+                                  .attributes = {"level"},
+                                  .comments = {},
+                                  .bounds = bounds.empty() ? std::nullopt : std::optional(bounds)},
+                                 {.format = format_, .replace = replace});
+    std::vector<float> levels;
+    const std::span vertices(mesh.positions);
+    for (std::size_t at = 0; at < vertices.size(); at += kPiece) {
+      const std::size_t count = std::min(kPiece, vertices.size() - at);
+      levels.assign(mesh.levels.begin() + static_cast<std::ptrdiff_t>(at),
+                    mesh.levels.begin() + static_cast<std::ptrdiff_t>(at + count));
+      writer->add_vertices(vertices.subspan(at, count), levels);
+    }
+    writer->add_triangles(mesh.triangles);
+    writer->finish();
+  }
+
+  std::string store_, output_, format_, level_ = "0", region_;
+  std::vector<std::string> focuses_;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_mesh() { return std::make_unique<MeshCommand>(); }
+
+}  // namespace terrace::tools

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <cstddef>
+#include <cstring>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <terrace/stream/point_writer.hpp>
+#include <terrace/stream/store.hpp>
+
+#include "detail.hpp"
+#include "interrupt.hpp"
+#include "output.hpp"
+#include "units.hpp"
+#include "verbs.hpp"
+#include "world.hpp"
+
+namespace terrace::tools {
+namespace {
+
+/// Points inside the wanted part, on their way to the writer. A point comes back if its level is
+/// wanted where it lies: with a region, only what is inside it or inside a focus.
+class PointOutput {
+ public:
+  PointOutput(const stream::Store& store, const Detail& detail, stream::PointWriter& writer)
+      : schema_(store.schema()),
+        placement_(placement_of(schema_)),
+        detail_(detail),
+        writer_(writer) {
+    for (const stream::Channel& channel : schema_.attributes) {
+      stream::Column column;
+      column.type = channel.type;
+      block_.attributes.push_back(std::move(column));
+    }
+  }
+
+  void add(const stream::ClusterPoints& points) {
+    check_interrupt();
+    const std::size_t payload = schema_.payload_size();
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const stream::Point3 p = world_point(placement_, points.positions[i]);
+      if (!inside(p)) continue;
+      block_.positions.push_back(p);
+      const std::byte* values = points.payload.data() + i * payload;
+      for (stream::Column& column : block_.attributes) {
+        const std::size_t size = stream::size_of(column.type);
+        column.bytes.insert(column.bytes.end(), values, values + size);
+        values += size;
+      }
+    }
+    if (block_.size() >= kPointsPerBlock) flush();
+  }
+
+  void flush() {
+    if (!block_.empty()) writer_.append(block_);
+    block_.clear();
+  }
+
+ private:
+  static constexpr std::size_t kPointsPerBlock = 65536;
+
+  [[nodiscard]] bool inside(const stream::Point3& p) const {
+    if (!detail_.region || detail_.region->contains(p)) return true;
+    for (const FinerRegion& focus : detail_.focuses) {
+      if (focus.region.contains(p)) return true;
+    }
+    return false;
+  }
+
+  const stream::Schema& schema_;
+  Placement placement_;
+  const Detail& detail_;
+  stream::PointWriter& writer_;
+  stream::PointBlock block_;
+};
+
+class PointsCommand final : public Command {
+ public:
+  void define(CLI::App& app) override {
+    app.add_option("STORE", store_, "where the points come from")->required();
+    add_output(app, output_, "the file to write: .xyz, .csv, .ply; - is standard output");
+    app.add_option("--format", format_, "xyz, csv, ply, ply-ascii; else by the file's ending");
+    app.add_option("--level", level_, "points of this level and above: a number or top")
+        ->capture_default_str();
+    app.add_option("--region", region_,
+                   "only points inside: minx,miny,maxx,maxy or a GeoJSON file");
+    app.add_option("--focus", focuses_,
+                   "BOX:L, points of level L and above inside the box; repeatable")
+        ->allow_extra_args(false);
+    not_yet(app, {"--max-points", "--region-crs", "--to-crs", "--overlay"});
+  }
+
+  Summary run(const CommonOptions& common) override {
+    const Stopwatch watch;
+    const stream::Store store = stream::Store::open(store_);
+    const Detail detail = Detail::parse(store, level_, region_, focuses_);
+    const auto writer = stream::open_point_writer(
+        output_, {.attributes = store.schema().attributes, .comments = {}},
+        {.format = format_, .replace = may_replace(output_, common.force)});
+    PointOutput output(store, detail, *writer);
+    for_each_wanted(store, detail,
+                    [&output](stream::ClusterId, const stream::ClusterRecord&,
+                              const stream::ClusterPoints& points) { output.add(points); });
+    output.flush();
+    const std::uint64_t points = writer->points();
+    writer->finish();
+
+    Summary summary;
+    summary.json = {{"vertices", points},
+                    {"triangles", 0},
+                    {"seconds", watch.seconds()},
+                    {"peak_rss_bytes", peak_rss_bytes()}};
+    summary.text = output_ + ": " + with_commas(points) + " points in " +
+                   readable_seconds(watch.seconds()) + "\n";
+    return summary;
+  }
+
+ private:
+  std::string store_, output_, format_, level_ = "0", region_;
+  std::vector<std::string> focuses_;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_points() { return std::make_unique<PointsCommand>(); }
+
+}  // namespace terrace::tools
