@@ -1,2 +1,259 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "terrace/tri/delaunay2.hpp"
+
+#include <cassert>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "delaunay2/access.hpp"
+#include "delaunay2/build.hpp"
+#include "delaunay2/insert.hpp"
+#include "delaunay2/query.hpp"
+#include "delaunay2/remove.hpp"
+#include "delaunay2/take_changes.hpp"
+
+namespace terrace::tri {
+namespace {
+
+using planar::kMaxVertices;
+using planar::kNone;
+
+template <class Kernel, class Point>
+void check_points(std::span<const Point> points) {
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (Kernel::valid(points[i])) continue;
+    const bool integers = std::is_same_v<Kernel, planar::IntKernel>;
+    throw std::invalid_argument(
+        "point " + std::to_string(i) + ": coordinates " + std::to_string(points[i][0]) + ", " +
+        std::to_string(points[i][1]) +
+        (integers ? " are not in the range 0 <= c < 2^30; move or scale the points"
+                  : " are not finite; leave such points out"));
+  }
+}
+
+void check_count(std::size_t present, std::size_t added) {
+  if (added > kMaxVertices - present)
+    throw std::length_error("a triangulation holds at most 2^29 - 2 vertices; " +
+                            std::to_string(present) + " are there and " + std::to_string(added) +
+                            " were to be added");
+}
+
+/// Coordinates of the lines of a grid; throws where they would be rounded or out of range.
+template <class Kernel, class Coord>
+std::vector<Coord> grid_lines(Coord begin, Coord step, std::uint32_t count, const char* axis) {
+  std::vector<Coord> lines(count);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    bool exact = false;
+    if constexpr (std::is_same_v<Coord, double>) {
+      const double offset = i * step;
+      lines[i] = begin + offset;
+      // x + y is exact if and only if both are recovered from it.
+      exact = Kernel::valid({lines[i], lines[i]}) && offset / step == i &&
+              lines[i] - begin == offset && lines[i] - offset == begin &&
+              std::fma(static_cast<double>(i), step, -offset) == 0;
+    } else {
+      const std::int64_t value = begin + std::int64_t{step} * i;
+      exact = value >= 0 && value < Kernel::kLimit;
+      if (exact) lines[i] = static_cast<Coord>(value);
+    }
+    if (!exact)
+      throw std::invalid_argument("grid: " + std::string(axis) + " of line " + std::to_string(i) +
+                                  " is out of range or not exact; use build()");
+  }
+  return lines;
+}
+
+}  // namespace
+
+template <class Coord>
+Delaunay2<Coord>::Delaunay2() : impl_(std::make_unique<Impl>()) {}
+template <class Coord>
+Delaunay2<Coord>::~Delaunay2() = default;
+template <class Coord>
+Delaunay2<Coord>::Delaunay2(Delaunay2&&) noexcept = default;
+template <class Coord>
+Delaunay2<Coord>& Delaunay2<Coord>::operator=(Delaunay2&&) noexcept = default;
+
+template <class Coord>
+std::vector<VertexId> Delaunay2<Coord>::build(std::span<const Point> points) {
+  assert(vertex_count() == 0);
+  check_count(0, points.size());
+  check_points<typename Impl::Kernel>(points);
+  return planar::build(impl_->mesh, points);
+}
+
+template <class Coord>
+VertexId Delaunay2<Coord>::build_grid(Coord x0, Coord y0, Coord step, std::uint32_t columns,
+                                      std::uint32_t rows) {
+  using Kernel = typename Impl::Kernel;
+  assert(vertex_count() == 0);
+  if (!(step > 0)) throw std::invalid_argument("grid: step must be positive");
+  if (rows > 0 && columns > kMaxVertices / rows) check_count(0, std::size_t{columns} * rows);
+  const std::vector<Coord> xs = grid_lines<Kernel>(x0, step, columns, "x");
+  const std::vector<Coord> ys = grid_lines<Kernel>(y0, step, rows, "y");
+  return VertexId{planar::build_grid<Kernel>(impl_->mesh, xs, ys)};
+}
+
+template <class Coord>
+auto Delaunay2<Coord>::insert(const Point& point, VertexId hint) -> Insertion {
+  assert(hint == kNoVertex || alive(hint));
+  check_count(impl_->mesh.vertex_count, 1);
+  check_points<typename Impl::Kernel>(std::span(&point, 1));
+  const planar::Inserted inserted = planar::insert_point(impl_->mesh, point, slot(hint));
+  return {VertexId{inserted.vertex}, inserted.created};
+}
+
+template <class Coord>
+void Delaunay2<Coord>::insert(std::span<const Point> points, std::span<Insertion> results,
+                              VertexId hint) {
+  assert(hint == kNoVertex || alive(hint));
+  assert(results.empty() || results.size() == points.size());
+  check_count(impl_->mesh.vertex_count, points.size());
+  check_points<typename Impl::Kernel>(points);
+  std::uint32_t near = slot(hint);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const planar::Inserted inserted = planar::insert_point(impl_->mesh, points[i], near);
+    near = inserted.vertex;
+    if (!results.empty()) results[i] = {VertexId{near}, inserted.created};
+  }
+}
+
+template <class Coord>
+void Delaunay2<Coord>::remove(VertexId vertex) {
+  assert(alive(vertex));
+  planar::remove_vertex(impl_->mesh, slot(vertex));
+}
+
+template <class Coord>
+void Delaunay2<Coord>::remove(std::span<const VertexId> vertices) {
+  impl_->set.clear();
+  for (const VertexId vertex : vertices) {
+    assert(alive(vertex));
+    impl_->set.push_back(slot(vertex));
+  }
+  planar::remove_set(impl_->mesh, std::span<const std::uint32_t>(impl_->set));
+}
+
+template <class Coord>
+void Delaunay2<Coord>::clear() {
+  impl_->mesh.clear();
+}
+
+template <class Coord>
+void Delaunay2<Coord>::reserve(std::size_t vertices) {
+  check_count(0, vertices);
+  impl_->mesh.point.reserve(vertices + 1);
+  impl_->mesh.incident.reserve(vertices + 1);
+  impl_->mesh.triangle.reserve(2 * vertices);
+}
+
+template <class Coord>
+std::size_t Delaunay2<Coord>::vertex_count() const {
+  return impl_->mesh.vertex_count;
+}
+
+template <class Coord>
+std::size_t Delaunay2<Coord>::triangle_count() const {
+  const auto& mesh = impl_->mesh;
+  if (mesh.flat) return 0;
+  // Of 2 n - 2 triangles, as many are ghosts as there are hull edges.
+  return 2 * std::size_t{mesh.vertex_count} - 2 - planar::degree(mesh, planar::kGhost);
+}
+
+template <class Coord>
+auto Delaunay2<Coord>::point(VertexId vertex) const -> Point {
+  assert(alive(vertex));
+  return impl_->mesh.point[slot(vertex)];
+}
+
+template <class Coord>
+std::array<VertexId, 3> Delaunay2<Coord>::vertices(TriangleId triangle) const {
+  assert(alive(triangle));
+  const auto& [a, b, c] = impl_->mesh.triangle[slot(triangle)].corner;
+  return {VertexId{a}, VertexId{b}, VertexId{c}};
+}
+
+template <class Coord>
+std::array<TriangleId, 3> Delaunay2<Coord>::neighbours(TriangleId triangle) const {
+  assert(alive(triangle));
+  std::array<TriangleId, 3> result;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::uint32_t t = planar::triangle_of(impl_->mesh.triangle[slot(triangle)].mate[i]);
+    result[i] = impl_->mesh.triangle_alive(t) ? TriangleId{t} : kNoTriangle;
+  }
+  return result;
+}
+
+template <class Coord>
+TriangleId Delaunay2<Coord>::triangle_at(VertexId vertex) const {
+  assert(alive(vertex));
+  const auto& mesh = impl_->mesh;
+  return mesh.flat ? kNoTriangle : TriangleId{mesh.finite_side(mesh.incident[slot(vertex)])};
+}
+
+template <class Coord>
+void Delaunay2<Coord>::adjacent(VertexId vertex, std::vector<VertexId>& result) const {
+  assert(alive(vertex));
+  planar::adjacent(impl_->mesh, slot(vertex), result);
+}
+
+template <class Coord>
+std::uint32_t Delaunay2<Coord>::vertex_slots() const {
+  return impl_->mesh.point.size();
+}
+template <class Coord>
+std::uint32_t Delaunay2<Coord>::triangle_slots() const {
+  return impl_->mesh.triangle.size();
+}
+template <class Coord>
+bool Delaunay2<Coord>::alive(VertexId vertex) const {
+  return impl_->mesh.vertex_alive(slot(vertex));
+}
+template <class Coord>
+bool Delaunay2<Coord>::alive(TriangleId triangle) const {
+  return impl_->mesh.triangle_alive(slot(triangle));
+}
+
+template <class Coord>
+Location Delaunay2<Coord>::locate(const Point& point, VertexId hint) const {
+  assert(hint == kNoVertex || alive(hint));
+  check_points<typename Impl::Kernel>(std::span(&point, 1));
+  return planar::locate(impl_->mesh, point, slot(hint));
+}
+
+template <class Coord>
+VertexId Delaunay2<Coord>::nearest(const Point& point, VertexId hint) const {
+  assert(hint == kNoVertex || alive(hint));
+  check_points<typename Impl::Kernel>(std::span(&point, 1));
+  return VertexId{planar::nearest(impl_->mesh, point, slot(hint))};
+}
+
+template <class Coord>
+std::uint64_t Delaunay2<Coord>::hash() const {
+  return planar::hash(impl_->mesh);
+}
+
+template <class Coord>
+std::size_t Delaunay2<Coord>::memory_bytes() const {
+  return impl_->mesh.bytes() + impl_->set.capacity() * sizeof(std::uint32_t);
+}
+
+template <class Coord>
+void Delaunay2<Coord>::start_journal() {
+  impl_->mesh.journal.start();
+}
+template <class Coord>
+void Delaunay2<Coord>::stop_journal() {
+  impl_->mesh.journal.stop();
+}
+template <class Coord>
+void Delaunay2<Coord>::take_changes(Changes& changes) {
+  assert(impl_->mesh.journal.on());
+  planar::take_changes<Coord>(impl_->mesh, changes);
+}
+
+template class Delaunay2<std::int32_t>;
+template class Delaunay2<double>;
+
+}  // namespace terrace::tri

@@ -96,7 +96,11 @@ const ClusterRecord& ClusterTree::record(ChildRef child) {
 ClusterTree::Plan ClusterTree::plan(const Judge& judge, const Take& take) {
   Plan result;
   std::vector<Slot> above{kRoot}, here;
-  std::vector<ChildRef> wanted;
+  struct Wanted {
+    ChildRef child;
+    bool children_too;
+  };
+  std::vector<Wanted> wanted;
   std::vector<ClusterId> ids;
   try {
     for (unsigned level = top(); level-- > 0 && !above.empty(); above.swap(here)) {
@@ -109,18 +113,20 @@ ClusterTree::Plan ClusterTree::plan(const Judge& judge, const Take& take) {
           const ChildRef child{parent, i};
           const Slot present = child_slot(child);
           const bool expanded = present != kNoSlot;
-          switch (judge(child, level, expanded)) {
+          const Verdict verdict = judge(child, level, expanded);
+          switch (verdict) {
             case Verdict::keep:
               break;
             case Verdict::visit:
               if (expanded) here.push_back(present);
               break;
             case Verdict::expand:
-              if (expanded) {
-                here.push_back(present);
-              } else {
-                wanted.push_back(child);
+            case Verdict::expand_alone:
+              if (!expanded) {
+                wanted.push_back({child, verdict == Verdict::expand});
                 ids.push_back(child_id(child));
+              } else if (verdict == Verdict::expand || has_expanded_children(present)) {
+                here.push_back(present);
               }
               break;
             case Verdict::collapse:
@@ -132,8 +138,8 @@ ClusterTree::Plan ClusterTree::plan(const Judge& judge, const Take& take) {
       if (!ids.empty()) source_->announce(ids);
       for (std::size_t i = 0; i < ids.size(); ++i) {
         result.staged.push_back(kNoSlot);  // the place first: what is staged must be known
-        result.staged.back() = stage(ids[i], wanted[i], take);
-        here.push_back(result.staged.back());
+        result.staged.back() = stage(ids[i], wanted[i].child, take);
+        if (wanted[i].children_too) here.push_back(result.staged.back());
       }
     }
   } catch (...) {
@@ -168,7 +174,7 @@ void ClusterTree::read_root(const Take& take) {
 
 void ClusterTree::append_below(Slot slot, std::vector<Slot>& out) const {
   const Cluster& cluster = clusters_[slot];
-  if (cluster.inner && cluster.inner->expanded != 0) {
+  if (has_expanded_children(slot)) {
     for (const Slot child : cluster.inner->children) {
       if (child != kNoSlot) append_below(child, out);
     }

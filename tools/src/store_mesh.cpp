@@ -98,14 +98,14 @@ TriangleMesh mesh_of_model(const tri::Multiresolution2<Coord>& model, const Plac
   const auto number_of = [&](tri::VertexId v) {
     std::uint32_t& n = number[tri::slot(v)];
     if (n == kUnused) {
-      n = static_cast<std::uint32_t>(mesh.vertices.size());
-      mesh.vertices.push_back(position(v));
+      n = static_cast<std::uint32_t>(mesh.positions.size());
+      mesh.positions.push_back(position(v));
       mesh.levels.push_back(static_cast<std::uint8_t>(model.level(v)));
     }
     return n;
   };
   if (!region) {
-    mesh.vertices.reserve(triangulation.vertex_count());
+    mesh.positions.reserve(triangulation.vertex_count());
     mesh.levels.reserve(triangulation.vertex_count());
     mesh.triangles.reserve(triangulation.triangle_count());
     // Points without a triangle (fewer than three, or all on one line) are written all the same.
@@ -140,6 +140,29 @@ TriangleMesh mesh_of_store(const stream::Store& store, const Detail& detail,
   check_memory(store, detail, memory_bytes);
   return store.schema().grid ? mesh_of<std::int32_t>(store, detail)
                              : mesh_of<double>(store, detail);
+}
+
+TriangleMesh points_of_store(const stream::Store& store, const Detail& detail) {
+  const Placement placement = placement_of(store.schema());
+  TriangleMesh cloud;
+  for_each_wanted(store, detail, [&](stream::ClusterId id, const stream::ClusterRecord&,
+                                     const stream::ClusterPoints& points) {
+    check_interrupt();
+    for (const stream::Point3& p : points.positions) {
+      const stream::Point3 place = world_point(placement, p);
+      if (detail.region && !detail.region->contains(place)) continue;
+      cloud.positions.push_back(place);
+      cloud.levels.push_back(static_cast<std::uint8_t>(stream::level_of(id)));
+    }
+  });
+  return cloud;
+}
+
+unsigned level_within(const stream::Store& store, std::uint64_t most_points) {
+  for (const stream::LevelInfo& level : store.levels()) {
+    if (level.points <= most_points) return level.level;
+  }
+  return store.top();
 }
 
 }  // namespace terrace::tools

@@ -45,11 +45,11 @@ class MeshCommand final : public Command {
     write(mesh, replace);
 
     Summary summary;
-    summary.json = {{"vertices", mesh.vertices.size()},
+    summary.json = {{"vertices", mesh.positions.size()},
                     {"triangles", mesh.triangles.size()},
                     {"seconds", watch.seconds()},
                     {"peak_rss_bytes", peak_rss_bytes()}};
-    summary.text = output_ + ": " + with_commas(mesh.vertices.size()) + " vertices, " +
+    summary.text = output_ + ": " + with_commas(mesh.positions.size()) + " vertices, " +
                    with_commas(mesh.triangles.size()) + " triangles in " +
                    readable_seconds(watch.seconds()) + "\n";
     return summary;
@@ -59,17 +59,17 @@ class MeshCommand final : public Command {
   void write(const TriangleMesh& mesh, bool replace) const {
     constexpr std::size_t kPiece = 65536;
     stream::Box3 bounds;
-    for (const stream::Point3& p : mesh.vertices) bounds.include(p);
+    for (const stream::Point3& p : mesh.positions) bounds.include(p);
     const auto writer =
         stream::open_mesh_writer(output_,
-                                 {.vertices = mesh.vertices.size(),
+                                 {.vertices = mesh.positions.size(),
                                   .triangles = mesh.triangles.size(),
                                   .attributes = {"level"},
                                   .comments = {},
                                   .bounds = bounds.empty() ? std::nullopt : std::optional(bounds)},
                                  {.format = format_, .replace = replace});
     std::vector<float> levels;
-    const std::span vertices(mesh.vertices);
+    const std::span vertices(mesh.positions);
     for (std::size_t at = 0; at < vertices.size(); at += kPiece) {
       const std::size_t count = std::min(kPiece, vertices.size() - at);
       levels.assign(mesh.levels.begin() + static_cast<std::ptrdiff_t>(at),

@@ -190,6 +190,7 @@ class MultiresolutionModel {
   Delta delta_;
   Stage stage_;
   std::vector<VertexId> created_;                            // in a step that also collapses
+  std::vector<bool> marks_;                                  // scratch of finish_delta(), all false
   std::vector<VertexId> gone_;                               // scratch of remove_cluster()
   std::vector<typename Triangulation::Insertion> inserted_;  // scratch of insert_clusters()
 };

@@ -95,13 +95,14 @@ auto MultiresolutionModel<Triangulation>::change_region(const Box3& region, unsi
 template <DynamicTriangulation Triangulation>
 ClusterTree::Judge MultiresolutionModel<Triangulation>::judge(const Detail& detail) {
   return [this, &detail](ChildRef child, unsigned child_level, bool) {
-    if (child_level >= detail.level) return Verdict::expand;
+    if (child_level > detail.level) return Verdict::expand;
+    Verdict verdict = child_level == detail.level ? Verdict::expand_alone : Verdict::collapse;
     for (const Focus& focus : detail.focuses) {
-      if (child_level >= focus.level && intersects(focus.box, tree_.record(child).box)) {
-        return Verdict::expand;
-      }
+      if (child_level < focus.level || !intersects(focus.box, tree_.record(child).box)) continue;
+      if (child_level > focus.level) return Verdict::expand;
+      verdict = Verdict::expand_alone;
     }
-    return Verdict::collapse;
+    return verdict;
   };
 }
 
@@ -230,15 +231,21 @@ void MultiresolutionModel<Triangulation>::finish_delta() {
     reassigned.insert(reassigned.end(), created_.begin(), created_.end());
   }
   if (reassigned.empty()) return;
-  std::sort(reassigned.begin(), reassigned.end());
-  reassigned.erase(std::unique(reassigned.begin(), reassigned.end()), reassigned.end());
-  // Only those that stayed are meant.
-  std::vector<VertexId> others(added.begin(), added.end());
-  others.insert(others.end(), removed.begin(), removed.end());
-  std::sort(others.begin(), others.end());
+  // Only those that stayed are meant, each once.
+  marks_.resize(owners_.slots());
+  const auto mark = [&](const auto& vertices, bool value) {
+    for (const VertexId vertex : vertices) marks_[static_cast<std::uint32_t>(vertex)] = value;
+  };
+  mark(added, true);
+  mark(removed, true);
   std::erase_if(reassigned, [&](VertexId vertex) {
-    return std::binary_search(others.begin(), others.end(), vertex);
+    const bool other = marks_[static_cast<std::uint32_t>(vertex)];
+    marks_[static_cast<std::uint32_t>(vertex)] = true;
+    return other;
   });
+  mark(added, false);
+  mark(removed, false);
+  mark(reassigned, false);
 }
 
 template <DynamicTriangulation Triangulation>
@@ -317,6 +324,7 @@ const ClusterRecord& MultiresolutionModel<Triangulation>::record(ClusterId clust
 template <DynamicTriangulation Triangulation>
 std::size_t MultiresolutionModel<Triangulation>::memory_bytes() const {
   return tree_.memory() + owners_.memory() + gone_.capacity() * sizeof(VertexId) +
+         created_.capacity() * sizeof(VertexId) + marks_.capacity() / 8 +
          inserted_.capacity() * sizeof(inserted_[0]) + stage_.points.capacity() * sizeof(Point) +
          stage_.heights.capacity() * sizeof(double);
 }

@@ -32,6 +32,8 @@ class VertexOwners {
   };
 
   void reserve(std::size_t vertex_slots);
+  /// All vertices seen so far are below.
+  [[nodiscard]] std::size_t slots() const { return standing_.size(); }
 
   Change add(VertexId vertex, Owner owner, double height, const ClusterTree& tree) {
     const std::size_t at = static_cast<std::uint32_t>(vertex);

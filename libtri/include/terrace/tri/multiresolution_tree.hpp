@@ -75,10 +75,11 @@ class ClusterTree {
 
   /// What a plan does with a child of an expanded cluster.
   enum class Verdict {
-    keep,     ///< leave it and all below it as it is
-    visit,    ///< leave it, but look at its children if it is expanded
-    expand,   ///< expand it, if it is not, and look at its children
-    collapse  ///< collapse it, if it is expanded, and with it all below
+    keep,          ///< leave it and all below it as it is
+    visit,         ///< leave it, but look at its children if it is expanded
+    expand,        ///< expand it, if it is not, and look at its children
+    expand_alone,  ///< the same, but none of its children is wanted expanded
+    collapse       ///< collapse it, if it is expanded, and with it all below
   };
   using Judge = std::function<Verdict(ChildRef, unsigned level, bool expanded)>;
   /// Receives the positions of a staged cluster, before the next is read. May throw.
@@ -126,6 +127,9 @@ class ClusterTree {
     std::unique_ptr<Inner> inner;
   };
 
+  [[nodiscard]] bool has_expanded_children(Slot slot) const {
+    return clusters_[slot].inner && clusters_[slot].inner->expanded != 0;
+  }
   [[nodiscard]] Slot stage(ClusterId id, ChildRef place, const Take& take);
   void check_ordinals(ClusterId id, std::span<const std::uint64_t> ordinals) const;
   void append_below(Slot slot, std::vector<Slot>& out) const;

@@ -1,0 +1,317 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The planar triangulation beside CGAL's Delaunay_triangulation_2 with EPICK, in one run on the
+// same points. Uniform: 1,000,000 points of 26 bits; grid: 1000 x 1000, in random order. Clusters:
+// 500 compact ones, the 300 points nearest to centres on a lattice.
+//
+// items_per_second counts points and is a median of 5 rounds. A round of a cluster row removes
+// (collapse) or inserts (expand) all clusters once; what restores the state after it is not timed.
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <fstream>
+#include <map>
+#include <numeric>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <CGAL/Delaunay_triangulation_2.h>
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <benchmark/benchmark.h>
+
+#include "terrace/tri/delaunay2.hpp"
+
+namespace {
+
+using terrace::tri::Delaunay2;
+using terrace::tri::VertexId;
+using Cells = std::array<std::int32_t, 2>;  // any input point
+
+const bool kSmall = std::getenv("TERRACE_BENCH_SMALL") != nullptr;
+const std::uint32_t kSide = kSmall ? 100 : 1000;
+const std::uint32_t kClustersPerRow = kSmall ? 2 : 25;
+const std::uint32_t kClustersPerColumn = kSmall ? 2 : 20;
+const std::size_t kClusterSize = kSmall ? 30 : 300;
+
+enum Input { kUniform, kGrid };
+
+const std::vector<Cells>& input_points(Input input) {
+  static std::map<Input, std::vector<Cells>> cache;
+  std::vector<Cells>& points = cache[input];
+  if (!points.empty()) return points;
+  std::mt19937_64 random(1);
+  for (std::uint32_t j = 0; j < kSide; ++j) {
+    for (std::uint32_t i = 0; i < kSide; ++i) {
+      if (input == kGrid) {
+        points.push_back({static_cast<std::int32_t>(i), static_cast<std::int32_t>(j)});
+      } else {
+        points.push_back(
+            {static_cast<std::int32_t>(random() >> 38), static_cast<std::int32_t>(random() >> 38)});
+      }
+    }
+  }
+  std::shuffle(points.begin(), points.end(), random);
+  return points;
+}
+
+/// Numbers of the points of each cluster, along a Hilbert curve, as a store keeps them; and of a
+/// point near the cluster that is in none.
+struct Cluster {
+  std::vector<std::uint32_t> members;
+  std::uint32_t outside = 0;
+};
+
+std::vector<Cluster> find_clusters(const std::vector<Cells>& points) {
+  Delaunay2<std::int32_t> triangulation;
+  const std::vector<VertexId> vertices = triangulation.build(points);
+  std::vector<std::uint32_t> point_of(triangulation.vertex_slots());
+  for (std::uint32_t i = 0; i < points.size(); ++i) point_of[slot(vertices[i])] = i;
+  std::int64_t extent = 0;
+  for (const Cells& p : points) extent = std::max<std::int64_t>(extent, p[0]);
+
+  std::vector<Cluster> clusters;
+  std::vector<char> seen(triangulation.vertex_slots());
+  std::vector<VertexId> around;
+  for (std::uint32_t j = 0; j < kClustersPerColumn; ++j) {
+    for (std::uint32_t i = 0; i < kClustersPerRow; ++i) {
+      const Cells centre{
+          static_cast<std::int32_t>(extent * (2 * i + 1) / (2 * kClustersPerRow)),
+          static_cast<std::int32_t>(extent * (2 * j + 1) / (2 * kClustersPerColumn))};
+      const auto distance = [&](VertexId v) {
+        const Cells p = triangulation.point(v);
+        const std::int64_t x = p[0] - centre[0];
+        const std::int64_t y = p[1] - centre[1];
+        return x * x + y * y;
+      };
+      // Breadth first, far enough to have the nearest ones.
+      std::vector<VertexId> found{triangulation.nearest(centre)};
+      seen[slot(found[0])] = 1;
+      for (std::size_t k = 0; found.size() < 3 * kClusterSize; ++k) {
+        triangulation.adjacent(found[k], around);
+        for (const VertexId v : around) {
+          if (seen[slot(v)] == 0) found.push_back(v);
+          seen[slot(v)] = 1;
+        }
+      }
+      for (const VertexId v : found) seen[slot(v)] = 0;
+      std::sort(found.begin(), found.end(), [&](VertexId a, VertexId b) {
+        return std::pair(distance(a), slot(a)) < std::pair(distance(b), slot(b));
+      });
+      Cluster cluster;
+      cluster.outside = point_of[slot(found[kClusterSize])];
+      found.resize(kClusterSize);
+      std::sort(found.begin(), found.end());
+      for (const VertexId v : found) cluster.members.push_back(point_of[slot(v)]);
+      clusters.push_back(std::move(cluster));
+    }
+  }
+  std::mt19937_64 random(2);
+  std::shuffle(clusters.begin(), clusters.end(), random);
+  return clusters;
+}
+
+const std::vector<Cluster>& input_clusters(Input input) {
+  static std::map<Input, std::vector<Cluster>> cache;
+  std::vector<Cluster>& clusters = cache[input];
+  if (clusters.empty()) clusters = find_clusters(input_points(input));
+  return clusters;
+}
+
+enum Order { kHilbert, kRandom };
+
+std::vector<Cluster> ordered_clusters(Input input, Order order) {
+  std::vector<Cluster> clusters = input_clusters(input);
+  std::mt19937_64 random(3);
+  if (order == kRandom)
+    for (Cluster& cluster : clusters)
+      std::shuffle(cluster.members.begin(), cluster.members.end(), random);
+  return clusters;
+}
+
+/// One interface over both triangulations. `vertex[i]` is the handle of input point i.
+template <class Coord>
+struct Ours {
+  std::vector<std::array<Coord, 2>> points;
+  Delaunay2<Coord> triangulation;
+  std::vector<VertexId> vertex;
+
+  explicit Ours(const std::vector<Cells>& input) {
+    for (const Cells& p : input)
+      points.push_back({static_cast<Coord>(p[0]), static_cast<Coord>(p[1])});
+  }
+  void build() { vertex = triangulation.build(points); }
+  void remove_one_by_one(const Cluster& cluster) {
+    for (const std::uint32_t i : cluster.members) triangulation.remove(vertex[i]);
+  }
+  void remove_set(const Cluster& cluster) {
+    set.clear();
+    for (const std::uint32_t i : cluster.members) set.push_back(vertex[i]);
+    triangulation.remove(std::span<const VertexId>(set));
+  }
+  void insert(const Cluster& cluster) {
+    VertexId hint = vertex[cluster.outside];
+    for (const std::uint32_t i : cluster.members)
+      hint = vertex[i] = triangulation.insert(points[i], hint).vertex;
+  }
+  std::vector<VertexId> set;
+};
+
+struct Cgal {
+  using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+  using Triangulation = CGAL::Delaunay_triangulation_2<Kernel>;
+  std::vector<Kernel::Point_2> points;
+  Triangulation triangulation;
+  std::vector<Triangulation::Vertex_handle> vertex;
+
+  explicit Cgal(const std::vector<Cells>& input) {
+    for (const Cells& p : input) points.emplace_back(p[0], p[1]);
+  }
+  void build() { triangulation.insert(points.begin(), points.end()); }
+  void find_vertices() {
+    std::map<Kernel::Point_2, std::uint32_t> number;
+    for (std::uint32_t i = 0; i < points.size(); ++i) number[points[i]] = i;
+    vertex.resize(points.size());
+    for (auto v : triangulation.finite_vertex_handles()) vertex[number[v->point()]] = v;
+  }
+  void remove_one_by_one(const Cluster& cluster) {
+    for (const std::uint32_t i : cluster.members) triangulation.remove(vertex[i]);
+  }
+  void insert(const Cluster& cluster) {
+    Triangulation::Vertex_handle hint = vertex[cluster.outside];
+    for (const std::uint32_t i : cluster.members)
+      hint = vertex[i] = triangulation.insert(points[i], hint->face());
+  }
+};
+
+class Stopwatch {
+ public:
+  [[nodiscard]] double seconds() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+/// VmRSS or VmHWM in bytes; 0 where there is no such file.
+double resident(const std::string& key) {
+  std::ifstream file("/proc/self/status");
+  std::string word;
+  while (file >> word)
+    if (word == key + ":" && file >> word) return std::stod(word) * 1024;
+  return 0;
+}
+
+/// Times `rounds` calls of round(), which returns seconds, and reports the median; the counters
+/// show the slowest and the fastest, in points per second.
+template <class Round>
+void measure(benchmark::State& state, std::size_t points, Round round) {
+  std::vector<double> seconds(kSmall ? 1 : 5);
+  for (auto _ : state) {
+    for (double& s : seconds) s = round();
+    std::sort(seconds.begin(), seconds.end());
+    state.SetIterationTime(seconds[seconds.size() / 2]);
+  }
+  state.SetItemsProcessed(static_cast<std::int64_t>(points));
+  state.counters["slowest"] = static_cast<double>(points) / seconds.back();
+  state.counters["fastest"] = static_cast<double>(points) / seconds.front();
+}
+
+template <class Engine>
+void bulk(benchmark::State& state) {
+  const auto& input = input_points(static_cast<Input>(state.range(0)));
+  double peak = 0;
+  double held = 0;
+  measure(state, input.size(), [&] {
+    Engine engine(input);
+    std::ofstream("/proc/self/clear_refs") << "5";  // the peak starts again from here
+    const double before = resident("VmRSS");
+    const Stopwatch watch;
+    engine.build();
+    const double seconds = watch.seconds();
+    peak = std::max(peak, resident("VmHWM") - before);
+    if constexpr (!std::is_same_v<Engine, Cgal>)
+      held = static_cast<double>(engine.triangulation.memory_bytes()) /
+             static_cast<double>(engine.triangulation.vertex_count());
+    return seconds;
+  });
+  state.counters["peak_B/pt"] = peak / static_cast<double>(input.size());
+  if (held > 0) state.counters["held_B/pt"] = held;
+}
+
+template <class Coord>
+void complete_grid(benchmark::State& state) {
+  measure(state, std::size_t{kSide} * kSide, [] {
+    Delaunay2<Coord> triangulation;
+    const Stopwatch watch;
+    triangulation.build_grid(0, 0, 1, kSide, kSide);
+    return watch.seconds();
+  });
+}
+
+enum Action { kExpand, kCollapseSets, kCollapseOneByOne };
+
+template <class Engine, Action kAction>
+void clusters(benchmark::State& state) {
+  const auto input = static_cast<Input>(state.range(0));
+  const std::vector<Cluster> all = ordered_clusters(input, static_cast<Order>(state.range(1)));
+  Engine engine(input_points(input));
+  engine.build();
+  if constexpr (std::is_same_v<Engine, Cgal>) engine.find_vertices();
+  const auto insert = [&] {
+    for (const Cluster& cluster : all) engine.insert(cluster);
+  };
+  const auto remove = [&] {
+    for (const Cluster& cluster : all) {
+      if constexpr (kAction == kCollapseSets) {
+        engine.remove_set(cluster);
+      } else {
+        engine.remove_one_by_one(cluster);
+      }
+    }
+  };
+  // Once round, so that memory is there.
+  remove();
+  insert();
+  measure(state, all.size() * kClusterSize, [&] {
+    const Stopwatch removal;
+    remove();
+    const double removing = removal.seconds();
+    const Stopwatch insertion;
+    insert();
+    return kAction == kExpand ? insertion.seconds() : removing;
+  });
+}
+
+void once(benchmark::internal::Benchmark* row) {
+  row->UseManualTime()->Iterations(1)->Unit(benchmark::kMillisecond);
+}
+void inputs(benchmark::internal::Benchmark* row) {
+  once(row);
+  row->ArgName("grid")->Arg(kUniform)->Arg(kGrid);
+}
+void inputs_and_orders(benchmark::internal::Benchmark* row) {
+  once(row);
+  row->ArgNames({"grid", "random_order"})->ArgsProduct({{kUniform, kGrid}, {kHilbert, kRandom}});
+}
+
+using OursInt = Ours<std::int32_t>;
+using OursDouble = Ours<double>;
+
+BENCHMARK(bulk<Cgal>)->Apply(inputs);
+BENCHMARK(bulk<OursInt>)->Apply(inputs);
+BENCHMARK(bulk<OursDouble>)->Apply(inputs);
+BENCHMARK(complete_grid<std::int32_t>)->Apply(once);
+BENCHMARK(complete_grid<double>)->Apply(once);
+BENCHMARK(clusters<Cgal, kExpand>)->Apply(inputs_and_orders);
+BENCHMARK(clusters<OursInt, kExpand>)->Apply(inputs_and_orders);
+BENCHMARK(clusters<OursDouble, kExpand>)->Apply(inputs_and_orders);
+BENCHMARK(clusters<Cgal, kCollapseOneByOne>)->Apply(inputs_and_orders);
+BENCHMARK(clusters<OursInt, kCollapseOneByOne>)->Apply(inputs_and_orders);
+BENCHMARK(clusters<OursInt, kCollapseSets>)->Apply(inputs_and_orders);
+BENCHMARK(clusters<OursDouble, kCollapseOneByOne>)->Apply(inputs_and_orders);
+BENCHMARK(clusters<OursDouble, kCollapseSets>)->Apply(inputs_and_orders);
+
+}  // namespace
+
+BENCHMARK_MAIN();

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Bulk construction: vertices are numbered along a Hilbert curve and inserted one by one, each near
+// the one before. Pure Hilbert order makes the curve's front a fan of long triangles; so a coarse
+// sample, every 32nd vertex, goes first (and of that every 32nd, and so on), which halves the work
+// (after N. Amenta, S. Choi, G. Rote, "Incremental constructions con BRIO",
+// doi:10.1145/777792.777824, with fixed samples in place of random ones).
+#include "build.hpp"
+
+#include <algorithm>
+
+#include "double_kernel.hpp"
+#include "flat.hpp"
+#include "hilbert.hpp"
+#include "insert.hpp"
+#include "int_kernel.hpp"
+#include "walk.hpp"
+
+namespace terrace::tri::planar {
+namespace {
+
+constexpr std::uint32_t kSample = 32;
+
+/// Puts points into slots begin, begin + 1, ... in Hilbert order. Returns the slot of each.
+template <class Kernel>
+std::vector<VertexId> number_vertices(Mesh<Kernel>& mesh,
+                                      std::span<const typename Kernel::Point> points,
+                                      std::uint32_t begin) {
+  std::vector<std::uint32_t> order = hilbert_order<Kernel>(points);
+  const auto count = static_cast<std::uint32_t>(points.size());
+  mesh.point.reserve(begin + count);
+  mesh.incident.reserve(begin + count);
+  mesh.point.resize(begin + count);
+  mesh.incident.resize(begin + count);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    mesh.point[begin + i] = points[order[i]];
+    mesh.incident[begin + i] = kNoIncident;
+  }
+  std::vector<VertexId> vertex_of(count);
+  for (std::uint32_t i = 0; i < count; ++i) vertex_of[order[i]] = VertexId{begin + i};
+  mesh.vertex_count = count;
+  return vertex_of;
+}
+
+/// Which vertex stands for one whose point was there already, as long as the slots are not yet
+/// free: its number with a bit in Mesh::incident.
+constexpr std::uint32_t kAlias = kFreeVertexBit;
+
+template <class Kernel>
+void insert_slot(Mesh<Kernel>& mesh, std::uint32_t vertex) {
+  const auto& p = mesh.point[vertex];
+  const WalkEnd end = walk(mesh, p, mesh.incident[mesh.last_vertex]);
+  if (!end.outside) {
+    const std::uint32_t equal = equal_corner(mesh, end.triangle, p);
+    if (equal != kNone) {
+      mesh.incident[vertex] = kAlias | equal;
+      return;
+    }
+  }
+  insert_vertex(mesh, vertex, end.triangle);
+  mesh.last_vertex = vertex;
+}
+
+/// The flat state of all slots from begin on, the triangles to come.
+template <class Kernel>
+void line_up(Mesh<Kernel>& mesh, std::uint32_t begin, std::uint32_t end) {
+  std::vector<std::uint32_t>& line = mesh.line;
+  for (std::uint32_t v = begin; v < end; ++v) line.push_back(v);
+  std::sort(line.begin(), line.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return lexicographically_less(mesh.point[a], mesh.point[b]) ||
+           (mesh.point[a] == mesh.point[b] && a < b);
+  });
+  std::size_t kept = 0;
+  for (const std::uint32_t v : line) {
+    if (kept > 0 && mesh.point[line[kept - 1]] == mesh.point[v]) {
+      mesh.incident[v] = kAlias | line[kept - 1];
+    } else {
+      line[kept++] = v;
+    }
+  }
+  line.resize(kept);
+  mesh.last_vertex = line.front();
+}
+
+/// The first vertex not on one line with the ones before, or kNone; `second`: the first that
+/// differs from vertex begin.
+template <class Kernel>
+std::uint32_t first_off_line(const Mesh<Kernel>& mesh, std::uint32_t begin, std::uint32_t end,
+                             std::uint32_t& second) {
+  second = begin + 1;
+  while (second < end && mesh.point[second] == mesh.point[begin]) ++second;
+  for (std::uint32_t v = second + 1; v < end; ++v)
+    if (Kernel::orientation(mesh.point[begin], mesh.point[second], mesh.point[v]) != 0) return v;
+  return kNone;
+}
+
+/// Frees the slots of equal points and makes vertex_of tell who stands for them.
+template <class Kernel>
+void resolve_aliases(Mesh<Kernel>& mesh, std::vector<VertexId>& vertex_of, std::uint32_t begin,
+                     std::uint32_t end) {
+  bool any = false;
+  for (std::uint32_t v = begin; v < end && !any; ++v) any = (mesh.incident[v] & kAlias) != 0;
+  if (!any) return;
+  for (VertexId& v : vertex_of) {
+    const std::uint32_t entry = mesh.incident[slot(v)];
+    if ((entry & kAlias) != 0) v = VertexId{entry & ~kAlias};
+  }
+  for (std::uint32_t v = end; v-- > begin;) {
+    if ((mesh.incident[v] & kAlias) == 0) continue;
+    mesh.incident[v] = kFreeVertexBit | mesh.free_vertex;
+    mesh.free_vertex = v;
+    --mesh.vertex_count;
+  }
+}
+
+}  // namespace
+
+template <class Kernel>
+std::vector<VertexId> build(Mesh<Kernel>& mesh, std::span<const typename Kernel::Point> points) {
+  mesh.forget_slots();
+  if (points.empty()) return {};
+  const std::uint32_t begin = mesh.point.size();
+  std::vector<VertexId> vertex_of = number_vertices(mesh, points, begin);
+  const std::uint32_t end = mesh.point.size();
+  std::uint32_t second = kNone;
+  const std::uint32_t third = first_off_line(mesh, begin, end, second);
+  if (third == kNone) {
+    line_up(mesh, begin, end);
+  } else {
+    mesh.triangle.reserve(2 * std::size_t{mesh.vertex_count} - 2);
+    mesh.line = {begin, second};
+    if (lexicographically_less(mesh.point[second], mesh.point[begin]))
+      std::swap(mesh.line[0], mesh.line[1]);
+    make_fan(mesh, third);
+    mesh.last_vertex = begin;
+    const auto insert_every = [&](std::uint32_t step, bool coarser_done) {
+      for (std::uint32_t i = step; i < end - begin; i += step) {
+        const std::uint32_t v = begin + i;
+        if (v == second || v == third || (coarser_done && i % (step * kSample) == 0)) continue;
+        insert_slot(mesh, v);
+      }
+    };
+    std::uint32_t step = 1;
+    while ((end - begin) / step > kSample * kSample) step *= kSample;
+    bool coarser_done = false;
+    for (; step > 0; step /= kSample) {
+      insert_every(step, coarser_done);
+      coarser_done = true;
+    }
+  }
+  resolve_aliases(mesh, vertex_of, begin, end);
+  if (mesh.journal.on())
+    for (std::uint32_t v = begin; v < end; ++v)
+      if (mesh.vertex_alive(v)) mesh.journal.touch_vertex(v, false, mesh.point[v]);
+  return vertex_of;
+}
+
+template std::vector<VertexId> build(Mesh<IntKernel>&, std::span<const IntKernel::Point>);
+template std::vector<VertexId> build(Mesh<DoubleKernel>&, std::span<const DoubleKernel::Point>);
+
+}  // namespace terrace::tri::planar

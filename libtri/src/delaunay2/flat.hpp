@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "insert.hpp"
+#include "mesh.hpp"
+
+/// The states without a triangle: no point, one, or any number on a line. Then the vertices are
+/// kept as a sorted sequence, and the first point beside the line turns it into a fan.
+
+namespace terrace::tri::planar {
+
+/// insert_point() while flat.
+template <class Kernel>
+Inserted insert_flat(Mesh<Kernel>& mesh, const typename Kernel::Point& p);
+
+/// Whether p lies on the line of the sorted points, or there is no line yet.
+template <class Kernel>
+bool on_line(const Mesh<Kernel>& mesh, const typename Kernel::Point& p) {
+  const auto& line = mesh.line;
+  return line.size() < 2 ||
+         Kernel::orientation(mesh.point[line.front()], mesh.point[line.back()], p) == 0;
+}
+
+/// Joins all vertices of the line to a vertex beside it: the only triangulation of such points.
+template <class Kernel>
+void make_fan(Mesh<Kernel>& mesh, std::uint32_t apex);
+
+/// Drops all triangles; `survivors`: all vertices left, which are collinear, in any order.
+template <class Kernel>
+void become_flat(Mesh<Kernel>& mesh, std::vector<std::uint32_t> survivors);
+
+/// Removes a vertex while flat.
+template <class Kernel>
+void remove_flat(Mesh<Kernel>& mesh, std::uint32_t vertex);
+
+}  // namespace terrace::tri::planar

@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The complete grid, written directly. All corners of a cell are cocircular; the perturbation gives
+// every cell the diagonal from lower right to upper left: of the four the upper right corner is
+// raised most, so the circle through the three others does not contain it.
+#include "build.hpp"
+#include "double_kernel.hpp"
+#include "int_kernel.hpp"
+
+namespace terrace::tri::planar {
+namespace {
+
+/// Numbers of vertices and triangles of a grid.
+struct GridNumbers {
+  std::uint32_t columns;
+  std::uint32_t rows;
+  std::uint32_t first_vertex;
+
+  [[nodiscard]] std::uint32_t vertex(std::uint32_t i, std::uint32_t j) const {
+    return first_vertex + j * columns + i;
+  }
+  /// The triangle of cell (i, j) at its lower left; that at its upper right is the next.
+  [[nodiscard]] std::uint32_t lower(std::uint32_t i, std::uint32_t j) const {
+    return 2 * (j * (columns - 1) + i);
+  }
+  [[nodiscard]] std::uint32_t upper(std::uint32_t i, std::uint32_t j) const {
+    return lower(i, j) + 1;
+  }
+  // Ghosts beyond the hull edges, numbered counter-clockwise from the lower left corner.
+  [[nodiscard]] std::uint32_t ghosts() const { return 2 * (columns - 1) + 2 * (rows - 1); }
+  [[nodiscard]] std::uint32_t ghost(std::uint32_t number) const {
+    return 2 * (columns - 1) * (rows - 1) + number;
+  }
+  [[nodiscard]] std::uint32_t below(std::uint32_t i) const { return ghost(i); }
+  [[nodiscard]] std::uint32_t right_of(std::uint32_t j) const { return ghost(columns - 1 + j); }
+  [[nodiscard]] std::uint32_t above(std::uint32_t i) const {
+    return ghost(columns - 1 + rows - 1 + (columns - 2 - i));
+  }
+  [[nodiscard]] std::uint32_t left_of(std::uint32_t j) const {
+    return ghost(2 * (columns - 1) + rows - 1 + (rows - 2 - j));
+  }
+};
+
+// With the cell's corners a (lower left), b, c, d counter-clockwise, the triangles are (a, b, d)
+// and (c, d, b); so across d-b lie corners a and c, index 0 of both.
+void write_cells(const GridNumbers& grid, Triangle* triangle) {
+  const std::uint32_t last_i = grid.columns - 2;
+  const std::uint32_t last_j = grid.rows - 2;
+  for (std::uint32_t j = 0; j <= last_j; ++j) {
+    const auto write = [&](std::uint32_t i, Side left, Side below, Side right, Side above) {
+      const std::uint32_t a = grid.vertex(i, j);
+      const std::uint32_t b = a + 1;
+      const std::uint32_t d = a + grid.columns;
+      const std::uint32_t c = d + 1;
+      const std::uint32_t t = grid.lower(i, j);
+      triangle[t] = {{a, b, d}, {make_side(t + 1, 0), left, below}};
+      triangle[t + 1] = {{c, d, b}, {make_side(t, 0), right, above}};
+    };
+    const auto below = [&](std::uint32_t i) {
+      return j == 0 ? make_side(grid.below(i), 0) : make_side(grid.upper(i, j - 1), 2);
+    };
+    const auto above = [&](std::uint32_t i) {
+      return j == last_j ? make_side(grid.above(i), 0) : make_side(grid.lower(i, j + 1), 2);
+    };
+    const auto left = [&](std::uint32_t i) {
+      return i == 0 ? make_side(grid.left_of(j), 0) : make_side(grid.upper(i - 1, j), 1);
+    };
+    const auto right = [&](std::uint32_t i) {
+      return i == last_i ? make_side(grid.right_of(j), 0) : make_side(grid.lower(i + 1, j), 1);
+    };
+    for (std::uint32_t i = 0; i <= last_i; ++i) write(i, left(i), below(i), right(i), above(i));
+  }
+}
+
+void write_ghosts(const GridNumbers& grid, Triangle* triangle) {
+  const std::uint32_t count = grid.ghosts();
+  std::uint32_t number = 0;
+  // Beyond the hull edge from a to b, counter-clockwise, whose inner side is given.
+  const auto write = [&](std::uint32_t a, std::uint32_t b, Side inner) {
+    const std::uint32_t t = grid.ghost(number);
+    const std::uint32_t before = grid.ghost(number == 0 ? count - 1 : number - 1);
+    const std::uint32_t after = grid.ghost(number + 1 == count ? 0 : number + 1);
+    triangle[t] = {{kGhost, b, a}, {inner, make_side(before, 2), make_side(after, 1)}};
+    ++number;
+  };
+  const std::uint32_t last_i = grid.columns - 2;
+  const std::uint32_t last_j = grid.rows - 2;
+  for (std::uint32_t i = 0; i <= last_i; ++i)
+    write(grid.vertex(i, 0), grid.vertex(i + 1, 0), make_side(grid.lower(i, 0), 2));
+  for (std::uint32_t j = 0; j <= last_j; ++j)
+    write(grid.vertex(last_i + 1, j), grid.vertex(last_i + 1, j + 1),
+          make_side(grid.upper(last_i, j), 1));
+  for (std::uint32_t i = last_i + 1; i-- > 0;)
+    write(grid.vertex(i + 1, last_j + 1), grid.vertex(i, last_j + 1),
+          make_side(grid.upper(i, last_j), 2));
+  for (std::uint32_t j = last_j + 1; j-- > 0;)
+    write(grid.vertex(0, j + 1), grid.vertex(0, j), make_side(grid.lower(0, j), 1));
+}
+
+void write_incident(const GridNumbers& grid, std::uint32_t* incident) {
+  const std::uint32_t last_i = grid.columns - 2;
+  const std::uint32_t last_j = grid.rows - 2;
+  for (std::uint32_t j = 0; j <= last_j; ++j) {
+    std::uint32_t* row = incident + grid.vertex(0, j);
+    for (std::uint32_t i = 0; i <= last_i; ++i) row[i] = grid.lower(i, j);
+    row[last_i + 1] = grid.lower(last_i, j);
+  }
+  std::uint32_t* row = incident + grid.vertex(0, last_j + 1);
+  row[0] = grid.lower(0, last_j);
+  for (std::uint32_t i = 0; i <= last_i; ++i) row[i + 1] = grid.upper(i, last_j);
+  incident[kGhost] = grid.ghost(0);
+}
+
+}  // namespace
+
+template <class Kernel>
+std::uint32_t build_grid(Mesh<Kernel>& mesh, std::span<const typename Kernel::Coord> xs,
+                         std::span<const typename Kernel::Coord> ys) {
+  const auto columns = static_cast<std::uint32_t>(xs.size());
+  const auto rows = static_cast<std::uint32_t>(ys.size());
+  mesh.forget_slots();
+  const std::uint32_t first = mesh.point.size();
+  const std::uint32_t count = columns * rows;
+  if (count == 0) return first;
+  mesh.point.reserve(first + count);
+  mesh.incident.reserve(first + count);
+  mesh.point.resize(first + count);
+  mesh.incident.resize(first + count);
+  typename Kernel::Point* point = mesh.point.data() + first;
+  for (const auto y : ys)
+    for (const auto x : xs) *point++ = {x, y};
+  mesh.vertex_count = count;
+  mesh.last_vertex = first;
+  if (columns == 1 || rows == 1) {
+    // Increasing coordinates: in lexicographic order already.
+    for (std::uint32_t v = first; v < first + count; ++v) {
+      mesh.incident[v] = kNoIncident;
+      mesh.line.push_back(v);
+    }
+  } else {
+    mesh.triangle.reserve(2 * std::size_t{count} - 2);
+    mesh.triangle.resize(2 * count - 2);
+    const GridNumbers grid{columns, rows, first};
+    write_cells(grid, mesh.triangle.data());
+    write_ghosts(grid, mesh.triangle.data());
+    write_incident(grid, mesh.incident.data());
+    mesh.flat = false;
+  }
+  if (mesh.journal.on()) {
+    constexpr Triangle kUnused{{kFreeCorner, 0, 0}, {}};
+    for (std::uint32_t v = first; v < first + count; ++v)
+      mesh.journal.touch_vertex(v, false, mesh.point[v]);
+    for (std::uint32_t t = 0; t < mesh.triangle.size(); ++t)
+      mesh.journal.touch_triangle(t, kUnused);
+  }
+  return first;
+}
+
+template std::uint32_t build_grid(Mesh<IntKernel>&, std::span<const IntKernel::Coord>,
+                                  std::span<const IntKernel::Coord>);
+template std::uint32_t build_grid(Mesh<DoubleKernel>&, std::span<const DoubleKernel::Coord>,
+                                  std::span<const DoubleKernel::Coord>);
+
+}  // namespace terrace::tri::planar

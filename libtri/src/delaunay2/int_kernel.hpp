@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+/// Exact predicates on integers of 30 bits, without floating point and without filters: differences
+/// have 31 bits with sign, their products fit 64 bits and products of those 128.
+
+namespace terrace::tri::planar {
+
+__extension__ typedef __int128 Int128;
+
+struct IntKernel {
+  using Coord = std::int32_t;
+  using Point = std::array<Coord, 2>;
+  static constexpr Coord kLimit = Coord{1} << 30;  ///< coordinates are in [0, kLimit)
+
+  static bool valid(const Point& p) {
+    return static_cast<std::uint32_t>(p[0]) < static_cast<std::uint32_t>(kLimit) &&
+           static_cast<std::uint32_t>(p[1]) < static_cast<std::uint32_t>(kLimit);
+  }
+
+  /// Cross and dot product of the vectors from `apex` to b and c.
+  struct Angle {
+    std::int64_t cross;
+    std::int64_t dot;
+  };
+  static Angle angle(Point apex, Point b, Point c) {
+    const std::int64_t bx = b[0] - apex[0];
+    const std::int64_t by = b[1] - apex[1];
+    const std::int64_t cx = c[0] - apex[0];
+    const std::int64_t cy = c[1] - apex[1];
+    return {bx * cy - by * cx, bx * cx + by * cy};
+  }
+
+  /// > 0 where a, b, c turn left, 0 where they are collinear.
+  static int orientation(Point a, Point b, Point c) { return sign(angle(a, b, c).cross); }
+
+  /// > 0 where p lies inside the circle through the counter-clockwise a, b, c; 0 where on it.
+  ///
+  /// p is inside where the angles at a and at p over the chord bc add up to more than 180 degrees;
+  /// this is the sign of sin(A + P), for which 10 multiplications of short numbers suffice. The
+  /// function stays out of line: inlined it takes registers from its callers and is slower.
+  [[gnu::noinline]] static int in_circle(Point a, Point b, Point c, Point p) {
+    const Angle at_a = angle(a, b, c);
+    const Angle at_p = angle(p, c, b);
+    const Int128 sine =
+        static_cast<Int128>(at_a.cross) * at_p.dot + static_cast<Int128>(at_p.cross) * at_a.dot;
+    return (sine < 0) - (sine > 0);
+  }
+
+  /// < 0 where a is nearer to p than b.
+  static int compare_distance(Point p, Point a, Point b) {
+    const auto square = [p](Point q) {
+      const std::int64_t x = q[0] - p[0];
+      const std::int64_t y = q[1] - p[1];
+      return x * x + y * y;
+    };
+    return sign(square(a) - square(b));
+  }
+
+ private:
+  static int sign(std::int64_t value) { return (value > 0) - (value < 0); }
+};
+
+}  // namespace terrace::tri::planar

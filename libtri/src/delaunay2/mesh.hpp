@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cassert>
+#include <cstdint>
+#include <vector>
+
+#include "journal.hpp"
+#include "pool.hpp"
+#include "triangle.hpp"
+
+/// The data of a triangulation and the steps that all algorithms share. No geometry here.
+
+namespace terrace::tri::planar {
+
+inline constexpr std::uint32_t kNone = 0xFFFFFFFFu;
+inline constexpr std::uint32_t kMaxVertices = (std::uint32_t{1} << 29) - 2;
+
+/// In Mesh::incident: a living vertex without triangles (all points are collinear).
+inline constexpr std::uint32_t kNoIncident = 0x7FFFFFFFu;
+/// In Mesh::incident: the slot is free, the other bits are the next free slot.
+inline constexpr std::uint32_t kFreeVertexBit = 0x80000000u;
+
+/// A simple polygon to be filled with triangles, see fill.hpp; scratch memory of removal.
+template <class Point>
+struct Hole {
+  std::vector<std::uint32_t> vertex;  ///< counter-clockwise; may contain the ghost
+  std::vector<Point> point;           ///< of vertex, in parallel
+  /// outer[i]: the side beyond the edge from vertex[i] to the next.
+  std::vector<Side> outer;
+  std::vector<std::uint32_t> slots;  ///< triangle slots to fill, more than enough
+  struct Part {
+    std::uint32_t first;
+    std::uint32_t last;
+    Side mate;
+  };
+  std::vector<Part> parts;
+};
+
+template <class KernelT>
+struct Mesh {
+  using Kernel = KernelT;
+  using Point = typename Kernel::Point;
+
+  // By vertex slot. Slot 0 is the ghost.
+  Pool<Point> point;
+  Pool<std::uint32_t> incident;  ///< a triangle at the vertex, or kNoIncident, or free
+  /// Set removal marks its vertices here; empty before the first one, zero between two.
+  Pool<std::uint8_t> mark;
+  // By triangle slot. Empty while all points are collinear ("flat").
+  Pool<Triangle> triangle;
+
+  /// While flat: all vertices in lexicographic order, which is their order on the line.
+  std::vector<std::uint32_t> line;
+  bool flat = true;
+
+  std::uint32_t vertex_count = 0;
+  std::uint32_t last_vertex = kNone;  ///< a living vertex, if there is any
+  std::uint32_t free_vertex = kFreeVertexBit - 1;
+  std::uint32_t free_triangle = kNone;
+
+  Journal<Point> journal;
+
+  // Scratch memory, kept between calls.
+  std::vector<Side> sides;
+  std::vector<std::uint32_t> spare;
+  Hole<Point> hole;
+
+  Mesh() {
+    point.push_back(Point{});
+    incident.push_back(kNoIncident);
+  }
+
+  /// Forgets the slots, all of them free.
+  void forget_slots() {
+    assert(vertex_count == 0 && flat);
+    point.resize(1);
+    incident.resize(1);
+    mark.resize(0);
+    triangle.resize(0);
+    free_vertex = kFreeVertexBit - 1;
+    free_triangle = kNone;
+  }
+  /// Removes everything and releases the memory; the journal goes on.
+  void clear() {
+    if (journal.on()) {
+      for (std::uint32_t v = 1; v < point.size(); ++v)
+        if (vertex_alive(v)) journal.touch_vertex(v, true, point[v]);
+      for (std::uint32_t t = 0; t < triangle.size(); ++t) journal.touch_triangle(t, triangle[t]);
+    }
+    Mesh empty;
+    empty.journal = std::move(journal);
+    *this = std::move(empty);
+  }
+
+  [[nodiscard]] bool vertex_alive(std::uint32_t v) const {
+    return v != kGhost && v < incident.size() && (incident[v] & kFreeVertexBit) == 0;
+  }
+  [[nodiscard]] bool triangle_alive(std::uint32_t t) const {
+    return t < triangle.size() && is_finite(triangle[t].corner);
+  }
+
+  /// A slot with the point and no triangle.
+  std::uint32_t new_vertex(const Point& p) {
+    std::uint32_t v = free_vertex;
+    if (v != kFreeVertexBit - 1) {
+      free_vertex = incident[v] & ~kFreeVertexBit;
+      if (journal.on()) journal.touch_vertex(v, false, p);
+      point[v] = p;
+      incident[v] = kNoIncident;
+    } else {
+      v = point.size();
+      if (journal.on()) journal.touch_vertex(v, false, p);
+      point.push_back(p);
+      incident.push_back(kNoIncident);
+    }
+    ++vertex_count;
+    return v;
+  }
+  void free_vertex_slot(std::uint32_t v) {
+    if (journal.on()) journal.touch_vertex(v, true, point[v]);
+    incident[v] = kFreeVertexBit | free_vertex;
+    free_vertex = v;
+    --vertex_count;
+  }
+
+  /// A slot for a triangle that the caller will write.
+  std::uint32_t new_triangle() {
+    std::uint32_t t = free_triangle;
+    if (t != kNone) {
+      free_triangle = triangle[t].corner[1];
+    } else {
+      t = triangle.size();
+      triangle.resize(t + 1);
+      triangle[t].corner[0] = kFreeCorner;
+    }
+    if (journal.on()) journal.touch_triangle(t, triangle[t]);
+    return t;
+  }
+  /// Before an algorithm overwrites or frees a triangle in use.
+  void record(std::uint32_t t) {
+    if (journal.on()) [[unlikely]]
+      journal.touch_triangle(t, triangle[t]);
+  }
+  void free_triangle_slot(std::uint32_t t) {
+    triangle[t].corner[0] = kFreeCorner;
+    triangle[t].corner[1] = free_triangle;
+    free_triangle = t;
+  }
+
+  /// Makes two sides each other's mate.
+  void link(Side a, Side b) {
+    triangle[triangle_of(a)].mate[index_of(a)] = b;
+    triangle[triangle_of(b)].mate[index_of(b)] = a;
+  }
+
+  /// The finite triangle on the other side of a ghost, or t itself.
+  [[nodiscard]] std::uint32_t finite_side(std::uint32_t t) const {
+    const Triangle& at = triangle[t];
+    for (std::uint32_t i = 0; i < 3; ++i)
+      if (at.corner[i] == kGhost) return triangle_of(at.mate[i]);
+    return t;
+  }
+
+  /// Index of v among the corners of t.
+  [[nodiscard]] std::uint32_t corner_index(std::uint32_t t, std::uint32_t v) const {
+    const Triangle& at = triangle[t];
+    assert(at.corner[0] == v || at.corner[1] == v || at.corner[2] == v);
+    return at.corner[0] == v ? 0 : at.corner[1] == v ? 1 : 2;
+  }
+
+  [[nodiscard]] std::size_t bytes() const {
+    return point.bytes() + incident.bytes() + mark.bytes() + triangle.bytes() + journal.bytes() +
+           (line.capacity() + sides.capacity() + spare.capacity()) * sizeof(std::uint32_t);
+  }
+};
+
+/// Lexicographic order: that of the perturbation, and along any line.
+template <class Point>
+bool lexicographically_less(const Point& a, const Point& b) {
+  return a[0] < b[0] || (a[0] == b[0] && a[1] < b[1]);
+}
+
+}  // namespace terrace::tri::planar

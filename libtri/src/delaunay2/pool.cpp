@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "pool.hpp"
+
+#include <cstdlib>
+#include <cstring>
+#include <new>
+
+#ifdef __linux__
+#include <sys/mman.h>
+#endif
+
+namespace terrace::tri::planar {
+namespace {
+
+void* checked(void* memory) {
+  if (memory == nullptr) throw std::bad_alloc();
+  return memory;
+}
+
+#ifdef __linux__
+
+constexpr std::size_t kHugePage = std::size_t{2} << 20;
+// Below this the heap serves: mappings are too coarse and too dear for small triangulations.
+constexpr std::size_t kMapFrom = 2 * kHugePage;
+
+std::size_t round_up(std::size_t bytes, std::size_t unit) {
+  return (bytes + unit - 1) / unit * unit;
+}
+
+// Huge pages for the whole ones among the first `bytes` bytes; the rest stays in small pages, so
+// that no memory is held behind the end.
+void advise(void* memory, std::size_t bytes) {
+  const std::size_t whole = bytes / kHugePage * kHugePage;
+  // Only a hint: without it everything works, more slowly.
+  if (whole > 0) (void)madvise(memory, whole, MADV_HUGEPAGE);
+}
+
+void* map(std::size_t bytes) {
+  constexpr std::size_t kSmallPage = 4096;
+  const std::size_t length = round_up(bytes, kSmallPage);
+  // Aligned to a huge page by cutting the ends of a larger mapping.
+  void* raw = mmap(nullptr, length + kHugePage, PROT_READ | PROT_WRITE,
+                   MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+  if (raw == MAP_FAILED) throw std::bad_alloc();
+  char* begin = static_cast<char*>(raw);
+  const std::size_t head = round_up(reinterpret_cast<std::uintptr_t>(begin), kHugePage) -
+                           reinterpret_cast<std::uintptr_t>(begin);
+  if (head > 0) munmap(begin, head);
+  if (head < kHugePage) munmap(begin + head + length, kHugePage - head);
+  advise(begin + head, bytes);
+  return begin + head;
+}
+
+#endif
+
+}  // namespace
+
+void* allocate_pages(std::size_t bytes) {
+#ifdef __linux__
+  if (bytes >= kMapFrom) return map(bytes);
+#endif
+  return checked(std::malloc(bytes));
+}
+
+void* resize_pages(void* memory, std::size_t old_bytes, std::size_t new_bytes) {
+#ifdef __linux__
+  if (old_bytes >= kMapFrom && new_bytes >= kMapFrom) {
+    void* moved = mremap(memory, old_bytes, new_bytes, MREMAP_MAYMOVE);
+    if (moved == MAP_FAILED) throw std::bad_alloc();
+    advise(moved, new_bytes);
+    return moved;
+  }
+  if (old_bytes >= kMapFrom || new_bytes >= kMapFrom) {
+    void* moved = allocate_pages(new_bytes);
+    std::memcpy(moved, memory, std::min(old_bytes, new_bytes));
+    free_pages(memory, old_bytes);
+    return moved;
+  }
+#else
+  (void)old_bytes;
+#endif
+  return checked(std::realloc(memory, new_bytes));
+}
+
+void free_pages(void* memory, std::size_t bytes) noexcept {
+#ifdef __linux__
+  if (bytes >= kMapFrom) {
+    munmap(memory, bytes);
+    return;
+  }
+#else
+  (void)bytes;
+#endif
+  std::free(memory);
+}
+
+}  // namespace terrace::tri::planar

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "mesh.hpp"
+
+/// The kernel's predicates made strict (by symbolic perturbation) and extended to ghost triangles.
+
+namespace terrace::tri::planar {
+
+/// Whether p, different from a, b and c, lies inside the circle through the counter-clockwise a, b,
+/// c after the perturbation: every lifted point is raised infinitesimally, the lexicographically
+/// larger infinitely more. Of four cocircular points only the largest one counts: raised itself, p
+/// is outside; if another one is, the lifted plane tilts about the other two, and p is below it on
+/// the side of the raised one. No three of the four are collinear, so the answer is never zero.
+template <class Kernel>
+bool inside_circle(const typename Kernel::Point& a, const typename Kernel::Point& b,
+                   const typename Kernel::Point& c, const typename Kernel::Point& p) {
+  const int sign = Kernel::in_circle(a, b, c, p);
+  if (sign != 0) [[likely]]
+    return sign > 0;
+  if (lexicographically_less(a, b)) {
+    if (lexicographically_less(b, c))
+      return lexicographically_less(p, c) && Kernel::orientation(a, b, p) > 0;
+    return lexicographically_less(p, b) && Kernel::orientation(c, a, p) > 0;
+  }
+  if (lexicographically_less(a, c))
+    return lexicographically_less(p, c) && Kernel::orientation(a, b, p) > 0;
+  return lexicographically_less(p, a) && Kernel::orientation(b, c, p) > 0;
+}
+
+/// Whether p, collinear with a and b, lies strictly between them.
+template <class Point>
+bool between(const Point& a, const Point& p, const Point& b) {
+  return lexicographically_less(a, b)
+             ? lexicographically_less(a, p) && lexicographically_less(p, b)
+             : lexicographically_less(b, p) && lexicographically_less(p, a);
+}
+
+/// Whether p is in conflict with the ghost triangle beyond the hull edge a -> b with the outside to
+/// its left: strictly outside, or inside the open edge.
+template <class Kernel>
+bool inside_ghost(const typename Kernel::Point& a, const typename Kernel::Point& b,
+                  const typename Kernel::Point& p) {
+  const int side = Kernel::orientation(a, b, p);
+  return side > 0 || (side == 0 && between(a, p, b));
+}
+
+/// Whether p, no corner of it, is in conflict with a triangle, ghost or not.
+template <class Kernel>
+bool in_conflict(const Mesh<Kernel>& mesh, const Triangle& t, const typename Kernel::Point& p) {
+  const auto& [a, b, c] = t.corner;
+  if (a == kGhost) [[unlikely]]
+    return inside_ghost<Kernel>(mesh.point[b], mesh.point[c], p);
+  if (b == kGhost) [[unlikely]]
+    return inside_ghost<Kernel>(mesh.point[c], mesh.point[a], p);
+  if (c == kGhost) [[unlikely]]
+    return inside_ghost<Kernel>(mesh.point[a], mesh.point[b], p);
+  return inside_circle<Kernel>(mesh.point[a], mesh.point[b], mesh.point[c], p);
+}
+
+}  // namespace terrace::tri::planar

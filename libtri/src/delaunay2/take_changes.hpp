@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "mesh.hpp"
+#include "terrace/tri/delaunay2.hpp"
+
+namespace terrace::tri::planar {
+
+constexpr std::array<VertexId, 3> vertex_ids(const std::array<std::uint32_t, 3>& corner) {
+  return {VertexId{corner[0]}, VertexId{corner[1]}, VertexId{corner[2]}};
+}
+
+constexpr bool same_rotated(const std::array<std::uint32_t, 3>& a,
+                            const std::array<std::uint32_t, 3>& b) {
+  for (std::uint32_t i = 0; i < 3; ++i)
+    if (a[0] == b[i] && a[1] == b[next_index(i)] && a[2] == b[previous_index(i)]) return true;
+  return false;
+}
+
+/// Turns the journal's records into net changes and empties it.
+template <class Coord, class Mesh>
+void take_changes(Mesh& mesh, typename Delaunay2<Coord>::Changes& changes) {
+  changes.clear();
+  auto& journal = mesh.journal;
+  for (const auto& record : journal.vertices()) {
+    const bool now = mesh.vertex_alive(record.slot);
+    if (record.was_alive && now && record.before == mesh.point[record.slot]) {
+      // The same again; so its triangles may be the same as well.
+      journal.forget_vertex(record.slot);
+      continue;
+    }
+    if (record.was_alive) {
+      changes.removed_vertices.push_back(VertexId{record.slot});
+      changes.removed_points.push_back(record.before);
+    }
+    if (now) changes.added_vertices.push_back(VertexId{record.slot});
+  }
+  const auto of_same_vertices = [&](const std::array<std::uint32_t, 3>& corner) {
+    for (const std::uint32_t v : corner)
+      if (journal.vertex_touched(v)) return false;
+    return true;
+  };
+  for (const auto& record : journal.triangles()) {
+    const bool before = is_finite(record.before);
+    const bool now = mesh.triangle_alive(record.slot);
+    if (before && now && same_rotated(record.before, mesh.triangle[record.slot].corner) &&
+        of_same_vertices(record.before))
+      continue;
+    if (before) {
+      changes.removed_triangles.push_back(TriangleId{record.slot});
+      changes.removed_corners.push_back(vertex_ids(record.before));
+    }
+    if (now) changes.added_triangles.push_back(TriangleId{record.slot});
+  }
+  journal.clear();
+}
+
+}  // namespace terrace::tri::planar

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "canvas.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <exception>
+#include <mutex>
+#include <thread>
+
+#include "portable_math.hpp"
+
+namespace terrace::tools {
+namespace {
+
+/// Neither snow nor shadow.
+constexpr std::array<float, 3> kBackground{0.90F, 0.92F, 0.94F};
+
+}  // namespace
+
+Canvas::Canvas(std::uint32_t width, std::uint32_t height)
+    : width_(width * kOversampling),
+      height_(height * kOversampling),
+      colours_(std::size_t{width_} * height_, kBackground),
+      depths_(std::size_t{width_} * height_, -std::numeric_limits<float>::infinity()) {}
+
+std::vector<std::uint8_t> Canvas::resolve() const {
+  const std::size_t width = width_ / kOversampling;
+  const std::size_t height = height_ / kOversampling;
+  std::vector<std::uint8_t> pixels(width * height * 3);
+  for (std::size_t y = 0; y < height; ++y) {
+    for (std::size_t x = 0; x < width; ++x) {
+      for (std::size_t c = 0; c < 3; ++c) {
+        float sum = 0;
+        for (std::size_t dy = 0; dy < kOversampling; ++dy) {
+          for (std::size_t dx = 0; dx < kOversampling; ++dx) {
+            sum += colours_[(y * kOversampling + dy) * width_ + x * kOversampling + dx][c];
+          }
+        }
+        constexpr float kSamples = kOversampling * kOversampling;
+        pixels[(y * width + x) * 3 + c] =
+            static_cast<std::uint8_t>(std::lround(255.0F * std::clamp(sum / kSamples, 0.0F, 1.0F)));
+      }
+    }
+  }
+  return pixels;
+}
+
+void for_bands(std::uint32_t rows, unsigned threads,
+               const std::function<void(std::uint32_t, std::uint32_t)>& work) {
+  const std::uint32_t bands = std::clamp<std::uint32_t>(threads * 4, 1, std::max(rows / 16, 1u));
+  std::atomic<std::uint32_t> next{0};
+  std::exception_ptr failure;
+  std::mutex failure_mutex;
+  const auto run = [&] {
+    for (std::uint32_t band = next++; band < bands; band = next++) {
+      try {
+        work(static_cast<std::uint32_t>(std::uint64_t{rows} * band / bands),
+             static_cast<std::uint32_t>(std::uint64_t{rows} * (band + 1) / bands));
+      } catch (...) {
+        const std::lock_guard lock(failure_mutex);
+        failure = std::current_exception();
+        next = bands;
+      }
+    }
+  };
+  {
+    std::vector<std::jthread> helpers;
+    for (unsigned i = 1; i < std::min(threads, bands); ++i) helpers.emplace_back(run);
+    run();
+  }
+  if (failure) std::rethrow_exception(failure);
+}
+
+Light Light::for_terrain(const ViewDirection& view, double relief) {
+  const double azimuth = view.azimuth + 135;
+  const double half = std::sqrt(0.5);
+  return {.direction = {portable_sin_degrees(azimuth) * half, portable_cos_degrees(azimuth) * half,
+                        half},
+          .relief = relief,
+          .flat = half};
+}
+
+Light Light::beside(const Camera& camera) {
+  stream::Point3 direction{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    direction[i] = camera.toward[i] + 0.45 * camera.up[i] - 0.45 * camera.right[i];
+  }
+  direction = unit(direction);
+  return {.direction = direction, .relief = 1.0, .flat = dot(direction, camera.toward)};
+}
+
+float Light::shade(stream::Point3 normal, const stream::Point3& toward) const {
+  if (dot(normal, toward) < 0) normal = {-normal[0], -normal[1], -normal[2]};
+  normal[0] *= relief;
+  normal[1] *= relief;
+  normal = unit(normal);
+  // Flat ground keeps its tint; slopes toward the light grow paler, the others darker.
+  const double lit = std::max(dot(normal, direction), 0.0) / flat;
+  constexpr double kAmbient = 0.28;
+  return static_cast<float>(kAmbient + (1 - kAmbient) * 0.92 * lit);
+}
+
+}  // namespace terrace::tools

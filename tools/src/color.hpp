@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "scene.hpp"
+
+namespace terrace::tools {
+
+/// Hypsometric tint: deep to high land as green, straw, brown, grey, white. share: 0 lowest, 1
+/// highest; clamped.
+Rgb land_colour(double share);
+/// Sea floor: dark to light blue. share: 0 deepest, 1 at the surface.
+Rgb sea_colour(double share);
+/// Slope: white, yellow, red, dark red at 0, 15, 35 and 60 degrees and above.
+Rgb slope_colour(double degrees);
+/// Colours that differ well for small numbers: levels, classes, clusters.
+Rgb category_colour(std::int64_t category);
+
+/// The range of heights that the tints span: without the outermost 0.5 % on either side, and with
+/// a shore at 0 where there is land and sea.
+struct HeightTint {
+  double low = 0.0, high = 1.0;
+  bool shore = false;
+
+  /// Heights that are not finite are ignored. O(n log n) of a sample of at most 100,000.
+  static HeightTint of(std::span<const double> heights);
+  [[nodiscard]] Rgb colour(double height) const;
+};
+
+}  // namespace terrace::tools

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <cmath>
+
+#include "draw.hpp"
+
+namespace terrace::tools {
+namespace {
+
+struct Splat {
+  float x, y, depth;
+};
+
+/// Samples that the cloud covers, as if it had no gaps: cells of a grid coarse enough that a cell
+/// of the cloud holds several points are counted.
+double covered_area(const std::vector<Splat>& splats, const Canvas& canvas) {
+  double area = 1;
+  for (std::uint32_t cell = 2; cell <= 256; cell *= 2) {
+    const std::size_t columns = canvas.width() / cell + 1;
+    std::vector<std::uint8_t> taken(columns * (canvas.height() / cell + 1), 0);
+    std::size_t count = 0, points = 0;
+    for (const Splat& s : splats) {
+      if (!(s.x >= 0 && s.y >= 0 && s.x < static_cast<float>(canvas.width()) &&
+            s.y < static_cast<float>(canvas.height()))) {
+        continue;
+      }
+      std::uint8_t& mark = taken[static_cast<std::size_t>(s.y) / cell * columns +
+                                 static_cast<std::size_t>(s.x) / cell];
+      count += mark == 0 ? 1 : 0;
+      mark = 1;
+      ++points;
+    }
+    area = std::max(static_cast<double>(count) * cell * cell, 1.0);
+    if (points >= 6 * count) break;
+  }
+  return area;
+}
+
+/// Averages depths over a square of 2 r + 1 samples, only over neighbours whose depth is within
+/// `step`: normals of discs would else be those of the discs. Rows, then columns.
+void smooth_depths(Canvas& canvas, int radius, float step, unsigned threads) {
+  const auto width = static_cast<int>(canvas.width()), height = static_cast<int>(canvas.height());
+  std::vector<float> other(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  const auto pass = [&](bool along_rows, auto&& get, auto&& set) {
+    for_bands(canvas.height(), threads, [&](std::uint32_t first, std::uint32_t last) {
+      for (int y = static_cast<int>(first); y < static_cast<int>(last); ++y) {
+        for (int x = 0; x < width; ++x) {
+          const float centre = get(x, y);
+          float sum = 0, weight = 0;
+          if (std::isfinite(centre)) {
+            for (int k = -radius; k <= radius; ++k) {
+              const int nx = along_rows ? x + k : x, ny = along_rows ? y : y + k;
+              if (nx < 0 || ny < 0 || nx >= width || ny >= height) continue;
+              const float d = get(nx, ny);
+              if (std::abs(d - centre) > step) continue;
+              const auto w = static_cast<float>(radius + 1 - std::abs(k));
+              sum += w * d;
+              weight += w;
+            }
+          }
+          set(x, y, weight > 0 ? sum / weight : centre);
+        }
+      }
+    });
+  };
+  const auto at = [width](int x, int y) {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+           static_cast<std::size_t>(x);
+  };
+  const auto canvas_depth = [&](int x, int y) -> float& {
+    return canvas.depth(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y));
+  };
+  pass(true, canvas_depth, [&](int x, int y, float d) { other[at(x, y)] = d; });
+  pass(
+      false, [&](int x, int y) { return other[at(x, y)]; },
+      [&](int x, int y, float d) { canvas_depth(x, y) = d; });
+}
+
+/// The slope of the depths at a sample along one axis, from the side without a jump.
+float slope(float before, float here, float after, float step) {
+  const float back = here - before, ahead = after - here;
+  const bool back_good = std::abs(back) <= step, ahead_good = std::abs(ahead) <= step;
+  if (back_good && ahead_good) return 0.5F * (back + ahead);
+  if (back_good) return back;
+  if (ahead_good) return ahead;
+  return 0;
+}
+
+/// Lights every sample by the normal that its depth and its neighbours' tell.
+void light_by_depth(const Camera& camera, const Light& light, float step, unsigned threads,
+                    Canvas& canvas) {
+  for_bands(canvas.height(), threads, [&](std::uint32_t first, std::uint32_t last) {
+    for (std::uint32_t y = first; y < last; ++y) {
+      for (std::uint32_t x = 0; x < canvas.width(); ++x) {
+        const float here = canvas.depth(x, y);
+        if (!std::isfinite(here)) continue;
+        const float left = canvas.depth(x == 0 ? x : x - 1, y);
+        const float right = canvas.depth(std::min(x + 1, canvas.width() - 1), y);
+        const float above = canvas.depth(x, y == 0 ? y : y - 1);
+        const float below = canvas.depth(x, std::min(y + 1, canvas.height() - 1));
+        // Metres of depth per metre along right and up.
+        const double along = slope(left, here, right, step) * camera.scale;
+        const double upward = -slope(above, here, below, step) * camera.scale;
+        stream::Point3 normal{};
+        for (std::size_t i = 0; i < 3; ++i) {
+          normal[i] = camera.toward[i] - along * camera.right[i] - upward * camera.up[i];
+        }
+        const float shade = light.shade(unit(normal), camera.toward);
+        for (float& c : canvas.colour(x, y)) {
+          c = shade <= 1 ? c * shade : c + (1 - c) * std::min(shade - 1, 1.0F);
+        }
+      }
+    }
+  });
+}
+
+}  // namespace
+
+void draw_points(const TriangleMesh& cloud, const std::vector<Rgb>& colours, const Camera& camera,
+                 const Light& light, const DrawOptions& options, Canvas& canvas) {
+  std::vector<Splat> splats(cloud.positions.size());
+  for (std::size_t i = 0; i < splats.size(); ++i) {
+    const auto [x, y, depth] = camera.project(cloud.positions[i]);
+    splats[i] = {static_cast<float>(x), static_cast<float>(y), static_cast<float>(depth)};
+  }
+  if (splats.empty()) return;
+  // Discs of this radius cover all but a few percent of an area over which so many points are
+  // scattered evenly: 1 - exp(-points * pi * r^2 / area) with r^2 = area / points is 0.957.
+  const double per_point = covered_area(splats, canvas) / static_cast<double>(splats.size());
+  const float radius = static_cast<float>(std::clamp(std::sqrt(per_point), 0.75, 60.0));
+  const bool own_normals = cloud.normals.size() == cloud.positions.size();
+
+  for_bands(canvas.height(), options.threads, [&](std::uint32_t first, std::uint32_t last) {
+    for (std::size_t i = 0; i < splats.size(); ++i) {
+      const Splat& s = splats[i];
+      const float y0 = std::max(std::ceil(s.y - radius - 0.5F), static_cast<float>(first));
+      const float y1 = std::min(std::floor(s.y + radius - 0.5F) + 1, static_cast<float>(last));
+      const float x0 = std::max(std::ceil(s.x - radius - 0.5F), 0.0F);
+      const float x1 =
+          std::min(std::floor(s.x + radius - 0.5F) + 1, static_cast<float>(canvas.width()));
+      if (!(y0 < y1 && x0 < x1)) continue;
+      float shade = 1;
+      if (own_normals) {
+        const auto& n = cloud.normals[i];
+        shade = light.shade({n[0], n[1], n[2]}, camera.toward);
+      }
+      const std::array<float, 3> colour{static_cast<float>(colours[i][0]) / 255.0F * shade,
+                                        static_cast<float>(colours[i][1]) / 255.0F * shade,
+                                        static_cast<float>(colours[i][2]) / 255.0F * shade};
+      for (auto y = static_cast<std::uint32_t>(y0); y < static_cast<std::uint32_t>(y1); ++y) {
+        for (auto x = static_cast<std::uint32_t>(x0); x < static_cast<std::uint32_t>(x1); ++x) {
+          const float dx = static_cast<float>(x) + 0.5F - s.x;
+          const float dy = static_cast<float>(y) + 0.5F - s.y;
+          const float square = (dx * dx + dy * dy) / (radius * radius);
+          if (square > 1) continue;
+          // Discs are a little vaulted, so that overlapping ones meet halfway between their
+          // centres.
+          const float depth = s.depth - square * radius * 0.5F / static_cast<float>(camera.scale);
+          if (!(depth > canvas.depth(x, y))) continue;
+          canvas.depth(x, y) = depth;
+          canvas.colour(x, y) = colour;
+        }
+      }
+    }
+  });
+  if (own_normals) return;
+  // A surface steeper than this, from sample to sample, is taken for two surfaces.
+  const float step = 4 * (radius + 1) / static_cast<float>(camera.scale);
+  const int reach = std::max(1, static_cast<int>(std::lround(1.5F * radius)));
+  smooth_depths(canvas, reach, step, options.threads);
+  light_by_depth(camera, light, step, options.threads, canvas);
+}
+
+}  // namespace terrace::tools

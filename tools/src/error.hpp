@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace terrace::tools {
+
+/// Wrong usage of the command: an option or value that makes no sense. Ends the command with exit
+/// code 2. (What is wrong with data is a stream::Error and ends it with 1.)
+class UsageError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// The reader of our standard output has gone. Ends the command quietly.
+class ClosedPipe : public std::runtime_error {
+ public:
+  ClosedPipe() : std::runtime_error("closed pipe") {}
+};
+
+}  // namespace terrace::tools

@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "ground.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include <GeographicLib/Constants.hpp>
+
+#include "portable_math.hpp"
+
+namespace terrace::tools {
+namespace {
+
+struct UnitName {
+  std::string_view name;
+  double metres;
+};
+
+// The spellings of GeoTIFF citations, WKT and EPSG.
+constexpr double kSurveyFoot = 1200.0 / 3937.0;
+constexpr std::array<UnitName, 14> kUnits{{
+    {"metre", 1.0},
+    {"meter", 1.0},
+    {"metres", 1.0},
+    {"meters", 1.0},
+    {"m", 1.0},
+    {"kilometre", 1000.0},
+    {"km", 1000.0},
+    {"foot", 0.3048},
+    {"feet", 0.3048},
+    {"ft", 0.3048},
+    {"international foot", 0.3048},
+    {"US survey foot", kSurveyFoot},
+    {"Foot_US", kSurveyFoot},
+    {"US foot", kSurveyFoot},
+}};
+
+bool same_text(std::string_view a, std::string_view b) {
+  const auto lower = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; };
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [&](char x, char y) { return lower(x) == lower(y); });
+}
+
+}  // namespace
+
+MetresPerDegree metres_per_degree(double latitude) {
+  // Radii of the parallel and the meridian: Snyder, Map Projections - A Working Manual (1987),
+  // USGS Professional Paper 1395, equations 4-19 to 4-21.
+  const double a = GeographicLib::Constants::WGS84_a();
+  const double f = GeographicLib::Constants::WGS84_f();
+  const double e2 = f * (2.0 - f);
+  const double phi = std::clamp(latitude, -90.0, 90.0);
+  const double sine = portable_sin_degrees(phi);
+  const double w2 = 1.0 - e2 * sine * sine;
+  const double w = std::sqrt(w2);
+  return {.longitude = kDegree * a * portable_cos_degrees(phi) / w,
+          .latitude = kDegree * a * (1.0 - e2) / (w2 * w)};
+}
+
+std::optional<double> metres_in_unit(std::string_view unit) {
+  for (const UnitName& known : kUnits) {
+    if (same_text(unit, known.name)) return known.metres;
+  }
+  return std::nullopt;
+}
+
+Ground::Ground(Placement placement, double z_weight) : placement_(std::move(placement)) {
+  const stream::Crs& crs = placement_.crs;
+  const auto assume = [this](const std::string& what) {
+    assumption_ += (assumption_.empty() ? "" : "; ") + what;
+  };
+
+  const bool degrees =
+      same_text(crs.horizontal_unit, "degree") ||
+      (crs.horizontal_unit.empty() && same_text(placement_.coordinates[0].unit, "degree"));
+  if (crs.geographic || degrees) {
+    kind_ = Kind::geographic;
+  } else if (crs.epsg == 3857 || crs.epsg == 3785 || crs.epsg == 900913) {
+    kind_ = Kind::web_mercator;
+  } else if (const auto metres = metres_in_unit(crs.horizontal_unit)) {
+    metres_horizontal_ = *metres;
+  } else if (const auto stored = metres_in_unit(placement_.coordinates[0].unit)) {
+    metres_horizontal_ = *stored;
+  } else {
+    assume("the horizontal unit is unknown and taken as metres");
+  }
+
+  // The heights' own unit if it is named, else that of a CRS in feet, else metres.
+  if (const auto channel = metres_in_unit(placement_.coordinates[2].unit)) {
+    metres_vertical_ = *channel;
+  } else if (const auto vertical = metres_in_unit(crs.vertical_unit)) {
+    metres_vertical_ = *vertical;
+  } else if (kind_ == Kind::linear && metres_horizontal_ < 1.0) {
+    metres_vertical_ = metres_horizontal_;
+    assume("the unit of heights is unknown and taken as that of x and y");
+  }
+  metres_vertical_ *= z_weight;
+}
+
+GroundMap Ground::map(const stream::Box3& stored) const {
+  double east = metres_horizontal_, north = metres_horizontal_;
+  if (kind_ != Kind::linear && !stored.empty()) {
+    const stream::Point3 centre =
+        world_point(placement_, {0.5 * (stored.min[0] + stored.max[0]),
+                                 0.5 * (stored.min[1] + stored.max[1]), stored.min[2]});
+    if (kind_ == Kind::geographic) {
+      const MetresPerDegree metres = metres_per_degree(centre[1]);
+      east = metres.longitude;
+      north = metres.latitude;
+    } else {
+      // y = a ln tan(pi/4 + phi/2), so cos(phi) = 1 / cosh(y/a). One metre of the map is
+      // rho cos(phi)/a metres northward on the ground, N cos(phi)/a eastward.
+      const double a = GeographicLib::Constants::WGS84_a();
+      const double growth = portable_exp(-std::abs(centre[1]) / a);
+      const double cosine = 2.0 * growth / (1.0 + growth * growth);
+      const double f = GeographicLib::Constants::WGS84_f();
+      const double e2 = f * (2.0 - f);
+      const double w2 = 1.0 - e2 * (1.0 - cosine * cosine);
+      const double w = std::sqrt(w2);
+      east = cosine / w;
+      north = cosine * (1.0 - e2) / (w2 * w);
+    }
+  }
+  const std::array<double, 6>& xy = placement_.world.xy;
+  return {east * xy[0],  east * xy[1],  0.0,  //
+          north * xy[3], north * xy[4], 0.0,  //
+          0.0,           0.0,           metres_vertical_ * placement_.coordinates[2].scale};
+}
+
+stream::Point3 apply(const GroundMap& map, const stream::Point3& v) {
+  return {map[0] * v[0] + map[1] * v[1] + map[2] * v[2],
+          map[3] * v[0] + map[4] * v[1] + map[5] * v[2],
+          map[6] * v[0] + map[7] * v[1] + map[8] * v[2]};
+}
+
+}  // namespace terrace::tools

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace terrace::tools {
+
+/// Thrown where work stops because of Ctrl-C. what() says how to go on.
+class Interrupted : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// From here on SIGINT and SIGTERM only set a flag (the second one ends the process at once), and a
+/// closed pipe is an error of the write instead of a signal.
+void install_signal_handlers();
+
+/// True once the user has asked to stop. Cheap; may be called from any thread.
+[[nodiscard]] bool interrupted() noexcept;
+
+/// Throws Interrupted if the user has asked to stop. Loops call it once per block.
+void check_interrupt();
+
+/// True if standard output is a pipe that nobody reads any more.
+[[nodiscard]] bool stdout_closed() noexcept;
+
+}  // namespace terrace::tools

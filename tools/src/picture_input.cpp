@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "picture_input.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <optional>
+#include <span>
+
+#include <CLI/CLI.hpp>
+
+#include "error.hpp"
+#include "ground.hpp"
+#include "height_grid.hpp"
+#include "interrupt.hpp"
+#include "mesh_file.hpp"
+#include "store_mesh.hpp"
+#include "terrace/stream/error.hpp"
+#include "terrace/stream/source.hpp"
+
+namespace terrace::tools {
+namespace {
+
+/// Moves positions in stored coordinates to metres on the ground about their middle, and keeps the
+/// heights as the source has them.
+void put_on_ground(PictureInput& input, const Placement& placement, const Ground& ground) {
+  stream::Box3 box;
+  for (const stream::Point3& p : input.mesh.positions) box.include(p);
+  const GroundMap map = ground.map(box);
+  const stream::Point3 middle{0.5 * (box.min[0] + box.max[0]), 0.5 * (box.min[1] + box.max[1]),
+                              0.5 * (box.min[2] + box.max[2])};
+  input.heights.reserve(input.mesh.positions.size());
+  for (stream::Point3& p : input.mesh.positions) {
+    input.heights.push_back(world_point(placement, p)[2]);
+    p = apply(map, {p[0] - middle[0], p[1] - middle[1], p[2] - middle[2]});
+  }
+  input.assumption = ground.assumption();
+}
+
+/// A mesh file says little of its CRS. x and y that could be degrees, beside heights that could not
+/// be any, are taken for longitude and latitude.
+bool looks_geographic(const MeshFile& file) {
+  if (file.comments.find("EPSG:4326") != std::string::npos) return true;
+  stream::Box3 box;
+  for (const stream::Point3& p : file.mesh.positions) box.include(p);
+  if (box.empty()) return false;
+  const double extent = std::max(box.max[0] - box.min[0], box.max[1] - box.min[1]);
+  return box.min[0] >= -360 && box.max[0] <= 360 && box.min[1] >= -90 && box.max[1] <= 90 &&
+         box.max[2] - box.min[2] > 5 * extent;
+}
+
+PictureInput from_mesh(MeshFile file) {
+  PictureInput input;
+  Placement placement;
+  const bool geographic = looks_geographic(file);
+  placement.crs.geographic = geographic;
+  placement.crs.horizontal_unit = geographic ? "degree" : "metre";
+  input.mesh = std::move(file.mesh);
+  put_on_ground(input, placement, Ground(placement));
+  if (geographic) input.assumption = "x and y are taken for longitude and latitude";
+  return input;
+}
+
+/// Bytes that a point of a cloud takes until it is drawn.
+constexpr std::uint64_t kBytesPerPoint = 100;
+
+/// A column of the block as doubles, by type.
+double value_at(const stream::Column& column, std::size_t i) {
+  using stream::ScalarType;
+  switch (column.type) {
+    case ScalarType::i8:
+      return column.as<std::int8_t>()[i];
+    case ScalarType::u8:
+      return column.as<std::uint8_t>()[i];
+    case ScalarType::i16:
+      return column.as<std::int16_t>()[i];
+    case ScalarType::u16:
+      return column.as<std::uint16_t>()[i];
+    case ScalarType::i32:
+      return column.as<std::int32_t>()[i];
+    case ScalarType::u32:
+      return column.as<std::uint32_t>()[i];
+    case ScalarType::i64:
+      return static_cast<double>(column.as<std::int64_t>()[i]);
+    case ScalarType::u64:
+      return static_cast<double>(column.as<std::uint64_t>()[i]);
+    case ScalarType::f32:
+      return column.as<float>()[i];
+    case ScalarType::f64:
+      return column.as<double>()[i];
+  }
+  return 0;
+}
+
+/// The number of the attribute with one of these names.
+std::optional<std::size_t> attribute(const stream::SourceInfo& info,
+                                     std::initializer_list<const char*> names) {
+  for (std::size_t i = 0; i < info.attributes.size(); ++i) {
+    for (const char* name : names) {
+      if (info.attributes[i].name == name) return i;
+    }
+  }
+  return std::nullopt;
+}
+
+/// Appends the block's points with those attributes that a picture can show.
+void append_cloud(const stream::SourceInfo& info, const stream::PointBlock& block,
+                  TriangleMesh& cloud) {
+  cloud.positions.insert(cloud.positions.end(), block.positions.begin(), block.positions.end());
+  const auto red = attribute(info, {"red"}), green = attribute(info, {"green"}),
+             blue = attribute(info, {"blue"});
+  const auto nx = attribute(info, {"nx"}), ny = attribute(info, {"ny"}),
+             nz = attribute(info, {"nz"});
+  const auto group = attribute(info, {"class", "classification", "cluster"});
+  const auto level = attribute(info, {"level"});
+  for (std::size_t i = 0; i < block.size(); ++i) {
+    const auto value = [&](std::size_t column) { return value_at(block.attributes[column], i); };
+    if (red && green && blue) {
+      const auto byte = [&](std::size_t column) {
+        // 16-bit colours are told by their type; what is stored as a float is 0 to 255.
+        const bool wide = block.attributes[column].type == stream::ScalarType::u16;
+        return static_cast<std::uint8_t>(
+            std::clamp(wide ? value(column) / 257 : value(column), 0.0, 255.0));
+      };
+      cloud.colours.push_back({byte(*red), byte(*green), byte(*blue)});
+    }
+    if (nx && ny && nz) {
+      cloud.normals.push_back({static_cast<float>(value(*nx)), static_cast<float>(value(*ny)),
+                               static_cast<float>(value(*nz))});
+    }
+    if (group) cloud.classes.push_back(static_cast<std::int32_t>(value(*group)));
+    if (level) {
+      cloud.levels.push_back(static_cast<std::uint8_t>(std::clamp(value(*level), 0.0, 255.0)));
+    }
+  }
+}
+
+PictureInput from_source(const std::string& path, std::uint64_t most_cells,
+                         const CommonOptions& common) {
+  const std::array<std::string, 1> files{path};
+  const std::unique_ptr<stream::PointSource> source = stream::open_source(files);
+  const stream::SourceInfo& info = source->info();
+  const std::uint64_t memory = common.memory_or(0);
+
+  PictureInput input;
+  std::optional<HeightGrid> grid;
+  if (info.grid) grid.emplace(info.columns, info.rows, most_cells);
+  ProgressMeter meter(common.progress, "points");
+  stream::PointBlock block;
+  while (source->next(block)) {
+    check_interrupt();
+    if (grid) {
+      for (const stream::Point3& p : block.positions) grid->add(p);
+    } else {
+      append_cloud(info, block, input.mesh);
+      if (input.mesh.positions.size() > memory / kBytesPerPoint) {
+        throw stream::Error(
+            {.file = path,
+             .where = {},
+             .cause = "has more points than " + readable_bytes(memory) + " can hold",
+             .remedy = "build a store and render that, or raise --memory"});
+      }
+    }
+    const stream::Progress progress = source->progress();
+    meter.update(progress.points, progress.fraction);
+  }
+  if (grid) {
+    input.mesh = grid->mesh();
+    input.terrain = true;
+  }
+  const Placement placement = placement_of(info);
+  put_on_ground(input, placement, Ground(placement));
+  return input;
+}
+
+}  // namespace
+
+void define_picture_input(CLI::App& app, PictureSelection& selection) {
+  not_yet(app, {"--level", "--focus"});
+  static_cast<void>(selection);
+}
+
+PictureInput read_picture_input(const std::string& path, const PictureSelection& selection,
+                                const ImageSize& size, const CommonOptions& common) {
+  static_cast<void>(selection);
+  if (std::filesystem::is_directory(path)) {
+    throw UsageError("rendering a store is not available yet");
+  }
+  if (std::optional<MeshFile> file = read_mesh_file(path)) return from_mesh(std::move(*file));
+  return from_source(path, 2 * size.width * size.height, common);
+}
+
+}  // namespace terrace::tools

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+
+namespace terrace::tools {
+
+enum class ProgressMode : std::uint8_t {
+  automatic,  ///< a line on a terminal, else nothing
+  json,       ///< JSON lines on standard error
+  none,
+};
+
+/// Shows how far the work has come, on standard error, at most ten times a second: rate, share done
+/// and time left. The line is gone when the object is.
+class ProgressMeter {
+ public:
+  /// what: what is counted, as in "points".
+  ProgressMeter(ProgressMode mode, std::string what);
+  ~ProgressMeter();
+  ProgressMeter(const ProgressMeter&) = delete;
+  ProgressMeter& operator=(const ProgressMeter&) = delete;
+
+  /// count: things done so far. fraction: share of the work done, 0 to 1; 0 if unknown.
+  void update(std::uint64_t count, double fraction);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  void show(std::uint64_t count, double fraction, double seconds);
+
+  ProgressMode mode_;
+  std::string what_;
+  Clock::time_point start_, last_;
+  bool line_shown_ = false;
+};
+
+}  // namespace terrace::tools

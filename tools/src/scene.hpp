@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "terrace/stream/point.hpp"
+
+namespace terrace::tools {
+
+using Rgb = std::array<std::uint8_t, 3>;
+
+/// Vertices with what is known of them, and triangles between them: none for a cloud of points.
+/// The optional columns are empty or as long as `positions`.
+struct TriangleMesh {
+  std::vector<stream::Point3> positions;
+  std::vector<std::array<std::uint32_t, 3>> triangles;  ///< either orientation
+  std::vector<std::uint8_t> levels;                     ///< of a store
+  std::vector<std::int32_t> classes;                    ///< class or cluster
+  std::vector<Rgb> colours;
+  std::vector<std::array<float, 3>> normals;  ///< unit length
+};
+
+/// True if the mesh is seen from above without overlap: nearly all triangles, seen along z, turn
+/// the same way. A cloud of points is none.
+bool is_height_field(const TriangleMesh& mesh);
+
+/// Unit normals at the vertices: those of the triangles around, weighed by area. For a height field
+/// they point up.
+std::vector<std::array<float, 3>> vertex_normals(const TriangleMesh& mesh);
+
+}  // namespace terrace::tools

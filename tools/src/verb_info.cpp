@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// info: what a store or a file holds.
+#include <filesystem>
+
+#include <CLI/CLI.hpp>
+
+#include "info.hpp"
+#include "verbs.hpp"
+
+namespace terrace::tools {
+namespace {
+
+class InfoCommand : public Command {
+ public:
+  void define(CLI::App& app) override {
+    app.add_option("input", input_, "Store, or file of points or cells; - is standard input")
+        ->required()
+        ->type_name("STORE|FILE");
+  }
+
+  Summary run(const CommonOptions& common) override {
+    return std::filesystem::is_directory(input_) ? info_of_store(input_, common)
+                                                 : info_of_file(input_, common);
+  }
+
+ private:
+  std::string input_;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_info() { return std::make_unique<InfoCommand>(); }
+
+}  // namespace terrace::tools

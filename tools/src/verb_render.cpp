@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// render: a picture of a raster, a mesh or a cloud of points.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <optional>
+#include <utility>
+
+#include <CLI/CLI.hpp>
+
+#include "camera.hpp"
+#include "color.hpp"
+#include "draw.hpp"
+#include "error.hpp"
+#include "ground.hpp"
+#include "height_grid.hpp"
+#include "interrupt.hpp"
+#include "mesh_file.hpp"
+#include "output.hpp"
+#include "picture_input.hpp"
+#include "terrace/stream/error.hpp"
+#include "terrace/stream/png.hpp"
+#include "units.hpp"
+#include "verbs.hpp"
+
+namespace terrace::tools {
+namespace {
+
+/// Square root of the mean squared slope (rise over run) of the triangles, weighed by area.
+double rms_slope(const TriangleMesh& mesh) {
+  double sum = 0, area = 0;
+  for (const auto& t : mesh.triangles) {
+    const stream::Point3 &a = mesh.positions[t[0]], &b = mesh.positions[t[1]],
+                         &c = mesh.positions[t[2]];
+    const stream::Point3 u{b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+    const stream::Point3 v{c[0] - a[0], c[1] - a[1], c[2] - a[2]};
+    const double nx = u[1] * v[2] - u[2] * v[1], ny = u[2] * v[0] - u[0] * v[2];
+    const double nz = std::abs(u[0] * v[1] - u[1] * v[0]);
+    if (nz <= 0) continue;
+    sum += (nx * nx + ny * ny) / nz;
+    area += nz;
+  }
+  return area > 0 ? std::sqrt(sum / area) : 0;
+}
+
+/// Degrees of slope at a vertex with that normal.
+double slope_degrees(const std::array<float, 3>& normal) {
+  const double horizontal = std::hypot(normal[0], normal[1]);
+  return std::atan2(horizontal, std::abs(static_cast<double>(normal[2]))) * 180 / 3.14159265358979;
+}
+
+class RenderCommand : public Command {
+ public:
+  void define(CLI::App& app) override {
+    app.add_option("input", input_, "Store, raster, mesh (PLY, OBJ) or cloud of points")
+        ->required()
+        ->type_name("FILE");
+    add_output(app, output_, "The picture (PNG); - is standard output");
+    app.add_option("--size", size_, "Of the picture in pixels")
+        ->capture_default_str()
+        ->type_name("WxH");
+    app.add_option("--color", color_, "height, slope, level, rgb, class, cluster or grey")
+        ->check(CLI::IsMember({"height", "slope", "level", "rgb", "class", "cluster", "grey"}))
+        ->type_name("WHAT");
+    app.add_flag("--wire", wire_, "Draw the edges of the triangles");
+    app.add_option("--view", view_, "top, or where the viewer stands: AZIMUTH,ELEVATION in degrees")
+        ->capture_default_str()
+        ->type_name("VIEW");
+    app.add_option("--exaggerate", exaggerate_,
+                   "Multiply heights (default: as much as the relief needs to be seen)")
+        ->check(CLI::PositiveNumber)
+        ->type_name("FACTOR");
+    define_picture_input(app, selection_);
+  }
+
+  Summary run(const CommonOptions& common) override {
+    const Stopwatch watch;
+    const ImageSize size = parse_size(size_);
+    if (size.width > 20000 || size.height > 20000) {
+      throw UsageError("pictures of more than 20000 pixels on a side are not drawn");
+    }
+    const ViewDirection view = parse_view(view_);
+    const bool replace = may_replace(output_, common.force);
+
+    PictureInput input = read_picture_input(input_, selection_, size, common);
+    if (!input.assumption.empty()) common.say(input_ + ": " + input.assumption);
+    check_interrupt();
+    TriangleMesh& mesh = input.mesh;
+    if (mesh.positions.empty()) {
+      throw stream::Error({.file = input_,
+                           .where = {},
+                           .cause = "holds no points",
+                           .remedy = "there is nothing to draw"});
+    }
+    const bool terrain = input.terrain || is_height_field(mesh);
+    const std::vector<Rgb> colours = colours_of(mesh, input.heights, terrain);
+    const double factor = exaggerate(mesh, terrain, view);
+
+    Canvas canvas(static_cast<std::uint32_t>(size.width), static_cast<std::uint32_t>(size.height));
+    Camera camera(view);
+    fit(camera, mesh.positions, canvas);
+    const Light light = terrain ? Light::for_terrain(view, relief_) : Light::beside(camera);
+    const DrawOptions options{.wire = wire_, .threads = common.threads};
+    if (mesh.triangles.empty()) {
+      draw_points(mesh, colours, camera, light, options, canvas);
+    } else {
+      draw_triangles(mesh, colours, camera, light, options, canvas);
+    }
+    check_interrupt();
+    stream::write_png(output_, size.width, size.height, 3, canvas.resolve(), replace);
+
+    Summary summary;
+    summary.json["width"] = size.width;
+    summary.json["height"] = size.height;
+    summary.json["vertices"] = mesh.positions.size();
+    summary.json["triangles"] = mesh.triangles.size();
+    summary.json["exaggeration"] = factor;
+    summary.json["seconds"] = watch.seconds();
+    summary.json["peak_rss_bytes"] = peak_rss_bytes();
+    summary.text = output_ + ": " + std::to_string(size.width) + " x " +
+                   std::to_string(size.height) + " pixels, " + with_commas(mesh.positions.size()) +
+                   " points, " + with_commas(mesh.triangles.size()) + " triangles";
+    if (factor != 1) summary.text += ", heights x " + number_text(factor);
+    summary.text += ", " + readable_seconds(watch.seconds()) + '\n';
+    return summary;
+  }
+
+ private:
+  /// One colour per vertex. heights: in the source's own unit.
+  [[nodiscard]] std::vector<Rgb> colours_of(const TriangleMesh& mesh,
+                                            const std::vector<double>& heights,
+                                            bool terrain) const {
+    std::string by = color_;
+    if (by.empty()) by = !mesh.colours.empty() ? "rgb" : terrain ? "height" : "grey";
+    const auto lacks = [&](const std::string& what) {
+      throw UsageError("--color " + by + ": '" + input_ + "' has no " + what);
+    };
+    std::vector<Rgb> colours(mesh.positions.size(), Rgb{205, 205, 200});
+    if (by == "rgb") {
+      if (mesh.colours.empty()) lacks("colours");
+      return mesh.colours;
+    }
+    if (by == "level" && mesh.levels.empty()) lacks("levels");
+    if ((by == "class" || by == "cluster") && mesh.classes.empty()) lacks(by);
+    if (by == "slope" && mesh.triangles.empty()) lacks("triangles to have a slope");
+    const HeightTint tint = HeightTint::of(heights);
+    const auto normals = by == "slope" ? vertex_normals(mesh) : std::vector<std::array<float, 3>>();
+    for (std::size_t i = 0; i < colours.size(); ++i) {
+      if (by == "height") colours[i] = tint.colour(heights[i]);
+      if (by == "slope") colours[i] = slope_colour(slope_degrees(normals[i]));
+      if (by == "level") colours[i] = category_colour(mesh.levels[i]);
+      if (by == "class" || by == "cluster") colours[i] = category_colour(mesh.classes[i]);
+    }
+    return colours;
+  }
+
+  /// Multiplies the heights and chooses the relief of the light. Returns the factor for heights.
+  double exaggerate(TriangleMesh& mesh, bool terrain, const ViewDirection& view) {
+    // Slopes of this size make light and shadow that are easy to see without looking wild.
+    constexpr double kPleasant = 0.45;
+    const double slope = terrain ? rms_slope(mesh) : 0;
+    const double wanted = slope > 0 ? std::clamp(kPleasant / slope, 1.0, 25.0) : 1.0;
+    double factor = 1;
+    if (exaggerate_ > 0) {
+      factor = exaggerate_;
+    } else if (std::abs(view.elevation) < 89) {
+      // Seen from the side the shape itself is stretched, but not as far as the light.
+      factor = std::round(10 * std::sqrt(wanted)) / 10;
+    }
+    relief_ = exaggerate_ > 0 ? 1.0 : std::max(1.0, wanted / factor);
+    for (stream::Point3& p : mesh.positions) p[2] *= factor;
+    return factor;
+  }
+
+  std::string input_, output_, size_ = "1600x1200", color_, view_ = "top";
+  bool wire_ = false;
+  double exaggerate_ = 0;
+  double relief_ = 1;
+  PictureSelection selection_;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_render() { return std::make_unique<RenderCommand>(); }
+
+}  // namespace terrace::tools

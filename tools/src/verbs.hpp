@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <memory>
+
+#include "cli.hpp"
+
+namespace terrace::tools {
+
+std::unique_ptr<Command> make_build();
+std::unique_ptr<Command> make_convert();
+std::unique_ptr<Command> make_info();
+std::unique_ptr<Command> make_mesh();
+std::unique_ptr<Command> make_points();
+std::unique_ptr<Command> make_render();
+std::unique_ptr<Command> make_synth();
+std::unique_ptr<Command> make_verify();
+
+}  // namespace terrace::tools
