@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Block clustering: points per second for each effort and instruction set, and the cost Q relative
-// to the reference search. Blocks of 10 000 points (TERRACE_BENCH_SMALL: 2 500), of
+// to the reference search. Blocks of 10 000 points (TERRACE_BENCH_SMALL: 576), of
 //   dem   square tiles of a fractal elevation model, cells of 30 m, neighbours differ by 2.65 m
 //   scan  patches 500 points wide of a bumpy closed surface
 //   shuf  the scan shuffled: each block is a coarse copy of the whole surface
@@ -26,7 +26,7 @@ namespace {
 using namespace terrace::cluster;
 
 const bool kSmall = std::getenv("TERRACE_BENCH_SMALL") != nullptr;
-const std::size_t kSide = kSmall ? 50 : 100;
+const std::size_t kSide = kSmall ? 24 : 100;
 const std::size_t kBlockSize = kSide * kSide;
 const std::size_t kBlocks = kSmall ? 2 : 16;
 const std::size_t kFullBlocks = kSmall ? 1 : 2;
@@ -50,7 +50,7 @@ Input make_input(std::size_t which) {
   } else if (which == 3) {
     points = inputs::cube(kBlocks * kBlockSize, random);
   } else {
-    points = kSmall ? inputs::scan(2, 100, random) : inputs::scan(4, 500, random);
+    points = kSmall ? inputs::scan(2, 40, random) : inputs::scan(4, 500, random);
     if (which == 2) inputs::shuffle(points, random);
   }
   Input input;

@@ -23,8 +23,9 @@ class Column {
   void reserve(std::size_t count, std::size_t kept = 0);
   [[nodiscard]] std::size_t capacity() const { return capacity_; }
   void swap(Column& other) noexcept;
-  operator T*() { return data_; }
-  operator const T*() const { return data_; }
+  // Inlined at any rate, see tests/check_symbols.sh.
+  [[gnu::always_inline]] operator T*() { return data_; }
+  [[gnu::always_inline]] operator const T*() const { return data_; }
 
  private:
   T* data_ = nullptr;
@@ -33,7 +34,7 @@ class Column {
 
 /// Floats are processed sixteen at a time.
 inline constexpr std::uint32_t kLanes = 16;
-inline constexpr std::uint32_t round_to_lanes(std::uint32_t n) {
+[[gnu::always_inline]] inline constexpr std::uint32_t round_to_lanes(std::uint32_t n) {
   return (n + kLanes - 1) & ~(kLanes - 1);
 }
 

@@ -99,9 +99,10 @@ std::vector<Block> degenerate_blocks(std::uint64_t seed) {
   return blocks;
 }
 
+/// Beside the portable one.
 std::vector<SimdPath> available_paths() {
   std::vector<SimdPath> paths;
-  for (const SimdPath path : {SimdPath::portable, SimdPath::avx2, SimdPath::avx512}) {
+  for (const SimdPath path : {SimdPath::avx2, SimdPath::avx512}) {
     try {
       BlockClusterer clusterer(path);
       paths.push_back(path);
@@ -125,14 +126,17 @@ TEST(BlockClusterer, ResultsAreValidAndTheSameOnAllPaths) {
   std::vector<BlockClusterer> clusterers;
   for (const SimdPath path : available_paths()) clusterers.emplace_back(path);
   BlockClusterer portable(SimdPath::portable);
+  std::size_t blocks_seen = 0;
   for (std::uint64_t seed = 1; seed <= 2; ++seed) {
     std::vector<Block> blocks = ordinary_blocks(seed);
     if (seed == 1) {
       for (Block& block : degenerate_blocks(seed)) blocks.push_back(std::move(block));
     }
     for (const Block& block : blocks) {
-      for (const double facility_cost : kFacilityCosts) {
-        const Effort effort = kEfforts[(seed + block.points.size() / 7) % 3];
+      const std::size_t turn = ++blocks_seen;
+      for (std::size_t k = 0; k < 2; ++k) {
+        const double facility_cost = kFacilityCosts[(turn + k) % 3];
+        const Effort effort = kEfforts[(turn / 3 + k) % 3];
         SCOPED_TRACE(testing::Message() << block.name << ", seed " << seed << ", effort "
                                         << static_cast<int>(effort) << ", cost " << facility_cost);
         const BlockOptions options{.facility_cost = facility_cost, .effort = effort, .seed = seed};
@@ -287,8 +291,8 @@ TEST(BlockClusterer, CostsBeyondTheRangeOfDoubleAreInfinite) {
 }
 
 TEST(BlockClusterer, PathsThatTheMachineLacksAreRefused) {
-  EXPECT_NO_THROW(BlockClusterer(SimdPath::portable));
-  EXPECT_NO_THROW(BlockClusterer(SimdPath::automatic));
+  EXPECT_NO_THROW(BlockClusterer{SimdPath::portable});
+  EXPECT_NO_THROW(BlockClusterer{SimdPath::automatic});
   EXPECT_NO_THROW(BlockClusterer{best_simd_path()});
 }
 
