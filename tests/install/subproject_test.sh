@@ -1,7 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Each library, copied into the subprojects of a stranger's project, is found there by its name,
-# builds without its tests, and links. The stranger has options of the most ordinary names.
+# Each library, copied into the subprojects of a stranger's project, is found there by its name and
+# builds there without its tests. The stranger has options of the most ordinary names.
 # Usage: subproject_test.sh SOURCE
 set -eu
 source=$1
@@ -50,14 +50,15 @@ int main() {
 }
 CODE
 
-# Unoptimised: what is tested is the building, not the result.
+# Unoptimised: what is tested is the building, not the result. All are configured and all users are
+# compiled; linked and run are those of the two quick libraries (CI builds each library alone).
 meson setup "$folder/build" "$folder" --buildtype=plain >"$folder/log" 2>&1 || { cat "$folder/log"; exit 1; }
-ninja -C "$folder/build" use_stream use_cluster use_matching use_tri >"$folder/log" 2>&1 ||
-  { tail -n 50 "$folder/log"; exit 1; }
-if find "$folder/build/subprojects" -name '*_tests' | grep .; then
-  echo 'a subproject built its tests'
+ninja -C "$folder/build" use_cluster use_matching use_stream.p/use_stream.cpp.o use_tri.p/use_tri.cpp.o \
+  >"$folder/log" 2>&1 || { tail -n 50 "$folder/log"; exit 1; }
+if grep -o 'subprojects/[^ ]*_tests' "$folder/build/build.ninja"; then
+  echo 'a subproject would build its tests'
   exit 1
 fi
-for library in stream cluster matching tri; do
+for library in cluster matching; do
   "$folder/build/use_$library" || { echo "use_$library failed"; exit 1; }
 done

@@ -145,6 +145,9 @@ def check_rooms(root):
         for name in ('LICENSE', 'README.md', 'meson.build', 'meson_options.txt'):
             if not os.path.isfile(os.path.join(root, f'lib{library}', name)):
                 yield f'lib{library}/{name}: is missing'
+    for name in ('LICENSE', 'README.md'):
+        if not os.path.isfile(os.path.join(root, 'tools', name)):
+            yield f'tools/{name}: is missing'
 
 
 def breaches(root):

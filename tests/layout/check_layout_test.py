@@ -33,6 +33,8 @@ def make_tree(root):
         write(root, f'{room}/bench/a_bench.cpp', f'// {spdx}#include <benchmark/benchmark.h>\n')
         os.symlink(f'../{room}', os.path.join(root, 'subprojects', f'terrace-{library}'))
     gpl = 'SPDX-License-Identifier: GPL-3.0-or-later\n'
+    for name in ('LICENSE', 'README.md'):
+        write(root, f'tools/{name}', 'text\n')
     write(root, 'tools/src/main.cpp', f'// {gpl}#include <terrace/tri/a.hpp>\n#include <CLI/CLI.hpp>\n')
     write(root, 'tests/run.sh', f'#!/bin/sh\n# {gpl}')
 
