@@ -158,7 +158,12 @@ TEST(GeoReference, RealFilesLieWhereGdalPutsThem) {
   for (const auto& entry : std::filesystem::recursive_directory_iterator(*folder / "dem")) {
     const std::string path = entry.path().string();
     if (entry.path().extension() != ".tif" || path.find("hostile") != path.npos) continue;
-    if (path.find("gcp") != path.npos) continue;
+    // Of the many encodings of one place a few will do: gdalinfo takes its time.
+    const std::string name = entry.path().filename().string();
+    const bool alike = path.find("/encodings/") != path.npos || name.starts_with("float") ||
+                       name.starts_with("uint") || name.starts_with("int") ||
+                       name.starts_with("byte_");
+    if (alike && name != "byte_point.tif" && name != "i16_scale_offset.tif") continue;
     SCOPED_TRACE(path);
     const nlohmann::json gdal = gdalinfo(path);
     ASSERT_FALSE(gdal.is_discarded());
@@ -186,8 +191,8 @@ TEST(GeoReference, RealFilesLieWhereGdalPutsThem) {
     EXPECT_EQ(band.value("scale", 1.0), info.sample.scale);
     EXPECT_EQ(band.value("offset", 0.0), info.sample.offset);
   }
-  EXPECT_GT(compared, 90u);
-  EXPECT_GT(codes, 20u);
+  EXPECT_GT(compared, 30u);
+  EXPECT_GT(codes, 15u);
 }
 
 }  // namespace
