@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "format_geotiff.hpp"
 #include "format_ply.hpp"
 #include "format_xyz.hpp"
 #include "input.hpp"
@@ -74,7 +75,7 @@ struct HeadScope {
 
 std::span<const Format> formats() {
   // The most telling content first: text is whatever looks like a table of numbers.
-  static const std::array<Format, 2> all{ply_format(), xyz_format()};
+  static const std::array<Format, 3> all{geotiff_format(), ply_format(), xyz_format()};
   return all;
 }
 

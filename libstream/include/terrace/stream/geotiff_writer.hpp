@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <span>
+
+#include "terrace/stream/source.hpp"
+
+namespace terrace::stream {
+
+enum class GeoTiffCompression { none, deflate, zstd };
+
+/// What a GeoTIFF of one band says of itself.
+struct GeoTiffOptions {
+  std::uint32_t columns = 0, rows = 0;
+  Channel sample;        ///< type of the samples; scale, offset and unit where not the default
+  WorldTransform world;  ///< from column and row to the sample's place, as in SourceInfo
+  bool pixel_is_point = false;  ///< a sample stands for a point and not for its cell's area
+  Crs crs;                      ///< EPSG codes, else the name as a citation
+  std::optional<double> nodata;
+  GeoTiffCompression compression = GeoTiffCompression::deflate;
+  int level = 6;             ///< of the compression: 1 to 12 (deflate), 1 to 22 (zstd)
+  bool predictor = true;     ///< code differences of neighbours: smaller for terrain
+  std::uint32_t tile = 256;  ///< columns and rows of a tile, a multiple of 16
+  bool replace = false;      ///< an existing file
+};
+
+/// Writes a tiled GeoTIFF of one band, in rows from the top or in tiles in any order; BigTIFF where
+/// 4 GiB might not do. The file appears whole and synced with `commit()`, or not at all (see
+/// AtomicFile). Holds one row of tiles.
+class GeoTiffWriter {
+ public:
+  /// Throws: Error if the file cannot be made or the compression is not in the system's libtiff.
+  GeoTiffWriter(const std::filesystem::path& path, const GeoTiffOptions& options);
+  ~GeoTiffWriter();
+  GeoTiffWriter(GeoTiffWriter&&) noexcept;
+  GeoTiffWriter& operator=(GeoTiffWriter&&) noexcept;
+
+  /// The next rows from the top: native samples, any number of whole rows.
+  void write_rows(std::span<const std::byte> samples);
+  /// One tile, `options.tile` squared native samples by rows; what hangs over the raster's edge is
+  /// ignored. Tiles never written are left out of the file: readers take them for nodata, or 0. Not
+  /// to be mixed with `write_rows`.
+  void write_tile(std::uint32_t across, std::uint32_t down, std::span<const std::byte> samples);
+  /// Publishes the file. After `write_rows` all rows must have been written.
+  void commit();
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace terrace::stream

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "terrace/stream/source.hpp"
+
+namespace terrace::stream {
+
+/// What is known of a raster before its samples are read.
+struct RasterInfo {
+  std::string format;  ///< "geotiff", ...
+  std::vector<std::string> files;
+  std::uint64_t columns = 0, rows = 0;
+  Channel sample;  ///< type of the raw samples, and what they mean
+  WorldTransform world;
+  Crs crs;
+  std::optional<double> nodata;  ///< raw units; of the first file
+  /// The pieces in which the raster is stored: reading in multiples of them, counted from the
+  /// raster's corner, decodes each once.
+  std::uint64_t block_columns = 1, block_rows = 1;
+  std::vector<std::string> comments;
+};
+
+/// A rectangle of cells.
+struct CellWindow {
+  std::uint64_t column = 0, row = 0;    ///< of its first cell
+  std::uint64_t columns = 0, rows = 0;  ///< its size
+};
+
+/// Where `Raster::read_over` puts samples: cell (c, r) of the window is element r * stride + c.
+/// `valid` is 0 for cells without data and 1 otherwise.
+struct CellBuffer {
+  std::byte* samples = nullptr;  ///< native values of RasterInfo::sample.type
+  std::uint8_t* valid = nullptr;
+  std::size_t stride = 0;  ///< cells from one row to the next
+};
+
+/// A raster that can be read by windows. Not thread-safe.
+///
+/// Cells without data are those that equal the file's nodata value, that lie in blocks the file
+/// leaves out although it has a nodata value, and that are NaN or infinite.
+class Raster {
+ public:
+  virtual ~Raster() = default;
+
+  [[nodiscard]] virtual const RasterInfo& info() const = 0;
+  /// Lays the valid samples of `window` over what `out` holds: writes them, sets their `valid` to 1
+  /// and leaves every other cell alone. Returns whether it wrote any. Windows that go forward
+  /// (down, or to the right in the same rows) are cheap; others may decode blocks again. Throws:
+  /// Error naming file and block.
+  virtual bool read_over(const CellWindow& window, const CellBuffer& out) = 0;
+};
+
+struct RasterOptions {
+  int band = 1;                            ///< counted from 1
+  std::uint64_t memory_bytes = 64u << 20;  ///< no decoded block may be larger than this
+  /// Bytes of decoded blocks, of those that a window has used in part, to keep for the next one.
+  std::uint64_t cache_bytes = 16u << 20;
+};
+
+/// Opens a GeoTIFF: strips and tiles, classic and BigTIFF, every codec of the libtiff at hand,
+/// integers and floats of up to 64 bits, any band. Overviews are skipped. Never maps the file.
+///
+/// `world` maps to the sample's place, that is the centre of the cell for PixelIsArea. A file
+/// without georeferencing is a plain grid of unit cells, y = -row; a comment says so. One that is
+/// referenced by several tie points only is refused.
+/// Throws: Error.
+std::unique_ptr<Raster> open_geotiff(const std::string& file, const RasterOptions& options = {});
+
+/// Opens a member of a mosaic anew.
+using RasterOpener = std::function<std::unique_ptr<Raster>(const std::string& file)>;
+
+/// Several rasters as one: where they overlap, the valid sample of the last named wins. They must
+/// agree in sample (type, scale, offset), cell size and phase (to 1/1000 cell) and, unless
+/// `ignore_crs`, in CRS. Keeps at most `open_at_once` of them open.
+/// Throws: Error naming two files and what differs, or if the union has 2^30 columns or rows.
+std::unique_ptr<Raster> open_mosaic(const std::vector<std::string>& files,
+                                    const RasterOpener& opener, bool ignore_crs = false,
+                                    std::size_t open_at_once = 32);
+
+/// The cells of a raster as points (see SourceInfo::grid): in tiles that are square on the ground,
+/// of at most `options.block_points` cells, one block each. The raster is read in windows of about
+/// 16 x 16 tiles or more, less if they would not fit into `options.memory_bytes`; within a window
+/// the tiles follow a Hilbert curve. 64-bit integers have the attribute "sample".
+std::unique_ptr<PointSource> points_of(std::unique_ptr<Raster> raster,
+                                       const SourceOptions& options = {});
+
+}  // namespace terrace::stream

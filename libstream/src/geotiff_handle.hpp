@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <tiffio.h>
+
+#include "terrace/stream/error.hpp"
+
+namespace terrace::stream {
+
+/// A TIFF file opened for reading by libtiff, without memory mapping, without a word to standard
+/// error, with every allocation of libtiff's bounded; positioned at the first directory that is
+/// not an overview or a mask.
+class GeoTiffHandle {
+ public:
+  /// `memory_bytes`: most that libtiff may allocate at once for decoding.
+  /// Throws: Error if the file cannot be opened or its directory cannot be read.
+  GeoTiffHandle(const std::string& file, std::uint64_t memory_bytes);
+  ~GeoTiffHandle();
+  GeoTiffHandle(const GeoTiffHandle&) = delete;
+  GeoTiffHandle& operator=(const GeoTiffHandle&) = delete;
+
+  [[nodiscard]] TIFF* tiff() const { return tiff_; }
+  [[nodiscard]] const std::string& file() const { return file_; }
+  [[nodiscard]] std::uint64_t file_bytes() const { return file_bytes_; }
+  /// What libtiff warned of: fields it ignored because they are damaged.
+  [[nodiscard]] const std::vector<std::string>& warnings() const { return warnings_; }
+
+  /// Reads exactly `out.size()` bytes at `offset`; false if the file has not so many.
+  /// Throws: Error if reading fails.
+  [[nodiscard]] bool read(std::uint64_t offset, std::span<std::byte> out) const;
+  /// What libtiff last complained of, and forgets it. Empty if it has not.
+  std::string take_complaint();
+
+  /// Values of a field of GeoTIFF's or GDAL's; empty if it is not there.
+  /// Throws: Error if it has another type.
+  [[nodiscard]] std::vector<double> doubles(std::uint32_t tag) const;
+  [[nodiscard]] std::vector<std::uint16_t> shorts(std::uint32_t tag) const;
+  [[nodiscard]] std::string text(std::uint32_t tag) const;
+  /// A scalar field, or its default value according to the TIFF specification.
+  template <class T>
+  [[nodiscard]] T value_or(std::uint32_t tag, T otherwise) const {
+    T value = otherwise;
+    return TIFFGetFieldDefaulted(tiff_, tag, &value) == 1 ? value : otherwise;
+  }
+  template <class T>
+  [[nodiscard]] std::optional<T> value(std::uint32_t tag) const {
+    T found{};
+    if (TIFFGetField(tiff_, tag, &found) != 1) return std::nullopt;
+    return found;
+  }
+
+  [[noreturn]] void fail(std::string where, std::string cause, std::string remedy = {}) const;
+
+ private:
+  struct Io;
+  [[nodiscard]] std::span<const std::byte> field(std::uint32_t tag, int type) const;
+  static int on_error(TIFF*, void* self, const char* module, const char* format, va_list values);
+  static int on_warning(TIFF*, void* self, const char* module, const char* format, va_list values);
+
+  std::string file_;
+  std::uint64_t file_bytes_ = 0;
+  std::unique_ptr<Io> io_;
+  std::string complaint_;
+  std::vector<std::string> warnings_;
+  TIFF* tiff_ = nullptr;
+};
+
+}  // namespace terrace::stream

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "terrace/stream/source.hpp"
+
+namespace terrace::stream {
+
+/// The GeoKeys of a TIFF: small numbers and texts by key. Entries that point outside their arrays,
+/// or are cut short, are left out and listed in `faults`.
+class GeoKeys {
+ public:
+  GeoKeys(std::span<const std::uint16_t> directory, const std::string& ascii);
+
+  [[nodiscard]] std::optional<std::uint16_t> number(std::uint16_t key) const;
+  [[nodiscard]] std::string text(std::uint16_t key) const;  ///< empty if there is none
+  [[nodiscard]] bool empty() const { return numbers_.empty() && texts_.empty(); }
+  [[nodiscard]] const std::vector<std::string>& faults() const { return faults_; }
+
+ private:
+  std::unordered_map<std::uint16_t, std::uint16_t> numbers_;
+  std::unordered_map<std::uint16_t, std::string> texts_;
+  std::vector<std::string> faults_;
+};
+
+/// The coordinate reference system the keys name; codes that are user-defined count as none.
+Crs crs_of(const GeoKeys& keys);
+
+}  // namespace terrace::stream

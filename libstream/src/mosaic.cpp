@@ -1,0 +1,262 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <list>
+#include <optional>
+#include <sstream>
+#include <utility>
+
+#include "raster_overlay.hpp"
+#include "terrace/stream/error.hpp"
+#include "terrace/stream/raster.hpp"
+
+namespace terrace::stream {
+namespace {
+
+constexpr std::uint64_t kMostCells = 1u << 30;
+constexpr double kPhase = 1e-3;  // cells
+
+std::string printed(double value) {
+  std::ostringstream out;
+  out.precision(17);
+  out << value;
+  return out.str();
+}
+
+[[noreturn]] void differ(const std::string& first, const std::string& other,
+                         const std::string& what, const std::string& remedy) {
+  throw Error({.file = other,
+               .where = {},
+               .cause = "does not fit to " + first + ": " + what,
+               .remedy = remedy});
+}
+
+/// Where the raster's first cell lies in the cells of `frame`.
+std::array<double, 2> cell_of(const WorldTransform& frame, double x, double y) {
+  const auto& m = frame.xy;
+  const double determinant = m[0] * m[4] - m[1] * m[3];
+  const double dx = x - m[2], dy = y - m[5];
+  return {(m[4] * dx - m[1] * dy) / determinant, (m[0] * dy - m[3] * dx) / determinant};
+}
+
+struct Member {
+  std::string file;
+  std::int64_t column = 0, row = 0;  // of its first cell, first in the frame of the first file
+  std::uint64_t columns = 0, rows = 0;
+};
+
+/// All four corners must lie on cells of the first raster, so cell sizes and rotation agree, too.
+Member placed(const RasterInfo& first, const RasterInfo& other) {
+  const std::string &a = first.files.front(), &b = other.files.front();
+  const auto& m = other.world.xy;
+  const auto corner = [&](double c, double r) {
+    return cell_of(first.world, m[0] * c + m[1] * r + m[2], m[3] * c + m[4] * r + m[5]);
+  };
+  const std::string align = "align them first: gdalwarp -tap -tr, or gdalbuildvrt -resolution";
+  const std::array<double, 2> origin = corner(0, 0);
+  const double column = std::round(origin[0]), row = std::round(origin[1]);
+  const auto width = static_cast<double>(other.columns), height = static_cast<double>(other.rows);
+  for (const auto& [c, r] :
+       {std::pair(width, 0.0), std::pair(0.0, height), std::pair(width, height)}) {
+    const auto at = corner(c, r);
+    if (!(std::abs(at[0] - origin[0] - c) <= kPhase && std::abs(at[1] - origin[1] - r) <= kPhase)) {
+      differ(a, b,
+             "cells of " + printed(m[0]) + " x " + printed(m[4]) + " where the other has " +
+                 printed(first.world.xy[0]) + " x " + printed(first.world.xy[4]),
+             align);
+    }
+  }
+  if (!(std::abs(origin[0] - column) <= kPhase && std::abs(origin[1] - row) <= kPhase)) {
+    differ(a, b,
+           "its cells are shifted by " + printed(origin[0] - column) + ", " +
+               printed(origin[1] - row) + " of a cell",
+           align);
+  }
+  if (std::abs(column) >= 0x1p31 || std::abs(row) >= 0x1p31) {
+    differ(a, b, "it lies 2^31 cells away or more", "read them separately");
+  }
+  return {.file = b,
+          .column = static_cast<std::int64_t>(column),
+          .row = static_cast<std::int64_t>(row),
+          .columns = other.columns,
+          .rows = other.rows};
+}
+
+void check_samples(const RasterInfo& first, const RasterInfo& other) {
+  const std::string &a = first.files.front(), &b = other.files.front();
+  if (first.sample.type != other.sample.type) {
+    differ(a, b,
+           "samples are " + std::string(name_of(other.sample.type)) + ", there " +
+               std::string(name_of(first.sample.type)),
+           "convert one: gdal_translate -ot");
+  }
+  if (first.sample.scale != other.sample.scale || first.sample.offset != other.sample.offset) {
+    differ(a, b,
+           "scale and offset are " + printed(other.sample.scale) + ", " +
+               printed(other.sample.offset) + ", there " + printed(first.sample.scale) + ", " +
+               printed(first.sample.offset),
+           "make them agree: gdal_translate -unscale");
+  }
+  if (first.sample.unit != other.sample.unit) {
+    differ(a, b,
+           "heights are in \"" + other.sample.unit + "\", there in \"" + first.sample.unit + "\"",
+           "convert one of them, or name the CRS of all");
+  }
+}
+
+void check_crs(const RasterInfo& first, const RasterInfo& other) {
+  const auto described = [](const Crs& crs) {
+    std::ostringstream text;
+    if (crs.epsg != 0) {
+      text << "EPSG:" << crs.epsg;
+    } else {
+      text << '"' << crs.name << '"';
+    }
+    if (crs.vertical_epsg != 0) text << '+' << crs.vertical_epsg;
+    return text.str();
+  };
+  const Crs &a = first.crs, &b = other.crs;
+  const bool same_name = a.epsg != 0 || a.name == b.name;
+  if (a.epsg == b.epsg && same_name && a.vertical_epsg == b.vertical_epsg &&
+      a.geographic == b.geographic && a.horizontal_unit == b.horizontal_unit) {
+    return;
+  }
+  differ(first.files.front(), other.files.front(),
+         "its CRS is " + described(b) + ", there " + described(a),
+         "reproject one (gdalwarp -t_srs), or name the CRS of all");
+}
+
+class Mosaic final : public Raster {
+ public:
+  Mosaic(const std::vector<std::string>& files, RasterOpener opener, bool ignore_crs,
+         std::size_t open_at_once)
+      : opener_(std::move(opener)), open_at_once_(std::max<std::size_t>(open_at_once, 1)) {
+    assert(!files.empty());
+    std::optional<RasterInfo> first;
+    for (const std::string& file : files) {
+      const std::unique_ptr<Raster> raster = opener_(file);
+      const RasterInfo& info = raster->info();
+      if (!first) {
+        first = info;
+      } else {
+        check_samples(*first, info);
+        if (!ignore_crs) check_crs(*first, info);
+      }
+      members_.push_back(placed(*first, info));
+      for (const std::string& comment : info.comments) note(file + ": " + comment);
+    }
+    unite(*first);
+  }
+
+  [[nodiscard]] const RasterInfo& info() const override { return info_; }
+
+  bool read_over(const CellWindow& window, const CellBuffer& out) override {
+    bool any = false;
+    const auto left = static_cast<std::int64_t>(window.column);
+    const auto top = static_cast<std::int64_t>(window.row);
+    const auto right = left + static_cast<std::int64_t>(window.columns);
+    const auto bottom = top + static_cast<std::int64_t>(window.rows);
+    for (std::size_t i = 0; i < members_.size(); ++i) {
+      const Member& member = members_[i];
+      const auto l = std::max(left, member.column), t = std::max(top, member.row);
+      const auto r = std::min(right, member.column + static_cast<std::int64_t>(member.columns));
+      const auto b = std::min(bottom, member.row + static_cast<std::int64_t>(member.rows));
+      if (l >= r || t >= b) continue;
+      const auto cell =
+          static_cast<std::size_t>(t - top) * out.stride + static_cast<std::size_t>(l - left);
+      any |= opened(i).read_over({.column = static_cast<std::uint64_t>(l - member.column),
+                                  .row = static_cast<std::uint64_t>(t - member.row),
+                                  .columns = static_cast<std::uint64_t>(r - l),
+                                  .rows = static_cast<std::uint64_t>(b - t)},
+                                 {.samples = out.samples + cell * size_of(info_.sample.type),
+                                  .valid = out.valid + cell,
+                                  .stride = out.stride});
+    }
+    return any;
+  }
+
+ private:
+  struct Open {
+    std::size_t member;
+    std::unique_ptr<Raster> raster;
+  };
+
+  void note(std::string comment) {
+    constexpr std::size_t kMostComments = 16;
+    if (info_.comments.size() < kMostComments) info_.comments.push_back(std::move(comment));
+  }
+
+  /// The union's size and place; members then count from its corner.
+  void unite(const RasterInfo& first) {
+    std::int64_t left = 0, top = 0, right = 0, bottom = 0;
+    for (const Member& member : members_) {
+      left = std::min(left, member.column);
+      top = std::min(top, member.row);
+      right = std::max(right, member.column + static_cast<std::int64_t>(member.columns));
+      bottom = std::max(bottom, member.row + static_cast<std::int64_t>(member.rows));
+    }
+    std::vector<std::string> comments = std::move(info_.comments);
+    info_ = first;
+    info_.comments = std::move(comments);
+    info_.files.clear();
+    for (Member& member : members_) {
+      info_.files.push_back(member.file);
+      member.column -= left;
+      member.row -= top;
+    }
+    info_.columns = static_cast<std::uint64_t>(right - left);
+    info_.rows = static_cast<std::uint64_t>(bottom - top);
+    if (info_.columns >= kMostCells || info_.rows >= kMostCells) {
+      throw Error({.file = members_.front().file,
+                   .where = {},
+                   .cause = "the mosaic of the " + std::to_string(members_.size()) + " files has " +
+                            std::to_string(info_.columns) + " x " + std::to_string(info_.rows) +
+                            " cells: columns and rows must each be fewer than 2^30",
+                   .remedy = "read the files separately"});
+    }
+    auto& m = info_.world.xy;
+    const auto c = static_cast<double>(left), r = static_cast<double>(top);
+    m[2] = m[0] * c + m[1] * r + m[2];
+    m[5] = m[3] * c + m[4] * r + m[5];
+    // Blocks of several files have no common grid.
+    if (members_.size() > 1) info_.block_columns = info_.block_rows = 1;
+  }
+
+  Raster& opened(std::size_t member) {
+    const auto found =
+        std::find_if(open_.begin(), open_.end(), [&](const Open& o) { return o.member == member; });
+    if (found != open_.end()) {
+      open_.splice(open_.begin(), open_, found);
+      return *open_.front().raster;
+    }
+    if (open_.size() == open_at_once_) open_.pop_back();
+    open_.push_front({member, opener_(members_[member].file)});
+    const RasterInfo& info = open_.front().raster->info();
+    if (info.columns != members_[member].columns || info.rows != members_[member].rows ||
+        info.sample.type != info_.sample.type) {
+      throw Error({.file = members_[member].file,
+                   .where = {},
+                   .cause = "has changed while it was read",
+                   .remedy = "start again"});
+    }
+    return *open_.front().raster;
+  }
+
+  RasterOpener opener_;
+  std::size_t open_at_once_;
+  RasterInfo info_;
+  std::vector<Member> members_;
+  std::list<Open> open_;  // the latest used first
+};
+
+}  // namespace
+
+std::unique_ptr<Raster> open_mosaic(const std::vector<std::string>& files,
+                                    const RasterOpener& opener, bool ignore_crs,
+                                    std::size_t open_at_once) {
+  return std::make_unique<Mosaic>(files, opener, ignore_crs, open_at_once);
+}
+
+}  // namespace terrace::stream

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <condition_variable>
+#include <deque>
+#include <exception>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include "terrace/stream/source.hpp"
+
+namespace terrace::stream {
+namespace {
+
+class ReadAhead final : public PointSource {
+ public:
+  ReadAhead(std::unique_ptr<PointSource> source, std::size_t blocks)
+      : source_(std::move(source)),
+        most_(std::max<std::size_t>(blocks, 1)),
+        info_(source_->info()),
+        thread_([this] { run(); }) {}
+
+  ~ReadAhead() override {
+    {
+      const std::lock_guard lock(mutex_);
+      stop_ = true;
+    }
+    room_.notify_one();
+    thread_.join();
+  }
+  ReadAhead(const ReadAhead&) = delete;
+  ReadAhead& operator=(const ReadAhead&) = delete;
+
+  [[nodiscard]] const SourceInfo& info() const override { return info_; }
+
+  bool next(PointBlock& block) override {
+    block.clear();
+    std::unique_lock lock(mutex_);
+    news_.wait(lock, [this] { return !ready_.empty() || ended_; });
+    if (ready_.empty()) {
+      if (error_) std::rethrow_exception(error_);
+      progress_ = last_progress_;
+      return false;
+    }
+    progress_ = ready_.front().progress;
+    // The caller's buffers go back to the reading thread: nothing is allocated in the long run.
+    if (spare_.size() < most_) {
+      spare_.push_back(std::exchange(block, std::move(ready_.front().block)));
+    } else {
+      block = std::move(ready_.front().block);
+    }
+    ready_.pop_front();
+    lock.unlock();
+    room_.notify_one();
+    return true;
+  }
+
+  /// As of the block last delivered.
+  [[nodiscard]] Progress progress() const override { return progress_; }
+
+ private:
+  struct Ready {
+    PointBlock block;
+    Progress progress;
+  };
+
+  void run() {
+    try {
+      while (step()) {
+      }
+    } catch (...) {
+      const std::lock_guard lock(mutex_);
+      error_ = std::current_exception();
+    }
+    {
+      const std::lock_guard lock(mutex_);
+      ended_ = true;
+      last_progress_ = source_->progress();
+    }
+    news_.notify_one();
+  }
+
+  bool step() {
+    Ready ready;
+    {
+      std::unique_lock lock(mutex_);
+      room_.wait(lock, [this] { return ready_.size() < most_ || stop_; });
+      if (stop_) return false;
+      if (!spare_.empty()) {
+        ready.block = std::move(spare_.back());
+        spare_.pop_back();
+      }
+    }
+    if (!source_->next(ready.block)) return false;
+    ready.progress = source_->progress();
+    {
+      const std::lock_guard lock(mutex_);
+      ready_.push_back(std::move(ready));
+    }
+    news_.notify_one();
+    return true;
+  }
+
+  const std::unique_ptr<PointSource> source_;  // the thread's alone once it runs
+  const std::size_t most_;
+  const SourceInfo info_;
+  Progress progress_;  // the caller's alone
+
+  std::mutex mutex_;
+  std::condition_variable news_, room_;
+  std::deque<Ready> ready_;
+  std::vector<PointBlock> spare_;
+  Progress last_progress_;
+  std::exception_ptr error_;
+  bool ended_ = false, stop_ = false;
+
+  std::thread thread_;  // last: it starts when all else is there
+};
+
+}  // namespace
+
+std::unique_ptr<PointSource> read_ahead(std::unique_ptr<PointSource> source, std::size_t blocks) {
+  return std::make_unique<ReadAhead>(std::move(source), blocks);
+}
+
+}  // namespace terrace::stream

@@ -1,0 +1,314 @@
+// SPDX-License-Identifier: Apache-2.0
+// What libtiff writes, in every encoding it has, must be read back bit by bit.
+#include <bit>
+#include <cmath>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "../src/geotiff_unpack.hpp"
+#include "raster_testing.hpp"
+#include "temp_folder.hpp"
+#include "terrace/stream/error.hpp"
+#include "terrace/stream/raster.hpp"
+#include "tiff_writing.hpp"
+
+namespace terrace::stream {
+namespace {
+
+constexpr std::array<ScalarType, 10> kTypes{
+    ScalarType::i8,  ScalarType::u8,  ScalarType::i16, ScalarType::u16, ScalarType::i32,
+    ScalarType::u32, ScalarType::i64, ScalarType::u64, ScalarType::f32, ScalarType::f64};
+
+bool is_float(ScalarType type) { return type == ScalarType::f32 || type == ScalarType::f64; }
+
+/// Samples with long runs and noise, of any bits for integers, finite for floats.
+std::vector<std::byte> random_samples(std::mt19937_64& random, ScalarType type, std::size_t count) {
+  std::vector<std::byte> bytes(count * size_of(type));
+  std::uint64_t value = random();
+  for (std::size_t i = 0; i < count; ++i) {
+    if (random() % 3 != 0) value = random() >> (random() % 64);
+    if (type == ScalarType::f32) {
+      const auto f = static_cast<float>(static_cast<std::int64_t>(value)) * 0x1p-20f;
+      std::memcpy(bytes.data() + i * 4, &f, 4);
+    } else if (type == ScalarType::f64) {
+      const double f = static_cast<double>(static_cast<std::int64_t>(value)) * 0x1p-20;
+      std::memcpy(bytes.data() + i * 8, &f, 8);
+    } else {
+      std::memcpy(bytes.data() + i * size_of(type), &value, size_of(type));
+    }
+  }
+  return bytes;
+}
+
+std::vector<std::byte> band_of(const std::vector<std::byte>& samples, const TiffSpec& spec,
+                               std::uint32_t band) {
+  const std::size_t size = size_of(spec.type), cells = std::size_t{spec.columns} * spec.rows;
+  std::vector<std::byte> bytes(cells * size);
+  for (std::size_t i = 0; i < cells; ++i) {
+    std::memcpy(bytes.data() + i * size, samples.data() + (i * spec.bands + band) * size, size);
+  }
+  return bytes;
+}
+
+/// Reads the file as a whole, in random windows with little memory, and as points.
+void expect_samples(const std::string& path, const TiffSpec& spec,
+                    const std::vector<std::byte>& expected, int band, std::mt19937_64& random) {
+  const std::size_t size = size_of(spec.type);
+  const auto raster = open_geotiff(path, {.band = band});
+  const WholeRaster whole = read_whole(*raster);
+  ASSERT_EQ(whole.info.columns, spec.columns);
+  ASSERT_EQ(whole.info.rows, spec.rows);
+  ASSERT_EQ(whole.info.sample.type, spec.type);
+  ASSERT_EQ(whole.samples, expected);
+  ASSERT_EQ(std::count(whole.valid.begin(), whole.valid.end(), 1),
+            static_cast<std::ptrdiff_t>(whole.cells()));
+
+  const auto frugal = open_geotiff(path, {.band = band, .cache_bytes = random() % 40000});
+  for (int i = 0; i < 4; ++i) {
+    CellWindow window;
+    window.column = random() % spec.columns;
+    window.row = random() % spec.rows;
+    window.columns = 1 + random() % (spec.columns - window.column);
+    window.rows = 1 + random() % (spec.rows - window.row);
+    const std::size_t stride = window.columns + random() % 3;
+    std::vector<std::byte> samples(stride * window.rows * size);
+    std::vector<std::uint8_t> valid(stride * window.rows);
+    ASSERT_TRUE(frugal->read_over(window, {samples.data(), valid.data(), stride}));
+    for (std::size_t r = 0; r < window.rows; ++r) {
+      const std::size_t cell = (window.row + r) * spec.columns + window.column;
+      ASSERT_EQ(std::memcmp(samples.data() + r * stride * size, expected.data() + cell * size,
+                            window.columns * size),
+                0);
+    }
+  }
+
+  SourceOptions options;
+  options.band = band;
+  options.block_points = 1 + random() % 500;
+  options.memory_bytes = 100000 + random() % 100000;
+  const auto source = points_of(open_geotiff(path, {.band = band}), options);
+  std::vector<std::byte> seen(expected.size());
+  std::vector<int> times(std::size_t{spec.columns} * spec.rows);
+  PointBlock block;
+  while (source->next(block)) {
+    ASSERT_LE(block.size(), options.block_points);
+    const bool exact = !source->info().attributes.empty();
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      const Point3& p = block.positions[i];
+      const auto cell =
+          static_cast<std::size_t>(p[1]) * spec.columns + static_cast<std::size_t>(p[0]);
+      ++times.at(cell);
+      if (exact) {
+        std::memcpy(seen.data() + cell * size, block.attributes[0].bytes.data() + i * size, size);
+      } else {
+        ASSERT_EQ(p[2], whole.value(cell));
+      }
+    }
+    if (exact) {
+      ASSERT_EQ(block.attributes[0].bytes.size(), block.size() * size);
+    }
+  }
+  ASSERT_EQ(std::count(times.begin(), times.end(), 1), static_cast<std::ptrdiff_t>(times.size()));
+  ASSERT_EQ(source->progress().points, times.size());
+  ASSERT_EQ(source->progress().fraction, 1.0);
+  if (!source->info().attributes.empty()) {
+    ASSERT_EQ(seen, expected);
+  }
+}
+
+void round_trip(TiffSpec spec, std::uint64_t seed) {
+  SCOPED_TRACE("seed " + std::to_string(seed) + " type " + std::string(name_of(spec.type)) +
+               " codec " + std::to_string(spec.compression) + " predictor " +
+               std::to_string(spec.predictor) + " mode " + spec.mode + " tile " +
+               std::to_string(spec.tile_columns) + " bands " + std::to_string(spec.bands));
+  std::mt19937_64 random(seed);
+  const TempFolder folder;
+  const std::string path = (folder.path() / "x.tif").string();
+  const auto samples =
+      random_samples(random, spec.type, std::size_t{spec.columns} * spec.rows * spec.bands);
+  ASSERT_NO_FATAL_FAILURE(write_tiff(path, spec, samples));
+  for (std::uint32_t band = 0; band < spec.bands; ++band) {
+    ASSERT_NO_FATAL_FAILURE(expect_samples(path, spec, band_of(samples, spec, band),
+                                           static_cast<int>(band) + 1, random));
+  }
+}
+
+TEST(GeoTiffEncodings, EveryTypeAndCodecReadsBack) {
+  std::uint64_t seed = 1;
+  for (const ScalarType type : kTypes) {
+    for (const int codec :
+         {COMPRESSION_NONE, COMPRESSION_LZW, COMPRESSION_PACKBITS, COMPRESSION_ADOBE_DEFLATE,
+          COMPRESSION_DEFLATE, COMPRESSION_LZMA, COMPRESSION_ZSTD, COMPRESSION_LERC}) {
+      if (TIFFIsCODECConfigured(static_cast<std::uint16_t>(codec)) == 0) continue;
+      // LERC knows no 64-bit integers.
+      if (codec == COMPRESSION_LERC && (type == ScalarType::i64 || type == ScalarType::u64)) {
+        continue;
+      }
+      const bool predicts = codec == COMPRESSION_LZW || codec == COMPRESSION_ADOBE_DEFLATE ||
+                            codec == COMPRESSION_DEFLATE || codec == COMPRESSION_ZSTD;
+      for (const int predictor : {1, 2, 3}) {
+        if (predictor != 1 && !predicts) continue;
+        if (predictor == 3 && !is_float(type)) continue;
+        std::mt19937_64 random(++seed);
+        TiffSpec spec;
+        spec.type = type;
+        spec.compression = static_cast<std::uint16_t>(codec);
+        spec.predictor = static_cast<std::uint16_t>(predictor);
+        spec.columns = 1 + static_cast<std::uint32_t>(random() % 90);
+        spec.rows = 1 + static_cast<std::uint32_t>(random() % 90);
+        spec.mode = random() % 2 == 0 ? "w" : "w8";
+        if (random() % 2 == 0) spec.mode += "b";
+        if (random() % 2 == 0) {
+          spec.tile_columns = 16 * (1 + static_cast<std::uint32_t>(random() % 3));
+          spec.tile_rows = 16 * (1 + static_cast<std::uint32_t>(random() % 3));
+        } else {
+          spec.rows_per_strip = static_cast<std::uint32_t>(random() % (spec.rows + 1));
+        }
+        if (codec != COMPRESSION_LERC) {
+          spec.bands = 1 + static_cast<std::uint32_t>(random() % 3);
+          spec.separate = random() % 2 == 0;
+        }
+        round_trip(spec, seed);
+        if (testing::Test::HasFatalFailure()) return;
+      }
+    }
+  }
+}
+
+TEST(GeoTiffEncodings, OneCompressedStripLargerThanMemoryIsReadByRows) {
+  const TempFolder folder;
+  const std::string path = (folder.path() / "x.tif").string();
+  TiffSpec spec;
+  spec.columns = 700;
+  spec.rows = 900;
+  spec.compression = COMPRESSION_ADOBE_DEFLATE;
+  std::vector<std::int16_t> values(std::size_t{spec.columns} * spec.rows);
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<std::int16_t>(i / 64);
+  write_tiff(path, spec, as_samples(values));
+  SourceOptions options;
+  options.memory_bytes = 100000;  // a tenth of the strip
+  const auto source = points_of(open_geotiff(path, {.memory_bytes = 100000}), options);
+  PointBlock block;
+  std::size_t points = 0;
+  while (source->next(block)) {
+    for (const Point3& p : block.positions) {
+      ASSERT_EQ(p[2],
+                values[static_cast<std::size_t>(p[1]) * 700 + static_cast<std::size_t>(p[0])]);
+      ++points;
+    }
+  }
+  EXPECT_EQ(points, values.size());
+}
+
+TEST(GeoTiffEncodings, ATileLargerThanMemoryIsRefusedWithItsNeeds) {
+  const TempFolder folder;
+  const std::string path = (folder.path() / "x.tif").string();
+  TiffSpec spec;
+  spec.columns = spec.rows = 16;
+  spec.tile_columns = spec.tile_rows = 2048;
+  spec.compression = COMPRESSION_ADOBE_DEFLATE;
+  write_tiff(path, spec, std::vector<std::byte>(512));
+  try {
+    open_geotiff(path, {.memory_bytes = 1u << 20});
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("MiB"), std::string::npos) << error.what();
+  }
+  EXPECT_NO_THROW(open_geotiff(path));
+}
+
+/// Packs unsigned numbers of `bits` bits, each row from a byte on, from the highest bit on.
+std::vector<std::uint8_t> packed(const std::vector<std::uint32_t>& values, std::size_t columns,
+                                 unsigned bits) {
+  std::vector<std::uint8_t> out;
+  for (std::size_t row = 0; row < values.size() / columns; ++row) {
+    std::size_t at = 0;
+    out.resize((row + 1) * ((columns * bits + 7) / 8));
+    std::uint8_t* const line = out.data() + row * ((columns * bits + 7) / 8);
+    for (std::size_t c = 0; c < columns; ++c) {
+      for (unsigned b = bits; b-- > 0; ++at) {
+        if ((values[row * columns + c] >> b & 1) != 0) {
+          line[at / 8] = static_cast<std::uint8_t>(line[at / 8] | (0x80 >> at % 8));
+        }
+      }
+    }
+  }
+  return out;
+}
+
+TEST(GeoTiffEncodings, IntegersOfOddWidths) {
+  const TempFolder folder;
+  const std::string path = (folder.path() / "x.tif").string();
+  std::mt19937_64 random(7);
+  for (unsigned bits = 1; bits < 32; ++bits) {
+    if (bits == 8 || bits == 16 || bits == 24) continue;
+    for (const int format : {SAMPLEFORMAT_UINT, SAMPLEFORMAT_INT}) {
+      SCOPED_TRACE(std::to_string(bits) + " bits, format " + std::to_string(format));
+      constexpr std::size_t kColumns = 13, kRows = 5;
+      std::vector<std::uint32_t> values(kColumns * kRows);
+      for (auto& v : values) v = static_cast<std::uint32_t>(random()) & ((1u << bits) - 1);
+      std::vector<std::uint8_t> bytes = packed(values, kColumns, bits);
+      TIFF* tiff = TIFFOpen(path.c_str(), "w");
+      TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, static_cast<std::uint32_t>(kColumns));
+      TIFFSetField(tiff, TIFFTAG_IMAGELENGTH, static_cast<std::uint32_t>(kRows));
+      TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, static_cast<int>(bits));
+      TIFFSetField(tiff, TIFFTAG_SAMPLEFORMAT, format);
+      TIFFSetField(tiff, TIFFTAG_SAMPLESPERPIXEL, 1);
+      TIFFSetField(tiff, TIFFTAG_ROWSPERSTRIP, static_cast<std::uint32_t>(kRows));
+      TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK);
+      TIFFSetField(tiff, TIFFTAG_COMPRESSION, COMPRESSION_ADOBE_DEFLATE);
+      ASSERT_GT(TIFFWriteEncodedStrip(tiff, 0, bytes.data(), static_cast<tmsize_t>(bytes.size())),
+                0);
+      TIFFClose(tiff);
+      const WholeRaster whole = read_whole(*open_geotiff(path));
+      for (std::size_t i = 0; i < values.size(); ++i) {
+        auto expected = static_cast<double>(values[i]);
+        if (format == SAMPLEFORMAT_INT && (values[i] >> (bits - 1)) != 0) {
+          expected -= static_cast<double>(std::uint64_t{1} << bits);
+        }
+        ASSERT_EQ(whole.value(i), expected) << i;
+      }
+    }
+  }
+}
+
+/// The definition of IEEE 754's formats, in powers of two.
+double small_float(std::uint32_t bits, int exponent_bits, int mantissa_bits) {
+  const std::uint32_t mantissa = bits & ((1u << mantissa_bits) - 1);
+  const int most = (1 << exponent_bits) - 1;
+  const int exponent = static_cast<int>(bits >> mantissa_bits) & most;
+  const double sign = (bits >> (mantissa_bits + exponent_bits)) != 0 ? -1 : 1;
+  if (exponent == most) {
+    return mantissa != 0 ? std::nan("") : sign * std::numeric_limits<double>::infinity();
+  }
+  const int bias = most / 2;
+  if (exponent == 0) return sign * std::ldexp(mantissa, 1 - bias - mantissa_bits);
+  return sign * std::ldexp(mantissa + (1u << mantissa_bits), exponent - bias - mantissa_bits);
+}
+
+TEST(GeoTiffEncodings, EverySmallFloatWidensExactly) {
+  for (std::uint32_t bits = 0; bits < 0x10000; ++bits) {
+    const double expected = small_float(bits, 5, 10);
+    const auto got = static_cast<double>(float_from_16(static_cast<std::uint16_t>(bits)));
+    if (std::isnan(expected)) {
+      ASSERT_TRUE(std::isnan(got)) << bits;
+    } else {
+      ASSERT_EQ(std::bit_cast<std::uint64_t>(got), std::bit_cast<std::uint64_t>(expected)) << bits;
+    }
+  }
+  for (std::uint32_t bits = 0; bits < 0x1000000; bits += 7) {
+    const double expected = small_float(bits, 7, 16);
+    const auto got = static_cast<double>(float_from_24(bits));
+    if (std::isnan(expected)) {
+      ASSERT_TRUE(std::isnan(got)) << bits;
+    } else {
+      ASSERT_EQ(std::bit_cast<std::uint64_t>(got), std::bit_cast<std::uint64_t>(expected)) << bits;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace terrace::stream
