@@ -32,7 +32,7 @@ bool holds(const Triangle& triangle, const Point2& p) {
 }
 
 bool touches(const Polygon& polygon, const Triangle& triangle) {
-  if (covers(polygon, triangle[0])) return true;
+  if (tools::covers(polygon, triangle[0])) return true;
   for (const std::vector<Point2>& ring : polygon) {
     if (ring.empty()) continue;
     if (holds(triangle, ring[0])) return true;
