@@ -32,19 +32,21 @@ class Source : public testing::Test {
   TempFolder folder_;
 };
 
-/// Makes standard input another file for the life of the object.
-class StandardInput {
+/// Makes standard input or output another file for the life of the object.
+class Redirected {
  public:
-  explicit StandardInput(int fd) : saved_(dup(STDIN_FILENO)) { dup2(fd, STDIN_FILENO); }
-  ~StandardInput() {
-    dup2(saved_, STDIN_FILENO);
+  Redirected(int standard, int fd) : standard_(standard), saved_(dup(standard)) {
+    dup2(fd, standard);
+  }
+  ~Redirected() {
+    dup2(saved_, standard_);
     close(saved_);
   }
-  StandardInput(const StandardInput&) = delete;
-  StandardInput& operator=(const StandardInput&) = delete;
+  Redirected(const Redirected&) = delete;
+  Redirected& operator=(const Redirected&) = delete;
 
  private:
-  int saved_;
+  int standard_, saved_;
 };
 
 TEST_F(Source, TellsFormatsByContentBeforeEnding) {
@@ -107,7 +109,7 @@ TEST_F(Source, ReadsStandardInputAndPipes) {
       close(ends[1]);
     });
     {
-      const StandardInput input(ends[0]);
+      const Redirected input(STDIN_FILENO, ends[0]);
       const AllPoints all = read_all(std::vector<std::string>{"-"}, options);
       EXPECT_EQ(all.points.size(), 50000u);
       EXPECT_EQ(all.points.positions[49999][0], 49999.0);
@@ -120,7 +122,7 @@ TEST_F(Source, ReadsStandardInputAndPipes) {
   const std::string file = put("f.csv", text);
   const int fd = open(file.c_str(), O_RDONLY);
   {
-    const StandardInput input(fd);
+    const Redirected input(STDIN_FILENO, fd);
     EXPECT_EQ(read_all(std::vector<std::string>{"-"}).points.size(), 50000u);
   }
   close(fd);
@@ -129,6 +131,30 @@ TEST_F(Source, ReadsStandardInputAndPipes) {
   std::thread writer([&] { write_text(fifo, text); });
   EXPECT_EQ(read_all({file, fifo}).points.size(), 100000u);
   writer.join();
+}
+
+TEST_F(Source, TextGoesToStandardOutput) {
+  PointBlock block;
+  for (int i = 0; i < 20000; ++i) block.positions.push_back({1.0 * i, 0.5, -1});
+  for (const std::string format : {"", "csv"}) {
+    const auto path = folder_.path() / ("out" + format);
+    const int fd = open(path.c_str(), O_WRONLY | O_CREAT, 0600);
+    std::fflush(stdout);
+    {
+      const Redirected output(STDOUT_FILENO, fd);
+      const auto writer = open_point_writer("-", {}, {.format = format});
+      writer->append(block);
+      writer->finish();
+    }
+    close(fd);
+    EXPECT_TRUE(same_bits(read_file(path).points.positions, block.positions));
+  }
+  EXPECT_NE(error_of([] { open_point_writer("-", {}, {.format = "ply"}); }).find("to a pipe"),
+            std::string::npos);
+  EXPECT_NE(error_of([&] {
+              open_point_writer((folder_.path() / "p.las").string(), {});
+            }).find("known are xyz (.xyz, .txt), csv (.csv), ply (.ply), ply-ascii"),
+            std::string::npos);
 }
 
 TEST_F(Source, PromisesInAPipeAreNotBelieved) {
@@ -141,7 +167,7 @@ TEST_F(Source, PromisesInAPipeAreNotBelieved) {
   ASSERT_EQ(pipe(ends), 0);
   ASSERT_EQ(write(ends[1], text.data(), text.size()), static_cast<ssize_t>(text.size()));
   close(ends[1]);
-  const StandardInput input(ends[0]);
+  const Redirected input(STDIN_FILENO, ends[0]);
   close(ends[0]);
   const std::string error = refusal({"-"});
   EXPECT_NE(error.find("standard input: byte"), std::string::npos) << error;

@@ -6,8 +6,8 @@
 // items_per_second counts points and is a median of 5 rounds. A round of a cluster row removes
 // (collapse) or inserts (expand) all clusters once; what restores the state after it is not timed.
 #include <algorithm>
-#include <chrono>
 #include <cstdlib>
+#include <ctime>
 #include <fstream>
 #include <map>
 #include <numeric>
@@ -183,14 +183,15 @@ struct Cgal {
   }
 };
 
+/// CPU time of the process, which has one thread: other load of the machine disturbs it less.
 class Stopwatch {
  public:
   [[nodiscard]] double seconds() const {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    return static_cast<double>(std::clock() - start_) / CLOCKS_PER_SEC;
   }
 
  private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  std::clock_t start_ = std::clock();
 };
 
 /// VmRSS or VmHWM in bytes; 0 where there is no such file.

@@ -13,7 +13,8 @@ namespace {
 template <class T>
 class Multiresolution : public testing::Test {};
 
-using Triangulations = testing::Types<StandIn<std::int32_t>, StandIn<double>>;
+using Triangulations = testing::Types<StandIn<std::int32_t>, StandIn<double>,
+                                      Delaunay2<std::int32_t>, Delaunay2<double>>;
 TYPED_TEST_SUITE(Multiresolution, Triangulations);
 
 constexpr Shape kShapes[] = {Shape::random, Shape::grid, Shape::duplicates, Shape::line,

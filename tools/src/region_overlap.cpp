@@ -24,7 +24,7 @@ bool cross(const Point2& a, const Point2& b, const Point2& c, const Point2& d) {
          (cda == 0 && in_box(a, c, d)) || (cdb == 0 && in_box(b, c, d));
 }
 
-bool covers(const Triangle& triangle, const Point2& p) {
+bool holds(const Triangle& triangle, const Point2& p) {
   const int a = orientation(triangle[0], triangle[1], p);
   const int b = orientation(triangle[1], triangle[2], p);
   const int c = orientation(triangle[2], triangle[0], p);
@@ -32,10 +32,10 @@ bool covers(const Triangle& triangle, const Point2& p) {
 }
 
 bool touches(const Polygon& polygon, const Triangle& triangle) {
-  if (covers(polygon, triangle[0])) return true;
+  if (tools::covers(polygon, triangle[0])) return true;
   for (const std::vector<Point2>& ring : polygon) {
     if (ring.empty()) continue;
-    if (covers(triangle, ring[0])) return true;
+    if (holds(triangle, ring[0])) return true;
     for (std::size_t i = 0; i < ring.size(); ++i) {
       const Point2 &a = ring[i], &b = ring[(i + 1) % ring.size()];
       for (std::size_t k = 0; k < 3; ++k) {

@@ -10,7 +10,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "crs.hpp"
+#include "crs_option.hpp"
 #include "error.hpp"
 #include "store_build.hpp"
 #include "units.hpp"

@@ -35,8 +35,9 @@ std::span<const Verb> verbs() {
       {"view", "open the interactive viewer", "terrace view dem.terrace", nullptr},
       {"publish", "write a folder for any web server", "terrace publish dem.terrace -o public",
        nullptr},
-      {"synth", "make test inputs", "terrace synth dem --size 4096x4096 -o dem.tif", nullptr},
-      {"convert", "convert between point formats", "terrace convert scan.ply -o scan.xyz", nullptr},
+      {"synth", "make test inputs", "terrace synth dem --size 4096x4096 -o dem.tif", make_synth},
+      {"convert", "convert between point formats", "terrace convert scan.ply -o scan.xyz",
+       make_convert},
   }};
   return kVerbs;
 }

@@ -5,6 +5,7 @@
 #include <array>
 #include <numeric>
 #include <type_traits>
+#include <vector>
 
 #include "double_kernel.hpp"
 #include "int_kernel.hpp"
@@ -131,28 +132,29 @@ class Cells {
 };
 
 /// Stable, least significant digit first: three passes of 11 bits.
-void radix_sort(std::vector<Entry>& entries) {
+void radix_sort(Pool<Entry>& entries) {
   constexpr unsigned kBits = 11;
   constexpr std::size_t kDigits = std::size_t{1} << kBits;
   std::array<std::array<std::uint32_t, kDigits>, 3> start{};
-  for (const Entry& entry : entries)
+  for (const Entry& entry : span_of(entries))
     for (unsigned pass = 0; pass < 3; ++pass)
       ++start[pass][entry.key >> (kBits * pass) & (kDigits - 1)];
   for (auto& counters : start)
     std::exclusive_scan(counters.begin(), counters.end(), counters.begin(), 0u);
-  std::vector<Entry> other(entries.size());
+  Pool<Entry> other;
+  other.resize(entries.size());
   for (unsigned pass = 0; pass < 3; ++pass) {
-    for (const Entry& entry : entries)
+    for (const Entry& entry : span_of(entries))
       other[start[pass][entry.key >> (kBits * pass) & (kDigits - 1)]++] = entry;
-    entries.swap(other);
+    std::swap(entries, other);
   }
 }
 
-void sort_entries(std::vector<Entry>& entries) {
+void sort_entries(Pool<Entry>& entries) {
   if (entries.size() >= kMinRadix) {
     radix_sort(entries);
   } else {
-    std::stable_sort(entries.begin(), entries.end(),
+    std::stable_sort(entries.data(), entries.data() + entries.size(),
                      [](const Entry& a, const Entry& b) { return a.key < b.key; });
   }
 }
@@ -167,36 +169,38 @@ void sort_range(std::span<const typename Kernel::Point> points, std::span<std::u
   };
   const Cells<Kernel> cells(points, Numbers{order, order.size()});
   if (cells.single()) return;
-  std::vector<Entry> entries(order.size());
-  for (std::size_t i = 0; i < order.size(); ++i)
-    entries[i] = {cells.key(points[order[i]]), order[i]};
+  const auto count = static_cast<std::uint32_t>(order.size());
+  Pool<Entry> entries;
+  entries.resize(count);
+  for (std::uint32_t i = 0; i < count; ++i) entries[i] = {cells.key(points[order[i]]), order[i]};
   sort_entries(entries);
   // Entries are gone before the runs are sorted, so that memory does not add up.
   std::vector<std::span<std::uint32_t>> long_runs;
-  std::size_t begin = 0;
-  for (std::size_t i = 0; i < order.size(); ++i) {
+  std::uint32_t begin = 0;
+  for (std::uint32_t i = 0; i < count; ++i) {
     order[i] = entries[i].number;
-    if (i + 1 == order.size() || entries[i + 1].key != entries[i].key) {
+    if (i + 1 == count || entries[i + 1].key != entries[i].key) {
       if (i + 1 - begin > kLeaf) long_runs.push_back(order.subspan(begin, i + 1 - begin));
       begin = i + 1;
     }
   }
-  entries = {};
+  entries.release();
   for (const std::span<std::uint32_t> run : long_runs) sort_range<Kernel>(points, run);
 }
 
 }  // namespace
 
 template <class Kernel>
-std::vector<std::uint32_t> hilbert_order(std::span<const typename Kernel::Point> points) {
-  std::vector<std::uint32_t> order(points.size());
-  std::iota(order.begin(), order.end(), 0u);
-  if (!order.empty()) sort_range<Kernel>(points, order);
+Pool<std::uint32_t> hilbert_order(std::span<const typename Kernel::Point> points) {
+  Pool<std::uint32_t> order;
+  order.resize(static_cast<std::uint32_t>(points.size()));
+  const std::span<std::uint32_t> all = span_of(order);
+  std::iota(all.begin(), all.end(), 0u);
+  if (!all.empty()) sort_range<Kernel>(points, all);
   return order;
 }
 
-template std::vector<std::uint32_t> hilbert_order<IntKernel>(std::span<const IntKernel::Point>);
-template std::vector<std::uint32_t> hilbert_order<DoubleKernel>(
-    std::span<const DoubleKernel::Point>);
+template Pool<std::uint32_t> hilbert_order<IntKernel>(std::span<const IntKernel::Point>);
+template Pool<std::uint32_t> hilbert_order<DoubleKernel>(std::span<const DoubleKernel::Point>);
 
 }  // namespace terrace::tri::planar

@@ -3,7 +3,8 @@
 
 #include <cstdint>
 #include <span>
-#include <vector>
+
+#include "pool.hpp"
 
 namespace terrace::tri::planar {
 
@@ -11,6 +12,6 @@ namespace terrace::tri::planar {
 /// result are close in the plane. Points too close to tell apart by 16 bits per axis are sorted in
 /// their own box. Points are valid. O(n); 16 bytes per point while it runs besides the result.
 template <class Kernel>
-std::vector<std::uint32_t> hilbert_order(std::span<const typename Kernel::Point> points);
+Pool<std::uint32_t> hilbert_order(std::span<const typename Kernel::Point> points);
 
 }  // namespace terrace::tri::planar

@@ -12,57 +12,74 @@ namespace terrace::tri::planar {
 template <class Kernel>
 void insert_vertex(Mesh<Kernel>& mesh, std::uint32_t vertex, std::uint32_t conflict) {
   const typename Kernel::Point p = mesh.point[vertex];
-  std::vector<Side>& pending = mesh.sides;
-  // Slots of cavity triangles to be used again at once. A cavity of k triangles has k + 2 edges.
-  std::vector<std::uint32_t>& spare = mesh.spare;
-  pending.clear();
-  spare.clear();
-  spare.push_back(mesh.new_triangle());
-  spare.push_back(mesh.new_triangle());
+  // Sides still to be crossed, and slots of cavity triangles, which are used again at once. A
+  // cavity of k triangles has k + 2 edges, so neither ever holds more than k + 2.
+  const std::uint32_t spare_first = mesh.new_triangle();
+  const std::uint32_t spare_second = mesh.new_triangle();
+  constexpr std::size_t kSpares = 2;
+  if (mesh.sides.empty()) mesh.sides.resize(64);
+  if (mesh.spare.size() < mesh.sides.size()) mesh.spare.resize(mesh.sides.size());
+  Side* pending = mesh.sides.data();
+  std::uint32_t* spare = mesh.spare.data();
+  std::size_t pending_count = 0;
+  std::size_t spare_count = kSpares;
+  spare[0] = spare_first;
+  spare[1] = spare_second;
+  std::size_t most_removed = mesh.sides.size() - kSpares;
+  // No triangle or vertex is added to the pools from here on.
+  Triangle* const triangle = mesh.triangle.data();
+  std::uint32_t* const incident = mesh.incident.data();
+  const bool recording = mesh.journal.on();
 
+  std::size_t removed = 0;
   const auto remove = [&](std::uint32_t t) {
-    mesh.record(t);
-    spare.push_back(t);
+    if (recording) [[unlikely]]
+      mesh.record(t);
+    if (++removed > most_removed) [[unlikely]] {
+      mesh.sides.resize(2 * mesh.sides.size());
+      mesh.spare.resize(mesh.sides.size());
+      pending = mesh.sides.data();
+      spare = mesh.spare.data();
+      most_removed = mesh.sides.size() - kSpares;
+    }
+    spare[spare_count++] = t;
   };
-  {
-    const Triangle& t = mesh.triangle[conflict];
-    pending.push_back(t.mate[1]);
-    pending.push_back(t.mate[0]);
-    pending.push_back(t.mate[2]);
-    remove(conflict);
-  }
 
+  remove(conflict);
+  pending[pending_count++] = triangle[conflict].mate[1];
+  pending[pending_count++] = triangle[conflict].mate[0];
+  Side side = triangle[conflict].mate[2];
   std::uint32_t first = kNone;
   std::uint32_t previous = kNone;
-  while (!pending.empty()) {
-    const Side side = pending.back();
-    pending.pop_back();
+  while (true) {
     const std::uint32_t outer = triangle_of(side);
     const std::uint32_t i = index_of(side);
-    Triangle& t = mesh.triangle[outer];
+    Triangle& t = triangle[outer];
     if (in_conflict(mesh, t, p)) {
-      pending.push_back(t.mate[previous_index(i)]);
-      pending.push_back(t.mate[next_index(i)]);
       remove(outer);
+      side = t.mate[next_index(i)];
+      pending[pending_count++] = t.mate[previous_index(i)];
+      __builtin_prefetch(&triangle[triangle_of(t.mate[previous_index(i)])]);
       continue;
     }
     // The edge seen from inside the cavity.
     const std::uint32_t from = t.corner[previous_index(i)];
     const std::uint32_t to = t.corner[next_index(i)];
-    const std::uint32_t created = spare.back();
-    spare.pop_back();
+    const std::uint32_t created = spare[--spare_count];
     t.mate[i] = make_side(created, 0);
-    mesh.triangle[created] = {{vertex, from, to}, {side, 0, make_side(previous, 1)}};
-    mesh.incident[from] = created;
+    triangle[created] = {{vertex, from, to}, {side, 0, make_side(previous, 1)}};
+    incident[from] = created;
     if (previous == kNone) {
       first = created;
     } else {
-      mesh.triangle[previous].mate[1] = make_side(created, 2);
+      triangle[previous].mate[1] = make_side(created, 2);
     }
     previous = created;
+    if (pending_count == 0) break;
+    side = pending[--pending_count];
   }
   mesh.link(make_side(previous, 1), make_side(first, 2));
-  mesh.incident[vertex] = previous;
+  incident[vertex] = previous;
 }
 
 template <class Kernel>

@@ -175,6 +175,12 @@ struct Mesh {
   }
 };
 
+/// operator== of std::array calls memcmp, which is slow for so little.
+template <class Point>
+bool same_point(const Point& a, const Point& b) {
+  return a[0] == b[0] && a[1] == b[1];
+}
+
 /// Lexicographic order: that of the perturbation, and along any line.
 template <class Point>
 bool lexicographically_less(const Point& a, const Point& b) {

@@ -27,12 +27,11 @@ std::size_t round_up(std::size_t bytes, std::size_t unit) {
   return (bytes + unit - 1) / unit * unit;
 }
 
-// Huge pages for the whole ones among the first `bytes` bytes; the rest stays in small pages, so
-// that no memory is held behind the end.
+// Huge pages where whole ones fit; a last part stays in small pages by itself. The whole mapping is
+// advised, that part too: the kernel refuses to move one whose parts have different advice.
 void advise(void* memory, std::size_t bytes) {
-  const std::size_t whole = bytes / kHugePage * kHugePage;
   // Only a hint: without it everything works, more slowly.
-  if (whole > 0) (void)madvise(memory, whole, MADV_HUGEPAGE);
+  if (bytes >= kHugePage) (void)madvise(memory, bytes, MADV_HUGEPAGE);
 }
 
 void* map(std::size_t bytes) {

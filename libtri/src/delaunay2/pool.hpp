@@ -5,6 +5,7 @@
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <type_traits>
 #include <utility>
 
@@ -27,9 +28,15 @@ class Pool {
 
  public:
   Pool() = default;
-  Pool(Pool&& other) noexcept { swap(other); }
+  Pool(Pool&& other) noexcept
+      : data_(std::exchange(other.data_, nullptr)),
+        size_(std::exchange(other.size_, 0)),
+        capacity_(std::exchange(other.capacity_, 0)) {}
   Pool& operator=(Pool&& other) noexcept {
-    swap(other);
+    Pool moved(std::move(other));
+    std::swap(data_, moved.data_);
+    std::swap(size_, moved.size_);
+    std::swap(capacity_, moved.capacity_);
     return *this;
   }
   ~Pool() { release(); }
@@ -67,11 +74,6 @@ class Pool {
   }
 
  private:
-  void swap(Pool& other) noexcept {
-    std::swap(data_, other.data_);
-    std::swap(size_, other.size_);
-    std::swap(capacity_, other.capacity_);
-  }
   [[nodiscard]] std::size_t grown() const {
     return capacity_ < 4096 ? 2 * capacity_ + 16 : capacity_ + capacity_ / 8;
   }
@@ -86,5 +88,10 @@ class Pool {
   std::uint32_t size_ = 0;
   std::size_t capacity_ = 0;
 };
+
+template <class T>
+std::span<T> span_of(Pool<T>& pool) {
+  return {pool.data(), pool.size()};
+}
 
 }  // namespace terrace::tri::planar

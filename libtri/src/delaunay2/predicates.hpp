@@ -7,17 +7,10 @@
 
 namespace terrace::tri::planar {
 
-/// Whether p, different from a, b and c, lies inside the circle through the counter-clockwise a, b,
-/// c after the perturbation: every lifted point is raised infinitesimally, the lexicographically
-/// larger infinitely more. Of four cocircular points only the largest one counts: raised itself, p
-/// is outside; if another one is, the lifted plane tilts about the other two, and p is below it on
-/// the side of the raised one. No three of the four are collinear, so the answer is never zero.
+/// inside_circle() where the four are cocircular. Out of line, as it is rare.
 template <class Kernel>
-bool inside_circle(const typename Kernel::Point& a, const typename Kernel::Point& b,
-                   const typename Kernel::Point& c, const typename Kernel::Point& p) {
-  const int sign = Kernel::in_circle(a, b, c, p);
-  if (sign != 0) [[likely]]
-    return sign > 0;
+[[gnu::noinline]] bool inside_perturbed_circle(typename Kernel::Point a, typename Kernel::Point b,
+                                               typename Kernel::Point c, typename Kernel::Point p) {
   if (lexicographically_less(a, b)) {
     if (lexicographically_less(b, c))
       return lexicographically_less(p, c) && Kernel::orientation(a, b, p) > 0;
@@ -26,6 +19,22 @@ bool inside_circle(const typename Kernel::Point& a, const typename Kernel::Point
   if (lexicographically_less(a, c))
     return lexicographically_less(p, c) && Kernel::orientation(a, b, p) > 0;
   return lexicographically_less(p, a) && Kernel::orientation(b, c, p) > 0;
+}
+
+/// Whether p, different from a, b and c, lies inside the circle through the counter-clockwise a, b,
+/// c after the perturbation: every lifted point is raised infinitesimally, the lexicographically
+/// larger infinitely more. Of four cocircular points only the largest one counts: raised itself, p
+/// is outside; if another one is, the lifted plane tilts about the other two, and p is below it on
+/// the side of the raised one. No three of the four are collinear, so the answer is never zero.
+template <class Kernel>
+[[gnu::always_inline]] inline bool inside_circle(const typename Kernel::Point& a,
+                                                 const typename Kernel::Point& b,
+                                                 const typename Kernel::Point& c,
+                                                 const typename Kernel::Point& p) {
+  const int sign = Kernel::in_circle(a, b, c, p);
+  if (sign != 0) [[likely]]
+    return sign > 0;
+  return inside_perturbed_circle<Kernel>(a, b, c, p);
 }
 
 /// Whether p, collinear with a and b, lies strictly between them.
@@ -47,15 +56,15 @@ bool inside_ghost(const typename Kernel::Point& a, const typename Kernel::Point&
 
 /// Whether p, no corner of it, is in conflict with a triangle, ghost or not.
 template <class Kernel>
-bool in_conflict(const Mesh<Kernel>& mesh, const Triangle& t, const typename Kernel::Point& p) {
+[[gnu::always_inline]] inline bool in_conflict(const Mesh<Kernel>& mesh, const Triangle& t,
+                                               const typename Kernel::Point& p) {
   const auto& [a, b, c] = t.corner;
-  if (a == kGhost) [[unlikely]]
-    return inside_ghost<Kernel>(mesh.point[b], mesh.point[c], p);
-  if (b == kGhost) [[unlikely]]
-    return inside_ghost<Kernel>(mesh.point[c], mesh.point[a], p);
-  if (c == kGhost) [[unlikely]]
-    return inside_ghost<Kernel>(mesh.point[a], mesh.point[b], p);
-  return inside_circle<Kernel>(mesh.point[a], mesh.point[b], mesh.point[c], p);
+  const typename Kernel::Point* const point = mesh.point.data();
+  if (!has_ghost(t.corner)) [[likely]]
+    return inside_circle<Kernel>(point[a], point[b], point[c], p);
+  if (a == kGhost) return inside_ghost<Kernel>(point[b], point[c], p);
+  if (b == kGhost) return inside_ghost<Kernel>(point[c], point[a], p);
+  return inside_ghost<Kernel>(point[a], point[b], p);
 }
 
 }  // namespace terrace::tri::planar

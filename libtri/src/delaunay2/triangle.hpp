@@ -35,7 +35,8 @@ struct Triangle {
 static_assert(sizeof(Triangle) == 24);
 
 constexpr bool has_ghost(const std::array<std::uint32_t, 3>& corner) {
-  return corner[0] == kGhost || corner[1] == kGhost || corner[2] == kGhost;
+  // One branch for the three.
+  return (corner[0] == kGhost) | (corner[1] == kGhost) | (corner[2] == kGhost);
 }
 /// A finite triangle in use.
 constexpr bool is_finite(const std::array<std::uint32_t, 3>& corner) {

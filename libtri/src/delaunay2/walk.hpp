@@ -61,7 +61,7 @@ template <class Kernel>
 std::uint32_t equal_corner(const Mesh<Kernel>& mesh, std::uint32_t t,
                            const typename Kernel::Point& p) {
   for (const std::uint32_t v : mesh.triangle[t].corner)
-    if (mesh.point[v] == p) return v;
+    if (same_point(mesh.point[v], p)) return v;
   return kNone;
 }
 

@@ -128,6 +128,7 @@ struct ClusterPoints {
   bool has_representative = false;      ///< false for the root only
   Point3 representative{};
   std::vector<std::byte> representative_payload;
+  std::vector<std::uint64_t> representative_children;  ///< its `level` ordinals, level 0 first
 
   [[nodiscard]] std::size_t size() const { return positions.size(); }
 };

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <libdeflate.h>
+
+namespace terrace::stream::store {
+
+using Bytes = std::vector<std::uint8_t>;
+using ByteView = std::span<const std::uint8_t>;
+
+static_assert(std::endian::native == std::endian::little,
+              "multi-byte values are copied as they are; a big-endian machine needs swaps here");
+
+/// Damaged bytes inside a store: what is wrong, without the place. The callers that know file and
+/// offset turn it into an Error.
+class Damage : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+inline std::uint32_t crc32(std::uint32_t crc, const void* data, std::size_t size) {
+  return libdeflate_crc32(crc, data, size);
+}
+inline std::uint32_t crc32(ByteView bytes) { return crc32(0, bytes.data(), bytes.size()); }
+
+template <class T>
+T load(const std::uint8_t* at) {
+  T value;
+  std::memcpy(&value, at, sizeof value);
+  return value;
+}
+
+template <class T>
+void put(Bytes& out, T value) {
+  const std::size_t at = out.size();
+  out.resize(at + sizeof value);
+  std::memcpy(out.data() + at, &value, sizeof value);
+}
+
+/// Unsigned, 7 bits per byte, low bits first, top bit of a byte: more follow.
+inline void put_varint(Bytes& out, std::uint64_t value) {
+  for (; value >= 0x80; value >>= 7) out.push_back(static_cast<std::uint8_t>(value | 0x80));
+  out.push_back(static_cast<std::uint8_t>(value));
+}
+
+/// 0, -1, 1, -2, ... become 0, 1, 2, 3, ...: small magnitudes give small numbers.
+constexpr std::uint64_t zigzag(std::int64_t value) {
+  return (static_cast<std::uint64_t>(value) << 1) ^ static_cast<std::uint64_t>(value >> 63);
+}
+constexpr std::int64_t unzigzag(std::uint64_t value) {
+  return static_cast<std::int64_t>((value >> 1) ^ (std::uint64_t{0} - (value & 1)));
+}
+
+/// Reads what `put` wrote and never past the end.
+class ByteReader {
+ public:
+  explicit ByteReader(ByteView bytes) : bytes_(bytes) {}
+
+  [[nodiscard]] std::size_t offset() const { return at_; }
+  [[nodiscard]] std::size_t left() const { return bytes_.size() - at_; }
+
+  template <class T>
+  T get() {
+    const T value = load<T>(take(sizeof(T)).data());
+    return value;
+  }
+  std::uint64_t varint() {
+    std::uint64_t value = 0;
+    for (unsigned shift = 0; shift < 64; shift += 7) {
+      const std::uint8_t byte = get<std::uint8_t>();
+      if (shift == 63 && byte > 1) break;
+      value |= static_cast<std::uint64_t>(byte & 0x7f) << shift;
+      if (byte < 0x80) return value;
+    }
+    throw Damage("a number has too many bytes");
+  }
+  ByteView take(std::size_t size) {
+    if (size > left()) throw Damage("the data end too early");
+    const ByteView part = bytes_.subspan(at_, size);
+    at_ += size;
+    return part;
+  }
+
+ private:
+  ByteView bytes_;
+  std::size_t at_ = 0;
+};
+
+}  // namespace terrace::stream::store

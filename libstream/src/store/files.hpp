@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+
+#include "bytes.hpp"
+
+namespace terrace::stream::store {
+
+/// A file descriptor that closes itself.
+class Descriptor {
+ public:
+  Descriptor() = default;
+  explicit Descriptor(int fd) : fd_(fd) {}
+  Descriptor(Descriptor&& other) noexcept : fd_(other.release()) {}
+  Descriptor& operator=(Descriptor&& other) noexcept;
+  ~Descriptor();
+
+  [[nodiscard]] int get() const { return fd_; }
+  [[nodiscard]] bool open() const { return fd_ >= 0; }
+  int release() {
+    const int fd = fd_;
+    fd_ = -1;
+    return fd;
+  }
+
+ private:
+  int fd_ = -1;
+};
+
+/// A new file, written front to back through a buffer, its CRC-32 kept along.
+/// Every failed write, also one that shows only at fsync or close, is thrown as an Error.
+class OutputFile {
+ public:
+  explicit OutputFile(std::filesystem::path path);
+
+  void write(ByteView bytes);
+  /// Writes what is buffered, syncs and closes.
+  void finish();
+  [[nodiscard]] std::uint64_t size() const { return size_; }
+  [[nodiscard]] std::uint32_t checksum() const { return checksum_; }
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  void flush();
+
+  std::filesystem::path path_;
+  Descriptor fd_;
+  Bytes buffer_;
+  std::uint64_t size_ = 0;
+  std::uint32_t checksum_ = 0;
+};
+
+/// A file read at any place, by any thread (pread).
+class InputFile {
+ public:
+  /// Throws: Error if it cannot be opened or does not have `size` bytes.
+  InputFile(std::filesystem::path path, std::uint64_t size);
+
+  /// Fills `out` from `offset`. Throws: Error if the file ends before.
+  void read(std::uint64_t offset, std::span<std::uint8_t> out) const;
+  [[nodiscard]] std::uint64_t size() const { return size_; }
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+  Descriptor fd_;
+  std::uint64_t size_ = 0;
+};
+
+/// The whole file; `most` guards the memory. Throws: Error.
+std::string read_whole(const std::filesystem::path& path, std::uint64_t most);
+/// fsync of a folder. Throws: Error.
+void sync_folder(const std::filesystem::path& folder);
+
+}  // namespace terrace::stream::store

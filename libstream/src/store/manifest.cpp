@@ -1,0 +1,301 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "manifest.hpp"
+
+#include <charconv>
+#include <cmath>
+
+#include <nlohmann/json.hpp>
+
+#include "bytes.hpp"
+#include "files.hpp"
+#include "terrace/stream/error.hpp"
+
+namespace terrace::stream::store {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kFormatName = "terrace-store";
+/// The text ends with this, eight hexadecimal digits, and the closing below. The checksum is the
+/// CRC-32 of the whole text with zeros for its digits.
+constexpr std::string_view kChecksumKey = "\"checksum\": \"";
+constexpr std::string_view kClosing = "\"\n}\n";
+constexpr std::string_view kZeros = "00000000";
+
+std::string hexadecimal(std::uint32_t value) {
+  std::string text(8, '0');
+  for (std::size_t i = 8; i-- > 0; value >>= 4) text[i] = "0123456789abcdef"[value & 15];
+  return text;
+}
+
+std::uint32_t from_hexadecimal(const std::string& text) {
+  std::uint32_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, 16);
+  if (text.size() != 8 || error != std::errc() || end != text.data() + 8) {
+    throw Damage("a checksum is not eight hexadecimal digits");
+  }
+  return value;
+}
+
+/// JSON has no infinities and no NaN; they are rare enough to be words.
+Json number(double value) {
+  if (std::isfinite(value)) return value;
+  return std::isnan(value) ? "nan" : value > 0 ? "inf" : "-inf";
+}
+
+double number(const Json& json) {
+  if (!json.is_string()) return json.get<double>();
+  const auto word = json.get<std::string>();
+  if (word == "inf") return std::numeric_limits<double>::infinity();
+  if (word == "-inf") return -std::numeric_limits<double>::infinity();
+  if (word == "nan") return std::numeric_limits<double>::quiet_NaN();
+  throw Damage("\"" + word + "\" is not a number");
+}
+
+Json channel_json(const Channel& channel) {
+  return {{"name", channel.name},
+          {"type", std::string(name_of(channel.type))},
+          {"scale", number(channel.scale)},
+          {"offset", number(channel.offset)},
+          {"unit", channel.unit}};
+}
+
+Channel channel_of(const Json& json) {
+  Channel channel;
+  channel.name = json.at("name").get<std::string>();
+  const auto type = scalar_type_of(json.at("type").get<std::string>());
+  if (!type) throw Damage("a channel has an unknown type");
+  channel.type = *type;
+  channel.scale = number(json.at("scale"));
+  channel.offset = number(json.at("offset"));
+  channel.unit = json.at("unit").get<std::string>();
+  return channel;
+}
+
+Json point_json(const Point3& p) { return Json::array({number(p[0]), number(p[1]), number(p[2])}); }
+
+Point3 point_of(const Json& json) {
+  if (!json.is_array() || json.size() != 3) throw Damage("a point does not have three coordinates");
+  return {number(json[0]), number(json[1]), number(json[2])};
+}
+
+Json file_json(const FileEntry& file) {
+  return {{"file", file.name}, {"bytes", file.bytes}, {"crc32", hexadecimal(file.checksum)}};
+}
+
+FileEntry file_of(const Json& json) {
+  FileEntry file{json.at("file").get<std::string>(), json.at("bytes").get<std::uint64_t>(),
+                 from_hexadecimal(json.at("crc32").get<std::string>())};
+  // A name, not a way out of the folder.
+  if (file.name.empty() || file.name.find('/') != std::string::npos || file.name[0] == '.') {
+    throw Damage("a file name is not allowed");
+  }
+  return file;
+}
+
+Json crs_json(const Crs& crs) {
+  return {{"epsg", crs.epsg},
+          {"vertical_epsg", crs.vertical_epsg},
+          {"name", crs.name},
+          {"geographic", crs.geographic},
+          {"horizontal_unit", crs.horizontal_unit},
+          {"vertical_unit", crs.vertical_unit},
+          {"wkt", crs.wkt}};
+}
+
+Crs crs_of(const Json& json) {
+  Crs crs;
+  crs.epsg = json.at("epsg").get<int>();
+  crs.vertical_epsg = json.at("vertical_epsg").get<int>();
+  crs.name = json.at("name").get<std::string>();
+  crs.geographic = json.at("geographic").get<bool>();
+  crs.horizontal_unit = json.at("horizontal_unit").get<std::string>();
+  crs.vertical_unit = json.at("vertical_unit").get<std::string>();
+  crs.wkt = json.at("wkt").get<std::string>();
+  return crs;
+}
+
+Json to_json(const Manifest& m) {
+  Json json;
+  json["format"] = kFormatName;
+  json["version"] = m.version;
+  json["kind"] = m.schema.grid ? "grid" : "cloud";
+  json["source"] = m.schema.format;
+  json["points"] = m.points;
+  json["nodata"] = m.schema.nodata;
+  json["columns"] = m.schema.columns;
+  json["rows"] = m.schema.rows;
+  json["bounds"] = m.bounds.empty()
+                       ? Json(nullptr)
+                       : Json{{"min", point_json(m.bounds.min)}, {"max", point_json(m.bounds.max)}};
+  json["mean_height"] = number(m.mean_height);
+  json["coordinates"] = Json::array();
+  for (const Channel& channel : m.schema.coordinates) {
+    json["coordinates"].push_back(channel_json(channel));
+  }
+  json["attributes"] = Json::array();
+  for (const Channel& channel : m.schema.attributes) {
+    json["attributes"].push_back(channel_json(channel));
+  }
+  json["world"] = Json::array();
+  for (const double c : m.schema.world.xy) json["world"].push_back(number(c));
+  json["crs"] = crs_json(m.schema.crs);
+  json["vertical"] = m.schema.vertical;
+  json["parameters"] = Json::array();
+  for (const auto& [name, value] : m.schema.parameters) {
+    json["parameters"].push_back({{"name", name}, {"value", value}});
+  }
+  json["levels"] = Json::array();
+  for (std::size_t l = 0; l < m.levels.size(); ++l) {
+    const LevelEntry& level = m.levels[l];
+    const Json segment = {{"clusters", level.clusters},
+                          {"data", file_json(level.data)},
+                          {"index", file_json(level.index)},
+                          {"directory_bytes", level.directory_bytes}};
+    json["levels"].push_back({{"level", l},
+                              {"points", level.points},
+                              {"members", level.members},
+                              {"clusters", level.clusters},
+                              {"segments", Json::array({segment})}});
+  }
+  return json;
+}
+
+Manifest from_json(const Json& json) {
+  Manifest m;
+  m.version = json.at("version").get<int>();
+  const auto kind = json.at("kind").get<std::string>();
+  if (kind != "grid" && kind != "cloud") throw Damage("the kind is unknown");
+  m.schema.grid = kind == "grid";
+  m.schema.format = json.at("source").get<std::string>();
+  m.points = json.at("points").get<std::uint64_t>();
+  m.schema.nodata = json.at("nodata").get<std::uint64_t>();
+  m.schema.columns = json.at("columns").get<std::uint64_t>();
+  m.schema.rows = json.at("rows").get<std::uint64_t>();
+  if (const Json& bounds = json.at("bounds"); !bounds.is_null()) {
+    m.bounds = {point_of(bounds.at("min")), point_of(bounds.at("max"))};
+  }
+  m.mean_height = number(json.at("mean_height"));
+  const Json& coordinates = json.at("coordinates");
+  if (!coordinates.is_array() || coordinates.size() != 3) {
+    throw Damage("there are not three coordinates");
+  }
+  for (std::size_t i = 0; i < 3; ++i) m.schema.coordinates[i] = channel_of(coordinates[i]);
+  for (const Json& channel : json.at("attributes")) {
+    m.schema.attributes.push_back(channel_of(channel));
+  }
+  if (m.schema.attributes.size() > kMostAttributes) throw Damage("there are too many attributes");
+  const Json& world = json.at("world");
+  if (!world.is_array() || world.size() != 6)
+    throw Damage("the world transform is not six numbers");
+  for (std::size_t i = 0; i < 6; ++i) m.schema.world.xy[i] = number(world[i]);
+  m.schema.crs = crs_of(json.at("crs"));
+  m.schema.vertical = json.at("vertical").get<std::string>();
+  for (const Json& parameter : json.at("parameters")) {
+    m.schema.parameters.emplace_back(parameter.at("name").get<std::string>(),
+                                     parameter.at("value").get<std::string>());
+  }
+  for (const Json& level : json.at("levels")) {
+    const Json& segments = level.at("segments");
+    if (!segments.is_array() || segments.size() != 1) {
+      throw Damage("a level does not have one segment");
+    }
+    LevelEntry entry;
+    entry.points = level.at("points").get<std::uint64_t>();
+    entry.members = level.at("members").get<std::uint64_t>();
+    entry.clusters = level.at("clusters").get<std::uint64_t>();
+    entry.data = file_of(segments[0].at("data"));
+    entry.index = file_of(segments[0].at("index"));
+    entry.directory_bytes = segments[0].at("directory_bytes").get<std::uint64_t>();
+    m.levels.push_back(std::move(entry));
+  }
+  return m;
+}
+
+/// Counts that must agree with one another whatever the files hold.
+void check_counts(const Manifest& m) {
+  if (m.levels.empty() || m.levels.size() > 255) throw Damage("the number of levels is impossible");
+  if (m.levels[0].points != m.points) throw Damage("the points of level 0 are not all points");
+  for (std::size_t l = 0; l < m.levels.size(); ++l) {
+    const LevelEntry& level = m.levels[l];
+    const bool top = l + 1 == m.levels.size();
+    const std::uint64_t above = top ? 0 : m.levels[l + 1].points;
+    if (level.points < above || level.members != level.points - above) {
+      throw Damage("the members of level " + std::to_string(l) + " do not add up");
+    }
+    // Every cluster is headed by a point of the next level, but for the root.
+    if (level.clusters != (top ? 1 : above)) {
+      throw Damage("the clusters of level " + std::to_string(l) + " do not add up");
+    }
+  }
+}
+
+[[noreturn]] void damaged(const std::filesystem::path& file, const std::string& cause) {
+  throw Error({.file = file.string(),
+               .where = {},
+               .cause = "damaged manifest: " + cause,
+               .remedy = "restore the file or build the store anew"});
+}
+
+}  // namespace
+
+std::string to_text(const Manifest& manifest) {
+  Json json = to_json(manifest);
+  json["checksum"] = kZeros;
+  std::string text = json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  const std::uint32_t checksum = crc32(0, text.data(), text.size());
+  const std::size_t at = text.size() - kClosing.size() - kZeros.size();
+  text.replace(at, kZeros.size(), hexadecimal(checksum));
+  return text;
+}
+
+Manifest parse_manifest(const std::string& text, const std::filesystem::path& file) {
+  Json json;
+  try {
+    json = Json::parse(text);
+    if (!json.is_object() || json.at("format") != kFormatName) {
+      damaged(file, "it does not say that this is a store");
+    }
+    // Before anything that a newer version may do otherwise.
+    const auto version = json.at("version").get<std::int64_t>();
+    if (version > kVersion) {
+      throw Error({.file = file.string(),
+                   .where = {},
+                   .cause = "store version " + std::to_string(version) +
+                            " was written by a newer terrace; this one reads up to version " +
+                            std::to_string(kVersion),
+                   .remedy = "update"});
+    }
+    if (version < 1) damaged(file, "the version is impossible");
+
+    const std::size_t tail = kChecksumKey.size() + kZeros.size() + kClosing.size();
+    if (text.size() < tail) damaged(file, "it is too short");
+    const std::size_t at = text.size() - kClosing.size() - kZeros.size();
+    std::string zeroed = text;
+    zeroed.replace(at, kZeros.size(), kZeros);
+    if (text.compare(text.size() - tail, kChecksumKey.size(), kChecksumKey) != 0 ||
+        text.substr(at, kZeros.size()) != hexadecimal(crc32(0, zeroed.data(), zeroed.size()))) {
+      damaged(file, "its checksum is wrong");
+    }
+    Manifest manifest = from_json(json);
+    check_counts(manifest);
+    return manifest;
+  } catch (const Json::exception& error) {
+    damaged(file, error.what());
+  } catch (const Damage& error) {
+    damaged(file, error.what());
+  }
+}
+
+bool looks_like_store(const std::filesystem::path& folder) {
+  std::error_code error;
+  const auto path = folder / kManifestName;
+  if (!std::filesystem::is_regular_file(path, error)) return false;
+  try {
+    return read_whole(path, kMostManifestBytes).find(kFormatName) != std::string::npos;
+  } catch (const Error&) {
+    return false;
+  }
+}
+
+}  // namespace terrace::stream::store

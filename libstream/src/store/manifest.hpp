@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "terrace/stream/store.hpp"
+
+namespace terrace::stream::store {
+
+inline constexpr int kVersion = 1;
+inline constexpr const char* kManifestName = "manifest.json";
+inline constexpr std::uint64_t kMostManifestBytes = 64u << 20;
+inline constexpr std::size_t kMostAttributes = 4096;
+
+struct FileEntry {
+  std::string name;
+  std::uint64_t bytes = 0;
+  std::uint32_t checksum = 0;
+};
+
+/// A level as the manifest lists it. Version 1 has one segment per level.
+struct LevelEntry {
+  std::uint64_t points = 0, members = 0, clusters = 0;
+  FileEntry data, index;
+  std::uint64_t directory_bytes = 0;  ///< at the end of the index file
+};
+
+struct Manifest {
+  int version = kVersion;
+  Schema schema;
+  std::uint64_t points = 0;
+  Box3 bounds;
+  double mean_height = 0.0;
+  std::vector<LevelEntry> levels;  ///< level 0 first
+};
+
+/// The manifest as JSON text, its own checksum included.
+std::string to_text(const Manifest& manifest);
+
+/// Throws: Error, in the name of `file`, if the text is not a manifest of this version or earlier,
+/// or not the one that was written.
+Manifest parse_manifest(const std::string& text, const std::filesystem::path& file);
+
+/// Whether `folder` has a manifest that says it is a store, of whatever version, damaged or not.
+bool looks_like_store(const std::filesystem::path& folder);
+
+}  // namespace terrace::stream::store

@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "bytes.hpp"
+#include "symbols.hpp"
+
+/// The entropy coder: static rANS with a 32-bit state and 16-bit words from the front of a byte
+/// string, raw bits from its back.
+/// Source: J. Duda, Asymmetric numeral systems, arXiv:1311.2540; F. Giesen, Interleaved entropy
+/// coders, arXiv:1402.3392.
+
+namespace terrace::stream::store {
+
+inline constexpr unsigned kScaleBits = 11;
+inline constexpr std::uint32_t kScale = 1u << kScaleBits;
+/// The state lies in [kLow, 2^32) between symbols.
+inline constexpr std::uint32_t kLow = 1u << 16;
+
+/// Frequencies of a context, adding up to kScale. Symbols of frequency 0 go by the escape, which
+/// always has one.
+using Frequencies = std::array<std::uint16_t, kSymbols>;
+
+/// A context's table as the encoder uses it.
+struct EncodeTable {
+  struct Entry {
+    std::uint16_t frequency = 0, start = 0;
+  };
+  std::array<Entry, kSymbols> entries{};
+};
+
+/// A context's table as the decoder uses it: by slot, symbol | frequency << 8 | bias << 20.
+using DecodeTable = std::array<std::uint32_t, kScale>;
+
+EncodeTable encode_table(const Frequencies& frequencies);
+void fill_decode_table(const Frequencies& frequencies, DecodeTable& table);
+
+/// Bits, most significant first; `append_reversed` puts them so that the first is in the last byte.
+class BitWriter {
+ public:
+  void clear() {
+    bytes_.clear();
+    hold_ = 0;
+    held_ = 0;
+  }
+  /// Requires value < 2^bits, bits <= 64.
+  void put(std::uint64_t value, unsigned bits) {
+    if (bits > 32) {
+      put(value >> 32, bits - 32);
+      value &= 0xffffffff;
+      bits = 32;
+    }
+    hold_ = (hold_ << bits) | value;
+    held_ += bits;
+    while (held_ >= 8) {
+      held_ -= 8;
+      bytes_.push_back(static_cast<std::uint8_t>(hold_ >> held_));
+    }
+  }
+  void append_reversed(Bytes& out) const {
+    if (held_ > 0) out.push_back(static_cast<std::uint8_t>(hold_ << (8 - held_)));
+    out.insert(out.end(), bytes_.rbegin(), bytes_.rend());
+  }
+
+ private:
+  Bytes bytes_;
+  std::uint64_t hold_ = 0;
+  unsigned held_ = 0;
+};
+
+/// Collects the symbols of one cluster. Without tables it only counts, for training.
+class SymbolEncoder {
+ public:
+  static constexpr bool kDecoding = false;
+
+  /// `tables`: one per context; empty to count. They must outlive the encoder.
+  explicit SymbolEncoder(std::span<const EncodeTable> tables) : tables_(tables) {}
+
+  /// In counting: occurrences by context and symbol.
+  std::vector<std::array<std::uint32_t, kSymbols>>& counts() { return counts_; }
+
+  void start() {
+    symbols_.clear();
+    bits_.clear();
+  }
+  void symbol(unsigned context, unsigned symbol) {
+    if (tables_.empty()) {
+      if (context >= counts_.size()) counts_.resize(context + 1);
+      ++counts_[context][symbol];
+      return;
+    }
+    if (tables_[context].entries[symbol].frequency == 0) {
+      symbols_.push_back(context << 8 | kEscape);
+      bits_.put(symbol, kEscapeBits);
+    } else {
+      symbols_.push_back(context << 8 | symbol);
+    }
+  }
+  void raw(std::uint64_t value, unsigned bits) {
+    if (!tables_.empty()) bits_.put(value, bits);
+  }
+  void number(unsigned context, std::uint64_t value) {
+    const unsigned c = class_of(value);
+    symbol(context, c);
+    raw(value - kClassRange[c].base, kClassRange[c].bits);
+  }
+  /// Appends the byte string. `last` (< 2^16) is what the decoder finds in its final state.
+  void finish(Bytes& out, std::uint32_t last);
+
+ private:
+  std::span<const EncodeTable> tables_;
+  std::vector<std::uint32_t> symbols_;
+  std::vector<std::uint16_t> words_;
+  BitWriter bits_;
+  std::vector<std::array<std::uint32_t, kSymbols>> counts_;
+};
+
+/// Bytes that must be readable before and behind a cluster's byte string.
+inline constexpr std::size_t kPadding = 16;
+
+/// Decodes what SymbolEncoder wrote. Reads at most kPadding bytes to either side of the string
+/// whatever is in it; `finish` tells whether the string was consumed exactly.
+class SymbolDecoder {
+ public:
+  static constexpr bool kDecoding = true;
+
+  SymbolDecoder(std::span<const DecodeTable* const> tables, ByteView bytes)
+      : tables_(tables),
+        next_(bytes.data()),
+        end_(bytes.data() + bytes.size()),
+        limit_bits_(bytes.size() * 8) {
+    if (bytes.size() < 4) throw Damage("a cluster has too few bytes");
+    state_ = load<std::uint32_t>(next_);
+    next_ += 4;
+  }
+
+  unsigned symbol(unsigned context) {
+    const std::uint32_t entry = (*tables_[context])[state_ & (kScale - 1)];
+    state_ = ((entry >> 8) & 0xfff) * (state_ >> kScaleBits) + (entry >> 20);
+    const std::uint32_t refilled = state_ << 16 | load<std::uint16_t>(next_);
+    // Selected, not branched upon: whether a word is due is close to a coin toss.
+    const bool low = state_ < kLow;
+    state_ = low ? refilled : state_;
+    next_ += low ? 2 : 0;
+    next_ = next_ > end_ ? end_ : next_;
+    const unsigned symbol = entry & 0xff;
+    if (symbol == kEscape) [[unlikely]]
+      return escaped();
+    return symbol;
+  }
+  std::uint64_t raw(unsigned bits) {
+    if (bits > 56) [[unlikely]] {
+      const std::uint64_t high = raw(bits - 32);
+      return high << 32 | raw(32);
+    }
+    const std::uint64_t hold = load<std::uint64_t>(end_ - 8 - (used_bits_ >> 3));
+    const std::uint64_t value = (hold << (used_bits_ & 7)) >> 1 >> (63 - bits);
+    used_bits_ += bits;
+    used_bits_ = used_bits_ > limit_bits_ ? limit_bits_ : used_bits_;
+    return value;
+  }
+  std::uint64_t number(unsigned context) {
+    const ClassRange range = kClassRange[symbol(context)];
+    return range.base + raw(range.bits);
+  }
+  /// The encoder's `last`. Throws: Damage unless both ends have met.
+  std::uint32_t finish() const {
+    if (next_ != end_ - (used_bits_ + 7) / 8 || state_ < kLow || state_ >= 2 * kLow) {
+      throw Damage("a cluster's bytes do not end where its points do");
+    }
+    return state_ - kLow;
+  }
+
+ private:
+  unsigned escaped() {
+    const std::uint64_t symbol = raw(kEscapeBits);
+    if (symbol >= kClasses) throw Damage("a cluster has a symbol that does not exist");
+    return static_cast<unsigned>(symbol);
+  }
+
+  std::span<const DecodeTable* const> tables_;
+  const std::uint8_t* next_;
+  const std::uint8_t* end_;
+  std::size_t limit_bits_;
+  std::size_t used_bits_ = 0;
+  std::uint32_t state_;
+};
+
+}  // namespace terrace::stream::store

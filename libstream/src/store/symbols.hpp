@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstdint>
+
+namespace terrace::stream::store {
+
+/// An unsigned number is coded as a *class*, by the entropy coder, and the bits that the class
+/// leaves open, as they are. Numbers below 16 are classes of their own; above, a class is the
+/// exponent and the first bit after it, so that 64-bit numbers need 136 classes.
+inline constexpr unsigned kClasses = 136;
+/// Announces a class that its context has never seen in training: eight raw bits name it.
+inline constexpr unsigned kEscape = kClasses;
+inline constexpr unsigned kSymbols = kClasses + 1;
+inline constexpr unsigned kEscapeBits = 8;
+
+struct ClassRange {
+  std::uint64_t base = 0;
+  std::uint8_t bits = 0;
+};
+
+constexpr unsigned class_of(std::uint64_t value) {
+  if (value < 16) return static_cast<unsigned>(value);
+  const unsigned exponent = static_cast<unsigned>(std::bit_width(value)) - 1;
+  return 16 + (exponent - 4) * 2 + static_cast<unsigned>((value >> (exponent - 1)) & 1);
+}
+
+/// By symbol, the escape (0 bits, base 0) included.
+inline constexpr std::array<ClassRange, kSymbols> kClassRange = [] {
+  std::array<ClassRange, kSymbols> table{};
+  for (unsigned c = 0; c < kClasses; ++c) {
+    if (c < 16) {
+      table[c] = {c, 0};
+    } else {
+      const unsigned exponent = 4 + (c - 16) / 2;
+      table[c] = {(std::uint64_t{2} | (c & 1)) << (exponent - 1),
+                  static_cast<std::uint8_t>(exponent - 1)};
+    }
+  }
+  return table;
+}();
+
+/// Contexts: each has a table of frequencies of its own. Attribute contexts follow the fixed ones.
+namespace context {
+inline constexpr unsigned kForm = 0;        ///< grid or k-d, own box or not
+inline constexpr unsigned kRunCount = 1;    ///< by the runs of the row above: 0, 1, more
+inline constexpr unsigned kRunStart = 4;    ///< by the last step of this border, -2 to 2; first row
+inline constexpr unsigned kRunEnd = 10;     ///< likewise
+inline constexpr unsigned kRunGap = 16;     ///< of second and further runs
+inline constexpr unsigned kRunLength = 17;  ///< likewise
+inline constexpr unsigned kInset = 18;      ///< six: low and high side of each axis
+inline constexpr unsigned kChild = 24;      ///< six: level below, levels further down; by magnitude
+inline constexpr unsigned kSplit = 30;      ///< k-d counts of 2 to 31 points, then by bit width
+inline constexpr unsigned kSplitDirect = 32;
+inline constexpr unsigned kSplitWide = kSplit + kSplitDirect - 2;
+inline constexpr unsigned kHeight = kSplitWide + 24;
+inline constexpr unsigned kHeightSteps = 32;
+inline constexpr unsigned kAttribute = kHeight + 2 * kHeightSteps;
+inline constexpr unsigned kPerAttribute = 10;  ///< number form, first value, eight by magnitude
+}  // namespace context
+
+}  // namespace terrace::stream::store

@@ -1,0 +1,251 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "verify.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "bytes.hpp"
+
+namespace terrace::stream::store {
+namespace {
+
+/// Mixes 64 bits well. Source: S. Vigna, SplitMix64.
+constexpr std::uint64_t mixed(std::uint64_t x) {
+  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+  return x ^ (x >> 31);
+}
+
+std::uint64_t hash_of(std::uint64_t ordinal, const Point3& p, std::span<const std::byte> payload) {
+  std::uint64_t h = mixed(ordinal + 0x9e3779b97f4a7c15u);
+  for (const double c : p) h = mixed(h ^ std::bit_cast<std::uint64_t>(c));
+  return mixed(h ^ crc32(0, payload.data(), payload.size()));
+}
+
+/// What is summed up over one level while it is read.
+struct LevelSums {
+  std::uint64_t members = 0;
+  std::vector<bool> headed;  ///< clusters whose head has been found above
+  // Sums over clusters, and over the points that say they head them: equal if every point that
+  // heads a cluster is the cluster's representative, value by value.
+  std::uint64_t representatives = 0, heads = 0;
+};
+
+/// Whether `outer` holds what is certain of the box below: both sides of that are grown by less
+/// than a step, a power of two that divides both of them.
+bool reaches(const Box3& outer, const Entry& below) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto low = static_cast<std::uint64_t>(below.low[axis]), end = low + below.size[axis];
+    const auto slack = (std::uint64_t{1} << std::min(63, std::countr_zero(low | end))) - 1;
+    const NumberForm form = below.forms[axis];
+    if (to_double(static_cast<std::int64_t>(low + slack), form) < outer.min[axis] ||
+        to_double(static_cast<std::int64_t>(end - 1 - slack), form) > outer.max[axis]) {
+      return false;
+    }
+  }
+  return true;
+}
+
+class Verification {
+ public:
+  Verification(const Store& store, const Manifest& manifest,
+               const std::vector<std::unique_ptr<LevelReader>>& levels,
+               const std::function<void(const Problem&)>& report)
+      : store_(store), manifest_(manifest), levels_(levels), report_(report) {}
+
+  bool run() {
+    sums_.resize(levels_.size());
+    for (std::size_t l = 0; l < levels_.size(); ++l) {
+      sums_[l].headed.resize(levels_[l]->clusters());
+      check_file(levels_[l]->data(), manifest_.levels[l].data.checksum);
+      check_file(levels_[l]->index(), manifest_.levels[l].index.checksum);
+    }
+    for (unsigned l = 0; l < levels_.size(); ++l) check_level(l);
+    for (std::size_t l = 0; l + 1 < levels_.size(); ++l) check_heads(l);
+    check_totals();
+    return good_;
+  }
+
+ private:
+  void problem(const std::filesystem::path& file, std::uint64_t offset, std::string what) {
+    good_ = false;
+    if (report_) report_({.file = file.string(), .offset = offset, .what = std::move(what)});
+  }
+  void cluster_problem(unsigned level, std::uint64_t ordinal, std::uint64_t offset,
+                       const std::string& what) {
+    problem(levels_[level]->data().path(), offset,
+            "cluster " + std::to_string(level) + "/" + std::to_string(ordinal) + ": " + what);
+  }
+
+  void check_file(const InputFile& file, std::uint32_t expected) {
+    try {
+      Bytes bytes(1u << 20);
+      std::uint32_t checksum = 0;
+      for (std::uint64_t offset = 0; offset < file.size(); offset += bytes.size()) {
+        bytes.resize(std::min<std::uint64_t>(bytes.size(), file.size() - offset));
+        file.read(offset, bytes);
+        checksum = crc32(checksum, bytes.data(), bytes.size());
+      }
+      if (checksum != expected) problem(file.path(), 0, "the checksum of the file is wrong");
+    } catch (const Error& error) {
+      problem(file.path(), 0, error.what());
+    }
+  }
+
+  void check_level(unsigned l) {
+    const LevelReader& level = *levels_[l];
+    std::uint64_t data_end = 0;
+    for (std::uint64_t p = 0; p < level.pages(); ++p) {
+      try {
+        check_page(l, p, data_end);
+      } catch (const Error& error) {
+        problem(level.index().path(), level.page_offset(p), error.what());
+      } catch (const Damage& damage) {
+        problem(level.index().path(), level.page_offset(p), damage.what());
+      }
+    }
+    if (data_end != level.data().size()) {
+      problem(level.data().path(), data_end, "the clusters do not end where the file does");
+    }
+    if (sums_[l].members != manifest_.levels[l].members) {
+      problem(store_.path() / kManifestName, 0,
+              "level " + std::to_string(l) + " has " + std::to_string(sums_[l].members) +
+                  " members, not " + std::to_string(manifest_.levels[l].members));
+    }
+  }
+
+  void check_page(unsigned l, std::uint64_t number, std::uint64_t& data_end) {
+    const LevelReader& level = *levels_[l];
+    const auto page = level.page(number);
+    if (page->offset(0) != data_end) {
+      problem(level.index().path(), level.page_offset(number),
+              "the page's clusters do not follow those of the page before");
+    }
+    data_end = page->end();
+    for (std::uint32_t i = 0; i < page->clusters(); ++i) {
+      const std::uint64_t ordinal = number * kPageClusters + i;
+      try {
+        std::uint64_t offset = 0;
+        const Entry entry = level.entry(ordinal, offset);
+        level.read(ordinal, space_, points_);
+        check_cluster(l, ordinal, record_of(entry, l, offset, level.top()));
+      } catch (const Error& error) {
+        problem(level.data().path(), page->offset(i), error.what());
+      }
+    }
+  }
+
+  void check_cluster(unsigned l, std::uint64_t ordinal, const ClusterRecord& record) {
+    LevelSums& sums = sums_[l];
+    sums.members += points_.size();
+    const ClusterSummary& summary = record.summary;
+    bool inside = true;
+    for (const Point3& p : points_.positions) inside &= summary.box.contains(p);
+    if (points_.has_representative) inside &= summary.box.contains(points_.representative);
+    if (!inside) cluster_problem(l, ordinal, record.offset, "a point lies outside of its box");
+    if (!(summary.error >= 0)) {
+      cluster_problem(l, ordinal, record.offset, "the error is not a number from 0 up");
+    }
+    if (points_.has_representative) {
+      sums.representatives +=
+          hash_of(ordinal, points_.representative, points_.representative_payload);
+    }
+    if (l == 0) {
+      for (const Point3& p : points_.positions) enter_height(p);
+      if (points_.has_representative) enter_height(points_.representative);
+      return;
+    }
+    const std::size_t stride = levels_[l]->layout().payload_size;
+    std::uint64_t descendants = 0;
+    bool boxes = true, exists = true;
+    const auto check_child = [&](std::uint64_t child) {
+      if (child >= levels_[l - 1]->clusters()) {
+        exists = false;
+        return;
+      }
+      std::uint64_t offset = 0;
+      const Entry below = levels_[l - 1]->entry(child, offset);
+      descendants += record_of(below, l - 1, offset, /*root=*/false).summary.descendants;
+      boxes &= reaches(summary.box, below);
+    };
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+      const std::span<const std::byte> payload(points_.payload.data() + i * stride, stride);
+      for (unsigned j = 0; j < l; ++j) {
+        const std::uint64_t child = points_.children[i * l + j];
+        if (child >= levels_[j]->clusters()) {
+          exists = false;
+          continue;
+        }
+        if (sums_[j].headed[child]) {
+          cluster_problem(l, ordinal, record.offset,
+                          "cluster " + std::to_string(j) + "/" + std::to_string(child) +
+                              " is headed a second time");
+        }
+        sums_[j].headed[child] = true;
+        sums_[j].heads += hash_of(child, points_.positions[i], payload);
+      }
+      check_child(points_.children[i * l + l - 1]);
+    }
+    if (points_.has_representative) check_child(points_.representative_children[l - 1]);
+    if (!exists)
+      cluster_problem(l, ordinal, record.offset, "a point heads a cluster that does not exist");
+    if (exists && descendants != summary.descendants) {
+      cluster_problem(l, ordinal, record.offset, "the descendants do not add up");
+    }
+    if (!boxes)
+      cluster_problem(l, ordinal, record.offset, "a cluster below reaches out of its box");
+  }
+
+  void enter_height(const Point3& p) {
+    bounds_.include(p);
+    height_sum_ += p[2];
+  }
+
+  void check_heads(std::size_t l) {
+    const LevelSums& sums = sums_[l];
+    const auto orphan = std::find(sums.headed.begin(), sums.headed.end(), false);
+    if (orphan != sums.headed.end()) {
+      cluster_problem(static_cast<unsigned>(l),
+                      static_cast<std::uint64_t>(orphan - sums.headed.begin()), 0,
+                      "no point above heads it");
+    } else if (sums.heads != sums.representatives) {
+      problem(levels_[l]->data().path(), 0,
+              "the representatives of level " + std::to_string(l) +
+                  " are not the points above that head its clusters");
+    }
+  }
+
+  void check_totals() {
+    const auto manifest = store_.path() / kManifestName;
+    if (bounds_ != manifest_.bounds) problem(manifest, 0, "the bounds are not those of the points");
+    if (manifest_.points == 0) return;
+    const double mean = height_sum_ / static_cast<double>(manifest_.points);
+    const double size = std::max({std::abs(bounds_.min[2]), std::abs(bounds_.max[2]), 1e-300});
+    // The sums run in different orders.
+    if (std::isfinite(mean) && !(std::abs(mean - manifest_.mean_height) <= 1e-9 * size)) {
+      problem(manifest, 0, "the mean height is not that of the points");
+    }
+  }
+
+  const Store& store_;
+  const Manifest& manifest_;
+  const std::vector<std::unique_ptr<LevelReader>>& levels_;
+  const std::function<void(const Problem&)>& report_;
+  std::vector<LevelSums> sums_;
+  ReadSpace space_;
+  ClusterPoints points_;
+  Box3 bounds_;
+  double height_sum_ = 0.0;
+  bool good_ = true;
+};
+
+}  // namespace
+
+bool verify_store(const Store& store, const Manifest& manifest,
+                  const std::vector<std::unique_ptr<LevelReader>>& levels,
+                  const std::function<void(const Problem&)>& report) {
+  return Verification(store, manifest, levels, report).run();
+}
+
+}  // namespace terrace::stream::store

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "level_reader.hpp"
+#include "manifest.hpp"
+
+namespace terrace::stream::store {
+
+/// Checks every byte and every invariant of an open store; see Store::verify.
+/// Memory: two bits per cluster and some buffers.
+bool verify_store(const Store& store, const Manifest& manifest,
+                  const std::vector<std::unique_ptr<LevelReader>>& levels,
+                  const std::function<void(const Problem&)>& report);
+
+}  // namespace terrace::stream::store

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/stream/store.hpp"
+
+#include <cstdlib>
+#include <fstream>
+#include <map>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "stand_in_hierarchy.hpp"
+#include "store_testing.hpp"
+#include "terrace/stream/error.hpp"
+
+namespace terrace::stream {
+namespace {
+
+using testing::StandInHierarchy;
+using testing::TemporaryFolder;
+using testing::uniform;
+
+TEST(Store, EmptyStoreOpens) {
+  const TemporaryFolder folder;
+  StoreWriter writer(folder.path() / "s", testing::grid_schema(ScalarType::i16));
+  StandInHierarchy(writer, {}).finish();
+  const Store store = Store::open(folder.path() / "s");
+  EXPECT_EQ(store.points(), 0u);
+  EXPECT_EQ(store.top(), 0u);
+  EXPECT_TRUE(store.bounds().empty());
+  ClusterPoints points;
+  store.read(store.root(), points);
+  EXPECT_EQ(points.size(), 0u);
+  EXPECT_FALSE(points.has_representative);
+  EXPECT_TRUE(store.record(store.root()).summary.box.empty());
+  EXPECT_TRUE(store.verify(testing::expect_no_problem));
+}
+
+TEST(Store, OnePointComesBack) {
+  const TemporaryFolder folder;
+  StoreWriter writer(folder.path() / "s", testing::cloud_schema());
+  StandInHierarchy hierarchy(writer, {});
+  hierarchy.push(std::vector<Point3>{{1.5, -0.0, 1e300}});
+  hierarchy.finish();
+  const Store store = Store::open(folder.path() / "s");
+  EXPECT_EQ(testing::all_points(store), (testing::PointBag{{{1.5, -0.0, 1e300}, {}}}));
+  EXPECT_TRUE(store.verify(testing::expect_no_problem));
+}
+
+/// Rasters of every sample type, smooth and rough, come back bit for bit.
+TEST(Store, GridsComeBackBitForBit) {
+  for (const ScalarType type : testing::kAllTypes) {
+    for (const testing::Relief relief :
+         {testing::Relief::flat, testing::Relief::fractal, testing::Relief::noise,
+          testing::Relief::extreme, testing::Relief::decimal}) {
+      SCOPED_TRACE(::testing::Message()
+                   << name_of(type) << ", relief " << static_cast<int>(relief));
+      testing::check_round_trip(testing::grid_schema(type),
+                                testing::grid_blocks(type, relief, 96, 88, 40, 1),
+                                {.block_points = 1600, .cluster_points = 40});
+    }
+  }
+}
+
+TEST(Store, GridsFarFromTheOriginComeBack) {
+  auto blocks = testing::grid_blocks(ScalarType::i16, testing::Relief::fractal, 60, 60, 30, 2);
+  for (auto& block : blocks) {
+    for (Point3& p : block.positions) {
+      p[0] += (1 << 30) - 100;
+      p[1] += (1 << 30) - 100;
+    }
+  }
+  testing::check_round_trip(testing::grid_schema(ScalarType::i16), blocks,
+                            {.block_points = 900, .cluster_points = 30});
+}
+
+TEST(Store, CellsGivenTwiceAreKept) {
+  std::vector<testing::Block> blocks(3);
+  std::mt19937_64 random(3);
+  for (auto& block : blocks) {
+    for (int i = 0; i < 500; ++i) {
+      block.positions.push_back({static_cast<double>(random() % 8),
+                                 static_cast<double>(random() % 8),
+                                 static_cast<double>(random() % 3)});
+    }
+  }
+  testing::check_round_trip(testing::grid_schema(ScalarType::u8), blocks,
+                            {.block_points = 500, .cluster_points = 50});
+  for (auto& block : blocks)
+    std::fill(block.positions.begin(), block.positions.end(), Point3{7, 7, 7});
+  testing::check_round_trip(testing::grid_schema(ScalarType::u8), blocks,
+                            {.block_points = 500, .cluster_points = 50});
+  testing::check_round_trip(testing::cloud_schema(), blocks,
+                            {.block_points = 500, .cluster_points = 50});
+}
+
+TEST(Store, CloudsOfAllNumbersComeBackBitForBit) {
+  for (const auto numbers :
+       {testing::Numbers::decimals, testing::Numbers::floats, testing::Numbers::doubles,
+        testing::Numbers::extremes, testing::Numbers::mixed}) {
+    SCOPED_TRACE(static_cast<int>(numbers));
+    testing::check_round_trip(testing::cloud_schema(), testing::cloud_blocks(numbers, 8000, 900, 4),
+                              {.block_points = 900, .cluster_points = 60});
+  }
+}
+
+TEST(Store, AttributesOfAllTypesComeBackBitForBit) {
+  Schema schema = testing::cloud_schema();
+  for (const ScalarType type : testing::kAllTypes)
+    schema.attributes.push_back(testing::channel(std::string(name_of(type)), type));
+  auto blocks = testing::cloud_blocks(testing::Numbers::decimals, 6000, 900, 5);
+  std::mt19937_64 random(6);
+  std::uint64_t row = 0;
+  for (auto& block : blocks) {
+    for (std::size_t i = 0; i < block.positions.size(); ++i, ++row) {
+      // Constant, counting and random bytes in turn: the last also make NaNs of every payload.
+      for (const Channel& channel : schema.attributes) {
+        const std::uint64_t value = row < 1800 ? 0 : row < 3600 ? row : random();
+        const auto* bytes = reinterpret_cast<const std::byte*>(&value);
+        block.payload.insert(block.payload.end(), bytes, bytes + size_of(channel.type));
+      }
+    }
+  }
+  testing::check_round_trip(schema, blocks, {.block_points = 900, .cluster_points = 60});
+}
+
+TEST(Store, DecimalAttributesAreSmall) {
+  Schema schema = testing::cloud_schema();
+  schema.attributes.push_back(testing::channel("t", ScalarType::f64));
+  auto blocks = testing::cloud_blocks(testing::Numbers::decimals, 6000, 900, 7);
+  std::uint64_t row = 0;
+  for (auto& block : blocks) {
+    for (std::size_t i = 0; i < block.positions.size(); ++i, ++row) {
+      const double value = static_cast<double>(row % 50) / 100;
+      const auto* bytes = reinterpret_cast<const std::byte*>(&value);
+      block.payload.insert(block.payload.end(), bytes, bytes + 8);
+    }
+  }
+  const std::uint64_t with =
+      testing::check_round_trip(schema, blocks, {.block_points = 900, .cluster_points = 60});
+  for (auto& block : blocks) block.payload.clear();
+  const std::uint64_t without = testing::check_round_trip(
+      testing::cloud_schema(), blocks, {.block_points = 900, .cluster_points = 60});
+  EXPECT_LT(with, without + 6000 * 2);
+}
+
+}  // namespace
+}  // namespace terrace::stream

@@ -1,0 +1,322 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <map>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "stand_in_hierarchy.hpp"
+#include "terrace/stream/store.hpp"
+
+/// What the tests of the store share: inputs of many kinds and the check that they come back.
+
+namespace terrace::stream::testing {
+
+inline constexpr std::array kAllTypes{
+    ScalarType::i8,  ScalarType::u8,  ScalarType::i16, ScalarType::u16, ScalarType::i32,
+    ScalarType::u32, ScalarType::i64, ScalarType::u64, ScalarType::f32, ScalarType::f64};
+
+/// A folder of its own under the system's, removed with everything in it.
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    static std::atomic<int> count{0};
+    path_ = std::filesystem::temp_directory_path() /
+            ("terrace-store-test-" + std::to_string(::getpid()) + "-" + std::to_string(count++));
+    std::filesystem::remove_all(path_);
+    std::filesystem::create_directories(path_);
+  }
+  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+inline double uniform(std::mt19937_64& random) {
+  return static_cast<double>(random() >> 11) * 0x1p-53;
+}
+
+inline Channel channel(std::string name, ScalarType type = ScalarType::f64) {
+  return {std::move(name), type, 1.0, 0.0, {}};
+}
+
+inline Schema grid_schema(ScalarType type) {
+  Schema schema;
+  schema.grid = true;
+  schema.coordinates = {
+      channel("column", ScalarType::i32), channel("row", ScalarType::i32),
+      Channel{.name = "height", .type = type, .scale = 0.5, .offset = 3, .unit = "metre"}};
+  schema.world.xy = {30, 0, 500000.25, 0, -30, 5e6};
+  schema.crs = {.epsg = 32632,
+                .vertical_epsg = 5773,
+                .name = "UTM",
+                .wkt = "",
+                .geographic = false,
+                .horizontal_unit = "metre",
+                .vertical_unit = "metre"};
+  schema.vertical = "orthometric";
+  schema.format = "test";
+  schema.parameters = {{"block", "10000"}, {"effort", "standard"}};
+  return schema;
+}
+
+inline Schema cloud_schema() {
+  Schema schema;
+  schema.coordinates = {channel("x"), channel("y"), channel("z")};
+  schema.format = "test";
+  return schema;
+}
+
+struct Block {
+  std::vector<Point3> positions;
+  std::vector<std::byte> payload;
+};
+
+enum class Relief { flat, fractal, noise, extreme, decimal };
+
+inline double limit_low(ScalarType type) {
+  switch (type) {
+    case ScalarType::i8:
+      return -128;
+    case ScalarType::i16:
+      return -32768;
+    case ScalarType::i32:
+      return -2147483648.0;
+    case ScalarType::i64:
+      return -0x1p63;
+    case ScalarType::f32:
+      return -std::numeric_limits<float>::max();
+    case ScalarType::f64:
+      return -std::numeric_limits<double>::max();
+    default:
+      return 0;
+  }
+}
+inline double limit_high(ScalarType type) {
+  switch (type) {
+    case ScalarType::i8:
+      return 127;
+    case ScalarType::u8:
+      return 255;
+    case ScalarType::i16:
+      return 32767;
+    case ScalarType::u16:
+      return 65535;
+    case ScalarType::i32:
+      return 2147483647.0;
+    case ScalarType::u32:
+      return 4294967295.0;
+    case ScalarType::i64:
+      return 0x1p63;
+    case ScalarType::u64:
+      return 0x1p64;
+    case ScalarType::f32:
+      return std::numeric_limits<float>::max();
+    case ScalarType::f64:
+      return std::numeric_limits<double>::max();
+  }
+  return 0;
+}
+
+/// A raster in square tiles of at most `tile` cells a side, a tenth of the cells without data.
+inline std::vector<Block> grid_blocks(ScalarType type, Relief relief, int width, int height,
+                                      int tile, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  const bool floating = type == ScalarType::f32 || type == ScalarType::f64;
+  const auto sample = [&](int x, int y) -> double {
+    switch (relief) {
+      case Relief::flat:
+        return 42;
+      case Relief::fractal: {
+        const double h = 60 + 40 * (std::abs(x % 64 - 32) / 32.0) +
+                         15 * (std::abs(y % 20 - 10) / 10.0) + 4 * uniform(random);
+        return type == ScalarType::f32   ? static_cast<double>(static_cast<float>(h))
+               : type == ScalarType::f64 ? h
+                                         : std::floor(h);
+      }
+      case Relief::noise:
+        return static_cast<double>(random() % 128);
+      case Relief::extreme: {
+        if (floating && random() % 7 == 0) return -0.0;
+        if (type == ScalarType::f32 && random() % 7 == 0)
+          return static_cast<double>(std::numeric_limits<float>::denorm_min());
+        return random() % 2 == 0 ? limit_low(type) : limit_high(type);
+      }
+      case Relief::decimal: {
+        const double h = static_cast<double>(random() % 100) / 100;
+        return type == ScalarType::f32   ? static_cast<double>(static_cast<float>(h))
+               : type == ScalarType::f64 ? h
+                                         : std::floor(h * 100);
+      }
+    }
+    return 0;
+  };
+  std::vector<Block> blocks;
+  for (int ty = 0; ty < height; ty += tile) {
+    for (int tx = 0; tx < width; tx += tile) {
+      Block block;
+      for (int y = ty; y < std::min(height, ty + tile); ++y) {
+        for (int x = tx; x < std::min(width, tx + tile); ++x) {
+          if (random() % 10 == 0) continue;
+          block.positions.push_back({static_cast<double>(x), static_cast<double>(y), sample(x, y)});
+        }
+      }
+      blocks.push_back(std::move(block));
+    }
+  }
+  return blocks;
+}
+
+enum class Numbers { decimals, floats, doubles, extremes, mixed };
+
+inline std::vector<Block> cloud_blocks(Numbers numbers, std::size_t points,
+                                       std::size_t block_points, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::vector<Block> blocks;
+  for (std::size_t start = 0; start < points; start += block_points) {
+    Block block;
+    const Numbers kind =
+        numbers == Numbers::mixed ? static_cast<Numbers>(blocks.size() % 4) : numbers;
+    const double origin = static_cast<double>(blocks.size() % 3) * 100;
+    const auto number = [&]() -> double {
+      const double u = origin + 100 * uniform(random);
+      switch (kind) {
+        case Numbers::decimals:
+          return std::nearbyint(u * 1000) / 1000 + 0.0;
+        case Numbers::floats:
+          return static_cast<double>(static_cast<float>(u - 150));
+        case Numbers::doubles:
+          return (u - 150) * uniform(random);
+        default:
+          return std::array{-0.0, 0.0, 1e308, -1e308, 5e-324, 1.0, 0.1}[random() % 7];
+      }
+    };
+    for (std::size_t i = 0; i < std::min(block_points, points - start); ++i) {
+      block.positions.push_back({number(), number(), number()});
+    }
+    blocks.push_back(std::move(block));
+  }
+  return blocks;
+}
+
+/// Points as bit patterns, with their attributes, and how often each is there.
+class PointBag {
+ public:
+  struct Item {
+    Point3 position;
+    std::vector<std::byte> payload;
+  };
+  PointBag() = default;
+  PointBag(std::initializer_list<Item> items) {
+    for (const Item& item : items) add(item.position, item.payload);
+  }
+  void add(const Point3& p, std::span<const std::byte> payload) {
+    std::string key(sizeof p + payload.size(), '\0');
+    std::memcpy(key.data(), &p, sizeof p);
+    if (!payload.empty()) std::memcpy(key.data() + sizeof p, payload.data(), payload.size());
+    ++counts_[key];
+  }
+  friend bool operator==(const PointBag&, const PointBag&) = default;
+
+ private:
+  std::map<std::string, int> counts_;
+};
+
+inline void expect_no_problem(const Problem& problem) {
+  ADD_FAILURE() << problem.file << ", byte " << problem.offset << ": " << problem.what;
+}
+
+/// The members of all levels: every point of the store once.
+inline PointBag all_points(const Store& store) {
+  PointBag bag;
+  const std::size_t stride = store.schema().payload_size();
+  for (unsigned level = 0; level <= store.top(); ++level) {
+    store.for_each(level, [&](ClusterId, const ClusterRecord&, const ClusterPoints& points) {
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        bag.add(points.positions[i], std::span(points.payload).subspan(i * stride, stride));
+      }
+    });
+  }
+  return bag;
+}
+
+inline std::uint64_t write_store(const std::filesystem::path& path, const Schema& schema,
+                                 const std::vector<Block>& blocks,
+                                 const StandInHierarchy::Options& options) {
+  StoreWriter writer(path, schema);
+  StandInHierarchy hierarchy(writer, options);
+  for (const Block& block : blocks) hierarchy.push(block.positions, block.payload);
+  return hierarchy.finish();
+}
+
+/// Writes the blocks, reads them back in every way, and verifies. Returns the bytes of the store.
+inline std::uint64_t check_round_trip(const Schema& schema, const std::vector<Block>& blocks,
+                                      const StandInHierarchy::Options& options) {
+  const TemporaryFolder folder;
+  const auto path = folder.path() / "store";
+  const std::uint64_t bytes = write_store(path, schema, blocks, options);
+  const Store store = Store::open(path);
+  EXPECT_EQ(store.bytes(), bytes);
+
+  PointBag expected;
+  Box3 bounds;
+  double sum = 0;
+  std::uint64_t n = 0;
+  const std::size_t stride = schema.payload_size();
+  for (const Block& block : blocks) {
+    for (std::size_t i = 0; i < block.positions.size(); ++i, ++n) {
+      expected.add(block.positions[i], std::span(block.payload).subspan(i * stride, stride));
+      bounds.include(block.positions[i]);
+      sum += block.positions[i][2] / 4;
+    }
+  }
+  EXPECT_EQ(store.points(), n);
+  EXPECT_EQ(store.bounds(), bounds);
+  EXPECT_TRUE(all_points(store) == expected) << "other points came back";
+  EXPECT_TRUE(store.verify(expect_no_problem));
+
+  // One by one, the same as in sequence; and what heads a cluster is its representative.
+  ClusterPoints single, head;
+  for (unsigned level = 0; level <= store.top(); ++level) {
+    std::uint64_t next = 0;
+    store.for_each(
+        level, [&](ClusterId id, const ClusterRecord& record, const ClusterPoints& points) {
+          EXPECT_EQ(ordinal_of(id), next++);
+          EXPECT_EQ(level_of(id), level);
+          store.read(id, single);
+          EXPECT_EQ(std::memcmp(single.positions.data(), points.positions.data(),
+                                points.size() * sizeof(Point3)),
+                    0);
+          EXPECT_EQ(single.payload, points.payload);
+          EXPECT_EQ(single.children, points.children);
+          EXPECT_EQ(store.record(id).offset, record.offset);
+          EXPECT_EQ(record.points, points.size());
+          for (const Point3& p : points.positions) EXPECT_TRUE(record.summary.box.contains(p));
+          for (std::size_t i = 0; i < points.size(); ++i) {
+            for (unsigned j = 0; j < level; ++j) {
+              store.read(cluster_id(j, points.children[i * level + j]), head);
+              EXPECT_TRUE(head.has_representative);
+              EXPECT_EQ(std::memcmp(&head.representative, &points.positions[i], sizeof(Point3)), 0);
+            }
+          }
+        });
+    EXPECT_EQ(next, store.levels()[level].clusters);
+  }
+  return bytes;
+}
+
+}  // namespace terrace::stream::testing
