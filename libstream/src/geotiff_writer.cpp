@@ -266,6 +266,7 @@ void GeoTiffWriter::Impl::set_fields() {
   check(TIFFSetField(tiff, TIFFTAG_SAMPLESPERPIXEL, 1), "bands");
   check(TIFFSetField(tiff, TIFFTAG_SAMPLEFORMAT, format), "type");
   check(TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK), "photometric");
+  check(TIFFSetField(tiff, TIFFTAG_SOFTWARE, "terrace"), "software");
   check(TIFFSetField(tiff, TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG), "layout");
   check(TIFFSetField(tiff, TIFFTAG_TILEWIDTH, options.tile), "tile size");
   check(TIFFSetField(tiff, TIFFTAG_TILELENGTH, options.tile), "tile size");

@@ -68,6 +68,13 @@ bool write_image(const Image& image, Output& output) {
   png_set_IHDR(png, info, static_cast<png_uint_32>(image.width),
                static_cast<png_uint_32>(image.height), image.bit_depth, image.color_type,
                PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+  // Names the writer, so that a file can be told from others before it is replaced.
+  static char key[] = "Software", value[] = "terrace";
+  png_text mark{};
+  mark.compression = PNG_TEXT_COMPRESSION_NONE;
+  mark.key = key;
+  mark.text = value;
+  png_set_text(png, info, &mark, 1);
   png_write_info(png, info);
   if (image.swap) png_set_swap(png);
   for (std::size_t row = 0; row < image.height; ++row) {

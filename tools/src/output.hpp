@@ -5,6 +5,9 @@
 
 namespace terrace::tools {
 
+/// The comment that marks files of formats with comments.
+inline constexpr const char* kWriterMark = "written by terrace";
+
 /// True if the regular file at `path` bears the mark of terrace: every format that terrace writes
 /// with room for one names its writer near the file's begin or end. Text tables have no such room;
 /// a file that holds nothing but numbers, separators and one line of names passes too.

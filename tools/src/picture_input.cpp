@@ -10,6 +10,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "detail.hpp"
 #include "error.hpp"
 #include "ground.hpp"
 #include "height_grid.hpp"
@@ -174,21 +175,81 @@ PictureInput from_source(const std::string& path, std::uint64_t most_cells,
   return input;
 }
 
+/// All cells of a raster's store, reduced.
+TriangleMesh grid_of_store(const stream::Store& store, std::uint64_t most_cells,
+                           ProgressMode progress) {
+  const stream::Schema& schema = store.schema();
+  HeightGrid grid(schema.columns, schema.rows, most_cells);
+  ProgressMeter meter(progress, "points");
+  std::uint64_t points = 0;
+  for (const stream::LevelInfo& level : store.levels()) {
+    store.for_each(level.level, [&](stream::ClusterId, const stream::ClusterRecord&,
+                                    const stream::ClusterPoints& cluster) {
+      check_interrupt();
+      for (const stream::Point3& p : cluster.positions) grid.add(p);
+      points += cluster.size();
+      meter.update(points, static_cast<double>(points) / static_cast<double>(store.points()));
+    });
+  }
+  return grid.mesh();
+}
+
+PictureInput from_store(const std::string& path, const PictureSelection& selection,
+                        std::uint64_t most_cells, const CommonOptions& common) {
+  const stream::Store store = stream::Store::open(path);
+  const bool whole = selection.focuses.empty();
+  const Placement stored = placement_of(store.schema());
+  PictureInput input;
+  input.terrain = store.schema().grid || store.schema().crs.epsg != 0;
+
+  // Reading more than this for one picture takes too long to be a default.
+  constexpr std::uint64_t kMostCells = std::uint64_t{1} << 27;
+  const bool all_cells =
+      selection.level == "0" || (selection.level.empty() && store.points() <= kMostCells);
+  if (store.schema().grid && whole && all_cells && !selection.triangles) {
+    input.mesh = grid_of_store(store, most_cells, common.progress);
+    put_on_ground(input, stored, Ground(stored));
+    return input;
+  }
+  const std::string level = !selection.level.empty() ? selection.level
+                            : whole                  ? std::to_string(level_within(store, 4000000))
+                                                     : std::string("top");
+  const Detail detail = Detail::parse(store, level, "", selection.focuses);
+  input.mesh = store.schema().grid || selection.triangles
+                   ? mesh_of_store(store, detail, common.memory_or(0))
+                   : points_of_store(store, detail);
+  // These positions are in the CRS already.
+  Placement world;
+  world.crs = stored.crs;
+  world.coordinates[0].unit = stored.coordinates[0].unit;
+  world.coordinates[2].unit = stored.coordinates[2].unit;
+  put_on_ground(input, world, Ground(world));
+  return input;
+}
+
 }  // namespace
 
 void define_picture_input(CLI::App& app, PictureSelection& selection) {
-  not_yet(app, {"--level", "--focus"});
-  static_cast<void>(selection);
+  app.add_option("--level", selection.level,
+                 "store: detail, a number or top (default: all cells, or about 4 M points)")
+      ->type_name("L");
+  app.add_option("--focus", selection.focuses,
+                 "store: BOX:L, all points of level L inside the box; repeatable (the rest: top)")
+      ->allow_extra_args(false)
+      ->type_name("BOX:L");
 }
 
 PictureInput read_picture_input(const std::string& path, const PictureSelection& selection,
                                 const ImageSize& size, const CommonOptions& common) {
-  static_cast<void>(selection);
+  const std::uint64_t most_cells = 2 * size.width * size.height;
   if (std::filesystem::is_directory(path)) {
-    throw UsageError("rendering a store is not available yet");
+    return from_store(path, selection, most_cells, common);
+  }
+  if (!selection.level.empty() || !selection.focuses.empty()) {
+    throw UsageError("'" + path + "' is no store: --level and --focus do not apply");
   }
   if (std::optional<MeshFile> file = read_mesh_file(path)) return from_mesh(std::move(*file));
-  return from_source(path, 2 * size.width * size.height, common);
+  return from_source(path, most_cells, common);
 }
 
 }  // namespace terrace::tools

@@ -12,8 +12,9 @@ namespace terrace::tools {
 
 /// The part of an input that a picture shows.
 struct PictureSelection {
-  std::string level;
+  std::string level;  ///< empty: what a picture can show
   std::vector<std::string> focuses;
+  bool triangles = false;  ///< triangles are wanted, not points or cells
 };
 
 /// Adds --level and --focus.

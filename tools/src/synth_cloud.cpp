@@ -176,7 +176,8 @@ std::unique_ptr<Cloud> make_clusters(std::uint64_t points, std::uint64_t seed) {
 Permutation::Permutation(std::uint64_t size, std::uint64_t seed)
     : size_(size),
       seed_(scramble(seed)),
-      half_bits_(static_cast<unsigned>(std::bit_width(std::max<std::uint64_t>(size, 2) - 1) + 1) / 2) {}
+      half_bits_(static_cast<unsigned>(std::bit_width(std::max<std::uint64_t>(size, 2) - 1) + 1) /
+                 2) {}
 
 std::uint64_t Permutation::operator()(std::uint64_t n) const {
   const std::uint64_t mask = (std::uint64_t{1} << half_bits_) - 1;

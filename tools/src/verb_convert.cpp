@@ -40,9 +40,9 @@ class ConvertCommand : public Command {
     options.format = input_format_;
     const auto source = stream::read_ahead(stream::open_source(files, options));
     const stream::SourceInfo& info = source->info();
-    const auto writer =
-        stream::open_point_writer(output_, {.attributes = info.attributes, .comments = {}},
-                                  {.format = format_, .replace = replace});
+    const auto writer = stream::open_point_writer(
+        output_, {.attributes = info.attributes, .comments = {kWriterMark}},
+        {.format = format_, .replace = replace});
     {
       ProgressMeter meter(common.progress, "points");
       stream::PointBlock block;

@@ -65,7 +65,7 @@ class MeshCommand final : public Command {
                                  {.vertices = mesh.positions.size(),
                                   .triangles = mesh.triangles.size(),
                                   .attributes = {"level"},
-                                  .comments = {},
+                                  .comments = {kWriterMark},
                                   .bounds = bounds.empty() ? std::nullopt : std::optional(bounds)},
                                  {.format = format_, .replace = replace});
     std::vector<float> levels;

@@ -96,7 +96,7 @@ class PointsCommand final : public Command {
     const stream::Store store = stream::Store::open(store_);
     const Detail detail = Detail::parse(store, level_, region_, focuses_);
     const auto writer = stream::open_point_writer(
-        output_, {.attributes = store.schema().attributes, .comments = {}},
+        output_, {.attributes = store.schema().attributes, .comments = {kWriterMark}},
         {.format = format_, .replace = may_replace(output_, common.force)});
     PointOutput output(store, detail, *writer);
     for_each_wanted(store, detail,

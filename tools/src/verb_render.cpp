@@ -83,6 +83,7 @@ class RenderCommand : public Command {
     const ViewDirection view = parse_view(view_);
     const bool replace = may_replace(output_, common.force);
 
+    selection_.triangles = wire_;
     PictureInput input = read_picture_input(input_, selection_, size, common);
     if (!input.assumption.empty()) common.say(input_ + ": " + input.assumption);
     check_interrupt();

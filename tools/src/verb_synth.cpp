@@ -118,8 +118,9 @@ class SynthCommand : public Command {
                                          : kind_ == "uniform" ? make_uniform(common.seed)
                                                               : make_clusters(points, common.seed);
     const DeliveryOrder order(shuffle_, points, common.seed, common.memory_or(kStreamingMemory));
-    const auto writer = stream::open_point_writer(
-        output_, {}, {.format = {}, .replace = may_replace(output_, common.force)});
+    const auto writer =
+        stream::open_point_writer(output_, {.attributes = {}, .comments = {kWriterMark}},
+                                  {.format = {}, .replace = may_replace(output_, common.force)});
     {
       ProgressMeter meter(common.progress, "points");
       stream::PointBlock block;

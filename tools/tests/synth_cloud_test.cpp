@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "src/synth_cloud.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <numeric>
+
+#include <gtest/gtest.h>
+
+#include "src/error.hpp"
+#include "terrace/stream/error.hpp"
+
+namespace terrace::tools {
+namespace {
+
+constexpr std::uint64_t kMemory = 1 << 20;
+
+TEST(Permutation, IsOneOfEverySize) {
+  for (std::uint64_t size = 1; size < 300; ++size) {
+    const Permutation permutation(size, size);
+    std::vector<std::uint64_t> seen;
+    for (std::uint64_t n = 0; n < size; ++n) seen.push_back(permutation(n));
+    std::sort(seen.begin(), seen.end());
+    for (std::uint64_t n = 0; n < size; ++n) ASSERT_EQ(seen[n], n) << size;
+  }
+}
+
+TEST(Permutation, LeavesLittleInOrder) {
+  constexpr std::uint64_t kSize = 100000;
+  const Permutation permutation(kSize, 1);
+  std::uint64_t fixed = 0, ascending = 0;
+  for (std::uint64_t n = 0; n + 1 < kSize; ++n) {
+    fixed += permutation(n) == n ? 1 : 0;
+    ascending += permutation(n) < permutation(n + 1) ? 1 : 0;
+  }
+  EXPECT_LT(fixed, 20u);
+  EXPECT_NEAR(static_cast<double>(ascending) / kSize, 0.5, 0.02);
+}
+
+TEST(DeliveryOrder, KeepsPiecesTogether) {
+  constexpr std::uint64_t kSize = 5000;
+  const DeliveryOrder order("pieces:20-60", kSize, 3, kMemory);
+  std::vector<std::uint64_t> seen;
+  std::size_t breaks = 0;
+  for (std::uint64_t n = 0; n < kSize; ++n) {
+    seen.push_back(order(n));
+    if (n > 0 && seen[n] != seen[n - 1] + 1) ++breaks;
+  }
+  EXPECT_GT(breaks, kSize / 60 / 2);
+  EXPECT_LE(breaks, kSize / 20 + 1);
+  std::sort(seen.begin(), seen.end());
+  for (std::uint64_t n = 0; n < kSize; ++n) ASSERT_EQ(seen[n], n);
+}
+
+TEST(DeliveryOrder, RefusesWhatItCannotDo) {
+  for (const char* text :
+       {"some", "pieces", "pieces:5", "pieces:0-5", "pieces:7-5", "pieces:a-b"}) {
+    EXPECT_THROW(DeliveryOrder(text, 10, 1, kMemory), UsageError) << text;
+  }
+  EXPECT_THROW(DeliveryOrder("pieces:1-1", 1000000, 1, kMemory), stream::Error);
+}
+
+TEST(Clouds, LieInTheirPlace) {
+  const auto uniform = make_uniform(1);
+  const auto surface = make_surface(5000, 1);
+  const auto clusters = make_clusters(5000, 1);
+  stream::Point3 mean{};
+  for (std::uint64_t n = 0; n < 5000; ++n) {
+    const stream::Point3 u = uniform->at(n), s = surface->at(n), c = clusters->at(n);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      EXPECT_GE(u[axis], 0);
+      EXPECT_LE(u[axis], 1);
+      mean[axis] += u[axis] / 5000;
+      EXPECT_NEAR(c[axis], 0.5, 0.8);
+    }
+    const double radius = std::sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2]);
+    EXPECT_NEAR(radius, 100, 45);
+  }
+  for (const double m : mean) EXPECT_NEAR(m, 0.5, 0.02);
+}
+
+// A block of a swath is compact: successive points lie side by side.
+TEST(Surface, ComesInSwaths) {
+  const auto surface = make_surface(100000, 1);
+  double near = 0;
+  for (std::uint64_t n = 20000; n < 21000; ++n) {
+    const stream::Point3 a = surface->at(n), b = surface->at(n + 1);
+    near += std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]) < 4 ? 1 : 0;
+  }
+  EXPECT_GT(near, 900);
+}
+
+// Golden: the same bytes on every machine and compiler.
+TEST(Clouds, BytesAreFixed) {
+  std::uint64_t hash = 14695981039346656037u;  // FNV-1a
+  for (const auto& cloud : {make_surface(1000, 1), make_uniform(1), make_clusters(1000, 1)}) {
+    for (std::uint64_t n = 0; n < 1000; ++n) {
+      for (const double v : cloud->at(n)) {
+        hash = (hash ^ std::bit_cast<std::uint64_t>(v)) * 1099511628211u;
+      }
+    }
+  }
+  EXPECT_EQ(hash, 0u);
+}
+
+}  // namespace
+}  // namespace terrace::tools
