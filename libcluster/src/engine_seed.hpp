@@ -58,7 +58,8 @@ class Seeder {
     // which makes many facilities look cheaper than they are. How fast the cost grows when the
     // length is multiplied by four tells the dimension: about 4 on a line, 2 on a surface. Fitted
     // by trial.
-    const float growth = connection[best + 1] / connection[best - 1];
+    const float growth =
+        connection[best - 1] > 0 ? connection[best + 1] / connection[best - 1] : 4.0f;
     const float correction = 0.7f + 0.3f * (growth - 2.3f) / 0.73f;
     return count * stretch * (correction < 0.7f ? 0.7f : correction > 1.0f ? 1.0f : correction);
   }
