@@ -31,7 +31,7 @@ struct Channel {
   ScalarType type = ScalarType::f64;
   double scale = 1.0;
   double offset = 0.0;
-  std::string unit;  ///< "metre", "foot", ...; empty if unknown
+  std::string unit{};  ///< "metre", "foot", ...; empty if unknown
 
   friend bool operator==(const Channel&, const Channel&) = default;
 };
@@ -124,13 +124,13 @@ class PointSource {
 
 /// What a caller may ask of any source.
 struct SourceOptions {
-  std::string format;  ///< name of a registered format; empty: by content, then ending
+  std::string format{};  ///< name of a registered format; empty: by content, then ending
   std::size_t block_points = 10000;        ///< most points per block
   std::uint64_t memory_bytes = 64u << 20;  ///< what the source may hold, roughly
   int band = 1;                            ///< of rasters, counted from 1
   double cell_aspect = 0.0;  ///< ground height/width of a raster's cell, so that tiles are
                              ///< square on the ground; 0: as the transform says
-  std::optional<Crs> crs;    ///< replaces what the file says
+  std::optional<Crs> crs{};  ///< replaces what the file says
 };
 
 /// Opens one file, or several as one source: rasters form a mosaic (same CRS, cell size and phase;
@@ -145,10 +145,11 @@ std::unique_ptr<PointSource> open_source(std::span<const std::string> files,
 std::unique_ptr<PointSource> read_ahead(std::unique_ptr<PointSource> source,
                                         std::size_t blocks = 8);
 
-/// A format in the registry. `recognise` sees the first bytes (up to 4096) and the file's name.
+/// A format in the registry. `recognise` sees the first bytes of a file, up to 4096.
 struct Format {
   std::string name;
   std::vector<std::string> endings;  ///< lower case, with the dot: ".tif"
+  bool streams = false;              ///< can be read from a pipe, front to back
   bool (*recognise)(std::span<const std::byte> head) = nullptr;
   std::unique_ptr<PointSource> (*open)(std::span<const std::string> files,
                                        const SourceOptions& options) = nullptr;

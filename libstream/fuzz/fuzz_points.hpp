@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cassert>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <span>
+#include <string>
+
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include "terrace/stream/error.hpp"
+#include "terrace/stream/source.hpp"
+
+namespace terrace::stream {
+
+/// Stops the fuzzer where the library broke a promise, in release builds too.
+inline void require(bool good, const char* what) {
+  if (good) return;
+  std::fprintf(stderr, "broken promise: %s\n", what);
+  std::abort();
+}
+
+/// The input as a file in memory, so that the reader takes its ordinary way.
+class MemoryFile {
+ public:
+  MemoryFile(const std::uint8_t* data, std::size_t size) : fd_(memfd_create("fuzz", 0)) {
+    require(fd_ >= 0 && write(fd_, data, size) == static_cast<ssize_t>(size), "memfd");
+    name_ = "/proc/self/fd/" + std::to_string(fd_);
+  }
+  ~MemoryFile() { close(fd_); }
+  MemoryFile(const MemoryFile&) = delete;
+  MemoryFile& operator=(const MemoryFile&) = delete;
+
+  [[nodiscard]] const std::string& name() const { return name_; }
+
+ private:
+  int fd_;
+  std::string name_;
+};
+
+/// What came of reading a file: its points folded into one number, or an Error.
+struct Reading {
+  bool refused = false;
+  std::uint64_t points = 0;
+  std::uint64_t hash = 0;
+
+  friend bool operator==(const Reading&, const Reading&) = default;
+};
+
+/// Reads all of a file and holds the reader to its promises: blocks within their size, columns of
+/// the right length, finite coordinates, no exception but Error.
+inline Reading read_through(const std::string& file, const SourceOptions& options) {
+  Reading reading;
+  const auto fold = [&](const void* bytes, std::size_t size) {
+    const auto* at = static_cast<const unsigned char*>(bytes);
+    for (std::size_t i = 0; i < size; ++i) reading.hash = reading.hash * 1099511628211u + at[i];
+  };
+  try {
+    const auto source = open_source(std::span(&file, 1), options);
+    const std::size_t columns = source->info().attributes.size();
+    PointBlock block;
+    while (source->next(block)) {
+      require(!block.empty() && block.size() <= options.block_points, "size of a block");
+      require(block.attributes.size() == columns, "number of columns");
+      for (std::size_t c = 0; c < columns; ++c) {
+        const Column& column = block.attributes[c];
+        require(column.type == source->info().attributes[c].type, "type of a column");
+        require(column.bytes.size() == block.size() * size_of(column.type), "length of a column");
+      }
+      for (std::size_t i = 0; i < block.size(); ++i) {
+        for (const double value : block.positions[i]) {
+          require(value - value == 0.0, "finite coordinates");
+        }
+        // In the order of the points, so that blocks of any size fold alike.
+        fold(&block.positions[i], sizeof(Point3));
+        for (const Column& column : block.attributes) {
+          fold(column.bytes.data() + i * size_of(column.type), size_of(column.type));
+        }
+      }
+      reading.points += block.size();
+    }
+    require(block.empty(), "an empty block at the end");
+    require(source->progress().points == reading.points, "progress");
+    const auto promised = source->info().points;
+    require(!promised || *promised == reading.points, "as many points as promised");
+  } catch (const Error& error) {
+    require(!error.parts().cause.empty(), "a cause");
+    reading = {.refused = true};
+  }
+  return reading;
+}
+
+}  // namespace terrace::stream

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+
+namespace terrace::stream {
+
+/// Writes a PNG image of 8 bits per channel, rows from top to bottom, without padding.
+///
+/// channels: 1 grey, 2 grey and alpha, 3 RGB, 4 RGBA; pixels: width * height * channels values.
+/// The file appears whole and synced, or not at all; an existing one only goes with `replace`.
+/// Throws: Error if the image is empty or larger than 2^31 - 1 on a side, or cannot be written.
+void write_png(const std::filesystem::path& path, std::size_t width, std::size_t height,
+               int channels, std::span<const std::uint8_t> pixels, bool replace = false);
+
+/// The same for one channel of 16 bits: `samples` are width * height values.
+void write_png_grey16(const std::filesystem::path& path, std::size_t width, std::size_t height,
+                      std::span<const std::uint16_t> samples, bool replace = false);
+
+}  // namespace terrace::stream

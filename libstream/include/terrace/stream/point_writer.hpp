@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "terrace/stream/source.hpp"
+
+namespace terrace::stream {
+
+/// What a file of points says before its first point.
+struct PointHeader {
+  /// Columns after the coordinates, in the order of PointBlock::attributes. Types are kept where
+  /// the format has types. A column whose scale is not 1 or offset not 0 is written as real values
+  /// (float64).
+  std::vector<Channel> attributes{};
+  std::vector<std::string> comments{};  ///< written where the format has comments (PLY)
+};
+
+/// Stored coordinates to the coordinates of the CRS: WorldTransform, then scale and offset of the
+/// third coordinate. Attributes stay.
+void to_world(const SourceInfo& info, PointBlock& block);
+
+/// Writes a stream of points to a file, which appears under its name, whole and synced, with
+/// finish(); a writer destroyed before leaves nothing. Bounded memory; same points, same bytes.
+class PointWriter {
+ public:
+  virtual ~PointWriter() = default;
+
+  /// Appends points. `block.positions` are world coordinates and written as doubles, exactly;
+  /// `block.attributes` are the columns of the header. Throws: Error if the disk is full or the
+  /// like.
+  virtual void append(const PointBlock& block) = 0;
+  /// Publishes the file. Nothing may be appended afterwards.
+  virtual void finish() = 0;
+  /// Points appended so far.
+  [[nodiscard]] virtual std::uint64_t points() const = 0;
+};
+
+struct WriterOptions {
+  /// Name of a format; empty: by the file's ending. Points: "xyz" (x y z and attributes, separated
+  /// by blanks), "csv" (with a header line), "ply" (binary, little-endian), "ply-ascii".
+  /// Meshes: "ply", "ply-ascii", "obj", "glb".
+  std::string format{};
+  bool replace = false;  ///< an existing file is replaced instead of refused
+};
+
+/// A writer for `path`; "-" is standard output, for "xyz" (also if no format is named) and "csv".
+/// Numbers in text are the shortest that read back as the same value.
+/// Throws: Error if the format is unknown (names the known ones) or the file cannot be created.
+std::unique_ptr<PointWriter> open_point_writer(const std::string& path, const PointHeader& header,
+                                               const WriterOptions& options = {});
+
+}  // namespace terrace::stream

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+
+#include "terrace/stream/source.hpp"
+
+namespace terrace::stream {
+
+/// Opens one file of a format.
+using OpenOne = std::unique_ptr<PointSource> (*)(const std::string& file,
+                                                 const SourceOptions& options);
+
+/// Several files, one after the other, as one source; a single one as it is. Looks at the head of
+/// each at once and opens it (again) when its turn comes, pipes only once.
+/// Throws: Error if one cannot be opened or differs from the first in channels or CRS.
+std::unique_ptr<PointSource> open_in_turn(std::span<const std::string> files,
+                                          const SourceOptions& options, OpenOne open_one);
+
+}  // namespace terrace::stream

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+#include "input.hpp"
+
+namespace terrace::stream {
+
+/// The lines of a text, in a window of bounded size. Lines end in LF or CR LF; the last needs none.
+class LineReader {
+ public:
+  /// Longest line in bytes; a longer one is an Error, for it would have to be held whole.
+  static constexpr std::size_t kMaxLine = 64u << 10;
+
+  /// `input` must outlive the reader; nobody else may move it between two lines.
+  explicit LineReader(Input& input) : input_(&input) {}
+
+  /// The next line without its end; false when there is none. `line` is valid until the next call.
+  /// Throws: Error if the line is longer than kMaxLine or cannot be read.
+  bool next(std::string_view& line);
+  /// Makes the next call of next() return the line last returned once more.
+  void hold() {
+    pending_ = 0;
+    --number_;
+  }
+  /// Moves past one line of any length that is not blank; false when there is none.
+  bool skip();
+  /// Moves the input past the line last returned, which then is no longer valid.
+  void release() {
+    input_->consume(pending_);
+    pending_ = 0;
+  }
+  /// Number of the line last returned, counted from 1.
+  [[nodiscard]] std::uint64_t number() const { return number_; }
+
+ private:
+  Input* input_;
+  std::size_t pending_ = 0;  ///< bytes of the line last returned, its end included
+  std::uint64_t number_ = 0;
+};
+
+}  // namespace terrace::stream

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "terrace/stream/source.hpp"
+
+namespace terrace::stream {
+
+/// The attributes of a stream on their way into a file.
+class OutputColumns {
+ public:
+  explicit OutputColumns(std::span<const Channel> attributes);
+
+  [[nodiscard]] std::size_t size() const { return columns_.size(); }
+  /// The type in the file: the column's own, or float64 where real values are written.
+  [[nodiscard]] ScalarType type(std::size_t column) const { return columns_[column].written; }
+  /// Fit for a header: distinct, not empty, none of x, y, z in either case, no blanks, no control
+  /// characters.
+  [[nodiscard]] const std::string& name(std::size_t column) const { return columns_[column].name; }
+
+  /// Asserts that the block has these columns.
+  void check(const PointBlock& block) const;
+  /// Appends the values of point `i` as text, `separator` before each.
+  void append_text(std::string& out, const PointBlock& block, std::size_t i, char separator) const;
+  /// Appends the values of point `i` as little-endian bytes.
+  void append_bytes(std::string& out, const PointBlock& block, std::size_t i) const;
+
+ private:
+  struct OutputColumn {
+    std::string name;
+    ScalarType stored, written;
+    double scale, offset;
+    bool real;  ///< scale and offset are applied
+  };
+  std::vector<OutputColumn> columns_;
+};
+
+}  // namespace terrace::stream

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+#include "terrace/stream/point.hpp"
+#include "terrace/stream/source.hpp"
+
+namespace terrace::stream {
+
+/// A scalar column in rows of `stride` bytes: value i lies at rows + i * stride.
+struct PackedColumn {
+  const char* rows = nullptr;
+  std::size_t stride = 0;
+  std::size_t count = 0;
+  ScalarType type = ScalarType::f32;
+  bool swap = false;  ///< the bytes are in the other order than this machine's
+};
+
+/// Copies the column into coordinate `axis` of `points`.
+void decode_coordinate(const PackedColumn& column, Point3* points, std::size_t axis);
+/// Copies the column's values to `to`, packed, in this machine's byte order.
+void decode_values(const PackedColumn& column, std::byte* to);
+
+/// The value at `raw`, in this machine's byte order, as a double.
+double to_double(const std::byte* raw, ScalarType type);
+/// The value of an integer type at `raw`; negative ones keep their sign, uint64 wraps to negative.
+std::int64_t to_integer(const std::byte* raw, ScalarType type);
+
+/// Reads the number in `text` as `type` and stores it at `raw`. Integers may be written like "3.0".
+/// False if it is no number of that type's range.
+bool parse_scalar(std::string_view text, ScalarType type, std::byte* raw);
+
+}  // namespace terrace::stream

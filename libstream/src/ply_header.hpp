@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "input.hpp"
+#include "terrace/stream/source.hpp"
+
+namespace terrace::stream {
+
+enum class PlyEncoding { ascii, little_endian, big_endian };
+
+struct PlyProperty {
+  std::string name;
+  ScalarType type = ScalarType::f32;  ///< of the value, or of a list's items
+  bool list = false;
+  ScalarType count_type = ScalarType::u8;  ///< of a list's length
+};
+
+struct PlyElement {
+  std::string name;
+  std::uint64_t count = 0;
+  std::vector<PlyProperty> properties;
+
+  [[nodiscard]] bool has_lists() const;
+  /// Bytes of one item in a binary file, each list taken as empty.
+  [[nodiscard]] std::size_t binary_bytes() const;
+};
+
+struct PlyHeader {
+  PlyEncoding encoding = PlyEncoding::ascii;
+  std::vector<PlyElement> elements;
+  std::vector<std::string> comments;
+  std::uint64_t lines = 0;  ///< of the header
+};
+
+/// Reads the header and leaves `input` at the first byte after it.
+/// Throws: Error with the line for whatever is not PLY 1.0, and if the elements promise more items
+/// than the rest of a regular file can hold.
+PlyHeader read_ply_header(Input& input);
+
+}  // namespace terrace::stream

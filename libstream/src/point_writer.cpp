@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/stream/point_writer.hpp"
+
+namespace terrace::stream {
+
+void to_world(const SourceInfo& info, PointBlock& block) {
+  const std::array<double, 6>& m = info.world.xy;
+  // Points that are stored as they are stay bit for bit what they are (1 * -0.0 + 0 would not).
+  if (info.world != WorldTransform{}) {
+    for (Point3& p : block.positions) {
+      const double x = p[0] * m[0] + p[1] * m[1] + m[2];
+      const double y = p[0] * m[3] + p[1] * m[4] + m[5];
+      p[0] = x;
+      p[1] = y;
+    }
+  }
+  const Channel& height = info.coordinates[2];
+  if (height.scale != 1.0 || height.offset != 0.0) {
+    for (Point3& p : block.positions) p[2] = p[2] * height.scale + height.offset;
+  }
+}
+
+}  // namespace terrace::stream

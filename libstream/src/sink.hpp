@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "terrace/stream/atomic_file.hpp"
+
+namespace terrace::stream {
+
+/// Where a writer's bytes go: to a file that appears when it is complete, or, for "-", to standard
+/// output.
+class Sink {
+ public:
+  Sink(const std::string& path, bool replace);
+
+  void write(std::string_view text);
+  void write(std::span<const std::byte> bytes) {
+    write(std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+  }
+  /// Replaces bytes that were written before; for files only.
+  void write_at(std::uint64_t offset, std::string_view text);
+  /// Bytes so far.
+  [[nodiscard]] std::uint64_t size() const { return size_; }
+  /// Publishes the file, or flushes standard output.
+  void commit();
+
+ private:
+  void flush();
+
+  std::optional<AtomicFile> file_;  ///< nothing: standard output
+  std::string pending_;             ///< for standard output
+  std::uint64_t size_ = 0;
+};
+
+}  // namespace terrace::stream

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace terrace::stream {
+
+/// A blank inside a line.
+inline bool is_blank(char c) { return c == ' ' || c == '\t'; }
+
+/// `line` from its first character that is no blank.
+std::string_view trim_left(std::string_view line);
+/// `line` without the blanks at both ends.
+std::string_view trim(std::string_view line);
+/// The fields of a line, blanks around them removed. The separator ' ' stands for runs of blanks.
+std::vector<std::string_view> split_fields(std::string_view line, char separator);
+/// `text` made fit for an error message: in quotes, cut to 40 characters, nothing unprintable.
+std::string quoted(std::string_view text);
+
+}  // namespace terrace::stream

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cassert>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "terrace/stream/mesh_writer.hpp"
+#include "terrace/stream/point_writer.hpp"
+
+namespace terrace::stream {
+
+/// A format that can be written, as a row of a table.
+struct WriterFormat {
+  std::string_view name;
+  std::string_view ending;  ///< empty: by name only
+  std::string_view second_ending;
+  bool streams;  ///< fit for standard output
+};
+
+/// The row for `path`: by options.format, else by ending; for "-" the first that streams.
+/// Throws: Error that lists the formats of the table.
+std::size_t choose_format(std::span<const WriterFormat> table, const std::string& path,
+                          const WriterOptions& options);
+
+std::unique_ptr<PointWriter> open_xyz_writer(const std::string& path, const PointHeader& header,
+                                             bool replace);
+std::unique_ptr<PointWriter> open_csv_writer(const std::string& path, const PointHeader& header,
+                                             bool replace);
+std::unique_ptr<PointWriter> open_ply_writer(const std::string& path, const PointHeader& header,
+                                             bool replace);
+std::unique_ptr<PointWriter> open_ply_ascii_writer(const std::string& path,
+                                                   const PointHeader& header, bool replace);
+
+std::unique_ptr<MeshWriter> open_ply_mesh_writer(const std::string& path, const MeshHeader& header,
+                                                 bool replace);
+std::unique_ptr<MeshWriter> open_ply_ascii_mesh_writer(const std::string& path,
+                                                       const MeshHeader& header, bool replace);
+std::unique_ptr<MeshWriter> open_obj_writer(const std::string& path, const MeshHeader& header,
+                                            bool replace);
+std::unique_ptr<MeshWriter> open_glb_writer(const std::string& path, const MeshHeader& header,
+                                            bool replace);
+
+/// Holds a mesh writer's caller to its promises.
+class MeshCounts {
+ public:
+  explicit MeshCounts(const MeshHeader& header)
+      : vertices_(header.vertices),
+        triangles_(header.triangles),
+        attributes_(header.attributes.size()) {}
+
+  void add_vertices(std::span<const Point3> positions, std::span<const float> attributes) {
+    assert(positions.size() <= vertices_left() && triangles_seen_ == 0);
+    assert(attributes.size() == positions.size() * attributes_);
+    (void)attributes;
+    vertices_seen_ += positions.size();
+  }
+  void add_triangles(std::span<const TriangleIndices> triangles) {
+    assert(vertices_left() == 0 && triangles.size() <= triangles_ - triangles_seen_);
+    triangles_seen_ += triangles.size();
+  }
+  /// True if there are as many as promised.
+  [[nodiscard]] bool complete() const {
+    return vertices_seen_ == vertices_ && triangles_seen_ == triangles_;
+  }
+  [[nodiscard]] std::uint64_t vertices_left() const { return vertices_ - vertices_seen_; }
+
+ private:
+  std::uint64_t vertices_, triangles_;
+  std::size_t attributes_;
+  std::uint64_t vertices_seen_ = 0, triangles_seen_ = 0;
+};
+
+}  // namespace terrace::stream

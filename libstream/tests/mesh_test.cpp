@@ -1,0 +1,283 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "point_files.hpp"
+#include "terrace/stream/mesh_writer.hpp"
+
+namespace terrace::stream {
+namespace {
+
+struct Mesh {
+  std::vector<Point3> positions;
+  std::vector<float> levels;
+  std::vector<TriangleIndices> triangles;
+};
+
+Mesh random_mesh(std::uint64_t seed, std::size_t vertices, std::size_t triangles) {
+  std::mt19937_64 random(seed);
+  const auto unit = [&] { return static_cast<double>(random() >> 11) * 0x1p-53; };
+  Mesh mesh;
+  for (std::size_t i = 0; i < vertices; ++i) {
+    mesh.positions.push_back({691000.0 + 1000 * unit(), 5338000.0 + 2000 * unit(), 500 * unit()});
+    mesh.levels.push_back(static_cast<float>(random() % 9));
+  }
+  for (std::size_t i = 0; i < triangles; ++i) {
+    TriangleIndices triangle;
+    for (auto& index : triangle) index = static_cast<std::uint32_t>(random() % vertices);
+    mesh.triangles.push_back(triangle);
+  }
+  return mesh;
+}
+
+void write(const std::string& path, const Mesh& mesh, MeshHeader header,
+           const WriterOptions& options = {}, std::size_t piece = 1000) {
+  header.vertices = mesh.positions.size();
+  header.triangles = mesh.triangles.size();
+  const auto writer = open_mesh_writer(path, header, options);
+  const std::size_t columns = header.attributes.size();
+  for (std::size_t i = 0; i < mesh.positions.size(); i += piece) {
+    const std::size_t n = std::min(piece, mesh.positions.size() - i);
+    writer->add_vertices(
+        std::span(mesh.positions).subspan(i, n),
+        columns == 0 ? std::span<const float>{} : std::span(mesh.levels).subspan(i, n));
+  }
+  for (std::size_t i = 0; i < mesh.triangles.size(); i += piece) {
+    writer->add_triangles(
+        std::span(mesh.triangles).subspan(i, std::min(piece, mesh.triangles.size() - i)));
+  }
+  EXPECT_FALSE(std::filesystem::exists(path)) << "published too early";
+  writer->finish();
+}
+
+template <class T>
+T at(const std::string& bytes, std::size_t offset) {
+  T value;
+  EXPECT_LE(offset + sizeof value, bytes.size());
+  std::memcpy(&value, bytes.data() + offset, sizeof value);
+  return value;
+}
+
+class MeshFile : public testing::Test {
+ protected:
+  std::string path(const std::string& name) { return (folder_.path() / name).string(); }
+
+  TempFolder folder_;
+};
+
+TEST_F(MeshFile, ObjHoldsExactDoublesAndCountsFromOne) {
+  const Mesh mesh = random_mesh(1, 2500, 4000);
+  write(path("m.obj"), mesh, {.attributes = {"level"}, .comments = {"one", "two\nthree"}});
+  std::istringstream lines(read_text(path("m.obj")));
+  std::string line;
+  Mesh back;
+  std::vector<std::string> comments;
+  while (std::getline(lines, line)) {
+    if (line[0] == '#') {
+      comments.push_back(line);
+      continue;
+    }
+    std::istringstream words(line.substr(1));
+    std::string a, b, c, rest;
+    words >> a >> b >> c;
+    EXPECT_FALSE(words >> rest) << line;
+    if (line[0] == 'v') {
+      EXPECT_TRUE(back.triangles.empty());
+      back.positions.push_back({std::stod(a), std::stod(b), std::stod(c)});
+    } else {
+      ASSERT_EQ(line[0], 'f');
+      const auto index = [](const std::string& word) {
+        return static_cast<std::uint32_t>(std::stoul(word) - 1);
+      };
+      back.triangles.push_back({index(a), index(b), index(c)});
+    }
+  }
+  EXPECT_EQ(comments, (std::vector<std::string>{"# one", "# two three"}));
+  EXPECT_TRUE(same_bits(back.positions, mesh.positions));
+  EXPECT_EQ(back.triangles, mesh.triangles);
+}
+
+TEST_F(MeshFile, PlyIsReadBackBitForBit) {
+  const Mesh mesh = random_mesh(2, 2500, 4000);
+  for (const std::string format : {"ply", "ply-ascii"}) {
+    SCOPED_TRACE(format);
+    const std::string file = path(format + ".ply");
+    write(file, mesh, {.attributes = {"level"}, .comments = {"c"}}, {.format = format});
+    const AllPoints all = read_file(file);
+    EXPECT_TRUE(same_bits(all.points.positions, mesh.positions));
+    ASSERT_EQ(all.info.attributes.size(), 1u);
+    EXPECT_EQ(all.info.attributes[0].name, "level");
+    const auto levels = all.points.attributes[0].as<float>();
+    EXPECT_TRUE(std::equal(levels.begin(), levels.end(), mesh.levels.begin(), mesh.levels.end()));
+    const std::string bytes = read_text(file);
+    const std::size_t body = bytes.find("end_header\n") + 11;
+    if (format == "ply") {
+      ASSERT_EQ(bytes.size(), body + 2500 * 28 + 4000 * 13);
+      for (std::size_t i = 0; i < 4000; ++i) {
+        const std::size_t face = body + 2500 * 28 + i * 13;
+        EXPECT_EQ(bytes[face], 3);
+        for (std::size_t k = 0; k < 3; ++k) {
+          EXPECT_EQ(at<std::uint32_t>(bytes, face + 1 + 4 * k), mesh.triangles[i][k]);
+        }
+      }
+    } else {
+      std::istringstream last(bytes.substr(bytes.rfind('\n', bytes.size() - 2)));
+      std::uint32_t n, a, b, c;
+      last >> n >> a >> b >> c;
+      EXPECT_EQ(n, 3u);
+      EXPECT_EQ((TriangleIndices{a, b, c}), mesh.triangles.back());
+    }
+  }
+}
+
+/// A GLB file taken apart by the specification's own words.
+struct Glb {
+  nlohmann::json json;
+  std::string binary;
+
+  explicit Glb(const std::string& bytes) {
+    EXPECT_EQ(bytes.substr(0, 4), "glTF");
+    EXPECT_EQ(at<std::uint32_t>(bytes, 4), 2u);
+    EXPECT_EQ(at<std::uint32_t>(bytes, 8), bytes.size());
+    const std::size_t json_bytes = at<std::uint32_t>(bytes, 12);
+    EXPECT_EQ(bytes.substr(16, 4), "JSON");
+    EXPECT_EQ(json_bytes % 4, 0u);
+    json = nlohmann::json::parse(bytes.substr(20, json_bytes));
+    const std::size_t chunk = 20 + json_bytes;
+    if (chunk == bytes.size()) return;
+    const std::size_t binary_bytes = at<std::uint32_t>(bytes, chunk);
+    EXPECT_EQ(bytes.substr(chunk + 4, 4), std::string("BIN\0", 4));
+    EXPECT_EQ(binary_bytes % 4, 0u);
+    EXPECT_EQ(chunk + 8 + binary_bytes, bytes.size());
+    binary = bytes.substr(chunk + 8);
+    EXPECT_EQ(json["buffers"][0]["byteLength"], binary_bytes);
+  }
+  /// Element `i`, component `k` of an accessor.
+  template <class T>
+  [[nodiscard]] T value(std::size_t accessor, std::size_t i, std::size_t k) const {
+    const auto& a = json["accessors"][accessor];
+    const auto& view = json["bufferViews"][a["bufferView"].get<std::size_t>()];
+    const std::size_t components = a["type"] == "VEC3" ? 3 : 1;
+    const std::size_t stride = view.value("byteStride", sizeof(T) * components);
+    const std::size_t inside = a.value("byteOffset", std::size_t{0}) + i * stride + k * sizeof(T);
+    EXPECT_LE(inside + sizeof(T), view["byteLength"].get<std::size_t>());
+    return at<T>(binary, view.value("byteOffset", std::size_t{0}) + inside);
+  }
+};
+
+TEST_F(MeshFile, GlbKeepsPositionsAboutItsOrigin) {
+  const Mesh mesh = random_mesh(3, 3000, 5001);
+  Box3 bounds;
+  for (const Point3& p : mesh.positions) bounds.include(p);
+  for (const bool with_bounds : {true, false}) {
+    SCOPED_TRACE(with_bounds);
+    MeshHeader header{.attributes = {"level"}};
+    if (with_bounds) header.bounds = bounds;
+    const std::string file = path(with_bounds ? "a.glb" : "b.glb");
+    write(file, mesh, header, {}, 700);
+    const Glb glb(read_text(file));
+    EXPECT_EQ(glb.json["asset"]["version"], "2.0");
+    const auto& node = glb.json["nodes"][0];
+    const auto& primitive = glb.json["meshes"][0]["primitives"][0];
+    EXPECT_EQ(primitive["mode"], 4);
+    const std::size_t position = primitive["attributes"]["POSITION"];
+    const std::size_t level = primitive["attributes"]["_LEVEL"];
+    const std::size_t indices = primitive["indices"];
+    const auto& accessor = glb.json["accessors"][position];
+    ASSERT_EQ(accessor["count"], 3000);
+    ASSERT_EQ(glb.json["accessors"][indices]["count"], 3 * 5001);
+    EXPECT_EQ(accessor["componentType"], 5126);
+    EXPECT_EQ(glb.json["accessors"][indices]["componentType"], 5125);
+    std::array<float, 3> min{INFINITY, INFINITY, INFINITY}, max{-INFINITY, -INFINITY, -INFINITY};
+    for (std::size_t i = 0; i < 3000; ++i) {
+      std::array<double, 3> world;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const float stored = glb.value<float>(position, i, k);
+        min[k] = std::min(min[k], stored);
+        max[k] = std::max(max[k], stored);
+        world[k] = node["translation"][k].get<double>() + static_cast<double>(stored);
+      }
+      // glTF's y is up: (x, y, z) here is (x, z, -y) there.
+      const Point3 back{world[0], -world[2], world[1]};
+      for (std::size_t k = 0; k < 3; ++k) {
+        const double reach = with_bounds ? 1000 : 2000;
+        EXPECT_NEAR(back[k], mesh.positions[i][k], reach * 0x1p-24 + 1e-9);
+      }
+      EXPECT_EQ(glb.value<float>(level, i, 0), mesh.levels[i]);
+    }
+    for (std::size_t k = 0; k < 3; ++k) {
+      // As a reader sees them: the decimal numbers are the stored floats, exactly.
+      EXPECT_EQ(accessor["min"][k].get<double>(), static_cast<double>(min[k]));
+      EXPECT_EQ(accessor["max"][k].get<double>(), static_cast<double>(max[k]));
+    }
+    for (std::size_t i = 0; i < 5001; ++i) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        EXPECT_EQ(glb.value<std::uint32_t>(indices, 3 * i + k, 0), mesh.triangles[i][k]);
+      }
+    }
+  }
+}
+
+TEST_F(MeshFile, GlbWithoutTrianglesIsACloudAndWithoutVerticesAnEmptyScene) {
+  Mesh mesh = random_mesh(4, 10, 0);
+  write(path("cloud.glb"), mesh, {});
+  const Glb cloud(read_text(path("cloud.glb")));
+  const auto& primitive = cloud.json["meshes"][0]["primitives"][0];
+  EXPECT_EQ(primitive["mode"], 0);
+  EXPECT_FALSE(primitive.contains("indices"));
+  write(path("empty.glb"), {}, {});
+  const Glb empty(read_text(path("empty.glb")));
+  EXPECT_EQ(empty.json["scenes"].size(), 1u);
+  EXPECT_FALSE(empty.json.contains("meshes"));
+  EXPECT_FALSE(empty.json.contains("buffers"));
+  EXPECT_TRUE(empty.binary.empty());
+}
+
+TEST_F(MeshFile, GlbRefusesWhatItCannotHoldBeforeItWrites) {
+  for (const MeshHeader& header : {MeshHeader{.vertices = 400'000'000, .triangles = 0},
+                                   MeshHeader{.vertices = 3, .triangles = 1ull << 62},
+                                   MeshHeader{.vertices = 200'000'000, .triangles = 200'000'000}}) {
+    const std::string error = error_of([&] { open_mesh_writer(path("big.glb"), header); });
+    EXPECT_NE(error.find("at most 4 GiB; write PLY"), std::string::npos) << error;
+  }
+  EXPECT_TRUE(std::filesystem::is_empty(folder_.path()));
+}
+
+TEST_F(MeshFile, EmptyMeshesAndPiecesOfAnySizeGiveTheSameBytes) {
+  const Mesh mesh = random_mesh(5, 900, 1700);
+  for (const std::string ending : {".ply", ".obj", ".glb"}) {
+    SCOPED_TRACE(ending);
+    write(path("whole" + ending), mesh, {.attributes = {"level"}}, {}, 10000);
+    write(path("pieces" + ending), mesh, {.attributes = {"level"}}, {}, 1);
+    EXPECT_EQ(read_text(path("whole" + ending)), read_text(path("pieces" + ending)));
+    if (ending != ".glb") {
+      write(path("empty" + ending), {}, {});
+      EXPECT_TRUE(std::filesystem::exists(path("empty" + ending)));
+    }
+  }
+}
+
+TEST_F(MeshFile, FormatsAreChosenByNameThenByEnding) {
+  const auto refusal = [&](const std::string& file, const WriterOptions& options = {}) {
+    return error_of([&] { open_mesh_writer(file, {}, options); });
+  };
+  const std::string unknown = refusal(path("m.stl"));
+  for (const std::string_view known : {"obj (.obj)", "ply (.ply)", "ply-ascii", "glb (.glb)"}) {
+    EXPECT_NE(unknown.find(known), std::string::npos) << unknown;
+  }
+  EXPECT_NE(refusal(path("mesh")), "");
+  EXPECT_NE(refusal(path("m.obj"), {.format = "xyz"}).find("unknown output format 'xyz'"),
+            std::string::npos);
+  EXPECT_NE(refusal("-", {.format = "glb"}).find("cannot be written to a pipe"), std::string::npos);
+  EXPECT_EQ(refusal(path("m.PLY")), "");
+  EXPECT_EQ(refusal(path("m.dat"), {.format = "obj"}), "");
+}
+
+}  // namespace
+}  // namespace terrace::stream

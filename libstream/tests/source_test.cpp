@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cstdlib>
+#include <limits>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "point_files.hpp"
+#include "terrace/stream/point_writer.hpp"
+
+namespace terrace::stream {
+namespace {
+
+const char* const kPly =
+    "ply\nformat ascii 1.0\nelement vertex 1\nproperty double x\nproperty double y\n"
+    "property double z\nend_header\n7 8 9\n";
+
+class Source : public testing::Test {
+ protected:
+  std::string put(const std::string& name, std::string_view text) {
+    return write_text(folder_.path() / name, text);
+  }
+  std::string refusal(const std::vector<std::string>& files, const SourceOptions& options = {}) {
+    return error_of([&] { read_all(files, options); });
+  }
+
+  TempFolder folder_;
+};
+
+/// Makes standard input or output another file for the life of the object.
+class Redirected {
+ public:
+  Redirected(int standard, int fd) : standard_(standard), saved_(dup(standard)) {
+    dup2(fd, standard);
+  }
+  ~Redirected() {
+    dup2(saved_, standard_);
+    close(saved_);
+  }
+  Redirected(const Redirected&) = delete;
+  Redirected& operator=(const Redirected&) = delete;
+
+ private:
+  int standard_, saved_;
+};
+
+TEST_F(Source, TellsFormatsByContentBeforeEnding) {
+  EXPECT_EQ(read_all({put("a.txt", kPly)}).info.format, "ply");
+  EXPECT_EQ(read_all({put("a.ply", "1 2 3\n")}).info.format, "xyz");
+  EXPECT_EQ(read_all({put("noending", "1;2;3\n")}).info.format, "xyz");
+  EXPECT_NE(refusal({put("b.PLY", "plx")}).find("does not begin with 'ply'"), std::string::npos);
+  EXPECT_NE(refusal({put("c.csv", "hello, world\n")}).find("no points"), std::string::npos);
+}
+
+TEST_F(Source, RefusesWhatItDoesNotKnow) {
+  const std::string prose = put("readme", "This is a text of 3 lines\nwith 1 2 3\nin it\n");
+  EXPECT_NE(refusal({prose}).find("neither content nor name"), std::string::npos);
+  EXPECT_NE(refusal({put("empty", "")}).find("empty: the file is empty"), std::string::npos);
+  EXPECT_NE(refusal({put("e.csv", "")}).find("e.csv: the file is empty"), std::string::npos);
+  EXPECT_NE(refusal({prose}, {.format = "lax"}).find("unknown input format 'lax'; known are"),
+            std::string::npos);
+  EXPECT_NE(refusal({(folder_.path() / "none.xyz").string()}).find("No such file"),
+            std::string::npos);
+  EXPECT_NE(refusal({folder_.path().string()}).find("is a folder"), std::string::npos);
+}
+
+TEST_F(Source, ChainsFilesOfOneFormat) {
+  const std::vector<std::string> files{put("1.xyz", "1 2 3 4\n5 6 7 8\n"), put("2.xyz", "9 9 9 9"),
+                                       put("3.xyz", "# c\n0 0 0 0\n")};
+  const AllPoints all = read_all(files);
+  EXPECT_EQ(all.info.files, files);
+  EXPECT_EQ(all.points.positions,
+            (std::vector<Point3>{{1, 2, 3}, {5, 6, 7}, {9, 9, 9}, {0, 0, 0}}));
+  EXPECT_EQ(all.points.attributes[0].as<double>()[3], 0.0);
+
+  const std::string ply = put("a.ply", kPly);
+  const AllPoints two = read_all({ply, ply});
+  EXPECT_EQ(two.info.points, 2u);
+  EXPECT_EQ(two.points.size(), 2u);
+}
+
+TEST_F(Source, ChainedFilesMustAgree) {
+  const std::string three = put("3.xyz", "1 2 3\n"), four = put("4.xyz", "1 2 3 4\n");
+  EXPECT_NE(refusal({three, four}).find("4.xyz: its attributes are float64 a3, those of "),
+            std::string::npos);
+  EXPECT_NE(refusal({three, put("p.ply", kPly)}).find("p.ply: is ply, but "), std::string::npos);
+  EXPECT_NE(refusal({three, put("g.csv", "lon,lat,height\n1,2,3\n")}).find("g.csv: "),
+            std::string::npos);
+  EXPECT_NE(refusal({"-", "-"}, {.format = "xyz"}).find("named twice"), std::string::npos);
+}
+
+TEST_F(Source, ReadsStandardInputAndPipes) {
+  std::string text = "x,y,z,i\n";
+  for (int i = 0; i < 50000; ++i) text += std::to_string(i) + ",1,2," + std::to_string(i) + "\n";
+  for (const SourceOptions& options : {SourceOptions{}, SourceOptions{.format = "xyz"}}) {
+    int ends[2];
+    ASSERT_EQ(pipe(ends), 0);
+    std::thread writer([&] {
+      for (std::string_view left = text; !left.empty();) {
+        const ssize_t n = write(ends[1], left.data(), std::min<std::size_t>(left.size(), 777));
+        if (n <= 0) break;
+        left.remove_prefix(static_cast<std::size_t>(n));
+      }
+      close(ends[1]);
+    });
+    {
+      const Redirected input(STDIN_FILENO, ends[0]);
+      const AllPoints all = read_all(std::vector<std::string>{"-"}, options);
+      EXPECT_EQ(all.points.size(), 50000u);
+      EXPECT_EQ(all.points.positions[49999][0], 49999.0);
+      EXPECT_EQ(all.points.attributes[0].as<double>()[4097], 4097.0);
+    }
+    writer.join();
+    close(ends[0]);
+  }
+  // A file as standard input, and a named pipe.
+  const std::string file = put("f.csv", text);
+  const int fd = open(file.c_str(), O_RDONLY);
+  {
+    const Redirected input(STDIN_FILENO, fd);
+    EXPECT_EQ(read_all(std::vector<std::string>{"-"}).points.size(), 50000u);
+  }
+  close(fd);
+  const std::string fifo = (folder_.path() / "fifo").string();
+  ASSERT_EQ(mkfifo(fifo.c_str(), 0600), 0);
+  std::thread writer([&] { write_text(fifo, text); });
+  EXPECT_EQ(read_all({file, fifo}).points.size(), 100000u);
+  writer.join();
+}
+
+TEST_F(Source, TextGoesToStandardOutput) {
+  PointBlock block;
+  for (int i = 0; i < 20000; ++i) block.positions.push_back({1.0 * i, 0.5, -1});
+  for (const std::string format : {"", "csv"}) {
+    const auto path = folder_.path() / ("out" + format);
+    const int fd = open(path.c_str(), O_WRONLY | O_CREAT, 0600);
+    std::fflush(stdout);
+    {
+      const Redirected output(STDOUT_FILENO, fd);
+      const auto writer = open_point_writer("-", {}, {.format = format});
+      writer->append(block);
+      writer->finish();
+    }
+    close(fd);
+    EXPECT_TRUE(same_bits(read_file(path).points.positions, block.positions));
+  }
+  EXPECT_NE(error_of([] { open_point_writer("-", {}, {.format = "ply"}); }).find("to a pipe"),
+            std::string::npos);
+  EXPECT_NE(error_of([&] {
+              open_point_writer((folder_.path() / "p.las").string(), {});
+            }).find("known are xyz (.xyz, .txt), csv (.csv), ply (.ply), ply-ascii"),
+            std::string::npos);
+}
+
+TEST_F(Source, PromisesInAPipeAreNotBelieved) {
+  // Nothing is known of the bytes to come, so nothing may be made ready for them.
+  const std::string text =
+      "ply\nformat binary_little_endian 1.0\nelement vertex 1000000000000000000\n"
+      "property double x\nproperty double y\nproperty double z\nend_header\n" +
+      std::string(48, '\0');
+  int ends[2];
+  ASSERT_EQ(pipe(ends), 0);
+  ASSERT_EQ(write(ends[1], text.data(), text.size()), static_cast<ssize_t>(text.size()));
+  close(ends[1]);
+  const Redirected input(STDIN_FILENO, ends[0]);
+  close(ends[0]);
+  const std::string error = refusal({"-"});
+  EXPECT_NE(error.find("standard input: byte"), std::string::npos) << error;
+  EXPECT_NE(error.find("ends in item 2 of element 'vertex'"), std::string::npos) << error;
+}
+
+TEST_F(Source, CrsOfTheCallerReplacesTheFiles) {
+  Crs crs;
+  crs.epsg = 32632;
+  const AllPoints all = read_all({put("g.csv", "lon,lat,height\n1,2,3\n")}, {.crs = crs});
+  EXPECT_EQ(all.info.crs, crs);
+}
+
+TEST(ToWorld, AppliesTheTransformAndTheScaleOfHeights) {
+  SourceInfo info;
+  info.world.xy = {2, 1, 100, 0, -3, 200};
+  info.coordinates[2].scale = 0.5;
+  info.coordinates[2].offset = -1;
+  PointBlock block;
+  block.positions = {{1, 2, 3}, {0, 0, 0}};
+  to_world(info, block);
+  EXPECT_EQ(block.positions, (std::vector<Point3>{{104, 194, 0.5}, {100, 200, -1}}));
+}
+
+TEST(ToWorld, LeavesPointsWithoutTransformBitForBit) {
+  PointBlock block;
+  block.positions = {{-0.0, 1e308, 5e-324}, {1, -0.0, -0.0}};
+  const auto before = block.positions;
+  to_world({}, block);
+  EXPECT_TRUE(same_bits(block.positions, before));
+}
+
+TEST(Formats, HaveNamesReadersAndDistinctEndings) {
+  std::vector<std::string> names, endings;
+  for (const Format& format : formats()) {
+    names.push_back(format.name);
+    endings.insert(endings.end(), format.endings.begin(), format.endings.end());
+    EXPECT_NE(format.recognise, nullptr);
+    EXPECT_NE(format.open, nullptr);
+    EXPECT_FALSE(format.recognise({})) << format.name;
+  }
+  for (auto* list : {&names, &endings}) {
+    std::sort(list->begin(), list->end());
+    EXPECT_EQ(std::adjacent_find(list->begin(), list->end()), list->end());
+  }
+  EXPECT_NE(std::find(names.begin(), names.end(), "ply"), names.end());
+}
+
+}  // namespace
+}  // namespace terrace::stream

@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "point_files.hpp"
+#include "terrace/stream/point_writer.hpp"
+
+namespace terrace::stream {
+namespace {
+
+class Xyz : public testing::Test {
+ protected:
+  AllPoints read(std::string_view text, const SourceOptions& options = {.format = "xyz"}) {
+    return read_file(write_text(folder_.path() / "points.xyz", text), options);
+  }
+  std::string refusal(std::string_view text) {
+    return error_of([&] { read(text); });
+  }
+
+  TempFolder folder_;
+};
+
+TEST_F(Xyz, ReadsEverySeparatorLineEndAndComment) {
+  const std::vector<Point3> expected{{1, 2, 3}, {4.5, -5, 6e3}};
+  for (const std::string_view text : {
+           "1 2 3\n4.5 -5 6e3\n",
+           "1 2 3\n4.5 -5 6e3",
+           "1\t2\t3\r\n4.5\t-5\t6e3\r\n",
+           "1,2,3\n4.5,-5,6e3\n",
+           "1, 2 ,3\n 4.5 , -5,\t6e3 \n",
+           "1;2;3\n4.5;-5;6e3\n",
+           "  1   2 \t 3  \n\n\n4.5 -5 +6000.00\n\n",
+           "# a comment\n// another\n1 2 3\n  # between\n4.5 -5 6e3\n// end",
+           "x y z\n1 2 3\n4.5 -5 6e3\n",
+           "X,Y,Z\n1,2,3\n4.5,-5,6e3\n",
+           "\"x\",\"y\",\"z\"\n1,2,3\n4.5,-5,6e3\n",
+           "z,x,y\n3,1,2\n6e3,4.5,-5\n",
+           "Easting;Northing;Elevation\n1;2;3\n4.5;-5;6e3\n",
+           "first second third\n1 2 3\n4.5 -5 6e3\n",
+           "//X Y Z\n1 2 3\n4.5 -5 6e3\n",
+           "\xEF\xBB\xBFx,y,z\n1,2,3\n4.5,-5,6e3\n",
+           "\xEF\xBB\xBF"
+           "1,2,3\n4.5,-5,6e3\n",
+       }) {
+    SCOPED_TRACE(text);
+    const AllPoints all = read(text);
+    EXPECT_TRUE(same_bits(all.points.positions, expected));
+    EXPECT_TRUE(all.info.attributes.empty());
+    EXPECT_FALSE(all.info.crs.geographic);
+    EXPECT_TRUE(same_bits(read(text, {}).points.positions, expected)) << "told by content";
+  }
+}
+
+TEST_F(Xyz, NamesCoordinatesAndAttributesByTheHeader) {
+  const AllPoints all = read("id,lat,lon,height,class,class\n7,47,8,500,2,3\n8,48,9,600,6,nan\n");
+  EXPECT_TRUE(same_bits(all.points.positions, std::vector<Point3>{{8, 47, 500}, {9, 48, 600}}));
+  EXPECT_TRUE(all.info.crs.geographic);
+  ASSERT_EQ(all.info.attributes.size(), 3u);
+  EXPECT_EQ(all.info.attributes[0].name, "id");
+  EXPECT_EQ(all.info.attributes[1].name, "class");
+  EXPECT_EQ(all.info.attributes[2].name, "class_2");
+  EXPECT_EQ(all.points.attributes[0].as<double>()[1], 8.0);
+  EXPECT_EQ(all.points.attributes[1].as<double>()[0], 2.0);
+  EXPECT_TRUE(std::isnan(all.points.attributes[2].as<double>()[1]));
+}
+
+TEST_F(Xyz, LettersGoBeforeWords) {
+  const AllPoints all = read("lat,lon,x,y,z,height\n47,8,1,2,3,4\n");
+  EXPECT_TRUE(same_bits(all.points.positions, std::vector<Point3>{{1, 2, 3}}));
+  EXPECT_FALSE(all.info.crs.geographic);
+  ASSERT_EQ(all.info.attributes.size(), 3u);
+  EXPECT_EQ(all.info.attributes[2].name, "height");
+}
+
+TEST_F(Xyz, UnnamedColumnsAreNumbered) {
+  const AllPoints all = read("1 2 3 4 5\n6 7 8 9 10\n");
+  ASSERT_EQ(all.info.attributes.size(), 2u);
+  EXPECT_EQ(all.info.attributes[0].name, "a3");
+  EXPECT_EQ(all.info.attributes[1].name, "a4");
+  EXPECT_EQ(all.points.attributes[1].as<double>()[1], 10.0);
+}
+
+TEST_F(Xyz, RefusesBadTextWithItsLine) {
+  const struct {
+    std::string_view text, message;
+  } cases[] = {
+      {"", "the file is empty"},
+      {"\n\n", "there are no points"},
+      {"# nothing\n", "there are no points"},
+      {"x y z\n", "there are no points"},
+      {"1 2 3\n1 2\n", "line 2: has 2 columns, the lines before have 3"},
+      {"1 2 3\n1 2 3 4\n", "line 2: has 4 columns"},
+      {"1,2,3\n1,2,3,\n", "line 2: has 4 columns"},
+      {"1,2,3\n1,,3\n", "line 2: column 2 is empty"},
+      {"1 2 3\n\n# c\n1 2 nan\n", "line 4: column 3 is nan"},
+      {"1 2 3\n1 -inf 3\n", "line 2: column 2 is -inf"},
+      {"1 2 1e999\n", "line 1: column 3, '1e999'"},
+      {"1 2 3\n1 2 abc\n", "line 2: column 3, 'abc'"},
+      {"1 2 3\n1 2 3x\n", "line 2: column 3, '3x'"},
+      {"1 2 3\n1 2 --3\n", "line 2: column 3, '--3'"},
+      {"1 2 3\n1 2 +-3\n", "line 2: column 3, '+-3'"},
+      {"1 2 3\n1 2 0x10\n", "line 2: column 3, '0x10'"},
+      {"1 2 3\r1 2 3\r", "line 1: "},
+      {"1 2\n", "line 1: has 2 columns, but a point needs x, y and z; add"},
+      {"5\n1 2 3\n", "line 1: has 1 column,"},
+      {"x,y\n1,2\n", "has 2 columns"},
+      {"x,y,value\n1,2,3\n", "line 1: the header names no z column"},
+      {"x,x,y,z\n1,2,3,4\n", "line 1: columns 'x' and 'x' name the same coordinate"},
+      {"x,y,z\n1,2,3,4\n", "line 2: has 4 columns, but the header in line 1 names 3"},
+      {"x,y,z\nabc,y,z\n1,2,3\n", "line 2: column 1, 'abc'"},
+      {"1,5;2,5;3,5\n", "column 1, '1,5'"},
+      {std::string_view("1 2 3\n1 2 \0003\n", 13), "line 2: column 3"},
+  };
+  for (const auto& [text, message] : cases) {
+    SCOPED_TRACE(text);
+    const std::string error = refusal(text);
+    EXPECT_NE(error.find(message), std::string::npos) << error;
+    EXPECT_NE(error.find("points.xyz"), std::string::npos) << error;
+  }
+}
+
+TEST_F(Xyz, RefusesLinesThatNeverEnd) {
+  const std::string error = refusal("1 2 3\n" + std::string(200000, '7'));
+  EXPECT_NE(error.find("line 2: longer than 65536 bytes"), std::string::npos) << error;
+  EXPECT_NE(refusal(std::string(1 << 20, ' ')).find("line 1: longer"), std::string::npos);
+}
+
+TEST_F(Xyz, SmallNumbersBecomeZeroAndLargeOnesAreRefused) {
+  const AllPoints all = read("1e-999 -1e-400 0.000000001e-320\n4.9e-324 0e999 00012\n");
+  EXPECT_TRUE(
+      same_bits(all.points.positions, std::vector<Point3>{{0, -0.0, 0}, {4.9e-324, 0, 12}}));
+  EXPECT_NE(refusal("1 2 " + std::string(400, '9')), "");
+  const std::string tiny = "0." + std::string(400, '0') + "1";
+  EXPECT_EQ(read("1 2 " + tiny).points.positions[0][2], 0.0);
+}
+
+TEST_F(Xyz, BlocksAreBoundedAndInFileOrder) {
+  std::string text;
+  for (int i = 0; i < 1000; ++i) text += std::to_string(i) + " 0 0 " + std::to_string(-i) + "\n";
+  for (const std::size_t size : {1u, 7u, 1000u, 5000u}) {
+    const AllPoints all = read(text, {.block_points = size});
+    EXPECT_EQ(all.largest_block, std::min<std::size_t>(size, 1000));
+    ASSERT_EQ(all.points.size(), 1000u);
+    for (std::size_t i = 0; i < 1000; ++i) {
+      EXPECT_EQ(all.points.positions[i][0], static_cast<double>(i));
+      EXPECT_EQ(all.points.attributes[0].as<double>()[i], -static_cast<double>(i));
+    }
+  }
+}
+
+TEST_F(Xyz, ReportsProgress) {
+  std::string text;
+  for (int i = 0; i < 100000; ++i) text += "1 2 3\n";
+  const std::vector<std::string> files{write_text(folder_.path() / "p.xyz", text)};
+  const auto source = open_source(files);
+  PointBlock block;
+  double last = 0;
+  std::uint64_t points = 0;
+  while (source->next(block)) {
+    points += block.size();
+    const Progress progress = source->progress();
+    EXPECT_EQ(progress.points, points);
+    EXPECT_GE(progress.fraction, last);
+    EXPECT_LE(progress.fraction, 1.0);
+    last = progress.fraction;
+  }
+  EXPECT_EQ(last, 1.0);
+}
+
+/// The law of both text formats: what is written is read back bit for bit.
+TEST_F(Xyz, WritesWhatItReadsBitForBit) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    SCOPED_TRACE(seed);
+    std::mt19937_64 random(seed);
+    const std::size_t count = random() % 200 + 1, columns = random() % 4;
+    PointBlock block;
+    PointHeader header;
+    for (std::size_t i = 0; i < count; ++i) {
+      block.positions.push_back({any_double(random), any_double(random), any_double(random)});
+    }
+    for (std::size_t c = 0; c < columns; ++c) {
+      std::vector<double> values;
+      for (std::size_t i = 0; i < count; ++i) values.push_back(any_double(random));
+      header.attributes.push_back({.name = "value " + std::to_string(c)});
+      block.attributes.push_back(column_of(ScalarType::f64, values));
+    }
+    for (const std::string name : {"out.xyz", "out.csv"}) {
+      const auto path = folder_.path() / name;
+      const auto writer = open_point_writer(path, header, {.replace = true});
+      writer->append(block);
+      EXPECT_EQ(writer->points(), count);
+      writer->finish();
+      const AllPoints all = read_file(path);
+      EXPECT_TRUE(same_bits(all.points.positions, block.positions));
+      ASSERT_EQ(all.points.attributes.size(), columns);
+      for (std::size_t c = 0; c < columns; ++c) {
+        EXPECT_EQ(all.points.attributes[c].bytes, block.attributes[c].bytes);
+        if (name == "out.csv") {
+          EXPECT_EQ(all.info.attributes[c].name, "value_" + std::to_string(c));
+        }
+      }
+    }
+  }
+}
+
+TEST_F(Xyz, WritesTypedColumnsInShortestFormAndScaledOnesAsRealValues) {
+  const PointHeader header{
+      .attributes = {{.name = "n", .type = ScalarType::i64},
+                     {.name = "f", .type = ScalarType::f32},
+                     {.name = "s", .type = ScalarType::u16, .scale = 0.5, .offset = 10},
+                     {.name = "Z", .type = ScalarType::u8},
+                     {.name = "a,b", .type = ScalarType::u8}}};
+  PointBlock block;
+  block.positions = {{0.1, -2, 1e300}};
+  block.attributes = {
+      column_of<std::int64_t>(ScalarType::i64, {-9007199254740993}),
+      column_of<float>(ScalarType::f32, {0.1f}), column_of<std::uint16_t>(ScalarType::u16, {65535}),
+      column_of<std::uint8_t>(ScalarType::u8, {200}), column_of<std::uint8_t>(ScalarType::u8, {7})};
+  const auto path = folder_.path() / "typed.csv";
+  const auto writer = open_point_writer(path, header);
+  writer->append(block);
+  EXPECT_FALSE(std::filesystem::exists(path));
+  writer->finish();
+  EXPECT_EQ(read_text(path),
+            "x,y,z,n,f,s,Z_2,\"a_b\"\n0.1,-2,1e+300,-9007199254740993,0.1,32777.5,200,7\n");
+  EXPECT_NE(error_of([&] { open_point_writer(path, header); }), "") << "it exists";
+}
+
+}  // namespace
+}  // namespace terrace::stream
