@@ -6,7 +6,7 @@
 
 #include <tiff.h>
 
-#include "raster_overlay.hpp"
+#include "with_type.hpp"
 
 namespace terrace::stream {
 namespace {

@@ -8,7 +8,6 @@
 #include <sstream>
 #include <utility>
 
-#include "raster_overlay.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/raster.hpp"
 

@@ -90,6 +90,12 @@ NodataRule NodataRule::parse(const std::string& text, ScalarType type) {
       if (std::isfinite(value)) {
         set_float_range(rule, value, std::numeric_limits<float>::epsilon(),
                         std::numeric_limits<float>::max());
+        if (!rule.unmatched) {  // subnormal floats are coarser than that
+          constexpr double kMost = std::numeric_limits<float>::max();
+          const double rounded = static_cast<float>(std::clamp(value, -kMost, kMost));
+          rule.low = std::min(rule.low, rounded);
+          rule.high = std::max(rule.high, rounded);
+        }
       }
       return rule;
     case ScalarType::f64:

@@ -7,6 +7,8 @@
 #include <limits>
 #include <type_traits>
 
+#include "with_type.hpp"
+
 namespace terrace::stream {
 namespace {
 

@@ -21,32 +21,4 @@ struct SampleRow {
 bool overlay_row(ScalarType type, const SampleRow& row, const NodataRule& rule, std::byte* out,
                  std::uint8_t* valid);
 
-/// Calls `f` with a value of the C++ type of `type`.
-template <class F>
-decltype(auto) with_type(ScalarType type, F&& f) {
-  switch (type) {
-    case ScalarType::i8:
-      return f(std::int8_t{});
-    case ScalarType::u8:
-      return f(std::uint8_t{});
-    case ScalarType::i16:
-      return f(std::int16_t{});
-    case ScalarType::u16:
-      return f(std::uint16_t{});
-    case ScalarType::i32:
-      return f(std::int32_t{});
-    case ScalarType::u32:
-      return f(std::uint32_t{});
-    case ScalarType::i64:
-      return f(std::int64_t{});
-    case ScalarType::u64:
-      return f(std::uint64_t{});
-    case ScalarType::f32:
-      return f(float{});
-    case ScalarType::f64:
-      break;
-  }
-  return f(double{});
-}
-
 }  // namespace terrace::stream

@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "raster_order.hpp"
-#include "raster_overlay.hpp"
 #include "terrace/stream/raster.hpp"
+#include "with_type.hpp"
 
 namespace terrace::stream {
 namespace {

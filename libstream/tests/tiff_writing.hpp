@@ -50,6 +50,8 @@ inline const std::array<TIFFFieldInfo, 8>& geo_fields() {
 /// Writes `samples`, native values by rows, bands of a cell side by side.
 inline void write_tiff(const std::filesystem::path& path, const TiffSpec& spec,
                        const std::vector<std::byte>& samples) {
+  const TIFFErrorHandler handler =
+      TIFFSetWarningHandler(nullptr);  // Deflate's old code: on purpose
   TIFF* tiff = TIFFOpen(path.c_str(), spec.mode.c_str());
   ASSERT_NE(tiff, nullptr) << path;
   TIFFMergeFieldInfo(tiff, geo_fields().data(), static_cast<std::uint32_t>(geo_fields().size()));
@@ -100,6 +102,7 @@ inline void write_tiff(const std::filesystem::path& path, const TiffSpec& spec,
     }
   }
   TIFFClose(tiff);
+  TIFFSetWarningHandler(handler);
 }
 
 /// Sets pixel scale 1 x 1 and a tie point, for a raster that lies at (x, y).
