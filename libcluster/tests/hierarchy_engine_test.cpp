@@ -407,6 +407,35 @@ TEST(HierarchyEngine, ExceptionsComeOutOnce) {
   }
 }
 
+/// Its first block fails at once while the second is still being prepared.
+class LingeringSink : public RecordingSink {
+ public:
+  std::unique_ptr<Prepared> prepare(const FinishedBlock& block) override {
+    if (block.block == 0) {
+      for (int ms = 0; inside == 0 && ms < 5000; ++ms) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      }
+      throw Failure("first block");
+    }
+    ++inside;
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    --inside;
+    return RecordingSink::prepare(block);
+  }
+  std::atomic<int> inside = 0;
+};
+
+TEST(HierarchyEngine, NoCallToTheSinkIsRunningWhenAnExceptionComesOut) {
+  LingeringSink sink;
+  HierarchyEngine engine(small_blocks(3), sink, [] { return runs_of_ten; });
+  const auto build = [&] {
+    push_all(engine, line(301), 50);
+    engine.finish();
+  };
+  EXPECT_THROW(build(), Failure);
+  EXPECT_EQ(sink.inside, 0);
+}
+
 TEST(HierarchyEngine, FinishOnlyOnce) {
   RecordingSink sink;
   HierarchyEngine engine(small_blocks(), sink, [] { return runs_of_ten; });

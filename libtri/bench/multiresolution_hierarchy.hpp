@@ -222,6 +222,10 @@ class Timed {
     const Lap lap(seconds());
     inner_.remove(vertices);
   }
+  void reserve(std::size_t vertices) {
+    const Lap lap(seconds());
+    inner_.reserve(vertices);
+  }
   void start_journal() { inner_.start_journal(); }
   void take_changes(Changes& changes) {
     const Lap lap(journal_seconds());

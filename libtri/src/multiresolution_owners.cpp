@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "terrace/tri/multiresolution_owners.hpp"
 
+#include <algorithm>
 #include <iterator>
 
 namespace terrace::tri {
@@ -13,13 +14,16 @@ PointId point_id(VertexOwners::Owner owner, const ClusterTree& tree) {
 }  // namespace
 
 void VertexOwners::reserve(std::size_t vertex_slots) {
-  standing_.reserve(vertex_slots);
-  heights_.reserve(vertex_slots);
+  const std::size_t capacity = standing_.capacity();
+  if (vertex_slots <= capacity) return;
+  // By an eighth at least, not by doubling: it is the memory per vertex that counts here.
+  const std::size_t wanted = std::max(vertex_slots, capacity + capacity / 8 + 64);
+  standing_.reserve(wanted);
+  heights_.reserve(wanted);
 }
 
 void VertexOwners::grow(std::size_t slots) {
-  // By an eighth, not by doubling: it is the memory per vertex that counts here.
-  if (slots > standing_.capacity()) reserve(slots + slots / 8 + 64);
+  reserve(slots);
   standing_.resize(slots);
   heights_.resize(slots);
 }

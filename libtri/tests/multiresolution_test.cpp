@@ -94,7 +94,7 @@ std::vector<ClusterId> expandable(const MultiresolutionModel<T>& model, MemorySo
 // Any sequence of steps: the expanded set is what the step's definition says, the model is what the
 // expanded set says, and a consumer of deltas sees just that.
 TYPED_TEST(Multiresolution, EveryStepDoesWhatItSays) {
-  for (Case& c : cases(12)) {
+  for (Case& c : cases(40)) {
     TRACE(c);
     const WholeTree tree(c.source);
     const Detail start = random_detail(c);
@@ -159,7 +159,7 @@ TYPED_TEST(Multiresolution, EveryStepDoesWhatItSays) {
 }
 
 TYPED_TEST(Multiresolution, CollapseIsTheInverseOfExpand) {
-  for (Case& c : cases(6)) {
+  for (Case& c : cases(15)) {
     TRACE(c);
     MultiresolutionModel<TypeParam> model(c.source, random_detail(c));
     for (const ClusterId id : expandable(model, c.source)) {
@@ -179,7 +179,7 @@ TYPED_TEST(Multiresolution, CollapseIsTheInverseOfExpand) {
 // The order in which a set of clusters came to be expanded leaves no trace, nor does what was
 // expanded meanwhile, nor whether points came in bulk.
 TYPED_TEST(Multiresolution, OrderLeavesNoTrace) {
-  for (Case& c : cases(6)) {
+  for (Case& c : cases(15)) {
     TRACE(c);
     const WholeTree tree(c.source);
     const Detail goal = random_detail(c);

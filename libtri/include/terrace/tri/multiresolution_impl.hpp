@@ -177,6 +177,13 @@ void MultiresolutionModel<Triangulation>::remove_cluster(Slot cluster) {
 
 template <DynamicTriangulation Triangulation>
 void MultiresolutionModel<Triangulation>::insert_clusters(bool list_created) {
+  if (stage_.points.size() > kKeptPoints) {
+    const std::size_t vertices = triangulation_.vertex_count() + stage_.points.size();
+    owners_.reserve(vertices + 1);
+    if constexpr (requires { triangulation_.reserve(vertices); }) {
+      triangulation_.reserve(vertices);
+    }
+  }
   for (const Staged& staged : stage_.clusters) {
     const std::span<VertexId> vertices = tree_.vertices(staged.slot);
     const std::size_t size = vertices.size();

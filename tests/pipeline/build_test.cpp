@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// From a file to a store: the same bytes whatever the number of threads, within the memory granted,
+// and nothing left behind where the work fails.
+#include <cstdint>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <set>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <terrace/stream/error.hpp>
+#include <terrace/stream/geotiff_writer.hpp>
+#include <terrace/stream/store.hpp>
+#include <unistd.h>
+
+#include "store_build.hpp"
+#include "temporary_folder.hpp"
+
+namespace terrace {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string bytes_of(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+std::map<std::string, std::string> files_of(const fs::path& folder) {
+  std::map<std::string, std::string> files;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    if (entry.is_regular_file()) files[entry.path().filename().string()] = bytes_of(entry.path());
+  }
+  return files;
+}
+
+class Build : public testing::Test {
+ protected:
+  static constexpr std::uint32_t kSize = 700;
+
+  void SetUp() override {
+    stream::GeoTiffOptions options;
+    options.columns = options.rows = kSize;
+    options.sample.type = stream::ScalarType::i16;
+    options.world.xy = {30, 0, 500000, 0, -30, 5200000};
+    options.nodata = -1;
+    std::vector<std::int16_t> samples(kSize * kSize);
+    for (std::uint32_t row = 0; row < kSize; ++row) {
+      for (std::uint32_t column = 0; column < kSize; ++column) {
+        const bool lake = (column / 90 + row / 70) % 7 == 0;
+        samples[row * kSize + column] = static_cast<std::int16_t>(
+            lake ? -1 : 400 + (column * row) % 61 + (column * 7 + row * 3) % 37);
+        valid_ += lake ? 0 : 1;
+      }
+    }
+    stream::GeoTiffWriter writer(dem(), options);
+    writer.write_rows(std::as_bytes(std::span(samples)));
+    writer.commit();
+    request_.inputs = {dem().string()};
+    request_.store = folder_.path() / "a.store";
+  }
+
+  [[nodiscard]] fs::path dem() const { return folder_.path() / "dem.tif"; }
+
+  tests::TemporaryFolder folder_;
+  tools::BuildRequest request_;
+  std::uint64_t valid_ = 0;
+};
+
+TEST_F(Build, KeepsEveryValidCellOnceAndCountsTheOthers) {
+  const tools::BuildOutcome outcome = tools::build_store(request_);
+  EXPECT_EQ(outcome.points, valid_);
+  EXPECT_EQ(outcome.points + outcome.nodata, std::uint64_t{kSize} * kSize);
+  const stream::Store store = stream::Store::open(request_.store);
+  EXPECT_EQ(store.schema().nodata, outcome.nodata);
+  std::set<std::pair<double, double>> cells;
+  for (unsigned level = 0; level <= store.top(); ++level) {
+    store.for_each(level, [&](stream::ClusterId, const stream::ClusterRecord&,
+                              const stream::ClusterPoints& points) {
+      for (const stream::Point3& p : points.positions) {
+        EXPECT_TRUE(cells.emplace(p[0], p[1]).second) << p[0] << ", " << p[1] << " twice";
+      }
+    });
+  }
+  EXPECT_EQ(cells.size(), valid_);
+}
+
+TEST_F(Build, GivesTheSameBytesForAnyNumberOfThreads) {
+  tools::build_store(request_);
+  const auto one = files_of(request_.store);
+  for (const unsigned threads : {2u, 3u, 8u}) {
+    SCOPED_TRACE(threads);
+    request_.store = folder_.path() / std::to_string(threads);
+    request_.threads = threads;
+    tools::build_store(request_);
+    EXPECT_TRUE(files_of(request_.store) == one);
+  }
+}
+
+TEST_F(Build, RefusesAnOutputThatExistsAndKeepsIt) {
+  tools::build_store(request_);
+  const auto before = files_of(request_.store);
+  EXPECT_THROW(tools::build_store(request_), stream::Error);
+  EXPECT_TRUE(files_of(request_.store) == before);
+}
+
+TEST_F(Build, SaysWhatMemoryItNeeds) {
+  request_.memory_bytes = std::uint64_t{8} << 20;
+  try {
+    tools::build_store(request_);
+    FAIL() << "8 MiB were enough";
+  } catch (const stream::Error& error) {
+    EXPECT_NE(std::string(error.what()).find("need"), std::string::npos) << error.what();
+  }
+}
+
+TEST_F(Build, LeavesNothingWhenTheDiskIsFull) {
+  // A limit on the size of files stands in for a full disk: EFBIG where that says ENOSPC.
+  for (const rlim_t limit : {rlim_t{1}, rlim_t{5000}, rlim_t{60000}}) {
+    SCOPED_TRACE(limit);
+    const pid_t child = fork();
+    if (child == 0) {
+      const rlimit size{limit, limit};
+      setrlimit(RLIMIT_FSIZE, &size);
+      try {
+        tools::build_store(request_);
+        _exit(2);
+      } catch (const stream::Error&) {
+        _exit(0);
+      }
+    }
+    int status = 0;
+    ASSERT_EQ(waitpid(child, &status, 0), child);
+    EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << status;
+    std::set<std::string> left;
+    for (const auto& entry : fs::directory_iterator(folder_.path())) {
+      left.insert(entry.path().filename().string());
+    }
+    EXPECT_EQ(left, std::set<std::string>{"dem.tif"});
+  }
+}
+
+TEST_F(Build, RefusesARasterOfNodataOnly) {
+  stream::GeoTiffOptions options;
+  options.columns = options.rows = 20;
+  options.sample.type = stream::ScalarType::u8;
+  options.nodata = 0;
+  options.replace = true;
+  stream::GeoTiffWriter writer(dem(), options);
+  writer.write_rows(std::vector<std::byte>(400));
+  writer.commit();
+  EXPECT_THROW(tools::build_store(request_), stream::Error);
+  EXPECT_FALSE(fs::exists(request_.store));
+}
+
+}  // namespace
+}  // namespace terrace

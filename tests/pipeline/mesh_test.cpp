@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Meshes out of a store: a focus holds every point inside, the mesh covers the hull without
+// overlap, and a store in pieces gives the mesh of its points whatever they were clustered into.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <set>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <terrace/stream/error.hpp>
+#include <terrace/stream/geotiff_writer.hpp>
+#include <terrace/stream/store.hpp>
+
+#include "detail.hpp"
+#include "store_build.hpp"
+#include "store_mesh.hpp"
+#include "temporary_folder.hpp"
+
+namespace terrace {
+namespace {
+
+constexpr std::uint64_t kMuch = std::uint64_t{4} << 30;
+constexpr std::uint32_t kSize = 500;
+constexpr double kCell = 30, kLeft = 500000, kTop = 5200000;
+
+/// Twice the area of a triangle seen from above; positive when counter-clockwise.
+double doubled_area(const tools::TriangleMesh& mesh, const std::array<std::uint32_t, 3>& t) {
+  const auto &a = mesh.positions[t[0]], &b = mesh.positions[t[1]], &c = mesh.positions[t[2]];
+  return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+}
+
+/// Every edge lies in one triangle (the border) or in two, and all turn counter-clockwise.
+void expect_sound(const tools::TriangleMesh& mesh) {
+  std::map<std::pair<std::uint32_t, std::uint32_t>, int> edges;
+  for (const auto& t : mesh.triangles) {
+    ASSERT_GT(doubled_area(mesh, t), 0.0);
+    for (std::size_t i = 0; i < 3; ++i) ++edges[{t[i], t[(i + 1) % 3]}];
+  }
+  for (const auto& [edge, count] : edges) {
+    ASSERT_EQ(count, 1) << "an edge twice in the same direction: triangles overlap";
+  }
+}
+
+class Mesh : public testing::Test {
+ protected:
+  // One store for all tests: they only read.
+  static void SetUpTestSuite() {
+    folder_ = new tests::TemporaryFolder;
+    stream::GeoTiffOptions options;
+    options.columns = options.rows = kSize;
+    options.sample.type = stream::ScalarType::i16;
+    options.world.xy = {kCell, 0, kLeft, 0, -kCell, kTop};
+    std::vector<std::int16_t> samples;
+    for (std::uint32_t row = 0; row < kSize; ++row) {
+      for (std::uint32_t column = 0; column < kSize; ++column) {
+        samples.push_back(static_cast<std::int16_t>(
+            500 + 200 * std::sin(column / 40.0) + 150 * std::cos(row / 31.0) + (column * row) % 5));
+      }
+    }
+    stream::GeoTiffWriter writer(folder_->path() / "dem.tif", options);
+    writer.write_rows(std::as_bytes(std::span(samples)));
+    writer.commit();
+    tools::BuildRequest request;
+    request.inputs = {(folder_->path() / "dem.tif").string()};
+    request.store = folder_->path() / "dem.store";
+    request.block_points = 2000;  // more levels
+    tools::build_store(request);
+    store_ = new stream::Store(stream::Store::open(request.store));
+    ASSERT_GE(store_->top(), 2u);
+  }
+  static void TearDownTestSuite() {
+    delete store_;
+    delete folder_;
+  }
+
+  static tests::TemporaryFolder* folder_;
+  static stream::Store* store_;
+};
+tests::TemporaryFolder* Mesh::folder_ = nullptr;
+stream::Store* Mesh::store_ = nullptr;
+
+TEST_F(Mesh, OfALevelHasThePointsOfThatLevelAndAbove) {
+  for (unsigned level = 0; level <= store_->top(); ++level) {
+    SCOPED_TRACE(level);
+    const tools::TriangleMesh mesh =
+        mesh_of_store(*store_, tools::Detail::parse(*store_, std::to_string(level), "", {}), kMuch);
+    EXPECT_EQ(mesh.positions.size(), store_->levels()[level].points);
+    expect_sound(mesh);
+    for (const std::uint8_t l : mesh.levels) EXPECT_GE(l, level);
+  }
+}
+
+TEST_F(Mesh, OfLevelZeroIsTheGrid) {
+  const tools::TriangleMesh mesh =
+      mesh_of_store(*store_, tools::Detail::parse(*store_, "0", "", {}), kMuch);
+  EXPECT_EQ(mesh.positions.size(), std::size_t{kSize} * kSize);
+  EXPECT_EQ(mesh.triangles.size(), std::size_t{2} * (kSize - 1) * (kSize - 1));
+  double area = 0;
+  for (const auto& t : mesh.triangles) area += doubled_area(mesh, t) / 2;
+  EXPECT_EQ(area, (kSize - 1) * kCell * (kSize - 1) * kCell);
+}
+
+TEST_F(Mesh, HoldsEveryPointInsideAFocusAndFewOutside) {
+  // Columns 200 to 260, rows 100 to 160, borders on samples.
+  const std::string box = "506000,5195200,507800,5197000";
+  const tools::TriangleMesh mesh =
+      mesh_of_store(*store_, tools::Detail::parse(*store_, "top", "", {box + ":0"}), kMuch);
+  expect_sound(mesh);
+  std::set<std::pair<double, double>> inside;
+  for (const auto& p : mesh.positions) {
+    if (p[0] >= 506000 && p[0] <= 507800 && p[1] >= 5195200 && p[1] <= 5197000) {
+      inside.emplace(p[0], p[1]);
+    }
+  }
+  EXPECT_EQ(inside.size(), std::size_t{61} * 61);
+  EXPECT_LT(mesh.positions.size(), std::size_t{kSize} * kSize / 10);
+}
+
+TEST_F(Mesh, OfARegionIsThePartOfTheWholeThatReachesIn) {
+  const std::string box = "505003,5190001,507004,5192002";
+  const tools::TriangleMesh part =
+      mesh_of_store(*store_, tools::Detail::parse(*store_, "0", box, {}), kMuch);
+  expect_sound(part);
+  // At full resolution the region's triangles are grid triangles.
+  double inside = 0;
+  for (const auto& t : part.triangles) {
+    stream::Box3 bounds;
+    for (const std::uint32_t v : t) bounds.include(part.positions[v]);
+    EXPECT_TRUE(bounds.min[0] <= 507004 && bounds.max[0] >= 505003 && bounds.min[1] <= 5192002 &&
+                bounds.max[1] >= 5190001);
+    inside += doubled_area(part, t) / 2;
+  }
+  EXPECT_GE(inside, 2001.0 * 2001.0);
+  EXPECT_LE(inside, (2001.0 + 4 * kCell) * (2001.0 + 4 * kCell));
+}
+
+TEST_F(Mesh, SaysWhatMemoryItNeeds) {
+  try {
+    mesh_of_store(*store_, tools::Detail::parse(*store_, "0", "", {}), std::uint64_t{1} << 20);
+    FAIL() << "one MiB was enough";
+  } catch (const stream::Error& error) {
+    EXPECT_NE(std::string(error.what()).find("needs"), std::string::npos) << error.what();
+  }
+}
+
+TEST_F(Mesh, PointsOfTheSameDetailAreItsVertices) {
+  const tools::Detail detail =
+      tools::Detail::parse(*store_, "1", "", {"506000,5195200,507800,5197000:0"});
+  const tools::TriangleMesh mesh = mesh_of_store(*store_, detail, kMuch);
+  const tools::TriangleMesh cloud = points_of_store(*store_, detail);
+  std::vector<stream::Point3> a = mesh.positions, b = cloud.positions;
+  std::sort(a.begin(), a.end());
+  std::sort(b.begin(), b.end());
+  EXPECT_EQ(a, b);
+}
+
+}  // namespace
+}  // namespace terrace
