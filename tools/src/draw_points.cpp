@@ -155,7 +155,7 @@ void draw_points(const TriangleMesh& cloud, const std::vector<Rgb>& colours, con
           if (square > 1) continue;
           // Discs are a little vaulted, so that overlapping ones meet halfway between their
           // centres.
-          const float depth = s.depth - square * radius * 0.5F / static_cast<float>(camera.scale);
+          const float depth = s.depth - square * radius * 0.1F / static_cast<float>(camera.scale);
           if (!(depth > canvas.depth(x, y))) continue;
           canvas.depth(x, y) = depth;
           canvas.colour(x, y) = colour;
@@ -166,7 +166,9 @@ void draw_points(const TriangleMesh& cloud, const std::vector<Rgb>& colours, con
   if (own_normals) return;
   // A surface steeper than this, from sample to sample, is taken for two surfaces.
   const float step = 4 * (radius + 1) / static_cast<float>(camera.scale);
-  const int reach = std::max(1, static_cast<int>(std::lround(1.5F * radius)));
+  const int reach = std::max(1, static_cast<int>(std::lround(2 * radius)));
+  // Twice: the second pass takes away what the edges of the first one's squares leave.
+  smooth_depths(canvas, reach, step, options.threads);
   smooth_depths(canvas, reach, step, options.threads);
   light_by_depth(camera, light, step, options.threads, canvas);
 }
