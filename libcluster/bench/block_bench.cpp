@@ -131,7 +131,7 @@ void reference(benchmark::State& state, std::size_t which) {
     local_search(input.blocks[0], {}, 1.0, SearchLength::tenth, 1, clustering);
     benchmark::DoNotOptimize(clustering.assignment.data());
   }
-  state.SetItemsProcessed(static_cast<std::int64_t>(state.iterations() * kBlockSize));
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(kBlockSize));
 }
 
 }  // namespace

@@ -66,12 +66,17 @@ SearchPlan plan_of(const BlockOptions& options, std::size_t count) {
   const Effort effort = count < kFullBelow ? Effort::full : options.effort;
   switch (effort) {
     case Effort::fast:
-      plan.spacing = 2;
+      plan.candidates = 1.5f;
+      plan.most_spacing = 32;
       break;
     case Effort::standard:
+      plan.candidates = 3.0f;
+      plan.most_spacing = 32;
       plan.polish = 2;
       break;
     case Effort::fine:
+      plan.candidates = 4.0f;
+      plan.most_spacing = 16;
       plan.sweeps = 3;
       plan.polish = 3;
       break;

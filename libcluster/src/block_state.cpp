@@ -116,7 +116,10 @@ void BlockState::build_segments() {
     fz[kept] = fz[j];
     size[kept++] = size[j];
   }
-  for (std::uint32_t j = kept; j < facility_count; ++j) fx[j] = kFarAway;
+  for (std::uint32_t j = kept; j < facility_count; ++j) {
+    fx[j] = kFarAway;
+    reach[j] = 0;
+  }
   const bool renumbered = kept != facility_count;
   facility_count = kept;
 

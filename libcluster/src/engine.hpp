@@ -11,7 +11,8 @@ namespace terrace::cluster {
 struct SearchPlan {
   std::uint32_t random_candidates = 0;  ///< if not 0, instead of sweeps
   std::uint32_t sweeps = 1;             ///< along the curve
-  std::uint32_t spacing = 1;            ///< a factor: 2 considers half as many points per sweep
+  float candidates = 3.0f;              ///< per facility and sweep, at least
+  std::uint32_t most_spacing = 32;      ///< points from one candidate to the next
   std::uint32_t polish = 1;             ///< rounds of moving facilities and assigning all points
   std::uint64_t seed = 1;               ///< of the random candidates
 };
