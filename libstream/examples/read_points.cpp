@@ -49,7 +49,7 @@ int main(int argc, char** argv) {
     }
     std::printf("%s: %llu points\n", source->info().format.c_str(),
                 static_cast<unsigned long long>(points));
-    for (int axis = 0; axis < 3; ++axis) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
       std::printf("%c: %.3f to %.3f\n", "xyz"[axis], bounds.min[axis], bounds.max[axis]);
     }
     if (argc == 1) std::filesystem::remove(files[0]);

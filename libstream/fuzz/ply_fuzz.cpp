@@ -5,7 +5,7 @@
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace terrace::stream;
   const MemoryFile file(data, size);
-  const Reading large = read_through(file.name(), {.format = "ply"});
+  const Reading large = read_through(file.name(), {.format = "ply", .block_points = 500});
   const Reading small = read_through(file.name(), {.format = "ply", .block_points = 3});
   require(large == small, "the same points in blocks of any size");
   read_through(file.name(), {});

@@ -4,9 +4,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cerrno>
-#include <csignal>
 #include <cstring>
-#include <ctime>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -17,6 +15,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "file_size_signal.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::stream {
@@ -24,32 +23,6 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::size_t kBufferBytes = 1u << 20;
-
-/// Holds SIGXFSZ back on this thread, so that a write beyond RLIMIT_FSIZE fails with EFBIG instead
-/// of ending the process; takes back the signal that the failed write has left pending.
-class FileSizeSignalBlock {
- public:
-  FileSizeSignalBlock() {
-    sigemptyset(&set_);
-    sigaddset(&set_, SIGXFSZ);
-    pthread_sigmask(SIG_BLOCK, &set_, &before_);
-  }
-  ~FileSizeSignalBlock() {
-    const int error = errno;
-    if (sigismember(&before_, SIGXFSZ) == 0) {
-      const timespec at_once{};
-      while (sigtimedwait(&set_, nullptr, &at_once) == -1 && errno == EINTR) {
-      }
-    }
-    pthread_sigmask(SIG_SETMASK, &before_, nullptr);
-    errno = error;
-  }
-  FileSizeSignalBlock(const FileSizeSignalBlock&) = delete;
-  FileSizeSignalBlock& operator=(const FileSizeSignalBlock&) = delete;
-
- private:
-  sigset_t set_{}, before_{};
-};
 
 std::string remedy_for(int error_number) {
   switch (error_number) {

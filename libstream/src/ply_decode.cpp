@@ -9,6 +9,7 @@
 #include <type_traits>
 
 #include "number.hpp"
+#include "text.hpp"
 #include "with_type.hpp"
 
 namespace terrace::stream {
@@ -70,21 +71,22 @@ T load_native(const std::byte* raw) {
   return value;
 }
 
+bool ends_word(const char* at, const char* end) { return at == end || is_blank(*at); }
+
 template <class T>
-bool parse_integer(std::string_view text, T& value) {
-  const char* const end = text.data() + text.size();
-  const char* begin = text.data();
-  if (text.size() > 1 && text[0] == '+' && text[1] != '-') ++begin;
-  const auto [rest, error] = std::from_chars(begin, end, value);
-  if (error == std::errc{} && rest == end) return true;
+const char* parse_integer(const char* at, const char* end, T& value) {
+  if (end - at > 1 && at[0] == '+' && at[1] != '-') ++at;
+  const auto [rest, error] = std::from_chars(at, end, value);
+  if (error == std::errc{} && ends_word(rest, end)) return rest;
   // "3.0", "1e2": some programs print every number as a real one.
   double real = 0;
-  if (parse_real(begin, end, real) != end || real != std::trunc(real)) return false;
+  const char* const real_end = parse_real(at, end, real);
+  if (real_end == nullptr || real != std::trunc(real)) return nullptr;
   // Both limits are exact: the upper one is the power of two after the largest value.
   const double above = std::ldexp(1.0, std::numeric_limits<T>::digits);
-  if (!(real >= static_cast<double>(std::numeric_limits<T>::min()) && real < above)) return false;
+  if (!(real >= static_cast<double>(std::numeric_limits<T>::min()) && real < above)) return nullptr;
   value = static_cast<T>(real);
-  return true;
+  return real_end;
 }
 
 }  // namespace
@@ -114,18 +116,16 @@ std::int64_t to_integer(const std::byte* raw, ScalarType type) {
       type, [&](auto tag) { return static_cast<std::int64_t>(load_native<decltype(tag)>(raw)); });
 }
 
-bool parse_scalar(std::string_view text, ScalarType type, std::byte* raw) {
-  return with_type(type, [&](auto tag) {
-    auto value = tag;
-    bool good = false;
-    if constexpr (std::is_floating_point_v<decltype(tag)>) {
-      const char* const end = text.data() + text.size();
-      good = !text.empty() && parse_real(text.data(), end, value) == end;
+const char* parse_scalar(const char* at, const char* end, ScalarType type, std::byte* raw) {
+  return with_type(type, [&](auto value) {
+    const char* rest = nullptr;
+    if constexpr (std::is_floating_point_v<decltype(value)>) {
+      rest = parse_real(at, end, value);
     } else {
-      good = parse_integer(text, value);
+      rest = parse_integer(at, end, value);
     }
     std::memcpy(raw, &value, sizeof value);
-    return good;
+    return rest != nullptr && ends_word(rest, end) ? rest : nullptr;
   });
 }
 

@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <string_view>
 
 #include "terrace/stream/point.hpp"
 #include "terrace/stream/source.hpp"
@@ -29,8 +28,9 @@ double to_double(const std::byte* raw, ScalarType type);
 /// The value of an integer type at `raw`; negative ones keep their sign, uint64 wraps to negative.
 std::int64_t to_integer(const std::byte* raw, ScalarType type);
 
-/// Reads the number in `text` as `type` and stores it at `raw`. Integers may be written like "3.0".
-/// False if it is no number of that type's range.
-bool parse_scalar(std::string_view text, ScalarType type, std::byte* raw);
+/// Reads the number that starts at `at` as `type` and stores it at `raw`. Integers may be written
+/// like "3.0". Returns the place after it, or null if what stands before the next blank or `end` is
+/// no number of that type's range.
+const char* parse_scalar(const char* at, const char* end, ScalarType type, std::byte* raw);
 
 }  // namespace terrace::stream

@@ -261,17 +261,18 @@ class PlySource final : public PointSource {
          "the file is damaged or its header is wrong");
   }
 
-  /// Takes the first word of `line` as a value of `type`.
+  /// Takes the first word of `line` as a value of `type`, and the blanks after it.
   void read_word(std::string_view& line, ScalarType type, const PlyProperty& property,
                  std::byte* raw) const {
-    const std::size_t length = std::min(line.find_first_of(" \t"), line.size());
-    const std::string_view word = line.substr(0, length);
-    if (!parse_scalar(word, type, raw)) {
+    const char* const end = line.data() + line.size();
+    const char* const rest = parse_scalar(line.data(), end, type, raw);
+    if (rest == nullptr) {
+      const std::string_view word = line.substr(0, line.find_first_of(" \t"));
       fail_line(word.empty() ? "the line ends before property " + quoted(property.name)
                              : quoted(word) + " is no " + std::string(name_of(type)) +
                                    " for property " + quoted(property.name));
     }
-    line = trim_left(line.substr(length));
+    line = trim_left({rest, static_cast<std::size_t>(end - rest)});
   }
 
   std::byte* attribute_at(PointBlock& block, const Field& field, std::size_t i) const {

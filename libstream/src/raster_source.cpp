@@ -90,17 +90,19 @@ class RasterSource final : public PointSource {
     }
     const std::size_t cells = window_.columns * window_.rows;
     const ScalarType type = raster_->info().sample.type;
+    std::fill_n(valid_.begin(), dirty_cells_, std::uint8_t{0});
+    dirty_cells_ = 0;
     if (valid_.size() < cells) {
+      valid_.resize(cells);
       samples_.resize(cells * size_of(type));
-      valid_.assign(cells, 0);
-    } else if (dirty_) {
-      std::fill_n(valid_.begin(), cells, std::uint8_t{0});
     }
     next_tile_ = 0;
     order_.clear();
-    dirty_ = raster_->read_over(
+    dirty_cells_ = cells;  // even if reading throws
+    const bool any = raster_->read_over(
         window_, {.samples = samples_.data(), .valid = valid_.data(), .stride = window_.columns});
-    if (!dirty_) {
+    if (!any) {
+      dirty_cells_ = 0;
       progress_.nodata += cells;
       advance_progress(cells);
       return true;
@@ -186,7 +188,7 @@ class RasterSource final : public PointSource {
   CellWindow window_;
   std::vector<std::byte> samples_;  // of the window
   std::vector<std::uint8_t> valid_;
-  bool dirty_ = false;  // valid_ has ones
+  std::size_t dirty_cells_ = 0;  // so many at the front of valid_ may not be zero
   GridSize tiles_;
   std::vector<std::uint32_t> order_;  // of the window's tiles
   std::size_t next_tile_ = 0;

@@ -5,11 +5,6 @@
 
 namespace terrace::stream {
 
-std::string_view trim_left(std::string_view line) {
-  while (!line.empty() && is_blank(line.front())) line.remove_prefix(1);
-  return line;
-}
-
 std::string_view trim(std::string_view line) {
   line = trim_left(line);
   while (!line.empty() && is_blank(line.back())) line.remove_suffix(1);

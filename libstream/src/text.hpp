@@ -11,7 +11,10 @@ namespace terrace::stream {
 inline bool is_blank(char c) { return c == ' ' || c == '\t'; }
 
 /// `line` from its first character that is no blank.
-std::string_view trim_left(std::string_view line);
+inline std::string_view trim_left(std::string_view line) {
+  while (!line.empty() && is_blank(line.front())) line.remove_prefix(1);
+  return line;
+}
 /// `line` without the blanks at both ends.
 std::string_view trim(std::string_view line);
 /// The fields of a line, blanks around them removed. The separator ' ' stands for runs of blanks.

@@ -42,7 +42,7 @@ class Counting final : public PointSource {
 };
 
 TEST(ReadAhead, DeliversTheSameStream) {
-  for (const std::size_t ahead : {0, 1, 2, 8, 1000}) {
+  for (const std::size_t ahead : {0u, 1u, 2u, 8u, 1000u}) {
     for (const int blocks : {0, 1, 7, 500}) {
       const auto source = read_ahead(std::make_unique<Counting>(blocks, false), ahead);
       EXPECT_EQ(source->info().format, "counting");

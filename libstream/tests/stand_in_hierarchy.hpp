@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -12,7 +13,8 @@
 namespace terrace::stream::testing {
 
 /// A stand-in for the hierarchy builder: clusters blocks by the nearest of evenly strided seeds and
-/// pushes them into a store, level by level. Good clusters are not its aim, a valid hierarchy is.
+/// hands them on, level by level, the root last. Good clusters are not its aim, a valid hierarchy
+/// is.
 class StandInHierarchy {
  public:
   struct Options {
@@ -21,8 +23,20 @@ class StandInHierarchy {
     std::array<double, 3> scale{1, 1, 1};  ///< to ground units
   };
 
+  using Sink = std::function<void(const ClusteredBlock&)>;
+
+  StandInHierarchy(std::size_t payload_size, Options options, Sink sink)
+      : sink_(std::move(sink)), options_(options), stride_(payload_size) {}
+
   StandInHierarchy(StoreWriter& writer, Options options)
-      : writer_(writer), options_(std::move(options)), stride_(writer.schema().payload_size()) {}
+      : StandInHierarchy(writer.schema().payload_size(), options,
+                         [&writer, this](const ClusteredBlock& block) {
+                           if (block.representatives[0] == UINT32_MAX) {
+                             bytes_ = writer.finish(block);
+                           } else {
+                             writer.append(writer.encode(block));
+                           }
+                         }) {}
 
   /// One block of level 0.
   void push(std::span<const Point3> positions, std::span<const std::byte> payload = {}) {
@@ -33,7 +47,7 @@ class StandInHierarchy {
     add(0, std::move(points));
   }
 
-  /// Returns the bytes of the store.
+  /// Returns the bytes of the store, if it was one.
   std::uint64_t finish() {
     if (levels_.empty()) levels_.resize(1), closed_.resize(1);
     // The top is the first level that was never closed.
@@ -52,14 +66,15 @@ class StandInHierarchy {
       all.box.include(s.box);
       all.descendants += s.descendants;
     }
-    return writer_.finish({.level = top,
-                           .positions = points.positions,
-                           .payload = points.payload,
-                           .children = points.children,
-                           .first = first,
-                           .order = order,
-                           .representatives = {&none, 1},
-                           .summaries = {&all, 1}});
+    sink_({.level = top,
+           .positions = points.positions,
+           .payload = points.payload,
+           .children = points.children,
+           .first = first,
+           .order = order,
+           .representatives = {&none, 1},
+           .summaries = {&all, 1}});
+    return bytes_;
   }
 
  private:
@@ -157,15 +172,16 @@ class StandInHierarchy {
       representatives.push_back(nearest);
       summaries.push_back(summary);
     }
-    const std::uint64_t ordinal = writer_.clusters(level);
-    writer_.append(writer_.encode({.level = level,
-                                   .positions = points.positions,
-                                   .payload = points.payload,
-                                   .children = points.children,
-                                   .first = first,
-                                   .order = order,
-                                   .representatives = representatives,
-                                   .summaries = summaries}));
+    const std::uint64_t ordinal = clusters_[level];
+    clusters_[level] += clusters.size();
+    sink_({.level = level,
+           .positions = points.positions,
+           .payload = points.payload,
+           .children = points.children,
+           .first = first,
+           .order = order,
+           .representatives = representatives,
+           .summaries = summaries});
 
     Points up;
     for (std::size_t c = 0; c < representatives.size(); ++c) {
@@ -181,7 +197,9 @@ class StandInHierarchy {
     add(level + 1, std::move(up));
   }
 
-  StoreWriter& writer_;
+  Sink sink_;
+  std::array<std::uint64_t, 64> clusters_{};
+  std::uint64_t bytes_ = 0;
   Options options_;
   std::size_t stride_;
   std::vector<Points> levels_;

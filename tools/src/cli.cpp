@@ -70,7 +70,8 @@ const Verb& find_verb(const std::string& name) {
   throw UsageError("there is no verb '" + name + "'; `terrace --help` lists them");
 }
 
-void add_common_options(CLI::App& app, CommonOptions& common, std::string& memory) {
+void add_common_options(CLI::App& app, CommonOptions& common, std::string& memory,
+                        std::string& seed) {
   const std::string group = "Common options";
   app.add_option("--threads", common.threads, "Threads; never changes results (default: all cores)")
       ->check(CLI::Range(1U, 4096U))
@@ -79,8 +80,7 @@ void add_common_options(CLI::App& app, CommonOptions& common, std::string& memor
   app.add_option("--memory", memory, "Most memory to use: 256M, 2G; never changes results")
       ->group(group)
       ->type_name("SIZE");
-  app.add_option("--seed", common.seed, "Same input, options and seed give the same bytes")
-      ->capture_default_str()
+  app.add_option("--seed", seed, "Same input, options and seed give the same bytes (default: 1)")
       ->group(group)
       ->type_name("N");
   app.add_flag("--json", common.json, "Print the summary as one JSON object on standard output")
@@ -111,10 +111,10 @@ int run_verb(const Verb& verb, std::vector<std::string> arguments) {
 
   CommonOptions common;
   common.threads = std::max(1U, std::thread::hardware_concurrency());
-  std::string memory;
+  std::string memory, seed;
   const std::unique_ptr<Command> command = verb.create();
   command->define(app);
-  add_common_options(app, common, memory);
+  add_common_options(app, common, memory, seed);
 
   try {
     std::reverse(arguments.begin(), arguments.end());  // as CLI11 takes them
@@ -126,6 +126,7 @@ int run_verb(const Verb& verb, std::vector<std::string> arguments) {
     throw UsageError(std::string(error.what()) + "; `terrace " + verb.name + " --help` tells more");
   }
   if (!memory.empty()) common.memory_bytes = parse_memory(memory);
+  if (!seed.empty()) common.seed = parse_count(seed);
   if (common.quiet && common.progress == ProgressMode::automatic) {
     common.progress = ProgressMode::none;
   }

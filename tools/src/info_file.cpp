@@ -3,6 +3,8 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <memory>
+#include <utility>
 
 #include "info.hpp"
 #include "interrupt.hpp"
@@ -72,8 +74,9 @@ std::uint64_t bytes_of(const std::vector<std::string>& files) {
 
 Summary info_of_file(const std::string& path, const CommonOptions& common) {
   const std::array<std::string, 1> files{path};
-  const std::unique_ptr<stream::PointSource> source =
-      stream::read_ahead(stream::open_source(files));
+  std::unique_ptr<stream::PointSource> source = stream::open_source(files);
+  // Standard input is read by this thread, which Ctrl-C reaches.
+  if (path != "-") source = stream::read_ahead(std::move(source));
   const Contents contents = stream_through(*source, common);
   const stream::SourceInfo& info = source->info();
   const stream::Channel& z = info.coordinates[2];

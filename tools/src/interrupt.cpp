@@ -18,6 +18,8 @@ extern "C" void on_stop_signal(int signal) {
     ::raise(signal);
   }
   stop_requested = 1;
+  // A read that waits for a terminal or a pipe is tried again after a signal; now it fails.
+  ::close(STDIN_FILENO);
 }
 
 }  // namespace

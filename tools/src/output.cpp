@@ -30,8 +30,12 @@ bool is_number_table(std::string_view bytes, bool whole_file) {
     return is_number_char(c) || std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' ||
            c == '#' || c == '"';
   };
+  // A first line of names needs numbers below it; alone it may be a letter's.
+  const bool names = !std::all_of(
+      bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(first_end), is_number_char);
   const std::string_view head = bytes.substr(0, first_end);
   const std::string_view body = bytes.substr(first_end);
+  if (names && body.find_first_of("0123456789") == std::string_view::npos) return false;
   return std::all_of(head.begin(), head.end(), is_name_char) &&
          std::all_of(body.begin(), body.end(), is_number_char);
 }

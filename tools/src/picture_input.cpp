@@ -59,7 +59,7 @@ PictureInput from_mesh(MeshFile file) {
   placement.crs.horizontal_unit = geographic ? "degree" : "metre";
   input.mesh = std::move(file.mesh);
   put_on_ground(input, placement, Ground(placement));
-  if (geographic) input.assumption = "x and y are taken for longitude and latitude";
+  if (geographic) input.guess = "x and y are taken for longitude and latitude";
   return input;
 }
 

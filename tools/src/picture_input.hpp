@@ -25,7 +25,8 @@ struct PictureInput {
   TriangleMesh mesh;            ///< positions in metres about the middle of the whole
   std::vector<double> heights;  ///< of the vertices, in the source's unit
   bool terrain = false;         ///< a height field for certain; else the mesh tells
-  std::string assumption;       ///< what had to be assumed, to be told to the user
+  std::string guess;            ///< what changes the picture and was guessed
+  std::string assumption;       ///< what had to be assumed of units
 };
 
 /// Reads a store, a raster (reduced to about four cells per pixel), a mesh, or a cloud of points.

@@ -60,35 +60,39 @@ void pack(const stream::PointBlock& block, std::size_t payload_size,
   }
 }
 
-/// How the peak resident set is shared out. The estimate of what is fixed is generous; a test holds
-/// the whole to --memory.
-struct MemoryPlan {
-  std::uint64_t source = 0;
-  std::size_t blocks_ahead = 0;
+/// What the source may hold: the same whatever --memory says, since the order of a raster's tiles
+/// depends on how much of it is read at once and results must not.
+constexpr std::uint64_t kSourceMemory = std::uint64_t{64} << 20;
+constexpr std::size_t kBlocksAhead = 4;
 
-  MemoryPlan(const BuildRequest& request, std::size_t payload_size) {
-    const std::uint64_t point = sizeof(stream::Point3) + payload_size + 64;
-    const std::uint64_t block = request.block_points * point;
-    // Blocks being clustered or waiting their turn, one forming per level, and those that the store
-    // writer holds back to train its tables.
-    const std::uint64_t fixed =
-        (std::uint64_t{48} << 20) + (8 * request.threads + 8) * block +
-        64 * request.block_points * (sizeof(stream::Point3) + payload_size + 16);
-    const std::uint64_t least = fixed + (std::uint64_t{16} << 20);
-    if (request.memory_bytes < least) {
-      throw stream::Error({.file = request.store.string(),
-                           .where = {},
-                           .cause = "--memory " + std::to_string(request.memory_bytes >> 20) +
-                                    "M is not enough: blocks of " +
-                                    std::to_string(request.block_points) + " points on " +
-                                    std::to_string(request.threads) + " threads need " +
-                                    std::to_string((least >> 20) + 1) + "M",
-                           .remedy = "raise --memory or lower --block or --threads"});
-    }
-    blocks_ahead = 4;
-    source = (request.memory_bytes - fixed) / 2;
+/// Bytes at the peak with so many threads: a generous estimate; a benchmark prints the true peak.
+std::uint64_t memory_needed(const BuildRequest& request, std::size_t payload_size,
+                            std::uint64_t threads) {
+  const std::uint64_t point = sizeof(stream::Point3) + payload_size;
+  // Blocks read ahead, being clustered or waiting their turn, one forming per level, with what is
+  // worked out per point beside them; and those that the store writer holds back to train its
+  // tables.
+  const std::uint64_t blocks =
+      (8 * threads + 8 + kBlocksAhead) * request.block_points * (point + 64) +
+      64 * request.block_points * (point + 16);
+  return kSourceMemory + (std::uint64_t{32} << 20) + blocks;
+}
+
+/// As many threads as were asked for and fit into --memory: their number changes no result.
+/// Throws: stream::Error if not even one does.
+unsigned threads_within_memory(const BuildRequest& request, std::size_t payload_size) {
+  for (unsigned threads = request.threads; threads > 0; --threads) {
+    if (memory_needed(request, payload_size, threads) <= request.memory_bytes) return threads;
   }
-};
+  const std::uint64_t needed = memory_needed(request, payload_size, 1);
+  throw stream::Error({.file = request.store.string(),
+                       .where = {},
+                       .cause = "--memory " + std::to_string(request.memory_bytes >> 20) +
+                                "M is not enough: blocks of " +
+                                std::to_string(request.block_points) + " points need " +
+                                std::to_string((needed >> 20) + 1) + "M",
+                       .remedy = "raise --memory or lower --block"});
+}
 
 std::size_t payload_size(const stream::SourceInfo& info) {
   std::size_t bytes = 0;
@@ -126,7 +130,7 @@ BuildOutcome build_store(const BuildRequest& request, const BuildProgress& progr
   stream::SourceOptions source_options;
   source_options.format = request.input_format;
   source_options.block_points = request.block_points;
-  source_options.memory_bytes = request.memory_bytes / 8;
+  source_options.memory_bytes = kSourceMemory;
   source_options.band = request.band;
   source_options.crs = request.crs;
   auto source = stream::open_source(request.inputs, source_options);
@@ -134,14 +138,13 @@ BuildOutcome build_store(const BuildRequest& request, const BuildProgress& progr
   const Ground ground(placement_of(info), request.z_weight);
   BuildOutcome outcome;
   if (!ground.assumption().empty()) outcome.notes.push_back(ground.assumption());
-  const MemoryPlan memory(request, payload_size(info));
+  const unsigned threads = threads_within_memory(request, payload_size(info));
   if (info.grid) {
     // Tiles are to be square on the ground: only now is it known what a cell measures there.
     source_options.cell_aspect = cell_aspect(ground, info);
-    source_options.memory_bytes = memory.source;
     source = stream::open_source(request.inputs, source_options);
   }
-  source = stream::read_ahead(std::move(source), memory.blocks_ahead);
+  source = stream::read_ahead(std::move(source), kBlocksAhead);
 
   const stream::Schema schema = schema_of(source->info(), request);
   stream::StoreWriter writer(request.store, schema, request.replace);
@@ -152,7 +155,7 @@ BuildOutcome build_store(const BuildRequest& request, const BuildProgress& progr
   options.block.effort = request.effort;
   options.block.seed = request.seed;
   options.payload_size = schema.payload_size();
-  options.threads = request.threads;
+  options.threads = threads;
   options.ground = [&ground](const cluster::Bounds& bounds) {
     return ground.map({bounds.min, bounds.max});
   };

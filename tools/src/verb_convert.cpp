@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // convert: a stream of points from one format to another.
 #include <array>
-#include <filesystem>
+#include <memory>
+#include <utility>
 
 #include <CLI/CLI.hpp>
 
@@ -38,7 +39,9 @@ class ConvertCommand : public Command {
     const std::array<std::string, 1> files{input_};
     stream::SourceOptions options;
     options.format = input_format_;
-    const auto source = stream::read_ahead(stream::open_source(files, options));
+    std::unique_ptr<stream::PointSource> source = stream::open_source(files, options);
+    // Standard input is read by this thread, which Ctrl-C reaches.
+    if (input_ != "-") source = stream::read_ahead(std::move(source));
     const stream::SourceInfo& info = source->info();
     const auto writer = stream::open_point_writer(
         output_, {.attributes = info.attributes, .comments = {kWriterMark}},

@@ -85,7 +85,8 @@ class RenderCommand : public Command {
 
     selection_.triangles = wire_;
     PictureInput input = read_picture_input(input_, selection_, size, common);
-    if (!input.assumption.empty()) common.say(input_ + ": " + input.assumption);
+    if (!input.guess.empty()) common.say(input_ + ": " + input.guess);
+    if (!input.assumption.empty()) common.explain(input_ + ": " + input.assumption);
     check_interrupt();
     TriangleMesh& mesh = input.mesh;
     if (mesh.positions.empty()) {

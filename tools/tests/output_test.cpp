@@ -38,7 +38,7 @@ TEST_F(MayReplace, ForceTakesMarkedFilesAndNumberTablesOnly) {
   for (const char* foreign : {"ply\nformat ascii 1.0\n", "#!/bin/sh\necho 1\n",
                               "\x7F"
                               "ELF",
-                              "Dear diary,\ntoday 1 2 3\n"}) {
+                              "Dear diary,\ntoday 1 2 3\n", "Dear friend, no points here.\n"}) {
     write(foreign);
     EXPECT_THROW(may_replace(path_, true), stream::Error) << foreign;
   }

@@ -12,7 +12,7 @@
 namespace terrace::stream::store {
 
 template <class Coder>
-void code_symbol(Coder& coder, unsigned context, unsigned& symbol) {
+TERRACE_STORE_INLINE void code_symbol(Coder& coder, unsigned context, unsigned& symbol) {
   if constexpr (Coder::kDecoding) {
     symbol = coder.symbol(context);
   } else {
@@ -22,7 +22,7 @@ void code_symbol(Coder& coder, unsigned context, unsigned& symbol) {
 
 /// Returns the class of the number.
 template <class Coder>
-unsigned code_number(Coder& coder, unsigned context, std::uint64_t& value) {
+TERRACE_STORE_INLINE unsigned code_number(Coder& coder, unsigned context, std::uint64_t& value) {
   if constexpr (Coder::kDecoding) {
     const unsigned c = coder.symbol(context);
     value = kClassRange[c].base + coder.raw(kClassRange[c].bits);
@@ -35,19 +35,10 @@ unsigned code_number(Coder& coder, unsigned context, std::uint64_t& value) {
   }
 }
 
-template <class Coder>
-void code_raw(Coder& coder, std::uint64_t& value, unsigned bits) {
-  if constexpr (Coder::kDecoding) {
-    value = coder.raw(bits);
-  } else {
-    coder.raw(value, bits);
-  }
-}
-
 /// A number known to be below `size` (>= 1), every value costing the same but for a bit
 /// (truncated binary).
 template <class Coder>
-void code_uniform(Coder& coder, std::uint64_t& value, std::uint64_t size) {
+TERRACE_STORE_INLINE void code_uniform(Coder& coder, std::uint64_t& value, std::uint64_t size) {
   const unsigned bits = static_cast<unsigned>(std::bit_width(size)) - 1;
   const std::uint64_t power = std::uint64_t{1} << bits;
   const std::uint64_t shorter = power - (size - power);  // this many values take `bits` bits

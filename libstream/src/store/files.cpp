@@ -8,6 +8,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "../file_size_signal.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::stream::store {
@@ -50,6 +51,7 @@ void OutputFile::write(ByteView bytes) {
 }
 
 void OutputFile::flush() {
+  const FileSizeSignalBlock no_signal;
   const std::uint8_t* next = buffer_.data();
   std::size_t left = buffer_.size();
   while (left > 0) {
@@ -64,6 +66,7 @@ void OutputFile::flush() {
 
 void OutputFile::finish() {
   flush();
+  const FileSizeSignalBlock no_signal;
   if (::fsync(fd_.get()) != 0) throw failed(path_, "cannot sync");
   if (::close(fd_.release()) != 0) throw failed(path_, "cannot close");
 }

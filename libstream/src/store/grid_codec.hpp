@@ -45,8 +45,9 @@ class GridCodec {
 
   /// The cells, in the order of rows and columns. Decoding fills x and y with n cells.
   template <class Coder>
-  void positions(Coder& coder, std::uint32_t width, std::uint32_t height, std::uint32_t n,
+  void positions(Coder& shared, std::uint32_t width, std::uint32_t height, std::uint32_t n,
                  std::uint64_t* x, std::uint64_t* y) {
+    typename Coder::Local coder = shared;
     if constexpr (Coder::kDecoding) start(width, height);
     cells_.resize(n);
     std::uint32_t found = 0;
@@ -97,16 +98,18 @@ class GridCodec {
     }
     if (found != n) throw Damage("a cluster has too few cells");
     find_patterns(height);
+    if constexpr (Coder::kDecoding) shared = coder;
   }
 
   /// The heights of the cells, in [0, size). Encoding has them from `place`, decoding fills z.
   template <class Coder>
-  void heights(Coder& coder, const Predictor& predictor, std::uint64_t size, std::uint64_t* z) {
+  void heights(Coder& shared, const Predictor& predictor, std::uint64_t size, std::uint64_t* z) {
     if (size == 1) {
       if constexpr (Coder::kDecoding) std::fill(z, z + cells_.size(), 0);
       return;
     }
     const auto most = static_cast<std::int64_t>(std::min<std::uint64_t>(size - 1, INT64_MAX));
+    typename Coder::Local coder = shared;
     const std::ptrdiff_t up = stride_;
     std::int64_t last = most / 2;
     std::size_t i = 0;
@@ -152,6 +155,7 @@ class GridCodec {
       last = *at;
       ++i;
     }
+    if constexpr (Coder::kDecoding) shared = coder;
   }
 
   /// Training: enters the cells of `positions` into the least squares.

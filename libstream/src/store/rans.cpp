@@ -27,6 +27,10 @@ void fill_decode_table(const Frequencies& frequencies, DecodeTable& table) {
   assert(slot == kScale);
 }
 
+void SymbolDecoder::throw_bad_symbol() {
+  throw Damage("a cluster has a symbol that does not exist");
+}
+
 void SymbolEncoder::finish(Bytes& out, std::uint32_t last) {
   if (tables_.empty()) return;
   assert(last < kLow);

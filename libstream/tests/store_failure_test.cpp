@@ -1,0 +1,385 @@
+// SPDX-License-Identifier: Apache-2.0
+// What must not happen: half-written stores that open, damage that goes unnoticed, strangers' files
+// removed.
+#include <csignal>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <random>
+#include <string>
+#include <thread>
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/file.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "stand_in_hierarchy.hpp"
+#include "store_inputs.hpp"
+#include "store_testing.hpp"
+#include "terrace/stream/error.hpp"
+#include "terrace/stream/store.hpp"
+
+namespace terrace::stream {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::StandInHierarchy;
+using testing::TemporaryFolder;
+
+std::string bytes_of(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+void write_bytes(const fs::path& file, const std::string& bytes) {
+  std::ofstream(file, std::ios::binary) << bytes;
+}
+
+/// One byte in place: rewriting whole files would wait for the disk each time.
+void overwrite(const fs::path& file, std::size_t at, char byte) {
+  std::fstream out(file, std::ios::binary | std::ios::in | std::ios::out);
+  out.seekp(static_cast<std::streamoff>(at));
+  out.put(byte);
+}
+
+std::map<std::string, std::string> files_of(const fs::path& folder) {
+  std::map<std::string, std::string> files;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    files[entry.path().filename().string()] = bytes_of(entry.path());
+  }
+  return files;
+}
+
+std::vector<std::string> names_in(const fs::path& folder) {
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    names.push_back(entry.path().filename().string());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+void write_small(const fs::path& path, std::uint64_t seed, bool replace = false) {
+  StoreWriter writer(path, testing::grid_schema(ScalarType::i16), replace);
+  StandInHierarchy hierarchy(writer,
+                             {.block_points = 100, .cluster_points = 10, .scale = {1, 1, 1}});
+  for (const auto& block :
+       testing::grid_blocks(ScalarType::i16, testing::Relief::fractal, 24, 20, 10, seed)) {
+    hierarchy.push(block.positions);
+  }
+  hierarchy.finish();
+}
+
+/// The words of the Error that `action` throws; empty if it throws none.
+template <class Action>
+std::string error_of(Action&& action) {
+  try {
+    action();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return {};
+}
+
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+TEST(StoreDamage, EveryFlippedBitIsFound) {
+  const TemporaryFolder folder;
+  const auto path = folder.path() / "s";
+  write_small(path, 1);
+  for (const auto& [name, bytes] : files_of(path)) {
+    // Every bit of the first and last part; one bit of every byte between.
+    for (std::size_t at = 0; at < bytes.size(); ++at) {
+      const bool edge = at < 200 || at + 200 > bytes.size();
+      for (unsigned bit = edge ? 0 : at % 8; bit < (edge ? 8 : at % 8 + 1); ++bit) {
+        const char damaged = static_cast<char>(bytes[at] ^ (1 << bit));
+        overwrite(path / name, at, damaged);
+        bool found = false;
+        try {
+          const Store store = Store::open(path);
+          std::size_t problems = 0;
+          const bool good = store.verify([&](const Problem& problem) {
+            ++problems;
+            EXPECT_FALSE(problem.file.empty());
+            EXPECT_FALSE(problem.what.empty());
+          });
+          EXPECT_EQ(good, problems == 0);
+          found = !good;
+        } catch (const Error&) {
+          found = true;
+        }
+        ASSERT_TRUE(found) << name << ", byte " << at << ", bit " << bit;
+      }
+      overwrite(path / name, at, bytes[at]);
+    }
+  }
+  EXPECT_TRUE(Store::open(path).verify(testing::expect_no_problem));
+}
+
+TEST(StoreDamage, ReadingDamagedClustersThrows) {
+  const TemporaryFolder folder;
+  const auto path = folder.path() / "s";
+  write_small(path, 2);
+  const auto file = path / "level-0.0.clusters";
+  const std::string bytes = bytes_of(file);
+  for (std::size_t at = 0; at < bytes.size(); at += 3) {
+    overwrite(file, at, static_cast<char>(bytes[at] ^ 0x10));
+    const Store store = Store::open(path);
+    EXPECT_TRUE(contains(error_of([&] { testing::all_points(store); }), "checksum")) << at;
+    overwrite(file, at, bytes[at]);
+  }
+}
+
+TEST(StoreDamage, TruncatedAndMissingFilesAreNamed) {
+  const TemporaryFolder folder;
+  const auto path = folder.path() / "s";
+  write_small(path, 3);
+  for (const auto& [name, bytes] : files_of(path)) {
+    if (bytes.empty()) continue;
+    write_bytes(path / name, bytes.substr(0, bytes.size() / 2));
+    EXPECT_TRUE(contains(error_of([&] { Store::open(path); }), name)) << name;
+    fs::remove(path / name);
+    EXPECT_FALSE(error_of([&] { Store::open(path); }).empty()) << name;
+    write_bytes(path / name, bytes);
+  }
+  EXPECT_TRUE(contains(error_of([&] { Store::open(folder.path()); }), "no store"));
+}
+
+TEST(StoreDamage, NewerVersionAsksForAnUpdate) {
+  const TemporaryFolder folder;
+  const auto path = folder.path() / "s";
+  write_small(path, 4);
+  std::string text = bytes_of(path / "manifest.json");
+  const std::size_t at = text.find("\"version\": 1");
+  ASSERT_NE(at, std::string::npos);
+  write_bytes(path / "manifest.json", text.replace(at, 12, "\"version\": 2"));
+  const std::string words = error_of([&] { Store::open(path); });
+  EXPECT_TRUE(contains(words, "newer terrace")) << words;
+  EXPECT_TRUE(contains(words, "update")) << words;
+}
+
+TEST(StoreDamage, WrongOrdinalsAndLevelsAreErrors) {
+  const TemporaryFolder folder;
+  const auto path = folder.path() / "s";
+  write_small(path, 5);
+  const Store store = Store::open(path);
+  ClusterPoints points;
+  EXPECT_FALSE(error_of([&] {
+                 static_cast<void>(store.record(cluster_id(0, store.levels()[0].clusters)));
+               }).empty());
+  EXPECT_FALSE(error_of([&] { store.read(cluster_id(store.top() + 1, 0), points); }).empty());
+}
+
+TEST(StoreWriting, ExistingOutputsAreRefused) {
+  const TemporaryFolder folder;
+  const auto path = folder.path() / "s";
+  write_small(path, 6);
+  const auto before = files_of(path);
+  EXPECT_TRUE(contains(error_of([&] { write_small(path, 7); }), "exists"));
+  EXPECT_EQ(files_of(path), before);
+  write_small(path, 7, /*replace=*/true);
+  EXPECT_NE(files_of(path), before);
+  EXPECT_TRUE(Store::open(path).verify(testing::expect_no_problem));
+
+  fs::create_directory(folder.path() / "other");
+  write_bytes(folder.path() / "other" / "precious", "1");
+  EXPECT_TRUE(
+      contains(error_of([&] { write_small(folder.path() / "other", 7, true); }), "not a store"));
+  write_bytes(folder.path() / "file", "1");
+  EXPECT_TRUE(
+      contains(error_of([&] { write_small(folder.path() / "file", 7, true); }), "not a store"));
+  EXPECT_EQ(bytes_of(folder.path() / "other" / "precious"), "1");
+  EXPECT_EQ(names_in(folder.path()), (std::vector<std::string>{"file", "other", "s"}));
+}
+
+TEST(StoreWriting, OfTwoWritersTheFirstToFinishWins) {
+  const TemporaryFolder folder;
+  const auto path = folder.path() / "s";
+  StoreWriter first(path, testing::cloud_schema()), second(path, testing::cloud_schema());
+  StandInHierarchy a(first, {}), b(second, {});
+  a.push(std::vector<Point3>{{1, 2, 3}});
+  b.push(std::vector<Point3>{{4, 5, 6}});
+  b.finish();
+  EXPECT_TRUE(contains(error_of([&] { a.finish(); }), "exists"));
+  EXPECT_EQ(testing::all_points(Store::open(path)), (testing::PointBag{{{4, 5, 6}, {}}}));
+}
+
+TEST(StoreWriting, AbandonedWritersLeaveNothing) {
+  const TemporaryFolder folder;
+  {
+    StoreWriter writer(folder.path() / "s", testing::cloud_schema());
+    StandInHierarchy hierarchy(writer, {});
+    hierarchy.push(std::vector<Point3>{{1, 2, 3}});
+    EXPECT_FALSE(names_in(folder.path()).empty());
+  }
+  EXPECT_TRUE(names_in(folder.path()).empty());
+}
+
+TEST(StoreWriting, KilledWritersLeaveNothingThatOpensAndAreCleanedUp) {
+  std::mt19937_64 random(8);
+  const TemporaryFolder folder;
+  const auto path = folder.path() / "s";
+  for (int round = 0; round < 12; ++round) {
+    // Dies after some block; in the last rounds, anywhere at all.
+    const std::uint64_t blocks = random() % 60;
+    const auto delay = static_cast<useconds_t>(random() % 60000);
+    const pid_t child = ::fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      try {
+        StoreWriter writer(path, testing::grid_schema(ScalarType::i16));
+        StandInHierarchy hierarchy(writer,
+                                   {.block_points = 100, .cluster_points = 10, .scale = {1, 1, 1}});
+        std::uint64_t count = 0;
+        for (const auto& block :
+             testing::grid_blocks(ScalarType::i16, testing::Relief::fractal, 100, 60, 10, 9)) {
+          if (round < 6 && count++ == blocks) ::_exit(0);
+          hierarchy.push(block.positions);
+        }
+        hierarchy.finish();
+      } catch (...) {
+        ::_exit(1);
+      }
+      ::_exit(0);
+    }
+    if (round >= 6) {
+      ::usleep(delay);
+      ::kill(child, SIGKILL);
+    }
+    int status = 0;
+    ::waitpid(child, &status, 0);
+    if (fs::exists(path)) {
+      EXPECT_TRUE(Store::open(path).verify(testing::expect_no_problem));
+      fs::remove_all(path);
+    }
+  }
+  // What the dead have left the next one takes away; what a living one has, it does not touch.
+  StoreWriter living(path, testing::cloud_schema());
+  const auto with_living = names_in(folder.path());
+  EXPECT_EQ(with_living.size(), 2u) << "a folder and its lock";
+  { const StoreWriter other(path, testing::cloud_schema()); }
+  EXPECT_EQ(names_in(folder.path()), with_living);
+}
+
+TEST(StoreWriting, OtherNamesAreNotTouched) {
+  const TemporaryFolder folder;
+  fs::create_directory(folder.path() / ".other.tmp-1");
+  fs::create_directory(folder.path() / ".s.tmp-1");
+  write_small(folder.path() / "s", 10);
+  EXPECT_EQ(names_in(folder.path()), (std::vector<std::string>{".other.tmp-1", "s"}));
+}
+
+/// Runs `write` in a process whose files may not grow beyond `limit`. True if it threw an Error.
+bool throws_under_limit(rlim_t limit, const fs::path& path) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    ::signal(SIGXFSZ, SIG_IGN);
+    const rlimit r{limit, limit};
+    ::setrlimit(RLIMIT_FSIZE, &r);
+    int code = 2;
+    try {
+      write_small(path, 11);
+      code = 0;
+    } catch (const Error& error) {
+      code = contains(error.what(), "cannot") ? 1 : 3;
+    } catch (...) {
+    }
+    ::_exit(code);
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) < 2) << "exit status " << status;
+  return WEXITSTATUS(status) == 1;
+}
+
+TEST(StoreWriting, FullDisksAreErrorsAndLeaveNothing) {
+  const TemporaryFolder folder;
+  const auto path = folder.path() / "s";
+  write_small(path, 11);
+  std::uint64_t largest = 0;
+  for (const auto& [name, bytes] : files_of(path))
+    largest = std::max<std::uint64_t>(largest, bytes.size());
+  fs::remove_all(path);
+  for (const rlim_t limit :
+       {std::uint64_t{0}, std::uint64_t{1}, std::uint64_t{100}, largest / 2, largest - 1}) {
+    EXPECT_TRUE(throws_under_limit(limit, path)) << limit;
+    EXPECT_TRUE(names_in(folder.path()).empty()) << limit;
+  }
+  EXPECT_FALSE(throws_under_limit(largest, path));
+  EXPECT_TRUE(fs::exists(path));
+}
+
+TEST(StoreWriting, CoordinatesThatAreNotFiniteAreErrors) {
+  const TemporaryFolder folder;
+  for (const double bad :
+       {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    const std::string words = error_of([&] {
+      StoreWriter writer(folder.path() / "s", testing::cloud_schema());
+      StandInHierarchy hierarchy(writer, {});
+      hierarchy.push(std::vector<Point3>{{1, bad, 3}});
+      hierarchy.finish();
+    });
+    EXPECT_TRUE(contains(words, "not finite")) << words;
+  }
+}
+
+/// The files, encoded by one thread in order or by several ahead of their turn.
+std::map<std::string, std::string> files_for_threads(const std::vector<testing::OwnedBlock>& blocks,
+                                                     unsigned ahead) {
+  const TemporaryFolder folder;
+  const auto path = folder.path() / "s";
+  StoreWriter writer(path, testing::grid_schema(ScalarType::i16));
+  for (std::size_t start = 0; start < blocks.size(); start += ahead) {
+    const std::size_t end = std::min<std::size_t>(blocks.size(), start + ahead);
+    std::vector<StoreWriter::EncodedPtr> encoded(end - start);
+    std::vector<std::thread> threads;
+    for (unsigned t = 0; t < std::min(ahead, 4u); ++t) {
+      threads.emplace_back([&, t] {
+        for (std::size_t b = start + t; b < end; b += std::min(ahead, 4u)) {
+          if (blocks[b].representatives[0] != UINT32_MAX) {
+            encoded[b - start] = writer.encode(blocks[b].view());
+          }
+        }
+      });
+    }
+    for (std::thread& thread : threads) thread.join();
+    for (std::size_t b = start; b < end; ++b) {
+      if (encoded[b - start] != nullptr) {
+        writer.append(std::move(encoded[b - start]));
+      } else {
+        writer.finish(blocks[b].view());
+      }
+    }
+  }
+  return files_of(path);
+}
+
+TEST(StoreWriting, BytesDoNotDependOnWhenBlocksAreEncoded) {
+  // More blocks than a segment has, so that some are encoded with tables that go out of use; with
+  // cells given twice, whose order must survive.
+  std::mt19937_64 random(12);
+  std::vector<std::vector<Point3>> blocks;
+  for (int b = 0; b < 1200; ++b) {
+    std::vector<Point3> block;
+    const double x0 = 8.0 * (b % 40), y0 = 8.0 * (b / 40), rough = b < 900 ? 3 : 50;
+    for (int i = 0; i < 64; ++i) {
+      block.push_back({x0 + i % 8, y0 + i / 8, std::floor(rough * testing::uniform(random))});
+      if (random() % 100 == 0) block.push_back(block.back());
+    }
+    blocks.push_back(std::move(block));
+  }
+  const auto recorded = testing::recorded_hierarchy(
+      blocks, {.block_points = 70, .cluster_points = 16, .scale = {1, 1, 1}});
+  const auto expected = files_for_threads(recorded, 1);
+  for (const unsigned ahead : {7u, 200u, 1500u}) {
+    EXPECT_TRUE(files_for_threads(recorded, ahead) == expected) << ahead << " blocks ahead";
+  }
+}
+
+}  // namespace
+}  // namespace terrace::stream
