@@ -261,7 +261,7 @@ TYPED_TEST(Multiresolution, WithoutDeltasTheModelIsTheSame) {
 
 // Roots of no, one and two points; clusters without members; one level only.
 TYPED_TEST(Multiresolution, TinyHierarchies) {
-  for (const std::size_t count : {0, 1, 2, 3}) {
+  for (const std::size_t count : std::array<std::size_t, 4>{0, 1, 2, 3}) {
     SCOPED_TRACE(count);
     MemorySource source;
     MemorySource::Cluster root;
