@@ -18,6 +18,9 @@
 #include <CGAL/Delaunay_triangulation_2.h>
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <benchmark/benchmark.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 #include "terrace/tri/delaunay2.hpp"
 
@@ -128,58 +131,89 @@ std::vector<Cluster> ordered_clusters(Input input, Order order) {
   return clusters;
 }
 
-/// One interface over both triangulations. `vertex[i]` is the handle of input point i.
+/// One interface over both triangulations. Points and handles of a cluster lie together, as a store
+/// delivers them.
 template <class Coord>
 struct Ours {
-  std::vector<std::array<Coord, 2>> points;
+  using Point = std::array<Coord, 2>;
+  struct Members {
+    std::vector<Point> points;
+    std::vector<typename Delaunay2<Coord>::Insertion> vertices;
+    VertexId outside;
+  };
+  std::vector<Point> points;
   Delaunay2<Coord> triangulation;
   std::vector<VertexId> vertex;
+  std::vector<Members> clusters;
+  std::vector<VertexId> set;
 
   explicit Ours(const std::vector<Cells>& input) {
     for (const Cells& p : input)
       points.push_back({static_cast<Coord>(p[0]), static_cast<Coord>(p[1])});
   }
   void build() { vertex = triangulation.build(points); }
-  void remove_one_by_one(const Cluster& cluster) {
-    for (const std::uint32_t i : cluster.members) triangulation.remove(vertex[i]);
+  void find(const std::vector<Cluster>& all) {
+    for (const Cluster& cluster : all) {
+      Members& members = clusters.emplace_back();
+      members.outside = vertex[cluster.outside];
+      for (const std::uint32_t i : cluster.members) {
+        members.points.push_back(points[i]);
+        members.vertices.push_back({vertex[i], true});
+      }
+    }
   }
-  void remove_set(const Cluster& cluster) {
+  void remove_one_by_one(const Members& members) {
+    for (const auto& insertion : members.vertices) triangulation.remove(insertion.vertex);
+  }
+  void remove_set(const Members& members) {
     set.clear();
-    for (const std::uint32_t i : cluster.members) set.push_back(vertex[i]);
+    for (const auto& insertion : members.vertices) set.push_back(insertion.vertex);
     triangulation.remove(std::span<const VertexId>(set));
   }
-  void insert(const Cluster& cluster) {
-    VertexId hint = vertex[cluster.outside];
-    for (const std::uint32_t i : cluster.members)
-      hint = vertex[i] = triangulation.insert(points[i], hint).vertex;
+  void insert(Members& members) {
+    triangulation.insert(members.points, members.vertices, members.outside);
   }
-  std::vector<VertexId> set;
 };
 
 struct Cgal {
   using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
   using Triangulation = CGAL::Delaunay_triangulation_2<Kernel>;
+  using Vertex = Triangulation::Vertex_handle;
+  struct Members {
+    std::vector<Kernel::Point_2> points;
+    std::vector<Vertex> vertices;
+    Vertex outside;
+  };
   std::vector<Kernel::Point_2> points;
   Triangulation triangulation;
-  std::vector<Triangulation::Vertex_handle> vertex;
+  std::vector<Members> clusters;
 
   explicit Cgal(const std::vector<Cells>& input) {
     for (const Cells& p : input) points.emplace_back(p[0], p[1]);
   }
   void build() { triangulation.insert(points.begin(), points.end()); }
-  void find_vertices() {
-    std::map<Kernel::Point_2, std::uint32_t> number;
-    for (std::uint32_t i = 0; i < points.size(); ++i) number[points[i]] = i;
-    vertex.resize(points.size());
-    for (auto v : triangulation.finite_vertex_handles()) vertex[number[v->point()]] = v;
+  void find(const std::vector<Cluster>& all) {
+    const auto find_vertex = [&](std::uint32_t i) {
+      return triangulation.nearest_vertex(points[i], clusters.back().outside == Vertex()
+                                                         ? Triangulation::Face_handle()
+                                                         : clusters.back().outside->face());
+    };
+    for (const Cluster& cluster : all) {
+      Members& members = clusters.emplace_back();
+      members.outside = find_vertex(cluster.outside);
+      for (const std::uint32_t i : cluster.members) {
+        members.points.push_back(points[i]);
+        members.vertices.push_back(find_vertex(i));
+      }
+    }
   }
-  void remove_one_by_one(const Cluster& cluster) {
-    for (const std::uint32_t i : cluster.members) triangulation.remove(vertex[i]);
+  void remove_one_by_one(const Members& members) {
+    for (const Vertex v : members.vertices) triangulation.remove(v);
   }
-  void insert(const Cluster& cluster) {
-    Triangulation::Vertex_handle hint = vertex[cluster.outside];
-    for (const std::uint32_t i : cluster.members)
-      hint = vertex[i] = triangulation.insert(points[i], hint->face());
+  void insert(Members& members) {
+    Vertex hint = members.outside;
+    for (std::size_t i = 0; i < members.points.size(); ++i)
+      hint = members.vertices[i] = triangulation.insert(members.points[i], hint->face());
   }
 };
 
@@ -201,6 +235,14 @@ double resident(const std::string& key) {
   while (file >> word)
     if (word == key + ":" && file >> word) return std::stod(word) * 1024;
   return 0;
+}
+
+/// Lets the peak of resident memory start again from what is in use.
+void start_peak() {
+#ifdef __GLIBC__
+  malloc_trim(0);
+#endif
+  std::ofstream("/proc/self/clear_refs") << "5";
 }
 
 /// Times `rounds` calls of round(), which returns seconds, and reports the median; the counters
@@ -225,7 +267,7 @@ void bulk(benchmark::State& state) {
   double held = 0;
   measure(state, input.size(), [&] {
     Engine engine(input);
-    std::ofstream("/proc/self/clear_refs") << "5";  // the peak starts again from here
+    start_peak();
     const double before = resident("VmRSS");
     const Stopwatch watch;
     engine.build();
@@ -258,16 +300,16 @@ void clusters(benchmark::State& state) {
   const std::vector<Cluster> all = ordered_clusters(input, static_cast<Order>(state.range(1)));
   Engine engine(input_points(input));
   engine.build();
-  if constexpr (std::is_same_v<Engine, Cgal>) engine.find_vertices();
+  engine.find(all);
   const auto insert = [&] {
-    for (const Cluster& cluster : all) engine.insert(cluster);
+    for (auto& members : engine.clusters) engine.insert(members);
   };
   const auto remove = [&] {
-    for (const Cluster& cluster : all) {
+    for (const auto& members : engine.clusters) {
       if constexpr (kAction == kCollapseSets) {
-        engine.remove_set(cluster);
+        engine.remove_set(members);
       } else {
-        engine.remove_one_by_one(cluster);
+        engine.remove_one_by_one(members);
       }
     }
   };

@@ -111,12 +111,11 @@ void Delaunay2<Coord>::insert(std::span<const Point> points, std::span<Insertion
   assert(results.empty() || results.size() == points.size());
   check_count(impl_->mesh.vertex_count, points.size());
   check_points<typename Impl::Kernel>(points);
-  std::uint32_t near = slot(hint);
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const planar::Inserted inserted = planar::insert_point(impl_->mesh, points[i], near);
-    near = inserted.vertex;
-    if (!results.empty()) results[i] = {VertexId{near}, inserted.created};
-  }
+  planar::insert_points(impl_->mesh, points, slot(hint),
+                        [&](std::size_t i, const planar::Inserted& inserted) {
+                          if (!results.empty())
+                            results[i] = {VertexId{inserted.vertex}, inserted.created};
+                        });
 }
 
 template <class Coord>

@@ -111,8 +111,8 @@ class Inspection {
       const std::uint32_t opposite = beyond.corner[k];
       expect(opposite != at.corner[i], "triangles ", t, " and ", other, " are the same");
       if (fault_.empty() && opposite != kGhost)
-        expect(!in_conflict(mesh_, at, mesh_.point[opposite]), "vertex ", opposite,
-               " is inside the circle of triangle ", t);
+        expect(!in_conflict<Kernel>(mesh_.point.data(), at, mesh_.point[opposite]), "vertex ",
+               opposite, " is inside the circle of triangle ", t);
     }
     if (finite && fault_.empty())
       expect(Kernel::orientation(mesh_.point[at.corner[0]], mesh_.point[at.corner[1]],

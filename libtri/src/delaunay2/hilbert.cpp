@@ -20,8 +20,8 @@ struct Entry {
 
 /// Runs of equal keys up to this length stay as they are.
 constexpr std::size_t kLeaf = 16;
-/// Below this, comparison sorting beats three passes over 2048 counters.
-constexpr std::size_t kMinRadix = 3000;
+/// Below this, counters would cost more than points.
+constexpr std::uint32_t kFew = 3000;
 
 /// One step down the curve: by orientation of the present square (4) and quadrant (4; x above y),
 /// the quadrant's place on the curve, and the orientation of the square there.
@@ -100,7 +100,9 @@ class Cells {
     }
     if constexpr (std::is_integral_v<Coord>) {
       const Coord extent = std::max(high[0] - low_[0], high[1] - low_[1]);
-      while (extent >> shift_ > 0xFFFF) ++shift_;
+      // The extent uses the key's first bit, so that no set is left in one cell.
+      while (extent >> down_ > 0xFFFF) ++down_;
+      while (extent > 0 && extent << up_ < 0x8000) ++up_;
       single_ = extent == 0;
     } else {
       // Halves: the extent of finite doubles may overflow.
@@ -118,7 +120,7 @@ class Cells {
  private:
   [[nodiscard]] std::uint32_t cell(Coord c, Coord low) const {
     if constexpr (std::is_integral_v<Coord>) {
-      return static_cast<std::uint32_t>(c - low) >> shift_;
+      return static_cast<std::uint32_t>(c - low) >> down_ << up_;
     } else {
       const double part = (c / 2 - low / 2) / extent_ * 65536;
       return part < 65535 ? static_cast<std::uint32_t>(part) : 65535;
@@ -127,35 +129,27 @@ class Cells {
 
   Point low_;
   Coord extent_ = 0;
-  unsigned shift_ = 0;
+  unsigned down_ = 0;
+  unsigned up_ = 0;
   bool single_ = false;
 };
 
-/// Stable, least significant digit first: three passes of 11 bits.
+/// Stable, least significant digit first: `passes` passes of kBits bits.
+template <unsigned kBits, unsigned kPasses>
 void radix_sort(Pool<Entry>& entries) {
-  constexpr unsigned kBits = 11;
   constexpr std::size_t kDigits = std::size_t{1} << kBits;
-  std::array<std::array<std::uint32_t, kDigits>, 3> start{};
+  std::array<std::array<std::uint32_t, kDigits>, kPasses> start{};
   for (const Entry& entry : span_of(entries))
-    for (unsigned pass = 0; pass < 3; ++pass)
+    for (unsigned pass = 0; pass < kPasses; ++pass)
       ++start[pass][entry.key >> (kBits * pass) & (kDigits - 1)];
   for (auto& counters : start)
     std::exclusive_scan(counters.begin(), counters.end(), counters.begin(), 0u);
   Pool<Entry> other;
   other.resize(entries.size());
-  for (unsigned pass = 0; pass < 3; ++pass) {
+  for (unsigned pass = 0; pass < kPasses; ++pass) {
     for (const Entry& entry : span_of(entries))
       other[start[pass][entry.key >> (kBits * pass) & (kDigits - 1)]++] = entry;
     std::swap(entries, other);
-  }
-}
-
-void sort_entries(Pool<Entry>& entries) {
-  if (entries.size() >= kMinRadix) {
-    radix_sort(entries);
-  } else {
-    std::stable_sort(entries.data(), entries.data() + entries.size(),
-                     [](const Entry& a, const Entry& b) { return a.key < b.key; });
   }
 }
 
@@ -172,8 +166,16 @@ void sort_range(std::span<const typename Kernel::Point> points, std::span<std::u
   const auto count = static_cast<std::uint32_t>(order.size());
   Pool<Entry> entries;
   entries.resize(count);
-  for (std::uint32_t i = 0; i < count; ++i) entries[i] = {cells.key(points[order[i]]), order[i]};
-  sort_entries(entries);
+  // Few points are told apart by the curve's coarse cells, and if not, in the runs below.
+  const bool few = count < kFew;
+  const unsigned shift = few ? 16 : 0;
+  for (std::uint32_t i = 0; i < count; ++i)
+    entries[i] = {cells.key(points[order[i]]) >> shift, order[i]};
+  if (few) {
+    radix_sort<8, 2>(entries);
+  } else {
+    radix_sort<11, 3>(entries);
+  }
   // Entries are gone before the runs are sorted, so that memory does not add up.
   std::vector<std::span<std::uint32_t>> long_runs;
   std::uint32_t begin = 0;

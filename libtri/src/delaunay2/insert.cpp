@@ -28,6 +28,7 @@ void insert_vertex(Mesh<Kernel>& mesh, std::uint32_t vertex, std::uint32_t confl
   std::size_t most_removed = mesh.sides.size() - kSpares;
   // No triangle or vertex is added to the pools from here on.
   Triangle* const triangle = mesh.triangle.data();
+  const auto* const point = mesh.point.data();
   std::uint32_t* const incident = mesh.incident.data();
   const bool recording = mesh.journal.on();
 
@@ -55,7 +56,7 @@ void insert_vertex(Mesh<Kernel>& mesh, std::uint32_t vertex, std::uint32_t confl
     const std::uint32_t outer = triangle_of(side);
     const std::uint32_t i = index_of(side);
     Triangle& t = triangle[outer];
-    if (in_conflict(mesh, t, p)) {
+    if (in_conflict<Kernel>(point, t, p)) {
       remove(outer);
       side = t.mate[next_index(i)];
       pending[pending_count++] = t.mate[previous_index(i)];
@@ -80,6 +81,7 @@ void insert_vertex(Mesh<Kernel>& mesh, std::uint32_t vertex, std::uint32_t confl
   }
   mesh.link(make_side(previous, 1), make_side(first, 2));
   incident[vertex] = previous;
+  mesh.prefetch_free_triangle();
 }
 
 template <class Kernel>

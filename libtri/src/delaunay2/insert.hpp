@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <span>
+
+#include "hilbert.hpp"
 #include "mesh.hpp"
 
 namespace terrace::tri::planar {
@@ -21,5 +24,24 @@ struct Inserted {
 };
 template <class Kernel>
 Inserted insert_point(Mesh<Kernel>& mesh, const typename Kernel::Point& p, std::uint32_t hint);
+
+/// Inserts points in an order of its own. Calls done(number, inserted) for each.
+///
+/// The hint of a point is the one before on a Hilbert curve. As in bulk construction a coarse
+/// sample goes first: it saves a quarter of the triangles that would be made and replaced again.
+template <class Kernel, class Done>
+void insert_points(Mesh<Kernel>& mesh, std::span<const typename Kernel::Point> points,
+                   std::uint32_t hint, Done done) {
+  constexpr std::uint32_t kSample = 8;
+  const Pool<std::uint32_t> order = hilbert_order<Kernel>(points);
+  const auto insert = [&](std::uint32_t i) {
+    const Inserted inserted = insert_point(mesh, points[i], hint);
+    hint = inserted.vertex;
+    done(i, inserted);
+  };
+  for (std::uint32_t k = 0; k < order.size(); k += kSample) insert(order[k]);
+  for (std::uint32_t k = 0; k < order.size(); ++k)
+    if (k % kSample != 0) insert(order[k]);
+}
 
 }  // namespace terrace::tri::planar

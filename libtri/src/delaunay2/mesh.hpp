@@ -105,6 +105,10 @@ struct Mesh {
     std::uint32_t v = free_vertex;
     if (v != kFreeVertexBit - 1) {
       free_vertex = incident[v] & ~kFreeVertexBit;
+      if (free_vertex != kFreeVertexBit - 1) {
+        __builtin_prefetch(&incident[free_vertex], 1);
+        __builtin_prefetch(&point[free_vertex], 1);
+      }
       if (journal.on()) journal.touch_vertex(v, false, p);
       point[v] = p;
       incident[v] = kNoIncident;
@@ -129,6 +133,8 @@ struct Mesh {
     std::uint32_t t = free_triangle;
     if (t != kNone) {
       free_triangle = triangle[t].corner[1];
+      // The next one is needed soon and was not touched for long.
+      if (free_triangle != kNone) __builtin_prefetch(&triangle[free_triangle], 1);
     } else {
       t = triangle.size();
       triangle.resize(t + 1);
@@ -136,6 +142,12 @@ struct Mesh {
     }
     if (journal.on()) journal.touch_triangle(t, triangle[t]);
     return t;
+  }
+  /// An insertion takes two slots, and the second is known only from the first.
+  void prefetch_free_triangle() const {
+    if (free_triangle == kNone) return;
+    const std::uint32_t second = triangle[free_triangle].corner[1];
+    if (second != kNone) __builtin_prefetch(&triangle[second], 1);
   }
   /// Before an algorithm overwrites or frees a triangle in use.
   void record(std::uint32_t t) {

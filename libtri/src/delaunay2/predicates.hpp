@@ -54,12 +54,12 @@ bool inside_ghost(const typename Kernel::Point& a, const typename Kernel::Point&
   return side > 0 || (side == 0 && between(a, p, b));
 }
 
-/// Whether p, no corner of it, is in conflict with a triangle, ghost or not.
+/// Whether p, no corner of it, is in conflict with a triangle, ghost or not; `point`: the vertices'
+/// points.
 template <class Kernel>
-[[gnu::always_inline]] inline bool in_conflict(const Mesh<Kernel>& mesh, const Triangle& t,
-                                               const typename Kernel::Point& p) {
+[[gnu::always_inline]] inline bool in_conflict(const typename Kernel::Point* point,
+                                               const Triangle& t, const typename Kernel::Point& p) {
   const auto& [a, b, c] = t.corner;
-  const typename Kernel::Point* const point = mesh.point.data();
   if (!has_ghost(t.corner)) [[likely]]
     return inside_circle<Kernel>(point[a], point[b], point[c], p);
   if (a == kGhost) return inside_ghost<Kernel>(point[b], point[c], p);

@@ -10,13 +10,6 @@ constexpr std::array<VertexId, 3> vertex_ids(const std::array<std::uint32_t, 3>&
   return {VertexId{corner[0]}, VertexId{corner[1]}, VertexId{corner[2]}};
 }
 
-constexpr bool same_rotated(const std::array<std::uint32_t, 3>& a,
-                            const std::array<std::uint32_t, 3>& b) {
-  for (std::uint32_t i = 0; i < 3; ++i)
-    if (a[0] == b[i] && a[1] == b[next_index(i)] && a[2] == b[previous_index(i)]) return true;
-  return false;
-}
-
 /// Turns the journal's records into net changes and empties it.
 template <class Coord, class Mesh>
 void take_changes(Mesh& mesh, typename Delaunay2<Coord>::Changes& changes) {
@@ -43,7 +36,7 @@ void take_changes(Mesh& mesh, typename Delaunay2<Coord>::Changes& changes) {
   for (const auto& record : journal.triangles()) {
     const bool before = is_finite(record.before);
     const bool now = mesh.triangle_alive(record.slot);
-    if (before && now && same_rotated(record.before, mesh.triangle[record.slot].corner) &&
+    if (before && now && record.before == mesh.triangle[record.slot].corner &&
         of_same_vertices(record.before))
       continue;
     if (before) {

@@ -145,8 +145,9 @@ class Delaunay2 {
   VertexId build_grid(Coord x0, Coord y0, Coord step, std::uint32_t columns, std::uint32_t rows);
   /// hint: a vertex near the point, for the walk; kNoVertex: the last one used.
   Insertion insert(const Point& point, VertexId hint = kNoVertex);
-  /// Inserts in the given order (spatially sorted is fastest), each point the hint of the next.
-  /// results: as many as points, or none. Nothing is inserted if one point is invalid.
+  /// Inserts a set near the hint, in any order (it is sorted inside). results: as many as points,
+  /// in parallel, or none. Of equal points one is the created one. Nothing is inserted if one point
+  /// is invalid.
   void insert(std::span<const Point> points, std::span<Insertion> results,
               VertexId hint = kNoVertex);
   void remove(VertexId vertex);
@@ -173,7 +174,8 @@ class Delaunay2 {
   /// the hull to its previous. While all points are collinear: those before and after on the line.
   void adjacent(VertexId vertex, std::vector<VertexId>& result) const;
 
-  /// Handles of vertices and triangles are below these numbers; they never shrink but by clear().
+  /// Handles of vertices and triangles are below these numbers; they shrink only
+  /// by clear(), and when an empty triangulation is built.
   /// Not all slots below are alive: free ones, and those that the structure uses for itself.
   [[nodiscard]] std::uint32_t vertex_slots() const;
   [[nodiscard]] std::uint32_t triangle_slots() const;
