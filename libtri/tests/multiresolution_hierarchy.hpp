@@ -77,8 +77,8 @@ class MemorySource : public ClusterSource {
   Cluster last_;
 };
 
-/// Clusters the points level by level about random centres: one point in `ratio` goes up, `levels`
-/// times (fewer if one point is left).
+/// Clusters the points level by level about random centres, most to the nearest one: one point in
+/// `ratio` goes up, `levels` times (fewer if one point is left).
 inline MemorySource make_hierarchy(const std::vector<Point3>& points, unsigned levels, double ratio,
                                    std::mt19937_64& random) {
   struct Node {
@@ -108,6 +108,8 @@ inline MemorySource make_hierarchy(const std::vector<Point3>& points, unsigned l
           nearest = c;
         }
       }
+      // Some stray, so that clusters overlap and points of equal coordinates part.
+      if (below(random, 6) == 0) nearest = below(random, centres);
       MemorySource::Cluster& cluster = clusters[nearest];
       cluster.positions.push_back(nodes[i].position);
       cluster.children.insert(cluster.children.end(), nodes[i].children.begin(),

@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <map>
 #include <span>
+#include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include "terrace/tri/delaunay2.hpp"
@@ -74,10 +76,8 @@ class StandIn {
   }
   [[nodiscard]] std::array<VertexId, 3> vertices(TriangleId triangle) const {
     std::array<VertexId, 3> result;
-    for (std::size_t i = 0; i < 3; ++i) {
-      result[i] =
-          VertexId{by_point_.at(state_.triangles.at(static_cast<std::uint32_t>(triangle))[i])};
-    }
+    const Corners& corners = state_.triangles.at(static_cast<std::uint32_t>(triangle));
+    for (std::size_t i = 0; i < 3; ++i) result[i] = VertexId{corners[i].second};
     return result;
   }
   [[nodiscard]] std::vector<VertexId> all_vertices() const {
@@ -101,7 +101,9 @@ class StandIn {
   }
 
  private:
-  using Corners = std::array<Point, 3>;
+  // With the slots: a point that comes back in another one makes other triangles.
+  using Corner = std::pair<Point, std::uint32_t>;
+  using Corners = std::array<Corner, 3>;
   struct State {
     std::map<std::uint32_t, Point> vertices;
     std::map<std::uint32_t, Corners> triangles;
@@ -130,8 +132,7 @@ class StandIn {
   }
   void renew() {
     std::map<Corners, bool> wanted;
-    std::vector<Point> sorted;
-    for (const auto& [point, slot] : by_point_) sorted.push_back(point);
+    const std::vector<Corner> sorted(by_point_.begin(), by_point_.end());
     for (std::size_t i = 2; i < sorted.size(); ++i) {
       wanted[{sorted[i - 2], sorted[i - 1], sorted[i]}] = true;
     }
