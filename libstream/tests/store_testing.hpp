@@ -286,6 +286,11 @@ inline std::uint64_t check_round_trip(const Schema& schema, const std::vector<Bl
   }
   EXPECT_EQ(store.points(), n);
   EXPECT_EQ(store.bounds(), bounds);
+  if (n > 0) {
+    // Quarters, so that the largest doubles do not overflow.
+    const double largest = std::max(std::abs(bounds.min[2]), std::abs(bounds.max[2])) / 4;
+    EXPECT_NEAR(store.mean_height() / 4, sum / static_cast<double>(n), largest * 1e-9);
+  }
   EXPECT_TRUE(all_points(store) == expected) << "other points came back";
   EXPECT_TRUE(store.verify(expect_no_problem));
 

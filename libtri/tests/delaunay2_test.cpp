@@ -7,6 +7,7 @@
 #include <random>
 #include <set>
 #include <stdexcept>
+#include <type_traits>
 
 #include <gtest/gtest.h>
 
@@ -112,7 +113,9 @@ TYPED_TEST(Delaunay2Test, RemovalOfSetsEqualsRebuild) {
       vertices.resize(random() % (vertices.size() + 1));
       const std::uint64_t keep_out = random() % 4;
       if (keep_out > 0)
-        std::erase_if(vertices, [&](VertexId) { return random() % (4 << (2 * keep_out)) == 0; });
+        std::erase_if(vertices, [&](VertexId) {
+          return random() % (std::uint64_t{4} << (2 * keep_out)) == 0;
+        });
       triangulation.remove(std::span<const VertexId>(vertices));
       ASSERT_EQ(find_fault(triangulation), "");
       ASSERT_EQ(triangulation.hash(), this->rebuilt_hash(triangulation));
@@ -226,10 +229,11 @@ TYPED_TEST(Delaunay2Test, LocateAndNearestAgreeWithBruteForce) {
        {PointSet::kUniform, PointSet::kFewBits, PointSet::kSevenBits, PointSet::kGrid,
         PointSet::kHorizontal, PointSet::kOffLine, PointSet::kCircle, PointSet::kClusters}) {
     SCOPED_TRACE(name(kind));
-    using Kernel = Delaunay2Access::Kernel<TypeParam>;
     const auto points = make_points<TypeParam>(kind, 100, 8);
     Delaunay2<TypeParam> triangulation;
     triangulation.build(points);
+    using Kernel =
+        typename std::remove_cvref_t<decltype(Delaunay2Access::mesh(triangulation))>::Kernel;
     std::vector<Point> queries = make_points<TypeParam>(kind, 300, 9);
     for (const PointSet other : {PointSet::kFewBits, PointSet::kGrid})
       for (const Point& p : make_points<TypeParam>(other, 100, 10)) queries.push_back(p);

@@ -10,8 +10,6 @@
 #include <string>
 #include <vector>
 
-#include <libdeflate.h>
-
 namespace terrace::stream::store {
 
 using Bytes = std::vector<std::uint8_t>;
@@ -27,9 +25,8 @@ class Damage : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-inline std::uint32_t crc32(std::uint32_t crc, const void* data, std::size_t size) {
-  return libdeflate_crc32(crc, data, size);
-}
+/// The CRC-32 of zlib, continued from `crc` (0 at first).
+std::uint32_t crc32(std::uint32_t crc, const void* data, std::size_t size);
 inline std::uint32_t crc32(ByteView bytes) { return crc32(0, bytes.data(), bytes.size()); }
 
 template <class T>

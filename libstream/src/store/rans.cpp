@@ -38,7 +38,7 @@ void SymbolEncoder::finish(Bytes& out, std::uint32_t last) {
   // final one, so it carries 16 bits for nothing.
   std::uint32_t state = kLow + last;
   words_.clear();
-  for (std::size_t i = symbols_.size(); i-- > 0;) {
+  for (std::size_t i = used_; i-- > 0;) {
     const EncodeTable::Entry entry = tables_[symbols_[i] >> 8].entries[symbols_[i] & 0xff];
     const std::uint32_t frequency = entry.frequency;
     if (state >= static_cast<std::uint64_t>(frequency) << (32 - kScaleBits)) {

@@ -91,36 +91,33 @@ class SymbolEncoder {
   std::vector<std::array<std::uint32_t, kSymbols>>& counts() { return counts_; }
 
   void start() {
-    symbols_.clear();
+    used_ = 0;
     bits_.clear();
   }
-  void symbol(unsigned context, unsigned symbol) {
+  TERRACE_STORE_INLINE void symbol(unsigned context, unsigned symbol) {
     if (tables_.empty()) {
       if (context >= counts_.size()) counts_.resize(context + 1);
       ++counts_[context][symbol];
       return;
     }
-    if (tables_[context].entries[symbol].frequency == 0) {
-      symbols_.push_back(context << 8 | kEscape);
+    if (used_ == symbols_.size()) symbols_.resize(2 * used_ + 256);
+    std::uint32_t coded = symbol;
+    if (tables_[context].entries[symbol].frequency == 0) [[unlikely]] {
+      coded = kEscape;
       bits_.put(symbol, kEscapeBits);
-    } else {
-      symbols_.push_back(context << 8 | symbol);
     }
+    symbols_[used_++] = context << 8 | coded;
   }
-  void raw(std::uint64_t value, unsigned bits) {
-    if (!tables_.empty()) bits_.put(value, bits);
-  }
-  void number(unsigned context, std::uint64_t value) {
-    const unsigned c = class_of(value);
-    symbol(context, c);
-    raw(value - kClassRange[c].base, kClassRange[c].bits);
+  TERRACE_STORE_INLINE void raw(std::uint64_t value, unsigned bits) {
+    if (bits > 0 && !tables_.empty()) bits_.put(value, bits);
   }
   /// Appends the byte string. `last` (< 2^16) is what the decoder finds in its final state.
   void finish(Bytes& out, std::uint32_t last);
 
  private:
   std::span<const EncodeTable> tables_;
-  std::vector<std::uint32_t> symbols_;
+  std::vector<std::uint32_t> symbols_;  ///< the first used_, as context << 8 | symbol
+  std::size_t used_ = 0;
   std::vector<std::uint16_t> words_;
   BitWriter bits_;
   std::vector<std::array<std::uint32_t, kSymbols>> counts_;

@@ -22,8 +22,6 @@ struct Delaunay2<Coord>::Impl {
 /// For the library's own tests.
 struct Delaunay2Access {
   template <class Coord>
-  using Kernel = typename Delaunay2<Coord>::Impl::Kernel;
-  template <class Coord>
   static const auto& mesh(const Delaunay2<Coord>& triangulation) {
     return triangulation.impl_->mesh;
   }

@@ -21,7 +21,7 @@ void* checked(void* memory) {
 
 constexpr std::size_t kHugePage = std::size_t{2} << 20;
 // Below this the heap serves: mappings are too coarse and too dear for small triangulations.
-constexpr std::size_t kMapFrom = 2 * kHugePage;
+constexpr std::size_t kMapFrom = std::size_t{1} << 20;
 
 std::size_t round_up(std::size_t bytes, std::size_t unit) {
   return (bytes + unit - 1) / unit * unit;

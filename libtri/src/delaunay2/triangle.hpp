@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 
@@ -35,8 +36,8 @@ struct Triangle {
 static_assert(sizeof(Triangle) == 24);
 
 constexpr bool has_ghost(const std::array<std::uint32_t, 3>& corner) {
-  // One branch for the three.
-  return (corner[0] == kGhost) | (corner[1] == kGhost) | (corner[2] == kGhost);
+  // One branch for the three: the least is zero.
+  return std::min(corner[0], std::min(corner[1], corner[2])) == kGhost;
 }
 /// A finite triangle in use.
 constexpr bool is_finite(const std::array<std::uint32_t, 3>& corner) {
