@@ -113,12 +113,14 @@ BENCHMARK(hierarchy_terrain_tiles)
     ->ArgName("threads")
     ->Arg(1)
     ->Arg(2)
+    ->MeasureProcessCPUTime()
     ->UseRealTime()
     ->Unit(benchmark::kMillisecond);
 BENCHMARK(hierarchy_shuffled_scan)
     ->ArgName("threads")
     ->Arg(1)
     ->Arg(2)
+    ->MeasureProcessCPUTime()
     ->UseRealTime()
     ->Unit(benchmark::kMillisecond);
 BENCHMARK(hierarchy_overhead)->ArgName("map")->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
