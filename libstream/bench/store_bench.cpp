@@ -87,7 +87,7 @@ const Store& built(bool grid) {
 }
 
 void count_points(benchmark::State& state, std::uint64_t points) {
-  state.SetItemsProcessed(static_cast<std::int64_t>(state.iterations() * points));
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(points));
 }
 
 /// encode() of blocks that have their tables, no I/O.

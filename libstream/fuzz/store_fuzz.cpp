@@ -29,7 +29,8 @@ Schema schema_for(bool grid) {
   return schema;
 }
 
-/// Frequencies in which everything is likely, so that bytes reach far into the decoder.
+/// Frequencies in which everything is likely, so that bytes reach far into the decoder. The levels
+/// have the same contexts.
 Tables even_tables(unsigned contexts) {
   Tables tables;
   std::array<std::uint32_t, kSymbols> counts{};
@@ -40,7 +41,7 @@ Tables even_tables(unsigned contexts) {
 
 void decode_cluster(ByteReader in, bool grid, unsigned level) {
   const Layout layout(schema_for(grid), level);
-  const DecodingTables tables(even_tables(layout.contexts()));
+  static const DecodingTables tables(even_tables(layout.contexts()));
   Entry entry;
   entry.points = in.get<std::uint16_t>() % 4096u;
   for (std::size_t axis = 0; axis < 3; ++axis) {
