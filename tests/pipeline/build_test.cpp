@@ -55,8 +55,8 @@ class Build : public testing::Test {
     for (std::uint32_t row = 0; row < kSize; ++row) {
       for (std::uint32_t column = 0; column < kSize; ++column) {
         const bool lake = (column / 90 + row / 70) % 7 == 0;
-        samples[row * kSize + column] = static_cast<std::int16_t>(
-            lake ? -1 : 400 + (column * row) % 61 + (column * 7 + row * 3) % 37);
+        const std::uint32_t height = 400 + (column * row) % 61 + (column * 7 + row * 3) % 37;
+        samples[row * kSize + column] = lake ? std::int16_t{-1} : static_cast<std::int16_t>(height);
         valid_ += lake ? 0 : 1;
       }
     }
