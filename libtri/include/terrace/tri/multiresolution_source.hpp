@@ -3,6 +3,7 @@
 
 #include <array>
 #include <compare>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <span>
@@ -63,14 +64,14 @@ constexpr Box3 box2(double min_x, double min_y, double max_x, double max_y) {
 }
 /// Whether the boxes have a point in common; false if a bound is not a number.
 constexpr bool intersects(const Box3& a, const Box3& b) {
-  for (int i = 0; i < 3; ++i) {
+  for (std::size_t i = 0; i < 3; ++i) {
     if (!(a.min[i] <= b.max[i] && b.min[i] <= a.max[i])) return false;
   }
   return true;
 }
 /// Whether all of `inner` lies in `outer`.
 constexpr bool contains(const Box3& outer, const Box3& inner) {
-  for (int i = 0; i < 3; ++i) {
+  for (std::size_t i = 0; i < 3; ++i) {
     if (!(outer.min[i] <= inner.min[i] && inner.max[i] <= outer.max[i])) return false;
   }
   return true;
