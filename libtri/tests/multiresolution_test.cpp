@@ -278,7 +278,7 @@ TYPED_TEST(Multiresolution, VertexThatChangesHandsWithinAStep) {
   MultiresolutionModel<TypeParam> model(source);
   Consumer<TypeParam> consumer(model);
   const WholeTree tree(source);
-  for (const std::size_t c : {0, 1, 2, 0, 2, 1}) {
+  for (const std::size_t c : {0u, 1u, 2u, 0u, 2u, 1u}) {
     const Detail detail{1, {{boxes[c], 0}}};
     consumer.apply(model.set_detail(detail));
     ASSERT_NO_FATAL_FAILURE(check_model(model, source, wanted(tree, source, detail)));
@@ -288,7 +288,7 @@ TYPED_TEST(Multiresolution, VertexThatChangesHandsWithinAStep) {
 
 // Roots of no, one and two points; clusters without members; one level only.
 TYPED_TEST(Multiresolution, TinyHierarchies) {
-  for (const std::size_t count : {0, 1, 2, 3}) {
+  for (const std::size_t count : {0u, 1u, 2u, 3u}) {
     SCOPED_TRACE(count);
     MemorySource source;
     MemorySource::Cluster root;
