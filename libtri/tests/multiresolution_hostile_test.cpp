@@ -92,6 +92,9 @@ void expect_refused(const std::function<void(MemorySource&, ClusterId)>& spoil, 
     EXPECT_TRUE(none.empty());
     source.levels = good.levels;
     ASSERT_NO_FATAL_FAILURE(check_model(model, source, {}));
+    // Nothing of the failure is left in the way.
+    ASSERT_NO_THROW(model.set_level(0));
+    ASSERT_NO_FATAL_FAILURE(check_model(model, source, wanted(tree, source, {0, {}})));
   }
 }
 

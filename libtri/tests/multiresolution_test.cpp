@@ -259,9 +259,36 @@ TYPED_TEST(Multiresolution, WithoutDeltasTheModelIsTheSame) {
   }
 }
 
+// One step takes a vertex out with one cluster and puts it back with another, where it may or may
+// not get its old slot. Whichever, the consumer learns of the new height.
+TYPED_TEST(Multiresolution, VertexThatChangesHandsWithinAStep) {
+  MemorySource source;
+  source.levels.resize(2);
+  const Box3 boxes[] = {box2(0, 0, 40, 40), box2(60, 0, 100, 40), box2(0, 60, 40, 100)};
+  for (const double height : {1.0, 2.0, 3.0}) {
+    MemorySource::Cluster cluster;
+    cluster.positions = {{50, 50, height}};
+    cluster.record = {boxes[source.levels[0].size()], 0.0, 1};
+    source.levels[0].push_back(cluster);
+  }
+  source.levels[1].resize(1);
+  source.root().positions = {{0, 0, 0}, {100, 0, 0}, {0, 100, 0}};
+  source.root().children = {0, 1, 2};
+
+  MultiresolutionModel<TypeParam> model(source);
+  Consumer<TypeParam> consumer(model);
+  const WholeTree tree(source);
+  for (const std::size_t c : {0u, 1u, 2u, 0u, 2u, 1u}) {
+    const Detail detail{1, {{boxes[c], 0}}};
+    consumer.apply(model.set_detail(detail));
+    ASSERT_NO_FATAL_FAILURE(check_model(model, source, wanted(tree, source, detail)));
+    ASSERT_NO_FATAL_FAILURE(consumer.check());
+  }
+}
+
 // Roots of no, one and two points; clusters without members; one level only.
 TYPED_TEST(Multiresolution, TinyHierarchies) {
-  for (const std::size_t count : std::array<std::size_t, 4>{0, 1, 2, 3}) {
+  for (const std::size_t count : {0u, 1u, 2u, 3u}) {
     SCOPED_TRACE(count);
     MemorySource source;
     MemorySource::Cluster root;
