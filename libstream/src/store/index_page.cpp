@@ -78,13 +78,14 @@ void write_page(std::span<const Entry> entries, std::uint64_t offset, Bytes& out
 
 IndexPage::IndexPage(Bytes bytes, std::uint32_t clusters)
     : bytes_(std::move(bytes)), clusters_(clusters) {
+  assert(clusters >= 1 && clusters <= kPageClusters);
   const std::size_t size = bytes_.size();
   if (size < 4 ||
       crc32({bytes_.data(), size - 4}) != load<std::uint32_t>(bytes_.data() + size - 4)) {
     throw Damage("the checksum of an index page is wrong");
   }
   ByteReader in({bytes_.data(), size - 4});
-  offset_ = in.varint();
+  offsets_[0] = in.varint();
   std::uint64_t bits = 0;
   for (unsigned f = 0; f < kFields; ++f) {
     Column& column = columns_[f];
@@ -101,6 +102,11 @@ IndexPage::IndexPage(Bytes bytes, std::uint32_t clusters)
   if (in.left() != (bits + 7) / 8) throw Damage("an index page has a wrong size");
   for (Column& column : columns_) column.start += static_cast<std::uint32_t>(in.offset() * 8);
   bytes_.resize(size + kSlack);
+  for (std::uint32_t i = 0; i < clusters_; ++i) {
+    const std::uint64_t cluster = value(kBytes, i);
+    if (cluster >= kMostBytes) throw Damage("an index entry is out of range");
+    offsets_[i + 1] = offsets_[i] + cluster;
+  }
 }
 
 std::uint64_t IndexPage::value(Field field, std::uint32_t i) const {
@@ -118,10 +124,10 @@ std::uint64_t IndexPage::value(Field field, std::uint32_t i) const {
 Entry IndexPage::entry(std::uint32_t i) const {
   assert(i < clusters_);
   Entry entry;
-  const std::uint64_t bytes = value(kBytes, i), points = value(kPoints, i);
+  const std::uint64_t bytes = offsets_[i + 1] - offsets_[i], points = value(kPoints, i);
   std::uint64_t forms = value(kForms, i);
   const std::uint64_t error = value(kError, i);
-  if (bytes >= kMostBytes || points > kMostPoints || error > 0x7ff0u * 2) {
+  if (points > kMostPoints || error > 0x7ff0u * 2) {
     throw Damage("an index entry is out of range");
   }
   entry.bytes = static_cast<std::uint32_t>(bytes);
@@ -138,12 +144,6 @@ Entry IndexPage::entry(std::uint32_t i) const {
   entry.descendants = value(kDescendants, i);
   entry.checksum = static_cast<std::uint32_t>(value(kChecksum, i));
   return entry;
-}
-
-std::uint64_t IndexPage::offset(std::uint32_t i) const {
-  std::uint64_t sum = offset_;
-  for (std::uint32_t k = 0; k < i; ++k) sum += value(kBytes, k);
-  return sum;
 }
 
 }  // namespace terrace::stream::store

@@ -25,10 +25,10 @@ class IndexPage {
 
   [[nodiscard]] std::uint32_t clusters() const { return clusters_; }
   [[nodiscard]] Entry entry(std::uint32_t i) const;
-  /// Of cluster i in the data file. Time O(i).
-  [[nodiscard]] std::uint64_t offset(std::uint32_t i) const;
+  /// Of cluster i in the data file; i = clusters() is behind the last.
+  [[nodiscard]] std::uint64_t offset(std::uint32_t i) const { return offsets_[i]; }
   /// Offset of the cluster behind the last.
-  [[nodiscard]] std::uint64_t end() const { return offset(clusters_); }
+  [[nodiscard]] std::uint64_t end() const { return offsets_[clusters_]; }
 
  private:
   enum Field : unsigned {
@@ -58,7 +58,7 @@ class IndexPage {
 
   Bytes bytes_;
   std::uint32_t clusters_ = 0;
-  std::uint64_t offset_ = 0;
+  std::array<std::uint64_t, kPageClusters + 1> offsets_{};
   std::array<Column, kFields> columns_{};
 };
 

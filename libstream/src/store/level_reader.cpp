@@ -8,8 +8,8 @@ namespace {
 
 constexpr const char* kRemedy = "restore the file or build the store anew";
 /// About 1.5 KB each.
-constexpr std::uint64_t kCachedPages = 1024;
-/// About 300 KB each; one set is for about ten million points of level 0.
+constexpr std::uint64_t kCachedPages = 4096;
+/// About 100 KB each; one set is for about ten million points of level 0.
 constexpr std::uint64_t kCachedTables = 32;
 
 Error damaged_file(const InputFile& file, std::uint64_t offset, const std::string& cause) {

@@ -52,19 +52,21 @@ std::uint64_t LevelWriter::append(PreparedBlock block, bool root) {
 }
 
 void LevelWriter::train() {
+  // Where there are many blocks, a part of them tells as much: others wait for this.
+  const bool many = held_.size() == kTrainingBlocks;
   Tables tables;
   if (layout_.grid && layout_.level == 0) {
     PredictorFit sums;
-    for (const RawBlock& block : held_) {
-      const ClusteredBlock view = block.view();
+    for (std::size_t b = 0; b < held_.size(); b += many ? 4 : 1) {
+      const ClusteredBlock view = held_[b].view();
       encoder_.load(layout_, view);
       encoder_.fit(sums);
     }
     tables.predictor = sums.fit();
   }
   Counts counts;
-  for (const RawBlock& block : held_) {
-    const ClusteredBlock view = block.view();
+  for (std::size_t b = 0; b < held_.size(); b += many ? 2 : 1) {
+    const ClusteredBlock view = held_[b].view();
     encoder_.load(layout_, view);
     encoder_.count(tables.predictor, counts);
   }

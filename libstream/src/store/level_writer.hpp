@@ -13,8 +13,8 @@
 
 namespace terrace::stream::store {
 
-/// Blocks of a level that share tables, and how many of them, from the first, the tables are made
-/// from.
+/// Blocks of a level that share tables, and how many of them, from the first, are held back until
+/// the tables are made from them.
 inline constexpr std::uint64_t kSegmentBlocks = 1024;
 inline constexpr std::size_t kTrainingBlocks = 64;
 

@@ -18,13 +18,13 @@ EncodeTable encode_table(const Frequencies& frequencies) {
 }
 
 void fill_decode_table(const Frequencies& frequencies, DecodeTable& table) {
-  unsigned slot = 0;
+  unsigned start = 0;
   for (unsigned s = 0; s < kSymbols; ++s) {
-    for (unsigned bias = 0; bias < frequencies[s]; ++bias, ++slot) {
-      table[slot] = s | static_cast<std::uint32_t>(frequencies[s]) << 8 | bias << 20;
-    }
+    table.ranges[s] = {frequencies[s], static_cast<std::uint16_t>(start)};
+    std::fill_n(table.symbols.begin() + start, frequencies[s], static_cast<std::uint8_t>(s));
+    start += frequencies[s];
   }
-  assert(slot == kScale);
+  assert(start == kScale);
 }
 
 void SymbolDecoder::throw_bad_symbol() {

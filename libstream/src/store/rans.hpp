@@ -39,8 +39,15 @@ struct EncodeTable {
   std::array<Entry, kSymbols> entries{};
 };
 
-/// A context's table as the decoder uses it: by slot, symbol | frequency << 8 | bias << 20.
-using DecodeTable = std::array<std::uint32_t, kScale>;
+/// A context's table as the decoder uses it. Two small arrays rather than one of 32-bit slots: a
+/// set of tables then stays in the caches that are near, also when clusters are read at random.
+struct DecodeTable {
+  struct Range {
+    std::uint16_t frequency = 0, start = 0;
+  };
+  std::array<std::uint8_t, kScale> symbols{};  ///< by slot
+  std::array<Range, kSymbols> ranges{};        ///< by symbol
+};
 
 EncodeTable encode_table(const Frequencies& frequencies);
 void fill_decode_table(const Frequencies& frequencies, DecodeTable& table);
@@ -145,15 +152,17 @@ class SymbolDecoder {
   }
 
   TERRACE_STORE_INLINE unsigned symbol(unsigned context) {
-    const std::uint32_t entry = (*tables_[context])[state_ & (kScale - 1)];
-    state_ = ((entry >> 8) & 0xfff) * (state_ >> kScaleBits) + (entry >> 20);
+    const DecodeTable& table = *tables_[context];
+    const std::uint32_t slot = state_ & (kScale - 1);
+    const unsigned symbol = table.symbols[slot];
+    const DecodeTable::Range range = table.ranges[symbol];
+    state_ = range.frequency * (state_ >> kScaleBits) + slot - range.start;
     const std::uint32_t refilled = state_ << 16 | load<std::uint16_t>(next_);
     // Selected, not branched upon: whether a word is due is close to a coin toss.
     const bool low = state_ < kLow;
     state_ = low ? refilled : state_;
     next_ += low ? 2 : 0;
     next_ = next_ > end_ ? end_ : next_;
-    const unsigned symbol = entry & 0xff;
     if (symbol == kEscape) [[unlikely]]
       return escaped();
     return symbol;
