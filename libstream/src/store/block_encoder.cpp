@@ -259,12 +259,8 @@ void BlockEncoder::positions(SymbolEncoder& coder, Use&& heights) {
     heights();
     for (std::uint32_t i = 0; i < n; ++i) order_[i] = grid_.point(i);
   } else {
-    split_points_.resize(n);
-    for (std::uint32_t i = 0; i < n; ++i) {
-      split_points_[i] = {{relative_[0][i], relative_[1][i], relative_[2][i]}, i};
-    }
-    split_.code(coder, {{0, 0, 0}, size}, split_points_);
-    for (std::uint32_t i = 0; i < n; ++i) order_[i] = split_points_[i].number;
+    split_.code(coder, {{0, 0, 0}, size},
+                {relative_[0].data(), relative_[1].data(), relative_[2].data()}, order_.data(), n);
   }
 }
 

@@ -53,7 +53,6 @@ class BlockEncoder {
   std::vector<std::uint32_t> order_;                    ///< of coding, as numbers within members_
   GridCodec grid_;
   SplitCodec split_;
-  std::vector<SplitCodec::Point> split_points_;
   std::vector<std::int64_t> column_;
   std::vector<double> doubles_;
 };

@@ -136,11 +136,8 @@ void ClusterDecoder::positions(SymbolDecoder& coder, const Layout& layout,
     if (axis.size() < n) axis.resize(n);
   }
   if (form & kSplitForm) {
-    split_points_.resize(n);
-    split_.code(coder, {{0, 0, 0}, box_.size}, split_points_);
-    for (std::uint32_t i = 0; i < n; ++i) {
-      for (std::size_t axis = 0; axis < 3; ++axis) relative_[axis][i] = split_points_[i].at[axis];
-    }
+    split_.code(coder, {{0, 0, 0}, box_.size},
+                {relative_[0].data(), relative_[1].data(), relative_[2].data()}, nullptr, n);
     return;
   }
   if (!layout.grid || !GridCodec::fits(box_.size[0], box_.size[1], n)) {

@@ -32,7 +32,6 @@ class ClusterDecoder {
   std::array<std::vector<std::uint64_t>, 3> relative_;
   GridCodec grid_;
   SplitCodec split_;
-  std::vector<SplitCodec::Point> split_points_;
   std::vector<std::int64_t> column_;
   std::vector<std::byte> payload_;
   std::vector<std::int64_t> children_;

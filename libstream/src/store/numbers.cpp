@@ -35,22 +35,17 @@ bool all_integers(std::span<const double> values) {
 /// A value that n digits hold is held by n + 1, so one pass is enough but for the largest values.
 NumberForm decimals(std::span<const double> values, NumberForm base) {
   auto form = base;
-  for (const double value : values) {
-    while (!holds(value, form)) {
+  std::size_t settled = 0;  // values before this one were tried with fewer digits
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    while (!holds(values[i], form)) {
       if (++form == base + 10) return kDoubleBits;
+      settled = i;
     }
   }
-  for (const double value : values) {
+  for (const double value : values.first(settled)) {
     if (!holds(value, form)) return kDoubleBits;
   }
   return form;
-}
-
-/// Number of integers between the smallest and the largest value, less one.
-std::uint64_t range(std::span<const double> values, NumberForm form) {
-  const auto [low, high] = std::minmax_element(values.begin(), values.end());
-  return static_cast<std::uint64_t>(to_integer(*high, form)) -
-         static_cast<std::uint64_t>(to_integer(*low, form));
 }
 
 }  // namespace
@@ -66,10 +61,15 @@ NumberForm form_of(std::span<const double> values) {
   });
   const NumberForm bits = floats ? kFloatBits : kDoubleBits;
   NumberForm best = bits;
+  const auto [low, high] = std::minmax_element(values.begin(), values.end());
+  const auto range = [&, least = *low, most = *high](NumberForm form) {
+    return static_cast<std::uint64_t>(to_integer(most, form)) -
+           static_cast<std::uint64_t>(to_integer(least, form));
+  };
   for (const NumberForm base : {kIntegerForm, kFloatDecimals}) {
     if (base == kFloatDecimals && !floats) continue;
     const NumberForm form = decimals(values, base);
-    if (form != kDoubleBits && range(values, form) < range(values, best)) best = form;
+    if (form != kDoubleBits && range(form) < range(best)) best = form;
   }
   return best;
 }

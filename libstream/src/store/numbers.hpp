@@ -60,7 +60,9 @@ inline std::int64_t to_integer(double value, NumberForm form) {
   if (form == kIntegerForm) return static_cast<std::int64_t>(value);
   if (form < kFloatBits) {
     const unsigned digits = form < kFloatDecimals ? form : form - kFloatDecimals;
-    return static_cast<std::int64_t>(std::nearbyint(value * kPowersOfTen[digits]));
+    // The nearest integer, by hand: without SSE 4.1 std::nearbyint is a call.
+    const double scaled = value * kPowersOfTen[digits];
+    return static_cast<std::int64_t>(scaled + (scaled < 0 ? -0.5 : 0.5));
   }
   if (form == kFloatBits) return ordered_bits(static_cast<float>(value));
   return ordered_bits(value);

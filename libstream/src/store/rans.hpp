@@ -56,7 +56,7 @@ void fill_decode_table(const Frequencies& frequencies, DecodeTable& table);
 class BitWriter {
  public:
   void clear() {
-    bytes_.clear();
+    words_.clear();
     hold_ = 0;
     held_ = 0;
   }
@@ -69,19 +69,25 @@ class BitWriter {
     }
     hold_ = (hold_ << bits) | value;
     held_ += bits;
-    while (held_ >= 8) {
-      held_ -= 8;
-      bytes_.push_back(static_cast<std::uint8_t>(hold_ >> held_));
+    if (held_ >= 32) {
+      held_ -= 32;
+      words_.push_back(static_cast<std::uint32_t>(hold_ >> held_));
     }
   }
   void append_reversed(Bytes& out) const {
-    if (held_ > 0) out.push_back(static_cast<std::uint8_t>(hold_ << (8 - held_)));
-    out.insert(out.end(), bytes_.rbegin(), bytes_.rend());
+    std::uint64_t rest = hold_;
+    unsigned left = held_;
+    if (left % 8 != 0) {
+      rest <<= 8 - left % 8;
+      left += 8 - left % 8;
+    }
+    for (; left > 0; left -= 8, rest >>= 8) out.push_back(static_cast<std::uint8_t>(rest));
+    for (std::size_t i = words_.size(); i-- > 0;) store::put(out, words_[i]);
   }
 
  private:
-  Bytes bytes_;
-  std::uint64_t hold_ = 0;
+  std::vector<std::uint32_t> words_;
+  std::uint64_t hold_ = 0;  ///< the lower held_ (< 32) bits are still to go
   unsigned held_ = 0;
 };
 

@@ -23,63 +23,74 @@ struct IntegerBox {
 
 class SplitCodec {
  public:
-  struct Point {
-    std::array<std::uint64_t, 3> at{};
-    std::uint32_t number = 0;  ///< the encoder's, which tells the order of coding
-  };
-
-  /// Encoding re-orders points; decoding fills them. All lie in `box`.
+  /// n points in `box`, coordinate by coordinate in `at`. Decoding fills `at`; encoding fills
+  /// `order` with the numbers of the points in the order of coding (points at one place:
+  /// ascending).
   template <class Coder>
-  void code(Coder& coder, const IntegerBox& box, std::vector<Point>& points) {
-    split(coder, box, points.data(), static_cast<std::uint32_t>(points.size()));
+  void code(Coder& shared, const IntegerBox& box, const std::array<std::uint64_t*, 3>& at,
+            std::uint32_t* order, std::uint32_t n) {
+    at_ = at;
+    order_ = order;
+    if constexpr (!Coder::kDecoding) {
+      if (upper_.size() < n) upper_.resize(n);
+      for (std::uint32_t i = 0; i < n; ++i) order[i] = i;
+    }
+    split(shared, box, 0, n);
   }
 
  private:
   template <class Coder>
-  void split(Coder& coder, IntegerBox box, Point* points, std::uint32_t n) {
+  void split(Coder& coder, IntegerBox box, std::uint32_t first, std::uint32_t n) {
     // The lower half recursively, the upper one by going round: at most 192 deep.
     while (n > 1) {
       std::size_t axis = box.size[1] > box.size[0] ? 1 : 0;
       if (box.size[2] > box.size[axis]) axis = 2;
       if (box.size[axis] == 1) {
         if constexpr (Coder::kDecoding) {
-          for (std::uint32_t i = 0; i < n; ++i) points[i].at = box.low;
-        } else {
-          std::sort(points, points + n,
-                    [](const Point& a, const Point& b) { return a.number < b.number; });
+          for (std::size_t a = 0; a < 3; ++a) std::fill_n(at_[a] + first, n, box.low[a]);
         }
         return;
       }
       const std::uint64_t lower = box.size[axis] - box.size[axis] / 2;
       const std::uint64_t middle = box.low[axis] + lower;
       std::uint32_t below = 0;
-      if constexpr (!Coder::kDecoding) {
-        below = static_cast<std::uint32_t>(
-            std::partition(points, points + n,
-                           [&](const Point& p) { return p.at[axis] < middle; }) -
-            points);
-      }
+      if constexpr (!Coder::kDecoding) below = partition(first, n, axis, middle);
       code_count(coder, n, below);
 
       IntegerBox half = box;
       half.size[axis] = lower;
-      if (below > 0) split(coder, half, points, below);
+      if (below > 0) split(coder, half, first, below);
       box.low[axis] = middle;
       box.size[axis] -= lower;
-      points += below;
+      first += below;
       n -= below;
     }
     if (n == 1) {
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        if (box.size[axis] == 1) {
-          if constexpr (Coder::kDecoding) points->at[axis] = box.low[axis];
-          continue;
-        }
-        std::uint64_t value = points->at[axis] - box.low[axis];
-        code_uniform(coder, value, box.size[axis]);
-        if constexpr (Coder::kDecoding) points->at[axis] = box.low[axis] + value;
+        std::uint64_t value = 0;
+        if constexpr (!Coder::kDecoding) value = at_[axis][order_[first]] - box.low[axis];
+        if (box.size[axis] > 1) code_uniform(coder, value, box.size[axis]);
+        if constexpr (Coder::kDecoding) at_[axis][first] = box.low[axis] + value;
       }
     }
+  }
+
+  /// Brings the points below `middle` to the front, keeping the order of both parts, and returns
+  /// their number. Writes to both parts and counts in one: a branch here is a coin toss.
+  std::uint32_t partition(std::uint32_t first, std::uint32_t n, std::size_t axis,
+                          std::uint64_t middle) {
+    std::uint32_t* const points = order_ + first;
+    std::uint32_t* const upper = upper_.data();
+    const std::uint64_t* const values = at_[axis];
+    std::uint32_t below = 0;
+    for (std::uint32_t i = 0; i < n; ++i) {
+      const std::uint32_t point = points[i];
+      points[below] = point;
+      upper[i - below] = point;
+      below += values[point] < middle;
+    }
+    std::copy_n(upper, n - below, points + below);
+    return below;
   }
 
   template <class Coder>
@@ -100,6 +111,10 @@ class SplitCodec {
       if (below > n) throw Damage("a part of a cluster has more points than the whole");
     }
   }
+
+  std::array<std::uint64_t*, 3> at_{};
+  std::uint32_t* order_ = nullptr;
+  std::vector<std::uint32_t> upper_;  ///< of a partition under way
 };
 
 }  // namespace terrace::stream::store
