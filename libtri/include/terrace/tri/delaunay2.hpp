@@ -151,8 +151,9 @@ class Delaunay2 {
   void insert(std::span<const Point> points, std::span<Insertion> results,
               VertexId hint = kNoVertex);
   void remove(VertexId vertex);
-  /// Removes a set (all different) by enlarging one hole (J. Skala, thesis, section 8.1); much
-  /// faster than one by one when the set is compact, not slower when it is not.
+  /// Removes a set (all different) by enlarging one hole (J. Skala, thesis, section 8.1); faster
+  /// than one by one where the set is compact. Where no hole is possible, one by one after the
+  /// attempt.
   void remove(std::span<const VertexId> vertices);
   /// Removes everything and gives the memory back; a journal goes on.
   void clear();
