@@ -86,9 +86,10 @@ struct ClusterRecord {
 
 /// The members of a cluster, in the order that gives their ids. They are inserted in this order:
 /// one in which neighbours follow each other (row by row for rasters, a k-d tree's for clouds)
-/// is 1.3 to 1.6 times as fast as a random one, and as fast as a Hilbert curve. A member of level L
-/// has L `children`: the ordinals of the clusters that it heads on levels 0, 1, ... L - 1; those of
-/// member i start at children[i * L]. What the spans show lives until the next call of read().
+/// is 1.2 to 1.6 times as fast as a random one, and about as fast as a Hilbert curve. A member of
+/// level L has L `children`: the ordinals of the clusters that it heads on levels 0, 1, ... L - 1;
+/// those of member i start at children[i * L]. What the spans show lives until the next call of
+/// read().
 struct ClusterMembers {
   std::span<const Point3> positions;
   std::span<const std::uint64_t> children;
