@@ -12,9 +12,9 @@ class Interrupted : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// From here on SIGINT and SIGTERM only set a flag and close standard input, so that nobody waits for
-/// it (the second one ends the process at once), and a
-/// closed pipe is an error of the write instead of a signal.
+/// From here on SIGINT and SIGTERM only set a flag and close standard input, so that nobody waits
+/// for it (the second one ends the process at once), and a closed pipe is an error of the write
+/// instead of a signal.
 void install_signal_handlers();
 
 /// True once the user has asked to stop. Cheap; may be called from any thread.

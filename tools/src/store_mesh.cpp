@@ -145,16 +145,17 @@ TriangleMesh mesh_of_store(const stream::Store& store, const Detail& detail,
 TriangleMesh points_of_store(const stream::Store& store, const Detail& detail) {
   const Placement placement = placement_of(store.schema());
   TriangleMesh cloud;
-  for_each_wanted(store, detail, [&](stream::ClusterId id, const stream::ClusterRecord&,
-                                     const stream::ClusterPoints& points) {
-    check_interrupt();
-    for (const stream::Point3& p : points.positions) {
-      const stream::Point3 place = world_point(placement, p);
-      if (detail.region && !detail.region->contains(place)) continue;
-      cloud.positions.push_back(place);
-      cloud.levels.push_back(static_cast<std::uint8_t>(stream::level_of(id)));
-    }
-  });
+  for_each_wanted(
+      store, detail,
+      [&](stream::ClusterId id, const stream::ClusterRecord&, const stream::ClusterPoints& points) {
+        check_interrupt();
+        for (const stream::Point3& p : points.positions) {
+          const stream::Point3 place = world_point(placement, p);
+          if (detail.region && !detail.region->contains(place)) continue;
+          cloud.positions.push_back(place);
+          cloud.levels.push_back(static_cast<std::uint8_t>(stream::level_of(id)));
+        }
+      });
   return cloud;
 }
 

@@ -10,10 +10,10 @@
 namespace terrace::tools {
 
 /// The 2D Delaunay triangulation of what `detail` wants: rasters in column and row, exactly; other
-/// points in x and y. Positions are in the store's CRS, triangles counter-clockwise seen from above,
-/// levels the highest of each vertex's point. With a region, the triangles that reach into it, whole.
-/// memory_bytes: what the work may take. Throws: stream::Error on a damaged store, or when the
-/// points would not fit, saying what they need.
+/// points in x and y. Positions are in the store's CRS, triangles counter-clockwise seen from
+/// above, levels the highest of each vertex's point. With a region, the triangles that reach into
+/// it, whole. memory_bytes: what the work may take. Throws: stream::Error on a damaged store, or
+/// when the points would not fit, saying what they need.
 TriangleMesh mesh_of_store(const stream::Store& store, const Detail& detail,
                            std::uint64_t memory_bytes);
 

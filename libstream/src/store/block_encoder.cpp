@@ -319,7 +319,7 @@ void BlockEncoder::encode(const EncodingTables& tables, Bytes& bytes, std::vecto
       if (entry.points >= kLow) coder.raw(at >> 16, 16);
       coder.finish(bytes, at & 0xffff);
       entry.bytes = static_cast<std::uint32_t>(bytes.size() - start);
-      entry.checksum = crc32({bytes.data() + start, entry.bytes});
+      entry.checksum = crc16({bytes.data() + start, entry.bytes});
     }
     entries.push_back(entry);
   }

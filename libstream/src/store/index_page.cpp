@@ -48,7 +48,7 @@ void write_page(std::span<const Entry> entries, std::uint64_t offset, Bytes& out
       differences |= rows[i][f] - rows[0][f];
     }
     // A checksum is noise: all of its bits, always.
-    if (f == IndexPage::kChecksum) least = 0, most = UINT32_MAX, differences = 1;
+    if (f == IndexPage::kChecksum) least = 0, most = UINT16_MAX, differences = 1;
     column.base = least;
     column.shift = differences == 0 ? 0 : static_cast<std::uint8_t>(std::countr_zero(differences));
     column.width = static_cast<std::uint8_t>(std::bit_width((most - least) >> column.shift));
@@ -142,7 +142,7 @@ Entry IndexPage::entry(std::uint32_t i) const {
   if (forms != 0) throw Damage("an index entry has an unknown number form");
   entry.error = static_cast<std::uint16_t>(error);
   entry.descendants = value(kDescendants, i);
-  entry.checksum = static_cast<std::uint32_t>(value(kChecksum, i));
+  entry.checksum = static_cast<std::uint16_t>(value(kChecksum, i));
   return entry;
 }
 

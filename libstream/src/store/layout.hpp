@@ -42,7 +42,7 @@ struct Entry {
   std::array<std::uint64_t, 3> size{1, 1, 1};  ///< of the box: integers per axis
   std::uint16_t error = 0;                     ///< see error_code
   std::uint64_t descendants = 0;               ///< levels above 0
-  std::uint32_t checksum = 0;                  ///< CRC-32 of the bytes
+  std::uint16_t checksum = 0;                  ///< CRC-16 of the bytes
 };
 
 /// An error as 16 bits, never rounded down: the upper bits of the double (5 of the mantissa).

@@ -148,7 +148,7 @@ Error LevelReader::damaged(std::uint64_t ordinal, const std::string& cause) cons
 void LevelReader::decode(std::uint64_t ordinal, const Entry& entry, std::uint64_t offset,
                          ByteView bytes, ClusterDecoder& decoder, ClusterPoints& out) const {
   try {
-    if (crc32(bytes) != entry.checksum) {
+    if (crc16(bytes) != entry.checksum) {
       throw Damage("the checksum of the bytes from " + std::to_string(offset) + " on is wrong");
     }
     if (entry.points > most_points_) throw Damage("a cluster has more points than the store");

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cstdint>
+#include <random>
+#include <string_view>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "../src/store/bytes.hpp"
+
+namespace terrace::stream::store {
+namespace {
+
+/// Bit by bit, as the polynomial is defined.
+std::uint16_t crc16_by_bits(ByteView bytes) {
+  unsigned crc = 0xFFFF;
+  for (const std::uint8_t byte : bytes) {
+    crc ^= static_cast<unsigned>(byte) << 8;
+    for (int bit = 0; bit < 8; ++bit) crc = (crc << 1) ^ ((crc & 0x8000) != 0 ? 0x11021u : 0u);
+  }
+  return static_cast<std::uint16_t>(crc ^ 0xFFFF);
+}
+
+TEST(Crc16, HasThePublishedCheckValue) {
+  constexpr std::string_view kText = "123456789";
+  EXPECT_EQ(crc16({reinterpret_cast<const std::uint8_t*>(kText.data()), kText.size()}), 0xD64E);
+  EXPECT_EQ(crc16({}), 0);
+}
+
+TEST(Crc16, EqualsTheDefinitionForEveryLength) {
+  std::mt19937_64 random(1);
+  for (std::size_t size = 0; size < 100; ++size) {
+    SCOPED_TRACE(size);
+    std::vector<std::uint8_t> bytes(size);
+    for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(random());
+    EXPECT_EQ(crc16(bytes), crc16_by_bits(bytes));
+  }
+}
+
+}  // namespace
+}  // namespace terrace::stream::store
