@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
+#include <cerrno>
 #include <cstdint>
+#include <cstdlib>
 #include <filesystem>
 #include <limits>
 #include <memory>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
+#include <terrace/stream/error.hpp>
 
 #include "crs_option.hpp"
 #include "error.hpp"
@@ -21,6 +25,30 @@ namespace {
 
 /// The trial run behind --dry-run reads this many points and scales up.
 constexpr std::uint64_t kTrialPoints = 1'000'000;
+
+/// A folder beside the target that goes with the object.
+class TrialFolder {
+ public:
+  explicit TrialFolder(const std::filesystem::path& parent) {
+    std::string name = (parent / ".terrace-dry-run-XXXXXX").string();
+    if (mkdtemp(name.data()) == nullptr) {
+      throw stream::system_error(name, "cannot make a folder for the trial", errno,
+                                 "choose an output in a folder that can be written");
+    }
+    path_ = name;
+  }
+  ~TrialFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  TrialFolder(const TrialFolder&) = delete;
+  TrialFolder& operator=(const TrialFolder&) = delete;
+
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
 
 class BuildCommand final : public Command {
  public:
@@ -62,7 +90,14 @@ class BuildCommand final : public Command {
     request_.threads = common.threads;
     request_.memory_bytes = common.memory_or(kStreamingMemory);
     if (output_ == "-") throw UsageError("a store is a folder: it cannot go to standard output");
-    return dry_run_ ? estimate(common) : build(common);
+    std::error_code ignored;
+    if (!common.force && std::filesystem::exists(request_.store, ignored)) {
+      throw stream::Error({.file = output_,
+                           .where = {},
+                           .cause = "exists already",
+                           .remedy = "name another output, or give --force to replace it"});
+    }
+    return dry_run_ ? estimate() : build(common);
   }
 
  private:
@@ -95,17 +130,19 @@ class BuildCommand final : public Command {
   }
 
   /// Builds a store of the first points beside the target, weighs it and removes it.
-  Summary estimate(const CommonOptions& common) {
+  Summary estimate() {
+    if (std::find(request_.inputs.begin(), request_.inputs.end(), "-") != request_.inputs.end()) {
+      throw UsageError("--dry-run reads its input before the build does: name files, not -");
+    }
     const auto source = stream::open_source(request_.inputs, {.format = request_.input_format});
     const stream::SourceInfo& info = source->info();
     const std::filesystem::path target = request_.store;
-    request_.store = target.string() + ".dry-run-" + std::to_string(common.seed);
-    request_.replace = true;
+    const TrialFolder folder(target.parent_path());
+    request_.store = folder.path() / "store";
     request_.most_points = kTrialPoints;
     const Stopwatch watch;
     const BuildOutcome trial = build_store(request_);
     const double seconds = watch.seconds();
-    std::filesystem::remove_all(request_.store);
 
     // A raster's number of valid cells is not known before it is read: the trial's share is taken.
     const double valid =

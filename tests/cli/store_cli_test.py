@@ -1,0 +1,158 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The verbs on stores as their users meet them: build, info, verify, points, mesh.
+
+TERRACE=path/to/terrace store_cli_test.py
+"""
+
+import filecmp
+import json
+import os
+import subprocess
+import tempfile
+import unittest
+
+TERRACE = os.environ.get('TERRACE', 'terrace')
+SIZE = 600
+
+
+def terrace(*args):
+    return subprocess.run([TERRACE, *map(str, args)], capture_output=True, text=True, timeout=120)
+
+
+class StoreTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.dem = cls.path('dem.tif')
+        cls.store = cls.path('dem.terrace')
+        cls.run_ok('synth', 'dem', '--size', f'{SIZE}x{SIZE}', '-o', cls.dem)
+        cls.run_ok('build', cls.dem, '-o', cls.store, '--block', 3000)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.folder.cleanup()
+
+    @classmethod
+    def path(cls, name):
+        return os.path.join(cls.folder.name, name)
+
+    @staticmethod
+    def run_ok(*args):
+        result = terrace(*args)
+        assert result.returncode == 0, result.stderr
+        return result.stdout
+
+    def files(self, store):
+        return sorted(os.listdir(store))
+
+    def expect_error(self, code, *args):
+        result = terrace(*args)
+        self.assertEqual(result.returncode, code, result.stderr)
+        self.assertEqual(result.stdout, '')
+        self.assertEqual(len(result.stderr.splitlines()), 1, result.stderr)
+        return result.stderr
+
+    def test_build_reports_the_keys_of_the_contract_and_stays_within_memory(self):
+        store = self.path('keys.terrace')
+        summary = json.loads(self.run_ok('build', self.dem, '-o', store, '--json', '--memory', '200M'))
+        self.assertEqual(set(summary), {'points', 'nodata', 'seconds', 'points_per_second',
+                                        'peak_rss_bytes', 'store_bytes', 'levels'})
+        self.assertEqual(summary['points'], SIZE * SIZE)
+        self.assertLessEqual(summary['peak_rss_bytes'], 200 << 20)
+        self.assertEqual(summary['store_bytes'],
+                         sum(os.path.getsize(os.path.join(store, f)) for f in self.files(store)))
+
+    def test_threads_and_memory_do_not_change_a_byte(self):
+        for i, options in enumerate([('--threads', 1), ('--threads', 2, '--memory', '1G'),
+                                     ('--threads', 5, '--memory', '190M')]):
+            store = self.path(f'same{i}.terrace')
+            self.run_ok('build', self.dem, '-o', store, '--block', 3000, *options)
+            self.assertEqual(self.files(store), self.files(self.store))
+            self.assertEqual(filecmp.cmpfiles(store, self.store, self.files(store), shallow=False)[1:],
+                             ([], []))
+
+    def test_an_existing_store_is_replaced_only_with_force(self):
+        store = self.path('again.terrace')
+        self.run_ok('build', self.dem, '-o', store)
+        self.assertIn('--force', self.expect_error(1, 'build', self.dem, '-o', store))
+        self.run_ok('build', self.dem, '-o', store, '--force')
+
+    def test_force_spares_what_terrace_did_not_write(self):
+        folder = self.path('mine')
+        os.mkdir(folder)
+        open(os.path.join(folder, 'letter.txt'), 'w').close()
+        self.expect_error(1, 'build', self.dem, '-o', folder, '--force')
+        self.assertEqual(os.listdir(folder), ['letter.txt'])
+
+    def test_a_dry_run_writes_nothing(self):
+        before = sorted(os.listdir(self.folder.name))
+        summary = json.loads(self.run_ok('build', self.dem, '-o', self.path('dry.terrace'),
+                                         '--dry-run', '--json'))
+        self.assertEqual(summary['points'], SIZE * SIZE)
+        self.assertGreater(summary['store_bytes'], 0)
+        self.assertEqual(sorted(os.listdir(self.folder.name)), before)
+
+    def test_info_has_the_keys_of_the_contract(self):
+        info = json.loads(self.run_ok('info', self.store, '--json'))
+        for key in ('format', 'version', 'points', 'levels', 'bounds', 'crs', 'vertical', 'channels',
+                    'parameters', 'bytes'):
+            self.assertIn(key, info)
+        self.assertEqual(info['levels'][0]['points'], SIZE * SIZE)
+        for below, above in zip(info['levels'], info['levels'][1:]):
+            self.assertEqual(above['points'], below['clusters'])
+        self.assertEqual(info['crs']['epsg'], 32632)
+
+    def test_verify_finds_a_flipped_bit(self):
+        store = self.path('flipped.terrace')
+        self.run_ok('build', self.dem, '-o', store)
+        self.assertTrue(json.loads(self.run_ok('verify', store, '--json'))['ok'])
+        name = os.path.join(store, 'level-0.0.clusters')
+        with open(name, 'r+b') as file:
+            file.seek(os.path.getsize(name) // 2)
+            byte = file.read(1)[0]
+            file.seek(-1, os.SEEK_CUR)
+            file.write(bytes([byte ^ 4]))
+        result = terrace('verify', store, '--json')
+        self.assertEqual(result.returncode, 1)
+        verdict = json.loads(result.stdout)
+        self.assertFalse(verdict['ok'])
+        self.assertIn('level-0.0.clusters', verdict['problems'][0]['file'])
+
+    def test_points_of_every_level_are_as_many_as_info_says(self):
+        for level in json.loads(self.run_ok('info', self.store, '--json'))['levels']:
+            out = self.path(f'level{level["level"]}.xyz')
+            self.run_ok('points', self.store, '--level', level['level'], '-o', out)
+            with open(out) as file:
+                self.assertEqual(sum(1 for _ in file), level['points'])
+
+    def test_points_of_a_region_are_those_inside(self):
+        low = json.loads(self.run_ok('info', self.store, '--json'))['bounds']['min']
+        box = [low[0] + 300, low[1] + 600, low[0] + 1200, low[1] + 1800]
+        text = self.run_ok('points', self.store, '--region', ','.join(map(str, box)), '-o', '-')
+        points = [tuple(map(float, line.split())) for line in text.splitlines()]
+        self.assertEqual(len(points), 31 * 41)
+        for x, y, _ in points:
+            self.assertTrue(box[0] <= x <= box[2] and box[1] <= y <= box[3])
+
+    def test_mesh_in_every_format(self):
+        for ending in ('ply', 'obj', 'glb'):
+            out = self.path(f'mesh.{ending}')
+            summary = json.loads(self.run_ok('mesh', self.store, '--level', 'top', '-o', out, '--json'))
+            self.assertEqual(set(summary), {'vertices', 'triangles', 'seconds', 'peak_rss_bytes'})
+            self.assertGreater(summary['triangles'], summary['vertices'])
+            self.assertGreater(os.path.getsize(out), 100)
+
+    def test_levels_that_are_not_there_are_wrong_usage(self):
+        self.assertIn('top', self.expect_error(2, 'mesh', self.store, '--level', 9, '-o',
+                                               self.path('none.ply')))
+        self.assertFalse(os.path.exists(self.path('none.ply')))
+
+    def test_what_is_no_store_is_said(self):
+        for verb in ('verify', 'info'):
+            self.expect_error(1, verb, self.path('nothing'))
+        self.expect_error(1, 'mesh', self.dem, '-o', self.path('none.ply'))
+
+
+if __name__ == '__main__':
+    unittest.main()
