@@ -13,6 +13,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <sys/mount.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <terrace/stream/error.hpp>
@@ -145,6 +146,23 @@ TEST_F(Build, LeavesNothingWhenTheDiskIsFull) {
     }
     EXPECT_EQ(left, std::set<std::string>{"dem.tif"});
   }
+}
+
+TEST_F(Build, LeavesNothingOnADiskThatIsFull) {
+  const fs::path disk = folder_.path() / "disk";
+  fs::create_directory(disk);
+  if (mount("tmpfs", disk.c_str(), "tmpfs", 0, "size=128k") != 0) {
+    GTEST_SKIP() << "mounting a small tmpfs needs privileges";
+  }
+  request_.store = disk / "a.store";
+  try {
+    tools::build_store(request_);
+    ADD_FAILURE() << "the store fits into 128 KiB";
+  } catch (const stream::Error& error) {
+    EXPECT_NE(std::string(error.what()).find("No space left"), std::string::npos) << error.what();
+  }
+  EXPECT_TRUE(fs::is_empty(disk));
+  EXPECT_EQ(umount(disk.c_str()), 0);
 }
 
 TEST_F(Build, RefusesARasterOfNodataOnly) {
