@@ -13,29 +13,6 @@ constexpr std::size_t kGroup = 4;
 
 }  // namespace
 
-Bounds bounds_of(std::span<const Point3> positions) {
-  Bounds box = empty_bounds();
-  std::size_t i = 0;
-  if (positions.size() >= kGroup) {
-    std::array<double, 3 * kGroup> low, high;
-    low.fill(std::numeric_limits<double>::infinity());
-    high.fill(-std::numeric_limits<double>::infinity());
-    for (; i + kGroup <= positions.size(); i += kGroup) {
-      for (std::size_t j = 0; j < 3 * kGroup; ++j) {
-        const double x = positions[i + j / 3][j % 3];
-        low[j] = x < low[j] ? x : low[j];
-        high[j] = x > high[j] ? x : high[j];
-      }
-    }
-    for (std::size_t j = 0; j < kGroup; ++j) {
-      include(box, Point3{low[3 * j], low[3 * j + 1], low[3 * j + 2]});
-      include(box, Point3{high[3 * j], high[3 * j + 1], high[3 * j + 2]});
-    }
-  }
-  for (; i < positions.size(); ++i) include(box, positions[i]);
-  return box;
-}
-
 std::size_t first_not_finite(std::span<const Point3> positions) {
   // 0 * x is zero for finite x and NaN for all others; a NaN stays in the sum.
   std::array<double, 3 * kGroup> sum{};

@@ -14,13 +14,6 @@
 
 namespace terrace::cluster {
 
-constexpr GroundMap kIdentityMap{1, 0, 0, 0, 1, 0, 0, 0, 1};
-
-constexpr Bounds empty_bounds() {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  return {{kInfinity, kInfinity, kInfinity}, {-kInfinity, -kInfinity, -kInfinity}};
-}
-
 inline void include(Bounds& box, const Point3& p) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     box.min[axis] = p[axis] < box.min[axis] ? p[axis] : box.min[axis];
@@ -56,8 +49,6 @@ inline double ground_extent(const GroundMap& m, const Bounds& box) {
   }
   return sum;
 }
-
-Bounds bounds_of(std::span<const Point3> positions);
 
 /// The index of the first point with a coordinate that is not finite, or positions.size().
 std::size_t first_not_finite(std::span<const Point3> positions);

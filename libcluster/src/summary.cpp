@@ -57,7 +57,7 @@ Summary summarise_heads(std::span<const Point3> positions, std::span<const Summa
                         std::span<const std::uint32_t> members, std::uint32_t representative,
                         const GroundMap& map) {
   const Point3& from = positions[representative];
-  Summary result{empty_bounds(), 0.0, 0};
+  Summary result{kEmptyBounds, 0.0, 0};
   double by_triangle = 0.0;
   for (const std::uint32_t member : members) {
     const Point3& p = positions[member];

@@ -10,6 +10,8 @@
 #include <vector>
 
 #include "terrace/cluster/block.hpp"
+#include "terrace/cluster/bounds.hpp"
+#include "terrace/cluster/metric.hpp"
 #include "terrace/cluster/point.hpp"
 
 /// The streaming cluster hierarchy: one pass over points of any number in constant memory, by
@@ -25,16 +27,10 @@
 
 namespace terrace::cluster {
 
-/// A closed axis-aligned box; min = +infinity and max = -infinity when empty.
-struct Bounds {
-  Point3 min, max;
-  friend bool operator==(const Bounds&, const Bounds&) = default;
-};
-
 /// A linear map, row-major: ground = map * position. Clustering measures distances on the ground
 /// (metres); positions stay as they came. Entries must be finite and not all zero. A map may be
 /// singular: a row of zeros leaves that direction out of all distances.
-using GroundMap = std::array<double, 9>;
+using GroundMap = LinearMap;
 
 /// Over all descendants of a cluster down to level 0, representative included.
 /// error: never less than the ground distance from the representative to a descendant; exact (the

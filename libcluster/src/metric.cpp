@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/cluster/metric.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+#include <type_traits>
+
+namespace terrace::cluster {
+namespace {
+
+template <class... Ts>
+struct Overloaded : Ts... {
+  using Ts::operator()...;
+};
+template <class... Ts>
+Overloaded(Ts...) -> Overloaded<Ts...>;
+
+// Sine and cosine of an angle in degrees, exact at multiples of 90.
+std::array<double, 2> sine_cosine(double degrees) {
+  int quarter = 0;
+  const double rest = std::remquo(degrees, 90.0, &quarter) * (std::numbers::pi / 180.0);
+  const double s = std::sin(rest), c = std::cos(rest);
+  switch (quarter & 3) {
+    case 0:
+      return {s, c};
+    case 1:
+      return {c, -s};
+    case 2:
+      return {-s, -c};
+    default:
+      return {-c, s};
+  }
+}
+
+void check_semi_axis(double length, std::size_t axis) {
+  if (length > 0.0 && std::isfinite(length) && std::isfinite(1.0 / length)) return;
+  throw std::invalid_argument("semi-axis " + std::to_string(axis) + " of an ellipse is " +
+                              std::to_string(length) +
+                              ": it must be positive and finite, in the unit of the points");
+}
+
+LinearMap upright(double angle_degrees) {
+  if (!std::isfinite(angle_degrees)) {
+    throw std::invalid_argument(
+        "the angle of an ellipse is not finite: give it in degrees, "
+        "counter-clockwise from +x");
+  }
+  const auto [s, c] = sine_cosine(angle_degrees);
+  return {c, s, 0, -s, c, 0, 0, 0, 1};
+}
+
+double euclidean(const Point3& a, const Point3& b) {
+  const double x = b[0] - a[0], y = b[1] - a[1], z = b[2] - a[2];
+  return std::sqrt(x * x + y * y + z * z);
+}
+
+double mapped_length(const LinearMap& m, double x, double y, double z) {
+  const double u = m[0] * x + m[1] * y + m[2] * z;
+  const double v = m[3] * x + m[4] * y + m[5] * z;
+  const double w = m[6] * x + m[7] * y + m[8] * z;
+  return std::sqrt(u * u + v * v + w * w);
+}
+
+double minkowski(double p, double x, double y, double z) {
+  x = std::abs(x);
+  y = std::abs(y);
+  z = std::abs(z);
+  const double largest = std::max({x, y, z});
+  if (largest == 0.0 || std::isinf(p)) return largest;
+  if (p == 1.0) return x + y + z;
+  // Relative to the largest, so that powers neither overflow nor vanish.
+  return largest *
+         std::pow(std::pow(x / largest, p) + std::pow(y / largest, p) + std::pow(z / largest, p),
+                  1.0 / p);
+}
+
+bool separate(const Bounds& a, const Bounds& b) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (a.max[axis] < b.min[axis] || b.max[axis] < a.min[axis]) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+Elliptical::Elliptical(double a, double b, double angle_degrees, double c)
+    : Elliptical({a, b, c}, upright(angle_degrees)) {}
+
+Elliptical::Elliptical(const Point3& semi_axes, const LinearMap& axes) : map_{}, least_scale_(0.0) {
+  for (std::size_t k = 0; k < 3; ++k) check_semi_axis(semi_axes[k], k);
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) {
+      double product = 0.0;
+      for (std::size_t k = 0; k < 3; ++k) product += axes[3 * i + k] * axes[3 * j + k];
+      if (!(std::abs(product - (i == j ? 1.0 : 0.0)) <= 1e-9)) {
+        throw std::invalid_argument(
+            "the axes of an ellipsoid are not orthonormal: product of rows " + std::to_string(i) +
+            " and " + std::to_string(j) + " is " + std::to_string(product));
+      }
+    }
+  }
+  // M = sum over the axes of e e^T / semi-axis: the turn back leaves it symmetric.
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        map_[3 * i + j] += axes[3 * k + i] * axes[3 * k + j] / semi_axes[k];
+      }
+    }
+  }
+  least_scale_ = 1.0 / std::max({semi_axes[0], semi_axes[1], semi_axes[2]});
+}
+
+EllipticalField::EllipticalField(std::vector<Region> regions) : regions_(std::move(regions)) {
+  for (std::size_t r = 0; r < regions_.size(); ++r) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (regions_[r].box.min[axis] <= regions_[r].box.max[axis]) continue;
+      throw std::invalid_argument("region " + std::to_string(r) +
+                                  " of a field of metrics is empty or not a number along axis " +
+                                  std::to_string(axis) +
+                                  ": its minimum must not exceed its maximum");
+    }
+  }
+}
+
+const EllipticalField::Region* EllipticalField::find(const Point3& position) const {
+  for (const Region& region : regions_) {
+    if (contains(region.box, position)) return &region;
+  }
+  return nullptr;
+}
+
+const LinearMap& EllipticalField::operator()(const Point3& position) const {
+  const Region* region = find(position);
+  return region ? region->metric.map() : kIdentityMap;
+}
+
+double EllipticalField::least_scale(const Point3& position) const {
+  const Region* region = find(position);
+  return region ? region->metric.least_scale() : 1.0;
+}
+
+std::optional<LinearMap> EllipticalField::uniform_in(const Bounds& box) const {
+  for (const Region& region : regions_) {
+    if (separate(region.box, box)) continue;
+    if (contains(region.box, box.min) && contains(region.box, box.max)) return region.metric.map();
+    return std::nullopt;
+  }
+  return kIdentityMap;
+}
+
+bool is_symmetric(const Metric& metric) {
+  if (const auto* custom = std::get_if<CustomMetric>(&metric)) return custom->symmetric;
+  if (const auto* field = std::get_if<EllipticalField>(&metric)) return field->regions().empty();
+  return true;
+}
+
+bool obeys_triangle_inequality(const Metric& metric) {
+  return std::visit(Overloaded{
+                        [](const Euclidean&) { return true; },
+                        [](const SquaredEuclidean&) { return false; },
+                        [](const Minkowski& m) { return m.p >= 1.0; },
+                        [](const Elliptical&) { return true; },
+                        [](const EllipticalField& field) { return field.regions().empty(); },
+                        [](const CustomMetric& custom) { return custom.triangle_inequality; },
+                    },
+                    metric);
+}
+
+std::string name_of(const Metric& metric) {
+  return std::visit(Overloaded{
+                        [](const Euclidean&) -> std::string { return "euclidean"; },
+                        [](const SquaredEuclidean&) -> std::string { return "squared"; },
+                        [](const Minkowski& m) -> std::string {
+                          std::string p = std::to_string(m.p);
+                          if (p.find('.') != std::string::npos) {
+                            p.erase(p.find_last_not_of('0') + 1);
+                            if (p.back() == '.') p.pop_back();
+                          }
+                          return "minkowski:" + p;
+                        },
+                        [](const Elliptical&) -> std::string { return "elliptical"; },
+                        [](const EllipticalField&) -> std::string { return "elliptical field"; },
+                        [](const CustomMetric&) -> std::string { return "custom"; },
+                    },
+                    metric);
+}
+
+void check(const Metric& metric) {
+  if (const auto* minkowski = std::get_if<Minkowski>(&metric); minkowski && !(minkowski->p > 0.0)) {
+    throw std::invalid_argument("the exponent of a Minkowski distance is " +
+                                std::to_string(minkowski->p) +
+                                ": it must be positive (1 and above give a metric)");
+  }
+  if (const auto* custom = std::get_if<CustomMetric>(&metric); custom && !custom->distance) {
+    throw std::invalid_argument("a custom metric without a function");
+  }
+}
+
+double distance(const Metric& metric, const Point3& facility, const Point3& client) {
+  const double x = client[0] - facility[0];
+  const double y = client[1] - facility[1];
+  const double z = client[2] - facility[2];
+  return std::visit(
+      Overloaded{
+          [&](const Euclidean&) { return euclidean(facility, client); },
+          [&](const SquaredEuclidean&) { return x * x + y * y + z * z; },
+          [&](const Minkowski& m) { return minkowski(m.p, x, y, z); },
+          [&](const Elliptical& e) { return mapped_length(e.map(), x, y, z); },
+          [&](const EllipticalField& field) { return mapped_length(field(facility), x, y, z); },
+          [&](const CustomMetric& custom) { return custom.distance(facility, client); },
+      },
+      metric);
+}
+
+double diagonal(const Metric& metric, const Bounds& box) {
+  if (!(box.min[0] <= box.max[0])) return 0.0;
+  if (std::holds_alternative<EllipticalField>(metric)) return euclidean(box.min, box.max);
+  double longest = 0.0;
+  for (unsigned corner = 0; corner < 4; ++corner) {
+    Point3 from = box.min, to = box.max;
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      if (corner >> axis & 1u) std::swap(from[axis], to[axis]);
+    }
+    longest = std::max({longest, distance(metric, from, to), distance(metric, to, from)});
+  }
+  return longest;
+}
+
+}  // namespace terrace::cluster
