@@ -83,6 +83,33 @@ inline std::vector<std::vector<std::uint32_t>> members_of(const Dendrogram& dend
   return members;
 }
 
+/// What is wrong with a dendrogram as a run of complete linkage: each row must merge two clusters
+/// than which none are nearer, at the distance of their farthest points, up to `tolerance`
+/// (relative). Empty if nothing is. O(n^3).
+inline std::string complete_fault(const Dendrogram& dendrogram, Distances d, double tolerance) {
+  if (std::string fault = dendrogram_fault(dendrogram); !fault.empty()) return fault;
+  std::vector<std::size_t> place(dendrogram.points);  // of each cluster its row of d
+  for (std::size_t i = 0; i < place.size(); ++i) place[i] = i;
+  std::vector<std::size_t> active = place;
+  for (const Merge& merge : dendrogram.merges) {
+    const std::string row = "row " + std::to_string(place.size() - dendrogram.points) + ": ";
+    const std::size_t a = place[merge.a];
+    const std::size_t b = place[merge.b];
+    if (std::abs(merge.height - d[a][b]) > tolerance * d[a][b]) return row + "wrong height";
+    for (const std::size_t i : active) {
+      for (const std::size_t j : active) {
+        if (i < j && d[i][j] * (1 + tolerance) < merge.height) {
+          return row + "others are nearer";
+        }
+      }
+    }
+    for (const std::size_t k : active) d[a][k] = d[k][a] = std::max(d[a][k], d[b][k]);
+    active.erase(std::find(active.begin(), active.end(), b));
+    place.push_back(a);
+  }
+  return {};
+}
+
 /// Inputs of about `count` points, degenerate ones among them.
 struct NamedPoints {
   std::string name;
