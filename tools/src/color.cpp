@@ -6,6 +6,8 @@
 #include <cmath>
 #include <vector>
 
+#include "portable_math.hpp"
+
 namespace terrace::tools {
 namespace {
 
@@ -70,6 +72,12 @@ Rgb category_colour(std::int64_t category) {
                                                     {136, 34, 51}}};
   const auto count = static_cast<std::int64_t>(kCategories.size());
   return kCategories[static_cast<std::size_t>(((category % count) + count) % count)];
+}
+
+Rgb cluster_colour(std::int64_t cluster) {
+  if (cluster < 0) return {200, 200, 200};
+  return category_colour(
+      static_cast<std::int64_t>(scramble(static_cast<std::uint64_t>(cluster)) >> 8));
 }
 
 HeightTint HeightTint::of(std::span<const double> heights) {

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/cluster/complete_linkage.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <stdexcept>
+#include <string>
+
+#include "complete_rounds.hpp"
+#include "linkage_points.hpp"
+#include "linkage_tree.hpp"
+
+namespace terrace::cluster {
+namespace {
+
+template <class T>
+const LinkageKernels<T>& kernels_of(SimdPath path) {
+  const SimdPath best = best_simd_path();
+  if (path == SimdPath::automatic) path = best;
+  if (path > best) {
+    throw std::invalid_argument(
+        "this processor lacks the instructions of the SIMD path asked for; "
+        "SimdPath::automatic takes the best there is");
+  }
+#ifdef TERRACE_CLUSTER_X86
+  if constexpr (sizeof(T) == sizeof(float)) {
+    if (path == SimdPath::avx512) return kLinkageFloatAvx512;
+    if (path == SimdPath::avx2) return kLinkageFloatAvx2;
+  } else {
+    if (path == SimdPath::avx512) return kLinkageDoubleAvx512;
+    if (path == SimdPath::avx2) return kLinkageDoubleAvx2;
+  }
+#endif
+  if constexpr (sizeof(T) == sizeof(float)) {
+    return kLinkageFloatPortable;
+  } else {
+    return kLinkageDoublePortable;
+  }
+}
+
+std::string pair_text(std::size_t i, std::size_t j) {
+  return "the distance of " + std::to_string(std::min(i, j)) + " and " +
+         std::to_string(std::max(i, j));
+}
+
+void check_distance(double value, double most, std::size_t i, std::size_t j) {
+  if (value >= 0.0 && value <= most) return;
+  throw std::invalid_argument(pair_text(i, j) + " is " + std::to_string(value) +
+                              "; distances must be finite and not negative");
+}
+
+template <class T>
+Dendrogram of_points(std::span<const Point3> points, const CompleteLinkageOptions& options) {
+  const LinkageKernels<T>& kernels = kernels_of<T>(options.path);
+  const LinkagePoints linkage_points(points);
+  BandMatrix<T> matrix(points.size(), options.memory_limit);
+  if (points.size() < 2) return make_dendrogram(points.size(), {});
+  // In the order of a kD-tree most clusters that merge have rows that are near in the matrix.
+  std::vector<std::uint32_t> all(points.size());
+  std::iota(all.begin(), all.end(), 0u);
+  const LinkageTree tree(linkage_points.scaled(), all, options.threads);
+  const double* const x = tree.axis(0);
+  const double* const y = tree.axis(1);
+  const double* const z = tree.axis(2);
+  CompleteRounds<T> rounds(matrix, kernels, options.threads);
+  std::vector<Link> links = rounds.run([&](std::size_t i, T* row) {
+    const std::size_t after = std::min(matrix.width(), points.size() - 1 - i);
+    kernels.distances(x + i + 1, y + i + 1, z + i + 1, after, x[i], y[i], z[i], row);
+    kernels.distances(x, y, z, matrix.width() - after, x[i], y[i], z[i], row + after);
+  });
+  for (Link& link : links) {
+    link = {tree.number(link.i), tree.number(link.j), linkage_points.height(link.height)};
+  }
+  return make_dendrogram(points.size(), links);
+}
+
+template <class T>
+Dendrogram of_function(std::size_t count, const PairDistance& distance,
+                       const CompleteLinkageOptions& options) {
+  const LinkageKernels<T>& kernels = kernels_of<T>(options.path);
+  BandMatrix<T> matrix(count, options.memory_limit);
+  CompleteRounds<T> rounds(matrix, kernels, options.threads);
+  const double most = std::numeric_limits<T>::max();
+  const std::vector<Link> links = rounds.run([&](std::size_t i, T* row) {
+    // The second copies are never read.
+    const bool second_copy = count % 2 == 0 && i >= count / 2;
+    for (std::size_t k = 0; k < matrix.width() - (second_copy ? 1 : 0); ++k) {
+      const std::uint64_t j = band_partner(count, {i, k});
+      const double value = distance(static_cast<std::uint32_t>(std::min<std::uint64_t>(i, j)),
+                                    static_cast<std::uint32_t>(std::max<std::uint64_t>(i, j)));
+      check_distance(value, most, i, j);
+      row[k] = static_cast<T>(value);
+    }
+  });
+  return make_dendrogram(count, links);
+}
+
+}  // namespace
+
+Dendrogram complete_linkage(std::span<const Point3> points, const CompleteLinkageOptions& options) {
+  return options.entry == MatrixEntry::float32 ? of_points<float>(points, options)
+                                               : of_points<double>(points, options);
+}
+
+Dendrogram complete_linkage(std::size_t count, const PairDistance& distance,
+                            const CompleteLinkageOptions& options) {
+  return options.entry == MatrixEntry::float32 ? of_function<float>(count, distance, options)
+                                               : of_function<double>(count, distance, options);
+}
+
+template <class T>
+Dendrogram complete_linkage(BandMatrix<T>&& distances, const CompleteLinkageOptions& options) {
+  const std::size_t n = distances.size();
+  for (std::size_t i = 0; n % 2 == 0 && i < n / 2; ++i) {
+    const std::size_t j = i + n / 2;
+    if (distances.at(i, j) != distances.at(j, i)) {
+      throw std::invalid_argument(pair_text(i, j) +
+                                  " is in the matrix twice, with different values");
+    }
+  }
+  CompleteRounds<T> rounds(distances, kernels_of<T>(options.path), options.threads);
+  const std::vector<Link> links = rounds.run([&](std::size_t i, const T* row) {
+    for (std::size_t k = 0; k < distances.width(); ++k) {
+      check_distance(row[k], std::numeric_limits<T>::max(), i, band_partner(n, {i, k}));
+    }
+  });
+  return make_dendrogram(n, links);
+}
+
+template Dendrogram complete_linkage(BandMatrix<float>&&, const CompleteLinkageOptions&);
+template Dendrogram complete_linkage(BandMatrix<double>&&, const CompleteLinkageOptions&);
+
+}  // namespace terrace::cluster
