@@ -98,20 +98,6 @@ void permute(SearchFrame& frame, const std::vector<std::uint32_t>& order) {
   }
 }
 
-// How far a cost of the frame may be from that of the given coordinates: bringing a coordinate
-// into range rounds it by half a unit in the last place of the box, also where the distance is
-// short.
-double rounding_of_frame(const FacilityPoints& problem, const SearchFrame& frame) {
-  const double diagonal = frame.facility_cost / problem.facility_cost;  // of weight 1
-  double weight = 0.0;
-  for (const double w : frame.weights) weight += w;
-  double power = 1.0;
-  if (const auto* minkowski = std::get_if<Minkowski>(&problem.metric)) {
-    power = std::min(power, minkowski->p);
-  }
-  return weight * diagonal * std::pow(16.0 * std::numeric_limits<double>::epsilon(), power);
-}
-
 }  // namespace
 
 DualBound lower_bound(const FacilityPoints& problem, const FacilitySolution& start,
