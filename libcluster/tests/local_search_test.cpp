@@ -21,47 +21,6 @@ TEST(CandidateCount, FollowsTheThesis) {
   EXPECT_EQ(candidate_count(SearchLength::tenth, 0), 0u);
 }
 
-TEST(LocalSearch, GainIsWhatOpeningSpares) {
-  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
-    SCOPED_TRACE(testing::Message() << "seed " << seed);
-    std::mt19937_64 random(seed);
-    // A coarse grid, so that duplicates and ties happen.
-    std::vector<Point3> points = inputs::cube(200, random);
-    if (seed % 2 == 0) {
-      for (Point3& p : points) {
-        for (double& v : p) v = std::floor(v * 5);
-      }
-    }
-    std::vector<double> weights;
-    if (seed % 3 == 0) {
-      for (std::size_t i = 0; i < points.size(); ++i) {
-        weights.push_back(0.1 + 10 * inputs::uniform(random));
-      }
-    }
-    LocalSearch search(points, weights, seed % 4 == 0 ? 0.2 : 1.0);
-    search.start(random);
-    unsigned closed = 0;
-    for (int step = 0; step < 300; ++step) {
-      const auto candidate = static_cast<std::uint32_t>(random() % points.size());
-      const double before = search.cost();
-      const std::size_t facilities = search.facility_count();
-      const double gain = search.gain(candidate);
-      // Losses are carried out as well: the law does not depend on the sign.
-      if (gain <= 0 && step % 5 != 0) continue;
-      search.open(candidate);
-      closed += search.facility_count() <= facilities ? 1u : 0u;
-      ASSERT_NEAR(before - search.cost(), gain, 1e-9 * before);
-      BlockClustering clustering;
-      search.result(clustering);
-      ASSERT_NEAR(clustering.cost(), search.cost(), 1e-9 * before);
-      for (std::size_t c = 0; c < clustering.facilities.size(); ++c) {
-        ASSERT_EQ(clustering.assignment[clustering.facilities[c]], c);
-      }
-    }
-    EXPECT_GT(closed, 0u);
-  }
-}
-
 TEST(LocalSearch, IsNearTheOptimumOnTinyBlocks) {
   double sum = 0.0;
   constexpr int kBlocks = 60;

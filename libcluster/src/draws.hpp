@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <random>
+#include <utility>
+#include <vector>
+
+/// Random draws that are the same everywhere: the distributions of the standard library differ
+/// between implementations.
+
+namespace terrace::cluster {
+
+/// Below `bound`, which is positive and below 2^32.
+inline std::uint32_t draw_below(std::size_t bound, std::mt19937_64& random) {
+  return static_cast<std::uint32_t>(((random() >> 32) * bound) >> 32);
+}
+
+template <class T>
+void draw_order(std::vector<T>& items, std::mt19937_64& random) {
+  for (std::size_t i = items.size(); i > 1; --i) {
+    std::swap(items[i - 1], items[draw_below(i, random)]);
+  }
+}
+
+/// A seed of its own for each of many runs (the finaliser of SplitMix64).
+inline std::uint64_t seed_of_run(std::uint64_t seed, std::uint64_t run) {
+  std::uint64_t z = seed + (run + 1) * 0x9e3779b97f4a7c15u;
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+  return z ^ (z >> 31);
+}
+
+}  // namespace terrace::cluster

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <exception>
+#include <mutex>
+#include <thread>
+#include <type_traits>
+#include <vector>
+
+namespace terrace::cluster {
+
+/// Threads that wait for short pieces of work and take them within a microsecond: they look for
+/// work for a while before they sleep. The caller never waits for a thread that has not begun, so
+/// that a busy machine costs nothing but the help.
+class ThreadTeam {
+ public:
+  /// threads: the caller's included; starts as many as the system grants.
+  explicit ThreadTeam(unsigned threads);
+  ~ThreadTeam();
+  ThreadTeam(const ThreadTeam&) = delete;
+  ThreadTeam& operator=(const ThreadTeam&) = delete;
+
+  [[nodiscard]] std::size_t threads() const { return threads_.size() + 1; }
+
+  /// Calls task(0) ... task(count - 1), each once, by any threads, and returns when all are done.
+  /// The first exception to occur comes out, when nothing runs any more; pieces not yet begun are
+  /// left out then.
+  template <class Task>
+  void run(std::size_t count, Task&& task) {
+    if (threads_.empty() || count < 2) {
+      for (std::size_t k = 0; k < count; ++k) task(k);
+      return;
+    }
+    run_together(count, &task, [](void* object, std::size_t k) {
+      (*static_cast<std::remove_reference_t<Task>*>(object))(k);
+    });
+  }
+
+ private:
+  using Call = void (*)(void*, std::size_t);
+  void run_together(std::size_t count, void* task, Call call);
+  void work();
+  void run_thread();
+
+  // The upper half counts: odd while there is work. The lower half is the number of threads, the
+  // caller's not included, that are at it.
+  static constexpr std::uint64_t kStep = std::uint64_t{1} << 32;
+  std::atomic<std::uint64_t> state_ = 0;
+  std::atomic<bool> stop_ = false;
+  std::atomic<std::size_t> next_ = 0;
+  std::size_t count_ = 0;
+  void* task_ = nullptr;
+  Call call_ = nullptr;
+  std::mutex failure_mutex_;
+  std::exception_ptr failure_;
+  std::vector<std::thread> threads_;
+};
+
+}  // namespace terrace::cluster

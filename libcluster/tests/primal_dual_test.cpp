@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/cluster/primal_dual.hpp"
+
+#include <cmath>
+#include <stdexcept>
+
+#include <gtest/gtest.h>
+
+#include "matrix_laws.hpp"
+
+namespace terrace::cluster {
+namespace {
+
+double sum_of(const std::vector<double>& values) {
+  double sum = 0.0;
+  for (const double v : values) sum += v;
+  return sum;
+}
+
+double most_paid_share(const FacilityMatrix& matrix, const std::vector<double>& duals,
+                       double divisor) {
+  double most = 0.0;
+  for (std::size_t j = 0; j < matrix.facilities; ++j) {
+    double paid = 0.0;
+    for (std::size_t i = 0; i < matrix.clients; ++i) {
+      paid += std::max(0.0, duals[i] / divisor - matrix.cost(j, i));
+    }
+    if (paid > 0.0) most = std::max(most, paid / matrix.opening[j]);
+  }
+  return most;
+}
+
+TEST(PrimalDual, KeepsItsPromises) {
+  double growth_cost = 0.0, stars_cost = 0.0;
+  unsigned count = 0;
+  for (std::uint64_t seed = 1; seed <= 300; ++seed) {
+    const laws::MatrixProblem problem = laws::random_problem(seed, 11, 25);
+    SCOPED_TRACE(testing::Message() << "seed " << seed << ", " << problem.kind);
+    const FacilityMatrix matrix = problem.matrix();
+    const double best = laws::optimum(matrix);
+    const PrimalDual growth = jain_vazirani(matrix);
+    const PrimalDual stars = greedy_stars(matrix);
+    for (const PrimalDual* result : {&growth, &stars}) {
+      laws::expect_solution(matrix, result->solution);
+      EXPECT_LE(result->solution.lower_bound, best);
+      EXPECT_GE(result->solution.cost(), best * (1.0 - 1e-12));
+      const double bound = sum_of(result->duals) / result->divisor;
+      EXPECT_NEAR(result->solution.lower_bound, bound, 1e-8 * bound);
+    }
+    EXPECT_EQ(growth.divisor, 1.0);
+    EXPECT_LE(most_paid_share(matrix, growth.duals, 1.0), 1.0 + 1e-9);
+    EXPECT_LE(most_paid_share(matrix, stars.duals, stars.divisor), 1.0 + 1e-8);
+    // Duals pay for the stars, and clients then change only to cheaper ones.
+    EXPECT_LE(stars.solution.cost(), sum_of(stars.duals) * (1.0 + 1e-12));
+    if (!problem.metric) continue;
+    EXPECT_LE(growth.solution.cost(), 3.0 * growth.solution.lower_bound * (1.0 + 1e-9));
+    EXPECT_LE(stars.divisor, 1.861);
+    EXPECT_LE(stars.solution.cost(), 1.861 * stars.solution.lower_bound * (1.0 + 1e-9));
+    growth_cost += growth.solution.cost() / best;
+    stars_cost += stars.solution.cost() / best;
+    ++count;
+  }
+  // On metric costs, measured: 1.08 and 1.03.
+  EXPECT_LT(growth_cost / count, 1.2);
+  EXPECT_LT(stars_cost / count, 1.1);
+}
+
+TEST(PrimalDual, FollowsTheClock) {
+  // Two facilities of cost 3 and 4; clients at 1 and 2 from the first, 5 and 0 from the second.
+  const std::vector<double> opening{3.0, 4.0}, costs{1.0, 2.0, 5.0, 0.0};
+  const FacilityMatrix problem{2, 2, opening, costs};
+  // At time 3 the first has been offered 2 + 1; the second 0 + 3, one too few.
+  const PrimalDual growth = jain_vazirani(problem);
+  EXPECT_EQ(growth.duals, (std::vector{3.0, 3.0}));
+  EXPECT_EQ(growth.solution.facilities, (std::vector<std::uint32_t>{0}));
+  EXPECT_EQ(growth.solution.cost(), 6.0);
+  EXPECT_NEAR(growth.solution.lower_bound, 6.0, 1e-12);
+  const PrimalDual stars = greedy_stars(problem);
+  EXPECT_EQ(stars.duals, (std::vector{3.0, 3.0}));
+  EXPECT_EQ(stars.solution.facilities, (std::vector<std::uint32_t>{0}));
+  EXPECT_EQ(stars.divisor, 1.0);
+}
+
+TEST(PrimalDual, ClosesWhatSharesAPayer) {
+  // The client between pays for both facilities: only the first that opened stays.
+  const std::vector<double> opening{2.0, 3.0}, costs{1.0, 0.5, 9.0, 9.0, 0.5, 1.0};
+  const FacilityMatrix problem{2, 3, opening, costs};
+  const PrimalDual growth = jain_vazirani(problem);
+  EXPECT_EQ(growth.solution.facilities, (std::vector<std::uint32_t>{0}));
+}
+
+TEST(PrimalDual, EqualAndFreeOnes) {
+  const std::vector<double> zeros(12, 0.0), free(3, 0.0), ones(12, 1.0), paid(3, 2.0);
+  for (const auto& algorithm : {jain_vazirani, greedy_stars}) {
+    EXPECT_EQ(algorithm({3, 4, free, zeros}).solution.cost(), 0.0);
+    const PrimalDual equal = algorithm({3, 4, paid, ones});
+    EXPECT_EQ(equal.solution.facilities, (std::vector<std::uint32_t>{0}));
+    EXPECT_EQ(equal.solution.cost(), 6.0);
+    EXPECT_EQ(algorithm({1, 1, std::vector{2.0}, std::vector{3.0}}).solution.cost(), 5.0);
+    EXPECT_THROW(static_cast<void>(algorithm({0, 1, {}, {}})), std::invalid_argument);
+  }
+}
+
+TEST(PrimalDual, HugeAndTinyCosts) {
+  for (std::uint64_t seed = 1; seed <= 24; ++seed) {
+    SCOPED_TRACE(testing::Message() << "seed " << seed);
+    const laws::MatrixProblem problem = laws::random_problem(seed, 8, 12);
+    if (problem.kind == "sparse") continue;
+    for (const auto& algorithm : {jain_vazirani, greedy_stars}) {
+      const PrimalDual plain = algorithm(problem.matrix());
+      for (const int exponent : {1010, -1000}) {
+        laws::MatrixProblem scaled = problem;
+        scaled.scale(std::ldexp(1.0, exponent));
+        EXPECT_EQ(algorithm(scaled.matrix()).solution.facilities, plain.solution.facilities);
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace terrace::cluster
