@@ -18,7 +18,7 @@ using namespace terrace::cluster;
 
 const bool kSmall = std::getenv("TERRACE_BENCH_SMALL") != nullptr;
 
-enum class Input { cube, grid, clumps, spacing };
+enum class Input { cube, grid, clumps };
 
 std::vector<Point3> make_points(Input input, std::size_t count) {
   std::mt19937_64 random(20);
@@ -30,9 +30,6 @@ std::vector<Point3> make_points(Input input, std::size_t count) {
       if (input == Input::clumps) v = std::floor(v * 4) + 0.1 * v * inputs::uniform(random);
     }
   }
-  double x = 1;
-  for (std::size_t i = 0; input == Input::spacing && i < count; ++i, x *= 1.06)
-    points[i] = {x, 0, 0};
   return points;
 }
 
@@ -43,6 +40,24 @@ void complete(benchmark::State& state, Input input, MatrixEntry entry) {
                                        .entry = entry};
   for ([[maybe_unused]] const auto iteration : state) {
     const Dendrogram dendrogram = complete_linkage(points, options);
+    benchmark::DoNotOptimize(dendrogram.merges.data());
+  }
+}
+
+void complete_function(benchmark::State& state, bool row) {
+  const auto count = static_cast<std::size_t>(state.range(0));
+  const std::vector<Point3> points = make_points(Input::cube, count);
+  const PairDistance distance = [&](std::uint32_t i, std::uint32_t j) -> double {
+    if (row) return j;
+    const Point3& p = points[i];
+    const Point3& q = points[j];
+    return std::sqrt((p[0] - q[0]) * (p[0] - q[0]) + (p[1] - q[1]) * (p[1] - q[1]) +
+                     (p[2] - q[2]) * (p[2] - q[2]));
+  };
+  const CompleteLinkageOptions options{.threads = static_cast<unsigned>(state.range(1)),
+                                       .entry = MatrixEntry::float32};
+  for ([[maybe_unused]] const auto iteration : state) {
+    const Dendrogram dendrogram = complete_linkage(count, distance, options);
     benchmark::DoNotOptimize(dendrogram.merges.data());
   }
 }
@@ -81,6 +96,8 @@ int main(int argc, char** argv) {
                                        MatrixEntry::float64),
           {10000});
   }
+  sizes(benchmark::RegisterBenchmark("complete/float/shuffled", complete_function, false), {10000});
+  sizes(benchmark::RegisterBenchmark("complete/float/row", complete_function, true), {10000});
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
   benchmark::RunSpecifiedBenchmarks();

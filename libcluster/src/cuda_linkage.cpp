@@ -1,52 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "terrace/cluster/cuda_linkage.hpp"
 
-#include <cstdint>
-#include <numeric>
 #include <stdexcept>
-#include <vector>
 
 #include "linkage_points.hpp"
 
 #ifdef TERRACE_CLUSTER_CUDA
 #include "cuda_rounds.hpp"
-#include "linkage_tree.hpp"
+#include "device_dendrogram.hpp"
 #endif
 
 namespace terrace::cluster {
 namespace {
 
-#ifdef TERRACE_CLUSTER_CUDA
-
-template <class Rounds>
-Dendrogram linkage(std::span<const Point3> points, const Rounds& rounds) {
-  const LinkagePoints scaled(points);
+/// The points are looked at first: what is wrong with them is wrong on every machine.
+LinkagePoints checked(std::span<const Point3> points) {
+  LinkagePoints scaled(points);
   if (const CudaStatus status = cuda_available(); !status.available) {
     throw std::runtime_error(status.reason);
   }
-  if (points.size() < 2) return make_dendrogram(points.size(), {});
-  // In the order of a kD-tree most clusters that merge have rows that are near in the matrix.
-  std::vector<std::uint32_t> all(points.size());
-  std::iota(all.begin(), all.end(), 0u);
-  const LinkageTree tree(scaled.scaled(), all, 1);
-  std::vector<Point3> ordered(points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) ordered[i] = tree.point(i);
-  std::vector<Link> links;
-  links.reserve(points.size());
-  for (const device::RoundLink& link : rounds(ordered)) {
-    links.push_back({tree.number(link.i), tree.number(link.j), scaled.height(link.square)});
-  }
-  return make_dendrogram(points.size(), links);
+  return scaled;
 }
-
-#else
-
-Dendrogram refuse(std::span<const Point3> points) {
-  const LinkagePoints scaled(points);
-  throw std::runtime_error(cuda_available().reason);
-}
-
-#endif
 
 }  // namespace
 
@@ -54,26 +28,25 @@ Dendrogram refuse(std::span<const Point3> points) {
 
 CudaStatus cuda_available() {
   const std::string fault = device::cuda_fault();
-  if (!fault.empty()) {
-    return {false,
-            {},
-            "this machine has no CUDA device that works (" + fault +
-                "): cluster on the CPU, or see to the GPU and its driver"};
-  }
-  return {true, device::cuda_device_name(), {}};
+  if (fault.empty()) return {true, device::cuda_device_name(), {}};
+  return {false,
+          {},
+          "this machine has no CUDA device that works (" + fault +
+              "): cluster on the CPU, or see to the GPU and its driver"};
 }
 
 Dendrogram cuda_complete_linkage(std::span<const Point3> points,
                                  const CudaLinkageOptions& options) {
-  return linkage(points, [&](const std::vector<Point3>& scaled) {
-    return options.entry == MatrixEntry::float32 ? device::cuda_complete_rounds<float>(scaled)
-                                                 : device::cuda_complete_rounds<double>(scaled);
+  return device::dendrogram_of(checked(points), [&](std::span<const Point3> ordered) {
+    return options.entry == MatrixEntry::float32 ? device::cuda_complete_rounds<float>(ordered)
+                                                 : device::cuda_complete_rounds<double>(ordered);
   });
 }
 
 Dendrogram cuda_single_linkage(std::span<const Point3> points) {
-  return linkage(
-      points, [](const std::vector<Point3>& scaled) { return device::cuda_single_rounds(scaled); });
+  return device::dendrogram_of(checked(points), [](std::span<const Point3> ordered) {
+    return device::cuda_single_rounds(ordered);
+  });
 }
 
 #else
@@ -85,11 +58,16 @@ CudaStatus cuda_available() {
           "option -Dterrace_cuda=enabled"};
 }
 
+// Without a device checked() throws.
 Dendrogram cuda_complete_linkage(std::span<const Point3> points, const CudaLinkageOptions&) {
-  return refuse(points);
+  (void)checked(points);
+  return {};
 }
 
-Dendrogram cuda_single_linkage(std::span<const Point3> points) { return refuse(points); }
+Dendrogram cuda_single_linkage(std::span<const Point3> points) {
+  (void)checked(points);
+  return {};
+}
 
 #endif
 

@@ -27,7 +27,8 @@ template <class Entry>
   const std::uint64_t slots = points | 1;
   const std::uint64_t band = slots * (slots / 2) * sizeof(Entry);
   const std::uint64_t parts = NearestOfRows<Entry>::parts(static_cast<std::uint32_t>(slots));
-  return band + (band + 15) / 16 * 9 + slots * (parts + 3) * (4 + sizeof(Entry)) + slots * 80;
+  const std::uint64_t per_slot = parts * (4 + sizeof(Entry)) + 80 + 4 * sizeof(Entry);
+  return band + band / 16 * 9 + slots * per_slot + kSmallMemory;
 }
 
 template <class Entry, class Device>

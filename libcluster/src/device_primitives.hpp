@@ -23,6 +23,9 @@ namespace terrace::cluster::device {
 
 inline constexpr std::uint32_t kNone = UINT32_MAX;
 
+/// Room for what does not grow with the points.
+inline constexpr std::size_t kSmallMemory = 65536;
+
 /// Adds to a counter that others add to at the same time.
 TERRACE_CLUSTER_HOST_DEVICE inline void add(std::uint32_t* counter, std::uint32_t value) {
 #if defined(__CUDA_ARCH__)

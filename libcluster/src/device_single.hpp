@@ -165,7 +165,8 @@ struct OwnClusters {
 
 /// Memory that single_rounds() takes on the device.
 [[nodiscard]] inline std::uint64_t single_rounds_bytes(std::uint64_t points) {
-  return points * (12 * NearestOther::parts_of(static_cast<std::uint32_t>(points)) + 80);
+  return points * (12 * NearestOther::parts_of(static_cast<std::uint32_t>(points)) + 80) +
+         kSmallMemory;
 }
 
 /// points: at least two, fewer than 2^31, as LinkagePoints scales them. The links in no order that

@@ -38,6 +38,7 @@ class LoopDevice {
 
   template <class T>
   Memory<T> allocate(std::size_t count) {
+    bytes += count * sizeof(T);
     return Memory<T>(count);
   }
   template <class T>
@@ -85,7 +86,8 @@ class LoopDevice {
     }
   }
 
-  std::size_t launches = 0;
+  std::size_t bytes = 0;     ///< allocated, whether released or not
+  std::size_t launches = 0;  ///< kernels
 
  private:
   std::vector<std::size_t> order(std::size_t count) {

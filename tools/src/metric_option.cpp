@@ -169,6 +169,8 @@ cluster::Metric MetricChoice::on_ground(const stream::Point3& origin,
     cluster::Bounds box{{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}};
     if (region.box) {
       for (std::size_t axis = 0; axis < 3; ++axis) {
+        // Where heights do not count all points lie at 0, inside.
+        if (scale[axis] == 0.0) continue;
         box.min[axis] = scale[axis] * (region.box->min[axis] - origin[axis]);
         box.max[axis] = scale[axis] * (region.box->max[axis] - origin[axis]);
       }
