@@ -104,13 +104,13 @@ class SpaceSearch final : public SearchEngine {
 
   [[nodiscard]] auto points() const { return space_.points(); }
 
-  // Where an open facility is nearer than `distances` say; but a facility stays its own client.
+  // Where an open facility is nearer than `distances` say. A facility stays its own client, at 0.
   void find_nearest(std::vector<std::uint32_t>& facility, std::vector<double>& distances) const {
     for (const std::uint32_t j : state_.open()) {
       const From from = space_.from(j);
       for (std::uint32_t i = 0; i < state_.size(); ++i) {
         const double d = from(i);
-        if (d < distances[i] && !state_.is_open(i)) {
+        if (d < distances[i]) {
           distances[i] = d;
           facility[i] = j;
         }
