@@ -3,7 +3,11 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
+#include <stdexcept>
+#include <string>
 #include <utility>
+#include <variant>
 
 #include "ground.hpp"
 #include "summary.hpp"
@@ -93,19 +97,31 @@ std::uint64_t block_seed(std::uint64_t seed, unsigned level, std::uint64_t block
 }
 
 BlockProcessor::BlockProcessor(const HierarchyOptions& options, ClusterFunction cluster)
-    : options_(options), cluster_(std::move(cluster)) {}
+    : options_(options), cluster_(std::move(cluster)), metric_(options.metric) {
+  if (options.metric_of || !std::holds_alternative<Euclidean>(options.metric) ||
+      !options.channels.weights.empty()) {
+    metric_cluster_.emplace(options.channels.weights, options.simd);
+  }
+}
 
 void BlockProcessor::process(HierarchyBlock& block) {
   assert(block.size() > 0);
   const Bounds box = bounds_of(block.positions);
   const GroundMap map = options_.ground ? options_.ground(box) : kIdentityMap;
   check_ground_map(map, box, block.level, block.number);
+  if (options_.metric_of) {
+    metric_ = options_.metric_of(box);
+    check(metric_);
+  }
   if (map == kIdentityMap) {
     cluster(block, block.positions);
   } else {
-    // The minimum is taken off first, so that large offsets cost no digits in the product.
+    // The minimum is taken off first, so that large offsets cost no digits in the product; not
+    // where the metric depends on the place.
+    const bool anywhere = !std::holds_alternative<EllipticalField>(metric_) &&
+                          !std::holds_alternative<CustomMetric>(metric_);
     ground_.resize(block.size());
-    to_ground(block.positions, box.min, map, ground_);
+    to_ground(block.positions, anywhere ? box.min : Point3{}, map, ground_);
     cluster(block, ground_);
   }
   group_by_cluster(block.clustering, block.first, block.order);
@@ -122,15 +138,37 @@ void BlockProcessor::process(HierarchyBlock& block) {
   }
 }
 
+void BlockProcessor::read_channels(const HierarchyBlock& block) {
+  const std::size_t count = options_.channels.weights.size();
+  channels_.resize(block.size() * count);
+  if (count == 0) return;
+  for (std::size_t i = 0; i < block.size(); ++i) {
+    const auto values = std::span(channels_).subspan(i * count, count);
+    options_.channels.read(
+        std::span(block.payload).subspan(i * options_.payload_size, options_.payload_size), values);
+    for (std::size_t c = 0; c < count; ++c) {
+      if (std::isfinite(values[c])) continue;
+      throw std::invalid_argument("channel " + std::to_string(c) + " of point " +
+                                  std::to_string(i) + " in block " + std::to_string(block.number) +
+                                  " of level " + std::to_string(block.level) + " is not finite");
+    }
+  }
+}
+
 void BlockProcessor::cluster(HierarchyBlock& block, std::span<const Point3> ground) {
   weights_.clear();
   if (block.level > 0) normalised_weights(block.heads, weights_);
+  read_channels(block);
   BlockOptions options = options_.block;
   options.seed = block_seed(options_.block.seed, block.level, block.number);
 
   const std::size_t most = (block.size() + 1) / 2;
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
-    cluster_(ground, weights_, options, block.clustering);
+    if (metric_cluster_) {
+      metric_cluster_->run(metric_, ground, weights_, channels_, options, block.clustering);
+    } else {
+      cluster_(ground, weights_, options, block.clustering);
+    }
     assert(block.clustering.assignment.size() == block.size());
     if (block.clustering.facilities.size() <= most) return;
     options.facility_cost = std::max(4.0 * options.facility_cost, kLeastRaisedCost);

@@ -5,9 +5,11 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "metric_block.hpp"
 #include "terrace/cluster/block.hpp"
 #include "terrace/cluster/hierarchy.hpp"
 
@@ -40,7 +42,8 @@ struct HierarchyBlock {
   [[nodiscard]] FinishedBlock finished() const;
 };
 
-/// How a block is clustered: BlockClusterer::run, or a stand-in of the tests.
+/// How a block is clustered where distances are Euclidean: BlockClusterer::run, or a stand-in of
+/// the tests.
 using ClusterFunction = std::function<void(std::span<const Point3>, std::span<const double>,
                                            const BlockOptions&, BlockClustering&)>;
 
@@ -61,11 +64,14 @@ class BlockProcessor {
 
  private:
   void cluster(HierarchyBlock& block, std::span<const Point3> ground);
+  void read_channels(const HierarchyBlock& block);
 
   const HierarchyOptions& options_;
   ClusterFunction cluster_;
+  Metric metric_;                                       // of the block in work
+  std::optional<MetricBlockClusterer> metric_cluster_;  // unless distances are Euclidean
   std::vector<Point3> ground_;
-  std::vector<double> weights_;
+  std::vector<double> weights_, channels_;
 };
 
 }  // namespace terrace::cluster

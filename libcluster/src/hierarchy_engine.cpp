@@ -23,6 +23,16 @@ HierarchyOptions checked(HierarchyOptions options) {
   if (!(options.block.facility_cost > 0.0) || !std::isfinite(options.block.facility_cost)) {
     throw std::invalid_argument("facility_cost must be positive and finite");
   }
+  check(options.metric);
+  for (std::size_t c = 0; c < options.channels.weights.size(); ++c) {
+    const double weight = options.channels.weights[c];
+    if (weight >= 0.0 && std::isfinite(weight)) continue;
+    throw std::invalid_argument("the weight of channel " + std::to_string(c) + " is " +
+                                std::to_string(weight) + ": it must be finite and not negative");
+  }
+  if (!options.channels.weights.empty() && !options.channels.read) {
+    throw std::invalid_argument("channels have weights but no function that reads them");
+  }
   options.threads = std::clamp(options.threads, 1u, kMostThreads);
   return options;
 }

@@ -64,7 +64,7 @@ double bound(const CostRows& costs, const Connections& connections, std::size_t 
     duals[i] = std::isfinite(connections.second[i]) ? connections.second[i] : connections.cost[i];
   }
   MedianDual function(costs, k, options.threads);
-  return std::max(0.0, ascend(function, duals, cost, options.bound_iterations));
+  return std::max(0.0, ascend(function, duals, cost, {.iterations = options.bound_iterations}));
 }
 
 }  // namespace

@@ -16,6 +16,31 @@
 namespace terrace::cluster {
 namespace {
 
+void check_strategy(GainStrategy strategy, bool has_boxes, bool has_triangles,
+                    const std::string& what) {
+  const std::string asked = std::string("the strategy \"") + name_of(strategy) + "\" ";
+  switch (strategy) {
+    case GainStrategy::quadtree:
+    case GainStrategy::octree:
+    case GainStrategy::kd_tree:
+      if (has_boxes) return;
+      throw std::invalid_argument(asked +
+                                  "needs bounds on distances to boxes, and there are none of " +
+                                  what + ": take automatic or full_scan");
+    case GainStrategy::facilities:
+      if (has_triangles) return;
+      throw std::invalid_argument(
+          asked + "needs distances that are symmetric and obey the triangle inequality, and " +
+          what + " does not (or does not declare it): take automatic" +
+          (has_boxes ? ", kd_tree" : "") + " or full_scan");
+    case GainStrategy::fast:
+      throw std::invalid_argument(asked + "is a search of its own: see search_points()");
+    case GainStrategy::automatic:
+    case GainStrategy::full_scan:
+      return;
+  }
+}
+
 template <class Space>
 std::unique_ptr<SearchEngine> make(SearchFrame& frame, Space space, GainStrategy strategy,
                                    unsigned threads, const std::string& what) {
@@ -45,31 +70,6 @@ IndexSpace custom_space(const FacilityPoints& problem, const SearchFrame& frame,
 
 }  // namespace
 
-void check_strategy(GainStrategy strategy, bool has_boxes, bool has_triangles,
-                    const std::string& what) {
-  const std::string asked = std::string("the strategy \"") + name_of(strategy) + "\" ";
-  switch (strategy) {
-    case GainStrategy::quadtree:
-    case GainStrategy::octree:
-    case GainStrategy::kd_tree:
-      if (has_boxes) return;
-      throw std::invalid_argument(asked +
-                                  "needs bounds on distances to boxes, and there are none of " +
-                                  what + ": take automatic or full_scan");
-    case GainStrategy::facilities:
-      if (has_triangles) return;
-      throw std::invalid_argument(
-          asked + "needs distances that are symmetric and obey the triangle inequality, and " +
-          what + " does not (or does not declare it): take automatic" +
-          (has_boxes ? ", kd_tree" : "") + " or full_scan");
-    case GainStrategy::fast:
-      throw std::invalid_argument(asked + "is a search of its own: see search_points()");
-    case GainStrategy::automatic:
-    case GainStrategy::full_scan:
-      return;
-  }
-}
-
 std::unique_ptr<SearchEngine> make_search(const FacilityPoints& problem, GainStrategy strategy,
                                           unsigned threads) {
   SearchFrame frame = make_frame(problem);
@@ -98,6 +98,11 @@ std::unique_ptr<SearchEngine> make_search(const FacilityPoints& problem, GainStr
         }
       },
       problem.metric);
+}
+
+std::unique_ptr<SearchEngine> make_search(SearchFrame& frame, IndexSpace space,
+                                          GainStrategy strategy, unsigned threads) {
+  return make(frame, std::move(space), strategy, threads, "distances by a function");
 }
 
 FacilitySolution run_search(SearchEngine& engine, const PointSearchOptions& options,

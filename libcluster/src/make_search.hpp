@@ -2,9 +2,10 @@
 #pragma once
 
 #include <memory>
-#include <string>
 
 #include "search_engine.hpp"
+#include "search_frame.hpp"
+#include "search_space.hpp"
 #include "terrace/cluster/facility.hpp"
 #include "terrace/cluster/point_search.hpp"
 
@@ -15,10 +16,9 @@ namespace terrace::cluster {
 [[nodiscard]] std::unique_ptr<SearchEngine> make_search(const FacilityPoints& problem,
                                                         GainStrategy strategy, unsigned threads);
 
-/// Throws: std::invalid_argument if the strategy asks for more than the distances have; what: as in
-/// messages.
-void check_strategy(GainStrategy strategy, bool has_boxes, bool has_triangles,
-                    const std::string& what);
+/// The same for distances by index. frame: weights and costs alone.
+[[nodiscard]] std::unique_ptr<SearchEngine> make_search(SearchFrame& frame, IndexSpace space,
+                                                        GainStrategy strategy, unsigned threads);
 
 /// The whole search that the options ask for.
 [[nodiscard]] FacilitySolution run_search(SearchEngine& engine, const PointSearchOptions& options,

@@ -126,7 +126,7 @@ DualBound lower_bound(const FacilityPoints& problem, const FacilitySolution& sta
       PointDual<Space> function(*tree, space, frame.weights, frame.facility_cost,
                                 frame.outlier_price, options.threads);
       std::vector<double> variables = function.variables(duals);
-      const double best = ascend(function, variables, first.cost, options.iterations);
+      const double best = ascend(function, variables, first.cost, options);
       duals = function.duals(variables);
       return best;
     } else {
@@ -138,7 +138,7 @@ DualBound lower_bound(const FacilityPoints& problem, const FacilitySolution& sta
       }
       for (std::size_t i = 0; i < duals.size(); ++i) duals[i] *= frame.weights[i];
       RowDual function(rows, opening, ceiling, options.threads);
-      return ascend(function, duals, first.cost, options.iterations);
+      return ascend(function, duals, first.cost, options);
     }
   });
   bound.lower_bound = std::ldexp(std::max(0.0, value - rounding), frame.cost_exponent);

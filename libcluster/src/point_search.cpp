@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "terrace/cluster/point_search.hpp"
 
+#include <cmath>
 #include <stdexcept>
+#include <string>
 #include <utility>
 
+#include "linear_block.hpp"
 #include "make_search.hpp"
+#include "search_frame.hpp"
+#include "terrace/cluster/block.hpp"
 
 namespace terrace::cluster {
 namespace {
@@ -12,6 +17,52 @@ namespace {
 const FacilityPoints& checked(const FacilityPoints& problem) {
   check(problem);
   return problem;
+}
+
+Effort effort_of(SearchLength length) {
+  switch (length) {
+    case SearchLength::tenth:
+      return Effort::standard;
+    case SearchLength::log10_full:
+      return Effort::fine;
+    case SearchLength::log2_full:
+      break;
+  }
+  return Effort::full;
+}
+
+FacilitySolution search_fast(const FacilityPoints& problem, const PointSearchOptions& options,
+                             PointSearchStatistics* statistics) {
+  const auto refuse = [](const std::string& why, const std::string& remedy) {
+    throw std::invalid_argument("the strategy \"fast\" " + why + ": " + remedy);
+  };
+  if (problem.points.size() >= (std::size_t{1} << 24)) {
+    refuse("takes fewer than 2^24 points", "cluster them in blocks (hierarchy.hpp)");
+  }
+  if (!linear_map(problem.metric, bounds_of(problem.points))) {
+    refuse("needs a metric that a linear map of the points makes Euclidean, and \"" +
+               name_of(problem.metric) + "\" is none on these points",
+           "take automatic");
+  }
+  if (problem.channels.size() > 0) refuse("has no channels", "take automatic");
+  if (std::isfinite(problem.outlier_price)) refuse("leaves nobody out", "take automatic");
+  if (options.start) refuse("has a start of its own", "take automatic");
+
+  BlockClusterer clusterer;
+  BlockClustering clustering;
+  run_linear(clusterer, problem, effort_of(options.length), options.seed, clustering);
+  FacilitySolution solution;
+  solution.facilities = std::move(clustering.facilities);
+  solution.assignment = std::move(clustering.assignment);
+  // Costs in double precision, clusters by ascending facility.
+  const auto engine = make_search(problem, GainStrategy::full_scan, 1);
+  engine->start(solution);
+  if (statistics) {
+    *statistics = {};
+    statistics->wrongly_assigned = engine->wrongly_assigned();
+  }
+  if (options.assign_nearest) engine->assign_nearest();
+  return engine->state().solution();
 }
 
 }  // namespace
@@ -48,6 +99,7 @@ GainStrategy best_strategy(const FacilityPoints& problem) {
 FacilitySolution search_points(const FacilityPoints& problem, const PointSearchOptions& options,
                                PointSearchStatistics* statistics) {
   check(problem);
+  if (options.strategy == GainStrategy::fast) return search_fast(problem, options, statistics);
   const std::unique_ptr<SearchEngine> engine =
       make_search(problem, options.strategy, options.threads);
   return run_search(*engine, options, statistics);
@@ -55,7 +107,6 @@ FacilitySolution search_points(const FacilityPoints& problem, const PointSearchO
 
 PointSearch::PointSearch(const FacilityPoints& problem, GainStrategy strategy, unsigned threads)
     : engine_(make_search(checked(problem), strategy, threads)) {}
-PointSearch::PointSearch(std::unique_ptr<SearchEngine> engine) : engine_(std::move(engine)) {}
 PointSearch::~PointSearch() = default;
 PointSearch::PointSearch(PointSearch&&) noexcept = default;
 PointSearch& PointSearch::operator=(PointSearch&&) noexcept = default;

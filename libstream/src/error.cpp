@@ -25,7 +25,8 @@ std::string one_line(const Error::Parts& parts) {
 
 Error::Error(Parts parts) : std::runtime_error(one_line(parts)), parts_(std::move(parts)) {}
 
-Error system_error(std::string file, std::string action, int error_number, std::string remedy) {
+Error system_error(std::string file, const std::string& action, int error_number,
+                   std::string remedy) {
   return Error({.file = std::move(file),
                 .where = {},
                 .cause = action + ": " + std::generic_category().message(error_number),

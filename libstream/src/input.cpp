@@ -58,7 +58,7 @@ std::size_t read_some(int fd, char* to, std::size_t most, const std::string& nam
 
 }  // namespace
 
-Input::Input(std::string file) : name_(shown(file)), buffer_(kBufferBytes) {
+Input::Input(const std::string& file) : name_(shown(file)), buffer_(kBufferBytes) {
   const auto kept = heads().find(file);
   if (kept != heads().end()) {
     fd_ = kept->second.fd;

@@ -18,7 +18,7 @@ inline constexpr std::string_view kStandardStream = "-";
 class Input {
  public:
   /// Throws: Error if the file cannot be opened or is a folder.
-  explicit Input(std::string file);
+  explicit Input(const std::string& file);
   ~Input();
   Input(const Input&) = delete;
   Input& operator=(const Input&) = delete;

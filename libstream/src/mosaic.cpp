@@ -144,7 +144,10 @@ class Mosaic final : public Raster {
         if (!ignore_crs) check_crs(*first, info);
       }
       members_.push_back(placed(*first, info));
-      for (const std::string& comment : info.comments) note(file + ": " + comment);
+      for (const std::string& comment : info.comments) {
+        std::string line = file;
+        note(line.append(": ").append(comment));
+      }
     }
     unite(*first);
   }

@@ -17,6 +17,7 @@ constexpr std::size_t kPieceBytes = 64u << 10;
 
 std::vector<Channel> float_channels(const std::vector<std::string>& names) {
   std::vector<Channel> channels;
+  channels.reserve(names.size());
   for (const std::string& name : names) {
     channels.push_back({.name = name, .type = ScalarType::f32});
   }

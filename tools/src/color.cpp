@@ -6,6 +6,8 @@
 #include <cmath>
 #include <vector>
 
+#include "portable_math.hpp"
+
 namespace terrace::tools {
 namespace {
 
@@ -70,6 +72,16 @@ Rgb category_colour(std::int64_t category) {
                                                     {136, 34, 51}}};
   const auto count = static_cast<std::int64_t>(kCategories.size());
   return kCategories[static_cast<std::size_t>(((category % count) + count) % count)];
+}
+
+Rgb cluster_colour(std::int64_t cluster) {
+  if (cluster < 0) return {200, 200, 200};
+  const std::uint64_t scattered = scramble(static_cast<std::uint64_t>(cluster));
+  Rgb colour = category_colour(static_cast<std::int64_t>(scattered >> 8));
+  // In five shades, so that two clusters side by side are rarely alike.
+  const double shade = 0.7 + 0.12 * static_cast<double>(scattered % 5);
+  for (std::uint8_t& c : colour) c = static_cast<std::uint8_t>(std::min(255.0, shade * c));
+  return colour;
 }
 
 HeightTint HeightTint::of(std::span<const double> heights) {

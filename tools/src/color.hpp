@@ -17,6 +17,9 @@ Rgb sea_colour(double share);
 Rgb slope_colour(double degrees);
 /// Colours that differ well for small numbers: levels, classes, clusters.
 Rgb category_colour(std::int64_t category);
+/// The same for clusters, whose numbers say nothing of who lies beside whom: scattered. Negative
+/// numbers, points without a cluster, are light grey.
+Rgb cluster_colour(std::int64_t cluster);
 
 /// The range of heights that the tints span: without the outermost 0.5 % on either side, and with
 /// a shore at 0 where there is land and sea.

@@ -5,6 +5,10 @@
 
 #include "canvas.hpp"
 
+namespace terrace::cluster {
+struct Dendrogram;
+}
+
 namespace terrace::tools {
 
 struct DrawOptions {
@@ -22,6 +26,15 @@ void draw_triangles(const TriangleMesh& mesh, const std::vector<Rgb>& colours, c
 /// by the points' own normals, else by normals estimated from the depths around.
 void draw_points(const TriangleMesh& cloud, const std::vector<Rgb>& colours, const Camera& camera,
                  const Light& light, const DrawOptions& options, Canvas& canvas);
+
+/// Marks positions (metres on the ground) with small dark discs over what has been drawn, unless
+/// something lies in front of them.
+void draw_marks(const std::vector<stream::Point3>& positions, const Camera& camera,
+                const DrawOptions& options, Canvas& canvas);
+
+/// Draws a dendrogram, leaves at the bottom, heights linear; subtrees below 0.7 of the top in
+/// colours of their own. O(points + samples drawn).
+void draw_dendrogram(const cluster::Dendrogram& tree, Canvas& canvas);
 
 /// The smallest whole view of all positions: sets scale and centre for the size of `canvas`, with a
 /// margin of 2 %.

@@ -10,6 +10,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "column_value.hpp"
 #include "detail.hpp"
 #include "error.hpp"
 #include "ground.hpp"
@@ -66,34 +67,6 @@ PictureInput from_mesh(MeshFile file) {
 /// Bytes that a point of a cloud takes until it is drawn.
 constexpr std::uint64_t kBytesPerPoint = 100;
 
-/// A column of the block as doubles, by type.
-double value_at(const stream::Column& column, std::size_t i) {
-  using stream::ScalarType;
-  switch (column.type) {
-    case ScalarType::i8:
-      return column.as<std::int8_t>()[i];
-    case ScalarType::u8:
-      return column.as<std::uint8_t>()[i];
-    case ScalarType::i16:
-      return column.as<std::int16_t>()[i];
-    case ScalarType::u16:
-      return column.as<std::uint16_t>()[i];
-    case ScalarType::i32:
-      return column.as<std::int32_t>()[i];
-    case ScalarType::u32:
-      return column.as<std::uint32_t>()[i];
-    case ScalarType::i64:
-      return static_cast<double>(column.as<std::int64_t>()[i]);
-    case ScalarType::u64:
-      return static_cast<double>(column.as<std::uint64_t>()[i]);
-    case ScalarType::f32:
-      return column.as<float>()[i];
-    case ScalarType::f64:
-      return column.as<double>()[i];
-  }
-  return 0;
-}
-
 /// The number of the attribute with one of these names.
 std::optional<std::size_t> attribute(const stream::SourceInfo& info,
                                      std::initializer_list<const char*> names) {
@@ -108,6 +81,7 @@ std::optional<std::size_t> attribute(const stream::SourceInfo& info,
 /// Appends the block's points with those attributes that a picture can show.
 void append_cloud(const stream::SourceInfo& info, const stream::PointBlock& block,
                   TriangleMesh& cloud) {
+  const std::size_t before = cloud.positions.size();
   cloud.positions.insert(cloud.positions.end(), block.positions.begin(), block.positions.end());
   const auto red = attribute(info, {"red"}), green = attribute(info, {"green"}),
              blue = attribute(info, {"blue"});
@@ -115,6 +89,7 @@ void append_cloud(const stream::SourceInfo& info, const stream::PointBlock& bloc
              nz = attribute(info, {"nz"});
   const auto group = attribute(info, {"class", "classification", "cluster"});
   const auto level = attribute(info, {"level"});
+  const auto representative = attribute(info, {"representative"});
   for (std::size_t i = 0; i < block.size(); ++i) {
     const auto value = [&](std::size_t column) { return value_at(block.attributes[column], i); };
     if (red && green && blue) {
@@ -131,6 +106,10 @@ void append_cloud(const stream::SourceInfo& info, const stream::PointBlock& bloc
                                static_cast<float>(value(*nz))});
     }
     if (group) cloud.classes.push_back(static_cast<std::int32_t>(value(*group)));
+    // The column holds the number of the point that represents this one's cluster.
+    if (representative && value(*representative) == static_cast<double>(before + i)) {
+      cloud.representatives.push_back(static_cast<std::uint32_t>(before + i));
+    }
     if (level) {
       cloud.levels.push_back(static_cast<std::uint8_t>(std::clamp(value(*level), 0.0, 255.0)));
     }

@@ -19,6 +19,7 @@ struct TriangleMesh {
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< either orientation
   std::vector<std::uint8_t> levels;                     ///< of a store
   std::vector<std::int32_t> classes;                    ///< class or cluster
+  std::vector<std::uint32_t> representatives;  ///< of the clusters: vertex numbers, any length
   std::vector<Rgb> colours;
   std::vector<std::array<float, 3>> normals;  ///< unit length
 };

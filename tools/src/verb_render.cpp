@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// render: a picture of a raster, a mesh or a cloud of points.
+// render: a picture of a raster, a mesh, a cloud of points or a dendrogram.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,6 +11,7 @@
 
 #include "camera.hpp"
 #include "color.hpp"
+#include "dendrogram_file.hpp"
 #include "draw.hpp"
 #include "error.hpp"
 #include "ground.hpp"
@@ -53,7 +54,8 @@ double slope_degrees(const std::array<float, 3>& normal) {
 class RenderCommand : public Command {
  public:
   void define(CLI::App& app) override {
-    app.add_option("input", input_, "Store, raster, mesh (PLY, OBJ) or cloud of points")
+    app.add_option("input", input_,
+                   "Store, raster, mesh (PLY, OBJ), cloud of points or dendrogram (CSV)")
         ->required()
         ->type_name("FILE");
     add_output(app, output_, "The picture (PNG); - is standard output");
@@ -83,6 +85,7 @@ class RenderCommand : public Command {
     const ViewDirection view = parse_view(view_);
     const bool replace = may_replace(output_, common.force);
 
+    if (const auto tree = read_dendrogram(input_)) return render_tree(*tree, size, replace, watch);
     selection_.triangles = wire_;
     PictureInput input = read_picture_input(input_, selection_, size, common);
     if (!input.guess.empty()) common.say(input_ + ": " + input.guess);
@@ -106,6 +109,9 @@ class RenderCommand : public Command {
     const DrawOptions options{.wire = wire_, .threads = common.threads};
     if (mesh.triangles.empty()) {
       draw_points(mesh, colours, camera, light, options, canvas);
+      std::vector<stream::Point3> marks;
+      for (const std::uint32_t i : mesh.representatives) marks.push_back(mesh.positions[i]);
+      draw_marks(marks, camera, options, canvas);
     } else {
       draw_triangles(mesh, colours, camera, light, options, canvas);
     }
@@ -129,12 +135,34 @@ class RenderCommand : public Command {
   }
 
  private:
+  Summary render_tree(const cluster::Dendrogram& tree, const ImageSize& size, bool replace,
+                      const Stopwatch& watch) {
+    Canvas canvas(static_cast<std::uint32_t>(size.width), static_cast<std::uint32_t>(size.height));
+    draw_dendrogram(tree, canvas);
+    check_interrupt();
+    stream::write_png(output_, size.width, size.height, 3, canvas.resolve(), replace);
+    Summary summary;
+    summary.json = {{"width", size.width},        {"height", size.height},
+                    {"points", tree.points},      {"merges", tree.merges.size()},
+                    {"seconds", watch.seconds()}, {"peak_rss_bytes", peak_rss_bytes()}};
+    summary.text = output_ + ": " + std::to_string(size.width) + " x " +
+                   std::to_string(size.height) + " pixels, a dendrogram of " +
+                   with_commas(tree.points) + " points, " + readable_seconds(watch.seconds()) +
+                   '\n';
+    return summary;
+  }
+
   /// One colour per vertex. heights: in the source's own unit.
   [[nodiscard]] std::vector<Rgb> colours_of(const TriangleMesh& mesh,
                                             const std::vector<double>& heights,
                                             bool terrain) const {
     std::string by = color_;
-    if (by.empty()) by = !mesh.colours.empty() ? "rgb" : terrain ? "height" : "grey";
+    if (by.empty()) {
+      by = !mesh.colours.empty()           ? "rgb"
+           : !mesh.representatives.empty() ? "cluster"
+           : terrain                       ? "height"
+                                           : "grey";
+    }
     const auto lacks = [&](const std::string& what) {
       throw UsageError("--color " + by + ": '" + input_ + "' has no " + what);
     };
@@ -152,7 +180,8 @@ class RenderCommand : public Command {
       if (by == "height") colours[i] = tint.colour(heights[i]);
       if (by == "slope") colours[i] = slope_colour(slope_degrees(normals[i]));
       if (by == "level") colours[i] = category_colour(mesh.levels[i]);
-      if (by == "class" || by == "cluster") colours[i] = category_colour(mesh.classes[i]);
+      if (by == "class") colours[i] = category_colour(mesh.classes[i]);
+      if (by == "cluster") colours[i] = cluster_colour(mesh.classes[i]);
     }
     return colours;
   }

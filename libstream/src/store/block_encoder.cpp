@@ -55,7 +55,8 @@ void gather(std::span<const std::byte> payload, std::size_t stride, std::size_t 
   for (std::size_t i = 0; i < n; ++i) {
     T value;
     std::memcpy(&value, payload.data() + i * stride + offset, sizeof value);
-    out[i] = static_cast<std::int64_t>(value);
+    // The sign of int8 is meant.
+    out[i] = static_cast<std::int64_t>(value);  // NOLINT(bugprone-signed-char-misuse)
   }
 }
 

@@ -45,7 +45,7 @@ RawBlock decoded_block(const Layout& layout, const Tables& tables, const Bytes& 
     block.payload.insert(block.payload.end(), points.payload.begin(), points.payload.end());
     block.children.insert(block.children.end(), points.children.begin(), points.children.end());
     if (points.has_representative) {
-      const auto at = static_cast<std::ptrdiff_t>(start + decoder.representative());
+      const auto at = std::ptrdiff_t{start} + decoder.representative();
       block.representatives.push_back(static_cast<std::uint32_t>(at));
       block.positions.insert(block.positions.begin() + at, points.representative);
       block.payload.insert(

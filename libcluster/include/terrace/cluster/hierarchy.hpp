@@ -17,8 +17,8 @@
 /// The streaming cluster hierarchy: one pass over points of any number in constant memory, by
 /// divide and conquer over blocks, every level kept. Source: J. Skála, Algorithms for manipulating
 /// large geometric data, 4.3, 7.1.2, 7.2. Departs from it in: blocks are clustered in parallel;
-/// distances are ground distances; a level that fits one block becomes the top without being
-/// clustered; a facility cost that is too low to reduce a block is raised.
+/// distances are ground distances, under any metric; a level that fits one block becomes the top
+/// without being clustered; a facility cost that is too low to reduce a block is raised.
 ///
 /// Points come to level 0. Each block of a level is clustered on its own; the representative of
 /// each cluster, an input point, goes on to the level above, where it heads that cluster. So every
@@ -85,12 +85,31 @@ class HierarchySink {
   virtual void root(const FinishedBlock& block) = 0;
 };
 
+/// Attributes (colour, intensity) that the payload of a point holds, as further axes of distances.
+struct PayloadChannels {
+  std::vector<double> weights;  ///< ground units per unit of each channel; not negative, finite
+  /// Reads the channels of one point, as many as weights. Called from any thread.
+  std::function<void(std::span<const std::byte> payload, std::span<double> values)> read;
+};
+
 struct HierarchyOptions {
   std::size_t block_size = 10000;  ///< most points clustered together; 2 to 2^24 - 1
   /// Each block has a seed of its own, mixed from this one, its level and its ordinal. Of the
   /// points of a block at most half, rounded up, become representatives, else there might be no
   /// end to the levels: where the facility cost is too low for that, it is raised for that block.
   BlockOptions block;
+  /// How the block is clustered: on the ground, after `ground`; the boxes of a field are in that
+  /// frame. Where it is linear in the box of a block (Euclidean, elliptical, a field with one
+  /// region there) and there are no channels, the blocks are clustered as by BlockClusterer. Else
+  /// by search_points() with the strategy `automatic`: Effort::fast and standard try 0.1 m
+  /// candidates, fine m ceil(log10 m), full m ceil(log2 m), and blocks of fewer than 2500 points at
+  /// least m ceil(log10 m); clusters are then in the order of their representatives. That is ten to
+  /// a hundred times slower. Summary::error stays a ground distance, the Euclidean one.
+  Metric metric = Euclidean{};
+  /// In place of `metric`: the one for a block with these bounds, for a field where `ground`
+  /// depends on the block and so the frame that the boxes are in. Called from any thread.
+  std::function<Metric(const Bounds&)> metric_of;
+  PayloadChannels channels;      ///< none: position alone
   std::size_t payload_size = 0;  ///< bytes that travel with each point
   /// Threads that work, the caller's included: it clusters blocks while it would have to wait. Any
   /// number gives the same hierarchy; 1 (or 0) does all in the caller's thread and makes none.
@@ -113,8 +132,8 @@ struct HierarchyResult {
 class HierarchyBuilder {
  public:
   /// The sink must outlive the builder.
-  /// Throws: std::invalid_argument if block_size or facility_cost is out of range or the SIMD path
-  /// is not available.
+  /// Throws: std::invalid_argument if block_size, facility_cost, the metric or a channel's weight
+  /// is out of range, channels have no function, or the SIMD path is not available.
   HierarchyBuilder(HierarchyOptions options, HierarchySink& sink);
   /// Stops without finishing: waits for the blocks that are being clustered at this moment; then
   /// the sink gets no more calls.
@@ -128,7 +147,8 @@ class HierarchyBuilder {
   /// Throws: std::invalid_argument on a coordinate that is not finite, naming its index in the
   /// batch, and on a payload of another size than payload_size bytes per point (the builder is
   /// unchanged); what the sink or `ground` threw, and std::invalid_argument on a ground map that is
-  /// not finite, is zero, or makes distances beyond 1e150 (the builder has ended then, and takes no
+  /// not finite, is zero, or makes distances beyond 1e150, on a channel that is not finite and on a
+  /// custom distance that is negative or not finite (the builder has ended then, and takes no
   /// more calls: they throw std::logic_error).
   void push(std::span<const Point3> positions, std::span<const std::byte> payload = {});
 

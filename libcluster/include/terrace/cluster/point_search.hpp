@@ -149,8 +149,6 @@ class PointSearch {
   [[nodiscard]] PointSearchStatistics statistics() const;
 
  private:
-  friend class EntitySearch;
-  explicit PointSearch(std::unique_ptr<SearchEngine> engine);
   std::unique_ptr<SearchEngine> engine_;
 };
 

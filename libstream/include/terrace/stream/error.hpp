@@ -26,6 +26,7 @@ class Error : public std::runtime_error {
 };
 
 /// An Error for a failed system call: the cause ends with the text of `error_number` (errno).
-Error system_error(std::string file, std::string action, int error_number, std::string remedy = {});
+Error system_error(std::string file, const std::string& action, int error_number,
+                   std::string remedy = {});
 
 }  // namespace terrace::stream

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+// The local search by its strategies, on blocks of 10 000 points, facility cost 1 diagonal,
+// Meyerson's start:
+//   <input>/<strategy>/<metric>          0.1 m candidates, one thread
+//   <input>/<strategy>/threads:T         one gain by T threads
+//   <input>/<strategy>/batch:B/threads:T several gains at once
+// Inputs: scan (a patch of a bumpy surface), shuf (all of the surface, at random), cube.
+// Time is for a whole search, start included. Columns: ns per gain (all but the start: the mean
+// over the search, with what it opens), share of positive gains, share of vertices (clients and
+// facilities) inspected, Q against the full scan of the same batch 1 in %, clients that were not
+// at their nearest facility in %.
+#include <chrono>
+#include <cstdlib>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include <benchmark/benchmark.h>
+
+#include "../tests/inputs.hpp"
+#include "terrace/cluster/point_search.hpp"
+
+namespace {
+
+using namespace terrace::cluster;
+
+const bool kSmall = std::getenv("TERRACE_BENCH_SMALL") != nullptr;
+const std::size_t kPoints = kSmall ? 300 : 10000;
+
+const std::vector<Point3>& input(std::size_t which) {
+  static const auto all = [] {
+    std::mt19937_64 random(20);
+    std::vector<std::vector<Point3>> sets(3);
+    const auto surface = kSmall ? inputs::scan(2, 40, random) : inputs::scan(4, 100, random);
+    sets[0].assign(surface.begin(), surface.begin() + static_cast<std::ptrdiff_t>(kPoints));
+    sets[1] = surface;
+    inputs::shuffle(sets[1], random);
+    sets[1].resize(kPoints);
+    sets[2] = inputs::cube(kPoints, random);
+    return sets;
+  }();
+  return all[which];
+}
+
+constexpr const char* kInputs[] = {"scan", "shuf", "cube"};
+
+struct Setting {
+  GainStrategy strategy = GainStrategy::full_scan;
+  Metric metric = Euclidean{};
+  unsigned threads = 1;
+  std::size_t batch = 1;
+};
+
+void search(benchmark::State& state, std::size_t which, const Setting& setting) {
+  const FacilityPoints problem{.points = input(which), .metric = setting.metric};
+  PointSearchOptions options;
+  options.strategy = setting.strategy;
+  options.threads = setting.threads;
+  options.batch = setting.batch;
+  using Clock = std::chrono::steady_clock;
+  double seconds = 0.0;
+  std::size_t gains = 0;
+  PointSearchStatistics statistics;
+  double cost = 0.0;
+  for ([[maybe_unused]] const auto iteration : state) {
+    std::mt19937_64 random(options.seed);
+    PointSearch engine(problem, options.strategy, options.threads);
+    engine.start(random);
+    const auto begin = Clock::now();
+    engine.improve(candidate_count(options.length, kPoints), random, options.batch);
+    seconds += std::chrono::duration<double>(Clock::now() - begin).count();
+    gains += engine.statistics().candidates;
+    benchmark::DoNotOptimize(engine.cost());
+  }
+  cost = search_points(problem, options, &statistics).cost();
+  const double reference =
+      search_points(problem, {.strategy = options.strategy, .seed = options.seed}).cost();
+  state.counters["ns_per_gain"] = 1e9 * seconds / static_cast<double>(gains);
+  state.counters["positive"] = statistics.positive_share();
+  state.counters["inspected"] = statistics.inspected_share();
+  state.counters["Q_%"] = 100.0 * (cost / reference - 1.0);
+  state.counters["wrong_%"] =
+      100.0 * static_cast<double>(statistics.wrongly_assigned) / static_cast<double>(kPoints);
+}
+
+/// The production engine on the same block.
+void fast(benchmark::State& state, std::size_t which) {
+  const FacilityPoints problem{.points = input(which)};
+  double cost = 0.0;
+  for ([[maybe_unused]] const auto iteration : state) {
+    cost = search_points(problem, {.strategy = GainStrategy::fast}).cost();
+  }
+  const double reference = search_points(problem, {}).cost();
+  state.counters["Q_%"] = 100.0 * (cost / reference - 1.0);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const EllipticalField field({{{{-2, -2, -2}, {0.5, 0.5, 2}}, Elliptical(2.0, 0.7, 30.0)},
+                               {{{0.5, 0.5, -2}, {2, 2, 2}}, Elliptical(0.7, 2.0, 0.0)}});
+  const std::vector<std::pair<GainStrategy, Metric>> plain{
+      {GainStrategy::full_scan, Euclidean{}},
+      {GainStrategy::quadtree, Euclidean{}},
+      {GainStrategy::octree, Euclidean{}},
+      {GainStrategy::kd_tree, Euclidean{}},
+      {GainStrategy::facilities, Euclidean{}},
+      {GainStrategy::full_scan, Minkowski{1.0}},
+      {GainStrategy::kd_tree, Minkowski{1.0}},
+      {GainStrategy::facilities, Minkowski{1.0}},
+      {GainStrategy::full_scan, SquaredEuclidean{}},
+      {GainStrategy::kd_tree, SquaredEuclidean{}},
+      {GainStrategy::full_scan, field},
+      {GainStrategy::kd_tree, field},
+      {GainStrategy::facilities, Elliptical(2, 1, 30)}};
+  for (std::size_t which = 0; which < 3; ++which) {
+    const std::string name = std::string(kInputs[which]) + "/";
+    const auto add = [&](const std::string& setting, const Setting& values) {
+      benchmark::RegisterBenchmark((name + setting).c_str(), search, which, values)
+          ->Unit(benchmark::kMillisecond)
+          ->UseRealTime();
+    };
+    for (const auto& [strategy, metric] : plain) {
+      add(std::string(name_of(strategy)) + "/" + name_of(metric), {strategy, metric});
+    }
+    for (const GainStrategy strategy : {GainStrategy::full_scan, GainStrategy::facilities}) {
+      const std::string prefix = std::string(name_of(strategy)) + "/";
+      add(prefix + "threads:2", {strategy, Euclidean{}, 2});
+      for (const std::size_t batch : {std::size_t{4}, std::size_t{16}}) {
+        for (const unsigned threads : {1u, 2u}) {
+          add(prefix + "batch:" + std::to_string(batch) + "/threads:" + std::to_string(threads),
+              {strategy, Euclidean{}, threads, batch});
+        }
+      }
+    }
+    benchmark::RegisterBenchmark((name + "fast").c_str(), fast, which)
+        ->Unit(benchmark::kMillisecond)
+        ->UseRealTime();
+  }
+  benchmark::Initialize(&argc, argv);
+  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
+  benchmark::RunSpecifiedBenchmarks();
+  return 0;
+}

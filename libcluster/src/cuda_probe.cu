@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+// Compiled when the build is configured: whether nvcc, its host compiler and the GPUs asked for go
+// together.
+#include <span>
+#include <string>
+
+__global__ void probe(float* values) { values[threadIdx.x] = 0.0f; }
+
+std::string run_probe(std::span<float> values) {
+  probe<<<1, 1>>>(values.data());
+  return cudaGetErrorString(cudaGetLastError());
+}

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "scaling.hpp"
+#include "terrace/cluster/point.hpp"
+
+namespace terrace::cluster {
+
+/// Points in the order of a Z-order curve, in blocks of kBlock, and a tree over the blocks: each
+/// node has up to kFan children that follow each other, with a box and sums.
+struct KMeansTree {
+  static constexpr std::size_t kBlock = 32;
+  static constexpr std::size_t kFan = 4;
+
+  struct Node {
+    Point3 low, high;
+    double diagonal2 = 0;  ///< squared diagonal of the box
+    Point3 sum{};          ///< of weight times position
+    double weight = 0;
+  };
+
+  /// weights: scaled to at most 1, or empty.
+  KMeansTree(std::span<const Point3> points, std::span<const double> weights,
+             const Scaling& scaling);
+
+  [[nodiscard]] std::size_t block_count() const { return levels.front().size(); }
+  /// Blocks [first, last) below a node.
+  [[nodiscard]] std::size_t first_block(std::size_t level, std::size_t node) const;
+  [[nodiscard]] Point3 point(std::size_t place) const { return {x[place], y[place], z[place]}; }
+
+  std::size_t count = 0;
+  // Scaled columns, padded to whole blocks with copies of the last point at weight 0.
+  std::vector<double> x, y, z, w;
+  std::vector<std::uint32_t> original;    ///< index in the input; not padded
+  std::vector<std::vector<Node>> levels;  ///< levels[0]: the blocks; the last has one node
+};
+
+}  // namespace terrace::cluster

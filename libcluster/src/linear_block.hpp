@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+
+#include "terrace/cluster/block.hpp"
+#include "terrace/cluster/facility.hpp"
+
+namespace terrace::cluster {
+
+/// BlockClusterer on points of a metric that is linear on their box, whose diagonal is that of the
+/// metric. Requires: linear_map() of it, no channels, no outliers, check(problem).
+/// The costs in `result` are those of the mapped points and not to be used.
+void run_linear(BlockClusterer& clusterer, const FacilityPoints& problem, Effort effort,
+                std::uint64_t seed, BlockClustering& result);
+
+}  // namespace terrace::cluster

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "terrace/cluster/point.hpp"
+
+/// Points as linkage computes with them. Private to linkage.
+
+namespace terrace::cluster {
+
+/// Copies of points, scaled by a power of two so that squares of distances neither overflow nor,
+/// above 1e-150 of the largest coordinate, vanish. Scaling is exact: distances are those of the
+/// points to the last bit.
+class LinkagePoints {
+ public:
+  /// Throws std::invalid_argument for coordinates that are not finite or are beyond 1e307, and for
+  /// too many points.
+  explicit LinkagePoints(std::span<const Point3> points);
+  [[nodiscard]] const std::vector<Point3>& scaled() const { return scaled_; }
+  /// The distance of which this is the square after scaling.
+  [[nodiscard]] double height(double square) const;
+
+ private:
+  std::vector<Point3> scaled_;
+  int exponent_ = 0;
+};
+
+/// Symmetric to the last bit.
+[[nodiscard]] inline double squared_distance(const Point3& p, const Point3& q) {
+  const double dx = p[0] - q[0];
+  const double dy = p[1] - q[1];
+  const double dz = p[2] - q[2];
+  return dx * dx + dy * dy + dz * dz;
+}
+
+}  // namespace terrace::cluster

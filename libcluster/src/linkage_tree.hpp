@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "terrace/cluster/point.hpp"
+
+/// Private to linkage.
+
+namespace terrace::cluster {
+
+/// A kD-tree over points in its own order: the points of a node are consecutive. Nodes are
+/// numbered as in a heap (root 1, children 2v and 2v + 1); all leaves are on one level, and node q
+/// of a level with 2^t nodes has the points from floor(q n / 2^t) on.
+class LinkageTree {
+ public:
+  static constexpr std::size_t kLeaf = 8;  ///< most points of a leaf
+
+  struct Box {
+    Point3 low, high;
+  };
+
+  /// The order depends on the points alone. O(n log n).
+  LinkageTree(std::span<const Point3> points, std::span<const std::uint32_t> chosen,
+              unsigned threads);
+
+  [[nodiscard]] std::size_t size() const { return number_.size(); }
+  [[nodiscard]] std::size_t leaves() const { return std::size_t{1} << depth_; }
+  [[nodiscard]] std::size_t nodes() const { return 2 * leaves(); }  ///< 1 .. nodes() - 1
+  [[nodiscard]] std::size_t leaf_node(std::size_t leaf) const { return leaves() + leaf; }
+  [[nodiscard]] bool is_leaf(std::size_t node) const { return node >= leaves(); }
+  /// The first point of a leaf; of leaf + 1 the end.
+  [[nodiscard]] std::size_t leaf_begin(std::size_t leaf) const { return (leaf * size()) >> depth_; }
+  [[nodiscard]] const Box& box(std::size_t node) const { return boxes_[node]; }
+  /// Coordinates in tree order; kLeaf surplus entries follow, which may be read.
+  [[nodiscard]] const double* axis(unsigned a) const { return axes_[a].data(); }
+  [[nodiscard]] Point3 point(std::size_t i) const {
+    return {axes_[0][i], axes_[1][i], axes_[2][i]};
+  }
+  /// The number that the point in place i came with.
+  [[nodiscard]] std::uint32_t number(std::size_t i) const { return number_[i]; }
+
+ private:
+  struct Record {
+    Point3 p;
+    std::uint32_t number;
+  };
+  void split(std::size_t node, unsigned level, std::vector<Record>& records);
+  void split_all(std::size_t node, unsigned level, std::vector<Record>& records);
+
+  unsigned depth_ = 0;
+  std::vector<Box> boxes_;
+  std::vector<double> axes_[3];
+  std::vector<std::uint32_t> number_;
+};
+
+/// A lower bound of squared_distance(p, q) for all q in the box, rounding included: all operations
+/// are monotone and in the same order as there.
+[[nodiscard]] inline double squared_distance(const Point3& p, const LinkageTree::Box& box) {
+  double sum[3];
+  for (unsigned a = 0; a < 3; ++a) {
+    const double d = std::max({box.low[a] - p[a], p[a] - box.high[a], 0.0});
+    sum[a] = d * d;
+  }
+  return sum[0] + sum[1] + sum[2];
+}
+
+/// The same for two boxes.
+[[nodiscard]] inline double squared_distance(const LinkageTree::Box& p, const LinkageTree::Box& q) {
+  double sum[3];
+  for (unsigned a = 0; a < 3; ++a) {
+    const double d = std::max({q.low[a] - p.high[a], p.low[a] - q.high[a], 0.0});
+    sum[a] = d * d;
+  }
+  return sum[0] + sum[1] + sum[2];
+}
+
+}  // namespace terrace::cluster

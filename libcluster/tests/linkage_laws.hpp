@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "inputs.hpp"
+#include "terrace/cluster/dendrogram.hpp"
+#include "terrace/cluster/point.hpp"
+
+/// What linkage must obey, by brute force, and inputs that break what is not careful.
+
+namespace terrace::cluster::laws {
+
+template <class T>
+void shuffle(std::vector<T>& items, std::mt19937_64& random) {
+  for (std::size_t i = items.size(); i > 1; --i) std::swap(items[i - 1], items[random() % i]);
+}
+
+inline bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+using Distances = std::vector<std::vector<double>>;  // square, symmetric
+
+inline Distances distances_of(const std::vector<Point3>& points) {
+  Distances d(points.size(), std::vector<double>(points.size(), 0.0));
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    for (std::size_t j = 0; j < points.size(); ++j) {
+      // In long double, whose range has room for the squares of all doubles.
+      long double sum = 0;
+      for (unsigned a = 0; a < 3; ++a) {
+        const long double v = static_cast<long double>(points[i][a]) - points[j][a];
+        sum += v * v;
+      }
+      d[i][j] = static_cast<double>(std::sqrt(sum));
+    }
+  }
+  return d;
+}
+
+/// Agglomeration as in the textbook, O(n^3): the nearest two clusters merge, over and over;
+/// `combine` gives the distance to the new cluster. The heights.
+inline std::vector<double> brute_heights(Distances d, bool complete) {
+  std::vector<double> heights;
+  std::vector<std::size_t> active(d.size());
+  for (std::size_t i = 0; i < d.size(); ++i) active[i] = i;
+  while (active.size() > 1) {
+    std::size_t x = 0;
+    std::size_t y = 1;
+    for (std::size_t i = 0; i < active.size(); ++i) {
+      for (std::size_t j = i + 1; j < active.size(); ++j) {
+        if (d[active[i]][active[j]] < d[active[x]][active[y]]) {
+          x = i;
+          y = j;
+        }
+      }
+    }
+    const std::size_t a = active[x];
+    const std::size_t b = active[y];
+    heights.push_back(d[a][b]);
+    for (const std::size_t k : active) {
+      const double other = complete ? std::max(d[a][k], d[b][k]) : std::min(d[a][k], d[b][k]);
+      d[a][k] = d[k][a] = other;
+    }
+    active.erase(active.begin() + static_cast<std::ptrdiff_t>(y));
+  }
+  return heights;
+}
+
+/// The points of each cluster, rows included.
+inline std::vector<std::vector<std::uint32_t>> members_of(const Dendrogram& dendrogram) {
+  std::vector<std::vector<std::uint32_t>> members(dendrogram.points);
+  for (std::uint32_t i = 0; i < dendrogram.points; ++i) members[i] = {i};
+  for (const Merge& merge : dendrogram.merges) {
+    std::vector<std::uint32_t> both = members[merge.a];
+    both.insert(both.end(), members[merge.b].begin(), members[merge.b].end());
+    members.push_back(both);
+  }
+  return members;
+}
+
+/// What is wrong with a dendrogram as a run of complete linkage: each row must merge two clusters
+/// than which none are nearer, at the distance of their farthest points, up to `tolerance`
+/// (relative). Empty if nothing is. O(n^3).
+inline std::string complete_fault(const Dendrogram& dendrogram, Distances d, double tolerance) {
+  if (std::string fault = dendrogram_fault(dendrogram); !fault.empty()) return fault;
+  std::vector<std::size_t> place(dendrogram.points);  // of each cluster its row of d
+  for (std::size_t i = 0; i < place.size(); ++i) place[i] = i;
+  std::vector<std::size_t> active = place;
+  for (const Merge& merge : dendrogram.merges) {
+    const std::string row = "row " + std::to_string(place.size() - dendrogram.points) + ": ";
+    const std::size_t a = place[merge.a];
+    const std::size_t b = place[merge.b];
+    if (std::abs(merge.height - d[a][b]) > tolerance * d[a][b]) return row + "wrong height";
+    for (const std::size_t i : active) {
+      for (const std::size_t j : active) {
+        if (i < j && d[i][j] * (1 + tolerance) < merge.height) {
+          return row + "others are nearer";
+        }
+      }
+    }
+    for (const std::size_t k : active) d[a][k] = d[k][a] = std::max(d[a][k], d[b][k]);
+    active.erase(std::find(active.begin(), active.end(), b));
+    place.push_back(a);
+  }
+  return {};
+}
+
+/// Inputs of about `count` points, degenerate ones among them.
+struct NamedPoints {
+  std::string name;
+  std::vector<Point3> points;
+};
+inline std::vector<NamedPoints> linkage_inputs(std::size_t count, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  const std::vector<Point3> cube = inputs::cube(count, random);
+  std::vector<NamedPoints> sets;
+  const auto add = [&](const std::string& name, const std::function<void(Point3&)>& change) {
+    std::vector<Point3> points = cube;
+    for (Point3& p : points) change(p);
+    sets.push_back({name, points});
+  };
+  const auto all = [](double (*change)(double)) {
+    return [change](Point3& p) {
+      for (double& v : p) v = change(v);
+    };
+  };
+  add("cube", [](Point3&) {});
+  add("plane", [](Point3& p) { p[2] = 0; });
+  add("line", [](Point3& p) { p = {p[0], 2, 3}; });
+  add("skew line", [](Point3& p) { p = {p[0], p[0] * 0.5, -p[0]}; });
+  add("grid with duplicates", all([](double v) { return std::floor(v * 5); }));
+  add("few places", all([](double v) { return std::floor(v * 2); }));
+  add("equal", [](Point3& p) { p = {1, 2, 3}; });
+  add("huge", all([](double v) { return (v - 0.5) * 1.9e307; }));
+  add("tiny", all([](double v) { return v * 1e-300; }));
+  add("far off", all([](double v) { return 1e6 + v; }));
+  add("clumps", [&random](Point3& p) {
+    for (double& v : p) v = std::floor(v * 2) * 1000 + inputs::uniform(random);
+  });
+  add("clumps of clumps", all([](double v) { return v * v * v * v * v * v * v * v; }));
+  std::vector<Point3> grid;
+  for (std::size_t i = 0; i < count; ++i) {
+    grid.push_back(
+        {static_cast<double>(i % 7), static_cast<double>(i / 7 % 7), static_cast<double>(i / 49)});
+  }
+  sets.push_back({"grid", grid});
+  inputs::shuffle(grid, random);
+  sets.push_back({"shuffled grid", grid});
+  std::vector<Point3> geometric;
+  double x = 1;
+  for (std::size_t i = 0; i < count; ++i, x *= 1.3) geometric.push_back({x, 0, 0});
+  sets.push_back({"geometric spacing", geometric});
+  return sets;
+}
+
+}  // namespace terrace::cluster::laws

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include <terrace/cluster/dendrogram.hpp>
+
+namespace terrace::tools {
+
+/// Writes rows "a,b,height,size" as text, SciPy's linkage matrix; "-" is standard output. Heights
+/// are the shortest decimals that read back as the same double. Throws: stream::Error.
+void write_dendrogram(const std::string& path, const cluster::Dendrogram& dendrogram, bool replace);
+
+/// The dendrogram in a file that begins with the line "a,b,height,size"; nothing for any other
+/// file. Throws: stream::Error, naming the line, if a row is no row or the rows are no dendrogram.
+std::optional<cluster::Dendrogram> read_dendrogram(const std::string& path);
+
+}  // namespace terrace::tools

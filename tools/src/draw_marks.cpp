@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <cmath>
+
+#include "draw.hpp"
+
+namespace terrace::tools {
+
+void draw_marks(const std::vector<stream::Point3>& positions, const Camera& camera,
+                const DrawOptions& options, Canvas& canvas) {
+  if (positions.empty()) return;
+  // As large as can be told apart, up to a few pixels.
+  const double share =
+      static_cast<double>(canvas.width()) * canvas.height() / static_cast<double>(positions.size());
+  const double radius = std::clamp(0.14 * std::sqrt(share), 1.0, 8.0);
+  const double core = 0.6 * radius;
+  constexpr std::array<float, 3> kRim{1.0F, 1.0F, 1.0F}, kCore{0.1F, 0.1F, 0.12F};
+  // What lies just in front is the disc of the point itself or of its neighbours.
+  const double behind = 12.0 / camera.scale;
+  for_bands(canvas.height(), options.threads, [&](std::uint32_t first, std::uint32_t last) {
+    for (const stream::Point3& position : positions) {
+      const auto [cx, cy, depth] = camera.project(position);
+      const double y0 = std::max(std::floor(cy - radius), static_cast<double>(first));
+      const double y1 = std::min(std::ceil(cy + radius), static_cast<double>(last));
+      const double x0 = std::max(std::floor(cx - radius), 0.0);
+      const double x1 = std::min(std::ceil(cx + radius), static_cast<double>(canvas.width()));
+      if (!(y0 < y1 && x0 < x1)) continue;
+      const auto column = static_cast<std::uint32_t>(std::clamp(cx, 0.0, canvas.width() - 1.0));
+      const auto row = static_cast<std::uint32_t>(std::clamp(cy, 0.0, canvas.height() - 1.0));
+      if (canvas.depth(column, row) > depth + behind) continue;
+      for (auto y = static_cast<std::uint32_t>(y0); y < static_cast<std::uint32_t>(y1); ++y) {
+        for (auto x = static_cast<std::uint32_t>(x0); x < static_cast<std::uint32_t>(x1); ++x) {
+          const double distance = std::hypot(x + 0.5 - cx, y + 0.5 - cy);
+          if (distance <= radius) canvas.colour(x, y) = distance <= core ? kCore : kRim;
+        }
+      }
+    }
+  });
+}
+
+}  // namespace terrace::tools
