@@ -34,7 +34,7 @@ TEST(KMedian, FindsTheOptimumOfSmallProblems) {
     share += solution.lower_bound / best;
     ++count;
   }
-  EXPECT_GT(share / count, 0.93);
+  EXPECT_GT(share / count, 0.99);  // measured: 0.9963
 }
 
 TEST(KMedian, EndsWhereNoExchangeHelps) {
