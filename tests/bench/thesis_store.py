@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Tables 7.2 and 7.3 of the thesis, rerun with files and stores.
 
-J. Skala, Algorithms for manipulating large geometric data. Blocks of 10,000 points, facility cost
+J. Skála, Algorithms for manipulating large geometric data. Blocks of 10,000 points, facility cost
 twice the diagonal. For each of the thesis's eight sets a file is made (`terrace synth`), built into
 a store (`terrace build`), and clustered once more without files (thesis_io_bench); medians of the
 runs. The thesis's figures stand beside, in brackets; they are of other data and of the plain
@@ -10,14 +10,16 @@ search, and nothing is tested against them. With the folder of real data that TE
 some files there are run too.
 
 usage: thesis_store.py TERRACE THESIS_IO_BENCH [--most 4000000] [--full] [--runs 3] [--threads 2]
-                       [--out DIR]
+                       [--data DIR] [--out DIR]
 TERRACE may be left to the environment variable of that name (give -).
 """
 import argparse
 import csv
+import gzip
 import json
 import math
 import os
+import shutil
 import statistics
 import subprocess
 import sys
@@ -42,7 +44,25 @@ REAL = ["dem/gb_srtm3_mosaic_6001x4801.tif", "scan/armadillo_tm.ply", "scan/drag
 
 
 def json_of(command):
-    return json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout)
+    run = subprocess.run(command, stdout=subprocess.PIPE)
+    if run.returncode != 0:
+        sys.exit(f"failed: {' '.join(command)}")
+    return json.loads(run.stdout)
+
+
+def unpacked(path, folder):
+    """The file itself, or what is in it if it is compressed by gzip."""
+    if not path.endswith(".gz"):
+        return path
+    plain = os.path.join(folder, os.path.basename(path)[:-len(".gz")])
+    with gzip.open(path) as packed, open(plain, "wb") as file:
+        shutil.copyfileobj(packed, file)
+    return plain
+
+
+def quoted(figures):
+    """Figures of the thesis."""
+    return [f"[{figure}]" if figure else "" for figure in figures]
 
 
 def synth(options, folder, kind, ending, points, seed):
@@ -99,6 +119,7 @@ def main():
     parser.add_argument("--full", action="store_true", help="as many points as the thesis (11 GB of disk, 1 h)")
     parser.add_argument("--runs", type=int, default=3)
     parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--data", default=os.environ.get("TERRACE_DATA"), help="folder of real data")
     parser.add_argument("--out", help="folder for CSV files")
     options = parser.parse_args()
     if options.terrace == "-":
@@ -111,12 +132,11 @@ def main():
         size = size if options.full else min(size, options.most)
         with tempfile.TemporaryDirectory() as folder:
             time, count = measure(options, synth(options, folder, kind, ending, size, seed), folder)
-        times.append([f"{kind}, as {name}", *time, *(f"[{t}]" for t in thesis[:3])])
-        counts.append([f"{kind}, as {name}", *count, *(f"[{t}]" for t in thesis[3:])])
-    data = os.environ.get("TERRACE_DATA")
-    for file in REAL if data else []:
+        times.append([f"{kind}, as {name}", *time, *quoted(thesis[:3])])
+        counts.append([f"{kind}, as {name}", *count, *quoted(thesis[3:])])
+    for file in REAL if options.data else []:
         with tempfile.TemporaryDirectory() as folder:
-            time, count = measure(options, os.path.join(data, file), folder)
+            time, count = measure(options, unpacked(os.path.join(options.data, file), folder), folder)
         times.append([file, *time, "", "", ""])
         counts.append([file, *count, "", "", "", ""])
 

@@ -105,7 +105,8 @@ void figure_7_6(Setting& setting) {
                       {.title = "Memory over block size, N = " + grouped(points) + " (figure 7.6)",
                        .x = {.label = "block size m, points", .low = 0.0},
                        .y = {.label = "MB", .low = 0.0},
-                       .series = {smooth, steps, heap}});
+                       .series = {smooth, steps, heap},
+                       .legend_left = true});
 }
 
 }  // namespace terrace::cluster::thesis

@@ -65,9 +65,10 @@ void report_courses(Setting& setting, const std::string& name, const std::string
                     std::size_t per_bin, Share share) {
   Table table{name, title, {"candidates"}};
   Table data{name + "-course", "", {"candidates"}};
-  Plot plot{.title = label,
-            .x = {.label = "candidates tried", .low = 0.0},
-            .y = {.label = "share", .low = 0.0}};
+  Plot plot{
+      .title = label,
+      .x = {.label = "candidates tried", .low = 0.0, .high = static_cast<double>(kBins * per_bin)},
+      .y = {.label = "share", .low = 0.0}};
   for (std::size_t c = 0; c < kCosts.size(); ++c) {
     const std::string cost = "fc = " + fixed(kCosts[c], kCosts[c] < 0.5 ? 2
                                                         : kCosts[c] < 1 ? 1

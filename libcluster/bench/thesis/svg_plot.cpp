@@ -170,9 +170,10 @@ std::string drawn(const Series& series, const std::string& colour, const Scale& 
   return out + "'/>\n";
 }
 
-/// In the upper right corner, on a ground that hides the curves a little.
-std::string legend(const std::vector<Series>& all, const std::vector<std::string>& colours,
-                   const Scale& x, const Scale& y) {
+/// In an upper corner, on a ground that hides the curves a little.
+std::string legend(const Plot& plot, const std::vector<std::string>& colours, const Scale& x,
+                   const Scale& y) {
+  const std::vector<Series>& all = plot.series;
   std::size_t entries = 0;
   std::size_t longest = 0;
   for (const Series& series : all) {
@@ -181,7 +182,7 @@ std::string legend(const std::vector<Series>& all, const std::vector<std::string
   }
   if (entries == 0) return "";
   const double width = 52 + 6.6 * static_cast<double>(longest);
-  const double left = x.end - width - 10;
+  const double left = plot.legend_left ? x.start + 10 : x.end - width - 10;
   double row = y.end + 10;
   std::string out = "<rect x='" + pixels(left) + "' y='" + pixels(row) + "' width='" +
                     pixels(width) + "' height='" + pixels(10 + 19 * static_cast<double>(entries)) +
@@ -236,7 +237,7 @@ std::string svg(const Plot& plot) {
   out += "<g clip-path='url(#inside)'>\n";
   for (std::size_t i = 0; i < plot.series.size(); ++i)
     out += drawn(plot.series[i], colours[i], x, y);
-  out += "</g>\n" + legend(plot.series, colours, x, y) + "</svg>\n";
+  out += "</g>\n" + legend(plot, colours, x, y) + "</svg>\n";
   return out;
 }
 

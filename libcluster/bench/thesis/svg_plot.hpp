@@ -28,6 +28,7 @@ struct Plot {
   std::string title;
   Axis x, y;
   std::vector<Series> series = {};
+  bool legend_left = false;   ///< in the upper left corner instead of the right one
   bool equal_scales = false;  ///< a unit of x is as long as one of y
 };
 
