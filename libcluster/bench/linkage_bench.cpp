@@ -4,6 +4,7 @@
 // duplicates. linkage_peers.py runs this beside fastcluster.
 #include <cmath>
 #include <cstdlib>
+#include <fstream>
 #include <string>
 
 #include <benchmark/benchmark.h>
@@ -18,7 +19,7 @@ using namespace terrace::cluster;
 
 const bool kSmall = std::getenv("TERRACE_BENCH_SMALL") != nullptr;
 
-enum class Input { cube, grid, clumps, spacing };
+enum class Input { cube, grid, clumps };
 
 std::vector<Point3> make_points(Input input, std::size_t count) {
   std::mt19937_64 random(20);
@@ -30,10 +31,16 @@ std::vector<Point3> make_points(Input input, std::size_t count) {
       if (input == Input::clumps) v = std::floor(v * 4) + 0.1 * v * inputs::uniform(random);
     }
   }
-  double x = 1;
-  for (std::size_t i = 0; input == Input::spacing && i < count; ++i, x *= 1.06)
-    points[i] = {x, 0, 0};
   return points;
+}
+
+/// A line of /proc/self/status that gives kilobytes, in mebibytes; 0 where there is none.
+double status_mebibytes(const std::string& key) {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);) {
+    if (line.rfind(key + ":", 0) == 0) return std::stod(line.substr(key.size() + 1)) / 1024;
+  }
+  return 0.0;
 }
 
 void complete(benchmark::State& state, Input input, MatrixEntry entry) {
@@ -41,8 +48,29 @@ void complete(benchmark::State& state, Input input, MatrixEntry entry) {
   const std::vector<Point3> points = make_points(input, count);
   const CompleteLinkageOptions options{.threads = static_cast<unsigned>(state.range(1)),
                                        .entry = entry};
+  const double before = status_mebibytes("VmRSS");
   for ([[maybe_unused]] const auto iteration : state) {
     const Dendrogram dendrogram = complete_linkage(points, options);
+    benchmark::DoNotOptimize(dendrogram.merges.data());
+  }
+  // Of the process so far: of this benchmark only if it is the first.
+  state.counters["peak_MiB"] = status_mebibytes("VmHWM") - before;
+}
+
+void complete_function(benchmark::State& state, bool row) {
+  const auto count = static_cast<std::size_t>(state.range(0));
+  const std::vector<Point3> points = make_points(Input::cube, count);
+  const PairDistance distance = [&](std::uint32_t i, std::uint32_t j) -> double {
+    if (row) return j;
+    const Point3& p = points[i];
+    const Point3& q = points[j];
+    return std::sqrt((p[0] - q[0]) * (p[0] - q[0]) + (p[1] - q[1]) * (p[1] - q[1]) +
+                     (p[2] - q[2]) * (p[2] - q[2]));
+  };
+  const CompleteLinkageOptions options{.threads = static_cast<unsigned>(state.range(1)),
+                                       .entry = MatrixEntry::float32};
+  for ([[maybe_unused]] const auto iteration : state) {
+    const Dendrogram dendrogram = complete_linkage(count, distance, options);
     benchmark::DoNotOptimize(dendrogram.merges.data());
   }
 }
@@ -81,6 +109,8 @@ int main(int argc, char** argv) {
                                        MatrixEntry::float64),
           {10000});
   }
+  sizes(benchmark::RegisterBenchmark("complete/float/shuffled", complete_function, false), {10000});
+  sizes(benchmark::RegisterBenchmark("complete/float/row", complete_function, true), {10000});
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
   benchmark::RunSpecifiedBenchmarks();

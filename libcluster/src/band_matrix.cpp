@@ -7,24 +7,17 @@
 #include <stdexcept>
 #include <string>
 
-#include <unistd.h>
 #ifdef __linux__
 #include <sys/mman.h>
 #endif
 
+#include "machine_memory.hpp"
 #include "terrace/cluster/dendrogram.hpp"
 
 namespace terrace::cluster {
 namespace {
 
 constexpr std::size_t kHugePage = std::size_t{1} << 21;
-
-std::uint64_t memory_of_machine() {
-  const long pages = sysconf(_SC_PHYS_PAGES);
-  const long page = sysconf(_SC_PAGESIZE);
-  if (pages <= 0 || page <= 0) return std::numeric_limits<std::uint64_t>::max();
-  return static_cast<std::uint64_t>(pages) * static_cast<std::uint64_t>(page);
-}
 
 }  // namespace
 

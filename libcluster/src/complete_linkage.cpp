@@ -76,24 +76,67 @@ Dendrogram of_points(std::span<const Point3> points, const CompleteLinkageOption
   return make_dendrogram(points.size(), links);
 }
 
+/// An order in which near things are near: halves by which of two far things is nearer, and so on.
+/// Three calls of `distance` for each thing and level.
+void order_by_distance(std::span<std::uint32_t> things, const PairDistance& distance) {
+  constexpr std::size_t kEnough = 8;
+  if (things.size() <= kEnough) return;
+  struct Item {
+    double key;
+    std::uint32_t thing;
+  };
+  std::vector<Item> items(things.size());
+  const auto measure_from = [&](std::uint32_t pole, double sign) {
+    for (std::size_t i = 0; i < things.size(); ++i) {
+      const double d = things[i] == pole ? 0.0 : distance(pole, things[i]);
+      items[i] = {sign * d + (sign < 0 ? items[i].key : 0.0), things[i]};
+    }
+  };
+  const auto farthest = [&] {
+    return std::max_element(items.begin(), items.end(),
+                            [](const Item& x, const Item& y) { return x.key < y.key; })
+        ->thing;
+  };
+  measure_from(things.front(), 1.0);
+  const std::uint32_t pole = farthest();
+  measure_from(pole, 1.0);
+  measure_from(farthest(), -1.0);
+  const std::size_t half = things.size() / 2;
+  std::nth_element(items.begin(), items.begin() + static_cast<std::ptrdiff_t>(half), items.end(),
+                   [](const Item& x, const Item& y) {
+                     return x.key < y.key || (x.key == y.key && x.thing < y.thing);
+                   });
+  for (std::size_t i = 0; i < things.size(); ++i) things[i] = items[i].thing;
+  // Which things a half has does not depend on how the library finds a median; their order would.
+  std::sort(things.begin(), things.begin() + static_cast<std::ptrdiff_t>(half));
+  std::sort(things.begin() + static_cast<std::ptrdiff_t>(half), things.end());
+  order_by_distance(things.first(half), distance);
+  order_by_distance(things.subspan(half), distance);
+}
+
 template <class T>
 Dendrogram of_function(std::size_t count, const PairDistance& distance,
                        const CompleteLinkageOptions& options) {
   const LinkageKernels<T>& kernels = kernels_of<T>(options.path);
   BandMatrix<T> matrix(count, options.memory_limit);
+  const auto checked = [&](std::uint32_t i, std::uint32_t j) {
+    const double value = distance(std::min(i, j), std::max(i, j));
+    check_distance(value, std::numeric_limits<T>::max(), i, j);
+    return value;
+  };
+  // As of points: clusters that merge should have rows that are near in the matrix.
+  std::vector<std::uint32_t> thing(count);
+  std::iota(thing.begin(), thing.end(), 0u);
+  order_by_distance(thing, checked);
   CompleteRounds<T> rounds(matrix, kernels, options.threads);
-  const double most = std::numeric_limits<T>::max();
-  const std::vector<Link> links = rounds.run([&](std::size_t i, T* row) {
+  std::vector<Link> links = rounds.run([&](std::size_t i, T* row) {
     // The second copies are never read.
     const bool second_copy = count % 2 == 0 && i >= count / 2;
     for (std::size_t k = 0; k < matrix.width() - (second_copy ? 1 : 0); ++k) {
-      const std::uint64_t j = band_partner(count, {i, k});
-      const double value = distance(static_cast<std::uint32_t>(std::min<std::uint64_t>(i, j)),
-                                    static_cast<std::uint32_t>(std::max<std::uint64_t>(i, j)));
-      check_distance(value, most, i, j);
-      row[k] = static_cast<T>(value);
+      row[k] = static_cast<T>(checked(thing[i], thing[band_partner(count, {i, k})]));
     }
   });
+  for (Link& link : links) link = {thing[link.i], thing[link.j], link.height};
   return make_dendrogram(count, links);
 }
 

@@ -14,6 +14,7 @@ constexpr std::size_t kRowsPerBlock = 32;
 constexpr std::size_t kThreadsFrom = 512;  ///< clusters; below, threads cost more than they save
 constexpr std::size_t kChainBelow = 8;     ///< a round that merges less than 1/8 is followed by it
 constexpr std::uint32_t kPairsPerCheck = 256;
+constexpr std::size_t kPrefetch = 8;
 
 }  // namespace
 
@@ -47,8 +48,10 @@ std::vector<Link> CompleteRounds<T>::run(const FillRow& fill) {
     const std::size_t pairs = match();
     list_parts();
     for_blocks(first_.size(), kRowsPerBlock, threads(),
-               [&](std::size_t begin, std::size_t end, unsigned) {
-                 for (std::size_t k = begin; k < end; ++k) bring_in(static_cast<std::uint32_t>(k));
+               [&](std::size_t begin, std::size_t end, unsigned thread) {
+                 for (std::size_t k = begin; k < end; ++k) {
+                   bring_in(static_cast<std::uint32_t>(k), columns_[thread]);
+                 }
                });
     shrink();
     if (pairs * kChainBelow < before && size() > 1) {
@@ -173,7 +176,33 @@ void CompleteRounds<T>::list_parts() {
 /// others is brought in here, into the row of the first part. That only reads entries with a second
 /// part, and only writes entries of two first parts, so all clusters may do it at once.
 template <class T>
-void CompleteRounds<T>::bring_in(std::uint32_t k) {
+void CompleteRounds<T>::bring_in(std::uint32_t k, Columns& columns) {
+  std::vector<std::uint32_t>& others = columns.others;
+  list_others(k, others);
+  const std::uint32_t a = first_[k];
+  const auto for_entries = [&](std::uint32_t other, auto action) {
+    const std::uint32_t c = first_[other];
+    if (second_[other] != c) action(entry(a, second_[other]));
+    if (second_[k] == a) return;
+    action(entry(second_[k], c));
+    if (second_[other] != c) action(entry(second_[k], second_[other]));
+  };
+  // Each is in another row, far from the last.
+  for (std::size_t i = 0; i < others.size(); ++i) {
+    if (i + kPrefetch < others.size()) {
+      for_entries(others[i + kPrefetch], [](const T& from) { __builtin_prefetch(&from); });
+    }
+    const std::uint32_t c = first_[others[i]];
+    T& to = clusters_[a].row[offset(a, c)];
+    for_entries(others[i], [&to](const T& from) { to = std::max(to, from); });
+  }
+}
+
+/// New clusters whose entry belongs to the row of k, with an entry of their parts that is neither
+/// in the row of the first part of k nor, in a column of that row, in the row of the second.
+template <class T>
+void CompleteRounds<T>::list_others(std::uint32_t k, std::vector<std::uint32_t>& others) const {
+  others.clear();
   const std::uint32_t m = size();
   const std::uint32_t a = first_[k];
   const std::uint32_t b = second_[k];
@@ -182,17 +211,18 @@ void CompleteRounds<T>::bring_in(std::uint32_t k) {
     // Clusters in the row of a that are not in the row of b. Offsets count from a.
     const std::uint32_t begin = b - a;
     const std::uint32_t end = begin + clusters_[b].length;
-    const auto bring = [&](std::uint32_t from, std::uint32_t to) {
+    const auto list = [&](std::uint32_t from, std::uint32_t to) {
       for (std::uint32_t step = from; step <= to; ++step) {
         const std::uint32_t j = a + step < m ? a + step : a + step - m;
-        if (j != b) bring_in(k, new_cluster_[j]);
+        const std::uint32_t other = new_cluster_[j];
+        if (j != b && holds(a, first_[other])) others.push_back(other);
       }
     };
     if (end < m) {
-      bring(1, std::min(length, begin));
-      bring(end + 1, length);
+      list(1, std::min(length, begin));
+      list(end + 1, length);
     } else {
-      bring(end - m + 1, std::min(length, begin));
+      list(end - m + 1, std::min(length, begin));
     }
   }
   // Pairs of which one is in the row of a and the other is not.
@@ -204,22 +234,8 @@ void CompleteRounds<T>::bring_in(std::uint32_t k) {
     }
     for (std::size_t q = p; q < p + count; ++q) {
       if (pair_first_[q] != a && holds(a, pair_first_[q]) && !holds(a, pair_second_[q])) {
-        bring_in(k, new_cluster_[pair_first_[q]]);
+        others.push_back(new_cluster_[pair_first_[q]]);
       }
-    }
-  }
-}
-
-/// The same for one other new cluster, if its entry belongs to the row of k.
-template <class T>
-void CompleteRounds<T>::bring_in(std::uint32_t k, std::uint32_t other) {
-  const std::uint32_t a = first_[k];
-  const std::uint32_t c = first_[other];
-  if (!holds(a, c)) return;
-  T& to = clusters_[a].row[offset(a, c)];
-  for (const std::uint32_t x : {a, second_[k]}) {
-    for (const std::uint32_t y : {c, second_[other]}) {
-      if (x != a || y != c) to = std::max(to, entry(x, y));
     }
   }
 }

@@ -51,11 +51,12 @@ class CompleteRounds {
   struct Pieces {
     Piece after, wrapped;
   };
-  /// What a thread found out about columns, and room for a row.
+  /// What a thread found out about columns, and room for its work.
   struct Columns {
     std::vector<T> best;
     std::vector<Index> row;
     std::vector<T> buffer;
+    std::vector<std::uint32_t> others;
   };
 
   [[nodiscard]] std::uint32_t size() const { return static_cast<std::uint32_t>(clusters_.size()); }
@@ -82,8 +83,8 @@ class CompleteRounds {
   std::size_t match();
   bool pair_up(std::uint32_t c, const Nearest& candidate);
   void list_parts();
-  void bring_in(std::uint32_t k);
-  void bring_in(std::uint32_t k, std::uint32_t other);
+  void bring_in(std::uint32_t k, Columns& columns);
+  void list_others(std::uint32_t k, std::vector<std::uint32_t>& others) const;
   [[nodiscard]] Cluster shrunk(std::uint32_t k, Columns& columns);
   void shrink();
 

@@ -28,7 +28,7 @@ std::span<const Verb> verbs() {
       {"contour", "write contour lines",
        "terrace contour dem.terrace --interval 50 -o lines.geojson", nullptr},
       {"cluster", "cluster one point file in memory", "terrace cluster cloud.ply -o clustered.ply",
-       nullptr},
+       make_cluster},
       {"match", "match points in pairs, or build the binary tree",
        "terrace match places.csv -o pairs.csv", nullptr},
       {"render", "draw a picture", "terrace render mesh.ply --wire -o mesh.png", make_render},

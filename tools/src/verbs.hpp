@@ -8,6 +8,7 @@
 namespace terrace::tools {
 
 std::unique_ptr<Command> make_build();
+std::unique_ptr<Command> make_cluster();
 std::unique_ptr<Command> make_convert();
 std::unique_ptr<Command> make_info();
 std::unique_ptr<Command> make_mesh();

@@ -50,8 +50,9 @@ struct CompleteLinkageOptions {
 [[nodiscard]] Dendrogram complete_linkage(std::span<const Point3> points,
                                           const CompleteLinkageOptions& options = {});
 
-/// The distance of two things by their numbers i < j. Called once for each pair, from several
-/// threads at once if there are; an exception of it comes out of complete_linkage().
+/// The distance of two things by their numbers i < j. Called once for each pair, and before that
+/// about 3 n log n times to find a good order; from several threads at once if there are. An
+/// exception of it comes out of complete_linkage().
 using PairDistance = std::function<double(std::uint32_t i, std::uint32_t j)>;
 
 /// `count` things of any kind. Throws std::invalid_argument, naming the pair, if a distance is
@@ -59,9 +60,10 @@ using PairDistance = std::function<double(std::uint32_t i, std::uint32_t j)>;
 [[nodiscard]] Dendrogram complete_linkage(std::size_t count, const PairDistance& distance,
                                           const CompleteLinkageOptions& options = {});
 
-/// A matrix of distances, filled. Its contents are used up; options.entry and memory_limit do not
-/// matter. Throws std::invalid_argument, naming the pair, if an entry is negative or not finite,
-/// or the two copies of a pair that is there twice differ.
+/// A matrix of distances, filled. Faster if things that are near have numbers that are near. Its
+/// contents are used up; options.entry and memory_limit do not matter. Throws
+/// std::invalid_argument, naming the pair, if an entry is negative or not finite, or the two copies
+/// of a pair that is there twice differ.
 template <class T>
 [[nodiscard]] Dendrogram complete_linkage(BandMatrix<T>&& distances,
                                           const CompleteLinkageOptions& options = {});

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "svg_plot.hpp"
+
+/// Where results go: tables to stdout and as CSV into a folder, plots as SVG into the folder.
+
+namespace terrace::cluster::thesis {
+
+struct Table {
+  std::string name;  ///< of the file
+  std::string title;
+  std::vector<std::string> columns;
+  std::vector<std::vector<std::string>> rows = {};  ///< as many cells as columns
+
+  void add(std::vector<std::string> row) { rows.push_back(std::move(row)); }
+};
+
+/// Numbers as text: 1234.5678 with 2 digits is "1234.57", "12 345 678", a share of 0.0123 is
+/// "1.2 %".
+std::string fixed(double value, int digits);
+std::string grouped(std::uint64_t value);
+std::string percent(double share, int digits = 1);
+/// What share of the time `before` is spared by taking `after`, as the thesis gives its speed-ups:
+/// twice as fast is "50 %".
+std::string time_saved(double before, double after);
+/// "[0:20:18]": a figure of the thesis in a column of ours.
+std::string quoted(std::string_view figure);
+
+class Report {
+ public:
+  /// The folder is made. Without one no files are written.
+  /// Throws: std::filesystem::filesystem_error.
+  explicit Report(std::optional<std::filesystem::path> folder);
+
+  /// Throws: std::logic_error on a row of another length, std::runtime_error if a file cannot be
+  /// written.
+  void table(const Table& table);
+  /// As CSV only.
+  void data(const Table& table);
+  void plot(const std::string& name, const Plot& plot);
+  void note(std::string_view text);
+
+ private:
+  void write(const std::string& file, const std::string& text) const;
+  std::optional<std::filesystem::path> folder_;
+};
+
+}  // namespace terrace::cluster::thesis

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+/// Line and scatter plots as SVG text.
+
+namespace terrace::cluster::thesis {
+
+struct Series {
+  enum class Mark { line, dashes, dots };
+  std::string name;  ///< in the legend; empty: not there
+  std::vector<double> x = {}, y = {};
+  Mark mark = Mark::line;
+  double size = 1.6;        ///< stroke width of lines, radius of dots, in pixels
+  std::string colour = {};  ///< empty: the next of the palette
+};
+
+struct Axis {
+  std::string label;
+  bool log = false;
+  std::optional<double> low = {}, high = {};  ///< else what the data need
+};
+
+struct Plot {
+  std::string title;
+  Axis x, y;
+  std::vector<Series> series = {};
+  bool legend_left = false;   ///< in the upper left corner instead of the right one
+  bool equal_scales = false;  ///< a unit of x is as long as one of y
+};
+
+/// On a logarithmic axis values that are not positive break lines. A plot without any data has its
+/// frame alone.
+[[nodiscard]] std::string svg(const Plot& plot);
+
+}  // namespace terrace::cluster::thesis

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+// Reads points, one a line with two or three coordinates, from standard input and prints their
+// dendrogram, a row for each merge as in SciPy's linkage matrix: cluster, cluster, height, size.
+//     linkage single|complete|complete-float [THREADS] < points
+// Without arguments it clusters two small rings, and prints how many clusters each linkage makes of
+// them below a height.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <iostream>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "terrace/cluster/complete_linkage.hpp"
+#include "terrace/cluster/single_linkage.hpp"
+
+namespace {
+
+using namespace terrace::cluster;
+
+std::vector<Point3> read_points(std::istream& in) {
+  std::vector<Point3> points;
+  for (std::string line; std::getline(in, line);) {
+    std::istringstream fields(line);
+    Point3 p{0.0, 0.0, 0.0};
+    if (!(fields >> p[0])) continue;  // an empty line
+    if (!(fields >> p[1])) throw std::runtime_error("a line has one coordinate: " + line);
+    fields >> p[2];
+    points.push_back(p);
+  }
+  return points;
+}
+
+Dendrogram linkage(const std::string& method, const std::vector<Point3>& points, unsigned threads) {
+  if (method == "single") return single_linkage(points, {.threads = threads});
+  if (method == "complete") return complete_linkage(points, {.threads = threads});
+  if (method == "complete-float") {
+    return complete_linkage(points, {.threads = threads, .entry = MatrixEntry::float32});
+  }
+  throw std::runtime_error("the method is single, complete or complete-float, not " + method);
+}
+
+int demonstrate() {
+  std::vector<Point3> points;
+  for (int i = 0; i < 60; ++i) {
+    const double angle = 0.1047 * i;
+    const double radius = i % 2 == 0 ? 1.0 : 2.0;
+    points.push_back({radius * std::cos(angle), radius * std::sin(angle), 0.0});
+  }
+  // Single linkage follows the rings, complete linkage makes compact pieces.
+  for (const char* method : {"single", "complete"}) {
+    const std::vector<std::uint32_t> labels = cut_height(linkage(method, points, 1), 0.5);
+    std::printf("%s linkage: %u clusters below 0.5\n", method,
+                *std::max_element(labels.begin(), labels.end()) + 1);
+  }
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 2) return demonstrate();
+  try {
+    const unsigned threads = argc > 2 ? static_cast<unsigned>(std::atoi(argv[2])) : 1;
+    for (const Merge& merge : linkage(argv[1], read_points(std::cin), threads).merges) {
+      std::printf("%u %u %.17g %u\n", merge.a, merge.b, merge.height, merge.size);
+    }
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "linkage: %s\n", error.what());
+    return 1;
+  }
+  return 0;
+}

@@ -1,0 +1,319 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The verb `cluster` and its pictures as their users meet them.
+
+TERRACE=path/to/terrace cluster_cli_test.py
+"""
+
+import csv
+import json
+import math
+import os
+import random
+import subprocess
+import tempfile
+import unittest
+
+TERRACE = os.environ.get('TERRACE', 'terrace')
+METHODS = ['facility', 'primal-dual', 'k-means', 'k-median', 'single', 'complete']
+COUNTING = ['k-means', 'k-median', 'single', 'complete']
+
+
+def terrace(*args):
+    return subprocess.run([TERRACE, *map(str, args)], capture_output=True, text=True, timeout=120)
+
+
+def distance(a, b):
+    return math.dist(a, b)
+
+
+def diagonal(points):
+    return math.dist([min(axis) for axis in zip(*points)], [max(axis) for axis in zip(*points)])
+
+
+def agglomerate(points, farthest):
+    """Heights of complete (farthest) or single linkage by brute force."""
+    clusters, heights = [[p] for p in points], []
+    between = max if farthest else min
+    while len(clusters) > 1:
+        height, i, j = min((between(distance(p, q) for p in a for q in b), i, j)
+                           for i, a in enumerate(clusters) for j, b in enumerate(clusters[:i]))
+        heights.append(height)
+        clusters[j] += clusters.pop(i)
+    return heights
+
+
+class ClusterTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.blobs = cls.path('blobs.csv')
+        generator = random.Random(5)
+        cls.points = []
+        for centre in ((0, 0, 0), (40, 5, 1), (10, 50, 3), (60, 60, 9)):
+            for _ in range(60):
+                cls.points.append([c + generator.gauss(0, 2) for c in centre])
+        generator.shuffle(cls.points)
+        cls.write(cls.blobs, ['x', 'y', 'z'], cls.points)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.folder.cleanup()
+
+    @classmethod
+    def path(cls, name):
+        return os.path.join(cls.folder.name, name)
+
+    @staticmethod
+    def write(path, header, rows):
+        with open(path, 'w', newline='') as file:
+            writer = csv.writer(file)
+            writer.writerow(header)
+            writer.writerows(rows)
+
+    @staticmethod
+    def read(path):
+        with open(path, newline='') as file:
+            return list(csv.DictReader(file))
+
+    @staticmethod
+    def run_ok(*args):
+        result = terrace(*args)
+        assert result.returncode == 0, result.stderr
+        return result.stdout
+
+    def expect_error(self, code, *args):
+        result = terrace(*args)
+        self.assertEqual(result.returncode, code, result.stderr)
+        self.assertEqual(result.stdout, '')
+        self.assertEqual(len(result.stderr.splitlines()), 1, result.stderr)
+        return result.stderr
+
+    def clustered(self, *options, source=None):
+        """Runs the command; summary, rows of the output."""
+        out = self.path('out.csv')
+        summary = json.loads(self.run_ok('cluster', source or self.blobs, '-o', out, '--json',
+                                         '--force', *options))
+        return summary, self.read(out)
+
+    def test_facility_location_states_costs_that_add_up_and_a_bound(self):
+        summary, rows = self.clustered()
+        self.assertLessEqual({'clusters', 'cost', 'opening_cost', 'connection_cost', 'lower_bound',
+                              'seconds'}, set(summary))
+        self.assertEqual(len(rows), len(self.points))
+        connection, representatives = 0.0, {}
+        for i, row in enumerate(rows):
+            self.assertEqual([float(row[a]) for a in 'xyz'], self.points[i])
+            chosen = int(row['representative'])
+            self.assertEqual(representatives.setdefault(int(row['cluster']), chosen), chosen)
+            self.assertEqual(rows[chosen]['cluster'], row['cluster'])
+            connection += distance(self.points[i], self.points[chosen])
+        self.assertEqual(len(representatives), summary['clusters'])
+        nearest = sum(min(distance(p, self.points[r]) for r in representatives.values())
+                      for p in self.points)
+        self.assertAlmostEqual(summary['connection_cost'] / connection, 1, places=9)
+        self.assertAlmostEqual(nearest / connection, 1, places=6)
+        self.assertAlmostEqual(summary['opening_cost'] /
+                               (len(representatives) * diagonal(self.points)), 1, places=9)
+        self.assertAlmostEqual(summary['cost'],
+                               summary['opening_cost'] + summary['connection_cost'], places=6)
+        self.assertLessEqual(summary['lower_bound'], summary['cost'])
+        self.assertGreater(summary['lower_bound'], 0.9 * summary['cost'])
+
+    def test_every_method_finds_blobs_far_apart(self):
+        for method in METHODS:
+            options = ['-k', 4] if method in COUNTING else ['--facility-cost', 1]
+            summary, rows = self.clustered('--method', method, *options)
+            with self.subTest(method=method):
+                self.assertEqual(summary['clusters'], 4)
+                for i in range(0, len(rows), 7):
+                    for j in range(0, len(rows), 5):
+                        near = distance(self.points[i], self.points[j]) < 25
+                        self.assertEqual(rows[i]['cluster'] == rows[j]['cluster'], near)
+
+    def test_strategies_and_threads_give_the_same_bytes(self):
+        outputs = set()
+        for number, options in enumerate((
+                ['full-scan'], ['quadtree'], ['octree'], ['kd-tree'], ['facilities'],
+                ['facilities', '--threads', 3])):
+            out = self.path(f'strategy{number}.csv')
+            self.run_ok('cluster', self.blobs, '-o', out, '--facility-cost', 0.1, '--iterations',
+                        'log10', '--strategy', *options)
+            with open(out, 'rb') as file:
+                outputs.add(file.read())
+        self.assertEqual(len(outputs), 1)
+        other = self.path('seed.csv')
+        self.run_ok('cluster', self.blobs, '-o', other, '--facility-cost', 0.1, '--iterations',
+                    'tenth', '--seed', 2)
+        with open(other, 'rb') as file:
+            self.assertNotIn(file.read(), outputs)
+
+    def test_an_outlier_is_left_out_at_its_price(self):
+        path = self.path('outlier.csv')
+        self.write(path, ['x', 'y', 'z'], self.points + [[1000, 1000, 0]])
+        summary, rows = self.clustered('--facility-cost', 0.05, '--outlier-price', 0.04, source=path)
+        self.assertEqual(summary['outliers'], 1)
+        self.assertEqual((rows[-1]['cluster'], rows[-1]['representative']), ('-1', '-1'))
+        self.assertAlmostEqual(summary['outlier_cost'] /
+                               (0.04 * diagonal(self.points + [[1000, 1000, 0]])), 1, places=9)
+
+    def test_dendrograms_have_the_heights_of_brute_force(self):
+        few = self.path('few.csv')
+        self.write(few, ['x', 'y', 'z'], self.points[:40])
+        for method in ('single', 'complete'):
+            out = self.path(f'{method}-tree.csv')
+            self.run_ok('cluster', few, '--method', method, '--dendrogram', out)
+            rows = self.read(out)
+            self.assertEqual(list(rows[0]), ['a', 'b', 'height', 'size'])
+            heights = [float(row['height']) for row in rows]
+            for ours, theirs in zip(heights, agglomerate(self.points[:40], method == 'complete'),
+                                    strict=True):
+                self.assertAlmostEqual(ours / theirs, 1, places=12)
+            self.assertEqual(int(rows[-1]['size']), 40)
+            picture = self.path(f'{method}.png')
+            summary = json.loads(self.run_ok('render', out, '-o', picture, '--json', '--size',
+                                             '300x200'))
+            self.assertEqual(summary['merges'], 39)
+
+    def test_trees_are_cut_by_height_and_by_count(self):
+        labels = self.path('labels.txt')
+        self.run_ok('cluster', self.blobs, '--method', 'single', '--height', 15, '--labels', labels)
+        with open(labels) as file:
+            numbers = [int(line) for line in file]
+        self.assertEqual(len(numbers), len(self.points))
+        self.assertEqual(set(numbers), {0, 1, 2, 3})
+        summary, _ = self.clustered('--method', 'complete', '-k', 9, '--single-precision')
+        self.assertEqual(summary['clusters'], 9)
+        self.assertIsNone(summary['cost'])
+
+    def test_an_ellipse_is_a_scaling(self):
+        metric = self.path('ellipse.json')
+        with open(metric, 'w') as file:
+            json.dump({'regions': [{'semi_axes': [4, 1, 1], 'angle': 0}]}, file)
+        scaled = self.path('scaled.csv')
+        self.write(scaled, ['x', 'y', 'z'], [[x / 4, y, z] for x, y, z in self.points])
+        options = ['--facility-cost', 0.2, '--iterations', 'log10', '--strategy', 'kd-tree']
+        one, rows = self.clustered('--metric', f'elliptical:{metric}', *options)
+        two, others = self.clustered(*options, source=scaled)
+        self.assertEqual([row['cluster'] for row in rows], [row['cluster'] for row in others])
+        self.assertAlmostEqual(one['cost'] / two['cost'], 1, places=9)
+
+    def test_a_field_of_ellipses_and_other_metrics_run(self):
+        metric = self.path('field.json')
+        with open(metric, 'w') as file:
+            json.dump({'regions': [{'box': [-20, -20, 30, 30], 'semi_axes': [5, 0.5], 'angle': 45}]},
+                      file)
+        for name in (f'elliptical:{metric}', 'squared', 'minkowski:1', 'minkowski:inf'):
+            with self.subTest(metric=name):
+                summary, rows = self.clustered('--metric', name, '--facility-cost', 0.2)
+                self.assertGreaterEqual(summary['clusters'], 2)
+                self.assertLessEqual(summary['lower_bound'], summary['cost'])
+                self.assertEqual(len(rows), len(self.points))
+
+    def test_channels_and_weights_count(self):
+        path = self.path('coloured.csv')
+        self.write(path, ['x', 'y', 'z', 'intensity', 'mass'],
+                   [[i % 10, i // 10, 0, 100 * (i % 2), 1 + 9 * (i == 55)] for i in range(100)])
+        _, rows = self.clustered('--method', 'facility', '--channel', 'intensity:10', source=path)
+        for row in rows:
+            chosen = rows[int(row['representative'])]
+            self.assertEqual(row['intensity'], chosen['intensity'])
+        light, _ = self.clustered(source=path)
+        heavy, _ = self.clustered('--weight', 'mass', '--facility-cost', 100, source=path)
+        self.assertEqual(heavy['clusters'], 1)
+        self.assertGreater(light['clusters'], 1)
+        self.assertIn('intensity', self.expect_error(2, 'cluster', path, '--channel', 'colour:1',
+                                                     '-o', self.path('none.csv')))
+
+    def test_clustered_points_are_clustered_anew_and_drawn(self):
+        first = self.path('first.ply')
+        self.run_ok('cluster', self.blobs, '-o', first)
+        again = self.path('again.csv')
+        self.run_ok('cluster', first, '-o', again, '--method', 'k-means', '-k', 7)
+        rows = self.read(again)
+        self.assertEqual(list(rows[0]), ['x', 'y', 'z', 'cluster', 'representative'])
+        self.assertEqual(len({row['cluster'] for row in rows}), 7)
+        picture = self.path('clusters.png')
+        self.run_ok('render', first, '-o', picture, '--size', '200x200')
+        self.assertGreater(os.path.getsize(picture), 1000)
+
+    def test_only_the_result_goes_to_standard_output(self):
+        result = terrace('cluster', self.blobs, '-o', '-', '--format', 'csv')
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(len(result.stdout.splitlines()), len(self.points) + 1)
+        self.assertIn('cost', result.stderr)
+        result = terrace('cluster', self.blobs, '--labels', self.path('l.txt'))
+        self.assertIn('lower bound', result.stdout)
+        self.expect_error(2, 'cluster', self.blobs, '-o', '-', '--labels', '-')
+
+    def test_equal_points_are_one_cluster(self):
+        path = self.path('equal.csv')
+        self.write(path, ['x', 'y', 'z'], [[1e6, 2e6, 3]] * 50)
+        for method in METHODS:
+            options = ['-k', 3] if method in COUNTING else []
+            with self.subTest(method=method):
+                summary, rows = self.clustered('--method', method, *options, source=path)
+                self.assertEqual(len(rows), 50)
+                self.assertGreaterEqual(summary['clusters'], 1)
+                self.assertLessEqual(summary['clusters'], 3)
+        one = self.path('one.csv')
+        self.write(one, ['x', 'y', 'z'], [[1, 2, 3]])
+        for method in METHODS:
+            options = ['-k', 1] if method in COUNTING else []
+            summary, rows = self.clustered('--method', method, *options, source=one)
+            self.assertEqual((summary['clusters'], rows[0]['representative']), (1, '0'))
+
+    def test_usage_errors_are_one_line_and_leave_nothing(self):
+        none = self.path('none.csv')
+        for options in (['--method', 'k-means'], ['--method', 'k-median'], ['--method', 'ward'],
+                        ['--method', 'single'], ['-k', 3], ['--method', 'k-means', '-k', 0],
+                        ['--method', 'k-means', '-k', 1000], ['--height', 3],
+                        ['--method', 'single', '-k', 2, '--height', 3],
+                        ['--method', 'single', '-k', 2, '--metric', 'squared'],
+                        ['--method', 'k-means', '-k', 2, '--metric', 'minkowski:1'],
+                        ['--dendrogram', none], ['--facility-cost', 0], ['--metric', 'taxi'],
+                        ['--strategy', 'magic'], ['--channel', 'x'], ['--iterations', 'many'],
+                        ['--method', 'k-means', '-k', 2, '--batch', 4]):
+            with self.subTest(options=options):
+                self.expect_error(2, 'cluster', self.blobs, '-o', none, *options)
+                self.assertFalse(os.path.exists(none))
+        self.assertIn('nothing to write', self.expect_error(2, 'cluster', self.blobs))
+
+    def test_bad_data_is_named(self):
+        path = self.path('bad.csv')
+        self.write(path, ['x', 'y', 'z', 'mass'], [[0, 0, 0, 1], [1, 1, 1, -1]])
+        none = self.path('none.csv')
+        self.assertIn('point 1', self.expect_error(1, 'cluster', path, '-o', none, '--weight', 'mass'))
+        self.expect_error(1, 'cluster', self.path('nowhere.csv'), '-o', none)
+        metric = self.path('bad.json')
+        with open(metric, 'w') as file:
+            json.dump({'regions': [{'semi_axes': [1, 0]}]}, file)
+        self.assertIn('region 0', self.expect_error(1, 'cluster', self.blobs, '-o', none, '--metric',
+                                                    f'elliptical:{metric}'))
+
+    def test_what_is_too_much_for_memory_says_how_much_it_needs(self):
+        many = self.path('many.ply')
+        self.run_ok('synth', 'uniform', '--points', 30000, '-o', many)
+        for method in ('complete', 'primal-dual'):
+            message = self.expect_error(1, 'cluster', many, '--method', method, '--labels',
+                                        self.path('none.txt'), '--memory', '100M',
+                                        *(['-k', 2] if method == 'complete' else []))
+            self.assertRegex(message, r'\d+ (bytes|MiB|GiB|B)')
+
+    def test_cuda_without_a_device_is_a_clear_error(self):
+        tree = self.path('cuda.csv')
+        result = terrace('cluster', self.blobs, '--method', 'complete', '--device', 'cuda',
+                         '--dendrogram', tree)
+        if result.returncode == 0:
+            here = self.path('cpu.csv')
+            self.run_ok('cluster', self.blobs, '--method', 'complete', '--dendrogram', here)
+            self.assertEqual(self.read(tree), self.read(here))
+        else:
+            self.assertEqual(result.returncode, 1)
+            self.assertIn('CUDA', result.stderr)
+            self.assertEqual(len(result.stderr.splitlines()), 1)
+            self.assertFalse(os.path.exists(tree))
+
+
+if __name__ == '__main__':
+    unittest.main()

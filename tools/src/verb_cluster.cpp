@@ -1,0 +1,377 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// cluster: clusters one file of points in memory, by any method of libcluster.
+#include <algorithm>
+#include <limits>
+#include <new>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "cluster_run.hpp"
+#include "dendrogram_file.hpp"
+#include "error.hpp"
+#include "interrupt.hpp"
+#include "metric_option.hpp"
+#include "output.hpp"
+#include "point_table.hpp"
+#include "store_build.hpp"
+#include "terrace/stream/atomic_file.hpp"
+#include "terrace/stream/error.hpp"
+#include "terrace/stream/point_writer.hpp"
+#include "units.hpp"
+#include "verbs.hpp"
+
+namespace terrace::tools {
+namespace {
+
+class ClusterCommand final : public Command {
+ public:
+  void define(CLI::App& app) override {
+    app.add_option("input", input_, "File of points (or cells); - is standard input")
+        ->required()
+        ->type_name("FILE");
+    app.add_option(
+           "-o,--output", output_,
+           "The points with columns 'cluster' and 'representative' (the number of the point "
+           "that stands for the cluster; -1: outlier); - is standard output")
+        ->type_name("FILE");
+    app.add_option("--labels", labels_, "One cluster number per line, in the order of the input")
+        ->type_name("FILE");
+    app.add_option("--dendrogram", dendrogram_,
+                   "single, complete: the whole tree as rows a,b,height,size (SciPy's)")
+        ->type_name("FILE.csv");
+    app.add_option("--format", format_, "Of the output: xyz, csv, ply, ply-ascii (else its ending)")
+        ->type_name("NAME");
+    app.add_option("--input-format", input_format_, "Of the input (else its content, its ending)")
+        ->type_name("NAME");
+    app.add_option("--method", method_,
+                   "facility, primal-dual, k-means, k-median, single or complete")
+        ->capture_default_str()
+        ->type_name("NAME");
+    app.add_option("-k", request_.k, "Number of clusters")
+        ->check(CLI::PositiveNumber)
+        ->type_name("K");
+    app.add_option("--height", height_, "single, complete: cut the tree at this distance")
+        ->check(CLI::NonNegativeNumber)
+        ->type_name("H");
+    app.add_option("--facility-cost", facility_cost_,
+                   "Times the diagonal of the points: larger makes fewer clusters")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    app.add_option("--outlier-price", outlier_price_,
+                   "facility: leave a point out if that costs less; times the diagonal")
+        ->check(CLI::PositiveNumber)
+        ->type_name("PRICE");
+    app.add_option("--strategy", request_.strategy,
+                   "facility: automatic, fast, full-scan, quadtree, octree, kd-tree or facilities")
+        ->check(CLI::IsMember(
+            {"automatic", "fast", "full-scan", "quadtree", "octree", "kd-tree", "facilities"}))
+        ->capture_default_str()
+        ->type_name("NAME");
+    app.add_option("--iterations", request_.iterations,
+                   "facility: tenth, log10, log2 (times N), or a number of candidates")
+        ->type_name("N");
+    app.add_option("--effort", effort_, "facility: how long to search")
+        ->check(CLI::IsMember({"fast", "default", "fine", "full"}))
+        ->capture_default_str();
+    app.add_option("--batch", request_.batch, "facility: candidates judged at once")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    app.add_option("--restarts", request_.restarts,
+                   "k-means, k-median: runs, the best of which counts")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    app.add_option("--bound-iterations", request_.bound_iterations,
+                   "Steps towards a lower bound of the cost; 0: none (default: some seconds)")
+        ->type_name("N");
+    app.add_option(
+           "--metric", metric_,
+           "euclidean, squared, minkowski:P or elliptical:FILE (JSON: boxes with semi-axes)")
+        ->capture_default_str()
+        ->type_name("METRIC");
+    app.add_option("--channel", channels_,
+                   "A column that counts in distances too, and how many metres its unit is worth")
+        ->allow_extra_args(false)
+        ->type_name("NAME:WEIGHT");
+    app.add_option("--weight", weight_, "The column of the points' weights")->type_name("NAME");
+    app.add_option("--z-weight", z_weight_, "How much heights count in a distance")
+        ->check(CLI::NonNegativeNumber)
+        ->capture_default_str();
+    app.add_flag("--single-precision", request_.single_precision,
+                 "complete: a matrix of half the size");
+    app.add_option("--device", device_, "single, complete: cpu or cuda")
+        ->check(CLI::IsMember({"cpu", "cuda"}))
+        ->capture_default_str();
+  }
+
+  Summary run(const CommonOptions& common) override {
+    const Stopwatch watch;
+    check_usage(common);
+    const MetricChoice metric = MetricChoice::parse(metric_);
+    const bool replace_points = output_.empty() ? false : may_replace(output_, common.force);
+    const bool replace_labels = labels_.empty() ? false : may_replace(labels_, common.force);
+    const bool replace_tree = dendrogram_.empty() ? false : may_replace(dendrogram_, common.force);
+
+    request_.memory_bytes = common.memory_or(0);
+    PointTable table = read_point_table(input_, input_format_, request_.memory_bytes, common);
+    if (table.size() > std::numeric_limits<std::int32_t>::max()) {
+      throw stream::Error(
+          {.file = input_,
+           .where = {},
+           .cause = "has " + with_commas(table.size()) + " points",
+           .remedy = "at most 2,147,483,647 are clustered in memory; build a store"});
+    }
+    const GroundFrame ground = GroundFrame::of(table, z_weight_);
+    if (!ground.assumption.empty()) common.explain(input_ + ": " + ground.assumption);
+    std::vector<cluster::Point3> positions(table.size());
+    std::transform(table.positions.begin(), table.positions.end(), positions.begin(), ground);
+    const std::vector<double> weights =
+        weight_.empty() ? std::vector<double>() : table.column(weight_);
+    const ChannelTable channels = read_channels(table);
+
+    cluster::FacilityPoints problem;
+    problem.points = positions;
+    problem.weights = weights;
+    problem.metric = metric.on_ground(ground.origin, ground.scale);
+    problem.channels = {channels.values, channels.weights};
+    problem.facility_cost = facility_cost_;
+    if (outlier_price_ > 0) problem.outlier_price = outlier_price_;
+
+    ClusterOutcome outcome;
+    try {
+      ProgressMeter meter(common.progress, "points");
+      outcome = run_clustering(request_, problem, [&](double fraction) {
+        check_interrupt();
+        meter.update(static_cast<std::uint64_t>(fraction * static_cast<double>(table.size())),
+                     fraction);
+      });
+    } catch (const std::invalid_argument& error) {
+      throw stream::Error({.file = input_, .where = {}, .cause = error.what(), .remedy = {}});
+    } catch (const std::bad_alloc&) {
+      throw stream::Error({.file = input_,
+                           .where = {},
+                           .cause = "does not fit into memory with method " + method_,
+                           .remedy = "take fewer points, or another method"});
+    }
+    for (const std::string& note : outcome.notes) common.say(note);
+
+    if (!labels_.empty()) write_labels(outcome, replace_labels);
+    if (!dendrogram_.empty()) write_dendrogram(dendrogram_, *outcome.dendrogram, replace_tree);
+    const std::size_t outliers = static_cast<std::size_t>(
+        std::count(outcome.labels.begin(), outcome.labels.end(), cluster::kOutlier));
+    const std::uint64_t points = table.size();
+    if (!output_.empty()) write_points(std::move(table), outcome, replace_points);
+    return summary_of(outcome, points, outliers, watch);
+  }
+
+ private:
+  struct ChannelTable {
+    std::vector<double> values, weights;
+  };
+
+  void check_usage(const CommonOptions& common) {
+    const auto method = cluster_method_of(method_);
+    if (!method) {
+      throw UsageError("--method " + method_ +
+                       ": the methods are facility, primal-dual, k-means, k-median, single and "
+                       "complete");
+    }
+    request_.method = *method;
+    request_.effort = *effort_of(effort_);
+    request_.cuda = device_ == "cuda";
+    request_.seed = common.seed;
+    request_.threads = common.threads;
+    if (height_ >= 0) request_.height = height_;
+    const bool tree = *method == ClusterMethod::single || *method == ClusterMethod::complete;
+    const bool flat = !output_.empty() || !labels_.empty();
+    if (!flat && dendrogram_.empty()) {
+      throw UsageError(
+          "there is nothing to write: name -o FILE, --labels FILE or --dendrogram FILE");
+    }
+    if (!tree && (!dendrogram_.empty() || request_.height || request_.cuda)) {
+      throw UsageError(
+          "--dendrogram, --height and --device are for the methods single and complete");
+    }
+    if (tree && flat && request_.k == 0 && !request_.height) {
+      throw UsageError("--method " + method_ +
+                       " gives a tree: say where to cut it, with -k K or "
+                       "--height H");
+    }
+    if (request_.k != 0 && request_.height) throw UsageError("give either -k or --height");
+    const bool counts = *method == ClusterMethod::k_means || *method == ClusterMethod::k_median;
+    if (counts && request_.k == 0) throw UsageError("--method " + method_ + " needs -k K");
+    if (!counts && !tree && request_.k != 0) {
+      throw UsageError("--method " + method_ +
+                       " finds the number of clusters itself, by --facility-cost; -k is for "
+                       "k-means, k-median, single and complete");
+    }
+    if (*method != ClusterMethod::facility &&
+        (outlier_price_ > 0 || request_.strategy != "automatic" || !request_.iterations.empty() ||
+         request_.batch != 1)) {
+      throw UsageError(
+          "--outlier-price, --strategy, --iterations and --batch are for --method "
+          "facility");
+    }
+    const int on_output = (output_ == "-") + (labels_ == "-") + (dendrogram_ == "-") + common.json;
+    if (on_output > 1) throw UsageError("only one thing can go to standard output");
+  }
+
+  [[nodiscard]] ChannelTable read_channels(const PointTable& table) const {
+    ChannelTable channels;
+    std::vector<std::vector<double>> columns;
+    for (const std::string& text : channels_) {
+      const std::size_t colon = text.rfind(':');
+      if (colon == std::string::npos || colon == 0) {
+        throw UsageError("--channel " + text + ": write NAME:WEIGHT, as in intensity:0.5");
+      }
+      channels.weights.push_back(
+          parse_number(text.substr(colon + 1), "the weight of --channel " + text));
+      if (!(channels.weights.back() >= 0)) {
+        throw UsageError("--channel " + text + ": the weight must not be negative");
+      }
+      columns.push_back(table.column(text.substr(0, colon)));
+    }
+    channels.values.resize(table.size() * columns.size());
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+      for (std::size_t i = 0; i < table.size(); ++i) {
+        channels.values[i * columns.size() + c] = columns[c][i];
+      }
+    }
+    return channels;
+  }
+
+  void write_labels(const ClusterOutcome& outcome, bool replace) const {
+    std::string text;
+    for (const std::uint32_t label : outcome.labels) {
+      text += label == cluster::kOutlier ? "-1" : std::to_string(label);
+      text += '\n';
+    }
+    if (labels_ == "-") {
+      std::fwrite(text.data(), 1, text.size(), stdout);
+      if (std::fflush(stdout) != 0) throw ClosedPipe();
+      return;
+    }
+    stream::AtomicFile file(labels_, replace);
+    file.write(text);
+    file.commit();
+  }
+
+  void write_points(PointTable table, const ClusterOutcome& outcome, bool replace) const {
+    // Points that were clustered before are clustered anew.
+    table.drop("cluster");
+    table.drop("representative");
+    std::vector<stream::Channel> attributes = table.info.attributes;
+    attributes.push_back({.name = "cluster", .type = stream::ScalarType::i32});
+    attributes.push_back({.name = "representative", .type = stream::ScalarType::i32});
+    const auto writer = stream::open_point_writer(
+        output_, {.attributes = std::move(attributes), .comments = {kWriterMark}},
+        {.format = format_, .replace = replace});
+    const std::size_t own = table.attributes.size();
+    constexpr std::size_t kBlock = 65536;
+    stream::PointBlock block;
+    for (std::size_t begin = 0; begin < table.size(); begin += kBlock) {
+      check_interrupt();
+      const std::size_t end = std::min(begin + kBlock, table.size());
+      const auto at = [](std::size_t i) { return static_cast<std::ptrdiff_t>(i); };
+      block.positions.assign(table.positions.begin() + at(begin),
+                             table.positions.begin() + at(end));
+      block.attributes.resize(own + 2);
+      for (std::size_t c = 0; c < own; ++c) {
+        const std::size_t size = stream::size_of(table.attributes[c].type);
+        block.attributes[c].type = table.attributes[c].type;
+        block.attributes[c].bytes.assign(table.attributes[c].bytes.begin() + at(begin * size),
+                                         table.attributes[c].bytes.begin() + at(end * size));
+      }
+      std::vector<std::int32_t> label(end - begin), representative(end - begin);
+      for (std::size_t i = begin; i < end; ++i) {
+        const std::uint32_t cluster = outcome.labels[i];
+        const bool outlier = cluster == cluster::kOutlier;
+        label[i - begin] = outlier ? -1 : static_cast<std::int32_t>(cluster);
+        representative[i - begin] =
+            outlier ? -1 : static_cast<std::int32_t>(outcome.representatives[cluster]);
+      }
+      for (const auto& [slot, values] :
+           {std::pair(own, &label), std::pair(own + 1, &representative)}) {
+        const auto bytes = std::as_bytes(std::span<const std::int32_t>(*values));
+        block.attributes[slot].type = stream::ScalarType::i32;
+        block.attributes[slot].bytes.assign(bytes.begin(), bytes.end());
+      }
+      writer->append(block);
+    }
+    writer->finish();
+  }
+
+  [[nodiscard]] Summary summary_of(const ClusterOutcome& outcome, std::uint64_t points,
+                                   std::size_t outliers, const Stopwatch& watch) const {
+    const auto number = [](const std::optional<double>& value) -> nlohmann::ordered_json {
+      return value ? nlohmann::ordered_json(*value) : nlohmann::ordered_json(nullptr);
+    };
+    std::optional<double> cost;
+    if (outcome.connection_cost) {
+      cost = *outcome.connection_cost + outcome.opening_cost.value_or(0.0) +
+             outcome.outlier_cost.value_or(0.0);
+    }
+    std::optional<double> gap;
+    if (cost && outcome.lower_bound && *outcome.lower_bound > 0) {
+      gap = std::max(0.0, *cost / *outcome.lower_bound - 1.0);
+    }
+    Summary summary;
+    summary.json = {{"points", points},
+                    {"clusters", outcome.representatives.size()},
+                    {"outliers", outliers},
+                    {"cost", number(cost)},
+                    {"opening_cost", number(outcome.opening_cost)},
+                    {"connection_cost", number(outcome.connection_cost)},
+                    {"outlier_cost", number(outcome.outlier_cost)},
+                    {"lower_bound", number(outcome.lower_bound)},
+                    {"gap", number(gap)},
+                    {"seconds", watch.seconds()},
+                    {"peak_rss_bytes", peak_rss_bytes()}};
+    std::string& text = summary.text;
+    text = with_commas(points) + " points, ";
+    if (!outcome.labels.empty()) {
+      text += with_commas(outcome.representatives.size()) + " clusters";
+      if (outliers > 0) text += " and " + with_commas(outliers) + " outliers";
+      text += ", ";
+    }
+    text += readable_seconds(watch.seconds()) + "\n";
+    if (cost) {
+      text += "cost " + rounded(*cost);
+      if (outcome.opening_cost) {
+        text += " = " + rounded(*outcome.opening_cost) + " for opening + " +
+                rounded(*outcome.connection_cost) + " for connecting";
+      }
+      if (outliers > 0) text += " + " + rounded(*outcome.outlier_cost) + " for outliers";
+      text += "\n";
+    }
+    if (gap) {
+      text += "lower bound " + rounded(*outcome.lower_bound) + ": at most " + rounded(100 * *gap) +
+              " % above the optimum\n";
+    }
+    // Costs are a result; they stay out of the way of another one on standard output.
+    summary.text_is_result = output_ != "-" && labels_ != "-" && dendrogram_ != "-";
+    return summary;
+  }
+
+  static std::string rounded(double value) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.6g", value);
+    return text;
+  }
+
+  ClusterRequest request_;
+  std::string input_, output_, labels_, dendrogram_, format_, input_format_;
+  std::string method_ = "facility", effort_ = "default", metric_ = "euclidean", weight_;
+  std::string device_ = "cpu";
+  std::vector<std::string> channels_;
+  double height_ = -1, facility_cost_ = 1.0, outlier_price_ = 0, z_weight_ = 1.0;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_cluster() { return std::make_unique<ClusterCommand>(); }
+
+}  // namespace terrace::tools
