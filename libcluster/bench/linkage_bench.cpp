@@ -4,6 +4,7 @@
 // duplicates. linkage_peers.py runs this beside fastcluster.
 #include <cmath>
 #include <cstdlib>
+#include <fstream>
 #include <string>
 
 #include <benchmark/benchmark.h>
@@ -33,15 +34,27 @@ std::vector<Point3> make_points(Input input, std::size_t count) {
   return points;
 }
 
+/// A line of /proc/self/status that gives kilobytes, in mebibytes; 0 where there is none.
+double status_mebibytes(const std::string& key) {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);) {
+    if (line.rfind(key + ":", 0) == 0) return std::stod(line.substr(key.size() + 1)) / 1024;
+  }
+  return 0.0;
+}
+
 void complete(benchmark::State& state, Input input, MatrixEntry entry) {
   const auto count = static_cast<std::size_t>(state.range(0));
   const std::vector<Point3> points = make_points(input, count);
   const CompleteLinkageOptions options{.threads = static_cast<unsigned>(state.range(1)),
                                        .entry = entry};
+  const double before = status_mebibytes("VmRSS");
   for ([[maybe_unused]] const auto iteration : state) {
     const Dendrogram dendrogram = complete_linkage(points, options);
     benchmark::DoNotOptimize(dendrogram.merges.data());
   }
+  // Of the process so far: of this benchmark only if it is the first.
+  state.counters["peak_MiB"] = status_mebibytes("VmHWM") - before;
 }
 
 void complete_function(benchmark::State& state, bool row) {

@@ -11,21 +11,23 @@ needs (SciPy's pdist); peak memory is that of the process less what it had befor
 least of several.
 """
 import json
-import os
 import resource
 import subprocess
 import sys
 import time
 
 
+def counters(program, pattern, *options):
+    output = subprocess.run(
+        [program, f"--benchmark_filter={pattern}", "--benchmark_format=json", *options],
+        stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, check=True, text=True).stdout
+    return json.loads(output)["benchmarks"]
+
+
 def ours(program, pattern):
     """Milliseconds by name of the benchmark, the least of the repetitions."""
-    output = subprocess.run(
-        [program, f"--benchmark_filter={pattern}", "--benchmark_repetitions=3",
-         "--benchmark_min_time=0.2", "--benchmark_format=json"],
-        stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, check=True, text=True).stdout
     times = {}
-    for run in json.loads(output)["benchmarks"]:
+    for run in counters(program, pattern, "--benchmark_repetitions=3", "--benchmark_min_time=0.2"):
         if run.get("run_type") == "iteration":
             name = run["run_name"]
             times[name] = min(times.get(name, float("inf")), run["real_time"])
@@ -89,16 +91,9 @@ def compare_complete(program, modules):
 
 
 def compare_memory(program, modules):
-    """Each in a process of its own, less the same process before the work."""
-    def peak_of(pattern):
-        child = subprocess.Popen([program, f"--benchmark_filter={pattern}"],
-                                 stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        return 1024 * os.wait4(child.pid, 0)[2].ru_maxrss
-    idle = peak_of("single/cube/10000/1/")
-    mebi = 1 << 20
-    for entry in "float", "double":
-        extra = peak_of(f"complete/{entry}/cube/10000/1/") - idle
-        print(f"complete/{entry}, 10 000 points: {extra / mebi:.1f} MiB")
+    for entry in "float", "double":  # each in a process of its own
+        peak = counters(program, f"complete/{entry}/cube/10000/1/")[0]["peak_MiB"]
+        print(f"complete/{entry}, 10 000 points: {peak:.1f} MiB")
     if modules is None:
         return
     fastcluster, numpy, pdist = modules
@@ -107,7 +102,7 @@ def compare_memory(program, modules):
     fastcluster.linkage(pdist(small), method="complete", preserve_input=False)
     before = peak_bytes()
     fastcluster.linkage(pdist(points), method="complete", preserve_input=False)
-    print(f"pdist + fastcluster, 10 000 points: {(peak_bytes() - before) / mebi:.1f} MiB")
+    print(f"pdist + fastcluster, 10 000 points: {(peak_bytes() - before) / (1 << 20):.1f} MiB")
 
 
 def main():

@@ -244,7 +244,8 @@ struct MarkStale {
       s.alive[i] = 0;
       return;
     }
-    if (!s.keeps(i) && s.partner[s.nearest[i]] == s.nearest[i]) return;
+    // That of a cluster that merged is its partner.
+    if (s.partner[s.nearest[i]] == s.nearest[i]) return;
     s.stale[i] = 1;
     add(&counts->stale, 1);
   }

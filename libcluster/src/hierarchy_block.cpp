@@ -97,9 +97,10 @@ std::uint64_t block_seed(std::uint64_t seed, unsigned level, std::uint64_t block
 }
 
 BlockProcessor::BlockProcessor(const HierarchyOptions& options, ClusterFunction cluster)
-    : options_(options), cluster_(std::move(cluster)) {
-  if (!std::holds_alternative<Euclidean>(options.metric) || !options.channels.weights.empty()) {
-    metric_cluster_.emplace(options.metric, options.channels.weights, options.simd);
+    : options_(options), cluster_(std::move(cluster)), metric_(options.metric) {
+  if (options.metric_of || !std::holds_alternative<Euclidean>(options.metric) ||
+      !options.channels.weights.empty()) {
+    metric_cluster_.emplace(options.channels.weights, options.simd);
   }
 }
 
@@ -108,13 +109,17 @@ void BlockProcessor::process(HierarchyBlock& block) {
   const Bounds box = bounds_of(block.positions);
   const GroundMap map = options_.ground ? options_.ground(box) : kIdentityMap;
   check_ground_map(map, box, block.level, block.number);
+  if (options_.metric_of) {
+    metric_ = options_.metric_of(box);
+    check(metric_);
+  }
   if (map == kIdentityMap) {
     cluster(block, block.positions);
   } else {
     // The minimum is taken off first, so that large offsets cost no digits in the product; not
     // where the metric depends on the place.
-    const bool anywhere = !std::holds_alternative<EllipticalField>(options_.metric) &&
-                          !std::holds_alternative<CustomMetric>(options_.metric);
+    const bool anywhere = !std::holds_alternative<EllipticalField>(metric_) &&
+                          !std::holds_alternative<CustomMetric>(metric_);
     ground_.resize(block.size());
     to_ground(block.positions, anywhere ? box.min : Point3{}, map, ground_);
     cluster(block, ground_);
@@ -160,7 +165,7 @@ void BlockProcessor::cluster(HierarchyBlock& block, std::span<const Point3> grou
   const std::size_t most = (block.size() + 1) / 2;
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
     if (metric_cluster_) {
-      metric_cluster_->run(ground, weights_, channels_, options, block.clustering);
+      metric_cluster_->run(metric_, ground, weights_, channels_, options, block.clustering);
     } else {
       cluster_(ground, weights_, options, block.clustering);
     }

@@ -68,6 +68,7 @@ class BlockProcessor {
 
   const HierarchyOptions& options_;
   ClusterFunction cluster_;
+  Metric metric_;                                       // of the block in work
   std::optional<MetricBlockClusterer> metric_cluster_;  // unless distances are Euclidean
   std::vector<Point3> ground_;
   std::vector<double> weights_, channels_;

@@ -6,7 +6,8 @@
 namespace terrace::cluster {
 
 double ascend(DualFunction& function, std::vector<double>& duals, double target,
-              std::uint32_t iterations) {
+              const LowerBoundOptions& options) {
+  const std::uint32_t iterations = options.iterations;
   const std::uint32_t patience = std::clamp<std::uint32_t>(iterations / 30, 4, 30);
   constexpr double kShortest = 1e-4;
   // What a direction keeps of the last one: without it the duals swing between two facilities.
@@ -18,6 +19,7 @@ double ascend(DualFunction& function, std::vector<double>& duals, double target,
   double length = 1.0;
   std::uint32_t idle = 0;
   for (std::uint32_t k = 0; k < iterations && best < target * (1.0 - 1e-13); ++k) {
+    if (options.progress && !options.progress(k, iterations)) break;
     double square = 0.0;
     for (std::size_t i = 0; i < n; ++i) {
       direction[i] = slope[i] + kMemory * direction[i];

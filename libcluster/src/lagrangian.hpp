@@ -7,6 +7,8 @@
 #include <span>
 #include <vector>
 
+#include "terrace/cluster/lower_bound.hpp"
+
 namespace terrace::cluster {
 
 /// L(v) as it was computed, and how far rounding may have taken it above its true value.
@@ -58,8 +60,8 @@ class DualFunction {
 
 /// Subgradient steps that aim at `target`, the cost of a solution, from `duals`, which become the
 /// best that were found; returns the safe value there. The step is that of Polyak, halved after
-/// a number of steps without gain.
+/// a number of steps without gain. Of the options it takes iterations and progress.
 double ascend(DualFunction& function, std::vector<double>& duals, double target,
-              std::uint32_t iterations);
+              const LowerBoundOptions& options);
 
 }  // namespace terrace::cluster

@@ -97,7 +97,7 @@ DualBound lower_bound(const FacilityMatrix& problem, const FacilitySolution& sta
     }
     RowDual function(costs, costs.opening(), {}, options.threads);
     function.clamp(bound.duals);
-    ascend(function, bound.duals, cost, options.iterations);
+    ascend(function, bound.duals, cost, options);
   }
   bound.lower_bound = finished(costs, bound.duals);
   unscale(costs, bound.duals);

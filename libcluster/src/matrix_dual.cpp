@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <numeric>
 
 #include "parallel_blocks.hpp"
 
@@ -26,6 +27,21 @@ double paid(const double* duals, const double* costs, std::size_t n) {
   return ((sums[0] + sums[1]) + (sums[2] + sums[3])) + ((sums[4] + sums[5]) + (sums[6] + sums[7]));
 }
 
+void add_up(const CostRows& costs, std::span<const double> duals, unsigned threads,
+            std::vector<double>& sums) {
+  const std::size_t m = costs.facilities(), n = costs.clients();
+  parallel_blocks((m + kBlock - 1) / kBlock, threads, [&](std::size_t block) {
+    std::vector<double> scratch;
+    for (std::size_t j = block * kBlock; j < std::min(m, (block + 1) * kBlock); ++j) {
+      sums[j] = paid(duals.data(), costs.row(j, scratch), n);
+    }
+  });
+}
+
+void count_payers(std::span<const double> duals, const double* costs, std::span<double> slope) {
+  for (std::size_t i = 0; i < duals.size(); ++i) slope[i] -= duals[i] > costs[i] ? 1.0 : 0.0;
+}
+
 }  // namespace
 
 RowDual::RowDual(const CostRows& costs, std::span<const double> opening,
@@ -46,12 +62,7 @@ RowDual::RowDual(const CostRows& costs, std::span<const double> opening,
 
 DualValue RowDual::evaluate(std::span<const double> duals, std::span<double> slope) {
   const std::size_t m = costs_->facilities(), n = costs_->clients();
-  parallel_blocks((m + kBlock - 1) / kBlock, threads_, [&](std::size_t block) {
-    std::vector<double> scratch;
-    for (std::size_t j = block * kBlock; j < std::min(m, (block + 1) * kBlock); ++j) {
-      paid_[j] = paid(duals.data(), costs_->row(j, scratch), n);
-    }
-  });
+  add_up(*costs_, duals, threads_, paid_);
   DualSum sum(n);
   for (std::size_t i = 0; i < n; ++i) {
     sum.client(duals[i]);
@@ -61,8 +72,7 @@ DualValue RowDual::evaluate(std::span<const double> duals, std::span<double> slo
   for (std::size_t j = 0; j < m; ++j) {
     sum.facility(opening_[j], paid_[j]);
     if (!(paid_[j] > opening_[j])) continue;
-    const double* const row = costs_->row(j, scratch);
-    for (std::size_t i = 0; i < n; ++i) slope[i] -= duals[i] > row[i] ? 1.0 : 0.0;
+    count_payers(duals, costs_->row(j, scratch), slope);
   }
   return sum.value();
 }
@@ -72,6 +82,39 @@ void RowDual::clamp(std::span<double> duals) const {
     duals[i] = std::max(duals[i], floor_[i]);
     if (!ceiling_.empty()) duals[i] = std::min(duals[i], ceiling_[i]);
   }
+}
+
+MedianDual::MedianDual(const CostRows& costs, std::size_t k, unsigned threads)
+    : costs_(&costs),
+      k_(k),
+      threads_(threads),
+      paid_(costs.facilities()),
+      order_(costs.facilities()) {
+  std::iota(order_.begin(), order_.end(), 0u);
+}
+
+DualValue MedianDual::evaluate(std::span<const double> duals, std::span<double> slope) {
+  add_up(*costs_, duals, threads_, paid_);
+  std::sort(order_.begin(), order_.end(), [this](std::uint32_t a, std::uint32_t b) {
+    return paid_[a] > paid_[b] || (paid_[a] == paid_[b] && a < b);
+  });
+  DualSum sum(costs_->clients());
+  for (std::size_t i = 0; i < duals.size(); ++i) {
+    sum.client(duals[i]);
+    slope[i] = 1.0;
+  }
+  // Rounding may have left out one that is paid more than the least of them, but by no more than
+  // the sums are in doubt.
+  std::vector<double> scratch;
+  for (std::size_t r = 0; r < k_; ++r) {
+    sum.facility(0.0, paid_[order_[r]]);
+    count_payers(duals, costs_->row(order_[r], scratch), slope);
+  }
+  return sum.value();
+}
+
+void MedianDual::clamp(std::span<double> duals) const {
+  for (double& v : duals) v = std::max(v, 0.0);
 }
 
 }  // namespace terrace::cluster

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
+#include <span>
 #include <vector>
 
 #include "cost_rows.hpp"
@@ -12,8 +14,7 @@ namespace terrace::cluster {
 /// evaluation.
 class RowDual final : public DualFunction {
  public:
-  /// `ceiling`: what a client pays at most (the price of leaving it out), or empty. `weights`: of
-  /// the clients, for the slope; empty for 1 each.
+  /// `ceiling`: what a client pays at most (the price of leaving it out), or empty.
   RowDual(const CostRows& costs, std::span<const double> opening, std::span<const double> ceiling,
           unsigned threads);
 
@@ -27,6 +28,23 @@ class RowDual final : public DualFunction {
   std::span<const double> opening_, ceiling_;
   unsigned threads_;
   std::vector<double> floor_, paid_;
+};
+
+/// L of k-median: facilities cost nothing, and the k that are paid most are open,
+///     L(v) = sum_i v_i - sum of the k greatest of sum_i max(0, v_i - c_ij).
+class MedianDual final : public DualFunction {
+ public:
+  MedianDual(const CostRows& costs, std::size_t k, unsigned threads);
+
+  DualValue evaluate(std::span<const double> duals, std::span<double> slope) override;
+  void clamp(std::span<double> duals) const override;
+
+ private:
+  const CostRows* costs_;
+  std::size_t k_;
+  unsigned threads_;
+  std::vector<double> paid_;
+  std::vector<std::uint32_t> order_;
 };
 
 }  // namespace terrace::cluster

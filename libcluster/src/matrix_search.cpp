@@ -12,8 +12,14 @@ namespace terrace::cluster {
 // Gains below this share of the cost are rounding: without it a search might go in circles.
 constexpr double kLeastGain = 1e-12;
 
-MatrixSearch::MatrixSearch(const CostRows& costs, std::span<const double> opening)
-    : costs_(&costs), opening_(opening), state_(costs), closing_(costs.facilities()) {
+MatrixSearch::MatrixSearch(const CostRows& costs, std::span<const double> opening,
+                           std::span<const std::uint32_t> candidates)
+    : costs_(&costs),
+      opening_(opening),
+      state_(costs),
+      closing_(costs.facilities()),
+      order_(candidates.begin(), candidates.end()) {
+  if (!order_.empty()) return;
   order_.resize(costs.facilities());
   std::iota(order_.begin(), order_.end(), 0u);
 }

@@ -15,9 +15,13 @@ namespace terrace::cluster {
 /// One solution under local search. Always at least one facility is open.
 class MatrixSearch {
  public:
-  MatrixSearch(const CostRows& costs, std::span<const double> opening);
+  /// `candidates`: facilities that may open; none: all.
+  MatrixSearch(const CostRows& costs, std::span<const double> opening,
+               std::span<const std::uint32_t> candidates = {});
 
   void reset(std::span<const std::uint32_t> open);
+  /// After a change of the opening costs.
+  void reprice() { update_cost(); }
   /// To a local optimum; candidates are tried in random order.
   void descend(std::mt19937_64& random);
   /// Closes and opens about `strength` random facilities each.

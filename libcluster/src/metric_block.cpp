@@ -21,19 +21,18 @@ SearchLength length_of(Effort effort, std::size_t count) {
 
 }  // namespace
 
-MetricBlockClusterer::MetricBlockClusterer(Metric metric, std::vector<double> channel_weights,
-                                           SimdPath path)
-    : metric_(std::move(metric)), channel_weights_(std::move(channel_weights)), clusterer_(path) {}
+MetricBlockClusterer::MetricBlockClusterer(std::vector<double> channel_weights, SimdPath path)
+    : channel_weights_(std::move(channel_weights)), clusterer_(path) {}
 
-void MetricBlockClusterer::run(std::span<const Point3> points, std::span<const double> weights,
-                               std::span<const double> channels, const BlockOptions& options,
-                               BlockClustering& result) {
+void MetricBlockClusterer::run(const Metric& metric, std::span<const Point3> points,
+                               std::span<const double> weights, std::span<const double> channels,
+                               const BlockOptions& options, BlockClustering& result) {
   const FacilityPoints problem{.points = points,
                                .weights = weights,
-                               .metric = metric_,
+                               .metric = metric,
                                .channels = {channels, channel_weights_},
                                .facility_cost = options.facility_cost};
-  if (channel_weights_.empty() && linear_map(metric_, bounds_of(points))) {
+  if (channel_weights_.empty() && linear_map(metric, bounds_of(points))) {
     run_linear(clusterer_, problem, options.effort, options.seed, result);
     return;
   }

@@ -13,15 +13,14 @@ namespace terrace::cluster {
 /// that is possible, else by local search. One object per thread.
 class MetricBlockClusterer {
  public:
-  MetricBlockClusterer(Metric metric, std::vector<double> channel_weights, SimdPath path);
+  MetricBlockClusterer(std::vector<double> channel_weights, SimdPath path);
 
   /// points: on the ground. channels: row by row. The costs in `result` are not filled in.
   /// Throws: std::invalid_argument on a distance of a custom metric that is none.
-  void run(std::span<const Point3> points, std::span<const double> weights,
+  void run(const Metric& metric, std::span<const Point3> points, std::span<const double> weights,
            std::span<const double> channels, const BlockOptions& options, BlockClustering& result);
 
  private:
-  Metric metric_;
   std::vector<double> channel_weights_;
   BlockClusterer clusterer_;
 };

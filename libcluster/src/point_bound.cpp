@@ -98,20 +98,6 @@ void permute(SearchFrame& frame, const std::vector<std::uint32_t>& order) {
   }
 }
 
-// How far a cost of the frame may be from that of the given coordinates: bringing a coordinate
-// into range rounds it by half a unit in the last place of the box, also where the distance is
-// short.
-double rounding_of_frame(const FacilityPoints& problem, const SearchFrame& frame) {
-  const double diagonal = frame.facility_cost / problem.facility_cost;  // of weight 1
-  double weight = 0.0;
-  for (const double w : frame.weights) weight += w;
-  double power = 1.0;
-  if (const auto* minkowski = std::get_if<Minkowski>(&problem.metric)) {
-    power = std::min(power, minkowski->p);
-  }
-  return weight * diagonal * std::pow(16.0 * std::numeric_limits<double>::epsilon(), power);
-}
-
 }  // namespace
 
 DualBound lower_bound(const FacilityPoints& problem, const FacilitySolution& start,
@@ -140,7 +126,7 @@ DualBound lower_bound(const FacilityPoints& problem, const FacilitySolution& sta
       PointDual<Space> function(*tree, space, frame.weights, frame.facility_cost,
                                 frame.outlier_price, options.threads);
       std::vector<double> variables = function.variables(duals);
-      const double best = ascend(function, variables, first.cost, options.iterations);
+      const double best = ascend(function, variables, first.cost, options);
       duals = function.duals(variables);
       return best;
     } else {
@@ -152,7 +138,7 @@ DualBound lower_bound(const FacilityPoints& problem, const FacilitySolution& sta
       }
       for (std::size_t i = 0; i < duals.size(); ++i) duals[i] *= frame.weights[i];
       RowDual function(rows, opening, ceiling, options.threads);
-      return ascend(function, duals, first.cost, options.iterations);
+      return ascend(function, duals, first.cost, options);
     }
   });
   bound.lower_bound = std::ldexp(std::max(0.0, value - rounding), frame.cost_exponent);

@@ -6,10 +6,12 @@
 #include <cmath>
 #include <memory>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 #include "box_tree.hpp"
 #include "lagrangian.hpp"
+#include "leaf_sum.hpp"
 #include "parallel_blocks.hpp"
 
 namespace terrace::cluster {
@@ -29,6 +31,7 @@ class PointDual final : public DualFunction {
             double facility_cost, double price, unsigned threads)
       : tree_(&tree),
         space_(&space),
+        leaf_sum_(space),
         weights_(weights),
         facility_cost_(facility_cost),
         price_(price),
@@ -100,7 +103,7 @@ class PointDual final : public DualFunction {
   }
 
   struct Work {
-    std::vector<std::uint32_t> stack, leaves, payers;
+    std::vector<std::uint32_t> stack, leaves, near;
   };
 
   // Children come after their parents.
@@ -121,7 +124,7 @@ class PointDual final : public DualFunction {
     }
   }
 
-  // Returns the most clients that a facility of the leaf has to add up.
+  // Returns the most clients that a facility of the leaf has looked at.
   std::size_t visit(std::uint32_t leaf, Work& work) {
     const auto& nodes = tree_->nodes();
     const std::uint32_t first = nodes[leaf].first, end = first + nodes[leaf].count;
@@ -130,49 +133,71 @@ class PointDual final : public DualFunction {
     while (!work.stack.empty()) {
       const std::uint32_t n = work.stack.back();
       work.stack.pop_back();
-      bool near = false;
-      for (std::uint32_t j = first; j < end && !near; ++j) {
-        near = space_->box_distance(j, nodes[n].box) < longest_[n];
-      }
+      const bool near = is_near(leaf, n);
       if (!near) continue;
       if (nodes[n].child_count == 0) work.leaves.push_back(n);
       for (std::uint32_t c = 0; c < nodes[n].child_count; ++c) {
         work.stack.push_back(nodes[n].first_child + c);
       }
     }
-    std::size_t clients = 1;
-    for (const std::uint32_t n : work.leaves) clients += nodes[n].count;
-    work.payers.resize(std::max(work.payers.size(), clients));
     std::size_t most = 0;
     for (std::uint32_t j = first; j < end; ++j) most = std::max(most, add_up(j, work));
     return most;
   }
 
+  // Whether some facility of the leaf may be nearer to the node's box than somebody pays there.
+  [[nodiscard]] bool is_near(std::uint32_t leaf, std::uint32_t node) const {
+    const BoxTree::Node& from = tree_->nodes()[leaf];
+    const Bounds& box = tree_->nodes()[node].box;
+    if constexpr (std::is_same_v<Space, FieldSpace>) {
+      for (std::uint32_t j = from.first; j < from.first + from.count; ++j) {
+        if (space_->box_distance(j, box) < longest_[node]) return true;
+      }
+      return false;
+    } else {
+      // The distance of two boxes is that of any point of the one from the other grown by what the
+      // first extends beside the point.
+      const Point3& p = space_->points()[from.first];
+      Bounds grown = box;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        grown.min[axis] -= from.box.max[axis] - p[axis];
+        grown.max[axis] += p[axis] - from.box.min[axis];
+      }
+      return space_->box_distance(from.first, grown) < longest_[node];
+    }
+  }
+
+  // Returns how many clients it has looked at.
   std::size_t add_up(std::uint32_t facility, Work& work) {
-    const auto from = space_->from(facility);
-    double sum = 0.0;
-    std::size_t payers = 0;
+    typename LeafSum<Space>::From from(leaf_sum_, facility);
+    std::size_t looked = 0;
+    work.near.clear();
     for (const std::uint32_t n : work.leaves) {
       const BoxTree::Node& node = tree_->nodes()[n];
       if (!(space_->box_distance(facility, node.box) < longest_[n])) continue;
+      from.add(node.first, node.count, payment_.data(), weights_.data());
+      work.near.push_back(n);
+      looked += node.count;
+    }
+    paid_[facility] = from.sum();
+    if (paid_[facility] > facility_cost_) count_payers(facility, work);
+    return looked;
+  }
+
+  // Few facilities are worth opening: their distances are worked out again.
+  void count_payers(std::uint32_t facility, const Work& work) {
+    const auto from = space_->from(facility);
+    for (const std::uint32_t n : work.near) {
+      const BoxTree::Node& node = tree_->nodes()[n];
       for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
-        const double left = payment_[i] - from(i);
-        sum += left > 0.0 ? weights_[i] * left : 0.0;
-        work.payers[payers] = i;
-        payers += left > 0.0 ? 1 : 0;
+        if (payment_[i] > from(i)) count_[i].fetch_add(1, std::memory_order_relaxed);
       }
     }
-    paid_[facility] = sum;
-    if (sum > facility_cost_) {
-      for (std::size_t k = 0; k < payers; ++k) {
-        count_[work.payers[k]].fetch_add(1, std::memory_order_relaxed);
-      }
-    }
-    return payers;
   }
 
   const BoxTree* tree_;
   const Space* space_;
+  LeafSum<Space> leaf_sum_;
   std::span<const double> weights_;
   double facility_cost_, price_;
   unsigned threads_;

@@ -55,6 +55,20 @@ auto with_space(const FacilityPoints& problem, SearchFrame& frame, std::span<con
       problem.metric);
 }
 
+/// How far a cost of the frame may be from that of the given coordinates: bringing a coordinate
+/// into range rounds it by half a unit in the last place of the box, also where the distance is
+/// short.
+inline double rounding_of_frame(const FacilityPoints& problem, const SearchFrame& frame) {
+  const double diagonal = frame.facility_cost / problem.facility_cost;  // of weight 1
+  double weight = 0.0;
+  for (const double w : frame.weights) weight += w;
+  double power = 1.0;
+  if (const auto* minkowski = std::get_if<Minkowski>(&problem.metric)) {
+    power = std::min(power, minkowski->p);
+  }
+  return weight * diagonal * std::pow(16.0 * std::numeric_limits<double>::epsilon(), power);
+}
+
 /// Weighted distances, worked out row by row; nobody pays more than the price of being left out.
 template <class Space>
 class PointRows final : public CostRows {

@@ -126,14 +126,13 @@ SearchFrame make_frame(const FacilityPoints& problem) {
       }
       for (double& m : map) m = std::ldexp(m, -map_exponent);
       for (Point3& p : frame.points) p = mapped(map, p);
-      if (std::holds_alternative<Elliptical>(problem.metric)) {
-        positions = std::ldexp(mapped_diagonal(map, extent), map_exponent);
-      }
       // Along the longest semi-axis the points may have become tiny.
       const Scaling again(frame.points);
       frame.points = scaled(frame.points, again);
       const int change = map_exponent + again.exponent;
-      positions = std::ldexp(positions, -change);
+      positions = std::holds_alternative<Elliptical>(problem.metric)
+                      ? std::ldexp(mapped_diagonal(map, extent), -again.exponent)
+                      : std::ldexp(positions, -change);
       exponent += change;
     }
   }

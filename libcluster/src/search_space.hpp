@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -9,6 +8,7 @@
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -19,6 +19,7 @@
 /// Distances as the search engine takes them, a class for each kind of metric, so that they are
 /// inlined. Each has
 ///     From from(f)            what measures distances from facility f: double operator()(client)
+///                             order(client) orders as they do, and from_order() makes them of it
 ///     box_distance(f, box)    no client in the box is nearer to f, as computed (if kHasBoxes)
 ///     kHasBoxes, has_triangles()   whether cells in space and clusters as cells may be used
 
@@ -62,7 +63,19 @@ class NormSpace {
         return space.norm_(x, y, z, nullptr, nullptr, 0);
       }
     }
+    [[nodiscard]] double order(std::uint32_t client) const {
+      if constexpr (kChannels || !std::is_same_v<Norm, EuclideanNorm>) {
+        return (*this)(client);
+      } else {
+        const Point3& p = space.points_[client];
+        return SquaredNorm{}(p[0] - origin[0], p[1] - origin[1], p[2] - origin[2], nullptr, nullptr,
+                             0);
+      }
+    }
   };
+  [[nodiscard]] static double from_order(double order) {
+    return !kChannels && std::is_same_v<Norm, EuclideanNorm> ? std::sqrt(order) : order;
+  }
   [[nodiscard]] From from(std::uint32_t facility) const {
     return {*this, points_[facility], channels_of(facility)};
   }
@@ -108,7 +121,7 @@ class FieldSpace {
   struct From {
     const FieldSpace& space;
     Point3 origin;
-    LinearMap map;
+    const LinearMap& map;
     const double* channels;
     double operator()(std::uint32_t client) const {
       const Point3& p = space.points_[client];
@@ -119,7 +132,9 @@ class FieldSpace {
                                        space.channels_of(client), channels, space.channel_count_);
       return d < 0x1p500 ? d : 0x1p500;  // needles of ellipses may leave the range of double
     }
+    [[nodiscard]] double order(std::uint32_t client) const { return (*this)(client); }
   };
+  [[nodiscard]] static double from_order(double order) { return order; }
   [[nodiscard]] From from(std::uint32_t facility) const {
     return {*this, points_[facility], *places_[facility].map, channels_of(facility)};
   }
@@ -168,7 +183,9 @@ class IndexSpace {
                                   std::to_string(d) +
                                   ": the function must return numbers from 0 to 1e300");
     }
+    [[nodiscard]] double order(std::uint32_t client) const { return (*this)(client); }
   };
+  [[nodiscard]] static double from_order(double order) { return order; }
   [[nodiscard]] From from(std::uint32_t facility) const { return {*this, facility}; }
   [[nodiscard]] bool has_triangles() const { return triangles_; }
 

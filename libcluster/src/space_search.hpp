@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <numeric>
 #include <optional>
 #include <random>
-#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -56,13 +56,18 @@ class SpaceSearch final : public SearchEngine {
     std::vector<double> distances(count);
     for (const std::uint32_t i : order) {
       std::uint32_t nearest = kOutlier;
-      double least = price;
+      double least = std::numeric_limits<double>::infinity();
       for (const std::uint32_t j : open) {
-        const double d = space_.from(j)(i);
-        if (nearest == kOutlier ? d <= least : d < least) {
+        const double d = space_.from(j).order(i);
+        if (d < least) {
           least = d;
           nearest = j;
         }
+      }
+      least = Space::from_order(least);
+      if (least > price) {
+        least = price;
+        nearest = kOutlier;
       }
       if (open.empty() || random_unit(random) * state_.facility_cost() < state_.weight(i) * least) {
         open.push_back(i);
@@ -77,37 +82,40 @@ class SpaceSearch final : public SearchEngine {
 
   void assign_nearest() override {
     std::vector<std::uint32_t> facility(state_.size());
-    std::vector<double> distances(state_.size());
-    for (std::uint32_t i = 0; i < state_.size(); ++i) {
-      std::tie(facility[i], distances[i]) = nearest(i);
-    }
+    for (std::uint32_t i = 0; i < state_.size(); ++i) facility[i] = state_.facility(i);
+    std::vector<double> distances = state_.distances();
+    find_nearest(facility, distances);
     replace(std::move(facility), std::move(distances));
   }
 
   [[nodiscard]] std::size_t wrongly_assigned() const override {
+    std::vector<std::uint32_t> facility(state_.size(), 0);
+    std::vector<double> distances = state_.distances();
+    find_nearest(facility, distances);
     std::size_t wrong = 0;
     for (std::uint32_t i = 0; i < state_.size(); ++i) {
-      wrong += nearest(i).second < state_.distance(i) ? 1u : 0u;
+      wrong += distances[i] < state_.distance(i) ? 1u : 0u;
     }
     return wrong;
   }
 
  private:
+  using From = typename Space::From;
+
   [[nodiscard]] auto points() const { return space_.points(); }
 
-  // A nearer facility than the present one, or the price, or what there is.
-  [[nodiscard]] std::pair<std::uint32_t, double> nearest(std::uint32_t client) const {
-    std::uint32_t best = state_.facility(client);
-    double least = state_.distance(client);
-    if (best == client) return {best, least};
+  // Where an open facility is nearer than `distances` say. A facility stays its own client, at 0.
+  void find_nearest(std::vector<std::uint32_t>& facility, std::vector<double>& distances) const {
     for (const std::uint32_t j : state_.open()) {
-      const double d = space_.from(j)(client);
-      if (d < least) {
-        least = d;
-        best = j;
+      const From from = space_.from(j);
+      for (std::uint32_t i = 0; i < state_.size(); ++i) {
+        const double d = from(i);
+        if (d < distances[i]) {
+          distances[i] = d;
+          facility[i] = j;
+        }
       }
     }
-    return {best, least};
   }
 
   [[nodiscard]] double distance(std::uint32_t facility, std::uint32_t client) const override {
@@ -126,7 +134,6 @@ class SpaceSearch final : public SearchEngine {
   void judge(std::uint32_t candidate, bool parallel, Verdict& verdict) override;
 
   // Parts of a gain. Each appends to a verdict.
-  using From = typename Space::From;
   void scan_all(std::uint32_t candidate, const From& from, Verdict& verdict);
   void scan_tree(std::uint32_t candidate, const From& from, Verdict& verdict) const;
   void scan_outliers(const From& from, Verdict& verdict) const;

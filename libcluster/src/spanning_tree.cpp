@@ -2,6 +2,7 @@
 #include "spanning_tree.hpp"
 
 #include <atomic>
+#include <bit>
 #include <limits>
 
 #include "linkage_points.hpp"
@@ -13,6 +14,7 @@ namespace {
 constexpr std::uint32_t kMixed = 0xffffffffu;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::size_t kBlock = 2048;
+constexpr std::size_t kLeavesPerBlock = 256;
 
 }  // namespace
 
@@ -42,7 +44,7 @@ SpanningTree::SpanningTree(const LinkageTree& tree, unsigned threads)
       take_from_lists(begin, end);
     });
     label_nodes();
-    for_blocks(count_, kBlock, threads_,
+    for_blocks(tree_.leaves(), kLeavesPerBlock, threads_,
                [this](std::size_t begin, std::size_t end, unsigned) { search_tree(begin, end); });
     merge();
   }
@@ -99,18 +101,39 @@ void SpanningTree::label_nodes() {
 }
 
 void SpanningTree::search_tree(std::size_t begin, std::size_t end) {
-  for (std::size_t i = begin; i < end; ++i) {
-    if (component_[i] == largest_ || used_[i] < lists_.length()) continue;
-    if (bound_[i] <= limit(component_[i])) search_from(static_cast<std::uint32_t>(i));
+  for (std::size_t leaf = begin; leaf < end; ++leaf) {
+    const auto first = static_cast<std::uint32_t>(tree_.leaf_begin(leaf));
+    const auto last = static_cast<std::uint32_t>(tree_.leaf_begin(leaf + 1));
+    unsigned searching = 0;
+    for (std::uint32_t i = first; i < last; ++i) {
+      searching |= static_cast<unsigned>(must_search(i)) << (i - first);
+    }
+    while (searching != 0) {
+      // Points of one component search together.
+      const std::uint32_t own =
+          component_[first + static_cast<unsigned>(std::countr_zero(searching))];
+      Group group;
+      for (std::uint32_t i = first; i < last; ++i) {
+        const unsigned bit = 1u << (i - first);
+        if ((searching & bit) == 0 || component_[i] != own) continue;
+        group.add(i, tree_.point(i));
+        searching &= ~bit;
+      }
+      search_from(group, own);
+    }
   }
 }
 
-/// Finds the nearest point of another component, unless it is farther than what the point's own
-/// component has found by then.
-void SpanningTree::search_from(std::uint32_t place) {
+bool SpanningTree::must_search(std::uint32_t place) {
   const std::uint32_t own = component_[place];
-  const Point3 p = tree_.point(place);
+  return own != largest_ && used_[place] == lists_.length() && bound_[place] <= limit(own);
+}
+
+/// Finds the shortest edge from the group to other components, unless it is longer than what its
+/// own component has found by then.
+void SpanningTree::search_from(const Group& group, std::uint32_t own) {
   TreeEdge best{limit(own), kMixed, kMixed};
+  std::uint32_t best_place = kMixed;
   struct Waiting {
     double square;
     std::size_t node;
@@ -122,8 +145,8 @@ void SpanningTree::search_from(std::uint32_t place) {
     const Waiting top = stack[--waiting];
     if (top.square > best.square) continue;
     if (!tree_.is_leaf(top.node)) {
-      Waiting near{squared_distance(p, tree_.box(2 * top.node)), 2 * top.node};
-      Waiting far{squared_distance(p, tree_.box(2 * top.node + 1)), 2 * top.node + 1};
+      Waiting near{squared_distance(group.box, tree_.box(2 * top.node)), 2 * top.node};
+      Waiting far{squared_distance(group.box, tree_.box(2 * top.node + 1)), 2 * top.node + 1};
       if (far.square < near.square) std::swap(near, far);
       if (far.square <= best.square && label_[far.node] != own) stack[waiting++] = far;
       if (near.square <= best.square && label_[near.node] != own) stack[waiting++] = near;
@@ -131,19 +154,26 @@ void SpanningTree::search_from(std::uint32_t place) {
     }
     const std::size_t leaf = top.node - tree_.leaves();
     const auto end = static_cast<std::uint32_t>(tree_.leaf_begin(leaf + 1));
-    for (auto j = static_cast<std::uint32_t>(tree_.leaf_begin(leaf)); j < end; ++j) {
-      if (component_[j] == own) continue;
-      const TreeEdge edge = TreeEdge::of(squared_distance(p, tree_.point(j)), place, j);
-      if (edge < best) best = edge;
+    for (unsigned q = 0; q < group.count; ++q) {
+      const Point3 p = tree_.point(group.place[q]);
+      if (squared_distance(p, tree_.box(top.node)) > best.square) continue;
+      for (auto j = static_cast<std::uint32_t>(tree_.leaf_begin(leaf)); j < end; ++j) {
+        if (component_[j] == own) continue;
+        const TreeEdge edge = TreeEdge::of(squared_distance(p, tree_.point(j)), group.place[q], j);
+        if (edge < best) {
+          best = edge;
+          best_place = group.place[q];
+        }
+      }
     }
   }
-  bound_[place] = best.square;
-  if (best.low == kMixed) return;
+  for (unsigned q = 0; q < group.count; ++q) bound_[group.place[q]] = best.square;
+  if (best_place == kMixed) return;
   offer(own, best);
   // The nearest of another component for as long as that is another one: the list's last entry.
   const unsigned last = lists_.length() - 1;
-  lists_.of(place)[last] = best.low == place ? best.high : best.low;
-  used_[place] = static_cast<std::uint8_t>(last);
+  lists_.of(best_place)[last] = best.low == best_place ? best.high : best.low;
+  used_[best_place] = static_cast<std::uint8_t>(last);
 }
 
 void SpanningTree::merge() {

@@ -19,7 +19,8 @@ namespace terrace::cluster {
 /// Borůvka: in each round every component but the largest takes its shortest edge to another one.
 /// A point's candidate is the first neighbour of its list in another component. When its list is
 /// used up it has a bound instead, and searches the tree only if that is below what its component
-/// has found so far; the search leaves out nodes that lie in the component as a whole. The largest
+/// has found so far, together with others of its leaf; the search leaves out nodes that lie in the
+/// component as a whole. The largest
 /// component, which would search longest, is found by the others.
 class SpanningTree {
  public:
@@ -42,10 +43,26 @@ class SpanningTree {
     std::array<std::atomic_flag, kCount> flags_{};
   };
 
+  /// Points of one leaf and one component, and their box.
+  struct Group {
+    LinkageTree::Box box;
+    std::uint32_t place[LinkageTree::kLeaf];
+    unsigned count = 0;
+    void add(std::uint32_t i, const Point3& p) {
+      if (count == 0) box = {p, p};
+      for (unsigned a = 0; a < 3; ++a) {
+        box.low[a] = std::min(box.low[a], p[a]);
+        box.high[a] = std::max(box.high[a], p[a]);
+      }
+      place[count++] = i;
+    }
+  };
+
   void label_nodes();
   void take_from_lists(std::size_t begin, std::size_t end);
   void search_tree(std::size_t begin, std::size_t end);
-  void search_from(std::uint32_t place);
+  [[nodiscard]] bool must_search(std::uint32_t place);
+  void search_from(const Group& group, std::uint32_t own);
   void offer(std::uint32_t component, const TreeEdge& edge);
   [[nodiscard]] double limit(std::uint32_t component);
   void merge();

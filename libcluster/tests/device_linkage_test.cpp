@@ -51,6 +51,14 @@ TEST(DeviceLinkage, GivesTheDendrogramsOfTheCpu) {
   }
 }
 
+TEST(DeviceLinkage, SingleLinkageOfMorePointsThanOnePart) {
+  std::mt19937_64 random(12);
+  const std::vector<Point3> points = inputs::cube(2500, random);
+  ASSERT_GT(device::NearestOther::parts_of(2500), 2u);
+  LoopDevice loop(32, true, 1);
+  EXPECT_EQ(single_on(loop, points), single_linkage(points));
+}
+
 TEST(DeviceLinkage, TiesAndDegenerateInputs) {
   for (const std::size_t count : {2u, 3u, 10u, 61u, 150u}) {
     for (const auto& [name, points] : laws::linkage_inputs(count, 3)) {

@@ -60,7 +60,7 @@ class Words {
     double value = 0.0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
     if (error != std::errc() || end != text.data() + text.size() || !(value >= 0.0)) {
-      fail("'" + std::string(text) + "' is not a number from 0");
+      fail(std::string(text) + " is not a number from 0");
     }
     return value;
   }
@@ -158,7 +158,7 @@ inline void parse(Words words, Instance& instance) {
   } else if (instance.format == "pmed") {
     read_pmed(words, instance);
   } else {
-    words.fail("format '" + instance.format + "' is unknown");
+    words.fail(instance.format + " is no known format");
   }
 }
 

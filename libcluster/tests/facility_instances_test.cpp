@@ -6,6 +6,7 @@
 
 #include "matrix_laws.hpp"
 #include "terrace/cluster/facility_search.hpp"
+#include "terrace/cluster/k_median.hpp"
 #include "terrace/cluster/lower_bound.hpp"
 #include "terrace/cluster/primal_dual.hpp"
 
@@ -70,6 +71,28 @@ TEST(FacilityInstances, CostsAreNearTheKnownOptima) {
   }
   EXPECT_EQ(seen, 75u);
   EXPECT_LE(sum / count, 0.005);
+}
+
+TEST(FacilityInstances, MediansAreNearTheKnownOptima) {
+  const auto folder = instances::folder();
+  if (!folder) GTEST_SKIP() << "TERRACE_DATA names no folder with facility/optima.tsv";
+  unsigned seen = 0;
+  for (instances::Instance& instance : instances::listed(*folder)) {
+    if (instance.format != "pmed") continue;
+    ++seen;
+    if (kSlow && instance.facilities > 100) continue;
+    SCOPED_TRACE(instance.file);
+    instances::load(*folder, instance);
+    const FacilityMatrix matrix = instance.matrix();
+    const FacilitySolution found = k_median(matrix, instance.medians, {.threads = 2});
+    laws::expect_solution(matrix, found, false);
+    EXPECT_EQ(found.facilities.size(), instance.medians);
+    EXPECT_LE(found.cost(), instance.optimum * 1.02);
+    EXPECT_GE(found.cost(), instance.optimum);
+    EXPECT_LE(found.lower_bound, instance.optimum);
+    EXPECT_GE(found.lower_bound, 0.95 * instance.optimum);
+  }
+  EXPECT_EQ(seen, 14u);
 }
 
 TEST(FacilityInstances, ReaderRefusesWhatIsNotAnInstance) {

@@ -120,7 +120,24 @@ TEST(HierarchyMetric, FieldsAreOnTheGround) {
     EXPECT_EQ(by_metres.levels[0][b].order, by_degrees.levels[0][b].order);
     EXPECT_EQ(by_metres.levels[0][b].representatives, by_degrees.levels[0][b].representatives);
   }
+  // The same if each block has a frame of its own, here twice as large in every other one.
+  const auto growth = [](const Bounds& box) { return box.min[1] > 0x1p4 + 0x1p-9 ? 2.0 : 1.0; };
+  options.ground = [&](const Bounds& box) {
+    return GroundMap{growth(box) * 0x1p16, 0, 0, 0, growth(box) * 0x1p17, 0, 0, 0, growth(box)};
+  };
   options.metric = Euclidean{};
+  options.metric_of = [&](const Bounds& box) -> Metric {
+    const double g = growth(box);
+    return EllipticalField(
+        {{{{g * 0x1p20, g * 0x1p21, -1}, {g * (0x1p20 + 512), g * (0x1p21 + 700), 1}},
+          Elliptical(5.0, 1.0, 45.0)}});
+  };
+  RecordingSink by_blocks;
+  build(degrees, options, by_blocks);
+  for (std::size_t b = 0; b < by_blocks.levels[0].size(); ++b) {
+    EXPECT_EQ(by_blocks.levels[0][b].representatives, by_degrees.levels[0][b].representatives);
+  }
+  options.metric_of = {};
   build(degrees, options, plain);
   EXPECT_NE(plain.levels[0][0].order, by_degrees.levels[0][0].order);
 }

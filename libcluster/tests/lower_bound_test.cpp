@@ -32,9 +32,9 @@ TEST(LowerBound, IsBelowTheOptimum) {
     share += bound.lower_bound / best;
     ++count;
   }
-  // Measured: 0.990 and 0.994.
-  EXPECT_GT(ascent_share / count, 0.98);
-  EXPECT_GT(share / count, 0.99);
+  // Measured: 0.99898 and 0.99933.
+  EXPECT_GT(ascent_share / count, 0.997);
+  EXPECT_GT(share / count, 0.998);
 }
 
 TEST(LowerBound, DualsOfTheAscentAreFeasible) {

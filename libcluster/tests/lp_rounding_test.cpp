@@ -63,7 +63,7 @@ TEST(LpRounding, NoBoundIsAboveTheRelaxation) {
     share += bound / limit;
     ++count;
   }
-  EXPECT_GT(share / count, 0.995);
+  EXPECT_GT(share / count, 0.999);  // measured: 0.99999
 }
 
 TEST(LpRounding, FiftyByFifty) {

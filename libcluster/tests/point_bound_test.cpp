@@ -140,7 +140,7 @@ TEST(PointBound, IsBelowTheOptimum) {
     share += bound.lower_bound / best;
     ++count;
   }
-  EXPECT_GT(share / count, 0.98);  // measured: 0.994
+  EXPECT_GT(share / count, 0.998);  // measured: 0.9998
 }
 
 TEST(PointBound, IsThatOfTheMatrix) {
@@ -149,7 +149,7 @@ TEST(PointBound, IsThatOfTheMatrix) {
     Case c;
     make(c, seed, 10);
     std::mt19937_64 random(seed);
-    const std::size_t n = 100;
+    const std::size_t n = 80;
     c.points = inputs::cube(n, random);
     if (!c.weights.empty()) c.weights.resize(n, 2.0);
     c.channels.resize(n * c.channel_weights.size());
@@ -168,7 +168,7 @@ TEST(PointBound, IsThatOfTheMatrix) {
     for (const std::uint32_t k : found.assignment) {
       start.assignment.push_back(found.facilities[k] < n ? k : kOutlier);
     }
-    const DualBound bound = lower_bound(c.problem, start, {.iterations = 300});
+    const DualBound bound = lower_bound(c.problem, start, {.iterations = 200});
     EXPECT_LE(bound.lower_bound, found.cost());
     EXPECT_GE(bound.lower_bound, 0.97 * limit);
     EXPECT_NEAR(bound.lower_bound, dual_value(same.matrix, bound.duals), 1e-6 * found.cost());

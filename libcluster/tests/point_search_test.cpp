@@ -275,7 +275,8 @@ TEST(PointSearch, ScaleAndOffsetDoNotMatter) {
   laws::add_channels(p, random);
   for (const Metric& metric :
        {Metric(Euclidean{}), Metric(Elliptical(2.0, 0.5, 90.0)), Metric(Minkowski{1.0}),
-        Metric(Minkowski{4.0}), Metric(Elliptical(0x1p700, 0x1p690, 0.0))}) {
+        Metric(Minkowski{4.0}), Metric(Elliptical(0x1p700, 0x1p690, 0.0)),
+        Metric(Elliptical(0x1p-1015, 0x1p-1020, 45.0, 0x1p-1018))}) {
     SCOPED_TRACE(name_of(metric));
     OwnedProblem plain = p;
     plain.metric = metric;

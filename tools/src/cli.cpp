@@ -10,6 +10,7 @@
 #include <vector>
 
 #include <CLI/CLI.hpp>
+#include <terrace/cluster/cuda_linkage.hpp>
 #include <unistd.h>
 
 #include "error.hpp"
@@ -57,7 +58,9 @@ std::string general_help() {
 }
 
 std::string version_text() {
-  return std::string("terrace ") + kVersion + "\nbuild: " + kBuild + "\nparts: " + kParts + "\n";
+  const cluster::CudaStatus cuda = cluster::cuda_available();
+  return std::string("terrace ") + kVersion + "\nbuild: " + kBuild + "\nparts: linkage on a GPU: " +
+         (cuda.available ? cuda.device : cuda.reason) + "\n";
 }
 
 const Verb& find_verb(const std::string& name) {

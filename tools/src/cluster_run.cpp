@@ -10,6 +10,7 @@
 #include <terrace/cluster/complete_linkage.hpp>
 #include <terrace/cluster/cuda_linkage.hpp>
 #include <terrace/cluster/k_means.hpp>
+#include <terrace/cluster/k_median.hpp>
 #include <terrace/cluster/lower_bound.hpp>
 #include <terrace/cluster/point_matrix.hpp>
 #include <terrace/cluster/point_search.hpp>
@@ -107,13 +108,24 @@ void no_channels(const FacilityPoints& problem, const char* method) {
   }
 }
 
-/// The lower bound that goes with a solution; takes as many steps as were asked for.
+/// Steps towards the lower bound: as many as were asked for, else what takes seconds.
+std::uint32_t bound_steps(const ClusterRequest& request, std::size_t points) {
+  if (request.bound_iterations) return *request.bound_iterations;
+  return static_cast<std::uint32_t>(std::clamp<std::size_t>(4'000'000 / points, 20, 300));
+}
+
 double bound_of(const ClusterRequest& request, const FacilityPoints& problem,
-                const FacilitySolution& solution) {
-  if (request.bound_iterations == 0) return 0.0;
-  return cluster::lower_bound(problem, solution,
-                              {.iterations = request.bound_iterations, .threads = request.threads})
-      .lower_bound;
+                const FacilitySolution& solution, const ClusterProgress& progress) {
+  const std::uint32_t steps = bound_steps(request, problem.points.size());
+  if (steps == 0) return 0.0;
+  cluster::LowerBoundOptions options;
+  options.iterations = steps;
+  options.threads = request.threads;
+  options.progress = [&](std::uint32_t done, std::uint32_t total) {
+    progress(static_cast<double>(done) / static_cast<double>(total));
+    return true;
+  };
+  return cluster::lower_bound(problem, solution, options).lower_bound;
 }
 
 cluster::SearchLength length_of(cluster::Effort effort) {
@@ -162,18 +174,20 @@ ClusterOutcome by_facilities(const ClusterRequest& request, const FacilityPoints
   }
   FacilitySolution solution = cluster::search_points(problem, options);
   progress(1.0);
-  solution.lower_bound = bound_of(request, problem, solution);
+  solution.lower_bound = bound_of(request, problem, solution, progress);
   ClusterOutcome outcome;
   take(outcome, std::move(solution));
   return outcome;
 }
 
-ClusterOutcome by_growth(const ClusterRequest& request, const FacilityPoints& problem) {
+ClusterOutcome by_growth(const ClusterRequest& request, const FacilityPoints& problem,
+                         const ClusterProgress& progress) {
   // Beside the matrix the growth keeps the clients sorted by facility, half as much again.
   const cluster::PointMatrix matrix = cluster::point_matrix(problem, request.memory_bytes / 3 * 2);
   cluster::PrimalDual grown = cluster::greedy_stars(matrix.view());
   FacilitySolution& solution = grown.solution;
-  solution.lower_bound = std::max(solution.lower_bound, bound_of(request, problem, solution));
+  solution.lower_bound =
+      std::max(solution.lower_bound, bound_of(request, problem, solution, progress));
   ClusterOutcome outcome;
   take(outcome, std::move(solution));
   return outcome;
@@ -215,6 +229,21 @@ ClusterOutcome by_k_means(const ClusterRequest& request, const FacilityPoints& p
                             " iterations, before it had come to rest");
   }
   outcome.representatives = nearest_to_means(points, outcome.labels, used);
+  return outcome;
+}
+
+ClusterOutcome by_k_median(const ClusterRequest& request, const FacilityPoints& problem) {
+  // Each step takes the distances of all pairs.
+  const std::uint64_t points = problem.points.size();
+  const auto steps = request.bound_iterations.value_or(static_cast<std::uint32_t>(
+      std::min<std::uint64_t>(300, std::uint64_t{10'000'000'000} / (points * points))));
+  ClusterOutcome outcome;
+  take(outcome, cluster::k_median(problem, request.k,
+                                  {.restarts = static_cast<std::uint32_t>(request.restarts),
+                                   .bound_iterations = steps,
+                                   .seed = request.seed,
+                                   .threads = request.threads}));
+  outcome.opening_cost.reset();
   return outcome;
 }
 
@@ -300,11 +329,11 @@ ClusterOutcome run_clustering(const ClusterRequest& request, const FacilityPoint
     case ClusterMethod::facility:
       return by_facilities(request, problem, progress);
     case ClusterMethod::primal_dual:
-      return by_growth(request, problem);
+      return by_growth(request, problem, progress);
     case ClusterMethod::k_means:
       return by_k_means(request, problem);
     case ClusterMethod::k_median:
-      throw UsageError("--method k-median is not available yet");
+      return by_k_median(request, problem);
     case ClusterMethod::single:
     case ClusterMethod::complete:
       break;

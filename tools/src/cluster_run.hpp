@@ -35,7 +35,7 @@ struct ClusterRequest {
   std::size_t batch = 1;  ///< gains judged at once
   std::size_t k = 0;      ///< clusters wanted; 0: not said
   std::optional<double> height;
-  std::uint32_t bound_iterations = 100;  ///< of the lower bound; 0: none
+  std::optional<std::uint32_t> bound_iterations;  ///< of the lower bound; 0: none
   std::size_t restarts = 1;
   bool single_precision = false;  ///< of the matrix of complete linkage
   bool cuda = false;

@@ -76,8 +76,12 @@ Rgb category_colour(std::int64_t category) {
 
 Rgb cluster_colour(std::int64_t cluster) {
   if (cluster < 0) return {200, 200, 200};
-  return category_colour(
-      static_cast<std::int64_t>(scramble(static_cast<std::uint64_t>(cluster)) >> 8));
+  const std::uint64_t scattered = scramble(static_cast<std::uint64_t>(cluster));
+  Rgb colour = category_colour(static_cast<std::int64_t>(scattered >> 8));
+  // In five shades, so that two clusters side by side are rarely alike.
+  const double shade = 0.7 + 0.12 * static_cast<double>(scattered % 5);
+  for (std::uint8_t& c : colour) c = static_cast<std::uint8_t>(std::min(255.0, shade * c));
+  return colour;
 }
 
 HeightTint HeightTint::of(std::span<const double> heights) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "metric_option.hpp"
 
+#include <cmath>
 #include <fstream>
 #include <limits>
 #include <stdexcept>
@@ -151,6 +152,30 @@ MetricChoice MetricChoice::parse(const std::string& text) {
   return choice;
 }
 
+bool MetricChoice::has_boxes() const {
+  // What stands behind a region without a box counts nowhere.
+  return kind == Kind::elliptical && regions.front().box.has_value();
+}
+
+std::string MetricChoice::canonical() const {
+  if (kind != Kind::elliptical) return text;
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const Region& region : regions) {
+    nlohmann::ordered_json json = nlohmann::ordered_json::object();
+    if (region.box) {
+      const stream::Box3& box = *region.box;
+      // Boxes in the plane have no bounds in z, for which JSON has no number.
+      json["box"] = std::isfinite(box.min[2])
+                        ? std::vector<double>{box.min[0], box.min[1], box.min[2],
+                                              box.max[0], box.max[1], box.max[2]}
+                        : std::vector<double>{box.min[0], box.min[1], box.max[0], box.max[1]};
+    }
+    json["map"] = region.metric.map();
+    list.push_back(std::move(json));
+  }
+  return "elliptical:" + list.dump();
+}
+
 cluster::Metric MetricChoice::on_ground(const stream::Point3& origin,
                                         const stream::Point3& scale) const {
   switch (kind) {
@@ -163,7 +188,7 @@ cluster::Metric MetricChoice::on_ground(const stream::Point3& origin,
     case Kind::elliptical:
       break;
   }
-  if (!regions.front().box) return regions.front().metric;
+  if (!has_boxes()) return regions.front().metric;
   std::vector<cluster::EllipticalField::Region> field;
   for (const Region& region : regions) {
     cluster::Bounds box{{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}};

@@ -35,6 +35,11 @@ struct MetricChoice {
   /// and member.
   static MetricChoice parse(const std::string& text);
 
+  /// Without names of files: what the regions are, as JSON in one line. For records.
+  [[nodiscard]] std::string canonical() const;
+  /// True where boxes make the metric depend on the place.
+  [[nodiscard]] bool has_boxes() const;
+
   /// The metric between points ground = scale * (position - origin), component by component, where
   /// positions are in the CRS. scale: positive.
   [[nodiscard]] cluster::Metric on_ground(const stream::Point3& origin,

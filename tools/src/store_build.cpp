@@ -43,6 +43,9 @@ stream::Schema schema_of(const stream::SourceInfo& info, const BuildRequest& req
                        {"effort", name_of(request.effort)},
                        {"z_weight", number_text(request.z_weight)},
                        {"seed", std::to_string(request.seed)}};
+  if (request.metric.kind != MetricChoice::Kind::euclidean) {
+    schema.parameters.emplace_back("metric", request.metric.canonical());
+  }
   return schema;
 }
 
@@ -113,6 +116,32 @@ double cell_aspect(const Ground& ground, const stream::SourceInfo& info) {
   return length(1) / length(0);
 }
 
+/// Regions are boxes in the CRS; the ground's frame may differ from block to block.
+void set_metric(const BuildRequest& request, const stream::SourceInfo& info, const Ground& ground,
+                cluster::HierarchyOptions& options) {
+  const MetricChoice& choice = request.metric;
+  if (!choice.has_boxes()) {
+    options.metric = choice.on_ground({0, 0, 0}, {1, 1, 1});
+    return;
+  }
+  const std::array<double, 6>& xy = info.world.xy;
+  const stream::Channel& height = info.coordinates[2];
+  if (xy[1] != 0.0 || xy[3] != 0.0) {
+    throw stream::Error({.file = request.inputs.front(),
+                         .where = {},
+                         .cause = "is a rotated raster, and --metric " + choice.text +
+                                  " has boxes along the axes of the CRS",
+                         .remedy =
+                             "give the metric one region without a box, or convert the raster "
+                             "to points first"});
+  }
+  options.metric_of = [&choice, &ground, xy, height](const cluster::Bounds& bounds) {
+    const GroundMap map = ground.map({bounds.min, bounds.max});
+    return choice.on_ground({xy[2], xy[5], height.offset},
+                            {map[0] / xy[0], map[4] / xy[4], map[8] / height.scale});
+  };
+}
+
 }  // namespace
 
 std::optional<cluster::Effort> effort_of(const std::string& name) {
@@ -159,6 +188,7 @@ BuildOutcome build_store(const BuildRequest& request, const BuildProgress& progr
   options.ground = [&ground](const cluster::Bounds& bounds) {
     return ground.map({bounds.min, bounds.max});
   };
+  set_metric(request, source->info(), ground, options);
   cluster::HierarchyBuilder builder(options, sink);
 
   stream::PointBlock block;

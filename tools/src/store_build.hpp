@@ -11,6 +11,8 @@
 #include <terrace/cluster/block.hpp>
 #include <terrace/stream/source.hpp>
 
+#include "metric_option.hpp"
+
 namespace terrace::tools {
 
 /// What `terrace build` was asked to do.
@@ -25,6 +27,7 @@ struct BuildRequest {
   double facility_cost = 1.0;  ///< times the diagonal of a block
   cluster::Effort effort = cluster::Effort::standard;
   double z_weight = 1.0;
+  MetricChoice metric;  ///< on the ground
   int band = 1;
   std::uint64_t seed = 1;
   unsigned threads = 1;

@@ -73,8 +73,13 @@ class BuildCommand final : public Command {
     app.add_option("--z-weight", request_.z_weight, "how much heights count in a distance")
         ->check(CLI::NonNegativeNumber)
         ->capture_default_str();
+    app.add_option(
+           "--metric", metric_,
+           "euclidean, squared, minkowski:P or elliptical:FILE (JSON: boxes with semi-axes)")
+        ->capture_default_str()
+        ->type_name("METRIC");
     app.add_flag("--dry-run", dry_run_, "only tell points, disk and time, from a trial");
-    not_yet(app, {"--metric", "--order", "--resume", "--append"});
+    not_yet(app, {"--order", "--resume", "--append"});
   }
 
   Summary run(const CommonOptions& common) override {
@@ -86,6 +91,7 @@ class BuildCommand final : public Command {
       throw UsageError("--block must be between 2 and 1000000, not " + std::to_string(block_));
     }
     request_.block_points = block_;
+    request_.metric = MetricChoice::parse(metric_);
     request_.seed = common.seed;
     request_.threads = common.threads;
     request_.memory_bytes = common.memory_or(kStreamingMemory);
@@ -172,7 +178,7 @@ class BuildCommand final : public Command {
   }
 
   BuildRequest request_;
-  std::string output_, crs_, effort_ = "default";
+  std::string output_, crs_, effort_ = "default", metric_ = "euclidean";
   std::uint64_t block_ = 10000;
   bool dry_run_ = false;
 };

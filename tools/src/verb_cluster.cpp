@@ -85,8 +85,8 @@ class ClusterCommand final : public Command {
         ->check(CLI::PositiveNumber)
         ->capture_default_str();
     app.add_option("--bound-iterations", request_.bound_iterations,
-                   "Effort spent on the lower bound of the cost; 0: none")
-        ->capture_default_str();
+                   "Steps towards a lower bound of the cost; 0: none (default: some seconds)")
+        ->type_name("N");
     app.add_option(
            "--metric", metric_,
            "euclidean, squared, minkowski:P or elliptical:FILE (JSON: boxes with semi-axes)")
@@ -117,6 +117,13 @@ class ClusterCommand final : public Command {
 
     request_.memory_bytes = common.memory_or(0);
     PointTable table = read_point_table(input_, input_format_, request_.memory_bytes, common);
+    if (table.size() > std::numeric_limits<std::int32_t>::max()) {
+      throw stream::Error(
+          {.file = input_,
+           .where = {},
+           .cause = "has " + with_commas(table.size()) + " points",
+           .remedy = "at most 2,147,483,647 are clustered in memory; build a store"});
+    }
     const GroundFrame ground = GroundFrame::of(table, z_weight_);
     if (!ground.assumption.empty()) common.explain(input_ + ": " + ground.assumption);
     std::vector<cluster::Point3> positions(table.size());

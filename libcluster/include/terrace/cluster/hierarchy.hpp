@@ -106,6 +106,9 @@ struct HierarchyOptions {
   /// least m ceil(log10 m); clusters are then in the order of their representatives. That is ten to
   /// a hundred times slower. Summary::error stays a ground distance, the Euclidean one.
   Metric metric = Euclidean{};
+  /// In place of `metric`: the one for a block with these bounds, for a field where `ground`
+  /// depends on the block and so the frame that the boxes are in. Called from any thread.
+  std::function<Metric(const Bounds&)> metric_of;
   PayloadChannels channels;      ///< none: position alone
   std::size_t payload_size = 0;  ///< bytes that travel with each point
   /// Threads that work, the caller's included: it clusters blocks while it would have to wait. Any

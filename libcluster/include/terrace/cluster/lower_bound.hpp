@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -41,9 +42,14 @@ struct DualBound {
 /// the memory is not to be had, saying how much it is.
 [[nodiscard]] DualBound dual_ascent(const FacilityMatrix& problem, std::uint32_t adjustments = 20);
 
+/// Called after each step with those done and to do at most. False ends the search: the bound so
+/// far is the result.
+using BoundProgress = std::function<bool(std::uint32_t done, std::uint32_t total)>;
+
 struct LowerBoundOptions {
   std::uint32_t iterations = 1000;  ///< subgradient steps; 0: only what they would start from
   unsigned threads = 1;             ///< 0: one per core. Never changes the result.
+  BoundProgress progress = {};
 };
 
 /// Dual ascent, then subgradient steps on L. `start` is a solution, whose cost is what the steps
