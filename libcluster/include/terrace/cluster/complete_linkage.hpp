@@ -17,7 +17,7 @@
 /// O(n^2) time. Complete linkage is reducible: clusters that are each other's nearest will merge,
 /// whatever happens elsewhere. So in each round all such pairs merge in one pass over the matrix,
 /// which shrinks with the clusters; where a round finds few, a nearest-neighbour chain takes over
-/// until a quarter of the clusters is gone. About 2 n words of memory beside the matrix.
+/// until a quarter of the clusters is gone. Beside the matrix it takes about 200 bytes a point.
 /// Sources: J. Skála, Algorithms for manipulating large geometric data, 4.2.1, 7.6; F. Murtagh,
 /// A survey of recent advances in hierarchical clustering algorithms, 1983.
 ///
