@@ -28,12 +28,12 @@ namespace terrace::cluster {
 
 /// The entries of the matrix.
 enum class MatrixEntry {
-  /// Half the memory and time. Each distance is rounded to float, so heights have a relative error
+  /// Half the memory. Each distance is rounded to float once, so heights have a relative error
   /// below 1e-7, and clusters whose distances differ by less may merge in the other order. Of
-  /// points: distances below 1e-18 of the largest coordinate count as zero.
+  /// points: distances below 1e-18 of the largest coordinate may count as zero.
   float32,
   /// Heights of points are exact to the last bits. Of points: distances below 1e-150 of the largest
-  /// coordinate count as zero.
+  /// coordinate may count as zero.
   float64,
 };
 
