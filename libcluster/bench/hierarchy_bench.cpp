@@ -12,8 +12,8 @@
 
 #include <benchmark/benchmark.h>
 
-#include "../src/hierarchy_engine.hpp"
 #include "../tests/inputs.hpp"
+#include "hierarchy/hierarchy_engine.hpp"
 #include "terrace/cluster/hierarchy.hpp"
 
 namespace terrace::cluster {

@@ -12,7 +12,12 @@
 
 namespace terrace::cluster {
 
-/// Below `bound`, which is positive and below 2^32.
+/// Uniform in [0, 1).
+inline double draw_unit(std::mt19937_64& random) {
+  return static_cast<double>(random() >> 11) * 0x1p-53;
+}
+
+/// Below `bound`, which is positive and at most 2^32.
 inline std::uint32_t draw_below(std::size_t bound, std::mt19937_64& random) {
   return static_cast<std::uint32_t>(((random() >> 32) * bound) >> 32);
 }

@@ -23,7 +23,7 @@ void pause() {
 ThreadTeam::ThreadTeam(unsigned threads) {
   threads_.reserve(threads);
   try {
-    for (unsigned i = 1; i < threads; ++i) threads_.emplace_back([this] { run_thread(); });
+    for (unsigned i = 1; i < threads; ++i) threads_.emplace_back([this, i] { run_thread(i); });
   } catch (const std::system_error&) {
     // Those there are do the same work.
   }
@@ -43,7 +43,7 @@ void ThreadTeam::run_together(std::size_t count, void* task, Call call) {
   next_.store(0, std::memory_order_relaxed);
   state_.fetch_add(kStep);  // nobody is at work, so this is odd and ends in 0
   state_.notify_all();
-  work();
+  work(0);
   state_.fetch_add(kStep);
   for (int looks = 0; (state_.load() & (kStep - 1)) != 0; ++looks) {
     if (looks < kLooks) {
@@ -55,12 +55,12 @@ void ThreadTeam::run_together(std::size_t count, void* task, Call call) {
   if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
 }
 
-void ThreadTeam::work() {
+void ThreadTeam::work(unsigned thread) {
   for (;;) {
     const std::size_t k = next_.fetch_add(1, std::memory_order_relaxed);
     if (k >= count_) return;
     try {
-      call_(task_, k);
+      call_(task_, k, thread);
     } catch (...) {
       const std::scoped_lock lock(failure_mutex_);
       if (!failure_) failure_ = std::current_exception();
@@ -69,7 +69,7 @@ void ThreadTeam::work() {
   }
 }
 
-void ThreadTeam::run_thread() {
+void ThreadTeam::run_thread(unsigned thread) {
   std::uint64_t done = 0;  // the count of the last work taken part in
   int looks = 0;
   for (;;) {
@@ -78,7 +78,7 @@ void ThreadTeam::run_thread() {
     const std::uint64_t turn = state / kStep;
     if (turn % 2 == 1 && turn != done) {
       if (!state_.compare_exchange_weak(state, state + 1)) continue;
-      work();
+      work(thread);
       state_.fetch_sub(1);
       done = turn;
       looks = 0;

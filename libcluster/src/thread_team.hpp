@@ -26,24 +26,35 @@ class ThreadTeam {
   [[nodiscard]] std::size_t threads() const { return threads_.size() + 1; }
 
   /// Calls task(0) ... task(count - 1), each once, by any threads, and returns when all are done.
+  /// A task may take the number of its thread too, below threads(), the caller's is 0: calls with
+  /// the same number do not overlap.
   /// The first exception to occur comes out, when nothing runs any more; pieces not yet begun are
   /// left out then.
   template <class Task>
   void run(std::size_t count, Task&& task) {
     if (threads_.empty() || count < 2) {
-      for (std::size_t k = 0; k < count; ++k) task(k);
+      for (std::size_t k = 0; k < count; ++k) call(task, k, 0);
       return;
     }
-    run_together(count, &task, [](void* object, std::size_t k) {
-      (*static_cast<std::remove_reference_t<Task>*>(object))(k);
+    run_together(count, &task, [](void* object, std::size_t k, unsigned thread) {
+      call(*static_cast<std::remove_reference_t<Task>*>(object), k, thread);
     });
   }
 
  private:
-  using Call = void (*)(void*, std::size_t);
+  using Call = void (*)(void*, std::size_t, unsigned);
+
+  template <class Task>
+  static void call(Task& task, std::size_t k, unsigned thread) {
+    if constexpr (std::is_invocable_v<Task&, std::size_t, unsigned>) {
+      task(k, thread);
+    } else {
+      task(k);
+    }
+  }
   void run_together(std::size_t count, void* task, Call call);
-  void work();
-  void run_thread();
+  void work(unsigned thread);
+  void run_thread(unsigned thread);
 
   // The upper half counts: odd while there is work. The lower half is the number of threads, the
   // caller's not included, that are at it.

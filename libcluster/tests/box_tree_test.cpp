@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "../src/box_tree.hpp"
+#include "facility/box_tree.hpp"
 
 #include <algorithm>
 #include <random>

@@ -2,9 +2,9 @@
 // The kernels of linkage on a GPU, run by loops over shuffled indices.
 #include <gtest/gtest.h>
 
-#include "../src/device_complete.hpp"
-#include "../src/device_dendrogram.hpp"
-#include "../src/device_single.hpp"
+#include "cuda/device_complete.hpp"
+#include "cuda/device_dendrogram.hpp"
+#include "cuda/device_single.hpp"
 #include "linkage_laws.hpp"
 #include "loop_device.hpp"
 #include "terrace/cluster/complete_linkage.hpp"

@@ -7,8 +7,8 @@
 
 #include <gtest/gtest.h>
 
-#include "../src/cost_rows.hpp"
-#include "../src/matrix_search.hpp"
+#include "facility/cost_rows.hpp"
+#include "facility/matrix_search.hpp"
 #include "matrix_laws.hpp"
 
 namespace terrace::cluster {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "../src/hierarchy_engine.hpp"
+#include "hierarchy/hierarchy_engine.hpp"
 
 #include <algorithm>
 #include <atomic>

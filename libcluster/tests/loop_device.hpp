@@ -9,7 +9,7 @@
 #include <random>
 #include <vector>
 
-#include "../src/device_primitives.hpp"
+#include "cuda/device_primitives.hpp"
 
 namespace terrace::cluster {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "../src/thread_team.hpp"
+#include "thread_team.hpp"
 
 #include <atomic>
 #include <chrono>

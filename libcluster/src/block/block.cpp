@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/cluster/block.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <limits>
+#include <stdexcept>
+
+#include "block/block_state.hpp"
+#include "block/engine.hpp"
+#include "block/exact_finish.hpp"
+#include "scaling.hpp"
+#include "terrace/cluster/local_search.hpp"
+
+namespace terrace::cluster {
+namespace {
+
+constexpr std::size_t kFullBelow = 2500;
+
+bool available(SimdPath path) {
+#ifdef TERRACE_CLUSTER_X86
+  if (path == SimdPath::avx2) return __builtin_cpu_supports("avx2") != 0;
+  if (path == SimdPath::avx512) {
+    return __builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512dq") != 0;
+  }
+#endif
+  return path == SimdPath::portable;
+}
+
+EngineFunction engine_of(SimdPath path) {
+#ifdef TERRACE_CLUSTER_X86
+  if (path == SimdPath::avx2) return run_engine_avx2;
+  if (path == SimdPath::avx512) return run_engine_avx512;
+#else
+  (void)path;
+#endif
+  return run_engine_portable;
+}
+
+/// A facility at the same place as one of lower number has no clients.
+void drop_empty_facilities(BlockState& state) {
+  for (std::uint32_t j = 0; j < state.facility_count; ++j) state.size[j] = 0;
+  for (std::uint32_t i = 0; i < state.count; ++i) ++state.size[state.nearest[i]];
+  std::uint32_t kept = 0;
+  for (std::uint32_t j = 0; j < state.facility_count; ++j) {
+    state.near[j] = kept;
+    if (state.size[j] != 0) state.facility[kept++] = state.facility[j];
+  }
+  if (kept == state.facility_count) return;
+  state.facility_count = kept;
+  for (std::uint32_t i = 0; i < state.count; ++i) state.nearest[i] = state.near[state.nearest[i]];
+}
+
+double mean_of(std::span<const double> weights) {
+  if (weights.empty()) return 1.0;
+  // Divided before they are added: the sum itself may exceed the range of double.
+  const double share = 1.0 / static_cast<double>(weights.size());
+  double mean = 0.0;
+  for (const double w : weights) mean += w * share;
+  return std::max(mean, std::numeric_limits<double>::min());
+}
+
+SearchPlan plan_of(const BlockOptions& options, std::size_t count) {
+  SearchPlan plan;
+  plan.seed = options.seed;
+  const Effort effort = count < kFullBelow ? Effort::full : options.effort;
+  switch (effort) {
+    case Effort::fast:
+      plan.candidates = 1.5f;
+      plan.most_spacing = 32;
+      break;
+    case Effort::standard:
+      plan.candidates = 3.0f;
+      plan.most_spacing = 32;
+      plan.polish = 2;
+      break;
+    case Effort::fine:
+      plan.candidates = 4.0f;
+      plan.most_spacing = 16;
+      plan.sweeps = 3;
+      plan.polish = 3;
+      break;
+    case Effort::full:
+      plan.random_candidates =
+          static_cast<std::uint32_t>(candidate_count(SearchLength::log2_full, count));
+      plan.polish = 3;
+      break;
+  }
+  return plan;
+}
+
+}  // namespace
+
+struct BlockClusterer::Impl {
+  EngineFunction engine;
+  CurveSorter sorter;
+  BlockState state;
+  ExactFinish finish;
+};
+
+BlockClusterer::BlockClusterer(SimdPath path) : impl_(std::make_unique<Impl>()) {
+  if (path == SimdPath::automatic) path = best_simd_path();
+  if (!available(path)) {
+    throw std::invalid_argument(
+        "this processor lacks the instructions of the SIMD path asked for; "
+        "SimdPath::automatic takes the best there is");
+  }
+  impl_->engine = engine_of(path);
+}
+BlockClusterer::~BlockClusterer() = default;
+BlockClusterer::BlockClusterer(BlockClusterer&&) noexcept = default;
+BlockClusterer& BlockClusterer::operator=(BlockClusterer&&) noexcept = default;
+
+void BlockClusterer::run(std::span<const Point3> points, std::span<const double> weights,
+                         const BlockOptions& options, BlockClustering& result) {
+  assert(weights.empty() || weights.size() == points.size());
+  assert(points.size() < (std::size_t{1} << 24));
+  assert(options.facility_cost > 0);
+  result.facilities.clear();
+  result.assignment.assign(points.size(), 0);
+  result.facility_cost = result.connection_cost = 0.0;
+  if (points.empty()) return;
+  const Scaling scaling(points);
+  if (scaling.diagonal == 0.0) {
+    result.facilities.push_back(0);
+    return;
+  }
+
+  // With weights of mean 1 no sum of theirs leaves the range of float. A facility cost beyond the
+  // sum of all distances means one facility, however far beyond it is.
+  const double mean_weight = mean_of(weights);
+  const double facility_cost = options.facility_cost * scaling.diagonal;
+  BlockState& state = impl_->state;
+  state.facility_cost = static_cast<float>(std::min(facility_cost / mean_weight, 1e8));
+  impl_->sorter.load(points, weights, mean_weight, scaling, state);
+  impl_->engine(state, plan_of(options, points.size()));
+  drop_empty_facilities(state);
+
+  for (std::uint32_t i = 0; i < state.count; ++i) {
+    result.assignment[state.original[i]] = state.nearest[i];
+  }
+  for (std::uint32_t j = 0; j < state.facility_count; ++j) {
+    result.facilities.push_back(state.original[state.facility[j]]);
+  }
+  const double connections = impl_->finish.run(points, weights, scaling, facility_cost, result);
+  result.facility_cost = scaling.unscaled(facility_cost);
+  result.connection_cost = scaling.unscaled(connections);
+}
+
+SimdPath best_simd_path() {
+  for (const SimdPath path : {SimdPath::avx512, SimdPath::avx2}) {
+    if (available(path)) return path;
+  }
+  return SimdPath::portable;
+}
+
+}  // namespace terrace::cluster

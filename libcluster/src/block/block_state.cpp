@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "block/block_state.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <new>
+#include <utility>
+
+namespace terrace::cluster {
+
+template <class T>
+Column<T>::~Column() {
+  if (data_ != nullptr) ::operator delete (data_, std::align_val_t{64});
+}
+
+template <class T>
+void Column<T>::reserve(std::size_t count, std::size_t kept) {
+  if (count <= capacity_) return;
+  const std::size_t capacity =
+      (std::max(count, capacity_ + capacity_ / 2) + kLanes - 1) / kLanes * kLanes;
+  T* data = static_cast<T*>(::operator new (capacity * sizeof(T), std::align_val_t{64}));
+  if (kept > 0) std::memcpy(data, data_, kept * sizeof(T));
+  std::memset(data + kept, 0, (capacity - kept) * sizeof(T));
+  if (data_ != nullptr) ::operator delete (data_, std::align_val_t{64});
+  data_ = data;
+  capacity_ = capacity;
+}
+
+template <class T>
+void Column<T>::swap(Column& other) noexcept {
+  std::swap(data_, other.data_);
+  std::swap(capacity_, other.capacity_);
+}
+
+template class Column<float>;
+template class Column<std::uint32_t>;
+
+void BlockState::reserve_facilities(std::uint32_t facilities) {
+  const std::size_t room = facilities + kLanes;
+  if (room <= facility.capacity()) return;
+  for (Column<std::uint32_t>* column : {&facility, &begin, &size, &near, &closes}) {
+    column->reserve(room, facility_count);
+  }
+  for (Column<float>* column :
+       {&fx, &fy, &fz, &reach, &furthest, &load, &spent, &mean_x, &mean_y, &mean_z, &scratch}) {
+    column->reserve(room, facility_count);
+  }
+  for (std::size_t j = facility_count; j < room; ++j) {
+    fx[j] = kFarAway;
+    reach[j] = 0;
+  }
+}
+
+std::uint32_t BlockState::add_facility(std::uint32_t point) {
+  reserve_facilities(facility_count + 1);
+  const std::uint32_t j = facility_count++;
+  facility[j] = point;
+  fx[j] = x[point];
+  fy[j] = y[point];
+  fz[j] = z[point];
+  reach[j] = furthest[j] = load[j] = spent[j] = 0;
+  size[j] = 0;
+  // The surplus lanes of the last vector.
+  for (std::uint32_t k = facility_count; k < round_to_lanes(facility_count); ++k) {
+    fx[k] = kFarAway;
+    fy[k] = fz[k] = reach[k] = 0;
+  }
+  return j;
+}
+
+void BlockState::remove_facility(std::uint32_t j) {
+  const std::uint32_t last = --facility_count;
+  if (j != last) {
+    for (Column<std::uint32_t>* column : {&facility, &begin, &size}) (*column)[j] = (*column)[last];
+    for (Column<float>* column :
+         {&fx, &fy, &fz, &reach, &furthest, &load, &spent, &mean_x, &mean_y, &mean_z}) {
+      (*column)[j] = (*column)[last];
+    }
+  }
+  fx[last] = kFarAway;
+  reach[last] = 0;
+}
+
+void BlockState::reserve_pool(std::uint32_t more) {
+  if (pool_used + more <= px.capacity()) return;
+  std::uint32_t live = 0;
+  for (std::uint32_t j = 0; j < facility_count; ++j) live += round_to_lanes(size[j]);
+  // Half of the pool is slack, so that compaction is rare.
+  const std::size_t room = std::max<std::size_t>(px.capacity(), 2 * (std::size_t{live} + more));
+  Column<float>* columns[6] = {&px, &py, &pz, &pw, &pd, &pp};
+  for (Column<float>& column : spare_) column.reserve(room);
+  std::uint32_t end = 0;
+  for (std::uint32_t j = 0; j < facility_count; ++j) {
+    const std::uint32_t length = round_to_lanes(size[j]);
+    for (int c = 0; c < 6; ++c) {
+      if (length > 0) std::memcpy(spare_[c] + end, *columns[c] + begin[j], length * sizeof(float));
+    }
+    begin[j] = end;
+    end += length;
+  }
+  for (int c = 0; c < 6; ++c) columns[c]->swap(spare_[c]);
+  pool_used = end;
+}
+
+void BlockState::build_segments() {
+  for (std::uint32_t j = 0; j < facility_count; ++j) size[j] = 0;
+  for (std::uint32_t i = 0; i < count; ++i) ++size[nearest[i]];
+  // Facilities that a duplicate of theirs deprives of their clients.
+  std::uint32_t kept = 0;
+  for (std::uint32_t j = 0; j < facility_count; ++j) {
+    near[j] = kept;
+    if (size[j] == 0) continue;
+    facility[kept] = facility[j];
+    fx[kept] = fx[j];
+    fy[kept] = fy[j];
+    fz[kept] = fz[j];
+    size[kept++] = size[j];
+  }
+  for (std::uint32_t j = kept; j < facility_count; ++j) {
+    fx[j] = kFarAway;
+    reach[j] = 0;
+  }
+  const bool renumbered = kept != facility_count;
+  facility_count = kept;
+
+  std::uint32_t end = 0;
+  for (std::uint32_t j = 0; j < facility_count; ++j) {
+    begin[j] = end;
+    end += round_to_lanes(size[j]);
+  }
+  for (Column<float>* column : {&px, &py, &pz, &pw, &pd, &pp})
+    column->reserve(2 * std::size_t{end});
+  pool_used = end;
+  for (std::uint32_t j = 0; j < facility_count; ++j) closes[j] = begin[j];  // the next free place
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const std::uint32_t j = renumbered ? near[nearest[i]] : nearest[i];
+    const std::uint32_t place = closes[j]++;
+    px[place] = x[i];
+    py[place] = y[i];
+    pz[place] = z[i];
+    pw[place] = w[i];
+    pd[place] = distance[i];
+    pp[place] = static_cast<float>(i);
+  }
+  for (std::uint32_t j = 0; j < facility_count; ++j) {
+    for (std::uint32_t place = begin[j] + size[j]; place < begin[j] + round_to_lanes(size[j]);
+         ++place) {
+      px[place] = fx[j];
+      py[place] = fy[j];
+      pz[place] = fz[j];
+      pw[place] = pd[place] = 0;
+    }
+  }
+}
+
+void BlockState::sort_facilities() {
+  std::sort(static_cast<std::uint32_t*>(facility), facility + facility_count);
+  for (std::uint32_t j = 0; j < facility_count; ++j) {
+    const std::uint32_t point = facility[j];
+    fx[j] = x[point];
+    fy[j] = y[point];
+    fz[j] = z[point];
+  }
+}
+
+}  // namespace terrace::cluster

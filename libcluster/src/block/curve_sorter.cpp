@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "block/block_state.hpp"
+
+namespace terrace::cluster {
+namespace {
+
+constexpr unsigned kDigitBits = 11;
+constexpr unsigned kDigits = 1u << kDigitBits;
+constexpr unsigned kKeyBits = 2 * kDigitBits;
+constexpr unsigned kMostAxisBits = 11;
+
+/// Places on the Z-order curve through a grid of equal cells over the block's box. Short sides have
+/// fewer cells and so fewer bits in the key, which leaves more for the long ones.
+struct CurveTable {
+  float cells = 0;  ///< per unit of length
+  std::array<std::array<std::uint32_t, 1u << kMostAxisBits>, 3> place;
+  std::array<std::uint32_t, 3> last;  ///< cell of each axis
+
+  explicit CurveTable(const Point3& extent) {
+    // The longest side is in [1/2, 1): bits of a side halve with its length.
+    std::array<unsigned, 3> fewer{};
+    for (unsigned axis = 0; axis < 3; ++axis) {
+      double side = extent[axis];
+      while (fewer[axis] < kMostAxisBits && side < 0.5) {
+        side *= 2;
+        ++fewer[axis];
+      }
+    }
+    unsigned bits = kMostAxisBits;
+    const auto total = [&] {
+      unsigned sum = 0;
+      for (unsigned axis = 0; axis < 3; ++axis) sum += bits > fewer[axis] ? bits - fewer[axis] : 0;
+      return sum;
+    };
+    while (total() > kKeyBits) --bits;
+    cells = static_cast<float>(1u << bits);
+    std::array<unsigned, 3> axis_bits{};
+    for (unsigned axis = 0; axis < 3; ++axis) {
+      axis_bits[axis] = bits > fewer[axis] ? bits - fewer[axis] : 0;
+      last[axis] = (1u << axis_bits[axis]) - 1;
+      place[axis][0] = 0;
+    }
+    unsigned key_bit = 0;
+    for (unsigned bit = 0; bit < bits; ++bit) {
+      for (unsigned axis = 0; axis < 3; ++axis) {
+        if (bit >= axis_bits[axis]) continue;
+        const std::uint32_t half = 1u << bit;
+        for (std::uint32_t cell = 0; cell < half; ++cell) {
+          place[axis][half + cell] = place[axis][cell] | (1u << key_bit);
+        }
+        ++key_bit;
+      }
+    }
+  }
+
+  [[nodiscard]] std::uint32_t key(float x, float y, float z) const {
+    return place[0][cell(x, 0)] | place[1][cell(y, 1)] | place[2][cell(z, 2)];
+  }
+
+ private:
+  [[nodiscard]] std::uint32_t cell(float v, unsigned axis) const {
+    return std::min(static_cast<std::uint32_t>(static_cast<std::int32_t>(v * cells)), last[axis]);
+  }
+};
+
+}  // namespace
+
+void CurveSorter::load(std::span<const Point3> points, std::span<const double> weights,
+                       double mean_weight, const Scaling& scaling, BlockState& state) {
+  const auto count = static_cast<std::uint32_t>(points.size());
+  const std::uint32_t padded = round_to_lanes(count);
+  for (Column<float>* column :
+       {&x_, &y_, &z_, &state.x, &state.y, &state.z, &state.w, &state.distance}) {
+    column->reserve(padded);
+  }
+  for (Column<std::uint32_t>* column :
+       {&key_, &other_key_, &order_, &other_order_, &state.original, &state.nearest}) {
+    column->reserve(padded);
+  }
+  for (Column<float>* column :
+       {&state.group_x, &state.group_y, &state.group_z, &state.group_radius}) {
+    column->reserve(padded / kLanes);
+  }
+  state.scratch_pool.reserve(padded);
+  state.count = count;
+
+  const CurveTable table(scaling.extent);
+  std::array<std::uint32_t, kDigits> low{};
+  std::array<std::uint32_t, kDigits> high{};
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const Point3 p = scaling.scaled(points[i]);
+    x_[i] = static_cast<float>(p[0]);
+    y_[i] = static_cast<float>(p[1]);
+    z_[i] = static_cast<float>(p[2]);
+    const std::uint32_t key = table.key(x_[i], y_[i], z_[i]);
+    key_[i] = key;
+    ++low[key % kDigits];
+    ++high[key / kDigits];
+  }
+  // Stable radix sort by two digits.
+  std::uint32_t low_sum = 0;
+  std::uint32_t high_sum = 0;
+  for (unsigned digit = 0; digit < kDigits; ++digit) {
+    low_sum += std::exchange(low[digit], low_sum);
+    high_sum += std::exchange(high[digit], high_sum);
+  }
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const std::uint32_t place = low[key_[i] % kDigits]++;
+    other_order_[place] = i;
+    other_key_[place] = key_[i] / kDigits;
+  }
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const std::uint32_t place = high[other_key_[i]]++;
+    const std::uint32_t from = other_order_[i];
+    state.original[place] = from;
+    state.x[place] = x_[from];
+    state.y[place] = y_[from];
+    state.z[place] = z_[from];
+  }
+  if (weights.empty()) {
+    std::fill_n(static_cast<float*>(state.w), count, 1.0f);
+  } else {
+    for (std::uint32_t i = 0; i < count; ++i) {
+      const double weight = weights[state.original[i]] / mean_weight;
+      state.w[i] = static_cast<float>(std::max(weight, 1e-30));
+    }
+  }
+  for (std::uint32_t i = count; i < padded; ++i) {
+    state.x[i] = state.x[count - 1];
+    state.y[i] = state.y[count - 1];
+    state.z[i] = state.z[count - 1];
+    state.w[i] = 0;
+  }
+}
+
+}  // namespace terrace::cluster

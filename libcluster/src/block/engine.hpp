@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+
+#include "block/block_state.hpp"
+
+namespace terrace::cluster {
+
+/// How long the engine searches.
+struct SearchPlan {
+  std::uint32_t random_candidates = 0;  ///< if not 0, instead of sweeps
+  std::uint32_t sweeps = 1;             ///< along the curve
+  float candidates = 3.0f;              ///< per facility and sweep, at least
+  std::uint32_t most_spacing = 32;      ///< points from one candidate to the next
+  std::uint32_t polish = 1;             ///< rounds of moving facilities and assigning all points
+  std::uint64_t seed = 1;               ///< of the random candidates
+};
+
+/// Clusters the block: fills facilities (in curve order) and nearest.
+using EngineFunction = void (*)(BlockState& state, const SearchPlan& plan);
+
+void run_engine_portable(BlockState& state, const SearchPlan& plan);
+void run_engine_avx2(BlockState& state, const SearchPlan& plan);
+void run_engine_avx512(BlockState& state, const SearchPlan& plan);
+
+}  // namespace terrace::cluster

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+
+#include "block/engine_facilities.hpp"
+
+namespace terrace::cluster {
+
+/// The step of the local search: judge a candidate, open it.
+template <class V>
+class Gain {
+ public:
+  explicit Gain(BlockState& state) : s_(state), facilities_(state) {}
+
+  /// What opening a facility at (x, y, z) spares. Fills near and closes.
+  float gain(float x, float y, float z) {
+    const V cx = V::broadcast(x);
+    const V cy = V::broadcast(y);
+    const V cz = V::broadcast(z);
+    const V zero = V::broadcast(0);
+    const std::uint32_t facilities = round_to_lanes(s_.facility_count);
+    std::uint32_t count = 0;
+    for (std::uint32_t j = 0; j < facilities; j += kLanes) {
+      const V d = squared(V::load(s_.fx + j), V::load(s_.fy + j), V::load(s_.fz + j), cx, cy, cz);
+      std::uint32_t bits = less(d, V::load(s_.reach + j)).bits();
+      while (bits != 0) {
+        s_.near[count++] = j + static_cast<std::uint32_t>(__builtin_ctz(bits));
+        bits &= bits - 1;
+      }
+    }
+    s_.near_count = count;
+    float gain = -s_.facility_cost;
+    V spared = zero;
+    for (std::uint32_t k = 0; k < count; ++k) {
+      const std::uint32_t j = s_.near[k];
+      const std::uint32_t first = s_.begin[j];
+      const std::uint32_t end = first + round_to_lanes(s_.size[j]);
+      // Closing j loses at least load * |candidate - mean| - spent: distance is convex.
+      const float mx = s_.mean_x[j] - x;
+      const float my = s_.mean_y[j] - y;
+      const float mz = s_.mean_z[j] - z;
+      const float mean_loss = s_.facility_cost + s_.spent[j];
+      const float load = s_.load[j];
+      s_.closes[k] = 0;
+      if (load * load * (mx * mx + my * my + mz * mz) < mean_loss * mean_loss) {
+        V lost = zero;
+        for (std::uint32_t i = first; i < end; i += kLanes) {
+          const V d =
+              sqrt(squared(V::load(s_.px + i), V::load(s_.py + i), V::load(s_.pz + i), cx, cy, cz));
+          const V change = (V::load(s_.pd + i) - d) * V::load(s_.pw + i);
+          const V better = max(change, zero);
+          spared = spared + better;
+          lost = lost + (better - change);
+        }
+        const float loss = sum(lost);
+        if (loss < s_.facility_cost) {
+          s_.closes[k] = 1;
+          gain += s_.facility_cost - loss;
+        }
+      } else {
+        for (std::uint32_t i = first; i < end; i += kLanes) {
+          const V d =
+              sqrt(squared(V::load(s_.px + i), V::load(s_.py + i), V::load(s_.pz + i), cx, cy, cz));
+          const V change = (V::load(s_.pd + i) - d) * V::load(s_.pw + i);
+          spared = spared + max(change, zero);
+        }
+      }
+    }
+    return gain + sum(spared);
+  }
+
+  /// Opens a facility at the point; gain() for it must have been the last call.
+  void open(std::uint32_t point) {
+    std::uint32_t most = kLanes;
+    for (std::uint32_t k = 0; k < s_.near_count; ++k) most += round_to_lanes(s_.size[s_.near[k]]);
+    s_.reserve_pool(most);
+    const std::uint32_t first = s_.pool_used;
+    std::uint32_t out = first;
+    const V cx = V::broadcast(s_.x[point]);
+    const V cy = V::broadcast(s_.y[point]);
+    const V cz = V::broadcast(s_.z[point]);
+    const V zero = V::broadcast(0);
+    for (std::uint32_t k = 0; k < s_.near_count; ++k) {
+      const std::uint32_t j = s_.near[k];
+      const bool closes = s_.closes[k] != 0;
+      const std::uint32_t begin = s_.begin[j];
+      const std::uint32_t end = begin + round_to_lanes(s_.size[j]);
+      std::uint32_t kept = begin;
+      bool changed = false;
+      for (std::uint32_t i = begin; i < end; i += kLanes) {
+        const V x = V::load(s_.px + i);
+        const V y = V::load(s_.py + i);
+        const V z = V::load(s_.pz + i);
+        const V d = sqrt(squared(x, y, z, cx, cy, cz));
+        const V old = V::load(s_.pd + i);
+        const V w = V::load(s_.pw + i);
+        const Mask client = less(zero, w);
+        // A vector's last lanes may be surplus: they have no weight and go nowhere.
+        const Mask moves = closes ? client : client & less(d, old);
+        const std::uint32_t bits = moves.bits();
+        if (bits == 0 && !changed) {
+          kept = i + kLanes;
+          continue;
+        }
+        const V p = V::load(s_.pp + i);
+        if (bits != 0) {
+          compress(s_.px + out, moves, x);
+          compress(s_.py + out, moves, y);
+          compress(s_.pz + out, moves, z);
+          compress(s_.pw + out, moves, w);
+          compress(s_.pd + out, moves, d);
+          compress(s_.pp + out, moves, p);
+          out += static_cast<std::uint32_t>(__builtin_popcount(bits));
+        }
+        if (!closes) {
+          const Mask stays = client & ~moves;
+          compress(s_.px + kept, stays, x);
+          compress(s_.py + kept, stays, y);
+          compress(s_.pz + kept, stays, z);
+          compress(s_.pw + kept, stays, w);
+          compress(s_.pd + kept, stays, old);
+          compress(s_.pp + kept, stays, p);
+          kept += static_cast<std::uint32_t>(__builtin_popcount(stays.bits()));
+          changed = true;
+        }
+      }
+      if (changed) {
+        s_.size[j] = kept - begin;
+        clear_surplus(kept);
+        facilities_.summarise(j);
+      }
+    }
+    for (std::uint32_t k = s_.near_count; k-- > 0;) {
+      if (s_.closes[k] != 0) s_.remove_facility(s_.near[k]);
+    }
+    const std::uint32_t j = s_.add_facility(point);
+    s_.begin[j] = first;
+    s_.size[j] = out - first;
+    clear_surplus(out);
+    s_.pool_used = first + round_to_lanes(out - first);
+    facilities_.summarise(j);
+    facilities_.recentre(j);
+  }
+
+  /// Makes the lanes from `end` to the next multiple of sixteen count for nothing.
+  void clear_surplus(std::uint32_t end) {
+    for (std::uint32_t i = end; i < round_to_lanes(end); ++i) {
+      s_.px[i] = s_.py[i] = s_.pz[i] = s_.pw[i] = s_.pd[i] = 0;
+    }
+  }
+
+ private:
+  using Mask = typename V::Mask;
+
+  BlockState& s_;
+  Facilities<V> facilities_;
+};
+
+}  // namespace terrace::cluster

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "block/linear_block.hpp"
+
+#include <algorithm>
+#include <limits>
+
+#include "facility/search_frame.hpp"
+#include "scaling.hpp"
+
+namespace terrace::cluster {
+
+void run_linear(BlockClusterer& clusterer, const FacilityPoints& problem, Effort effort,
+                std::uint64_t seed, BlockClustering& result) {
+  const SearchFrame frame = make_frame(problem);
+  BlockOptions options;
+  options.effort = effort;
+  options.seed = seed;
+  // The clusterer measures the box of the mapped points, the problem the mapped box of the points.
+  const Scaling scaling(frame.points);
+  if (scaling.diagonal > 0.0) {
+    options.facility_cost = std::clamp(frame.facility_cost / scaling.unscaled(scaling.diagonal),
+                                       std::numeric_limits<double>::min(), 0x1p1000);
+  }
+  clusterer.run(frame.points, frame.weights, options, result);
+}
+
+}  // namespace terrace::cluster

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/cluster/cuda_linkage.hpp"
+
+#include <stdexcept>
+
+#include "linkage/linkage_points.hpp"
+
+#ifdef TERRACE_CLUSTER_CUDA
+#include "cuda/cuda_rounds.hpp"
+#include "cuda/device_dendrogram.hpp"
+#endif
+
+namespace terrace::cluster {
+namespace {
+
+/// The points are looked at first: what is wrong with them is wrong on every machine.
+LinkagePoints checked(std::span<const Point3> points) {
+  LinkagePoints scaled(points);
+  if (const CudaStatus status = cuda_available(); !status.available) {
+    throw std::runtime_error(status.reason);
+  }
+  return scaled;
+}
+
+}  // namespace
+
+#ifdef TERRACE_CLUSTER_CUDA
+
+CudaStatus cuda_available() {
+  const std::string fault = device::cuda_fault();
+  if (fault.empty()) return {true, device::cuda_device_name(), {}};
+  return {false,
+          {},
+          "this machine has no CUDA device that works (" + fault +
+              "): cluster on the CPU, or see to the GPU and its driver"};
+}
+
+Dendrogram cuda_complete_linkage(std::span<const Point3> points,
+                                 const CudaLinkageOptions& options) {
+  return device::dendrogram_of(checked(points), [&](std::span<const Point3> ordered) {
+    return options.entry == MatrixEntry::float32 ? device::cuda_complete_rounds<float>(ordered)
+                                                 : device::cuda_complete_rounds<double>(ordered);
+  });
+}
+
+Dendrogram cuda_single_linkage(std::span<const Point3> points) {
+  return device::dendrogram_of(checked(points), [](std::span<const Point3> ordered) {
+    return device::cuda_single_rounds(ordered);
+  });
+}
+
+#else
+
+CudaStatus cuda_available() {
+  return {false,
+          {},
+          "this build is without CUDA: cluster on the CPU, or build with nvcc in PATH and the "
+          "option -Dterrace_cuda=enabled"};
+}
+
+// Without a device checked() throws.
+Dendrogram cuda_complete_linkage(std::span<const Point3> points, const CudaLinkageOptions&) {
+  (void)checked(points);
+  return {};
+}
+
+Dendrogram cuda_single_linkage(std::span<const Point3> points) {
+  (void)checked(points);
+  return {};
+}
+
+#endif
+
+}  // namespace terrace::cluster

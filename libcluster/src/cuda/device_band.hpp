@@ -1,0 +1,254 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "cuda/device_primitives.hpp"
+
+/// Kernels of complete linkage on the band-shaped half matrix (thesis 7.6.2): row i of `slots` rows
+/// has the distances to the slots i+1 .. i+half, counted modulo `slots`. The number of slots is odd
+/// here, if need be by one slot without a cluster, so that no pair is stored twice.
+
+namespace terrace::cluster::device {
+
+/// The clusters of a round, by slot. Pointers into the memory of the device.
+template <class Entry>
+struct Slots {
+  std::uint32_t slots = 0;
+  std::uint32_t half = 0;             ///< slots / 2, the length of a row
+  Entry* band = nullptr;              ///< squared distances
+  std::uint32_t* alive = nullptr;     ///< 1 if there is a cluster
+  std::uint32_t* stale = nullptr;     ///< 1 if its nearest neighbour is to be found again
+  std::uint32_t* nearest = nullptr;   ///< its nearest neighbour, the lowest of equals
+  Entry* distance = nullptr;          ///< of that
+  std::uint32_t* partner = nullptr;   ///< what it merges with in this round, or itself
+  std::uint32_t* original = nullptr;  ///< a point of it
+
+  /// The slot that an entry of a row is about.
+  TERRACE_CLUSTER_HOST_DEVICE std::uint32_t other(std::uint32_t row, std::uint32_t column) const {
+    return static_cast<std::uint32_t>(band_partner(slots, {row, column}));
+  }
+  TERRACE_CLUSTER_HOST_DEVICE Entry& at(std::uint32_t row, std::uint32_t column) const {
+    return band[std::uint64_t{row} * half + column];
+  }
+  TERRACE_CLUSTER_HOST_DEVICE Entry& between(std::uint32_t i, std::uint32_t j) const {
+    return band[band_entry(slots, i, j)];
+  }
+  TERRACE_CLUSTER_HOST_DEVICE bool keeps(std::uint32_t i) const { return partner[i] > i; }
+  TERRACE_CLUSTER_HOST_DEVICE bool ends(std::uint32_t i) const { return partner[i] < i; }
+};
+
+template <class Entry>
+TERRACE_CLUSTER_HOST_DEVICE Entry greater_of(Entry a, Entry b) {
+  return a < b ? b : a;
+}
+
+/// lanes over rows: distances of the points. Rounded to Entry once.
+template <class Entry>
+struct FillBand {
+  Slots<Entry> s;
+  const double *x, *y, *z;
+  std::uint32_t points;
+
+  TERRACE_CLUSTER_HOST_DEVICE bool skip(std::uint32_t row) const { return row >= points; }
+  TERRACE_CLUSTER_HOST_DEVICE void operator()(std::uint32_t row, std::uint32_t lane,
+                                              std::uint32_t lanes) const {
+    for (std::uint32_t k = lane; k < s.half; k += lanes) {
+      const std::uint32_t j = s.other(row, k);
+      if (j < points) s.at(row, k) = static_cast<Entry>(squared(x, y, z, row, j));
+    }
+  }
+};
+
+/// each over slots: a cluster to each of the first `points`.
+template <class Entry>
+struct FillSlots {
+  Slots<Entry> s;
+  std::uint32_t points;
+
+  TERRACE_CLUSTER_HOST_DEVICE void operator()(std::size_t index) const {
+    const auto i = static_cast<std::uint32_t>(index);
+    s.alive[i] = i < points ? 1 : 0;
+    s.stale[i] = s.alive[i];
+    s.original[i] = i;
+  }
+};
+
+template <class Entry>
+TERRACE_CLUSTER_HOST_DEVICE Best<Entry> best_of_row(const Slots<Entry>& s, std::uint32_t row,
+                                                    std::uint32_t lane, std::uint32_t lanes) {
+  Best<Entry> best;
+  for (std::uint32_t k = lane; k < s.half; k += lanes) {
+    const std::uint32_t j = s.other(row, k);
+    if (s.alive[j] != 0) best = nearer(best, {s.at(row, k), j});
+  }
+  return best;
+}
+
+/// reduce over slots: the nearest neighbour among those in the slot's own row.
+template <class Entry>
+struct NearestOfRow {
+  Slots<Entry> s;
+
+  TERRACE_CLUSTER_HOST_DEVICE bool skip(std::uint32_t row) const { return s.alive[row] == 0; }
+  TERRACE_CLUSTER_HOST_DEVICE Best<Entry> part(std::uint32_t row, std::uint32_t lane,
+                                               std::uint32_t lanes) const {
+    return best_of_row(s, row, lane, lanes);
+  }
+  TERRACE_CLUSTER_HOST_DEVICE void finish(std::uint32_t row, const Best<Entry>& best) const {
+    s.nearest[row] = best.index;
+    s.distance[row] = best.value;
+  }
+};
+
+/// reduce over slots, for few that are stale: in the own row and in the rows of the others. What is
+/// in the others is not next to each other in memory.
+template <class Entry>
+struct NearestOfStale {
+  Slots<Entry> s;
+
+  TERRACE_CLUSTER_HOST_DEVICE bool skip(std::uint32_t i) const { return s.stale[i] == 0; }
+  TERRACE_CLUSTER_HOST_DEVICE Best<Entry> part(std::uint32_t i, std::uint32_t lane,
+                                               std::uint32_t lanes) const {
+    Best<Entry> best = best_of_row(s, i, lane, lanes);
+    for (std::uint32_t k = lane; k < s.half; k += lanes) {
+      const std::uint32_t row = i > k ? i - k - 1 : i + s.slots - k - 1;
+      if (s.alive[row] != 0) best = nearer(best, {s.at(row, k), row});
+    }
+    return best;
+  }
+  TERRACE_CLUSTER_HOST_DEVICE void finish(std::uint32_t i, const Best<Entry>& best) const {
+    s.nearest[i] = best.index;
+    s.distance[i] = best.value;
+  }
+};
+
+/// each over kRows rows times slots: the nearest neighbour of a slot among some rows. Neighbouring
+/// indices read neighbouring columns of one row.
+template <class Entry>
+struct NearestOfRows {
+  static constexpr std::uint32_t kRows = 512;
+  Slots<Entry> s;
+  Entry* value;  // of the parts
+  std::uint32_t* index;
+
+  static std::uint32_t parts(std::uint32_t slots) { return (slots + kRows - 1) / kRows; }
+
+  TERRACE_CLUSTER_HOST_DEVICE void operator()(std::size_t number) const {
+    const auto part = static_cast<std::uint32_t>(number / s.slots);
+    const auto j = static_cast<std::uint32_t>(number % s.slots);
+    const std::uint32_t first = part * kRows;
+    const std::uint32_t end = first + kRows < s.slots ? first + kRows : s.slots;
+    Best<Entry> best;
+    for (std::uint32_t row = first; row < end; ++row) {
+      const std::uint32_t steps = j > row ? j - row : j + s.slots - row;
+      if (steps <= s.half && s.alive[row] != 0) {
+        best = nearer(best, {s.at(row, steps - 1), row});
+      }
+    }
+    value[number] = best.value;
+    index[number] = best.index;
+  }
+};
+
+/// each over slots: after NearestOfRow and NearestOfRows, the nearest of all.
+template <class Entry>
+struct NearestOfParts {
+  Slots<Entry> s;
+  const Entry* value;
+  const std::uint32_t* index;
+  std::uint32_t parts;
+
+  TERRACE_CLUSTER_HOST_DEVICE void operator()(std::size_t i) const {
+    if (s.alive[i] == 0) return;
+    Best<Entry> best{s.distance[i], s.nearest[i]};
+    for (std::size_t part = 0; part < parts; ++part) {
+      best = nearer(best, {value[part * s.slots + i], index[part * s.slots + i]});
+    }
+    s.nearest[i] = best.index;
+    s.distance[i] = best.value;
+  }
+};
+
+/// Counters of a round.
+struct RoundCounts {
+  std::uint32_t pairs, stale;
+};
+
+/// each over slots: pairs that are each other's nearest. Complete linkage is reducible: merging one
+/// such pair brings no cluster nearer to another, so all of them can merge at once.
+/// The links are stored by the point of the cluster that ends, which it does once.
+template <class Entry>
+struct MatchPairs {
+  Slots<Entry> s;
+  RoundCounts* counts;
+  std::uint32_t round;
+  std::uint32_t* link_other;
+  std::uint32_t* link_round;
+  Entry* link_square;
+
+  TERRACE_CLUSTER_HOST_DEVICE void operator()(std::size_t index) const {
+    const auto i = static_cast<std::uint32_t>(index);
+    s.partner[i] = i;
+    if (s.alive[i] == 0) return;
+    const std::uint32_t j = s.nearest[i];
+    if (s.nearest[j] != i) return;
+    s.partner[i] = j;
+    if (j < i) return;
+    link_other[s.original[j]] = s.original[i];
+    link_round[s.original[j]] = round;
+    link_square[s.original[j]] = s.distance[i];
+    add(&counts->pairs, 1);
+  }
+};
+
+/// lanes over slots, after MarkStale: distances of merged clusters, the greater ones. A pair of two
+/// merged clusters is updated by the lower of them, from the four distances of their halves; those
+/// of clusters that end are read only, so nothing is read that another index writes.
+template <class Entry>
+struct UpdateBand {
+  Slots<Entry> s;
+
+  TERRACE_CLUSTER_HOST_DEVICE bool skip(std::uint32_t a) const { return !s.keeps(a); }
+  TERRACE_CLUSTER_HOST_DEVICE void operator()(std::uint32_t a, std::uint32_t lane,
+                                              std::uint32_t lanes) const {
+    const std::uint32_t b = s.partner[a];
+    for (std::uint32_t k = lane; k < s.slots; k += lanes) {
+      if (k == a || s.alive[k] == 0) continue;
+      const bool pair = s.keeps(k);
+      if (pair && k < a) continue;
+      Entry& kept = s.between(a, k);
+      Entry value = greater_of(kept, s.between(b, k));
+      if (pair) {
+        const std::uint32_t d = s.partner[k];
+        value = greater_of(value, greater_of(s.between(a, d), s.between(b, d)));
+      }
+      kept = value;
+    }
+  }
+};
+
+/// each over slots, after MatchPairs: which clusters are left, and whose nearest neighbour may be
+/// another now. Distances only grow, so one that did not merge stays the nearest.
+template <class Entry>
+struct MarkStale {
+  Slots<Entry> s;
+  RoundCounts* counts;
+
+  TERRACE_CLUSTER_HOST_DEVICE void operator()(std::size_t index) const {
+    const auto i = static_cast<std::uint32_t>(index);
+    s.stale[i] = 0;
+    if (s.alive[i] == 0) return;
+    if (s.ends(i)) {
+      s.alive[i] = 0;
+      return;
+    }
+    // That of a cluster that merged is its partner.
+    if (s.partner[s.nearest[i]] == s.nearest[i]) return;
+    s.stale[i] = 1;
+    add(&counts->stale, 1);
+  }
+};
+
+}  // namespace terrace::cluster::device

@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hierarchy/block_pipeline.hpp"
+
+#include <algorithm>
+#include <system_error>
+#include <utility>
+
+namespace terrace::cluster {
+namespace {
+
+// Enough that a thread seldom waits for the turn of a slow block; a block is some 100 kB.
+constexpr std::size_t kBlocksPerThread = 4;
+
+}  // namespace
+
+BlockPipeline::BlockPipeline(unsigned threads, Stages stages)
+    : stages_(std::move(stages)), limit_(threads > 1 ? kBlocksPerThread * threads : 1) {
+  threads_.reserve(threads);
+  try {
+    for (unsigned i = 1; i < threads; ++i) threads_.emplace_back([this, i] { run_thread(i); });
+  } catch (const std::system_error&) {
+    // The system grants no more threads. Those there are do the same work, only later.
+  }
+}
+
+BlockPipeline::~BlockPipeline() {
+  {
+    const Lock lock(mutex_);
+    stop_ = true;
+    queue_.clear();
+  }
+  work_.notify_all();
+  for (std::thread& thread : threads_) thread.join();
+}
+
+BlockPipeline::BlockPtr BlockPipeline::take(unsigned level) {
+  BlockPtr block;
+  {
+    const Lock lock(mutex_);
+    if (!free_.empty()) {
+      block = std::move(free_.back());
+      free_.pop_back();
+    }
+  }
+  if (!block) block = std::make_unique<HierarchyBlock>();
+  block->reset(level);
+  return block;
+}
+
+void BlockPipeline::submit(BlockPtr block) {
+  {
+    const Lock lock(mutex_);
+    if (failed_ || stop_) return;
+    if (lanes_.size() <= block->level) lanes_.resize(block->level + 1);
+    queue_.push_back(std::move(block));
+    ++under_way_;
+  }
+  work_.notify_one();
+  progress_.notify_all();  // the owner may be waiting for something to do
+}
+
+void BlockPipeline::run_thread(unsigned thread) {
+  Lock lock(mutex_);
+  for (;;) {
+    work_.wait(lock, [this] { return stop_ || !queue_.empty(); });
+    if (stop_) return;
+    run_one(lock, thread);
+  }
+}
+
+void BlockPipeline::wait_below(std::size_t limit) {
+  Lock lock(mutex_);
+  while (!failed_ && under_way_ >= limit) {
+    if (queue_.empty()) {
+      progress_.wait(lock);
+    } else {
+      run_one(lock, 0);
+    }
+  }
+  if (failed_) {
+    progress_.wait(lock, [this] { return running_ == 0; });
+    if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
+  }
+}
+
+void BlockPipeline::run_one(Lock& lock, unsigned thread) {
+  BlockPtr block = std::move(queue_.front());
+  queue_.pop_front();
+  ++running_;
+  lock.unlock();
+  std::exception_ptr failure;
+  try {
+    stages_.process(*block, thread);
+  } catch (...) {
+    failure = std::current_exception();
+  }
+  lock.lock();
+  if (failure) {
+    fail(std::move(failure));
+  } else {
+    lanes_[block->level].ready.push_back(std::move(block));
+    commit_ready(lock);
+  }
+  --running_;
+  progress_.notify_all();
+}
+
+void BlockPipeline::commit_ready(Lock& lock) {
+  if (committing_) return;  // that thread looks again before it stops
+  committing_ = true;
+  while (BlockPtr block = next_ready()) {
+    lock.unlock();
+    std::exception_ptr failure;
+    try {
+      stages_.commit(*block);
+    } catch (...) {
+      failure = std::current_exception();
+    }
+    lock.lock();
+    if (failure) {
+      fail(std::move(failure));
+      break;
+    }
+    ++lanes_[block->level].next;
+    free_.push_back(std::move(block));
+    --under_way_;
+    progress_.notify_all();
+  }
+  committing_ = false;
+}
+
+BlockPipeline::BlockPtr BlockPipeline::next_ready() {
+  if (failed_ || stop_) return nullptr;
+  for (Lane& lane : lanes_) {
+    const auto turn = std::find_if(lane.ready.begin(), lane.ready.end(),
+                                   [&](const BlockPtr& b) { return b->number == lane.next; });
+    if (turn == lane.ready.end()) continue;
+    BlockPtr block = std::move(*turn);
+    lane.ready.erase(turn);
+    return block;
+  }
+  return nullptr;
+}
+
+void BlockPipeline::fail(std::exception_ptr failure) {
+  queue_.clear();
+  if (failed_) return;  // the first one counts
+  failed_ = true;
+  failure_ = std::move(failure);
+}
+
+}  // namespace terrace::cluster

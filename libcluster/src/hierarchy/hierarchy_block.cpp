@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hierarchy/hierarchy_block.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <variant>
+
+#include "ground.hpp"
+#include "hierarchy/summary.hpp"
+
+namespace terrace::cluster {
+namespace {
+
+// Steele, Lea, Flood: Fast splittable pseudorandom number generators, OOPSLA 2014.
+std::uint64_t splitmix64(std::uint64_t x) {
+  x += 0x9e3779b97f4a7c15u;
+  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+  return x ^ (x >> 31);
+}
+
+// Counts of level-0 points, scaled to mean 1 (thesis 7.1.2).
+void normalised_weights(std::span<const Summary> heads, std::vector<double>& weights) {
+  std::uint64_t total = 0;
+  for (const Summary& head : heads) total += head.descendants;
+  const double scale = static_cast<double>(heads.size()) / static_cast<double>(total);
+  weights.resize(heads.size());
+  for (std::size_t i = 0; i < heads.size(); ++i) {
+    weights[i] = static_cast<double>(heads[i].descendants) * scale;
+  }
+}
+
+// When a block must be clustered again, with four times the facility cost, and at least with that
+// at which neighbours in a block of 10,000 points on a surface are no longer worth a facility each.
+// The last attempt's cost exceeds the sum of all weighted distances in any block.
+constexpr int kAttempts = 20;
+constexpr double kLeastRaisedCost = 0x1p-8;
+
+// By counting; the points of each cluster come in ascending order.
+void group_by_cluster(const BlockClustering& clustering, std::vector<std::uint32_t>& first,
+                      std::vector<std::uint32_t>& order) {
+  const std::vector<std::uint32_t>& cluster_of = clustering.assignment;
+  const std::size_t clusters = clustering.facilities.size();
+  // first[c + 2] counts cluster c, then first[c + 1] is where its next point goes; when all points
+  // are placed, that is where the next cluster begins.
+  first.assign(clusters + 2, 0);
+  for (const std::uint32_t c : cluster_of) ++first[c + 2];
+  for (std::size_t c = 2; c < first.size(); ++c) first[c] += first[c - 1];
+  order.resize(cluster_of.size());
+  for (std::uint32_t i = 0; i < cluster_of.size(); ++i) order[first[cluster_of[i] + 1]++] = i;
+  first.pop_back();
+}
+
+// Points 2 i and 2 i + 1 make cluster i.
+void pair_up(std::size_t points, BlockClustering& clustering) {
+  clustering.facilities.clear();
+  for (std::uint32_t i = 0; i < points; i += 2) clustering.facilities.push_back(i);
+  for (std::uint32_t i = 0; i < points; ++i) clustering.assignment[i] = i / 2;
+}
+
+}  // namespace
+
+void HierarchyBlock::reset(unsigned new_level) {
+  level = new_level;
+  number = 0;
+  positions.clear();
+  payload.clear();
+  children.clear();
+  heads.clear();
+  prepared.reset();
+}
+
+void HierarchyBlock::append_representative(const HierarchyBlock& below, std::size_t c,
+                                           std::uint64_t ordinal, std::size_t payload_size) {
+  assert(level == below.level + 1);
+  const std::size_t point = below.clustering.facilities[c];
+  positions.push_back(below.positions[point]);
+  const auto bytes = std::span(below.payload).subspan(point * payload_size, payload_size);
+  payload.insert(payload.end(), bytes.begin(), bytes.end());
+  const auto old = std::span(below.children).subspan(point * below.level, below.level);
+  children.insert(children.end(), old.begin(), old.end());
+  children.push_back(ordinal);
+  heads.push_back(below.summaries[c]);
+}
+
+FinishedBlock HierarchyBlock::finished() const {
+  return {level,    number, positions, payload, children, first, order, clustering.facilities,
+          summaries};
+}
+
+std::uint64_t block_seed(std::uint64_t seed, unsigned level, std::uint64_t block) {
+  return splitmix64(splitmix64(splitmix64(seed) ^ level) ^ block);
+}
+
+BlockProcessor::BlockProcessor(const HierarchyOptions& options, ClusterFunction cluster)
+    : options_(options), cluster_(std::move(cluster)), metric_(options.metric) {
+  if (options.metric_of || !std::holds_alternative<Euclidean>(options.metric) ||
+      !options.channels.weights.empty()) {
+    metric_cluster_.emplace(options.channels.weights, options.simd);
+  }
+}
+
+void BlockProcessor::process(HierarchyBlock& block) {
+  assert(block.size() > 0);
+  const Bounds box = bounds_of(block.positions);
+  const GroundMap map = options_.ground ? options_.ground(box) : kIdentityMap;
+  check_ground_map(map, box, block.level, block.number);
+  if (options_.metric_of) {
+    metric_ = options_.metric_of(box);
+    check(metric_);
+  }
+  if (map == kIdentityMap) {
+    cluster(block, block.positions);
+  } else {
+    // The minimum is taken off first, so that large offsets cost no digits in the product; not
+    // where the metric depends on the place.
+    const bool anywhere = !std::holds_alternative<EllipticalField>(metric_) &&
+                          !std::holds_alternative<CustomMetric>(metric_);
+    ground_.resize(block.size());
+    to_ground(block.positions, anywhere ? box.min : Point3{}, map, ground_);
+    cluster(block, ground_);
+  }
+  group_by_cluster(block.clustering, block.first, block.order);
+
+  const std::vector<std::uint32_t>& representatives = block.clustering.facilities;
+  block.summaries.resize(representatives.size());
+  for (std::size_t c = 0; c < representatives.size(); ++c) {
+    const auto members =
+        std::span(block.order).subspan(block.first[c], block.first[c + 1] - block.first[c]);
+    block.summaries[c] =
+        block.level == 0
+            ? summarise_points(block.positions, members, representatives[c], map)
+            : summarise_heads(block.positions, block.heads, members, representatives[c], map);
+  }
+}
+
+void BlockProcessor::read_channels(const HierarchyBlock& block) {
+  const std::size_t count = options_.channels.weights.size();
+  channels_.resize(block.size() * count);
+  if (count == 0) return;
+  for (std::size_t i = 0; i < block.size(); ++i) {
+    const auto values = std::span(channels_).subspan(i * count, count);
+    options_.channels.read(
+        std::span(block.payload).subspan(i * options_.payload_size, options_.payload_size), values);
+    for (std::size_t c = 0; c < count; ++c) {
+      if (std::isfinite(values[c])) continue;
+      throw std::invalid_argument("channel " + std::to_string(c) + " of point " +
+                                  std::to_string(i) + " in block " + std::to_string(block.number) +
+                                  " of level " + std::to_string(block.level) + " is not finite");
+    }
+  }
+}
+
+void BlockProcessor::cluster(HierarchyBlock& block, std::span<const Point3> ground) {
+  weights_.clear();
+  if (block.level > 0) normalised_weights(block.heads, weights_);
+  read_channels(block);
+  BlockOptions options = options_.block;
+  options.seed = block_seed(options_.block.seed, block.level, block.number);
+
+  const std::size_t most = (block.size() + 1) / 2;
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    if (metric_cluster_) {
+      metric_cluster_->run(metric_, ground, weights_, channels_, options, block.clustering);
+    } else {
+      cluster_(ground, weights_, options, block.clustering);
+    }
+    assert(block.clustering.assignment.size() == block.size());
+    if (block.clustering.facilities.size() <= most) return;
+    options.facility_cost = std::max(4.0 * options.facility_cost, kLeastRaisedCost);
+  }
+  pair_up(block.size(), block.clustering);
+}
+
+}  // namespace terrace::cluster

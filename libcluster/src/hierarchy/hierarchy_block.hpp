@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "hierarchy/metric_block.hpp"
+#include "terrace/cluster/block.hpp"
+#include "terrace/cluster/hierarchy.hpp"
+
+/// One block of the hierarchy, from its first point to the sink. Private to the hierarchy.
+
+namespace terrace::cluster {
+
+/// The points of a block and, once it is processed, its clusters. Blocks are used again and keep
+/// their memory.
+struct HierarchyBlock {
+  unsigned level = 0;
+  std::uint64_t number = 0;
+  std::vector<Point3> positions;
+  std::vector<std::byte> payload;
+  std::vector<std::uint64_t> children;  ///< `level` per point
+  std::vector<Summary> heads;  ///< above level 0: of the cluster one level below, per point
+
+  BlockClustering clustering;
+  std::vector<std::uint32_t> first, order;  ///< as in FinishedBlock
+  std::vector<Summary> summaries;
+  std::unique_ptr<HierarchySink::Prepared> prepared;
+
+  [[nodiscard]] std::size_t size() const { return positions.size(); }
+
+  /// Empties the block for a new use.
+  void reset(unsigned new_level);
+  /// Appends cluster c of a processed block one level below, whose ordinal is now known.
+  void append_representative(const HierarchyBlock& below, std::size_t c, std::uint64_t ordinal,
+                             std::size_t payload_size);
+  [[nodiscard]] FinishedBlock finished() const;
+};
+
+/// How a block is clustered where distances are Euclidean: BlockClusterer::run, or a stand-in of
+/// the tests.
+using ClusterFunction = std::function<void(std::span<const Point3>, std::span<const double>,
+                                           const BlockOptions&, BlockClustering&)>;
+
+/// The seed of one block: a fixed mixture, so that blocks may be clustered in any order.
+std::uint64_t block_seed(std::uint64_t seed, unsigned level, std::uint64_t block);
+
+/// Clusters blocks and sums them up. One object per thread.
+class BlockProcessor {
+ public:
+  /// The options must outlive the processor.
+  BlockProcessor(const HierarchyOptions& options, ClusterFunction cluster);
+
+  /// Fills in clustering, first, order and summaries. At most half of the points, rounded up,
+  /// become representatives: where the facility cost is too low for that, it is raised for this
+  /// block. Without that bound the hierarchy might never come to an end.
+  /// Throws: std::invalid_argument as check_ground_map().
+  void process(HierarchyBlock& block);
+
+ private:
+  void cluster(HierarchyBlock& block, std::span<const Point3> ground);
+  void read_channels(const HierarchyBlock& block);
+
+  const HierarchyOptions& options_;
+  ClusterFunction cluster_;
+  Metric metric_;                                       // of the block in work
+  std::optional<MetricBlockClusterer> metric_cluster_;  // unless distances are Euclidean
+  std::vector<Point3> ground_;
+  std::vector<double> weights_, channels_;
+};
+
+}  // namespace terrace::cluster

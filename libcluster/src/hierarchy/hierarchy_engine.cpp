@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hierarchy/hierarchy_engine.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "ground.hpp"
+
+namespace terrace::cluster {
+namespace {
+
+constexpr unsigned kMostThreads = 1024;
+
+HierarchyOptions checked(HierarchyOptions options) {
+  if (options.block_size < 2 || options.block_size >= (std::size_t{1} << 24)) {
+    throw std::invalid_argument("block_size is " + std::to_string(options.block_size) +
+                                "; it must be at least 2 and below 2^24");
+  }
+  if (!(options.block.facility_cost > 0.0) || !std::isfinite(options.block.facility_cost)) {
+    throw std::invalid_argument("facility_cost must be positive and finite");
+  }
+  check(options.metric);
+  for (std::size_t c = 0; c < options.channels.weights.size(); ++c) {
+    const double weight = options.channels.weights[c];
+    if (weight >= 0.0 && std::isfinite(weight)) continue;
+    throw std::invalid_argument("the weight of channel " + std::to_string(c) + " is " +
+                                std::to_string(weight) + ": it must be finite and not negative");
+  }
+  if (!options.channels.weights.empty() && !options.channels.read) {
+    throw std::invalid_argument("channels have weights but no function that reads them");
+  }
+  options.threads = std::clamp(options.threads, 1u, kMostThreads);
+  return options;
+}
+
+}  // namespace
+
+HierarchyEngine::HierarchyEngine(HierarchyOptions options, HierarchySink& sink,
+                                 const std::function<ClusterFunction()>& make_cluster)
+    : options_(checked(std::move(options))),
+      sink_(sink),
+      levels_(1),
+      base_(levels_.front()),
+      pipeline_(options_.threads,
+                {[this](HierarchyBlock& block, unsigned thread) { process(block, thread); },
+                 [this](HierarchyBlock& block) { commit(block); }}) {
+  // No thread looks at the processors before the first block is submitted.
+  processors_.reserve(options_.threads);
+  for (unsigned i = 0; i < options_.threads; ++i) {
+    processors_.emplace_back(options_, make_cluster());
+  }
+}
+
+void HierarchyEngine::check_open() {
+  if (ended_) throw std::logic_error("the hierarchy is finished or has failed; it takes no more");
+}
+
+void HierarchyEngine::push(std::span<const Point3> positions, std::span<const std::byte> payload) {
+  check_open();
+  if (payload.size() != positions.size() * options_.payload_size) {
+    throw std::invalid_argument("the payload has " + std::to_string(payload.size()) + " bytes; " +
+                                std::to_string(positions.size()) + " points with " +
+                                std::to_string(options_.payload_size) + " bytes each need " +
+                                std::to_string(positions.size() * options_.payload_size));
+  }
+  if (const std::size_t bad = first_not_finite(positions); bad < positions.size()) {
+    throw std::invalid_argument("point " + std::to_string(bad) +
+                                " of the batch has a coordinate that is not finite");
+  }
+  const std::size_t held = base_.open ? base_.open->size() : 0;
+  const bool fits_a_block = positions.size() <= options_.block_size;
+  ended_ = true;  // should anything below throw
+  if (fits_a_block && held + positions.size() > options_.block_size) submit(base_);
+  while (!positions.empty()) {
+    if (base_.open && base_.open->size() == options_.block_size) submit(base_);
+    const std::size_t room = options_.block_size - (base_.open ? base_.open->size() : 0);
+    const std::size_t count = std::min(room, positions.size());
+    append(positions.first(count), payload.first(count * options_.payload_size));
+    positions = positions.subspan(count);
+    payload = payload.subspan(count * options_.payload_size);
+    pipeline_.wait_for_room();
+  }
+  ended_ = false;
+}
+
+void HierarchyEngine::append(std::span<const Point3> positions,
+                             std::span<const std::byte> payload) {
+  if (!base_.open) base_.open = pipeline_.take(0);
+  HierarchyBlock& block = *base_.open;
+  block.positions.insert(block.positions.end(), positions.begin(), positions.end());
+  block.payload.insert(block.payload.end(), payload.begin(), payload.end());
+  base_.points += positions.size();
+}
+
+void HierarchyEngine::submit(Level& level) {
+  level.open->number = level.blocks++;
+  pipeline_.submit(std::move(level.open));
+}
+
+void HierarchyEngine::process(HierarchyBlock& block, unsigned thread) {
+  processors_[thread].process(block);
+  block.prepared = sink_.prepare(block.finished());
+}
+
+void HierarchyEngine::commit(HierarchyBlock& block) {
+  sink_.commit(block.level, std::move(block.prepared));
+  if (levels_.size() <= block.level + 1) {
+    levels_.emplace_back().level = block.level + 1;
+  }
+  Level& level = levels_[block.level];
+  Level& above = levels_[block.level + 1];
+  for (std::size_t c = 0; c < block.summaries.size(); ++c) {
+    if (above.open && above.open->size() == options_.block_size) submit(above);
+    if (!above.open) above.open = pipeline_.take(above.level);
+    above.open->append_representative(block, c, level.clusters++, options_.payload_size);
+    ++above.points;
+  }
+}
+
+HierarchyResult HierarchyEngine::finish() {
+  check_open();
+  ended_ = true;
+  // A level that has submitted a block has an open one as well. wait_for_all() makes the level
+  // above complete; it exists then.
+  unsigned top = 0;
+  for (; levels_[top].blocks > 0; ++top) {
+    submit(levels_[top]);
+    pipeline_.wait_for_all();
+  }
+  pipeline_.wait_for_all();
+  deliver_root(levels_[top]);
+
+  HierarchyResult result;
+  result.points = base_.points;
+  result.top = top;
+  for (const Level& level : levels_) {
+    result.level_points.push_back(level.points);
+    result.level_clusters.push_back(level.clusters);
+  }
+  return result;
+}
+
+void HierarchyEngine::deliver_root(Level& level) {
+  if (!level.open) level.open = pipeline_.take(level.level);  // no points at all
+  HierarchyBlock& block = *level.open;
+  block.clustering.facilities.assign(1, kNoRepresentative);
+  block.first = {0, static_cast<std::uint32_t>(block.size())};
+  block.order.resize(block.size());
+  std::iota(block.order.begin(), block.order.end(), 0u);
+  Summary summary{bounds_of(block.positions), 0.0, block.size()};
+  if (block.level > 0) {
+    summary.descendants = 0;
+    for (const Summary& head : block.heads) {
+      include(summary.box, head.box);
+      summary.descendants += head.descendants;
+    }
+  }
+  block.summaries.assign(1, summary);
+  ++level.clusters;
+  sink_.root(block.finished());
+}
+
+}  // namespace terrace::cluster

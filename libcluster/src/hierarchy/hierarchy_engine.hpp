@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "hierarchy/block_pipeline.hpp"
+#include "hierarchy/hierarchy_block.hpp"
+#include "terrace/cluster/hierarchy.hpp"
+
+/// What HierarchyBuilder is made of; here tests can put another clustering in. Private.
+
+namespace terrace::cluster {
+
+class HierarchyEngine {
+ public:
+  /// make_cluster is called once per thread of the options.
+  HierarchyEngine(HierarchyOptions options, HierarchySink& sink,
+                  const std::function<ClusterFunction()>& make_cluster);
+
+  /// As HierarchyBuilder's.
+  void push(std::span<const Point3> positions, std::span<const std::byte> payload);
+  HierarchyResult finish();
+
+ private:
+  using BlockPtr = BlockPipeline::BlockPtr;
+
+  // A level is a stream of points cut into blocks. `open` is the block that the next point goes
+  // to; it is submitted when a point comes that does not fit, so that a level of just one block
+  // becomes the root.
+  struct Level {
+    unsigned level = 0;
+    BlockPtr open;
+    std::uint64_t points = 0;
+    std::uint64_t blocks = 0;    // submitted
+    std::uint64_t clusters = 0;  // committed
+  };
+
+  void append(std::span<const Point3> positions, std::span<const std::byte> payload);
+  void submit(Level& level);
+  void process(HierarchyBlock& block, unsigned thread);
+  void commit(HierarchyBlock& block);
+  void deliver_root(Level& level);
+  void check_open();
+
+  const HierarchyOptions options_;
+  HierarchySink& sink_;
+  std::vector<BlockProcessor> processors_;  // by thread
+  // Level 0 belongs to the caller of push(), except for `clusters`; that and the levels above to
+  // whoever commits. A deque, so that adding a level leaves `base_` where it is.
+  std::deque<Level> levels_;
+  Level& base_;
+  bool ended_ = false;
+  BlockPipeline pipeline_;  // last: its threads use all of the above
+};
+
+}  // namespace terrace::cluster

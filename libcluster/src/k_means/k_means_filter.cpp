@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "k_means/k_means_filter.hpp"
+
+#include <algorithm>
+#include <array>
+
+namespace terrace::cluster {
+namespace {
+
+constexpr std::size_t kBlock = KMeansTree::kBlock;
+
+/// Chunks are long beside k, so that their sums take less memory than the points.
+std::size_t chunk_level(const KMeansTree& tree, std::size_t clusters) {
+  const std::size_t least = std::max<std::size_t>(8192, 4 * clusters);
+  std::size_t level = 0;
+  for (std::size_t points = kBlock; points < least && level + 1 < tree.levels.size(); ++level) {
+    points *= KMeansTree::kFan;
+  }
+  return level;
+}
+
+template <int D>
+double distance2(double ax, double ay, double az, double bx, double by, double bz) {
+  const double x = ax - bx;
+  const double y = ay - by;
+  double sum = x * x + y * y;
+  if constexpr (D == 3) {
+    const double z = az - bz;
+    sum += z * z;
+  }
+  return sum;
+}
+
+}  // namespace
+
+KMeansFilter::KMeansFilter(const KMeansTree& tree, std::size_t clusters, ThreadTeam& team)
+    : tree_(tree),
+      clusters_(clusters),
+      team_(team),
+      chunk_level_(chunk_level(tree, clusters)),
+      cluster_(tree.block_count() * kBlock, kMixed),
+      owner_(tree.block_count(), kMixed),
+      sums_(clusters),
+      chunk_sums_(clusters * tree.levels[chunk_level_].size()),
+      scratch_(team.threads()) {
+  for (Scratch& scratch : scratch_) {
+    const std::size_t size = (chunk_level_ + 2) * clusters;
+    scratch.x.resize(size);
+    scratch.y.resize(size);
+    scratch.z.resize(size);
+    scratch.number.resize(size);
+  }
+}
+
+KMeansFilter::Candidates KMeansFilter::room(Scratch& scratch, std::size_t level) const {
+  const std::size_t at = level * clusters_;
+  return {&scratch.x[at], &scratch.y[at], &scratch.z[at], &scratch.number[at], 0};
+}
+
+bool KMeansFilter::assign(std::span<const Point3> centres) {
+  bool flat = true;
+  const KMeansTree::Node& root = tree_.levels.back().front();
+  flat = root.high[2] == 0.0;
+  for (const Point3& c : centres) flat = flat && c[2] == 0.0;
+  for (Scratch& scratch : scratch_) {
+    scratch.changed = false;
+    const Candidates all = room(scratch, chunk_level_ + 1);
+    for (std::uint32_t c = 0; c < centres.size(); ++c) {
+      all.x[c] = centres[c][0];
+      all.y[c] = centres[c][1];
+      all.z[c] = centres[c][2];
+      all.number[c] = c;
+    }
+  }
+  const std::size_t chunks = tree_.levels[chunk_level_].size();
+  team_.run(chunks, [&](std::size_t chunk, unsigned thread) {
+    const std::span<Sum> sums(chunk_sums_.data() + chunk * clusters_, clusters_);
+    std::fill(sums.begin(), sums.end(), Sum{});
+    Candidates all = room(scratch_[thread], chunk_level_ + 1);
+    all.count = centres.size();
+    if (flat) {
+      visit<2>(chunk_level_, chunk, all, scratch_[thread], sums);
+    } else {
+      visit<3>(chunk_level_, chunk, all, scratch_[thread], sums);
+    }
+  });
+  std::fill(sums_.begin(), sums_.end(), Sum{});
+  for (std::size_t chunk = 0; chunk < chunks; ++chunk) {
+    for (std::size_t c = 0; c < clusters_; ++c) {
+      const Sum& part = chunk_sums_[chunk * clusters_ + c];
+      for (unsigned axis = 0; axis < 3; ++axis) sums_[c].sum[axis] += part.sum[axis];
+      sums_[c].weight += part.weight;
+    }
+  }
+  return std::any_of(scratch_.begin(), scratch_.end(), [](const Scratch& s) { return s.changed; });
+}
+
+template <int D>
+void KMeansFilter::visit(std::size_t level, std::size_t index, const Candidates& from,
+                         Scratch& scratch, std::span<Sum> sums) {
+  const KMeansTree::Node& node = tree_.levels[level][index];
+  const double mx = 0.5 * (node.low[0] + node.high[0]);
+  const double my = 0.5 * (node.low[1] + node.high[1]);
+  const double mz = 0.5 * (node.low[2] + node.high[2]);
+  double least = distance2<D>(mx, my, mz, from.x[0], from.y[0], from.z[0]);
+  std::size_t best = 0;
+  for (std::size_t k = 1; k < from.count; ++k) {
+    const double d = distance2<D>(mx, my, mz, from.x[k], from.y[k], from.z[k]);
+    best = d < least ? k : best;
+    least = std::min(least, d);
+  }
+
+  // Against the best: |p - c|^2 - |p - best|^2 is linear in p and least at the corner farthest in
+  // the direction from the best to c. The margin covers the rounding of both squares anywhere in
+  // the box, whose error is relative.
+  const double bx = from.x[best];
+  const double by = from.y[best];
+  const double bz = from.z[best];
+  Candidates kept = room(scratch, level);
+  for (std::size_t k = 0; k < from.count; ++k) {
+    const double x = from.x[k];
+    const double y = from.y[k];
+    const double z = from.z[k];
+    const double px = x > bx ? node.high[0] : node.low[0];
+    const double py = y > by ? node.high[1] : node.low[1];
+    const double pz = z > bz ? node.high[2] : node.low[2];
+    const double to_this = distance2<D>(px, py, pz, x, y, z);
+    const double to_best = distance2<D>(px, py, pz, bx, by, bz);
+    kept.x[kept.count] = x;
+    kept.y[kept.count] = y;
+    kept.z[kept.count] = z;
+    kept.number[kept.count] = from.number[k];
+    const double margin = 4e-15 * (to_this + to_best + 2 * node.diagonal2);
+    kept.count += to_this - to_best > margin ? 0 : 1;
+  }
+
+  if (kept.count == 1) {
+    own(level, index, kept.number[0], scratch, sums);
+  } else if (level == 0) {
+    assign_block<D>(index, kept, scratch, sums);
+  } else {
+    const std::size_t first = index * KMeansTree::kFan;
+    const std::size_t end = std::min(first + KMeansTree::kFan, tree_.levels[level - 1].size());
+    for (std::size_t child = first; child < end; ++child) {
+      visit<D>(level - 1, child, kept, scratch, sums);
+    }
+  }
+}
+
+void KMeansFilter::own(std::size_t level, std::size_t index, std::uint32_t cluster,
+                       Scratch& scratch, std::span<Sum> sums) {
+  const KMeansTree::Node& node = tree_.levels[level][index];
+  for (unsigned axis = 0; axis < 3; ++axis) sums[cluster].sum[axis] += node.sum[axis];
+  sums[cluster].weight += node.weight;
+  const std::size_t end = tree_.first_block(level, index + 1);
+  for (std::size_t b = tree_.first_block(level, index); b < end; ++b) {
+    if (owner_[b] == cluster) continue;
+    owner_[b] = cluster;
+    for (std::size_t place = b * kBlock; place < (b + 1) * kBlock; ++place) {
+      scratch.changed = scratch.changed || cluster_[place] != cluster;
+      cluster_[place] = cluster;
+    }
+  }
+}
+
+template <int D>
+void KMeansFilter::assign_block(std::size_t block, const Candidates& candidates, Scratch& scratch,
+                                std::span<Sum> sums) {
+  const double* const x = &tree_.x[block * kBlock];
+  const double* const y = &tree_.y[block * kBlock];
+  const double* const z = &tree_.z[block * kBlock];
+  const double* const w = &tree_.w[block * kBlock];
+  std::array<double, kBlock> least;
+  std::array<double, kBlock> nearest{};  // a double, as the vectors of doubles select it
+  for (std::size_t i = 0; i < kBlock; ++i) {
+    least[i] = distance2<D>(x[i], y[i], z[i], candidates.x[0], candidates.y[0], candidates.z[0]);
+  }
+  for (std::size_t k = 1; k < candidates.count; ++k) {
+    const double cx = candidates.x[k];
+    const double cy = candidates.y[k];
+    const double cz = candidates.z[k];
+    const auto number = static_cast<double>(k);
+    for (std::size_t i = 0; i < kBlock; ++i) {
+      const double d = distance2<D>(x[i], y[i], z[i], cx, cy, cz);
+      nearest[i] = d < least[i] ? number : nearest[i];
+      least[i] = d < least[i] ? d : least[i];
+    }
+  }
+  std::uint32_t* const cluster = &cluster_[block * kBlock];
+  bool changed = false;
+  for (std::size_t i = 0; i < kBlock; ++i) {
+    const std::uint32_t c = candidates.number[static_cast<std::size_t>(nearest[i])];
+    changed = changed || cluster[i] != c;
+    cluster[i] = c;
+    Sum& sum = sums[c];
+    sum.sum[0] += w[i] * x[i];
+    sum.sum[1] += w[i] * y[i];
+    if constexpr (D == 3) sum.sum[2] += w[i] * z[i];
+    sum.weight += w[i];
+  }
+  scratch.changed = scratch.changed || changed;
+  owner_[block] = kMixed;
+}
+
+void KMeansFilter::move_point(std::size_t place, std::uint32_t cluster) {
+  cluster_[place] = cluster;
+  owner_[place / kBlock] = kMixed;
+  // The copies that fill the last block go with the last point: they must not count as a change.
+  if (place + 1 == tree_.count) {
+    std::fill(cluster_.begin() + static_cast<std::ptrdiff_t>(place), cluster_.end(), cluster);
+  }
+}
+
+}  // namespace terrace::cluster

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "k_means/k_means_tree.hpp"
+#include "thread_team.hpp"
+
+namespace terrace::cluster {
+
+/// Assigns the points of a tree to the nearest of k centres. From the root down each node keeps the
+/// centres that may be nearest to some point of its box; where one is left the whole node is its.
+/// What is left out is farther than another centre from all of the box by more than rounding, so
+/// the assignment is the one of comparing all computed distances, the lowest number among equals.
+class KMeansFilter {
+ public:
+  struct Sum {
+    Point3 sum{};  ///< of weight times position
+    double weight = 0;
+  };
+
+  /// tree and team outlive this object.
+  KMeansFilter(const KMeansTree& tree, std::size_t clusters, ThreadTeam& team);
+
+  /// One assignment. Returns whether a point changed its cluster since the last.
+  bool assign(std::span<const Point3> centres);
+
+  /// Of the clusters; always added up in the same order.
+  [[nodiscard]] std::span<Sum> sums() { return sums_; }
+  /// The cluster of the point at a place.
+  [[nodiscard]] std::uint32_t cluster(std::size_t place) const { return cluster_[place]; }
+  /// Overrules the last assignment.
+  void move_point(std::size_t place, std::uint32_t cluster);
+
+ private:
+  // Centres that may be nearest to a point of a node, in ascending order.
+  struct Candidates {
+    double* x;
+    double* y;
+    double* z;
+    std::uint32_t* number;
+    std::size_t count;
+  };
+  struct Scratch {
+    std::vector<double> x, y, z;  // room for k candidates on each level
+    std::vector<std::uint32_t> number;
+    std::vector<Sum> sums;  // of the chunk in work
+    bool changed = false;
+  };
+
+  template <int D>
+  void visit(std::size_t level, std::size_t node, const Candidates& from, Scratch& scratch,
+             std::span<Sum> sums);
+  template <int D>
+  void assign_block(std::size_t block, const Candidates& candidates, Scratch& scratch,
+                    std::span<Sum> sums);
+  void own(std::size_t level, std::size_t node, std::uint32_t cluster, Scratch& scratch,
+           std::span<Sum> sums);
+  [[nodiscard]] Candidates room(Scratch& scratch, std::size_t level) const;
+
+  static constexpr std::uint32_t kMixed = UINT32_MAX;
+
+  const KMeansTree& tree_;
+  const std::size_t clusters_;
+  ThreadTeam& team_;
+  std::size_t chunk_level_ = 0;         // the nodes of this level are shared among threads
+  std::vector<std::uint32_t> cluster_;  // by place, padded
+  std::vector<std::uint32_t> owner_;    // by block: the cluster of all its points, or kMixed
+  std::vector<Sum> sums_;
+  std::vector<Sum> chunk_sums_;
+  std::vector<Scratch> scratch_;  // by thread
+};
+
+}  // namespace terrace::cluster

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <random>
+#include <vector>
+
+#include "k_means/k_means_tree.hpp"
+
+namespace terrace::cluster {
+
+/// Places of k seeds by greedy k-means++: each is drawn with probability proportional to weight
+/// times squared distance to the nearest seed so far, a few times, and the draw that leaves the
+/// least sum of these is taken. Boxes that a new seed cannot serve better are left out.
+[[nodiscard]] std::vector<Point3> k_means_seeds(const KMeansTree& tree, std::size_t clusters,
+                                                std::mt19937_64& random);
+
+}  // namespace terrace::cluster

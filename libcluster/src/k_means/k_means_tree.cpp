@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "k_means/k_means_tree.hpp"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+namespace terrace::cluster {
+namespace {
+
+constexpr unsigned kAxisBits = 20;
+
+/// The lowest twenty bits with one gap each, or with two.
+std::uint64_t spread_by_one(std::uint64_t v) {
+  v = (v | v << 16) & 0x0000FFFF0000FFFF;
+  v = (v | v << 8) & 0x00FF00FF00FF00FF;
+  v = (v | v << 4) & 0x0F0F0F0F0F0F0F0F;
+  v = (v | v << 2) & 0x3333333333333333;
+  return (v | v << 1) & 0x5555555555555555;
+}
+std::uint64_t spread_by_two(std::uint64_t v) {
+  v = (v | v << 32) & 0x001F00000000FFFF;
+  v = (v | v << 16) & 0x001F0000FF0000FF;
+  v = (v | v << 8) & 0x100F00F00F00F00F;
+  v = (v | v << 4) & 0x10C30C30C30C30C3;
+  return (v | v << 2) & 0x1249249249249249;
+}
+
+struct Keyed {
+  std::uint64_t key;
+  std::uint32_t index;
+};
+
+/// Stable, by the lowest `bits` of the keys.
+void radix_sort(std::vector<Keyed>& items, unsigned bits) {
+  constexpr unsigned kDigitBits = 10;
+  constexpr std::size_t kDigits = std::size_t{1} << kDigitBits;
+  std::vector<Keyed> other(items.size());
+  for (unsigned shift = 0; shift < bits; shift += kDigitBits) {
+    std::array<std::size_t, kDigits> place{};
+    for (const Keyed& item : items) ++place[(item.key >> shift) % kDigits];
+    std::size_t sum = 0;
+    for (std::size_t& p : place) sum += std::exchange(p, sum);
+    for (const Keyed& item : items) other[place[(item.key >> shift) % kDigits]++] = item;
+    items.swap(other);
+  }
+}
+
+KMeansTree::Node joined(std::span<const KMeansTree::Node> children) {
+  KMeansTree::Node node = children.front();
+  for (const KMeansTree::Node& child : children.subspan(1)) {
+    for (unsigned axis = 0; axis < 3; ++axis) {
+      node.low[axis] = std::min(node.low[axis], child.low[axis]);
+      node.high[axis] = std::max(node.high[axis], child.high[axis]);
+      node.sum[axis] += child.sum[axis];
+    }
+    node.weight += child.weight;
+  }
+  node.diagonal2 = 0;
+  for (unsigned axis = 0; axis < 3; ++axis) {
+    const double side = node.high[axis] - node.low[axis];
+    node.diagonal2 += side * side;
+  }
+  return node;
+}
+
+}  // namespace
+
+KMeansTree::KMeansTree(std::span<const Point3> points, std::span<const double> weights,
+                       const Scaling& scaling)
+    : count(points.size()) {
+  const bool flat = scaling.extent[2] == 0.0;
+  std::vector<Keyed> order(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const Point3 p = scaling.scaled(points[i]);
+    const auto cell = [&](unsigned axis) {
+      return std::min(static_cast<std::uint64_t>(p[axis] * (1u << kAxisBits)),
+                      (std::uint64_t{1} << kAxisBits) - 1);
+    };
+    const std::uint64_t key =
+        flat ? spread_by_one(cell(0)) | spread_by_one(cell(1)) << 1
+             : spread_by_two(cell(0)) | spread_by_two(cell(1)) << 1 | spread_by_two(cell(2)) << 2;
+    order[i] = {key, static_cast<std::uint32_t>(i)};
+  }
+  radix_sort(order, (flat ? 2 : 3) * kAxisBits);
+
+  const std::size_t blocks = (count + kBlock - 1) / kBlock;
+  for (std::vector<double>* column : {&x, &y, &z, &w}) column->resize(blocks * kBlock);
+  original.resize(count);
+  for (std::size_t place = 0; place < blocks * kBlock; ++place) {
+    const std::uint32_t i = order[std::min(place, count - 1)].index;
+    const Point3 p = scaling.scaled(points[i]);
+    x[place] = p[0];
+    y[place] = p[1];
+    z[place] = p[2];
+    if (place < count) {
+      original[place] = i;
+      w[place] = weights.empty() ? 1.0 : weights[i];
+    }
+  }
+
+  std::vector<Node> level(blocks);
+  for (std::size_t b = 0; b < blocks; ++b) {
+    std::array<Node, kBlock> single;
+    for (std::size_t k = 0; k < kBlock; ++k) {
+      const std::size_t place = b * kBlock + k;
+      const Point3 p = point(place);
+      single[k] = {p, p, 0.0, {w[place] * p[0], w[place] * p[1], w[place] * p[2]}, w[place]};
+    }
+    level[b] = joined(single);
+  }
+  while (level.size() > 1) {
+    std::vector<Node> above((level.size() + kFan - 1) / kFan);
+    for (std::size_t k = 0; k < above.size(); ++k) {
+      const std::size_t first = k * kFan;
+      above[k] =
+          joined(std::span<const Node>(level).subspan(first, std::min(kFan, level.size() - first)));
+    }
+    levels.push_back(std::exchange(level, std::move(above)));
+  }
+  levels.push_back(std::move(level));
+}
+
+std::size_t KMeansTree::first_block(std::size_t level, std::size_t node) const {
+  for (; level > 0; --level) node *= kFan;
+  return std::min(node, block_count());
+}
+
+}  // namespace terrace::cluster

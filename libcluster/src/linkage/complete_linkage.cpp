@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/cluster/complete_linkage.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <stdexcept>
+#include <string>
+
+#include "linkage/complete_rounds.hpp"
+#include "linkage/linkage_points.hpp"
+#include "linkage/linkage_tree.hpp"
+
+namespace terrace::cluster {
+namespace {
+
+template <class T>
+const LinkageKernels<T>& kernels_of(SimdPath path) {
+  const SimdPath best = best_simd_path();
+  if (path == SimdPath::automatic) path = best;
+  if (path > best) {
+    throw std::invalid_argument(
+        "this processor lacks the instructions of the SIMD path asked for; "
+        "SimdPath::automatic takes the best there is");
+  }
+#ifdef TERRACE_CLUSTER_X86
+  if constexpr (sizeof(T) == sizeof(float)) {
+    if (path == SimdPath::avx512) return kLinkageFloatAvx512;
+    if (path == SimdPath::avx2) return kLinkageFloatAvx2;
+  } else {
+    if (path == SimdPath::avx512) return kLinkageDoubleAvx512;
+    if (path == SimdPath::avx2) return kLinkageDoubleAvx2;
+  }
+#endif
+  if constexpr (sizeof(T) == sizeof(float)) {
+    return kLinkageFloatPortable;
+  } else {
+    return kLinkageDoublePortable;
+  }
+}
+
+std::string pair_text(std::size_t i, std::size_t j) {
+  return "the distance of " + std::to_string(std::min(i, j)) + " and " +
+         std::to_string(std::max(i, j));
+}
+
+void check_distance(double value, double most, std::size_t i, std::size_t j) {
+  if (value >= 0.0 && value <= most) return;
+  throw std::invalid_argument(pair_text(i, j) + " is " + std::to_string(value) +
+                              "; distances must be finite and not negative");
+}
+
+template <class T>
+Dendrogram of_points(std::span<const Point3> points, const CompleteLinkageOptions& options) {
+  const LinkageKernels<T>& kernels = kernels_of<T>(options.path);
+  const LinkagePoints linkage_points(points);
+  BandMatrix<T> matrix(points.size(), options.memory_limit);
+  if (points.size() < 2) return make_dendrogram(points.size(), {});
+  // In the order of a kD-tree most clusters that merge have rows that are near in the matrix.
+  std::vector<std::uint32_t> all(points.size());
+  std::iota(all.begin(), all.end(), 0u);
+  const LinkageTree tree(linkage_points.scaled(), all, options.threads);
+  const double* const x = tree.axis(0);
+  const double* const y = tree.axis(1);
+  const double* const z = tree.axis(2);
+  CompleteRounds<T> rounds(matrix, kernels, options.threads);
+  std::vector<Link> links = rounds.run([&](std::size_t i, T* row) {
+    const std::size_t after = std::min(matrix.width(), points.size() - 1 - i);
+    kernels.distances(x + i + 1, y + i + 1, z + i + 1, after, x[i], y[i], z[i], row);
+    kernels.distances(x, y, z, matrix.width() - after, x[i], y[i], z[i], row + after);
+  });
+  for (Link& link : links) {
+    link = {tree.number(link.i), tree.number(link.j), linkage_points.height(link.height)};
+  }
+  return make_dendrogram(points.size(), links);
+}
+
+/// An order in which near things are near: halves by which of two far things is nearer, and so on.
+/// Three calls of `distance` for each thing and level.
+void order_by_distance(std::span<std::uint32_t> things, const PairDistance& distance) {
+  constexpr std::size_t kEnough = 8;
+  if (things.size() <= kEnough) return;
+  struct Item {
+    double key;
+    std::uint32_t thing;
+  };
+  std::vector<Item> items(things.size());
+  const auto measure_from = [&](std::uint32_t pole, double sign) {
+    for (std::size_t i = 0; i < things.size(); ++i) {
+      const double d = things[i] == pole ? 0.0 : distance(pole, things[i]);
+      items[i] = {sign * d + (sign < 0 ? items[i].key : 0.0), things[i]};
+    }
+  };
+  const auto farthest = [&] {
+    return std::max_element(items.begin(), items.end(),
+                            [](const Item& x, const Item& y) { return x.key < y.key; })
+        ->thing;
+  };
+  measure_from(things.front(), 1.0);
+  const std::uint32_t pole = farthest();
+  measure_from(pole, 1.0);
+  measure_from(farthest(), -1.0);
+  const std::size_t half = things.size() / 2;
+  std::nth_element(items.begin(), items.begin() + static_cast<std::ptrdiff_t>(half), items.end(),
+                   [](const Item& x, const Item& y) {
+                     return x.key < y.key || (x.key == y.key && x.thing < y.thing);
+                   });
+  for (std::size_t i = 0; i < things.size(); ++i) things[i] = items[i].thing;
+  // Which things a half has does not depend on how the library finds a median; their order would.
+  std::sort(things.begin(), things.begin() + static_cast<std::ptrdiff_t>(half));
+  std::sort(things.begin() + static_cast<std::ptrdiff_t>(half), things.end());
+  order_by_distance(things.first(half), distance);
+  order_by_distance(things.subspan(half), distance);
+}
+
+template <class T>
+Dendrogram of_function(std::size_t count, const PairDistance& distance,
+                       const CompleteLinkageOptions& options) {
+  const LinkageKernels<T>& kernels = kernels_of<T>(options.path);
+  BandMatrix<T> matrix(count, options.memory_limit);
+  const auto checked = [&](std::uint32_t i, std::uint32_t j) {
+    const double value = distance(std::min(i, j), std::max(i, j));
+    check_distance(value, std::numeric_limits<T>::max(), i, j);
+    return value;
+  };
+  // As of points: clusters that merge should have rows that are near in the matrix.
+  std::vector<std::uint32_t> thing(count);
+  std::iota(thing.begin(), thing.end(), 0u);
+  order_by_distance(thing, checked);
+  CompleteRounds<T> rounds(matrix, kernels, options.threads);
+  std::vector<Link> links = rounds.run([&](std::size_t i, T* row) {
+    // The second copies are never read.
+    const bool second_copy = count % 2 == 0 && i >= count / 2;
+    for (std::size_t k = 0; k < matrix.width() - (second_copy ? 1 : 0); ++k) {
+      row[k] = static_cast<T>(checked(thing[i], thing[band_partner(count, {i, k})]));
+    }
+  });
+  for (Link& link : links) link = {thing[link.i], thing[link.j], link.height};
+  return make_dendrogram(count, links);
+}
+
+}  // namespace
+
+Dendrogram complete_linkage(std::span<const Point3> points, const CompleteLinkageOptions& options) {
+  return options.entry == MatrixEntry::float32 ? of_points<float>(points, options)
+                                               : of_points<double>(points, options);
+}
+
+Dendrogram complete_linkage(std::size_t count, const PairDistance& distance,
+                            const CompleteLinkageOptions& options) {
+  return options.entry == MatrixEntry::float32 ? of_function<float>(count, distance, options)
+                                               : of_function<double>(count, distance, options);
+}
+
+template <class T>
+Dendrogram complete_linkage(BandMatrix<T>&& distances, const CompleteLinkageOptions& options) {
+  const std::size_t n = distances.size();
+  for (std::size_t i = 0; n % 2 == 0 && i < n / 2; ++i) {
+    const std::size_t j = i + n / 2;
+    if (distances.at(i, j) != distances.at(j, i)) {
+      throw std::invalid_argument(pair_text(i, j) +
+                                  " is in the matrix twice, with different values");
+    }
+  }
+  CompleteRounds<T> rounds(distances, kernels_of<T>(options.path), options.threads);
+  const std::vector<Link> links = rounds.run([&](std::size_t i, const T* row) {
+    for (std::size_t k = 0; k < distances.width(); ++k) {
+      check_distance(row[k], std::numeric_limits<T>::max(), i, band_partner(n, {i, k}));
+    }
+  });
+  return make_dendrogram(n, links);
+}
+
+template Dendrogram complete_linkage(BandMatrix<float>&&, const CompleteLinkageOptions&);
+template Dendrogram complete_linkage(BandMatrix<double>&&, const CompleteLinkageOptions&);
+
+}  // namespace terrace::cluster

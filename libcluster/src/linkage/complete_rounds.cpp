@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "linkage/complete_rounds.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <limits>
+
+#include "parallel.hpp"
+
+namespace terrace::cluster {
+namespace {
+
+constexpr std::size_t kRowsPerBlock = 32;
+constexpr std::size_t kThreadsFrom = 512;  ///< clusters; below, threads cost more than they save
+constexpr std::size_t kChainBelow = 8;     ///< a round that merges less than 1/8 is followed by it
+
+}  // namespace
+
+template <class T>
+CompleteRounds<T>::CompleteRounds(BandMatrix<T>& matrix, const LinkageKernels<T>& kernels,
+                                  unsigned threads)
+    : kernels_(kernels),
+      threads_(std::clamp(threads, 1u, 256u)),
+      clusters_(matrix.size()),
+      columns_(threads_) {
+  const auto n = static_cast<std::uint32_t>(matrix.size());
+  for (std::uint32_t c = 0; c < n; ++c) {
+    const bool second_copy = n % 2 == 0 && c >= n / 2;
+    clusters_[c] = {matrix.row(c), n / 2 - (second_copy ? 1u : 0u), c};
+  }
+}
+
+template <class T>
+std::vector<Link> CompleteRounds<T>::run(const FillRow& fill) {
+  begin_minima(size());
+  parallel_blocks(
+      size(), kRowsPerBlock, threads(), [&](std::size_t begin, std::size_t end, unsigned thread) {
+        for (std::size_t c = begin; c < end; ++c) {
+          fill(c, clusters_[c].row);
+          note_minima(static_cast<std::uint32_t>(c), clusters_[c], size(), columns_[thread]);
+        }
+      });
+  end_minima();
+  while (size() > 1) {
+    const std::size_t before = size();
+    const std::size_t pairs = match();
+    list_parts();
+    parallel_blocks(first_.size(), kRowsPerBlock, threads(),
+                    [&](std::size_t begin, std::size_t end, unsigned thread) {
+                      for (std::size_t k = begin; k < end; ++k) {
+                        bring_in(static_cast<std::uint32_t>(k), columns_[thread]);
+                      }
+                    });
+    shrink();
+    if (pairs * kChainBelow < before && size() > 1) {
+      chain();
+      shrink();
+    }
+  }
+  return std::move(links_);
+}
+
+template <class T>
+unsigned CompleteRounds<T>::threads() const {
+  return size() < kThreadsFrom ? 1 : threads_;
+}
+
+template <class T>
+typename CompleteRounds<T>::Pieces CompleteRounds<T>::pieces(std::uint32_t c) const {
+  const Cluster& cluster = clusters_[c];
+  const std::uint32_t after = std::min(cluster.length, size() - 1 - c);
+  return {{c + 1, c + 1 + after, cluster.row}, {0, cluster.length - after, cluster.row + after}};
+}
+
+template <class T>
+void CompleteRounds<T>::begin_minima(std::size_t count) {
+  ahead_.resize(count);
+  for (Columns& columns : columns_) {
+    columns.best.assign(count, std::numeric_limits<T>::infinity());
+    columns.row.assign(count, 0);
+  }
+}
+
+/// Of cluster c out of `count`.
+template <class T>
+void CompleteRounds<T>::note_minima(std::uint32_t c, const Cluster& cluster, std::uint32_t count,
+                                    Columns& columns) {
+  const std::uint32_t after = std::min(cluster.length, count - 1 - c);
+  const std::uint32_t wrapped = cluster.length - after;
+  T least = std::numeric_limits<T>::infinity();
+  std::uint32_t place = kNone;
+  const auto row = static_cast<Index>(c);
+  const std::size_t first = kernels_.minima(cluster.row, after, row, columns.best.data() + c + 1,
+                                            columns.row.data() + c + 1, &least);
+  if (first < after) place = c + 1 + static_cast<std::uint32_t>(first);
+  const std::size_t second = kernels_.minima(cluster.row + after, wrapped, row, columns.best.data(),
+                                             columns.row.data(), &least);
+  if (second < wrapped) place = static_cast<std::uint32_t>(second);
+  ahead_[c] = {least, place};
+}
+
+/// Each thread took rows in ascending order, so the first of equal ones is that of least number.
+template <class T>
+void CompleteRounds<T>::end_minima() {
+  behind_.assign(ahead_.size(), {std::numeric_limits<T>::infinity(), kNone});
+  for (const Columns& columns : columns_) {
+    for (std::size_t c = 0; c < behind_.size(); ++c) {
+      const auto row = static_cast<std::uint32_t>(columns.row[c]);
+      Nearest& best = behind_[c];
+      if (columns.best[c] < best.distance ||
+          (columns.best[c] == best.distance && row < best.cluster)) {
+        best = {columns.best[c], row};
+      }
+    }
+  }
+}
+
+template <class T>
+const typename CompleteRounds<T>::Nearest& CompleteRounds<T>::nearest(std::uint32_t c) const {
+  return behind_[c].distance < ahead_[c].distance ? behind_[c] : ahead_[c];
+}
+
+/// Pairs up clusters that are each other's nearest. At equal distances, which regular grids have
+/// throughout, a cluster has the choice of the first ahead and the first behind, and takes what is
+/// left: where all would insist on one of their nearest, few pairs would agree.
+template <class T>
+std::size_t CompleteRounds<T>::match() {
+  partner_.assign(size(), kNone);
+  const std::size_t before = links_.size();
+  for (std::uint32_t c = 0; c < size(); ++c) {
+    if (partner_[c] == kNone && !pair_up(c, ahead_[c])) pair_up(c, behind_[c]);
+  }
+  assert(links_.size() > before);
+  return links_.size() - before;
+}
+
+template <class T>
+bool CompleteRounds<T>::pair_up(std::uint32_t c, const Nearest& candidate) {
+  const std::uint32_t other = candidate.cluster;
+  if (other == kNone || partner_[other] != kNone) return false;
+  const T distance = nearest(c).distance;
+  if (candidate.distance != distance || nearest(other).distance != distance) return false;
+  partner_[c] = other;
+  partner_[other] = c;
+  links_.push_back({clusters_[c].name, clusters_[other].name, static_cast<double>(distance)});
+  return true;
+}
+
+/// The new clusters, in the order of their first parts.
+template <class T>
+void CompleteRounds<T>::list_parts() {
+  first_.clear();
+  second_.clear();
+  pair_first_.clear();
+  pair_second_.clear();
+  new_cluster_.resize(size());
+  firsts_before_.resize(size() + 1);
+  for (std::uint32_t c = 0; c < size(); ++c) {
+    firsts_before_[c] = static_cast<std::uint32_t>(first_.size());
+    if (partner_[c] != kNone && partner_[c] < c) continue;
+    const std::uint32_t other = partner_[c] == kNone ? c : partner_[c];
+    new_cluster_[c] = new_cluster_[other] = firsts_before_[c];
+    first_.push_back(c);
+    second_.push_back(other);
+    if (other != c) {
+      pair_first_.push_back(c);
+      pair_second_.push_back(other);
+    }
+  }
+  firsts_before_[size()] = static_cast<std::uint32_t>(first_.size());
+}
+
+/// The row of the new cluster k, after bring_in().
+template <class T>
+typename CompleteRounds<T>::Cluster CompleteRounds<T>::shrunk(std::uint32_t k, Columns& columns) {
+  const std::uint32_t a = first_[k];
+  const std::uint32_t m = size();
+  const Pieces own = pieces(a);
+  T* const wide = columns.buffer.data();
+  // Zero where the row of a has no entry: never the larger one.
+  std::fill(wide + own.wrapped.end, wide + a + 1, T{0});
+  std::fill(wide + own.after.end, wide + m, T{0});
+  std::copy_n(own.after.values, own.after.end - own.after.begin, wide + own.after.begin);
+  std::copy_n(own.wrapped.values, own.wrapped.end, wide);
+  if (second_[k] != a) {
+    const Pieces other = pieces(second_[k]);
+    for (const Piece& to : {own.after, own.wrapped}) {
+      for (const Piece& from : {other.after, other.wrapped}) {
+        const std::uint32_t begin = std::max(to.begin, from.begin);
+        const std::uint32_t end = std::min(to.end, from.end);
+        if (begin < end)
+          kernels_.raise(wide + begin, from.values + (begin - from.begin), end - begin);
+      }
+    }
+  }
+  const auto count = static_cast<std::uint32_t>(first_.size());
+  const std::uint32_t after = firsts_before_[own.after.end] - firsts_before_[own.after.begin];
+  const std::uint32_t wrapped = firsts_before_[own.wrapped.end];
+  assert(wrapped == 0 || k + 1 + after == count);
+  (void)count;
+  T* const row = clusters_[a].row;
+  kernels_.pick(wide, first_.data() + k + 1, second_.data() + k + 1, after, row);
+  kernels_.pick(wide, first_.data(), second_.data(), wrapped, row + after);
+  return {row, after + wrapped, clusters_[a].name};
+}
+
+/// Goes over to the new clusters and finds their nearest.
+template <class T>
+void CompleteRounds<T>::shrink() {
+  const auto count = static_cast<std::uint32_t>(first_.size());
+  begin_minima(count);
+  for (Columns& columns : columns_) columns.buffer.resize(size());
+  std::vector<Cluster> next(count);
+  parallel_blocks(count, kRowsPerBlock, threads(),
+                  [&](std::size_t begin, std::size_t end, unsigned thread) {
+                    for (std::size_t k = begin; k < end; ++k) {
+                      const auto c = static_cast<std::uint32_t>(k);
+                      next[k] = shrunk(c, columns_[thread]);
+                      note_minima(c, next[k], count, columns_[thread]);
+                    }
+                  });
+  clusters_.swap(next);
+  end_minima();
+}
+
+template class CompleteRounds<float>;
+template class CompleteRounds<double>;
+
+}  // namespace terrace::cluster

@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "linkage/linkage_kernels.hpp"
+#include "terrace/cluster/band_matrix.hpp"
+#include "terrace/cluster/dendrogram.hpp"
+
+/// Private to complete linkage.
+
+namespace terrace::cluster {
+
+/// Complete linkage over a band matrix, which it uses up.
+///
+/// Clusters are numbered 0..m-1 along the matrix. The row of cluster c holds its distances to the
+/// `length` clusters that follow, modulo m. When clusters merge or go, rows shrink where they are:
+/// a pair stays in the row of the same cluster for good, so lengths begin to differ, but no entry
+/// ever moves to another row. A new cluster takes the place of the first of its two parts.
+template <class T>
+class CompleteRounds {
+ public:
+  /// Makes the entries of row i of the matrix, or checks them; several rows at once, in any order.
+  using FillRow = std::function<void(std::size_t i, T* row)>;
+
+  CompleteRounds(BandMatrix<T>& matrix, const LinkageKernels<T>& kernels, unsigned threads);
+  /// All merges, by the first rows of the clusters. Of a pair that is there twice (even n), only
+  /// the copy in the upper half of the matrix counts.
+  std::vector<Link> run(const FillRow& fill);
+
+ private:
+  using Index = LaneIndex<T>;
+  static constexpr std::uint32_t kNone = 0xffffffffu;
+
+  struct Cluster {
+    T* row;
+    std::uint32_t length;
+    std::uint32_t name;  ///< of one of its points
+  };
+  struct Nearest {
+    T distance;
+    std::uint32_t cluster;
+  };
+  /// Entries of consecutive columns.
+  struct Piece {
+    std::uint32_t begin, end;
+    const T* values;
+  };
+  struct Pieces {
+    Piece after, wrapped;
+  };
+  /// What a thread found out about columns, and room for its work.
+  struct Columns {
+    std::vector<T> best;
+    std::vector<Index> row;
+    std::vector<T> buffer;
+    std::vector<std::uint32_t> others;
+  };
+
+  [[nodiscard]] std::uint32_t size() const { return static_cast<std::uint32_t>(clusters_.size()); }
+  /// Steps from a to b, less one, modulo their number: the place of b in the row of a.
+  [[nodiscard]] std::uint32_t offset(std::uint32_t a, std::uint32_t b) const {
+    return b > a ? b - a - 1 : b + size() - a - 1;
+  }
+  [[nodiscard]] bool holds(std::uint32_t a, std::uint32_t b) const {
+    return offset(a, b) < clusters_[a].length;
+  }
+  [[nodiscard]] T& entry(std::uint32_t a, std::uint32_t b) {
+    return holds(a, b) ? clusters_[a].row[offset(a, b)] : clusters_[b].row[offset(b, a)];
+  }
+  [[nodiscard]] Pieces pieces(std::uint32_t c) const;
+  [[nodiscard]] unsigned threads() const;
+
+  // Nearest clusters, row by row.
+  void begin_minima(std::size_t count);
+  void note_minima(std::uint32_t c, const Cluster& cluster, std::uint32_t count, Columns& columns);
+  void end_minima();
+  [[nodiscard]] const Nearest& nearest(std::uint32_t c) const;
+
+  // One round.
+  std::size_t match();
+  bool pair_up(std::uint32_t c, const Nearest& candidate);
+  void list_parts();
+  void bring_in(std::uint32_t k, Columns& columns);
+  void list_others(std::uint32_t k, std::vector<std::uint32_t>& others) const;
+  [[nodiscard]] Cluster shrunk(std::uint32_t k, Columns& columns);
+  void shrink();
+
+  // The chain.
+  void chain();
+  [[nodiscard]] Nearest nearest_of(std::uint32_t c, Nearest best);
+  void merge_into(std::uint32_t a, std::uint32_t b);
+
+  const LinkageKernels<T>& kernels_;
+  const unsigned threads_;
+  std::vector<Cluster> clusters_;
+  std::vector<Columns> columns_;         ///< of each thread
+  std::vector<Nearest> ahead_, behind_;  ///< nearest in the own row, and in the own column
+  std::vector<std::uint32_t> partner_;   ///< with which a cluster merges, or kNone
+  /// New clusters: their parts, the same twice if there is one only; and of each old cluster the
+  /// new one, and how many first parts come before it.
+  std::vector<std::uint32_t> first_, second_, new_cluster_, firsts_before_;
+  std::vector<std::uint32_t> pair_first_, pair_second_;  ///< those with two parts
+  std::vector<Link> links_;
+};
+
+extern template class CompleteRounds<float>;
+extern template class CompleteRounds<double>;
+
+}  // namespace terrace::cluster

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/cluster/dendrogram.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <stdexcept>
+#include <string>
+
+#include "linkage/union_find.hpp"
+
+namespace terrace::cluster {
+namespace {
+
+constexpr std::uint32_t kNoLabel = 0xffffffffu;
+
+std::string text_of(const Link& link) {
+  return "points " + std::to_string(link.i) + " and " + std::to_string(link.j);
+}
+
+/// Numbers of the links by height, equal ones in the order in which they came.
+std::vector<std::uint32_t> by_height(std::span<const Link> links) {
+  struct Key {
+    double height;
+    std::uint32_t link;
+  };
+  std::vector<Key> keys(links.size());
+  for (std::uint32_t r = 0; r < links.size(); ++r) keys[r] = {links[r].height, r};
+  std::sort(keys.begin(), keys.end(), [](const Key& x, const Key& y) {
+    return x.height < y.height || (x.height == y.height && x.link < y.link);
+  });
+  std::vector<std::uint32_t> order(links.size());
+  for (std::size_t r = 0; r < order.size(); ++r) order[r] = keys[r].link;
+  return order;
+}
+
+/// Flat clusters after the first `count` merges.
+std::vector<std::uint32_t> labels_after(const Dendrogram& dendrogram, std::size_t count) {
+  const std::size_t n = dendrogram.points;
+  // A cluster that is merged no more names itself, others get the name from above.
+  std::vector<std::uint32_t> name(n + count, kNoLabel);
+  for (std::size_t r = count; r-- > 0;) {
+    const Merge& merge = dendrogram.merges[r];
+    const auto self = static_cast<std::uint32_t>(n + r);
+    if (name[self] == kNoLabel) name[self] = self;
+    name[merge.a] = name[merge.b] = name[self];
+  }
+  std::vector<std::uint32_t> label(n + count, kNoLabel);
+  std::vector<std::uint32_t> result(n);
+  std::uint32_t next = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    const std::size_t cluster = name[i] == kNoLabel ? i : name[i];
+    if (label[cluster] == kNoLabel) label[cluster] = next++;
+    result[i] = label[cluster];
+  }
+  return result;
+}
+
+std::size_t merges_up_to(const Dendrogram& dendrogram, double height) {
+  const auto end = std::upper_bound(dendrogram.merges.begin(), dendrogram.merges.end(), height,
+                                    [](double h, const Merge& merge) { return h < merge.height; });
+  return static_cast<std::size_t>(end - dendrogram.merges.begin());
+}
+
+}  // namespace
+
+Dendrogram make_dendrogram(std::size_t points, std::span<const Link> links) {
+  if (points > kMostDendrogramPoints) {
+    throw std::invalid_argument(std::to_string(points) + " points are too many: a dendrogram has " +
+                                "at most 2^31");
+  }
+  if (links.size() != (points == 0 ? 0 : points - 1)) {
+    throw std::invalid_argument(std::to_string(links.size()) + " links for " +
+                                std::to_string(points) + " points; there must be one fewer");
+  }
+  for (std::size_t r = 0; r < links.size(); ++r) {
+    const Link& link = links[r];
+    const auto fail = [&](const char* what) {
+      throw std::invalid_argument("link " + std::to_string(r) + " of " + text_of(link) + " " +
+                                  what);
+    };
+    if (link.i >= points || link.j >= points) fail("names a point that there is not");
+    if (!(link.height >= 0.0)) fail("has a height that is negative or not a number");
+  }
+  Dendrogram dendrogram{.points = points, .merges = {}};
+  dendrogram.merges.reserve(links.size());
+  UnionFind sets(points);
+  std::vector<std::uint32_t> cluster(points);
+  std::vector<std::uint32_t> size(points, 1);
+  std::iota(cluster.begin(), cluster.end(), 0u);
+  auto next = static_cast<std::uint32_t>(points);
+  for (const std::uint32_t r : by_height(links)) {
+    const std::uint32_t x = sets.find(links[r].i);
+    const std::uint32_t y = sets.find(links[r].j);
+    if (!sets.unite(x, y)) {
+      throw std::invalid_argument("link " + std::to_string(r) + ": " + text_of(links[r]) +
+                                  " are one cluster already; links must form a tree");
+    }
+    const std::uint32_t root = std::min(x, y);
+    const auto [a, b] = std::minmax(cluster[x], cluster[y]);
+    size[root] = size[x] + size[y];
+    dendrogram.merges.push_back({a, b, links[r].height, size[root]});
+    cluster[root] = next++;
+  }
+  return dendrogram;
+}
+
+std::vector<std::uint32_t> cut_height(const Dendrogram& dendrogram, double height) {
+  if (std::isnan(height)) throw std::invalid_argument("the height of the cut is not a number");
+  return labels_after(dendrogram, merges_up_to(dendrogram, height));
+}
+
+std::vector<std::uint32_t> cut_count(const Dendrogram& dendrogram, std::size_t count) {
+  const std::size_t n = dendrogram.points;
+  if (count == 0 || count > n) {
+    throw std::invalid_argument("a cut into " + std::to_string(count) + " clusters of " +
+                                std::to_string(n) + " points; it must be from 1 to their number");
+  }
+  if (count == n) return labels_after(dendrogram, 0);
+  return labels_after(dendrogram,
+                      merges_up_to(dendrogram, dendrogram.merges[n - count - 1].height));
+}
+
+std::string dendrogram_fault(const Dendrogram& dendrogram) {
+  const std::size_t n = dendrogram.points;
+  if (n > kMostDendrogramPoints) return "more than 2^31 points";
+  if (dendrogram.merges.size() != (n == 0 ? 0 : n - 1)) {
+    return std::to_string(dendrogram.merges.size()) + " rows for " + std::to_string(n) + " points";
+  }
+  std::vector<bool> merged(2 * n, false);
+  const auto size_of = [&](std::uint32_t cluster) {
+    return cluster < n ? 1u : dendrogram.merges[cluster - n].size;
+  };
+  double last = 0.0;
+  for (std::size_t r = 0; r < dendrogram.merges.size(); ++r) {
+    const Merge& merge = dendrogram.merges[r];
+    const std::string row = "row " + std::to_string(r) + ": ";
+    if (!(merge.a < merge.b)) return row + "a is not below b";
+    if (merge.b >= n + r) return row + "a cluster that there is not yet";
+    if (merged[merge.a] || merged[merge.b]) return row + "a cluster that is merged already";
+    merged[merge.a] = merged[merge.b] = true;
+    if (merge.size != size_of(merge.a) + size_of(merge.b)) return row + "the size is wrong";
+    if (!(merge.height >= last)) return row + "the height is below the row before, or negative";
+    last = merge.height;
+  }
+  return {};
+}
+
+}  // namespace terrace::cluster

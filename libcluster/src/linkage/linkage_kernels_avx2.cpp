@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+#define TERRACE_VECTOR_BYTES 32
+#include "linkage/linkage_kernels_impl.hpp"
+
+namespace terrace::cluster {
+
+const LinkageKernels<float> kLinkageFloatAvx2 = {distances<float>, minima<float>, raise<float>,
+                                                 pick<float>, straddling};
+const LinkageKernels<double> kLinkageDoubleAvx2 = {distances<double>, minima<double>, raise<double>,
+                                                   pick<double>, straddling};
+
+}  // namespace terrace::cluster

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "linkage/linkage_tree.hpp"
+
+#include "parallel.hpp"
+
+namespace terrace::cluster {
+namespace {
+
+constexpr unsigned kSharedLevels = 6;  ///< whose nodes are split one level after the other
+
+}  // namespace
+
+LinkageTree::LinkageTree(std::span<const Point3> points, std::span<const std::uint32_t> chosen,
+                         unsigned threads) {
+  const std::size_t count = chosen.size();
+  while (count > (kLeaf << depth_)) ++depth_;
+  boxes_.resize(nodes());
+  number_.resize(count);
+  for (std::vector<double>& axis : axes_) axis.assign(count + kLeaf, 0.0);
+  std::vector<Record> records(count);
+  for (std::size_t i = 0; i < count; ++i) records[i] = {points[chosen[i]], chosen[i]};
+
+  const unsigned shared = std::min(kSharedLevels, depth_);
+  for (unsigned level = 0; level < shared; ++level) {
+    const std::size_t first = std::size_t{1} << level;
+    parallel_blocks(first, 1, threads, [&](std::size_t q, std::size_t, unsigned) {
+      split(first + q, level, records);
+    });
+  }
+  const std::size_t first = std::size_t{1} << shared;
+  parallel_blocks(first, 1, threads, [&](std::size_t q, std::size_t, unsigned) {
+    split_all(first + q, shared, records);
+    const std::size_t end = ((q + 1) * count) >> shared;
+    for (std::size_t i = (q * count) >> shared; i < end; ++i) {
+      for (unsigned a = 0; a < 3; ++a) axes_[a][i] = records[i].p[a];
+      number_[i] = records[i].number;
+    }
+  });
+}
+
+/// Sets the box of a node; divides its points among its children, if it has any.
+void LinkageTree::split(std::size_t node, unsigned level, std::vector<Record>& records) {
+  const std::size_t q = node - (std::size_t{1} << level);
+  const std::size_t begin = (q * size()) >> level;
+  const std::size_t end = ((q + 1) * size()) >> level;
+  Box box{records[begin].p, records[begin].p};
+  for (std::size_t i = begin + 1; i < end; ++i) {
+    for (unsigned a = 0; a < 3; ++a) {
+      const double v = records[i].p[a];
+      box.low[a] = v < box.low[a] ? v : box.low[a];
+      box.high[a] = v > box.high[a] ? v : box.high[a];
+    }
+  }
+  boxes_[node] = box;
+  const auto at = [&](std::size_t i) { return records.begin() + static_cast<std::ptrdiff_t>(i); };
+  if (level == depth_) {
+    // Which points a leaf has does not depend on how the library finds a median; their order would.
+    std::sort(at(begin), at(end),
+              [](const Record& x, const Record& y) { return x.number < y.number; });
+    return;
+  }
+  unsigned axis = 0;
+  for (unsigned a = 1; a < 3; ++a) {
+    if (box.high[a] - box.low[a] > box.high[axis] - box.low[axis]) axis = a;
+  }
+  const std::size_t middle = ((2 * q + 1) * size()) >> (level + 1);
+  std::nth_element(at(begin), at(middle), at(end), [axis](const Record& x, const Record& y) {
+    return x.p[axis] < y.p[axis] || (x.p[axis] == y.p[axis] && x.number < y.number);
+  });
+}
+
+void LinkageTree::split_all(std::size_t node, unsigned level, std::vector<Record>& records) {
+  split(node, level, records);
+  if (level == depth_) return;
+  split_all(2 * node, level + 1, records);
+  split_all(2 * node + 1, level + 1, records);
+}
+
+}  // namespace terrace::cluster

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "linkage/neighbour_lists.hpp"
+
+#include <limits>
+
+#include "parallel.hpp"
+
+namespace terrace::cluster {
+namespace {
+
+constexpr std::size_t kLeaf = LinkageTree::kLeaf;
+constexpr unsigned kMost = NeighbourLists::kMost;
+constexpr std::size_t kLeavesPerBlock = 64;
+
+/// The best found so far for one point, ascending.
+struct Best {
+  TreeEdge edge[kMost];
+  unsigned length;
+
+  void clear(unsigned entries) {
+    length = entries;
+    const double infinity = std::numeric_limits<double>::infinity();
+    for (TreeEdge& e : edge) e = {infinity, 0, 0};
+  }
+  [[nodiscard]] double reach() const { return edge[length - 1].square; }
+  void insert(const TreeEdge& e) {
+    unsigned k = length - 1;
+    if (!(e < edge[k])) return;
+    for (; k > 0 && e < edge[k - 1]; --k) edge[k] = edge[k - 1];
+    edge[k] = e;
+  }
+};
+
+}  // namespace
+
+NeighbourLists::NeighbourLists(const LinkageTree& tree, unsigned threads)
+    : length_(static_cast<unsigned>(std::min<std::size_t>(kMost, tree.size() - 1))),
+      lists_(tree.size() * length_) {
+  if (length_ == 0) return;
+  parallel_blocks(tree.leaves(), kLeavesPerBlock, threads,
+                  [&](std::size_t begin, std::size_t end, unsigned) {
+                    for (std::size_t leaf = begin; leaf < end; ++leaf) search(tree, leaf);
+                  });
+}
+
+/// All points of a leaf search together: what one of them needs, the others mostly do as well.
+void NeighbourLists::search(const LinkageTree& tree, std::size_t leaf) {
+  const std::size_t first = tree.leaf_begin(leaf);
+  const std::size_t count = tree.leaf_begin(leaf + 1) - first;
+  const std::size_t own = tree.leaf_node(leaf);
+  const LinkageTree::Box& box = tree.box(own);
+  Best best[kLeaf];
+  for (std::size_t q = 0; q < count; ++q) best[q].clear(length_);
+  double reach = std::numeric_limits<double>::infinity();
+
+  const auto visit = [&](std::size_t node) {
+    const std::size_t begin = tree.leaf_begin(node - tree.leaves());
+    const std::size_t size = tree.leaf_begin(node - tree.leaves() + 1) - begin;
+    const double* const x = tree.axis(0) + begin;
+    const double* const y = tree.axis(1) + begin;
+    const double* const z = tree.axis(2) + begin;
+    reach = 0.0;
+    for (std::size_t q = 0; q < count; ++q) {
+      const Point3 p = tree.point(first + q);
+      const double limit = best[q].reach();
+      if (squared_distance(p, tree.box(node)) <= limit) {
+        double square[kLeaf];
+        unsigned close = 0;
+        for (std::size_t k = 0; k < kLeaf; ++k) {
+          const double dx = p[0] - x[k];
+          const double dy = p[1] - y[k];
+          const double dz = p[2] - z[k];
+          square[k] = dx * dx + dy * dy + dz * dz;
+        }
+        for (unsigned k = 0; k < kLeaf; ++k) {
+          close |= static_cast<unsigned>(square[k] <= limit) << k;
+        }
+        close &= (1u << size) - 1;
+        if (node == own) close &= ~(1u << q);
+        for (; close != 0; close &= close - 1) {
+          const auto k = static_cast<std::size_t>(__builtin_ctz(close));
+          best[q].insert(TreeEdge::of(square[k], static_cast<std::uint32_t>(first + q),
+                                      static_cast<std::uint32_t>(begin + k)));
+        }
+      }
+      reach = std::max(reach, best[q].reach());
+    }
+  };
+
+  visit(own);
+  struct Waiting {
+    double square;
+    std::size_t node;
+  };
+  Waiting stack[128];
+  unsigned waiting = 0;
+  stack[waiting++] = {0.0, 1};
+  while (waiting > 0) {
+    const Waiting top = stack[--waiting];
+    // Equal distances count: of several neighbours at one distance the places decide.
+    if (top.square > reach || top.node == own) continue;
+    if (tree.is_leaf(top.node)) {
+      visit(top.node);
+      continue;
+    }
+    Waiting near{squared_distance(box, tree.box(2 * top.node)), 2 * top.node};
+    Waiting far{squared_distance(box, tree.box(2 * top.node + 1)), 2 * top.node + 1};
+    if (far.square < near.square) std::swap(near, far);
+    if (far.square <= reach) stack[waiting++] = far;
+    if (near.square <= reach) stack[waiting++] = near;
+  }
+
+  for (std::size_t q = 0; q < count; ++q) {
+    const auto place = static_cast<std::uint32_t>(first + q);
+    for (unsigned k = 0; k < length_; ++k) {
+      const TreeEdge& e = best[q].edge[k];
+      of(place)[k] = e.low == place ? e.high : e.low;
+    }
+  }
+}
+
+}  // namespace terrace::cluster

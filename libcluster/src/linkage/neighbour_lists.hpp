@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "linkage/linkage_tree.hpp"
+
+/// Private to single linkage.
+
+namespace terrace::cluster {
+
+/// A pair of places in a tree with the square of its length. Pairs are ordered by length, then by
+/// their places, so that no two are equal and the minimum spanning tree is unique.
+struct TreeEdge {
+  double square;
+  std::uint32_t low, high;  ///< low < high
+
+  static TreeEdge of(double square, std::uint32_t i, std::uint32_t j) {
+    return i < j ? TreeEdge{square, i, j} : TreeEdge{square, j, i};
+  }
+  friend bool operator<(const TreeEdge& x, const TreeEdge& y) {
+    if (x.square != y.square) return x.square < y.square;
+    return x.low != y.low ? x.low < y.low : x.high < y.high;
+  }
+};
+
+/// For each place of a tree the nearest others in the order of TreeEdge.
+class NeighbourLists {
+ public:
+  static constexpr unsigned kMost = 8;
+
+  NeighbourLists(const LinkageTree& tree, unsigned threads);
+  /// In each list: kMost, or all other points if they are fewer.
+  [[nodiscard]] unsigned length() const { return length_; }
+  [[nodiscard]] std::uint32_t* of(std::size_t place) { return lists_.data() + place * length_; }
+
+ private:
+  void search(const LinkageTree& tree, std::size_t leaf);
+
+  unsigned length_;
+  std::vector<std::uint32_t> lists_;
+};
+
+}  // namespace terrace::cluster

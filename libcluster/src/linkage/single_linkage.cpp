@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/cluster/single_linkage.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <stdexcept>
+#include <string>
+
+#include "linkage/linkage_points.hpp"
+#include "linkage/linkage_tree.hpp"
+#include "linkage/spanning_tree.hpp"
+#include "linkage/union_find.hpp"
+
+namespace terrace::cluster {
+namespace {
+
+/// Which points are the first at their place; links each of the others to the first, at height 0.
+/// The tree over what is left has no ties but those of geometry.
+std::vector<std::uint32_t> distinct(const std::vector<Point3>& points, std::vector<Link>& links) {
+  const auto hash = [](const Point3& p) {
+    std::uint64_t h = 0;
+    for (const double v : p) {
+      h = (h ^ std::bit_cast<std::uint64_t>(v)) * 0x9e3779b97f4a7c15u;
+      h ^= h >> 29;
+    }
+    return h * 0xbf58476d1ce4e5b9u;
+  };
+  constexpr std::uint32_t kFree = 0xffffffffu;
+  const auto bits = static_cast<unsigned>(std::bit_width(2 * points.size()));
+  std::vector<std::uint32_t> table(std::size_t{1} << bits, kFree);
+  std::vector<std::uint32_t> first;
+  first.reserve(points.size());
+  for (std::uint32_t i = 0; i < points.size(); ++i) {
+    std::size_t slot = hash(points[i]) >> (64 - bits);
+    while (table[slot] != kFree && points[table[slot]] != points[i]) {
+      slot = (slot + 1) & (table.size() - 1);
+    }
+    if (table[slot] == kFree) {
+      table[slot] = i;
+      first.push_back(i);
+    } else {
+      links.push_back({table[slot], i, 0.0});
+    }
+  }
+  return first;
+}
+
+}  // namespace
+
+std::vector<Link> spanning_tree(std::span<const Point3> points,
+                                const SingleLinkageOptions& options) {
+  const LinkagePoints linkage_points(points);
+  std::vector<Link> links;
+  if (points.size() < 2) return links;
+  links.reserve(points.size() - 1);
+  const std::vector<std::uint32_t> first = distinct(linkage_points.scaled(), links);
+  if (first.size() < 2) return links;
+  const LinkageTree tree(linkage_points.scaled(), first, options.threads);
+  const SpanningTree spanning(tree, options.threads);
+  for (const TreeEdge& edge : spanning.edges()) {
+    links.push_back(
+        {tree.number(edge.low), tree.number(edge.high), linkage_points.height(edge.square)});
+  }
+  return links;
+}
+
+Dendrogram single_linkage(std::span<const Point3> points, const SingleLinkageOptions& options) {
+  return make_dendrogram(points.size(), spanning_tree(points, options));
+}
+
+Dendrogram single_linkage(std::span<const Point3> points, std::span<const PointPair> candidates) {
+  const LinkagePoints linkage_points(points);
+  const std::vector<Point3>& scaled = linkage_points.scaled();
+  std::vector<TreeEdge> edges(candidates.size());
+  for (std::size_t e = 0; e < candidates.size(); ++e) {
+    const auto [i, j] = candidates[e];
+    if (i >= points.size() || j >= points.size()) {
+      throw std::invalid_argument("candidate " + std::to_string(e) + " names point " +
+                                  std::to_string(std::max(i, j)) + "; there are " +
+                                  std::to_string(points.size()));
+    }
+    edges[e] = TreeEdge::of(squared_distance(scaled[i], scaled[j]), i, j);
+  }
+  std::sort(edges.begin(), edges.end());
+  UnionFind sets(points.size());
+  std::vector<Link> links;
+  for (const TreeEdge& edge : edges) {
+    if (sets.unite(edge.low, edge.high)) {
+      links.push_back({edge.low, edge.high, linkage_points.height(edge.square)});
+    }
+  }
+  for (std::uint32_t i = 1; i < points.size(); ++i) {
+    if (sets.find(i) != 0) {
+      throw std::invalid_argument("the candidate pairs do not connect point " + std::to_string(i) +
+                                  " with point 0; the edges of a Delaunay triangulation would");
+    }
+  }
+  return make_dendrogram(points.size(), links);
+}
+
+}  // namespace terrace::cluster

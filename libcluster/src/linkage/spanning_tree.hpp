@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <thread>
+#include <vector>
+
+#include "linkage/linkage_tree.hpp"
+#include "linkage/neighbour_lists.hpp"
+#include "linkage/union_find.hpp"
+
+/// Private to single linkage.
+
+namespace terrace::cluster {
+
+/// The Euclidean minimum spanning tree of the points of a kD-tree, no two of them equal.
+///
+/// Borůvka: in each round every component but the largest takes its shortest edge to another one.
+/// A point's candidate is the first neighbour of its list in another component. When its list is
+/// used up it has a bound instead, and searches the tree only if that is below what its component
+/// has found so far, together with others of its leaf; the search leaves out nodes that lie in the
+/// component as a whole. The largest component, which would search longest, is found by the others.
+class SpanningTree {
+ public:
+  SpanningTree(const LinkageTree& tree, unsigned threads);
+  [[nodiscard]] const std::vector<TreeEdge>& edges() const { return edges_; }
+
+ private:
+  /// A few locks shared by all components.
+  class Locks {
+   public:
+    void lock(std::uint32_t key) {
+      while (flags_[key % kCount].test_and_set(std::memory_order_acquire)) {
+        std::this_thread::yield();  // whoever holds it may be waiting for a processor
+      }
+    }
+    void unlock(std::uint32_t key) { flags_[key % kCount].clear(std::memory_order_release); }
+
+   private:
+    static constexpr std::size_t kCount = 1024;
+    std::array<std::atomic_flag, kCount> flags_{};
+  };
+
+  /// Points of one leaf and one component, and their box.
+  struct Group {
+    LinkageTree::Box box;
+    std::uint32_t place[LinkageTree::kLeaf];
+    unsigned count = 0;
+    void add(std::uint32_t i, const Point3& p) {
+      if (count == 0) box = {p, p};
+      for (unsigned a = 0; a < 3; ++a) {
+        box.low[a] = std::min(box.low[a], p[a]);
+        box.high[a] = std::max(box.high[a], p[a]);
+      }
+      place[count++] = i;
+    }
+  };
+
+  void label_nodes();
+  void take_from_lists(std::size_t begin, std::size_t end);
+  void search_tree(std::size_t begin, std::size_t end);
+  [[nodiscard]] bool must_search(std::uint32_t place);
+  void search_from(const Group& group, std::uint32_t own);
+  void offer(std::uint32_t component, const TreeEdge& edge);
+  [[nodiscard]] double limit(std::uint32_t component);
+  void merge();
+
+  const LinkageTree& tree_;
+  const unsigned threads_;
+  const std::uint32_t count_;
+  NeighbourLists lists_;
+  std::vector<std::uint8_t> used_;        ///< entries of the list that are in the own component
+  std::vector<double> bound_;             ///< no other component is nearer once the list is used up
+  std::vector<std::uint32_t> component_;  ///< of each place: the least place of its component
+  std::vector<std::uint32_t> label_;      ///< of each node: its component, or kMixed
+  std::vector<TreeEdge> shortest_;        ///< found so far from a component, at its least place
+  Locks locks_;                           ///< of shortest_, which several threads lower
+  std::vector<std::uint32_t> roots_;      ///< the components
+  std::uint32_t largest_ = 0;             ///< component, kMixed at first
+  UnionFind sets_;
+  std::vector<TreeEdge> edges_;
+};
+
+}  // namespace terrace::cluster
