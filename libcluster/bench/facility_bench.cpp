@@ -8,7 +8,8 @@
 //   JV, JMS  jain_vazirani and greedy_stars
 //   bound    lower_bound from the search's solution
 //   JV bnd, JMS bnd   the bounds of the two primal-dual algorithms
-// Last, lower bounds of points: BlockClusterer's solution of a fractal elevation model, its gap.
+// Last, lower bounds of points: BlockClusterer's solution of a fractal elevation model, its gap;
+// and k-median of points.
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -167,6 +168,26 @@ void print_points() {
   }
 }
 
+void print_medians() {
+  std::printf("\n%-34s %9s %9s %12s %9s\n", "k-median of points", "k", "threads", "cost",
+              "seconds");
+  std::mt19937_64 random(20);
+  const std::vector<Point3> points = inputs::cube(kSmall ? 500 : 20000, random);
+  FacilityPoints problem;
+  problem.points = points;
+  for (const std::size_t k :
+       kSmall ? std::vector<std::size_t>{5} : std::vector<std::size_t>{20, 200}) {
+    for (const unsigned threads : {1u, 2u}) {
+      FacilitySolution solution;
+      const double seconds = seconds_of([&] {
+        solution = k_median(problem, k, {.restarts = 1, .bound_iterations = 0, .threads = threads});
+      });
+      std::printf("uniform in a cube, %-15zu %9zu %9u %12.4f %9.3f\n", points.size(), k, threads,
+                  solution.cost(), seconds);
+    }
+  }
+}
+
 }  // namespace
 
 int main() {
@@ -184,5 +205,6 @@ int main() {
     print_table(std::move(all), [](instances::Instance&) {});
   }
   print_points();
+  print_medians();
   return 0;
 }

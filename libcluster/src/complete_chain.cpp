@@ -2,6 +2,7 @@
 // The nearest-neighbour chain of complete linkage: from any cluster to its nearest, on to the
 // nearest of that, until two are each other's nearest and merge. Each step looks at m distances,
 // half of them one per row, so it serves only where rounds would merge too few clusters.
+#include <algorithm>
 #include <limits>
 
 #include "complete_rounds.hpp"

@@ -203,9 +203,9 @@ struct MatchPairs {
   }
 };
 
-/// lanes over slots: distances of merged clusters, the greater ones. A pair of two merged clusters
-/// is updated by the lower of them, from the four distances of their halves; those of clusters that
-/// end are read only, so nothing is read that another index writes.
+/// lanes over slots, after MarkStale: distances of merged clusters, the greater ones. A pair of two
+/// merged clusters is updated by the lower of them, from the four distances of their halves; those
+/// of clusters that end are read only, so nothing is read that another index writes.
 template <class Entry>
 struct UpdateBand {
   Slots<Entry> s;
@@ -215,7 +215,7 @@ struct UpdateBand {
                                               std::uint32_t lanes) const {
     const std::uint32_t b = s.partner[a];
     for (std::uint32_t k = lane; k < s.slots; k += lanes) {
-      if (k == a || s.alive[k] == 0 || s.ends(k)) continue;
+      if (k == a || s.alive[k] == 0) continue;
       const bool pair = s.keeps(k);
       if (pair && k < a) continue;
       Entry& kept = s.between(a, k);
@@ -229,7 +229,7 @@ struct UpdateBand {
   }
 };
 
-/// each over slots, after UpdateBand: which clusters are left, and whose nearest neighbour may be
+/// each over slots, after MatchPairs: which clusters are left, and whose nearest neighbour may be
 /// another now. Distances only grow, so one that did not merge stays the nearest.
 template <class Entry>
 struct MarkStale {

@@ -3,8 +3,8 @@
 
 #include "device_band.hpp"
 
-/// Kernels that move the clusters of a round to the first slots, in order, so that the band shrinks
-/// with their number.
+/// Kernels that move the clusters that a round leaves to the first slots, in order, so that the
+/// band shrinks with their number, and merge their distances on the way.
 
 namespace terrace::cluster::device {
 
@@ -48,9 +48,9 @@ struct NumberAlive {
   }
 };
 
-/// lanes over new slots.
+/// lanes over new slots: of two clusters the greatest distance between their halves.
 template <class Entry>
-struct CompactBand {
+struct MergeBand {
   Slots<Entry> from, to;
   const std::uint32_t* old_of_new;
   std::uint32_t clusters;
@@ -58,17 +58,25 @@ struct CompactBand {
   TERRACE_CLUSTER_HOST_DEVICE bool skip(std::uint32_t row) const { return row >= clusters; }
   TERRACE_CLUSTER_HOST_DEVICE void operator()(std::uint32_t row, std::uint32_t lane,
                                               std::uint32_t lanes) const {
-    const std::uint32_t i = old_of_new[row];
+    const std::uint32_t a = old_of_new[row];
+    const std::uint32_t b = from.partner[a];
     for (std::uint32_t k = lane; k < to.half; k += lanes) {
-      const std::uint32_t j = to.other(row, k);
-      if (j < clusters) to.at(row, k) = from.between(i, old_of_new[j]);
+      const std::uint32_t other = to.other(row, k);
+      if (other >= clusters) continue;
+      const std::uint32_t c = old_of_new[other];
+      const std::uint32_t d = from.partner[c];
+      Entry value = from.between(a, c);
+      if (d != c) value = greater_of(value, from.between(a, d));
+      if (b != a) value = greater_of(value, from.between(b, c));
+      if (b != a && d != c) value = greater_of(value, from.between(b, d));
+      to.at(row, k) = value;
     }
   }
 };
 
 /// each over new slots.
 template <class Entry>
-struct CompactSlots {
+struct MergeSlots {
   Slots<Entry> from, to;
   const std::uint32_t* new_of_old;
   const std::uint32_t* old_of_new;

@@ -16,9 +16,11 @@
 
 namespace terrace::cluster::device {
 
-/// A band of 0.75 slots or fewer is copied to the first slots: it then has 9/16 of the size.
+/// Whether a round leaves so few clusters that the band is made anew for them, in one pass over
+/// memory in order, rather than updated where it is, column by column. It has 0.64 of the size
+/// then.
 [[nodiscard]] constexpr bool worth_compacting(std::uint32_t clusters, std::uint32_t slots) {
-  return 4 * std::uint64_t{clusters} <= 3 * std::uint64_t{slots};
+  return 5 * std::uint64_t{clusters} <= 4 * std::uint64_t{slots};
 }
 
 /// Memory that complete_rounds() takes on the device at most.
@@ -28,7 +30,7 @@ template <class Entry>
   const std::uint64_t band = slots * (slots / 2) * sizeof(Entry);
   const std::uint64_t parts = NearestOfRows<Entry>::parts(static_cast<std::uint32_t>(slots));
   const std::uint64_t per_slot = parts * (4 + sizeof(Entry)) + 80 + 4 * sizeof(Entry);
-  return band + band / 16 * 9 + slots * per_slot + kSmallMemory;
+  return band + band / 25 * 16 + slots * per_slot + kSmallMemory;
 }
 
 template <class Entry, class Device>
@@ -63,16 +65,21 @@ class CompleteRounds {
       device_.clear(counts_.data(), 1);
       device_.each(s_.slots, MatchPairs<Entry>{s_, counts_.data(), round, link_other_.data(),
                                                link_round_.data(), link_square_.data()});
-      device_.lanes(s_.slots, UpdateBand<Entry>{s_});
       device_.each(s_.slots, MarkStale<Entry>{s_, counts_.data()});
       RoundCounts counts{};
       device_.download(&counts, counts_.data(), 1);
       // The nearest pair of all is one, so this is a fault of the device.
-      if (counts.pairs == 0) throw std::runtime_error("the device found no pair to merge");
+      if (counts.pairs == 0 || counts.pairs >= clusters_) {
+        throw std::runtime_error("the device found no pair to merge, or too many");
+      }
       clusters_ -= counts.pairs;
       ++round;
-      if (clusters_ <= 1) break;
-      if (worth_compacting(clusters_, s_.slots)) compact();
+      if (clusters_ == 1) break;
+      if (worth_compacting(clusters_, s_.slots)) {
+        compact();
+      } else {
+        device_.lanes(s_.slots, UpdateBand<Entry>{s_});
+      }
       // To find one anew reads its columns one by one, eight times as dear as together.
       if (4 * std::uint64_t{counts.stale} >= clusters_) {
         nearest_of_all();
@@ -146,9 +153,9 @@ class CompleteRounds {
     device_.each(kScanParts, CountAlive<Entry>{s_, scan_.data()});
     device_.each(kScanParts,
                  NumberAlive<Entry>{s_, scan_.data(), new_of_old_.data(), old_of_new_.data()});
-    device_.lanes(slots, CompactBand<Entry>{s_, to, old_of_new_.data(), clusters_});
+    device_.lanes(slots, MergeBand<Entry>{s_, to, old_of_new_.data(), clusters_});
     device_.each(slots,
-                 CompactSlots<Entry>{s_, to, new_of_old_.data(), old_of_new_.data(), clusters_});
+                 MergeSlots<Entry>{s_, to, new_of_old_.data(), old_of_new_.data(), clusters_});
     s_ = to;
     std::swap(now_, next_);
     std::swap(band_, spare_);

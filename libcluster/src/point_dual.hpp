@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "box_tree.hpp"
+#include "fast_distances.hpp"
 #include "lagrangian.hpp"
-#include "leaf_sum.hpp"
 #include "parallel_blocks.hpp"
 
 namespace terrace::cluster {
@@ -31,7 +31,7 @@ class PointDual final : public DualFunction {
             double facility_cost, double price, unsigned threads)
       : tree_(&tree),
         space_(&space),
-        leaf_sum_(space),
+        distances_(space),
         weights_(weights),
         facility_cost_(facility_cost),
         price_(price),
@@ -169,7 +169,7 @@ class PointDual final : public DualFunction {
 
   // Returns how many clients it has looked at.
   std::size_t add_up(std::uint32_t facility, Work& work) {
-    typename LeafSum<Space>::From from(leaf_sum_, facility);
+    auto from = distances_.from(facility);
     std::size_t looked = 0;
     work.near.clear();
     for (const std::uint32_t n : work.leaves) {
@@ -197,7 +197,7 @@ class PointDual final : public DualFunction {
 
   const BoxTree* tree_;
   const Space* space_;
-  LeafSum<Space> leaf_sum_;
+  FastDistances<Space> distances_;
   std::span<const double> weights_;
   double facility_cost_, price_;
   unsigned threads_;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "cost_rows.hpp"
+#include "fast_distances.hpp"
 #include "search_frame.hpp"
 #include "search_space.hpp"
 
@@ -55,19 +56,10 @@ auto with_space(const FacilityPoints& problem, SearchFrame& frame, std::span<con
       problem.metric);
 }
 
-/// How far a cost of the frame may be from that of the given coordinates: bringing a coordinate
-/// into range rounds it by half a unit in the last place of the box, also where the distance is
-/// short.
-inline double rounding_of_frame(const FacilityPoints& problem, const SearchFrame& frame) {
-  const double diagonal = frame.facility_cost / problem.facility_cost;  // of weight 1
-  double weight = 0.0;
-  for (const double w : frame.weights) weight += w;
-  double power = 1.0;
-  if (const auto* minkowski = std::get_if<Minkowski>(&problem.metric)) {
-    power = std::min(power, minkowski->p);
-  }
-  return weight * diagonal * std::pow(16.0 * std::numeric_limits<double>::epsilon(), power);
-}
+/// How far costs of the frame, summed over all clients, may be from those of the given coordinates:
+/// bringing coordinates into range and mapping them rounds by units in the last place of the box,
+/// also where the distance is short.
+[[nodiscard]] double rounding_of_frame(const FacilityPoints& problem, const SearchFrame& frame);
 
 /// Weighted distances, worked out row by row; nobody pays more than the price of being left out.
 template <class Space>
@@ -76,14 +68,16 @@ class PointRows final : public CostRows {
   PointRows(const Space& space, std::span<const double> weights, double price)
       : CostRows(weights.size(), weights.size()),
         space_(&space),
+        distances_(space),
         weights_(weights),
         price_(price) {}
 
   const double* row(std::size_t facility, std::vector<double>& scratch) const override {
-    scratch.resize(clients());
-    const auto from = space_->from(static_cast<std::uint32_t>(facility));
-    for (std::uint32_t i = 0; i < weights_.size(); ++i) {
-      scratch[i] = weights_[i] * std::min(from(i), price_);
+    const auto count = static_cast<std::uint32_t>(clients());
+    scratch.resize(count);
+    distances_.from(static_cast<std::uint32_t>(facility)).fill(count, scratch.data());
+    for (std::uint32_t i = 0; i < count; ++i) {
+      scratch[i] = weights_[i] * std::min(scratch[i], price_);
     }
     return scratch.data();
   }
@@ -97,6 +91,7 @@ class PointRows final : public CostRows {
 
  private:
   const Space* space_;
+  FastDistances<Space> distances_;
   std::span<const double> weights_;
   double price_;
 };

@@ -167,7 +167,10 @@ void SpanningTree::search_from(const Group& group, std::uint32_t own) {
       }
     }
   }
-  for (unsigned q = 0; q < group.count; ++q) bound_[group.place[q]] = best.square;
+  for (unsigned q = 0; q < group.count; ++q) {
+    double& bound = bound_[group.place[q]];
+    bound = std::max(bound, best.square);
+  }
   if (best_place == kMixed) return;
   offer(own, best);
   // The nearest of another component for as long as that is another one: the list's last entry.

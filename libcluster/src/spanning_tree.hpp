@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <atomic>
+#include <cstdint>
 #include <thread>
 #include <vector>
 
@@ -20,8 +22,7 @@ namespace terrace::cluster {
 /// A point's candidate is the first neighbour of its list in another component. When its list is
 /// used up it has a bound instead, and searches the tree only if that is below what its component
 /// has found so far, together with others of its leaf; the search leaves out nodes that lie in the
-/// component as a whole. The largest
-/// component, which would search longest, is found by the others.
+/// component as a whole. The largest component, which would search longest, is found by the others.
 class SpanningTree {
  public:
   SpanningTree(const LinkageTree& tree, unsigned threads);

@@ -108,15 +108,18 @@ void no_channels(const FacilityPoints& problem, const char* method) {
   }
 }
 
-/// Steps towards the lower bound: as many as were asked for, else what takes seconds.
-std::uint32_t bound_steps(const ClusterRequest& request, std::size_t points) {
+/// Steps towards the lower bound: as many as were asked for, else what takes seconds, as a step
+/// looks at some clusters' worth of points around each point.
+std::uint32_t bound_steps(const ClusterRequest& request, double points, double clusters) {
   if (request.bound_iterations) return *request.bound_iterations;
-  return static_cast<std::uint32_t>(std::clamp<std::size_t>(4'000'000 / points, 20, 300));
+  const double distances = 4.0 * points * points / clusters;
+  return static_cast<std::uint32_t>(std::clamp(3e9 / distances, 15.0, 300.0));
 }
 
 double bound_of(const ClusterRequest& request, const FacilityPoints& problem,
                 const FacilitySolution& solution, const ClusterProgress& progress) {
-  const std::uint32_t steps = bound_steps(request, problem.points.size());
+  const std::uint32_t steps = bound_steps(request, static_cast<double>(problem.points.size()),
+                                          static_cast<double>(solution.facilities.size()));
   if (steps == 0) return 0.0;
   cluster::LowerBoundOptions options;
   options.iterations = steps;

@@ -19,7 +19,15 @@ void StreamClustering::push(std::span<const Point3> points) {
 
 void StreamClustering::finish() {
   for (std::size_t level = 0; level < levels_.size(); ++level) {
-    if (level > 0 && levels_[level].all <= options_.block) return;  // the top
+    if (level > 0 && levels_[level].all <= options_.block) {  // the top
+      double weight = 0.0;
+      for (const double w : levels_[level].weights) weight += w;
+      if (weight != static_cast<double>(levels_[0].all)) {
+        throw std::runtime_error("the top weighs " + std::to_string(weight) + ", the input " +
+                                 std::to_string(levels_[0].all));
+      }
+      return;
+    }
     if (level > 0 && levels_[level].all >= levels_[level - 1].all) {
       throw std::runtime_error("level " + std::to_string(level) + " is not smaller than the one " +
                                "below: the facility cost is too low for this stream");

@@ -40,7 +40,7 @@ class StreamClustering {
   explicit StreamClustering(const StreamOptions& options, OnBlock on_block = {});
 
   void push(std::span<const Point3> points);
-  /// Throws: std::runtime_error if the clustering does not reduce a level.
+  /// Throws: std::runtime_error if the clustering does not reduce a level, or has lost weight.
   void finish();
 
   /// Spent in the search alone.

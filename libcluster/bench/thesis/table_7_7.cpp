@@ -30,7 +30,7 @@ constexpr std::array<ThesisRow, 8> kThesis{{{"6:18", "4:04", "35 %", "3:06", "51
 void table_7_7(Setting& setting) {
   const std::size_t block = setting.block(10'000);
   const unsigned threads = setting.threads;
-  const std::size_t batch = 8 * std::size_t{threads};
+  const std::size_t batch = 2 * std::size_t{threads};
   Table table{"table-7.7",
               "Table 7.7: threads (" + std::to_string(threads) + "). Blocks of " + grouped(block) +
                   ", facility cost 2 x diagonal, 0.1 m candidates, partition by facilities; "

@@ -17,7 +17,7 @@
 /// O(n^2) time. Complete linkage is reducible: clusters that are each other's nearest will merge,
 /// whatever happens elsewhere. So in each round all such pairs merge in one pass over the matrix,
 /// which shrinks with the clusters; where a round finds few, a nearest-neighbour chain takes over
-/// until a quarter of the clusters is gone. About 2 n words of memory beside the matrix.
+/// until a quarter of the clusters is gone. Beside the matrix it takes about 200 bytes a point.
 /// Sources: J. Skála, Algorithms for manipulating large geometric data, 4.2.1, 7.6; F. Murtagh,
 /// A survey of recent advances in hierarchical clustering algorithms, 1983.
 ///
@@ -28,12 +28,12 @@ namespace terrace::cluster {
 
 /// The entries of the matrix.
 enum class MatrixEntry {
-  /// Half the memory and time. Each distance is rounded to float, so heights have a relative error
+  /// Half the memory. Each distance is rounded to float once, so heights have a relative error
   /// below 1e-7, and clusters whose distances differ by less may merge in the other order. Of
-  /// points: distances below 1e-18 of the largest coordinate count as zero.
+  /// points: distances below 1e-18 of the largest coordinate may count as zero.
   float32,
   /// Heights of points are exact to the last bits. Of points: distances below 1e-150 of the largest
-  /// coordinate count as zero.
+  /// coordinate may count as zero.
   float64,
 };
 

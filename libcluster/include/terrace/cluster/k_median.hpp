@@ -19,7 +19,7 @@ namespace terrace::cluster {
 struct KMedianOptions {
   /// Descents by exchanges: the first from what the binary search found, each further one from
   /// that with half of the facilities replaced at random. At least 1; the best counts.
-  std::uint32_t restarts = 8;
+  std::uint32_t restarts = 32;
   /// Subgradient steps for lower_bound, each O(facilities * clients); 0: none is worked out.
   std::uint32_t bound_iterations = 300;
   std::uint64_t seed = 1;

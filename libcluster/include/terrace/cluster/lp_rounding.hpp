@@ -28,8 +28,8 @@ struct LpRounding {
 
 /// Clients in the order of their duals: each whose fractional facilities are all free yet opens the
 /// cheapest of them and blocks the rest. On metric costs the solution costs at most 4 times the
-/// relaxation. For small problems: constraints x <= y are added as they are violated, and 50 by 50
-/// take a fraction of a second, 100 by 100 seconds. Not from several threads at once.
+/// relaxation. For small problems: constraints x <= y are added as they are violated; 50 by 50 take
+/// hundredths of a second, 100 by 100 tenths. Not from several threads at once.
 /// Throws: std::invalid_argument as check() does; std::runtime_error if the library was built
 /// without GLPK, naming the option, or if GLPK fails.
 [[nodiscard]] LpRounding lp_rounding(const FacilityMatrix& problem);

@@ -24,11 +24,13 @@ struct SingleLinkageOptions {
 using PointPair = std::array<std::uint32_t, 2>;
 
 /// The dendrogram of points in space or, with z = 0, in the plane. O(n log n) time for points that
-/// are not contrived, many equal ones and regular grids included; about 150 bytes of memory a
+/// are not contrived, many equal ones and regular grids included; about 170 bytes of memory a
 /// point. Heights are exact to the last bits of a double; distances below 1e-150 of the largest
-/// coordinate count as zero. Where distances are equal the tree is one of several; it depends on
-/// the points and their order alone. Throws std::invalid_argument, which names the point, if a
-/// coordinate is not finite or beyond 1e307 in magnitude.
+/// coordinate may count as zero. Where distances are equal the tree is one of several; it depends
+/// on the points and their order alone.
+///
+/// Throws std::invalid_argument, which names the point, if a coordinate is not finite or beyond
+/// 1e307 in magnitude.
 [[nodiscard]] Dendrogram single_linkage(std::span<const Point3> points,
                                         const SingleLinkageOptions& options = {});
 
