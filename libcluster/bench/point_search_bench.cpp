@@ -7,7 +7,7 @@
 // Inputs: scan (a patch of a bumpy surface), shuf (all of the surface, at random), cube.
 // Time is for a whole search, start included. Columns: ns per gain (all but the start: the mean
 // over the search, with what it opens), share of positive gains, share of vertices (clients and
-// facilities) inspected, Q against the full scan of the same batch 1 in %, clients that were not
+// facilities) inspected, Q against batch 1 in %, clients that were not
 // at their nearest facility in %.
 #include <chrono>
 #include <cstdlib>

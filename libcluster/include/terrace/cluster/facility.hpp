@@ -37,8 +37,9 @@ struct FacilityPoints {
   std::span<const Point3> points = {};   ///< finite
   std::span<const double> weights = {};  ///< positive and finite, or empty for 1 each
   Metric metric = Euclidean{};
-  Channels channels = {};      ///< none: position alone
-  double facility_cost = 1.0;  ///< positive; times the diagonal of the bounding box in the metric
+  Channels channels = {};  ///< none: position alone
+  /// Positive; times the diagonal of the bounding box in the metric, channels being further axes.
+  double facility_cost = 1.0;
   /// What leaving a client of weight 1 out costs, as a multiple of the same diagonal; infinite:
   /// every client is connected. (7.1.3, figure 7.3)
   double outlier_price = std::numeric_limits<double>::infinity();
