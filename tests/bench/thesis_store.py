@@ -116,7 +116,8 @@ def main():
     parser.add_argument("terrace")
     parser.add_argument("io_bench")
     parser.add_argument("--most", type=int, default=4_000_000, help="points per set")
-    parser.add_argument("--full", action="store_true", help="as many points as the thesis (11 GB of disk, 1 h)")
+    parser.add_argument("--full", action="store_true",
+                        help="as many points as the thesis: files of up to 11.2 GB, one at a time")
     parser.add_argument("--runs", type=int, default=3)
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--data", default=os.environ.get("TERRACE_DATA"), help="folder of real data")
