@@ -33,11 +33,11 @@ class ThreadTeam {
   template <class Task>
   void run(std::size_t count, Task&& task) {
     if (threads_.empty() || count < 2) {
-      for (std::size_t k = 0; k < count; ++k) call(task, k, 0);
+      for (std::size_t k = 0; k < count; ++k) invoke(task, k, 0);
       return;
     }
     run_together(count, &task, [](void* object, std::size_t k, unsigned thread) {
-      call(*static_cast<std::remove_reference_t<Task>*>(object), k, thread);
+      invoke(*static_cast<std::remove_reference_t<Task>*>(object), k, thread);
     });
   }
 
@@ -45,7 +45,7 @@ class ThreadTeam {
   using Call = void (*)(void*, std::size_t, unsigned);
 
   template <class Task>
-  static void call(Task& task, std::size_t k, unsigned thread) {
+  static void invoke(Task& task, std::size_t k, unsigned thread) {
     if constexpr (std::is_invocable_v<Task&, std::size_t, unsigned>) {
       task(k, thread);
     } else {

@@ -10,8 +10,10 @@ import json
 import math
 import os
 import random
+import signal
 import subprocess
 import tempfile
+import time
 import unittest
 
 TERRACE = os.environ.get('TERRACE', 'terrace')
@@ -299,6 +301,20 @@ class ClusterTest(unittest.TestCase):
                                         self.path('none.txt'), '--memory', '100M',
                                         *(['-k', 2] if method == 'complete' else []))
             self.assertRegex(message, r'\d+ (bytes|MiB|GiB|B)')
+
+    def test_ctrl_c_stops_what_does_not_look_up(self):
+        many = self.path('interrupted.ply')
+        self.run_ok('synth', 'uniform', '--points', 200000, '-o', many)
+        tree = self.path('interrupted.csv')
+        command = subprocess.Popen(
+            [TERRACE, 'cluster', many, '--method', 'k-median', '-k', '50', '--labels', tree],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        time.sleep(1.5)
+        command.send_signal(signal.SIGINT)
+        out, error = command.communicate(timeout=60)
+        self.assertEqual(command.returncode, 130, error)
+        self.assertEqual((out, error.count('\n')), ('', 1))
+        self.assertFalse(os.path.exists(tree))
 
     def test_cuda_without_a_device_is_a_clear_error(self):
         tree = self.path('cuda.csv')

@@ -236,10 +236,10 @@ ClusterOutcome by_k_means(const ClusterRequest& request, const FacilityPoints& p
 }
 
 ClusterOutcome by_k_median(const ClusterRequest& request, const FacilityPoints& problem) {
-  // Each step takes the distances of all pairs.
-  const std::uint64_t points = problem.points.size();
-  const auto steps = request.bound_iterations.value_or(static_cast<std::uint32_t>(
-      std::min<std::uint64_t>(300, std::uint64_t{10'000'000'000} / (points * points))));
+  // Each step takes the distances of all pairs, and a hundred are the least that say something.
+  constexpr std::size_t kMostForBound = 10'000;
+  const std::uint32_t steps =
+      request.bound_iterations.value_or(problem.points.size() <= kMostForBound ? 100 : 0);
   ClusterOutcome outcome;
   take(outcome, cluster::k_median(problem, request.k,
                                   {.restarts = static_cast<std::uint32_t>(request.restarts),

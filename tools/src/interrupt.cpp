@@ -1,13 +1,21 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "interrupt.hpp"
 
+#include <chrono>
 #include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <future>
+#include <thread>
+#include <utility>
 
 #include <poll.h>
 #include <unistd.h>
 
 namespace terrace::tools {
 namespace {
+
+constexpr const char* kStopped = "interrupted; run the same command again to start anew";
 
 volatile std::sig_atomic_t stop_requested = 0;
 
@@ -39,7 +47,22 @@ void install_signal_handlers() {
 bool interrupted() noexcept { return stop_requested != 0; }
 
 void check_interrupt() {
-  if (interrupted()) throw Interrupted("interrupted; run the same command again to start anew");
+  if (interrupted()) throw Interrupted(kStopped);
+}
+
+void run_interruptible(const std::function<void()>& work) {
+  std::packaged_task<void()> task(work);
+  std::future<void> done = task.get_future();
+  std::thread worker(std::move(task));
+  using namespace std::chrono_literals;
+  while (done.wait_for(50ms) != std::future_status::ready) {
+    if (!interrupted() || done.wait_for(1s) == std::future_status::ready) continue;
+    std::fprintf(stderr, "terrace: %s\n", kStopped);
+    // Not exit(): the worker would go on beneath the destructors.
+    std::_Exit(130);
+  }
+  worker.join();
+  done.get();
 }
 
 bool stdout_closed() noexcept {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <functional>
 #include <stdexcept>
 #include <string>
 
@@ -22,6 +23,12 @@ void install_signal_handlers();
 
 /// Throws Interrupted if the user has asked to stop. Loops call it once per block.
 void check_interrupt();
+
+/// Calls `work` on a thread of its own and returns when it is done; what it throws comes out. If
+/// the user asks to stop and the work does not end by itself within a second (it calls
+/// check_interrupt() now and then, or it does not), the process ends here with a message and exit
+/// code 130. So `work` must not be writing anything.
+void run_interruptible(const std::function<void()>& work);
 
 /// True if standard output is a pipe that nobody reads any more.
 [[nodiscard]] bool stdout_closed() noexcept;

@@ -143,10 +143,13 @@ class ClusterCommand final : public Command {
     ClusterOutcome outcome;
     try {
       ProgressMeter meter(common.progress, "points");
-      outcome = run_clustering(request_, problem, [&](double fraction) {
-        check_interrupt();
-        meter.update(static_cast<std::uint64_t>(fraction * static_cast<double>(table.size())),
-                     fraction);
+      // Not all methods look up from their work.
+      run_interruptible([&] {
+        outcome = run_clustering(request_, problem, [&](double fraction) {
+          check_interrupt();
+          meter.update(static_cast<std::uint64_t>(fraction * static_cast<double>(table.size())),
+                       fraction);
+        });
       });
     } catch (const std::invalid_argument& error) {
       throw stream::Error({.file = input_, .where = {}, .cause = error.what(), .remedy = {}});
