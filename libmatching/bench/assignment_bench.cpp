@@ -1,8 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// Dense assignment between two sets of uniform points in the unit square, Euclidean costs.
+// Assignment between two sets of uniform points in the unit square, Euclidean costs.
+//
+// matching_assignment_bench --peer MATRIX N prints three times in seconds and the cost for a file
+// of N * N doubles: what assignment_peers.py compares with.
+#include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
+#include <fstream>
 #include <random>
+#include <string_view>
 #include <vector>
 
 #include <benchmark/benchmark.h>
@@ -44,6 +51,36 @@ void sizes(benchmark::internal::Benchmark* benchmark) {
 }
 BENCHMARK(assign_uniform)->Apply(sizes)->Unit(benchmark::kMillisecond);
 
+template <class Solve>
+void print_times(const Solve& solve) {
+  double cost = 0;
+  for (int round = 0; round < 3; ++round) {
+    const auto start = std::chrono::steady_clock::now();
+    cost = solve();
+    std::printf("%.6f ",
+                std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  }
+  std::printf("%.17g\n", cost);
+}
+
+int peer(const char* matrix, std::size_t n) {
+  std::vector<double> costs(n * n);
+  std::ifstream file(matrix, std::ios::binary);
+  file.read(reinterpret_cast<char*>(costs.data()),
+            static_cast<std::streamsize>(costs.size() * sizeof(double)));
+  if (!file) return 1;
+  print_times([&] { return terrace::matching::assign(costs, n, n).cost; });
+  return 0;
+}
+
 }  // namespace
 
-BENCHMARK_MAIN();
+int main(int argc, char** argv) {
+  if (argc == 4 && std::string_view(argv[1]) == "--peer") {
+    return peer(argv[2], std::strtoul(argv[3], nullptr, 10));
+  }
+  benchmark::Initialize(&argc, argv);
+  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
+  benchmark::RunSpecifiedBenchmarks();
+  return 0;
+}
