@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <span>
+
+#include "terrace/matching/assignment.hpp"
+
+namespace terrace::matching {
+
+using Point2 = std::array<double, 2>;
+using Point3 = std::array<double, 3>;
+
+/// Minimum-cost assignment of points to points, the cost being the Euclidean distance; optimal
+/// among all pairs although only near ones are ever looked at.
+///
+/// Each row starts with its nearest columns as candidates. Of all other columns a bound is kept on
+/// cost minus label; where a search reaches that bound before it has ended, the row gets the
+/// columns that are next by cost minus label, from a tree of the columns with the largest label
+/// below each node. So no absent pair ever violates the labels.
+///
+/// Requires: coordinates finite and at most kLargestCost in magnitude. Distances below 1e-150 times
+/// the largest coordinate count as 0.
+/// Returns: the assignment of min(rows, columns) rows with labels for all pairs, in the unit of the
+/// coordinates, up to rounding.
+/// Throws: std::invalid_argument if a coordinate is not (the set and the index are named).
+/// Cost: for uniform points about O(n^1.5) time; memory grows with the candidates, some 300 bytes a
+/// row; at worst as for the complete graph: O(n^3) time and 16 bytes a pair.
+/// Source: J. Skála, 4.3.1; pricing as in R. Jonker and A. Volgenant, 1987 (their sparse code on
+/// dense problems).
+Assignment assign_points(std::span<const Point2> rows, std::span<const Point2> columns);
+Assignment assign_points(std::span<const Point3> rows, std::span<const Point3> columns);
+
+/// As check() of assignment.hpp, on all pairs.
+///
+/// Cost: O(rows * columns) time.
+double check_points(const Assignment& assignment, std::span<const Point2> rows,
+                    std::span<const Point2> columns);
+double check_points(const Assignment& assignment, std::span<const Point3> rows,
+                    std::span<const Point3> columns);
+
+}  // namespace terrace::matching

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "terrace/matching/assignment.hpp"
+
+namespace terrace::matching {
+
+/// Collects by how much an assignment misses the conditions of optimality; see check().
+template <class Number>
+class OptimalityCheck {
+ public:
+  OptimalityCheck(const BasicAssignment<Number>& assignment, std::size_t rows, std::size_t columns)
+      : assignment_(assignment) {
+    if (assignment.column.size() != rows || assignment.row_dual.size() != rows ||
+        assignment.column_dual.size() != columns) {
+      throw std::invalid_argument("check: the assignment is not one of " + std::to_string(rows) +
+                                  " rows and " + std::to_string(columns) + " columns");
+    }
+    std::vector<bool> used(columns, false);
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < rows; ++i) {
+      const std::uint32_t j = assignment.column[i];
+      if (j == kUnassigned) {
+        if (rows <= columns) fail(i, "has no column");
+        demand_zero(assignment.row_dual[i]);
+        continue;
+      }
+      if (j >= columns) fail(i, "has a column out of range");
+      if (used[j]) fail(i, "has a column that an earlier row has");
+      used[j] = true;
+      ++count;
+    }
+    if (count != std::min(rows, columns)) {
+      throw std::invalid_argument("check: only " + std::to_string(count) + " rows have a column");
+    }
+    if (rows <= columns) {
+      for (const Number label : assignment.column_dual) demand_not_above(label);
+      for (std::size_t j = 0; j < columns; ++j) {
+        if (!used[j]) demand_zero(assignment.column_dual[j]);
+      }
+    } else {
+      for (const Number label : assignment.row_dual) demand_not_above(label);
+    }
+  }
+
+  void see(std::size_t i, std::size_t j, Number cost) {
+    const Number slack = cost - assignment_.row_dual[i] - assignment_.column_dual[j];
+    demand_not_above(-slack);
+    if (assignment_.column[i] == j) {
+      demand_zero(slack);
+      sum_ += cost;
+    }
+  }
+
+  Number worst() {
+    demand_zero(sum_ - assignment_.cost);
+    return worst_;
+  }
+
+ private:
+  [[noreturn]] static void fail(std::size_t row, const char* what) {
+    throw std::invalid_argument("check: row " + std::to_string(row) + " " + what);
+  }
+  // Written so that what is not a number comes out as such, and stays.
+  void demand_not_above(Number value) {
+    if (worst_ == worst_ && !(value <= worst_)) worst_ = value;
+  }
+  void demand_zero(Number value) { demand_not_above(value < 0 ? -value : value); }
+
+  const BasicAssignment<Number>& assignment_;
+  Number worst_ = 0, sum_ = 0;
+};
+
+}  // namespace terrace::matching

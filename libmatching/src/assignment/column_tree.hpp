@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <numeric>
+#include <span>
+#include <vector>
+
+#include "assignment/sparse_solver.hpp"
+#include "terrace/matching/assignment.hpp"
+
+namespace terrace::matching {
+
+template <std::size_t D>
+double distance_between(const std::array<double, D>& a, const std::array<double, D>& b) {
+  double sum = 0;
+  for (std::size_t d = 0; d < D; ++d) sum += (a[d] - b[d]) * (a[d] - b[d]);
+  return std::sqrt(sum);
+}
+
+/// A kd-tree of the columns that answers "which are least by distance minus label?".
+///
+/// Columns are numbered by their place in the tree; original() has the caller's number. Each node
+/// has a bound on the labels below it: labels only fall, so an old maximum is still a bound.
+template <std::size_t D>
+class ColumnTree {
+ public:
+  using Point = std::array<double, D>;
+
+  explicit ColumnTree(std::span<const Point> points) : original_(points.size()) {
+    std::iota(original_.begin(), original_.end(), 0u);
+    if (!points.empty()) build(points, 0, 0, points.size());
+    for (const std::uint32_t j : original_) points_.push_back(points[j]);
+    taken_.assign(points.size(), 0);
+    mark_.assign(points.size(), 0);
+  }
+
+  std::uint32_t original(std::uint32_t column) const { return original_[column]; }
+  const Point& point(std::uint32_t column) const { return points_[column]; }
+
+  /// Hides columns from the next nearest().
+  void hide(std::uint32_t column) { mark_[column] = round_ + 1; }
+
+  /// The `count` columns, or all if there are fewer, that are least by distance - label, below
+  /// `limit` and not hidden; in no particular order, into `found`. Returns the largest distance -
+  /// label among them.
+  double nearest(const Point& p, const std::vector<double>& labels, std::size_t count, double limit,
+                 std::vector<Candidate>& found) {
+    ++round_;
+    best_.clear();
+    if (!nodes_.empty()) descend_nearest(p, labels, count, limit, 0);
+    for (const Best& b : best_) found.push_back({b.column, b.distance});
+    return best_.empty() ? limit : best_.front().key;
+  }
+
+  /// The nearest column that was not taken, kUnassigned if all were.
+  Candidate nearest_free(const Point& p) const {
+    Candidate best{kUnassigned, std::numeric_limits<double>::infinity()};
+    if (!nodes_.empty()) descend_free(p, 0, best);
+    return best;
+  }
+
+  void take(std::uint32_t column) {
+    taken_[column] = 1;
+    for (std::uint32_t n = leaf_[column];; n = nodes_[n].parent) {
+      --nodes_[n].free;
+      if (n == 0) break;
+    }
+  }
+
+  /// After about as many falls of labels as there are columns the bounds are made anew.
+  void lowered(const std::vector<double>& labels) {
+    if (++falls_ < points_.size()) return;
+    falls_ = 0;
+    for (std::size_t n = nodes_.size(); n-- > 0;) {
+      Node& node = nodes_[n];
+      node.label = node.right == 0
+                       ? *std::max_element(labels.begin() + node.begin, labels.begin() + node.end)
+                       : std::max(nodes_[n + 1].label, nodes_[node.right].label);
+    }
+  }
+
+ private:
+  static constexpr std::size_t kLeaf = 8;
+
+  /// The left child follows its parent.
+  struct Node {
+    Point low, high;
+    double label = 0.0;
+    std::uint32_t begin, end, free, right = 0, parent = 0;
+  };
+  struct Best {
+    double key, distance;
+    std::uint32_t column;
+    bool operator<(const Best& other) const {
+      return key != other.key ? key < other.key : column < other.column;
+    }
+  };
+
+  void build(std::span<const Point> points, std::uint32_t parent, std::size_t begin,
+             std::size_t end) {
+    const auto me = static_cast<std::uint32_t>(nodes_.size());
+    Node node;
+    node.low = node.high = points[original_[begin]];
+    for (std::size_t k = begin; k < end; ++k) {
+      for (std::size_t d = 0; d < D; ++d) {
+        node.low[d] = std::min(node.low[d], points[original_[k]][d]);
+        node.high[d] = std::max(node.high[d], points[original_[k]][d]);
+      }
+    }
+    node.begin = static_cast<std::uint32_t>(begin);
+    node.end = static_cast<std::uint32_t>(end);
+    node.free = node.end - node.begin;
+    node.parent = parent;
+    nodes_.push_back(node);
+    if (end - begin <= kLeaf) {
+      leaf_.resize(end, me);
+      return;
+    }
+    std::size_t widest = 0;
+    for (std::size_t d = 1; d < D; ++d) {
+      if (node.high[d] - node.low[d] > node.high[widest] - node.low[widest]) widest = d;
+    }
+    const std::size_t middle = begin + (end - begin) / 2;
+    const auto at = [&](std::size_t k) {
+      return original_.begin() + static_cast<std::ptrdiff_t>(k);
+    };
+    // Equal coordinates in the order of the caller: the same tree with every standard library.
+    std::nth_element(at(begin), at(middle), at(end), [&](std::uint32_t a, std::uint32_t b) {
+      const double x = points[a][widest], y = points[b][widest];
+      return x != y ? x < y : a < b;
+    });
+    build(points, me, begin, middle);
+    nodes_[me].right = static_cast<std::uint32_t>(nodes_.size());
+    build(points, me, middle, end);
+  }
+
+  static double distance_to_box(const Point& p, const Node& node) {
+    double sum = 0;
+    for (std::size_t d = 0; d < D; ++d) {
+      const double out = std::max({node.low[d] - p[d], p[d] - node.high[d], 0.0});
+      sum += out * out;
+    }
+    return std::sqrt(sum);
+  }
+
+  void descend_nearest(const Point& p, const std::vector<double>& labels, std::size_t count,
+                       double limit, std::uint32_t n) {
+    const Node& node = nodes_[n];
+    const auto bar = [&] { return best_.size() < count ? limit : best_.front().key; };
+    if (node.right == 0) {
+      for (std::uint32_t j = node.begin; j < node.end; ++j) {
+        if (mark_[j] == round_) continue;
+        const double distance = distance_between(p, points_[j]);
+        const double key = distance - labels[j];
+        if (!(key < bar())) continue;
+        if (best_.size() == count) {
+          std::pop_heap(best_.begin(), best_.end());
+          best_.pop_back();
+        }
+        best_.push_back({key, distance, j});
+        std::push_heap(best_.begin(), best_.end());
+      }
+      return;
+    }
+    std::uint32_t near = n + 1, far = node.right;
+    double to_near = distance_to_box(p, nodes_[near]) - nodes_[near].label;
+    double to_far = distance_to_box(p, nodes_[far]) - nodes_[far].label;
+    if (to_far < to_near) {
+      std::swap(near, far);
+      std::swap(to_near, to_far);
+    }
+    if (to_near < bar()) descend_nearest(p, labels, count, limit, near);
+    if (to_far < bar()) descend_nearest(p, labels, count, limit, far);
+  }
+
+  void descend_free(const Point& p, std::uint32_t n, Candidate& best) const {
+    const Node& node = nodes_[n];
+    if (node.free == 0) return;
+    if (node.right == 0) {
+      for (std::uint32_t j = node.begin; j < node.end; ++j) {
+        if (taken_[j] != 0) continue;
+        const double distance = distance_between(p, points_[j]);
+        if (distance < best.cost) best = {j, distance};
+      }
+      return;
+    }
+    std::uint32_t near = n + 1, far = node.right;
+    double to_near = distance_to_box(p, nodes_[near]), to_far = distance_to_box(p, nodes_[far]);
+    if (to_far < to_near) {
+      std::swap(near, far);
+      std::swap(to_near, to_far);
+    }
+    if (to_near < best.cost) descend_free(p, near, best);
+    if (to_far < best.cost) descend_free(p, far, best);
+  }
+
+  std::vector<std::uint32_t> original_, leaf_;
+  std::vector<Point> points_;
+  std::vector<Node> nodes_;
+  std::vector<std::uint8_t> taken_;
+  std::vector<std::uint64_t> mark_;
+  std::uint64_t round_ = 0;
+  std::vector<Best> best_;
+  std::size_t falls_ = 0;
+};
+
+}  // namespace terrace::matching

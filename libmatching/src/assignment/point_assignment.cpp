@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/matching/point_assignment.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "assignment/check_optimal.hpp"
+#include "assignment/column_tree.hpp"
+#include "assignment/input_check.hpp"
+#include "assignment/sparse_solver.hpp"
+
+namespace terrace::matching {
+namespace {
+
+constexpr std::size_t kFirstCandidates = 8;
+
+template <std::size_t D>
+using Points = std::vector<std::array<double, D>>;
+
+/// The larger of `largest` and the magnitudes of the coordinates.
+template <std::size_t D>
+double magnitude(std::span<const std::array<double, D>> points, const char* set, double largest) {
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    for (const double x : points[i]) {
+      if (!(std::fabs(x) <= kLargestCost)) {
+        throw std::invalid_argument(std::string("assign_points: point ") + std::to_string(i) +
+                                    " of the " + set +
+                                    " has a coordinate that is not finite or above 1e300 in "
+                                    "magnitude; leave it out, or divide all by a power of 2");
+      }
+      largest = std::max(largest, std::fabs(x));
+    }
+  }
+  return largest;
+}
+
+/// Both sets times a power of two, which is exact, so that squares neither overflow nor vanish.
+template <std::size_t D>
+struct Scaled {
+  int exponent = 0;
+  Points<D> rows, columns;
+
+  Scaled(std::span<const std::array<double, D>> r, std::span<const std::array<double, D>> c)
+      : rows(r.begin(), r.end()), columns(c.begin(), c.end()) {
+    check_sizes(r.size(), c.size());
+    const double largest = magnitude<D>(c, "columns", magnitude<D>(r, "rows", 0.0));
+    if (largest > 0) std::frexp(largest, &exponent);
+    for (Points<D>* points : {&rows, &columns}) {
+      for (auto& p : *points) {
+        for (double& x : p) x = std::ldexp(x, -exponent);
+      }
+    }
+  }
+  double back(double value) const { return std::ldexp(value, exponent); }
+};
+
+/// The candidates of SparseSolver, from a tree of the columns.
+template <std::size_t D>
+class NearCandidates {
+ public:
+  NearCandidates(const Points<D>& rows, ColumnTree<D>& tree, std::size_t columns)
+      : rows_(rows), tree_(tree), lists_(rows.size()), threshold_(rows.size()) {
+    const std::vector<double> labels(columns, 0.0);
+    for (std::size_t i = 0; i < rows.size(); ++i)
+      extend(i, labels, std::numeric_limits<double>::infinity());
+  }
+
+  std::span<const Candidate> candidates(std::size_t row) const { return lists_[row]; }
+  double threshold(std::size_t row) const { return threshold_[row]; }
+
+  bool extend(std::size_t row, const std::vector<double>& labels, double limit) {
+    std::vector<Candidate>& list = lists_[row];
+    const std::size_t before = list.size(), count = std::max(kFirstCandidates, before);
+    for (const Candidate& c : list) tree_.hide(c.column);
+    const double worst = tree_.nearest(rows_[row], labels, count, limit, list);
+    // Fewer than asked for: below the limit there are no others.
+    threshold_[row] = list.size() - before < count ? limit : worst;
+    return list.size() != before;
+  }
+  Candidate nearest_free(std::size_t row) const { return tree_.nearest_free(rows_[row]); }
+  void lowered(const std::vector<double>& labels) { tree_.lowered(labels); }
+  void taken(std::uint32_t column) { tree_.take(column); }
+
+ private:
+  const Points<D>& rows_;
+  ColumnTree<D>& tree_;
+  std::vector<std::vector<Candidate>> lists_;
+  std::vector<double> threshold_;
+};
+
+/// For rows.size() <= columns.size(), without the cost.
+template <std::size_t D>
+Assignment assign_wide(const Points<D>& rows, const Points<D>& columns) {
+  ColumnTree<D> tree(columns);
+  NearCandidates<D> source(rows, tree, columns.size());
+  SparseSolver<NearCandidates<D>> solver(rows.size(), columns.size(), source);
+  // Every column is within reach of every row, so there is always a way.
+  solver.solve();
+  Assignment result = solver.result();
+  for (std::uint32_t& j : result.column) j = tree.original(j);
+  std::vector<double> labels(columns.size());
+  for (std::uint32_t j = 0; j < columns.size(); ++j)
+    labels[tree.original(j)] = result.column_dual[j];
+  result.column_dual = std::move(labels);
+  return result;
+}
+
+template <std::size_t D>
+Assignment assign_sets(std::span<const std::array<double, D>> rows,
+                       std::span<const std::array<double, D>> columns) {
+  const Scaled<D> scaled(rows, columns);
+  Assignment result;
+  if (rows.size() <= columns.size()) {
+    result = assign_wide<D>(scaled.rows, scaled.columns);
+  } else {
+    Assignment turned = assign_wide<D>(scaled.columns, scaled.rows);
+    result.column.assign(rows.size(), kUnassigned);
+    for (std::size_t j = 0; j < columns.size(); ++j)
+      result.column[turned.column[j]] = static_cast<std::uint32_t>(j);
+    result.row_dual = std::move(turned.column_dual);
+    result.column_dual = std::move(turned.row_dual);
+  }
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    if (result.column[i] == kUnassigned) continue;
+    result.cost += scaled.back(distance_between(scaled.rows[i], scaled.columns[result.column[i]]));
+  }
+  for (auto* labels : {&result.row_dual, &result.column_dual}) {
+    for (double& label : *labels) label = scaled.back(label);
+  }
+  return result;
+}
+
+template <std::size_t D>
+double check_sets(const Assignment& assignment, std::span<const std::array<double, D>> rows,
+                  std::span<const std::array<double, D>> columns) {
+  const Scaled<D> scaled(rows, columns);
+  OptimalityCheck<double> optimality(assignment, rows.size(), columns.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    for (std::size_t j = 0; j < columns.size(); ++j)
+      optimality.see(i, j, scaled.back(distance_between(scaled.rows[i], scaled.columns[j])));
+  }
+  return optimality.worst();
+}
+
+}  // namespace
+
+Assignment assign_points(std::span<const Point2> rows, std::span<const Point2> columns) {
+  return assign_sets<2>(rows, columns);
+}
+
+Assignment assign_points(std::span<const Point3> rows, std::span<const Point3> columns) {
+  return assign_sets<3>(rows, columns);
+}
+
+double check_points(const Assignment& assignment, std::span<const Point2> rows,
+                    std::span<const Point2> columns) {
+  return check_sets<2>(assignment, rows, columns);
+}
+
+double check_points(const Assignment& assignment, std::span<const Point3> rows,
+                    std::span<const Point3> columns) {
+  return check_sets<3>(assignment, rows, columns);
+}
+
+}  // namespace terrace::matching

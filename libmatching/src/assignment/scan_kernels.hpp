@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <type_traits>
+
+namespace terrace::matching {
+
+/// The numbers in which costs of a type are added: doubles for doubles and floats, 64 bits for
+/// integers of 32.
+template <class Cost>
+using LabelOf = std::conditional_t<std::is_integral_v<Cost>, std::int64_t, double>;
+
+/// Farther than everything, and the label that keeps a settled column there: base + c - kSettled is
+/// not below kFar for any cost c.
+template <class Number>
+inline constexpr Number kFar = std::numeric_limits<Number>::infinity();
+template <>
+inline constexpr std::int64_t kFar<std::int64_t> = std::int64_t{1} << 61;
+template <class Number>
+inline constexpr Number kSettled = -std::numeric_limits<Number>::infinity();
+template <>
+inline constexpr std::int64_t kSettled<std::int64_t> = -(std::int64_t{1} << 62);
+
+/// Columns that share one entry of `block_least`.
+inline constexpr std::size_t kScanBlock = 128;
+
+/// The inner loops over a row of the matrix, compiled for each instruction set. All give the same
+/// numbers.
+template <class Cost>
+struct ScanKernels {
+  using Number = LabelOf<Cost>;
+  /// For each column j: through = (base + costs[j]) - labels[j]; where that is below distance[j] it
+  /// goes there and `row` into previous[j]. block_least gets the least distance of each block of
+  /// columns; returns the least of all.
+  Number (*relax)(const Cost* costs, const Number* labels, std::size_t columns, Number base,
+                  std::int64_t row, Number* distance, std::int64_t* previous, Number* block_least);
+  /// The least two of costs[j] - labels[j], equal if two columns are; kFar if there are none.
+  void (*least_two)(const Cost* costs, const Number* labels, std::size_t columns, Number* first,
+                    Number* second);
+};
+
+/// Those for the best instruction set this processor has.
+template <class Cost>
+const ScanKernels<Cost>& scan_kernels();
+
+/// The instruction sets; tests compare them with each other.
+enum class ScanPath { portable, avx2, avx512 };
+bool has_scan_path(ScanPath path);
+template <class Cost>
+const ScanKernels<Cost>& scan_kernels(ScanPath path);
+
+}  // namespace terrace::matching

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+// The loops of scan_kernels.hpp over vectors of TERRACE_VECTOR_BYTES, for a file that is compiled
+// for one instruction set. Everything is in an unnamed namespace and calls nothing, so that no code
+// for newer processors can be shared with the rest of the program.
+#pragma once
+
+#include "assignment/scan_kernels.hpp"
+
+namespace terrace::matching {
+namespace {
+
+constexpr std::size_t kLanes = TERRACE_VECTOR_BYTES / 8;
+
+template <class Number>
+struct Vector {
+  typedef Number Type __attribute__((vector_size(TERRACE_VECTOR_BYTES)));
+};
+template <class Cost>
+struct Packed {
+  typedef Cost Type __attribute__((vector_size(kLanes * sizeof(Cost))));
+};
+
+template <class Number>
+typename Vector<Number>::Type load(const Number* from) {
+  typename Vector<Number>::Type v;
+  __builtin_memcpy(&v, from, sizeof v);
+  return v;
+}
+
+template <class Number>
+void store(Number* to, const typename Vector<Number>::Type& v) {
+  __builtin_memcpy(to, &v, sizeof v);
+}
+
+template <class Number, class Cost>
+typename Vector<Number>::Type load_costs(const Cost* from) {
+  typename Packed<Cost>::Type v;
+  __builtin_memcpy(&v, from, sizeof v);
+  return __builtin_convertvector(v, typename Vector<Number>::Type);
+}
+
+template <class Number>
+typename Vector<Number>::Type all(Number value) {
+  typename Vector<Number>::Type v;
+  for (std::size_t k = 0; k < kLanes; ++k) v[k] = value;
+  return v;
+}
+
+template <class Cost>
+LabelOf<Cost> relax(const Cost* costs, const LabelOf<Cost>* labels, std::size_t columns,
+                    LabelOf<Cost> base, std::int64_t row, LabelOf<Cost>* distance,
+                    std::int64_t* previous, LabelOf<Cost>* block_least) {
+  using Number = LabelOf<Cost>;
+  using V = typename Vector<Number>::Type;
+  const V bases = all(base);
+  const auto rows = all(row);
+  Number least = kFar<Number>;
+  for (std::size_t begin = 0; begin < columns; begin += kScanBlock) {
+    const std::size_t end = begin + kScanBlock < columns ? begin + kScanBlock : columns;
+    V lanes = all(kFar<Number>);
+    std::size_t j = begin;
+    for (; j + kLanes <= end; j += kLanes) {
+      const V through = (bases + load_costs<Number>(costs + j)) - load(labels + j);
+      const V before = load(distance + j);
+      const auto nearer = through < before;
+      const V now = nearer ? through : before;
+      store(distance + j, now);
+      store(previous + j, nearer ? rows : load(previous + j));
+      lanes = now < lanes ? now : lanes;
+    }
+    Number block = kFar<Number>;
+    for (; j < end; ++j) {
+      const Number through = (base + static_cast<Number>(costs[j])) - labels[j];
+      if (through < distance[j]) {
+        distance[j] = through;
+        previous[j] = row;
+      }
+      block = distance[j] < block ? distance[j] : block;
+    }
+    for (std::size_t k = 0; k < kLanes; ++k) block = lanes[k] < block ? lanes[k] : block;
+    block_least[begin / kScanBlock] = block;
+    least = block < least ? block : least;
+  }
+  return least;
+}
+
+template <class Cost>
+void least_two(const Cost* costs, const LabelOf<Cost>* labels, std::size_t columns,
+               LabelOf<Cost>* first, LabelOf<Cost>* second) {
+  using Number = LabelOf<Cost>;
+  using V = typename Vector<Number>::Type;
+  V first_lanes = all(kFar<Number>), second_lanes = first_lanes;
+  std::size_t j = 0;
+  for (; j + kLanes <= columns; j += kLanes) {
+    const V value = load_costs<Number>(costs + j) - load(labels + j);
+    const auto below = value < first_lanes;
+    const V other = below ? first_lanes : value;
+    first_lanes = below ? value : first_lanes;
+    second_lanes = other < second_lanes ? other : second_lanes;
+  }
+  Number a = kFar<Number>, b = a;
+  const auto take = [&](Number value) {
+    if (value < a) {
+      b = a;
+      a = value;
+    } else if (value < b) {
+      b = value;
+    }
+  };
+  for (; j < columns; ++j) take(static_cast<Number>(costs[j]) - labels[j]);
+  for (std::size_t k = 0; k < kLanes; ++k) {
+    take(first_lanes[k]);
+    take(second_lanes[k]);
+  }
+  *first = a;
+  *second = b;
+}
+
+}  // namespace
+}  // namespace terrace::matching

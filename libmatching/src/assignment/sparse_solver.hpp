@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "terrace/matching/assignment.hpp"
+
+namespace terrace::matching {
+
+struct Candidate {
+  std::uint32_t column;
+  double cost;
+};
+
+/// Shortest augmenting paths on lists of candidates, rows <= columns.
+///
+/// `Source` holds the lists:
+///   std::span<const Candidate> candidates(row): grows by extend() only;
+///   double threshold(row): cost - label of columns not in the list is at least this much;
+///   bool extend(row, labels, limit): adds columns to the list and raises the threshold; false if
+///     there is no absent column left below `limit`;
+///   Candidate nearest_free(row): some near free column, kUnassigned if it knows none;
+///   void lowered(labels): one of them fell;  void taken(column): it got its first row.
+/// Labels of columns start at 0, only fall, and only on columns that have a row.
+template <class Source>
+class SparseSolver {
+ public:
+  SparseSolver(std::size_t rows, std::size_t columns, Source& source)
+      : rows_(rows),
+        source_(source),
+        row_of_(columns, kUnassigned),
+        previous_(columns),
+        distance_(columns, kInfinity),
+        row_distance_(rows) {
+    result_.column.assign(rows, kUnassigned);
+    result_.row_dual.assign(rows, 0.0);
+    result_.column_dual.assign(columns, 0.0);
+  }
+
+  /// False if a row finds no way to a free column; result() is then of no use, and tree_rows() are
+  /// the rows that reach only tree_rows().size() - 1 columns.
+  bool solve() {
+    for (const std::uint32_t row : reduce_rows()) {
+      if (!augment(row)) return false;
+    }
+    return true;
+  }
+
+  /// Without the cost.
+  Assignment result() { return std::move(result_); }
+
+  std::vector<std::uint32_t> tree_rows() const {
+    std::vector<std::uint32_t> rows{start_};
+    for (const Settled& s : settled_) rows.push_back(row_of_[s.column]);
+    return rows;
+  }
+
+ private:
+  static constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  static constexpr std::size_t kReductionSteps = 4;
+
+  struct Settled {
+    std::uint32_t column;
+    double distance;
+  };
+  /// A column at its distance, or a row at the distance where its absent columns may come in.
+  struct Event {
+    double key;
+    std::uint32_t id;
+    bool row;
+    // The standard heap keeps the largest in front. Equal keys: fixed order.
+    bool operator<(const Event& other) const {
+      if (key != other.key) return key > other.key;
+      if (row != other.row) return row;
+      return id > other.id;
+    }
+  };
+
+  /// Augmenting row reduction as in DenseSolver, the columns that are not candidates standing in
+  /// with the threshold.
+  std::vector<std::uint32_t> reduce_rows() {
+    std::vector<std::uint32_t> left;
+    auto& labels = result_.column_dual;
+    std::size_t steps = kReductionSteps * rows_;
+    for (std::size_t i = 0; i < rows_; ++i) {
+      auto row = static_cast<std::uint32_t>(i);
+      while (row != kUnassigned) {
+        double least = kInfinity, second = source_.threshold(row), cost = 0;
+        std::uint32_t column = kUnassigned;
+        for (const Candidate& c : source_.candidates(row)) {
+          const double reduced = c.cost - labels[c.column];
+          if (reduced < least || (reduced == least && row_of_[column] != kUnassigned)) {
+            if (c.column != column) second = std::min(second, least);
+            least = reduced;
+            column = c.column;
+            cost = c.cost;
+          } else if (c.column != column) {
+            second = std::min(second, reduced);
+          }
+        }
+        result_.row_dual[row] = std::min(least, second);
+        if (column == kUnassigned || second < least) {
+          if (column == kUnassigned && second == kInfinity) result_.row_dual[row] = 0.0;
+          left.push_back(row);
+          break;
+        }
+        const std::uint32_t owner = row_of_[column];
+        const double label =
+            second == kInfinity ? labels[column] : labels[column] - (second - least);
+        if (owner != kUnassigned && (steps == 0 || !(label < labels[column]))) {
+          left.push_back(row);
+          break;
+        }
+        if (steps != 0) --steps;
+        if (label < labels[column]) {
+          labels[column] = label;
+          result_.row_dual[row] = cost - label;
+          source_.lowered(labels);
+        }
+        row_of_[column] = row;
+        result_.column[row] = column;
+        if (owner == kUnassigned) {
+          source_.taken(column);
+        } else {
+          result_.column[owner] = kUnassigned;
+        }
+        row = owner;
+      }
+    }
+    return left;
+  }
+
+  void reach_free(std::uint32_t row, std::uint32_t column, double distance) {
+    bound_ = distance;
+    sink_ = column;
+    sink_row_ = row;
+  }
+
+  void push(Event event) {
+    heap_.push_back(event);
+    std::push_heap(heap_.begin(), heap_.end());
+  }
+
+  /// Candidates of the row from `first` on.
+  void relax(std::uint32_t row, std::size_t first) {
+    const double base = row_distance_[row] - result_.row_dual[row];
+    for (const Candidate& c : source_.candidates(row).subspan(first)) {
+      const double through = (base + c.cost) - result_.column_dual[c.column];
+      if (!(through < bound_) || !(through < distance_[c.column])) continue;
+      if (row_of_[c.column] == kUnassigned) {
+        reach_free(row, c.column, through);
+        continue;
+      }
+      if (distance_[c.column] == kInfinity) touched_.push_back(c.column);
+      distance_[c.column] = through;
+      previous_[c.column] = row;
+      push({through, c.column, false});
+    }
+    const double absent = base + source_.threshold(row);
+    if (absent < bound_) push({absent, row, true});
+  }
+
+  bool augment(std::uint32_t start) {
+    for (const std::uint32_t j : touched_) distance_[j] = kInfinity;
+    touched_.clear();
+    settled_.clear();
+    heap_.clear();
+    start_ = start;
+    bound_ = kInfinity;
+    sink_ = kUnassigned;
+    auto& labels = result_.column_dual;
+    const Candidate free = source_.nearest_free(start);
+    if (free.column != kUnassigned)
+      reach_free(start, free.column, free.cost - result_.row_dual[start]);
+    row_distance_[start] = 0.0;
+    relax(start, 0);
+    while (!heap_.empty() && heap_.front().key < bound_) {
+      std::pop_heap(heap_.begin(), heap_.end());
+      const Event event = heap_.back();
+      heap_.pop_back();
+      if (event.row) {
+        const std::size_t known = source_.candidates(event.id).size();
+        const double limit = bound_ - row_distance_[event.id] + result_.row_dual[event.id];
+        if (source_.extend(event.id, labels, limit)) relax(event.id, known);
+        continue;
+      }
+      if (distance_[event.id] != event.key) continue;
+      settled_.push_back({event.id, event.key});
+      // Settled: nothing is below.
+      distance_[event.id] = -kInfinity;
+      const std::uint32_t row = row_of_[event.id];
+      row_distance_[row] = event.key;
+      relax(row, 0);
+    }
+    if (sink_ == kUnassigned) return false;
+    // Labels: rows of the tree rise, its columns fall, so that the path's edges become tight.
+    result_.row_dual[start] += bound_;
+    for (const Settled& s : settled_) {
+      const double fall = bound_ - s.distance;
+      result_.row_dual[row_of_[s.column]] += fall;
+      labels[s.column] -= fall;
+      source_.lowered(labels);
+    }
+    source_.taken(sink_);
+    std::uint32_t j = sink_;
+    for (std::uint32_t i = sink_row_;;) {
+      row_of_[j] = i;
+      std::swap(result_.column[i], j);
+      if (i == start) break;
+      i = previous_[j];
+    }
+    return true;
+  }
+
+  std::size_t rows_;
+  Source& source_;
+  Assignment result_;
+  std::vector<std::uint32_t> row_of_, previous_;
+  std::vector<double> distance_, row_distance_;
+  std::vector<std::uint32_t> touched_;
+  std::vector<Settled> settled_;
+  std::vector<Event> heap_;
+  std::uint32_t start_ = 0, sink_ = kUnassigned, sink_row_ = 0;
+  double bound_ = kInfinity;
+};
+
+}  // namespace terrace::matching

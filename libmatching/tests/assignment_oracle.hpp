@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <numeric>
+#include <random>
+#include <vector>
+
+namespace terrace::matching {
+
+/// The least cost over all ways to give min(rows, columns) rows a column.
+template <class Number>
+double brute_force(const std::vector<Number>& costs, std::size_t rows, std::size_t columns) {
+  // The longer side is permuted; its head meets the shorter side.
+  const bool tall = rows > columns;
+  std::vector<std::size_t> permutation(tall ? rows : columns);
+  std::iota(permutation.begin(), permutation.end(), std::size_t{0});
+  double best = std::numeric_limits<double>::infinity();
+  do {
+    double sum = 0;
+    for (std::size_t k = 0; k < std::min(rows, columns); ++k) {
+      const std::size_t entry = tall ? permutation[k] * columns + k : k * columns + permutation[k];
+      sum += static_cast<double>(costs[entry]);
+    }
+    best = std::min(best, sum);
+  } while (std::next_permutation(permutation.begin(), permutation.end()));
+  return best;
+}
+
+/// In [0, 1).
+inline double uniform(std::mt19937_64& random) {
+  return static_cast<double>(random() >> 11) * 0x1p-53;
+}
+
+}  // namespace terrace::matching
