@@ -39,13 +39,13 @@ void check_ends(std::size_t vertex_count, std::span<const AnyEdge> edges) {
 }
 
 template <class AnyEdge>
-Matching solve(std::size_t vertex_count, std::span<const AnyEdge> edges, double scale,
+Matching solve(std::size_t vertex_count, std::span<const AnyEdge> edges, int exponent,
                const std::vector<Edge>& doubled) {
   Solver solver(static_cast<std::uint32_t>(vertex_count), doubled);
   const std::uint32_t alone = solver.solve();
   if (alone != blossom::kNone) fail(blossom::unmatchable(solver, alone));
   Matching result = blossom::proof_of(solver);
-  result.scale = scale;
+  result.exponent = exponent;
   // Of parallel edges the least is the matched one.
   std::vector<std::size_t> chosen(vertex_count, edges.size());
   for (std::size_t k = 0; k < edges.size(); ++k) {
@@ -60,8 +60,10 @@ Matching solve(std::size_t vertex_count, std::span<const AnyEdge> edges, double 
   return result;
 }
 
-std::int64_t rounded(const WeightedEdge& e, double scale) { return std::llround(e.weight * scale); }
-std::int64_t rounded(const IntegerEdge& e, double) { return e.weight; }
+std::int64_t rounded(const WeightedEdge& e, int exponent) {
+  return std::llround(std::ldexp(e.weight, exponent));
+}
+std::int64_t rounded(const IntegerEdge& e, int) { return e.weight; }
 
 /// Sums of duals over the chain of blossoms from a vertex outward, and the chain itself.
 std::vector<std::uint32_t> chain_of(const Matching& m, std::uint32_t vertex) {
@@ -137,8 +139,8 @@ std::string error_of(const Matching& m, std::span<const AnyEdge> edges) {
     if (e.i >= m.mate.size() || e.j >= m.mate.size() || e.i == e.j) {
       return "edge " + std::to_string(k) + " does not belong to the graph";
     }
-    const std::int64_t slack = 2 * rounded(e, m.scale) - m.vertex_dual[e.i] - m.vertex_dual[e.j] -
-                               separating_duals(m, e.i, e.j);
+    const std::int64_t slack = 2 * rounded(e, m.exponent) - m.vertex_dual[e.i] -
+                               m.vertex_dual[e.j] - separating_duals(m, e.i, e.j);
     if (slack < 0) {
       return "edge " + std::to_string(k) + " is below its duals by " + std::to_string(-slack);
     }
@@ -163,7 +165,7 @@ double Matching::dual_bound() const {
   };
   for (const std::int64_t dual : vertex_dual) add(dual);
   for (const std::int64_t dual : blossom_dual) add(dual);
-  return (high * 0x1p32 + static_cast<double>(low)) / (2.0 * scale);
+  return std::ldexp(high * 0x1p32 + static_cast<double>(low), -1 - exponent);
 }
 
 Matching min_weight_perfect_matching(std::size_t vertex_count,
@@ -175,17 +177,15 @@ Matching min_weight_perfect_matching(std::size_t vertex_count,
       fail("edge " + std::to_string(k) + " has no finite weight");
     largest = std::max(largest, std::abs(edges[k].weight));
   }
-  int exponent = 0;
-  std::frexp(largest, &exponent);
+  int top = 0;
+  std::frexp(largest, &top);
   for (int bits = 52;; bits -= 9) {
-    // The scale itself must stay a number where all weights are tiny.
-    const int shift = std::min(bits - exponent, 1000);
-    const double scale = std::ldexp(1.0, shift);
+    const int exponent = bits - top;
     std::vector<Edge> doubled;
     doubled.reserve(edges.size());
-    for (const WeightedEdge& e : edges) doubled.push_back({e.i, e.j, 2 * rounded(e, scale)});
+    for (const WeightedEdge& e : edges) doubled.push_back({e.i, e.j, 2 * rounded(e, exponent)});
     try {
-      return solve(vertex_count, edges, scale, doubled);
+      return solve(vertex_count, edges, exponent, doubled);
     } catch (const std::overflow_error&) {
       if (bits <= 34) throw;
     }
@@ -205,7 +205,7 @@ Matching min_weight_perfect_matching(std::size_t vertex_count, std::span<const I
     }
     doubled.push_back({e.i, e.j, 2 * e.weight});
   }
-  return solve(vertex_count, edges, 1.0, doubled);
+  return solve(vertex_count, edges, 0, doubled);
 }
 
 std::string matching_error(const Matching& matching, std::span<const WeightedEdge> edges) {

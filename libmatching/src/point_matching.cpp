@@ -164,7 +164,6 @@ class Problem {
     const Matching sorted = blossom::proof_of(solver);
     Matching& proof = result.proof;
     proof = sorted;
-    proof.scale = cost_.scale;
     const auto given = [&](std::uint32_t k) { return k < n ? order_[k] : k; };
     for (std::uint32_t k = 0; k < sorted.mate.size(); ++k) {
       proof.mate[given(k)] = given(sorted.mate[k]);
@@ -184,8 +183,8 @@ class Problem {
     // From the unit of the scaled points back to the caller's.
     const int shift = options_.metric.distance ? 0 : shift_;
     result.cost = std::ldexp(result.cost, shift);
-    result.dual_bound = std::ldexp(proof.dual_bound(), shift);
-    proof.scale = std::ldexp(proof.scale, -shift);
+    proof.exponent = std::ilogb(cost_.scale) - shift;
+    result.dual_bound = proof.dual_bound();
     proof.cost = result.cost;
     if (!std::isfinite(result.cost)) fail("the cost passes the range of double; scale the points");
   }

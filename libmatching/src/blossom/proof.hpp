@@ -7,7 +7,7 @@
 namespace terrace::matching::blossom {
 
 /// What the solver knows as the public result: partners and duals, the blossoms numbered from 0.
-/// The caller fills cost and scale.
+/// The caller fills cost and exponent.
 Matching proof_of(Solver& solver);
 
 /// The message for a vertex that solve() could not match.
