@@ -53,7 +53,7 @@ class Pricing {
   /// points: in halving order, the solver's vertices 0 .. points.size() - 1.
   Pricing(std::span<const Point> points, const PairCost& cost) : points_(points), cost_(cost) {}
 
-  /// Violated pairs, for each point the kMost worst among those to later points.
+  /// Violated pairs, not all of them: the worst few of each part, for large parts more.
   std::vector<Edge> violated(const Solver& solver) {
     nest(solver);
     found_.clear();
@@ -74,6 +74,10 @@ class Pricing {
   struct Head {
     std::uint32_t node;
     std::int64_t around;
+  };
+  struct Wanted {
+    std::uint32_t part, from, to;
+    std::int64_t excess;  // negative
   };
   struct Member {
     std::uint32_t vertex, part, level;
@@ -190,10 +194,27 @@ class Pricing {
     return a.part != b.part && (b.level > a.level || (b.level == a.level && i < j));
   }
 
+  // Where two large parts are too near, all their pairs are: a few of them do.
+  void choose() {
+    std::sort(wanted_.begin(), wanted_.end(), [](const Wanted& a, const Wanted& b) {
+      return std::tie(a.part, a.excess, a.from, a.to) < std::tie(b.part, b.excess, b.from, b.to);
+    });
+    std::uint32_t part = kNone;
+    std::size_t taken = 0;
+    for (const Wanted& w : wanted_) {
+      taken = w.part == part ? taken + 1 : 0;
+      part = w.part;
+      if (taken >= kMost + size(part) / 8) continue;
+      const std::uint32_t i = members_[w.from].vertex;
+      found_.push_back({i, w.to, cost_(i, w.to)});
+    }
+  }
+
   void price() {
     std::vector<std::pair<std::int64_t, std::uint32_t>> worst;
-    const auto take = [&](std::uint32_t i) {
-      for (const auto& [excess, j] : worst) found_.push_back({i, j, cost_(i, j)});
+    wanted_.clear();
+    const auto take = [&](std::uint32_t k) {
+      for (const auto& [excess, j] : worst) wanted_.push_back({members_[k].part, k, j, excess});
       worst.clear();
     };
     const auto count = static_cast<std::uint32_t>(members_.size());
@@ -202,8 +223,9 @@ class Pricing {
         for (std::uint32_t j = 0; j < count; ++j) {
           if (faces(i, j)) test(members_[i], members_[j], worst);
         }
-        take(members_[i].vertex);
+        take(i);
       }
+      choose();
       return;
     }
     std::vector<Point> points(count);
@@ -252,8 +274,9 @@ class Pricing {
           if (faces(i, j)) test(a, members_[j], worst);
         }
       }
-      take(a.vertex);
+      take(i);
     }
+    choose();
   }
 
   std::span<const Point> points_;
@@ -263,6 +286,7 @@ class Pricing {
   std::vector<Head> heads_;
   std::vector<Member> members_;
   std::vector<std::int64_t> around_;  // of each level of the chain: the duals around, with its own
+  std::vector<Wanted> wanted_;
   std::vector<Edge> found_;
 };
 

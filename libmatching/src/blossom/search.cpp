@@ -15,12 +15,13 @@ constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
 
 }  // namespace
 
-bool Solver::search(std::uint32_t root) {
+Solver::Outcome Solver::search(std::uint32_t root, std::int64_t limit) {
   const auto later = [](const Event& x, const Event& y) {
     return std::tie(x.time, x.b, x.a) > std::tie(y.time, y.b, y.a);
   };
   delta_ = 0;
-  bound_ = kNever;
+  bound_ = limit == kNever ? kNever : limit + 1;
+  left_out_ = false;
   label_plus(root);
   scan_queue();
   while (!heap_.empty()) {
@@ -35,7 +36,7 @@ bool Solver::search(std::uint32_t root) {
       if (nodes_[top(event.a)].mate == kNone) {
         augment(v.key_from, event.a);
         end_tree();
-        return true;
+        return Outcome::kAugmented;
       }
       grow(event.a);
     } else if (event.b == kExpand) {
@@ -49,13 +50,21 @@ bool Solver::search(std::uint32_t root) {
     }
     scan_queue();
   }
+  if (left_out_) {
+    delta_ = limit;
+    end_tree();
+    return Outcome::kStopped;
+  }
   collect_witness();
   end_tree();
-  return false;
+  return Outcome::kImpossible;
 }
 
 void Solver::push(std::int64_t time, std::uint32_t a, std::uint32_t b) {
-  if (time >= bound_) return;
+  if (time >= bound_) {
+    left_out_ = true;
+    return;
+  }
   if (time > kLimit) {
     throw std::overflow_error("matching: the duals pass 64 bits; use smaller weights");
   }

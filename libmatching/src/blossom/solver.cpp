@@ -75,15 +75,39 @@ std::uint32_t Solver::solve() {
     if (in_use(x) && nodes_[x].parent == kNone && nodes_[x].mate == kNone) ++exposed;
   }
   const auto is_exposed = [&](std::uint32_t v) { return nodes_[top(v)].mate == kNone; };
-  for (std::uint32_t v = 0; v < n_; ++v) {
-    if (!is_exposed(v)) continue;
-    // Of the last two the late vertex is the root: its tree is one edge.
-    const bool last = exposed == 2 && late_ != kNone && is_exposed(late_);
-    const std::uint32_t root = top(last ? late_ : v);
-    if (!search(root)) return nodes_[root].base;
-    exposed -= 2;
+  // Trees stop at a limit that doubles from pass to pass: so the exposed vertices rise about
+  // evenly, their trees meet half way and stay small, and few are left for the searches without a
+  // limit.
+  std::int64_t limit = first_limit();
+  while (true) {
+    const bool unlimited = exposed <= 2 || limit > kLimit / 4 || limit == 0;
+    for (std::uint32_t v = 0; v < n_; ++v) {
+      if (!is_exposed(v)) continue;
+      const bool last = exposed == 2 && late_ != kNone && is_exposed(late_);
+      if (v == late_ && !last) continue;
+      // Of the last two the late vertex is the root: its tree is one edge.
+      const std::uint32_t root = top(last ? late_ : v);
+      const Outcome outcome =
+          search(root, unlimited || last ? std::numeric_limits<std::int64_t>::max() : limit);
+      if (outcome == Outcome::kImpossible) return nodes_[root].base;
+      if (outcome == Outcome::kAugmented) exposed -= 2;
+    }
+    if (exposed == 0) return kNone;
+    limit *= 2;
   }
-  return kNone;
+}
+
+// A quarter of the mean of the least costs around the vertices; 0 where that says nothing.
+std::int64_t Solver::first_limit() const {
+  double sum = 0.0;
+  for (std::uint32_t v = 0; v < n_; ++v) {
+    std::int64_t least = kLimit;
+    for (std::size_t k = arc_begin_[v]; k < arc_begin_[v + std::size_t{1}]; ++k) {
+      if (arcs_[k].to != late_) least = std::min(least, arcs_[k].cost);
+    }
+    sum += least == kLimit ? 0.0 : static_cast<double>(least);
+  }
+  return n_ == 0 ? 0 : static_cast<std::int64_t>(std::max(0.0, sum / 4.0 / n_));
 }
 
 std::vector<std::uint32_t> Solver::mates() {

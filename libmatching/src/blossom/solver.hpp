@@ -99,8 +99,10 @@ class Solver {
 
   void index_arcs();
   void start_duals();
+  std::int64_t first_limit() const;
 
-  bool search(std::uint32_t root);
+  enum class Outcome : std::uint8_t { kAugmented, kStopped, kImpossible };
+  Outcome search(std::uint32_t root, std::int64_t limit);
   void push(std::int64_t time, std::uint32_t a, std::uint32_t b);
   void label_plus(std::uint32_t node);
   void label_minus(std::uint32_t node, std::uint32_t from, std::uint32_t to);
@@ -148,7 +150,10 @@ class Solver {
 
   // The tree that stands.
   std::int64_t delta_ = 0;
-  std::int64_t bound_ = 0;  // an augmentation is known at this delta: later events are not needed
+  // Events from this delta on are not needed: an augmentation is known, or the limit. Whether one
+  // was left out for that.
+  std::int64_t bound_ = 0;
+  bool left_out_ = false;
   std::vector<Event> heap_;
   std::vector<std::uint32_t> labelled_, keyed_, queue_;
   std::uint32_t stamp_ = 0;
