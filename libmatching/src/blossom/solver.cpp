@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: Apache-2.0
+// The frame of the blossom solver: the graph, the first duals, and the loop over exposed vertices.
+#include "blossom/solver.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace terrace::matching::blossom {
+
+Solver::Solver(std::uint32_t n, std::vector<Edge> edges, std::uint32_t late)
+    : n_(n), late_(late), edges_(std::move(edges)), vertices_(n), sets_(n), nodes_(n) {
+  for (std::uint32_t v = 0; v < n; ++v) {
+    vertices_[v].set = v;
+    vertices_[v].key = std::numeric_limits<std::int64_t>::max();
+    sets_[v] = v;
+    nodes_[v].first = nodes_[v].last = nodes_[v].set = nodes_[v].base = v;
+  }
+  index_arcs();
+}
+
+void Solver::index_arcs() {
+  arc_begin_.assign(static_cast<std::size_t>(n_) + 1, 0);
+  for (const Edge& e : edges_) {
+    ++arc_begin_[e.i + std::size_t{1}];
+    ++arc_begin_[e.j + std::size_t{1}];
+  }
+  for (std::uint32_t v = 0; v < n_; ++v) arc_begin_[v + std::size_t{1}] += arc_begin_[v];
+  arcs_.resize(2 * edges_.size());
+  std::vector<std::size_t> fill(arc_begin_.begin(), arc_begin_.end() - 1);
+  for (const Edge& e : edges_) {
+    arcs_[fill[e.i]++] = {e.cost, e.j};
+    arcs_[fill[e.j]++] = {e.cost, e.i};
+  }
+}
+
+// Half the least weight around each vertex is feasible; then each exposed vertex rises as far as it
+// may and takes a neighbour that is exposed and tight.
+void Solver::start_duals() {
+  const auto arcs_of = [&](std::uint32_t v) {
+    return std::span<const Arc>(arcs_).subspan(arc_begin_[v],
+                                               arc_begin_[v + std::size_t{1}] - arc_begin_[v]);
+  };
+  for (std::uint32_t v = 0; v < n_; ++v) {
+    std::int64_t least = std::numeric_limits<std::int64_t>::max();
+    for (const Arc& arc : arcs_of(v)) {
+      if (arc.to != late_) least = std::min(least, arc.cost);
+    }
+    // Costs are even. The late vertex starts so low that nothing reaches it.
+    if (least != std::numeric_limits<std::int64_t>::max()) vertices_[v].potential = least / 2;
+    if (v == late_) vertices_[v].potential = -kLimit / 4;
+  }
+  for (std::uint32_t v = 0; v < n_; ++v) {
+    if (v == late_ || nodes_[v].mate != kNone || arcs_of(v).empty()) continue;
+    std::int64_t slack = std::numeric_limits<std::int64_t>::max();
+    std::uint32_t partner = kNone;
+    for (const Arc& arc : arcs_of(v)) {
+      const std::int64_t s = arc.cost - vertices_[v].potential - vertices_[arc.to].potential;
+      if (s < slack || (s == slack && partner == kNone && nodes_[arc.to].mate == kNone)) {
+        slack = s;
+        partner = nodes_[arc.to].mate == kNone ? arc.to : kNone;
+      }
+    }
+    vertices_[v].potential += slack;
+    if (partner != kNone) {
+      nodes_[v].mate = partner;
+      nodes_[partner].mate = v;
+    }
+  }
+}
+
+std::uint32_t Solver::solve() {
+  if (!std::exchange(started_, true)) start_duals();
+  std::uint32_t exposed = 0;
+  for (std::uint32_t x = 0; x < node_count(); ++x) {
+    if (in_use(x) && nodes_[x].parent == kNone && nodes_[x].mate == kNone) ++exposed;
+  }
+  const auto is_exposed = [&](std::uint32_t v) { return nodes_[top(v)].mate == kNone; };
+  // Trees stop at a limit that doubles from pass to pass: so the exposed vertices rise about
+  // evenly, their trees meet half way and stay small, and few are left for the searches without a
+  // limit.
+  std::int64_t limit = first_limit();
+  while (true) {
+    const bool unlimited = exposed <= 2 || limit > kLimit / 4 || limit == 0;
+    for (std::uint32_t v = 0; v < n_; ++v) {
+      if (!is_exposed(v)) continue;
+      const bool last = exposed == 2 && late_ != kNone && is_exposed(late_);
+      if (v == late_ && !last) continue;
+      // Of the last two the late vertex is the root: its tree is one edge.
+      const std::uint32_t root = top(last ? late_ : v);
+      const Outcome outcome =
+          search(root, unlimited || last ? std::numeric_limits<std::int64_t>::max() : limit);
+      if (outcome == Outcome::kImpossible) return nodes_[root].base;
+      if (outcome == Outcome::kAugmented) exposed -= 2;
+    }
+    if (exposed == 0) return kNone;
+    limit *= 2;
+  }
+}
+
+// A quarter of the mean of the least costs around the vertices; 0 where that says nothing.
+std::int64_t Solver::first_limit() const {
+  double sum = 0.0;
+  for (std::uint32_t v = 0; v < n_; ++v) {
+    std::int64_t least = kLimit;
+    for (std::size_t k = arc_begin_[v]; k < arc_begin_[v + std::size_t{1}]; ++k) {
+      if (arcs_[k].to != late_) least = std::min(least, arcs_[k].cost);
+    }
+    sum += least == kLimit ? 0.0 : static_cast<double>(least);
+  }
+  return n_ == 0 ? 0 : static_cast<std::int64_t>(std::max(0.0, sum / 4.0 / n_));
+}
+
+std::vector<std::uint32_t> Solver::mates() {
+  std::vector<std::uint32_t> mate(n_, kNone), open;
+  for (std::uint32_t node = 0; node < node_count(); ++node) {
+    if (!in_use(node) || nodes_[node].parent != kNone) continue;
+    open.push_back(node);
+    while (!open.empty()) {
+      const std::uint32_t x = open.back();
+      open.pop_back();
+      if (x < n_) {
+        mate[x] = nodes_[x].mate;
+        continue;
+      }
+      match_parts(x);
+      for (const Part& part : parts(x)) open.push_back(part.node);
+    }
+  }
+  return mate;
+}
+
+}  // namespace terrace::matching::blossom

@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+namespace terrace::matching::blossom {
+
+inline constexpr std::uint32_t kNone = 0xFFFFFFFFu;
+/// No potential may pass this: sums of three stay inside 64 bits.
+inline constexpr std::int64_t kLimit = std::int64_t{1} << 60;
+
+/// An edge with its doubled integer weight: doubled, so that all duals are integers.
+struct Edge {
+  std::uint32_t i, j;
+  std::int64_t cost;
+};
+
+/// Minimum-weight perfect matching by the primal-dual blossom method, one alternating tree at a
+/// time, on a sparse graph whose edges may be added to between two solutions.
+///
+/// A *node* is a vertex (id below n) or a blossom (id n and up). A node without a parent is a *top*
+/// node; only top nodes are matched, labelled and in the tree. The *potential* of a vertex is its
+/// own dual plus those of all blossoms around it, so that between different top nodes the slack of
+/// an edge is cost - potential(i) - potential(j), whatever is nested.
+///
+/// While a tree stands, the potential of a vertex labelled plus is stored less `delta_`, that of
+/// one labelled minus is stored plus `delta_`, and so are the duals of labelled blossoms: a dual
+/// change of the whole tree is one addition to `delta_`.
+class Solver {
+ public:
+  /// Takes n vertices and edges (ends below n, i != j, |cost| below kLimit / 4). Vertex `late`, if
+  /// any, may have edges to all others: it is matched last, so that its many edges are not scanned
+  /// again and again.
+  Solver(std::uint32_t n, std::vector<Edge> edges, std::uint32_t late = kNone);
+
+  /// Matches every vertex at least weight.
+  /// Returns kNone, or an exposed vertex that cannot be matched (then witness() proves it).
+  /// Throws std::overflow_error where a potential passes kLimit.
+  std::uint32_t solve();
+
+  /// Adds edges and repairs the duals where they are violated, at the price of exposing vertices.
+  void add(std::span<const Edge> edges);
+
+  /// The vertices whose removal leaves more odd components than they are, after a failed solve().
+  const std::vector<std::uint32_t>& witness() const { return witness_; }
+
+  /// The partner of each vertex, kNone where exposed.
+  std::vector<std::uint32_t> mates();
+
+  std::uint32_t vertex_count() const { return n_; }
+  std::uint32_t node_count() const { return static_cast<std::uint32_t>(nodes_.size()); }
+  std::int64_t potential(std::uint32_t vertex) const { return vertices_[vertex].potential; }
+  std::uint32_t parent(std::uint32_t node) const { return nodes_[node].parent; }
+  /// Of a blossom in use; 0 for vertices.
+  std::int64_t blossom_dual(std::uint32_t node) const { return nodes_[node].dual; }
+  bool in_use(std::uint32_t node) const { return nodes_[node].first != kNone; }
+  std::size_t edge_count() const { return edges_.size(); }
+
+ private:
+  enum class Label : std::uint8_t { kFree, kPlus, kMinus };
+
+  struct Vertex {
+    std::int64_t potential = 0;
+    std::int64_t key = 0;  // least cost - stored potential over the edges from plus vertices
+    std::uint32_t key_from = kNone;  // the plus end of that edge
+    std::uint32_t set = kNone;       // sets_[set] is the top node
+    std::uint32_t next = kNone;      // within the list of the top node
+    Label label = Label::kFree;
+  };
+
+  struct Node {
+    std::int64_t dual = 0;
+    std::uint32_t parent = kNone;
+    std::uint32_t first = kNone, last = kNone, size = 1;  // the list of its vertices
+    std::uint32_t set = kNone;
+    std::uint32_t base = kNone, mate = kNone;  // the matched edge: inside, outside
+    std::uint32_t enter_from = kNone,
+                  enter_to = kNone;  // of a minus node: the edge from its parent
+    std::uint32_t stamp = 0;
+    Label label = Label::kFree;
+  };
+
+  /// A part of a blossom and the edge to the next part around the cycle.
+  struct Part {
+    std::uint32_t node, from, to;
+  };
+
+  /// Grow: a is a vertex. Expand: a is a node. Shrink: a and b are the ends of an edge.
+  struct Event {
+    std::int64_t time;
+    std::uint32_t a, b;
+  };
+
+  std::uint32_t top(std::uint32_t vertex) const { return sets_[vertices_[vertex].set]; }
+  std::vector<Part>& parts(std::uint32_t blossom) { return parts_[blossom - n_]; }
+
+  void index_arcs();
+  void start_duals();
+  std::int64_t first_limit() const;
+
+  enum class Outcome : std::uint8_t { kAugmented, kStopped, kImpossible };
+  Outcome search(std::uint32_t root, std::int64_t limit);
+  void push(std::int64_t time, std::uint32_t a, std::uint32_t b);
+  void label_plus(std::uint32_t node);
+  void label_minus(std::uint32_t node, std::uint32_t from, std::uint32_t to);
+  void push_expansion(std::uint32_t node);
+  void stay_minus(std::uint32_t node, std::uint32_t from, std::uint32_t to);
+  void leave_minus(std::uint32_t node);
+  void scan(std::uint32_t vertex);
+  void scan_queue();
+  void offer(std::uint32_t vertex);
+  void grow(std::uint32_t vertex);
+  void augment(std::uint32_t from, std::uint32_t to);
+  void end_tree();
+  void collect_witness();
+
+  void shrink(std::uint32_t u, std::uint32_t v);
+  std::uint32_t tree_parent(std::uint32_t plus) const;
+  std::uint32_t common_ancestor(std::uint32_t u, std::uint32_t v);
+  void form(std::uint32_t blossom, std::uint32_t apex);
+  void expand(std::uint32_t blossom);
+
+  std::uint32_t new_blossom();
+  std::uint32_t part_holding(std::uint32_t blossom, std::uint32_t vertex) const;
+  std::uint32_t match_parts(std::uint32_t blossom);
+  void release_parts(std::uint32_t blossom);
+  void uncover(std::uint32_t vertex);
+  void repair(const Edge& edge);
+  void unmatch(std::uint32_t node);
+  std::int64_t shared_duals(std::uint32_t i, std::uint32_t j) const;
+
+  struct Arc {
+    std::int64_t cost;
+    std::uint32_t to;
+  };
+
+  std::uint32_t n_, late_;
+  std::vector<Edge> edges_;
+  std::vector<std::size_t> arc_begin_;
+  std::vector<Arc> arcs_;
+  std::vector<Vertex> vertices_;
+  std::vector<std::uint32_t> sets_;
+  std::vector<Node> nodes_;
+  std::vector<std::vector<Part>> parts_;
+  std::vector<std::uint32_t> spare_;  // blossoms not in use
+  bool started_ = false;
+
+  // The tree that stands.
+  std::int64_t delta_ = 0;
+  // Events from this delta on are not needed: an augmentation is known, or the limit. Whether one
+  // was left out for that.
+  std::int64_t bound_ = 0;
+  bool left_out_ = false;
+  std::vector<Event> heap_;
+  std::vector<std::uint32_t> labelled_, keyed_, queue_;
+  std::uint32_t stamp_ = 0;
+  std::vector<std::uint32_t> witness_;
+};
+
+}  // namespace terrace::matching::blossom

@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/matching/matching.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "blossom/proof.hpp"
+#include "blossom/solver.hpp"
+
+namespace terrace::matching {
+namespace {
+
+using blossom::Edge;
+using blossom::Solver;
+
+[[noreturn]] void fail(const std::string& what) {
+  throw std::invalid_argument("min_weight_perfect_matching: " + what);
+}
+
+template <class AnyEdge>
+void check_ends(std::size_t vertex_count, std::span<const AnyEdge> edges) {
+  if (vertex_count % 2 != 0) {
+    fail(std::to_string(vertex_count) +
+         " vertices, an odd number, have no perfect matching; add one with edges of weight 0");
+  }
+  if (vertex_count >= std::size_t{1} << 30) {
+    fail(std::to_string(vertex_count) + " vertices would need " +
+         std::to_string(vertex_count / 10000000) + " GB; at most 2^30 - 1 are possible");
+  }
+  for (std::size_t k = 0; k < edges.size(); ++k) {
+    const AnyEdge& e = edges[k];
+    if (e.i >= vertex_count || e.j >= vertex_count || e.i == e.j) {
+      fail("edge " + std::to_string(k) + " joins " + std::to_string(e.i) + " and " +
+           std::to_string(e.j) + "; ends must differ and be below " + std::to_string(vertex_count));
+    }
+  }
+}
+
+template <class AnyEdge>
+Matching solve(std::size_t vertex_count, std::span<const AnyEdge> edges, int exponent,
+               const std::vector<Edge>& doubled) {
+  Solver solver(static_cast<std::uint32_t>(vertex_count), doubled);
+  const std::uint32_t alone = solver.solve();
+  if (alone != blossom::kNone) fail(blossom::unmatchable(solver, alone));
+  Matching result = blossom::proof_of(solver);
+  result.exponent = exponent;
+  // Of parallel edges the least is the matched one.
+  std::vector<std::size_t> chosen(vertex_count, edges.size());
+  for (std::size_t k = 0; k < edges.size(); ++k) {
+    const AnyEdge& e = edges[k];
+    if (result.mate[e.i] != e.j) continue;
+    std::size_t& best = chosen[std::min(e.i, e.j)];
+    if (best == edges.size() || e.weight < edges[best].weight) best = k;
+  }
+  for (const std::size_t k : chosen) {
+    if (k != edges.size()) result.cost += static_cast<double>(edges[k].weight);
+  }
+  return result;
+}
+
+std::int64_t rounded(const WeightedEdge& e, int exponent) {
+  return std::llround(std::ldexp(e.weight, exponent));
+}
+std::int64_t rounded(const IntegerEdge& e, int) { return e.weight; }
+
+/// Sums of duals over the chain of blossoms from a vertex outward, and the chain itself.
+std::vector<std::uint32_t> chain_of(const Matching& m, std::uint32_t vertex) {
+  std::vector<std::uint32_t> chain;
+  for (std::uint32_t b = m.vertex_blossom[vertex]; b != kNobody; b = m.blossom_parent[b]) {
+    if (chain.size() > m.blossom_parent.size()) break;
+    chain.push_back(b);
+  }
+  std::reverse(chain.begin(), chain.end());
+  return chain;
+}
+
+std::int64_t separating_duals(const Matching& m, std::uint32_t i, std::uint32_t j) {
+  const std::vector<std::uint32_t> a = chain_of(m, i), b = chain_of(m, j);
+  std::size_t shared = 0;
+  while (shared < a.size() && shared < b.size() && a[shared] == b[shared]) ++shared;
+  std::int64_t sum = 0;
+  for (std::size_t k = shared; k < a.size(); ++k) sum += m.blossom_dual[a[k]];
+  for (std::size_t k = shared; k < b.size(); ++k) sum += m.blossom_dual[b[k]];
+  return sum;
+}
+
+std::string shape_error(const Matching& m) {
+  const std::size_t n = m.mate.size(), blossoms = m.blossom_dual.size();
+  if (m.vertex_dual.size() != n || m.vertex_blossom.size() != n ||
+      m.blossom_parent.size() != blossoms) {
+    return "the arrays differ in size";
+  }
+  for (std::size_t v = 0; v < n; ++v) {
+    if (m.mate[v] >= n || m.mate[v] == v || m.mate[m.mate[v]] != v) {
+      return "vertex " + std::to_string(v) + " is not matched both ways";
+    }
+    if (m.vertex_blossom[v] != kNobody && m.vertex_blossom[v] >= blossoms) {
+      return "vertex " + std::to_string(v) + " names a blossom that is not there";
+    }
+  }
+  for (std::size_t b = 0; b < blossoms; ++b) {
+    if (m.blossom_parent[b] != kNobody && m.blossom_parent[b] >= blossoms) {
+      return "blossom " + std::to_string(b) + " names a parent that is not there";
+    }
+    if (m.blossom_dual[b] < 0) return "blossom " + std::to_string(b) + " has a negative dual";
+  }
+  return {};
+}
+
+// Odd size, and one matched edge over the border where the dual is not 0.
+std::string blossom_error(const Matching& m) {
+  std::vector<std::size_t> size(m.blossom_dual.size(), 0), leaving(m.blossom_dual.size(), 0);
+  for (std::uint32_t v = 0; v < m.mate.size(); ++v) {
+    const std::vector<std::uint32_t> own = chain_of(m, v), other = chain_of(m, m.mate[v]);
+    for (std::size_t k = 0; k < own.size(); ++k) {
+      ++size[own[k]];
+      if (k >= other.size() || other[k] != own[k]) ++leaving[own[k]];
+    }
+  }
+  for (std::size_t b = 0; b < size.size(); ++b) {
+    if (size[b] % 2 == 0) return "blossom " + std::to_string(b) + " has an even size";
+    if (m.blossom_dual[b] != 0 && leaving[b] != 1) {
+      return "blossom " + std::to_string(b) + " has " + std::to_string(leaving[b]) +
+             " matched edges over its border";
+    }
+  }
+  return {};
+}
+
+template <class AnyEdge>
+std::string error_of(const Matching& m, std::span<const AnyEdge> edges) {
+  if (std::string error = shape_error(m); !error.empty()) return error;
+  if (std::string error = blossom_error(m); !error.empty()) return error;
+  std::vector<bool> tight(m.mate.size(), false);
+  for (std::size_t k = 0; k < edges.size(); ++k) {
+    const AnyEdge& e = edges[k];
+    if (e.i >= m.mate.size() || e.j >= m.mate.size() || e.i == e.j) {
+      return "edge " + std::to_string(k) + " does not belong to the graph";
+    }
+    const std::int64_t slack = 2 * rounded(e, m.exponent) - m.vertex_dual[e.i] -
+                               m.vertex_dual[e.j] - separating_duals(m, e.i, e.j);
+    if (slack < 0) {
+      return "edge " + std::to_string(k) + " is below its duals by " + std::to_string(-slack);
+    }
+    if (slack == 0 && m.mate[e.i] == e.j) tight[e.i] = tight[e.j] = true;
+  }
+  for (std::size_t v = 0; v < tight.size(); ++v) {
+    if (!tight[v]) return "the matched edge of vertex " + std::to_string(v) + " is not tight";
+  }
+  return {};
+}
+
+}  // namespace
+
+double Matching::dual_bound() const {
+  // Summed as integers in two parts, so that nothing is lost or overflows.
+  double high = 0.0;
+  std::int64_t low = 0;
+  const auto add = [&](std::int64_t dual) {
+    constexpr std::int64_t kPart = std::int64_t{1} << 32;
+    high += static_cast<double>(dual / kPart);
+    low += dual % kPart;
+  };
+  for (const std::int64_t dual : vertex_dual) add(dual);
+  for (const std::int64_t dual : blossom_dual) add(dual);
+  return std::ldexp(high * 0x1p32 + static_cast<double>(low), -1 - exponent);
+}
+
+Matching min_weight_perfect_matching(std::size_t vertex_count,
+                                     std::span<const WeightedEdge> edges) {
+  check_ends(vertex_count, edges);
+  double largest = 0.0;
+  for (std::size_t k = 0; k < edges.size(); ++k) {
+    if (!std::isfinite(edges[k].weight))
+      fail("edge " + std::to_string(k) + " has no finite weight");
+    largest = std::max(largest, std::abs(edges[k].weight));
+  }
+  int top = 0;
+  std::frexp(largest, &top);
+  for (int bits = 52;; bits -= 9) {
+    const int exponent = bits - top;
+    std::vector<Edge> doubled;
+    doubled.reserve(edges.size());
+    for (const WeightedEdge& e : edges) doubled.push_back({e.i, e.j, 2 * rounded(e, exponent)});
+    try {
+      return solve(vertex_count, edges, exponent, doubled);
+    } catch (const std::overflow_error&) {
+      if (bits <= 34) throw;
+    }
+  }
+}
+
+Matching min_weight_perfect_matching(std::size_t vertex_count, std::span<const IntegerEdge> edges) {
+  check_ends(vertex_count, edges);
+  std::vector<Edge> doubled;
+  doubled.reserve(edges.size());
+  constexpr std::int64_t kLargest = blossom::kLimit / 8;
+  for (std::size_t k = 0; k < edges.size(); ++k) {
+    const IntegerEdge& e = edges[k];
+    if (e.weight > kLargest || e.weight < -kLargest) {
+      fail("edge " + std::to_string(k) + " weighs " + std::to_string(e.weight) +
+           "; weights up to 2^57 fit, divide them");
+    }
+    doubled.push_back({e.i, e.j, 2 * e.weight});
+  }
+  return solve(vertex_count, edges, 0, doubled);
+}
+
+std::string matching_error(const Matching& matching, std::span<const WeightedEdge> edges) {
+  return error_of(matching, edges);
+}
+
+std::string matching_error(const Matching& matching, std::span<const IntegerEdge> edges) {
+  return error_of(matching, edges);
+}
+
+}  // namespace terrace::matching
