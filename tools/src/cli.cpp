@@ -59,8 +59,8 @@ std::string general_help() {
 
 std::string version_text() {
   const cluster::CudaStatus cuda = cluster::cuda_available();
-  return std::string("terrace ") + kVersion + "\nbuild: " + kBuild + "\nparts: linkage on a GPU: " +
-         (cuda.available ? cuda.device : cuda.reason) + "\n";
+  return std::string("terrace ") + kVersion + "\nbuild: " + kBuild +
+         "\nparts: linkage on a GPU: " + (cuda.available ? cuda.device : cuda.reason) + "\n";
 }
 
 const Verb& find_verb(const std::string& name) {

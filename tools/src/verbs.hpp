@@ -11,6 +11,7 @@ std::unique_ptr<Command> make_build();
 std::unique_ptr<Command> make_cluster();
 std::unique_ptr<Command> make_convert();
 std::unique_ptr<Command> make_info();
+std::unique_ptr<Command> make_match();
 std::unique_ptr<Command> make_mesh();
 std::unique_ptr<Command> make_points();
 std::unique_ptr<Command> make_render();

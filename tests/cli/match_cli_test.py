@@ -1,0 +1,129 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The verb `match` as its users meet it.
+
+TERRACE=path/to/terrace match_cli_test.py
+"""
+
+import csv
+import json
+import math
+import os
+import random
+import subprocess
+import tempfile
+import unittest
+
+TERRACE = os.environ.get('TERRACE', 'terrace')
+
+
+def terrace(*args):
+    return subprocess.run([TERRACE, *map(str, args)], capture_output=True, text=True, timeout=120)
+
+
+def optimum(points):
+    """The least total distance over all pairings, by trying them all."""
+    if not points:
+        return 0.0
+    first, rest = points[0], points[1:]
+    return min(math.dist(first, other) + optimum(rest[:i] + rest[i + 1:])
+               for i, other in enumerate(rest))
+
+
+class MatchTest(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = folder.name
+
+    def path(self, name):
+        return os.path.join(self.folder, name)
+
+    def points(self, count, seed=1):
+        generator = random.Random(seed)
+        points = [[generator.uniform(0, 100) for _ in range(3)] for _ in range(count)]
+        with open(self.path('points.csv'), 'w', newline='') as file:
+            writer = csv.writer(file)
+            writer.writerow(['x', 'y', 'z'])
+            writer.writerows(points)
+        return points
+
+    def match(self, *options):
+        out = self.path('pairs.csv')
+        result = terrace('match', self.path('points.csv'), '-o', out, '--json', '--force', *options)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        with open(out, newline='') as file:
+            return json.loads(result.stdout), list(csv.DictReader(file))
+
+    def check(self, points, summary, rows):
+        self.assertLessEqual({'pairs', 'cost', 'iterations', 'unmatched', 'seconds'}, set(summary))
+        self.assertEqual(summary['pairs'], len(points) // 2)
+        self.assertEqual(summary['unmatched'], len(points) % 2)
+        ends = [int(row[end]) for row in rows for end in 'ab']
+        self.assertEqual(len(set(ends)), len(ends))
+        if summary['unmatched']:
+            self.assertEqual(set(range(len(points))) - set(ends), {summary['left_over']})
+        for row in rows:
+            self.assertLess(int(row['a']), int(row['b']))
+            self.assertAlmostEqual(float(row['distance']),
+                                   math.dist(points[int(row['a'])], points[int(row['b'])]), places=9)
+        self.assertAlmostEqual(summary['cost'], sum(float(row['distance']) for row in rows), places=6)
+
+    def test_exact_is_the_optimum(self):
+        for seed in range(5):
+            points = self.points(10, seed)
+            summary, rows = self.match()
+            self.check(points, summary, rows)
+            self.assertAlmostEqual(summary['cost'], optimum(points), places=6)
+            self.assertAlmostEqual(summary['lower_bound'], summary['cost'], places=6)
+
+    def test_of_an_odd_number_one_is_left_over(self):
+        points = self.points(9)
+        summary, rows = self.match('--method', 'exact')
+        self.check(points, summary, rows)
+        self.assertAlmostEqual(summary['cost'],
+                               min(optimum(points[:i] + points[i + 1:]) for i in range(9)), places=6)
+        self.points(1)
+        summary, rows = self.match()
+        self.assertEqual((summary['pairs'], summary['left_over'], rows), (0, 0, []))
+
+    def test_halving_comes_near_and_never_below(self):
+        points = self.points(101)
+        exact, _ = self.match()
+        monotone, rows = self.match('--method', 'monotone')
+        self.check(points, monotone, rows)
+        published, rows = self.match('--method', 'monte-carlo', '--iterations', 50)
+        self.check(points, published, rows)
+        self.assertEqual(published['iterations'], 50)
+        self.assertLessEqual(exact['cost'], monotone['cost'] + 1e-6)
+        self.assertLess(monotone['cost'], 1.05 * exact['cost'])
+        self.assertGreater(published['cost'], monotone['cost'])
+        self.assertIsNone(published['lower_bound'])
+
+    def test_threads_never_change_the_bytes(self):
+        self.points(60)
+        outputs = set()
+        for threads in (1, 3):
+            self.match('--method', 'monte-carlo', '--iterations', 20, '--threads', threads)
+            with open(self.path('pairs.csv'), 'rb') as file:
+                outputs.add(file.read())
+        self.assertEqual(len(outputs), 1)
+
+    def test_errors_are_one_line(self):
+        self.points(10)
+        source, out = self.path('points.csv'), self.path('none.csv')
+        for code, options in ((2, ['--method', 'best']), (2, ['--iterations', 3]),
+                              (2, ['--seconds', 1]), (2, ['--tree']),
+                              (2, ['--method', 'monotone', '--iterations', 0])):
+            result = terrace('match', source, '-o', out, *options)
+            self.assertEqual(result.returncode, code, result.stderr)
+            self.assertEqual(len(result.stderr.splitlines()), 1, result.stderr)
+            self.assertFalse(os.path.exists(out))
+        self.assertEqual(terrace('match', self.path('nowhere.csv'), '-o', out).returncode, 1)
+        result = terrace('match', source, '-o', '-')
+        self.assertEqual(len(result.stdout.splitlines()), 6)
+        self.assertIn('the optimum', result.stderr)
+
+
+if __name__ == '__main__':
+    unittest.main()
