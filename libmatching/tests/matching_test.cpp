@@ -132,6 +132,7 @@ std::string message_of(std::size_t n, const std::vector<WeightedEdge>& edges) {
 TEST(Matching, NamesWhatIsWrong) {
   EXPECT_NE(message_of(3, {{0, 1, 1}}).find("odd"), std::string::npos);
   EXPECT_NE(message_of(2, {{0, 1, 1}, {1, 1, 1}}).find("edge 1 joins 1 and 1"), std::string::npos);
+  EXPECT_NE(message_of(std::size_t{1} << 40, {}).find("GB"), std::string::npos);
   EXPECT_NE(message_of(2, {{0, 2, 1}}).find("edge 0"), std::string::npos);
   EXPECT_NE(message_of(2, {{0, 1, std::nan("")}}).find("edge 0"), std::string::npos);
   EXPECT_NE(message_of(2, {{0, 1, INFINITY}}).find("edge 0"), std::string::npos);

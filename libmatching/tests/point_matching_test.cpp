@@ -235,6 +235,13 @@ TEST(PointMatching, NamesWhatIsWrong) {
   } catch (const std::invalid_argument& error) {
     EXPECT_NE(std::string(error.what()).find("point 2"), std::string::npos) << error.what();
   }
+  try {
+    // Refused before a point is read.
+    match_points(std::span<const Point2>(points.data(), std::size_t{1} << 30));
+    ADD_FAILURE();
+  } catch (const std::invalid_argument& error) {
+    EXPECT_NE(std::string(error.what()).find("GiB"), std::string::npos) << error.what();
+  }
   points[2] = {2, 2};
   PointMatchingOptions options;
   options.neighbours = 0;

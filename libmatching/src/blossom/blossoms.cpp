@@ -65,13 +65,14 @@ void Solver::form(std::uint32_t blossom, std::uint32_t apex) {
     if (nodes_[part.node].size > nodes_[largest].size) largest = part.node;
   }
   b.set = nodes_[largest].set;
-  std::uint32_t last = kNone;
+  std::uint32_t last = kNone, place = 0;
   for (const Part& part : parts(blossom)) {
     Node& x = nodes_[part.node];
     const bool rises = x.label == Label::kMinus;
     if (part.node >= n_) x.dual += rises ? -delta_ : delta_;
     x.label = Label::kFree;
     x.parent = blossom;
+    x.place = place++;
     b.size += x.size;
     if (rises || x.set != b.set) {
       for (std::uint32_t v = x.first;; v = vertices_[v].next) {

@@ -21,10 +21,7 @@ std::uint32_t Solver::new_blossom() {
 std::uint32_t Solver::part_holding(std::uint32_t blossom, std::uint32_t vertex) const {
   std::uint32_t x = vertex;
   while (nodes_[x].parent != blossom) x = nodes_[x].parent;
-  const std::vector<Part>& cycle = parts_[blossom - n_];
-  std::uint32_t k = 0;
-  while (cycle[k].node != x) ++k;
-  return k;
+  return nodes_[x].place;
 }
 
 // The part with the base has the blossom's matched edge, the others go in pairs round the cycle.

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "blossom/box_tree.hpp"
+#include "blossom/nest.hpp"
 #include "blossom/solver.hpp"
 
 namespace terrace::matching::blossom {
@@ -55,7 +56,7 @@ class Pricing {
 
   /// Violated pairs, not all of them: the worst few of each part, for large parts more.
   std::vector<Edge> violated(const Solver& solver) {
-    nest(solver);
+    nest_ = Nest(solver);
     found_.clear();
     heads_.assign(1, {kNone, 0});
     while (!heads_.empty()) {
@@ -83,57 +84,6 @@ class Pricing {
     std::uint32_t vertex, part, level;
     std::int64_t potential;
   };
-  struct Range {
-    std::uint32_t begin = 0, end = 0;
-  };
-
-  // Children of each node (of all tops under the last entry), and the vertices of each node as a
-  // range of one sequence.
-  void nest(const Solver& solver) {
-    const std::uint32_t count = solver.node_count(), n = solver.vertex_count();
-    child_begin_.assign(count + std::size_t{2}, 0);
-    const auto slot = [&](std::uint32_t node) {
-      const std::uint32_t parent = solver.parent(node);
-      return std::size_t{parent == kNone ? count : parent};
-    };
-    for (std::uint32_t x = 0; x < count; ++x) {
-      if (solver.in_use(x)) ++child_begin_[slot(x) + 1];
-    }
-    for (std::size_t k = 1; k < child_begin_.size(); ++k) child_begin_[k] += child_begin_[k - 1];
-    children_.resize(child_begin_.back());
-    std::vector<std::uint32_t> fill(child_begin_.begin(), child_begin_.end() - 1);
-    for (std::uint32_t x = 0; x < count; ++x) {
-      if (solver.in_use(x)) children_[fill[slot(x)]++] = x;
-    }
-    ranges_.assign(count, {});
-    order_.clear();
-    std::vector<std::uint32_t> open;
-    for (const std::uint32_t top : children_of(kNone)) {
-      open.push_back(top);
-      while (!open.empty()) {
-        const std::uint32_t x = open.back();
-        const auto here = static_cast<std::uint32_t>(order_.size());
-        if (x < n) {
-          ranges_[x] = {here, here + 1};
-          order_.push_back(x);
-          open.pop_back();
-        } else if (ranges_[x].end == kNone) {
-          ranges_[x].end = here;
-          open.pop_back();
-        } else {
-          ranges_[x] = {here, kNone};
-          for (const std::uint32_t child : children_of(x)) open.push_back(child);
-        }
-      }
-    }
-  }
-
-  std::span<const std::uint32_t> children_of(std::uint32_t node) const {
-    const std::size_t k = node == kNone ? child_begin_.size() - 2 : node;
-    return std::span(children_).subspan(child_begin_[k], child_begin_[k + 1] - child_begin_[k]);
-  }
-
-  std::uint32_t size(std::uint32_t node) const { return ranges_[node].end - ranges_[node].begin; }
 
   // The chain from a head: its levels, and as members the vertices with the level at which they
   // leave it.
@@ -146,12 +96,13 @@ class Pricing {
       if (node != kNone) around += solver.blossom_dual(node);
       around_.push_back(around);
       std::uint32_t largest = kNone;
-      for (const std::uint32_t child : children_of(node)) {
-        if (child >= solver.vertex_count() && (largest == kNone || size(child) > size(largest))) {
+      for (const std::uint32_t child : nest_.children_of(node)) {
+        if (child >= solver.vertex_count() &&
+            (largest == kNone || nest_.size(child) > nest_.size(largest))) {
           largest = child;
         }
       }
-      for (const std::uint32_t child : children_of(node)) {
+      for (const std::uint32_t child : nest_.children_of(node)) {
         if (child == largest) continue;
         add_part(child, solver);
         if (child >= solver.vertex_count()) heads_.push_back({child, around});
@@ -165,8 +116,7 @@ class Pricing {
 
   void add_part(std::uint32_t node, const Solver& solver) {
     const auto level = static_cast<std::uint32_t>(around_.size() - 1);
-    for (std::uint32_t k = ranges_[node].begin; k < ranges_[node].end; ++k) {
-      const std::uint32_t v = order_[k];
+    for (const std::uint32_t v : nest_.vertices_of(node)) {
       // The vertex that stands for nobody has all its edges already.
       if (v < points_.size()) members_.push_back({v, node, level, solver.potential(v)});
     }
@@ -204,7 +154,7 @@ class Pricing {
     for (const Wanted& w : wanted_) {
       taken = w.part == part ? taken + 1 : 0;
       part = w.part;
-      if (taken >= kMost + size(part) / 8) continue;
+      if (taken >= kMost + nest_.size(part) / 8) continue;
       const std::uint32_t i = members_[w.from].vertex;
       found_.push_back({i, w.to, cost_(i, w.to)});
     }
@@ -281,8 +231,7 @@ class Pricing {
 
   std::span<const Point> points_;
   const PairCost& cost_;
-  std::vector<std::uint32_t> child_begin_, children_, order_;
-  std::vector<Range> ranges_;
+  Nest nest_;
   std::vector<Head> heads_;
   std::vector<Member> members_;
   std::vector<std::int64_t> around_;  // of each level of the chain: the duals around, with its own

@@ -75,12 +75,13 @@ std::uint32_t Solver::solve() {
     if (in_use(x) && nodes_[x].parent == kNone && nodes_[x].mate == kNone) ++exposed;
   }
   const auto is_exposed = [&](std::uint32_t v) { return nodes_[top(v)].mate == kNone; };
-  // Trees stop at a limit that doubles from pass to pass: so the exposed vertices rise about
+  // Trees stop at a limit that grows from pass to pass: so the exposed vertices rise about
   // evenly, their trees meet half way and stay small, and few are left for the searches without a
   // limit.
   std::int64_t limit = first_limit();
   while (true) {
-    const bool unlimited = exposed <= 2 || limit > kLimit / 4 || limit == 0;
+    const bool unlimited = exposed <= 2 || limit > kLimit / 16;
+    const std::uint32_t before = exposed;
     for (std::uint32_t v = 0; v < n_; ++v) {
       if (!is_exposed(v)) continue;
       const bool last = exposed == 2 && late_ != kNone && is_exposed(late_);
@@ -93,11 +94,11 @@ std::uint32_t Solver::solve() {
       if (outcome == Outcome::kAugmented) exposed -= 2;
     }
     if (exposed == 0) return kNone;
-    limit *= 2;
+    limit += exposed < before ? limit / 2 + 1 : 3 * limit;
   }
 }
 
-// A quarter of the mean of the least costs around the vertices; 0 where that says nothing.
+// A sixteenth of the mean of the least costs around the vertices.
 std::int64_t Solver::first_limit() const {
   double sum = 0.0;
   for (std::uint32_t v = 0; v < n_; ++v) {
@@ -107,7 +108,7 @@ std::int64_t Solver::first_limit() const {
     }
     sum += least == kLimit ? 0.0 : static_cast<double>(least);
   }
-  return n_ == 0 ? 0 : static_cast<std::int64_t>(std::max(0.0, sum / 4.0 / n_));
+  return n_ == 0 ? 1 : static_cast<std::int64_t>(std::max(1.0, sum / 16.0 / n_));
 }
 
 std::vector<std::uint32_t> Solver::mates() {

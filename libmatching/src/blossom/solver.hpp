@@ -74,6 +74,7 @@ class Solver {
   struct Node {
     std::int64_t dual = 0;
     std::uint32_t parent = kNone;
+    std::uint32_t place = 0;                              // among the parent's parts
     std::uint32_t first = kNone, last = kNone, size = 1;  // the list of its vertices
     std::uint32_t set = kNone;
     std::uint32_t base = kNone, mate = kNone;  // the matched edge: inside, outside

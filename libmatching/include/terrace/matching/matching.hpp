@@ -33,7 +33,7 @@ struct IntegerEdge {
 struct Matching {
   std::vector<std::uint32_t> mate;  ///< partner of each vertex
   double cost = 0.0;                ///< sum of the weights of the matched edges
-  int exponent = 0;
+  int exponent = 0;                 ///< of the power of two that weights are counted by
   std::vector<std::int64_t> vertex_dual;
   std::vector<std::int64_t> blossom_dual;
   /// Blossoms nest: the innermost around each vertex, and the next one around each blossom, or
@@ -50,17 +50,23 @@ struct Matching {
 /// edges: any number, parallel ones allowed, weights finite and of any sign.
 /// Returns: a matching that is optimal for the rounded weights. For integer weights the exponent is
 /// 0 and nothing is rounded. For double weights it is chosen so that the largest takes 52 bits
-/// (fewer, at least 34, where the duals would not fit into 64 bits), so each weight is off by at
-/// most 2^-53 of the largest, and the cost is above the optimum by at most vertex_count * 2^-53
-/// times it. Throws: std::invalid_argument for an end that is not a vertex, a loop, a weight that
-/// is not finite or too large (the edge is named), an odd vertex_count, and a graph without a
-/// perfect matching (a vertex that no matching can reach and the set whose removal proves it are
-/// named); std::overflow_error where integer weights make duals that 64 bits cannot hold (possible
-/// only above 2^58 / vertex_count). Deterministic: the result depends on the input alone. Cost:
-/// O(vertices * edges * log) in the worst case; on sparse geometric graphs the trees are small and
-/// it is near linear. About 100 bytes per vertex and 48 per edge. Source: J. Edmonds, "Paths,
-/// trees, and flowers", 1965; the dual updates as in V. Kolmogorov, "Blossom V: a new
-/// implementation of a minimum cost perfect matching algorithm", 2009, with one tree at a time.
+/// (43 or 34 where the duals would not fit into 64 bits otherwise), so each weight is off by at
+/// most 2^-52 of the largest, and the cost is above the optimum by at most vertex_count * 2^-52
+/// times it (2^-34 with 34 bits).
+///
+/// Throws: std::invalid_argument for an end that is not a vertex, a loop, a weight that is not
+/// finite or too large (the edge is named), an odd vertex_count, and a graph without a perfect
+/// matching (a vertex that no matching can reach and the set whose removal proves it are named);
+/// std::overflow_error where the duals do not fit into 64 bits for all that.
+///
+/// Deterministic: the result depends on the input alone.
+///
+/// Cost: O(vertices * edges * log) in the worst case; on sparse geometric graphs most trees are
+/// small. About 100 bytes per vertex and 48 per edge.
+///
+/// Source: J. Edmonds, "Paths, trees, and flowers", 1965; the initial duals and the order of dual
+/// changes after V. Kolmogorov, "Blossom V: a new implementation of a minimum cost perfect matching
+/// algorithm", 2009, but one tree at a time, each stopped at a limit that grows from pass to pass.
 Matching min_weight_perfect_matching(std::size_t vertex_count, std::span<const WeightedEdge> edges);
 Matching min_weight_perfect_matching(std::size_t vertex_count, std::span<const IntegerEdge> edges);
 

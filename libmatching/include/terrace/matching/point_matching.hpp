@@ -47,15 +47,21 @@ struct PointMatching {
 ///
 /// points: any number, finite; equal ones allowed. Of an odd number that one is left over without
 /// which the rest costs least.
+///
 /// Method: the blossom algorithm on candidate edges, then pricing: absent pairs that are nearer
 /// than their duals allow are found through a tree of boxes with the largest dual in each, blossom
 /// by blossom, added, and the matching mended; until there is none. So the result is optimal on the
 /// complete graph, for distances rounded to multiples of 2^-48 (fewer bits only where the duals
 /// would not fit) of the longest candidate edge.
+///
 /// Returns: the same for the same input, options and metric.
+///
 /// Throws: std::invalid_argument for a coordinate or distance that is not finite (its index is
 /// named), a candidate edge with an end out of range, and n above 2^29.
-/// Cost: near O(n log n) on uniform points; about 1 kB per point.
+///
+/// Cost: on uniform points between n and n^1.3 in the plane, n^1.8 in space (measured, 10,000 to
+/// 100,000 points); more where many odd clusters are far apart. About 1 kB per point.
+///
 /// Source: pricing as in W. Cook and A. Rohe, "Computing minimum-weight perfect matchings", 1999.
 PointMatching match_points(std::span<const Point2> points,
                            const PointMatchingOptions& options = {});
