@@ -94,7 +94,7 @@ std::uint32_t Solver::solve() {
       if (outcome == Outcome::kAugmented) exposed -= 2;
     }
     if (exposed == 0) return kNone;
-    limit += exposed < before ? limit / 2 + 1 : 3 * limit;
+    limit += exposed < before ? limit / 8 + 1 : limit;
   }
 }
 
