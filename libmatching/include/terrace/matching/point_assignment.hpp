@@ -25,8 +25,8 @@ using Point3 = std::array<double, 3>;
 /// Returns: the assignment of min(rows, columns) rows with labels for all pairs, in the unit of the
 /// coordinates, up to rounding.
 /// Throws: std::invalid_argument if a coordinate is not (the set and the index are named).
-/// Cost: time depends on how far the sets are from each other; memory grows with the candidates, some 300 bytes a
-/// row; at worst as for the complete graph: O(n^3) time and 16 bytes a pair.
+/// Cost: time depends on how far the sets are from each other; memory grows with the candidates; at
+/// worst as for the complete graph: O(n^3) time and 16 bytes a pair.
 /// Source: J. Skála, 4.3.1; pricing as in R. Jonker and A. Volgenant, 1987 (their sparse code on
 /// dense problems).
 Assignment assign_points(std::span<const Point2> rows, std::span<const Point2> columns);
