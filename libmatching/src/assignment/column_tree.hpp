@@ -26,7 +26,7 @@ double distance_between(const std::array<double, D>& a, const std::array<double,
 /// A kd-tree of the columns that answers "which are least by distance minus label?".
 ///
 /// Columns are numbered by their place in the tree; original() has the caller's number. Each node
-/// has a bound on the labels below it: labels only fall, so an old maximum is still a bound.
+/// has the largest label below it.
 template <std::size_t D>
 class ColumnTree {
  public:
@@ -47,15 +47,15 @@ class ColumnTree {
   void hide(std::uint32_t column) { mark_[column] = round_ + 1; }
 
   /// The `count` columns, or all if there are fewer, that are least by distance - label, below
-  /// `limit` and not hidden; in no particular order, into `found`. Returns the largest distance -
-  /// label among them.
+  /// `limit` and not hidden; in no particular order, behind `found`. Returns what distance - label
+  /// of all others is not below: the largest of those found, or `limit`.
   double nearest(const Point& p, const std::vector<double>& labels, std::size_t count, double limit,
                  std::vector<Candidate>& found) {
     ++round_;
     best_.clear();
     if (!nodes_.empty()) descend_nearest(p, labels, count, limit, 0);
     for (const Best& b : best_) found.push_back({b.column, b.distance});
-    return best_.empty() ? limit : best_.front().key;
+    return best_.size() < count ? limit : best_.front().key;
   }
 
   /// The nearest column that was not taken, kUnassigned if all were.
@@ -73,15 +73,15 @@ class ColumnTree {
     }
   }
 
-  /// After about as many falls of labels as there are columns the bounds are made anew.
-  void lowered(const std::vector<double>& labels) {
-    if (++falls_ < points_.size()) return;
-    falls_ = 0;
-    for (std::size_t n = nodes_.size(); n-- > 0;) {
-      Node& node = nodes_[n];
-      node.label = node.right == 0
-                       ? *std::max_element(labels.begin() + node.begin, labels.begin() + node.end)
-                       : std::max(nodes_[n + 1].label, nodes_[node.right].label);
+  /// The label of the column fell: bounds above it are lowered as far as they change.
+  void lowered(const std::vector<double>& labels, std::uint32_t column) {
+    std::uint32_t n = leaf_[column];
+    const auto first = labels.begin() + nodes_[n].begin, last = labels.begin() + nodes_[n].end;
+    for (double label = *std::max_element(first, last); label < nodes_[n].label;) {
+      nodes_[n].label = label;
+      if (n == 0) break;
+      n = nodes_[n].parent;
+      label = std::max(nodes_[n + 1].label, nodes_[nodes_[n].right].label);
     }
   }
 
@@ -159,12 +159,18 @@ class ColumnTree {
         const double distance = distance_between(p, points_[j]);
         const double key = distance - labels[j];
         if (!(key < bar())) continue;
-        if (best_.size() == count) {
+        const bool full = best_.size() == count;
+        if (full) {
           std::pop_heap(best_.begin(), best_.end());
           best_.pop_back();
         }
         best_.push_back({key, distance, j});
-        std::push_heap(best_.begin(), best_.end());
+        // A heap only once it is full.
+        if (full) {
+          std::push_heap(best_.begin(), best_.end());
+        } else if (best_.size() == count) {
+          std::make_heap(best_.begin(), best_.end());
+        }
       }
       return;
     }
@@ -207,7 +213,6 @@ class ColumnTree {
   std::vector<std::uint64_t> mark_;
   std::uint64_t round_ = 0;
   std::vector<Best> best_;
-  std::size_t falls_ = 0;
 };
 
 }  // namespace terrace::matching

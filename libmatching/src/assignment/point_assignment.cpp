@@ -17,7 +17,8 @@
 namespace terrace::matching {
 namespace {
 
-constexpr std::size_t kFirstCandidates = 8;
+/// Columns a row starts with, and about how many it may get at a time.
+constexpr std::size_t kFirstCandidates = 12, kMoreCandidates = 32;
 
 template <std::size_t D>
 using Points = std::vector<std::array<double, D>>;
@@ -63,34 +64,47 @@ struct Scaled {
 template <std::size_t D>
 class NearCandidates {
  public:
+  static constexpr bool kComplete = true;
+
   NearCandidates(const Points<D>& rows, ColumnTree<D>& tree, std::size_t columns)
       : rows_(rows), tree_(tree), lists_(rows.size()), threshold_(rows.size()) {
     const std::vector<double> labels(columns, 0.0);
+    const double all = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < rows.size(); ++i)
-      extend(i, labels, std::numeric_limits<double>::infinity());
+      threshold_[i] = tree_.nearest(rows[i], labels, kFirstCandidates, all, lists_[i]);
+    step_ = threshold_;
+    // Not for ever where a row has all columns from the start, and not 0 where they are equal.
+    for (double& step : step_) step = step > 0 ? std::min(step, 1.0) : 0.01;
   }
 
   std::span<const Candidate> candidates(std::size_t row) const { return lists_[row]; }
   double threshold(std::size_t row) const { return threshold_[row]; }
 
-  bool extend(std::size_t row, const std::vector<double>& labels, double limit) {
+  std::size_t extend(std::size_t row, const std::vector<double>& labels, double limit) {
     std::vector<Candidate>& list = lists_[row];
-    const std::size_t before = list.size(), count = std::max(kFirstCandidates, before);
+    std::erase_if(list,
+                  [&](const Candidate& c) { return c.cost - labels[c.column] > threshold_[row]; });
+    const std::size_t before = list.size(), count = std::max(kMoreCandidates, before);
     for (const Candidate& c : list) tree_.hide(c.column);
-    const double worst = tree_.nearest(rows_[row], labels, count, limit, list);
-    // Fewer than asked for: below the limit there are no others.
-    threshold_[row] = list.size() - before < count ? limit : worst;
-    return list.size() != before;
+    // Where many columns are equally near their number rules, elsewhere the distance.
+    const double aim = std::min(limit, threshold_[row] + step_[row]);
+    const double reached = tree_.nearest(rows_[row], labels, count, aim, list);
+    // Steps grow as long as they bring nothing, be it that they are lost in rounding.
+    if (list.size() == before) step_[row] *= 2;
+    threshold_[row] = std::max(threshold_[row], reached);
+    return before;
   }
   Candidate nearest_free(std::size_t row) const { return tree_.nearest_free(rows_[row]); }
-  void lowered(const std::vector<double>& labels) { tree_.lowered(labels); }
+  void lowered(const std::vector<double>& labels, std::uint32_t column) {
+    tree_.lowered(labels, column);
+  }
   void taken(std::uint32_t column) { tree_.take(column); }
 
  private:
   const Points<D>& rows_;
   ColumnTree<D>& tree_;
   std::vector<std::vector<Candidate>> lists_;
-  std::vector<double> threshold_;
+  std::vector<double> threshold_, step_;
 };
 
 /// For rows.size() <= columns.size(), without the cost.

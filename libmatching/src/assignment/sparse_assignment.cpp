@@ -18,6 +18,9 @@ namespace {
 
 /// Compressed rows of our own; nothing is absent but what may not be chosen.
 struct EdgeLists {
+  // On few edges bids for what only one row can have go on without end.
+  static constexpr bool kComplete = false;
+
   std::size_t columns = 0;
   std::vector<std::size_t> begin;
   std::vector<Candidate> edges;
@@ -27,9 +30,11 @@ struct EdgeLists {
     return std::span(edges).subspan(begin[row], begin[row + 1] - begin[row]);
   }
   static double threshold(std::size_t) { return std::numeric_limits<double>::infinity(); }
-  static bool extend(std::size_t, const std::vector<double>&, double) { return false; }
+  std::size_t extend(std::size_t row, const std::vector<double>&, double) const {
+    return candidates(row).size();
+  }
   static Candidate nearest_free(std::size_t) { return {kUnassigned, 0.0}; }
-  static void lowered(const std::vector<double>&) {}
+  static void lowered(const std::vector<double>&, std::size_t) {}
   static void taken(std::size_t) {}
 };
 

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "assignment/bidding.hpp"
 #include "terrace/matching/assignment.hpp"
 
 namespace terrace::matching {
@@ -21,13 +22,15 @@ struct Candidate {
 /// Shortest augmenting paths on lists of candidates, rows <= columns.
 ///
 /// `Source` holds the lists:
-///   std::span<const Candidate> candidates(row): grows by extend() only;
+///   kComplete: that every column is within reach of every row, in the list or absent;
+///   std::span<const Candidate> candidates(row): changed by extend() only;
 ///   double threshold(row): cost - label of columns not in the list is at least this much;
-///   bool extend(row, labels, limit): adds columns to the list and raises the threshold; false if
-///     there is no absent column left below `limit`;
+///   size_t extend(row, labels, limit): raises the threshold, to `limit` at most, and adds the
+///     columns below it to the list, from the returned place on; columns that are not below the old
+///     threshold may leave the list;
 ///   Candidate nearest_free(row): some near free column, kUnassigned if it knows none;
-///   void lowered(labels): one of them fell;  void taken(column): it got its first row.
-/// Labels of columns start at 0, only fall, and only on columns that have a row.
+///   void lowered(labels, column): its label fell;  void taken(column): it got its first row.
+/// Labels of columns start at 0 and only fall; with rows < columns only on columns that have a row.
 template <class Source>
 class SparseSolver {
  public:
@@ -46,6 +49,11 @@ class SparseSolver {
   /// False if a row finds no way to a free column; result() is then of no use, and tree_rows() are
   /// the rows that reach only tree_rows().size() - 1 columns.
   bool solve() {
+    if (Source::kComplete && rows_ == row_of_.size()) {
+      bid(
+          rows_, result_.column_dual, [&](std::uint32_t row) { return offer(row); },
+          [&](std::uint32_t column) { source_.lowered(result_.column_dual, column); });
+    }
     for (const std::uint32_t row : reduce_rows()) {
       if (!augment(row)) return false;
     }
@@ -63,7 +71,7 @@ class SparseSolver {
 
  private:
   static constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  static constexpr std::size_t kReductionSteps = 4;
+  static constexpr std::size_t kReductionSteps = 16;
 
   struct Settled {
     std::uint32_t column;
@@ -81,6 +89,26 @@ class SparseSolver {
       return id > other.id;
     }
   };
+
+  Offer<double> offer(std::uint32_t row) {
+    for (;;) {
+      Offer<double> found{kUnassigned, kInfinity, source_.threshold(row)};
+      for (const Candidate& c : source_.candidates(row)) {
+        const double reduced = c.cost - result_.column_dual[c.column];
+        if (reduced < found.least) {
+          found.second = std::min(found.second, found.least);
+          found.least = reduced;
+          found.column = c.column;
+        } else {
+          found.second = std::min(found.second, reduced);
+        }
+      }
+      if (found.second == kInfinity) found.second = found.least;
+      if (found.least <= found.second) return found;
+      // The best one may be absent.
+      source_.extend(row, result_.column_dual, kInfinity);
+    }
+  }
 
   /// Augmenting row reduction as in DenseSolver, the columns that are not candidates standing in
   /// with the threshold.
@@ -121,7 +149,7 @@ class SparseSolver {
         if (label < labels[column]) {
           labels[column] = label;
           result_.row_dual[row] = cost - label;
-          source_.lowered(labels);
+          source_.lowered(labels, column);
         }
         row_of_[column] = row;
         result_.column[row] = column;
@@ -147,8 +175,8 @@ class SparseSolver {
     std::push_heap(heap_.begin(), heap_.end());
   }
 
-  /// Candidates of the row from `first` on.
-  void relax(std::uint32_t row, std::size_t first) {
+  /// Candidates of the row from `first` on; absent ones matter if they are below `limit`.
+  void relax(std::uint32_t row, std::size_t first, double limit) {
     const double base = row_distance_[row] - result_.row_dual[row];
     for (const Candidate& c : source_.candidates(row).subspan(first)) {
       const double through = (base + c.cost) - result_.column_dual[c.column];
@@ -163,7 +191,7 @@ class SparseSolver {
       push({through, c.column, false});
     }
     const double absent = base + source_.threshold(row);
-    if (absent < bound_) push({absent, row, true});
+    if (source_.threshold(row) < limit && absent < bound_) push({absent, row, true});
   }
 
   bool augment(std::uint32_t start) {
@@ -177,17 +205,16 @@ class SparseSolver {
     auto& labels = result_.column_dual;
     const Candidate free = source_.nearest_free(start);
     if (free.column != kUnassigned)
-      reach_free(start, free.column, free.cost - result_.row_dual[start]);
+      reach_free(start, free.column, free.cost - result_.row_dual[start] - labels[free.column]);
     row_distance_[start] = 0.0;
-    relax(start, 0);
+    relax(start, 0, kInfinity);
     while (!heap_.empty() && heap_.front().key < bound_) {
       std::pop_heap(heap_.begin(), heap_.end());
       const Event event = heap_.back();
       heap_.pop_back();
       if (event.row) {
-        const std::size_t known = source_.candidates(event.id).size();
         const double limit = bound_ - row_distance_[event.id] + result_.row_dual[event.id];
-        if (source_.extend(event.id, labels, limit)) relax(event.id, known);
+        relax(event.id, source_.extend(event.id, labels, limit), limit);
         continue;
       }
       if (distance_[event.id] != event.key) continue;
@@ -196,7 +223,7 @@ class SparseSolver {
       distance_[event.id] = -kInfinity;
       const std::uint32_t row = row_of_[event.id];
       row_distance_[row] = event.key;
-      relax(row, 0);
+      relax(row, 0, kInfinity);
     }
     if (sink_ == kUnassigned) return false;
     // Labels: rows of the tree rise, its columns fall, so that the path's edges become tight.
@@ -205,7 +232,7 @@ class SparseSolver {
       const double fall = bound_ - s.distance;
       result_.row_dual[row_of_[s.column]] += fall;
       labels[s.column] -= fall;
-      source_.lowered(labels);
+      source_.lowered(labels, s.column);
     }
     source_.taken(sink_);
     std::uint32_t j = sink_;

@@ -64,8 +64,7 @@ using CostRow = std::function<void(std::size_t row, std::span<double> costs)>;
 ///
 /// Throws: std::invalid_argument as above, std::bad_function_call if fill_row is empty, and
 /// whatever fill_row throws.
-/// Cost: O(rows + columns) memory; fill_row is called O(rows * min(rows, columns)) times, for
-/// uniform points some 20 to 60 times a row.
+/// Cost: O(rows + columns) memory; fill_row is called O(rows * min(rows, columns)) times at worst.
 Assignment assign_rows(std::size_t rows, std::size_t columns, const CostRow& fill_row);
 
 /// The same with costs from a function of row and column.
@@ -80,8 +79,8 @@ double > Assignment assign_pairs(std::size_t rows, std::size_t columns, Cost&& c
 /// By how much an assignment fails to be proven optimal: 0, or rounding, for a right one.
 ///
 /// Looks at every entry: that the labels are feasible, that chosen entries are tight, that the
-/// labels of what stayed over are 0 and those of the shorter side's opposite not above 0, and that
-/// the cost is the sum of the chosen entries.
+/// labels of the longer side are not above 0, and 0 for what stayed over, and that the cost is the
+/// sum of the chosen entries.
 /// Returns: the largest amount by which one of these is broken, in the unit of the costs.
 /// Throws: std::invalid_argument if `assignment` is none at all: sizes that do not fit, a column
 /// twice or out of range, a row without a column that could have one (the row is named).

@@ -17,15 +17,16 @@ using Point3 = std::array<double, 3>;
 /// Each row starts with its nearest columns as candidates. Of all other columns a bound is kept on
 /// cost minus label; where a search reaches that bound before it has ended, the row gets the
 /// columns that are next by cost minus label, from a tree of the columns with the largest label
-/// below each node. So no absent pair ever violates the labels.
+/// below each node. So no absent pair ever violates the labels. Where both sets are equally large,
+/// labels start from bounded rounds of bidding (D. Bertsekas, "The auction algorithm", 1988).
 ///
 /// Requires: coordinates finite and at most kLargestCost in magnitude. Distances below 1e-150 times
 /// the largest coordinate count as 0.
 /// Returns: the assignment of min(rows, columns) rows with labels for all pairs, in the unit of the
 /// coordinates, up to rounding.
 /// Throws: std::invalid_argument if a coordinate is not (the set and the index are named).
-/// Cost: for uniform points about O(n^1.5) time; memory grows with the candidates, some 300 bytes a
-/// row; at worst as for the complete graph: O(n^3) time and 16 bytes a pair.
+/// Cost: time depends on how far the sets are from each other; memory grows with the candidates; at
+/// worst as for the complete graph: O(n^3) time and 16 bytes a pair.
 /// Source: J. Skála, 4.3.1; pricing as in R. Jonker and A. Volgenant, 1987 (their sparse code on
 /// dense problems).
 Assignment assign_points(std::span<const Point2> rows, std::span<const Point2> columns);
