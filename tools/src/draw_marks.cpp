@@ -18,7 +18,8 @@ bool is_hidden(Canvas& canvas, double cx, double cy, double radius, double depth
        y <= inside(cy + radius, canvas.height()); ++y) {
     for (std::uint32_t x = inside(cx - radius, canvas.width());
          x <= inside(cx + radius, canvas.width()); ++x) {
-      if (!(canvas.depth(x, y) > depth)) return false;
+      // Beside the outline there is nothing.
+      if (std::isfinite(canvas.depth(x, y)) && canvas.depth(x, y) <= depth) return false;
     }
   }
   return true;
