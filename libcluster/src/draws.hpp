@@ -29,12 +29,19 @@ void draw_order(std::vector<T>& items, std::mt19937_64& random) {
   }
 }
 
-/// A seed of its own for each of many runs (the finaliser of SplitMix64).
+inline constexpr std::uint64_t kGoldenGamma = 0x9e3779b97f4a7c15u;
+
+/// G. Steele, D. Lea, C. Flood, Fast splittable pseudorandom number generators, OOPSLA 2014.
+inline std::uint64_t splitmix64(std::uint64_t x) {
+  x += kGoldenGamma;
+  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+  return x ^ (x >> 31);
+}
+
+/// A seed of its own for each of many runs.
 inline std::uint64_t seed_of_run(std::uint64_t seed, std::uint64_t run) {
-  std::uint64_t z = seed + (run + 1) * 0x9e3779b97f4a7c15u;
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-  return z ^ (z >> 31);
+  return splitmix64(seed + run * kGoldenGamma);
 }
 
 }  // namespace terrace::cluster

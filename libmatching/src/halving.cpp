@@ -49,7 +49,7 @@ Halves random_halves(std::uint32_t count, std::mt19937_64& random) {
 Halves ends_apart(const std::vector<std::uint32_t>& mate, std::mt19937_64& random) {
   Halves halves;
   for (std::uint32_t i = 0; i < mate.size(); ++i) {
-    if (mate[i] == kAlone) {
+    if (mate[i] == kNobody) {
       halves.second.push_back(i);
     } else if (i < mate[i]) {
       const bool swapped = (random() & 1u) != 0;
@@ -78,7 +78,7 @@ class Matcher {
       row_(halves.first[r], halves.second, costs_.data() + r * columns);
     }
     const auto assignment = assign(std::span<const double>(costs_), rows, columns);
-    Trial trial{std::vector<std::uint32_t>(count_, kAlone), 0.0};
+    Trial trial{std::vector<std::uint32_t>(count_, kNobody), 0.0};
     std::vector<double> distance(count_, 0.0);
     for (std::size_t r = 0; r < rows; ++r) {
       const std::uint32_t i = halves.first[r], j = halves.second[assignment.column[r]];
@@ -171,7 +171,7 @@ void check_memory(std::size_t count, unsigned threads) {
   const double machine = static_cast<double>(pages) * static_cast<double>(page);
   const double half = 0.5 * static_cast<double>(count) + 1.0;
   const double needed = 8.0 * half * half * threads;
-  if (count < kAlone && needed <= machine) return;
+  if (count < kNobody && needed <= machine) return;
   throw std::invalid_argument(
       "the distances between two halves of " + std::to_string(count) + " points would need " +
       std::to_string(static_cast<std::uint64_t>(needed / (1024.0 * 1024.0))) +
@@ -187,7 +187,7 @@ HalvingMatching run(std::size_t count, const Row& row, const HalvingOptions& opt
   Search search(options.iterations > 0 ? options.iterations : std::max<std::uint64_t>(count, 1),
                 options);
   if (count < 2) {
-    search.result.mate.assign(count, kAlone);
+    search.result.mate.assign(count, kNobody);
     if (count == 1) search.result.left_over = 0;
     return std::move(search.result);
   }
@@ -198,7 +198,7 @@ HalvingMatching run(std::size_t count, const Row& row, const HalvingOptions& opt
   }
   HalvingMatching& result = search.result;
   result.cost = result.steps.back().cost;
-  const auto alone = std::find(result.mate.begin(), result.mate.end(), kAlone);
+  const auto alone = std::find(result.mate.begin(), result.mate.end(), kNobody);
   if (alone != result.mate.end()) {
     result.left_over = static_cast<std::uint32_t>(alone - result.mate.begin());
   }

@@ -52,7 +52,7 @@ void check(const HalvingMatching& matching, const std::vector<Point3>& points) {
   double cost = 0.0;
   for (std::uint32_t i = 0; i < points.size(); ++i) {
     const std::uint32_t j = matching.mate[i];
-    if (j == kAlone) {
+    if (j == kNobody) {
       EXPECT_EQ(points.size() % 2, 1u);
       EXPECT_EQ(matching.left_over, i);
       continue;
@@ -62,7 +62,7 @@ void check(const HalvingMatching& matching, const std::vector<Point3>& points) {
     EXPECT_EQ(matching.mate[j], i);
     if (i < j) cost += distance(points[i], points[j]);
   }
-  EXPECT_EQ(points.size() % 2 == 1, matching.left_over != kAlone);
+  EXPECT_EQ(points.size() % 2 == 1, matching.left_over != kNobody);
   EXPECT_NEAR(matching.cost, cost, 1e-12 * cost);
   for (std::size_t k = 1; k < matching.steps.size(); ++k) {
     EXPECT_LT(matching.steps[k].cost, matching.steps[k - 1].cost);

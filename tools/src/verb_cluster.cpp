@@ -2,25 +2,23 @@
 // cluster: clusters one file of points in memory, by any method of libcluster.
 #include <algorithm>
 #include <limits>
-#include <new>
-#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 
+#include "cluster_output.hpp"
 #include "cluster_run.hpp"
 #include "dendrogram_file.hpp"
 #include "error.hpp"
 #include "interrupt.hpp"
+#include "library_call.hpp"
 #include "metric_option.hpp"
 #include "output.hpp"
 #include "point_table.hpp"
 #include "store_build.hpp"
-#include "terrace/stream/atomic_file.hpp"
 #include "terrace/stream/error.hpp"
-#include "terrace/stream/point_writer.hpp"
 #include "units.hpp"
 #include "verbs.hpp"
 
@@ -141,32 +139,25 @@ class ClusterCommand final : public Command {
     if (outlier_price_ > 0) problem.outlier_price = outlier_price_;
 
     ClusterOutcome outcome;
-    try {
+    {
       ProgressMeter meter(common.progress, "points");
-      // Not all methods look up from their work.
-      run_interruptible([&] {
+      call_library(input_, method_, [&] {
         outcome = run_clustering(request_, problem, [&](double fraction) {
           check_interrupt();
           meter.update(static_cast<std::uint64_t>(fraction * static_cast<double>(table.size())),
                        fraction);
         });
       });
-    } catch (const std::invalid_argument& error) {
-      throw stream::Error({.file = input_, .where = {}, .cause = error.what(), .remedy = {}});
-    } catch (const std::bad_alloc&) {
-      throw stream::Error({.file = input_,
-                           .where = {},
-                           .cause = "does not fit into memory with method " + method_,
-                           .remedy = "take fewer points, or another method"});
     }
     for (const std::string& note : outcome.notes) common.say(note);
 
-    if (!labels_.empty()) write_labels(outcome, replace_labels);
+    if (!labels_.empty()) write_labels(labels_, outcome, replace_labels);
     if (!dendrogram_.empty()) write_dendrogram(dendrogram_, *outcome.dendrogram, replace_tree);
     const std::size_t outliers = static_cast<std::size_t>(
         std::count(outcome.labels.begin(), outcome.labels.end(), cluster::kOutlier));
     const std::uint64_t points = table.size();
-    if (!output_.empty()) write_points(std::move(table), outcome, replace_points);
+    if (!output_.empty())
+      write_clustered(output_, format_, std::move(table), outcome, replace_points);
     return summary_of(outcome, points, outliers, watch);
   }
 
@@ -244,67 +235,6 @@ class ClusterCommand final : public Command {
       }
     }
     return channels;
-  }
-
-  void write_labels(const ClusterOutcome& outcome, bool replace) const {
-    std::string text;
-    for (const std::uint32_t label : outcome.labels) {
-      text += label == cluster::kOutlier ? "-1" : std::to_string(label);
-      text += '\n';
-    }
-    if (labels_ == "-") {
-      std::fwrite(text.data(), 1, text.size(), stdout);
-      if (std::fflush(stdout) != 0) throw ClosedPipe();
-      return;
-    }
-    stream::AtomicFile file(labels_, replace);
-    file.write(text);
-    file.commit();
-  }
-
-  void write_points(PointTable table, const ClusterOutcome& outcome, bool replace) const {
-    // Points that were clustered before are clustered anew.
-    table.drop("cluster");
-    table.drop("representative");
-    std::vector<stream::Channel> attributes = table.info.attributes;
-    attributes.push_back({.name = "cluster", .type = stream::ScalarType::i32});
-    attributes.push_back({.name = "representative", .type = stream::ScalarType::i32});
-    const auto writer = stream::open_point_writer(
-        output_, {.attributes = std::move(attributes), .comments = {kWriterMark}},
-        {.format = format_, .replace = replace});
-    const std::size_t own = table.attributes.size();
-    constexpr std::size_t kBlock = 65536;
-    stream::PointBlock block;
-    for (std::size_t begin = 0; begin < table.size(); begin += kBlock) {
-      check_interrupt();
-      const std::size_t end = std::min(begin + kBlock, table.size());
-      const auto at = [](std::size_t i) { return static_cast<std::ptrdiff_t>(i); };
-      block.positions.assign(table.positions.begin() + at(begin),
-                             table.positions.begin() + at(end));
-      block.attributes.resize(own + 2);
-      for (std::size_t c = 0; c < own; ++c) {
-        const std::size_t size = stream::size_of(table.attributes[c].type);
-        block.attributes[c].type = table.attributes[c].type;
-        block.attributes[c].bytes.assign(table.attributes[c].bytes.begin() + at(begin * size),
-                                         table.attributes[c].bytes.begin() + at(end * size));
-      }
-      std::vector<std::int32_t> label(end - begin), representative(end - begin);
-      for (std::size_t i = begin; i < end; ++i) {
-        const std::uint32_t cluster = outcome.labels[i];
-        const bool outlier = cluster == cluster::kOutlier;
-        label[i - begin] = outlier ? -1 : static_cast<std::int32_t>(cluster);
-        representative[i - begin] =
-            outlier ? -1 : static_cast<std::int32_t>(outcome.representatives[cluster]);
-      }
-      for (const auto& [slot, values] :
-           {std::pair(own, &label), std::pair(own + 1, &representative)}) {
-        const auto bytes = std::as_bytes(std::span<const std::int32_t>(*values));
-        block.attributes[slot].type = stream::ScalarType::i32;
-        block.attributes[slot].bytes.assign(bytes.begin(), bytes.end());
-      }
-      writer->append(block);
-    }
-    writer->finish();
   }
 
   [[nodiscard]] Summary summary_of(const ClusterOutcome& outcome, std::uint64_t points,

@@ -4,9 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <iostream>
-#include <new>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -16,10 +14,10 @@
 
 #include "error.hpp"
 #include "interrupt.hpp"
+#include "library_call.hpp"
 #include "output.hpp"
 #include "point_table.hpp"
 #include "terrace/stream/atomic_file.hpp"
-#include "terrace/stream/error.hpp"
 #include "units.hpp"
 #include "verbs.hpp"
 
@@ -73,16 +71,7 @@ class MatchCommand final : public Command {
     std::transform(table.positions.begin(), table.positions.end(), positions_.begin(), ground);
 
     Outcome outcome;
-    try {
-      run_interruptible([&] { outcome = halving ? halve(iterations, common) : solve(); });
-    } catch (const std::invalid_argument& error) {
-      throw stream::Error({.file = input_, .where = {}, .cause = error.what(), .remedy = {}});
-    } catch (const std::bad_alloc&) {
-      throw stream::Error({.file = input_,
-                           .where = {},
-                           .cause = "does not fit into memory with method " + method_,
-                           .remedy = "take fewer points"});
-    }
+    call_library(input_, method_, [&] { outcome = halving ? halve(iterations, common) : solve(); });
     const std::size_t pairs = write_pairs(outcome, replace);
     return summary_of(outcome, pairs, watch);
   }
@@ -120,7 +109,7 @@ class MatchCommand final : public Command {
     };
     matching::HalvingMatching matching = matching::match_by_halving(positions_, options);
     Outcome outcome{std::move(matching.mate), matching.cost, matching.iterations, {}, {}};
-    if (matching.left_over != matching::kAlone) outcome.left_over = matching.left_over;
+    if (matching.left_over != matching::kNobody) outcome.left_over = matching.left_over;
     return outcome;
   }
 

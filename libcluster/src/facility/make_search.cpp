@@ -1,17 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "facility/make_search.hpp"
 
-#include <cmath>
 #include <random>
 #include <stdexcept>
 #include <string>
-#include <type_traits>
 #include <utility>
-#include <variant>
-#include <vector>
 
 #include "facility/search_frame.hpp"
 #include "facility/space_search.hpp"
+#include "facility/with_space.hpp"
 
 namespace terrace::cluster {
 namespace {
@@ -53,51 +50,16 @@ std::unique_ptr<SearchEngine> make(SearchFrame& frame, Space space, GainStrategy
   return std::make_unique<SpaceSearch<Space>>(frame, std::move(space), strategy, threads);
 }
 
-// The caller's function on positions as they are; channels join under the root.
-IndexSpace custom_space(const FacilityPoints& problem, const SearchFrame& frame,
-                        const CustomMetric& metric) {
-  auto distance = [points = std::vector<Point3>(problem.points.begin(), problem.points.end()),
-                   channels = frame.channels, count = frame.channel_count,
-                   function = metric.distance](std::uint32_t facility, std::uint32_t client) {
-    double d = function(points[facility], points[client]);
-    for (std::size_t c = 0; c < count && d >= 0.0; ++c) {
-      d = std::hypot(d, channels[facility * count + c] - channels[client * count + c]);
-    }
-    return d;
-  };
-  return {std::move(distance), metric.symmetric && metric.triangle_inequality};
-}
-
 }  // namespace
 
 std::unique_ptr<SearchEngine> make_search(const FacilityPoints& problem, GainStrategy strategy,
                                           unsigned threads) {
   SearchFrame frame = make_frame(problem);
   const std::string what = "the metric \"" + name_of(problem.metric) + "\"";
-  const auto norm_search = [&](auto norm, bool triangles) {
-    return make(frame, NormSpace<decltype(norm), true>(frame, norm, triangles), strategy, threads,
-                what);
-  };
-  if (linear_map(problem.metric, bounds_of(problem.points))) {
-    if (frame.channel_count > 0) return norm_search(EuclideanNorm{}, true);
-    return make(frame, NormSpace<EuclideanNorm, false>(frame, {}, true), strategy, threads, what);
-  }
-  return std::visit(
-      [&](const auto& metric) -> std::unique_ptr<SearchEngine> {
-        using M = std::decay_t<decltype(metric)>;
-        if constexpr (std::is_same_v<M, Minkowski>) {
-          if (std::isinf(metric.p)) return norm_search(MaximumNorm{}, true);
-          if (metric.p == 1.0) return norm_search(CityBlockNorm{}, true);
-          return norm_search(PowerNorm{metric.p}, metric.p >= 1.0);
-        } else if constexpr (std::is_same_v<M, EllipticalField>) {
-          return make(frame, FieldSpace(frame, problem.points, metric), strategy, threads, what);
-        } else if constexpr (std::is_same_v<M, CustomMetric>) {
-          return make(frame, custom_space(problem, frame, metric), strategy, threads, what);
-        } else {
-          return norm_search(SquaredNorm{}, false);
-        }
-      },
-      problem.metric);
+  return with_space(problem, frame, problem.points,
+                    [&](auto space) -> std::unique_ptr<SearchEngine> {
+                      return make(frame, std::move(space), strategy, threads, what);
+                    });
 }
 
 std::unique_ptr<SearchEngine> make_search(SearchFrame& frame, IndexSpace space,

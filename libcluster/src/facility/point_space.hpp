@@ -4,57 +4,15 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <type_traits>
-#include <utility>
-#include <variant>
 #include <vector>
 
 #include "facility/cost_rows.hpp"
 #include "facility/fast_distances.hpp"
 #include "facility/search_frame.hpp"
 #include "facility/search_space.hpp"
+#include "facility/with_space.hpp"
 
 namespace terrace::cluster {
-
-/// Calls visit(space) with the distances of the problem among the points of its frame, which
-/// are moved out of it. `original` are the points in the order of the frame's.
-template <class Visit>
-auto with_space(const FacilityPoints& problem, SearchFrame& frame, std::span<const Point3> original,
-                const Visit& visit) {
-  using Result = decltype(visit(NormSpace<EuclideanNorm, false>(frame, {}, true)));
-  if (linear_map(problem.metric, bounds_of(original))) {
-    if (frame.channel_count == 0) return visit(NormSpace<EuclideanNorm, false>(frame, {}, true));
-    return visit(NormSpace<EuclideanNorm, true>(frame, {}, true));
-  }
-  const auto with_norm = [&](auto norm) -> Result {
-    return visit(NormSpace<decltype(norm), true>(frame, norm, false));
-  };
-  return std::visit(
-      [&](const auto& metric) -> Result {
-        using M = std::decay_t<decltype(metric)>;
-        if constexpr (std::is_same_v<M, Minkowski>) {
-          if (std::isinf(metric.p)) return with_norm(MaximumNorm{});
-          if (metric.p == 1.0) return with_norm(CityBlockNorm{});
-          return with_norm(PowerNorm{metric.p});
-        } else if constexpr (std::is_same_v<M, EllipticalField>) {
-          return visit(FieldSpace(frame, original, metric));
-        } else if constexpr (std::is_same_v<M, CustomMetric>) {
-          // The caller's function on positions as they are; channels join under the root.
-          auto distance = [original, channels = frame.channels, count = frame.channel_count,
-                           function = metric.distance](std::uint32_t j, std::uint32_t i) {
-            double d = function(original[j], original[i]);
-            for (std::size_t c = 0; c < count && d >= 0.0; ++c) {
-              d = std::hypot(d, channels[j * count + c] - channels[i * count + c]);
-            }
-            return d;
-          };
-          return visit(IndexSpace(std::move(distance), false));
-        } else {
-          return with_norm(SquaredNorm{});
-        }
-      },
-      problem.metric);
-}
 
 /// How far costs of the frame, summed over all clients, may be from those of the given coordinates:
 /// bringing coordinates into range and mapping them rounds by units in the last place of the box,

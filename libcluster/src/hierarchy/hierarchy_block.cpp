@@ -9,19 +9,12 @@
 #include <utility>
 #include <variant>
 
+#include "draws.hpp"
 #include "ground.hpp"
 #include "hierarchy/summary.hpp"
 
 namespace terrace::cluster {
 namespace {
-
-// Steele, Lea, Flood: Fast splittable pseudorandom number generators, OOPSLA 2014.
-std::uint64_t splitmix64(std::uint64_t x) {
-  x += 0x9e3779b97f4a7c15u;
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
-  return x ^ (x >> 31);
-}
 
 // Counts of level-0 points, scaled to mean 1 (thesis 7.1.2).
 void normalised_weights(std::span<const Summary> heads, std::vector<double>& weights) {

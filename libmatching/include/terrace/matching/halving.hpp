@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <limits>
 #include <span>
 #include <vector>
+
+#include "terrace/matching/matching.hpp"
+#include "terrace/matching/point.hpp"
 
 /// Euclidean matching by halving: the points are divided into two halves, which are matched at the
 /// least total distance (an assignment), again and again. Source: J. Skála, Algorithms for
@@ -16,8 +18,6 @@
 /// Neither method is exact; point_matching.hpp is. They are here as published, and one step beyond.
 
 namespace terrace::matching {
-
-using Point3 = std::array<double, 3>;
 
 enum class Halving : std::uint8_t {
   /// As published: random halves, the best matching of all iterations. It does not converge: of 100
@@ -43,13 +43,10 @@ struct HalvingOptions {
   std::function<bool(std::uint64_t done, std::uint64_t total, double cost)> progress = {};
 };
 
-/// Stands for the partner of a point that has none.
-inline constexpr std::uint32_t kAlone = 0xFFFFFFFFu;
-
 struct HalvingMatching {
-  std::vector<std::uint32_t> mate;   ///< partner of each point; kAlone for the one left over
-  double cost = 0.0;                 ///< sum of the distances of all pairs, added by lower index
-  std::uint32_t left_over = kAlone;  ///< the point without partner where their number is odd
+  std::vector<std::uint32_t> mate;    ///< partner of each point; kNobody for the one left over
+  double cost = 0.0;                  ///< sum of the distances of all pairs, added by lower index
+  std::uint32_t left_over = kNobody;  ///< the point without partner where their number is odd
   std::uint64_t iterations = 0;
   /// The cost after those iterations that lowered it, for a curve of convergence.
   struct Step {

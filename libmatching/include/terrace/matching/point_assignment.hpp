@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <span>
 
 #include "terrace/matching/assignment.hpp"
+#include "terrace/matching/point.hpp"
 
 namespace terrace::matching {
-
-using Point2 = std::array<double, 2>;
-using Point3 = std::array<double, 3>;
 
 /// Minimum-cost assignment of points to points, the cost being the Euclidean distance; optimal
 /// among all pairs although only near ones are ever looked at.

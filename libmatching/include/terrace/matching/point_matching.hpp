@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -10,11 +9,9 @@
 #include <vector>
 
 #include "terrace/matching/matching.hpp"
+#include "terrace/matching/point.hpp"
 
 namespace terrace::matching {
-
-using Point2 = std::array<double, 2>;
-using Point3 = std::array<double, 3>;
 
 /// A distance of the caller's. It must be symmetric and not below
 /// `factor * (Euclidean distance) - offset`, in the unit of the points: by that bound pairs are
