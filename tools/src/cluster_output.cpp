@@ -49,8 +49,7 @@ void write_clustered(const std::string& path, const std::string& format, PointTa
     check_interrupt();
     const std::size_t end = std::min(begin + kBlock, table.size());
     const auto at = [](std::size_t i) { return static_cast<std::ptrdiff_t>(i); };
-    block.positions.assign(table.positions.begin() + at(begin),
-                           table.positions.begin() + at(end));
+    block.positions.assign(table.positions.begin() + at(begin), table.positions.begin() + at(end));
     block.attributes.resize(own + 2);
     for (std::size_t c = 0; c < own; ++c) {
       const std::size_t size = stream::size_of(table.attributes[c].type);

@@ -6,8 +6,9 @@
 
 namespace terrace::tools {
 
-/// Runs long work of a library on points in memory, so that Ctrl-C ends it (run_interruptible()), and
-/// names the file in what it throws: std::invalid_argument and std::bad_alloc become stream::Error.
+/// Runs long work of a library on points in memory, so that Ctrl-C ends it (run_interruptible()),
+/// and names the file in what it throws: std::invalid_argument and std::bad_alloc become
+/// stream::Error.
 void call_library(const std::string& file, const std::string& method,
                   const std::function<void()>& work);
 

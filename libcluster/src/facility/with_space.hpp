@@ -38,7 +38,8 @@ auto with_space(const FacilityPoints& problem, SearchFrame& frame, std::span<con
           return visit(FieldSpace(frame, original, metric));
         } else if constexpr (std::is_same_v<M, CustomMetric>) {
           // The caller's function on positions as they are; channels join under the root.
-          auto distance = [points = std::vector<Point3>(original.begin(), original.end()), channels = frame.channels, count = frame.channel_count,
+          auto distance = [points = std::vector<Point3>(original.begin(), original.end()),
+                           channels = frame.channels, count = frame.channel_count,
                            function = metric.distance](std::uint32_t j, std::uint32_t i) {
             double d = function(points[j], points[i]);
             for (std::size_t c = 0; c < count && d >= 0.0; ++c) {
@@ -46,7 +47,8 @@ auto with_space(const FacilityPoints& problem, SearchFrame& frame, std::span<con
             }
             return d;
           };
-          return visit(IndexSpace(std::move(distance), metric.symmetric && metric.triangle_inequality));
+          return visit(
+              IndexSpace(std::move(distance), metric.symmetric && metric.triangle_inequality));
         } else {
           return with_norm(SquaredNorm{}, false);
         }
