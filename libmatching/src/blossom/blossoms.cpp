@@ -121,10 +121,11 @@ void Solver::leave_minus(std::uint32_t node) {
 void Solver::expand(std::uint32_t blossom) {
   const Node b = nodes_[blossom];
   const std::uint32_t count = static_cast<std::uint32_t>(parts(blossom).size());
-  const std::uint32_t entry = part_holding(blossom, b.enter_to);
-  const std::uint32_t exit = match_parts(blossom);
   const std::vector<Part> cycle = parts(blossom);
   release_parts(blossom);
+  const std::uint32_t entry = nodes_[top(b.enter_to)].place;
+  const std::uint32_t exit = nodes_[top(b.base)].place;
+  match_parts(blossom, exit);
   // The parts on the even way from the entry to the exit stay in the tree. Those that stay minus
   // are not touched vertex by vertex: in a deep nest the next expansion would do so again.
   const std::uint32_t ahead = (entry + count - exit) % count;

@@ -18,17 +18,11 @@ std::uint32_t Solver::new_blossom() {
   return blossom;
 }
 
-std::uint32_t Solver::part_holding(std::uint32_t blossom, std::uint32_t vertex) const {
-  std::uint32_t x = vertex;
-  while (nodes_[x].parent != blossom) x = nodes_[x].parent;
-  return nodes_[x].place;
-}
-
-// The part with the base has the blossom's matched edge, the others go in pairs round the cycle.
-std::uint32_t Solver::match_parts(std::uint32_t blossom) {
+// The part with the base, `exit`, has the blossom's matched edge, the others go in pairs round the
+// cycle.
+void Solver::match_parts(std::uint32_t blossom, std::uint32_t exit) {
   const std::vector<Part>& cycle = parts(blossom);
   const std::uint32_t count = static_cast<std::uint32_t>(cycle.size());
-  const std::uint32_t exit = part_holding(blossom, nodes_[blossom].base);
   nodes_[cycle[exit].node].base = nodes_[blossom].base;
   nodes_[cycle[exit].node].mate = nodes_[blossom].mate;
   for (std::uint32_t step = 1; step < count; step += 2) {
@@ -38,9 +32,10 @@ std::uint32_t Solver::match_parts(std::uint32_t blossom) {
     x.base = y.mate = part.from;
     x.mate = y.base = part.to;
   }
-  return exit;
 }
 
+// Afterwards top() tells which part a vertex is in. (The way up from the vertex would be as long as
+// the nest is deep.) Base and mate of the blossom stay to be read.
 void Solver::release_parts(std::uint32_t blossom) {
   Node& b = nodes_[blossom];
   for (const Part& part : parts(blossom)) {
@@ -75,8 +70,8 @@ void Solver::uncover(std::uint32_t vertex) {
     const std::uint32_t blossom = top(vertex);
     sum += nodes_[blossom].dual;
     if (nodes_[blossom].dual != 0) unmatch(blossom);
-    match_parts(blossom);
     release_parts(blossom);
+    match_parts(blossom, nodes_[top(nodes_[blossom].base)].place);
     for (const Part& part : parts(blossom)) {
       if (part.node == top(vertex)) continue;
       for (std::uint32_t v = nodes_[part.node].first;; v = vertices_[v].next) {

@@ -113,8 +113,19 @@ std::int64_t Solver::first_limit() const {
 
 std::vector<std::uint32_t> Solver::mates() {
   std::vector<std::uint32_t> mate(n_, kNone), open;
+  // Of a blossom's parts each is a range of its list of vertices.
+  std::vector<std::uint32_t> position(n_, 0);
+  const auto holds = [&](std::uint32_t node, std::uint32_t vertex) {
+    const Node& x = nodes_[node];
+    return position[x.first] <= position[vertex] && position[vertex] <= position[x.last];
+  };
   for (std::uint32_t node = 0; node < node_count(); ++node) {
     if (!in_use(node) || nodes_[node].parent != kNone) continue;
+    std::uint32_t place = 0;
+    for (std::uint32_t v = nodes_[node].first;; v = vertices_[v].next) {
+      position[v] = place++;
+      if (v == nodes_[node].last) break;
+    }
     open.push_back(node);
     while (!open.empty()) {
       const std::uint32_t x = open.back();
@@ -123,7 +134,10 @@ std::vector<std::uint32_t> Solver::mates() {
         mate[x] = nodes_[x].mate;
         continue;
       }
-      match_parts(x);
+      const std::vector<Part>& cycle = parts(x);
+      std::uint32_t exit = 0;
+      while (!holds(cycle[exit].node, nodes_[x].base)) ++exit;
+      match_parts(x, exit);
       for (const Part& part : parts(x)) open.push_back(part.node);
     }
   }

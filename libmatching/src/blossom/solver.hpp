@@ -125,8 +125,7 @@ class Solver {
   void expand(std::uint32_t blossom);
 
   std::uint32_t new_blossom();
-  std::uint32_t part_holding(std::uint32_t blossom, std::uint32_t vertex) const;
-  std::uint32_t match_parts(std::uint32_t blossom);
+  void match_parts(std::uint32_t blossom, std::uint32_t exit);
   void release_parts(std::uint32_t blossom);
   void uncover(std::uint32_t vertex);
   void repair(const Edge& edge);
