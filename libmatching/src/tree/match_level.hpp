@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "terrace/matching/point_matching.hpp"
+
+namespace terrace::matching::tree {
+
+/// How matching trees match the nodes of a level where the caller does not say: the partner of
+/// each, kNobody for the one left over. The result must not depend on the number of threads.
+template <std::size_t D>
+std::vector<std::uint32_t> match_level(std::span<const std::array<double, D>> points,
+                                       [[maybe_unused]] unsigned threads) {
+  return std::move(match_points(points).mate);
+}
+
+}  // namespace terrace::matching::tree
