@@ -61,11 +61,14 @@ class Windows {
       cost_ = cost();
       if (!whole) break;
       ++result_.rounds;
+      result_.optimal = parts.count() == 1;
+      if (result_.optimal) break;
       if (before - cost_ <= options_.tolerance * before) break;
     }
     result_.cost = cost_;
     // Rounding alone may lift the bound above the cost.
-    result_.dual_bound = std::min(cost_, discs_.bound(points_, metric_, threads_));
+    result_.dual_bound =
+        result_.optimal ? cost_ : std::min(cost_, discs_.bound(points_, metric_, threads_));
     const auto alone = std::find(result_.mate.begin(), result_.mate.end(), kNobody);
     if (alone != result_.mate.end()) {
       result_.left_over = static_cast<std::uint32_t>(alone - result_.mate.begin());

@@ -141,6 +141,16 @@ TEST(LargeMatching, IsExactUpToTheLimit) {
   options.exact_limit = 500;
   options.window = 100;
   EXPECT_FALSE(match_large(points, options).optimal);
+  // One window for all.
+  options.window = 502;
+  std::vector<std::uint32_t> labels(points.size());
+  for (std::size_t i = 0; i < labels.size(); ++i) labels[i] = static_cast<std::uint32_t>(i % 3);
+  options.labels = labels;
+  const LargeMatching whole = match_large(points, options);
+  EXPECT_TRUE(whole.optimal);
+  EXPECT_EQ(whole.rounds, 1u);
+  EXPECT_NEAR(whole.cost, m.cost, 1e-12 * m.cost);
+  EXPECT_NEAR(whole.dual_bound, m.cost, 1e-9 * m.cost);
 }
 
 TEST(LargeMatching, DoesNotDependOnThreads) {

@@ -102,18 +102,110 @@ class MatchTest(unittest.TestCase):
 
     def test_threads_never_change_the_bytes(self):
         self.points(60)
-        outputs = set()
-        for threads in (1, 3):
-            self.match('--method', 'monte-carlo', '--iterations', 20, '--threads', threads)
-            with open(self.path('pairs.csv'), 'rb') as file:
-                outputs.add(file.read())
-        self.assertEqual(len(outputs), 1)
+        labels = self.labels(k % 3 for k in range(60))
+        for options in (['--method', 'monte-carlo', '--iterations', 20],
+                        ['--labels', labels], ['--labels', labels, '--tree']):
+            outputs = set()
+            for threads in (1, 3):
+                self.match('--threads', threads, *options)
+                with open(self.path('pairs.csv'), 'rb') as file:
+                    outputs.add(file.read())
+            self.assertEqual(len(outputs), 1)
+
+    def labels(self, numbers):
+        path = self.path('labels.txt')
+        with open(path, 'w') as file:
+            file.writelines(f'{number}\n' for number in numbers)
+        return path
+
+    def test_clusters_first_then_windows(self):
+        points = self.points(301)
+        exact, _ = self.match()
+        self.assertTrue(exact['optimal'])
+        # -1 stands for no cluster.
+        labels = self.labels(-1 if x < 20 else int(x > 50) * 4000000000 for x, _, _ in points)
+        summary, rows = self.match('--labels', labels)
+        self.check(points, summary, rows)
+        self.assertEqual(summary['clusters'], 3)
+        self.assertAlmostEqual(summary['cost'], exact['cost'], places=6)
+
+    def tree_of(self, points, *options):
+        """The rows of a tree, checked: each node is used once, levels rise, midpoints are weighted."""
+        summary, rows = self.match('--tree', *options)
+        n = len(points)
+        self.assertEqual(len(rows), n - 1)
+        self.assertEqual(summary['pairs'], n - 1)
+        nodes = [(point, 1, 0) for point in points]
+        unused = set(range(n))
+        for k, row in enumerate(rows):
+            a, b = int(row['a']), int(row['b'])
+            self.assertLess(a, b)
+            unused -= {a, b}
+            (p, p_size, p_level), (q, q_size, q_level) = nodes[a], nodes[b]
+            size, level = int(row['size']), int(row['level'])
+            self.assertEqual(size, p_size + q_size)
+            self.assertGreater(level, max(p_level, q_level))
+            self.assertAlmostEqual(float(row['distance']), math.dist(p, q), places=7)
+            nodes.append(([(x * p_size + y * q_size) / size for x, y in zip(p, q)], size, level))
+            unused.add(n + k)
+        self.assertEqual(unused, {len(nodes) - 1})
+        self.assertAlmostEqual(summary['cost'], sum(float(row['distance']) for row in rows), places=6)
+        self.assertEqual(summary['levels'], max((int(row['level']) for row in rows), default=0))
+        return summary, rows
+
+    def test_the_tree_of_repeated_matching(self):
+        points = self.points(90)
+        _, pairs = self.match()
+        for options in ([], ['--method', 'exact'], ['--method', 'monotone'],
+                        ['--method', 'monte-carlo', '--iterations', 5]):
+            summary, rows = self.tree_of(points, *options)
+            # ceil(log2 90)
+            self.assertEqual(summary['levels'], 7)
+            if not options or options[1] == 'exact':
+                lowest = [(row['a'], row['b']) for row in rows if row['level'] == '1']
+                self.assertEqual(set(lowest), {(row['a'], row['b']) for row in pairs})
+        self.tree_of(self.points(1))
+
+    def test_a_cluster_is_a_subtree(self):
+        points = self.points(77)
+        labels = [int(x > 30) for x, _, _ in points]
+        for options in ([], ['--method', 'monotone']):
+            _, rows = self.tree_of(points, '--labels', self.labels(labels), *options)
+            clusters = [{label} for label in labels]
+            for row in rows[:-1]:
+                both = clusters[int(row['a'])] | clusters[int(row['b'])]
+                self.assertEqual(len(both), 1)
+                clusters.append(both)
+
+    def test_labels_must_be_those_of_the_points(self):
+        self.points(4)
+        out = self.path('none.csv')
+        for text, where in (('0\n1\n', '2 labels for 4 points'), ('0\n1\nx\n1\n', 'line 3'),
+                            ('0\n1\n\n1\n', 'line 3'), ('0\n1\n4294967295\n1\n', 'line 3'),
+                            ('0\n1\n-2\n1\n', 'line 3'), ('0\n1\n2\n1\n1\n', 'line 5')):
+            with open(self.path('labels.txt'), 'w') as file:
+                file.write(text)
+            result = terrace('match', self.path('points.csv'), '-o', out, '--labels',
+                             self.path('labels.txt'))
+            self.assertEqual(result.returncode, 1)
+            self.assertEqual(len(result.stderr.splitlines()), 1, result.stderr)
+            self.assertIn('labels.txt', result.stderr)
+            self.assertIn(where, result.stderr)
+            self.assertFalse(os.path.exists(out))
+
+    def test_too_little_memory_is_said_before_the_work(self):
+        self.points(20000)
+        result = terrace('match', self.path('points.csv'), '-o', self.path('none.csv'),
+                         '--memory', '8M')
+        self.assertEqual(result.returncode, 1)
+        self.assertIn('takes about', result.stderr)
 
     def test_errors_are_one_line(self):
         self.points(10)
         source, out = self.path('points.csv'), self.path('none.csv')
         for code, options in ((2, ['--method', 'best']), (2, ['--iterations', 3]),
-                              (2, ['--seconds', 1]), (2, ['--tree']),
+                              (2, ['--seconds', 1]), (1, ['--labels', self.path('nowhere.txt')]),
+                              (2, ['--method', 'exact', '--labels', source]),
                               (2, ['--method', 'monotone', '--iterations', 0])):
             result = terrace('match', source, '-o', out, *options)
             self.assertEqual(result.returncode, code, result.stderr)

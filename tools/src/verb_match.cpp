@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// match: pairs the points of one file at the least total distance.
+// match: pairs the points of one file at the least total distance, or makes the tree of repeated
+// matching.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <iostream>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include <CLI/CLI.hpp>
-#include <terrace/matching/halving.hpp>
-#include <terrace/matching/point_matching.hpp>
 
 #include "error.hpp"
 #include "interrupt.hpp"
+#include "label_file.hpp"
 #include "library_call.hpp"
+#include "match_run.hpp"
 #include "output.hpp"
 #include "point_table.hpp"
 #include "terrace/stream/atomic_file.hpp"
@@ -32,12 +32,13 @@ class MatchCommand final : public Command {
         ->type_name("FILE");
     add_output(app, output_,
                "The pairs, rows a,b,distance: numbers of points in the order of the input, from 0, "
-               "and metres; - is standard output");
+               "and metres; with --tree rows a,b,distance,size,level; - is standard output");
     app.add_option("--input-format", input_format_, "Of the input (else its content, its ending)")
         ->type_name("NAME");
     app.add_option("--method", method_,
-                   "auto or exact: the optimum; monotone: repeated halving, near it; monte-carlo: "
-                   "random halving, as the thesis has it")
+                   "auto: the optimum up to a million points, beyond it clusters first, then "
+                   "windows, with a proven bound; exact: the optimum; monotone: repeated halving, "
+                   "near it; monte-carlo: random halving, as the thesis has it")
         ->check(CLI::IsMember({"auto", "exact", "monotone", "monte-carlo"}))
         ->capture_default_str()
         ->type_name("NAME");
@@ -50,73 +51,75 @@ class MatchCommand final : public Command {
     app.add_option("--z-weight", z_weight_, "How much heights count in a distance")
         ->check(CLI::NonNegativeNumber)
         ->capture_default_str();
-    not_yet(app, {"--tree", "--labels"});
+    app.add_flag(
+        "--tree", tree_,
+        "Match the pairs again, and so on: the binary tree. Row k is node n + k of n points "
+        "and joins the nodes a and b; size: points below");
+    app.add_option("--labels", labels_,
+                   "One cluster number per line, in the order of the input: match within clusters "
+                   "first")
+        ->type_name("FILE");
   }
 
   Summary run(const CommonOptions& common) override {
     const Stopwatch watch;
-    const bool halving = method_ == "monotone" || method_ == "monte-carlo";
-    if (!halving && (!iterations_.empty() || seconds_ > 0)) {
-      throw UsageError("--iterations and --seconds are for --method monotone and monte-carlo");
-    }
-    if (output_ == "-" && common.json)
-      throw UsageError("--json and '-o -' both want standard output");
-    const std::uint64_t iterations = iterations_.empty() ? 0 : parse_count(iterations_);
-    if (!iterations_.empty() && iterations == 0) throw UsageError("--iterations must be positive");
+    MatchRequest request = request_of(common);
     const bool replace = may_replace(output_, common.force);
     const PointTable table = read_point_table(input_, input_format_, common.memory_or(0), common);
     const GroundFrame ground = GroundFrame::of(table, z_weight_);
     if (!ground.assumption.empty()) common.explain(input_ + ": " + ground.assumption);
+    std::vector<std::uint32_t> labels;
+    if (!labels_.empty()) labels = read_labels(labels_, table.size());
+    request.labels = labels;
     positions_.resize(table.size());
     std::transform(table.positions.begin(), table.positions.end(), positions_.begin(), ground);
 
-    Outcome outcome;
-    call_library(input_, method_, [&] { outcome = halving ? halve(iterations, common) : solve(); });
-    const std::size_t pairs = write_pairs(outcome, replace);
+    ProgressMeter meter(common.progress, tree_ ? "pairs" : "steps");
+    const MatchProgress progress = [&](std::uint64_t done, std::uint64_t total) {
+      check_interrupt();
+      meter.update(done, static_cast<double>(done) / static_cast<double>(total));
+    };
+    if (tree_) {
+      TreeOutcome outcome;
+      call_library(input_, method_,
+                   [&] { outcome = run_matching_tree(request, positions_, progress); });
+      write(rows_of(outcome), replace);
+      return summary_of(outcome, watch);
+    }
+    MatchOutcome outcome;
+    call_library(input_, method_, [&] { outcome = run_matching(request, positions_, progress); });
+    std::size_t pairs = 0;
+    write(rows_of(outcome, pairs), replace);
     return summary_of(outcome, pairs, watch);
   }
 
  private:
-  struct Outcome {
-    std::vector<std::uint32_t> mate;
-    double cost = 0.0;
-    std::uint64_t iterations = 0;
-    std::optional<std::uint32_t> left_over;
-    std::optional<double> lower_bound;
-  };
-
-  Outcome solve() const {
-    matching::PointMatching matching = matching::match_points(positions_);
-    Outcome outcome{
-        std::move(matching.mate), matching.cost, matching.rounds, {}, matching.dual_bound};
-    if (matching.left_over != matching::kNobody) outcome.left_over = matching.left_over;
-    return outcome;
+  [[nodiscard]] MatchRequest request_of(const CommonOptions& common) const {
+    MatchRequest request;
+    request.method = *match_method_of(method_);
+    const bool halving =
+        request.method == MatchMethod::monotone || request.method == MatchMethod::monte_carlo;
+    if (!halving && (!iterations_.empty() || seconds_ > 0)) {
+      throw UsageError("--iterations and --seconds are for --method monotone and monte-carlo");
+    }
+    if (!labels_.empty() && !tree_ && request.method != MatchMethod::automatic) {
+      throw UsageError("--labels is for --method auto, or for --tree with any method");
+    }
+    if (output_ == "-" && common.json)
+      throw UsageError("--json and '-o -' both want standard output");
+    request.iterations = iterations_.empty() ? 0 : parse_count(iterations_);
+    if (!iterations_.empty() && request.iterations == 0) {
+      throw UsageError("--iterations must be positive");
+    }
+    request.seconds = seconds_;
+    request.seed = common.seed;
+    request.threads = common.threads;
+    request.memory_bytes = common.memory_or(0);
+    return request;
   }
 
-  Outcome halve(std::uint64_t iterations, const CommonOptions& common) const {
-    ProgressMeter meter(common.progress, "iterations");
-    matching::HalvingOptions options;
-    options.method =
-        method_ == "monotone" ? matching::Halving::monotone : matching::Halving::monte_carlo;
-    options.iterations = iterations;
-    if (seconds_ > 0) options.seconds = seconds_;
-    options.seed = common.seed;
-    options.threads = common.threads;
-    options.progress = [&](std::uint64_t done, std::uint64_t total, double) {
-      check_interrupt();
-      meter.update(done, static_cast<double>(done) / static_cast<double>(total));
-      return true;
-    };
-    matching::HalvingMatching matching = matching::match_by_halving(positions_, options);
-    Outcome outcome{std::move(matching.mate), matching.cost, matching.iterations, {}, {}};
-    if (matching.left_over != matching::kNobody) outcome.left_over = matching.left_over;
-    return outcome;
-  }
-
-  /// Returns the number of pairs.
-  std::size_t write_pairs(const Outcome& outcome, bool replace) const {
+  std::string rows_of(const MatchOutcome& outcome, std::size_t& pairs) const {
     std::string text = "a,b,distance\n";
-    std::size_t pairs = 0;
     for (std::uint32_t a = 0; a < outcome.mate.size(); ++a) {
       const std::uint32_t b = outcome.mate[a];
       // Who has no partner has a number above all.
@@ -126,44 +129,100 @@ class MatchCommand final : public Command {
       text += std::to_string(a) + ',' + std::to_string(b) + ',' + number_text(distance) + '\n';
       ++pairs;
     }
+    return text;
+  }
+
+  static std::string rows_of(const TreeOutcome& outcome) {
+    std::string text = "a,b,distance,size,level\n";
+    for (const matching::MatchingTreeRow& row : outcome.tree.rows) {
+      text += std::to_string(row.a) + ',' + std::to_string(row.b) + ',' +
+              number_text(row.distance) + ',' + std::to_string(row.size) + ',' +
+              std::to_string(row.level) + '\n';
+    }
+    return text;
+  }
+
+  void write(const std::string& text, bool replace) const {
     if (output_ == "-") {
       std::cout << text;
       if (!std::cout.flush()) throw ClosedPipe();
-    } else {
-      stream::AtomicFile file(output_, replace);
-      file.write(text);
-      file.commit();
+      return;
     }
-    return pairs;
+    stream::AtomicFile file(output_, replace);
+    file.write(text);
+    file.commit();
   }
 
-  [[nodiscard]] Summary summary_of(const Outcome& outcome, std::size_t pairs,
+  [[nodiscard]] Summary summary_of(const MatchOutcome& outcome, std::size_t pairs,
                                    const Stopwatch& watch) const {
     Summary summary;
+    const auto alone = std::find(outcome.mate.begin(), outcome.mate.end(), matching::kNobody);
+    const bool odd = alone != outcome.mate.end();
     summary.json = {{"pairs", pairs},
                     {"cost", outcome.cost},
                     {"iterations", outcome.iterations},
-                    {"unmatched", outcome.left_over ? 1 : 0}};
+                    {"unmatched", odd ? 1 : 0},
+                    {"optimal", outcome.optimal},
+                    {"clusters", outcome.clusters}};
     summary.json["left_over"] = nullptr;
-    if (outcome.left_over) summary.json["left_over"] = *outcome.left_over;
+    if (odd) summary.json["left_over"] = alone - outcome.mate.begin();
     summary.json["lower_bound"] = nullptr;
     if (outcome.lower_bound) summary.json["lower_bound"] = *outcome.lower_bound;
-    summary.json["seconds"] = watch.seconds();
-    summary.json["peak_rss_bytes"] = peak_rss_bytes();
-    char cost[32];
-    std::snprintf(cost, sizeof cost, "%.9g", outcome.cost);
-    summary.text = with_commas(pairs) + " pairs, total distance " + cost;
-    summary.text += outcome.lower_bound ? " (the optimum)" : " (no bound)";
-    if (outcome.left_over) {
-      summary.text += ", point " + std::to_string(*outcome.left_over) + " left over";
+    summary.text = with_commas(pairs) + " pairs, total distance " + short_text(outcome.cost);
+    summary.text += guarantee(outcome);
+    if (odd) {
+      summary.text += ", point " + std::to_string(alone - outcome.mate.begin()) + " left over";
     }
-    summary.text += ", " + readable_seconds(watch.seconds()) + '\n';
-    summary.text_is_result = output_ != "-";
+    finish(summary, watch);
     return summary;
   }
 
+  [[nodiscard]] Summary summary_of(const TreeOutcome& outcome, const Stopwatch& watch) const {
+    double cost = 0.0;
+    std::uint32_t levels = 0;
+    for (const matching::MatchingTreeRow& row : outcome.tree.rows) {
+      cost += row.distance;
+      levels = std::max(levels, row.level);
+    }
+    Summary summary;
+    summary.json = {{"pairs", outcome.tree.rows.size()},
+                    {"cost", cost},
+                    {"iterations", levels},
+                    {"unmatched", 0},
+                    {"levels", levels},
+                    {"clusters", outcome.clusters}};
+    summary.text = "a tree of " + with_commas(outcome.tree.rows.size()) + " pairs on " +
+                   std::to_string(levels) + " levels, total distance " + short_text(cost);
+    finish(summary, watch);
+    return summary;
+  }
+
+  /// What is known of the matching, for the user.
+  static std::string guarantee(const MatchOutcome& outcome) {
+    if (outcome.optimal) return " (the optimum)";
+    if (!outcome.lower_bound || !(*outcome.lower_bound > 0.0)) return " (no bound)";
+    char share[64];
+    std::snprintf(share, sizeof share, " (at most %.2g %% above the optimum)",
+                  100.0 * std::max(0.0, outcome.cost / *outcome.lower_bound - 1.0));
+    return share;
+  }
+
+  static std::string short_text(double value) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.9g", value);
+    return text;
+  }
+
+  void finish(Summary& summary, const Stopwatch& watch) const {
+    summary.json["seconds"] = watch.seconds();
+    summary.json["peak_rss_bytes"] = peak_rss_bytes();
+    summary.text += ", " + readable_seconds(watch.seconds()) + '\n';
+    summary.text_is_result = output_ != "-";
+  }
+
   std::vector<stream::Point3> positions_;
-  std::string input_, output_, input_format_, method_ = "auto", iterations_;
+  std::string input_, output_, input_format_, method_ = "auto", iterations_, labels_;
+  bool tree_ = false;
   double seconds_ = 0, z_weight_ = 1;
 };
 

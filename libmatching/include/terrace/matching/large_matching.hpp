@@ -22,7 +22,7 @@ struct LargeMatchingOptions {
   /// Most rounds of windows after the first matching; 0 leaves it as the clusters or parts gave it.
   unsigned rounds = 8;
   /// Windows agree where a round makes the cost less by no more than this share.
-  double tolerance = 1e-4;
+  double tolerance = 1e-3;
   PointMetric metric{};  ///< Euclidean where `distance` is empty; called from several threads
   unsigned threads = 1;  ///< 0: one per core. Never changes the result.
   /// Called by the caller's thread between windows with those matched so far, those that there will
@@ -36,7 +36,7 @@ struct LargeMatching {
   double cost = 0.0;                  ///< sum of the distances of all pairs
   double dual_bound = 0.0;            ///< no matching costs less, but for rounding
   std::uint32_t left_over = kNobody;  ///< the point without partner where n is odd
-  bool optimal = false;               ///< matched exactly: cost and dual_bound are equal
+  bool optimal = false;               ///< matched all at once: the optimum, but for rounding
   unsigned rounds = 0;                ///< of windows; 0 where matched exactly
   std::uint64_t windows = 0;          ///< matched in all rounds, the clusters or parts too
 
