@@ -83,7 +83,8 @@ std::uint32_t Solver::solve() {
     const bool unlimited = exposed <= 2 || limit > kLimit / 16;
     const std::uint32_t before = exposed;
     for (std::uint32_t v = 0; v < n_; ++v) {
-      if (!is_exposed(v)) continue;
+      // Of an exposed blossom its base is the root, so that each pass searches from it once.
+      if (!is_exposed(v) || nodes_[top(v)].base != v) continue;
       const bool last = exposed == 2 && late_ != kNone && is_exposed(late_);
       if (v == late_ && !last) continue;
       // Of the last two the late vertex is the root: its tree is one edge.

@@ -1,0 +1,320 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/matching/large_matching.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include "windows/cut.hpp"
+#include "windows/discs.hpp"
+#include "windows/parallel.hpp"
+
+namespace terrace::matching {
+namespace {
+
+using windows::Discs;
+using windows::Unit;
+
+[[noreturn]] void fail(const std::string& what) {
+  throw std::invalid_argument("match_large: " + what);
+}
+
+/// Sets of points to be matched, each for itself: set k is [ends[k - 1], ends[k]) of `points`.
+struct Parts {
+  std::vector<std::uint32_t> points;
+  std::vector<std::size_t> ends;
+
+  [[nodiscard]] std::size_t count() const { return ends.size(); }
+  [[nodiscard]] std::span<const std::uint32_t> part(std::size_t k) const {
+    const std::size_t begin = k == 0 ? 0 : ends[k - 1];
+    return std::span(points).subspan(begin, ends[k] - begin);
+  }
+};
+
+template <std::size_t D>
+class Windows {
+ public:
+  using Point = std::array<double, D>;
+
+  /// points: so scaled that squares neither overflow nor vanish.
+  Windows(std::span<const Point> points, const LargeMatchingOptions& options,
+          const PointMetric& metric)
+      : points_(points),
+        options_(options),
+        metric_(metric),
+        threads_(options.threads == 0 ? std::max(1u, std::thread::hardware_concurrency())
+                                      : options.threads) {
+    result_.mate.assign(points.size(), kNobody);
+  }
+
+  LargeMatching solve() {
+    first_matching();
+    cost_ = cost();
+    for (unsigned round = 1; round <= options_.rounds && !stopped_; ++round) {
+      const double before = cost_;
+      const Parts parts = pairs_together(round);
+      const bool whole = match_parts(parts);
+      cost_ = cost();
+      if (!whole) break;
+      ++result_.rounds;
+      if (before - cost_ <= options_.tolerance * before) break;
+    }
+    result_.cost = cost_;
+    // Rounding alone may lift the bound above the cost.
+    result_.dual_bound = std::min(cost_, discs_.bound(points_, metric_, threads_));
+    const auto alone = std::find(result_.mate.begin(), result_.mate.end(), kNobody);
+    if (alone != result_.mate.end()) {
+      result_.left_over = static_cast<std::uint32_t>(alone - result_.mate.begin());
+    }
+    return std::move(result_);
+  }
+
+ private:
+  double distance(std::uint32_t i, std::uint32_t j) const {
+    if (metric_.distance) return metric_.distance(i, j);
+    double sum = 0.0;
+    for (std::size_t d = 0; d < D; ++d) {
+      sum += (points_[i][d] - points_[j][d]) * (points_[i][d] - points_[j][d]);
+    }
+    return std::sqrt(sum);
+  }
+
+  double cost() const {
+    double sum = 0.0;
+    for (std::uint32_t i = 0; i < result_.mate.size(); ++i) {
+      const std::uint32_t j = result_.mate[i];
+      if (j != kNobody && i < j) sum += distance(i, j);
+    }
+    return sum;
+  }
+
+  // Matches each part, then what was left over in the odd ones, until at most one point is.
+  void first_matching() {
+    std::vector<std::uint32_t> all(points_.size());
+    std::iota(all.begin(), all.end(), 0u);
+    Parts parts = options_.labels.empty() ? compact_parts(all) : clusters();
+    while (true) {
+      match_parts(parts, true);
+      std::vector<std::uint32_t> alone;
+      for (std::uint32_t i = 0; i < result_.mate.size(); ++i) {
+        if (result_.mate[i] == kNobody) alone.push_back(i);
+      }
+      if (alone.size() < 2) break;
+      keep_duals_ = false;
+      parts = compact_parts(alone);
+    }
+    keep_duals_ = true;
+  }
+
+  Parts compact_parts(std::span<const std::uint32_t> chosen) const {
+    std::vector<Unit<D>> units;
+    units.reserve(chosen.size());
+    for (const std::uint32_t i : chosen) units.push_back({points_[i], i});
+    Parts parts;
+    windows::cut<D>(units, options_.window, true, 0, 0, parts.ends);
+    parts.points.reserve(units.size());
+    for (const auto& unit : units) parts.points.push_back(unit.name);
+    sort_within(parts);
+    return parts;
+  }
+
+  // A cluster of more points than four windows have is cut: it would take too long, or too much
+  // memory.
+  Parts clusters() const {
+    std::vector<Unit<D>> units;
+    units.reserve(points_.size());
+    for (std::uint32_t i = 0; i < points_.size(); ++i) units.push_back({points_[i], i});
+    const auto& labels = options_.labels;
+    std::sort(units.begin(), units.end(), [&](const Unit<D>& a, const Unit<D>& b) {
+      return std::pair(labels[a.name], a.name) < std::pair(labels[b.name], b.name);
+    });
+    Parts parts;
+    for (std::size_t begin = 0, end = 0; begin < units.size(); begin = end) {
+      while (end < units.size() && labels[units[end].name] == labels[units[begin].name]) ++end;
+      windows::cut<D>(std::span(units).subspan(begin, end - begin), 4 * options_.window, true, 0,
+                      begin, parts.ends);
+    }
+    parts.points.reserve(units.size());
+    for (const auto& unit : units) parts.points.push_back(unit.name);
+    sort_within(parts);
+    return parts;
+  }
+
+  // Compact sets of present pairs; the point left over is in one of them.
+  Parts pairs_together(unsigned round) const {
+    std::vector<Unit<D>> units;
+    units.reserve(points_.size() / 2 + 1);
+    for (std::uint32_t i = 0; i < result_.mate.size(); ++i) {
+      const std::uint32_t j = result_.mate[i];
+      if (j < i) continue;
+      Unit<D> unit{points_[i], i};
+      for (std::size_t d = 0; d < D && j != kNobody; ++d) {
+        unit.centre[d] = 0.5 * (points_[i][d] + points_[j][d]);
+      }
+      units.push_back(unit);
+    }
+    Parts parts;
+    windows::cut<D>(units, options_.window / 2, false, round, 0, parts.ends);
+    parts.points.reserve(points_.size());
+    std::size_t done = 0;
+    for (std::size_t& end : parts.ends) {
+      for (; done < end; ++done) {
+        parts.points.push_back(units[done].name);
+        const std::uint32_t mate = result_.mate[units[done].name];
+        if (mate != kNobody) parts.points.push_back(mate);
+      }
+      end = parts.points.size();
+    }
+    sort_within(parts);
+    return parts;
+  }
+
+  // What a cut leaves within a part is in the order of the standard library's nth_element.
+  static void sort_within(Parts& parts) {
+    std::size_t begin = 0;
+    for (const std::size_t end : parts.ends) {
+      std::sort(parts.points.begin() + static_cast<std::ptrdiff_t>(begin),
+                parts.points.begin() + static_cast<std::ptrdiff_t>(end));
+      begin = end;
+    }
+  }
+
+  bool report() {
+    if (!options_.progress) return true;
+    const std::uint64_t done = windows_done_.load();
+    const std::uint64_t left = planned_ > done ? planned_ - done : 0;
+    const std::uint64_t rounds = options_.rounds - std::min(options_.rounds, result_.rounds + 1);
+    if (!options_.progress(done, done + left + rounds * parts_, cost_)) stopped_ = true;
+    // The first matching must be whole.
+    return !stopped_ || cost_ == 0.0;
+  }
+
+  /// Returns false if stopped before all were matched; those that were are in the matching.
+  bool match_parts(const Parts& parts, bool first = false) {
+    // A round that is stopped has no duals for some points: those of the round before stay.
+    Discs discs(keep_duals_ ? points_.size() : 0);
+    if (keep_duals_) discs.start(parts.count());
+    parts_ = parts.count();
+    planned_ = windows_done_.load() + parts_;
+    const bool all = windows::for_each_index(
+        parts.count(), threads_,
+        [&](std::size_t k) {
+          match_part(k, parts.part(k), first, discs);
+          ++windows_done_;
+        },
+        [&] { return report(); });
+    result_.windows = windows_done_.load();
+    if (all && keep_duals_) discs_ = std::move(discs);
+    return all;
+  }
+
+  void match_part(std::size_t k, std::span<const std::uint32_t> members, bool first, Discs& discs) {
+    std::vector<Point> points(members.size());
+    for (std::size_t m = 0; m < members.size(); ++m) points[m] = points_[members[m]];
+    PointMatchingOptions options;
+    if (metric_.distance) {
+      options.metric = metric_;
+      options.metric.distance = [&](std::uint32_t i, std::uint32_t j) {
+        return metric_.distance(members[i], members[j]);
+      };
+    }
+    const PointMatching matching = match_points(std::span<const Point>(points), options);
+    if (keep_duals_) discs.take(k, members, matching);
+    // Equally good matchings are not exchanged: they might go round in a circle for ever.
+    if (!first && !(matching.cost < cost_of(members) * (1.0 - 1e-12))) return;
+    for (std::size_t m = 0; m < members.size(); ++m) {
+      const std::uint32_t mate = matching.mate[m];
+      result_.mate[members[m]] = mate == kNobody ? kNobody : members[mate];
+    }
+  }
+
+  double cost_of(std::span<const std::uint32_t> members) const {
+    double sum = 0.0;
+    for (const std::uint32_t i : members) {
+      const std::uint32_t j = result_.mate[i];
+      if (j != kNobody && i < j) sum += distance(i, j);
+    }
+    return sum;
+  }
+
+  std::span<const Point> points_;
+  const LargeMatchingOptions& options_;
+  const PointMetric& metric_;
+  unsigned threads_;
+  LargeMatching result_;
+  Discs discs_{0};  // of the last round that was whole
+  bool keep_duals_ = true, stopped_ = false;
+  double cost_ = 0.0;
+  std::atomic<std::uint64_t> windows_done_{0};
+  std::uint64_t planned_ = 0, parts_ = 0;
+};
+
+template <std::size_t D>
+LargeMatching match(std::span<const std::array<double, D>> points,
+                    const LargeMatchingOptions& options) {
+  if (!options.labels.empty() && options.labels.size() != points.size()) {
+    fail(std::to_string(options.labels.size()) + " labels for " + std::to_string(points.size()) +
+         " points; give one for each");
+  }
+  if (options.window < 4) fail("window is " + std::to_string(options.window) + "; at least 4");
+  if (!(options.tolerance >= 0.0)) fail("tolerance must be a number and not negative");
+  LargeMatching result;
+  if (options.labels.empty() && points.size() <= std::max<std::size_t>(options.exact_limit, 3)) {
+    PointMatchingOptions exact;
+    exact.metric = options.metric;
+    PointMatching matching = match_points(points, exact);
+    result.mate = std::move(matching.mate);
+    result.cost = matching.cost;
+    result.dual_bound = std::min(matching.dual_bound, matching.cost);
+    result.left_over = matching.left_over;
+    result.optimal = true;
+    return result;
+  }
+  if (points.size() >= kNobody) fail("at most 2^32 - 2 points have numbers");
+  double largest = 0.0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    for (const double c : points[i]) {
+      if (!std::isfinite(c)) {
+        fail("a coordinate of point " + std::to_string(i) + " is not finite; leave it out");
+      }
+      largest = std::max(largest, std::abs(c));
+    }
+  }
+  int shift = 0;
+  if (largest > 0x1p400 || (largest < 0x1p-400 && largest > 0.0)) std::frexp(largest, &shift);
+  if (shift == 0) return Windows<D>(points, options, options.metric).solve();
+  std::vector<std::array<double, D>> scaled(points.begin(), points.end());
+  for (auto& p : scaled) {
+    for (double& c : p) c = std::ldexp(c, -shift);
+  }
+  PointMetric metric = options.metric;
+  metric.factor = std::ldexp(metric.factor, shift);
+  result = Windows<D>(std::span<const std::array<double, D>>(scaled), options, metric).solve();
+  if (!metric.distance) {
+    result.cost = std::ldexp(result.cost, shift);
+    result.dual_bound = std::ldexp(result.dual_bound, shift);
+  }
+  if (!std::isfinite(result.cost)) fail("the cost passes the range of double; scale the points");
+  return result;
+}
+
+}  // namespace
+
+double LargeMatching::gap() const {
+  if (optimal || cost <= dual_bound) return 0.0;
+  return dual_bound > 0.0 ? cost / dual_bound - 1.0 : std::numeric_limits<double>::infinity();
+}
+
+LargeMatching match_large(std::span<const Point2> points, const LargeMatchingOptions& options) {
+  return match<2>(points, options);
+}
+
+LargeMatching match_large(std::span<const Point3> points, const LargeMatchingOptions& options) {
+  return match<3>(points, options);
+}
+
+}  // namespace terrace::matching

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "terrace/matching/large_matching.hpp"
+
+namespace terrace::matching::tree {
+
+/// How matching trees match the nodes of a level where the caller does not say: the partner of
+/// each, kNobody for the one left over. The result must not depend on the number of threads.
+template <std::size_t D>
+std::vector<std::uint32_t> match_level(std::span<const std::array<double, D>> points,
+                                       unsigned threads) {
+  LargeMatchingOptions options;
+  options.threads = threads;
+  return std::move(match_large(points, options).mate);
+}
+
+}  // namespace terrace::matching::tree

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <exception>
+#include <functional>
+#include <thread>
+#include <utility>
+#include <vector>
+
+namespace terrace::matching::windows {
+
+/// Calls work(k) for k below count, several at once. `watch` is called by the caller's thread after
+/// each of its own; false keeps all further k from being begun.
+/// Returns whether all were done. Throws what the first k that failed has thrown.
+inline bool for_each_index(std::size_t count, unsigned threads,
+                           const std::function<void(std::size_t)>& work,
+                           const std::function<bool()>& watch = {}) {
+  std::atomic<std::size_t> next{0};
+  std::atomic<bool> stopped{false};
+  threads = std::max(1u, threads);
+  std::vector<std::pair<std::size_t, std::exception_ptr>> failures(threads, {count, nullptr});
+  const auto run = [&](unsigned t) {
+    for (std::size_t k; !stopped && (k = next++) < count;) {
+      try {
+        work(k);
+        if (t == 0 && watch && !watch()) stopped = true;
+      } catch (...) {
+        failures[t] = {k, std::current_exception()};
+        stopped = true;
+      }
+    }
+  };
+  {
+    std::vector<std::jthread> others;
+    for (unsigned t = 1; t < threads && t < count; ++t) others.emplace_back(run, t);
+    run(0);
+  }
+  std::pair<std::size_t, std::exception_ptr> first{count, nullptr};
+  for (const auto& failure : failures) {
+    if (failure.second && failure.first <= first.first) first = failure;
+  }
+  if (first.second) std::rethrow_exception(first.second);
+  return !stopped;
+}
+
+}  // namespace terrace::matching::windows
