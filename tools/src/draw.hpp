@@ -39,8 +39,9 @@ void draw_marks(const std::vector<stream::Point3>& positions, const Camera& came
 void draw_dendrogram(const cluster::Dendrogram& tree, Canvas& canvas);
 
 /// Draws a matching on white paper: its points as dots, those that no line reaches as rings, and
-/// its lines from red, level 1, to black, level `top`, the lower ones over the higher. Widths
-/// follow from the lengths of the lines. O((points + lines) log(lines) + samples drawn).
+/// its lines from red, level 1, to black, level `top`, the lower ones over the higher. In a crowd
+/// the higher ones are over the lower, and there are no dots. Widths follow from the usual length
+/// of a pair. O(points + lines log(lines) + samples drawn).
 void draw_matching(const MatchingPicture& picture, const Camera& camera, const DrawOptions& options,
                    Canvas& canvas);
 

@@ -81,12 +81,12 @@ double width_of_level(std::uint32_t level, double thin) {
   return std::min(width, thick);
 }
 
-/// Lines of higher levels first.
-std::vector<std::uint32_t> from_the_top(const std::vector<MatchingLine>& lines) {
+/// Lines of higher levels first, or last.
+std::vector<std::uint32_t> by_level(const std::vector<MatchingLine>& lines, bool higher_first) {
   std::vector<std::uint32_t> order(lines.size());
   std::iota(order.begin(), order.end(), 0u);
   std::stable_sort(order.begin(), order.end(), [&](std::uint32_t i, std::uint32_t j) {
-    return lines[i].level > lines[j].level;
+    return higher_first ? lines[i].level > lines[j].level : lines[i].level < lines[j].level;
   });
   return order;
 }
@@ -126,12 +126,12 @@ void draw_matching(const MatchingPicture& picture, const Camera& camera, const D
     if (line.a < points) reached[line.a] = true;
     if (line.b < points) reached[line.b] = true;
   }
-  const std::vector<std::uint32_t> order = from_the_top(lines);
   const double usual = usual_distance(lines, places, points, canvas);
   // Pairs stand alone; the lowest lines of a crowded tree leave room for the others.
   const double thin = std::clamp(0.055 * usual, picture.result.top > 1 ? 0.75 : 1.0, 4.0);
-  // Where dots would hide the lines, the ends of these are all that can be seen of points.
-  const bool dotted = usual > 14;
+  // In a crowd dots would hide the lines, and small lines the large ones.
+  const bool crowded = usual < 14;
+  const std::vector<std::uint32_t> order = by_level(lines, !crowded);
   const double dot = std::max(2.1 * thin, 1.5);
 
   for_bands(canvas.height(), options.threads, [&](std::uint32_t first, std::uint32_t last) {
@@ -149,9 +149,9 @@ void draw_matching(const MatchingPicture& picture, const Camera& camera, const D
       }
     }
     for (std::size_t i = 0; i < points; ++i) {
-      if (reached[i] && !dotted) continue;
+      if (reached[i] && crowded) continue;
       brush.dot(places[i], dot, kDot);
-      if (!reached[i]) brush.dot(places[i], 0.55 * dot, kPaper);
+      if (!reached[i] && !lines.empty()) brush.dot(places[i], 0.55 * dot, kPaper);
     }
   });
 }

@@ -187,6 +187,21 @@ TEST_F(DrawMatching, LevelsGoFromRedToBlackAndLowerOnesLieAbove) {
   EXPECT_EQ(at(20, 0)[0], 1.0F);
 }
 
+TEST_F(DrawMatching, InACrowdHigherLevelsLieAboveAndPointsAreNoDots) {
+  picture_.positions = {{-103, 0, 0}, {-97, 0, 0}, {97, 0, 0}, {103, 0, 0},
+                        {-100, 0, 0}, {100, 0, 0}, {0, 0, 0}};
+  picture_.result.lines = {{0, 1, 1}, {2, 3, 1}, {4, 5, 2}};
+  picture_.result.tree = true;
+  picture_.result.top = 2;
+  EXPECT_LT(at(-98, 0)[0], 0.2F);
+  EXPECT_GT(at(-102.5, 0)[0], 0.8F);
+  EXPECT_LT(at(-102.5, 0)[1], 0.6F);
+  // Without any line all points are dots, without a hole.
+  picture_.result.lines.clear();
+  EXPECT_LT(at(100, 0)[0], 1.0F);
+  EXPECT_LT(at(97, 0)[0], 0.2F);
+}
+
 TEST_F(DrawMatching, AnyNumberOfThreadsGivesTheSamePictureAndNothingLeavesIt) {
   constexpr double kHuge = std::numeric_limits<double>::max();
   picture_.positions = {{-1e6, -1e6, 0},    {1e6, 1e6, 0},      {0, 0, 0},   {0, 0, 0},
