@@ -300,7 +300,7 @@ void add(const std::shared_ptr<Scene>& scene, bool points) {
     for (std::size_t b = 0; b < kBuilders.size(); ++b) {
       const std::string name = scene->name() + "/" + what + "/" + kBuilders[b];
       auto* made = benchmark::RegisterBenchmark(
-          name.c_str(), [scene, run, b](benchmark::State& state) { run(state, *scene, b); });
+          name.c_str(), [scene, run = run, b](benchmark::State& state) { run(state, *scene, b); });
       made->Unit(benchmark::kMillisecond);
       if (std::string(what) == "build") made->Iterations(1);
     }

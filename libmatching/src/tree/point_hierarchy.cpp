@@ -73,24 +73,27 @@ void PointHierarchy<D>::nearest(const Point& query, std::size_t k,
 
 template <std::size_t D>
 std::optional<RayHit> PointHierarchy<D>::hit(const Ray& ray, double radius) const requires(D == 3) {
-  const double scaled = radius * tree_.frame().scale;
-  if (!(radius >= 0.0) || !(scaled <= 0x1p460)) {
-    throw std::invalid_argument("the balls' radius is " + std::to_string(radius) +
-                                "; it must be finite, not negative, and of the points' order");
+  // Clang 14 instantiates it in the plane all the same.
+  if constexpr (D == 3) {
+    const double scaled = radius * tree_.frame().scale;
+    if (!(radius >= 0.0) || !(scaled <= 0x1p460)) {
+      throw std::invalid_argument("the balls' radius is " + std::to_string(radius) +
+                                  "; it must be finite, not negative, and of the points' order");
+    }
+    const tree::FramedRay framed(ray, tree_.frame(), radius);
+    const RayHit best =
+        tree::walk_ray(tree_, framed, [&](const HierarchyNode<3>& leaf, RayHit& first) {
+          for (std::uint32_t slot = leaf.link; slot < leaf.link + leaf.count; ++slot) {
+            const std::optional<double> met = meets(framed, points_[slot], scaled);
+            if (!met) continue;
+            const double t = framed.moved_into({points_[slot], points_[slot]}, tree_.frame(), *met);
+            const std::uint32_t index = tree_.order()[slot];
+            if (t < first.t || (t == first.t && index < first.index)) first = {index, t};
+          }
+        });
+    if (best.index != kNobody) return RayHit{best.index, framed.callers_t(best.t)};
   }
-  const tree::FramedRay framed(ray, tree_.frame(), radius);
-  const RayHit best =
-      tree::walk_ray(tree_, framed, [&](const HierarchyNode<3>& leaf, RayHit& first) {
-        for (std::uint32_t slot = leaf.link; slot < leaf.link + leaf.count; ++slot) {
-          const std::optional<double> met = meets(framed, points_[slot], scaled);
-          if (!met) continue;
-          const double t = framed.moved_into({points_[slot], points_[slot]}, tree_.frame(), *met);
-          const std::uint32_t index = tree_.order()[slot];
-          if (t < first.t || (t == first.t && index < first.index)) first = {index, t};
-        }
-      });
-  if (best.index == kNobody) return std::nullopt;
-  return RayHit{best.index, framed.callers_t(best.t)};
+  return std::nullopt;
 }
 
 template class PointHierarchy<2>;
