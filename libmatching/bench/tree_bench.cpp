@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// The matching tree as a bounding volume hierarchy, beside a kD-tree split at medians and a binned
-// build by the surface area heuristic of the same points and triangles. All trees go down to single
-// primitives; leaves of at most 8 are then made by cost, with the same constants, layout and
-// queries, so that only the tree differs. Points and made meshes, and scans where TERRACE_DATA
-// names the data folder.
+// The matching tree as a bounding volume hierarchy, as it is and rotated (rotate_tree), beside a
+// kD-tree split at medians and a binned build by the surface area heuristic of the same points and
+// triangles. All trees go down to single primitives; leaves of at most 8 are then made by cost,
+// with the same constants, layout and queries, so that only the tree differs. Points and made
+// meshes, and scans where TERRACE_DATA names the data folder.
 //
 // Counters: the cost by the heuristic with both constants 1, primitives per leaf, depth.
 #include <algorithm>
@@ -108,12 +108,13 @@ std::vector<TreeChildren> matching_tree(const std::vector<Point3>& places) {
   return tree_children(make_matching_tree(std::span<const Point3>(places), options).rows);
 }
 
-const std::array<const char*, 3> kBuilders{"matching", "median", "binned"};
+constexpr std::array<const char*, 4> kBuilders{"matching", "rotated", "median", "binned"};
 
 std::vector<TreeChildren> build(std::size_t builder, const std::vector<Point3>& places,
                                 const std::vector<Box<3>>& boxes) {
   if (builder == 0) return matching_tree(places);
-  return builder == 1 ? peers::median_split(boxes) : peers::binned_sah(boxes);
+  if (builder == 1) return rotate_tree<3>(matching_tree(places), boxes);
+  return builder == 2 ? peers::median_split(boxes) : peers::binned_sah(boxes);
 }
 
 /// The same for all trees.
@@ -222,8 +223,8 @@ class Scene {
   std::vector<Point3> places_;
   std::vector<Box<3>> boxes_;
   Queries queries_;
-  std::array<std::optional<PointHierarchy<3>>, 3> point_trees_;
-  std::array<std::optional<TriangleHierarchy>, 3> triangle_trees_;
+  std::array<std::optional<PointHierarchy<3>>, kBuilders.size()> point_trees_;
+  std::array<std::optional<TriangleHierarchy>, kBuilders.size()> triangle_trees_;
 };
 
 void report(benchmark::State& state, const BoundingVolumeHierarchy<3>& tree) {

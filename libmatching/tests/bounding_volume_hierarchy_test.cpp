@@ -221,6 +221,56 @@ TEST(BoundingVolumeHierarchy, TakesDeepTreesAndAnyScale) {
   }
 }
 
+template <std::size_t D>
+void test_rotation(std::uint64_t seed) {
+  SCOPED_TRACE(testing::Message() << "seed " << seed << " dimension " << D);
+  std::mt19937_64 random(seed);
+  const std::size_t n = seed <= 6 ? seed - 1 : 50 + random() % 300;
+  auto boxes = random_boxes<D>(n, 0.1, random);
+  const double unit = seed % 4 == 0 ? 1e300 : seed % 4 == 1 ? 1e-300 : 1.0;
+  for (Box<D>& box : boxes) {
+    for (std::size_t d = 0; d < D; ++d) {
+      box.lo[d] *= unit;
+      box.hi[d] *= unit;
+    }
+  }
+  const auto rows = seed % 3 == 0 ? oracles::chain(n) : oracles::random_tree(n, random);
+  HierarchyOptions options;
+  options.leaf_size = 1;
+  const BoundingVolumeHierarchy<D> before(rows, boxes, options);
+  double cost = before.surface_area_cost();
+  for (const unsigned passes : {0u, 1u, 3u, 100u}) {
+    const auto rotated = rotate_tree<D>(rows, boxes, passes);
+    const BoundingVolumeHierarchy<D> after(rotated, boxes, options);
+    expect_sound(after, boxes, 1);
+    EXPECT_LE(after.surface_area_cost(), cost * (1.0 + 1e-5));
+    cost = after.surface_area_cost();
+    const auto pairs_of = [&](const std::vector<TreeChildren>& all) {
+      std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
+      for (const auto& [a, b] : all) {
+        if (a < n && b < n) pairs.push_back(std::minmax(a, b));
+      }
+      std::sort(pairs.begin(), pairs.end());
+      return pairs;
+    };
+    const auto old_pairs = pairs_of(rows), pairs = pairs_of(rotated);
+    EXPECT_TRUE(std::includes(pairs.begin(), pairs.end(), old_pairs.begin(), old_pairs.end()));
+  }
+  if (n > 6) {
+    EXPECT_LT(cost, 0.8 * before.surface_area_cost());
+  }
+}
+
+TEST(BoundingVolumeHierarchy, LosesCostByRotations) {
+  for (std::uint64_t seed = 1; seed <= 30; ++seed) {
+    test_rotation<2>(seed);
+    test_rotation<3>(seed);
+  }
+  const std::vector<Box<3>> boxes(3);
+  const std::vector<TreeChildren> bad{{0, 1}, {2, 4}};
+  EXPECT_THROW((void)rotate_tree<3>(bad, boxes), std::invalid_argument);
+}
+
 template <class Make>
 void expect_refused(Make&& make, const std::string& what) {
   try {

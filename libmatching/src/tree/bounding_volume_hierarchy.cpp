@@ -7,8 +7,13 @@
 #include <stdexcept>
 #include <string>
 
+#include "tree/box_area.hpp"
+#include "tree/check_tree.hpp"
+
 namespace terrace::matching {
 namespace {
+
+using tree::area_of;
 
 [[noreturn]] void fail(const std::string& what) {
   throw std::invalid_argument("BoundingVolumeHierarchy: " + what);
@@ -38,58 +43,10 @@ struct FloatBox {
   }
 };
 
-template <class AnyBox>
-double area_of(const AnyBox& box) {
-  std::array<double, std::tuple_size_v<decltype(box.lo)>> side;
-  for (std::size_t d = 0; d < side.size(); ++d) {
-    side[d] = static_cast<double>(box.hi[d]) - static_cast<double>(box.lo[d]);
-  }
-  if constexpr (side.size() == 2) {
-    return 2.0 * (side[0] + side[1]);
-  } else {
-    return 2.0 * (side[0] * side[1] + side[1] * side[2] + side[2] * side[0]);
-  }
-}
-
 void check_costs(const SurfaceAreaCosts& costs) {
   const auto bad = [](double c) { return !(c >= 0.0) || !std::isfinite(c); };
   if (bad(costs.traversal) || bad(costs.intersection)) {
     fail("the costs of the heuristic must be finite and not negative");
-  }
-}
-
-template <std::size_t D>
-void check_boxes(std::span<const Box<D>> boxes) {
-  for (std::size_t k = 0; k < boxes.size(); ++k) {
-    for (std::size_t d = 0; d < D; ++d) {
-      if (std::isfinite(boxes[k].lo[d]) && std::isfinite(boxes[k].hi[d]) &&
-          boxes[k].lo[d] <= boxes[k].hi[d]) {
-        continue;
-      }
-      fail("primitive " + std::to_string(k) +
-           " has a coordinate that is not finite or a box whose lo exceeds its hi; leave it out");
-    }
-  }
-}
-
-void check_rows(std::span<const TreeChildren> rows, std::size_t n) {
-  if (n > std::numeric_limits<std::uint32_t>::max() / 2) {
-    fail(std::to_string(n) + " primitives would need about " + std::to_string(n / 13000000) +
-         " GB; at most 2^31 - 1 are possible");
-  }
-  if (rows.size() != (n == 0 ? 0 : n - 1)) {
-    fail(std::to_string(rows.size()) + " rows for " + std::to_string(n) +
-         " primitives; a binary tree has one row less than leaves");
-  }
-  std::vector<bool> taken(n + rows.size(), false);
-  for (std::size_t r = 0; r < rows.size(); ++r) {
-    for (const std::uint32_t child : {rows[r].a, rows[r].b}) {
-      if (child >= n + r || taken[child]) {
-        fail("row " + std::to_string(r) + " names node " + std::to_string(child) + ", which " +
-             (child >= n + r ? "is not made by an earlier row" : "has a parent already"));
-      }
-      taken[child] = true;
-    }
   }
 }
 
@@ -196,8 +153,8 @@ BoundingVolumeHierarchy<D>::BoundingVolumeHierarchy(std::span<const TreeChildren
                                                     const HierarchyOptions& options) {
   check_costs(options.costs);
   if (options.leaf_size == 0) fail("leaf_size is 0; a leaf takes one primitive at least");
-  check_rows(rows, boxes.size());
-  check_boxes(boxes);
+  tree::check_rows(rows, boxes.size());
+  tree::check_boxes(boxes);
   frame_ = frame_of(boxes);
   if (boxes.empty()) return;
   Plan<D> plan(rows, boxes, options, frame_);

@@ -102,6 +102,21 @@ class BoundingVolumeHierarchy {
   std::size_t depth_ = 0;
 };
 
+/// A tree of less cost over the same boxes: from the leaves upward, where that makes the boxes
+/// smaller, a child changes places with a child of its sibling, or two children of siblings with
+/// one another; again and again until a pass gains less than one part in a thousand, or `passes`
+/// are done. Pairs of primitives stay pairs. Trees of matchings gain most: a matching knows
+/// distances and not boxes.
+///
+/// Returns: as many rows, with children before parents.
+/// Throws: std::invalid_argument for rows and boxes as BoundingVolumeHierarchy does.
+/// Cost: O(n) time a pass, some tens of nanoseconds a box; 80 bytes a box.
+/// Source: A. Kensler, "Tree rotations for improving bounding volume hierarchies", 2008.
+template <std::size_t D>
+[[nodiscard]] std::vector<TreeChildren> rotate_tree(std::span<const TreeChildren> rows,
+                                                    std::span<const Box<D>> boxes,
+                                                    unsigned passes = 16);
+
 extern template class BoundingVolumeHierarchy<2>;
 extern template class BoundingVolumeHierarchy<3>;
 
