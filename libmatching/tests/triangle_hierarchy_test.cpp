@@ -146,6 +146,40 @@ TEST(TriangleHierarchy, FindsTheFirstTriangle) {
   EXPECT_GT(hits, 300u);
 }
 
+// Rays within the plane of all triangles, as far as roundings allow: where such a triangle is met
+// is theirs to say, but it is the same for every tree.
+TEST(TriangleHierarchy, AnswersTheSameForEveryTreeWhenEdgeOn) {
+  std::size_t hits = 0;
+  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+    SCOPED_TRACE(testing::Message() << "seed " << seed);
+    std::mt19937_64 random(seed);
+    std::array<Point3, 2> axes;
+    for (Point3& axis : axes) {
+      for (double& c : axis) c = uniform(random) - 0.5;
+    }
+    const auto in_plane = [&] {
+      const double u = uniform(random), v = uniform(random);
+      Point3 p;
+      for (std::size_t d = 0; d < 3; ++d) p[d] = u * axes[0][d] + v * axes[1][d];
+      return p;
+    };
+    Mesh mesh;
+    for (std::uint32_t k = 0; k < 60; ++k) {
+      for (int corner = 0; corner < 3; ++corner) mesh.corners.push_back(in_plane());
+      mesh.triangles.push_back({3 * k, 3 * k + 1, 3 * k + 2});
+    }
+    const TriangleHierarchy hierarchy = by_matching(mesh), other = at_random(mesh, random);
+    for (int q = 0; q < 200; ++q) {
+      Ray ray{in_plane(), in_plane()};
+      for (std::size_t d = 0; d < 3; ++d) ray.direction[d] -= ray.origin[d];
+      const auto hit = hierarchy.hit(ray);
+      EXPECT_EQ(other.hit(ray), hit);
+      hits += hit.has_value() ? 1 : 0;
+    }
+  }
+  EXPECT_GT(hits, 1000u);
+}
+
 // On integers below 2^20 and along an axis the test is exact, and so is this one.
 TEST(TriangleHierarchy, HitsEdgesAndCornersOfAGrid) {
   Mesh mesh;

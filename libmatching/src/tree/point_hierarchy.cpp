@@ -86,9 +86,11 @@ std::optional<RayHit> PointHierarchy<D>::hit(const Ray& ray, double radius) cons
           for (std::uint32_t slot = leaf.link; slot < leaf.link + leaf.count; ++slot) {
             const std::optional<double> met = meets(framed, points_[slot], scaled);
             if (!met) continue;
-            const double t = framed.moved_into({points_[slot], points_[slot]}, tree_.frame(), *met);
+            const std::optional<double> t =
+                framed.moved_into({points_[slot], points_[slot]}, tree_.frame(), *met);
+            if (!t) continue;
             const std::uint32_t index = tree_.order()[slot];
-            if (t < first.t || (t == first.t && index < first.index)) first = {index, t};
+            if (*t < first.t || (*t == first.t && index < first.index)) first = {index, *t};
           }
         });
     if (best.index != kNobody) return RayHit{best.index, framed.callers_t(best.t)};

@@ -91,9 +91,11 @@ std::optional<RayHit> TriangleHierarchy::hit(const Ray& ray) const {
         for (std::uint32_t slot = leaf.link; slot < leaf.link + leaf.count; ++slot) {
           const std::optional<double> met = crossing(corners_[slot]);
           if (!met || *met < framed.t_min || *met > framed.t_max) continue;
-          const double t = framed.moved_into(box_of(corners_[slot]), tree_.frame(), *met);
+          const std::optional<double> t =
+              framed.moved_into(box_of(corners_[slot]), tree_.frame(), *met);
+          if (!t) continue;
           const std::uint32_t index = tree_.order()[slot];
-          if (t < first.t || (t == first.t && index < first.index)) first = {index, t};
+          if (*t < first.t || (*t == first.t && index < first.index)) first = {index, *t};
         }
       });
   if (best.index == kNobody) return std::nullopt;
