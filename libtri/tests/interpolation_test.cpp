@@ -339,6 +339,22 @@ TEST(Interpolation, GradientsOnEdgesAndVerticesAreMeans) {
   }
 }
 
+TEST(Interpolation, ManyNeighboursOfOneQuery) {
+  // A regular polygon: every circle of three of its corners contains the middle.
+  constexpr std::size_t kCorners = 1500;
+  std::vector<std::array<double, 2>> points;
+  for (std::size_t i = 0; i < kCorners; ++i) {
+    const double angle = 2 * 3.14159265358979323846 * static_cast<double>(i) / kCorners;
+    points.push_back({std::cos(angle), std::sin(angle)});
+  }
+  Delaunay2<double> triangulation;
+  triangulation.build(points);
+  std::vector<VertexWeight> weights;
+  weights_at(triangulation, {0, 0}, Interpolation::kNaturalNeighbour, weights);
+  ASSERT_EQ(weights.size(), kCorners);
+  for (const auto& [vertex, weight] : weights) ASSERT_NEAR(weight, 1.0 / kCorners, 1e-11);
+}
+
 TEST(Interpolation, SlopeAndAspect) {
   EXPECT_DOUBLE_EQ(slope_degrees({1, 0}), 45);
   EXPECT_DOUBLE_EQ(slope_degrees({0, 0}), 0);

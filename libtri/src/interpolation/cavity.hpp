@@ -38,15 +38,14 @@ struct Cavity {
   std::vector<Corner> corner;
   std::vector<std::array<std::uint32_t, 3>> triangle;
   std::vector<Link> link;
-  std::vector<Edge> rim;  ///< all round: edge i + 1 starts where edge i ends
-  std::vector<Pending> pending;
+  std::vector<Edge> rim;         ///< all round: edge i + 1 starts where edge i ends
+  std::vector<Pending> pending;  ///< scratch, a stack of which the caller knows the height
 
   void clear() {
     corner.clear();
     triangle.clear();
     link.clear();
     rim.clear();
-    pending.clear();
   }
 };
 
@@ -65,22 +64,25 @@ void find_cavity(const Mesh<Kernel>& mesh, const Query& p, std::uint32_t root, C
   const Triangle& first = triangle[root];
   for (const std::uint32_t v : first.corner) add_corner(v);
   cavity.triangle.push_back({0, 1, 2});
-  cavity.pending.push_back({first.mate[1], {2, 0, 0}});
-  cavity.pending.push_back({first.mate[0], {1, 2, 0}});
-  cavity.pending.push_back({first.mate[2], {0, 1, 0}});
-  while (!cavity.pending.empty()) {
-    const auto [side, edge] = cavity.pending.back();
-    cavity.pending.pop_back();
-    const Triangle& t = triangle[triangle_of(side)];
+  if (cavity.pending.empty()) cavity.pending.resize(64);
+  cavity.pending[0] = {first.mate[1], {2, 0, 0}};
+  cavity.pending[1] = {first.mate[0], {1, 2, 0}};
+  std::size_t height = 2;
+  Cavity::Pending now{first.mate[2], {0, 1, 0}};
+  while (true) {
+    const Triangle& t = triangle[triangle_of(now.side)];
     const bool inside =
         !has_ghost(t.corner) &&
         DoubleKernel::in_circle(to_query(point[t.corner[0]]), to_query(point[t.corner[1]]),
                                 to_query(point[t.corner[2]]), p) > 0;
+    const Cavity::Edge edge = now.edge;
     if (!inside) {
       cavity.rim.push_back(edge);
+      if (height == 0) return;
+      now = cavity.pending[--height];
       continue;
     }
-    const std::uint32_t i = index_of(side);
+    const std::uint32_t i = index_of(now.side);
     const std::uint32_t apex = add_corner(t.corner[i]);
     const auto number = static_cast<std::uint32_t>(cavity.triangle.size());
     cavity.triangle.push_back({edge.from, apex, edge.to});
@@ -88,8 +90,10 @@ void find_cavity(const Mesh<Kernel>& mesh, const Query& p, std::uint32_t root, C
     // Counter-clockwise: the edge from -> apex first.
     const Side later = t.mate[previous_index(i)];
     __builtin_prefetch(&triangle[triangle_of(later)]);
-    cavity.pending.push_back({later, {apex, edge.to, number}});
-    cavity.pending.push_back({t.mate[next_index(i)], {edge.from, apex, number}});
+    if (height == cavity.pending.size()) [[unlikely]]
+      cavity.pending.resize(2 * height);
+    cavity.pending[height++] = {later, {apex, edge.to, number}};
+    now = {t.mate[next_index(i)], {edge.from, apex, number}};
   }
 }
 
