@@ -140,7 +140,7 @@ class FrameTest(CommandTest):
 
     def test_refused_verbs_and_flags_are_2_and_hidden(self):
         refused = [['surface', 's', '-o', 'x'], ['mesh', 's', '-o', 'x', '--max-error', '1'],
-                   ['mesh', 's', '-o', 'x', '--smooth', 'taubin'], ['build', 'a', '-o', 's', '--resume'],
+                   ['mesh', 's', '-o', 'x', '--base'], ['build', 'a', '-o', 's', '--resume'],
                    ['build', 'a', '-o', 's', '--order', 'spatial'], ['points', 's', '-o', 'x', '--max-points=5']]
         for args in refused:
             with self.subTest(args=args):

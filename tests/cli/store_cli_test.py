@@ -143,6 +143,38 @@ class StoreTest(unittest.TestCase):
             self.assertGreater(summary['triangles'], summary['vertices'])
             self.assertGreater(os.path.getsize(out), 100)
 
+    def heights(self, *options):
+        """Heights by place, of the mesh that these options make."""
+        out = self.path('heights.obj')
+        self.run_ok('mesh', self.store, '-o', out, '--force', *options)
+        with open(out) as file:
+            vertices = [line.split()[1:4] for line in file if line.startswith('v ')]
+        return {(x, y): float(z) for x, y, z in vertices}
+
+    def test_smoothing_moves_heights_alone(self):
+        def roughness(heights):
+            values = [heights[place] for place in sorted(heights)]
+            return sum((a - b) ** 2 for a, b in zip(values, values[1:]))
+
+        raw = self.heights()
+        for method in ('laplacian', 'taubin:5', 'bilateral:3'):
+            smooth = self.heights('--smooth', method)
+            self.assertEqual(smooth.keys(), raw.keys())
+            self.assertLess(roughness(smooth), roughness(raw))
+        low, high = min(raw.values()), max(raw.values())
+        flat = self.heights('--smooth', 'laplacian:50')
+        self.assertTrue(all(low <= z <= high for z in flat.values()))
+        # Inside the region alone, whose border stays.
+        xs, ys = sorted({float(x) for x, _ in raw}), sorted({float(y) for _, y in raw})
+        box = (xs[len(xs) // 4], ys[len(ys) // 4], xs[len(xs) // 2], ys[len(ys) // 2])
+        part = self.heights('--region', ','.join(map(str, box)), '--smooth', 'laplacian')
+        moved = {place for place, z in part.items() if z != raw[place]}
+        self.assertGreater(len(moved), len(part) // 2)
+        for x, y in moved:
+            self.assertTrue(box[0] < float(x) < box[2] and box[1] < float(y) < box[3], (x, y, box))
+        self.expect_error(2, 'mesh', self.store, '-o', self.path('none.ply'), '--smooth', 'best')
+        self.expect_error(2, 'mesh', self.store, '-o', self.path('none.ply'), '--smooth', 'taubin:0')
+
     def test_levels_that_are_not_there_are_wrong_usage(self):
         self.assertIn('top', self.expect_error(2, 'mesh', self.store, '--level', 9, '-o',
                                                self.path('none.ply')))

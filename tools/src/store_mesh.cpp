@@ -58,8 +58,12 @@ tri::Detail in_stored_coordinates(const Detail& detail, const Placement& placeme
   return stored;
 }
 
+/// Smoothing: heights of two steps, the vertices, and 16 bytes per edge end.
+constexpr std::uint64_t kBytesToSmooth = 3 * 8 + 4 + 6 * 16;
+
 /// Counts what `detail` wants from the index alone and refuses what cannot fit.
-void check_memory(const stream::Store& store, const Detail& detail, std::uint64_t memory_bytes) {
+void check_memory(const stream::Store& store, const Detail& detail, std::uint64_t memory_bytes,
+                  bool smooths) {
   std::uint64_t points = 0;
   if (!detail.region && detail.focuses.empty()) {
     points = store.levels()[detail.level].points;
@@ -69,7 +73,8 @@ void check_memory(const stream::Store& store, const Detail& detail, std::uint64_
         [&](stream::ClusterId, const stream::ClusterRecord& record) { points += record.points; });
   }
   constexpr std::uint64_t kMostVertices = (std::uint64_t{1} << 29) - 2;
-  const std::uint64_t needed = points * kBytesPerVertex + (std::uint64_t{32} << 20);
+  const std::uint64_t needed =
+      points * (kBytesPerVertex + (smooths ? kBytesToSmooth : 0)) + (std::uint64_t{32} << 20);
   if (needed <= memory_bytes && points <= kMostVertices) return;
   throw stream::Error({.file = store.path().string(),
                        .where = {},
@@ -80,14 +85,56 @@ void check_memory(const stream::Store& store, const Detail& detail, std::uint64_
                        .remedy = "take a coarser --level or a smaller --region"});
 }
 
+/// The root mean square of the height differences along all edges.
+template <class Coord>
+double rms_step(const tri::Multiresolution2<Coord>& model) {
+  const auto& triangulation = model.triangulation();
+  double sum = 0.0, edges = 0.0;
+  for (const tri::TriangleId t : triangulation.all_triangles()) {
+    const auto corners = triangulation.vertices(t);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double step = model.height(corners[k]) - model.height(corners[(k + 1) % 3]);
+      sum += step * step;
+      edges += 1.0;
+    }
+  }
+  return edges > 0.0 ? std::sqrt(sum / edges) : 0.0;
+}
+
+/// The smoothed heights by slot.
+template <class Coord>
+std::vector<double> smoothed(const tri::Multiresolution2<Coord>& model, const Placement& placement,
+                             const std::optional<Region>& region, tri::SmoothingOptions options) {
+  const auto& triangulation = model.triangulation();
+  std::vector<double> heights(triangulation.vertex_slots(), 0.0);
+  std::vector<tri::VertexId> inside;
+  for (const tri::VertexId v : triangulation.all_vertices()) {
+    heights[tri::slot(v)] = model.height(v);
+    const auto p = triangulation.point(v);
+    if (!region ||
+        region->contains(world_point(
+            placement, {static_cast<double>(p[0]), static_cast<double>(p[1]), model.height(v)}))) {
+      inside.push_back(v);
+    }
+  }
+  if (options.edge_height == 0.0) options.edge_height = 4.0 * rms_step(model);
+  // Without any step there is nothing to smooth.
+  if (options.edge_height == 0.0) return heights;
+  for (const auto& [vertex, height] : tri::smooth(triangulation, heights, inside, options)) {
+    heights[tri::slot(vertex)] = height;
+  }
+  return heights;
+}
+
 template <class Coord>
 TriangleMesh mesh_of_model(const tri::Multiresolution2<Coord>& model, const Placement& placement,
-                           const std::optional<Region>& region) {
+                           const std::optional<Region>& region,
+                           const std::vector<double>& heights) {
   const auto& triangulation = model.triangulation();
   const auto position = [&](tri::VertexId v) {
     const auto p = triangulation.point(v);
-    return world_point(placement,
-                       {static_cast<double>(p[0]), static_cast<double>(p[1]), model.height(v)});
+    const double height = heights.empty() ? model.height(v) : heights[tri::slot(v)];
+    return world_point(placement, {static_cast<double>(p[0]), static_cast<double>(p[1]), height});
   };
   const std::array<double, 6>& m = placement.world.xy;
   const bool mirrored = m[0] * m[4] - m[1] * m[3] < 0;
@@ -124,22 +171,26 @@ TriangleMesh mesh_of_model(const tri::Multiresolution2<Coord>& model, const Plac
 }
 
 template <class Coord>
-TriangleMesh mesh_of(const stream::Store& store, const Detail& detail) {
+TriangleMesh mesh_of(const stream::Store& store, const Detail& detail,
+                     const std::optional<tri::SmoothingOptions>& smoothing) {
   StoreSource source(store);
   const Placement placement = placement_of(store.schema());
   const tri::Multiresolution2<Coord> model(source, in_stored_coordinates(detail, placement),
                                            {.deltas = false});
   check_interrupt();
-  return mesh_of_model(model, placement, detail.region);
+  std::vector<double> heights;
+  if (smoothing) heights = smoothed(model, placement, detail.region, *smoothing);
+  return mesh_of_model(model, placement, detail.region, heights);
 }
 
 }  // namespace
 
 TriangleMesh mesh_of_store(const stream::Store& store, const Detail& detail,
-                           std::uint64_t memory_bytes) {
-  check_memory(store, detail, memory_bytes);
-  return store.schema().grid ? mesh_of<std::int32_t>(store, detail)
-                             : mesh_of<double>(store, detail);
+                           std::uint64_t memory_bytes,
+                           const std::optional<tri::SmoothingOptions>& smoothing) {
+  check_memory(store, detail, memory_bytes, smoothing.has_value());
+  return store.schema().grid ? mesh_of<std::int32_t>(store, detail, smoothing)
+                             : mesh_of<double>(store, detail, smoothing);
 }
 
 TriangleMesh points_of_store(const stream::Store& store, const Detail& detail) {

@@ -2,6 +2,9 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
+
+#include <terrace/tri/smoothing.hpp>
 
 #include "detail.hpp"
 #include "scene.hpp"
@@ -14,8 +17,13 @@ namespace terrace::tools {
 /// above, levels the highest of each vertex's point. With a region, the triangles that reach into
 /// it, whole. memory_bytes: what the work may take. Throws: stream::Error on a damaged store, or
 /// when the points would not fit, saying what they need.
+///
+/// With `smoothing` heights are smoothed, with a region only inside it, its border staying: on the
+/// triangulation as it is made, so of rasters on the unit grid. An edge_height of 0 becomes four times
+/// the root mean square of the height differences along edges. The store never changes.
 TriangleMesh mesh_of_store(const stream::Store& store, const Detail& detail,
-                           std::uint64_t memory_bytes);
+                           std::uint64_t memory_bytes,
+                           const std::optional<tri::SmoothingOptions>& smoothing = {});
 
 /// The same points without triangles.
 TriangleMesh points_of_store(const stream::Store& store, const Detail& detail);

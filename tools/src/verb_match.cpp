@@ -36,7 +36,7 @@ class MatchCommand final : public Command {
     app.add_option("--input-format", input_format_, "Of the input (else its content, its ending)")
         ->type_name("NAME");
     app.add_option("--method", method_,
-                   "auto: the optimum up to a million points, beyond it clusters first, then "
+                   "auto: the optimum up to half a million points, beyond it clusters first, then "
                    "windows, with a proven bound; exact: the optimum; monotone: repeated halving, "
                    "near it; monte-carlo: random halving, as the thesis has it")
         ->check(CLI::IsMember({"auto", "exact", "monotone", "monte-carlo"}))

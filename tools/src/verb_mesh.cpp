@@ -12,6 +12,7 @@
 
 #include "detail.hpp"
 #include "output.hpp"
+#include "smooth_option.hpp"
 #include "store_mesh.hpp"
 #include "units.hpp"
 #include "verbs.hpp"
@@ -31,17 +32,23 @@ class MeshCommand final : public Command {
                    "only triangles that reach inside: minx,miny,maxx,maxy or a GeoJSON file");
     app.add_option("--focus", focuses_, "BOX:L, all points of level L inside the box; repeatable")
         ->allow_extra_args(false);
+    app.add_option(
+           "--smooth", smooth_,
+           "laplacian, taubin (keeps what is wide) or bilateral (keeps steps), :STEPS behind "
+           "if wanted (10); with --region only inside it")
+        ->type_name("METHOD");
     not_yet(app, {"--max-error", "--quality", "--max-points", "--duplicates", "--fill", "--metric",
-                  "--smooth", "--overlay", "--base", "--region-crs", "--to-crs"});
+                  "--overlay", "--base", "--region-crs", "--to-crs"});
   }
 
   Summary run(const CommonOptions& common) override {
     const Stopwatch watch;
+    const std::optional<tri::SmoothingOptions> smoothing = parse_smoothing(smooth_);
     const stream::Store store = stream::Store::open(store_);
     const Detail detail = Detail::parse(store, level_, region_, focuses_);
     const bool replace = may_replace(output_, common.force);
     const TriangleMesh mesh =
-        mesh_of_store(store, detail, common.memory_or(machine_memory_bytes() / 2));
+        mesh_of_store(store, detail, common.memory_or(machine_memory_bytes() / 2), smoothing);
     write(mesh, replace);
 
     Summary summary;
@@ -80,7 +87,7 @@ class MeshCommand final : public Command {
     writer->finish();
   }
 
-  std::string store_, output_, format_, level_ = "0", region_;
+  std::string store_, output_, format_, level_ = "0", region_, smooth_;
   std::vector<std::string> focuses_;
 };
 

@@ -14,7 +14,7 @@ namespace terrace::matching {
 
 struct LargeMatchingOptions {
   /// Up to so many points are matched exactly, as by match_points(), unless there are labels.
-  std::size_t exact_limit = 1'000'000;
+  std::size_t exact_limit = 500'000;
   /// The cluster of each point, any numbers: each cluster is matched first, then what was left over
   /// in clusters of odd size. Empty: the set is cut into compact parts instead.
   std::span<const std::uint32_t> labels{};
