@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "terrace/tri/view_control.hpp"
+
+namespace terrace::tri {
+namespace {
+
+// A new measurement counts an eighth; a slow one at once, as a step must not be late.
+double smoothed(double rate, double now) { return std::max(now, rate + (now - rate) / 8.0); }
+
+}  // namespace
+
+void StepMeter::start(const StepBudget& budget) {
+  timed_ = std::isfinite(budget.seconds);
+  if (std::isnan(budget.seconds) || (timed_ && !budget.clock)) {
+    throw std::invalid_argument("step budget: finite seconds need a clock");
+  }
+  budget_ = &budget;
+  operations_ = points_ = 0;
+  begin_ = last_ = now();
+}
+
+bool StepMeter::has(std::size_t points) const {
+  if (operations_ == 0) return true;
+  if (operations_ >= budget_->operations) return false;
+  if (!timed_) return true;
+  const double ahead = static_cast<double>(points) * operation_rate_ +
+                       static_cast<double>(points_ + points) * end_rate_;
+  return last_ - begin_ + ahead < budget_->seconds;
+}
+
+void StepMeter::spend(std::size_t points) {
+  ++operations_;
+  points_ += points;
+  if (!timed_) return;
+  const double before = std::exchange(last_, now());
+  // Of a cluster of a few points most is overhead.
+  if (points >= 32) {
+    operation_rate_ += ((last_ - before) / static_cast<double>(points) - operation_rate_) / 8.0;
+  }
+}
+
+void StepMeter::end() {
+  if (!timed_ || points_ < 1000) return;
+  end_rate_ = smoothed(end_rate_, (now() - last_) / static_cast<double>(points_));
+}
+
+namespace detail {
+
+void check(const GivenCluster& cluster, unsigned top) {
+  const unsigned level = level_of(cluster.cluster);
+  const std::size_t size = cluster.positions.size();
+  if (level > top) {
+    throw HierarchyError(cluster.cluster, "the top is level " + std::to_string(top));
+  }
+  if (cluster.children.size() != size * level) {
+    throw HierarchyError(cluster.cluster,
+                         std::to_string(size) + " members of level " + std::to_string(level) +
+                             " came with " + std::to_string(cluster.children.size()) +
+                             " child ordinals, not " + std::to_string(size * level) +
+                             "; the source is damaged, verify it");
+  }
+  const std::size_t records = level == 0 ? 0 : size + (level < top ? 1 : 0);
+  if (cluster.child_records.size() != records) {
+    throw HierarchyError(cluster.cluster, std::to_string(cluster.child_records.size()) +
+                                              " child records came, " + std::to_string(records) +
+                                              " are needed: one per member and one for the head");
+  }
+}
+
+ViewOptions checked(ViewOptions options) {
+  terrace::tri::check(options);
+  return options;
+}
+
+}  // namespace detail
+}  // namespace terrace::tri
