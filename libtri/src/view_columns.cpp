@@ -235,6 +235,7 @@ void check(const View& view) {
 void check(const ViewOptions& options) {
   check(options.collapse_below > 0.0 && options.collapse_below <= 1.0,
         "view options: collapse_below must be more than 0 and at most 1");
+  check(options.ask_above > 0.0, "view options: ask_above must be more than 0");
   check(options.guard >= 0.0 && std::isfinite(options.guard),
         "view options: guard must be finite and not negative");
   check(options.silhouette > 0.0 && options.silhouette <= 1.0,

@@ -22,6 +22,7 @@ bool less_wanted(const ViewFront::Candidate& a, const ViewFront::Candidate& b) {
 ViewFront::ViewFront(const ClusterTree& tree, const ViewOptions& options)
     : tree_(&tree),
       options_(&options),
+      ask_above_(std::max(options.ask_above, options.collapse_below)),
       columns_(options.silhouette < 1.0),
       bounds_(options.silhouette < 1.0) {}
 
@@ -117,6 +118,7 @@ void ViewFront::bound(std::uint32_t number) {
 void ViewFront::start(const View& view) {
   view_ = &view;
   candidates_.clear();
+  soon_.clear();
   order_.clear();
   sorted_below_ = -kInfinity;
   collapsed_ = 0;
@@ -136,7 +138,10 @@ void ViewFront::start(const View& view) {
   measure(view, *options_, bounds_, 0, bounds_.size(), bound_demand_);
   if (!pins_.empty()) apply_pins();
   for (std::uint32_t group = 0; group < groups_.size(); ++group) {
-    if (groups_[group] && bound_demand_.want[group] > 1.0) measure_group(group);
+    if (!groups_[group]) continue;
+    if (bound_demand_.want[group] > 1.0 || bound_demand_.keep[group] > ask_above_) {
+      measure_group(group);
+    }
   }
 }
 
@@ -192,11 +197,14 @@ void ViewFront::measure_group(std::uint32_t number) {
   }
   if (!pins_.empty()) override_by_pins(number);
   for (std::uint32_t i = 0; i < count; ++i) {
-    if (!(scratch_.want[i] > 1.0)) continue;
+    const bool wanted = scratch_.want[i] > 1.0;
+    if (!wanted && !(scratch_.keep[i] > ask_above_)) continue;
     const ChildRef place{group.parent, i};
     if (tree_->child_slot(place) != ClusterTree::kNoSlot) continue;
-    candidates_.push_back({scratch_.want[i], scratch_.keep[i], scratch_.distance[i], place,
-                           tree_->child_id(place), group.members[i]});
+    std::vector<Candidate>& list = wanted ? candidates_ : soon_;
+    list.push_back({scratch_.want[i], scratch_.keep[i], scratch_.distance[i], place,
+                    tree_->child_id(place), group.members[i]});
+    if (!wanted) continue;
     std::push_heap(candidates_.begin(), candidates_.end(), less_wanted);
   }
 }
@@ -207,8 +215,7 @@ void ViewFront::override_by_pins(std::uint32_t number) {
     const auto place = tree_->find(id);
     if (!place || place->parent != group.parent) continue;
     const bool up = how == Pin::expanded;
-    scratch_.want[place->index] = up ? kInfinity : 0.0;
-    if (up) scratch_.keep[place->index] = kInfinity;
+    scratch_.want[place->index] = scratch_.keep[place->index] = up ? kInfinity : 0.0;
   }
 }
 
@@ -224,6 +231,19 @@ std::optional<ViewFront::Candidate> ViewFront::next() {
     return candidate;
   }
   return std::nullopt;
+}
+
+std::span<const ViewFront::Candidate> ViewFront::soon() {
+  std::erase_if(soon_, [&](const Candidate& candidate) {
+    const auto place = tree_->find(candidate.id);
+    return !place || *place != candidate.place;
+  });
+  std::sort(soon_.begin(), soon_.end(), [](const Candidate& a, const Candidate& b) {
+    if (a.keep != b.keep) return a.keep > b.keep;
+    if (level_of(a.id) != level_of(b.id)) return level_of(a.id) > level_of(b.id);
+    return a.id < b.id;
+  });
+  return soon_;
 }
 
 double ViewFront::key(Slot slot) const {
@@ -287,7 +307,7 @@ double ViewFront::keep(ChildRef child) {
 std::size_t ViewFront::memory() const {
   std::size_t bytes = columns_.memory() + bounds_.memory() +
                       group_of_.capacity() * sizeof(std::uint32_t) +
-                      candidates_.capacity() * sizeof(Candidate) +
+                      (candidates_.capacity() + soon_.capacity()) * sizeof(Candidate) +
                       order_.capacity() * sizeof(Ordered) + by_level_.capacity() * sizeof(Slot);
   for (const ViewDemand* demand : {&own_, &bound_demand_, &scratch_}) {
     bytes += 3 * demand->want.capacity() * sizeof(double);

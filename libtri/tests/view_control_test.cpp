@@ -27,6 +27,7 @@ ViewOptions random_options(World& world) {
   ViewOptions options;
   options.collapse_below = 0.3 + 0.7 * unit(world.random);
   options.guard = 0.2 * unit(world.random);
+  options.ask_above = 0.2 + unit(world.random);
   return options;
 }
 

@@ -95,6 +95,9 @@ struct ViewOptions {
   /// distance (perspective) or of the picture's height (orthographic); boxes of focuses and regions
   /// hold what they have expanded until it is outside by this share of their longest finite side.
   double guard = 0.05;
+  /// Clusters are asked for before they are wanted: when their demand by the view widened by the
+  /// guard is above this, and not below collapse_below. Infinity: none are.
+  double ask_above = 0.85;
   /// Points of the model, the most there may be. The root's are always there.
   std::size_t max_points = std::size_t{1} << 28;
   /// Of the clusters given and kept, see ViewControl::give().

@@ -88,7 +88,7 @@ class ViewControl {
     /// Whether another step with the same view and no new clusters would change nothing.
     bool settled = false;
     /// The missing ones that are worth loading, most important first, as far as max_points and
-    /// max_cached_bytes have room for them.
+    /// max_cached_bytes have room for them; then those that may be wanted soon.
     std::vector<ViewRequest> wanted;
     /// Of these, those that no step has named before, or only before they were withdrawn or
     /// forgotten: for a caller who starts loading at once.
@@ -144,6 +144,8 @@ class ViewControl {
   enum class Room { enough, none, later };
   [[nodiscard]] Room make_room(const Candidate& candidate);
   void ask(const Candidate& candidate);
+  void ask_soon();
+  void request(const Candidate& candidate, double importance, double bytes);
   void expand(const Candidate& candidate, const GivenCluster& given);
   void collapse(Slot slot);
   void withdraw();
@@ -207,6 +209,7 @@ auto ViewControl<Triangulation>::step(const View& view, const StepBudget& budget
   meter_.mark();
   model_.open_step();
   expand_wanted();
+  ask_soon();
   bool done = true;
   for (;;) {
     if (!meter_.has(0)) {
@@ -238,8 +241,8 @@ void ViewControl<Triangulation>::expand_wanted() {
       room = make_room(*candidate);
       if (room == Room::later) ++result_.pending;
       if (room == Room::none) ++result_.blocked;
-      if (room == Room::later) {
-        claimed_ += given->positions.size();
+      if (room == Room::later) claimed_ += given->positions.size();
+      if (room != Room::enough) {
         claimed_bytes_ += ViewCache::bytes_of(level_of(candidate->id), candidate->members);
       }
     }
@@ -296,15 +299,31 @@ void ViewControl<Triangulation>::ask(const Candidate& candidate) {
   }
   claimed_ += members;
   claimed_bytes_ += more;
-  ViewRequest request{candidate.id, {}, candidate.members, candidate.want};
-  if (level > 0) request.head_child = model_.tree_.head_child(candidate.place);
-  result_.wanted.push_back(request);
-  if (known == asked_.end()) {
-    result_.requests.push_back(request);
-    asked_[candidate.id] = {number_, bytes};
-  } else {
-    known->second.step = number_;
+  request(candidate, candidate.want, bytes);
+}
+
+// Asks early for what may be wanted soon, and holds on to it if it is there.
+template <DynamicTriangulation Triangulation>
+void ViewControl<Triangulation>::ask_soon() {
+  for (const Candidate& candidate : front_.soon()) {
+    if (!faulty_.empty() && faulty_.count(candidate.id)) continue;
+    const double bytes = ViewCache::bytes_of(level_of(candidate.id), candidate.members);
+    const bool known = asked_.count(candidate.id) != 0;
+    if (!known && claimed_bytes_ + bytes > static_cast<double>(cache_.max_bytes())) break;
+    if (!known) claimed_bytes_ += bytes;
+    if (!cache_.find(candidate.id, true)) request(candidate, std::min(candidate.keep, 1.0), bytes);
   }
+}
+
+template <DynamicTriangulation Triangulation>
+void ViewControl<Triangulation>::request(const Candidate& candidate, double importance,
+                                         double bytes) {
+  ViewRequest request{candidate.id, {}, candidate.members, importance};
+  if (level_of(candidate.id) > 0) request.head_child = model_.tree_.head_child(candidate.place);
+  result_.wanted.push_back(request);
+  const auto [known, fresh] = asked_.try_emplace(candidate.id, Asked{number_, bytes});
+  if (fresh) result_.requests.push_back(request);
+  known->second.step = number_;
 }
 
 template <DynamicTriangulation Triangulation>

@@ -61,6 +61,8 @@ class ViewFront {
   /// The collapsed cluster that is wanted most, of equals the coarsest, then the smallest id; none
   /// when no demand is left that is more than 1. Children of what was added take part.
   [[nodiscard]] std::optional<Candidate> next();
+  /// Those that may be wanted soon, the most demanded first. Call it when next() has no more.
+  [[nodiscard]] std::span<const Candidate> soon();
   /// Points of expanded clusters whose demand is less than `below`.
   [[nodiscard]] std::size_t points_below(double below);
   /// The expanded cluster to collapse first, if its demand is less than `below`: out of view before
@@ -99,6 +101,7 @@ class ViewFront {
 
   const ClusterTree* tree_;
   const ViewOptions* options_;
+  double ask_above_;
   std::map<ClusterId, Pin> pins_;
 
   // By slot: the expanded clusters.
@@ -114,6 +117,7 @@ class ViewFront {
   // A step's.
   const View* view_ = nullptr;
   std::vector<Candidate> candidates_;  // a heap
+  std::vector<Candidate> soon_;
   ViewDemand scratch_;
   std::vector<Slot> by_level_;
   std::vector<Ordered> order_;
