@@ -82,8 +82,8 @@ void outlines(const Camera& camera, const ViewColumns& columns, std::size_t firs
 }
 
 void measure_camera(const View& view, const ViewOptions& options, const ViewColumns& columns,
-                    std::size_t first, const Boxes& boxes, const double* error, double* want,
-                    double* keep, double* distance) {
+                    std::size_t first, const Boxes& boxes, const double* error,
+                    const std::uint8_t* level, double* want, double* keep, double* distance) {
   const Camera& camera = *view.camera;
   const bool cones = columns.cones() && options.silhouette < 1.0;
   Block depth, near, far, want_gain, keep_gain;
@@ -102,7 +102,10 @@ void measure_camera(const View& view, const ViewOptions& options, const ViewColu
     // A ground unit's pixels; the eye may lie in the box.
     const double unit = camera.perspective ? scale / std::max(near[i], 1e-100) : scale;
     const double shown = std::min(error[i] * unit, kMaxDemand);
-    want[i] = std::max(want[i], depth[i] >= 0.0 ? std::min(shown * want_gain[i], kMaxDemand) : 0.0);
+    // Clusters above level 0 come early: what is below them has to be asked for.
+    const double lead = level[i] / (level[i] + 1.0) * margin;
+    want[i] =
+        std::max(want[i], depth[i] >= -lead ? std::min(shown * want_gain[i], kMaxDemand) : 0.0);
     keep[i] =
         std::max(keep[i], depth[i] >= -margin ? std::min(shown * keep_gain[i], kMaxDemand) : 0.0);
     distance[i] = near[i];
@@ -206,7 +209,7 @@ void measure(const View& view, const ViewOptions& options, const ViewColumns& co
       demand.distance[first + i] = 0.0;
     }
     if (view.camera) {
-      measure_camera(view, options, columns, first, boxes, error, want, keep,
+      measure_camera(view, options, columns, first, boxes, error, level, want, keep,
                      demand.distance.data() + first);
     }
     const auto raise = [&](const Box3& box, auto&& value) {

@@ -86,7 +86,7 @@ inline Demands own_demands(const View& view, const ViewOptions& options,
         }
         deepest = std::max(deepest, s);
       }
-      in = in && deepest >= 0.0;
+      in = in && deepest >= -margin * level / (level + 1.0);
       held = held && deepest >= -margin;
     }
     double pixels = record.error * camera.pixels;

@@ -94,6 +94,8 @@ struct ViewOptions {
   /// A cluster is out of view when it is outside the picture by more than this, as a share of its
   /// distance (perspective) or of the picture's height (orthographic); boxes of focuses and regions
   /// hold what they have expanded until it is outside by this share of their longest finite side.
+  /// A cluster of level l is taken to be in view from l / (l + 1) of this on, so that those below
+  /// it are known, and loaded, before they are seen.
   double guard = 0.05;
   /// Clusters are asked for before they are wanted: when their demand by the view widened by the
   /// guard is above this, and not below collapse_below. Infinity: none are.

@@ -29,8 +29,8 @@ class StepMeter {
   [[nodiscard]] bool has(std::size_t points) const;
   /// Call it after each operation.
   void spend(std::size_t points);
-  /// Call it before what comes at the end of a step, and after.
-  void mark() { last_ = now(); }
+  /// Call it before the first operation, and at the end of the step.
+  void ready() { last_ = now(); }
   void end();
 
  private:
@@ -206,7 +206,7 @@ auto ViewControl<Triangulation>::step(const View& view, const StepBudget& budget
   for (const auto& [id, asked] : asked_) claimed_bytes_ += asked.bytes;
 
   front_.start(view);
-  meter_.mark();
+  meter_.ready();
   model_.open_step();
   expand_wanted();
   ask_soon();
@@ -221,7 +221,6 @@ auto ViewControl<Triangulation>::step(const View& view, const StepBudget& budget
     collapse(slot);
   }
   withdraw();
-  meter_.mark();
   result_.delta = &model_.close_step();
   meter_.end();
   result_.settled = done && result_.pending == 0 && result_.expanded == 0 && result_.collapsed == 0;
