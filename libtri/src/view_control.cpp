@@ -4,8 +4,15 @@
 namespace terrace::tri {
 namespace {
 
-// A new measurement counts an eighth; a slow one at once, as a step must not be late.
-double smoothed(double rate, double now) { return std::max(now, rate + (now - rate) / 8.0); }
+// A new measurement counts an eighth, and one that was disturbed from outside no more than twice
+// what is usual.
+void learn(double& rate, double measured) {
+  if (rate > 0.0) measured = std::min(measured, 2.0 * rate);
+  rate = rate > 0.0 ? rate + (measured - rate) / 8.0 : measured;
+}
+
+// A little of each operation, and of the end of a step, does not depend on the number of points.
+double with_overhead(std::size_t points) { return static_cast<double>(points) + 16.0; }
 
 }  // namespace
 
@@ -23,8 +30,8 @@ bool StepMeter::has(std::size_t points) const {
   if (operations_ == 0) return true;
   if (operations_ >= budget_->operations) return false;
   if (!timed_) return true;
-  const double ahead = static_cast<double>(points) * operation_rate_ +
-                       static_cast<double>(points_ + points) * end_rate_;
+  const double ahead =
+      with_overhead(points) * operation_rate_ + with_overhead(points_ + points) * end_rate_;
   return last_ - begin_ + ahead < budget_->seconds;
 }
 
@@ -33,15 +40,11 @@ void StepMeter::spend(std::size_t points) {
   points_ += points;
   if (!timed_) return;
   const double before = std::exchange(last_, now());
-  // Of a cluster of a few points most is overhead.
-  if (points >= 32) {
-    operation_rate_ += ((last_ - before) / static_cast<double>(points) - operation_rate_) / 8.0;
-  }
+  learn(operation_rate_, (last_ - before) / with_overhead(points));
 }
 
 void StepMeter::end() {
-  if (!timed_ || points_ < 1000) return;
-  end_rate_ = smoothed(end_rate_, (now() - last_) / static_cast<double>(points_));
+  if (timed_ && operations_ > 0) learn(end_rate_, (now() - last_) / with_overhead(points_));
 }
 
 namespace detail {

@@ -279,7 +279,7 @@ void ViewFront::sort(double below) {
 }
 
 std::size_t ViewFront::points_below(double below) {
-  sort(kInfinity);
+  sort(below);
   const auto first = order_.begin() + static_cast<std::ptrdiff_t>(collapsed_);
   const auto end = std::lower_bound(first, order_.end() - 1, below,
                                     [](const Ordered& a, double value) { return a.key < value; });

@@ -59,7 +59,8 @@ class StepMeter {
 /// Order of a step: what is wanted most is expanded first. Where the points would be too many,
 /// clusters of less than collapse_below times its demand are collapsed for it: out of view first,
 /// the farthest of them first, then those of the least demand. What time is left goes to collapsing
-/// what is no longer wanted, in the same order. Under max_points the outcome depends on sizes, but
+/// what is no longer wanted, in the same order; once that is a quarter of the points, it comes
+/// before expanding. Under max_points the outcome depends on sizes, but
 /// it too stays once it is reached.
 ///
 /// Cost of a step without changes: O(expanded clusters + collapsed clusters next to wanted ones).
@@ -141,6 +142,7 @@ class ViewControl {
   };
 
   void expand_wanted();
+  bool collapse_unwanted(std::size_t up_to);
   enum class Room { enough, none, later };
   [[nodiscard]] Room make_room(const Candidate& candidate);
   void ask(const Candidate& candidate);
@@ -210,21 +212,24 @@ auto ViewControl<Triangulation>::step(const View& view, const StepBudget& budget
   model_.open_step();
   expand_wanted();
   ask_soon();
-  bool done = true;
-  for (;;) {
-    if (!meter_.has(0)) {
-      done = false;
-      break;
-    }
-    const Slot slot = front_.next_to_collapse(options_.collapse_below);
-    if (slot == ClusterTree::kNoSlot) break;
-    collapse(slot);
-  }
+  const bool done = collapse_unwanted(0);
   withdraw();
   result_.delta = &model_.close_step();
   meter_.end();
   result_.settled = done && result_.pending == 0 && result_.expanded == 0 && result_.collapsed == 0;
   return result_;
+}
+
+// Until no more than so many points of unwanted clusters are left; false if the budget ended first.
+template <DynamicTriangulation Triangulation>
+bool ViewControl<Triangulation>::collapse_unwanted(std::size_t up_to) {
+  while (front_.points_below(options_.collapse_below) > up_to || up_to == 0) {
+    if (!meter_.has(0)) return false;
+    const Slot slot = front_.next_to_collapse(options_.collapse_below);
+    if (slot == ClusterTree::kNoSlot) break;
+    collapse(slot);
+  }
+  return true;
 }
 
 template <DynamicTriangulation Triangulation>
@@ -260,6 +265,7 @@ auto ViewControl<Triangulation>::make_room(const Candidate& candidate) -> Room {
     const std::size_t needed = model_.point_count() + members;
     return needed > options_.max_points ? needed - options_.max_points : 0;
   };
+  collapse_unwanted(model_.point_count() / 4 + 1);
   if (lacking() > 0) {
     const double below = options_.collapse_below * candidate.want;
     if (evict_ && front_.points_below(below) < lacking()) evict_ = false;
@@ -270,10 +276,10 @@ auto ViewControl<Triangulation>::make_room(const Candidate& candidate) -> Room {
       if (slot == ClusterTree::kNoSlot) return Room::none;  // pins hold them
       collapse(slot);
     }
-    // What went may have had this cluster below it.
-    const auto place = model_.tree_.find(candidate.id);
-    if (!place || *place != candidate.place) return Room::none;
   }
+  // What went may have had this cluster below it.
+  const auto place = model_.tree_.find(candidate.id);
+  if (!place || *place != candidate.place) return Room::none;
   return meter_.has(members) ? Room::enough : Room::later;
 }
 
