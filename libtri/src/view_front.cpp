@@ -86,6 +86,13 @@ void ViewFront::drop(Slot slot, ChildRef place) {
     free_groups_.push_back(group);
   }
   changed_groups_.push_back(group_of_[place.parent]);
+  // What gave way to something more important may find room again in the same step, as it would in
+  // the next.
+  if (own_.want[slot] > 1.0 && !pinned_down(slot)) {
+    candidates_.push_back({own_.want[slot], own_.keep[slot], own_.distance[slot], place,
+                           tree_->child_id(place), members(place)});
+    std::push_heap(candidates_.begin(), candidates_.end(), less_wanted);
+  }
 }
 
 ClusterRecord ViewFront::record(ChildRef child) const {

@@ -48,7 +48,7 @@ TYPED_TEST(ViewControlOf, EndsWhereTheRuleSays) {
         const ClusterSet goal = wanted_by(tree, world.source, view, options, expanded_set(control));
         for (;;) {
           const auto& step = control.step(view);
-          ASSERT_NO_FATAL_FAILURE(consumer.apply(*step.delta));
+          ASSERT_NO_FATAL_FAILURE(consumer.apply(*step.delta, true));
           if (step.settled && step.wanted.empty()) break;
           ASSERT_EQ(step.pending + step.blocked, 0u);
           for (const ViewRequest& r : std::vector<ViewRequest>(step.wanted)) {
@@ -112,7 +112,7 @@ TEST(ViewControl, DeltasTellAll) {
       const View view = world.view();
       for (int steps = 0; steps < 3; ++steps) {
         const auto& step = control.step(view);
-        ASSERT_NO_FATAL_FAILURE(consumer.apply(*step.delta));
+        ASSERT_NO_FATAL_FAILURE(consumer.apply(*step.delta, true));
         ASSERT_NO_FATAL_FAILURE(consumer.check());
         for (const ViewRequest& r : std::vector<ViewRequest>(step.wanted)) {
           control.give(load(world.source, r));

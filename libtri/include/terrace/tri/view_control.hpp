@@ -144,6 +144,11 @@ class ViewControl {
   void expand_wanted();
   bool collapse_unwanted(std::size_t up_to);
   enum class Room { enough, none, later };
+  [[nodiscard]] std::size_t lacking(std::size_t points) const {
+    const std::size_t needed = model_.point_count() + points;
+    return needed > options_.max_points ? needed - options_.max_points : 0;
+  }
+  [[nodiscard]] bool could_fit(const Candidate& candidate, std::size_t points);
   [[nodiscard]] Room make_room(const Candidate& candidate);
   void ask(const Candidate& candidate);
   void ask_soon();
@@ -236,7 +241,7 @@ template <DynamicTriangulation Triangulation>
 void ViewControl<Triangulation>::expand_wanted() {
   while (const auto candidate = front_.next()) {
     if (!faulty_.empty() && faulty_.count(candidate->id)) continue;
-    const GivenCluster* given = cache_.find(candidate->id, true);
+    const GivenCluster* given = cache_.find(candidate->id, false);
     Room room = Room::none;
     if (!given) {
       ++result_.missing;
@@ -245,10 +250,11 @@ void ViewControl<Triangulation>::expand_wanted() {
       room = make_room(*candidate);
       if (room == Room::later) ++result_.pending;
       if (room == Room::none) ++result_.blocked;
-      if (room == Room::later) claimed_ += given->positions.size();
-      if (room != Room::enough) {
+      if (room == Room::later) {
+        claimed_ += given->positions.size();
         claimed_bytes_ += ViewCache::bytes_of(level_of(candidate->id), candidate->members);
       }
+      if (room != Room::none) cache_.find(candidate->id, true);
     }
     if (room == Room::enough) {
       expand(*candidate, *given);
@@ -258,19 +264,27 @@ void ViewControl<Triangulation>::expand_wanted() {
   }
 }
 
+// Whether room could be made for so many points. Once there is none for a cluster, none is made for
+// a lesser one; but what is unwanted anyway always gives way. So it does not matter where a step
+// was interrupted.
+template <DynamicTriangulation Triangulation>
+bool ViewControl<Triangulation>::could_fit(const Candidate& candidate, std::size_t points) {
+  const std::size_t lack = lacking(points);
+  if (lack == 0) return true;
+  const double unwanted = options_.collapse_below;
+  if (evict_ && front_.points_below(unwanted * candidate.want) >= lack) return true;
+  if (points == candidate.members) evict_ = false;
+  return front_.points_below(unwanted) >= lack;
+}
+
 template <DynamicTriangulation Triangulation>
 auto ViewControl<Triangulation>::make_room(const Candidate& candidate) -> Room {
   const std::size_t members = static_cast<std::size_t>(candidate.members);
-  const auto lacking = [&] {
-    const std::size_t needed = model_.point_count() + members;
-    return needed > options_.max_points ? needed - options_.max_points : 0;
-  };
   collapse_unwanted(model_.point_count() / 4 + 1);
-  if (lacking() > 0) {
-    const double below = options_.collapse_below * candidate.want;
-    if (evict_ && front_.points_below(below) < lacking()) evict_ = false;
-    if (!evict_) return Room::none;
-    while (lacking() > 0) {
+  if (lacking(members) > 0) {
+    if (!could_fit(candidate, members)) return Room::none;
+    const double below = options_.collapse_below * (evict_ ? candidate.want : 1.0);
+    while (lacking(members) > 0) {
       if (!meter_.has(0)) return Room::later;
       const Slot slot = front_.next_to_collapse(below);
       if (slot == ClusterTree::kNoSlot) return Room::none;  // pins hold them
@@ -288,15 +302,12 @@ void ViewControl<Triangulation>::ask(const Candidate& candidate) {
   const std::size_t members = static_cast<std::size_t>(
       std::min<std::uint64_t>(candidate.members, ClusterTree::kMaxMembers));
   const unsigned level = level_of(candidate.id);
-  // Nothing is asked for that could not be expanded or kept until then.
-  std::size_t room = options_.max_points;
-  if (model_.point_count() + claimed_ + members > room) {
-    room += front_.points_below(options_.collapse_below * candidate.want);
-  }
+  // Nothing is asked for that could not be expanded, or kept until then.
+  const std::size_t claims = claimed_ + members;
   const auto known = asked_.find(candidate.id);
   const double bytes = ViewCache::bytes_of(level, members);
   const double more = known == asked_.end() ? bytes : 0.0;
-  if (model_.point_count() + claimed_ + members > room ||
+  if (!could_fit(candidate, members) || !could_fit(candidate, claims) ||
       claimed_bytes_ + more > static_cast<double>(cache_.max_bytes())) {
     --result_.missing;
     ++result_.blocked;
