@@ -38,8 +38,8 @@ namespace terrace::tri {
 /// it too stays once it is reached.
 ///
 /// Cost of a step without changes: O(expanded clusters + collapsed clusters next to wanted ones).
-/// Memory beside the model: 57 bytes per expanded cluster and 65 per cluster that could be expanded
-/// (with outlines 89 and 97), and the given clusters that are kept.
+/// Memory beside the model: 85 bytes per expanded cluster and 65 per cluster that could be expanded
+/// (with outlines 32 more each), and the given clusters that are kept.
 template <DynamicTriangulation Triangulation>
 class ViewControl {
  public:

@@ -89,6 +89,8 @@ class ViewFront {
     std::size_t points_before;  // of those earlier in the order
   };
 
+  /// The order of the heap: whether `a` comes after `b`.
+  [[nodiscard]] static bool less_wanted(const Candidate& a, const Candidate& b);
   void bound(std::uint32_t group);
   void measure_group(std::uint32_t group);
   void clamp_to_parents();
