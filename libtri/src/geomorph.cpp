@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <limits>
-#include <numeric>
 #include <stdexcept>
 
 namespace terrace::tri {
@@ -30,37 +29,48 @@ double doubled_area(const Point3& a, const Point3& b, double x, double y) {
 void HeightPatches::build() {
   nodes_.clear();
   if (triangles_.empty()) return;
-  nodes_.reserve(2 * (triangles_.size() / 2 + 1));
+  nodes_.reserve(triangles_.size() + 1);
   nodes_.emplace_back();
+  places_.clear();
+  for (const auto& [a, b, c] : triangles_) {
+    places_.push_back(
+        {a[0] + b[0] + c[0], a[1] + b[1] + c[1], static_cast<std::uint32_t>(places_.size())});
+  }
   split(0, 0, static_cast<std::uint32_t>(triangles_.size()));
+  sorted_.clear();
+  for (const Place& place : places_) sorted_.push_back(triangles_[place.triangle]);
+  triangles_.swap(sorted_);
 }
 
-// Halves at the median of the first corners along the longer side.
+// Halves at the median along the longer side of what the middles span; boxes come from below.
 void HeightPatches::split(std::uint32_t node, std::uint32_t first, std::uint32_t last) {
   std::array<double, 4> box{kInfinity, kInfinity, -kInfinity, -kInfinity};
-  for (std::uint32_t i = first; i < last; ++i) {
-    for (const Corner& corner : triangles_[i]) {
-      for (std::size_t k = 0; k < 2; ++k) {
-        box[k] = std::min(box[k], corner[k]);
-        box[k + 2] = std::max(box[k + 2], corner[k]);
-      }
-    }
-  }
-  nodes_[node] = {box, first, last - first};
-  if (last - first <= kLeaf) return;
-  const std::size_t axis = box[2] - box[0] >= box[3] - box[1] ? 0 : 1;
-  const std::uint32_t middle = first + (last - first) / 2;
-  const auto at = [&](std::uint32_t i) {
-    return triangles_.begin() + static_cast<std::ptrdiff_t>(i);
+  const auto add = [&box](double x, double y) {
+    box = {std::min(box[0], x), std::min(box[1], y), std::max(box[2], x), std::max(box[3], y)};
   };
+  if (last - first <= kLeaf) {
+    for (std::uint32_t i = first; i < last; ++i) {
+      for (const Corner& corner : triangles_[places_[i].triangle]) add(corner[0], corner[1]);
+    }
+    nodes_[node] = {box, first, last - first};
+    return;
+  }
+  for (std::uint32_t i = first; i < last; ++i) add(places_[i].x, places_[i].y);
+  const bool by_x = box[2] - box[0] >= box[3] - box[1];
+  const std::uint32_t middle = first + (last - first) / 2;
+  const auto at = [&](std::uint32_t i) { return places_.begin() + static_cast<std::ptrdiff_t>(i); };
   std::nth_element(at(first), at(middle), at(last),
-                   [axis](const auto& a, const auto& b) { return a[0][axis] < b[0][axis]; });
+                   [by_x](const Place& a, const Place& b) { return by_x ? a.x < b.x : a.y < b.y; });
   const auto below = static_cast<std::uint32_t>(nodes_.size());
-  nodes_[node].first = below;
-  nodes_[node].count = 0;
   nodes_.resize(nodes_.size() + 2);
   split(below, first, middle);
   split(below + 1, middle, last);
+  const auto& left = nodes_[below].box;
+  const auto& right = nodes_[below + 1].box;
+  nodes_[node] = {{std::min(left[0], right[0]), std::min(left[1], right[1]),
+                   std::max(left[2], right[2]), std::max(left[3], right[3])},
+                  below,
+                  0};
 }
 
 std::optional<double> HeightPatches::height(double x, double y) const {

@@ -47,9 +47,15 @@ class HeightPatches {
     std::array<double, 4> box;   // least x, y, greatest x, y
     std::uint32_t first, count;  // triangles of a leaf; count 0: the children are at first, first+1
   };
+  // Thrice the middle of a triangle.
+  struct Place {
+    double x, y;
+    std::uint32_t triangle;
+  };
   void split(std::uint32_t node, std::uint32_t first, std::uint32_t last);
 
-  std::vector<std::array<Corner, 3>> triangles_;
+  std::vector<std::array<Corner, 3>> triangles_, sorted_;
+  std::vector<Place> places_;
   std::vector<Node> nodes_;
 };
 
