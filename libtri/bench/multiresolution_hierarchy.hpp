@@ -44,6 +44,7 @@ class ArraySource : public ClusterSource {
     std::vector<std::uint64_t> children;
     std::vector<std::uint32_t> first{0};  ///< of each cluster, and the end
     std::vector<Box3> boxes;
+    std::vector<double> errors;  ///< no descendant is farther in the plane from the head
   };
   std::vector<Level> levels;  ///< the last one is the root alone
   mutable double seconds = 0.0;
@@ -56,7 +57,7 @@ class ArraySource : public ClusterSource {
     const Lap lap(seconds);
     const Level& level = levels[level_of(id)];
     const std::size_t c = static_cast<std::size_t>(ordinal_of(id));
-    return {level.boxes[c], 0.0, level.first[c + 1] - level.first[c]};
+    return {level.boxes[c], level.errors[c], level.first[c + 1] - level.first[c]};
   }
   ClusterMembers read(ClusterId id) override {
     const Lap lap(seconds);
@@ -78,11 +79,12 @@ inline ArraySource make_hierarchy(std::vector<Point3> points, unsigned levels, d
     Point3 position;
     std::vector<std::uint64_t> children;
     Box3 box;
+    double reach = 0.0;  // no descendant is farther
   };
   std::vector<Node> nodes(points.size());
   double side = 1.0;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    nodes[i] = {points[i], {}, {points[i], points[i]}};
+    nodes[i] = {points[i], {}, {points[i], points[i]}, 0.0};
     side = std::max({side, points[i][0] + 1.0, points[i][1] + 1.0});
   }
   ArraySource source;
@@ -139,13 +141,20 @@ inline ArraySource make_hierarchy(std::vector<Point3> points, unsigned levels, d
     out.positions.resize(out.first.back());
     out.children.resize(std::size_t{out.first.back()} * level);
     std::vector<std::uint32_t> place(out.first.begin(), out.first.end() - 1);
-    for (std::uint32_t c = 0; c < count; ++c) out.boxes.push_back(nodes[centres[c]].box);
+    for (std::uint32_t c = 0; c < count; ++c) {
+      out.boxes.push_back(nodes[centres[c]].box);
+      out.errors.push_back(nodes[centres[c]].reach);
+    }
     for (std::size_t i = 0; i < nodes.size(); ++i) {
       if (cluster[i] == kNone) continue;
       const std::size_t at = place[cluster[i]]++;
       out.positions[at] = nodes[i].position;
       std::copy(nodes[i].children.begin(), nodes[i].children.end(),
                 out.children.begin() + static_cast<std::ptrdiff_t>(at * level));
+      const Point3& head = nodes[centres[cluster[i]]].position;
+      const Point3& p = nodes[i].position;
+      double& error = out.errors[cluster[i]];
+      error = std::max(error, std::hypot(p[0] - head[0], p[1] - head[1]) + nodes[i].reach);
       Box3& box = out.boxes[cluster[i]];
       for (std::size_t k = 0; k < 3; ++k) {
         box.min[k] = std::min(box.min[k], nodes[i].box.min[k]);
@@ -157,6 +166,7 @@ inline ArraySource make_hierarchy(std::vector<Point3> points, unsigned levels, d
       up[c] = std::move(nodes[centres[c]]);
       up[c].children.push_back(c);
       up[c].box = out.boxes[c];
+      up[c].reach = out.errors[c];
     }
     nodes = std::move(up);
     source.levels.push_back(std::move(out));
@@ -168,6 +178,7 @@ inline ArraySource make_hierarchy(std::vector<Point3> points, unsigned levels, d
   }
   root.first.push_back(static_cast<std::uint32_t>(nodes.size()));
   root.boxes.emplace_back();
+  root.errors.push_back(0.0);
   source.levels.push_back(std::move(root));
   return source;
 }

@@ -67,6 +67,14 @@ ClusterId ClusterTree::child_id(ChildRef child) const {
   return headed_by(parent.home, parent.home_index, level);
 }
 
+ClusterId ClusterTree::head_child(ChildRef child) const {
+  const Cluster& parent = clusters_[child.parent];
+  const unsigned level = level_of(parent.id) - 1;
+  assert(level > 0);
+  if (child.index < parent.size) return headed_by(child.parent, child.index, level - 1);
+  return headed_by(parent.home, parent.home_index, level - 1);
+}
+
 ClusterTree::Slot ClusterTree::child_slot(ChildRef child) const {
   return clusters_[child.parent].inner->children[child.index];
 }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cmath>
 #include <concepts>
 #include <cstddef>
@@ -58,6 +59,8 @@ struct Detail {
 struct ModelOptions {
   /// false: no deltas are recorded, steps are faster and every Delta is empty.
   bool deltas = true;
+  /// true: a Delta also tells the heights that were there before, for 8 bytes and a bit per vertex.
+  bool old_heights = false;
 };
 
 /// A triangulation of a hierarchy of clusters that is coarse here and fine there. The points of the
@@ -91,6 +94,9 @@ class MultiresolutionModel {
     typename Triangulation::Changes changes;
     /// Vertices that stayed, for which another point stands now: look at their height again.
     std::vector<VertexId> reassigned;
+    /// With ModelOptions::old_heights, else empty: the heights before the step of
+    /// changes.removed_vertices and of reassigned, in parallel.
+    std::vector<double> removed_heights, reassigned_heights;
   };
 
   /// Starts with the points of the given detail, built in one go. The first delta covers what comes
@@ -119,6 +125,12 @@ class MultiresolutionModel {
   /// Everything: expands and collapses until exactly the clusters wanted are expanded.
   const Delta& set_detail(const Detail& detail);
   const Delta& set_level(unsigned level) { return set_detail({level, {}}); }
+
+  /// Makes one step of several: until close_step() the functions above change the triangulation at
+  /// once, but what they return means nothing; close_step() returns the delta of them all. Of a
+  /// vertex whose point went and came back in between, `reassigned` may tell though it is the same.
+  void open_step();
+  const Delta& close_step();
 
   // ---- Reading --------------------------------------------------------------------------------
 
@@ -159,6 +171,9 @@ class MultiresolutionModel {
 
   static constexpr std::size_t kKeptPoints = 1 << 16;
 
+  template <DynamicTriangulation>
+  friend class ViewControl;  // it decides by the tree
+
   struct Staged {
     Slot slot;
     std::size_t first;  // of its points in points and heights
@@ -178,19 +193,26 @@ class MultiresolutionModel {
   void remove_cluster(Slot cluster);
   void insert_clusters(bool list_created);
   void build_clusters();
-  void note(VertexOwners::Change change, VertexId vertex);
+  void note(VertexOwners::Change change, VertexId vertex, double height_before);
+  void start_delta();
   void finish_delta();
+  void finish_reassigned();
+  void finish_heights();
   [[nodiscard]] ChildRef find(ClusterId cluster) const;
 
   Triangulation triangulation_;
   ClusterTree tree_;
   VertexOwners owners_;
   std::size_t points_ = 0;
-  bool deltas_;
+  bool deltas_, old_heights_;
+  bool open_ = false;  // between open_step() and close_step()
   Delta delta_;
   Stage stage_;
   std::vector<VertexId> created_;                            // in a step that also collapses
   std::vector<bool> marks_;                                  // scratch of finish_delta(), all false
+  std::vector<double> heights_before_;                       // with old_heights, by slot
+  std::vector<bool> noted_;                                  // those of heights_before_ that hold
+  std::vector<VertexId> noted_vertices_;                     // the same as a list
   std::vector<VertexId> gone_;                               // scratch of remove_cluster()
   std::vector<typename Triangulation::Insertion> inserted_;  // scratch of insert_clusters()
 };

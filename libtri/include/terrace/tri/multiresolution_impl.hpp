@@ -33,7 +33,7 @@ bool to_point(const Point3& position, Point& point) {
 template <DynamicTriangulation Triangulation>
 MultiresolutionModel<Triangulation>::MultiresolutionModel(ClusterSource& source,
                                                           const Detail& start, ModelOptions options)
-    : tree_(source), deltas_(options.deltas) {
+    : tree_(source), deltas_(options.deltas), old_heights_(options.deltas && options.old_heights) {
   const ClusterTree::Take take_points = take();
   tree_.read_root(take_points);
   // What is staged stays staged: the whole model goes if this fails.
@@ -148,12 +148,26 @@ auto MultiresolutionModel<Triangulation>::apply(const ClusterTree::Plan& plan) -
     tree_.cancel(plan);
     throw;
   }
-  delta_.reassigned.clear();
-  created_.clear();
+  if (!open_) start_delta();
   // Collapsing first keeps the peak low. With expanding first, vertices of points present before
   // and after would stay, but those are few.
   for (const Slot cluster : plan.collapsed) remove_cluster(cluster);
-  if (!plan.staged.empty()) insert_clusters(deltas_ && !plan.collapsed.empty());
+  if (!plan.staged.empty()) insert_clusters(deltas_ && (open_ || !plan.collapsed.empty()));
+  if (!open_) finish_delta();
+  return delta_;
+}
+
+template <DynamicTriangulation Triangulation>
+void MultiresolutionModel<Triangulation>::open_step() {
+  assert(!open_);
+  open_ = true;
+  start_delta();
+}
+
+template <DynamicTriangulation Triangulation>
+auto MultiresolutionModel<Triangulation>::close_step() -> const Delta& {
+  assert(open_);
+  open_ = false;
   finish_delta();
   return delta_;
 }
@@ -163,12 +177,10 @@ void MultiresolutionModel<Triangulation>::remove_cluster(Slot cluster) {
   gone_.clear();
   const std::span<const VertexId> vertices = tree_.vertices(cluster);
   for (std::uint32_t i = 0; i < vertices.size(); ++i) {
+    const double height = old_heights_ ? owners_.height(vertices[i]) : 0.0;
     const VertexOwners::Change change = owners_.remove(vertices[i], {cluster, i}, tree_);
-    if (change == VertexOwners::Change::last) {
-      gone_.push_back(vertices[i]);
-    } else {
-      note(change, vertices[i]);
-    }
+    if (change == VertexOwners::Change::last) gone_.push_back(vertices[i]);
+    note(change, vertices[i], height);
   }
   triangulation_.remove(gone_);
   points_ -= vertices.size();
@@ -193,9 +205,11 @@ void MultiresolutionModel<Triangulation>::insert_clusters(bool list_created) {
     for (std::uint32_t i = 0; i < size; ++i) {
       const VertexId vertex = inserted_[i].vertex;
       vertices[i] = vertex;
+      const bool had_height = old_heights_ && slot(vertex) < owners_.slots();
+      const double height = had_height ? owners_.height(vertex) : 0.0;
       const VertexOwners::Change change =
           owners_.add(vertex, {staged.slot, i}, stage_.heights[staged.first + i], tree_);
-      note(change, vertex);
+      note(change, vertex, height);
       if (list_created && change == VertexOwners::Change::first) created_.push_back(vertex);
     }
     points_ += size;
@@ -221,38 +235,75 @@ void MultiresolutionModel<Triangulation>::build_clusters() {
 }
 
 template <DynamicTriangulation Triangulation>
-void MultiresolutionModel<Triangulation>::note(VertexOwners::Change change, VertexId vertex) {
+void MultiresolutionModel<Triangulation>::note(VertexOwners::Change change, VertexId vertex,
+                                               double height_before) {
   if (change == VertexOwners::Change::other && deltas_) delta_.reassigned.push_back(vertex);
+  if (!old_heights_) return;
+  if (change != VertexOwners::Change::other && change != VertexOwners::Change::last) return;
+  // The first change of a step is the one that knows the height of before.
+  if (noted_.size() < owners_.slots()) {
+    noted_.resize(owners_.slots());
+    heights_before_.resize(owners_.slots());
+  }
+  if (noted_[slot(vertex)]) return;
+  noted_[slot(vertex)] = true;
+  noted_vertices_.push_back(vertex);
+  heights_before_[slot(vertex)] = height_before;
+}
+
+template <DynamicTriangulation Triangulation>
+void MultiresolutionModel<Triangulation>::start_delta() {
+  delta_.reassigned.clear();
+  delta_.removed_heights.clear();
+  delta_.reassigned_heights.clear();
+  created_.clear();
 }
 
 template <DynamicTriangulation Triangulation>
 void MultiresolutionModel<Triangulation>::finish_delta() {
   if (!deltas_) return;
   triangulation_.take_changes(delta_.changes);
-  const auto& added = delta_.changes.added_vertices;
-  const auto& removed = delta_.changes.removed_vertices;
-  std::vector<VertexId>& reassigned = delta_.reassigned;
   // A vertex that went with one point and came back with another has stayed, if it came back in its
   // old slot.
-  if (created_.size() > added.size()) {
-    reassigned.insert(reassigned.end(), created_.begin(), created_.end());
+  if (created_.size() > delta_.changes.added_vertices.size()) {
+    delta_.reassigned.insert(delta_.reassigned.end(), created_.begin(), created_.end());
   }
-  if (reassigned.empty()) return;
-  // Only those that stayed are meant, each once.
+  if (!delta_.reassigned.empty()) finish_reassigned();
+  if (old_heights_) finish_heights();
+}
+
+// Only vertices that stayed are meant, each once.
+template <DynamicTriangulation Triangulation>
+void MultiresolutionModel<Triangulation>::finish_reassigned() {
+  const auto& added = delta_.changes.added_vertices;
+  const auto& removed = delta_.changes.removed_vertices;
   marks_.resize(owners_.slots());
   const auto mark = [&](const auto& vertices, bool value) {
     for (const VertexId vertex : vertices) marks_[static_cast<std::uint32_t>(vertex)] = value;
   };
   mark(added, true);
   mark(removed, true);
-  std::erase_if(reassigned, [&](VertexId vertex) {
+  std::erase_if(delta_.reassigned, [&](VertexId vertex) {
+    if (!owners_.owned(vertex)) return true;  // came and went
     const bool other = marks_[static_cast<std::uint32_t>(vertex)];
     marks_[static_cast<std::uint32_t>(vertex)] = true;
     return other;
   });
   mark(added, false);
   mark(removed, false);
-  mark(reassigned, false);
+  mark(delta_.reassigned, false);
+}
+
+template <DynamicTriangulation Triangulation>
+void MultiresolutionModel<Triangulation>::finish_heights() {
+  for (const VertexId vertex : delta_.changes.removed_vertices) {
+    delta_.removed_heights.push_back(heights_before_[slot(vertex)]);
+  }
+  for (const VertexId vertex : delta_.reassigned) {
+    delta_.reassigned_heights.push_back(heights_before_[slot(vertex)]);
+  }
+  for (const VertexId vertex : noted_vertices_) noted_[slot(vertex)] = false;
+  noted_vertices_.clear();
 }
 
 template <DynamicTriangulation Triangulation>
@@ -332,6 +383,8 @@ template <DynamicTriangulation Triangulation>
 std::size_t MultiresolutionModel<Triangulation>::memory_bytes() const {
   return tree_.memory() + owners_.memory() + gone_.capacity() * sizeof(VertexId) +
          created_.capacity() * sizeof(VertexId) + marks_.capacity() / 8 +
+         heights_before_.capacity() * sizeof(double) + noted_.capacity() / 8 +
+         noted_vertices_.capacity() * sizeof(VertexId) +
          inserted_.capacity() * sizeof(inserted_[0]) + stage_.points.capacity() * sizeof(Point) +
          stage_.heights.capacity() * sizeof(double);
 }

@@ -61,6 +61,10 @@ class VertexOwners {
     const Owner owner = standing_[static_cast<std::uint32_t>(vertex)];
     return {owner.slot, owner.index & ~kShared};
   }
+  /// Whether a point lies on the vertex in this slot, which is below slots().
+  [[nodiscard]] bool owned(VertexId vertex) const {
+    return standing_[static_cast<std::uint32_t>(vertex)].slot != ClusterTree::kNoSlot;
+  }
   [[nodiscard]] double height(VertexId vertex) const {
     return heights_[static_cast<std::uint32_t>(vertex)];
   }

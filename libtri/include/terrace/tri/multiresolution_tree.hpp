@@ -56,11 +56,25 @@ class ClusterTree {
   [[nodiscard]] std::uint32_t child_count(Slot slot) const;
   [[nodiscard]] ClusterId child_id(ChildRef child) const;
   [[nodiscard]] VertexId head_vertex(ChildRef child) const;
+  /// The cluster one level below the child that the child's own head heads. Requires a child above
+  /// level 0.
+  [[nodiscard]] ClusterId head_child(ChildRef child) const;
+  /// Whether a cluster is in this slot; any number.
+  [[nodiscard]] bool live(Slot slot) const {
+    return slot < clusters_.size() && clusters_[slot].live;
+  }
+  [[nodiscard]] Slot slots() const { return static_cast<Slot>(clusters_.size()); }
+  /// Where an expanded cluster hangs; its parent is kNoSlot for the root.
+  [[nodiscard]] ChildRef place(Slot slot) const { return clusters_[slot].place; }
   /// kNoSlot while it is not expanded.
   [[nodiscard]] Slot child_slot(ChildRef child) const;
   /// Asks the source at the first call, remembers afterwards. Throws: what the source throws;
   /// HierarchyError if the record makes no sense.
   const ClusterRecord& record(ChildRef child);
+
+  [[nodiscard]] bool has_expanded_children(Slot slot) const {
+    return clusters_[slot].inner && clusters_[slot].inner->expanded != 0;
+  }
 
   /// Number of expanded clusters, the root not counted.
   [[nodiscard]] std::size_t expanded_count() const { return live_ - 1; }
@@ -127,9 +141,6 @@ class ClusterTree {
     std::unique_ptr<Inner> inner;
   };
 
-  [[nodiscard]] bool has_expanded_children(Slot slot) const {
-    return clusters_[slot].inner && clusters_[slot].inner->expanded != 0;
-  }
   [[nodiscard]] Slot stage(ClusterId id, ChildRef place, const Take& take);
   void check_ordinals(ClusterId id, std::span<const std::uint64_t> ordinals) const;
   void append_below(Slot slot, std::vector<Slot>& out) const;

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <list>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "terrace/tri/multiresolution_source.hpp"
+
+namespace terrace::tri {
+
+/// A cluster as its loader hands it over.
+struct GivenCluster {
+  ClusterId cluster{};
+  /// As in ClusterMembers.
+  std::vector<Point3> positions;
+  std::vector<std::uint64_t> children;
+  /// Above level 0: the records of the clusters one level down headed by each member, in order, and
+  /// then by the cluster's own head (ViewRequest::head_child); the root has no head.
+  std::vector<ClusterRecord> child_records;
+};
+
+/// A cluster that is missing.
+struct ViewRequest {
+  ClusterId cluster{};
+  ClusterId head_child{};     ///< above level 0: what its head heads one level down
+  std::uint64_t members = 0;  ///< by its record
+  double importance = 0.0;    ///< its error over what is tolerated
+};
+
+/// Reads a cluster from a source, with all that give() needs, and blocks while the source does.
+/// Throws what the source throws; HierarchyError where it is too damaged to ask on.
+GivenCluster load(ClusterSource& source, const ViewRequest& request);
+/// The root.
+GivenCluster load_root(ClusterSource& source);
+
+/// Given clusters within a budget of bytes; what was not used for the longest time goes first. As
+/// a source it delivers what is there and never waits.
+class ViewCache final : public ClusterSource {
+ public:
+  /// counts: clusters of each level below the top.
+  explicit ViewCache(std::vector<std::uint64_t> counts) : counts_(std::move(counts)) {}
+  /// No budget until this is called, before clusters are given.
+  void limit(std::size_t max_bytes) { max_bytes_ = max_bytes; }
+
+  /// Takes the place of an earlier one. False if it is larger than the budget: it is not kept then.
+  bool give(GivenCluster cluster);
+  /// Null if it is not there. `use`: it goes last from now on.
+  const GivenCluster* find(ClusterId cluster, bool use);
+  void drop(ClusterId cluster);
+
+  [[nodiscard]] std::size_t bytes() const { return bytes_; }
+  [[nodiscard]] std::size_t max_bytes() const { return max_bytes_; }
+  [[nodiscard]] std::size_t size() const { return places_.size(); }
+  /// Of a cluster that holds this many members.
+  [[nodiscard]] static double bytes_of(unsigned level, std::uint64_t members);
+
+  /// Makes the record known that the model will ask for.
+  void expect(ClusterId cluster, const ClusterRecord& record) {
+    expected_ = cluster;
+    record_ = record;
+  }
+  [[nodiscard]] unsigned top() const override { return static_cast<unsigned>(counts_.size()); }
+  [[nodiscard]] std::uint64_t cluster_count(unsigned level) const override {
+    return counts_[level];
+  }
+  ClusterRecord record(ClusterId id) override;
+  ClusterMembers read(ClusterId id) override;
+
+ private:
+  using Places = std::list<GivenCluster>;
+  void erase(std::unordered_map<ClusterId, Places::iterator>::iterator at);
+
+  std::vector<std::uint64_t> counts_;
+  std::size_t max_bytes_ = std::numeric_limits<std::size_t>::max(), bytes_ = 0;
+  Places clusters_;  // the longest unused first
+  std::unordered_map<ClusterId, Places::iterator> places_;
+  ClusterId expected_{};
+  ClusterRecord record_;
+};
+
+}  // namespace terrace::tri

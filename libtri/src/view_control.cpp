@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "terrace/tri/view_control.hpp"
+
+#include <string>
+#include <utility>
+
+namespace terrace::tri {
+namespace detail {
+
+void check(const GivenCluster& cluster, unsigned top) {
+  const unsigned level = level_of(cluster.cluster);
+  const std::size_t size = cluster.positions.size();
+  if (level > top) {
+    throw HierarchyError(cluster.cluster, "the top is level " + std::to_string(top));
+  }
+  if (cluster.children.size() != size * level) {
+    throw HierarchyError(cluster.cluster,
+                         std::to_string(size) + " members of level " + std::to_string(level) +
+                             " came with " + std::to_string(cluster.children.size()) +
+                             " child ordinals, not " + std::to_string(size * level) +
+                             "; the source is damaged, verify it");
+  }
+  const std::size_t records = level == 0 ? 0 : size + (level < top ? 1 : 0);
+  if (cluster.child_records.size() != records) {
+    throw HierarchyError(cluster.cluster, std::to_string(cluster.child_records.size()) +
+                                              " child records came, " + std::to_string(records) +
+                                              " are needed: one per member and one for the head");
+  }
+}
+
+ViewOptions checked(ViewOptions options) {
+  terrace::tri::check(options);
+  return options;
+}
+
+}  // namespace detail
+}  // namespace terrace::tri

@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "terrace/tri/view_front.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <limits>
+
+namespace terrace::tri {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+}  // namespace
+
+ViewFront::ViewFront(const ClusterTree& tree, const ViewOptions& options)
+    : tree_(&tree),
+      options_(&options),
+      ask_above_(std::max(options.ask_above, options.collapse_below)),
+      columns_(options.silhouette < 1.0),
+      bounds_(options.silhouette < 1.0) {}
+
+void ViewFront::add(Slot slot, std::span<const ClusterRecord> children,
+                    const Candidate* candidate) {
+  if (slot >= columns_.size()) {
+    const std::size_t size = std::max<std::size_t>(slot + 1, columns_.size() * 5 / 4);
+    columns_.resize(size);
+    own_.resize(size);
+    group_of_.resize(size, kNone);
+  }
+  const ChildRef place = tree_->place(slot);
+  if (slot == ClusterTree::kRoot) {
+    constexpr Point3 kLow{-kInfinity, -kInfinity, -kInfinity};
+    columns_.set(slot, {{kLow, {kInfinity, kInfinity, kInfinity}}, kInfinity, 0}, tree_->top());
+  } else {
+    const std::uint32_t parent = group_of_[place.parent];
+    columns_.copy(slot, groups_[parent]->columns, place.index);
+    changed_groups_.push_back(parent);
+  }
+  if (candidate) {
+    own_.want[slot] = candidate->want;
+    own_.keep[slot] = candidate->keep;
+    own_.distance[slot] = candidate->distance;
+  }
+  assert(children.size() == tree_->child_count(slot));
+  if (children.empty()) return;
+
+  if (free_groups_.empty()) {
+    free_groups_.push_back(static_cast<std::uint32_t>(groups_.size()));
+    groups_.emplace_back();
+    bounds_.resize(groups_.size());
+    bound_demand_.resize(groups_.size());
+  }
+  const std::uint32_t number = free_groups_.back();
+  free_groups_.pop_back();
+  group_of_[slot] = number;
+  groups_[number] = std::make_unique<Group>();
+  Group& group = *groups_[number];
+  group.parent = slot;
+  group.columns = ViewColumns(columns_.cones());
+  group.columns.resize(children.size());
+  const unsigned level = tree_->level(slot) - 1;
+  for (std::uint32_t i = 0; i < children.size(); ++i) {
+    group.members.push_back(children[i].members);
+    group.columns.set(i, children[i], level);
+    if (!columns_.cones()) continue;
+    group.columns.set_cone(i, options_->cone
+                                  ? options_->cone(tree_->child_id({slot, i}), children[i])
+                                  : terrain_cone(children[i]));
+  }
+  changed_groups_.push_back(number);
+  if (candidate) measure_group(number);
+}
+
+void ViewFront::drop(Slot slot, ChildRef place) {
+  const std::uint32_t group = group_of_[slot];
+  group_of_[slot] = kNone;
+  if (group != kNone) {
+    groups_[group].reset();
+    free_groups_.push_back(group);
+  }
+  changed_groups_.push_back(group_of_[place.parent]);
+  // What gave way to something more important may find room again in the same step, as it would in
+  // the next.
+  if (own_.want[slot] > 1.0 && !pinned_down(slot)) {
+    candidates_.push_back({own_.want[slot], own_.keep[slot], own_.distance[slot], place,
+                           tree_->child_id(place), members(place)});
+    std::push_heap(candidates_.begin(), candidates_.end(), &ViewFront::less_wanted);
+  }
+}
+
+ClusterRecord ViewFront::record(ChildRef child) const {
+  const Group& group = *groups_[group_of_[child.parent]];
+  ClusterRecord record;
+  for (std::size_t k = 0; k < 3; ++k) {
+    record.box.min[k] = group.columns.column(k)[child.index];
+    record.box.max[k] = group.columns.column(k + 3)[child.index];
+  }
+  record.error = group.columns.error(child.index);
+  record.members = group.members[child.index];
+  return record;
+}
+
+// A box around the collapsed children, and the greatest of their errors.
+void ViewFront::bound(std::uint32_t number) {
+  const Group& group = *groups_[number];
+  ClusterRecord none;
+  none.box = {{1.0, 1.0, 1.0}, {0.0, 0.0, 0.0}};
+  bounds_.set(number, none, tree_->level(group.parent) - 1);  // in no view
+  double error = 0.0;
+  for (std::uint32_t i = 0; i < group.columns.size(); ++i) {
+    if (tree_->child_slot({group.parent, i}) != ClusterTree::kNoSlot) continue;
+    bounds_.join(number, group.columns, i);
+    error = std::max(error, group.columns.error(i));
+  }
+  bounds_.set_error(number, error);
+}
+
+void ViewFront::start(const View& view) {
+  view_ = &view;
+  candidates_.clear();
+  soon_.clear();
+  order_.clear();
+  sorted_below_ = -kInfinity;
+  collapsed_ = 0;
+  last_ = ClusterId{~std::uint64_t{0}};
+  std::sort(changed_groups_.begin(), changed_groups_.end());
+  changed_groups_.erase(std::unique(changed_groups_.begin(), changed_groups_.end()),
+                        changed_groups_.end());
+  for (const std::uint32_t group : changed_groups_) {
+    if (groups_[group]) bound(group);
+  }
+  changed_groups_.clear();
+
+  measure(view, *options_, columns_, 0, columns_.size(), own_);
+  own_.want[ClusterTree::kRoot] = own_.keep[ClusterTree::kRoot] = kInfinity;
+  own_.distance[ClusterTree::kRoot] = 0.0;
+  clamp_to_parents();
+  measure(view, *options_, bounds_, 0, bounds_.size(), bound_demand_);
+  if (!pins_.empty()) apply_pins();
+  for (std::uint32_t group = 0; group < groups_.size(); ++group) {
+    if (!groups_[group]) continue;
+    if (bound_demand_.want[group] > 1.0 || bound_demand_.keep[group] > ask_above_) {
+      measure_group(group);
+    }
+  }
+}
+
+void ViewFront::clamp_to_parents() {
+  by_level_.clear();
+  for (Slot slot = ClusterTree::kRoot + 1; slot < tree_->slots(); ++slot) {
+    if (tree_->live(slot)) by_level_.push_back(slot);
+  }
+  // Few levels: a pass for each is cheaper than sorting.
+  for (unsigned level = tree_->top(); level-- > 0;) {
+    for (const Slot slot : by_level_) {
+      if (tree_->level(slot) != level) continue;
+      const Slot parent = tree_->place(slot).parent;
+      own_.want[slot] = std::min(own_.want[slot], own_.want[parent]);
+      own_.keep[slot] = std::min(own_.keep[slot], own_.keep[parent]);
+      own_.distance[slot] = std::max(own_.distance[slot], own_.distance[parent]);
+    }
+  }
+}
+
+void ViewFront::apply_pins() {
+  for (const auto& [id, how] : pins_) {
+    const auto place = tree_->find(id);
+    if (!place || how != Pin::expanded) continue;
+    Slot slot = tree_->child_slot(*place);
+    if (slot == ClusterTree::kNoSlot) bound_demand_.want[group_of_[place->parent]] = kInfinity;
+    if (slot == ClusterTree::kNoSlot) slot = place->parent;
+    for (; slot != ClusterTree::kRoot; slot = tree_->place(slot).parent) {
+      own_.keep[slot] = kInfinity;
+    }
+  }
+  for (const auto& [id, how] : pins_) {
+    const auto place = tree_->find(id);
+    if (!place || how != Pin::collapsed) continue;
+    const Slot slot = tree_->child_slot(*place);
+    if (slot == ClusterTree::kNoSlot) continue;
+    for (const Slot below : tree_->plan_collapse(slot).collapsed) own_.keep[below] = kPinnedDown;
+  }
+}
+
+void ViewFront::measure_group(std::uint32_t number) {
+  const Group& group = *groups_[number];
+  if (pinned_down(group.parent)) return;
+  const std::size_t count = group.columns.size();
+  scratch_.resize(std::max(count, scratch_.want.size()));
+  measure(*view_, *options_, group.columns, 0, count, scratch_);
+  const double most = own_.want[group.parent], least_distance = own_.distance[group.parent];
+  const double most_kept = own_.keep[group.parent];
+  for (std::size_t i = 0; i < count; ++i) {
+    scratch_.want[i] = std::min(scratch_.want[i], most);
+    scratch_.keep[i] = std::min(scratch_.keep[i], most_kept);
+    scratch_.distance[i] = std::max(scratch_.distance[i], least_distance);
+  }
+  if (!pins_.empty()) override_by_pins(number);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const bool wanted = scratch_.want[i] > 1.0;
+    if (!wanted && !(scratch_.keep[i] > ask_above_)) continue;
+    const ChildRef place{group.parent, i};
+    if (tree_->child_slot(place) != ClusterTree::kNoSlot) continue;
+    std::vector<Candidate>& list = wanted ? candidates_ : soon_;
+    list.push_back({scratch_.want[i], scratch_.keep[i], scratch_.distance[i], place,
+                    tree_->child_id(place), group.members[i]});
+    if (!wanted) continue;
+    std::push_heap(candidates_.begin(), candidates_.end(), &ViewFront::less_wanted);
+  }
+}
+
+void ViewFront::override_by_pins(std::uint32_t number) {
+  const Group& group = *groups_[number];
+  for (const auto& [id, how] : pins_) {
+    const auto place = tree_->find(id);
+    if (!place || place->parent != group.parent) continue;
+    const bool up = how == Pin::expanded;
+    scratch_.want[place->index] = scratch_.keep[place->index] = up ? kInfinity : 0.0;
+  }
+}
+
+double ViewFront::keep(ChildRef child) {
+  const Group& group = *groups_[group_of_[child.parent]];
+  scratch_.resize(std::max(group.columns.size(), scratch_.want.size()));
+  measure(*view_, *options_, group.columns, child.index, child.index + 1, scratch_);
+  return std::min(scratch_.keep[child.index], own_.keep[child.parent]);
+}
+
+std::size_t ViewFront::memory() const {
+  std::size_t bytes = columns_.memory() + bounds_.memory() +
+                      group_of_.capacity() * sizeof(std::uint32_t) +
+                      (candidates_.capacity() + soon_.capacity()) * sizeof(Candidate) +
+                      order_.capacity() * sizeof(Ordered) + by_level_.capacity() * sizeof(Slot);
+  for (const ViewDemand* demand : {&own_, &bound_demand_, &scratch_}) {
+    bytes += 3 * demand->want.capacity() * sizeof(double);
+  }
+  for (const auto& group : groups_) {
+    if (!group) continue;
+    bytes +=
+        sizeof(Group) + group->columns.memory() + group->members.capacity() * sizeof(std::uint64_t);
+  }
+  return bytes;
+}
+
+}  // namespace terrace::tri
