@@ -1,0 +1,339 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "terrace/tri/elliptical2.hpp"
+
+#include <cmath>
+#include <limits>
+#include <random>
+#include <stdexcept>
+
+#include <CGAL/Delaunay_triangulation_2.h>
+#include <CGAL/Exact_predicates_exact_constructions_kernel.h>
+#include <CGAL/Triangulation_vertex_base_with_info_2.h>
+#include <gtest/gtest.h>
+
+#include "elliptical2_access.hpp"
+#include "metrics.hpp"
+#include "multiresolution_hierarchy.hpp"
+#include "multiresolution_oracle.hpp"
+#include "points.hpp"
+#include "terrace/tri/multiresolution.hpp"
+
+namespace terrace::tri::test {
+namespace {
+
+// ---- CGAL on the mapped points, mapped without rounding ----------------------------------------
+
+using Exact = CGAL::Exact_predicates_exact_constructions_kernel;
+using Vertex = CGAL::Triangulation_vertex_base_with_info_2<std::size_t, Exact>;
+using Oracle = CGAL::Delaunay_triangulation_2<Exact, CGAL::Triangulation_data_structure_2<Vertex>>;
+
+std::vector<Corners> mapped_triangles(const std::vector<Plane>& points, const LinearMap2& m) {
+  std::vector<std::pair<Exact::Point_2, std::size_t>> mapped;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Exact::FT x(points[i][0]), y(points[i][1]);
+    mapped.emplace_back(Exact::Point_2(Exact::FT(m[0]) * x + Exact::FT(m[1]) * y,
+                                       Exact::FT(m[2]) * x + Exact::FT(m[3]) * y),
+                        i);
+  }
+  const Oracle oracle(mapped.begin(), mapped.end());
+  std::vector<Corners> result;
+  for (const auto& face : oracle.finite_face_handles()) {
+    Corners t;
+    for (int i = 0; i < 3; ++i) t[static_cast<std::size_t>(i)] = points[face->vertex(i)->info()];
+    result.push_back(rotated(t));
+  }
+  std::sort(result.begin(), result.end());
+  return result;
+}
+
+TEST(EllipticalDelaunay2, TrianglesAreCgalsOfTheMappedPointsTiesIncluded) {
+  for (const PointSet kind : kPointSets) {
+    for (std::size_t m = 0; m < lower_maps().size(); ++m) {
+      SCOPED_TRACE(name(kind) + " map " + std::to_string(m));
+      const auto points = make_points<double>(kind, 220, 31 + m);
+      EllipticalDelaunay2 triangulation(lower_maps()[m]);
+      triangulation.build(points);
+      ASSERT_EQ(find_fault(triangulation), "");
+      ASSERT_TRUE(triangles_of(triangulation) == mapped_triangles(points, lower_maps()[m]));
+    }
+  }
+}
+
+TEST(EllipticalDelaunay2, TrianglesAreCgalsOfTheMappedPointsForEllipses) {
+  for (const double angle : {0.0, 17.0, 45.0, 90.0, 123.456, -60.0}) {
+    for (const double ratio : {1.0, 3.0, 40.0}) {
+      SCOPED_TRACE("angle " + std::to_string(angle) + " ratio " + std::to_string(ratio));
+      const LinearMap2 map = ellipse_map(ratio, 1, angle);
+      EXPECT_EQ(map[1], map[2]);
+      const auto points = make_points<double>(PointSet::kUniform, 3000, 5);
+      EllipticalDelaunay2 triangulation(map);
+      triangulation.build(points);
+      ASSERT_TRUE(triangles_of(triangulation) == mapped_triangles(points, map));
+    }
+  }
+}
+
+TEST(EllipticalDelaunay2, NoVertexIsInsideAnEllipse) {
+  // Symmetric maps on points with ties, where CGAL's choice among mapped points may differ.
+  const LinearMap2 map = ellipse_map(4, 1, 30);
+  for (const PointSet kind : kPointSets) {
+    SCOPED_TRACE(name(kind));
+    EllipticalDelaunay2 triangulation(map);
+    triangulation.build(make_points<double>(kind, 60, 2));
+    ASSERT_EQ(find_fault(triangulation), "");
+    for (const TriangleId id : triangulation.all_triangles()) {
+      const Corners t = corners_of(triangulation, triangulation.vertices(id));
+      for (const VertexId v : triangulation.all_vertices())
+        ASSERT_LE(in_ellipse(map, t[0], t[1], t[2], triangulation.point(v)), 0);
+    }
+  }
+}
+
+TEST(EllipticalKernel, SignsAreExact) {
+  using planar::EllipticalKernel;
+  std::mt19937_64 random(6);
+  for (int round = 0; round < 4000; ++round) {
+    SCOPED_TRACE("round " + std::to_string(round));
+    // From plain to impossible for doubles, as for DoubleKernel.
+    const double scale = std::ldexp(1.0, static_cast<int>(random() % 500) - 250);
+    const double offset = round % 3 == 0 ? 0 : std::ldexp(scale, static_cast<int>(random() % 50));
+    std::array<Plane, 4> p;
+    for (auto& point : p) {
+      for (double& c : point) {
+        c = offset + scale * static_cast<double>(random() % 16);
+        if (random() % 4 == 0) c = std::nextafter(c, random() % 2 == 0 ? -1e300 : 1e300);
+      }
+    }
+    LinearMap2 map;
+    do {
+      for (double& entry : map) {
+        entry = std::ldexp(static_cast<double>(random() % 9) - 4.0,
+                           round % 5 == 0 ? static_cast<int>(random() % 200) - 100 : 0);
+      }
+    } while (map[0] * map[3] == map[1] * map[2]);
+    const planar::EllipticalMetric metric(map);
+    const EllipticalKernel::Scope scope(metric);
+    ASSERT_EQ(EllipticalKernel::in_circle(p[0], p[1], p[2], p[3]),
+              in_ellipse(map, p[0], p[1], p[2], p[3]));
+    using Q = CGAL::Exact_rational;
+    const auto squared = [&](const Plane& a) -> Q {
+      return square(map, Q(a[0]) - Q(p[0][0]), Q(a[1]) - Q(p[0][1]));
+    };
+    ASSERT_EQ(EllipticalKernel::compare_distance(p[0], p[1], p[2]),
+              static_cast<int>(CGAL::sign(Q(squared(p[1]) - squared(p[2])))));
+  }
+}
+
+// ---- Laws --------------------------------------------------------------------------------------
+
+TEST(EllipticalDelaunay2, WithAMapThatKeepsCirclesItIsDelaunay2) {
+  for (const LinearMap2& map :
+       {kIdentityMap2, LinearMap2{1e-200, 0, 0, 1e-200}, LinearMap2{0, -3, 3, 0},
+        LinearMap2{0, 1, 1, 0}, LinearMap2{3, -4, 4, 3}, LinearMap2{1e300, 0, 0, -1e300}}) {
+    for (const PointSet kind : kPointSets) {
+      SCOPED_TRACE(name(kind) + " " + std::to_string(map[0]));
+      const auto points = make_points<double>(kind, 300, 3);
+      EllipticalDelaunay2 elliptical(map);
+      Delaunay2<double> plain;
+      elliptical.build(points);
+      plain.build(points);
+      ASSERT_EQ(elliptical.hash(), plain.hash());
+      ASSERT_EQ(elliptical.triangle_count(), plain.triangle_count());
+    }
+  }
+}
+
+TEST(EllipticalDelaunay2, RandomOperationsEqualRebuild) {
+  const LinearMap2 maps[] = {ellipse_map(5, 1, 33), {1, 0, 0, 2}, ellipse_map(100, 1, 90)};
+  for (const PointSet kind : kPointSets) {
+    for (std::uint64_t seed = 0; seed < 3; ++seed) {
+      SCOPED_TRACE(name(kind) + " seed " + std::to_string(seed));
+      std::mt19937_64 random(seed);
+      const auto points = make_points<double>(kind, 250, seed + 100);
+      EllipticalDelaunay2 triangulation(maps[seed]);
+      std::vector<EllipticalDelaunay2::Insertion> results;
+      for (int step = 0; step < 30; ++step) {
+        std::vector<VertexId> alive;
+        for (const VertexId v : triangulation.all_vertices()) alive.push_back(v);
+        const std::size_t begin = random() % points.size();
+        const std::size_t count = std::min<std::size_t>(random() % 50, points.size() - begin);
+        const auto some = std::span(points).subspan(begin, count);
+        switch (random() % 4) {
+          case 0:
+            for (const auto& p : some) triangulation.insert(p);
+            break;
+          case 1:
+            results.resize(count);
+            triangulation.insert(some, results);
+            for (std::size_t i = 0; i < count; ++i)
+              ASSERT_EQ(triangulation.point(results[i].vertex), some[i]);
+            break;
+          case 2:
+            std::shuffle(alive.begin(), alive.end(), random);
+            alive.resize(random() % (alive.size() + 1));
+            for (const VertexId v : alive) triangulation.remove(v);
+            break;
+          default:
+            std::shuffle(alive.begin(), alive.end(), random);
+            alive.resize(random() % (alive.size() + 1));
+            triangulation.remove(std::span<const VertexId>(alive));
+        }
+        ASSERT_EQ(find_fault(triangulation), "") << "step " << step;
+        std::vector<Plane> left;
+        for (const VertexId v : triangulation.all_vertices())
+          left.push_back(triangulation.point(v));
+        std::shuffle(left.begin(), left.end(), random);
+        EllipticalDelaunay2 fresh(maps[seed]);
+        fresh.build(left);
+        ASSERT_EQ(triangulation.hash(), fresh.hash()) << "step " << step;
+      }
+    }
+  }
+}
+
+TEST(EllipticalDelaunay2, PointsThatWouldFallTogetherWhenMappedStayApart) {
+  // So flat an ellipse, so far out, that neighbours along it have the same mapped doubles.
+  const LinearMap2 map = ellipse_map(1e12, 1, 45);
+  std::vector<Plane> points;
+  for (int i = 0; i < 30; ++i) {
+    const double at = 1e9 + i * 0x1p-20;
+    points.push_back({at, at});
+    points.push_back({at, at + 3 + i % 2});
+  }
+  const auto mapped = [&](const Plane& p) {
+    return Plane{map[0] * p[0] + map[1] * p[1], map[2] * p[0] + map[3] * p[1]};
+  };
+  ASSERT_EQ(mapped(points[0]), mapped(points[2]));
+  EllipticalDelaunay2 triangulation(map);
+  const auto vertices = triangulation.build(points);
+  EXPECT_EQ(triangulation.vertex_count(), points.size());
+  for (std::size_t i = 0; i < points.size(); ++i)
+    EXPECT_EQ(triangulation.point(vertices[i]), points[i]);
+  EXPECT_EQ(find_fault(triangulation), "");
+  // Equal coordinates are one vertex, and only those.
+  EXPECT_FALSE(triangulation.insert(points[7]).created);
+  EXPECT_TRUE(triangulation.insert({1e9, std::nextafter(1e9, 2e9)}).created);
+  EXPECT_EQ(find_fault(triangulation), "");
+}
+
+TEST(EllipticalDelaunay2, NearestIsNearestInTheMetric) {
+  const LinearMap2 map = ellipse_map(6, 1, 20);
+  for (const PointSet kind : {PointSet::kUniform, PointSet::kFewBits, PointSet::kGrid,
+                              PointSet::kCircle, PointSet::kHorizontal}) {
+    SCOPED_TRACE(name(kind));
+    EllipticalDelaunay2 triangulation(map);
+    triangulation.build(make_points<double>(kind, 100, 8));
+    for (const Plane& q : make_points<double>(kind, 60, 9)) {
+      using Q = CGAL::Exact_rational;
+      VertexId best = kNoVertex;
+      Q least;
+      for (const VertexId v : triangulation.all_vertices()) {
+        const Plane p = triangulation.point(v);
+        const Q d = square(map, Q(p[0]) - Q(q[0]), Q(p[1]) - Q(q[1]));
+        if (best == kNoVertex || d < least || (d == least && p < triangulation.point(best))) {
+          best = v;
+          least = d;
+        }
+      }
+      ASSERT_EQ(triangulation.nearest(q), best);
+      if (triangulation.point(best) == q) {
+        ASSERT_EQ(triangulation.locate(q).vertex, best);
+      }
+    }
+  }
+}
+
+TEST(EllipticalDelaunay2, RefusesBadInputAndStaysUnchanged) {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(EllipticalDelaunay2({1, 2, 2, 4}), std::invalid_argument);
+  EXPECT_THROW(EllipticalDelaunay2({0, 0, 0, 0}), std::invalid_argument);
+  EXPECT_THROW(EllipticalDelaunay2({1, 0, 0, kNan}), std::invalid_argument);
+  EXPECT_THROW(static_cast<void>(ellipse_map(0, 1, 0)), std::invalid_argument);
+  EXPECT_THROW(static_cast<void>(ellipse_map(1, 1e-320, 0)), std::invalid_argument);
+  EXPECT_THROW(static_cast<void>(ellipse_map(1, 1, kNan)), std::invalid_argument);
+  EXPECT_THROW(static_cast<void>(ellipse_map(1, 1, std::array{1.0, 1.0})), std::invalid_argument);
+  EllipticalDelaunay2 triangulation({1, 0, 0, 2});
+  try {
+    triangulation.build(std::vector<Plane>{{0, 0}, {1, 0}, {0, kNan}});
+    FAIL();
+  } catch (const std::invalid_argument& error) {
+    EXPECT_NE(std::string(error.what()).find("point 2"), std::string::npos) << error.what();
+  }
+  EXPECT_THROW(triangulation.insert({kNan, 0}), std::invalid_argument);
+  EXPECT_EQ(triangulation.vertex_count(), 0u);
+  EXPECT_EQ(triangulation.nearest({0, 0}), kNoVertex);
+  triangulation.build({});
+  triangulation.insert({1, 1});
+  EXPECT_EQ(triangulation.triangle_count(), 0u);
+  EXPECT_EQ(find_fault(triangulation), "");
+}
+
+TEST(Metric2, MapsMeasureEllipses) {
+  // Radii have length 1.
+  const LinearMap2 map = ellipse_map(3, 2, 90);
+  EXPECT_EQ(map[0] * 2.0, 1.0);
+  EXPECT_EQ(map[3] * 3.0, 1.0);
+  EXPECT_EQ(map[1], 0.0);
+  const LinearMap2 turned = ellipse_map(5, 1, 30);
+  const double c = std::sqrt(0.75), s = 0.5;
+  EXPECT_NEAR(
+      std::hypot(turned[0] * 5 * c + turned[1] * 5 * s, turned[2] * 5 * c + turned[3] * 5 * s), 1.0,
+      1e-15);
+  EXPECT_NEAR(std::hypot(turned[1] * c - turned[0] * s, turned[3] * c - turned[2] * s), 1.0, 1e-15);
+  // Maps of space: the upright one bit for bit, another one by its lengths.
+  EXPECT_EQ(plane_map({turned[0], turned[1], 0, turned[2], turned[3], 0, 0, 0, 9}), turned);
+  const std::array<double, 9> m{2, 0.5, 0.25, 0.5, 1, -0.5, 0.25, -0.5, 3};
+  const LinearMap2 flat = plane_map(m);
+  for (const Plane& v : {Plane{1, 0}, Plane{0, 1}, Plane{-2, 3}}) {
+    EXPECT_NEAR(
+        std::hypot(flat[0] * v[0] + flat[1] * v[1], flat[2] * v[0] + flat[3] * v[1]),
+        std::hypot(m[0] * v[0] + m[1] * v[1], m[3] * v[0] + m[4] * v[1], m[6] * v[0] + m[7] * v[1]),
+        1e-14);
+  }
+  EXPECT_THROW(static_cast<void>(plane_map({0, 0, 1, 0, 1, 0, 0, 0, 1})), std::invalid_argument);
+}
+
+// ---- Levels of detail --------------------------------------------------------------------------
+
+static_assert(DynamicTriangulation<EllipticalDelaunay2>);
+
+constexpr LinearMap2 kSlanted{0.3, -0.2, -0.2, 0.9};
+/// With a metric of its own, as the oracle makes triangulations by default.
+struct Slanted : EllipticalDelaunay2 {
+  Slanted() : EllipticalDelaunay2(kSlanted) {}
+};
+
+TEST(EllipticalModel, HasLevelsOfDetail) {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    for (const Shape shape : {Shape::random, Shape::grid, Shape::duplicates, Shape::line}) {
+      SCOPED_TRACE(testing::Message() << "seed " << seed << ", shape " << static_cast<int>(shape));
+      std::mt19937_64 random(seed);
+      MemorySource source = make_hierarchy(make_points(shape, 150, random), 3, 4.0, random);
+      const WholeTree tree(source);
+      MultiresolutionModel<Slanted> model(source);
+      const std::uint64_t coarse = model.triangulation().hash();
+      Consumer<Slanted> consumer(model);
+      for (int step = 0; step < 8; ++step) {
+        Detail detail;
+        detail.level = static_cast<unsigned>(below(random, source.top() + 1));
+        const auto& p = source.root().positions[below(random, source.root().positions.size())];
+        detail.focuses.push_back({box2(p[0] - 5, p[1] - 5, p[0] + 5, p[1] + 5), 0});
+        consumer.apply(model.set_detail(detail));
+        ASSERT_NO_FATAL_FAILURE(check_model(model, source, wanted(tree, source, detail)));
+        ASSERT_NO_FATAL_FAILURE(consumer.check());
+        ASSERT_EQ(find_fault(model.triangulation()), "");
+      }
+      model.set_level(source.top());
+      ASSERT_EQ(model.triangulation().hash(), coarse);
+
+      // The metric may be given to the model.
+      MultiresolutionModel<EllipticalDelaunay2> given(source, {}, {},
+                                                      EllipticalDelaunay2(kSlanted));
+      ASSERT_EQ(given.triangulation().hash(), coarse);
+      ASSERT_EQ(given.triangulation().map(), kSlanted);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace terrace::tri::test
