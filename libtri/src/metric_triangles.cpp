@@ -29,6 +29,7 @@ class Flips {
   Flips(const Triangulation& triangulation, const MetricField2& field,
         const std::optional<Box3>& window)
       : point_(triangulation.vertex_slots()), region_(triangulation.vertex_slots(), kNoRegion) {
+    if (!window) triangle_.reserve(triangulation.triangle_count());
     // The dense number of each triangle that takes part.
     std::vector<std::uint32_t> number(triangulation.triangle_slots(), kNone);
     for (const TriangleId id : triangulation.all_triangles()) {

@@ -36,8 +36,8 @@ namespace terrace::tri {
 ///
 /// Throws: std::invalid_argument if the field gives a map at a vertex that is no metric, and what
 /// the field throws. The map is asked for once per vertex (of the window). Costs O(n) beside the
-/// flips, of which there are some per vertex for ellipses of ratio 3, in proportion to the ratio;
-/// at worst O(n^2). Holds about 76 bytes per vertex while it runs.
+/// flips, of which O(n^2) are possible, but few where ellipses are not extreme. Holds about 120
+/// bytes per vertex while it runs, the result among them.
 ///
 /// Triangulation: Delaunay2<std::int32_t>, Delaunay2<double> or EllipticalDelaunay2, by itself or
 /// that of a MultiresolutionModel.
