@@ -9,9 +9,10 @@
 #include <thread>
 #include <utility>
 
+#include "label_groups.hpp"
+#include "parallel.hpp"
 #include "windows/cut.hpp"
 #include "windows/discs.hpp"
-#include "windows/parallel.hpp"
 
 namespace terrace::matching {
 namespace {
@@ -128,21 +129,16 @@ class Windows {
   // A cluster of more points than four windows have is cut: it would take too long, or too much
   // memory.
   Parts clusters() const {
-    std::vector<Unit<D>> units;
-    units.reserve(points_.size());
-    for (std::uint32_t i = 0; i < points_.size(); ++i) units.push_back({points_[i], i});
-    const auto& labels = options_.labels;
-    std::sort(units.begin(), units.end(), [&](const Unit<D>& a, const Unit<D>& b) {
-      return std::pair(labels[a.name], a.name) < std::pair(labels[b.name], b.name);
-    });
+    const LabelGroups groups =
+        group_by_label(static_cast<std::uint32_t>(points_.size()), options_.labels);
     Parts parts;
-    for (std::size_t begin = 0, end = 0; begin < units.size(); begin = end) {
-      while (end < units.size() && labels[units[end].name] == labels[units[begin].name]) ++end;
-      windows::cut<D>(std::span(units).subspan(begin, end - begin), 4 * options_.window, true, 0,
-                      begin, parts.ends);
+    std::vector<Unit<D>> units;
+    for (std::size_t g = 0; g < groups.count(); ++g) {
+      units.clear();
+      for (const std::uint32_t i : groups.group(g)) units.push_back({points_[i], i});
+      windows::cut<D>(units, 4 * options_.window, true, 0, groups.begin[g], parts.ends);
+      for (const auto& unit : units) parts.points.push_back(unit.name);
     }
-    parts.points.reserve(units.size());
-    for (const auto& unit : units) parts.points.push_back(unit.name);
     sort_within(parts);
     return parts;
   }
@@ -203,7 +199,7 @@ class Windows {
     if (keep_duals_) discs.start(parts.count());
     parts_ = parts.count();
     planned_ = windows_done_.load() + parts_;
-    const bool all = windows::for_each_index(
+    const bool all = for_each_index(
         parts.count(), threads_,
         [&](std::size_t k) {
           match_part(k, parts.part(k), first, discs);

@@ -11,6 +11,8 @@ struct Dendrogram;
 
 namespace terrace::tools {
 
+struct MatchingPicture;
+
 struct DrawOptions {
   bool wire = false;  ///< draws the edges over the faces, which are then lit flat
   unsigned threads = 1;
@@ -35,6 +37,13 @@ void draw_marks(const std::vector<stream::Point3>& positions, const Camera& came
 /// Draws a dendrogram, leaves at the bottom, heights linear; subtrees below 0.7 of the top in
 /// colours of their own. O(points + samples drawn).
 void draw_dendrogram(const cluster::Dendrogram& tree, Canvas& canvas);
+
+/// Draws a matching on white paper: its points as dots, those that no line reaches as rings, and
+/// its lines from red, level 1, to black, level `top`, the lower ones over the higher. In a crowd
+/// the higher ones are over the lower, and there are no dots. Widths follow from the usual length
+/// of a pair. O(points + lines log(lines) + samples drawn).
+void draw_matching(const MatchingPicture& picture, const Camera& camera, const DrawOptions& options,
+                   Canvas& canvas);
 
 /// The smallest whole view of all positions: sets scale and centre for the size of `canvas`, with a
 /// margin of 2 %.

@@ -210,7 +210,8 @@ PictureInput from_store(const std::string& path, const PictureSelection& selecti
 
 void define_picture_input(CLI::App& app, PictureSelection& selection) {
   app.add_option("--level", selection.level,
-                 "store: detail, a number or top (default: all cells, or about 4 M points)")
+                 "store: detail, a number or top (default: all cells, or about 4 M points); tree: "
+                 "lines up to level L (default: all)")
       ->type_name("L");
   app.add_option("--focus", selection.focuses,
                  "store: BOX:L, all points of level L inside the box; repeatable (the rest: top)")

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// render: a picture of a raster, a mesh, a cloud of points or a dendrogram.
+// render: a picture of a raster, a mesh, a cloud of points, a dendrogram or a matching.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -17,6 +17,7 @@
 #include "ground.hpp"
 #include "height_grid.hpp"
 #include "interrupt.hpp"
+#include "matching_result.hpp"
 #include "mesh_file.hpp"
 #include "output.hpp"
 #include "picture_input.hpp"
@@ -55,7 +56,8 @@ class RenderCommand : public Command {
  public:
   void define(CLI::App& app) override {
     app.add_option("input", input_,
-                   "Store, raster, mesh (PLY, OBJ), cloud of points or dendrogram (CSV)")
+                   "Store, raster, mesh (PLY, OBJ), cloud of points, dendrogram (CSV), or pairs or "
+                   "tree of 'match' (CSV)")
         ->required()
         ->type_name("FILE");
     add_output(app, output_, "The picture (PNG); - is standard output");
@@ -74,6 +76,9 @@ class RenderCommand : public Command {
         ->check(CLI::PositiveNumber)
         ->type_name("FACTOR");
     define_picture_input(app, selection_);
+    app.add_option("--points", points_file_,
+                   "pairs, tree: the file of points that they were made from")
+        ->type_name("FILE");
   }
 
   Summary run(const CommonOptions& common) override {
@@ -85,6 +90,11 @@ class RenderCommand : public Command {
     const ViewDirection view = parse_view(view_);
     const bool replace = may_replace(output_, common.force);
 
+    if (is_matching_result(input_)) return render_matching(size, view, replace, common, watch);
+    if (!points_file_.empty()) {
+      throw UsageError("--points is for what 'terrace match' wrote; '" + input_ +
+                       "' is something else");
+    }
     if (const auto tree = read_dendrogram(input_)) return render_tree(*tree, size, replace, watch);
     selection_.triangles = wire_;
     PictureInput input = read_picture_input(input_, selection_, size, common);
@@ -152,6 +162,47 @@ class RenderCommand : public Command {
     return summary;
   }
 
+  Summary render_matching(const ImageSize& size, const ViewDirection& view, bool replace,
+                          const CommonOptions& common, const Stopwatch& watch) {
+    if (points_file_.empty()) {
+      throw UsageError("'" + input_ +
+                       "' says which points belong together, not where they are: "
+                       "name the file that it was made from with --points FILE");
+    }
+    if (wire_ || !color_.empty() || !selection_.focuses.empty()) {
+      throw UsageError("--wire, --color and --focus do not apply to what 'terrace match' wrote");
+    }
+    MatchingPicture picture = read_matching_picture(input_, points_file_, common);
+    if (!picture.assumption.empty()) common.explain(points_file_ + ": " + picture.assumption);
+    picture.keep_levels(selection_.level);
+    if (exaggerate_ > 0) {
+      for (stream::Point3& p : picture.positions) p[2] *= exaggerate_;
+    }
+    check_interrupt();
+    Canvas canvas(static_cast<std::uint32_t>(size.width), static_cast<std::uint32_t>(size.height));
+    Camera camera(view);
+    fit(camera, picture.positions, canvas);
+    draw_matching(picture, camera, {.threads = common.threads}, canvas);
+    check_interrupt();
+    stream::write_png(output_, size.width, size.height, 3, canvas.resolve(), replace);
+
+    const MatchingResult& result = picture.result;
+    Summary summary;
+    summary.json = {{"width", size.width},
+                    {"height", size.height},
+                    {"points", result.points},
+                    {"lines", result.lines.size()},
+                    {"levels", result.top},
+                    {"seconds", watch.seconds()},
+                    {"peak_rss_bytes", peak_rss_bytes()}};
+    summary.text = output_ + ": " + std::to_string(size.width) + " x " +
+                   std::to_string(size.height) + " pixels, " + with_commas(result.lines.size()) +
+                   (result.tree ? " lines of a tree of " : " pairs of ") +
+                   with_commas(result.points) + " points, " + readable_seconds(watch.seconds()) +
+                   '\n';
+    return summary;
+  }
+
   /// One colour per vertex. heights: in the source's own unit.
   [[nodiscard]] std::vector<Rgb> colours_of(const TriangleMesh& mesh,
                                             const std::vector<double>& heights,
@@ -204,7 +255,7 @@ class RenderCommand : public Command {
     return factor;
   }
 
-  std::string input_, output_, size_ = "1600x1200", color_, view_ = "top";
+  std::string input_, output_, points_file_, size_ = "1600x1200", color_, view_ = "top";
   bool wire_ = false;
   double exaggerate_ = 0;
   double relief_ = 1;

@@ -12,7 +12,7 @@
 
 #include <unistd.h>
 
-#include "tree/label_groups.hpp"
+#include "label_groups.hpp"
 #include "tree/match_level.hpp"
 
 namespace terrace::matching {
@@ -71,7 +71,7 @@ class Builder {
     if (n == 1) return std::move(tree_);
     tree_.rows.resize(n - 1);
     tree_.positions.resize(n - 1);
-    const tree::LabelGroups groups = tree::group_by_label(n, options_.labels);
+    const LabelGroups groups = group_by_label(n, options_.labels);
     std::vector<Node> roots(groups.count());
     try {
       build_clusters(groups, roots);
@@ -140,7 +140,7 @@ class Builder {
   }
 
   // A cluster of m points makes m - 1 rows, so each has its place before any is built.
-  void build_clusters(const tree::LabelGroups& groups, std::vector<Node>& roots) {
+  void build_clusters(const LabelGroups& groups, std::vector<Node>& roots) {
     std::vector<std::uint32_t> by_size(groups.count());
     std::iota(by_size.begin(), by_size.end(), 0u);
     std::stable_sort(by_size.begin(), by_size.end(), [&](std::uint32_t g, std::uint32_t h) {

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "blossom/box_tree.hpp"
-#include "windows/parallel.hpp"
+#include "parallel.hpp"
 
 namespace terrace::matching::windows {
 

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-namespace terrace::matching::windows {
+namespace terrace::matching {
 
 /// Calls work(k) for k below count, several at once. `watch` is called by the caller's thread after
 /// each of its own; false keeps all further k from being begun.
@@ -45,4 +45,4 @@ inline bool for_each_index(std::size_t count, unsigned threads,
   return !stopped;
 }
 
-}  // namespace terrace::matching::windows
+}  // namespace terrace::matching

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-namespace terrace::matching::tree {
+namespace terrace::matching {
 
 /// Points by their label: group g is order[begin[g]] .. order[begin[g + 1] - 1], indices ascending.
 /// Groups are by ascending label, none is empty.
@@ -50,4 +50,4 @@ inline LabelGroups group_by_label(std::uint32_t points, std::span<const std::uin
   return groups;
 }
 
-}  // namespace terrace::matching::tree
+}  // namespace terrace::matching

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <initializer_list>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "terrace/matching/halving.hpp"
+#include "terrace/matching/point.hpp"
+
+/// The figures of section 7.5.2 of the thesis, each as a CSV file and a few lines on stdout.
+
+namespace terrace::matching::thesis {
+
+/// One search of figures 7.23 and 7.24.
+struct SearchRun {
+  std::string set;  ///< "100a"
+  std::size_t points = 0;
+  std::uint64_t iterations = 0;
+  double optimum = 0.0;
+  HalvingMatching monte_carlo, monotone;
+
+  /// Per cent above the optimum after so many iterations.
+  [[nodiscard]] double gap_after(std::uint64_t iterations_done, const HalvingMatching& of) const;
+};
+
+/// How large to run, and where to write.
+struct Setting {
+  enum class Size { small, standard, full };  ///< small: as a test, in a second or two
+  Size size = Size::standard;
+  unsigned threads = 1;
+  std::optional<std::filesystem::path> out = {};  ///< a folder that exists; none: stdout alone
+  std::vector<SearchRun> runs = {};               ///< see search_runs()
+
+  [[nodiscard]] bool is_small() const { return size == Size::small; }
+};
+
+/// A table written row by row; numbers are the shortest decimals that read back the same.
+class Csv {
+ public:
+  using Cell = std::variant<std::string, std::uint64_t, double>;
+
+  /// Writes nothing where the setting has no folder.
+  Csv(const Setting& setting, const std::string& name, const std::string& header);
+  void row(std::initializer_list<Cell> cells);
+  /// Throws: std::runtime_error if the file could not be written.
+  void close();
+
+ private:
+  std::filesystem::path path_;
+  std::ofstream out_;
+};
+
+/// Uniform in the unit square, z = 0.
+std::vector<Point3> uniform_points(std::size_t count, std::uint64_t seed);
+/// Processor, cores and compiler.
+std::string machine();
+/// "12.35" of 12.3456 with 2 digits.
+std::string fixed(double value, int digits);
+
+/// Running time of the assignment against n.
+void figure_7_21(Setting& setting);
+/// The cost of each of the first 100 iterations of the Monte Carlo method.
+void figure_7_22(Setting& setting);
+/// The least cost so far against iterations.
+void figure_7_23(Setting& setting);
+/// By how many per cent of the one before each new least cost is lower.
+void figure_7_24(Setting& setting);
+
+}  // namespace terrace::matching::thesis

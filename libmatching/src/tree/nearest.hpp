@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "terrace/matching/point_hierarchy.hpp"
+#include "tree/near_walk.hpp"
+
+namespace terrace::matching::tree {
+
+/// A primitive by its squared distance in the hierarchy's scale, ties by index.
+using Candidate = std::pair<double, std::uint32_t>;
+
+/// The nearest primitive; squared(slot) is the squared distance of that in a slot.
+template <std::size_t D, class Squared>
+std::optional<Neighbour> nearest_one(const BoundingVolumeHierarchy<D>& tree,
+                                     const std::array<double, D>& framed, Squared&& squared) {
+  Candidate best{std::numeric_limits<double>::infinity(), kNobody};
+  const std::uint32_t* order = tree.order().data();
+  walk_near(
+      tree, framed,
+      [&](const HierarchyNode<D>& leaf) {
+        for (std::uint32_t slot = leaf.link; slot < leaf.link + leaf.count; ++slot) {
+          const double d = squared(slot);
+          if (d <= best.first) best = std::min(best, Candidate{d, order[slot]});
+        }
+      },
+      [&] { return best.first; });
+  if (best.second == kNobody) return std::nullopt;
+  return Neighbour{best.second, std::sqrt(best.first) / tree.frame().scale};
+}
+
+/// The k nearest, in `found`.
+template <std::size_t D, class Squared>
+void nearest_few(const BoundingVolumeHierarchy<D>& tree, const std::array<double, D>& framed,
+                 std::size_t k, Squared&& squared, std::vector<Neighbour>& found) {
+  found.clear();
+  k = std::min(k, tree.order().size());
+  if (k == 0) return;
+  // A heap with the farthest on top. Distances are squared until the end.
+  const auto nearer = [](const Neighbour& p, const Neighbour& q) {
+    return p.distance != q.distance ? p.distance < q.distance : p.index < q.index;
+  };
+  const std::uint32_t* order = tree.order().data();
+  double bound = std::numeric_limits<double>::infinity();
+  walk_near(
+      tree, framed,
+      [&](const HierarchyNode<D>& leaf) {
+        for (std::uint32_t slot = leaf.link; slot < leaf.link + leaf.count; ++slot) {
+          const Neighbour candidate{order[slot], squared(slot)};
+          if (candidate.distance > bound) continue;
+          if (found.size() == k) {
+            if (!nearer(candidate, found.front())) continue;
+            std::pop_heap(found.begin(), found.end(), nearer);
+            found.back() = candidate;
+          } else {
+            found.push_back(candidate);
+          }
+          std::push_heap(found.begin(), found.end(), nearer);
+          if (found.size() == k) bound = found.front().distance;
+        }
+      },
+      [&] { return bound; });
+  std::sort_heap(found.begin(), found.end(), nearer);
+  for (Neighbour& neighbour : found) {
+    neighbour.distance = std::sqrt(neighbour.distance) / tree.frame().scale;
+  }
+}
+
+}  // namespace terrace::matching::tree

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "terrace/matching/point_hierarchy.hpp"
+#include "tree/near_walk.hpp"
+
+namespace terrace::matching::tree {
+
+/// A ray in the units of the primitives, its direction's largest coordinate from 1/2 to 1, and what
+/// the boxes need of it.
+class FramedRay {
+ public:
+  /// margin: how far beyond a box the ray still meets what is in it, in the caller's unit.
+  FramedRay(const Ray& ray, const HierarchyFrame<3>& frame, double margin = 0.0) {
+    const FramedPlace<3> place(ray.origin, frame);
+    origin = place.scaled;
+    framed_origin_ = place.framed;
+    double largest = 0.0, far = frame.reach;
+    for (std::size_t d = 0; d < 3; ++d) {
+      if (!std::isfinite(ray.direction[d])) fail("direction is not finite");
+      largest = std::max(largest, std::abs(ray.direction[d]));
+      far = std::max(far, std::abs(framed_origin_[d]));
+    }
+    if (largest == 0.0) fail("direction has no length");
+    if (std::isnan(ray.t_min) || std::isnan(ray.t_max)) fail("t_min or t_max is not a number");
+    const int exponent = std::ilogb(largest) + 1;
+    unit_ = std::ldexp(frame.scale, exponent);
+    if (!(unit_ <= 0x1p1000) || !(unit_ >= 0x1p-1000)) {
+      fail("direction is too long or too short for coordinates of this size");
+    }
+    t_min = ray.t_min * unit_;
+    t_max = ray.t_max * unit_;
+    // Primitives are met with errors of some 2^-51 of all coordinates that enter.
+    const double wide = margin * frame.scale + 0x1p-48 * (far + margin * frame.scale);
+    for (std::size_t d = 0; d < 3; ++d) {
+      direction[d] = std::ldexp(ray.direction[d], -exponent);
+      inverse_[d] = 1.0 / direction[d];
+      backward_[d] = std::signbit(direction[d]);
+      for_lo_[d] = framed_origin_[d] + wide;
+      for_hi_[d] = framed_origin_[d] - wide;
+    }
+  }
+
+  /// From t of this ray to t of the caller's.
+  [[nodiscard]] double callers_t(double t) const { return t / unit_; }
+
+  struct Range {
+    double enter, leave;
+    [[nodiscard]] bool empty() const { return !(enter <= leave); }
+  };
+
+  /// Where the ray is within the box, not before t_min nor after `last`. Where a coordinate of the
+  /// direction is 0 and the origin on the box's border, 0 times infinity is passed over: that axis
+  /// excludes nothing.
+  template <class AnyBox>
+  [[nodiscard]] Range within(const AnyBox& box, double last) const {
+    Range range{t_min, last};
+    for (std::size_t d = 0; d < 3; ++d) {
+      const double lo = (static_cast<double>(box.lo[d]) - for_lo_[d]) * inverse_[d];
+      const double hi = (static_cast<double>(box.hi[d]) - for_hi_[d]) * inverse_[d];
+      const double enter = backward_[d] ? hi : lo;
+      const double leave = backward_[d] ? lo : hi;
+      range.enter = enter > range.enter ? enter : range.enter;
+      range.leave = leave < range.leave ? leave : range.leave;
+    }
+    return range;
+  }
+
+  /// t moved to where the ray is within the box of the primitive that was met at t, none if it is
+  /// nowhere: so no node around is left out on the ground of an earlier hit, and all trees answer
+  /// the same. A matter of some roundings but for triangles seen nearly edge-on. The box's
+  /// coordinates are in the units of the primitives.
+  [[nodiscard]] std::optional<double> moved_into(Box<3> box, const HierarchyFrame<3>& frame,
+                                                 double t) const {
+    for (std::size_t d = 0; d < 3; ++d) {
+      box.lo[d] -= frame.centre[d];
+      box.hi[d] -= frame.centre[d];
+    }
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    const Range range = within(box, kInfinity);
+    if (range.empty()) return std::nullopt;
+    return std::clamp(t, range.enter, range.leave);
+  }
+
+  Point3 origin, direction;
+  double t_min, t_max;
+
+ private:
+  [[noreturn]] static void fail(const char* what) {
+    throw std::invalid_argument(std::string("a ray's ") + what);
+  }
+
+  Point3 framed_origin_, inverse_, for_lo_, for_hi_;
+  std::array<bool, 3> backward_;
+  double unit_;
+};
+
+/// Calls leaf(node, best) for each leaf that the ray enters not after the best hit so far, near
+/// ones first; leaf() lowers best.t, in the ray's own t.
+template <class Leaf>
+RayHit walk_ray(const BoundingVolumeHierarchy<3>& tree, const FramedRay& ray, Leaf&& leaf) {
+  RayHit best{kNobody, ray.t_max};
+  const auto nodes = tree.nodes();
+  if (nodes.empty()) return best;
+  struct Entry {
+    double enter;
+    std::uint32_t node;
+  };
+  WalkStack<Entry> open(tree.depth());
+  const auto root = ray.within(nodes[0], best.t);
+  if (root.empty()) return best;
+  Entry at{root.enter, 0};
+  while (true) {
+    const auto& node = nodes[at.node];
+    if (node.count != 0) {
+      leaf(node, best);
+    } else {
+      const auto first = ray.within(nodes[at.node + 1], best.t);
+      const auto second = ray.within(nodes[node.link], best.t);
+      Entry near{first.enter, at.node + 1}, far{second.enter, node.link};
+      bool has_near = !first.empty(), has_far = !second.empty();
+      if (has_far && (!has_near || far.enter < near.enter)) {
+        std::swap(near, far);
+        std::swap(has_near, has_far);
+      }
+      if (has_near) {
+        if (has_far) open.push(far);
+        at = near;
+        continue;
+      }
+    }
+    do {
+      if (open.empty()) return best;
+      at = open.pop();
+    } while (at.enter > best.t);
+  }
+}
+
+}  // namespace terrace::matching::tree

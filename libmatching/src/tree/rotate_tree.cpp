@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <utility>
+
+#include "terrace/matching/bounding_volume_hierarchy.hpp"
+#include "tree/box_area.hpp"
+#include "tree/check_tree.hpp"
+
+namespace terrace::matching {
+namespace {
+
+template <std::size_t D>
+class Rotation {
+ public:
+  Rotation(std::span<const TreeChildren> rows, std::span<const Box<D>> boxes)
+      : count_(static_cast<std::uint32_t>(boxes.size())),
+        children_(rows.begin(), rows.end()),
+        boxes_(boxes.begin(), boxes.end()) {
+    // By a power of two, so that areas neither overflow nor vanish.
+    double largest = 0.0;
+    for (const Box<D>& box : boxes_) {
+      for (std::size_t d = 0; d < D; ++d) {
+        largest = std::max({largest, std::abs(box.lo[d]), std::abs(box.hi[d])});
+      }
+    }
+    if (largest > 0.0) {
+      const int exponent = -std::ilogb(largest) - 1;
+      for (Box<D>& box : boxes_) {
+        for (std::size_t d = 0; d < D; ++d) {
+          box.lo[d] = std::ldexp(box.lo[d], exponent);
+          box.hi[d] = std::ldexp(box.hi[d], exponent);
+        }
+      }
+    }
+    boxes_.reserve(boxes_.size() + rows.size());
+    for (const auto& [a, b] : rows) boxes_.push_back(together(a, b));
+    for (std::size_t v = count_; v < boxes_.size(); ++v) cost_ += tree::area_of(boxes_[v]);
+    set_order();
+  }
+
+  /// Whether it gained enough to go on.
+  bool pass() {
+    double gained = 0.0;
+    for (const std::uint32_t v : order_) gained += rotate(v);
+    set_order();
+    cost_ -= gained;
+    return gained > 1e-3 * cost_;
+  }
+
+  /// The rows by a walk that leaves each after its children.
+  [[nodiscard]] std::vector<TreeChildren> rows() const {
+    std::vector<std::uint32_t> number(boxes_.size());
+    for (std::uint32_t i = 0; i < count_; ++i) number[i] = i;
+    std::vector<TreeChildren> rows;
+    rows.reserve(children_.size());
+    for (const std::uint32_t v : order_) {
+      number[v] = static_cast<std::uint32_t>(count_ + rows.size());
+      const auto [a, b] = children_[v - count_];
+      rows.push_back({number[a], number[b]});
+    }
+    return rows;
+  }
+
+ private:
+  [[nodiscard]] Box<D> together(std::uint32_t a, std::uint32_t b) const {
+    Box<D> box = boxes_[a];
+    for (std::size_t d = 0; d < D; ++d) {
+      box.lo[d] = std::min(box.lo[d], boxes_[b].lo[d]);
+      box.hi[d] = std::max(box.hi[d], boxes_[b].hi[d]);
+    }
+    return box;
+  }
+
+  // An inner node that is no pair of primitives.
+  [[nodiscard]] bool may_change(std::uint32_t v) const {
+    if (v < count_) return false;
+    const auto [a, b] = children_[v - count_];
+    return a >= count_ || b >= count_;
+  }
+
+  /// Two nodes change places: `first` is a child of `first_parent`, and so on.
+  struct Swap {
+    std::uint32_t first_parent = 0, first = 0, second_parent = 0, second = 0;
+    double gain = 0.0;
+  };
+
+  static std::uint32_t other(const TreeChildren& children, std::uint32_t child) {
+    return children.a == child ? children.b : children.a;
+  }
+
+  // Of those swaps below v that make the boxes of its children smaller the best is made.
+  double rotate(std::uint32_t v) {
+    const auto [a, b] = children_[v - count_];
+    Swap best;
+    const auto lower = [&](std::uint32_t sibling, std::uint32_t parent) {
+      if (!may_change(parent)) return;
+      const TreeChildren below = children_[parent - count_];
+      for (const std::uint32_t child : {below.a, below.b}) {
+        const double gain =
+            tree::area_of(boxes_[parent]) - tree::area_of(together(sibling, other(below, child)));
+        if (gain > best.gain) best = {v, sibling, parent, child, gain};
+      }
+    };
+    lower(a, b);
+    lower(b, a);
+    if (may_change(a) && may_change(b)) {
+      const TreeChildren left = children_[a - count_], right = children_[b - count_];
+      const double now = tree::area_of(boxes_[a]) + tree::area_of(boxes_[b]);
+      for (const std::uint32_t child : {right.a, right.b}) {
+        const double gain = now - tree::area_of(together(left.a, other(right, child))) -
+                            tree::area_of(together(child, left.b));
+        if (gain > best.gain) best = {a, left.a, b, child, gain};
+      }
+    }
+    // Less would be rounding.
+    if (!(best.gain > 1e-12 * tree::area_of(boxes_[v]))) return 0.0;
+    replace(best.first_parent, best.first, best.second);
+    replace(best.second_parent, best.second, best.first);
+    for (const std::uint32_t parent : {best.first_parent, best.second_parent}) {
+      if (parent == v) continue;
+      const auto [first, second] = children_[parent - count_];
+      boxes_[parent] = together(first, second);
+    }
+    return best.gain;
+  }
+
+  void replace(std::uint32_t parent, std::uint32_t child, std::uint32_t by) {
+    TreeChildren& children = children_[parent - count_];
+    (children.a == child ? children.a : children.b) = by;
+  }
+
+  // Parents before children from the root, then turned round.
+  void set_order() {
+    order_.clear();
+    if (children_.empty()) return;
+    order_.reserve(children_.size());
+    std::vector<std::uint32_t> open{static_cast<std::uint32_t>(boxes_.size() - 1)};
+    while (!open.empty()) {
+      const std::uint32_t v = open.back();
+      open.pop_back();
+      order_.push_back(v);
+      const auto [a, b] = children_[v - count_];
+      for (const std::uint32_t child : {b, a}) {
+        if (child >= count_) open.push_back(child);
+      }
+    }
+    std::reverse(order_.begin(), order_.end());
+  }
+
+  std::uint32_t count_;
+  std::vector<TreeChildren> children_;
+  std::vector<Box<D>> boxes_;
+  std::vector<std::uint32_t> order_;  // of the inner nodes, children first; the root stays the last
+  double cost_ = 0.0;                 // the sum of the inner nodes' areas
+};
+
+}  // namespace
+
+template <std::size_t D>
+std::vector<TreeChildren> rotate_tree(std::span<const TreeChildren> rows,
+                                      std::span<const Box<D>> boxes, unsigned passes) {
+  tree::check_rows(rows, boxes.size());
+  tree::check_boxes(boxes);
+  Rotation<D> rotation(rows, boxes);
+  while (passes-- > 0 && rotation.pass()) {
+  }
+  return rotation.rows();
+}
+
+template std::vector<TreeChildren> rotate_tree<2>(std::span<const TreeChildren>,
+                                                  std::span<const Box<2>>, unsigned);
+template std::vector<TreeChildren> rotate_tree<3>(std::span<const TreeChildren>,
+                                                  std::span<const Box<3>>, unsigned);
+
+}  // namespace terrace::matching

@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Table 8.1 of the thesis beside ours: random clusters of an elevation model, expanded above a
+// coarse triangulation, are collapsed: by the model (its sets, and its bookkeeping with the
+// journal), point by point, and point by point by CGAL. Writes table_8_1.csv.
+//
+//   tri_thesis_bench --out DIR
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <ctime>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <CGAL/Delaunay_triangulation_2.h>
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+
+#include "multiresolution_hierarchy.hpp"
+#include "terrace/tri/multiresolution.hpp"
+
+namespace terrace::tri::bench {
+namespace {
+
+using Plain = Delaunay2<std::int32_t>;
+using Triangulation = Timed<Plain>;
+using Model = MultiresolutionModel<Triangulation>;
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using Cgal = CGAL::Delaunay_triangulation_2<Kernel>;
+
+const bool kSmall = std::getenv("TERRACE_BENCH_SMALL") != nullptr;
+const int kRounds = kSmall ? 1 : 7;
+
+/// Seconds on a Pentium 4 at 3.2 GHz.
+struct ThesisRow {
+  std::size_t clusters, points;
+  double overhead, one_by_one, hole_enlarging;
+};
+constexpr std::array<ThesisRow, 6> kThesis{{{15, 4454, 0.01, 0.09, 0.09},
+                                            {30, 9415, 0.08, 0.23, 0.17},
+                                            {60, 19095, 0.35, 0.49, 0.33},
+                                            {125, 36690, 1.37, 1.56, 0.72},
+                                            {250, 73060, 6.66, 4.04, 1.54},
+                                            {500, 146741, 35.23, 10.34, 5.54}}};
+
+/// CPU time of the process, which has one thread: other load of the machine disturbs it less.
+double now() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return values[values.size() / 2];
+}
+
+Plain::Point plane(const Point3& p) {
+  return {static_cast<std::int32_t>(p[0]), static_cast<std::int32_t>(p[1])};
+}
+
+std::vector<ClusterId> draw(const ArraySource& source, std::size_t count, std::mt19937_64& random) {
+  std::vector<std::uint64_t> all(source.cluster_count(0));
+  for (std::size_t k = 0; k < all.size(); ++k) all[k] = k;
+  std::vector<ClusterId> drawn;
+  for (std::size_t k = 0; k < std::min(count, all.size()); ++k) {
+    const auto rest = static_cast<double>(all.size() - k);
+    std::swap(all[k], all[k + static_cast<std::size_t>(unit(random) * rest)]);
+    drawn.push_back(cluster_id(0, all[k]));
+  }
+  return drawn;
+}
+
+struct Times {
+  double sets = 0.0, bookkeeping = 0.0, one_by_one = 0.0, cgal = 0.0;
+  std::size_t points = 0;
+};
+
+/// What the model and its journal add: all it spends, less what the triangulation and the source
+/// do.
+void bookkeeping(ArraySource& source, const std::vector<ClusterId>& clusters, Times& times) {
+  std::vector<double> own;
+  Model model(source, {1, {}});
+  for (int round = 0; round < kRounds; ++round) {
+    for (const ClusterId id : clusters) model.expand(id);
+    const double others = Triangulation::seconds() + source.seconds;
+    double total = 0.0;
+    {
+      const Lap lap(total);
+      for (const ClusterId id : clusters) model.collapse(id);
+    }
+    own.push_back(total - (Triangulation::seconds() + source.seconds - others));
+  }
+  times.bookkeeping = median(own);
+}
+
+/// Removal of the clusters' points, each cluster as a set or point by point.
+void removal(ArraySource& source, const std::vector<ClusterId>& clusters, Times& times) {
+  Plain triangulation;
+  std::vector<Plain::Point> base;
+  for (const Point3& p : source.levels.back().positions) base.push_back(plane(p));
+  triangulation.build(base);
+  std::vector<std::vector<VertexId>> sets(clusters.size());
+  const auto insert = [&] {
+    times.points = 0;
+    for (std::size_t k = 0; k < clusters.size(); ++k) {
+      std::vector<Plain::Point> points;
+      for (const Point3& p : source.read(clusters[k]).positions) points.push_back(plane(p));
+      std::vector<Plain::Insertion> insertions(points.size());
+      if (!points.empty()) {
+        triangulation.insert(points, insertions, triangulation.nearest(points[0]));
+      }
+      sets[k].clear();
+      for (const auto& insertion : insertions) sets[k].push_back(insertion.vertex);
+      times.points += points.size();
+    }
+  };
+  std::vector<double> as_sets, one_by_one;
+  for (int round = 0; round < kRounds; ++round) {
+    insert();
+    double begin = now();
+    for (const auto& set : sets) triangulation.remove(set);
+    as_sets.push_back(now() - begin);
+    insert();
+    begin = now();
+    for (const auto& set : sets) {
+      for (const VertexId vertex : set) triangulation.remove(vertex);
+    }
+    one_by_one.push_back(now() - begin);
+  }
+  times.sets = median(as_sets);
+  times.one_by_one = median(one_by_one);
+}
+
+void point_by_point_cgal(ArraySource& source, const std::vector<ClusterId>& clusters,
+                         Times& times) {
+  Cgal triangulation;
+  std::vector<Kernel::Point_2> base;
+  for (const Point3& p : source.levels.back().positions) base.emplace_back(p[0], p[1]);
+  triangulation.insert(base.begin(), base.end());
+  std::vector<double> seconds;
+  for (int round = 0; round < kRounds; ++round) {
+    std::vector<Cgal::Vertex_handle> vertices;
+    for (const ClusterId id : clusters) {
+      Cgal::Face_handle hint;
+      for (const Point3& p : source.read(id).positions) {
+        vertices.push_back(triangulation.insert(Kernel::Point_2(p[0], p[1]), hint));
+        hint = vertices.back()->face();
+      }
+    }
+    const double begin = now();
+    for (const auto& vertex : vertices) triangulation.remove(vertex);
+    seconds.push_back(now() - begin);
+  }
+  times.cgal = median(seconds);
+}
+
+int run(const std::filesystem::path& folder) {
+  std::mt19937_64 random(1);
+  const int side = kSmall ? 256 : 2048;
+  ArraySource source = make_hierarchy(grid_points(side), 1, 294.0, random);
+  std::filesystem::create_directories(folder);
+  std::ofstream csv(folder / "table_8_1.csv");
+  csv << "clusters,points,bookkeeping,one_by_one,as_sets,cgal_one_by_one,thesis_points,"
+         "thesis_overhead,thesis_one_by_one,thesis_hole_enlarging\n";
+  std::printf(
+      "Table 8.1: clusters of a %d x %d elevation model collapsed above its representatives,\n"
+      "milliseconds, median of %d; the thesis's seconds on a Pentium 4 in brackets\n"
+      "%8s %16s %16s %18s %16s %10s %8s %8s\n",
+      side, side, kRounds, "clusters", "points", "bookkeeping", "one by one", "as sets", "CGAL",
+      "to own", "to CGAL");
+  for (const ThesisRow& row : kThesis) {
+    const std::vector<ClusterId> clusters = draw(source, row.clusters, random);
+    Times times;
+    bookkeeping(source, clusters, times);
+    removal(source, clusters, times);
+    point_by_point_cgal(source, clusters, times);
+    csv << clusters.size() << ',' << times.points << ',' << times.bookkeeping << ','
+        << times.one_by_one << ',' << times.sets << ',' << times.cgal << ',' << row.points << ','
+        << row.overhead << ',' << row.one_by_one << ',' << row.hole_enlarging << '\n';
+    std::printf("%8zu %7zu [%6zu] %7.2f [%6.2f] %9.2f [%6.2f] %7.2f [%6.2f] %10.2f %7.1fx %7.1fx\n",
+                clusters.size(), times.points, row.points, 1e3 * times.bookkeeping, row.overhead,
+                1e3 * times.one_by_one, row.one_by_one, 1e3 * times.sets, row.hole_enlarging,
+                1e3 * times.cgal, times.one_by_one / times.sets, times.cgal / times.sets);
+    std::fflush(stdout);
+  }
+  csv.close();
+  return csv ? 0 : 1;
+}
+
+}  // namespace
+}  // namespace terrace::tri::bench
+
+int main(int argc, char** argv) {
+  std::filesystem::path folder = ".";
+  for (int k = 1; k < argc; ++k) {
+    if (std::strcmp(argv[k], "--out") != 0 || k + 1 == argc) {
+      std::cerr << "usage: tri_thesis_bench [--out DIR]\n";
+      return 2;
+    }
+    folder = argv[++k];
+  }
+  return terrace::tri::bench::run(folder);
+}

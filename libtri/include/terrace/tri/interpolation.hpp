@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <numbers>
+#include <span>
+#include <vector>
+
+#include "terrace/tri/delaunay2.hpp"
+#include "terrace/tri/heights.hpp"
+
+/// Heights, slopes and aspects anywhere on a triangulation. x grows to the east and y to the north.
+
+namespace terrace::tri {
+
+enum class Interpolation : std::uint8_t {
+  /// The nearest vertex, of several the lexicographically smallest; also outside the hull.
+  kNearest,
+  /// Barycentric coordinates in the triangle.
+  kLinear,
+  /// R. Sibson, "A vector identity for the Dirichlet tessellation",
+  /// doi:10.1017/S0305004100056589: the areas that the query's Voronoi cell would take from the
+  /// cells of its neighbours. Continuous, smooth but at vertices, and the same for any
+  /// triangulation of cocircular points.
+  kNaturalNeighbour,
+};
+
+struct VertexWeight {
+  VertexId vertex = kNoVertex;
+  double weight = 0;
+};
+
+/// The weights of the vertices that make the value at a query: they are >= 0, their sum is 1, and
+/// (but for kNearest) the weighted mean of the vertices is the query. No weights where there is no
+/// value: outside the hull (kLinear, kNaturalNeighbour), and in an empty triangulation. The hull
+/// belongs to the inside, decided exactly; while all points are on one line it is the segment
+/// between the outermost. On a vertex only that vertex has a weight, on a hull edge its two ends.
+///
+/// Which triangles a query concerns is decided exactly. The weights are computed with doubles and
+/// judged by an estimate of their error; where it is above 1e-11 (needles, queries next to the
+/// hull, coordinates near the ends of the range) again with rational numbers, some hundred times
+/// slower.
+///
+/// Replaces `weights`. hint: a vertex near the query, for the walk. Throws std::invalid_argument
+/// for a query that is not finite.
+template <class Coord>
+void weights_at(const Delaunay2<Coord>& triangulation, const Point2& query, Interpolation method,
+                std::vector<VertexWeight>& weights, VertexId hint = kNoVertex);
+
+/// Heights at many queries, in their order; NaN where there is no value or a vertex that has a
+/// weight has the height NaN. Queries are sorted along a Hilbert curve inside, so give many at
+/// once: about 0.4 us each on one core. threads: 0 for one per core; the bytes of the result do not
+/// depend on it. Memory: 16 bytes per query, for at most 2^24 queries at a time.
+///
+/// Throws std::invalid_argument naming the index of a query that is not finite, or if an array of
+/// heights is shorter than vertex_slots().
+template <class Coord>
+std::vector<double> heights_at(const Delaunay2<Coord>& triangulation, const Heights& heights,
+                               std::span<const Point2> queries, Interpolation method,
+                               unsigned threads = 0);
+
+/// Height gained per unit of length going east and north. NaN: no value.
+struct Gradient {
+  double x = std::numeric_limits<double>::quiet_NaN();
+  double y = std::numeric_limits<double>::quiet_NaN();
+};
+
+enum class GradientFrom : std::uint8_t {
+  /// The gradient of the triangle. On edges and vertices, where triangles differ: the mean of those
+  /// that meet there, weighted by area.
+  kTriangles,
+  /// The derivative of natural neighbour interpolation. On a vertex, where it has none: the mean
+  /// over the vertex's Voronoi cell by the same formula, which is exact for planes. On hull edges
+  /// and hull vertices, whose cells are unbounded: as kTriangles.
+  kNaturalNeighbours,
+};
+
+/// Gradients at many queries; all else as heights_at(). There is none outside the hull, and none
+/// while all points are on one line.
+template <class Coord>
+std::vector<Gradient> gradients_at(const Delaunay2<Coord>& triangulation, const Heights& heights,
+                                   std::span<const Point2> queries, GradientFrom from,
+                                   unsigned threads = 0);
+
+/// The angle between the surface and the horizontal in degrees, 0 to 90. Heights and coordinates
+/// must have the same unit.
+inline double slope_degrees(const Gradient& gradient) {
+  return std::atan(std::hypot(gradient.x, gradient.y)) * (180 / std::numbers::pi);
+}
+
+/// The direction in which the surface falls most, in degrees clockwise from north (+y): 90 is east
+/// (+x). 0 <= aspect < 360; NaN where it is level.
+inline double aspect_degrees(const Gradient& gradient) {
+  if (gradient.x == 0 && gradient.y == 0) return std::numeric_limits<double>::quiet_NaN();
+  const double degrees = std::atan2(-gradient.x, -gradient.y) * (180 / std::numbers::pi);
+  // A tiny negative angle would round to 360.
+  return !(degrees < 0) ? degrees + 0.0 : degrees + 360 < 360 ? degrees + 360 : 0;
+}
+
+#define TERRACE_TRI_DECLARE(Coord)                                                                \
+  extern template void weights_at(const Delaunay2<Coord>&, const Point2&, Interpolation,          \
+                                  std::vector<VertexWeight>&, VertexId);                          \
+  extern template std::vector<double> heights_at(                                                 \
+      const Delaunay2<Coord>&, const Heights&, std::span<const Point2>, Interpolation, unsigned); \
+  extern template std::vector<Gradient> gradients_at(                                             \
+      const Delaunay2<Coord>&, const Heights&, std::span<const Point2>, GradientFrom, unsigned);
+TERRACE_TRI_DECLARE(std::int32_t)
+TERRACE_TRI_DECLARE(double)
+#undef TERRACE_TRI_DECLARE
+
+}  // namespace terrace::tri

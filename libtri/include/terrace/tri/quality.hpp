@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "terrace/tri/delaunay2.hpp"
+#include "terrace/tri/heights.hpp"
+#include "terrace/tri/interpolation.hpp"
+#include "terrace/tri/multiresolution_source.hpp"
+
+/// Measures of a triangulation and of the surface on it. Angles, aspects and edges are those in the
+/// plane, where the triangulation is Delaunay. Coordinates are taken as doubles; sizes whose
+/// squares overflow give infinities.
+
+namespace terrace::tri {
+
+struct TriangleQuality {
+  double min_angle_degrees = 0;  ///< 0 to 60
+  /// Longest edge over 2 sqrt(3) times the radius of the inscribed circle: 1 for an equilateral
+  /// triangle, else more.
+  double aspect = 1;
+  std::array<double, 3> edges{};  ///< lengths, edge i opposite to corner i
+  double area = 0;
+  /// Of the sloping triangle. NaN where a height is, as the volumes.
+  double surface_area = 0;
+  /// Between the surface and the datum height, where it is above; where it is below, >= 0 too.
+  double volume_above = 0;
+  double volume_below = 0;
+};
+
+/// Requires a living triangle.
+template <class Coord>
+TriangleQuality triangle_quality(const Delaunay2<Coord>& triangulation, const Heights& heights,
+                                 TriangleId triangle, double datum = 0);
+
+struct MeshQuality {
+  std::size_t triangles = 0;
+  double min_angle_degrees =
+      0;  ///< the smallest; 0 where there is no triangle, as all that follows
+  double mean_min_angle_degrees = 0;
+  double max_aspect = 0;
+  double mean_aspect = 0;
+
+  std::size_t edges = 0;  ///< each counted once
+  double min_edge = 0;
+  double max_edge = 0;
+  double mean_edge = 0;
+  /// Numbers of edges in equal parts of min_edge .. max_edge.
+  std::vector<std::size_t> edge_histogram;
+
+  double area = 0;
+  double surface_area = 0;
+  double volume_above = 0;
+  double volume_below = 0;
+  /// above - below: the integral of height - datum.
+  [[nodiscard]] double volume() const { return volume_above - volume_below; }
+};
+
+/// Over all triangles. O(n). Throws std::invalid_argument if an array of heights is shorter than
+/// vertex_slots(), or if there are no bins.
+template <class Coord>
+MeshQuality mesh_quality(const Delaunay2<Coord>& triangulation, const Heights& heights,
+                         double datum = 0, std::size_t histogram_bins = 16);
+
+struct VerticalDistances {
+  std::size_t count = 0;  ///< points over the surface
+  std::size_t outside =
+      0;           ///< points beyond the hull, or where a height is NaN: in no figure below
+  double max = 0;  ///< of absolute values, as mean
+  double mean = 0;
+  double rms = 0;
+  double bias = 0;        ///< the mean of point - surface
+  std::size_t worst = 0;  ///< the index of the point with the distance `max`, the first of several
+};
+
+/// How far points that are not in the triangulation lie above or below its surface. threads and
+/// errors as heights_at(); the result does not depend on the number of threads.
+template <class Coord>
+VerticalDistances vertical_distances(const Delaunay2<Coord>& triangulation, const Heights& heights,
+                                     std::span<const Point3> points,
+                                     Interpolation method = Interpolation::kLinear,
+                                     unsigned threads = 0);
+
+#define TERRACE_TRI_DECLARE(Coord)                                                          \
+  extern template TriangleQuality triangle_quality(const Delaunay2<Coord>&, const Heights&, \
+                                                   TriangleId, double);                     \
+  extern template MeshQuality mesh_quality(const Delaunay2<Coord>&, const Heights&, double, \
+                                           std::size_t);                                    \
+  extern template VerticalDistances vertical_distances(                                     \
+      const Delaunay2<Coord>&, const Heights&, std::span<const Point3>, Interpolation, unsigned);
+TERRACE_TRI_DECLARE(std::int32_t)
+TERRACE_TRI_DECLARE(double)
+#undef TERRACE_TRI_DECLARE
+
+}  // namespace terrace::tri

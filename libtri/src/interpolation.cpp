@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "terrace/tri/interpolation.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "delaunay2/access.hpp"
+#include "delaunay2/hilbert.hpp"
+#include "interpolation/blocks.hpp"
+#include "interpolation/check_heights.hpp"
+#include "interpolation/sampler.hpp"
+
+namespace terrace::tri {
+namespace {
+
+/// Queries sorted at a time, so that memory is bounded.
+constexpr std::size_t kSorted = std::size_t{1} << 24;
+/// Queries per block of work. The first of each searches from afar.
+constexpr std::size_t kBlock = 8192;
+
+void check_queries(std::span<const Point2> queries) {
+  for (std::size_t i = 0; i < queries.size(); ++i) {
+    if (planar::DoubleKernel::valid(queries[i])) continue;
+    throw std::invalid_argument(
+        "query " + std::to_string(i) + ": coordinates " + std::to_string(queries[i][0]) + ", " +
+        std::to_string(queries[i][1]) + " are not finite; leave such queries out");
+  }
+}
+
+/// results[i] = answer(sampler, queries[i]), in an order of queries where the next one is near.
+template <class Mesh, class Result, class Answer>
+void answer_all(const Mesh& mesh, std::span<const Point2> queries, std::vector<Result>& results,
+                unsigned threads, Answer answer) {
+  using Sampler = planar::Sampler<typename Mesh::Kernel>;
+  if (mesh.vertex_count == 0) return;
+  for (std::size_t done = 0; done < queries.size(); done += kSorted) {
+    const auto part = queries.subspan(done, std::min(kSorted, queries.size() - done));
+    const auto order = planar::hilbert_order<planar::DoubleKernel>(part);
+    for_blocks(
+        part.size(), kBlock, threads, [&] { return std::make_unique<Sampler>(mesh); },
+        [&](std::size_t begin, std::size_t end, std::unique_ptr<Sampler>& sampler) {
+          sampler->start_at(planar::kNone);
+          constexpr std::size_t kAhead = 16;
+          for (std::size_t i = begin; i < end; ++i) {
+            if (i + kAhead < end)
+              __builtin_prefetch(&part[order[static_cast<std::uint32_t>(i + kAhead)]]);
+            const std::uint32_t query = order[static_cast<std::uint32_t>(i)];
+            results[done + query] = answer(*sampler, part[query]);
+          }
+        });
+  }
+}
+
+}  // namespace
+
+template <class Coord>
+void weights_at(const Delaunay2<Coord>& triangulation, const Point2& query, Interpolation method,
+                std::vector<VertexWeight>& weights, VertexId hint) {
+  assert(hint == kNoVertex || triangulation.alive(hint));
+  check_queries(std::span(&query, 1));
+  weights.clear();
+  const auto& mesh = Delaunay2Access::mesh(triangulation);
+  if (mesh.vertex_count == 0) return;
+  using Kernel = typename std::remove_cvref_t<decltype(mesh)>::Kernel;
+  planar::Sampler<Kernel> sampler(mesh);
+  sampler.start_at(slot(hint));
+  const auto found = sampler.weigh(query, method);
+  weights.assign(found.begin(), found.end());
+}
+
+template <class Coord>
+std::vector<double> heights_at(const Delaunay2<Coord>& triangulation, const Heights& heights,
+                               std::span<const Point2> queries, Interpolation method,
+                               unsigned threads) {
+  check_heights(triangulation, heights);
+  check_queries(queries);
+  constexpr double kNoValue = std::numeric_limits<double>::quiet_NaN();
+  std::vector<double> results(queries.size(), kNoValue);
+  answer_all(Delaunay2Access::mesh(triangulation), queries, results, threads,
+             [&](auto& sampler, const Point2& query) {
+               const auto weights = sampler.weigh(query, method);
+               if (weights.empty()) return kNoValue;
+               double sum = 0;
+               for (const auto& [vertex, weight] : weights) sum += weight * heights(vertex);
+               return sum;
+             });
+  return results;
+}
+
+template <class Coord>
+std::vector<Gradient> gradients_at(const Delaunay2<Coord>& triangulation, const Heights& heights,
+                                   std::span<const Point2> queries, GradientFrom from,
+                                   unsigned threads) {
+  check_heights(triangulation, heights);
+  check_queries(queries);
+  std::vector<Gradient> results(queries.size());
+  answer_all(
+      Delaunay2Access::mesh(triangulation), queries, results, threads,
+      [&](auto& sampler, const Point2& query) { return sampler.gradient(query, heights, from); });
+  return results;
+}
+
+#define TERRACE_TRI_DEFINE(Coord)                                                            \
+  template void weights_at(const Delaunay2<Coord>&, const Point2&, Interpolation,            \
+                           std::vector<VertexWeight>&, VertexId);                            \
+  template std::vector<double> heights_at(const Delaunay2<Coord>&, const Heights&,           \
+                                          std::span<const Point2>, Interpolation, unsigned); \
+  template std::vector<Gradient> gradients_at(const Delaunay2<Coord>&, const Heights&,       \
+                                              std::span<const Point2>, GradientFrom, unsigned);
+TERRACE_TRI_DEFINE(std::int32_t)
+TERRACE_TRI_DEFINE(double)
+#undef TERRACE_TRI_DEFINE
+
+}  // namespace terrace::tri

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "cavity.hpp"
+#include "terrace/tri/interpolation.hpp"
+#include "voronoi_cell.hpp"
+
+namespace terrace::tri::planar {
+
+/// Answers queries one after another, each search starting where the last one ended. For one
+/// thread; memory is kept from query to query.
+template <class Kernel>
+class Sampler {
+ public:
+  explicit Sampler(const Mesh<Kernel>& mesh);
+  ~Sampler();
+  Sampler(Sampler&&) = delete;
+  Sampler& operator=(Sampler&&) = delete;
+
+  /// The next search starts at this vertex; kNone: at the one used last by the triangulation.
+  void start_at(std::uint32_t vertex);
+  /// As weights_at().
+  std::span<const VertexWeight> weigh(const Query& p, Interpolation method);
+  /// As gradients_at().
+  Gradient gradient(const Query& p, const Heights& heights, GradientFrom from);
+
+ private:
+  struct Exact;
+
+  void weigh_edge(const Query& p, std::uint32_t a, std::uint32_t b);
+  void weigh_triangle(const Query& p, std::uint32_t t);
+  void weigh_neighbours(const Query& p, std::uint32_t t);
+  /// Measures the cell of p in cavity_. False: doubles are not good enough.
+  bool measure(const Query& p);
+  template <class Number>
+  void take_weights(const VoronoiCell<Number>& cell);
+  void divide_by_sum();
+  /// centre: the vertex on which p lies, or kNoVertex.
+  Gradient gradient_of_cell(const Query& p, const Heights& heights, VertexId centre);
+  Gradient gradient_of_triangles(const Heights& heights);
+  /// The triangles that meet at p, in triangles_.
+  void find_triangles(const Query& p, const QueryPlace& place);
+  Exact& exact();
+
+  const Mesh<Kernel>& mesh_;
+  std::uint32_t last_ = kNone;
+  std::vector<VertexWeight> weights_;
+  Cavity cavity_;
+  VoronoiCell<double> cell_;
+  std::vector<std::uint32_t> triangles_;
+  std::vector<std::array<double, 2>> slopes_;  ///< of weights, by corner of cavity_
+  std::unique_ptr<Exact> exact_;               ///< made when it is needed first
+};
+
+}  // namespace terrace::tri::planar

@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <type_traits>
+#include <vector>
+
+#include "cavity.hpp"
+
+/// The Voronoi cell that a query would get, and what it would take from each of its neighbours.
+///
+/// The cell's corners are the centres of the circles through the query and the edges of the
+/// cavity's rim; inside lie the centres of the cavity's triangles, which are corners of the cells
+/// of today. What the query takes from corner v is the polygon of the cell's side towards v and of
+/// the centres of the triangles at v. Each edge of such polygons is shared by two of them, dual to
+/// an edge of the cavity, and adds to the area of one what it takes from the other.
+
+namespace terrace::tri::planar {
+
+/// Errors of weights above this are not accepted of doubles.
+inline constexpr double kTolerance = 1e-11;
+/// Roundings that add up in a weight, beside what VoronoiCell::error counts.
+inline constexpr double kRoundings = 4;
+/// Products of four lengths must neither overflow nor lose bits: sizes of squares.
+inline constexpr double kLeastSquare = 1e-130;
+inline constexpr double kGreatestSquare = 1e130;
+
+/// Rounded to a double; specialised for rational numbers where they are used.
+template <class Number>
+struct Rounded;
+template <>
+struct Rounded<double> {
+  static double of(double value) { return value; }
+};
+
+/// Number = double, or exact rationals.
+template <class Number>
+struct VoronoiCell {
+  struct Vector {
+    Number x;
+    Number y;
+  };
+  std::vector<Vector> at;      ///< of corners, less the query
+  std::vector<Vector> centre;  ///< of triangles, less the query
+  std::vector<Vector> round;   ///< corners of the cell by edge of the rim
+  std::vector<Number> area;    ///< twice the area taken from each corner
+  Number total = 0;            ///< twice the cell's
+  /// Of doubles: the sum of squares of errors of centres, in units of rounding; an estimate.
+  Number error = 0;
+  Number extent = 0;  ///< of doubles: the sum of squares of `round`
+
+  void measure(const Cavity& cavity, const Query& p);
+  /// Of doubles, after measure(): whether the weights will be right to kTolerance.
+  [[nodiscard]] bool accurate() const;
+  /// The derivatives of the weights area / total by the query's coordinates, by corner. On a vertex
+  /// (find_link()): numbers s(i) so that the sum of s(i) * (height(i) - height of the vertex) is
+  /// the mean gradient over the cell. After measure(). False: not right to kTolerance.
+  bool differentiate(const Cavity& cavity, bool on_vertex,
+                     std::vector<std::array<double, 2>>& slopes);
+
+ private:
+  static Number cross(const Vector& a, const Vector& b) { return a.x * b.y - a.y * b.x; }
+  static Number square(const Vector& a) { return a.x * a.x + a.y * a.y; }
+  /// The point as far from the origin as from b and c, which are counter-clockwise.
+  Vector circumcentre(const Vector& b, const Vector& c);
+
+  std::vector<Vector> slope_;
+};
+
+template <class Number>
+auto VoronoiCell<Number>::circumcentre(const Vector& b, const Vector& c) -> Vector {
+  const Number bb = square(b);
+  const Number cc = square(c);
+  const Number half = Number(0.5) / cross(b, c);
+  const Vector result{(bb * c.y - cc * b.y) * half, (cc * b.x - bb * c.x) * half};
+  // The cross product has a relative error of 1 / sin of the angle, hence so does the radius. A
+  // sum, which is NaN where a term is.
+  if constexpr (std::is_same_v<Number, double>) error += bb * cc * half * half * square(result);
+  return result;
+}
+
+template <class Number>
+void VoronoiCell<Number>::measure(const Cavity& cavity, const Query& p) {
+  const auto number = [](double value) { return Number(value); };
+  at.resize(cavity.corner.size());
+  area.assign(cavity.corner.size(), Number(0));
+  centre.resize(cavity.triangle.size());
+  round.resize(cavity.rim.size());
+  total = 0;
+  error = 0;
+  extent = 0;
+  for (std::size_t i = 0; i < at.size(); ++i) {
+    const Query& v = cavity.corner[i].at;
+    at[i] = {number(v[0]) - number(p[0]), number(v[1]) - number(p[1])};
+  }
+  for (std::size_t i = 0; i < centre.size(); ++i) {
+    // Differences of the vertices themselves, as those of needles must be right.
+    const auto [ia, ib, ic] = cavity.triangle[i];
+    const Query& a = cavity.corner[ia].at;
+    const Query& b = cavity.corner[ib].at;
+    const Query& c = cavity.corner[ic].at;
+    const Number ax = number(a[0]);
+    const Number ay = number(a[1]);
+    const Vector u = circumcentre({number(b[0]) - ax, number(b[1]) - ay},
+                                  {number(c[0]) - ax, number(c[1]) - ay});
+    centre[i] = {at[ia].x + u.x, at[ia].y + u.y};
+  }
+  for (std::size_t i = 0; i < round.size(); ++i) {
+    round[i] = circumcentre(at[cavity.rim[i].from], at[cavity.rim[i].to]);
+    extent += square(round[i]);
+  }
+  const Vector* before = &round.back();
+  for (std::size_t i = 0; i < round.size(); ++i) {
+    const auto& [from, to, triangle] = cavity.rim[i];
+    const Number side = cross(*before, round[i]);
+    total += side;
+    area[from] += side;
+    before = &round[i];
+    if (centre.empty()) continue;
+    const Number shared = cross(round[i], centre[triangle]);
+    area[from] += shared;
+    area[to] -= shared;
+  }
+  for (const auto& [from, to, left, right] : cavity.link) {
+    const Number shared = cross(centre[right], centre[left]);
+    area[from] += shared;
+    area[to] -= shared;
+  }
+}
+
+template <class Number>
+bool VoronoiCell<Number>::accurate() const {
+  // A centre that is off by e moves the border of an area by e along a length of at most the
+  // cell's extent.
+  constexpr double kFactor = kRoundings * 0x1p-53 / kTolerance;
+  return total > kLeastSquare && total < kGreatestSquare &&
+         error * extent * (kFactor * kFactor) < total * total;
+}
+
+// A query that moves towards a corner of the cavity moves the side of its cell before that corner.
+// B. Piper, "Properties of local coordinates based on Dirichlet tesselations",
+// doi:10.1007/978-3-7091-6916-2_15: area i grows by the side's length over the corner's distance,
+// times the vector from the query to the side's middle.
+template <class Number>
+bool VoronoiCell<Number>::differentiate(const Cavity& cavity, bool on_vertex,
+                                        std::vector<std::array<double, 2>>& slopes) {
+  slope_.resize(at.size());
+  slopes.resize(at.size());
+  Vector sum{Number(0), Number(0)};
+  for (std::size_t i = 0; i < round.size(); ++i) {
+    const std::uint32_t corner = cavity.rim[i].from;
+    const Vector& v = at[corner];
+    const Vector& a = round[i == 0 ? round.size() - 1 : i - 1];
+    const Vector& b = round[i];
+    const Number ratio = ((b.y - a.y) * v.x - (b.x - a.x) * v.y) / (square(v) * total);
+    slope_[corner] = {ratio * (a.x + b.x), ratio * (a.y + b.y)};
+    sum.x += slope_[corner].x;
+    sum.y += slope_[corner].y;
+  }
+  double size = 0;
+  double farthest = 0;
+  for (std::size_t i = 0; i < slope_.size(); ++i) {
+    Vector& slope = slope_[i];
+    if constexpr (std::is_same_v<Number, double>) {
+      size += std::abs(slope.x) + std::abs(slope.y);
+      farthest = std::max(farthest, square(at[i]));
+    }
+    if (!on_vertex) {
+      const Number weight = area[i] / total;
+      slope.x -= weight * sum.x;
+      slope.y -= weight * sum.y;
+    }
+    slopes[i] = {Rounded<Number>::of(slope.x), Rounded<Number>::of(slope.y)};
+  }
+  // The sum of slopes times corners is the identity: errors are measured against 1.
+  return !std::is_same_v<Number, double> ||
+         size * std::sqrt(farthest) * (kRoundings * 0x1p-53 / kTolerance) < 1;
+}
+
+}  // namespace terrace::tri::planar

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <charconv>
+#include <cstdint>
+#include <fstream>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace terrace::tools {
+
+/// The lines of a text file behind a first line that says what it is.
+class CsvRows {
+ public:
+  /// Nothing for any file whose first line is another, and for what is no file.
+  static std::optional<CsvRows> open(const std::string& path, std::string_view header);
+
+  /// The next line that is not empty, without its end; false at the end of the file.
+  /// Throws: stream::Error on a line too long to be a row.
+  bool next(std::string_view& line);
+  /// Of the line that next() gave: "line 3".
+  [[nodiscard]] std::string where() const { return "line " + std::to_string(number_); }
+
+ private:
+  CsvRows(std::string path, std::ifstream stream)
+      : path_(std::move(path)), stream_(std::move(stream)) {}
+  bool read_line();
+
+  std::string path_;
+  std::ifstream stream_;
+  std::string line_;
+  std::uint64_t number_ = 0;
+};
+
+/// Takes the number at the beginning of `text`, and the comma behind it unless it is the last.
+template <class T>
+bool take_cell(std::string_view& text, T& value, bool last = false) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc()) return false;
+  text.remove_prefix(static_cast<std::size_t>(end - text.data()));
+  if (last) return text.empty();
+  if (text.empty() || text.front() != ',') return false;
+  text.remove_prefix(1);
+  return true;
+}
+
+}  // namespace terrace::tools
