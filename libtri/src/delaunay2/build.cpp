@@ -9,6 +9,7 @@
 #include <algorithm>
 
 #include "double_kernel.hpp"
+#include "elliptical_kernel.hpp"
 #include "flat.hpp"
 #include "hilbert.hpp"
 #include "insert.hpp"
@@ -156,5 +157,7 @@ std::vector<VertexId> build(Mesh<Kernel>& mesh, std::span<const typename Kernel:
 
 template std::vector<VertexId> build(Mesh<IntKernel>&, std::span<const IntKernel::Point>);
 template std::vector<VertexId> build(Mesh<DoubleKernel>&, std::span<const DoubleKernel::Point>);
+template std::vector<VertexId> build(Mesh<EllipticalKernel>&,
+                                     std::span<const EllipticalKernel::Point>);
 
 }  // namespace terrace::tri::planar

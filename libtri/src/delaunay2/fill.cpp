@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "double_kernel.hpp"
+#include "elliptical_kernel.hpp"
 #include "int_kernel.hpp"
 #include "predicates.hpp"
 
@@ -122,5 +123,6 @@ void fill_hole(Mesh<Kernel>& mesh) {
 
 template void fill_hole(Mesh<IntKernel>&);
 template void fill_hole(Mesh<DoubleKernel>&);
+template void fill_hole(Mesh<EllipticalKernel>&);
 
 }  // namespace terrace::tri::planar

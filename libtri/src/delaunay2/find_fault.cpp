@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <sstream>
 
+#include "../elliptical2_access.hpp"
 #include "access.hpp"
 #include "predicates.hpp"
 
@@ -138,5 +139,11 @@ std::string find_fault(const Delaunay2<Coord>& triangulation) {
 
 template std::string find_fault(const Delaunay2<std::int32_t>&);
 template std::string find_fault(const Delaunay2<double>&);
+
+std::string find_fault(const EllipticalDelaunay2& triangulation) {
+  const auto& impl = EllipticalDelaunay2Access::impl(triangulation);
+  const EllipticalKernel::Scope scope(impl.metric);
+  return Inspection(impl.mesh).run();
+}
 
 }  // namespace terrace::tri

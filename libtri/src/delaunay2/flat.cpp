@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "double_kernel.hpp"
+#include "elliptical_kernel.hpp"
 #include "int_kernel.hpp"
 
 namespace terrace::tri::planar {
@@ -103,11 +104,15 @@ void remove_flat(Mesh<Kernel>& mesh, std::uint32_t vertex) {
 
 template Inserted insert_flat(Mesh<IntKernel>&, const IntKernel::Point&);
 template Inserted insert_flat(Mesh<DoubleKernel>&, const DoubleKernel::Point&);
+template Inserted insert_flat(Mesh<EllipticalKernel>&, const EllipticalKernel::Point&);
 template void make_fan(Mesh<IntKernel>&, std::uint32_t);
 template void make_fan(Mesh<DoubleKernel>&, std::uint32_t);
+template void make_fan(Mesh<EllipticalKernel>&, std::uint32_t);
 template void become_flat(Mesh<IntKernel>&, std::vector<std::uint32_t>);
 template void become_flat(Mesh<DoubleKernel>&, std::vector<std::uint32_t>);
+template void become_flat(Mesh<EllipticalKernel>&, std::vector<std::uint32_t>);
 template void remove_flat(Mesh<IntKernel>&, std::uint32_t);
 template void remove_flat(Mesh<DoubleKernel>&, std::uint32_t);
+template void remove_flat(Mesh<EllipticalKernel>&, std::uint32_t);
 
 }  // namespace terrace::tri::planar

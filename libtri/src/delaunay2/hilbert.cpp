@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "double_kernel.hpp"
+#include "elliptical_kernel.hpp"
 #include "int_kernel.hpp"
 
 namespace terrace::tri::planar {
@@ -204,5 +205,7 @@ Pool<std::uint32_t> hilbert_order(std::span<const typename Kernel::Point> points
 
 template Pool<std::uint32_t> hilbert_order<IntKernel>(std::span<const IntKernel::Point>);
 template Pool<std::uint32_t> hilbert_order<DoubleKernel>(std::span<const DoubleKernel::Point>);
+template Pool<std::uint32_t> hilbert_order<EllipticalKernel>(
+    std::span<const EllipticalKernel::Point>);
 
 }  // namespace terrace::tri::planar

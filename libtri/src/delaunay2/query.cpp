@@ -5,6 +5,7 @@
 #include <bit>
 
 #include "double_kernel.hpp"
+#include "elliptical_kernel.hpp"
 #include "int_kernel.hpp"
 #include "walk.hpp"
 
@@ -174,14 +175,21 @@ std::uint64_t hash(const Mesh<Kernel>& mesh) {
 
 template Location locate(const Mesh<IntKernel>&, const IntKernel::Point&, std::uint32_t);
 template Location locate(const Mesh<DoubleKernel>&, const DoubleKernel::Point&, std::uint32_t);
+template Location locate(const Mesh<EllipticalKernel>&, const EllipticalKernel::Point&,
+                         std::uint32_t);
 template std::uint32_t nearest(const Mesh<IntKernel>&, const IntKernel::Point&, std::uint32_t);
 template std::uint32_t nearest(const Mesh<DoubleKernel>&, const DoubleKernel::Point&,
                                std::uint32_t);
+template std::uint32_t nearest(const Mesh<EllipticalKernel>&, const EllipticalKernel::Point&,
+                               std::uint32_t);
 template void adjacent(const Mesh<IntKernel>&, std::uint32_t, std::vector<VertexId>&);
 template void adjacent(const Mesh<DoubleKernel>&, std::uint32_t, std::vector<VertexId>&);
+template void adjacent(const Mesh<EllipticalKernel>&, std::uint32_t, std::vector<VertexId>&);
 template std::uint32_t degree(const Mesh<IntKernel>&, std::uint32_t);
 template std::uint32_t degree(const Mesh<DoubleKernel>&, std::uint32_t);
+template std::uint32_t degree(const Mesh<EllipticalKernel>&, std::uint32_t);
 template std::uint64_t hash(const Mesh<IntKernel>&);
 template std::uint64_t hash(const Mesh<DoubleKernel>&);
+template std::uint64_t hash(const Mesh<EllipticalKernel>&);
 
 }  // namespace terrace::tri::planar

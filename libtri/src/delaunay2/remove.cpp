@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "double_kernel.hpp"
+#include "elliptical_kernel.hpp"
 #include "fill.hpp"
 #include "flat.hpp"
 #include "int_kernel.hpp"
@@ -92,8 +93,10 @@ void remove_vertex(Mesh<Kernel>& mesh, std::uint32_t vertex) {
 
 template void remove_vertex(Mesh<IntKernel>&, std::uint32_t);
 template void remove_vertex(Mesh<DoubleKernel>&, std::uint32_t);
+template void remove_vertex(Mesh<EllipticalKernel>&, std::uint32_t);
 template bool collinear(const Mesh<IntKernel>&, std::span<const std::uint32_t>);
 template bool collinear(const Mesh<DoubleKernel>&, std::span<const std::uint32_t>);
+template bool collinear(const Mesh<EllipticalKernel>&, std::span<const std::uint32_t>);
 template void turn_ghost_inside(Hole<IntKernel::Point>&);
 template void turn_ghost_inside(Hole<DoubleKernel::Point>&);
 

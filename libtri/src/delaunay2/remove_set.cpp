@@ -10,6 +10,7 @@
 #include <algorithm>
 
 #include "double_kernel.hpp"
+#include "elliptical_kernel.hpp"
 #include "fill.hpp"
 #include "insert.hpp"
 #include "int_kernel.hpp"
@@ -253,5 +254,6 @@ void remove_set(Mesh<Kernel>& mesh, std::span<const std::uint32_t> vertices) {
 
 template void remove_set(Mesh<IntKernel>&, std::span<const std::uint32_t>);
 template void remove_set(Mesh<DoubleKernel>&, std::span<const std::uint32_t>);
+template void remove_set(Mesh<EllipticalKernel>&, std::span<const std::uint32_t>);
 
 }  // namespace terrace::tri::planar

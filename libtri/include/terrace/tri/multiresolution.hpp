@@ -101,9 +101,10 @@ class MultiresolutionModel {
 
   /// Starts with the points of the given detail, built in one go. The first delta covers what comes
   /// after: begin with a look at the triangulation. The source must outlive the model.
+  /// `empty`: the triangulation to fill, where it has options of its own (a metric).
   /// Throws: what the source throws, HierarchyError, std::length_error.
   explicit MultiresolutionModel(ClusterSource& source, const Detail& start = {},
-                                ModelOptions options = {});
+                                ModelOptions options = {}, Triangulation empty = Triangulation());
 
   // ---- Steps ----------------------------------------------------------------------------------
   // All return the delta, which lives until the next step, and throw what the source throws,

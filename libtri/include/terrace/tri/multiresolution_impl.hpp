@@ -32,8 +32,12 @@ bool to_point(const Point3& position, Point& point) {
 
 template <DynamicTriangulation Triangulation>
 MultiresolutionModel<Triangulation>::MultiresolutionModel(ClusterSource& source,
-                                                          const Detail& start, ModelOptions options)
-    : tree_(source), deltas_(options.deltas), old_heights_(options.deltas && options.old_heights) {
+                                                          const Detail& start, ModelOptions options,
+                                                          Triangulation empty)
+    : triangulation_(std::move(empty)),
+      tree_(source),
+      deltas_(options.deltas),
+      old_heights_(options.deltas && options.old_heights) {
   const ClusterTree::Take take_points = take();
   tree_.read_root(take_points);
   // What is staged stays staged: the whole model goes if this fails.

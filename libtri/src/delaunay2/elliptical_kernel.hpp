@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <memory>
+
+#include "double_kernel.hpp"
+#include "terrace/tri/metric2.hpp"
+
+/// Exact predicates in an elliptical metric, on the points as they are: nothing is mapped, so
+/// nothing is rounded. What turns left and what lies between is the same in all linear metrics;
+/// only circles become ellipses and distances lengths of mapped vectors.
+
+namespace terrace::tri::planar {
+
+/// A map M made ready for the predicates, which need M only by Q = M^T M.
+class EllipticalMetric {
+ public:
+  /// Requires a finite, invertible map.
+  explicit EllipticalMetric(const LinearMap2& map);
+
+ private:
+  friend class EllipticalKernel;
+  struct Exact;
+  // Q times a power of two, its largest entry near 1, each entry within 2^-52 of itself.
+  double xx_, xy_, yy_;
+  std::shared_ptr<const Exact> exact_;
+};
+
+/// The algorithms call kernels statically; so the metric that is meant is set per thread, by a
+/// Scope, for as long as a call takes.
+class EllipticalKernel : public DoubleKernel {
+ public:
+  class Scope {
+   public:
+    explicit Scope(const EllipticalMetric& metric) : before_(metric_) { metric_ = &metric; }
+    ~Scope() { metric_ = before_; }
+    Scope(const Scope&) = delete;
+    Scope& operator=(const Scope&) = delete;
+
+   private:
+    const EllipticalMetric* before_;
+  };
+
+  /// > 0 where p lies inside the ellipse of the metric through the counter-clockwise a, b, c; 0
+  /// where on it. As DoubleKernel::in_circle(): the crosses of mapped vectors are those of the
+  /// vectors times the determinant of M, which changes no sign; their dots are d^T Q e.
+  static int in_circle(const Point& a, const Point& b, const Point& c, const Point& p) {
+    const Sized at_a = sized_angle(a, b, c);
+    const Sized at_p = sized_angle(p, c, b);
+    const double sine = at_a.cross * at_p.dot + at_p.cross * at_a.dot;
+    const double size = at_a.cross_size * at_p.dot_size + at_p.cross_size * at_a.dot_size;
+    // In units of u = 2^-53: differences 2 + 2; of the dots products 1, sum of two 1, entries of Q
+    // 2, products with them 1, sums 2; of the crosses products 1, sum 1; then product 1 and sum 1:
+    // 15 u of the sum of absolute values, itself rounded: 18 u is safe. Otherwise as there.
+    const double largest = at_a.dot_size + at_p.dot_size + at_a.cross_size + at_p.cross_size;
+    if (std::abs(sine) > 18 * 0x1p-53 * size + 0x1p-400 && largest < 0x1p200)
+      return sine < 0 ? 1 : -1;
+    return in_circle_exact(a, b, c, p);
+  }
+
+  /// < 0 where a is nearer to p than b.
+  static int compare_distance(const Point& p, const Point& a, const Point& b);
+
+ private:
+  struct Sized {
+    double cross, dot;
+    double cross_size, dot_size;  ///< sums of absolute values of the products
+  };
+  static Sized sized_angle(const Point& apex, const Point& b, const Point& c) {
+    const EllipticalMetric& q = *metric_;
+    const double bx = b[0] - apex[0];
+    const double by = b[1] - apex[1];
+    const double cx = c[0] - apex[0];
+    const double cy = c[1] - apex[1];
+    const double xy = bx * cy;
+    const double yx = by * cx;
+    const double xx = q.xx_ * (bx * cx);
+    const double yy = q.yy_ * (by * cy);
+    const double mixed = q.xy_ * (xy + yx);
+    return {xy - yx, xx + mixed + yy, std::abs(xy) + std::abs(yx),
+            std::abs(xx) + std::abs(q.xy_) * (std::abs(xy) + std::abs(yx)) + std::abs(yy)};
+  }
+  static int in_circle_exact(const Point& a, const Point& b, const Point& c, const Point& p);
+
+  static constinit thread_local const EllipticalMetric* metric_;
+};
+
+}  // namespace terrace::tri::planar

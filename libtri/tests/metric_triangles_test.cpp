@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "terrace/tri/metric_triangles.hpp"
+
+#include <limits>
+#include <map>
+#include <random>
+#include <stdexcept>
+#include <utility>
+
+#include <gtest/gtest.h>
+
+#include "delaunay2/elliptical_kernel.hpp"
+#include "delaunay2/predicates.hpp"
+#include "metrics.hpp"
+#include "points.hpp"
+
+namespace terrace::tri::test {
+namespace {
+
+/// Three boxes of different ellipses over the extent of the points, two of them overlapping.
+template <class Coord>
+MetricField2 three_regions(const std::vector<std::array<Coord, 2>>& points) {
+  Plane low{}, high{};
+  for (std::size_t k = 0; k < 2; ++k) {
+    low[k] = high[k] = static_cast<double>(points[0][k]);
+    for (const auto& p : points) {
+      low[k] = std::min(low[k], static_cast<double>(p[k]));
+      high[k] = std::max(high[k], static_cast<double>(p[k]));
+    }
+  }
+  const auto box = [&](double x0, double y0, double x1, double y1) {
+    const auto at = [&](std::size_t k, double part) { return low[k] + (high[k] - low[k]) * part; };
+    return box2(at(0, x0), at(1, y0), at(0, x1), at(1, y1));
+  };
+  return MetricField2({{box(0, 0, 0.5, 0.6), ellipse_map(5, 1, 30)},
+                       {box(0.4, 0.3, 1, 0.7), ellipse_map(1, 3, 0)},
+                       {box(0.2, 0.7, 0.9, 1), ellipse_map(20, 1, -45)}});
+}
+
+template <class Triangulation>
+std::vector<Corners> corners_of_all(const Triangulation& triangulation,
+                                    const std::vector<std::array<VertexId, 3>>& triangles) {
+  std::vector<Corners> result;
+  for (const auto& vertices : triangles) {
+    const Corners t = corners_of(triangulation, vertices);
+    EXPECT_EQ(static_cast<double>(triangulation.point(vertices[0])[0]), t[0][0]);
+    result.push_back(t);
+  }
+  std::sort(result.begin(), result.end());
+  return result;
+}
+
+using Edge = std::pair<Plane, Plane>;
+/// The corner to the left of each directed edge.
+std::map<Edge, Plane> apices(const std::vector<Corners>& triangles) {
+  std::map<Edge, Plane> result;
+  for (const Corners& t : triangles) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      EXPECT_TRUE(result.emplace(Edge{t[(i + 1) % 3], t[(i + 2) % 3]}, t[i]).second)
+          << "an edge has two triangles on one side";
+    }
+  }
+  return result;
+}
+std::set<Edge> border(const std::map<Edge, Plane>& edges) {
+  std::set<Edge> result;
+  for (const auto& [edge, apex] : edges)
+    if (!edges.contains({edge.second, edge.first})) result.insert(edge);
+  return result;
+}
+
+/// All that is guaranteed. Returns the number of triangles that are not among `before`.
+std::size_t check(const std::vector<Corners>& before, const std::vector<Corners>& after,
+                  const MetricField2& field, const LinearMap2& given = kIdentityMap2) {
+  // A triangulation of the same: positive areas, every edge matched, the same border; so it covers
+  // what is within the border once. And it has the same corners.
+  EXPECT_EQ(before.size(), after.size());
+  std::set<Plane> corners_before, corners_after;
+  for (const Corners& t : before) corners_before.insert(t.begin(), t.end());
+  for (const Corners& t : after) {
+    corners_after.insert(t.begin(), t.end());
+    EXPECT_GT(planar::DoubleKernel::orientation(t[0], t[1], t[2]), 0);
+  }
+  EXPECT_TRUE(corners_before == corners_after);
+  const auto edges_before = apices(before), edges_after = apices(after);
+  EXPECT_TRUE(border(edges_before) == border(edges_after));
+  // Where regions meet nothing has changed.
+  const auto mixed = [&](const Corners& t) {
+    return field(t[0]) != field(t[1]) || field(t[0]) != field(t[2]);
+  };
+  std::vector<Corners> mixed_before, mixed_after;
+  std::copy_if(before.begin(), before.end(), std::back_inserter(mixed_before), mixed);
+  std::copy_if(after.begin(), after.end(), std::back_inserter(mixed_after), mixed);
+  EXPECT_TRUE(mixed_before == mixed_after);
+  // Within regions edges are Delaunay, ties broken as always.
+  std::map<LinearMap2, planar::EllipticalMetric> metrics;
+  for (const auto& [edge, apex] : edges_after) {
+    const auto mate = edges_after.find({edge.second, edge.first});
+    const LinearMap2 map = field(apex);
+    if (mate == edges_after.end() || field(edge.first) != map || field(edge.second) != map ||
+        field(mate->second) != map)
+      continue;
+    EXPECT_LE(in_ellipse(map, apex, edge.first, edge.second, mate->second), 0);
+    const auto& metric = metrics.try_emplace(map, map).first->second;
+    const planar::EllipticalKernel::Scope scope(metric);
+    EXPECT_FALSE(planar::inside_circle<planar::EllipticalKernel>(apex, edge.first, edge.second,
+                                                                 mate->second));
+  }
+  std::size_t changed = 0;
+  for (const Corners& t : after) {
+    if (std::binary_search(before.begin(), before.end(), t)) continue;
+    ++changed;
+    EXPECT_NE(field(t[0]), given) << "a triangle in the triangulation's own metric changed";
+  }
+  return changed;
+}
+
+template <class Coord>
+class MetricTriangles : public ::testing::Test {};
+using CoordTypes = ::testing::Types<std::int32_t, double>;
+TYPED_TEST_SUITE(MetricTriangles, CoordTypes);
+
+TYPED_TEST(MetricTriangles, KeepWhatIsGuaranteed) {
+  for (const PointSet kind : kPointSets) {
+    for (const std::size_t count : {1u, 3u, 30u, 800u}) {
+      SCOPED_TRACE(name(kind) + " " + std::to_string(count));
+      const auto points = make_points<TypeParam>(kind, count, 41);
+      Delaunay2<TypeParam> triangulation;
+      triangulation.build(points);
+      const MetricField2 field = three_regions(points);
+      const std::size_t changed =
+          check(triangles_of(triangulation),
+                corners_of_all(triangulation, metric_triangles(triangulation, field)), field);
+      if (kind == PointSet::kUniform && count == 800) {
+        EXPECT_GT(changed, 300u);
+      }
+      if (this->HasFailure()) return;
+    }
+  }
+}
+
+TYPED_TEST(MetricTriangles, AreOfThePointsAlone) {
+  for (const PointSet kind : kPointSets) {
+    SCOPED_TRACE(name(kind));
+    auto points = make_points<TypeParam>(kind, 400, 42);
+    const MetricField2 field = three_regions(points);
+    Delaunay2<TypeParam> one;
+    one.build(points);
+    const auto expected = corners_of_all(one, metric_triangles(one, field));
+    // Another order, and others that come and go.
+    std::mt19937_64 random(7);
+    std::shuffle(points.begin(), points.end(), random);
+    Delaunay2<TypeParam> other;
+    std::vector<VertexId> guests;
+    const auto others = make_points<TypeParam>(kind, 200, 43);
+    for (std::size_t i = 0; i < others.size(); ++i) {
+      other.insert(points[2 * i]);
+      if (const auto [v, created] = other.insert(others[i]); created) guests.push_back(v);
+    }
+    other.remove(std::span<const VertexId>(guests));
+    for (const auto& p : points) other.insert(p);
+    ASSERT_TRUE(corners_of_all(other, metric_triangles(other, field)) == expected);
+  }
+}
+
+TYPED_TEST(MetricTriangles, OfOneMetricAreThoseOfTheEllipticalTriangulation) {
+  std::vector<LinearMap2> maps = lower_maps();
+  maps.push_back(ellipse_map(7, 1, 25));
+  for (const PointSet kind : kPointSets) {
+    for (std::size_t m = 0; m < maps.size(); ++m) {
+      SCOPED_TRACE(name(kind) + " map " + std::to_string(m));
+      const auto points = make_points<TypeParam>(kind, 300, 44);
+      Delaunay2<TypeParam> triangulation;
+      triangulation.build(points);
+      std::vector<Plane> doubles;
+      for (const auto& p : points)
+        doubles.push_back({static_cast<double>(p[0]), static_cast<double>(p[1])});
+      EllipticalDelaunay2 elliptical(maps[m]);
+      elliptical.build(doubles);
+      const MetricField2 everywhere([&](const Plane&) { return maps[m]; });
+      ASSERT_TRUE(corners_of_all(triangulation, metric_triangles(triangulation, everywhere)) ==
+                  triangles_of(elliptical));
+      // And back.
+      const MetricField2 none(std::vector<MetricField2::Region>{});
+      ASSERT_TRUE(corners_of_all(elliptical, metric_triangles(elliptical, none)) ==
+                  triangles_of(triangulation));
+    }
+  }
+}
+
+TEST(MetricTriangles2, StartFromAnEllipticalTriangulationToo) {
+  const auto points = make_points<double>(PointSet::kSevenBits, 700, 45);
+  EllipticalDelaunay2 triangulation(ellipse_map(3, 1, 80));
+  triangulation.build(points);
+  const MetricField2 field(
+      [&](const Plane& p) { return p[0] < 60 ? triangulation.map() : ellipse_map(1, 6, 10); });
+  EXPECT_GT(check(triangles_of(triangulation),
+                  corners_of_all(triangulation, metric_triangles(triangulation, field)), field,
+                  triangulation.map()),
+            100u);
+}
+
+TEST(MetricTriangles2, AWindowIsAFunctionOfThePointsAndTheWindow) {
+  for (std::uint64_t seed = 0; seed < 10; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937_64 random(seed);
+    auto points = make_points<double>(PointSet::kSevenBits, 600, 46 + seed);
+    const MetricField2 field = three_regions(points);
+    const double x = static_cast<double>(random() % 100), y = static_cast<double>(random() % 100);
+    const Box3 window = box2(x, y, x + 40, y + 25);
+    Delaunay2<double> triangulation;
+    triangulation.build(points);
+    const auto result =
+        corners_of_all(triangulation, metric_triangles(triangulation, field, window));
+    std::vector<Corners> before;
+    for (const Corners& t : triangles_of(triangulation)) {
+      const auto [x0, x1] = std::minmax({t[0][0], t[1][0], t[2][0]});
+      const auto [y0, y1] = std::minmax({t[0][1], t[1][1], t[2][1]});
+      if (x0 <= x + 40 && x <= x1 && y0 <= y + 25 && y <= y1) before.push_back(t);
+    }
+    check(before, result, field);
+    std::shuffle(points.begin(), points.end(), random);
+    Delaunay2<double> other;
+    for (const auto& p : points) other.insert(p);
+    EXPECT_TRUE(corners_of_all(other, metric_triangles(other, field, window)) == result);
+    // Infinite in all directions: everything.
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    EXPECT_TRUE(
+        metric_triangles(other, field, box2(-kInfinity, -kInfinity, kInfinity, kInfinity)) ==
+        metric_triangles(other, field));
+  }
+}
+
+TEST(MetricField2, RefusesWhatIsNoField) {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  using Regions = std::vector<MetricField2::Region>;
+  const auto refuses = [](Regions regions, const std::string& where) {
+    try {
+      const MetricField2 field(std::move(regions));
+      ADD_FAILURE() << where;
+    } catch (const std::invalid_argument& error) {
+      EXPECT_NE(std::string(error.what()).find(where), std::string::npos) << error.what();
+    }
+  };
+  const Box3 box = box2(0, 0, 1, 1);
+  refuses({{box, kIdentityMap2}, {box2(1, 0, 0, 1), kIdentityMap2}}, "region 1");
+  refuses({{box2(0, kNan, 1, 1), kIdentityMap2}}, "region 0");
+  refuses({{box, {1, 1, 1, 1}}}, "region 0");
+  EXPECT_THROW(MetricField2(std::function<LinearMap2(const Plane&)>()), std::invalid_argument);
+
+  Delaunay2<double> triangulation;
+  triangulation.build(std::vector<Plane>{{0, 0}, {1, 0}, {0, 1}, {1, 1}});
+  const MetricField2 bad([&](const Plane& p) {
+    return p[0] > 0 ? LinearMap2{1, 0, 0, kNan} : kIdentityMap2;
+  });
+  EXPECT_THROW(static_cast<void>(metric_triangles(triangulation, bad)), std::invalid_argument);
+  // Closed boxes, the first one holds, Euclidean outside.
+  const MetricField2 field({{box, {2, 0, 0, 1}}, {box2(1, 0, 2, 1), {3, 0, 0, 1}}});
+  EXPECT_EQ(field({1, 1})[0], 2);
+  EXPECT_EQ(field({1.5, 0})[0], 3);
+  EXPECT_EQ(field({2.5, 0}), kIdentityMap2);
+}
+
+}  // namespace
+}  // namespace terrace::tri::test

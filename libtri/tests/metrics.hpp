@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <CGAL/Exact_rational.h>
+
+#include "terrace/tri/elliptical2.hpp"
+#include "terrace/tri/metric2.hpp"
+
+/// Metrics for the tests, and what they mean, in rational numbers.
+
+namespace terrace::tri::test {
+
+using Plane = std::array<double, 2>;
+using Corners = std::array<Plane, 3>;
+
+/// Maps that keep the lexicographic order, so that mapped ties are broken alike; every metric has
+/// one such map.
+inline const std::vector<LinearMap2>& lower_maps() {
+  static const std::vector<LinearMap2> maps{{1, 0, 0, 1},       {1, 0, 0, 3},
+                                            {0.1, 0, 0.7, 0.3}, {5, 0, -4, 0.5},
+                                            {1e-3, 0, 2, 1e3},  {1e-200, 0, 1e-200, 2e-200}};
+  return maps;
+}
+
+inline CGAL::Exact_rational square(const LinearMap2& m, const CGAL::Exact_rational& x,
+                                   const CGAL::Exact_rational& y) {
+  using Q = CGAL::Exact_rational;
+  const Q u = Q(m[0]) * x + Q(m[1]) * y, v = Q(m[2]) * x + Q(m[3]) * y;
+  return u * u + v * v;
+}
+
+/// 1 where p lies inside the ellipse through the counter-clockwise a, b, c, 0 on it, -1 outside.
+inline int in_ellipse(const LinearMap2& m, const Plane& a, const Plane& b, const Plane& c,
+                      const Plane& p) {
+  using Q = CGAL::Exact_rational;
+  Q row[3][3];
+  const Plane* corner[3] = {&a, &b, &c};
+  for (int i = 0; i < 3; ++i) {
+    row[i][0] = Q((*corner[i])[0]) - Q(p[0]);
+    row[i][1] = Q((*corner[i])[1]) - Q(p[1]);
+    row[i][2] = square(m, row[i][0], row[i][1]);
+  }
+  const auto minor = [&](int i, int k) -> Q {
+    return row[i][0] * row[k][1] - row[k][0] * row[i][1];
+  };
+  return static_cast<int>(
+      CGAL::sign(Q(row[0][2] * minor(1, 2) + row[1][2] * minor(2, 0) + row[2][2] * minor(0, 1))));
+}
+
+inline Corners rotated(Corners t) {
+  std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
+  return t;
+}
+
+template <class Triangulation>
+Corners corners_of(const Triangulation& triangulation, const std::array<VertexId, 3>& vertices) {
+  Corners t;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto p = triangulation.point(vertices[i]);
+    t[i] = {static_cast<double>(p[0]), static_cast<double>(p[1])};
+  }
+  return rotated(t);
+}
+
+template <class Triangulation>
+std::vector<Corners> triangles_of(const Triangulation& triangulation) {
+  std::vector<Corners> result;
+  for (const TriangleId id : triangulation.all_triangles())
+    result.push_back(corners_of(triangulation, triangulation.vertices(id)));
+  std::sort(result.begin(), result.end());
+  return result;
+}
+
+}  // namespace terrace::tri::test
