@@ -1,0 +1,237 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Gift wrapping of a hole. A facet with the hole in front of it determines its tetrahedron: the
+// empty sphere grows along the facet's axis until it meets a vertex. So facets are taken in any
+// order; each new tetrahedron's other facets either meet an open one, which ends both, or become
+// open. No rule of validity, no order, no case of failure.
+//
+// Which vertex is met first is found in double with bounds of the error, for all vertices of the
+// hole at once; those that the bounds cannot tell apart meet in exact (and perturbed) sphere tests.
+//
+// Where no vertex is in front of a facet, the hull is there, and the tetrahedron is a ghost. Facets
+// with the ghost are never asked: every new ghost has a finite facet, and finite tetrahedra of a
+// hole hang together by finite facets with one beyond the hole's edge.
+#include "wrap.hpp"
+
+#include <cmath>
+#include <limits>
+
+#include "double_kernel.hpp"
+#include "facet_table.hpp"
+#include "int_kernel.hpp"
+#include "predicates.hpp"
+#include "wrap_scan.hpp"
+
+namespace terrace::tri::spatial {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kUnit = 0x1p-53;
+
+template <class Kernel>
+class Wrapping {
+ public:
+  using Point = typename Kernel::Point;
+
+  explicit Wrapping(Mesh<Kernel>& mesh) : mesh_(mesh), hole_(mesh.hole), table_(mesh.hole.table) {}
+
+  void run() {
+    prepare();
+    while (!hole_.pending.empty()) {
+      const std::uint32_t i = hole_.pending.back();
+      hole_.pending.pop_back();
+      if (hole_.facets[i].outer != hole_.kMatched) fill(i);
+    }
+    for (std::uint32_t k = 1; k < hole_.vertex.size(); ++k)
+      mesh_.vertex[hole_.vertex[k]].incident = hole_.incident[k];
+    for (; used_ < hole_.slots.size(); ++used_) mesh_.free_tetrahedron_slot(hole_.slots[used_]);
+  }
+
+ private:
+  using Facet = typename Hole<Point>::Facet;
+
+  void prepare() {
+    count_ = hole_.vertex.size();
+    const std::size_t padded = (count_ + kScanPadding - 1) / kScanPadding * kScanPadding;
+    std::array<std::vector<double>*, 3> axis = {&hole_.x, &hole_.y, &hole_.z};
+    double square = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      std::vector<double>& c = *axis[k];
+      c.assign(padded, std::numeric_limits<double>::quiet_NaN());
+      double low = kInfinity;
+      double high = -kInfinity;
+      for (std::size_t i = 1; i < count_; ++i) {
+        c[i] = static_cast<double>(hole_.point[i][k]);
+        low = std::min(low, c[i]);
+        high = std::max(high, c[i]);
+      }
+      square += (high - low) * (high - low);
+    }
+    // Of any vector from vertex to vertex, rounded up.
+    length_ = std::sqrt(square) * (1 + 0x1p-40);
+    if (hole_.power.size() < padded) {
+      hole_.power.resize(padded);
+      hole_.volume.resize(padded);
+    }
+    hole_.incident.resize(count_);
+    hole_.pending.clear();
+    table_.clear(hole_.facets.size());
+    for (std::uint32_t i = 0; i < hole_.facets.size(); ++i) {
+      table_.find_or_add(hole_.facets[i].corner, i);
+      if (is_finite_facet(hole_.facets[i].corner)) hole_.pending.push_back(i);
+    }
+    std::uint32_t gone = 0;
+    for (const std::uint32_t t : hole_.slots)
+      if (!has_ghost(mesh_.tetrahedron[t].corner)) ++gone;
+    mesh_.finite_count -= gone;
+    used_ = 0;
+  }
+  static bool is_finite_facet(const std::array<std::uint32_t, 3>& corner) {
+    return corner[0] != 0 && corner[1] != 0 && corner[2] != 0;
+  }
+
+  /// Makes the tetrahedron on an open facet.
+  void fill(std::uint32_t i) {
+    const auto [a, b, c] = hole_.facets[i].corner;
+    const std::uint32_t apex = choose(a, b, c);
+    const std::uint32_t t = used_ < hole_.slots.size() ? hole_.slots[used_++] : new_slot();
+    const std::array<std::uint32_t, 4> local = {apex, a, b, c};
+    for (std::size_t k = 0; k < 4; ++k) {
+      mesh_.tetrahedron[t].corner[k] = hole_.vertex[local[k]];
+      hole_.incident[local[k]] = t;
+    }
+    if (apex != 0) ++mesh_.finite_count;
+    mesh_.link(make_side(t, 0), hole_.facets[i].outer);
+    hole_.facets[i].outer = hole_.kMatched;
+    for (std::uint32_t k = 1; k < 4; ++k) {
+      const auto& f = kFacet[k];
+      // Seen from the other side.
+      const std::array<std::uint32_t, 3> corner = {local[f[0]], local[f[2]], local[f[1]]};
+      const auto next = static_cast<std::uint32_t>(hole_.facets.size());
+      const std::uint32_t known = table_.find_or_add(corner, next);
+      if (known != next) {
+        assert(hole_.facets[known].outer != hole_.kMatched);
+        mesh_.link(make_side(t, k), hole_.facets[known].outer);
+        hole_.facets[known].outer = hole_.kMatched;
+        continue;
+      }
+      hole_.facets.push_back({corner, make_side(t, k)});
+      if (is_finite_facet(corner)) hole_.pending.push_back(next);
+    }
+  }
+  std::uint32_t new_slot() {
+    hole_.slots.push_back(mesh_.new_tetrahedron());
+    return hole_.slots[used_++];
+  }
+
+  /// The vertex that the growing sphere meets first, or 0, the ghost.
+  std::uint32_t choose(std::uint32_t a, std::uint32_t b, std::uint32_t c) {
+    ScanFacet facet;
+    hole_.near.clear();
+    double volume_error = kInfinity;
+    if (measure(a, b, c, facet)) {
+      volume_error = facet.volume_error;
+      const double most = scan_(hole_.x.data(), hole_.y.data(), hole_.z.data(), count_, facet,
+                                hole_.power.data(), hole_.volume.data());
+      list_near(facet, most);
+    } else {
+      for (std::uint32_t i = 1; i < count_; ++i) hole_.near.push_back(i);
+    }
+    if (hole_.near.size() == 1 && hole_.volume[hole_.near[0]] > volume_error) return hole_.near[0];
+    std::uint32_t best = 0;
+    for (const std::uint32_t d : hole_.near) {
+      if (d == a || d == b || d == c) continue;
+      const bool certain = hole_.volume[d] > volume_error;
+      if (!certain &&
+          Kernel::orientation(hole_.point[d], hole_.point[a], hole_.point[b], hole_.point[c]) <= 0)
+        continue;
+      if (best == 0 || beats(d, best, a, b, c)) best = d;
+    }
+    return best;
+  }
+  bool beats(std::uint32_t d, std::uint32_t best, std::uint32_t a, std::uint32_t b,
+             std::uint32_t c) const {
+    const auto at = [&](std::uint32_t k) -> const auto& { return mesh_.vertex[hole_.vertex[k]]; };
+    return inside_sphere<Kernel>(at(best), at(a), at(b), at(c), hole_.point[d]);
+  }
+
+  /// The facet for scan(); false where bounds of errors could not be trusted.
+  ///
+  /// With u = 2^-53, edges e and f from the corner, normal n = e x f, b = |e| |f| (|e| + |f|), k =
+  /// |e| |f| / |n|, first order: each coordinate of n is wrong by 4 u |e| |f| at most (differences
+  /// included), n by 7 u |e| |f|. A volume is then wrong by 7 u |e| |f| w + 4 u |e| |f| w, w the
+  /// length of the vertex's vector. r = |e|^2 f - |f|^2 e, of length b at most, is wrong by 8 u b;
+  /// r x n by 25 k u b |n|; |n|^2 relatively by 17 k u; so the diameter, their quotient, by 43 k u
+  /// b / |n|, and its length is at most b / |n|. A power is wrong by that times w, and 6 u w (w + b
+  /// / |n|) for its own operations. The constants below are larger by a tenth at least, for what is
+  /// left out, and cover the operations of those who use the bounds.
+  bool measure(std::uint32_t a, std::uint32_t b, std::uint32_t c, ScanFacet& facet) const {
+    const std::array<const double*, 3> axis = {hole_.x.data(), hole_.y.data(), hole_.z.data()};
+    std::array<double, 3> e;
+    std::array<double, 3> f;
+    double ee = 0;
+    double ff = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      facet.corner[k] = axis[k][a];
+      e[k] = axis[k][c] - axis[k][a];
+      f[k] = axis[k][b] - axis[k][a];
+      ee += e[k] * e[k];
+      ff += f[k] * f[k];
+    }
+    std::array<double, 3> r;
+    double nn = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::size_t l = (k + 1) % 3;
+      const std::size_t m = (k + 2) % 3;
+      facet.normal[k] = e[l] * f[m] - e[m] * f[l];
+      nn += facet.normal[k] * facet.normal[k];
+      r[k] = ee * f[k] - ff * e[k];
+    }
+    const double lengths = std::sqrt(ee * ff);
+    const double normal = std::sqrt(nn);
+    const double k = lengths / normal;
+    if (!(k < 0x1p40 && normal > 0x1p-400 && length_ < 0x1p150)) return false;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::size_t l = (i + 1) % 3;
+      const std::size_t m = (i + 2) % 3;
+      facet.diameter[i] = (r[l] * facet.normal[m] - r[m] * facet.normal[l]) / nn;
+    }
+    const double diameter = k * (std::sqrt(ee) + std::sqrt(ff));
+    facet.power_error = length_ * kUnit * (48 * k * diameter + 12 * (length_ + diameter));
+    // Integers small enough make integers that are exact: 6 w^3 < 2^53.
+    const bool exact = std::is_same_v<typename Kernel::Coord, std::int32_t> && length_ < 114'000;
+    facet.volume_error = exact ? 0 : 16 * kUnit * lengths * length_;
+    return true;
+  }
+
+  /// Lists the vertices that may have the least ratio of power and volume; `most`: a bound of it.
+  void list_near(const ScanFacet& facet, double most) {
+    const double* const power = hole_.power.data();
+    const double* const volume = hole_.volume.data();
+    const bool any = most < kInfinity;
+    const double factor = any ? most : 0;
+    const double margin = any ? facet.power_error + std::abs(most) * facet.volume_error : kInfinity;
+    for (std::uint32_t i = 1; i < count_; ++i)
+      if (volume[i] + facet.volume_error > 0 && power[i] - factor * volume[i] <= margin)
+        hole_.near.push_back(i);
+  }
+
+  Mesh<Kernel>& mesh_;
+  Hole<Point>& hole_;
+  FacetTable table_;
+  const ScanFunction scan_ = scan_function();
+  std::size_t count_ = 0;
+  std::size_t used_ = 0;  ///< slots that have been used again
+  double length_ = 0;
+};
+
+}  // namespace
+
+template <class Kernel>
+void wrap_hole(Mesh<Kernel>& mesh) {
+  Wrapping<Kernel>(mesh).run();
+}
+
+template void wrap_hole(Mesh<IntKernel>&);
+template void wrap_hole(Mesh<DoubleKernel>&);
+
+}  // namespace terrace::tri::spatial
