@@ -7,6 +7,7 @@
 
 #include "facet_table.hpp"
 #include "tetrahedron.hpp"
+#include "wrap_scan.hpp"
 
 namespace terrace::tri::spatial {
 
@@ -31,6 +32,7 @@ struct Hole {
   // open facets still to be filled; a table of facets by their corners.
   std::vector<double> x, y, z;
   std::vector<double> power, volume;
+  ScanFunction scan = best_scan_function();
   std::vector<std::uint32_t> near;
   std::vector<std::uint32_t> pending;
   std::vector<FacetEntry> table;

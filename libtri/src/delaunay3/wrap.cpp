@@ -19,7 +19,6 @@
 #include "facet_table.hpp"
 #include "int_kernel.hpp"
 #include "predicates.hpp"
-#include "wrap_scan.hpp"
 
 namespace terrace::tri::spatial {
 namespace {
@@ -71,7 +70,10 @@ class Wrapping {
     if (hole_.power.size() < padded) {
       hole_.power.resize(padded);
       hole_.volume.resize(padded);
+      hole_.near.resize(padded);
     }
+    vertices_ = {hole_.x.data(), hole_.y.data(),     hole_.z.data(),
+                 padded,         hole_.power.data(), hole_.volume.data()};
     hole_.incident.resize(count_);
     hole_.pending.clear();
     table_.clear(hole_.facets.size());
@@ -126,19 +128,20 @@ class Wrapping {
   /// The vertex that the growing sphere meets first, or 0, the ghost.
   std::uint32_t choose(std::uint32_t a, std::uint32_t b, std::uint32_t c) {
     ScanFacet facet;
-    hole_.near.clear();
     double volume_error = kInfinity;
+    std::size_t near = 0;
     if (measure(a, b, c, facet)) {
       volume_error = facet.volume_error;
-      const double most = scan_(hole_.x.data(), hole_.y.data(), hole_.z.data(), count_, facet,
-                                hole_.power.data(), hole_.volume.data());
-      list_near(facet, most);
+      near = hole_.scan(vertices_, facet, hole_.near.data());
+      if (near == 1 && hole_.volume[hole_.near[0]] > volume_error) [[likely]]
+        return hole_.near[0];
     } else {
-      for (std::uint32_t i = 1; i < count_; ++i) hole_.near.push_back(i);
+      while (++near < count_) hole_.near[near - 1] = static_cast<std::uint32_t>(near);
+      --near;
     }
-    if (hole_.near.size() == 1 && hole_.volume[hole_.near[0]] > volume_error) return hole_.near[0];
     std::uint32_t best = 0;
-    for (const std::uint32_t d : hole_.near) {
+    for (std::size_t i = 0; i < near; ++i) {
+      const std::uint32_t d = hole_.near[i];
       if (d == a || d == b || d == c) continue;
       const bool certain = hole_.volume[d] > volume_error;
       if (!certain &&
@@ -203,22 +206,10 @@ class Wrapping {
     return true;
   }
 
-  /// Lists the vertices that may have the least ratio of power and volume; `most`: a bound of it.
-  void list_near(const ScanFacet& facet, double most) {
-    const double* const power = hole_.power.data();
-    const double* const volume = hole_.volume.data();
-    const bool any = most < kInfinity;
-    const double factor = any ? most : 0;
-    const double margin = any ? facet.power_error + std::abs(most) * facet.volume_error : kInfinity;
-    for (std::uint32_t i = 1; i < count_; ++i)
-      if (volume[i] + facet.volume_error > 0 && power[i] - factor * volume[i] <= margin)
-        hole_.near.push_back(i);
-  }
-
   Mesh<Kernel>& mesh_;
   Hole<Point>& hole_;
   FacetTable table_;
-  const ScanFunction scan_ = scan_function();
+  ScanVertices vertices_{};
   std::size_t count_ = 0;
   std::size_t used_ = 0;  ///< slots that have been used again
   double length_ = 0;
