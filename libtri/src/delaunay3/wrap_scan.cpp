@@ -1,9 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <cstddef>
+#include <cstdint>
 
 namespace {
+
 constexpr std::size_t kLanes = 2;
+using Lanes = double __attribute__((vector_size(kLanes * sizeof(double))));
+using Mask = std::int64_t __attribute__((vector_size(kLanes * sizeof(double))));
+
+/// A bit for each lane that is true.
+[[gnu::always_inline]] inline unsigned bits_of(Mask mask) {
+  return static_cast<unsigned>((mask[0] & 1) | (mask[1] & 2));
 }
+
+}  // namespace
+
 #include "wrap_scan_impl.hpp"
 
 namespace terrace::tri::spatial {

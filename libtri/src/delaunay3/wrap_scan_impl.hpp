@@ -1,17 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-// Included once for each instruction set, with kLanes defined before: what is here must not be
-// shared between objects, so nothing has a name outside its object, and no function of another
-// header is called.
+// Included once for each instruction set, with kLanes and a function bits_of() for masks defined
+// before: what is here must not be shared between objects, so nothing has a name outside its
+// object, and no function of another header is called.
 #include "wrap_scan.hpp"
 
 namespace terrace::tri::spatial {
 namespace {
 
-using Lanes = double __attribute__((vector_size(kLanes * sizeof(double))));
 using Loaded = double __attribute__((vector_size(kLanes * sizeof(double)), aligned(8), may_alias));
-using Mask = std::int64_t __attribute__((vector_size(kLanes * sizeof(double))));
 
 constexpr double kNothing = __builtin_inf();
 
@@ -33,15 +31,15 @@ constexpr double kNothing = __builtin_inf();
     best_power = better ? power : best_power;
     best_volume = better ? volume : best_volume;
   }
-  double least = kNothing;
-  for (std::size_t i = 0; i < kLanes; ++i) {
-    if (!(best_power[i] < kNothing)) continue;
-    const double power = best_power[i] + f.power_error;
-    const double ratio =
-        power / (power > 0 ? best_volume[i] - f.volume_error : best_volume[i] + f.volume_error);
-    least = ratio < least ? ratio : least;
-  }
-  return least;
+  const Lanes power = best_power + f.power_error;
+  const Lanes ratio = power / (best_volume + (power > 0.0 ? -volume_error : volume_error));
+  const Lanes known = best_power < kNothing ? ratio : kNothing - Lanes{};
+  double least[kLanes];
+  for (std::size_t i = 0; i < kLanes; ++i) least[i] = known[i];
+  for (std::size_t half = kLanes / 2; half > 0; half /= 2)
+    for (std::size_t i = 0; i < half; ++i)
+      least[i] = least[i + half] < least[i] ? least[i + half] : least[i];
+  return least[0];
 }
 
 [[gnu::always_inline]] inline std::size_t scan_with_lanes(const ScanVertices& v, const ScanFacet& f,
@@ -52,21 +50,16 @@ constexpr double kNothing = __builtin_inf();
   const double margin =
       any ? f.power_error + (least < 0 ? -least : least) * f.volume_error : kNothing;
   std::size_t listed = 0;
-  // Hits are rare: eight vertices are asked at once whether one of them is.
   for (std::size_t i = 0; i < v.count; i += kScanPadding) {
-    Mask hits{};
-    for (std::size_t k = i; k < i + kScanPadding; k += kLanes) {
-      const Lanes power = *reinterpret_cast<const Loaded*>(v.power + k);
-      const Lanes volume = *reinterpret_cast<const Loaded*>(v.volume + k);
-      hits |= (volume + f.volume_error > 0.0) & (power - factor * volume <= margin);
+    unsigned hits = 0;
+    for (std::size_t k = 0; k < kScanPadding; k += kLanes) {
+      const Lanes power = *reinterpret_cast<const Loaded*>(v.power + i + k);
+      const Lanes volume = *reinterpret_cast<const Loaded*>(v.volume + i + k);
+      const Mask hit = (volume + f.volume_error > 0.0) & (power - factor * volume <= margin);
+      hits |= bits_of(hit) << k;
     }
-    std::int64_t hit = 0;
-    for (std::size_t k = 0; k < kLanes; ++k) hit |= hits[k];
-    if (hit == 0) [[likely]]
-      continue;
-    for (std::size_t k = i; k < i + kScanPadding; ++k)
-      if (v.volume[k] + f.volume_error > 0 && v.power[k] - factor * v.volume[k] <= margin)
-        near[listed++] = static_cast<std::uint32_t>(k);
+    for (; hits != 0; hits &= hits - 1)
+      near[listed++] = static_cast<std::uint32_t>(i) + static_cast<unsigned>(__builtin_ctz(hits));
   }
   return listed;
 }
