@@ -95,7 +95,7 @@ TYPED_TEST(Delaunay3CgalTest, SameTetrahedraAfterRemoval) {
   for (const PointSet3 kind : kPointSets3) {
     if (kind == PointSet3::kCurves) continue;
     SCOPED_TRACE(name(kind));
-    const auto points = make_points3<TypeParam>(kind, 600, 32);
+    const auto points = make_points3<TypeParam>(kind, 300, 32);
     std::mt19937_64 random(33);
     Delaunay3<TypeParam> triangulation;
     triangulation.build(points);

@@ -55,6 +55,38 @@ TYPED_TEST(Delaunay3Test, BuildIsValidAndCompleteForEveryKindOfPoints) {
   }
 }
 
+TYPED_TEST(Delaunay3Test, ThreadsLeaveNoTrace) {
+  // Enough for passes in parts, with duplicates across their border, long cavities, and ties.
+  for (const PointSet3 kind : {PointSet3::kUniform, PointSet3::kGrid, PointSet3::kFiveBits,
+                               PointSet3::kSlab, PointSet3::kClusters}) {
+    SCOPED_TRACE(name(kind));
+    auto points = make_points3<TypeParam>(kind, 20'000, 6);
+    Delaunay3<TypeParam> one;
+    Delaunay3<TypeParam> two;
+    Delaunay3<TypeParam> inserted;
+    const auto vertices = one.build(points, 1);
+    ASSERT_EQ(two.build(points, 2), vertices);
+    ASSERT_EQ(find_fault(one), "");
+    const auto& first = Delaunay3Access::mesh(one);
+    const auto& second = Delaunay3Access::mesh(two);
+    ASSERT_EQ(first.tetrahedron.size(), second.tetrahedron.size());
+    ASSERT_EQ(first.free_tetrahedron, second.free_tetrahedron);
+    for (std::uint32_t t = 0; t < first.tetrahedron.size(); ++t) {
+      ASSERT_EQ(first.tetrahedron[t].corner[0], second.tetrahedron[t].corner[0]);
+      if (first.tetrahedron[t].corner[0] == spatial::kFreeCorner) continue;
+      ASSERT_EQ(first.tetrahedron[t].corner, second.tetrahedron[t].corner);
+      ASSERT_EQ(first.tetrahedron[t].mate, second.tetrahedron[t].mate);
+    }
+    inserted.insert(points, {});
+    ASSERT_EQ(inserted.hash(), one.hash());
+    // It is an ordinary triangulation from here on.
+    const std::vector<VertexId> some(vertices.begin(), vertices.begin() + 300);
+    std::set<VertexId> going(some.begin(), some.end());
+    two.remove(std::vector<VertexId>(going.begin(), going.end()));
+    ASSERT_EQ(find_fault(two), "");
+  }
+}
+
 TYPED_TEST(Delaunay3Test, OneByOneEqualsBuild) {
   for (const PointSet3 kind : kPointSets3) {
     SCOPED_TRACE(name(kind));
