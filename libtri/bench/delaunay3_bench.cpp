@@ -7,6 +7,7 @@
 // items_per_second counts points and is a median of 5 rounds (CGAL's removal: 1). A round of a
 // cluster row removes or inserts all clusters once; what restores the state after it is not timed.
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <ctime>
@@ -24,6 +25,7 @@
 #include <malloc.h>
 #endif
 
+#include "delaunay3/access.hpp"
 #include "terrace/tri/delaunay3.hpp"
 
 namespace {
@@ -290,7 +292,20 @@ void bulk(benchmark::State& state) {
   if (held > 0) state.counters["held_B/pt"] = held;
 }
 
-enum Action { kInsert, kRemoveSets, kRemoveOneByOne };
+/// Wall time of bulk construction by one or two threads, to be run on two idle cores.
+template <class Coord>
+void bulk_by_threads(benchmark::State& state) {
+  const auto& input = input_points(static_cast<Input>(state.range(0)));
+  const Ours<Coord> points(input);
+  measure(state, input.size(), 5, [&] {
+    Delaunay3<Coord> triangulation;
+    const auto start = std::chrono::steady_clock::now();
+    triangulation.build(points.points, static_cast<unsigned>(state.range(1)));
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  });
+}
+
+enum Action { kInsert, kRemoveSets, kRemoveOneByOne, kRemoveByEars };
 
 template <class Engine, Action kAction>
 void clusters(benchmark::State& state) {
@@ -299,12 +314,14 @@ void clusters(benchmark::State& state) {
   Engine engine(input_points(input));
   engine.build();
   engine.find(all);
+  if constexpr (kAction == kRemoveByEars)
+    terrace::tri::Delaunay3Access::mesh(engine.triangulation).hole.by_ears = true;
   const auto insert = [&] {
     for (auto& members : engine.clusters) engine.insert(members);
   };
   const auto remove = [&] {
     for (auto& members : engine.clusters) {
-      if constexpr (kAction == kRemoveOneByOne) {
+      if constexpr (kAction == kRemoveOneByOne || kAction == kRemoveByEars) {
         engine.remove_one_by_one(members);
       } else {
         engine.remove_set(members);
@@ -329,17 +346,25 @@ void inputs(benchmark::internal::Benchmark* row) {
   row->ArgName("input")->Arg(kCube)->Arg(kTorus)->Arg(kGrid);
 }
 
+void inputs_and_threads(benchmark::internal::Benchmark* row) {
+  row->UseManualTime()->Iterations(1)->Unit(benchmark::kMillisecond);
+  row->ArgNames({"input", "threads"})->ArgsProduct({{kCube, kTorus, kGrid}, {1, 2}});
+}
+
 using OursInt = Ours<std::int32_t>;
 using OursDouble = Ours<double>;
 
 BENCHMARK(bulk<Cgal>)->Apply(inputs);
 BENCHMARK(bulk<OursInt>)->Apply(inputs);
 BENCHMARK(bulk<OursDouble>)->Apply(inputs);
+BENCHMARK(bulk_by_threads<std::int32_t>)->Apply(inputs_and_threads);
+BENCHMARK(bulk_by_threads<double>)->Apply(inputs_and_threads);
 BENCHMARK(clusters<Cgal, kInsert>)->Apply(inputs);
 BENCHMARK(clusters<OursInt, kInsert>)->Apply(inputs);
 BENCHMARK(clusters<OursDouble, kInsert>)->Apply(inputs);
 BENCHMARK(clusters<Cgal, kRemoveOneByOne>)->Apply(inputs);
 BENCHMARK(clusters<OursInt, kRemoveOneByOne>)->Apply(inputs);
+BENCHMARK(clusters<OursInt, kRemoveByEars>)->Apply(inputs);
 BENCHMARK(clusters<OursDouble, kRemoveOneByOne>)->Apply(inputs);
 BENCHMARK(clusters<Cgal, kRemoveSets>)->Apply(inputs);
 BENCHMARK(clusters<OursInt, kRemoveSets>)->Apply(inputs);

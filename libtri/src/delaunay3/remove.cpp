@@ -6,6 +6,7 @@
 #include "remove.hpp"
 
 #include "double_kernel.hpp"
+#include "ear_queue.hpp"
 #include "flat.hpp"
 #include "hilbert.hpp"
 #include "int_kernel.hpp"
@@ -38,7 +39,11 @@ class Removal {
         return;
       }
       for (const std::uint32_t t : hole_.slots) mesh_.mark[t] = kUnknown;
-      wrap_hole(mesh_);
+      if (hole_.by_ears && vertices_.size() == 1) {
+        fill_by_ears(mesh_, mesh_.vertex[vertices_[0]].point);
+      } else {
+        wrap_hole(mesh_);
+      }
     }
     for (const std::uint32_t v : vertices_) mesh_.free_vertex_slot(v);
     mesh_.last_vertex = hole_.vertex[1];
