@@ -80,7 +80,8 @@ class EarQueue {
         const std::uint64_t back = ends(corner[(k + 2) % 3], corner[(k + 1) % 3]);
         for (auto at = std::lower_bound(edges_.begin(), edges_.end(), Edge{back, 0});
              at != edges_.end() && at->ends == back; ++at) {
-          if (filling_.is_open(at->facet)) add_ear(i, at->facet);
+          // Each pair once.
+          if (at->facet < i && filling_.is_open(at->facet)) add_ear(i, at->facet);
         }
       }
     }
