@@ -223,7 +223,7 @@ TYPED_TEST(Delaunay3Test, CompactSetsLeaveNoTrace) {
 TYPED_TEST(Delaunay3Test, CavitiesAndHolesOfAnySize) {
   // Points near a sphere, whose centre is joined to all of them, 2 n - 4 facets round it: sizes
   // below and above those that are treated apart.
-  for (const std::size_t count : {5u, 40u, 61u, 62u, 63u, 64u, 65u, 66u, 130u, 300u}) {
+  for (const std::size_t count : {5u, 40u, 61u, 62u, 63u, 64u, 65u, 66u, 130u, 200u, 3000u}) {
     SCOPED_TRACE(count);
     std::mt19937_64 random(count);
     std::vector<std::array<TypeParam, 3>> points;
