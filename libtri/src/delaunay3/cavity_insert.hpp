@@ -64,6 +64,10 @@ class CavityInsertion {
       std::array<Verdict, 4> filtered;
       for (std::uint32_t i = 0; i < 4; ++i) {
         const std::uint32_t other = tetrahedron_of(t.mate[i]);
+        if constexpr (!Part::kWhole) {
+          // The other corners are those of t, which is owned.
+          if (!part_.owns(tetrahedron[other].corner[index_of(t.mate[i])])) return false;
+        }
         filtered[i] =
             mark[other] == kUnknown ? conflicts.filter(tetrahedron[other]) : Verdict::kOut;
       }
@@ -72,9 +76,6 @@ class CavityInsertion {
         // Read again: it may be a neighbour twice.
         if (mark[other] == kUnknown) {
           const Tetrahedron& tested = tetrahedron[other];
-          if constexpr (!Part::kWhole) {
-            if (!part_.owns(tested)) return false;
-          }
           if (filtered[i] == Verdict::kIn ||
               (filtered[i] != Verdict::kOut && conflicts.decide(tested, filtered[i]))) {
             mark[other] = kTaken;

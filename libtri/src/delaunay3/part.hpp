@@ -38,9 +38,12 @@ class Part {
         room_(blocks * kBlock),
         free_(free_list) {}
 
+  [[nodiscard]] bool owns(std::uint32_t corner) const {
+    return range_.has(corner) || corner == kGhost;
+  }
   [[nodiscard]] bool owns(const Tetrahedron& t) const {
     for (const std::uint32_t v : t.corner)
-      if (v != kGhost && !range_.has(v)) return false;
+      if (!owns(v)) return false;
     return true;
   }
   /// Whether the neighbour beyond facet i may be read: where a corner of that facet is in the range

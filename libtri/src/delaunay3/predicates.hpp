@@ -104,9 +104,7 @@ class Conflicts {
     // circle of the facet out, perturbed in the same way.
     const int side = orientation_with<Kernel>(vertex_, t, ghost, point_);
     if (side != 0) return side > 0;
-    const Tetrahedron& finite = tetrahedron_[tetrahedron_of(t.mate[ghost])];
-    const Verdict again = filter(finite);
-    return again == Verdict::kIn || (again != Verdict::kOut && decide_finite(finite, again));
+    return decide_finite(tetrahedron_[tetrahedron_of(t.mate[ghost])], Verdict::kOpen);
   }
   [[nodiscard]] bool operator()(const Tetrahedron& t) const {
     const Verdict filtered = filter(t);
