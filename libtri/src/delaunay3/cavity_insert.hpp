@@ -80,8 +80,10 @@ class CavityInsertion {
               (filtered[i] != Verdict::kOut && conflicts.decide(tested, filtered[i]))) {
             mark[other] = kTaken;
             cavity_.inside[inside_count_++] = other;
-            for (const Side mate : tested.mate)
+            for (const Side mate : tested.mate) {
               __builtin_prefetch(&tetrahedron[tetrahedron_of(mate)]);
+              __builtin_prefetch(&mark[tetrahedron_of(mate)]);
+            }
             continue;
           }
           mark[other] = kKept;
