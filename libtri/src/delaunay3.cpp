@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "terrace/tri/delaunay3.hpp"
+
+#include <cassert>
+#include <stdexcept>
+#include <string>
+
+#include "delaunay3/access.hpp"
+#include "delaunay3/build.hpp"
+#include "delaunay3/insert.hpp"
+#include "delaunay3/query.hpp"
+#include "delaunay3/remove.hpp"
+#include "delaunay3/take_changes.hpp"
+
+namespace terrace::tri {
+namespace {
+
+using spatial::kMaxVertices;
+
+template <class Kernel, class Point>
+void check_points(std::span<const Point> points) {
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (Kernel::valid(points[i])) continue;
+    const bool integers = std::is_same_v<Kernel, spatial::IntKernel>;
+    throw std::invalid_argument(
+        "point " + std::to_string(i) + ": coordinates " + std::to_string(points[i][0]) + ", " +
+        std::to_string(points[i][1]) + ", " + std::to_string(points[i][2]) +
+        (integers ? " are not in the range 0 <= c < 2^30; move or scale the points"
+                  : " are not finite; leave such points out"));
+  }
+}
+
+void check_count(std::size_t present, std::size_t added) {
+  if (added > kMaxVertices - present)
+    throw std::length_error("a triangulation holds at most 2^29 - 2 vertices; " +
+                            std::to_string(present) + " are there and " + std::to_string(added) +
+                            " were to be added");
+}
+
+}  // namespace
+
+template <class Coord>
+Delaunay3<Coord>::Delaunay3() : impl_(std::make_unique<Impl>()) {}
+template <class Coord>
+Delaunay3<Coord>::~Delaunay3() = default;
+template <class Coord>
+Delaunay3<Coord>::Delaunay3(Delaunay3&&) noexcept = default;
+template <class Coord>
+Delaunay3<Coord>& Delaunay3<Coord>::operator=(Delaunay3&&) noexcept = default;
+
+template <class Coord>
+std::vector<VertexId> Delaunay3<Coord>::build(std::span<const Point> points, unsigned threads) {
+  assert(vertex_count() == 0);
+  check_count(0, points.size());
+  check_points<typename Impl::Kernel>(points);
+  return spatial::build(impl_->mesh, points, threads);
+}
+
+template <class Coord>
+auto Delaunay3<Coord>::insert(const Point& point, VertexId hint) -> Insertion {
+  assert(hint == kNoVertex || alive(hint));
+  check_count(impl_->mesh.vertex_count, 1);
+  check_points<typename Impl::Kernel>(std::span(&point, 1));
+  const spatial::Inserted inserted = spatial::insert_point(impl_->mesh, point, slot(hint));
+  return {VertexId{inserted.vertex}, inserted.created};
+}
+
+template <class Coord>
+void Delaunay3<Coord>::insert(std::span<const Point> points, std::span<Insertion> results,
+                              VertexId hint) {
+  assert(hint == kNoVertex || alive(hint));
+  assert(results.empty() || results.size() == points.size());
+  check_count(impl_->mesh.vertex_count, points.size());
+  check_points<typename Impl::Kernel>(points);
+  spatial::insert_points(impl_->mesh, points, slot(hint),
+                         [&](std::size_t i, const spatial::Inserted& inserted) {
+                           if (!results.empty())
+                             results[i] = {VertexId{inserted.vertex}, inserted.created};
+                         });
+}
+
+template <class Coord>
+void Delaunay3<Coord>::remove(VertexId vertex) {
+  assert(alive(vertex));
+  const std::uint32_t one = slot(vertex);
+  spatial::remove_set(impl_->mesh, std::span(&one, 1));
+}
+
+template <class Coord>
+void Delaunay3<Coord>::remove(std::span<const VertexId> vertices) {
+  impl_->set.clear();
+  for (const VertexId vertex : vertices) {
+    assert(alive(vertex));
+    impl_->set.push_back(slot(vertex));
+  }
+  spatial::remove_set(impl_->mesh, std::span<const std::uint32_t>(impl_->set));
+}
+
+template <class Coord>
+void Delaunay3<Coord>::clear() {
+  impl_->mesh.clear();
+}
+
+template <class Coord>
+void Delaunay3<Coord>::reserve(std::size_t vertices) {
+  check_count(0, vertices);
+  impl_->mesh.vertex.reserve(vertices + 1);
+  impl_->mesh.tetrahedron.reserve(7 * vertices);
+  impl_->mesh.mark.reserve(7 * vertices);
+}
+
+template <class Coord>
+std::size_t Delaunay3<Coord>::vertex_count() const {
+  return impl_->mesh.vertex_count;
+}
+
+template <class Coord>
+std::size_t Delaunay3<Coord>::tetrahedron_count() const {
+  return impl_->mesh.finite_count;
+}
+
+template <class Coord>
+auto Delaunay3<Coord>::point(VertexId vertex) const -> Point {
+  assert(alive(vertex));
+  return impl_->mesh.vertex[slot(vertex)].point;
+}
+
+template <class Coord>
+std::array<VertexId, 4> Delaunay3<Coord>::vertices(TetrahedronId tetrahedron) const {
+  assert(alive(tetrahedron));
+  return spatial::vertex_ids(impl_->mesh.tetrahedron[slot(tetrahedron)].corner);
+}
+
+template <class Coord>
+std::array<TetrahedronId, 4> Delaunay3<Coord>::neighbours(TetrahedronId tetrahedron) const {
+  assert(alive(tetrahedron));
+  std::array<TetrahedronId, 4> result;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const auto t = spatial::tetrahedron_of(impl_->mesh.tetrahedron[slot(tetrahedron)].mate[i]);
+    result[i] = impl_->mesh.tetrahedron_alive(t) ? TetrahedronId{t} : kNoTetrahedron;
+  }
+  return result;
+}
+
+template <class Coord>
+TetrahedronId Delaunay3<Coord>::tetrahedron_at(VertexId vertex) const {
+  assert(alive(vertex));
+  const auto& mesh = impl_->mesh;
+  return mesh.flat ? kNoTetrahedron
+                   : TetrahedronId{mesh.finite_side(mesh.vertex[slot(vertex)].incident)};
+}
+
+template <class Coord>
+void Delaunay3<Coord>::adjacent(VertexId vertex, std::vector<VertexId>& result) const {
+  assert(alive(vertex));
+  spatial::adjacent(impl_->mesh, slot(vertex), result);
+}
+
+template <class Coord>
+void Delaunay3<Coord>::tetrahedra_at(VertexId vertex, std::vector<TetrahedronId>& result) const {
+  assert(alive(vertex));
+  spatial::tetrahedra_at(impl_->mesh, slot(vertex), result);
+}
+
+template <class Coord>
+std::uint32_t Delaunay3<Coord>::vertex_slots() const {
+  return impl_->mesh.vertex.size();
+}
+template <class Coord>
+std::uint32_t Delaunay3<Coord>::tetrahedron_slots() const {
+  return impl_->mesh.tetrahedron.size();
+}
+template <class Coord>
+bool Delaunay3<Coord>::alive(VertexId vertex) const {
+  return impl_->mesh.vertex_alive(slot(vertex));
+}
+template <class Coord>
+bool Delaunay3<Coord>::alive(TetrahedronId tetrahedron) const {
+  return impl_->mesh.tetrahedron_alive(slot(tetrahedron));
+}
+
+template <class Coord>
+Location3 Delaunay3<Coord>::locate(const Point& point, VertexId hint) const {
+  assert(hint == kNoVertex || alive(hint));
+  check_points<typename Impl::Kernel>(std::span(&point, 1));
+  return spatial::locate(impl_->mesh, point, slot(hint));
+}
+
+template <class Coord>
+VertexId Delaunay3<Coord>::nearest(const Point& point, VertexId hint) const {
+  assert(hint == kNoVertex || alive(hint));
+  check_points<typename Impl::Kernel>(std::span(&point, 1));
+  return VertexId{spatial::nearest(impl_->mesh, point, slot(hint))};
+}
+
+template <class Coord>
+std::uint64_t Delaunay3<Coord>::hash() const {
+  return spatial::hash(impl_->mesh);
+}
+
+template <class Coord>
+std::size_t Delaunay3<Coord>::memory_bytes() const {
+  return impl_->mesh.bytes() + impl_->set.capacity() * sizeof(std::uint32_t);
+}
+
+template <class Coord>
+void Delaunay3<Coord>::start_journal() {
+  impl_->mesh.journal.start();
+}
+template <class Coord>
+void Delaunay3<Coord>::stop_journal() {
+  impl_->mesh.journal.stop();
+}
+template <class Coord>
+void Delaunay3<Coord>::take_changes(Changes& changes) {
+  assert(impl_->mesh.journal.on());
+  spatial::take_changes<Coord>(impl_->mesh, changes);
+}
+
+template class Delaunay3<std::int32_t>;
+template class Delaunay3<double>;
+
+}  // namespace terrace::tri

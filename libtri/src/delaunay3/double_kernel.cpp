@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "double_kernel.hpp"
+
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+
+#include "../delaunay2/double_kernel.hpp"
+#include "int_kernel.hpp"
+
+namespace terrace::tri::spatial {
+namespace {
+
+using Epick = CGAL::Exact_predicates_inexact_constructions_kernel;
+
+Epick::Point_3 cgal(const DoubleKernel::Point& p) { return {p[0], p[1], p[2]}; }
+
+// Whole numbers whose differences IntKernel can take, when ties are frequent (grids) and must not
+// be dear.
+bool to_integers(const DoubleKernel::Point& p, IntKernel::Point& result) {
+  constexpr double kLimit = 0x1p29;
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (!(p[k] > -kLimit && p[k] < kLimit)) return false;
+    result[k] = static_cast<IntKernel::Coord>(p[k]);
+    if (result[k] != p[k]) return false;
+  }
+  return true;
+}
+
+template <std::size_t N>
+bool to_integers(const std::array<const DoubleKernel::Point*, N>& points,
+                 std::array<IntKernel::Point, N>& result) {
+  for (std::size_t i = 0; i < N; ++i)
+    if (!to_integers(*points[i], result[i])) return false;
+  return true;
+}
+
+}  // namespace
+
+int DoubleKernel::orientation_exact(const Point& a, const Point& b, const Point& c,
+                                    const Point& d) {
+  std::array<IntKernel::Point, 4> whole;
+  if (to_integers<4>({&a, &b, &c, &d}, whole))
+    return IntKernel::orientation(whole[0], whole[1], whole[2], whole[3]);
+  return Epick().orientation_3_object()(cgal(a), cgal(b), cgal(c), cgal(d));
+}
+
+bool DoubleKernel::collinear(const Point& a, const Point& b, const Point& c) {
+  // On a line if and only if all three projections are.
+  using Planar = planar::DoubleKernel;
+  return Planar::orientation({a[0], a[1]}, {b[0], b[1]}, {c[0], c[1]}) == 0 &&
+         Planar::orientation({a[1], a[2]}, {b[1], b[2]}, {c[1], c[2]}) == 0 &&
+         Planar::orientation({a[2], a[0]}, {b[2], b[0]}, {c[2], c[0]}) == 0;
+}
+
+int DoubleKernel::in_sphere(const Point& a, const Point& b, const Point& c, const Point& d,
+                            const Point& p) {
+  std::array<IntKernel::Point, 5> whole;
+  if (to_integers<5>({&a, &b, &c, &d, &p}, whole))
+    return IntKernel::in_sphere(whole[0], whole[1], whole[2], whole[3], whole[4]);
+  return Epick().side_of_oriented_sphere_3_object()(cgal(a), cgal(b), cgal(c), cgal(d), cgal(p));
+}
+
+int DoubleKernel::compare_distance(const Point& p, const Point& a, const Point& b) {
+  return Epick().compare_distance_3_object()(cgal(p), cgal(a), cgal(b));
+}
+
+}  // namespace terrace::tri::spatial

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+
+#include "in_sphere.hpp"
+
+/// Exact predicates on doubles: one evaluation in double with a bound of its error decides nearly
+/// always; what is left goes to integers where the coordinates are some, else to CGAL.
+
+namespace terrace::tri::spatial {
+
+struct DoubleKernel {
+  using Coord = double;
+  using Point = std::array<Coord, 3>;
+
+  struct alignas(32) Vertex {
+    Point point;
+    std::uint32_t incident;  ///< see mesh.hpp
+  };
+
+  static bool valid(const Point& p) {
+    return std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]);
+  }
+
+  /// The sign of det(b - a, c - a, d - a): > 0 where the four are in order, 0 where coplanar.
+  static int orientation(const Point& a, const Point& b, const Point& c, const Point& d) {
+    const Vector u = difference(b, a);
+    const Vector v = difference(c, a);
+    const Vector w = difference(d, a);
+    const double det = (u.y * v.z - u.z * v.y) * w.x + (u.z * v.x - u.x * v.z) * w.y +
+                       (u.x * v.y - u.y * v.x) * w.z;
+    // The product of the three lengths bounds each of three sums of products; 8 relative errors of
+    // u = 2^-53 enter (3 in differences, 2 in minors, 1 and 2 in the last step): 24 u times the
+    // product of lengths, here squared and rounded up. Far-off sizes are left to the exact test.
+    const double size = u.square() * v.square() * w.square();
+    if (det * det > 7.5e-30 * size && size > 0x1p-900 && size < 0x1p900) [[likely]]
+      return det > 0 ? 1 : -1;
+    return orientation_exact(a, b, c, d);
+  }
+  /// Whether a, b, c lie on one line.
+  static bool collinear(const Point& a, const Point& b, const Point& c);
+
+  /// A point to be tested against many spheres.
+  class Probe {
+   public:
+    explicit Probe(const Point& p) : x_{p[0], p[0]}, y_{p[1], p[1]}, z_{p[2], p[2]} {}
+
+    /// Where the point lies with respect to the sphere through four vertices in order.
+    [[gnu::always_inline]] Verdict side(const Vertex& a, const Vertex& b, const Vertex& c,
+                                        const Vertex& d) const {
+      const auto pairs = [](const Vertex& v, const Vertex& w, std::size_t k) {
+        return Pair{v.point[k], w.point[k]};
+      };
+      const InSphere test =
+          in_sphere_value({pairs(a, b, 0) - x_, pairs(c, d, 0) - x_, pairs(a, b, 1) - y_,
+                           pairs(c, d, 1) - y_, pairs(a, b, 2) - z_, pairs(c, d, 2) - z_});
+      // As in IntKernel, and one relative error for each of the five differences in a product: 16 *
+      // 12 u < 2.2e-14. Sizes near underflow and overflow are left to the exact test.
+      const double fifth = test.largest * test.largest * test.largest * test.largest * test.largest;
+      if (test.value * test.value > 4.9e-28 * fifth && fifth > 0x1p-900 && fifth < 0x1p900)
+          [[likely]]
+        return test.value > 0 ? Verdict::kIn : Verdict::kOut;
+      return Verdict::kOpen;
+    }
+
+   private:
+    Pair x_, y_, z_;
+  };
+
+  /// > 0 where p lies inside the sphere through a, b, c, d, which are in order; 0 where on it.
+  static int in_sphere(const Point& a, const Point& b, const Point& c, const Point& d,
+                       const Point& p);
+
+  /// < 0 where a is nearer to p than b.
+  static int compare_distance(const Point& p, const Point& a, const Point& b);
+
+ private:
+  struct Vector {
+    double x, y, z;
+    [[nodiscard]] double square() const { return x * x + y * y + z * z; }
+  };
+  static Vector difference(const Point& a, const Point& b) {
+    return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+  }
+  static int orientation_exact(const Point& a, const Point& b, const Point& c, const Point& d);
+};
+
+}  // namespace terrace::tri::spatial

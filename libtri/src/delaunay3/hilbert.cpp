@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "hilbert.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <numeric>
+#include <type_traits>
+#include <vector>
+
+#include "double_kernel.hpp"
+#include "int_kernel.hpp"
+
+namespace terrace::tri::spatial {
+namespace {
+
+using planar::Pool;
+using planar::span_of;
+
+struct Entry {
+  std::uint32_t key;
+  std::uint32_t number;
+};
+
+/// Runs of equal keys up to this length stay as they are.
+constexpr std::size_t kLeaf = 16;
+/// Below this, counters would cost more than points.
+constexpr std::uint32_t kFew = 3000;
+constexpr unsigned kBits = 10;  ///< of a key, per axis
+
+/// One step down the curve: the octant's place on it, and the state of the cube there. A state is
+/// the corner where the curve enters and the axis along which it leaves (C. Hamilton, A.
+/// Rau-Chaplin, "Compact Hilbert indices", doi:10.1016/j.ipl.2007.08.034): 8 * axis + corner.
+struct Step {
+  std::uint8_t place;
+  std::uint8_t state;
+};
+
+constexpr unsigned rotated_left(unsigned bits, unsigned by) {
+  by %= 3;
+  return (bits << by | bits >> (3 - by)) & 7;
+}
+constexpr unsigned rotated_right(unsigned bits, unsigned by) {
+  return rotated_left(bits, 3 - by % 3);
+}
+constexpr unsigned gray(unsigned i) { return i ^ i >> 1; }
+constexpr unsigned trailing_ones(unsigned i) { return static_cast<unsigned>(std::countr_one(i)); }
+
+constexpr Step single_step(unsigned state, unsigned octant) {
+  const unsigned corner = state % 8;
+  const unsigned axis = state / 8;
+  const unsigned code = rotated_right(octant ^ corner, axis + 1);
+  unsigned place = 0;
+  while (gray(place) != code) ++place;
+  const unsigned entry = place == 0 ? 0 : gray((place - 1) / 2 * 2);
+  const unsigned along = place == 0       ? 0
+                         : place % 2 == 0 ? trailing_ones(place - 1) % 3
+                                          : trailing_ones(place) % 3;
+  const unsigned next_corner = corner ^ rotated_left(entry, axis + 1);
+  const unsigned next_axis = (axis + along + 1) % 3;
+  return {static_cast<std::uint8_t>(place), static_cast<std::uint8_t>(8 * next_axis + next_corner)};
+}
+
+constexpr std::array<Step, 24 * 8> make_table() {
+  std::array<Step, 24 * 8> table{};
+  for (unsigned state = 0; state < 24; ++state)
+    for (unsigned octant = 0; octant < 8; ++octant)
+      table[state * 8 + octant] = single_step(state, octant);
+  return table;
+}
+constexpr auto kTable = make_table();
+
+/// Place of a cell of a cube of 2^10 cells along each edge on the curve.
+std::uint32_t hilbert_key(const std::array<std::uint32_t, 3>& cell) {
+  std::uint32_t key = 0;
+  std::uint32_t state = 0;
+  for (unsigned bit = kBits; bit-- > 0;) {
+    const std::uint32_t octant =
+        (cell[0] >> bit & 1) << 2 | (cell[1] >> bit & 1) << 1 | (cell[2] >> bit & 1);
+    const Step& step = kTable[state * 8 + octant];
+    key = key << 3 | step.place;
+    state = step.state;
+  }
+  return key;
+}
+
+/// Maps points of a set to cells of its bounding cube.
+template <class Kernel>
+class Cells {
+ public:
+  using Point = typename Kernel::Point;
+  using Coord = typename Kernel::Coord;
+
+  Cells(std::span<const Point> points, std::span<const std::uint32_t> order) {
+    Point high = points[order[0]];
+    low_ = high;
+    for (const std::uint32_t i : order) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        low_[k] = std::min(low_[k], points[i][k]);
+        high[k] = std::max(high[k], points[i][k]);
+      }
+    }
+    if constexpr (std::is_integral_v<Coord>) {
+      const Coord extent = std::max({high[0] - low_[0], high[1] - low_[1], high[2] - low_[2]});
+      // The extent uses the key's first bit, so that no set is left in one cell.
+      while (extent >> down_ >= Coord{1} << kBits) ++down_;
+      while (extent > 0 && extent << up_ < Coord{1} << (kBits - 1)) ++up_;
+      single_ = extent == 0;
+    } else {
+      // Halves: the extent of finite doubles may overflow.
+      extent_ = std::max(
+          {high[0] / 2 - low_[0] / 2, high[1] / 2 - low_[1] / 2, high[2] / 2 - low_[2] / 2});
+      single_ = !(extent_ > 0);
+    }
+  }
+
+  /// All points are equal (or as good as).
+  [[nodiscard]] bool single() const { return single_; }
+  [[nodiscard]] std::uint32_t key(const Point& p) const {
+    return hilbert_key({cell(p[0], low_[0]), cell(p[1], low_[1]), cell(p[2], low_[2])});
+  }
+
+ private:
+  [[nodiscard]] std::uint32_t cell(Coord c, Coord low) const {
+    if constexpr (std::is_integral_v<Coord>) {
+      return static_cast<std::uint32_t>(c - low) >> down_ << up_;
+    } else {
+      constexpr double kCells = 1 << kBits;
+      const double part = (c / 2 - low / 2) / extent_ * kCells;
+      return static_cast<std::uint32_t>(std::min(part, kCells - 1));
+    }
+  }
+
+  Point low_;
+  Coord extent_ = 0;
+  unsigned down_ = 0;
+  unsigned up_ = 0;
+  bool single_ = false;
+};
+
+/// Stable, least significant digit first: `kPasses` passes of kDigit bits.
+template <unsigned kDigit, unsigned kPasses>
+void radix_sort(Pool<Entry>& entries) {
+  constexpr std::size_t kDigits = std::size_t{1} << kDigit;
+  std::array<std::array<std::uint32_t, kDigits>, kPasses> start{};
+  for (const Entry& entry : span_of(entries))
+    for (unsigned pass = 0; pass < kPasses; ++pass)
+      ++start[pass][entry.key >> (kDigit * pass) & (kDigits - 1)];
+  for (auto& counters : start)
+    std::exclusive_scan(counters.begin(), counters.end(), counters.begin(), 0u);
+  Pool<Entry> other;
+  other.resize(entries.size());
+  for (unsigned pass = 0; pass < kPasses; ++pass) {
+    for (const Entry& entry : span_of(entries))
+      other[start[pass][entry.key >> (kDigit * pass) & (kDigits - 1)]++] = entry;
+    std::swap(entries, other);
+  }
+}
+
+/// Sorts a range of point numbers. Each level tells 10 more bits apart, so it is never deep.
+template <class Kernel>
+void sort_range(std::span<const typename Kernel::Point> points, std::span<std::uint32_t> order) {
+  const Cells<Kernel> cells(points, order);
+  if (cells.single()) return;
+  const auto count = static_cast<std::uint32_t>(order.size());
+  Pool<Entry> entries;
+  entries.resize(count);
+  // Few points are told apart by the curve's coarse cells, and if not, in the runs below.
+  const bool few = count < kFew;
+  const unsigned shift = few ? 3 * kBits - 16 : 0;
+  for (std::uint32_t i = 0; i < count; ++i)
+    entries[i] = {cells.key(points[order[i]]) >> shift, order[i]};
+  if (few) {
+    radix_sort<8, 2>(entries);
+  } else {
+    radix_sort<10, 3>(entries);
+  }
+  // Entries are gone before the runs are sorted, so that memory does not add up.
+  std::vector<std::span<std::uint32_t>> long_runs;
+  std::uint32_t begin = 0;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    order[i] = entries[i].number;
+    if (i + 1 == count || entries[i + 1].key != entries[i].key) {
+      if (i + 1 - begin > kLeaf) long_runs.push_back(order.subspan(begin, i + 1 - begin));
+      begin = i + 1;
+    }
+  }
+  entries.release();
+  for (const std::span<std::uint32_t> run : long_runs) sort_range<Kernel>(points, run);
+}
+
+}  // namespace
+
+template <class Kernel>
+Pool<std::uint32_t> hilbert_order(std::span<const typename Kernel::Point> points) {
+  Pool<std::uint32_t> order;
+  order.resize(static_cast<std::uint32_t>(points.size()));
+  const std::span<std::uint32_t> all = span_of(order);
+  std::iota(all.begin(), all.end(), 0u);
+  if (!all.empty()) sort_range<Kernel>(points, all);
+  return order;
+}
+
+template Pool<std::uint32_t> hilbert_order<IntKernel>(std::span<const IntKernel::Point>);
+template Pool<std::uint32_t> hilbert_order<DoubleKernel>(std::span<const DoubleKernel::Point>);
+
+}  // namespace terrace::tri::spatial

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "../delaunay2/pool.hpp"
+
+namespace terrace::tri::spatial {
+
+/// Numbers of the points along a Hilbert curve over their bounding cube, so that points close in
+/// the result are close in space. Points too close to tell apart by 10 bits per axis are sorted in
+/// their own cube. Points are valid. O(n); 16 bytes per point while it runs besides the result.
+template <class Kernel>
+planar::Pool<std::uint32_t> hilbert_order(std::span<const typename Kernel::Point> points);
+
+}  // namespace terrace::tri::spatial

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <span>
+
+#include "hilbert.hpp"
+#include "mesh.hpp"
+
+namespace terrace::tri::spatial {
+
+/// Joins a vertex, which has its slot and point but no tetrahedron, to a triangulation with
+/// tetrahedra. `conflict`: a tetrahedron in conflict with it, as walk() finds where no corner
+/// equals the point. See cavity_insert.hpp.
+template <class Kernel>
+void insert_vertex(Mesh<Kernel>& mesh, std::uint32_t vertex, std::uint32_t conflict);
+
+/// Inserts a point, or finds the vertex that equals it. `hint`: a living vertex, or kNone.
+struct Inserted {
+  std::uint32_t vertex;
+  bool created;
+};
+template <class Kernel>
+Inserted insert_point(Mesh<Kernel>& mesh, const typename Kernel::Point& p, std::uint32_t hint);
+
+/// Calls visit(k) for all k below count, every fourth of them first, of these again every fourth,
+/// and so on from the coarsest: points of a curve so inserted make half of the tetrahedra that are
+/// made and replaced again when they come in order (after N. Amenta, S. Choi, G. Rote, "Incremental
+/// constructions con BRIO", doi:10.1145/777792.777824, with fixed samples in place of random ones).
+template <class Visit>
+void visit_coarse_first(std::uint32_t count, Visit visit) {
+  constexpr std::uint32_t kFactor = 4;
+  std::uint32_t step = 1;
+  while (count / step > kFactor * kFactor) step *= kFactor;
+  for (bool coarsest = true; step > 0; step /= kFactor, coarsest = false)
+    for (std::uint32_t k = 0; k < count; k += step)
+      if (coarsest || k % (step * kFactor) != 0) visit(k);
+}
+
+/// Inserts points along a Hilbert curve, coarse samples first. Calls done(number, inserted) for
+/// each.
+template <class Kernel, class Done>
+void insert_points(Mesh<Kernel>& mesh, std::span<const typename Kernel::Point> points,
+                   std::uint32_t hint, Done done) {
+  const Pool<std::uint32_t> order = hilbert_order<Kernel>(points);
+  visit_coarse_first(order.size(), [&](std::uint32_t k) {
+    const Inserted inserted = insert_point(mesh, points[order[k]], hint);
+    hint = inserted.vertex;
+    done(order[k], inserted);
+  });
+}
+
+}  // namespace terrace::tri::spatial

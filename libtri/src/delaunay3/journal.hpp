@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "tetrahedron.hpp"
+
+/// What slots held when a change first touched them, as in the plane. One bit per slot tells
+/// whether it was touched already, so the cost of recording does not depend on how often a slot is
+/// used again.
+
+namespace terrace::tri::spatial {
+
+template <class Point>
+class Journal {
+ public:
+  struct TetrahedronRecord {
+    std::uint32_t slot;
+    std::array<std::uint32_t, 4> before;  ///< corners; kFreeCorner or a ghost: no tetrahedron
+  };
+  struct VertexRecord {
+    std::uint32_t slot;
+    bool was_alive;
+    Point before;
+  };
+
+  [[nodiscard]] bool on() const { return on_; }
+
+  void start() {
+    tetrahedra_ = {};
+    vertices_ = {};
+    on_ = true;
+  }
+  void stop() {
+    start();
+    on_ = false;
+  }
+
+  /// Call only while on(), before the slot changes.
+  void touch_tetrahedron(std::uint32_t slot, const std::array<std::uint32_t, 4>& before) {
+    if (tetrahedra_.first_touch(slot)) tetrahedra_.records.push_back({slot, before});
+  }
+  void touch_vertex(std::uint32_t slot, bool was_alive, const Point& before) {
+    if (vertices_.first_touch(slot)) vertices_.records.push_back({slot, was_alive, before});
+  }
+
+  [[nodiscard]] const std::vector<TetrahedronRecord>& tetrahedra() const {
+    return tetrahedra_.records;
+  }
+  [[nodiscard]] const std::vector<VertexRecord>& vertices() const { return vertices_.records; }
+  [[nodiscard]] bool vertex_touched(std::uint32_t slot) const { return vertices_.touched(slot); }
+  void forget_vertex(std::uint32_t slot) { vertices_.untouch(slot); }
+  void clear() {
+    tetrahedra_.clear();
+    vertices_.clear();
+  }
+  [[nodiscard]] std::size_t bytes() const { return tetrahedra_.bytes() + vertices_.bytes(); }
+
+ private:
+  template <class Record>
+  struct Touched {
+    std::vector<std::uint64_t> bits;
+    std::vector<Record> records;
+
+    bool first_touch(std::uint32_t slot) {
+      const std::size_t word = slot / 64;
+      if (word >= bits.size()) bits.resize(word + word / 8 + 16);
+      const std::uint64_t bit = std::uint64_t{1} << (slot % 64);
+      if ((bits[word] & bit) != 0) return false;
+      bits[word] |= bit;
+      return true;
+    }
+    [[nodiscard]] bool touched(std::uint32_t slot) const {
+      return slot / 64 < bits.size() && (bits[slot / 64] >> (slot % 64) & 1) != 0;
+    }
+    void untouch(std::uint32_t slot) { bits[slot / 64] &= ~(std::uint64_t{1} << (slot % 64)); }
+    void clear() {
+      for (const Record& record : records) untouch(record.slot);
+      records.clear();
+    }
+    [[nodiscard]] std::size_t bytes() const {
+      return bits.capacity() * sizeof(std::uint64_t) + records.capacity() * sizeof(Record);
+    }
+  };
+
+  bool on_ = false;
+  Touched<TetrahedronRecord> tetrahedra_;
+  Touched<VertexRecord> vertices_;
+};
+
+}  // namespace terrace::tri::spatial

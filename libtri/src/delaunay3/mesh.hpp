@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cassert>
+#include <cstdint>
+#include <stdexcept>
+#include <vector>
+
+#include "../delaunay2/pool.hpp"
+#include "cavity.hpp"
+#include "hole.hpp"
+#include "journal.hpp"
+#include "tetrahedron.hpp"
+
+/// The data of a tetrahedralisation and the steps that all algorithms share. No geometry here.
+
+namespace terrace::tri::spatial {
+
+using planar::Pool;
+
+inline constexpr std::uint32_t kNone = 0xFFFFFFFFu;
+inline constexpr std::uint32_t kMaxVertices = (std::uint32_t{1} << 29) - 2;
+inline constexpr std::uint32_t kMaxTetrahedra = (std::uint32_t{1} << 30) - 2;
+
+// What Vertex::incident holds: a tetrahedron at the vertex (below 2^30), or one of these.
+/// Within one operation: the vertex's number in a cavity or hole, with this bit.
+inline constexpr std::uint32_t kLocalBit = 0x40000000u;
+/// Within a removal: to be removed, not met yet; and met.
+inline constexpr std::uint32_t kToRemove = 0x7FFFFFF0u;
+inline constexpr std::uint32_t kRemoving = 0x7FFFFFF1u;
+/// A living vertex without tetrahedra (all points are coplanar).
+inline constexpr std::uint32_t kNoIncident = 0x7FFFFFFFu;
+/// The slot is free, the other bits are the next free slot.
+inline constexpr std::uint32_t kFreeVertexBit = 0x80000000u;
+
+/// Values of Mesh::mark.
+inline constexpr std::uint8_t kUnknown = 0;
+inline constexpr std::uint8_t kTaken = 1;  ///< in the cavity or hole
+inline constexpr std::uint8_t kKept = 2;   ///< tested, and not in it
+
+template <class KernelT>
+struct Mesh {
+  using Kernel = KernelT;
+  using Point = typename Kernel::Point;
+  using Vertex = typename Kernel::Vertex;  ///< point and incident
+
+  Pool<Vertex> vertex;  ///< slot 0 is the ghost
+  // By tetrahedron slot. Empty while all points are coplanar ("flat").
+  Pool<Tetrahedron> tetrahedron;
+  Pool<std::uint8_t> mark;  ///< kUnknown between two operations
+
+  /// While flat: all vertices in lexicographic order.
+  std::vector<std::uint32_t> waiting;
+  /// While flat: vertices of the waiting that span their point, line or plane.
+  std::vector<std::uint32_t> basis;
+  bool flat = true;
+
+  std::uint32_t vertex_count = 0;
+  std::uint32_t last_vertex = kNone;  ///< a living vertex, if there is any
+  std::uint32_t free_vertex = kFreeVertexBit - 1;
+  std::uint32_t free_tetrahedron = kNone;
+  std::uint32_t finite_count = 0;  ///< finite tetrahedra
+
+  Journal<Point> journal;
+
+  // Scratch memory, kept between calls.
+  Cavity cavity;
+  Hole<Point> hole;
+
+  Mesh() { vertex.push_back(Vertex{Point{}, kNoIncident}); }
+
+  /// Forgets the slots, all of them free.
+  void forget_slots() {
+    assert(vertex_count == 0 && flat);
+    vertex.resize(1);
+    tetrahedron.resize(0);
+    mark.resize(0);
+    free_vertex = kFreeVertexBit - 1;
+    free_tetrahedron = kNone;
+  }
+  /// Removes everything and releases the memory; the journal goes on.
+  void clear() {
+    if (journal.on()) {
+      for (std::uint32_t v = 1; v < vertex.size(); ++v)
+        if (vertex_alive(v)) journal.touch_vertex(v, true, vertex[v].point);
+      for (std::uint32_t t = 0; t < tetrahedron.size(); ++t) record(t);
+    }
+    Mesh empty;
+    empty.journal = std::move(journal);
+    *this = std::move(empty);
+  }
+
+  [[nodiscard]] bool vertex_alive(std::uint32_t v) const {
+    return v != kGhost && v < vertex.size() && (vertex[v].incident & kFreeVertexBit) == 0;
+  }
+  [[nodiscard]] bool tetrahedron_alive(std::uint32_t t) const {
+    return t < tetrahedron.size() && is_finite(tetrahedron[t].corner);
+  }
+
+  /// A slot with the point and no tetrahedron.
+  std::uint32_t new_vertex(const Point& p) {
+    std::uint32_t v = free_vertex;
+    const bool again = v != kFreeVertexBit - 1;
+    if (!again) v = vertex.size();
+    if (journal.on()) journal.touch_vertex(v, false, p);
+    if (again) {
+      free_vertex = vertex[v].incident & ~kFreeVertexBit;
+      if (free_vertex != kFreeVertexBit - 1) __builtin_prefetch(&vertex[free_vertex], 1);
+      vertex[v] = Vertex{p, kNoIncident};
+    } else {
+      vertex.push_back(Vertex{p, kNoIncident});
+    }
+    ++vertex_count;
+    return v;
+  }
+  void free_vertex_slot(std::uint32_t v) {
+    if (journal.on()) journal.touch_vertex(v, true, vertex[v].point);
+    vertex[v].incident = kFreeVertexBit | free_vertex;
+    free_vertex = v;
+    --vertex_count;
+  }
+
+  /// A slot for a tetrahedron that the caller will write.
+  std::uint32_t new_tetrahedron() {
+    std::uint32_t t = free_tetrahedron;
+    if (t != kNone) {
+      free_tetrahedron = tetrahedron[t].corner[1];
+      if (free_tetrahedron != kNone) __builtin_prefetch(&tetrahedron[free_tetrahedron], 1);
+    } else {
+      t = tetrahedron.size();
+      if (t >= kMaxTetrahedra)
+        throw std::length_error("a triangulation holds at most 2^30 - 2 tetrahedra");
+      tetrahedron.resize(t + 1);
+      mark.resize(t + 1);
+      tetrahedron[t].corner[0] = kFreeCorner;
+      mark[t] = kUnknown;
+    }
+    record(t);
+    return t;
+  }
+  /// Before an algorithm overwrites or frees a tetrahedron in use.
+  void record(std::uint32_t t) {
+    if (journal.on()) [[unlikely]]
+      journal.touch_tetrahedron(t, tetrahedron[t].corner);
+  }
+  void free_tetrahedron_slot(std::uint32_t t) {
+    tetrahedron[t].corner[0] = kFreeCorner;
+    tetrahedron[t].corner[1] = free_tetrahedron;
+    free_tetrahedron = t;
+  }
+
+  /// Makes two sides each other's mate.
+  void link(Side a, Side b) {
+    tetrahedron[tetrahedron_of(a)].mate[index_of(a)] = b;
+    tetrahedron[tetrahedron_of(b)].mate[index_of(b)] = a;
+  }
+
+  /// The finite tetrahedron on the other side of a ghost, or t itself.
+  [[nodiscard]] std::uint32_t finite_side(std::uint32_t t) const {
+    const std::uint32_t ghost = ghost_index(tetrahedron[t].corner);
+    return ghost < 4 ? tetrahedron_of(tetrahedron[t].mate[ghost]) : t;
+  }
+
+  /// Index of v among the corners of t.
+  [[nodiscard]] std::uint32_t corner_index(std::uint32_t t, std::uint32_t v) const {
+    const auto& corner = tetrahedron[t].corner;
+    std::uint32_t i = 0;
+    while (i < 3 && corner[i] != v) ++i;
+    assert(corner[i] == v);
+    return i;
+  }
+
+  [[nodiscard]] std::size_t bytes() const {
+    return vertex.bytes() + tetrahedron.bytes() + mark.bytes() + journal.bytes() + cavity.bytes() +
+           hole.bytes() + (waiting.capacity() + basis.capacity()) * sizeof(std::uint32_t);
+  }
+};
+
+/// operator== of std::array calls memcmp, which is slow for so little.
+template <class Point>
+bool same_point(const Point& a, const Point& b) {
+  return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
+}
+
+/// Lexicographic order, that of the perturbation.
+template <class Point>
+bool lexicographically_less(const Point& a, const Point& b) {
+  if (a[0] != b[0]) return a[0] < b[0];
+  return a[1] < b[1] || (a[1] == b[1] && a[2] < b[2]);
+}
+
+}  // namespace terrace::tri::spatial

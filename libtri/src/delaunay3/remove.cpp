@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Removal of vertices, one or a set: all tetrahedra at them are taken out, and what they leave is
+// filled as a whole, whatever its form: with vertices that stay inside it (islands), with handles
+// and pinches, at the hull. A hole ends where tetrahedra that stay are beyond a facet; two that
+// touch in edges or vertices only are filled one after the other.
+#include "remove.hpp"
+
+#include "double_kernel.hpp"
+#include "ear_queue.hpp"
+#include "flat.hpp"
+#include "hilbert.hpp"
+#include "int_kernel.hpp"
+#include "wrap.hpp"
+
+namespace terrace::tri::spatial {
+namespace {
+
+/// The filling of a hole looks at each of its vertices for each facet, so larger sets are cut.
+constexpr std::size_t kMaxSet = 512;
+
+template <class Kernel>
+class Removal {
+ public:
+  Removal(Mesh<Kernel>& mesh, std::span<const std::uint32_t> vertices)
+      : mesh_(mesh), hole_(mesh.hole), vertices_(vertices) {}
+
+  void run() {
+    starts_.clear();
+    for (const std::uint32_t v : vertices_) {
+      starts_.push_back(mesh_.vertex[v].incident);
+      mesh_.vertex[v].incident = kToRemove;
+    }
+    for (std::size_t i = 0; i < vertices_.size(); ++i) {
+      if (mesh_.vertex[vertices_[i]].incident != kToRemove) continue;
+      gather(starts_[i]);
+      if (must_restart()) {
+        for (const std::uint32_t v : vertices_) mesh_.free_vertex_slot(v);
+        std::vector<std::uint32_t> survivors;
+        for (std::uint32_t v = 1; v < mesh_.vertex.size(); ++v)
+          if (mesh_.vertex_alive(v)) survivors.push_back(v);
+        restart(mesh_, std::move(survivors));
+        return;
+      }
+      for (const std::uint32_t t : hole_.slots) mesh_.mark[t] = kUnknown;
+      if (hole_.by_ears && vertices_.size() == 1) {
+        fill_by_ears(mesh_, mesh_.vertex[vertices_[0]].point);
+      } else {
+        wrap_hole(mesh_);
+      }
+    }
+    for (const std::uint32_t v : vertices_) mesh_.free_vertex_slot(v);
+    mesh_.last_vertex = hole_.vertex[1];
+  }
+
+ private:
+  [[nodiscard]] bool to_go(std::uint32_t v) const {
+    const std::uint32_t incident = mesh_.vertex[v].incident;
+    return incident == kToRemove || incident == kRemoving;
+  }
+
+  /// Local number of a corner that stays.
+  std::uint32_t number(std::uint32_t v) {
+    if (v == kGhost) return 0;
+    std::uint32_t& incident = mesh_.vertex[v].incident;
+    if ((incident & kLocalBit) == 0) {
+      incident = kLocalBit | static_cast<std::uint32_t>(hole_.vertex.size());
+      hole_.vertex.push_back(v);
+      hole_.point.push_back(mesh_.vertex[v].point);
+    }
+    return incident & ~kLocalBit;
+  }
+
+  /// Lists the tetrahedra of a hole, the facets round it, and the vertices that stay at it.
+  void gather(std::uint32_t start) {
+    hole_.vertex.assign(1, kGhost);
+    hole_.point.assign(1, {});
+    hole_.facets.clear();
+    hole_.slots.clear();
+    take(start);
+    for (std::size_t k = 0; k < hole_.slots.size(); ++k) {
+      const Tetrahedron& t = mesh_.tetrahedron[hole_.slots[k]];
+      std::array<std::uint32_t, 4> local;
+      unsigned going = 0;
+      for (std::size_t i = 0; i < 4; ++i) {
+        const std::uint32_t v = t.corner[i];
+        if (to_go(v)) {
+          mesh_.vertex[v].incident = kRemoving;
+          going |= 1u << i;
+        } else {
+          local[i] = number(v);
+        }
+      }
+      for (std::uint32_t i = 0; i < 4; ++i) {
+        const std::uint32_t other = tetrahedron_of(t.mate[i]);
+        if (mesh_.mark[other] == kTaken) continue;
+        if ((going & ~(1u << i)) != 0 ||
+            to_go(mesh_.tetrahedron[other].corner[index_of(t.mate[i])])) {
+          take(other);
+        } else {
+          const auto& f = kFacet[i];
+          hole_.facets.push_back({{local[f[0]], local[f[1]], local[f[2]]}, t.mate[i]});
+        }
+      }
+    }
+  }
+  void take(std::uint32_t t) {
+    mesh_.mark[t] = kTaken;
+    mesh_.record(t);
+    hole_.slots.push_back(t);
+    for (const Side mate : mesh_.tetrahedron[t].mate)
+      __builtin_prefetch(&mesh_.tetrahedron[tetrahedron_of(mate)]);
+  }
+
+  /// Whether all is to be made anew: where no tetrahedron is left to start from; where the
+  /// survivors are coplanar, which requires that all of them are at the one hole; and where a
+  /// hole's vertices are so many that looking at each of them for each facet would cost more.
+  [[nodiscard]] bool must_restart() const {
+    if (hole_.facets.empty()) return true;
+    const std::size_t vertices = hole_.vertex.size();
+    constexpr std::size_t kLooksPerInsertion = 2048;
+    if (vertices > FacetTable::kMaxCorner ||
+        vertices * vertices > kLooksPerInsertion * mesh_.vertex_count)
+      return true;
+    return vertices - 1 + vertices_.size() == mesh_.vertex_count &&
+           coplanar<Kernel>(mesh_, hole_.vertex);
+  }
+
+  Mesh<Kernel>& mesh_;
+  Hole<typename Kernel::Point>& hole_;
+  std::span<const std::uint32_t> vertices_;
+  std::vector<std::uint32_t> starts_;
+};
+
+}  // namespace
+
+template <class Kernel>
+void remove_set(Mesh<Kernel>& mesh, std::span<const std::uint32_t> vertices) {
+  if (vertices.empty()) return;
+  if (mesh.flat) {
+    remove_flat(mesh, vertices);
+    return;
+  }
+  if (vertices.size() <= kMaxSet) {
+    Removal<Kernel>(mesh, vertices).run();
+    return;
+  }
+  std::vector<typename Kernel::Point> points;
+  points.reserve(vertices.size());
+  for (const std::uint32_t v : vertices) points.push_back(mesh.vertex[v].point);
+  const Pool<std::uint32_t> order = hilbert_order<Kernel>(points);
+  std::vector<std::uint32_t> part;
+  for (std::uint32_t begin = 0; begin < order.size();) {
+    part.clear();
+    for (; begin < order.size() && part.size() < kMaxSet; ++begin)
+      part.push_back(vertices[order[begin]]);
+    remove_set<Kernel>(mesh, part);
+  }
+}
+
+template void remove_set(Mesh<IntKernel>&, std::span<const std::uint32_t>);
+template void remove_set(Mesh<DoubleKernel>&, std::span<const std::uint32_t>);
+
+}  // namespace terrace::tri::spatial

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <span>
+
+#include "mesh.hpp"
+
+namespace terrace::tri::spatial {
+
+/// Removes different vertices, one or many, see remove.cpp.
+template <class Kernel>
+void remove_set(Mesh<Kernel>& mesh, std::span<const std::uint32_t> vertices);
+
+}  // namespace terrace::tri::spatial

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <bit>
+#include <vector>
+
+#include "mesh.hpp"
+
+namespace terrace::tri::spatial {
+
+/// The tetrahedra round a vertex, ghosts included, breadth first. Marks of its own in a hash table,
+/// so that several readers can have one each.
+template <class Kernel>
+class Star {
+ public:
+  Star(const Mesh<Kernel>& mesh, std::uint32_t vertex) : mesh_(mesh), vertex_(vertex) {
+    table_.assign(64, kNone);
+    add(mesh.vertex[vertex].incident);
+  }
+
+  /// The next tetrahedron, or kNone after the last.
+  std::uint32_t next() {
+    if (at_ == found_.size()) return kNone;
+    const std::uint32_t t = found_[at_++];
+    const Tetrahedron& tetrahedron = mesh_.tetrahedron[t];
+    for (std::size_t i = 0; i < 4; ++i)
+      if (tetrahedron.corner[i] != vertex_) add(tetrahedron_of(tetrahedron.mate[i]));
+    return t;
+  }
+
+ private:
+  void add(std::uint32_t t) {
+    if (!enter(t)) return;
+    found_.push_back(t);
+    if (2 * found_.size() < table_.size()) return;
+    table_.assign(2 * table_.size(), kNone);
+    for (const std::uint32_t again : found_) enter(again);
+  }
+  bool enter(std::uint32_t t) {
+    const std::size_t mask = table_.size() - 1;
+    std::size_t i = t * 0x9E3779B1u >> 7 & mask;
+    for (; table_[i] != kNone; i = (i + 1) & mask)
+      if (table_[i] == t) return false;
+    table_[i] = t;
+    return true;
+  }
+
+  const Mesh<Kernel>& mesh_;
+  std::uint32_t vertex_;
+  std::vector<std::uint32_t> found_;
+  std::vector<std::uint32_t> table_;
+  std::size_t at_ = 0;
+};
+
+}  // namespace terrace::tri::spatial

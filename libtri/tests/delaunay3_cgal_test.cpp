@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// CGAL's Delaunay_triangulation_3 as an oracle, ties included: it perturbs by the same order. So
+// sets of tetrahedra must be equal, whatever the input.
+#include <algorithm>
+#include <cmath>
+
+#include <CGAL/Delaunay_triangulation_3.h>
+#include <CGAL/Exact_predicates_exact_constructions_kernel.h>
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <gtest/gtest.h>
+
+#include "delaunay3/access.hpp"
+#include "points3.hpp"
+
+namespace terrace::tri {
+namespace {
+
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using Oracle = CGAL::Delaunay_triangulation_3<Kernel>;
+using Corners = std::array<std::array<double, 3>, 4>;
+
+std::vector<Corners> tetrahedra_of(const Oracle& oracle) {
+  std::vector<Corners> result;
+  if (oracle.dimension() < 3) return result;
+  for (const auto& cell : oracle.finite_cell_handles()) {
+    Corners corners;
+    for (int i = 0; i < 4; ++i) {
+      const auto& p = cell->vertex(i)->point();
+      corners[static_cast<std::size_t>(i)] = {p.x(), p.y(), p.z()};
+    }
+    std::sort(corners.begin(), corners.end());
+    result.push_back(corners);
+  }
+  std::sort(result.begin(), result.end());
+  return result;
+}
+
+template <class Coord>
+std::vector<Corners> tetrahedra_of(const Delaunay3<Coord>& triangulation) {
+  std::vector<Corners> result;
+  for (const TetrahedronId id : triangulation.all_tetrahedra()) {
+    Corners corners;
+    const auto vertices = triangulation.vertices(id);
+    for (std::size_t i = 0; i < 4; ++i) {
+      const auto p = triangulation.point(vertices[i]);
+      corners[i] = {static_cast<double>(p[0]), static_cast<double>(p[1]),
+                    static_cast<double>(p[2])};
+    }
+    std::sort(corners.begin(), corners.end());
+    result.push_back(corners);
+  }
+  std::sort(result.begin(), result.end());
+  return result;
+}
+
+template <class Coord>
+std::vector<Kernel::Point_3> to_cgal(const std::vector<std::array<Coord, 3>>& points) {
+  std::vector<Kernel::Point_3> result;
+  for (const auto& p : points)
+    result.emplace_back(static_cast<double>(p[0]), static_cast<double>(p[1]),
+                        static_cast<double>(p[2]));
+  return result;
+}
+
+template <class Coord>
+void expect_equal_to_cgal(const Delaunay3<Coord>& triangulation, const Oracle& oracle) {
+  EXPECT_EQ(find_fault(triangulation), "");
+  EXPECT_EQ(triangulation.vertex_count(), oracle.number_of_vertices());
+  const auto ours = tetrahedra_of(triangulation);
+  EXPECT_EQ(ours.size(), triangulation.tetrahedron_count());
+  EXPECT_TRUE(ours == tetrahedra_of(oracle));
+}
+
+template <class Coord>
+class Delaunay3CgalTest : public ::testing::Test {};
+using Coords = ::testing::Types<std::int32_t, double>;
+TYPED_TEST_SUITE(Delaunay3CgalTest, Coords);
+
+TYPED_TEST(Delaunay3CgalTest, SameTetrahedra) {
+  for (const PointSet3 kind : kPointSets3) {
+    for (const std::size_t count : {4u, 10u, 150u, 2000u}) {
+      // Two lines of points have a tetrahedron for each pair of points.
+      if (kind == PointSet3::kCurves && count > 150) continue;
+      SCOPED_TRACE(name(kind) + " " + std::to_string(count));
+      const auto points = make_points3<TypeParam>(kind, count, 31);
+      Delaunay3<TypeParam> triangulation;
+      triangulation.build(points);
+      const auto theirs = to_cgal(points);
+      expect_equal_to_cgal(triangulation, Oracle(theirs.begin(), theirs.end()));
+    }
+  }
+}
+
+TYPED_TEST(Delaunay3CgalTest, SameTetrahedraAfterRemoval) {
+  for (const PointSet3 kind : kPointSets3) {
+    if (kind == PointSet3::kCurves) continue;
+    SCOPED_TRACE(name(kind));
+    const auto points = make_points3<TypeParam>(kind, 300, 32);
+    std::mt19937_64 random(33);
+    Delaunay3<TypeParam> triangulation;
+    triangulation.build(points);
+    for (int round = 0; round < 3; ++round) {
+      std::vector<VertexId> going;
+      for (const VertexId v : triangulation.all_vertices())
+        if (random() % 3 == 0) going.push_back(v);
+      triangulation.remove(std::span<const VertexId>(going));
+      std::vector<std::array<TypeParam, 3>> left;
+      for (const VertexId v : triangulation.all_vertices()) left.push_back(triangulation.point(v));
+      const auto theirs = to_cgal(left);
+      expect_equal_to_cgal(triangulation, Oracle(theirs.begin(), theirs.end()));
+    }
+  }
+}
+
+/// What a filter says must be right; it may leave anything open.
+bool agrees(spatial::Verdict verdict, int side) {
+  switch (verdict) {
+    case spatial::Verdict::kIn:
+      return side > 0;
+    case spatial::Verdict::kOut:
+      return side < 0;
+    case spatial::Verdict::kOn:
+      return side == 0;
+    case spatial::Verdict::kOpen:
+      break;
+  }
+  return true;
+}
+
+/// Signs of the kernel for doubles against exact rational arithmetic.
+using Exact = CGAL::Exact_predicates_exact_constructions_kernel;
+Exact::Point_3 exact(const std::array<double, 3>& p) { return {p[0], p[1], p[2]}; }
+
+void expect_exact_signs(const std::array<std::array<double, 3>, 5>& p) {
+  using Ours = spatial::DoubleKernel;
+  const std::array<Exact::Point_3, 5> q = {exact(p[0]), exact(p[1]), exact(p[2]), exact(p[3]),
+                                           exact(p[4])};
+  const int turn = CGAL::orientation(q[0], q[1], q[2], q[3]);
+  ASSERT_EQ(Ours::orientation(p[0], p[1], p[2], p[3]), turn);
+  ASSERT_EQ(Ours::collinear(p[0], p[1], p[2]), CGAL::collinear(q[0], q[1], q[2]));
+  if (turn != 0) {
+    const int side = CGAL::side_of_oriented_sphere(q[0], q[1], q[2], q[3], q[4]);
+    ASSERT_EQ(Ours::in_sphere(p[0], p[1], p[2], p[3], p[4]), side);
+    const auto vertex = [&](std::size_t i) { return Ours::Vertex{p[i], 0}; };
+    const spatial::Verdict verdict =
+        Ours::Probe(p[4]).side(vertex(0), vertex(1), vertex(2), vertex(3));
+    ASSERT_TRUE(agrees(verdict, side));
+  }
+  ASSERT_EQ(Ours::compare_distance(p[0], p[1], p[2]),
+            static_cast<int>(CGAL::compare_distance_to_point(q[0], q[1], q[2])));
+}
+
+TEST(DoubleKernel3, SignsAreExact) {
+  std::mt19937_64 random(5);
+  for (int round = 0; round < 20'000; ++round) {
+    SCOPED_TRACE("round " + std::to_string(round));
+    // Points on a small raster, moved far out, scaled, and disturbed in the last bits: decisions
+    // from plain to impossible for doubles.
+    const double scale = std::ldexp(1.0, static_cast<int>(random() % 2000) - 1000);
+    const double offset = round % 3 == 0 ? 0 : std::ldexp(scale, static_cast<int>(random() % 20));
+    std::array<std::array<double, 3>, 5> p;
+    for (auto& point : p) {
+      for (double& c : point) {
+        c = offset + scale * static_cast<double>(random() % 8);
+        if (random() % 4 == 0) c = std::nextafter(c, random() % 2 == 0 ? -1e300 : 1e300);
+      }
+    }
+    expect_exact_signs(p);
+    if (::testing::Test::HasFatalFailure()) return;
+  }
+}
+
+TEST(IntKernel3, SignsAreExact) {
+  using Ours = spatial::IntKernel;
+  std::mt19937_64 random(6);
+  for (int round = 0; round < 20'000; ++round) {
+    SCOPED_TRACE("round " + std::to_string(round));
+    // From small rasters to the whole range, nearly cospherical or not.
+    const std::uint64_t bound = std::uint64_t{1} << (1 + random() % 30);
+    std::array<Ours::Point, 5> p;
+    std::array<Exact::Point_3, 5> q;
+    for (std::size_t i = 0; i < 5; ++i) {
+      for (auto& c : p[i]) {
+        c = static_cast<std::int32_t>(random() % std::min<std::uint64_t>(bound, 8));
+        if (random() % 2 == 0) c = static_cast<std::int32_t>(bound - 1) - c;
+        c = std::max(c, 0);
+        if (round % 2 == 0) c = static_cast<std::int32_t>(random() % bound);
+      }
+      q[i] = Exact::Point_3(p[i][0], p[i][1], p[i][2]);
+    }
+    const int turn = CGAL::orientation(q[0], q[1], q[2], q[3]);
+    ASSERT_EQ(Ours::orientation(p[0], p[1], p[2], p[3]), turn);
+    ASSERT_EQ(Ours::collinear(p[0], p[1], p[2]), CGAL::collinear(q[0], q[1], q[2]));
+    ASSERT_EQ(Ours::compare_distance(p[0], p[1], p[2]),
+              static_cast<int>(CGAL::compare_distance_to_point(q[0], q[1], q[2])));
+    if (turn == 0) continue;
+    const int side = CGAL::side_of_oriented_sphere(q[0], q[1], q[2], q[3], q[4]);
+    ASSERT_EQ(Ours::in_sphere(p[0], p[1], p[2], p[3], p[4]), side);
+    const auto vertex = [&](std::size_t i) { return Ours::Vertex{p[i], 0}; };
+    const spatial::Verdict verdict =
+        Ours::Probe(p[4]).side(vertex(0), vertex(1), vertex(2), vertex(3));
+    ASSERT_TRUE(agrees(verdict, side));
+  }
+}
+
+}  // namespace
+}  // namespace terrace::tri
