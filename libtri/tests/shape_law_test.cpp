@@ -66,7 +66,7 @@ TYPED_TEST(ShapeLawTest, NoVertexIsLost) {
     if (triangulation.tetrahedron_count() == 0) continue;
     for (ShapeOptions options : all_options()) {
       // Nothing but the guard keeps anything where the factor is that small.
-      options.edge_factor = 1e-6;
+      options.edge_factor = 1e-12;
       SCOPED_TRACE(terrace::tri::name(kind) + ", " + name(options));
       Shape3<TypeParam> shape(options);
       shape.restore(triangulation);
@@ -141,17 +141,21 @@ TEST(ShapeTest, IntegersAndDoublesGiveTheSame) {
 TYPED_TEST(ShapeLawTest, UpdateEqualsRestore) {
   using Triangulation = Delaunay3<TypeParam>;
   for (const PointSet3 kind : kPointSets3) {
-    for (std::uint64_t seed = 0; seed < 3; ++seed) {
+    for (std::uint64_t seed = 0; seed < 2; ++seed) {
       SCOPED_TRACE(terrace::tri::name(kind) + " seed " + std::to_string(seed));
       std::mt19937_64 random(seed);
       const auto points =
-          make_points3<TypeParam>(kind, kind == PointSet3::kCurves ? 60 : 300, seed + 40);
+          make_points3<TypeParam>(kind, kind == PointSet3::kCurves ? 30 : 200, seed + 40);
       Triangulation triangulation;
       std::vector<Shape3<TypeParam>> shapes;
-      for (const ShapeOptions& options : all_options()) shapes.emplace_back(options);
+      for (const ShapeOptions& options : all_options()) {
+        // From scratch anyway; one is enough.
+        if (options.rule == ShapeRule::kPublished && shapes.size() != 2) continue;
+        shapes.emplace_back(options);
+      }
       triangulation.start_journal();
       typename Triangulation::Changes changes;
-      for (int step = 0; step < 60; ++step) {
+      for (int step = 0; step < 30; ++step) {
         // Several operations within one set of changes now and then.
         do {
           std::vector<VertexId> alive;

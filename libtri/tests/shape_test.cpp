@@ -112,7 +112,7 @@ TEST(ShapeTest, TorusWithNoise) {
 TEST(ShapeTest, TwoSpheres) {
   Noise noise{std::mt19937_64(5), 0.001};
   Points points = sphere(1.0, {0, 0, 0}, 0.08, noise);
-  const Points other = sphere(0.5, {1.9, 0.2, 0.1}, 0.05, noise);
+  const Points other = sphere(0.5, {2.9, 0.2, 0.1}, 0.05, noise);
   points.insert(points.end(), other.begin(), other.end());
   const SurfaceMeasures measured = restored(points);
   EXPECT_EQ(measured.components, 2u);
@@ -122,28 +122,30 @@ TEST(ShapeTest, TwoSpheres) {
 }
 
 TEST(ShapeTest, Cup) {
-  // Height 2, outer radius 1; the cavity of radius 0.7 goes down to 0.4.
+  // Height 2, outer radius 1; the cavity goes down to 0.4 and widens from radius 0.5 to 0.8.
   Noise noise{std::mt19937_64(6), 0.001};
   std::vector<std::array<double, 2>> profile;
   const double step = 0.05;
   add_line(profile, {0, 0}, {1, 0}, step);
   add_line(profile, {1, 0}, {1, 2}, step);
-  add_line(profile, {1, 2}, {0.7, 2}, step);
-  add_line(profile, {0.7, 2}, {0.7, 0.4}, step);
-  add_line(profile, {0.7, 0.4}, {0, 0.4}, step);
+  add_line(profile, {1, 2}, {0.8, 2}, step);
+  add_line(profile, {0.8, 2}, {0.5, 0.4}, step);
+  add_line(profile, {0.5, 0.4}, {0, 0.4}, step);
   profile.push_back({0, 0.4});
   Points points;
   add_revolved(points, profile, step, noise);
   const SurfaceMeasures measured = restored(points);
   EXPECT_EQ(measured.components, 1u);
   EXPECT_EQ(measured.euler_characteristic, 2);
-  EXPECT_NEAR(measured.volume / (kPi * 2 - kPi * 0.49 * 1.6), 1.0, 0.02);
+  const double cavity = kPi * 1.6 / 3 * (0.64 + 0.4 + 0.25);
+  EXPECT_NEAR(measured.volume / (kPi * 2 - cavity), 1.0, 0.02);
 }
 
 TEST(ShapeTest, SphereByEdgeLength) {
   Noise noise{std::mt19937_64(7), 0.001};
   ShapeOptions options;
   options.criterion = ShapeCriterion::kEdgeLength;
+  options.edge_factor = 1.0;
   const SurfaceMeasures measured = restored(sphere(1.0, {0, 0, 0}, 0.1, noise), options);
   EXPECT_EQ(measured.components, 1u);
   EXPECT_NEAR(measured.volume / (4 * kPi / 3), 1.0, 0.05);

@@ -30,7 +30,9 @@ enum class ShapeCriterion : std::uint8_t {
 enum class ShapeRule : std::uint8_t {
   /// A tetrahedron beyond an open facet is removed as soon as that facet is no boundary facet as
   /// seen from it. Open facets are those of the hull and of what has been removed. So the removed
-  /// ones are what can be reached from outside: a function of the tetrahedra alone.
+  /// ones are what can be reached from outside: a function of the tetrahedra alone. Between
+  /// surfaces
+  /// that face each other across a gap, single tetrahedra may stay, where the gap is widest.
   kFlood,
   /// As published: a tetrahedron with open facets is removed only if none of them is a boundary
   /// facet. The result depends on the order; here it goes in rounds (the neighbours of what one
@@ -42,7 +44,9 @@ enum class ShapeRule : std::uint8_t {
 struct ShapeOptions {
   ShapeCriterion criterion = ShapeCriterion::kGabriel;
   ShapeRule rule = ShapeRule::kFlood;
-  /// Of ShapeCriterion::kEdgeLength; the smaller, the more is removed.
+  /// Of ShapeCriterion::kEdgeLength; the smaller, the more is removed. 0.5 is the thesis's, for the
+  /// published rule. The flood rule goes through the first hole: with 0.5 it empties even a sphere
+  /// of regular samples, which 1 restores.
   double edge_factor = 0.5;
   /// No vertex loses all of its tetrahedra. Published rule: a removal that would take the last one
   /// does not happen. Flood rule: after the flood tetrahedra are put back until every vertex has
