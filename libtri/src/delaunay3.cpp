@@ -49,11 +49,11 @@ template <class Coord>
 Delaunay3<Coord>& Delaunay3<Coord>::operator=(Delaunay3&&) noexcept = default;
 
 template <class Coord>
-std::vector<VertexId> Delaunay3<Coord>::build(std::span<const Point> points) {
+std::vector<VertexId> Delaunay3<Coord>::build(std::span<const Point> points, unsigned threads) {
   assert(vertex_count() == 0);
   check_count(0, points.size());
   check_points<typename Impl::Kernel>(points);
-  return spatial::build(impl_->mesh, points);
+  return spatial::build(impl_->mesh, points, threads);
 }
 
 template <class Coord>

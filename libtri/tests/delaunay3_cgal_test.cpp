@@ -91,6 +91,27 @@ TYPED_TEST(Delaunay3CgalTest, SameTetrahedra) {
   }
 }
 
+TYPED_TEST(Delaunay3CgalTest, SameTetrahedraAfterRemoval) {
+  for (const PointSet3 kind : kPointSets3) {
+    if (kind == PointSet3::kCurves) continue;
+    SCOPED_TRACE(name(kind));
+    const auto points = make_points3<TypeParam>(kind, 300, 32);
+    std::mt19937_64 random(33);
+    Delaunay3<TypeParam> triangulation;
+    triangulation.build(points);
+    for (int round = 0; round < 3; ++round) {
+      std::vector<VertexId> going;
+      for (const VertexId v : triangulation.all_vertices())
+        if (random() % 3 == 0) going.push_back(v);
+      triangulation.remove(std::span<const VertexId>(going));
+      std::vector<std::array<TypeParam, 3>> left;
+      for (const VertexId v : triangulation.all_vertices()) left.push_back(triangulation.point(v));
+      const auto theirs = to_cgal(left);
+      expect_equal_to_cgal(triangulation, Oracle(theirs.begin(), theirs.end()));
+    }
+  }
+}
+
 /// What a filter says must be right; it may leave anything open.
 bool agrees(spatial::Verdict verdict, int side) {
   switch (verdict) {

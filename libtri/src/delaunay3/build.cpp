@@ -1,19 +1,24 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Bulk construction: vertices are numbered along a Hilbert curve and inserted one by one, each near
-// the one before, coarse samples first.
+// the one before, coarse samples first. Fine samples are inserted by two threads, see
+// parts_insert.cpp.
 #include "build.hpp"
 
 #include <algorithm>
+#include <array>
 
 #include "double_kernel.hpp"
 #include "flat.hpp"
 #include "hilbert.hpp"
 #include "insert.hpp"
 #include "int_kernel.hpp"
-#include "walk.hpp"
+#include "parts_insert.hpp"
 
 namespace terrace::tri::spatial {
 namespace {
+
+/// Passes over fewer points than this are not cut into parts.
+constexpr std::uint32_t kInParts = 8192;
 
 /// Puts points into slots begin, begin + 1, ... in Hilbert order. Returns the slot of each.
 template <class Kernel>
@@ -30,25 +35,6 @@ std::vector<VertexId> number_vertices(Mesh<Kernel>& mesh,
   for (std::uint32_t i = 0; i < count; ++i) vertex_of[order[i]] = VertexId{begin + i};
   mesh.vertex_count = count;
   return vertex_of;
-}
-
-/// Which vertex stands for one whose point was there already, as long as the slots are not yet
-/// free: its number with a bit in Vertex::incident.
-constexpr std::uint32_t kAlias = kFreeVertexBit;
-
-template <class Kernel>
-void insert_slot(Mesh<Kernel>& mesh, std::uint32_t vertex) {
-  const auto& p = mesh.vertex[vertex].point;
-  const WalkEnd end = walk(mesh, p, mesh.vertex[mesh.last_vertex].incident);
-  if (!end.outside) {
-    const std::uint32_t equal = equal_corner(mesh, end.tetrahedron, p);
-    if (equal != kNone) {
-      mesh.vertex[vertex].incident = kAlias | equal;
-      return;
-    }
-  }
-  insert_vertex(mesh, vertex, end.tetrahedron);
-  mesh.last_vertex = vertex;
 }
 
 /// The flat state of all slots from begin on; mesh.basis spans their plane.
@@ -90,13 +76,40 @@ void resolve_aliases(Mesh<Kernel>& mesh, std::vector<VertexId>& vertex_of, std::
     mesh.free_vertex = v;
     --mesh.vertex_count;
   }
-  // The basis of a flat state was the first of equal points, which stand for themselves.
+}
+
+/// Inserts all but the four of the first tetrahedron: every fourth, of these every fourth before,
+/// and so on.
+template <class Kernel>
+void insert_all(Mesh<Kernel>& mesh, std::uint32_t begin, std::uint32_t end,
+                const std::array<std::uint32_t, 4>& first, unsigned threads) {
+  constexpr std::uint32_t kFactor = 4;
+  const std::uint32_t count = end - begin;
+  std::uint32_t step = 1;
+  while (count / step > kFactor * kFactor) step *= kFactor;
+  std::vector<std::uint32_t> going;
+  for (bool coarsest = true; step > 0; step /= kFactor, coarsest = false) {
+    going.clear();
+    if (!coarsest) going.reserve(count / step);
+    for (std::uint32_t k = 0; k < count; k += step) {
+      if (!coarsest && k % (step * kFactor) == 0) continue;
+      if (std::find(first.begin(), first.end(), begin + k) == first.end())
+        going.push_back(begin + k);
+    }
+    // With fewer the border of the parts is everywhere.
+    if (count / step < kInParts) {
+      for (const std::uint32_t v : going) insert_slot(mesh, v);
+    } else {
+      insert_in_parts(mesh, begin, end, going, threads);
+    }
+  }
 }
 
 }  // namespace
 
 template <class Kernel>
-std::vector<VertexId> build(Mesh<Kernel>& mesh, std::span<const typename Kernel::Point> points) {
+std::vector<VertexId> build(Mesh<Kernel>& mesh, std::span<const typename Kernel::Point> points,
+                            unsigned threads) {
   mesh.forget_slots();
   if (points.empty()) return {};
   const std::uint32_t begin = mesh.vertex.size();
@@ -112,14 +125,17 @@ std::vector<VertexId> build(Mesh<Kernel>& mesh, std::span<const typename Kernel:
     const std::size_t usual = 7 * std::size_t{mesh.vertex_count};
     mesh.tetrahedron.reserve(usual);
     mesh.mark.reserve(usual);
-    const std::vector<std::uint32_t> basis = mesh.basis;
+    const std::array<std::uint32_t, 4> first = {mesh.basis[0], mesh.basis[1], mesh.basis[2], apex};
+    // Several threads do not record; all slots were free before.
+    Journal<typename Kernel::Point> journal;
+    std::swap(journal, mesh.journal);
     make_first(mesh, apex);
     mesh.last_vertex = apex;
-    visit_coarse_first(end - begin, [&](std::uint32_t k) {
-      const std::uint32_t v = begin + k;
-      if (v == apex || std::find(basis.begin(), basis.end(), v) != basis.end()) return;
-      insert_slot(mesh, v);
-    });
+    insert_all(mesh, begin, end, first, threads);
+    std::swap(journal, mesh.journal);
+    if (mesh.journal.on())
+      for (std::uint32_t t = 0; t < mesh.tetrahedron.size(); ++t)
+        mesh.journal.touch_tetrahedron(t, {kFreeCorner, 0, 0, 0});
   }
   resolve_aliases(mesh, vertex_of, begin, end);
   if (mesh.journal.on())
@@ -128,7 +144,8 @@ std::vector<VertexId> build(Mesh<Kernel>& mesh, std::span<const typename Kernel:
   return vertex_of;
 }
 
-template std::vector<VertexId> build(Mesh<IntKernel>&, std::span<const IntKernel::Point>);
-template std::vector<VertexId> build(Mesh<DoubleKernel>&, std::span<const DoubleKernel::Point>);
+template std::vector<VertexId> build(Mesh<IntKernel>&, std::span<const IntKernel::Point>, unsigned);
+template std::vector<VertexId> build(Mesh<DoubleKernel>&, std::span<const DoubleKernel::Point>,
+                                     unsigned);
 
 }  // namespace terrace::tri::spatial

@@ -17,8 +17,9 @@ struct Cavity {
     std::array<std::uint32_t, 3> local;   ///< numbers of the corners among the boundary's vertices
     std::uint32_t slot;                   ///< of the tetrahedron on it
   };
-  /// Up to so many facets the boundary's vertices are numbered with six bits.
-  static constexpr std::size_t kSmall = 124;
+  /// With up to so many facets the boundary has 63 vertices, which are numbered from 1 with six
+  /// bits.
+  static constexpr std::size_t kSmall = 2 * 63 - 4;
   static constexpr std::uint32_t kStride = 64;
 
   std::vector<std::uint32_t> inside;  ///< slots of the tetrahedra in conflict, as a queue

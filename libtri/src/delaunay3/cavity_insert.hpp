@@ -18,9 +18,14 @@ class CavityInsertion {
   CavityInsertion(Mesh<Kernel>& mesh, Cavity& cavity, Part& part)
       : mesh_(mesh), cavity_(cavity), part_(part) {}
 
-  /// False where the cavity meets tetrahedra outside the part; then nothing has changed.
+  /// False where the cavity meets tetrahedra outside the part or the part is out of room; then
+  /// nothing has changed.
   bool run(std::uint32_t vertex, std::uint32_t conflict) {
-    const bool possible = collect(mesh_.vertex[vertex].point, conflict);
+    bool possible = collect(mesh_.vertex[vertex].point, conflict);
+    if constexpr (!Part::kWhole) {
+      out_of_room_ = possible && !part_.has_room(facet_count_);
+      possible = possible && !out_of_room_;
+    }
     if (possible) {
       take_slots();
       if (facet_count_ <= Cavity::kSmall) {
@@ -34,6 +39,7 @@ class CavityInsertion {
       mesh_.mark[tetrahedron_of(cavity_.facets[i].outer)] = kUnknown;
     return possible;
   }
+  [[nodiscard]] bool out_of_room() const { return out_of_room_; }
 
  private:
   bool collect(const typename Kernel::Point& p, std::uint32_t conflict) {
@@ -190,6 +196,7 @@ class CavityInsertion {
   Part& part_;
   std::size_t inside_count_ = 0;
   std::size_t facet_count_ = 0;
+  bool out_of_room_ = false;
 };
 
 /// The whole mesh as a part.

@@ -7,6 +7,7 @@
 
 #include "facet_table.hpp"
 #include "tetrahedron.hpp"
+#include "wrap_scan.hpp"
 
 namespace terrace::tri::spatial {
 
@@ -27,13 +28,19 @@ struct Hole {
   std::vector<Facet> facets;
   std::vector<std::uint32_t> slots;  ///< of the tetrahedra taken out
 
+  /// Fill the hole of one vertex by ear_queue.cpp, a second method to compare with.
+  bool by_ears = false;
+
+  // Of hole_filling.hpp: open facets, as a stack, some of them closed again; facets by corners.
+  std::vector<std::uint32_t> pending;
+  std::vector<FacetEntry> table;
+
   // Of wrap.cpp: coordinates of the vertices by local number, padded; what a facet makes of each;
-  // open facets still to be filled; a table of facets by their corners.
+  // numbers of those that may be the next corner.
   std::vector<double> x, y, z;
   std::vector<double> power, volume;
   std::vector<std::uint32_t> near;
-  std::vector<std::uint32_t> pending;
-  std::vector<FacetEntry> table;
+  ScanFunction scan = best_scan_function();
 
   [[nodiscard]] std::size_t bytes() const {
     return (vertex.capacity() + incident.capacity() + slots.capacity() + near.capacity() +

@@ -6,6 +6,7 @@
 #include "remove.hpp"
 
 #include "double_kernel.hpp"
+#include "ear_queue.hpp"
 #include "flat.hpp"
 #include "hilbert.hpp"
 #include "int_kernel.hpp"
@@ -34,11 +35,18 @@ class Removal {
       gather(starts_[i]);
       if (must_restart()) {
         for (const std::uint32_t v : vertices_) mesh_.free_vertex_slot(v);
-        restart(mesh_, {hole_.vertex.begin() + 1, hole_.vertex.end()});
+        std::vector<std::uint32_t> survivors;
+        for (std::uint32_t v = 1; v < mesh_.vertex.size(); ++v)
+          if (mesh_.vertex_alive(v)) survivors.push_back(v);
+        restart(mesh_, std::move(survivors));
         return;
       }
       for (const std::uint32_t t : hole_.slots) mesh_.mark[t] = kUnknown;
-      wrap_hole(mesh_);
+      if (hole_.by_ears && vertices_.size() == 1) {
+        fill_by_ears(mesh_, mesh_.vertex[vertices_[0]].point);
+      } else {
+        wrap_hole(mesh_);
+      }
     }
     for (const std::uint32_t v : vertices_) mesh_.free_vertex_slot(v);
     mesh_.last_vertex = hole_.vertex[1];
@@ -103,11 +111,17 @@ class Removal {
       __builtin_prefetch(&mesh_.tetrahedron[tetrahedron_of(mate)]);
   }
 
-  /// Whether all is to be made anew: where no tetrahedron is left to start from, where the
-  /// survivors are coplanar, which requires that all of them are at the one hole.
+  /// Whether all is to be made anew: where no tetrahedron is left to start from; where the
+  /// survivors are coplanar, which requires that all of them are at the one hole; and where a
+  /// hole's vertices are so many that looking at each of them for each facet would cost more.
   [[nodiscard]] bool must_restart() const {
     if (hole_.facets.empty()) return true;
-    return hole_.vertex.size() - 1 + vertices_.size() == mesh_.vertex_count &&
+    const std::size_t vertices = hole_.vertex.size();
+    constexpr std::size_t kLooksPerInsertion = 2048;
+    if (vertices > FacetTable::kMaxCorner ||
+        vertices * vertices > kLooksPerInsertion * mesh_.vertex_count)
+      return true;
+    return vertices - 1 + vertices_.size() == mesh_.vertex_count &&
            coplanar<Kernel>(mesh_, hole_.vertex);
   }
 

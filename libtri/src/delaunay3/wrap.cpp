@@ -16,10 +16,9 @@
 #include <limits>
 
 #include "double_kernel.hpp"
-#include "facet_table.hpp"
+#include "hole_filling.hpp"
 #include "int_kernel.hpp"
 #include "predicates.hpp"
-#include "wrap_scan.hpp"
 
 namespace terrace::tri::spatial {
 namespace {
@@ -32,23 +31,18 @@ class Wrapping {
  public:
   using Point = typename Kernel::Point;
 
-  explicit Wrapping(Mesh<Kernel>& mesh) : mesh_(mesh), hole_(mesh.hole), table_(mesh.hole.table) {}
+  Wrapping(Mesh<Kernel>& mesh, HoleFilling<Kernel>& filling)
+      : mesh_(mesh), hole_(mesh.hole), filling_(filling) {}
 
   void run() {
     prepare();
-    while (!hole_.pending.empty()) {
-      const std::uint32_t i = hole_.pending.back();
-      hole_.pending.pop_back();
-      if (hole_.facets[i].outer != hole_.kMatched) fill(i);
+    for (std::uint32_t i = filling_.next_open(); i != kNone; i = filling_.next_open()) {
+      const auto [a, b, c] = hole_.facets[i].corner;
+      filling_.attach(i, choose(a, b, c));
     }
-    for (std::uint32_t k = 1; k < hole_.vertex.size(); ++k)
-      mesh_.vertex[hole_.vertex[k]].incident = hole_.incident[k];
-    for (; used_ < hole_.slots.size(); ++used_) mesh_.free_tetrahedron_slot(hole_.slots[used_]);
   }
 
  private:
-  using Facet = typename Hole<Point>::Facet;
-
   void prepare() {
     count_ = hole_.vertex.size();
     const std::size_t padded = (count_ + kScanPadding - 1) / kScanPadding * kScanPadding;
@@ -71,74 +65,29 @@ class Wrapping {
     if (hole_.power.size() < padded) {
       hole_.power.resize(padded);
       hole_.volume.resize(padded);
+      hole_.near.resize(padded);
     }
-    hole_.incident.resize(count_);
-    hole_.pending.clear();
-    table_.clear(hole_.facets.size());
-    for (std::uint32_t i = 0; i < hole_.facets.size(); ++i) {
-      table_.find_or_add(hole_.facets[i].corner, i);
-      if (is_finite_facet(hole_.facets[i].corner)) hole_.pending.push_back(i);
-    }
-    std::uint32_t gone = 0;
-    for (const std::uint32_t t : hole_.slots)
-      if (!has_ghost(mesh_.tetrahedron[t].corner)) ++gone;
-    mesh_.finite_count -= gone;
-    used_ = 0;
-  }
-  static bool is_finite_facet(const std::array<std::uint32_t, 3>& corner) {
-    return corner[0] != 0 && corner[1] != 0 && corner[2] != 0;
-  }
-
-  /// Makes the tetrahedron on an open facet.
-  void fill(std::uint32_t i) {
-    const auto [a, b, c] = hole_.facets[i].corner;
-    const std::uint32_t apex = choose(a, b, c);
-    const std::uint32_t t = used_ < hole_.slots.size() ? hole_.slots[used_++] : new_slot();
-    const std::array<std::uint32_t, 4> local = {apex, a, b, c};
-    for (std::size_t k = 0; k < 4; ++k) {
-      mesh_.tetrahedron[t].corner[k] = hole_.vertex[local[k]];
-      hole_.incident[local[k]] = t;
-    }
-    if (apex != 0) ++mesh_.finite_count;
-    mesh_.link(make_side(t, 0), hole_.facets[i].outer);
-    hole_.facets[i].outer = hole_.kMatched;
-    for (std::uint32_t k = 1; k < 4; ++k) {
-      const auto& f = kFacet[k];
-      // Seen from the other side.
-      const std::array<std::uint32_t, 3> corner = {local[f[0]], local[f[2]], local[f[1]]};
-      const auto next = static_cast<std::uint32_t>(hole_.facets.size());
-      const std::uint32_t known = table_.find_or_add(corner, next);
-      if (known != next) {
-        assert(hole_.facets[known].outer != hole_.kMatched);
-        mesh_.link(make_side(t, k), hole_.facets[known].outer);
-        hole_.facets[known].outer = hole_.kMatched;
-        continue;
-      }
-      hole_.facets.push_back({corner, make_side(t, k)});
-      if (is_finite_facet(corner)) hole_.pending.push_back(next);
-    }
-  }
-  std::uint32_t new_slot() {
-    hole_.slots.push_back(mesh_.new_tetrahedron());
-    return hole_.slots[used_++];
+    vertices_ = {hole_.x.data(), hole_.y.data(),     hole_.z.data(),
+                 padded,         hole_.power.data(), hole_.volume.data()};
   }
 
   /// The vertex that the growing sphere meets first, or 0, the ghost.
   std::uint32_t choose(std::uint32_t a, std::uint32_t b, std::uint32_t c) {
     ScanFacet facet;
-    hole_.near.clear();
     double volume_error = kInfinity;
+    std::size_t near = 0;
     if (measure(a, b, c, facet)) {
       volume_error = facet.volume_error;
-      const double most = scan_(hole_.x.data(), hole_.y.data(), hole_.z.data(), count_, facet,
-                                hole_.power.data(), hole_.volume.data());
-      list_near(facet, most);
+      near = hole_.scan(vertices_, facet, hole_.near.data());
+      if (near == 1 && hole_.volume[hole_.near[0]] > volume_error) [[likely]]
+        return hole_.near[0];
     } else {
-      for (std::uint32_t i = 1; i < count_; ++i) hole_.near.push_back(i);
+      while (++near < count_) hole_.near[near - 1] = static_cast<std::uint32_t>(near);
+      --near;
     }
-    if (hole_.near.size() == 1 && hole_.volume[hole_.near[0]] > volume_error) return hole_.near[0];
     std::uint32_t best = 0;
-    for (const std::uint32_t d : hole_.near) {
+    for (std::size_t i = 0; i < near; ++i) {
+      const std::uint32_t d = hole_.near[i];
       if (d == a || d == b || d == c) continue;
       const bool certain = hole_.volume[d] > volume_error;
       if (!certain &&
@@ -203,34 +152,30 @@ class Wrapping {
     return true;
   }
 
-  /// Lists the vertices that may have the least ratio of power and volume; `most`: a bound of it.
-  void list_near(const ScanFacet& facet, double most) {
-    const double* const power = hole_.power.data();
-    const double* const volume = hole_.volume.data();
-    const bool any = most < kInfinity;
-    const double factor = any ? most : 0;
-    const double margin = any ? facet.power_error + std::abs(most) * facet.volume_error : kInfinity;
-    for (std::uint32_t i = 1; i < count_; ++i)
-      if (volume[i] + facet.volume_error > 0 && power[i] - factor * volume[i] <= margin)
-        hole_.near.push_back(i);
-  }
-
   Mesh<Kernel>& mesh_;
   Hole<Point>& hole_;
-  FacetTable table_;
-  const ScanFunction scan_ = scan_function();
+  HoleFilling<Kernel>& filling_;
+  ScanVertices vertices_{};
   std::size_t count_ = 0;
-  std::size_t used_ = 0;  ///< slots that have been used again
   double length_ = 0;
 };
 
 }  // namespace
 
 template <class Kernel>
-void wrap_hole(Mesh<Kernel>& mesh) {
-  Wrapping<Kernel>(mesh).run();
+void wrap_rest(Mesh<Kernel>& mesh, HoleFilling<Kernel>& filling) {
+  Wrapping<Kernel>(mesh, filling).run();
+  filling.finish();
 }
 
+template <class Kernel>
+void wrap_hole(Mesh<Kernel>& mesh) {
+  HoleFilling<Kernel> filling(mesh);
+  wrap_rest(mesh, filling);
+}
+
+template void wrap_rest(Mesh<IntKernel>&, HoleFilling<IntKernel>&);
+template void wrap_rest(Mesh<DoubleKernel>&, HoleFilling<DoubleKernel>&);
 template void wrap_hole(Mesh<IntKernel>&);
 template void wrap_hole(Mesh<DoubleKernel>&);
 

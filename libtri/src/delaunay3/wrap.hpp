@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "hole_filling.hpp"
 #include "mesh.hpp"
 
 namespace terrace::tri::spatial {
@@ -9,5 +10,9 @@ namespace terrace::tri::spatial {
 /// of a plane, see wrap.cpp. Vertices at it get tetrahedra; slots left over are freed.
 template <class Kernel>
 void wrap_hole(Mesh<Kernel>& mesh);
+
+/// The same for what another way of filling has left open.
+template <class Kernel>
+void wrap_rest(Mesh<Kernel>& mesh, HoleFilling<Kernel>& filling);
 
 }  // namespace terrace::tri::spatial

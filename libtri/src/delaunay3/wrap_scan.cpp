@@ -1,44 +1,58 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "wrap_scan.hpp"
+#include <cstddef>
+#include <cstdint>
 
-#include <limits>
-
-namespace terrace::tri::spatial {
 namespace {
 
 constexpr std::size_t kLanes = 2;
 using Lanes = double __attribute__((vector_size(kLanes * sizeof(double))));
-using Unaligned = double __attribute__((vector_size(kLanes * sizeof(double)), aligned(8)));
+using Mask = std::int64_t __attribute__((vector_size(kLanes * sizeof(double))));
 
-Lanes all(double value) { return value - Lanes{}; }
-
-double scan(const double* x, const double* y, const double* z, std::size_t count,
-            const ScanFacet& facet, double* power, double* volume) {
-  const Lanes infinity = all(std::numeric_limits<double>::infinity());
-  Lanes least = infinity;
-  const Lanes zero{};
-  for (std::size_t i = 0; i < count; i += kLanes) {
-    const Lanes wx = *reinterpret_cast<const Unaligned*>(x + i) - facet.corner[0];
-    const Lanes wy = *reinterpret_cast<const Unaligned*>(y + i) - facet.corner[1];
-    const Lanes wz = *reinterpret_cast<const Unaligned*>(z + i) - facet.corner[2];
-    const Lanes t = facet.normal[0] * wx + facet.normal[1] * wy + facet.normal[2] * wz;
-    const Lanes s = wx * (wx - facet.diameter[0]) + wy * (wy - facet.diameter[1]) +
-                    wz * (wz - facet.diameter[2]);
-    *reinterpret_cast<Unaligned*>(power + i) = s;
-    *reinterpret_cast<Unaligned*>(volume + i) = t;
-    const Lanes above = s + facet.power_error;
-    const Lanes ratio =
-        above / (t + (above > zero ? all(-facet.volume_error) : all(facet.volume_error)));
-    const Lanes counted = t > all(facet.volume_error) ? ratio : infinity;
-    least = counted < least ? counted : least;
-  }
-  double result = least[0];
-  for (std::size_t i = 1; i < kLanes; ++i) result = least[i] < result ? least[i] : result;
-  return result;
+/// A bit for each lane that is true.
+[[gnu::always_inline]] inline unsigned bits_of(Mask mask) {
+  return static_cast<unsigned>((mask[0] & 1) | (mask[1] & 2));
 }
 
 }  // namespace
 
-ScanFunction scan_function() { return &scan; }
+#include "wrap_scan_impl.hpp"
+
+namespace terrace::tri::spatial {
+
+std::size_t scan_portable(const ScanVertices& vertices, const ScanFacet& facet,
+                          std::uint32_t* near) {
+  return scan_with_lanes(vertices, facet, near);
+}
+
+#ifdef TERRACE_TRI_X86
+
+bool supported(ScanPath path) {
+  if (path == ScanPath::kAvx2) return __builtin_cpu_supports("avx2") != 0;
+  if (path == ScanPath::kAvx512)
+    return __builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512dq") != 0;
+  return true;
+}
+
+ScanFunction scan_function(ScanPath path) {
+  return path == ScanPath::kAvx512 ? scan_avx512
+         : path == ScanPath::kAvx2 ? scan_avx2
+                                   : scan_portable;
+}
+
+#else
+
+bool supported(ScanPath path) { return path == ScanPath::kPortable; }
+
+ScanFunction scan_function(ScanPath) { return scan_portable; }
+
+#endif
+
+ScanFunction best_scan_function() {
+  static const ScanFunction best =
+      scan_function(supported(ScanPath::kAvx512) ? ScanPath::kAvx512
+                    : supported(ScanPath::kAvx2) ? ScanPath::kAvx2
+                                                 : ScanPath::kPortable);
+  return best;
+}
 
 }  // namespace terrace::tri::spatial

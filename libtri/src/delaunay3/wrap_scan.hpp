@@ -20,14 +20,32 @@ struct ScanFacet {
   double volume_error;
 };
 
-inline constexpr std::size_t kScanPadding = 8;  ///< arrays are as long as a multiple of it
+/// Coordinates of the vertices; the arrays are as long as a multiple of kScanPadding. NaN: no
+/// vertex. Memory for a power and a volume of each.
+struct ScanVertices {
+  const double* x;
+  const double* y;
+  const double* z;
+  std::size_t count;  ///< with padding
+  double* power;
+  double* volume;
+};
+inline constexpr std::size_t kScanPadding = 8;
 
-/// Writes power and volume of `count` vertices (rounded up to kScanPadding; NaN is no vertex).
-/// Returns an upper bound of the least power / volume among vertices with certainly positive
-/// volume, or infinity.
-using ScanFunction = double (*)(const double* x, const double* y, const double* z,
-                                std::size_t count, const ScanFacet& facet, double* power,
-                                double* volume);
-ScanFunction scan_function();
+/// Lists the vertices that may have positive volume and, of these, the least power / volume, and
+/// leaves power and volume of all. Returns their number; `near` has room for all vertices.
+using ScanFunction = std::size_t (*)(const ScanVertices& vertices, const ScanFacet& facet,
+                                     std::uint32_t* near);
+
+/// The same for several processors: what they list may differ where bounds of errors are met.
+enum class ScanPath : std::uint8_t { kPortable, kAvx2, kAvx512 };
+bool supported(ScanPath path);
+ScanFunction scan_function(ScanPath path);  ///< of a supported path
+ScanFunction best_scan_function();
+
+std::size_t scan_portable(const ScanVertices& vertices, const ScanFacet& facet,
+                          std::uint32_t* near);
+std::size_t scan_avx2(const ScanVertices& vertices, const ScanFacet& facet, std::uint32_t* near);
+std::size_t scan_avx512(const ScanVertices& vertices, const ScanFacet& facet, std::uint32_t* near);
 
 }  // namespace terrace::tri::spatial

@@ -87,8 +87,9 @@ class Delaunay3 {
 
   /// Adds points to an empty triangulation, fast. Returns the vertex of each point, equal points
   /// the same. O(n log n) where points are spread as those of a volume or a surface are; besides
-  /// the result 20 bytes per point for sorting, freed before the tetrahedra are made.
-  std::vector<VertexId> build(std::span<const Point> points);
+  /// the result 20 bytes per point for sorting, freed before the tetrahedra are made. At most two
+  /// threads are of use; the result, handles included, is the same for any number.
+  std::vector<VertexId> build(std::span<const Point> points, unsigned threads = 1);
   /// hint: a vertex near the point, for the walk; kNoVertex: the last one used.
   Insertion insert(const Point& point, VertexId hint = kNoVertex);
   /// Inserts a set near the hint, in any order (it is sorted inside). results: as many as points,

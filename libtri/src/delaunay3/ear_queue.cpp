@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The hole of one vertex filled by cutting ears, after J. Skala, thesis, section 8.2, and O.
+// Devillers, "On deletion in Delaunay triangulations", doi:10.1142/S0218195902000815. An ear is the
+// tetrahedron of two neighbouring facets. Ears wait in a queue; that whose sphere contains the
+// removed vertex least comes first, measured by its power, in-sphere test / orientation.
+//
+// The powers are rounded, so the order is only good, not exact, and where powers are equal it is
+// any. Before an ear is cut, exact perturbed tests tell whether its sphere is empty of the hole's
+// vertices: a tetrahedron that is has its place in the result whenever it is made. So the result is
+// exact with ties too. An ear that is not empty never will be and is dropped. Where no ear is left
+// before the hole is full (which ties and the hull can cause) the rest is wrapped.
+#include "ear_queue.hpp"
+
+#include <algorithm>
+#include <limits>
+
+#include "double_kernel.hpp"
+#include "int_kernel.hpp"
+#include "predicates.hpp"
+#include "wrap.hpp"
+
+namespace terrace::tri::spatial {
+namespace {
+
+template <class Kernel>
+class EarQueue {
+ public:
+  using Point = typename Kernel::Point;
+
+  EarQueue(Mesh<Kernel>& mesh, HoleFilling<Kernel>& filling, const Point& removed)
+      : mesh_(mesh), hole_(mesh.hole), filling_(filling), removed_(removed) {}
+
+  void run() {
+    add_facets(0);
+    while (!queue_.empty()) {
+      std::pop_heap(queue_.begin(), queue_.end(), later);
+      const Ear ear = queue_.back();
+      queue_.pop_back();
+      if (!filling_.is_open(ear.facet) || !is_empty(ear)) continue;
+      const auto before = static_cast<std::uint32_t>(hole_.facets.size());
+      filling_.attach(ear.facet, ear.apex);
+      add_facets(before);
+    }
+  }
+
+ private:
+  struct Ear {
+    double power;
+    std::uint32_t facet;
+    std::uint32_t apex;
+  };
+  struct Edge {
+    std::uint64_t ends;  ///< from, to
+    std::uint32_t facet;
+    bool operator<(const Edge& other) const {
+      return ends != other.ends ? ends < other.ends : facet < other.facet;
+    }
+  };
+
+  static bool later(const Ear& a, const Ear& b) {
+    if (a.power != b.power) return a.power > b.power;
+    return a.facet != b.facet ? a.facet > b.facet : a.apex > b.apex;
+  }
+
+  /// Lists the edges of facets from a number on, and their ears.
+  void add_facets(std::uint32_t first) {
+    const auto count = static_cast<std::uint32_t>(hole_.facets.size());
+    const auto before = static_cast<std::ptrdiff_t>(edges_.size());
+    for (std::uint32_t i = first; i < count; ++i) {
+      const auto& corner = hole_.facets[i].corner;
+      for (std::size_t k = 0; k < 3; ++k)
+        edges_.push_back({ends(corner[(k + 1) % 3], corner[(k + 2) % 3]), i});
+    }
+    std::sort(edges_.begin() + before, edges_.end());
+    std::inplace_merge(edges_.begin(), edges_.begin() + before, edges_.end());
+    for (std::uint32_t i = first; i < count; ++i) {
+      if (!filling_.is_open(i) || !filling_.is_finite_facet(i)) continue;
+      const auto& corner = hole_.facets[i].corner;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const std::uint64_t back = ends(corner[(k + 2) % 3], corner[(k + 1) % 3]);
+        for (auto at = std::lower_bound(edges_.begin(), edges_.end(), Edge{back, 0});
+             at != edges_.end() && at->ends == back; ++at) {
+          // Each pair once.
+          if (at->facet < i && filling_.is_open(at->facet)) add_ear(i, at->facet);
+        }
+      }
+    }
+  }
+  static std::uint64_t ends(std::uint32_t from, std::uint32_t to) {
+    return std::uint64_t{from} << 32 | to;
+  }
+
+  /// The tetrahedron of a facet and the corner of another one that is not in it.
+  void add_ear(std::uint32_t facet, std::uint32_t other) {
+    const auto [a, b, c] = hole_.facets[facet].corner;
+    for (const std::uint32_t d : hole_.facets[other].corner) {
+      if (d == 0 || d == a || d == b || d == c) continue;
+      if (Kernel::orientation(hole_.point[d], hole_.point[a], hole_.point[b], hole_.point[c]) <= 0)
+        continue;
+      queue_.push_back({power(d, a, b, c), facet, d});
+      std::push_heap(queue_.begin(), queue_.end(), later);
+    }
+  }
+
+  /// Rounded, or far back where it overflows.
+  [[nodiscard]] double power(std::uint32_t d, std::uint32_t a, std::uint32_t b,
+                             std::uint32_t c) const {
+    std::array<std::array<double, 3>, 4> r;
+    const std::array<std::uint32_t, 4> corner = {d, a, b, c};
+    for (std::size_t i = 0; i < 4; ++i)
+      for (std::size_t k = 0; k < 3; ++k)
+        r[i][k] = static_cast<double>(hole_.point[corner[i]][k]) - static_cast<double>(removed_[k]);
+    const auto pair = [&](std::size_t i, std::size_t k) { return Pair{r[i][k], r[i + 1][k]}; };
+    const double test =
+        in_sphere_value({pair(0, 0), pair(2, 0), pair(0, 1), pair(2, 1), pair(0, 2), pair(2, 2)})
+            .value;
+    for (std::size_t i = 1; i < 4; ++i)
+      for (std::size_t k = 0; k < 3; ++k) r[i][k] -= r[0][k];
+    const double orientation = (r[1][1] * r[2][2] - r[1][2] * r[2][1]) * r[3][0] +
+                               (r[1][2] * r[2][0] - r[1][0] * r[2][2]) * r[3][1] +
+                               (r[1][0] * r[2][1] - r[1][1] * r[2][0]) * r[3][2];
+    const double result = test / orientation;
+    return result >= 0 ? result : std::numeric_limits<double>::infinity();
+  }
+
+  [[nodiscard]] bool is_empty(const Ear& ear) const {
+    const auto [a, b, c] = hole_.facets[ear.facet].corner;
+    const auto at = [&](std::uint32_t k) -> const auto& { return mesh_.vertex[hole_.vertex[k]]; };
+    for (std::uint32_t k = 1; k < hole_.vertex.size(); ++k) {
+      if (k == a || k == b || k == c || k == ear.apex) continue;
+      if (inside_sphere<Kernel>(at(ear.apex), at(a), at(b), at(c), hole_.point[k])) return false;
+    }
+    return true;
+  }
+
+  Mesh<Kernel>& mesh_;
+  Hole<Point>& hole_;
+  HoleFilling<Kernel>& filling_;
+  const Point& removed_;
+  std::vector<Ear> queue_;
+  std::vector<Edge> edges_;
+};
+
+}  // namespace
+
+template <class Kernel>
+void fill_by_ears(Mesh<Kernel>& mesh, const typename Kernel::Point& removed) {
+  HoleFilling<Kernel> filling(mesh);
+  EarQueue<Kernel>(mesh, filling, removed).run();
+  wrap_rest(mesh, filling);
+}
+
+template void fill_by_ears(Mesh<IntKernel>&, const IntKernel::Point&);
+template void fill_by_ears(Mesh<DoubleKernel>&, const DoubleKernel::Point&);
+
+}  // namespace terrace::tri::spatial

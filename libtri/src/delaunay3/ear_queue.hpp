@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "mesh.hpp"
+
+namespace terrace::tri::spatial {
+
+/// Fills mesh.hole, left by one vertex at `removed`, by cutting ears, see ear_queue.cpp.
+template <class Kernel>
+void fill_by_ears(Mesh<Kernel>& mesh, const typename Kernel::Point& removed);
+
+}  // namespace terrace::tri::spatial

@@ -1,0 +1,11 @@
+#!/bin/sh
+# SPDX-License-Identifier: GPL-3.0-or-later
+# check_symbols.sh NM ARCHIVE: fails if the archive defines a weak function. The linker may take
+# such a function for the whole program, which then stops on processors that lack the instructions.
+set -eu
+symbols=$("$1" --defined-only "$2")
+echo "$symbols" | grep -q scan_avx || { echo "no scan in $2"; exit 1; }
+if echo "$symbols" | grep ' W '; then
+  echo "the functions above may be shared with code for other processors"
+  exit 1
+fi
