@@ -31,8 +31,8 @@ enum class ShapeRule : std::uint8_t {
   /// A tetrahedron beyond an open facet is removed as soon as that facet is no boundary facet as
   /// seen from it. Open facets are those of the hull and of what has been removed. So the removed
   /// ones are what can be reached from outside: a function of the tetrahedra alone. Between
-  /// surfaces
-  /// that face each other across a gap, single tetrahedra may stay, where the gap is widest.
+  /// surfaces that face each other across a gap or round a hole, a few tetrahedra may stay whose
+  /// facets are all boundary facets.
   kFlood,
   /// As published: a tetrahedron with open facets is removed only if none of them is a boundary
   /// facet. The result depends on the order; here it goes in rounds (the neighbours of what one
