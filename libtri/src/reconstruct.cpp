@@ -168,7 +168,8 @@ Surface wrapped(std::span<const Point3> points, const Box& box, const SurfaceOpt
     double diagonal2 = 0.0;
     for (std::size_t k = 0; k < 3; ++k)
       diagonal2 += (box.max[k] - box.min[k]) * (box.max[k] - box.min[k]);
-    alpha = 4 * std::sqrt(diagonal2 / static_cast<double>(points.size()));
+    const double spacing = std::sqrt(1 / static_cast<double>(points.size()));
+    alpha = std::sqrt(diagonal2) * std::max(0.05, 4 * spacing);
     if (alpha == 0.0) return {};
   }
   return reconstruct::alpha_wrap(points, alpha,

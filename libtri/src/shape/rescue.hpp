@@ -66,22 +66,23 @@ void rescue(const Mesh& mesh, State& state) {
   };
   const auto finite_removed = [&](std::uint32_t t) { return is_removed(state.of[t]); };
 
-  std::vector<RescueKey> all;  // every tetrahedron with a lost vertex, once per such vertex
-  std::priority_queue<RescueKey, std::vector<RescueKey>, decltype(later)> next(later);
-  for (const std::uint32_t v : state.lost) {
-    spatial::Star star(mesh, v);
-    for (std::uint32_t t = star.next(); t != spatial::kNone; t = star.next()) {
-      if (!finite_removed(t)) continue;
-      all.push_back(rescue_key(mesh, t));
-      for (const spatial::Side side : mesh.tetrahedron[t].mate) {
-        if (state.of[spatial::tetrahedron_of(side)] != kKept) continue;
-        next.push(all.back());
-        break;
-      }
+  const auto each_with_lost = [&](const auto& visit) {
+    for (const std::uint32_t v : state.lost) {
+      if (state.degree[v] != 0) continue;
+      spatial::Star star(mesh, v);
+      for (std::uint32_t t = star.next(); t != spatial::kNone; t = star.next())
+        if (finite_removed(t)) visit(t);
     }
-  }
-  std::sort(all.begin(), all.end(),
-            [&](const RescueKey& a, const RescueKey& b) { return later(b, a); });
+  };
+  std::priority_queue<RescueKey, std::vector<RescueKey>, decltype(later)> next(later);
+  each_with_lost([&](std::uint32_t t) {
+    for (const spatial::Side side : mesh.tetrahedron[t].mate) {
+      if (state.of[spatial::tetrahedron_of(side)] != kKept) continue;
+      next.push(rescue_key(mesh, t));
+      break;
+    }
+  });
+  std::vector<RescueKey> rest;  // what is beside nothing kept, once that is all there is
   std::size_t at = 0;
   const auto take = [&](std::uint32_t t) {
     state.of[t] |= kRescuedBit;
@@ -99,9 +100,14 @@ void rescue(const Mesh& mesh, State& state) {
       next.pop();
       if (has_lost(t)) take(t);
     }
-    while (at < all.size() && !has_lost(all[at].tetrahedron)) ++at;
-    if (at == all.size()) break;
-    take(all[at].tetrahedron);
+    if (rest.empty()) {
+      each_with_lost([&](std::uint32_t t) { rest.push_back(rescue_key(mesh, t)); });
+      std::sort(rest.begin(), rest.end(),
+                [&](const RescueKey& a, const RescueKey& b) { return later(b, a); });
+    }
+    while (at < rest.size() && !has_lost(rest[at].tetrahedron)) ++at;
+    if (at == rest.size()) break;
+    take(rest[at].tetrahedron);
   }
   for (const std::uint32_t v : state.lost) state.degree[v] = 0;
 }

@@ -39,8 +39,8 @@ struct SurfaceOptions {
   double radius_ratio_bound = 5.0;
   double beta = 0.52;
   /// Of kAlphaWrap, in the points' unit: openings up to about this radius are closed, and the
-  /// distance from the points. 0: alpha is 4 d / sqrt(n), d the diagonal of the points' box, and
-  /// the offset alpha / 30.
+  /// distance from the points. 0: alpha is the larger of d / 20 and 4 d / sqrt(n), d the diagonal
+  /// of the points' box, and the offset alpha / 30. Larger openings let the wrap inside.
   double alpha = 0.0;
   double offset = 0.0;
 };
