@@ -1,0 +1,241 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Restoring shapes: from scratch and after a change, on a torus of 200,000 points with noise, and
+// on the scans of the folder that TERRACE_DATA names, of which a table tells how good they come
+// out.
+//
+// Times are of the restoring alone, after the build; a "change" is the removal of the 100 points
+// nearest to one of them, or their insertion again.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <numbers>
+#include <random>
+
+#include <benchmark/benchmark.h>
+
+#include "../tests/scan_file.hpp"
+#include "terrace/tri/reconstruct.hpp"
+#include "terrace/tri/shape.hpp"
+
+namespace {
+
+using namespace terrace::tri;
+
+const bool kSmall = std::getenv("TERRACE_BENCH_SMALL") != nullptr;
+const std::size_t kCount = kSmall ? 2'000 : 200'000;
+
+const std::vector<Point3>& torus() {
+  static const std::vector<Point3> points = [] {
+    std::mt19937_64 random(1);
+    const auto unit = [&] { return static_cast<double>(random() >> 11) * 0x1p-53; };
+    std::vector<Point3> result;
+    while (result.size() < kCount) {
+      const double a = 2 * std::numbers::pi * unit(), b = 2 * std::numbers::pi * unit();
+      if (unit() * 1.4 > 1 + 0.4 * std::cos(b)) continue;  // even by area
+      const double tube = 0.4 + 0.001 * (2 * unit() - 1);
+      const double radius = 1 + tube * std::cos(b);
+      result.push_back({radius * std::cos(a), radius * std::sin(a), tube * std::sin(b)});
+    }
+    return result;
+  }();
+  return points;
+}
+
+template <class Coord>
+std::vector<std::array<Coord, 3>> points_of(const std::vector<Point3>& points, double& step) {
+  if constexpr (std::is_same_v<Coord, double>) {
+    step = 1.0;
+    return points;
+  } else {
+    return quantised(points, step);
+  }
+}
+
+template <class Coord>
+struct Torus {
+  Torus() {
+    double step = 0.0;
+    triangulation.build(points_of<Coord>(torus(), step));
+  }
+  Delaunay3<Coord> triangulation;
+};
+
+template <class Coord>
+void restore(benchmark::State& state, const ShapeOptions& options) {
+  static const Torus<Coord> torus;
+  Shape3<Coord> shape(options);
+  for (auto _ : state) shape.restore(torus.triangulation);
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(kCount));
+  state.counters["kept"] = static_cast<double>(shape.kept_count());
+  state.counters["rescued"] = static_cast<double>(shape.rescued_count());
+}
+
+template <class Coord>
+void update(benchmark::State& state) {
+  Torus<Coord> torus;
+  auto& triangulation = torus.triangulation;
+  Shape3<Coord> shape;
+  triangulation.start_journal();
+  shape.restore(triangulation);
+  // The points nearest to one of them, breadth first.
+  std::vector<VertexId> cluster{*triangulation.all_vertices().begin()}, around;
+  for (std::size_t i = 0; cluster.size() < 100; ++i) {
+    triangulation.adjacent(cluster[i], around);
+    for (const VertexId v : around)
+      if (cluster.size() < 100 && std::find(cluster.begin(), cluster.end(), v) == cluster.end())
+        cluster.push_back(v);
+  }
+  std::vector<std::array<Coord, 3>> points;
+  for (const VertexId v : cluster) points.push_back(triangulation.point(v));
+  std::vector<typename Delaunay3<Coord>::Insertion> inserted(points.size());
+  typename Delaunay3<Coord>::Changes changes;
+  for (auto _ : state) {
+    state.PauseTiming();
+    triangulation.remove(cluster);
+    triangulation.take_changes(changes);
+    state.ResumeTiming();
+    shape.update(triangulation, changes);
+    state.PauseTiming();
+    triangulation.insert(points, inserted);
+    for (std::size_t i = 0; i < cluster.size(); ++i) cluster[i] = inserted[i].vertex;
+    triangulation.take_changes(changes);
+    state.ResumeTiming();
+    shape.update(triangulation, changes);
+  }
+  state.SetItemsProcessed(2 * state.iterations());  // changes
+}
+
+double seconds(const std::function<void()>& work) {
+  const auto start = std::chrono::steady_clock::now();
+  work();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+struct Scan {
+  const char* file;
+  const char* name;
+};
+constexpr Scan kScans[] = {
+    {"bun_zipper.ply", "bunny"},           {"armadillo_libigl.obj", "armadillo"},
+    {"dragon_vrip_res2.ply.gz", "dragon"}, {"lucy_100k.ply", "Lucy"},
+    {"armadillo_tm.ply", "armadillo 2"},
+};
+
+Surface read_scan(const std::filesystem::path& path) {
+  if (path.extension() == ".gz") {
+    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> pipe(
+        popen(("gzip -dc '" + path.string() + "'").c_str(), "r"), pclose);
+    std::string text;
+    std::vector<char> block(1 << 16);
+    for (std::size_t n; pipe && (n = std::fread(block.data(), 1, block.size(), pipe.get())) > 0;)
+      text.append(block.data(), n);
+    std::istringstream in(text);
+    return read_ply(in);
+  }
+  std::ifstream in(path, std::ios::binary);
+  return path.extension() == ".obj" ? read_obj(in) : read_ply(in);
+}
+
+void print_row(const char* name, const char* how, double build, double shape_time,
+               const SurfaceMeasures& m, std::size_t lost, std::size_t rescued, double scale,
+               const SurfaceMeasures& original, double volume) {
+  std::printf("%-12s %-14s %6.3f %6.4f %7zu %6lld %5zu %6zu %6zu %6zu", name, how, build,
+              shape_time, m.faces, static_cast<long long>(m.euler_characteristic), m.components,
+              m.non_manifold_edges, lost, rescued);
+  if (original.faces > 0)
+    std::printf(" %7.4f %7.4f", m.area * scale * scale / original.area,
+                m.volume * scale * scale * scale / volume);
+  std::printf("%s\n", m.closed ? "" : " open");
+}
+
+template <class Coord>
+void scan_rows(const char* name, const Surface& original, const SurfaceMeasures& measures,
+               double volume) {
+  double step = 0.0;
+  const auto points = points_of<Coord>(original.points, step);
+  double build = 1e9;
+  Delaunay3<Coord> triangulation;
+  for (int round = 0; round < 3; ++round) {
+    Delaunay3<Coord> fresh;
+    build = std::min(build, seconds([&] { fresh.build(points); }));
+    triangulation = std::move(fresh);
+  }
+  struct Way {
+    const char* name;
+    ShapeOptions options;
+  };
+  Way ways[] = {{"flood", {}}, {"no guard", {}}, {"published", {}}};
+  ways[1].options.keep_vertices = false;
+  ways[2].options.rule = ShapeRule::kPublished;
+  for (const Way& way : ways) {
+    Shape3<Coord> shape(way.options);
+    double time = 1e9;
+    for (int round = 0; round < 3; ++round)
+      time = std::min(time, seconds([&] { shape.restore(triangulation); }));
+    const std::string how = std::string(way.name) + (std::is_same_v<Coord, double> ? " d" : " i");
+    print_row(name, how.c_str(), build, time, measure(shape.surface(triangulation).surface),
+              shape.lost_vertices().size(), shape.rescued_count(), step, measures, volume);
+  }
+}
+
+void print_table(const std::filesystem::path& folder) {
+  std::printf(
+      "Scans, points alone; build and restoring in seconds, best of 3; i: integers of 24 bits, d:\n"
+      "doubles; area and volume over the original's, its openings closed. CGAL's: whole calls.\n"
+      "%-12s %-14s %6s %6s %7s %6s %5s %6s %6s %6s %7s %7s\n",
+      "", "", "build", "shape", "faces", "chi", "comp", "nonman", "lost", "put b.", "area",
+      "volume");
+  for (const Scan& scan : kScans) {
+    if (!std::filesystem::exists(folder / scan.file)) continue;
+    const Surface original = read_scan(folder / scan.file);
+    SurfaceMeasures measures;
+    double volume = 1.0;
+    if (!original.faces.empty()) {
+      measures = measure(original);
+      volume = measure(with_openings_closed(original)).volume;
+    }
+    scan_rows<std::int32_t>(scan.name, original, measures, volume);
+    scan_rows<double>(scan.name, original, measures, volume);
+    if (&scan != kScans) continue;  // CGAL's on the first
+    for (const auto method : {SurfaceMethod::kAdvancingFront, SurfaceMethod::kAlphaWrap}) {
+      SurfaceOptions options;
+      options.method = method;
+      ReconstructedSurface found;
+      const double time = seconds([&] { found = reconstruct_surface(original.points, options); });
+      const bool front = method == SurfaceMethod::kAdvancingFront;
+      print_row(scan.name, front ? "adv. front" : "alpha wrap", 0.0, time, measure(found.surface),
+                front ? original.points.size() - found.input.size() : 0, 0, 1.0, measures, volume);
+    }
+  }
+  std::printf("\n");
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const char* data = std::getenv("TERRACE_DATA");
+  if (data != nullptr && !kSmall) print_table(std::filesystem::path(data) / "scan");
+  ShapeOptions no_guard, published, edges;
+  no_guard.keep_vertices = false;
+  published.rule = ShapeRule::kPublished;
+  edges.criterion = ShapeCriterion::kEdgeLength;
+  edges.edge_factor = 1.0;
+  const auto add = [](const char* name, auto function) {
+    benchmark::RegisterBenchmark(name, function)->Unit(benchmark::kMillisecond);
+  };
+  add("flood/integers", [](auto& state) { restore<std::int32_t>(state, {}); });
+  add("flood/doubles", [](auto& state) { restore<double>(state, {}); });
+  add("flood/no guard", [=](auto& state) { restore<std::int32_t>(state, no_guard); });
+  add("flood/edge length", [=](auto& state) { restore<std::int32_t>(state, edges); });
+  add("published", [=](auto& state) { restore<std::int32_t>(state, published); });
+  add("update/integers", update<std::int32_t>);
+  add("update/doubles", update<double>);
+  benchmark::Initialize(&argc, argv);
+  benchmark::RunSpecifiedBenchmarks();
+  return 0;
+}

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Points of a dumbbell. Its surface comes back from the points alone; then a part is sampled more
+// densely, and the shape follows the triangulation's changes.
+#include "terrace/tri/shape.hpp"
+
+#include <cmath>
+#include <cstdio>
+#include <vector>
+
+#include "terrace/tri/reconstruct.hpp"
+
+namespace tri = terrace::tri;
+
+// A dumbbell: `along` from end to end and `round` the axis, both from 0 to 1.
+static tri::Point3 on_dumbbell(double along, double round) {
+  const double t = 3.141592653589793 * along, angle = 6.283185307179586 * round;
+  const double radius = std::sin(t) * (0.55 - 0.25 * std::cos(4 * t));
+  return {radius * std::cos(angle), radius * std::sin(angle), -1.5 * std::cos(t)};
+}
+
+int main() {
+  std::vector<tri::Point3> points;
+  for (int i = 0; i < 4000; ++i) points.push_back(on_dumbbell((i + 0.5) / 4000, 0.618034 * i));
+
+  // In one call.
+  const tri::SurfaceMeasures coarse = tri::measure(tri::reconstruct_surface(points).surface);
+  std::printf("%zu faces, area %.3f, volume %.3f, %zu component, Euler characteristic %d\n",
+              coarse.faces, coarse.area, coarse.volume, coarse.components,
+              static_cast<int>(coarse.euler_characteristic));
+
+  // With a triangulation that changes.
+  tri::Delaunay3<double> triangulation;
+  triangulation.build(points);
+  tri::Shape3<double> shape;
+  triangulation.start_journal();
+  shape.restore(triangulation);
+
+  std::vector<tri::Point3> detail;
+  for (int i = 0; i < 400; ++i) detail.push_back(on_dumbbell(0.3 + i / 4000.0, 0.381966 * i));
+  triangulation.insert(detail, {}, triangulation.nearest(detail[0]));
+  tri::Delaunay3<double>::Changes changes;
+  triangulation.take_changes(changes);
+  shape.update(triangulation, changes);
+
+  const tri::ShapeSurface finer = shape.surface(triangulation);
+  std::printf("with detail: %zu faces, %zu of %zu tetrahedra kept, %zu vertices put back\n",
+              finer.surface.faces.size(), shape.kept_count(), triangulation.tetrahedron_count(),
+              shape.rescued_count());
+  const tri::SurfaceMeasures measured = tri::measure(finer.surface);
+  return coarse.closed && coarse.euler_characteristic == 2 && measured.closed ? 0 : 1;
+}

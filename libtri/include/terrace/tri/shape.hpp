@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "terrace/tri/delaunay3.hpp"
+#include "terrace/tri/surface.hpp"
+
+/// Restoring the non-convex shape of points scanned from a surface: of the Delaunay tetrahedra,
+/// which fill the convex hull, those outside the shape are peeled off, starting from the hull
+/// (J. Skala's thesis, section 8.3). What remains is the inside, its outer facets the surface.
+
+namespace terrace::tri {
+
+/// Which facets of a tetrahedron are likely to lie on the surface ("boundary" facets), as seen from
+/// that tetrahedron: those that are small beside it.
+enum class ShapeCriterion : std::uint8_t {
+  /// The smallest sphere that contains the facet does not contain the tetrahedron's fourth corner
+  /// in its inside (K. Gabriel, R. Sokal, doi:10.2307/2412323). Two corners of the facet lie on
+  /// that sphere where the third sees them at an obtuse angle, otherwise all three. Exact.
+  kGabriel,
+  /// The facet's perimeter is below edge_factor times the sum of the other three edges. In doubles,
+  /// the same for the same points.
+  kEdgeLength,
+};
+
+enum class ShapeRule : std::uint8_t {
+  /// A tetrahedron beyond an open facet is removed as soon as that facet is no boundary facet as
+  /// seen from it. Open facets are those of the hull and of what has been removed. So the removed
+  /// ones are what can be reached from outside: a function of the tetrahedra alone. Between
+  /// surfaces that face each other across a gap or round a hole, a few tetrahedra may stay whose
+  /// facets are all boundary facets.
+  kFlood,
+  /// As published: a tetrahedron with open facets is removed only if none of them is a boundary
+  /// facet. The result depends on the order; here it goes in rounds (the neighbours of what one
+  /// round has removed are the next), within a round lexicographically by the corners sorted by x,
+  /// y, z. It leaves slivers standing everywhere; for comparison.
+  kPublished,
+};
+
+struct ShapeOptions {
+  ShapeCriterion criterion = ShapeCriterion::kGabriel;
+  ShapeRule rule = ShapeRule::kFlood;
+  /// Of ShapeCriterion::kEdgeLength; the smaller, the more is removed. 0.5 is the thesis's, for the
+  /// published rule. The flood rule goes through the first hole: with 0.5 it empties even a sphere
+  /// of regular samples, which 1 restores.
+  double edge_factor = 0.5;
+  /// No vertex loses all of its tetrahedra. Published rule: a removal that would take the last one
+  /// does not happen. Flood rule: after the flood tetrahedra are put back until every vertex has
+  /// one: always the one with the shortest longest edge (of equal ones the lexicographically
+  /// first, corners sorted) among those that have a vertex without tetrahedra and share a facet
+  /// with what is kept; where none does, among all that have such a vertex.
+  bool keep_vertices = true;
+};
+
+struct ShapeSurface {
+  Surface surface;
+  std::vector<VertexId> vertices;  ///< which each point of the surface is; by slot
+};
+
+/// The kept tetrahedra of a triangulation, from scratch or kept up to date with its changes. A
+/// function of the point set and the options, whatever the triangulation's and this object's
+/// history.
+///
+/// One byte per tetrahedron slot and four per vertex slot.
+template <class Coord>
+class Shape3 {
+ public:
+  using Triangulation = Delaunay3<Coord>;
+
+  /// Throws std::invalid_argument if edge_factor is not a positive finite number.
+  explicit Shape3(const ShapeOptions& options = {});
+  ~Shape3();
+  /// A moved-from shape can only be destroyed or assigned to.
+  Shape3(Shape3&&) noexcept;
+  Shape3& operator=(Shape3&&) noexcept;
+
+  /// From scratch. Flood: O(n) facet tests, about as many as there are removed tetrahedra times
+  /// two, and O(m log m) for m tetrahedra at vertices that the flood has lost.
+  void restore(const Triangulation& triangulation);
+
+  /// After changes of the triangulation that this object was restored from (or of its first, empty
+  /// state): the same result as restore(), at a cost that depends on the changes. Nothing else may
+  /// have changed since the last call: `changes` is all that take_changes() gives after a journal
+  /// was started before restore().
+  ///
+  /// Flood: every removed tetrahedron remembers the facet by which the flood came. What was reached
+  /// through a tetrahedron that is gone, and what was reached through that, is judged again.
+  /// O(changes + judged again), O(m log m) as above, and a walk round the corners of facets that
+  /// came to the hull. Published rule: from scratch, as nothing about it is local.
+  void update(const Triangulation& triangulation, const typename Triangulation::Changes& changes);
+
+  /// Any handle; false for those that are not alive.
+  [[nodiscard]] bool kept(TetrahedronId tetrahedron) const;
+  /// Number of kept tetrahedra. O(1).
+  [[nodiscard]] std::size_t kept_count() const;
+  /// Tetrahedra put back after the flood for the sake of a vertex.
+  [[nodiscard]] std::size_t rescued_count() const;
+  /// Vertices that the rule itself leaves without a tetrahedron, by slot: with keep_vertices and
+  /// the flood rule those that have been given one back. None while there are no tetrahedra at all.
+  [[nodiscard]] std::vector<VertexId> lost_vertices() const;
+  /// Kept tetrahedra by slot. O(slots).
+  [[nodiscard]] std::vector<TetrahedronId> kept_tetrahedra() const;
+
+  /// The facets between kept tetrahedra and what is not kept, counter-clockwise seen from outside.
+  /// Every edge is in as many of them one way as the other: the surface is closed. Where kept
+  /// tetrahedra meet in an edge only, that edge is in four or more faces, and where they meet in a
+  /// vertex only, the surface touches itself there. Faces by slot of their tetrahedron. O(slots).
+  [[nodiscard]] ShapeSurface surface(const Triangulation& triangulation) const;
+  /// Sum of the volumes of the kept tetrahedra. O(slots).
+  [[nodiscard]] double volume(const Triangulation& triangulation) const;
+
+  [[nodiscard]] const ShapeOptions& options() const;
+  [[nodiscard]] std::size_t memory_bytes() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+extern template class Shape3<std::int32_t>;
+extern template class Shape3<double>;
+
+}  // namespace terrace::tri

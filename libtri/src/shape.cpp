@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "terrace/tri/shape.hpp"
+
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "delaunay3/access.hpp"
+#include "shape/criterion.hpp"
+#include "shape/flood.hpp"
+#include "shape/published.hpp"
+#include "shape/rescue.hpp"
+#include "shape/state.hpp"
+
+namespace terrace::tri {
+
+template <class Coord>
+struct Shape3<Coord>::Impl {
+  ShapeOptions options;
+  shape::State state;
+
+  template <class Work>
+  void with_criterion(const Work& work) const {
+    if (options.criterion == ShapeCriterion::kGabriel) {
+      work(shape::Gabriel{});
+    } else {
+      work(shape::EdgeLength{options.edge_factor});
+    }
+  }
+};
+
+template <class Coord>
+Shape3<Coord>::Shape3(const ShapeOptions& options) : impl_(std::make_unique<Impl>()) {
+  if (!(std::isfinite(options.edge_factor) && options.edge_factor > 0.0))
+    throw std::invalid_argument("the factor for edge lengths is " +
+                                std::to_string(options.edge_factor) +
+                                ", but must be positive and finite; 0.5 is usual");
+  impl_->options = options;
+}
+template <class Coord>
+Shape3<Coord>::~Shape3() = default;
+template <class Coord>
+Shape3<Coord>::Shape3(Shape3&&) noexcept = default;
+template <class Coord>
+Shape3<Coord>& Shape3<Coord>::operator=(Shape3&&) noexcept = default;
+
+template <class Coord>
+void Shape3<Coord>::restore(const Triangulation& triangulation) {
+  const auto& mesh = Delaunay3Access::mesh(triangulation);
+  shape::State& state = impl_->state;
+  const bool keep_vertices = impl_->options.keep_vertices;
+  impl_->with_criterion([&](const auto& criterion) {
+    if (impl_->options.rule == ShapeRule::kFlood) {
+      shape::flood(mesh, state, criterion);
+      if (keep_vertices) shape::rescue(mesh, state);
+    } else {
+      shape::peel_as_published(mesh, state, criterion, keep_vertices);
+    }
+  });
+}
+
+template <class Coord>
+void Shape3<Coord>::update(const Triangulation& triangulation,
+                           const typename Triangulation::Changes& changes) {
+  if (impl_->options.rule != ShapeRule::kFlood) return restore(triangulation);
+  const auto& mesh = Delaunay3Access::mesh(triangulation);
+  impl_->with_criterion([&](const auto& criterion) {
+    shape::update_flood(mesh, impl_->state, criterion, changes);
+    if (impl_->options.keep_vertices) shape::rescue(mesh, impl_->state);
+  });
+}
+
+template <class Coord>
+bool Shape3<Coord>::kept(TetrahedronId tetrahedron) const {
+  const auto& of = impl_->state.of;
+  return slot(tetrahedron) < of.size() && shape::is_kept(of[slot(tetrahedron)]);
+}
+
+template <class Coord>
+std::size_t Shape3<Coord>::kept_count() const {
+  return impl_->state.kept_count + impl_->state.rescued.size();
+}
+
+template <class Coord>
+std::size_t Shape3<Coord>::rescued_count() const {
+  return impl_->state.rescued.size();
+}
+
+template <class Coord>
+std::vector<VertexId> Shape3<Coord>::lost_vertices() const {
+  std::vector<VertexId> result;
+  for (const std::uint32_t v : impl_->state.lost) result.push_back(VertexId{v});
+  return result;
+}
+
+template <class Coord>
+std::vector<TetrahedronId> Shape3<Coord>::kept_tetrahedra() const {
+  std::vector<TetrahedronId> result;
+  result.reserve(kept_count());
+  for (std::uint32_t t = 0; t < impl_->state.of.size(); ++t)
+    if (shape::is_kept(impl_->state.of[t])) result.push_back(TetrahedronId{t});
+  return result;
+}
+
+template <class Coord>
+ShapeSurface Shape3<Coord>::surface(const Triangulation& triangulation) const {
+  const auto& mesh = Delaunay3Access::mesh(triangulation);
+  const auto& of = impl_->state.of;
+  ShapeSurface result;
+  std::vector<std::array<std::uint32_t, 3>>& faces = result.surface.faces;
+  constexpr std::uint32_t kUnused = spatial::kNone;
+  std::vector<std::uint32_t> number(mesh.vertex.size(), kUnused);
+  for (std::uint32_t t = 0; t < of.size(); ++t) {
+    if (!shape::is_kept(of[t])) continue;
+    const spatial::Tetrahedron& tetrahedron = mesh.tetrahedron[t];
+    for (std::uint32_t i = 0; i < 4; ++i) {
+      if (shape::is_kept(of[spatial::tetrahedron_of(tetrahedron.mate[i])])) continue;
+      // With the corner first in order: seen from the other side they turn counter-clockwise.
+      faces.push_back(spatial::facet_of(tetrahedron, i));
+      for (const std::uint32_t v : faces.back()) number[v] = 0;
+    }
+  }
+  for (std::uint32_t v = 0; v < number.size(); ++v) {
+    if (number[v] == kUnused) continue;
+    number[v] = static_cast<std::uint32_t>(result.vertices.size());
+    result.vertices.push_back(VertexId{v});
+    result.surface.points.push_back(shape::to_doubles(mesh.vertex[v].point));
+  }
+  for (auto& face : faces)
+    for (std::uint32_t& v : face) v = number[v];
+  return result;
+}
+
+template <class Coord>
+double Shape3<Coord>::volume(const Triangulation& triangulation) const {
+  const auto& mesh = Delaunay3Access::mesh(triangulation);
+  double sum = 0.0;
+  for (std::uint32_t t = 0; t < impl_->state.of.size(); ++t) {
+    if (!shape::is_kept(impl_->state.of[t])) continue;
+    std::array<shape::Vector3, 4> p;
+    for (std::size_t i = 0; i < 4; ++i)
+      p[i] = shape::to_doubles(mesh.vertex[mesh.tetrahedron[t].corner[i]].point);
+    sum += shape::dot(shape::minus(p[1], p[0]),
+                      shape::cross(shape::minus(p[2], p[0]), shape::minus(p[3], p[0])));
+  }
+  return sum / 6;
+}
+
+template <class Coord>
+const ShapeOptions& Shape3<Coord>::options() const {
+  return impl_->options;
+}
+
+template <class Coord>
+std::size_t Shape3<Coord>::memory_bytes() const {
+  const shape::State& s = impl_->state;
+  std::size_t words = s.degree.capacity() + s.lost.capacity() + s.rescued.capacity() +
+                      s.queue.capacity() + s.pending.capacity() + s.touched.capacity();
+  return sizeof(Impl) + s.of.capacity() + words * sizeof(std::uint32_t);
+}
+
+template class Shape3<std::int32_t>;
+template class Shape3<double>;
+
+}  // namespace terrace::tri

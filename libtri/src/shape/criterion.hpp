@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+
+#include "../delaunay3/mesh.hpp"
+#include "gabriel.hpp"
+
+/// The two criteria for facets that are likely to lie on the surface. Both depend on the points of
+/// the tetrahedron alone, not on the order of its corners.
+
+namespace terrace::tri::shape {
+
+/// A criterion answers whether the facet opposite to corner i of a tetrahedron is a boundary facet
+/// as seen from that tetrahedron.
+struct Gabriel {
+  template <class Mesh>
+  bool boundary(const Mesh& mesh, const spatial::Tetrahedron& t, std::uint32_t i) const {
+    const auto f = spatial::facet_of(t, i);
+    const auto* vertex = mesh.vertex.data();
+    return !in_smallest_sphere(vertex[f[0]].point, vertex[f[1]].point, vertex[f[2]].point,
+                               vertex[t.corner[i]].point);
+  }
+};
+
+/// The length, without over- or underflow. Symmetric.
+inline double distance(const Vector3& a, const Vector3& b) {
+  // Of finite doubles the difference of quarters is finite; below, scaling is exact.
+  constexpr double kBig = 0x1p480, kSmall = 0x1p-480;
+  Vector3 d = minus(a, b);
+  const double m = largest(d);
+  if (m > kSmall && m < kBig) [[likely]]
+    return std::sqrt(dot(d, d));
+  if (m == 0.0) return 0.0;
+  if (m <= kSmall) {
+    for (double& c : d) c *= 0x1p540;
+    return std::sqrt(dot(d, d)) * 0x1p-540;
+  }
+  for (std::size_t k = 0; k < 3; ++k) d[k] = a[k] * 0x1p-560 - b[k] * 0x1p-560;
+  return std::sqrt(dot(d, d)) * 0x1p560;  // may be infinite, as the sum of such lengths would be
+}
+
+struct EdgeLength {
+  double factor;
+
+  template <class Mesh>
+  bool boundary(const Mesh& mesh, const spatial::Tetrahedron& t, std::uint32_t i) const {
+    const auto f = spatial::facet_of(t, i);
+    std::array<Vector3, 3> p;
+    for (std::size_t k = 0; k < 3; ++k) p[k] = to_doubles(mesh.vertex[f[k]].point);
+    const Vector3 apex = to_doubles(mesh.vertex[t.corner[i]].point);
+    return sum({distance(p[0], p[1]), distance(p[1], p[2]), distance(p[2], p[0])}) <
+           factor * sum({distance(p[0], apex), distance(p[1], apex), distance(p[2], apex)});
+  }
+
+ private:
+  /// In order of size, so that the order of the corners does not show in the last bit.
+  static double sum(std::array<double, 3> lengths) {
+    std::sort(lengths.begin(), lengths.end());
+    return lengths[0] / 8 + lengths[1] / 8 + lengths[2] / 8;  // both sides alike, and finite
+  }
+};
+
+}  // namespace terrace::tri::shape

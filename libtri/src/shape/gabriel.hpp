@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <type_traits>
+
+/// Whether a point lies inside the smallest sphere that contains a triangle. Exact: doubles with a
+/// bound on their error, and exact numbers where the bound does not decide.
+
+namespace terrace::tri::shape {
+
+/// a, b, c not on a line; d different from them. Exact for all finite coordinates.
+bool in_smallest_sphere_exactly(const std::array<double, 3>& a, const std::array<double, 3>& b,
+                                const std::array<double, 3>& c, const std::array<double, 3>& d);
+
+template <class Point>
+std::array<double, 3> to_doubles(const Point& p) {
+  return {static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2])};
+}
+
+using Vector3 = std::array<double, 3>;
+
+inline Vector3 minus(const Vector3& a, const Vector3& b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+inline double dot(const Vector3& a, const Vector3& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+inline Vector3 cross(const Vector3& a, const Vector3& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+inline double largest(const Vector3& a) {
+  return std::max({std::abs(a[0]), std::abs(a[1]), std::abs(a[2])});
+}
+
+/// d inside the smallest sphere of a, b, c.
+template <class Coord>
+bool in_smallest_sphere(const std::array<Coord, 3>& pa, const std::array<Coord, 3>& pb,
+                        const std::array<Coord, 3>& pc, const std::array<Coord, 3>& pd) {
+  const Vector3 origin = to_doubles(pa);
+  const Vector3 b = minus(to_doubles(pb), origin);
+  const Vector3 c = minus(to_doubles(pc), origin);
+  const Vector3 d = minus(to_doubles(pd), origin);
+  const double m = std::max({largest(b), largest(c), largest(d)});
+  // Within these limits no term below over- or underflows in a way that counts.
+  if (!(m > 0x1p-120 && m < 0x1p160)) [[unlikely]]
+    return in_smallest_sphere_exactly(origin, to_doubles(pb), to_doubles(pc), to_doubles(pd));
+
+  // A sum of products of two differences of at most m: three for each of bb, cc and twice as many
+  // for the rest; every product and partial sum is rounded, and so are differences of doubles. The
+  // total of the absolute products is below 12 m^2 in every case, each off by at most 8 roundings.
+  const double bound2 = 12 * 8 * 0x1p-53 * (m * m);
+  const double bb = dot(b, b), cc = dot(c, c), bc = dot(b, c);
+  const double at_b = bb - bc, at_c = cc - bc;  // cosines at a, b and c but for a positive factor
+  // The sphere on an edge, where the angle opposite to it is obtuse; the product of the vectors
+  // from d to its ends is negative inside.
+  const double dd = dot(d, d);
+  double product = 0.0;
+  if (bc < -bound2) {
+    product = dd - dot(d, b) - dot(d, c) + bc;  // (d - b)(d - c)
+  } else if (at_b < -bound2) {
+    product = dd - dot(d, c);  // d (d - c)
+  } else if (at_c < -bound2) {
+    product = dd - dot(d, b);  // d (d - b)
+  } else if (bc > bound2 && at_b > bound2 && at_c > bound2) {
+    // The circumcentre is w / (2 n^2), and d is inside its sphere where d^2 < 2 d w / (2 n^2). All
+    // is a sum of products of six differences, of at most 108 m^6 together, each off by at most 24
+    // roundings.
+    const Vector3 n = cross(b, c);
+    const Vector3 nb = cross(n, b), cn = cross(c, n);
+    const double dw = cc * dot(d, nb) + bb * dot(d, cn);
+    const double power = dd * dot(n, n) - dw;
+    const double bound6 = 108 * 24 * 0x1p-53 * (m * m * m) * (m * m * m);
+    if (power < -bound6) return true;
+    if (power > bound6) return false;
+    return in_smallest_sphere_exactly(origin, to_doubles(pb), to_doubles(pc), to_doubles(pd));
+  } else {
+    return in_smallest_sphere_exactly(origin, to_doubles(pb), to_doubles(pc), to_doubles(pd));
+  }
+  if (product < -bound2) return true;
+  if (product > bound2) return false;
+  return in_smallest_sphere_exactly(origin, to_doubles(pb), to_doubles(pc), to_doubles(pd));
+}
+
+}  // namespace terrace::tri::shape

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "../delaunay3/mesh.hpp"
+#include "terrace/tri/shape.hpp"
+
+/// What is known of a shape, and the steps that the rules share.
+
+namespace terrace::tri::shape {
+
+// What State::of holds. Below kKept: removed, and the facet by which the flood came.
+inline constexpr std::uint8_t kKept = 4;
+/// No finite tetrahedron. A ghost has it too, so the neighbour of a living tetrahedron is open,
+/// that is removed or beyond the hull, if and only if its state is not kKept.
+inline constexpr std::uint8_t kAbsent = 5;
+/// Removed by the flood and put back. Only between two operations.
+inline constexpr std::uint8_t kRescuedBit = 8;
+
+constexpr bool is_kept(std::uint8_t state) { return state == kKept || (state & kRescuedBit) != 0; }
+constexpr bool is_removed(std::uint8_t state) { return state < kKept; }
+
+struct State {
+  std::vector<std::uint8_t> of;  ///< by tetrahedron slot
+  /// By vertex slot: the number of its tetrahedra in state kKept.
+  std::vector<std::uint32_t> degree;
+  std::vector<std::uint32_t> lost;     ///< living vertices of degree 0 while there are tetrahedra
+  std::vector<std::uint32_t> rescued;  ///< tetrahedra
+  std::size_t kept_count = 0;          ///< in state kKept
+  // Scratch memory, kept between calls.
+  std::vector<std::uint32_t> queue;    ///< removed ones whose neighbours are to be judged
+  std::vector<std::uint32_t> pending;  ///< kept ones to be judged on all sides
+  std::vector<std::uint32_t> touched;  ///< vertices whose degree may have changed
+
+  template <class Mesh>
+  void keep(const Mesh& mesh, std::uint32_t t) {
+    of[t] = kKept;
+    ++kept_count;
+    for (const std::uint32_t v : mesh.tetrahedron[t].corner) ++degree[v];
+  }
+  template <class Mesh>
+  void remove(const Mesh& mesh, std::uint32_t t, std::uint32_t side) {
+    of[t] = static_cast<std::uint8_t>(side);
+    --kept_count;
+    for (const std::uint32_t v : mesh.tetrahedron[t].corner) --degree[v];
+  }
+  void forget_rescued() {
+    for (const std::uint32_t t : rescued) of[t] &= static_cast<std::uint8_t>(~kRescuedBit);
+    rescued.clear();
+  }
+};
+
+/// All finite tetrahedra kept.
+template <class Mesh>
+void keep_all(const Mesh& mesh, State& state) {
+  state.of.assign(mesh.tetrahedron.size(), kAbsent);
+  state.degree.assign(mesh.vertex.size(), 0);
+  state.lost.clear();
+  state.rescued.clear();
+  state.kept_count = 0;
+  for (std::uint32_t t = 0; t < mesh.tetrahedron.size(); ++t)
+    if (spatial::is_finite(mesh.tetrahedron[t].corner)) state.keep(mesh, t);
+}
+
+template <class Mesh>
+void find_lost(const Mesh& mesh, State& state) {
+  state.lost.clear();
+  if (mesh.flat) return;
+  for (std::uint32_t v = 1; v < mesh.vertex.size(); ++v)
+    if (state.degree[v] == 0 && mesh.vertex_alive(v)) state.lost.push_back(v);
+}
+
+}  // namespace terrace::tri::shape

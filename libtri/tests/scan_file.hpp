@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cstdint>
+#include <cstring>
+#include <fstream>
+#include <limits>
+#include <map>
+#include <set>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "terrace/tri/surface.hpp"
+
+/// Scans for tests and benchmarks: PLY (ASCII and little-endian binary, points first, then faces
+/// with one list as their first property) and OBJ with triangles.
+
+namespace terrace::tri {
+
+namespace scan_file {
+
+inline std::size_t size_of(const std::string& type) {
+  if (type == "char" || type == "uchar" || type == "int8" || type == "uint8") return 1;
+  if (type == "short" || type == "ushort" || type == "int16" || type == "uint16") return 2;
+  if (type == "double" || type == "float64") return 8;
+  return 4;
+}
+
+/// One number, from text or from little-endian bytes.
+inline double read_number(std::istream& in, const std::string& type, bool ascii) {
+  double value = std::numeric_limits<double>::quiet_NaN();
+  if (ascii) {
+    in >> value;
+    return value;
+  }
+  static_assert(std::endian::native == std::endian::little);
+  char bytes[8] = {};
+  in.read(bytes, static_cast<std::streamsize>(size_of(type)));
+  const auto as = [&](auto number) {
+    std::memcpy(&number, bytes, sizeof number);
+    return static_cast<double>(number);
+  };
+  if (type == "float" || type == "float32") return as(0.0f);
+  if (type == "double" || type == "float64") return as(0.0);
+  if (type == "uchar" || type == "uint8") return as(std::uint8_t{});
+  if (type == "char" || type == "int8") return as(std::int8_t{});
+  if (type == "ushort" || type == "uint16") return as(std::uint16_t{});
+  if (type == "short" || type == "int16") return as(std::int16_t{});
+  if (type == "uint" || type == "uint32") return as(std::uint32_t{});
+  return as(std::int32_t{});
+}
+
+}  // namespace scan_file
+
+inline Surface read_ply(std::istream& in) {
+  using scan_file::read_number;
+  struct Element {
+    std::string name;
+    std::size_t count;
+    std::vector<std::vector<std::string>> properties;  // words after "property"
+  };
+  std::vector<Element> elements;
+  bool ascii = true;
+  std::string line;
+  while (std::getline(in, line) && line.rfind("end_header", 0) != 0) {
+    std::istringstream words(line);
+    std::string word;
+    words >> word;
+    if (word == "format") {
+      words >> word;
+      ascii = word == "ascii";
+    } else if (word == "element") {
+      elements.emplace_back();
+      words >> elements.back().name >> elements.back().count;
+    } else if (word == "property") {
+      elements.back().properties.emplace_back();
+      while (words >> word) elements.back().properties.back().push_back(word);
+    }
+  }
+  Surface surface;
+  for (const Element& element : elements) {
+    for (std::size_t k = 0; k < element.count && in; ++k) {
+      std::array<double, 3> point{};
+      for (const auto& property : element.properties) {
+        if (property[0] != "list") {
+          const double value = read_number(in, property[0], ascii);
+          const std::size_t axis = std::string("xyz").find(property[1]);
+          if (property[1].size() == 1 && axis < 3) point[axis] = value;
+          continue;
+        }
+        std::vector<std::uint32_t> corners(
+            static_cast<std::size_t>(read_number(in, property[1], ascii)));
+        for (auto& corner : corners)
+          corner = static_cast<std::uint32_t>(read_number(in, property[2], ascii));
+        if (element.name != "face") continue;
+        for (std::size_t i = 2; i < corners.size(); ++i)
+          surface.faces.push_back({corners[0], corners[i - 1], corners[i]});
+      }
+      if (element.name == "vertex") surface.points.push_back(point);
+    }
+  }
+  if (!in || surface.points.empty()) throw std::runtime_error("not a whole PLY file");
+  return surface;
+}
+
+inline Surface read_obj(std::istream& in) {
+  Surface surface;
+  std::string line;
+  while (std::getline(in, line)) {
+    std::istringstream words(line);
+    std::string kind;
+    words >> kind;
+    if (kind == "v") {
+      std::array<double, 3> point{};
+      words >> point[0] >> point[1] >> point[2];
+      surface.points.push_back(point);
+    } else if (kind == "f") {
+      std::array<std::uint32_t, 3> face{};
+      for (auto& corner : face) {
+        std::string word;
+        words >> word;
+        corner = static_cast<std::uint32_t>(std::stoul(word) - 1);
+      }
+      surface.faces.push_back(face);
+    }
+  }
+  if (surface.points.empty()) throw std::runtime_error("not an OBJ file");
+  return surface;
+}
+
+/// Each opening (a connected set of edges in one face) closed by a fan to its centre, so that the
+/// enclosed volume is defined.
+inline Surface with_openings_closed(Surface surface) {
+  using Edge = std::pair<std::uint32_t, std::uint32_t>;
+  std::set<Edge> edges;
+  for (const auto& f : surface.faces)
+    for (std::size_t i = 0; i < 3; ++i) edges.insert({f[i], f[(i + 1) % 3]});
+  std::map<std::uint32_t, std::vector<std::uint32_t>> next;
+  for (const auto& [from, to] : edges)
+    if (!edges.contains({to, from})) {
+      next[from].push_back(to);
+      next[to];
+    }
+  while (!next.empty()) {
+    std::set<std::uint32_t> opening{next.begin()->first};
+    for (bool grown = true; grown;) {
+      grown = false;
+      for (const auto& [from, tos] : next)
+        for (const std::uint32_t to : tos)
+          if (opening.contains(from) != opening.contains(to)) {
+            opening.insert({from, to});
+            grown = true;
+          }
+    }
+    std::array<double, 3> centre{};
+    for (const std::uint32_t v : opening)
+      for (std::size_t k = 0; k < 3; ++k)
+        centre[k] += surface.points[v][k] / static_cast<double>(opening.size());
+    const auto middle = static_cast<std::uint32_t>(surface.points.size());
+    surface.points.push_back(centre);
+    for (const std::uint32_t from : opening) {
+      for (const std::uint32_t to : next[from]) surface.faces.push_back({to, from, middle});
+      next.erase(from);
+    }
+  }
+  return surface;
+}
+
+/// The corners of the box at 0 and 2^24 - 1 on its longest side.
+inline std::vector<std::array<std::int32_t, 3>> quantised(
+    const std::vector<std::array<double, 3>>& points, double& step) {
+  std::array<double, 3> low = points.at(0), high = low;
+  for (const auto& p : points) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      low[k] = std::min(low[k], p[k]);
+      high[k] = std::max(high[k], p[k]);
+    }
+  }
+  const double extent = std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
+  step = extent / ((1 << 24) - 1);
+  std::vector<std::array<std::int32_t, 3>> result;
+  for (const auto& p : points) {
+    std::array<std::int32_t, 3> q{};
+    for (std::size_t k = 0; k < 3; ++k)
+      q[k] = static_cast<std::int32_t>((p[k] - low[k]) / step + 0.5);
+    result.push_back(q);
+  }
+  return result;
+}
+
+}  // namespace terrace::tri
