@@ -168,7 +168,8 @@ class Consumer {
  public:
   explicit Consumer(const MultiresolutionModel<T>& model) : model_(&model) { look(*this); }
 
-  /// Applies a delta as its documentation says, each claim checked. `several`: of a step of several.
+  /// Applies a delta as its documentation says, each claim checked. `several`: of a step of
+  /// several.
   void apply(const typename MultiresolutionModel<T>::Delta& delta, bool several = false) {
     for (const TriangleId t : delta.changes.removed_triangles) {
       ASSERT_EQ(triangles_.erase(t), 1u) << "removed a triangle that was not there";

@@ -19,8 +19,8 @@ namespace terrace::tools {
 /// when the points would not fit, saying what they need.
 ///
 /// With `smoothing` heights are smoothed, with a region only inside it, its border staying: on the
-/// triangulation as it is made, so of rasters on the unit grid. An edge_height of 0 becomes four times
-/// the root mean square of the height differences along edges. The store never changes.
+/// triangulation as it is made, so of rasters on the unit grid. An edge_height of 0 becomes four
+/// times the root mean square of the height differences along edges. The store never changes.
 TriangleMesh mesh_of_store(const stream::Store& store, const Detail& detail,
                            std::uint64_t memory_bytes,
                            const std::optional<tri::SmoothingOptions>& smoothing = {});

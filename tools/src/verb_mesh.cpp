@@ -1,16 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <algorithm>
-#include <cstddef>
 #include <memory>
-#include <span>
 #include <string>
 #include <vector>
 
 #include <CLI/CLI.hpp>
-#include <terrace/stream/mesh_writer.hpp>
 #include <terrace/stream/store.hpp>
 
 #include "detail.hpp"
+#include "mesh_output.hpp"
 #include "output.hpp"
 #include "smooth_option.hpp"
 #include "store_mesh.hpp"
@@ -49,7 +46,7 @@ class MeshCommand final : public Command {
     const bool replace = may_replace(output_, common.force);
     const TriangleMesh mesh =
         mesh_of_store(store, detail, common.memory_or(machine_memory_bytes() / 2), smoothing);
-    write(mesh, replace);
+    write_mesh(output_, format_, mesh, replace);
 
     Summary summary;
     summary.json = {{"vertices", mesh.positions.size()},
@@ -63,30 +60,6 @@ class MeshCommand final : public Command {
   }
 
  private:
-  void write(const TriangleMesh& mesh, bool replace) const {
-    constexpr std::size_t kPiece = 65536;
-    stream::Box3 bounds;
-    for (const stream::Point3& p : mesh.positions) bounds.include(p);
-    const auto writer =
-        stream::open_mesh_writer(output_,
-                                 {.vertices = mesh.positions.size(),
-                                  .triangles = mesh.triangles.size(),
-                                  .attributes = {"level"},
-                                  .comments = {kWriterMark},
-                                  .bounds = bounds.empty() ? std::nullopt : std::optional(bounds)},
-                                 {.format = format_, .replace = replace});
-    std::vector<float> levels;
-    const std::span vertices(mesh.positions);
-    for (std::size_t at = 0; at < vertices.size(); at += kPiece) {
-      const std::size_t count = std::min(kPiece, vertices.size() - at);
-      levels.assign(mesh.levels.begin() + static_cast<std::ptrdiff_t>(at),
-                    mesh.levels.begin() + static_cast<std::ptrdiff_t>(at + count));
-      writer->add_vertices(vertices.subspan(at, count), levels);
-    }
-    writer->add_triangles(mesh.triangles);
-    writer->finish();
-  }
-
   std::string store_, output_, format_, level_ = "0", region_, smooth_;
   std::vector<std::string> focuses_;
 };

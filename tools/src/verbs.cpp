@@ -17,7 +17,7 @@ std::span<const Verb> verbs() {
       {"mesh", "write a triangle mesh with local detail",
        "terrace mesh dem.terrace --level top --focus 500000,5000000,510000,5010000:0 -o mesh.ply",
        make_mesh},
-      {"surface", "write a 3D surface", "terrace surface scan.terrace -o scan.ply", nullptr},
+      {"surface", "write a 3D surface", "terrace surface scan.terrace -o scan.ply", make_surface},
       {"tile", "write terrain tiles for web globes", "terrace tile dem.terrace -o tiles", nullptr},
       {"sample", "answer heights and slopes at points",
        "terrace sample dem.terrace --points places.csv", nullptr},

@@ -73,7 +73,8 @@ class SetRemoval {
   void gather() {
     triangles_.clear();
     boundary_.clear();
-    // Clusters lie scattered in memory: the triangle of a vertex is asked for a few vertices before.
+    // Clusters lie scattered in memory: the triangle of a vertex is asked for a few vertices
+    // before.
     constexpr std::size_t kAhead = 8;
     for (std::size_t k = 0; k < removed_.size(); ++k) {
       const std::uint32_t v = removed_[k];

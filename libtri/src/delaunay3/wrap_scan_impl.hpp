@@ -9,7 +9,15 @@
 namespace terrace::tri::spatial {
 namespace {
 
-using Loaded = double __attribute__((vector_size(kLanes * sizeof(double)), aligned(8), may_alias));
+// Of memory that is aligned for one double only.
+[[gnu::always_inline]] inline Lanes load(const double* from) {
+  Lanes lanes;
+  __builtin_memcpy(&lanes, from, sizeof lanes);
+  return lanes;
+}
+[[gnu::always_inline]] inline void store(double* to, Lanes lanes) {
+  __builtin_memcpy(to, &lanes, sizeof lanes);
+}
 
 constexpr double kNothing = __builtin_inf();
 
@@ -20,13 +28,13 @@ constexpr double kNothing = __builtin_inf();
   Lanes best_power = kNothing - Lanes{};
   Lanes best_volume = 1.0 - Lanes{};
   for (std::size_t i = 0; i < v.count; i += kLanes) {
-    const Lanes x = *reinterpret_cast<const Loaded*>(v.x + i) - f.corner[0];
-    const Lanes y = *reinterpret_cast<const Loaded*>(v.y + i) - f.corner[1];
-    const Lanes z = *reinterpret_cast<const Loaded*>(v.z + i) - f.corner[2];
+    const Lanes x = load(v.x + i) - f.corner[0];
+    const Lanes y = load(v.y + i) - f.corner[1];
+    const Lanes z = load(v.z + i) - f.corner[2];
     const Lanes volume = f.normal[0] * x + f.normal[1] * y + f.normal[2] * z;
     const Lanes power = x * (x - f.diameter[0]) + y * (y - f.diameter[1]) + z * (z - f.diameter[2]);
-    *reinterpret_cast<Loaded*>(v.power + i) = power;
-    *reinterpret_cast<Loaded*>(v.volume + i) = volume;
+    store(v.power + i, power);
+    store(v.volume + i, volume);
     const Mask better = (volume > volume_error) & (power * best_volume < best_power * volume);
     best_power = better ? power : best_power;
     best_volume = better ? volume : best_volume;
@@ -53,8 +61,8 @@ constexpr double kNothing = __builtin_inf();
   for (std::size_t i = 0; i < v.count; i += kScanPadding) {
     unsigned hits = 0;
     for (std::size_t k = 0; k < kScanPadding; k += kLanes) {
-      const Lanes power = *reinterpret_cast<const Loaded*>(v.power + i + k);
-      const Lanes volume = *reinterpret_cast<const Loaded*>(v.volume + i + k);
+      const Lanes power = load(v.power + i + k);
+      const Lanes volume = load(v.volume + i + k);
       const Mask hit = (volume + f.volume_error > 0.0) & (power - factor * volume <= margin);
       hits |= bits_of(hit) << k;
     }

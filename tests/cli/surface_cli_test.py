@@ -1,0 +1,143 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The verb `surface` as its users meet it.
+
+TERRACE=path/to/terrace surface_cli_test.py
+"""
+
+import collections
+import json
+import math
+import os
+import struct
+import subprocess
+import tempfile
+import unittest
+
+TERRACE = os.environ.get('TERRACE', 'terrace')
+RADIUS = 10.0
+
+
+def terrace(*args):
+    return subprocess.run([TERRACE, *map(str, args)], capture_output=True, text=True, timeout=120)
+
+
+def sphere(count):
+    """Points spread evenly, on a spiral."""
+    points = []
+    for k in range(count):
+        z = 1 - (2 * k + 1) / count
+        angle = k * math.pi * (3 - math.sqrt(5))
+        r = math.sqrt(1 - z * z)
+        points.append((RADIUS * r * math.cos(angle), RADIUS * r * math.sin(angle), RADIUS * z))
+    return points
+
+
+class SurfaceTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        with open(cls.path('ball.xyz'), 'w') as file:
+            file.writelines(f'{x} {y} {z}\n' for x, y, z in sphere(3000))
+        cls.store = cls.path('ball.terrace')
+        result = terrace('build', cls.path('ball.xyz'), '-o', cls.store, '--block', 1000)
+        assert result.returncode == 0, result.stderr
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.folder.cleanup()
+
+    @classmethod
+    def path(cls, name):
+        return os.path.join(cls.folder.name, name)
+
+    def surface(self, name, *options):
+        out = self.path(name)
+        result = terrace('surface', self.store, '-o', out, '--json', '--force', *options)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return json.loads(result.stdout), out
+
+    def read_obj(self, path):
+        vertices, faces = [], []
+        with open(path) as file:
+            for line in file:
+                words = line.split()
+                if words[:1] == ['v']:
+                    vertices.append(tuple(map(float, words[1:4])))
+                elif words[:1] == ['f']:
+                    faces.append([int(word.split('/')[0]) - 1 for word in words[1:4]])
+        return vertices, faces
+
+    def test_a_ball_comes_back_closed_and_outward(self):
+        summary, out = self.surface('ball.obj')
+        vertices, faces = self.read_obj(out)
+        self.assertEqual((summary['vertices'], summary['triangles']), (len(vertices), len(faces)))
+        self.assertEqual((len(vertices), len(faces)), (3000, 5996))
+        self.assertTrue(summary['closed'])
+        self.assertEqual((summary['components'], summary['euler_characteristic']), (1, 2))
+        self.assertAlmostEqual(summary['area'], 4 * math.pi * RADIUS ** 2, delta=10)
+        directed = collections.Counter()
+        volume = 0.0
+        for a, b, c in faces:
+            directed.update([(a, b), (b, c), (c, a)])
+            (ax, ay, az), (bx, by, bz), (cx, cy, cz) = vertices[a], vertices[b], vertices[c]
+            volume += (ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)) / 6
+        self.assertTrue(all(directed[b, a] == count for (a, b), count in directed.items()))
+        self.assertAlmostEqual(volume, 4 / 3 * math.pi * RADIUS ** 3, delta=40)
+        self.assertAlmostEqual(volume, summary['volume'], places=6)
+
+    def test_coarse_with_a_fine_part(self):
+        coarse, _ = self.surface('coarse.ply', '--level', 'top')
+        mixed, _ = self.surface('mixed.ply', '--level', 'top', '--focus', '0,0,0,11,11,11:0')
+        fine, _ = self.surface('fine.ply')
+        self.assertLess(coarse['vertices'], mixed['vertices'])
+        self.assertLess(mixed['vertices'], fine['vertices'])
+
+    def test_the_other_criteria(self):
+        for criterion in ('edge:1', 'advancing-front', 'alpha-wrap', 'alpha-wrap:2'):
+            summary, _ = self.surface('other.ply', '--criterion', criterion)
+            self.assertGreater(summary['triangles'], 100)
+            self.assertAlmostEqual(summary['area'], 4 * math.pi * RADIUS ** 2, delta=300)
+
+    def test_tetrahedra_fill_the_volume(self):
+        summary, out = self.surface('ball.vtk', '--tetrahedra')
+        with open(out, 'rb') as file:
+            data = file.read()
+        head, data = data.split(b'POINTS ', 1)
+        self.assertIn(b'BINARY\nDATASET UNSTRUCTURED_GRID', head)
+        line, data = data.split(b'\n', 1)
+        count = int(line.split()[0])
+        points = [struct.unpack('>3d', data[24 * k:24 * k + 24]) for k in range(count)]
+        line, data = data[24 * count:].split(b'CELLS ', 1)[1].split(b'\n', 1)
+        cells, numbers = map(int, line.split())
+        self.assertEqual((cells, numbers), (summary['tetrahedra'], 5 * summary['tetrahedra']))
+        volume = 0.0
+        for k in range(cells):
+            four, a, b, c, d = struct.unpack('>5i', data[20 * k:20 * k + 20])
+            self.assertEqual(four, 4)
+            u, v, w = ([x - y for x, y in zip(points[p], points[a])] for p in (b, c, d))
+            volume += (u[0] * (v[1] * w[2] - v[2] * w[1]) + u[1] * (v[2] * w[0] - v[0] * w[2]) +
+                       u[2] * (v[0] * w[1] - v[1] * w[0])) / 6
+        self.assertAlmostEqual(volume, summary['volume'], places=6)
+        rest = data[20 * cells:]
+        self.assertTrue(rest.startswith(f'\nCELL_TYPES {cells}\n'.encode()))
+        self.assertIn(f'\nPOINT_DATA {count}\nSCALARS level unsigned_char 1\n'.encode(), rest)
+
+    def test_errors_are_one_line(self):
+        out = self.path('none.ply')
+        for code, options in ((2, ['--criterion', 'best']), (2, ['--criterion', 'edge:-1']),
+                              (2, ['--criterion', 'gabriel:1']), (2, ['--tetrahedra']),
+                              (2, ['--level', 9]), (1, ['--memory', '1M'])):
+            result = terrace('surface', self.store, '-o', out, *options)
+            self.assertEqual(result.returncode, code, result.stderr)
+            self.assertEqual(len(result.stderr.splitlines()), 1, result.stderr)
+            self.assertFalse(os.path.exists(out))
+        result = terrace('surface', self.store, '-o', self.path('none.vtk'))
+        self.assertEqual(result.returncode, 2, result.stderr)
+        result = terrace('surface', self.store, '-o', self.path('none.vtk'), '--tetrahedra',
+                         '--criterion', 'alpha-wrap')
+        self.assertEqual(result.returncode, 2, result.stderr)
+
+
+if __name__ == '__main__':
+    unittest.main()

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <terrace/stream/store.hpp>
+#include <terrace/tri/reconstruct.hpp>
+
+#include "detail.hpp"
+#include "scene.hpp"
+
+namespace terrace::tools {
+
+/// What --criterion says: edge, edge:FACTOR, gabriel, advancing-front, alpha-wrap or
+/// alpha-wrap:ALPHA (metres). Throws: UsageError.
+tri::SurfaceOptions parse_criterion(const std::string& text);
+
+/// A surface, or the tetrahedra inside it. Positions are in the store's CRS.
+struct SurfaceOutcome {
+  TriangleMesh mesh;
+  std::vector<std::array<std::uint32_t, 4>> tetrahedra;  ///< where asked for, in place of triangles
+  tri::SurfaceMeasures measures;                         ///< of the surface, in metres
+};
+
+/// The surface of the points that `detail` wants, restored in metres on the ground: of points in
+/// degrees about the middle of their box. Throws: UsageError where the method has no tetrahedra,
+/// stream::Error on a damaged store, and where the points do not fit into memory_bytes, saying what
+/// they need.
+SurfaceOutcome surface_of_store(const stream::Store& store, const Detail& detail,
+                                const tri::SurfaceOptions& options, bool tetrahedra,
+                                std::uint64_t memory_bytes);
+
+}  // namespace terrace::tools
