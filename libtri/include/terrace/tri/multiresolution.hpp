@@ -17,15 +17,16 @@
 #include <vector>
 
 #include "terrace/tri/delaunay2.hpp"
+#include "terrace/tri/delaunay3.hpp"
 #include "terrace/tri/multiresolution_owners.hpp"
 #include "terrace/tri/multiresolution_source.hpp"
 #include "terrace/tri/multiresolution_tree.hpp"
 
 namespace terrace::tri {
 
-/// What the model asks of a triangulation; Delaunay2 has it. The result of any sequence of calls
-/// must be a function of the point set alone: then collapse is the exact inverse of expand. Point
-/// is an array of 2 or 3 coordinates, integers of at most 30 bits or doubles.
+/// What the model asks of a triangulation; Delaunay2 and Delaunay3 have it. The result of any
+/// sequence of calls must be a function of the point set alone: then collapse is the exact inverse
+/// of expand. Point is an array of 2 or 3 coordinates, integers of at most 30 bits or doubles.
 template <class T>
 concept DynamicTriangulation = requires(T t, const T& c, std::span<const typename T::Point> points,
                                         std::span<typename T::Insertion> results, VertexId hint,
@@ -221,6 +222,9 @@ class MultiresolutionModel {
 /// The model of points in the plane: std::int32_t for rasters in column and row, else double.
 template <class Coord>
 using Multiresolution2 = MultiresolutionModel<Delaunay2<Coord>>;
+/// The model of points in space: tetrahedra in place of triangles; a height is the z of a vertex.
+template <class Coord>
+using Multiresolution3 = MultiresolutionModel<Delaunay3<Coord>>;
 
 }  // namespace terrace::tri
 
