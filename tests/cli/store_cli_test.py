@@ -6,7 +6,9 @@ TERRACE=path/to/terrace store_cli_test.py
 """
 
 import filecmp
+import itertools
 import json
+import math
 import os
 import subprocess
 import tempfile
@@ -174,6 +176,39 @@ class StoreTest(unittest.TestCase):
             self.assertTrue(box[0] < float(x) < box[2] and box[1] < float(y) < box[3], (x, y, box))
         self.expect_error(2, 'mesh', self.store, '-o', self.path('none.ply'), '--smooth', 'best')
         self.expect_error(2, 'mesh', self.store, '-o', self.path('none.ply'), '--smooth', 'taubin:0')
+
+    def triangles(self, *options):
+        out = self.path('triangles.obj')
+        self.run_ok('mesh', self.store, '--level', 1, '-o', out, '--force', *options)
+        with open(out) as file:
+            lines = [line.split() for line in file]
+        vertices = [tuple(map(float, line[1:3])) for line in lines if line[:1] == ['v']]
+        return {frozenset(vertices[int(word.split('/')[0]) - 1] for word in line[1:4])
+                for line in lines if line[:1] == ['f']}
+
+    def test_an_elliptical_metric_changes_triangles_inside_its_region_alone(self):
+        plain = self.triangles()
+        xs = sorted(x for triangle in plain for x, _ in triangle)
+        ys = sorted(y for triangle in plain for _, y in triangle)
+        box = [xs[len(xs) // 4], ys[len(ys) // 4], xs[3 * len(xs) // 4], ys[3 * len(ys) // 4]]
+        regions = self.path('regions.json')
+        with open(regions, 'w') as file:
+            json.dump({'regions': [{'box': box, 'semi_axes': [6, 1], 'angle': 30}]}, file)
+        slanted = self.triangles('--metric', f'elliptical:{regions}')
+        self.assertEqual(len(slanted), len(plain))
+        inside = lambda point: box[0] <= point[0] <= box[2] and box[1] <= point[1] <= box[3]
+        changed = slanted - plain
+        self.assertGreater(len(changed), len(plain) // 20)
+        self.assertTrue(all(inside(point) for triangle in changed for point in triangle))
+
+        def east(triangles):
+            """How far edges turn towards 30 degrees from +x: mean cosine of the doubled angle."""
+            turns = [math.cos(2 * (math.atan2(q[1] - p[1], q[0] - p[0]) - math.radians(30)))
+                     for triangle in triangles for p, q in itertools.combinations(triangle, 2)]
+            return sum(turns) / len(turns)
+
+        self.assertGreater(east(changed), east(plain - slanted) + 0.3)
+        self.expect_error(2, 'mesh', self.store, '-o', self.path('none.ply'), '--metric', 'squared')
 
     def test_levels_that_are_not_there_are_wrong_usage(self):
         self.assertIn('top', self.expect_error(2, 'mesh', self.store, '--level', 9, '-o',

@@ -9,8 +9,11 @@
 #include <utility>
 
 #include <terrace/stream/error.hpp>
+#include <terrace/tri/metric_triangles.hpp>
 #include <terrace/tri/multiresolution.hpp>
 
+#include "error.hpp"
+#include "ground.hpp"
 #include "interrupt.hpp"
 #include "region_overlap.hpp"
 #include "store_source.hpp"
@@ -60,10 +63,12 @@ tri::Detail in_stored_coordinates(const Detail& detail, const Placement& placeme
 
 /// Smoothing: heights of two steps, the vertices, and 16 bytes per edge end.
 constexpr std::uint64_t kBytesToSmooth = 3 * 8 + 4 + 6 * 16;
+/// The triangles of a field of metrics.
+constexpr std::uint64_t kBytesToFlip = 120;
 
 /// Counts what `detail` wants from the index alone and refuses what cannot fit.
 void check_memory(const stream::Store& store, const Detail& detail, std::uint64_t memory_bytes,
-                  bool smooths) {
+                  std::uint64_t more_per_vertex) {
   std::uint64_t points = 0;
   if (!detail.region && detail.focuses.empty()) {
     points = store.levels()[detail.level].points;
@@ -74,7 +79,7 @@ void check_memory(const stream::Store& store, const Detail& detail, std::uint64_
   }
   constexpr std::uint64_t kMostVertices = (std::uint64_t{1} << 29) - 2;
   const std::uint64_t needed =
-      points * (kBytesPerVertex + (smooths ? kBytesToSmooth : 0)) + (std::uint64_t{32} << 20);
+      points * (kBytesPerVertex + more_per_vertex) + (std::uint64_t{32} << 20);
   if (needed <= memory_bytes && points <= kMostVertices) return;
   throw stream::Error({.file = store.path().string(),
                        .where = {},
@@ -126,10 +131,47 @@ std::vector<double> smoothed(const tri::Multiresolution2<Coord>& model, const Pl
   return heights;
 }
 
+/// The metric in the coordinates of the triangulation.
+tri::MetricField2 field_of(const MetricChoice& metric, const stream::Store& store,
+                           const Placement& placement) {
+  const std::array<double, 6>& m = placement.world.xy;
+  const Ground ground(placement);
+  std::vector<tri::MetricField2::Region> regions;
+  for (const MetricChoice::Region& region : metric.regions) {
+    if (region.box && (m[1] != 0.0 || m[3] != 0.0)) {
+      throw UsageError("--metric: the boxes of regions need a raster that is not rotated");
+    }
+    constexpr double kEverywhere = std::numeric_limits<double>::infinity();
+    tri::Box3 box{{-kEverywhere, -kEverywhere, -kEverywhere},
+                  {kEverywhere, kEverywhere, kEverywhere}};
+    stream::Box3 around = store.bounds();
+    if (region.box) {
+      const tri::Box3 stored = stored_box(placement, *region.box);
+      for (std::size_t axis = 0; axis < 2; ++axis) {
+        box.min[axis] = around.min[axis] = stored.min[axis];
+        box.max[axis] = around.max[axis] = stored.max[axis];
+      }
+    }
+    // From stored coordinates to the ground, then by the ellipse to the unit circle.
+    const GroundMap on_ground = ground.map(around);
+    const cluster::LinearMap& ellipse = region.metric.map();
+    std::array<double, 9> map{};
+    for (std::size_t row = 0; row < 3; ++row) {
+      for (std::size_t column = 0; column < 3; ++column) {
+        for (std::size_t k = 0; k < 3; ++k) {
+          map[3 * row + column] += ellipse[3 * row + k] * on_ground[3 * k + column];
+        }
+      }
+    }
+    regions.push_back({box, tri::plane_map(map)});
+  }
+  return tri::MetricField2(std::move(regions));
+}
+
 template <class Coord>
 TriangleMesh mesh_of_model(const tri::Multiresolution2<Coord>& model, const Placement& placement,
-                           const std::optional<Region>& region,
-                           const std::vector<double>& heights) {
+                           const std::optional<Region>& region, const std::vector<double>& heights,
+                           const std::optional<tri::MetricField2>& field) {
   const auto& triangulation = model.triangulation();
   const auto position = [&](tri::VertexId v) {
     const auto p = triangulation.point(v);
@@ -158,39 +200,52 @@ TriangleMesh mesh_of_model(const tri::Multiresolution2<Coord>& model, const Plac
     // Points without a triangle (fewer than three, or all on one line) are written all the same.
     for (const tri::VertexId v : triangulation.all_vertices()) number_of(v);
   }
-  for (const tri::TriangleId t : triangulation.all_triangles()) {
-    auto corners = triangulation.vertices(t);
+  const auto add = [&](std::array<tri::VertexId, 3> corners) {
     if (mirrored) std::swap(corners[1], corners[2]);
     if (region &&
         !touches(*region, {position(corners[0]), position(corners[1]), position(corners[2])})) {
-      continue;
+      return;
     }
     mesh.triangles.push_back({number_of(corners[0]), number_of(corners[1]), number_of(corners[2])});
+  };
+  if (field) {
+    for (const auto& corners : tri::metric_triangles(triangulation, *field)) add(corners);
+  } else {
+    for (const tri::TriangleId t : triangulation.all_triangles()) add(triangulation.vertices(t));
   }
   return mesh;
 }
 
 template <class Coord>
-TriangleMesh mesh_of(const stream::Store& store, const Detail& detail,
-                     const std::optional<tri::SmoothingOptions>& smoothing) {
+TriangleMesh mesh_of(const stream::Store& store, const Detail& detail, const MeshOptions& options) {
   StoreSource source(store);
   const Placement placement = placement_of(store.schema());
+  std::optional<tri::MetricField2> field;
+  if (options.metric.kind == MetricChoice::Kind::elliptical) {
+    field = field_of(options.metric, store, placement);
+  }
   const tri::Multiresolution2<Coord> model(source, in_stored_coordinates(detail, placement),
                                            {.deltas = false});
   check_interrupt();
   std::vector<double> heights;
-  if (smoothing) heights = smoothed(model, placement, detail.region, *smoothing);
-  return mesh_of_model(model, placement, detail.region, heights);
+  if (options.smoothing) heights = smoothed(model, placement, detail.region, *options.smoothing);
+  return mesh_of_model(model, placement, detail.region, heights, field);
 }
 
 }  // namespace
 
 TriangleMesh mesh_of_store(const stream::Store& store, const Detail& detail,
-                           std::uint64_t memory_bytes,
-                           const std::optional<tri::SmoothingOptions>& smoothing) {
-  check_memory(store, detail, memory_bytes, smoothing.has_value());
-  return store.schema().grid ? mesh_of<std::int32_t>(store, detail, smoothing)
-                             : mesh_of<double>(store, detail, smoothing);
+                           std::uint64_t memory_bytes, const MeshOptions& options) {
+  const MetricChoice::Kind kind = options.metric.kind;
+  if (kind != MetricChoice::Kind::euclidean && kind != MetricChoice::Kind::elliptical) {
+    throw UsageError("a mesh has the metric euclidean or elliptical:FILE, not " +
+                     options.metric.text);
+  }
+  check_memory(store, detail, memory_bytes,
+               (options.smoothing ? kBytesToSmooth : 0) +
+                   (kind == MetricChoice::Kind::elliptical ? kBytesToFlip : 0));
+  return store.schema().grid ? mesh_of<std::int32_t>(store, detail, options)
+                             : mesh_of<double>(store, detail, options);
 }
 
 TriangleMesh points_of_store(const stream::Store& store, const Detail& detail) {

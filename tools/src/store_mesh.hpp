@@ -7,23 +7,30 @@
 #include <terrace/tri/smoothing.hpp>
 
 #include "detail.hpp"
+#include "metric_option.hpp"
 #include "scene.hpp"
 #include "terrace/stream/store.hpp"
 
 namespace terrace::tools {
 
+struct MeshOptions {
+  /// Heights are smoothed, with a region only inside it, its border staying: on the triangulation
+  /// as it is made, so of rasters on the unit grid. An edge_height of 0 becomes four times the root
+  /// mean square of the height differences along edges.
+  std::optional<tri::SmoothingOptions> smoothing;
+  /// Elliptical: triangles within a region suit its metric on the ground (see
+  /// tri::metric_triangles); outside all regions nothing changes.
+  MetricChoice metric;
+};
+
 /// The 2D Delaunay triangulation of what `detail` wants: rasters in column and row, exactly; other
 /// points in x and y. Positions are in the store's CRS, triangles counter-clockwise seen from
 /// above, levels the highest of each vertex's point. With a region, the triangles that reach into
 /// it, whole. memory_bytes: what the work may take. Throws: stream::Error on a damaged store, or
-/// when the points would not fit, saying what they need.
-///
-/// With `smoothing` heights are smoothed, with a region only inside it, its border staying: on the
-/// triangulation as it is made, so of rasters on the unit grid. An edge_height of 0 becomes four
-/// times the root mean square of the height differences along edges. The store never changes.
+/// when the points would not fit, saying what they need; UsageError for a metric that triangles
+/// cannot follow, and for boxes on a rotated raster. The store never changes.
 TriangleMesh mesh_of_store(const stream::Store& store, const Detail& detail,
-                           std::uint64_t memory_bytes,
-                           const std::optional<tri::SmoothingOptions>& smoothing = {});
+                           std::uint64_t memory_bytes, const MeshOptions& options = {});
 
 /// The same points without triangles.
 TriangleMesh points_of_store(const stream::Store& store, const Detail& detail);

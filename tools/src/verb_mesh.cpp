@@ -34,18 +34,24 @@ class MeshCommand final : public Command {
            "laplacian, taubin (keeps what is wide) or bilateral (keeps steps), :STEPS behind "
            "if wanted (10); with --region only inside it")
         ->type_name("METHOD");
-    not_yet(app, {"--max-error", "--quality", "--max-points", "--duplicates", "--fill", "--metric",
-                  "--overlay", "--base", "--region-crs", "--to-crs"});
+    app.add_option(
+           "--metric", metric_,
+           "euclidean, or elliptical:FILE (JSON regions as for cluster): triangles follow the "
+           "ellipses inside the regions")
+        ->capture_default_str()
+        ->type_name("NAME");
+    not_yet(app, {"--max-error", "--quality", "--max-points", "--duplicates", "--fill", "--overlay",
+                  "--base", "--region-crs", "--to-crs"});
   }
 
   Summary run(const CommonOptions& common) override {
     const Stopwatch watch;
-    const std::optional<tri::SmoothingOptions> smoothing = parse_smoothing(smooth_);
+    const MeshOptions options{parse_smoothing(smooth_), MetricChoice::parse(metric_)};
     const stream::Store store = stream::Store::open(store_);
     const Detail detail = Detail::parse(store, level_, region_, focuses_);
     const bool replace = may_replace(output_, common.force);
     const TriangleMesh mesh =
-        mesh_of_store(store, detail, common.memory_or(machine_memory_bytes() / 2), smoothing);
+        mesh_of_store(store, detail, common.memory_or(machine_memory_bytes() / 2), options);
     write_mesh(output_, format_, mesh, replace);
 
     Summary summary;
@@ -60,7 +66,7 @@ class MeshCommand final : public Command {
   }
 
  private:
-  std::string store_, output_, format_, level_ = "0", region_, smooth_;
+  std::string store_, output_, format_, level_ = "0", region_, smooth_, metric_ = "euclidean";
   std::vector<std::string> focuses_;
 };
 
