@@ -150,7 +150,7 @@ std::uint32_t build_grid(Mesh<Kernel>& mesh, std::span<const typename Kernel::Co
     for (std::uint32_t v = first; v < first + count; ++v)
       mesh.journal.touch_vertex(v, false, mesh.point[v]);
     for (std::uint32_t t = 0; t < mesh.triangle.size(); ++t)
-      mesh.journal.touch_triangle(t, kUnused);
+      mesh.journal.touch_cell(t, kUnused.corner);
   }
   return first;
 }

@@ -7,22 +7,13 @@
 #include <type_traits>
 #include <vector>
 
+#include "../curve_sort.hpp"
 #include "double_kernel.hpp"
 #include "elliptical_kernel.hpp"
 #include "int_kernel.hpp"
 
 namespace terrace::tri::planar {
 namespace {
-
-struct Entry {
-  std::uint32_t key;
-  std::uint32_t number;
-};
-
-/// Runs of equal keys up to this length stay as they are.
-constexpr std::size_t kLeaf = 16;
-/// Below this, counters would cost more than points.
-constexpr std::uint32_t kFew = 3000;
 
 /// One step down the curve: by orientation of the present square (4) and quadrant (4; x above y),
 /// the quadrant's place on the curve, and the orientation of the square there.
@@ -88,15 +79,13 @@ class Cells {
   using Point = typename Kernel::Point;
   using Coord = typename Kernel::Coord;
 
-  template <class Numbers>
-  Cells(std::span<const Point> points, const Numbers& numbers) {
-    Point high = points[numbers(0)];
+  Cells(std::span<const Point> points, std::span<const std::uint32_t> order) : points_(points) {
+    Point high = points[order[0]];
     low_ = high;
-    for (std::size_t i = 1; i < numbers.size; ++i) {
-      const Point& p = points[numbers(i)];
+    for (const std::uint32_t i : order) {
       for (std::size_t k = 0; k < 2; ++k) {
-        low_[k] = std::min(low_[k], p[k]);
-        high[k] = std::max(high[k], p[k]);
+        low_[k] = std::min(low_[k], points[i][k]);
+        high[k] = std::max(high[k], points[i][k]);
       }
     }
     if constexpr (std::is_integral_v<Coord>) {
@@ -114,7 +103,8 @@ class Cells {
 
   /// All points are equal (or as good as).
   [[nodiscard]] bool single() const { return single_; }
-  [[nodiscard]] std::uint32_t key(const Point& p) const {
+  [[nodiscard]] std::uint32_t key(std::uint32_t number) const {
+    const Point& p = points_[number];
     return hilbert_key(cell(p[0], low_[0]), cell(p[1], low_[1]));
   }
 
@@ -128,68 +118,13 @@ class Cells {
     }
   }
 
+  std::span<const Point> points_;
   Point low_;
   Coord extent_ = 0;
   unsigned down_ = 0;
   unsigned up_ = 0;
   bool single_ = false;
 };
-
-/// Stable, least significant digit first: `passes` passes of kBits bits.
-template <unsigned kBits, unsigned kPasses>
-void radix_sort(Pool<Entry>& entries) {
-  constexpr std::size_t kDigits = std::size_t{1} << kBits;
-  std::array<std::array<std::uint32_t, kDigits>, kPasses> start{};
-  for (const Entry& entry : span_of(entries))
-    for (unsigned pass = 0; pass < kPasses; ++pass)
-      ++start[pass][entry.key >> (kBits * pass) & (kDigits - 1)];
-  for (auto& counters : start)
-    std::exclusive_scan(counters.begin(), counters.end(), counters.begin(), 0u);
-  Pool<Entry> other;
-  other.resize(entries.size());
-  for (unsigned pass = 0; pass < kPasses; ++pass) {
-    for (const Entry& entry : span_of(entries))
-      other[start[pass][entry.key >> (kBits * pass) & (kDigits - 1)]++] = entry;
-    std::swap(entries, other);
-  }
-}
-
-/// Sorts order[begin, end). Each level tells 16 more bits apart, so it is never deep.
-template <class Kernel>
-void sort_range(std::span<const typename Kernel::Point> points, std::span<std::uint32_t> order) {
-  struct Numbers {
-    std::span<std::uint32_t> order;
-    std::size_t size;
-    std::uint32_t operator()(std::size_t i) const { return order[i]; }
-  };
-  const Cells<Kernel> cells(points, Numbers{order, order.size()});
-  if (cells.single()) return;
-  const auto count = static_cast<std::uint32_t>(order.size());
-  Pool<Entry> entries;
-  entries.resize(count);
-  // Few points are told apart by the curve's coarse cells, and if not, in the runs below.
-  const bool few = count < kFew;
-  const unsigned shift = few ? 16 : 0;
-  for (std::uint32_t i = 0; i < count; ++i)
-    entries[i] = {cells.key(points[order[i]]) >> shift, order[i]};
-  if (few) {
-    radix_sort<8, 2>(entries);
-  } else {
-    radix_sort<11, 3>(entries);
-  }
-  // Entries are gone before the runs are sorted, so that memory does not add up.
-  std::vector<std::span<std::uint32_t>> long_runs;
-  std::uint32_t begin = 0;
-  for (std::uint32_t i = 0; i < count; ++i) {
-    order[i] = entries[i].number;
-    if (i + 1 == count || entries[i + 1].key != entries[i].key) {
-      if (i + 1 - begin > kLeaf) long_runs.push_back(order.subspan(begin, i + 1 - begin));
-      begin = i + 1;
-    }
-  }
-  entries.release();
-  for (const std::span<std::uint32_t> run : long_runs) sort_range<Kernel>(points, run);
-}
 
 }  // namespace
 
@@ -199,7 +134,9 @@ Pool<std::uint32_t> hilbert_order(std::span<const typename Kernel::Point> points
   order.resize(static_cast<std::uint32_t>(points.size()));
   const std::span<std::uint32_t> all = span_of(order);
   std::iota(all.begin(), all.end(), 0u);
-  if (!all.empty()) sort_range<Kernel>(points, all);
+  if (all.empty()) return order;
+  sort_along_curve<32>(
+      all, [&](std::span<const std::uint32_t> range) { return Cells<Kernel>(points, range); });
   return order;
 }
 

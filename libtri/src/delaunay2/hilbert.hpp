@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <span>
 
-#include "pool.hpp"
+#include "../pool.hpp"
 
 namespace terrace::tri::planar {
 

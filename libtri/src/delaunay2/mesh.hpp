@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "journal.hpp"
-#include "pool.hpp"
+#include "../journal.hpp"
+#include "../pool.hpp"
 #include "triangle.hpp"
 
 /// The data of a triangulation and the steps that all algorithms share. No geometry here.
@@ -59,7 +59,7 @@ struct Mesh {
   std::uint32_t free_vertex = kFreeVertexBit - 1;
   std::uint32_t free_triangle = kNone;
 
-  Journal<Point> journal;
+  Journal<Point, 3> journal;
 
   // Scratch memory, kept between calls.
   std::vector<Side> sides;
@@ -86,7 +86,7 @@ struct Mesh {
     if (journal.on()) {
       for (std::uint32_t v = 1; v < point.size(); ++v)
         if (vertex_alive(v)) journal.touch_vertex(v, true, point[v]);
-      for (std::uint32_t t = 0; t < triangle.size(); ++t) journal.touch_triangle(t, triangle[t]);
+      for (std::uint32_t t = 0; t < triangle.size(); ++t) journal.touch_cell(t, triangle[t].corner);
     }
     Mesh empty;
     empty.journal = std::move(journal);
@@ -140,7 +140,7 @@ struct Mesh {
       triangle.resize(t + 1);
       triangle[t].corner[0] = kFreeCorner;
     }
-    if (journal.on()) journal.touch_triangle(t, triangle[t]);
+    if (journal.on()) journal.touch_cell(t, triangle[t].corner);
     return t;
   }
   /// An insertion takes two slots, and the second is known only from the first.
@@ -152,7 +152,7 @@ struct Mesh {
   /// Before an algorithm overwrites or frees a triangle in use.
   void record(std::uint32_t t) {
     if (journal.on()) [[unlikely]]
-      journal.touch_triangle(t, triangle[t]);
+      journal.touch_cell(t, triangle[t].corner);
   }
   void free_triangle_slot(std::uint32_t t) {
     triangle[t].corner[0] = kFreeCorner;

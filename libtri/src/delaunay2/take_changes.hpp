@@ -33,7 +33,7 @@ void take_changes(Mesh& mesh, typename Delaunay2<Coord>::Changes& changes) {
       if (journal.vertex_touched(v)) return false;
     return true;
   };
-  for (const auto& record : journal.triangles()) {
+  for (const auto& record : journal.cells()) {
     const bool before = is_finite(record.before);
     const bool now = mesh.triangle_alive(record.slot);
     if (before && now && record.before == mesh.triangle[record.slot].corner &&

@@ -127,7 +127,7 @@ std::vector<VertexId> build(Mesh<Kernel>& mesh, std::span<const typename Kernel:
     mesh.mark.reserve(usual);
     const std::array<std::uint32_t, 4> first = {mesh.basis[0], mesh.basis[1], mesh.basis[2], apex};
     // Several threads do not record; all slots were free before.
-    Journal<typename Kernel::Point> journal;
+    Journal<typename Kernel::Point, 4> journal;
     std::swap(journal, mesh.journal);
     make_first(mesh, apex);
     mesh.last_vertex = apex;
@@ -135,7 +135,7 @@ std::vector<VertexId> build(Mesh<Kernel>& mesh, std::span<const typename Kernel:
     std::swap(journal, mesh.journal);
     if (mesh.journal.on())
       for (std::uint32_t t = 0; t < mesh.tetrahedron.size(); ++t)
-        mesh.journal.touch_tetrahedron(t, {kFreeCorner, 0, 0, 0});
+        mesh.journal.touch_cell(t, {kFreeCorner, 0, 0, 0});
   }
   resolve_aliases(mesh, vertex_of, begin, end);
   if (mesh.journal.on())

@@ -6,17 +6,15 @@
 #include <stdexcept>
 #include <vector>
 
-#include "../delaunay2/pool.hpp"
+#include "../journal.hpp"
+#include "../pool.hpp"
 #include "cavity.hpp"
 #include "hole.hpp"
-#include "journal.hpp"
 #include "tetrahedron.hpp"
 
 /// The data of a tetrahedralisation and the steps that all algorithms share. No geometry here.
 
 namespace terrace::tri::spatial {
-
-using planar::Pool;
 
 inline constexpr std::uint32_t kNone = 0xFFFFFFFFu;
 inline constexpr std::uint32_t kMaxVertices = (std::uint32_t{1} << 29) - 2;
@@ -61,7 +59,7 @@ struct Mesh {
   std::uint32_t free_tetrahedron = kNone;
   std::uint32_t finite_count = 0;  ///< finite tetrahedra
 
-  Journal<Point> journal;
+  Journal<Point, 4> journal;
 
   // Scratch memory, kept between calls.
   Cavity cavity;
@@ -141,7 +139,7 @@ struct Mesh {
   /// Before an algorithm overwrites or frees a tetrahedron in use.
   void record(std::uint32_t t) {
     if (journal.on()) [[unlikely]]
-      journal.touch_tetrahedron(t, tetrahedron[t].corner);
+      journal.touch_cell(t, tetrahedron[t].corner);
   }
   void free_tetrahedron_slot(std::uint32_t t) {
     tetrahedron[t].corner[0] = kFreeCorner;

@@ -33,7 +33,7 @@ void take_changes(Mesh& mesh, typename Delaunay3<Coord>::Changes& changes) {
       if (journal.vertex_touched(v)) return false;
     return true;
   };
-  for (const auto& record : journal.tetrahedra()) {
+  for (const auto& record : journal.cells()) {
     const bool before = is_finite(record.before);
     const bool now = mesh.tetrahedron_alive(record.slot);
     if (before && now && record.before == mesh.tetrahedron[record.slot].corner &&

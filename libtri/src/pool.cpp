@@ -9,7 +9,7 @@
 #include <sys/mman.h>
 #endif
 
-namespace terrace::tri::planar {
+namespace terrace::tri {
 namespace {
 
 void* checked(void* memory) {
@@ -93,4 +93,4 @@ void free_pages(void* memory, std::size_t bytes) noexcept {
   std::free(memory);
 }
 
-}  // namespace terrace::tri::planar
+}  // namespace terrace::tri

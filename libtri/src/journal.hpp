@@ -1,22 +1,24 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
-
-#include "triangle.hpp"
 
 /// What slots held when a change first touched them. One bit per slot tells whether it was touched
 /// already, so the cost of recording does not depend on how often a slot is used again.
 
-namespace terrace::tri::planar {
+namespace terrace::tri {
 
-template <class Point>
+/// Cells are the triangles or tetrahedra, by their corners.
+template <class Point, std::size_t kCorners>
 class Journal {
  public:
-  struct TriangleRecord {
+  using Corners = std::array<std::uint32_t, kCorners>;
+  struct CellRecord {
     std::uint32_t slot;
-    std::array<std::uint32_t, 3> before;  ///< corners; kFreeCorner or a ghost: no triangle
+    Corners before;  ///< kFreeCorner or a ghost: no cell
   };
   struct VertexRecord {
     std::uint32_t slot;
@@ -27,7 +29,7 @@ class Journal {
   [[nodiscard]] bool on() const { return on_; }
 
   void start() {
-    triangles_ = {};
+    cells_ = {};
     vertices_ = {};
     on_ = true;
   }
@@ -37,22 +39,22 @@ class Journal {
   }
 
   /// Call only while on(), before the slot changes.
-  void touch_triangle(std::uint32_t slot, const Triangle& before) {
-    if (triangles_.first_touch(slot)) triangles_.records.push_back({slot, before.corner});
+  void touch_cell(std::uint32_t slot, const Corners& before) {
+    if (cells_.first_touch(slot)) cells_.records.push_back({slot, before});
   }
   void touch_vertex(std::uint32_t slot, bool was_alive, const Point& before) {
     if (vertices_.first_touch(slot)) vertices_.records.push_back({slot, was_alive, before});
   }
 
-  [[nodiscard]] const std::vector<TriangleRecord>& triangles() const { return triangles_.records; }
+  [[nodiscard]] const std::vector<CellRecord>& cells() const { return cells_.records; }
   [[nodiscard]] const std::vector<VertexRecord>& vertices() const { return vertices_.records; }
   [[nodiscard]] bool vertex_touched(std::uint32_t slot) const { return vertices_.touched(slot); }
   void forget_vertex(std::uint32_t slot) { vertices_.untouch(slot); }
   void clear() {
-    triangles_.clear();
+    cells_.clear();
     vertices_.clear();
   }
-  [[nodiscard]] std::size_t bytes() const { return triangles_.bytes() + vertices_.bytes(); }
+  [[nodiscard]] std::size_t bytes() const { return cells_.bytes() + vertices_.bytes(); }
 
  private:
   template <class Record>
@@ -82,8 +84,8 @@ class Journal {
   };
 
   bool on_ = false;
-  Touched<TriangleRecord> triangles_;
+  Touched<CellRecord> cells_;
   Touched<VertexRecord> vertices_;
 };
 
-}  // namespace terrace::tri::planar
+}  // namespace terrace::tri

@@ -13,7 +13,7 @@
 /// uninitialised, grow by an eighth without a second copy where the system can move pages, and use
 /// huge pages once they are large (a sixth faster: the accesses are scattered).
 
-namespace terrace::tri::planar {
+namespace terrace::tri {
 
 /// Memory of at least `bytes` bytes; throws std::bad_alloc.
 void* allocate_pages(std::size_t bytes);
@@ -94,4 +94,4 @@ std::span<T> span_of(Pool<T>& pool) {
   return {pool.data(), pool.size()};
 }
 
-}  // namespace terrace::tri::planar
+}  // namespace terrace::tri

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <numeric>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "pool.hpp"
+
+/// Sorting of points by the cell of a space-filling curve that they are in.
+
+namespace terrace::tri {
+
+struct CurveEntry {
+  std::uint32_t key;
+  std::uint32_t number;
+};
+
+/// Stable, least significant digit first: `kPasses` passes of kDigit bits.
+template <unsigned kDigit, unsigned kPasses>
+void radix_sort(Pool<CurveEntry>& entries) {
+  constexpr std::size_t kDigits = std::size_t{1} << kDigit;
+  std::array<std::array<std::uint32_t, kDigits>, kPasses> start{};
+  for (const CurveEntry& entry : span_of(entries))
+    for (unsigned pass = 0; pass < kPasses; ++pass)
+      ++start[pass][entry.key >> (kDigit * pass) & (kDigits - 1)];
+  for (auto& counters : start)
+    std::exclusive_scan(counters.begin(), counters.end(), counters.begin(), 0u);
+  Pool<CurveEntry> other;
+  other.resize(entries.size());
+  for (unsigned pass = 0; pass < kPasses; ++pass) {
+    for (const CurveEntry& entry : span_of(entries))
+      other[start[pass][entry.key >> (kDigit * pass) & (kDigits - 1)]++] = entry;
+    std::swap(entries, other);
+  }
+}
+
+/// Sorts a range of point numbers. cells_of(range) lays a raster over these points: single() tells
+/// that they are all in one place, key(number) is the place of a point's cell on the curve, of
+/// kKeyBits bits. What one raster does not tell apart the next, over fewer points, does, so
+/// recursion is never deep.
+template <unsigned kKeyBits, class CellsOf>
+void sort_along_curve(std::span<std::uint32_t> order, const CellsOf& cells_of) {
+  // Runs of equal keys up to this length stay as they are.
+  constexpr std::size_t kLeaf = 16;
+  // Below this, counters would cost more than points.
+  constexpr std::uint32_t kFew = 3000;
+  const auto cells = cells_of(order);
+  if (cells.single()) return;
+  const auto count = static_cast<std::uint32_t>(order.size());
+  Pool<CurveEntry> entries;
+  entries.resize(count);
+  // Few points are told apart by the curve's coarse cells, and if not, in the runs below.
+  const bool few = count < kFew;
+  const unsigned shift = few ? kKeyBits - 16 : 0;
+  for (std::uint32_t i = 0; i < count; ++i) entries[i] = {cells.key(order[i]) >> shift, order[i]};
+  if (few) {
+    radix_sort<8, 2>(entries);
+  } else {
+    radix_sort<(kKeyBits + 2) / 3, 3>(entries);
+  }
+  // Entries are gone before the runs are sorted, so that memory does not add up.
+  std::vector<std::span<std::uint32_t>> long_runs;
+  std::uint32_t begin = 0;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    order[i] = entries[i].number;
+    if (i + 1 == count || entries[i + 1].key != entries[i].key) {
+      if (i + 1 - begin > kLeaf) long_runs.push_back(order.subspan(begin, i + 1 - begin));
+      begin = i + 1;
+    }
+  }
+  entries.release();
+  for (const std::span<std::uint32_t> run : long_runs) sort_along_curve<kKeyBits>(run, cells_of);
+}
+
+}  // namespace terrace::tri
