@@ -8,7 +8,7 @@
 #include <string>
 
 #include "reconstruct/methods.hpp"
-#include "surface_parts.hpp"
+#include "shape/surface_parts.hpp"
 
 namespace terrace::tri {
 namespace {

@@ -9,7 +9,7 @@
 #include <CGAL/Triangulation_vertex_base_with_info_2.h>
 #include <gtest/gtest.h>
 
-#include "elliptical2_access.hpp"
+#include "elliptical/access.hpp"
 #include "metrics.hpp"
 #include "points.hpp"
 

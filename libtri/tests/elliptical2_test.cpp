@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "elliptical2_access.hpp"
+#include "elliptical/access.hpp"
 #include "metrics.hpp"
 #include "multiresolution_hierarchy.hpp"
 #include "multiresolution_oracle.hpp"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <sstream>
 
-#include "../elliptical2_access.hpp"
+#include "../elliptical/access.hpp"
 #include "access.hpp"
 #include "predicates.hpp"
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "terrace/tri/view_control.hpp"
-
 #include <string>
 #include <utility>
+
+#include "terrace/tri/view_control.hpp"
 
 namespace terrace::tri {
 namespace detail {

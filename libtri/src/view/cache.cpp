@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "terrace/tri/view_cache.hpp"
-
 #include <cassert>
 #include <string>
 #include <utility>
+
+#include "terrace/tri/view_cache.hpp"
 
 namespace terrace::tri {
 namespace {

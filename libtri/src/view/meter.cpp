@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "terrace/tri/view_meter.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <utility>
+
+#include "terrace/tri/view_meter.hpp"
 
 namespace terrace::tri {
 namespace {

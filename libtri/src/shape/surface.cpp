@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "surface_parts.hpp"
+#include "shape/surface_parts.hpp"
 
 namespace terrace::tri {
 namespace {

@@ -10,7 +10,7 @@
 #include "delaunay2/query.hpp"
 #include "delaunay2/remove.hpp"
 #include "delaunay2/take_changes.hpp"
-#include "elliptical2_access.hpp"
+#include "elliptical/access.hpp"
 
 namespace terrace::tri {
 namespace {
