@@ -56,8 +56,8 @@ struct PointMatching {
 /// Throws: std::invalid_argument for a coordinate or distance that is not finite (its index is
 /// named), a candidate edge with an end out of range, and n above 2^29.
 ///
-/// Cost: on uniform points between n and n^1.3 in the plane, n^1.6 in space (measured, 10,000 to
-/// 100,000 points); more where many odd clusters are far apart. About 1 kB per point.
+/// Cost: on uniform points about n^1.2 in the plane, n^1.3 in space (measured, 10,000 to 1,000,000
+/// points); more where many odd clusters are far apart. About 0.8 kB per point.
 ///
 /// Source: pricing as in W. Cook and A. Rohe, "Computing minimum-weight perfect matchings", 1999.
 PointMatching match_points(std::span<const Point2> points,
