@@ -19,9 +19,8 @@ void* checked(void* memory) {
 
 #ifdef __linux__
 
-constexpr std::size_t kHugePage = std::size_t{2} << 20;
 // Below this the heap serves: mappings are too coarse and too dear for small triangulations.
-constexpr std::size_t kMapFrom = std::size_t{1} << 20;
+constexpr std::size_t kMapFrom = kHugePage;
 
 std::size_t round_up(std::size_t bytes, std::size_t unit) {
   return (bytes + unit - 1) / unit * unit;
@@ -50,6 +49,22 @@ void* map(std::size_t bytes) {
   return begin + head;
 }
 
+// Grows a mapping: in place, or to an address that keeps its huge pages whole. Where the kernel
+// chooses the address they would all fall apart into small ones.
+void* remap(void* memory, std::size_t old_bytes, std::size_t new_bytes) {
+  void* grown = mremap(memory, old_bytes, new_bytes, 0);
+  if (grown == MAP_FAILED) {
+    void* target = map(new_bytes);
+    grown = mremap(memory, old_bytes, new_bytes, MREMAP_MAYMOVE | MREMAP_FIXED, target);
+    if (grown == MAP_FAILED) {
+      munmap(target, new_bytes);
+      throw std::bad_alloc();
+    }
+  }
+  advise(grown, new_bytes);
+  return grown;
+}
+
 #endif
 
 }  // namespace
@@ -63,12 +78,7 @@ void* allocate_pages(std::size_t bytes) {
 
 void* resize_pages(void* memory, std::size_t old_bytes, std::size_t new_bytes) {
 #ifdef __linux__
-  if (old_bytes >= kMapFrom && new_bytes >= kMapFrom) {
-    void* moved = mremap(memory, old_bytes, new_bytes, MREMAP_MAYMOVE);
-    if (moved == MAP_FAILED) throw std::bad_alloc();
-    advise(moved, new_bytes);
-    return moved;
-  }
+  if (old_bytes >= kMapFrom && new_bytes >= kMapFrom) return remap(memory, old_bytes, new_bytes);
   if (old_bytes >= kMapFrom || new_bytes >= kMapFrom) {
     void* moved = allocate_pages(new_bytes);
     std::memcpy(moved, memory, std::min(old_bytes, new_bytes));

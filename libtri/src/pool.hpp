@@ -15,6 +15,8 @@
 
 namespace terrace::tri {
 
+inline constexpr std::size_t kHugePage = std::size_t{2} << 20;
+
 /// Memory of at least `bytes` bytes; throws std::bad_alloc.
 void* allocate_pages(std::size_t bytes);
 /// Moves `old_bytes` bytes of contents to `new_bytes` bytes of memory; throws std::bad_alloc, the
@@ -75,7 +77,11 @@ class Pool {
 
  private:
   [[nodiscard]] std::size_t grown() const {
-    return capacity_ < 4096 ? 2 * capacity_ + 16 : capacity_ + capacity_ / 8;
+    if (capacity_ < 4096) return 2 * capacity_ + 16;
+    const std::size_t bytes = (capacity_ + capacity_ / 8) * sizeof(T);
+    // Whole huge pages: what is first used in small ones stays in them.
+    return (bytes < kHugePage ? bytes : (bytes + kHugePage - 1) / kHugePage * kHugePage) /
+           sizeof(T);
   }
   void set_capacity(std::size_t count) {
     void* moved = data_ == nullptr ? allocate_pages(count * sizeof(T))

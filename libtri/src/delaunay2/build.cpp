@@ -107,8 +107,8 @@ void resolve_aliases(Mesh<Kernel>& mesh, std::vector<VertexId>& vertex_of, std::
   }
   for (std::uint32_t v = end; v-- > begin;) {
     if ((mesh.incident[v] & kAlias) == 0) continue;
-    mesh.incident[v] = kFreeVertexBit | mesh.free_vertex;
-    mesh.free_vertex = v;
+    mesh.incident[v] = kFreeVertexBit;
+    mesh.free_vertices.put(v);
     --mesh.vertex_count;
   }
 }

@@ -39,13 +39,11 @@ class Inspection {
     std::uint32_t alive = 0;
     for (std::uint32_t v = 1; v < mesh_.point.size(); ++v) alive += mesh_.vertex_alive(v) ? 1 : 0;
     expect(alive == mesh_.vertex_count, "vertex count ", mesh_.vertex_count, ", found ", alive);
-    std::uint32_t free = 0;
-    for (std::uint32_t v = mesh_.free_vertex; v != kFreeVertexBit - 1 && free < mesh_.point.size();
-         v = mesh_.incident[v] & ~kFreeVertexBit) {
-      expect(!mesh_.vertex_alive(v), "vertex ", v, " is in the free list and alive");
-      ++free;
-    }
-    expect(alive + free + 1 == mesh_.point.size(), "free list of vertices has ", free, ", not ",
+    for (std::uint32_t v = 1; v < mesh_.point.size(); ++v)
+      expect(mesh_.vertex_alive(v) != mesh_.free_vertices.contains(v), "vertex ", v,
+             " is free and alive, or neither");
+    const std::size_t free = mesh_.free_vertices.count();
+    expect(alive + free + 1 == mesh_.point.size(), free, " free vertices, not ",
            mesh_.point.size() - 1 - alive);
     expect((mesh_.last_vertex == kNone) == (alive == 0), "last vertex is not kept");
     if (alive > 0) expect(mesh_.vertex_alive(mesh_.last_vertex), "last vertex is dead");
@@ -77,13 +75,12 @@ class Inspection {
     }
     expect(used == 2 * mesh_.vertex_count - 2, used, " triangles for ", mesh_.vertex_count,
            " vertices");
-    std::uint32_t free = 0;
-    for (std::uint32_t t = mesh_.free_triangle; t != kNone && free <= mesh_.triangle.size();
-         t = mesh_.triangle[t].corner[1]) {
-      expect(mesh_.triangle[t].corner[0] == kFreeCorner, "triangle ", t, " is free and alive");
-      ++free;
-    }
-    expect(used + free == mesh_.triangle.size(), "free list of triangles has ", free);
+    for (std::uint32_t t = 0; t < mesh_.triangle.size(); ++t)
+      expect((mesh_.triangle[t].corner[0] == kFreeCorner) == mesh_.free_triangles.contains(t),
+             "triangle ", t, " is free and alive, or neither");
+    const std::size_t free = mesh_.free_triangles.count();
+    expect(used + free == mesh_.triangle.size(), free, " free triangles of ",
+           mesh_.triangle.size());
     for (std::uint32_t v = 0; v < mesh_.point.size(); ++v) {
       if (v != kGhost && !mesh_.vertex_alive(v)) continue;
       const std::uint32_t t = mesh_.incident[v];

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "../free_slots.hpp"
 #include "../journal.hpp"
 #include "../pool.hpp"
 #include "triangle.hpp"
@@ -18,7 +19,7 @@ inline constexpr std::uint32_t kMaxVertices = (std::uint32_t{1} << 29) - 2;
 
 /// In Mesh::incident: a living vertex without triangles (all points are collinear).
 inline constexpr std::uint32_t kNoIncident = 0x7FFFFFFFu;
-/// In Mesh::incident: the slot is free, the other bits are the next free slot.
+/// In Mesh::incident: the slot is free.
 inline constexpr std::uint32_t kFreeVertexBit = 0x80000000u;
 
 /// A simple polygon to be filled with triangles, see fill.hpp; scratch memory of removal.
@@ -35,6 +36,26 @@ struct Hole {
     Side mate;
   };
   std::vector<Part> parts;
+};
+
+/// What removing a set of vertices takes out, see flood.hpp; scratch memory.
+struct Region {
+  struct Edge {
+    std::uint32_t from;
+    std::uint32_t to;
+    Side outer;
+  };
+  std::vector<std::uint32_t> removed;  ///< vertices
+  Pool<std::uint32_t> triangles;       ///< at a removed vertex
+  Pool<std::uint32_t> mixed;           ///< those of them with a kept corner
+  std::vector<Edge> boundary;          ///< with the region to the left, in no order
+  Pool<Side> rim;                      ///< edges that may be on the boundary
+  Pool<Side> queue;
+  // The boundary by loops: numbers of edges, and where each loop ends among these.
+  std::vector<std::uint32_t> ordered;
+  std::vector<std::size_t> loop_ends;
+  std::vector<std::uint8_t> visited;  ///< by number of edge
+  std::vector<std::uint32_t> pinches;
 };
 
 template <class KernelT>
@@ -56,8 +77,8 @@ struct Mesh {
 
   std::uint32_t vertex_count = 0;
   std::uint32_t last_vertex = kNone;  ///< a living vertex, if there is any
-  std::uint32_t free_vertex = kFreeVertexBit - 1;
-  std::uint32_t free_triangle = kNone;
+  FreeSlots free_vertices;
+  FreeSlots free_triangles;
 
   Journal<Point, 3> journal;
 
@@ -65,6 +86,7 @@ struct Mesh {
   std::vector<Side> sides;
   std::vector<std::uint32_t> spare;
   Hole<Point> hole;
+  Region region;
 
   Mesh() {
     point.push_back(Point{});
@@ -78,8 +100,8 @@ struct Mesh {
     incident.resize(1);
     mark.resize(0);
     triangle.resize(0);
-    free_vertex = kFreeVertexBit - 1;
-    free_triangle = kNone;
+    free_vertices.clear();
+    free_triangles.clear();
   }
   /// Removes everything and releases the memory; the journal goes on.
   void clear() {
@@ -102,13 +124,9 @@ struct Mesh {
 
   /// A slot with the point and no triangle.
   std::uint32_t new_vertex(const Point& p) {
-    std::uint32_t v = free_vertex;
-    if (v != kFreeVertexBit - 1) {
-      free_vertex = incident[v] & ~kFreeVertexBit;
-      if (free_vertex != kFreeVertexBit - 1) {
-        __builtin_prefetch(&incident[free_vertex], 1);
-        __builtin_prefetch(&point[free_vertex], 1);
-      }
+    std::uint32_t v = 0;
+    if (!free_vertices.empty()) {
+      v = free_vertices.take();
       if (journal.on()) journal.touch_vertex(v, false, p);
       point[v] = p;
       incident[v] = kNoIncident;
@@ -123,18 +141,16 @@ struct Mesh {
   }
   void free_vertex_slot(std::uint32_t v) {
     if (journal.on()) journal.touch_vertex(v, true, point[v]);
-    incident[v] = kFreeVertexBit | free_vertex;
-    free_vertex = v;
+    incident[v] = kFreeVertexBit;
+    free_vertices.put(v);
     --vertex_count;
   }
 
   /// A slot for a triangle that the caller will write.
   std::uint32_t new_triangle() {
-    std::uint32_t t = free_triangle;
-    if (t != kNone) {
-      free_triangle = triangle[t].corner[1];
-      // The next one is needed soon and was not touched for long.
-      if (free_triangle != kNone) __builtin_prefetch(&triangle[free_triangle], 1);
+    std::uint32_t t = 0;
+    if (!free_triangles.empty()) {
+      t = free_triangles.take();
     } else {
       t = triangle.size();
       triangle.resize(t + 1);
@@ -143,11 +159,12 @@ struct Mesh {
     if (journal.on()) journal.touch_cell(t, triangle[t].corner);
     return t;
   }
-  /// An insertion takes two slots, and the second is known only from the first.
+  /// The next free slots are needed soon and were not touched for long.
   void prefetch_free_triangle() const {
-    if (free_triangle == kNone) return;
-    const std::uint32_t second = triangle[free_triangle].corner[1];
-    if (second != kNone) __builtin_prefetch(&triangle[second], 1);
+    if (free_triangles.empty()) return;
+    const std::uint32_t next = free_triangles.next();
+    __builtin_prefetch(&triangle[next], 1);
+    if (next + 8 < triangle.size()) __builtin_prefetch(&triangle[next + 8], 1);
   }
   /// Before an algorithm overwrites or frees a triangle in use.
   void record(std::uint32_t t) {
@@ -156,8 +173,7 @@ struct Mesh {
   }
   void free_triangle_slot(std::uint32_t t) {
     triangle[t].corner[0] = kFreeCorner;
-    triangle[t].corner[1] = free_triangle;
-    free_triangle = t;
+    free_triangles.put(t);
   }
 
   /// Makes two sides each other's mate.
@@ -183,6 +199,7 @@ struct Mesh {
 
   [[nodiscard]] std::size_t bytes() const {
     return point.bytes() + incident.bytes() + mark.bytes() + triangle.bytes() + journal.bytes() +
+           free_vertices.bytes() + free_triangles.bytes() +
            (line.capacity() + sides.capacity() + spare.capacity()) * sizeof(std::uint32_t);
   }
 };

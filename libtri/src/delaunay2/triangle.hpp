@@ -27,7 +27,7 @@ constexpr std::uint32_t next_index(std::uint32_t i) { return 0b001001u >> (2 * i
 constexpr std::uint32_t previous_index(std::uint32_t i) { return 0b010010u >> (2 * i) & 3; }
 
 struct Triangle {
-  /// Counter-clockwise. A free slot has kFreeCorner first, then the next free slot.
+  /// Counter-clockwise. A free slot has kFreeCorner first.
   std::array<std::uint32_t, 3> corner;
   /// mate[i]: the same edge as the side opposite to corner[i], seen from the neighbour. So the
   /// neighbour's corner beyond it is known without a search.

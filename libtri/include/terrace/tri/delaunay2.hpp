@@ -22,8 +22,8 @@
 namespace terrace::tri {
 
 /// 32-bit handles: numbers of slots. A vertex handle stays valid until its vertex is removed, a
-/// triangle handle until an operation removes the triangle; both slots are then used again, the
-/// last freed one first. So data kept in plain arrays indexed by slot stays dense.
+/// triangle handle until an operation removes the triangle; both slots are then used again, those
+/// freed last first, in blocks of 64. So data kept in plain arrays indexed by slot stays dense.
 enum class VertexId : std::uint32_t {};
 enum class TriangleId : std::uint32_t {};
 inline constexpr VertexId kNoVertex{0xFFFFFFFFu};
