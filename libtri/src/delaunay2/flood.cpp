@@ -84,9 +84,9 @@ void flood(Mesh<Kernel>& mesh) {
     push(at.mate[2], fresh & ((a | b) != 0) & (entered != 2));
     const unsigned count = a + b + c;
     out.mixed[mixed] = t;
-    mixed += fresh & (count < 3) ? 1 : 0;
+    mixed += (fresh & (count < 3)) ? 1 : 0;
     out.rim[rim] = make_side(t, b + 2 * c);
-    rim += fresh & (count == 1) ? 1 : 0;
+    rim += (fresh & (count == 1)) ? 1 : 0;
   }
   region.triangles.resize(triangles);
   region.mixed.resize(mixed);
