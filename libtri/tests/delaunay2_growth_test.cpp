@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <span>
+#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "delaunay2/access.hpp"
 #include "terrace/tri/delaunay2.hpp"
 
 namespace terrace::tri {
@@ -27,6 +29,41 @@ TEST(Delaunay2Growth, InsertionFromNothingGoesOn) {
   built.build(points);
   EXPECT_EQ(grown.vertex_count(), points.size());
   EXPECT_EQ(grown.hash(), built.hash());
+}
+
+// Sets large enough that their scratch memory is not kept: one hole; holes that are too long to be
+// filled, which are given up after all has been flooded; and a small set after these.
+TEST(Delaunay2Growth, LargeSetsLeaveTheRest) {
+  constexpr std::int32_t kSide = 300;
+  Delaunay2<std::int32_t> triangulation;
+  const VertexId first = triangulation.build_grid(0, 0, 1, kSide, kSide);
+  const std::uint64_t whole = triangulation.hash();
+  const auto in_square = [](std::int32_t x, std::int32_t y) {
+    return x >= 5 && y >= 5 && x < kSide - 5 && y < kSide - 5;
+  };
+  const auto in_lattice = [](std::int32_t x, std::int32_t y) { return x % 3 == 1 && y % 3 == 1; };
+  const auto in_corner = [](std::int32_t x, std::int32_t y) { return x < 7 && y < 7; };
+  const auto check = [&](auto member) {
+    std::vector<VertexId> set;
+    std::vector<Delaunay2<std::int32_t>::Point> removed, kept;
+    for (const VertexId v : triangulation.all_vertices()) {
+      const auto p = triangulation.point(v);
+      (member(p[0], p[1]) ? removed : kept).push_back(p);
+      if (member(p[0], p[1])) set.push_back(v);
+    }
+    triangulation.remove(set);
+    EXPECT_EQ(find_fault(triangulation), "");
+    Delaunay2<std::int32_t> rest;
+    rest.build(kept);
+    EXPECT_EQ(triangulation.hash(), rest.hash());
+    triangulation.insert(removed, {});
+    EXPECT_EQ(find_fault(triangulation), "");
+    EXPECT_EQ(triangulation.hash(), whole);
+  };
+  ASSERT_TRUE(triangulation.alive(first));
+  check(in_square);
+  check(in_lattice);
+  check(in_corner);
 }
 
 }  // namespace
