@@ -78,10 +78,11 @@ class Pool {
  private:
   [[nodiscard]] std::size_t grown() const {
     if (capacity_ < 4096) return 2 * capacity_ + 16;
-    const std::size_t bytes = (capacity_ + capacity_ / 8) * sizeof(T);
+    const std::size_t eighth = capacity_ + capacity_ / 8;
+    if (eighth * sizeof(T) < kHugePage) return eighth;
     // Whole huge pages: what is first used in small ones stays in them.
-    return (bytes < kHugePage ? bytes : (bytes + kHugePage - 1) / kHugePage * kHugePage) /
-           sizeof(T);
+    const std::size_t whole = eighth * sizeof(T) / kHugePage * kHugePage / sizeof(T);
+    return whole > capacity_ ? whole : whole + kHugePage / sizeof(T);
   }
   void set_capacity(std::size_t count) {
     void* moved = data_ == nullptr ? allocate_pages(count * sizeof(T))
