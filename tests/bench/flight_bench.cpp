@@ -16,8 +16,6 @@
 #include <exception>
 #include <filesystem>
 #include <memory>
-#include <numbers>
-#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -26,6 +24,7 @@
 
 #include "../pipeline/temporary_folder.hpp"
 #include "cli.hpp"
+#include "flight_path.hpp"
 #include "flight_viewer.hpp"
 #include "store_build.hpp"
 
@@ -57,64 +56,6 @@ Store open_store(const std::filesystem::path& folder) {
   terrace::tools::build_store(request);
   return Store::open(request.store);
 }
-
-enum class Kind { perspective, map };
-
-/// The way of the camera: a circle about the middle, looking ahead and down by 30 degrees. For the
-/// map it looks straight down.
-class Flight {
- public:
-  Flight(const Store& store, Kind kind) : kind_(kind) {
-    const auto placement = terrace::tools::placement_of(store.schema());
-    const terrace::stream::Box3 box = terrace::tools::world_box(placement, store.bounds());
-    middle_ = {(box.min[0] + box.max[0]) / 2, (box.min[1] + box.max[1]) / 2, box.max[2]};
-    const double side = std::min(box.max[0] - box.min[0], box.max[1] - box.min[1]);
-    cell_ = std::sqrt((box.max[0] - box.min[0]) * (box.max[1] - box.min[1]) /
-                      static_cast<double>(store.points()));
-    radius_ = 0.22 * side;
-    const double ground = terrace::tools::world_point(placement, {0, 0, store.mean_height()})[2];
-    // As much is seen over small stores as over large ones, in proportion.
-    const double seen = std::sqrt(static_cast<double>(active())) * cell_;
-    above_ = 0.3 * seen;
-    middle_[2] = kind == Kind::perspective ? ground + above_ : box.max[2] + 1.0;
-  }
-
-  /// More of it, more points: of the map the extent, in perspective the detail.
-  double scale = 1.0;
-
-  [[nodiscard]] tri::View view(double way) const {
-    const double angle = way / radius_, c = std::cos(angle), s = std::sin(angle);
-    tri::Pose pose;
-    pose.position = {middle_[0] + radius_ * c, middle_[1] + radius_ * s, middle_[2]};
-    tri::View view;
-    if (kind_ == Kind::map) {
-      view.camera = tri::orthographic_camera(pose, map_height(), kAspect, kPixels);
-      view.pixel_error = 1e-6;  // full resolution
-      return view;
-    }
-    pose.direction = {-s * std::sqrt(0.75), c * std::sqrt(0.75), -0.5};
-    pose.up = {0, 0, 1};
-    view.camera = tri::perspective_camera(pose, kFov, kAspect, kPixels);
-    view.pixel_error = 2.0 / scale;
-    return view;
-  }
-  /// Of what is seen, in metres; in perspective where the middle of the picture meets the ground.
-  [[nodiscard]] double width() const {
-    if (kind_ == Kind::map) return kAspect * map_height();
-    return 2.0 * (2.0 * above_) * std::tan(kFov / 2 * std::numbers::pi / 180.0) * kAspect;
-  }
-
- private:
-  static constexpr double kAspect = 1.5, kPixels = 1080.0, kFov = 60.0;
-
-  [[nodiscard]] double map_height() const {
-    return scale * std::sqrt(static_cast<double>(active()) / kAspect) * cell_;
-  }
-
-  Kind kind_;
-  std::array<double, 3> middle_{};
-  double cell_ = 0.0, radius_ = 0.0, above_ = 0.0;
-};
 
 /// Reads every byte once: what is measured is not the disk.
 void warm(const Store& store) {
@@ -248,7 +189,7 @@ int run() {
               "pixels");
   int status = 0;
   for (const Kind kind : {Kind::perspective, Kind::map}) {
-    Flight flight(store, kind);
+    Flight flight(store, kind, active());
     tune(flight, store);
     for (const bool threads : {false, true}) {
       std::string name = kind == Kind::map ? "map" : "perspective";
