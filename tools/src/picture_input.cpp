@@ -18,6 +18,7 @@
 #include "interrupt.hpp"
 #include "mesh_file.hpp"
 #include "store_mesh.hpp"
+#include "surface_run.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/source.hpp"
 
@@ -173,6 +174,23 @@ TriangleMesh grid_of_store(const stream::Store& store, std::uint64_t most_cells,
   return grid.mesh();
 }
 
+/// Whether more than half of the surface is steeper than 60 degrees: triangles between the upper
+/// and the lower side of a body that was triangulated as if it were a terrain.
+bool mostly_steep(const TriangleMesh& mesh) {
+  double steep = 0, all = 0;
+  for (const auto& t : mesh.triangles) {
+    const stream::Point3 &a = mesh.positions[t[0]], &b = mesh.positions[t[1]],
+                         &c = mesh.positions[t[2]];
+    const stream::Point3 u{b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+    const stream::Point3 v{c[0] - a[0], c[1] - a[1], c[2] - a[2]};
+    const double level = std::abs(u[0] * v[1] - u[1] * v[0]);
+    const double area = std::hypot(level, u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2]);
+    all += area;
+    if (level < 0.5 * area) steep += area;
+  }
+  return steep > 0.5 * all;
+}
+
 PictureInput from_store(const std::string& path, const PictureSelection& selection,
                         std::uint64_t most_cells, const CommonOptions& common) {
   const stream::Store store = stream::Store::open(path);
@@ -194,15 +212,24 @@ PictureInput from_store(const std::string& path, const PictureSelection& selecti
                             : whole                  ? std::to_string(level_within(store, 4000000))
                                                      : std::string("top");
   const Detail detail = Detail::parse(store, level, "", selection.focuses);
-  input.mesh = store.schema().grid || selection.triangles
-                   ? mesh_of_store(store, detail, common.memory_or(0))
-                   : points_of_store(store, detail);
   // These positions are in the CRS already.
   Placement world;
   world.crs = stored.crs;
   world.coordinates[0].unit = stored.coordinates[0].unit;
   world.coordinates[2].unit = stored.coordinates[2].unit;
-  put_on_ground(input, world, Ground(world));
+  const Ground ground(world);
+  if (!store.schema().grid && !selection.triangles) {
+    input.mesh = points_of_store(store, detail);
+    put_on_ground(input, world, ground);
+    return input;
+  }
+  input.mesh = mesh_of_store(store, detail, common.memory_or(0));
+  put_on_ground(input, world, ground);
+  if (input.terrain || !mostly_steep(input.mesh)) return input;
+  input = {};
+  input.mesh = surface_of_store(store, detail, {}, false, common.memory_or(0)).mesh;
+  input.guess = "no height field: the surface is that of 'terrace surface'";
+  put_on_ground(input, world, ground);
   return input;
 }
 

@@ -22,6 +22,8 @@ struct TriangleMesh {
   std::vector<std::uint32_t> representatives;  ///< of the clusters: vertex numbers, any length
   std::vector<Rgb> colours;
   std::vector<std::array<float, 3>> normals;  ///< unit length
+  /// Of a cloud that is coarse somewhere: the levels that are left out around a point, 0 for none.
+  std::vector<std::uint8_t> left_out;
 };
 
 /// True if the mesh is seen from above without overlap: nearly all triangles, seen along z, turn
