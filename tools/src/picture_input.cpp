@@ -194,7 +194,7 @@ bool mostly_steep(const TriangleMesh& mesh) {
 PictureInput from_store(const std::string& path, const PictureSelection& selection,
                         std::uint64_t most_cells, const CommonOptions& common) {
   const stream::Store store = stream::Store::open(path);
-  const bool whole = selection.focuses.empty();
+  const bool whole = selection.focuses.empty() && selection.region.empty();
   const Placement stored = placement_of(store.schema());
   PictureInput input;
   input.terrain = store.schema().grid || store.schema().crs.epsg != 0;
@@ -209,9 +209,10 @@ PictureInput from_store(const std::string& path, const PictureSelection& selecti
     return input;
   }
   const std::string level = !selection.level.empty() ? selection.level
-                            : whole                  ? std::to_string(level_within(store, 4000000))
-                                                     : std::string("top");
-  const Detail detail = Detail::parse(store, level, "", selection.focuses);
+                            : selection.focuses.empty()
+                                ? std::to_string(level_within(store, 4000000))
+                                : std::string("top");
+  const Detail detail = Detail::parse(store, level, selection.region, selection.focuses);
   // These positions are in the CRS already.
   Placement world;
   world.crs = stored.crs;
@@ -240,6 +241,10 @@ void define_picture_input(CLI::App& app, PictureSelection& selection) {
                  "store: detail, a number or top (default: all cells, or about 4 M points); tree: "
                  "lines up to level L (default: all)")
       ->type_name("L");
+  app.add_option("--region", selection.region,
+                 "store: only what is inside (triangles: what reaches inside): a box, "
+                 "minx,miny[,minz],maxx,maxy[,maxz], or a GeoJSON file")
+      ->type_name("BOX");
   app.add_option("--focus", selection.focuses,
                  "store: BOX:L, all points of level L inside the box; repeatable (the rest: top)")
       ->allow_extra_args(false)
@@ -252,8 +257,8 @@ PictureInput read_picture_input(const std::string& path, const PictureSelection&
   if (std::filesystem::is_directory(path)) {
     return from_store(path, selection, most_cells, common);
   }
-  if (!selection.level.empty() || !selection.focuses.empty()) {
-    throw UsageError("'" + path + "' is no store: --level and --focus do not apply");
+  if (!selection.level.empty() || !selection.region.empty() || !selection.focuses.empty()) {
+    throw UsageError("'" + path + "' is no store: --level, --region and --focus do not apply");
   }
   if (std::optional<MeshFile> file = read_mesh_file(path)) return from_mesh(std::move(*file));
   return from_source(path, most_cells, common);
