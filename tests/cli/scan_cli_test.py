@@ -118,6 +118,13 @@ class ScanTest(unittest.TestCase):
         self.assertLess(coarse['vertices'], POINTS // 20)
         self.covered(rows, 0.85)
 
+    def test_a_region_shows_what_is_inside(self):
+        summary, _ = self.picture('--region', '0,0,0,11,11,11')
+        self.assertEqual(summary['vertices'], sum(min(p) >= 0 for p in self.all))
+        result = terrace('render', self.path('ball.xyz'), '-o', self.path('none.png'), '--region',
+                         '0,0,0,11,11,11')
+        self.assertEqual(result.returncode, 2, result.stderr)
+
     def test_wires_are_those_of_the_surface(self):
         summary, rows = self.picture('--wire')
         self.assertEqual((summary['vertices'], summary['triangles']), (POINTS, 2 * POINTS - 4))

@@ -191,6 +191,22 @@ bool mostly_steep(const TriangleMesh& mesh) {
   return steep > 0.5 * all;
 }
 
+/// The finest level with no more points, in clusters that reach into the region, than a picture
+/// needs.
+std::string finest_level(const stream::Store& store, const std::string& region) {
+  constexpr std::uint64_t kMost = 4000000;
+  if (region.empty()) return std::to_string(level_within(store, kMost));
+  for (unsigned level = 0; level < store.top(); ++level) {
+    const Detail detail = Detail::parse(store, std::to_string(level), region, {});
+    std::uint64_t points = 0;
+    for_each_wanted_record(
+        store, detail,
+        [&](stream::ClusterId, const stream::ClusterRecord& record) { points += record.points; });
+    if (points <= kMost) return std::to_string(level);
+  }
+  return "top";
+}
+
 PictureInput from_store(const std::string& path, const PictureSelection& selection,
                         std::uint64_t most_cells, const CommonOptions& common) {
   const stream::Store store = stream::Store::open(path);
@@ -208,10 +224,9 @@ PictureInput from_store(const std::string& path, const PictureSelection& selecti
     put_on_ground(input, stored, Ground(stored));
     return input;
   }
-  const std::string level = !selection.level.empty() ? selection.level
-                            : selection.focuses.empty()
-                                ? std::to_string(level_within(store, 4000000))
-                                : std::string("top");
+  const std::string level = !selection.level.empty()    ? selection.level
+                            : selection.focuses.empty() ? finest_level(store, selection.region)
+                                                        : std::string("top");
   const Detail detail = Detail::parse(store, level, selection.region, selection.focuses);
   // These positions are in the CRS already.
   Placement world;
