@@ -174,23 +174,6 @@ TriangleMesh grid_of_store(const stream::Store& store, std::uint64_t most_cells,
   return grid.mesh();
 }
 
-/// Whether more than half of the surface is steeper than 60 degrees: triangles between the upper
-/// and the lower side of a body that was triangulated as if it were a terrain.
-bool mostly_steep(const TriangleMesh& mesh) {
-  double steep = 0, all = 0;
-  for (const auto& t : mesh.triangles) {
-    const stream::Point3 &a = mesh.positions[t[0]], &b = mesh.positions[t[1]],
-                         &c = mesh.positions[t[2]];
-    const stream::Point3 u{b[0] - a[0], b[1] - a[1], b[2] - a[2]};
-    const stream::Point3 v{c[0] - a[0], c[1] - a[1], c[2] - a[2]};
-    const double level = std::abs(u[0] * v[1] - u[1] * v[0]);
-    const double area = std::hypot(level, u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2]);
-    all += area;
-    if (level < 0.5 * area) steep += area;
-  }
-  return steep > 0.5 * all;
-}
-
 /// The finest level with no more points, in clusters that reach into the region, than a picture
 /// needs.
 std::string finest_level(const stream::Store& store, const std::string& region) {

@@ -29,6 +29,21 @@ bool is_height_field(const TriangleMesh& mesh) {
   return std::max(up, down) > 0 && std::min(up, down) < 0.001 * std::max(up, down);
 }
 
+bool mostly_steep(const TriangleMesh& mesh) {
+  double steep = 0, all = 0;
+  for (const auto& t : mesh.triangles) {
+    const stream::Point3 &a = mesh.positions[t[0]], &b = mesh.positions[t[1]],
+                         &c = mesh.positions[t[2]];
+    const stream::Point3 u{b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+    const stream::Point3 v{c[0] - a[0], c[1] - a[1], c[2] - a[2]};
+    const double level = std::abs(u[0] * v[1] - u[1] * v[0]);
+    const double area = std::hypot(level, u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2]);
+    all += area;
+    if (level < 0.5 * area) steep += area;
+  }
+  return steep > 0.5 * all;
+}
+
 std::vector<std::array<float, 3>> vertex_normals(const TriangleMesh& mesh) {
   std::vector<stream::Point3> sums(mesh.positions.size(), stream::Point3{});
   double up = 0;

@@ -30,6 +30,10 @@ struct TriangleMesh {
 /// the same way. A cloud of points is none.
 bool is_height_field(const TriangleMesh& mesh);
 
+/// Whether more than half of the surface is steeper than 60 degrees: triangles between the upper
+/// and the lower side of a body that was triangulated as if it were a terrain.
+bool mostly_steep(const TriangleMesh& mesh);
+
 /// Unit normals at the vertices: those of the triangles around, weighed by area. For a height field
 /// they point up.
 std::vector<std::array<float, 3>> vertex_normals(const TriangleMesh& mesh);
