@@ -32,14 +32,10 @@ bool is_height_field(const TriangleMesh& mesh) {
 bool mostly_steep(const TriangleMesh& mesh) {
   double steep = 0, all = 0;
   for (const auto& t : mesh.triangles) {
-    const stream::Point3 &a = mesh.positions[t[0]], &b = mesh.positions[t[1]],
-                         &c = mesh.positions[t[2]];
-    const stream::Point3 u{b[0] - a[0], b[1] - a[1], b[2] - a[2]};
-    const stream::Point3 v{c[0] - a[0], c[1] - a[1], c[2] - a[2]};
-    const double level = std::abs(u[0] * v[1] - u[1] * v[0]);
-    const double area = std::hypot(level, u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2]);
+    const stream::Point3 n = area_vector(mesh, t);
+    const double area = std::hypot(n[0], n[1], n[2]);
     all += area;
-    if (level < 0.5 * area) steep += area;
+    if (std::abs(n[2]) < 0.5 * area) steep += area;
   }
   return steep > 0.5 * all;
 }
