@@ -1,75 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// CGAL's Delaunay_triangulation_3 as an oracle, ties included: it perturbs by the same order. So
-// sets of tetrahedra must be equal, whatever the input.
+// Sets of tetrahedra and signs of predicates against CGAL's, on made points.
 #include <algorithm>
 #include <cmath>
 
-#include <CGAL/Delaunay_triangulation_3.h>
 #include <CGAL/Exact_predicates_exact_constructions_kernel.h>
-#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <gtest/gtest.h>
 
-#include "delaunay3/access.hpp"
+#include "delaunay3_oracle.hpp"
 #include "points3.hpp"
 
 namespace terrace::tri {
 namespace {
-
-using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-using Oracle = CGAL::Delaunay_triangulation_3<Kernel>;
-using Corners = std::array<std::array<double, 3>, 4>;
-
-std::vector<Corners> tetrahedra_of(const Oracle& oracle) {
-  std::vector<Corners> result;
-  if (oracle.dimension() < 3) return result;
-  for (const auto& cell : oracle.finite_cell_handles()) {
-    Corners corners;
-    for (int i = 0; i < 4; ++i) {
-      const auto& p = cell->vertex(i)->point();
-      corners[static_cast<std::size_t>(i)] = {p.x(), p.y(), p.z()};
-    }
-    std::sort(corners.begin(), corners.end());
-    result.push_back(corners);
-  }
-  std::sort(result.begin(), result.end());
-  return result;
-}
-
-template <class Coord>
-std::vector<Corners> tetrahedra_of(const Delaunay3<Coord>& triangulation) {
-  std::vector<Corners> result;
-  for (const TetrahedronId id : triangulation.all_tetrahedra()) {
-    Corners corners;
-    const auto vertices = triangulation.vertices(id);
-    for (std::size_t i = 0; i < 4; ++i) {
-      const auto p = triangulation.point(vertices[i]);
-      corners[i] = {static_cast<double>(p[0]), static_cast<double>(p[1]),
-                    static_cast<double>(p[2])};
-    }
-    std::sort(corners.begin(), corners.end());
-    result.push_back(corners);
-  }
-  std::sort(result.begin(), result.end());
-  return result;
-}
-
-template <class Coord>
-std::vector<Kernel::Point_3> to_cgal(const std::vector<std::array<Coord, 3>>& points) {
-  std::vector<Kernel::Point_3> result;
-  for (const auto& p : points)
-    result.emplace_back(static_cast<double>(p[0]), static_cast<double>(p[1]),
-                        static_cast<double>(p[2]));
-  return result;
-}
-
-template <class Coord>
-void expect_equal_to_cgal(const Delaunay3<Coord>& triangulation, const Oracle& oracle) {
-  EXPECT_EQ(find_fault(triangulation), "");
-  EXPECT_EQ(triangulation.vertex_count(), oracle.number_of_vertices());
-  const auto ours = tetrahedra_of(triangulation);
-  EXPECT_EQ(ours.size(), triangulation.tetrahedron_count());
-  EXPECT_TRUE(ours == tetrahedra_of(oracle));
-}
 
 template <class Coord>
 class Delaunay3CgalTest : public ::testing::Test {};

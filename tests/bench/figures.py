@@ -1,26 +1,33 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures after those of the thesis, made by the command: of made data, and of the scan of Lucy where
-TERRACE_DATA names a folder that has it.
+"""Pictures after those of the thesis, made by the command: of made data, and of a scan of Lucy, of the
+heights of the whole world and of laser scanned streets where TERRACE_DATA names a folder that has them.
 
 figures.py TERRACE --out DIR [--small]
 """
 
 import argparse
 import json
+import lzma
 import os
 import random
+import struct
 import subprocess
 import tempfile
 
 FIGURES = {
     '7.1': 'clusters with facility costs of 0.3, 1 and 3 times the default',
     '7.2': 'clusters of a cloud in its order, and of the same shuffled (7.4)',
+    '7.3': 'two blocks: an outlier that joins a distant cluster',
     '7.8': 'points of a scan: all levels coarse, one part fine',
+    '7.11': 'clusters of the whole world',
     '7.15': 'three regions with elliptical metrics: clusters and triangles',
     '7.16': 'the same on an elevation model',
     '8.1': 'an elevation model: coarse, finer round a focus, full resolution in its centre',
+    '8.2': 'the tetrahedra of a scan: wires and their hull',
     '8.9': 'a scan with its shape restored: coarse, finer in one part (8.6)',
+    'A.1': 'a laser scanned place: the top, a finer part, full resolution in its centre (to A.3: closer)',
+    'A.4': 'a larger one (to A.6: closer)',
 }
 
 
@@ -57,6 +64,14 @@ class Maker:
         last = [l + end[a] * (h - l) if a in axes else h for a, (l, h) in enumerate(zip(low, high))]
         return first, last
 
+    def data(self, *names):
+        """The path of a file of TERRACE_DATA; None without it."""
+        path = os.path.join(os.environ.get('TERRACE_DATA', ''), *names)
+        return path if os.path.exists(path) else None
+
+    def box(self, low, high, begin, end, axes):
+        return ','.join(map(str, sum(self.part(low, high, begin, end, axes), [])))
+
     def regions(self, low, high, ratio):
         """Three boxes in the plane with ellipses across, along and aslant, as in figure 7.15."""
         list_ = []
@@ -89,12 +104,38 @@ class Maker:
                 self.run('points', store, '--level', level, '-o', points)
                 self.picture(points, f'{name}_level{level}')
 
+    def outlier(self):
+        """Two clouds of one cluster each; a point of the right one came with the left one's block."""
+        generator = random.Random(3)
+        blocks = []
+        for x, count in ((0, 200), (7, 199)):
+            blocks.append([(x + generator.gauss(0, .7), generator.gauss(0, .7))
+                           for _ in range(count)])
+        blocks[0].append((6.2, .1))
+        rows = []
+        for number, block in enumerate(blocks):
+            cloud, clusters = self.path('block.xyz'), self.path('block.csv')
+            with open(cloud, 'w') as file:
+                file.writelines(f'{x} {y} 0\n' for x, y in block)
+            self.run('cluster', cloud, '-o', clusters, '--z-weight', 0, '--facility-cost', 20)
+            with open(clusters) as file:
+                head, *lines = file.read().split()
+            for line in lines:
+                x, y, z, cluster, representative = line.split(',')
+                rows.append((x, y, z, 2 * int(cluster) + number,
+                             int(representative) + number * len(blocks[0])))
+        both = self.path('outlier.csv')
+        with open(both, 'w') as file:
+            file.write(head.replace('cluster', 'class') + '\n')
+            file.writelines(','.join(map(str, row)) + '\n' for row in rows)
+        self.picture(both, '7_3', '--color', 'class')
+
     def scan(self):
         """The store of Lucy, or of a made surface, and which axis points up."""
         store = self.path('scan.store')
         if not os.path.exists(store):
-            cloud = os.path.join(os.environ.get('TERRACE_DATA', ''), 'scan', 'lucy_100k.ply')
-            if not os.path.exists(cloud):
+            cloud = self.data('scan', 'lucy_100k.ply')
+            if not cloud:
                 cloud = self.path('scan.ply')
                 self.run('synth', 'surface', '--points', self.count(100000), '-o', cloud)
             self.run('build', cloud, '-o', store, '--block', 5000)
@@ -108,6 +149,16 @@ class Maker:
         self.run('points', store, '--level', min(1, top), '--focus',
                  ','.join(map(str, first + last)) + ':0', '-o', points)
         self.picture(points, '7_8', '--view', '20,10')
+
+    def world(self):
+        dem = self.data('dem', 'etopo1_1deg_f32.tif')
+        if not dem or self.small:
+            dem = self.path('world.tif')
+            self.run('synth', 'dem', '--size', '60x30' if self.small else '360x180', '-o', dem)
+        clusters = self.path('world.ply')
+        self.run('cluster', dem, '-o', clusters, '--bound-iterations', 0)
+        # Seen as a map: heights beside degrees would be walls.
+        self.picture(clusters, '7_11', '--exaggerate', 1e-6)
 
     def elliptical_points(self):
         cloud, store = self.path('plane.xyz'), self.path('plane.store')
@@ -151,6 +202,20 @@ class Maker:
         self.picture(mesh, '8_1', '--wire')
         self.picture(mesh, '8_1_aslant', '--wire', '--view', '200,35')
 
+    def tetrahedra(self):
+        """Without a limit of edges nothing is peeled off: the tetrahedra fill the convex hull."""
+        store = self.scan()
+        low, high, top = self.bounds(store)
+        hull, inside, wires = (self.path(name) for name in ('hull.ply', 'inside.vtk', 'wires.obj'))
+        options = ('--level', min(1, top), '--criterion', 'edge:1e6')
+        self.run('surface', store, '-o', hull, *options)
+        self.run('surface', store, '-o', inside, '--tetrahedra', *options)
+        width = .0005 * max(h - l for l, h in zip(low, high))
+        with open(wires, 'w') as file:
+            write_wires(*read_tetrahedra(inside), width, file)
+        self.picture(wires, '8_2_wires', '--view', '20,10', '--exaggerate', 1)
+        self.picture(hull, '8_2_hull', '--view', '20,10', '--wire')
+
     def restored_shape(self):
         store = self.scan()
         low, high, top = self.bounds(store)
@@ -165,19 +230,102 @@ class Maker:
         self.run('surface', store, '-o', surface)
         self.picture(surface, '8_9_full', '--view', '20,10')
 
+    def place(self, number, name, block, view):
+        """A laser scanned place: overview, the finer part, its centre."""
+        cloud, store = self.path('place.ply'), self.path('place.store')
+        las = self.data('lidar', name)
+        if las and not self.small:
+            las_to_ply(las, cloud)
+        else:
+            self.run('synth', 'surface', '--points', self.count(200000), '-o', cloud)
+        self.run('build', cloud, '-o', store, '--block', block)
+        low, high, top = self.bounds(store)
+        part, centre, detail = ((a, b) for a, b in (((.3, .3), (.7, .7)), ((.44, .44), (.56, .56)),
+                                                    ((.47, .47), (.53, .53))))
+        focuses = ['--focus', self.box(low[:2], high[:2], *centre, (0, 1)) + ':0']
+        if top > 1:
+            focuses += ['--focus', self.box(low[:2], high[:2], *part, (0, 1)) + ':1']
+        options = ['--level', 'top', '--color', 'level', '--exaggerate', 1, *focuses]
+        self.picture(store, f'A_{number}', *options, '--view', view)
+        for k, region in enumerate((part, detail), 1):
+            self.picture(store, f'A_{number + k}', *options, '--view', view,
+                         '--region', self.box(low[:2], high[:2], *region, (0, 1)))
+
+    def street(self):
+        self.place(1, 'autzen_trim.las', 2000, '200,35')
+
+    def town(self):
+        self.place(4, 'autzen_ept_depth0-2.las.xz', 5000, '200,35')
+
+
+def las_to_ply(path, target):
+    """The records of an uncompressed LAS file as a PLY file, coordinates as stored."""
+    with (lzma.open if path.endswith('.xz') else open)(path, 'rb') as file:
+        data = file.read()
+    begin, _, _, length, count = struct.unpack('<IIBHI', data[96:111])
+    columns = ['int x', 'int y', 'int z', 'ushort intensity']
+    columns += [f'uchar other{k}' for k in range(length - 14)]
+    header = ['ply', 'format binary_little_endian 1.0', f'element vertex {count}',
+              *(f'property {column}' for column in columns), 'end_header', '']
+    with open(target, 'wb') as file:
+        file.write('\n'.join(header).encode())
+        file.write(data[begin:begin + count * length])
+
+
+def read_tetrahedra(path):
+    """Points and quadruples of a binary VTK file."""
+    with open(path, 'rb') as file:
+        data = file.read().split(b'POINTS ', 1)[1]
+    line, data = data.split(b'\n', 1)
+    count = int(line.split()[0])
+    points = list(struct.iter_unpack('>3d', data[:24 * count]))
+    line, data = data[24 * count:].split(b'CELLS ', 1)[1].split(b'\n', 1)
+    cells = int(line.split()[0])
+    return points, [cell[1:] for cell in struct.iter_unpack('>5i', data[:20 * cells])]
+
+
+def write_wires(points, tetrahedra, width, file):
+    """Every edge as two thin strips across each other."""
+    edges = {tuple(sorted((cell[i], cell[j]))) for cell in tetrahedra
+             for i in range(4) for j in range(i)}
+    vertices = 0
+    for a, b in sorted(edges):
+        p, q = points[a], points[b]
+        along = [y - x for x, y in zip(p, q)]
+        least = min(range(3), key=lambda axis: abs(along[axis]))
+        one = cross(along, [float(axis == least) for axis in range(3)], width)
+        for offset in (one, cross(along, one, width)):
+            for end in (p, q):
+                for sign in (-1, 1):
+                    file.write('v ' + ' '.join(str(x + sign * o) for x, o in zip(end, offset)) + '\n')
+            k = vertices
+            file.write(f'f {k + 1} {k + 2} {k + 4}\nf {k + 1} {k + 4} {k + 3}\n')
+            vertices += 4
+
+
+def cross(a, b, length):
+    """A vector of that length across both."""
+    c = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    size = sum(x * x for x in c) ** .5
+    return [length * x / size for x in c]
+
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
     parser.add_argument('terrace')
     parser.add_argument('--out', required=True)
     parser.add_argument('--small', action='store_true', help='quickly, to see that it works')
+    parser.add_argument('--only', metavar='LIST', help='of these figures alone: 7.3,A.1')
     options = parser.parse_args()
     os.makedirs(options.out, exist_ok=True)
     maker = Maker(options.terrace, options.out, options.small)
-    works = (maker.facility_costs, maker.orders, maker.selected_points, maker.elliptical_points,
-             maker.elliptical_terrain, maker.terrain_detail, maker.restored_shape)
+    works = (maker.facility_costs, maker.orders, maker.outlier, maker.selected_points, maker.world,
+             maker.elliptical_points, maker.elliptical_terrain, maker.terrain_detail,
+             maker.tetrahedra, maker.restored_shape, maker.street, maker.town)
     for (figure, what), work in zip(FIGURES.items(), works, strict=True):
-        print(f'{figure}: {what}')
+        if options.only and figure not in options.only.split(','):
+            continue
+        print(f'{figure}: {what}', flush=True)
         work()
 
 

@@ -24,8 +24,9 @@ struct DrawOptions {
 void draw_triangles(const TriangleMesh& mesh, const std::vector<Rgb>& colours, const Camera& camera,
                     const Light& light, const DrawOptions& options, Canvas& canvas);
 
-/// Draws a cloud of points as discs just large enough to close the gaps at the cloud's density. Lit
-/// by the points' own normals, else by normals estimated from the depths around.
+/// Draws a cloud of points as discs just large enough to close the gaps at the cloud's density, or,
+/// where some parts are coarser than others, at each part's. Lit by the points' own normals, else
+/// by normals estimated from the depths around.
 void draw_points(const TriangleMesh& cloud, const std::vector<Rgb>& colours, const Camera& camera,
                  const Light& light, const DrawOptions& options, Canvas& canvas);
 

@@ -1,15 +1,29 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <numbers>
+#include <vector>
 
 #include "draw.hpp"
+#include "point_spacing.hpp"
 
 namespace terrace::tools {
 namespace {
 
 struct Splat {
-  float x, y, depth;
+  float x, y, depth, radius;
 };
+
+/// What the samples show, beside the canvas: radii of the discs, 0 where there is none.
+using Radii = std::vector<float>;
+
+/// A surface steeper than this, from sample to sample, is taken for two surfaces.
+float jump(float radius, const Camera& camera) {
+  return 4 * (radius + 1) / static_cast<float>(camera.scale);
+}
 
 /// Samples that the cloud covers, as if it had no gaps: cells of a grid coarse enough that a cell
 /// of the cloud holds several points are counted.
@@ -36,11 +50,49 @@ double covered_area(const std::vector<Splat>& splats, const Canvas& canvas) {
   return area;
 }
 
-/// Averages depths over a square of 2 r + 1 samples, only over neighbours whose depth is within
-/// `step`: normals of discs would else be those of the discs. Rows, then columns.
-void smooth_depths(Canvas& canvas, int radius, float step, unsigned threads) {
+/// Where a cloud is coarse in parts, discs as large as the part needs: by the distances to a few
+/// neighbours among the points that are as coarse, but not much above what is usual among them.
+void set_radii(const TriangleMesh& cloud, const Camera& camera, const Canvas& canvas,
+               const DrawOptions& options, std::vector<Splat>& splats) {
+  constexpr unsigned kRank = 8;
+  // Points of one side: for scattered ones the same cover as below, for representatives, which keep
+  // apart, less.
+  const double scattered = 1.34 * std::sqrt(std::numbers::pi / kRank);
+  const double apart = 0.8 * std::sqrt(std::numbers::pi / kRank);
+  // What covers a tenth of the picture tells nothing of a shape.
+  const double most = std::max(1.0, 0.1 * std::min(canvas.width(), canvas.height()));
+  std::array<std::vector<std::uint32_t>, 256> groups;
+  for (std::size_t i = 0; i < splats.size(); ++i) {
+    groups[cloud.left_out[i]].push_back(static_cast<std::uint32_t>(i));
+  }
+  std::vector<stream::Point3> positions;
+  for (std::size_t coarse = 0; coarse < groups.size(); ++coarse) {
+    const std::vector<std::uint32_t>& group = groups[coarse];
+    if (group.size() < 2) continue;
+    const double per_distance = coarse > 0 ? apart : scattered;
+    positions.clear();
+    for (const std::uint32_t i : group) positions.push_back(cloud.positions[i]);
+    const std::vector<float> distances = neighbour_distances(positions, kRank, options.threads);
+    std::vector<float> sorted = distances;
+    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+    std::nth_element(sorted.begin(), middle, sorted.end());
+    for (std::size_t k = 0; k < group.size(); ++k) {
+      const double distance = std::min(distances[k], 1.5F * *middle);
+      splats[group[k]].radius =
+          static_cast<float>(std::clamp(per_distance * distance * camera.scale, 1.0, most));
+    }
+  }
+}
+
+/// Averages depths over a square somewhat larger than the disc, only over neighbours whose depth is
+/// no jump away: normals of discs would else be those of the discs. Rows, then columns.
+void smooth_depths(Canvas& canvas, const Radii& radii, const Camera& camera, unsigned threads) {
   const auto width = static_cast<int>(canvas.width()), height = static_cast<int>(canvas.height());
   std::vector<float> other(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  const auto at = [width](int x, int y) {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+           static_cast<std::size_t>(x);
+  };
   const auto pass = [&](bool along_rows, auto&& get, auto&& set) {
     for_bands(canvas.height(), threads, [&](std::uint32_t first, std::uint32_t last) {
       for (int y = static_cast<int>(first); y < static_cast<int>(last); ++y) {
@@ -48,12 +100,16 @@ void smooth_depths(Canvas& canvas, int radius, float step, unsigned threads) {
           const float centre = get(x, y);
           float sum = 0, weight = 0;
           if (std::isfinite(centre)) {
+            const float disc = radii[at(x, y)], step = jump(disc, camera);
+            const int radius = std::max(1, static_cast<int>(std::lround(1.2F * disc)));
             for (int k = -radius; k <= radius; ++k) {
               const int nx = along_rows ? x + k : x, ny = along_rows ? y : y + k;
               if (nx < 0 || ny < 0 || nx >= width || ny >= height) continue;
               const float d = get(nx, ny);
-              if (std::abs(d - centre) > step) continue;
-              const auto w = static_cast<float>(radius + 1 - std::abs(k));
+              const float jump_share = (d - centre) / step;
+              if (!(std::abs(jump_share) < 1)) continue;
+              const float near = 1 - jump_share * jump_share;
+              const float w = static_cast<float>(radius + 1 - std::abs(k)) * near * near;
               sum += w * d;
               weight += w;
             }
@@ -62,10 +118,6 @@ void smooth_depths(Canvas& canvas, int radius, float step, unsigned threads) {
         }
       }
     });
-  };
-  const auto at = [width](int x, int y) {
-    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
-           static_cast<std::size_t>(x);
   };
   const auto canvas_depth = [&](int x, int y) -> float& {
     return canvas.depth(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y));
@@ -87,13 +139,14 @@ float slope(float before, float here, float after, float step) {
 }
 
 /// Lights every sample by the normal that its depth and its neighbours' tell.
-void light_by_depth(const Camera& camera, const Light& light, float step, unsigned threads,
+void light_by_depth(const Camera& camera, const Light& light, const Radii& radii, unsigned threads,
                     Canvas& canvas) {
   for_bands(canvas.height(), threads, [&](std::uint32_t first, std::uint32_t last) {
     for (std::uint32_t y = first; y < last; ++y) {
       for (std::uint32_t x = 0; x < canvas.width(); ++x) {
         const float here = canvas.depth(x, y);
         if (!std::isfinite(here)) continue;
+        const float step = jump(radii[std::size_t{y} * canvas.width() + x], camera);
         const float left = canvas.depth(x == 0 ? x : x - 1, y);
         const float right = canvas.depth(std::min(x + 1, canvas.width() - 1), y);
         const float above = canvas.depth(x, y == 0 ? y : y - 1);
@@ -121,7 +174,7 @@ void draw_points(const TriangleMesh& cloud, const std::vector<Rgb>& colours, con
   std::vector<Splat> splats(cloud.positions.size());
   for (std::size_t i = 0; i < splats.size(); ++i) {
     const auto [x, y, depth] = camera.project(cloud.positions[i]);
-    splats[i] = {static_cast<float>(x), static_cast<float>(y), static_cast<float>(depth)};
+    splats[i] = {static_cast<float>(x), static_cast<float>(y), static_cast<float>(depth), 0};
   }
   if (splats.empty()) return;
   // Discs of radius r cover all but exp(-points * pi * r^2 / area) of an area over which so many
@@ -129,12 +182,16 @@ void draw_points(const TriangleMesh& cloud, const std::vector<Rgb>& colours, con
   // that this leaves half a percent there, and nothing of a terrain.
   constexpr double kCover = 1.9;
   const double per_point = covered_area(splats, canvas) / static_cast<double>(splats.size());
-  const auto radius = static_cast<float>(std::clamp(kCover * std::sqrt(per_point), 1.0, 60.0));
+  const auto usual = static_cast<float>(std::clamp(kCover * std::sqrt(per_point), 1.0, 60.0));
   const bool own_normals = cloud.normals.size() == cloud.positions.size();
+  for (Splat& splat : splats) splat.radius = usual;
+  if (cloud.left_out.size() == splats.size()) set_radii(cloud, camera, canvas, options, splats);
 
+  Radii radii(std::size_t{canvas.width()} * canvas.height(), 0.0F);
   for_bands(canvas.height(), options.threads, [&](std::uint32_t first, std::uint32_t last) {
     for (std::size_t i = 0; i < splats.size(); ++i) {
       const Splat& s = splats[i];
+      const float radius = s.radius;
       const float y0 = std::max(std::ceil(s.y - radius - 0.5F), static_cast<float>(first));
       const float y1 = std::min(std::floor(s.y + radius - 0.5F) + 1, static_cast<float>(last));
       const float x0 = std::max(std::ceil(s.x - radius - 0.5F), 0.0F);
@@ -161,18 +218,16 @@ void draw_points(const TriangleMesh& cloud, const std::vector<Rgb>& colours, con
           if (!(depth > canvas.depth(x, y))) continue;
           canvas.depth(x, y) = depth;
           canvas.colour(x, y) = colour;
+          radii[std::size_t{y} * canvas.width() + x] = radius;
         }
       }
     }
   });
   if (own_normals) return;
-  // A surface steeper than this, from sample to sample, is taken for two surfaces.
-  const float step = 4 * (radius + 1) / static_cast<float>(camera.scale);
-  const int reach = std::max(1, static_cast<int>(std::lround(1.2F * radius)));
   // Twice: the second pass takes away what the edges of the first one's squares leave.
-  smooth_depths(canvas, reach, step, options.threads);
-  smooth_depths(canvas, reach, step, options.threads);
-  light_by_depth(camera, light, step, options.threads, canvas);
+  smooth_depths(canvas, radii, camera, options.threads);
+  smooth_depths(canvas, radii, camera, options.threads);
+  light_by_depth(camera, light, radii, options.threads, canvas);
 }
 
 }  // namespace terrace::tools

@@ -18,6 +18,7 @@
 #include "interrupt.hpp"
 #include "mesh_file.hpp"
 #include "store_mesh.hpp"
+#include "surface_run.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/source.hpp"
 
@@ -173,10 +174,26 @@ TriangleMesh grid_of_store(const stream::Store& store, std::uint64_t most_cells,
   return grid.mesh();
 }
 
+/// The finest level with no more points, in clusters that reach into the region, than a picture
+/// needs.
+std::string finest_level(const stream::Store& store, const std::string& region) {
+  constexpr std::uint64_t kMost = 4000000;
+  if (region.empty()) return std::to_string(level_within(store, kMost));
+  for (unsigned level = 0; level < store.top(); ++level) {
+    const Detail detail = Detail::parse(store, std::to_string(level), region, {});
+    std::uint64_t points = 0;
+    for_each_wanted_record(
+        store, detail,
+        [&](stream::ClusterId, const stream::ClusterRecord& record) { points += record.points; });
+    if (points <= kMost) return std::to_string(level);
+  }
+  return "top";
+}
+
 PictureInput from_store(const std::string& path, const PictureSelection& selection,
                         std::uint64_t most_cells, const CommonOptions& common) {
   const stream::Store store = stream::Store::open(path);
-  const bool whole = selection.focuses.empty();
+  const bool whole = selection.focuses.empty() && selection.region.empty();
   const Placement stored = placement_of(store.schema());
   PictureInput input;
   input.terrain = store.schema().grid || store.schema().crs.epsg != 0;
@@ -190,19 +207,28 @@ PictureInput from_store(const std::string& path, const PictureSelection& selecti
     put_on_ground(input, stored, Ground(stored));
     return input;
   }
-  const std::string level = !selection.level.empty() ? selection.level
-                            : whole                  ? std::to_string(level_within(store, 4000000))
-                                                     : std::string("top");
-  const Detail detail = Detail::parse(store, level, "", selection.focuses);
-  input.mesh = store.schema().grid || selection.triangles
-                   ? mesh_of_store(store, detail, common.memory_or(0))
-                   : points_of_store(store, detail);
+  const std::string level = !selection.level.empty()    ? selection.level
+                            : selection.focuses.empty() ? finest_level(store, selection.region)
+                                                        : std::string("top");
+  const Detail detail = Detail::parse(store, level, selection.region, selection.focuses);
   // These positions are in the CRS already.
   Placement world;
   world.crs = stored.crs;
   world.coordinates[0].unit = stored.coordinates[0].unit;
   world.coordinates[2].unit = stored.coordinates[2].unit;
-  put_on_ground(input, world, Ground(world));
+  const Ground ground(world);
+  if (!store.schema().grid && !selection.triangles) {
+    input.mesh = points_of_store(store, detail);
+    put_on_ground(input, world, ground);
+    return input;
+  }
+  input.mesh = mesh_of_store(store, detail, common.memory_or(0));
+  put_on_ground(input, world, ground);
+  if (input.terrain || !mostly_steep(input.mesh)) return input;
+  input = {};
+  input.mesh = surface_of_store(store, detail, {}, false, common.memory_or(0)).mesh;
+  input.guess = "no height field: the surface is that of 'terrace surface'";
+  put_on_ground(input, world, ground);
   return input;
 }
 
@@ -213,6 +239,10 @@ void define_picture_input(CLI::App& app, PictureSelection& selection) {
                  "store: detail, a number or top (default: all cells, or about 4 M points); tree: "
                  "lines up to level L (default: all)")
       ->type_name("L");
+  app.add_option("--region", selection.region,
+                 "store: only what is inside (triangles: what reaches inside): a box, "
+                 "minx,miny[,minz],maxx,maxy[,maxz], or a GeoJSON file")
+      ->type_name("BOX");
   app.add_option("--focus", selection.focuses,
                  "store: BOX:L, all points of level L inside the box; repeatable (the rest: top)")
       ->allow_extra_args(false)
@@ -225,8 +255,8 @@ PictureInput read_picture_input(const std::string& path, const PictureSelection&
   if (std::filesystem::is_directory(path)) {
     return from_store(path, selection, most_cells, common);
   }
-  if (!selection.level.empty() || !selection.focuses.empty()) {
-    throw UsageError("'" + path + "' is no store: --level and --focus do not apply");
+  if (!selection.level.empty() || !selection.region.empty() || !selection.focuses.empty()) {
+    throw UsageError("'" + path + "' is no store: --level, --region and --focus do not apply");
   }
   if (std::optional<MeshFile> file = read_mesh_file(path)) return from_mesh(std::move(*file));
   return from_source(path, most_cells, common);

@@ -12,12 +12,13 @@ namespace terrace::tools {
 
 /// The part of an input that a picture shows.
 struct PictureSelection {
-  std::string level;  ///< empty: what a picture can show
+  std::string level;   ///< empty: what a picture can show
+  std::string region;  ///< empty: everywhere
   std::vector<std::string> focuses;
   bool triangles = false;  ///< triangles are wanted, not points or cells
 };
 
-/// Adds --level and --focus.
+/// Adds --level, --region and --focus.
 void define_picture_input(CLI::App& app, PictureSelection& selection);
 
 /// What is to be drawn, on the ground.

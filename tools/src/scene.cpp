@@ -29,6 +29,17 @@ bool is_height_field(const TriangleMesh& mesh) {
   return std::max(up, down) > 0 && std::min(up, down) < 0.001 * std::max(up, down);
 }
 
+bool mostly_steep(const TriangleMesh& mesh) {
+  double steep = 0, all = 0;
+  for (const auto& t : mesh.triangles) {
+    const stream::Point3 n = area_vector(mesh, t);
+    const double area = std::hypot(n[0], n[1], n[2]);
+    all += area;
+    if (std::abs(n[2]) < 0.5 * area) steep += area;
+  }
+  return steep > 0.5 * all;
+}
+
 std::vector<std::array<float, 3>> vertex_normals(const TriangleMesh& mesh) {
   std::vector<stream::Point3> sums(mesh.positions.size(), stream::Point3{});
   double up = 0;

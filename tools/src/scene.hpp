@@ -22,11 +22,17 @@ struct TriangleMesh {
   std::vector<std::uint32_t> representatives;  ///< of the clusters: vertex numbers, any length
   std::vector<Rgb> colours;
   std::vector<std::array<float, 3>> normals;  ///< unit length
+  /// Of a cloud that is coarse somewhere: the levels that are left out around a point, 0 for none.
+  std::vector<std::uint8_t> left_out;
 };
 
 /// True if the mesh is seen from above without overlap: nearly all triangles, seen along z, turn
 /// the same way. A cloud of points is none.
 bool is_height_field(const TriangleMesh& mesh);
+
+/// Whether more than half of the surface is steeper than 60 degrees: triangles between the upper
+/// and the lower side of a body that was triangulated as if it were a terrain.
+bool mostly_steep(const TriangleMesh& mesh);
 
 /// Unit normals at the vertices: those of the triangles around, weighed by area. For a height field
 /// they point up.

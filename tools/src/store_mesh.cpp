@@ -250,16 +250,27 @@ TriangleMesh mesh_of_store(const stream::Store& store, const Detail& detail,
 
 TriangleMesh points_of_store(const stream::Store& store, const Detail& detail) {
   const Placement placement = placement_of(store.schema());
+  const bool coarse = detail.level > 0;
   TriangleMesh cloud;
   for_each_wanted(
       store, detail,
       [&](stream::ClusterId id, const stream::ClusterRecord&, const stream::ClusterPoints& points) {
         check_interrupt();
-        for (const stream::Point3& p : points.positions) {
-          const stream::Point3 place = world_point(placement, p);
+        const unsigned level = stream::level_of(id);
+        for (std::size_t i = 0; i < points.size(); ++i) {
+          const stream::Point3 place = world_point(placement, points.positions[i]);
           if (detail.region && !detail.region->contains(place)) continue;
           cloud.positions.push_back(place);
-          cloud.levels.push_back(static_cast<std::uint8_t>(stream::level_of(id)));
+          cloud.levels.push_back(static_cast<std::uint8_t>(level));
+          if (!coarse) continue;
+          unsigned left_out = level;
+          for (; left_out > 0; --left_out) {
+            const unsigned below = left_out - 1;
+            const stream::ClusterId headed =
+                stream::cluster_id(below, points.children[i * level + below]);
+            if (!detail.wants(below, world_box(placement, store.record(headed).summary.box))) break;
+          }
+          cloud.left_out.push_back(static_cast<std::uint8_t>(left_out));
         }
       });
   return cloud;

@@ -32,7 +32,7 @@ struct MeshOptions {
 TriangleMesh mesh_of_store(const stream::Store& store, const Detail& detail,
                            std::uint64_t memory_bytes, const MeshOptions& options = {});
 
-/// The same points without triangles.
+/// The same points without triangles; `left_out` says where they are coarse.
 TriangleMesh points_of_store(const stream::Store& store, const Detail& detail);
 
 /// The finest level with at most `most_points` points; the top if none has so few.

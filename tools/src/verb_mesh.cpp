@@ -26,7 +26,8 @@ class MeshCommand final : public Command {
     app.add_option("--level", level_, "detail outside the focuses: a number or top")
         ->capture_default_str();
     app.add_option("--region", region_,
-                   "only triangles that reach inside: minx,miny,maxx,maxy or a GeoJSON file");
+                   "only triangles that reach inside: a box, minx,miny[,minz],maxx,maxy[,maxz], or "
+                   "a GeoJSON file");
     app.add_option("--focus", focuses_, "BOX:L, all points of level L inside the box; repeatable")
         ->allow_extra_args(false);
     app.add_option(

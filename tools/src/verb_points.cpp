@@ -83,8 +83,9 @@ class PointsCommand final : public Command {
     app.add_option("--format", format_, "xyz, csv, ply, ply-ascii; else by the file's ending");
     app.add_option("--level", level_, "points of this level and above: a number or top")
         ->capture_default_str();
-    app.add_option("--region", region_,
-                   "only points inside: minx,miny,maxx,maxy or a GeoJSON file");
+    app.add_option(
+        "--region", region_,
+        "only points inside: a box, minx,miny[,minz],maxx,maxy[,maxz], or a GeoJSON file");
     app.add_option("--focus", focuses_,
                    "BOX:L, points of level L and above inside the box; repeatable")
         ->allow_extra_args(false);

@@ -169,8 +169,9 @@ class RenderCommand : public Command {
                        "' says which points belong together, not where they are: "
                        "name the file that it was made from with --points FILE");
     }
-    if (wire_ || !color_.empty() || !selection_.focuses.empty()) {
-      throw UsageError("--wire, --color and --focus do not apply to what 'terrace match' wrote");
+    if (wire_ || !color_.empty() || !selection_.region.empty() || !selection_.focuses.empty()) {
+      throw UsageError(
+          "--wire, --color, --region and --focus do not apply to what 'terrace match' wrote");
     }
     MatchingPicture picture = read_matching_picture(input_, points_file_, common);
     if (!picture.assumption.empty()) common.explain(points_file_ + ": " + picture.assumption);

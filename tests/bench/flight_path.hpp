@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+
+#include <terrace/stream/store.hpp>
+#include <terrace/tri/view.hpp>
+
+#include "world.hpp"
+
+namespace terrace::tests {
+
+enum class Kind { perspective, map };
+
+/// The way of the camera: a circle about the middle, looking ahead and down by 30 degrees. For the
+/// map it looks straight down.
+class Flight {
+ public:
+  /// active: points that are to be in the model.
+  Flight(const stream::Store& store, Kind kind, std::size_t active)
+      : kind_(kind), points_(static_cast<double>(active)) {
+    const auto placement = tools::placement_of(store.schema());
+    const stream::Box3 box = tools::world_box(placement, store.bounds());
+    middle_ = {(box.min[0] + box.max[0]) / 2, (box.min[1] + box.max[1]) / 2, box.max[2]};
+    const double side = std::min(box.max[0] - box.min[0], box.max[1] - box.min[1]);
+    cell_ = std::sqrt((box.max[0] - box.min[0]) * (box.max[1] - box.min[1]) /
+                      static_cast<double>(store.points()));
+    radius_ = 0.22 * side;
+    const double ground = tools::world_point(placement, {0, 0, store.mean_height()})[2];
+    // As much is seen over small stores as over large ones, in proportion.
+    const double seen = std::sqrt(points_) * cell_;
+    above_ = 0.3 * seen;
+    middle_[2] = kind == Kind::perspective ? ground + above_ : box.max[2] + 1.0;
+  }
+
+  /// More of it, more points: of the map the extent, in perspective the detail.
+  double scale = 1.0;
+
+  [[nodiscard]] tri::View view(double way) const {
+    const double angle = way / radius_, c = std::cos(angle), s = std::sin(angle);
+    tri::Pose pose;
+    pose.position = {middle_[0] + radius_ * c, middle_[1] + radius_ * s, middle_[2]};
+    tri::View view;
+    if (kind_ == Kind::map) {
+      view.camera = tri::orthographic_camera(pose, map_height(), kAspect, kPixels);
+      view.pixel_error = 1e-6;  // full resolution
+      return view;
+    }
+    pose.direction = {-s * std::sqrt(0.75), c * std::sqrt(0.75), -0.5};
+    pose.up = {0, 0, 1};
+    view.camera = tri::perspective_camera(pose, kFov, kAspect, kPixels);
+    view.pixel_error = 2.0 / scale;
+    return view;
+  }
+  /// Of what is seen, in metres; in perspective where the middle of the picture meets the ground.
+  [[nodiscard]] double width() const {
+    if (kind_ == Kind::map) return kAspect * map_height();
+    return 2.0 * (2.0 * above_) * std::tan(kFov / 2 * std::numbers::pi / 180.0) * kAspect;
+  }
+
+ private:
+  static constexpr double kAspect = 1.5, kPixels = 1080.0, kFov = 60.0;
+
+  [[nodiscard]] double map_height() const { return scale * std::sqrt(points_ / kAspect) * cell_; }
+
+  Kind kind_;
+  double points_;
+  std::array<double, 3> middle_{};
+  double cell_ = 0.0, radius_ = 0.0, above_ = 0.0;
+};
+
+}  // namespace terrace::tests
