@@ -104,7 +104,7 @@ struct EllipticalMetric::Exact {
 
 constinit thread_local const EllipticalMetric* EllipticalKernel::metric_ = nullptr;
 
-EllipticalMetric::EllipticalMetric(const LinearMap3& map) {
+EllipticalMetric::EllipticalMetric(const LinearMap3& map) : map_(map) {
   int exponent = 0;
   double most = 0;
   for (const double m : map) most = std::max(most, std::abs(m));

@@ -31,6 +31,7 @@ class EllipticalMetric {
  private:
   friend class EllipticalKernel;
   struct Exact;
+  LinearMap3 map_;
   double r00_ = 0, r01_ = 0, r02_ = 0, r11_ = 0, r12_ = 0, r22_ = 0;
   double spread_ = 0;
   double filter2_ = 0;  ///< see EllipticalKernel::Probe::side()
@@ -111,6 +112,14 @@ class EllipticalKernel : public DoubleKernel {
   /// Whether d lies inside the smallest ellipsoid of the metric that contains the triangle a, b, c,
   /// not on a line; d different from them. Exact.
   static bool in_smallest_sphere(const Point& a, const Point& b, const Point& c, const Point& d);
+
+  /// The difference p - origin mapped by M, the same on every machine, rounded.
+  static Point by_map(const Point& p, const Point& origin) {
+    const LinearMap3& m = metric_->map_;
+    const double x = p[0] - origin[0], y = p[1] - origin[1], z = p[2] - origin[2];
+    return {m[0] * x + m[1] * y + m[2] * z, m[3] * x + m[4] * y + m[5] * z,
+            m[6] * x + m[7] * y + m[8] * z};
+  }
 
   /// The difference p - origin mapped by R, wrong by 9 u spread() times its length.
   static Point mapped(const Point& p, const Point& origin) {
