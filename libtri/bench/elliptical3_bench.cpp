@@ -3,7 +3,8 @@
 // Delaunay_triangulation_3 with EPICK on points that were mapped and rounded, in one run on the
 // same points: 100,000 uniform ones, or the complete grid of 46^3, in random order. Metrics: a
 // sphere; axes of 5, 1, 2 along those of the coordinates, and turned; 100, 1, 1 turned. Then the
-// removal of 200 compact sets of 100 of the uniform ones, and their insertion with hints.
+// removal of 200 compact sets of 100 of the uniform ones, and their insertion with hints. Then
+// flips to three regions.
 //
 // items_per_second counts points; CPU time, median of 5 rounds.
 #include <algorithm>
@@ -17,7 +18,7 @@
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <benchmark/benchmark.h>
 
-#include "terrace/tri/elliptical3.hpp"
+#include "terrace/tri/metric_tetrahedra.hpp"
 
 namespace {
 
@@ -181,6 +182,31 @@ void elliptical_sets(benchmark::State& state) {
               state.range(0) != 0);
 }
 
+/// Three boxes that cover most of the cube, ellipsoids of the given ratio. Counts besides how many
+/// facets stay that are not Delaunay, of those within regions about twice as many as tetrahedra.
+void regions(benchmark::State& state) {
+  const auto points = input_points(static_cast<Input>(state.range(0)));
+  const auto ratio = static_cast<double>(state.range(1));
+  const double side = state.range(0) == kGrid ? kSide : 1;
+  const tri::LinearMap3 axes{2.0 / 7,  3.0 / 7,  6.0 / 7, 6.0 / 7, 2.0 / 7,
+                             -3.0 / 7, -3.0 / 7, 6.0 / 7, -2.0 / 7};
+  const tri::MetricField3 field(
+      {{{{0, 0, 0}, {0.5 * side, 0.6 * side, side}}, tri::ellipsoid_map({ratio, 1, 1}, axes)},
+       {{{0.5 * side, 0, 0}, {side, 0.6 * side, side}}, tri::ellipsoid_map({1, 1, ratio})},
+       {{{0, 0.7 * side, 0}, {side, side, side}}, tri::ellipsoid_map({ratio, ratio, 1}, axes)}});
+  tri::Delaunay3<double> triangulation;
+  triangulation.build(points);
+  measure(state, points.size(), [&] {
+    const double start = now();
+    const tri::MetricTetrahedra result = tri::metric_tetrahedra(triangulation, field);
+    const double seconds = now() - start;
+    state.counters["tetrahedra"] = static_cast<double>(result.tetrahedra.size());
+    state.counters["flips"] = static_cast<double>(result.flips);
+    state.counters["stuck"] = static_cast<double>(result.stuck);
+    return seconds;
+  });
+}
+
 void once(benchmark::internal::Benchmark* row) {
   row->UseManualTime()->Iterations(1)->Unit(benchmark::kMillisecond);
 }
@@ -199,6 +225,10 @@ BENCHMARK(elliptical_sets)
     ->Apply(once)
     ->ArgNames({"insert", "metric"})
     ->ArgsProduct({{0, 1}, {kRound, kTurned, kThin}});
+BENCHMARK(regions)
+    ->Apply(once)
+    ->ArgNames({"grid", "ratio"})
+    ->ArgsProduct({{kUniform, kGrid}, {2, 5, 20}});
 
 }  // namespace
 
