@@ -45,6 +45,12 @@ void check(std::span<const Point3> points, const SurfaceOptions& options) {
   }
   const auto finite = [](double value) { return std::isfinite(value); };
   check_option("quantise_bits", options.quantise_bits, options.quantise_bits <= 30, "at most 30");
+  if (options.metric) {
+    if (options.method != SurfaceMethod::kShape || options.quantise_bits != 0)
+      throw std::invalid_argument(
+          "a metric is for the method kShape without quantise_bits; leave one of them out");
+    check_metric(*options.metric, "the metric of a surface");
+  }
   check_option("radius_ratio_bound", options.radius_ratio_bound,
                finite(options.radius_ratio_bound) && options.radius_ratio_bound > 0,
                "positive and finite");
@@ -92,15 +98,15 @@ ReconstructedSurface compact(std::span<const Point3> points, std::vector<Face> f
   return result;
 }
 
-template <class Coord>
-std::vector<Face> shape_faces(std::span<const std::array<Coord, 3>> points,
-                              const ShapeOptions& options) {
-  Delaunay3<Coord> triangulation;
+template <class Triangulation>
+std::vector<Face> shape_faces(std::span<const typename Triangulation::Point> points,
+                              const ShapeOptions& options,
+                              Triangulation triangulation = Triangulation()) {
   const std::vector<VertexId> vertices = triangulation.build(points);
   std::vector<std::uint32_t> point_of(triangulation.vertex_slots());
   for (std::size_t i = vertices.size(); i-- > 0;)
     point_of[slot(vertices[i])] = static_cast<std::uint32_t>(i);
-  Shape3<Coord> shape(options);
+  BasicShape3<Triangulation> shape(options);
   shape.restore(triangulation);
   ShapeSurface surface = shape.surface(triangulation);
   for (Face& face : surface.surface.faces)
@@ -182,9 +188,13 @@ ReconstructedSurface reconstruct_surface(std::span<const Point3> points,
                                          const SurfaceOptions& options) {
   check(points, options);
   if (options.method == SurfaceMethod::kShape) {
-    if (options.quantise_bits == 0) return compact(points, shape_faces(points, options.shape));
+    if (options.metric)
+      return compact(points,
+                     shape_faces(points, options.shape, EllipticalDelaunay3(*options.metric)));
+    if (options.quantise_bits == 0)
+      return compact(points, shape_faces<Delaunay3<double>>(points, options.shape));
     const auto integers = quantised(points, options.quantise_bits);
-    return compact(points, shape_faces<std::int32_t>(integers, options.shape));
+    return compact(points, shape_faces<Delaunay3<std::int32_t>>(integers, options.shape));
   }
   if (points.empty()) return {};
   const Box box = box_of(points);

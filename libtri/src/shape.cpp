@@ -6,6 +6,7 @@
 #include <string>
 
 #include "delaunay3/access.hpp"
+#include "elliptical/access3.hpp"
 #include "shape/criterion.hpp"
 #include "shape/flood.hpp"
 #include "shape/published.hpp"
@@ -13,43 +14,69 @@
 #include "shape/state.hpp"
 
 namespace terrace::tri {
+namespace {
 
 template <class Coord>
-struct Shape3<Coord>::Impl {
+const auto& mesh_of(const Delaunay3<Coord>& triangulation) {
+  return Delaunay3Access::mesh(triangulation);
+}
+const auto& mesh_of(const EllipticalDelaunay3& triangulation) {
+  return EllipticalDelaunay3Access::impl(triangulation).mesh;
+}
+
+/// Does some work in the metric of a triangulation.
+template <class Coord, class Work>
+void in_metric_of(const Delaunay3<Coord>&, const Work& work) {
+  work();
+}
+template <class Work>
+void in_metric_of(const EllipticalDelaunay3& triangulation, const Work& work) {
+  const spatial::EllipticalKernel::Scope scope(
+      EllipticalDelaunay3Access::impl(triangulation).metric);
+  work();
+}
+
+}  // namespace
+
+template <class Triangulation>
+struct BasicShape3<Triangulation>::Impl {
   ShapeOptions options;
   shape::State state;
 
   template <class Work>
-  void with_criterion(const Work& work) const {
-    if (options.criterion == ShapeCriterion::kGabriel) {
-      work(shape::Gabriel{});
-    } else {
-      work(shape::EdgeLength{options.edge_factor});
-    }
+  void with_criterion(const Triangulation& triangulation, const Work& work) const {
+    in_metric_of(triangulation, [&] {
+      if (options.criterion == ShapeCriterion::kGabriel) {
+        work(shape::Gabriel{});
+      } else {
+        work(shape::EdgeLength{options.edge_factor});
+      }
+    });
   }
 };
 
-template <class Coord>
-Shape3<Coord>::Shape3(const ShapeOptions& options) : impl_(std::make_unique<Impl>()) {
+template <class Triangulation>
+BasicShape3<Triangulation>::BasicShape3(const ShapeOptions& options)
+    : impl_(std::make_unique<Impl>()) {
   if (!(std::isfinite(options.edge_factor) && options.edge_factor > 0.0))
     throw std::invalid_argument("the factor for edge lengths is " +
                                 std::to_string(options.edge_factor) +
                                 ", but must be positive and finite; 0.5 is usual");
   impl_->options = options;
 }
-template <class Coord>
-Shape3<Coord>::~Shape3() = default;
-template <class Coord>
-Shape3<Coord>::Shape3(Shape3&&) noexcept = default;
-template <class Coord>
-Shape3<Coord>& Shape3<Coord>::operator=(Shape3&&) noexcept = default;
+template <class Triangulation>
+BasicShape3<Triangulation>::~BasicShape3() = default;
+template <class Triangulation>
+BasicShape3<Triangulation>::BasicShape3(BasicShape3&&) noexcept = default;
+template <class Triangulation>
+BasicShape3<Triangulation>& BasicShape3<Triangulation>::operator=(BasicShape3&&) noexcept = default;
 
-template <class Coord>
-void Shape3<Coord>::restore(const Triangulation& triangulation) {
-  const auto& mesh = Delaunay3Access::mesh(triangulation);
+template <class Triangulation>
+void BasicShape3<Triangulation>::restore(const Triangulation& triangulation) {
+  const auto& mesh = mesh_of(triangulation);
   shape::State& state = impl_->state;
   const bool keep_vertices = impl_->options.keep_vertices;
-  impl_->with_criterion([&](const auto& criterion) {
+  impl_->with_criterion(triangulation, [&](const auto& criterion) {
     if (impl_->options.rule == ShapeRule::kFlood) {
       shape::flood(mesh, state, criterion);
       if (keep_vertices) shape::rescue(mesh, state);
@@ -59,42 +86,42 @@ void Shape3<Coord>::restore(const Triangulation& triangulation) {
   });
 }
 
-template <class Coord>
-void Shape3<Coord>::update(const Triangulation& triangulation,
-                           const typename Triangulation::Changes& changes) {
+template <class Triangulation>
+void BasicShape3<Triangulation>::update(const Triangulation& triangulation,
+                                        const typename Triangulation::Changes& changes) {
   if (impl_->options.rule != ShapeRule::kFlood) return restore(triangulation);
-  const auto& mesh = Delaunay3Access::mesh(triangulation);
-  impl_->with_criterion([&](const auto& criterion) {
+  const auto& mesh = mesh_of(triangulation);
+  impl_->with_criterion(triangulation, [&](const auto& criterion) {
     shape::update_flood(mesh, impl_->state, criterion, changes);
     if (impl_->options.keep_vertices) shape::rescue(mesh, impl_->state);
   });
 }
 
-template <class Coord>
-bool Shape3<Coord>::kept(TetrahedronId tetrahedron) const {
+template <class Triangulation>
+bool BasicShape3<Triangulation>::kept(TetrahedronId tetrahedron) const {
   const auto& of = impl_->state.of;
   return slot(tetrahedron) < of.size() && shape::is_kept(of[slot(tetrahedron)]);
 }
 
-template <class Coord>
-std::size_t Shape3<Coord>::kept_count() const {
+template <class Triangulation>
+std::size_t BasicShape3<Triangulation>::kept_count() const {
   return impl_->state.kept_count + impl_->state.rescued.size();
 }
 
-template <class Coord>
-std::size_t Shape3<Coord>::rescued_count() const {
+template <class Triangulation>
+std::size_t BasicShape3<Triangulation>::rescued_count() const {
   return impl_->state.rescued.size();
 }
 
-template <class Coord>
-std::vector<VertexId> Shape3<Coord>::lost_vertices() const {
+template <class Triangulation>
+std::vector<VertexId> BasicShape3<Triangulation>::lost_vertices() const {
   std::vector<VertexId> result;
   for (const std::uint32_t v : impl_->state.lost) result.push_back(VertexId{v});
   return result;
 }
 
-template <class Coord>
-std::vector<TetrahedronId> Shape3<Coord>::kept_tetrahedra() const {
+template <class Triangulation>
+std::vector<TetrahedronId> BasicShape3<Triangulation>::kept_tetrahedra() const {
   std::vector<TetrahedronId> result;
   result.reserve(kept_count());
   for (std::uint32_t t = 0; t < impl_->state.of.size(); ++t)
@@ -102,9 +129,9 @@ std::vector<TetrahedronId> Shape3<Coord>::kept_tetrahedra() const {
   return result;
 }
 
-template <class Coord>
-ShapeSurface Shape3<Coord>::surface(const Triangulation& triangulation) const {
-  const auto& mesh = Delaunay3Access::mesh(triangulation);
+template <class Triangulation>
+ShapeSurface BasicShape3<Triangulation>::surface(const Triangulation& triangulation) const {
+  const auto& mesh = mesh_of(triangulation);
   const auto& of = impl_->state.of;
   ShapeSurface result;
   std::vector<std::array<std::uint32_t, 3>>& faces = result.surface.faces;
@@ -131,9 +158,9 @@ ShapeSurface Shape3<Coord>::surface(const Triangulation& triangulation) const {
   return result;
 }
 
-template <class Coord>
-double Shape3<Coord>::volume(const Triangulation& triangulation) const {
-  const auto& mesh = Delaunay3Access::mesh(triangulation);
+template <class Triangulation>
+double BasicShape3<Triangulation>::volume(const Triangulation& triangulation) const {
+  const auto& mesh = mesh_of(triangulation);
   double sum = 0.0;
   for (std::uint32_t t = 0; t < impl_->state.of.size(); ++t) {
     if (!shape::is_kept(impl_->state.of[t])) continue;
@@ -146,20 +173,21 @@ double Shape3<Coord>::volume(const Triangulation& triangulation) const {
   return sum / 6;
 }
 
-template <class Coord>
-const ShapeOptions& Shape3<Coord>::options() const {
+template <class Triangulation>
+const ShapeOptions& BasicShape3<Triangulation>::options() const {
   return impl_->options;
 }
 
-template <class Coord>
-std::size_t Shape3<Coord>::memory_bytes() const {
+template <class Triangulation>
+std::size_t BasicShape3<Triangulation>::memory_bytes() const {
   const shape::State& s = impl_->state;
   std::size_t words = s.degree.capacity() + s.lost.capacity() + s.rescued.capacity() +
                       s.queue.capacity() + s.pending.capacity() + s.touched.capacity();
   return sizeof(Impl) + s.of.capacity() + words * sizeof(std::uint32_t);
 }
 
-template class Shape3<std::int32_t>;
-template class Shape3<double>;
+template class BasicShape3<Delaunay3<std::int32_t>>;
+template class BasicShape3<Delaunay3<double>>;
+template class BasicShape3<EllipticalDelaunay3>;
 
 }  // namespace terrace::tri

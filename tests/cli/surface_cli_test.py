@@ -123,11 +123,58 @@ class SurfaceTest(unittest.TestCase):
         self.assertTrue(rest.startswith(f'\nCELL_TYPES {cells}\n'.encode()))
         self.assertIn(f'\nPOINT_DATA {count}\nSCALARS level unsigned_char 1\n'.encode(), rest)
 
+    def write_metric(self, name, **region):
+        with open(self.path(name), 'w') as file:
+            json.dump({'regions': [region]}, file)
+        return 'elliptical:' + self.path(name)
+
+    def test_samples_of_a_stretched_torus_need_its_metric(self):
+        # Thirty times as far apart along one of the turned axes.
+        count, stretch, c, s = 3000, 30, 0.6, 0.8
+        with open(self.path('torus.xyz'), 'w') as file:
+            for i in range(count):
+                u, v = 2 * math.pi * (i * 0.6180339887498949 % 1), 2 * math.pi * i / count
+                r = 1 + 0.4 * math.cos(v)
+                x, y, z = r * math.cos(u), stretch * r * math.sin(u), 0.4 * math.sin(v)
+                file.write(f'{c * x - s * y} {s * x + c * y} {z}\n')
+        store = self.path('torus.terrace')
+        result = terrace('build', self.path('torus.xyz'), '-o', store)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        volume = 2 * math.pi ** 2 * 0.16 * stretch
+        by_angle = self.write_metric('angle.json', semi_axes=[1, stretch, 1],
+                                     angle=math.degrees(math.atan2(s, c)))
+        by_rotation = self.write_metric('rotation.json', semi_axes=[1, 1, stretch],
+                                        rotation=[[c, s, 0], [0, 0, 1], [-s, c, 0]])
+        for metric in (by_angle, by_rotation):
+            for options in ([], ['--criterion', 'edge:1'], ['--tetrahedra']):
+                out = self.path('torus.vtk' if '--tetrahedra' in options else 'torus.obj')
+                result = terrace('surface', store, '-o', out, '--json', '--force', '--metric', metric,
+                                 *options)
+                self.assertEqual(result.returncode, 0, result.stderr)
+                summary = json.loads(result.stdout)
+                self.assertTrue(summary['closed'])
+                self.assertAlmostEqual(summary['volume'], volume, delta=0.05 * volume)
+                if options == []:
+                    self.assertEqual((summary['vertices'], summary['euler_characteristic']), (count, 0))
+        plain = terrace('surface', store, '-o', self.path('torus.obj'), '--json', '--force')
+        self.assertGreater(abs(json.loads(plain.stdout)['volume'] - volume), 0.1 * volume)
+
+    def test_the_metric_of_a_sphere_changes_nothing(self):
+        metric = self.write_metric('sphere.json', semi_axes=[2, 2, 2], angle=0)
+        self.surface('plain.obj')
+        self.surface('metric.obj', '--metric', metric)
+        with open(self.path('plain.obj')) as plain, open(self.path('metric.obj')) as other:
+            self.assertEqual(plain.read(), other.read())
+
     def test_errors_are_one_line(self):
+        boxed = self.write_metric('boxed.json', box=[0, 0, 1, 1], semi_axes=[2, 1])
+        round_one = self.write_metric('round.json', semi_axes=[1, 1])
         out = self.path('none.ply')
         for code, options in ((2, ['--criterion', 'best']), (2, ['--criterion', 'edge:-1']),
                               (2, ['--criterion', 'gabriel:1']), (2, ['--tetrahedra']),
-                              (2, ['--level', 9]), (1, ['--memory', '1M'])):
+                              (2, ['--level', 9]), (1, ['--memory', '1M']), (2, ['--metric', boxed]),
+                              (2, ['--metric', 'squared']), (1, ['--metric', 'elliptical:none']),
+                              (2, ['--metric', round_one, '--criterion', 'alpha-wrap'])):
             result = terrace('surface', self.store, '-o', out, *options)
             self.assertEqual(result.returncode, code, result.stderr)
             self.assertEqual(len(result.stderr.splitlines()), 1, result.stderr)

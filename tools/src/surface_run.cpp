@@ -71,11 +71,11 @@ std::vector<stream::Point3> on_ground(const std::vector<stream::Point3>& positio
   return ground;
 }
 
+template <class Triangulation>
 void keep_tetrahedra(const std::vector<stream::Point3>& ground, const tri::SurfaceOptions& options,
-                     TriangleMesh points, SurfaceOutcome& outcome) {
-  tri::Delaunay3<double> triangulation;
+                     TriangleMesh points, Triangulation triangulation, SurfaceOutcome& outcome) {
   const std::vector<tri::VertexId> vertices = triangulation.build(ground, 2);
-  tri::Shape3<double> shape(options.shape);
+  tri::BasicShape3<Triangulation> shape(options.shape);
   shape.restore(triangulation);
   outcome.measures = tri::measure(shape.surface(triangulation).surface);
   // Of equal points the first stands for all.
@@ -122,6 +122,21 @@ tri::SurfaceOptions parse_criterion(const std::string& text) {
   return options;
 }
 
+std::optional<tri::LinearMap3> surface_metric(const MetricChoice& metric,
+                                              const tri::SurfaceOptions& options) {
+  if (metric.kind == MetricChoice::Kind::euclidean) return std::nullopt;
+  if (metric.kind != MetricChoice::Kind::elliptical) {
+    throw UsageError("a surface has the metric euclidean or elliptical:FILE, not " + metric.text);
+  }
+  if (options.method != tri::SurfaceMethod::kShape) {
+    throw UsageError("--metric is for --criterion gabriel and edge");
+  }
+  if (metric.has_boxes()) {
+    throw UsageError("--metric: a surface has one ellipsoid, so its region has no \"box\"");
+  }
+  return metric.regions.front().metric.map();
+}
+
 SurfaceOutcome surface_of_store(const stream::Store& store, const Detail& detail,
                                 const tri::SurfaceOptions& options, bool tetrahedra,
                                 std::uint64_t memory_bytes) {
@@ -133,7 +148,12 @@ SurfaceOutcome surface_of_store(const stream::Store& store, const Detail& detail
   const std::vector<stream::Point3> ground = on_ground(points.positions, store.schema());
   SurfaceOutcome outcome;
   if (tetrahedra) {
-    keep_tetrahedra(ground, options, std::move(points), outcome);
+    if (options.metric) {
+      keep_tetrahedra(ground, options, std::move(points), tri::EllipticalDelaunay3(*options.metric),
+                      outcome);
+    } else {
+      keep_tetrahedra(ground, options, std::move(points), tri::Delaunay3<double>(), outcome);
+    }
     return outcome;
   }
   tri::ReconstructedSurface surface = tri::reconstruct_surface(ground, options);

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,7 @@
 #include <terrace/tri/reconstruct.hpp>
 
 #include "detail.hpp"
+#include "metric_option.hpp"
 #include "scene.hpp"
 
 namespace terrace::tools {
@@ -17,6 +19,11 @@ namespace terrace::tools {
 /// What --criterion says: edge, edge:FACTOR, gabriel, advancing-front, alpha-wrap or
 /// alpha-wrap:ALPHA (metres). Throws: UsageError.
 tri::SurfaceOptions parse_criterion(const std::string& text);
+
+/// The one elliptical metric of a surface, between positions in metres; none where it is Euclidean.
+/// Throws: UsageError for another kind of metric, one with boxes, or with a method of CGAL's.
+std::optional<tri::LinearMap3> surface_metric(const MetricChoice& metric,
+                                              const tri::SurfaceOptions& options);
 
 /// A surface, or the tetrahedra inside it. Positions are in the store's CRS.
 struct SurfaceOutcome {

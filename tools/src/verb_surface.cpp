@@ -11,6 +11,7 @@
 #include "error.hpp"
 #include "library_call.hpp"
 #include "mesh_output.hpp"
+#include "metric_option.hpp"
 #include "output.hpp"
 #include "surface_run.hpp"
 #include "units.hpp"
@@ -38,13 +39,21 @@ class SurfaceCommand final : public Command {
                    "beside the others (0.5); or CGAL's advancing-front, alpha-wrap[:METRES]")
         ->capture_default_str()
         ->type_name("NAME");
+    app.add_option(
+           "--metric", metric_,
+           "of --criterion gabriel and edge: euclidean or elliptical:FILE, an ellipsoid for "
+           "samples that are denser in some directions than in others; see 'terrace cluster "
+           "--help'")
+        ->capture_default_str()
+        ->type_name("METRIC");
     app.add_flag("--tetrahedra", tetrahedra_, "write the tetrahedra inside instead");
-    not_yet(app, {"--metric", "--region-crs", "--to-crs"});
+    not_yet(app, {"--region-crs", "--to-crs"});
   }
 
   Summary run(const CommonOptions& common) override {
     const Stopwatch watch;
-    const tri::SurfaceOptions options = parse_criterion(criterion_);
+    tri::SurfaceOptions options = parse_criterion(criterion_);
+    options.metric = surface_metric(MetricChoice::parse(metric_), options);
     const bool vtk = output_.ends_with(".vtk");
     if (tetrahedra_ != vtk) throw UsageError("--tetrahedra and an output named .vtk go together");
     const stream::Store store = stream::Store::open(store_);
@@ -89,7 +98,8 @@ class SurfaceCommand final : public Command {
     return summary;
   }
 
-  std::string store_, output_, format_, level_ = "0", region_, criterion_ = "gabriel";
+  std::string store_, output_, format_, level_ = "0", region_, criterion_ = "gabriel",
+                                        metric_ = "euclidean";
   std::vector<std::string> focuses_;
   bool tetrahedra_ = false;
 };

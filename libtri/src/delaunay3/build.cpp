@@ -8,6 +8,7 @@
 #include <array>
 
 #include "double_kernel.hpp"
+#include "elliptical_kernel.hpp"
 #include "flat.hpp"
 #include "hilbert.hpp"
 #include "insert.hpp"
@@ -147,5 +148,7 @@ std::vector<VertexId> build(Mesh<Kernel>& mesh, std::span<const typename Kernel:
 template std::vector<VertexId> build(Mesh<IntKernel>&, std::span<const IntKernel::Point>, unsigned);
 template std::vector<VertexId> build(Mesh<DoubleKernel>&, std::span<const DoubleKernel::Point>,
                                      unsigned);
+template std::vector<VertexId> build(Mesh<EllipticalKernel>&,
+                                     std::span<const EllipticalKernel::Point>, unsigned);
 
 }  // namespace terrace::tri::spatial

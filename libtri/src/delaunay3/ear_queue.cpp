@@ -15,6 +15,7 @@
 #include <limits>
 
 #include "double_kernel.hpp"
+#include "elliptical_kernel.hpp"
 #include "int_kernel.hpp"
 #include "predicates.hpp"
 #include "wrap.hpp"
@@ -152,5 +153,6 @@ void fill_by_ears(Mesh<Kernel>& mesh, const typename Kernel::Point& removed) {
 
 template void fill_by_ears(Mesh<IntKernel>&, const IntKernel::Point&);
 template void fill_by_ears(Mesh<DoubleKernel>&, const DoubleKernel::Point&);
+template void fill_by_ears(Mesh<EllipticalKernel>&, const EllipticalKernel::Point&);
 
 }  // namespace terrace::tri::spatial

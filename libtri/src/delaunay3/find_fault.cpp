@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <sstream>
 
+#include "../elliptical/access3.hpp"
 #include "access.hpp"
 #include "flat.hpp"
 #include "predicates.hpp"
@@ -161,5 +162,11 @@ std::string find_fault(const Delaunay3<Coord>& triangulation) {
 
 template std::string find_fault(const Delaunay3<std::int32_t>&);
 template std::string find_fault(const Delaunay3<double>&);
+
+std::string find_fault(const EllipticalDelaunay3& triangulation) {
+  const auto& impl = EllipticalDelaunay3Access::impl(triangulation);
+  const EllipticalKernel::Scope scope(impl.metric);
+  return Inspection(impl.mesh).run();
+}
 
 }  // namespace terrace::tri

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "double_kernel.hpp"
+#include "elliptical_kernel.hpp"
 #include "int_kernel.hpp"
 #include "walk.hpp"
 
@@ -142,6 +143,7 @@ void make_first(Mesh<Kernel>& mesh, std::uint32_t apex) {
   template void make_first(Mesh<Kernel>&, std::uint32_t);
 TERRACE_INSTANTIATE(IntKernel)
 TERRACE_INSTANTIATE(DoubleKernel)
+TERRACE_INSTANTIATE(EllipticalKernel)
 #undef TERRACE_INSTANTIATE
 
 }  // namespace terrace::tri::spatial

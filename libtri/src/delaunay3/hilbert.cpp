@@ -10,6 +10,7 @@
 
 #include "../curve_sort.hpp"
 #include "double_kernel.hpp"
+#include "elliptical_kernel.hpp"
 #include "int_kernel.hpp"
 
 namespace terrace::tri::spatial {
@@ -145,5 +146,7 @@ Pool<std::uint32_t> hilbert_order(std::span<const typename Kernel::Point> points
 
 template Pool<std::uint32_t> hilbert_order<IntKernel>(std::span<const IntKernel::Point>);
 template Pool<std::uint32_t> hilbert_order<DoubleKernel>(std::span<const DoubleKernel::Point>);
+template Pool<std::uint32_t> hilbert_order<EllipticalKernel>(
+    std::span<const EllipticalKernel::Point>);
 
 }  // namespace terrace::tri::spatial

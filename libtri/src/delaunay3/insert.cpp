@@ -3,6 +3,7 @@
 
 #include "cavity_insert.hpp"
 #include "double_kernel.hpp"
+#include "elliptical_kernel.hpp"
 #include "flat.hpp"
 #include "int_kernel.hpp"
 
@@ -34,7 +35,10 @@ Inserted insert_point(Mesh<Kernel>& mesh, const typename Kernel::Point& p, std::
 
 template void insert_vertex(Mesh<IntKernel>&, std::uint32_t, std::uint32_t);
 template void insert_vertex(Mesh<DoubleKernel>&, std::uint32_t, std::uint32_t);
+template void insert_vertex(Mesh<EllipticalKernel>&, std::uint32_t, std::uint32_t);
 template Inserted insert_point(Mesh<IntKernel>&, const IntKernel::Point&, std::uint32_t);
 template Inserted insert_point(Mesh<DoubleKernel>&, const DoubleKernel::Point&, std::uint32_t);
+template Inserted insert_point(Mesh<EllipticalKernel>&, const EllipticalKernel::Point&,
+                               std::uint32_t);
 
 }  // namespace terrace::tri::spatial

@@ -13,6 +13,7 @@
 
 #include "cavity_insert.hpp"
 #include "double_kernel.hpp"
+#include "elliptical_kernel.hpp"
 #include "insert.hpp"
 #include "int_kernel.hpp"
 #include "part.hpp"
@@ -22,6 +23,19 @@ namespace terrace::tri::spatial {
 namespace {
 
 constexpr std::uint32_t kParts = 2;
+
+/// A thread that has this one's metric.
+template <class Kernel, class Work>
+std::thread in_thread(const Work& work) {
+  if constexpr (std::is_same_v<Kernel, EllipticalKernel>) {
+    return std::thread([work, &metric = EllipticalKernel::metric()] {
+      const EllipticalKernel::Scope scope(metric);
+      work();
+    });
+  } else {
+    return std::thread(work);
+  }
+}
 
 /// What one thread does.
 template <class Kernel>
@@ -107,7 +121,7 @@ class Round {
                            hint(0));
       Worker<Kernel> second(mesh_, Part(ranges_[1], base, kParts, 1, blocks, kNone), hint(1));
       if (threads > 1) {
-        std::thread other([&] { second.run(lists[1]); });
+        std::thread other = in_thread<Kernel>([&] { second.run(lists[1]); });
         first.run(lists[0]);
         other.join();
       } else {
@@ -212,9 +226,12 @@ void insert_in_parts(Mesh<Kernel>& mesh, std::uint32_t begin, std::uint32_t end,
 
 template void insert_slot(Mesh<IntKernel>&, std::uint32_t);
 template void insert_slot(Mesh<DoubleKernel>&, std::uint32_t);
+template void insert_slot(Mesh<EllipticalKernel>&, std::uint32_t);
 template void insert_in_parts(Mesh<IntKernel>&, std::uint32_t, std::uint32_t,
                               std::span<std::uint32_t>, unsigned);
 template void insert_in_parts(Mesh<DoubleKernel>&, std::uint32_t, std::uint32_t,
+                              std::span<std::uint32_t>, unsigned);
+template void insert_in_parts(Mesh<EllipticalKernel>&, std::uint32_t, std::uint32_t,
                               std::span<std::uint32_t>, unsigned);
 
 }  // namespace terrace::tri::spatial

@@ -5,6 +5,7 @@
 #include <bit>
 
 #include "double_kernel.hpp"
+#include "elliptical_kernel.hpp"
 #include "int_kernel.hpp"
 #include "star.hpp"
 #include "walk.hpp"
@@ -180,6 +181,7 @@ std::uint64_t hash(const Mesh<Kernel>& mesh) {
   template std::uint64_t hash(const Mesh<Kernel>&);
 TERRACE_INSTANTIATE(IntKernel)
 TERRACE_INSTANTIATE(DoubleKernel)
+TERRACE_INSTANTIATE(EllipticalKernel)
 #undef TERRACE_INSTANTIATE
 
 }  // namespace terrace::tri::spatial

@@ -7,6 +7,7 @@
 
 #include "double_kernel.hpp"
 #include "ear_queue.hpp"
+#include "elliptical_kernel.hpp"
 #include "flat.hpp"
 #include "hilbert.hpp"
 #include "int_kernel.hpp"
@@ -159,5 +160,6 @@ void remove_set(Mesh<Kernel>& mesh, std::span<const std::uint32_t> vertices) {
 
 template void remove_set(Mesh<IntKernel>&, std::span<const std::uint32_t>);
 template void remove_set(Mesh<DoubleKernel>&, std::span<const std::uint32_t>);
+template void remove_set(Mesh<EllipticalKernel>&, std::span<const std::uint32_t>);
 
 }  // namespace terrace::tri::spatial

@@ -16,6 +16,7 @@
 #include <limits>
 
 #include "double_kernel.hpp"
+#include "elliptical_kernel.hpp"
 #include "hole_filling.hpp"
 #include "int_kernel.hpp"
 #include "predicates.hpp"
@@ -54,7 +55,7 @@ class Wrapping {
       double low = kInfinity;
       double high = -kInfinity;
       for (std::size_t i = 1; i < count_; ++i) {
-        c[i] = static_cast<double>(hole_.point[i][k]);
+        c[i] = static_cast<double>(scanned(hole_.point[i])[k]);
         low = std::min(low, c[i]);
         high = std::max(high, c[i]);
       }
@@ -62,6 +63,12 @@ class Wrapping {
     }
     // Of any vector from vertex to vertex, rounded up.
     length_ = std::sqrt(square) * (1 + 0x1p-40);
+    if constexpr (kMapped) {
+      // Both ends of a vector are off by 9 u spread() times their distances from the first vertex.
+      const double spread = EllipticalKernel::metric().spread();
+      length_ *= 1 + 0x1p-20;
+      vector_error_ = spread < 0x1p28 ? 18.5 * kUnit * spread * length_ : kInfinity;
+    }
     if (hole_.power.size() < padded) {
       hole_.power.resize(padded);
       hole_.volume.resize(padded);
@@ -69,6 +76,15 @@ class Wrapping {
     }
     vertices_ = {hole_.x.data(), hole_.y.data(),     hole_.z.data(),
                  padded,         hole_.power.data(), hole_.volume.data()};
+  }
+
+  /// Where scan() sees a point: in an elliptical metric mapped to where it is the Euclidean one.
+  Point scanned(const Point& p) const {
+    if constexpr (kMapped) {
+      return EllipticalKernel::mapped(p, hole_.point[1]);
+    } else {
+      return p;
+    }
   }
 
   /// The vertex that the growing sphere meets first, or 0, the ghost.
@@ -149,8 +165,24 @@ class Wrapping {
     // Integers small enough make integers that are exact: 6 w^3 < 2^53.
     const bool exact = std::is_same_v<typename Kernel::Coord, std::int32_t> && length_ < 114'000;
     facet.volume_error = exact ? 0 : 16 * kUnit * lengths * length_;
+    return !kMapped || add_vector_errors(std::sqrt(ee) + std::sqrt(ff), lengths, normal, facet);
+  }
+
+  /// All vectors are wrong by d, vector_error_, besides. Let s be the sum of the lengths of e and
+  /// f. Then n is wrong by s d; r, of length k s |n| at most, by 1.5 s^2 d; so the diameter by (1.5
+  /// s^2 + 3 k s^2) d / |n|, first order, and k is 1 at least. False where that could be a large
+  /// part.
+  bool add_vector_errors(double s, double lengths, double normal, ScanFacet& facet) const {
+    const double d = 1.1 * vector_error_;
+    if (!(s * d < 0x1p-20 * normal)) return false;
+    const double k = lengths / normal;
+    const double diameter_error = 4.5 * k * s * (s / normal) * d;
+    facet.volume_error += (s * length_ + lengths) * d;
+    facet.power_error += (2 * length_ + k * s) * d + length_ * diameter_error;
     return true;
   }
+
+  static constexpr bool kMapped = std::is_same_v<Kernel, EllipticalKernel>;
 
   Mesh<Kernel>& mesh_;
   Hole<Point>& hole_;
@@ -158,6 +190,7 @@ class Wrapping {
   ScanVertices vertices_{};
   std::size_t count_ = 0;
   double length_ = 0;
+  double vector_error_ = 0;  ///< of vectors from vertex to vertex, where they are mapped
 };
 
 }  // namespace
@@ -176,7 +209,9 @@ void wrap_hole(Mesh<Kernel>& mesh) {
 
 template void wrap_rest(Mesh<IntKernel>&, HoleFilling<IntKernel>&);
 template void wrap_rest(Mesh<DoubleKernel>&, HoleFilling<DoubleKernel>&);
+template void wrap_rest(Mesh<EllipticalKernel>&, HoleFilling<EllipticalKernel>&);
 template void wrap_hole(Mesh<IntKernel>&);
 template void wrap_hole(Mesh<DoubleKernel>&);
+template void wrap_hole(Mesh<EllipticalKernel>&);
 
 }  // namespace terrace::tri::spatial

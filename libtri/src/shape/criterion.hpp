@@ -5,7 +5,9 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <type_traits>
 
+#include "../delaunay3/elliptical_kernel.hpp"
 #include "../delaunay3/mesh.hpp"
 #include "gabriel.hpp"
 
@@ -14,6 +16,11 @@
 
 namespace terrace::tri::shape {
 
+/// Whether the mesh is in an elliptical metric, that of the scope.
+template <class Mesh>
+inline constexpr bool is_elliptical =
+    std::is_same_v<typename Mesh::Kernel, spatial::EllipticalKernel>;
+
 /// A criterion answers whether the facet opposite to corner i of a tetrahedron is a boundary facet
 /// as seen from that tetrahedron.
 struct Gabriel {
@@ -21,8 +28,13 @@ struct Gabriel {
   bool boundary(const Mesh& mesh, const spatial::Tetrahedron& t, std::uint32_t i) const {
     const auto f = spatial::facet_of(t, i);
     const auto* vertex = mesh.vertex.data();
-    return !in_smallest_sphere(vertex[f[0]].point, vertex[f[1]].point, vertex[f[2]].point,
-                               vertex[t.corner[i]].point);
+    const auto &a = vertex[f[0]].point, &b = vertex[f[1]].point, &c = vertex[f[2]].point;
+    const auto& d = vertex[t.corner[i]].point;
+    if constexpr (is_elliptical<Mesh>) {
+      return !in_smallest_ellipsoid(a, b, c, d);
+    } else {
+      return !in_smallest_sphere(a, b, c, d);
+    }
   }
 };
 
@@ -43,6 +55,26 @@ inline double distance(const Vector3& a, const Vector3& b) {
   return std::sqrt(dot(d, d)) * 0x1p560;  // may be infinite, as the sum of such lengths would be
 }
 
+/// From a to b, in the metric mapped to where it is the Euclidean one.
+template <class Mesh>
+Vector3 edge(const Mesh&, const Vector3& a, const Vector3& b) {
+  if constexpr (is_elliptical<Mesh>) {
+    return spatial::EllipticalKernel::by_map(b, a);
+  } else {
+    return minus(b, a);
+  }
+}
+
+/// Of that.
+template <class Mesh>
+double edge_length(const Mesh& mesh, const Vector3& a, const Vector3& b) {
+  if constexpr (is_elliptical<Mesh>) {
+    return distance(edge(mesh, a, b), {});
+  } else {
+    return distance(a, b);
+  }
+}
+
 struct EdgeLength {
   double factor;
 
@@ -52,8 +84,9 @@ struct EdgeLength {
     std::array<Vector3, 3> p;
     for (std::size_t k = 0; k < 3; ++k) p[k] = to_doubles(mesh.vertex[f[k]].point);
     const Vector3 apex = to_doubles(mesh.vertex[t.corner[i]].point);
-    return sum({distance(p[0], p[1]), distance(p[1], p[2]), distance(p[2], p[0])}) <
-           factor * sum({distance(p[0], apex), distance(p[1], apex), distance(p[2], apex)});
+    const auto length = [&](const Vector3& a, const Vector3& b) { return edge_length(mesh, a, b); };
+    return sum({length(p[0], p[1]), length(p[1], p[2]), length(p[2], p[0])}) <
+           factor * sum({length(p[0], apex), length(p[1], apex), length(p[2], apex)});
   }
 
  private:

@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <type_traits>
 
+#include "../delaunay3/elliptical_kernel.hpp"
+
 /// Whether a point lies inside the smallest sphere that contains a triangle. Exact: doubles with a
 /// bound on their error, and exact numbers where the bound does not decide.
 
@@ -36,23 +38,22 @@ inline double largest(const Vector3& a) {
   return std::max({std::abs(a[0]), std::abs(a[1]), std::abs(a[2])});
 }
 
-/// d inside the smallest sphere of a, b, c.
-template <class Coord>
-bool in_smallest_sphere(const std::array<Coord, 3>& pa, const std::array<Coord, 3>& pb,
-                        const std::array<Coord, 3>& pc, const std::array<Coord, 3>& pd) {
-  const Vector3 origin = to_doubles(pa);
-  const Vector3 b = minus(to_doubles(pb), origin);
-  const Vector3 c = minus(to_doubles(pc), origin);
-  const Vector3 d = minus(to_doubles(pd), origin);
+/// Whether d lies inside the smallest sphere of the origin, b, c: 1, -1, or 0 where that is not
+/// known. The vectors are differences of doubles, and wrong by 9 u spread times their lengths
+/// besides.
+inline int filter_smallest_sphere(const Vector3& b, const Vector3& c, const Vector3& d,
+                                  double spread = 0.0) {
   const double m = std::max({largest(b), largest(c), largest(d)});
   // Within these limits no term below over- or underflows in a way that counts.
   if (!(m > 0x1p-120 && m < 0x1p160)) [[unlikely]]
-    return in_smallest_sphere_exactly(origin, to_doubles(pb), to_doubles(pc), to_doubles(pd));
+    return 0;
 
   // A sum of products of two differences of at most m: three for each of bb, cc and twice as many
   // for the rest; every product and partial sum is rounded, and so are differences of doubles. The
   // total of the absolute products is below 12 m^2 in every case, each off by at most 8 roundings.
-  const double bound2 = 12 * 8 * 0x1p-53 * (m * m);
+  // Scalar products of vectors wrong by e each, of at most 3^0.5 m, are off by 2 e 3^0.5 m; there
+  // are four.
+  const double bound2 = (12 * 8 + 240 * spread) * 0x1p-53 * (m * m);
   const double bb = dot(b, b), cc = dot(c, c), bc = dot(b, c);
   const double at_b = bb - bc, at_c = cc - bc;  // cosines at a, b and c but for a positive factor
   // The sphere on an edge, where the angle opposite to it is obtuse; the product of the vectors
@@ -68,21 +69,41 @@ bool in_smallest_sphere(const std::array<Coord, 3>& pa, const std::array<Coord, 
   } else if (bc > bound2 && at_b > bound2 && at_c > bound2) {
     // The circumcentre is w / (2 n^2), and d is inside its sphere where d^2 < 2 d w / (2 n^2). All
     // is a sum of products of six differences, of at most 108 m^6 together, each off by at most 24
-    // roundings.
+    // roundings. Three products of six vectors, each wrong by e: 18 e 3^2.5 m^5.
     const Vector3 n = cross(b, c);
     const Vector3 nb = cross(n, b), cn = cross(c, n);
     const double dw = cc * dot(d, nb) + bb * dot(d, cn);
     const double power = dd * dot(n, n) - dw;
-    const double bound6 = 108 * 24 * 0x1p-53 * (m * m * m) * (m * m * m);
-    if (power < -bound6) return true;
-    if (power > bound6) return false;
-    return in_smallest_sphere_exactly(origin, to_doubles(pb), to_doubles(pc), to_doubles(pd));
+    const double bound6 = (108 * 24 + 4800 * spread) * 0x1p-53 * (m * m * m) * (m * m * m);
+    return power < -bound6 ? 1 : power > bound6 ? -1 : 0;
   } else {
-    return in_smallest_sphere_exactly(origin, to_doubles(pb), to_doubles(pc), to_doubles(pd));
+    return 0;
   }
-  if (product < -bound2) return true;
-  if (product > bound2) return false;
+  return product < -bound2 ? 1 : product > bound2 ? -1 : 0;
+}
+
+/// d inside the smallest sphere of a, b, c.
+template <class Coord>
+bool in_smallest_sphere(const std::array<Coord, 3>& pa, const std::array<Coord, 3>& pb,
+                        const std::array<Coord, 3>& pc, const std::array<Coord, 3>& pd) {
+  const Vector3 origin = to_doubles(pa);
+  const int side = filter_smallest_sphere(
+      minus(to_doubles(pb), origin), minus(to_doubles(pc), origin), minus(to_doubles(pd), origin));
+  if (side != 0) [[likely]]
+    return side > 0;
   return in_smallest_sphere_exactly(origin, to_doubles(pb), to_doubles(pc), to_doubles(pd));
+}
+
+/// The same in the elliptical metric of the scope.
+inline bool in_smallest_ellipsoid(const Vector3& a, const Vector3& b, const Vector3& c,
+                                  const Vector3& d) {
+  using Kernel = spatial::EllipticalKernel;
+  const double spread = Kernel::metric().spread();
+  const int side = spread < 0x1p28
+                       ? filter_smallest_sphere(Kernel::mapped(b, a), Kernel::mapped(c, a),
+                                                Kernel::mapped(d, a), spread)
+                       : 0;
+  return side != 0 ? side > 0 : Kernel::in_smallest_sphere(a, b, c, d);
 }
 
 }  // namespace terrace::tri::shape

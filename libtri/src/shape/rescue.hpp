@@ -39,7 +39,7 @@ RescueKey rescue_key(const Mesh& mesh, std::uint32_t t) {
   for (std::size_t i = 0; i < 4; ++i) {
     const Vector3 p = to_doubles(mesh.vertex[key.corner[i]].point);
     for (std::size_t j = i + 1; j < 4; ++j) {
-      const Vector3 d = minus(p, to_doubles(mesh.vertex[key.corner[j]].point));
+      const Vector3 d = edge(mesh, to_doubles(mesh.vertex[key.corner[j]].point), p);
       key.longest2 = std::max(key.longest2, dot(d, d));
     }
   }

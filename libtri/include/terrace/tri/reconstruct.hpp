@@ -3,9 +3,11 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "terrace/tri/metric3.hpp"
 #include "terrace/tri/shape.hpp"
 #include "terrace/tri/surface.hpp"
 
@@ -34,6 +36,9 @@ struct SurfaceOptions {
   /// over the longest side of their box, faster; 24 is finer than a float. Of points that become
   /// one the first stands for all. The surface has the given coordinates in any case.
   unsigned quantise_bits = 0;
+  /// Of kShape: an elliptical metric in which the points are triangulated and the facets judged,
+  /// see EllipticalShape3. Not together with quantise_bits.
+  std::optional<LinearMap3> metric;
   /// Of kAdvancingFront, see CGAL: the larger, the rather a triangle is taken in spite of the
   /// radius of its sphere; and how much the surface may bend at an edge, in radians.
   double radius_ratio_bound = 5.0;
@@ -52,8 +57,9 @@ struct ReconstructedSurface {
 };
 
 /// Throws std::invalid_argument naming the index of a point that is not finite, or an option that
-/// is not in its range. CGAL's two methods construct points in doubles: they refuse coordinates
-/// beyond 1e100 in size and, unless all are equal, boxes whose sides are all below 1e-100.
+/// is not in its range (a metric with another method or with rounding among them). CGAL's two
+/// methods construct points in doubles: they refuse coordinates beyond 1e100 in size and, unless
+/// all are equal, boxes whose sides are all below 1e-100.
 ///
 /// kShape and kAdvancingFront give no faces where all points (after any rounding) are in one plane;
 /// kAlphaWrap gives none without points or where all are equal and alpha is 0. Duplicates do not

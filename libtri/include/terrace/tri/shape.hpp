@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "terrace/tri/delaunay3.hpp"
+#include "terrace/tri/elliptical3.hpp"
 #include "terrace/tri/surface.hpp"
 
 /// Restoring the non-convex shape of points scanned from a surface: of the Delaunay tetrahedra,
@@ -65,18 +66,17 @@ struct ShapeSurface {
 /// function of the point set and the options, whatever the triangulation's and this object's
 /// history.
 ///
-/// One byte per tetrahedron slot and four per vertex slot.
-template <class Coord>
-class Shape3 {
+/// One byte per tetrahedron slot and four per vertex slot. Triangulation: Delaunay3 or
+/// EllipticalDelaunay3; see the names below.
+template <class Triangulation>
+class BasicShape3 {
  public:
-  using Triangulation = Delaunay3<Coord>;
-
   /// Throws std::invalid_argument if edge_factor is not a positive finite number.
-  explicit Shape3(const ShapeOptions& options = {});
-  ~Shape3();
+  explicit BasicShape3(const ShapeOptions& options = {});
+  ~BasicShape3();
   /// A moved-from shape can only be destroyed or assigned to.
-  Shape3(Shape3&&) noexcept;
-  Shape3& operator=(Shape3&&) noexcept;
+  BasicShape3(BasicShape3&&) noexcept;
+  BasicShape3& operator=(BasicShape3&&) noexcept;
 
   /// From scratch. Flood: O(n) facet tests, about as many as there are removed tetrahedra times
   /// two, and O(m log m) for m tetrahedra at vertices that the flood has lost.
@@ -121,7 +121,18 @@ class Shape3 {
   std::unique_ptr<Impl> impl_;
 };
 
-extern template class Shape3<std::int32_t>;
-extern template class Shape3<double>;
+template <class Coord>
+using Shape3 = BasicShape3<Delaunay3<Coord>>;
+
+/// In an elliptical metric: the tetrahedra are those of the metric, smallest spheres are its
+/// smallest ellipsoids (exact), and lengths of edges, those that decide what is put back among
+/// them, are its lengths (in doubles, of differences mapped by the triangulation's map). So it is
+/// the shape of the mapped points: samples that are denser across the long axes than along them
+/// are as good as even ones.
+using EllipticalShape3 = BasicShape3<EllipticalDelaunay3>;
+
+extern template class BasicShape3<Delaunay3<std::int32_t>>;
+extern template class BasicShape3<Delaunay3<double>>;
+extern template class BasicShape3<EllipticalDelaunay3>;
 
 }  // namespace terrace::tri

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <memory>
+
+#include "double_kernel.hpp"
+#include "terrace/tri/metric3.hpp"
+
+/// Exact predicates in an elliptical metric, on the points as they are: nothing is mapped but
+/// differences inside the filters. Orientation is the same in all linear metrics; only spheres
+/// become ellipsoids and distances lengths of mapped vectors.
+
+namespace terrace::tri::spatial {
+
+/// A map M made ready for the predicates, which need M only by Q = M^T M.
+///
+/// Filters use the upper triangular R with R^T R = Q (times a power of two), its diagonal positive:
+/// it differs from M by a turn or a mirror, so sizes are those of M and turns are kept. Each of its
+/// entries is rounded from an exact one, within 5 u of itself, u = 2^-53. A difference mapped by it
+/// is then wrong by 9 u |R| |d| component by component (difference 1, entry 5, product 1, sums 2),
+/// and d = R^-1 m: so by 9 u spread() times the length of the mapped difference m.
+class EllipticalMetric {
+ public:
+  /// Requires a finite, invertible map.
+  explicit EllipticalMetric(const LinearMap3& map);
+
+  /// A bound of the norm of |R| |R^-1|: 1 for axes along those of the coordinates, else it grows
+  /// with the ratio of the longest semi-axis to the shortest. May be infinite.
+  [[nodiscard]] double spread() const { return spread_; }
+
+ private:
+  friend class EllipticalKernel;
+  struct Exact;
+  LinearMap3 map_;
+  double r00_ = 0, r01_ = 0, r02_ = 0, r11_ = 0, r12_ = 0, r22_ = 0;
+  double spread_ = 0;
+  double filter2_ = 0;  ///< see EllipticalKernel::Probe::side()
+  std::shared_ptr<const Exact> exact_;
+};
+
+/// The algorithms call kernels statically; so the metric that is meant is set per thread, by a
+/// Scope, for as long as a call takes.
+class EllipticalKernel : public DoubleKernel {
+ public:
+  class Scope {
+   public:
+    explicit Scope(const EllipticalMetric& metric) : before_(metric_) { metric_ = &metric; }
+    ~Scope() { metric_ = before_; }
+    Scope(const Scope&) = delete;
+    Scope& operator=(const Scope&) = delete;
+
+   private:
+    const EllipticalMetric* before_;
+  };
+  /// That of the scope, to be set in other threads as well.
+  static const EllipticalMetric& metric() { return *metric_; }
+
+  /// A point to be tested against many ellipsoids.
+  class Probe {
+   public:
+    explicit Probe(const Point& p) : x_{p[0], p[0]}, y_{p[1], p[1]}, z_{p[2], p[2]} {
+      const EllipticalMetric& m = *metric_;
+      r00_ = both(m.r00_), r01_ = both(m.r01_), r02_ = both(m.r02_);
+      r11_ = both(m.r11_), r12_ = both(m.r12_), r22_ = both(m.r22_);
+      filter2_ = m.filter2_;
+    }
+
+    /// Where the point lies with respect to the ellipsoid through four vertices in order: the
+    /// mapped differences meet the test of DoubleKernel.
+    [[gnu::always_inline]] Verdict side(const Vertex& a, const Vertex& b, const Vertex& c,
+                                        const Vertex& d) const {
+      const auto pairs = [](const Vertex& v, const Vertex& w, std::size_t k) {
+        return Pair{v.point[k], w.point[k]};
+      };
+      const Pair x01 = pairs(a, b, 0) - x_, x23 = pairs(c, d, 0) - x_;
+      const Pair y01 = pairs(a, b, 1) - y_, y23 = pairs(c, d, 1) - y_;
+      const Pair z01 = pairs(a, b, 2) - z_, z23 = pairs(c, d, 2) - z_;
+      const InSphere test = in_sphere_value(
+          {r00_ * x01 + r01_ * y01 + r02_ * z01, r00_ * x23 + r01_ * y23 + r02_ * z23,
+           r11_ * y01 + r12_ * z01, r11_ * y23 + r12_ * z23, r22_ * z01, r22_ * z23});
+      // Let L be the largest squared length of a mapped row. As in IntKernel the operations are
+      // wrong by 132 u L^2.5. By Hadamard a 3 x 3 minor is at most L^1.5; where each row is wrong
+      // by e, minors are by 3 e L, squares by 2 e L^0.5, the four products by 20 e L^2, and e is 9
+      // u spread L^0.5. So (160 + 200 spread) u L^2.5 bounds all. Sizes near underflow and overflow
+      // are left to the exact test.
+      const double fifth = test.largest * test.largest * test.largest * test.largest * test.largest;
+      if (test.value * test.value > filter2_ * fifth && fifth > 0x1p-900 && fifth < 0x1p900)
+          [[likely]]
+        return test.value > 0 ? Verdict::kIn : Verdict::kOut;
+      return Verdict::kOpen;
+    }
+
+   private:
+    static Pair both(double value) { return Pair{value, value}; }
+    Pair x_, y_, z_;
+    Pair r00_, r01_, r02_, r11_, r12_, r22_;
+    double filter2_;
+  };
+
+  /// > 0 where p lies inside the ellipsoid of the metric through a, b, c, d, which are in order; 0
+  /// where on it.
+  static int in_sphere(const Point& a, const Point& b, const Point& c, const Point& d,
+                       const Point& p);
+
+  /// < 0 where a is nearer to p than b.
+  static int compare_distance(const Point& p, const Point& a, const Point& b);
+
+  /// The sign of q(u, v), u from `from` to a and v from there to b: > 0 where the metric sees them
+  /// at an acute angle.
+  static int angle(const Point& from, const Point& a, const Point& b);
+
+  /// Whether d lies inside the smallest ellipsoid of the metric that contains the triangle a, b, c,
+  /// not on a line; d different from them. Exact.
+  static bool in_smallest_sphere(const Point& a, const Point& b, const Point& c, const Point& d);
+
+  /// The difference p - origin mapped by M, the same on every machine, rounded.
+  static Point by_map(const Point& p, const Point& origin) {
+    const LinearMap3& m = metric_->map_;
+    const double x = p[0] - origin[0], y = p[1] - origin[1], z = p[2] - origin[2];
+    return {m[0] * x + m[1] * y + m[2] * z, m[3] * x + m[4] * y + m[5] * z,
+            m[6] * x + m[7] * y + m[8] * z};
+  }
+
+  /// The difference p - origin mapped by R, wrong by 9 u spread() times its length.
+  static Point mapped(const Point& p, const Point& origin) {
+    const EllipticalMetric& m = *metric_;
+    const double x = p[0] - origin[0], y = p[1] - origin[1], z = p[2] - origin[2];
+    return {m.r00_ * x + m.r01_ * y + m.r02_ * z, m.r11_ * y + m.r12_ * z, m.r22_ * z};
+  }
+
+ private:
+  static constinit thread_local const EllipticalMetric* metric_;
+};
+
+}  // namespace terrace::tri::spatial
