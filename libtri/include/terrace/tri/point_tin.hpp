@@ -99,9 +99,10 @@ struct PointTin {
 /// Depends on the arguments alone. One thread. About n log n for n samples; 33 to 40 bytes per
 /// sample and about 80 per vertex besides the result.
 ///
-/// Throws std::invalid_argument naming the index of a coordinate or height that is not finite, of a
-/// frame vertex where the polygon is not convex, of a duplicate with kError; for options out of
-/// range or arrays of different lengths; std::length_error for more than 2^31 - 2 samples.
+/// Throws std::invalid_argument naming the index of a coordinate or height that is not finite or of
+/// a size above 1e100, of a frame vertex where the polygon is not convex, of a duplicate with
+/// kError; for options out of range or arrays of different lengths; std::length_error for more than
+/// 2^29 samples.
 [[nodiscard]] PointTin point_tin(std::span<const double> x, std::span<const double> y,
                                  std::span<const double> z, std::span<const Point3> frame,
                                  const PointTinOptions& options);
