@@ -66,8 +66,12 @@ bool Greedy::insert(std::uint32_t index, std::uint32_t triangle) {
   // Rounding may have dealt it to another list.
   if (!lattice_ && spot.triangle != triangle) move(index, triangle, spot.triangle);
   cavity_.dig(mesh_.triangles, spot.triangle, [&](const Triangle& t) {
-    return Kernel::in_circle(mesh_.place(t.corner[0]), mesh_.place(t.corner[1]),
-                             mesh_.place(t.corner[2]), p) > 0;
+    const Place2 a = mesh_.place(t.corner[0]);
+    const Place2 b = mesh_.place(t.corner[1]);
+    const Place2 c = mesh_.place(t.corner[2]);
+    if (delaunay_) return Kernel::in_circle(a, b, c, p) > 0;
+    return Kernel::orientation(a, b, p) >= 0 && Kernel::orientation(b, c, p) >= 0 &&
+           Kernel::orientation(c, a, p) >= 0;
   });
   mesh_.vertices.push_back(vertex);
   cavity_.fill(mesh_.triangles, mesh_.vertices.size() - 1,

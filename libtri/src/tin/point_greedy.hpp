@@ -21,6 +21,9 @@ class Greedy {
   Greedy(Mesh& mesh, double max_error, bool fixed_border, const std::optional<TinLattice>& lattice)
       : mesh_(mesh), bound_(max_error), fixed_border_(fixed_border), lattice_(lattice) {}
 
+  /// From now on a new vertex only cuts the triangles that contain it: for meshes that are not
+  /// Delaunay any more.
+  void stop_delaunay() { delaunay_ = false; }
   /// Puts all triangles with an error into the queue.
   void take_all();
   /// Inserts samples until none that can become a vertex exceeds the bound, or there are
@@ -40,6 +43,7 @@ class Greedy {
   Mesh& mesh_;
   double bound_;
   bool fixed_border_;
+  bool delaunay_ = true;
   std::optional<TinLattice> lattice_;
   ErrorBuckets queue_{1e-30F};
   Cavity cavity_;
