@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <span>
 
 #include "cavity.hpp"
 #include "error_queue.hpp"
@@ -24,8 +25,9 @@ class Greedy {
   /// From now on a new vertex only cuts the triangles that contain it: for meshes that are not
   /// Delaunay any more.
   void stop_delaunay() { delaunay_ = false; }
-  /// Puts all triangles with an error into the queue.
-  void take_all();
+  /// Puts triangles into the queue, which have an error. Their order is that of insertion among
+  /// nearly equal errors: memory is in the cache if neighbours are near each other.
+  void take(std::span<const std::uint32_t> triangles);
   /// Inserts samples until none that can become a vertex exceeds the bound, or there are
   /// max_vertices, or more than max_triangles.
   void run(std::size_t max_vertices, std::size_t max_triangles);

@@ -114,8 +114,7 @@ class Maker {
     for (const std::uint32_t step : kSteps) {
       const std::size_t listed = samples_.size() / step;
       if (step > 1 && listed < 1024) continue;
-      list_samples(mesh_, step, bound);
-      greedy.take_all();
+      greedy.take(list_samples(mesh_, step, bound).waiting);
       greedy.run(max_vertices, step > 1 ? listed / kSamplesPerTriangle : kUnlimited);
     }
   }
@@ -124,7 +123,7 @@ class Maker {
   void mend(Greedy& greedy, double bound, std::size_t max_vertices) {
     measured_ = list_samples(mesh_, 1, bound);
     while (measured_.to_mend > 0 && mesh_.vertices.size() < max_vertices) {
-      greedy.take_all();
+      greedy.take(measured_.waiting);
       greedy.run(max_vertices, kUnlimited);
       measured_ = list_samples(mesh_, 1, bound);
     }
