@@ -39,7 +39,8 @@ void Greedy::rescan(std::uint32_t triangle) {
 }
 
 void Greedy::take(std::span<const std::uint32_t> triangles) {
-  for (const std::uint32_t t : triangles) queue_.push(mesh_.triangles[t].error, t);
+  for (const std::uint32_t t : triangles)
+    if (mesh_.triangles[t].error > 0) queue_.push(mesh_.triangles[t].error, t);
 }
 
 void Greedy::run(std::size_t max_vertices, std::size_t max_triangles) {
