@@ -111,19 +111,14 @@ class Maker {
   void insert_greedily(Greedy& greedy, double bound, std::size_t max_vertices) {
     constexpr std::uint32_t kSteps[] = {64, 8, 1};
     constexpr std::size_t kSamplesPerTriangle = 8;
-    // Triangles that are finished before others are begun: so few that they and their samples stay
-    // in the cache.
-    constexpr std::size_t kTogether = 128;
+    // So few that they and their triangles stay in the cache.
+    constexpr std::size_t kTogether = 8192;
     for (const std::uint32_t step : kSteps) {
       const std::size_t listed = samples_.size() / step;
       if (step > 1 && listed < 1024) continue;
-      const std::vector<std::uint32_t> waiting = list_samples(mesh_, step, bound).waiting;
-      const std::size_t enough = step > 1 ? listed / kSamplesPerTriangle : kUnlimited;
-      const std::size_t group = step > 1 || max_vertices != kUnlimited ? waiting.size() : kTogether;
-      for (std::size_t begin = 0; begin < waiting.size(); begin += group) {
-        greedy.take(std::span(waiting).subspan(begin, std::min(group, waiting.size() - begin)));
-        greedy.run(max_vertices, enough);
-      }
+      const bool last = step == 1 && max_vertices == kUnlimited;
+      greedy.start(list_samples(mesh_, step, bound).waiting, last ? kTogether : samples_.size());
+      greedy.run(max_vertices, step > 1 ? listed / kSamplesPerTriangle : kUnlimited);
     }
   }
 
@@ -131,7 +126,7 @@ class Maker {
   void mend(Greedy& greedy, double bound, std::size_t max_vertices) {
     measured_ = list_samples(mesh_, 1, bound);
     while (measured_.to_mend > 0 && mesh_.vertices.size() < max_vertices) {
-      greedy.take(measured_.waiting);
+      greedy.start(measured_.waiting, samples_.size());
       greedy.run(max_vertices, kUnlimited);
       measured_ = list_samples(mesh_, 1, bound);
     }
