@@ -49,6 +49,7 @@ class ErrorBuckets {
       while (!bucket.empty()) {
         const std::uint32_t t = bucket.back();
         bucket.pop_back();
+        fetch_soon(triangles, bucket);
         if (triangles[t].error > 0 && bucket_of(triangles[t].error) == top_ - 1) return t;
       }
     }
@@ -62,6 +63,15 @@ class ErrorBuckets {
   }
   std::size_t bucket_of(float error) const {
     return std::max(octave_quarter(error), base_) - base_;
+  }
+
+  /// Brings those that are likely to be next, and their neighbours, into the cache.
+  static void fetch_soon(const Triangles& triangles, const std::vector<std::uint32_t>& bucket) {
+    const std::size_t size = bucket.size();
+    if (size < 8) return;
+    __builtin_prefetch(&triangles[bucket[size - 8]]);
+    for (const std::uint32_t next : triangles[bucket[size - 4]].next)
+      if (next != kNone) __builtin_prefetch(&triangles[next]);
   }
 
   template <class TileOf>

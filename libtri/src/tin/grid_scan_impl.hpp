@@ -299,11 +299,7 @@ template <class T, class Visit>
   }
 }
 
-template <class T>
-[[gnu::always_inline]] inline bool at(const GridCorner<T>& corner, std::int32_t x, std::int32_t y) {
-  return corner.x == x && corner.y == y;
-}
-
+/// Corners are never the worst: their errors are at most `slack`, which is at most `best`.
 template <class T>
 GridWorst<T> worst_in(const GridSamples<T>& samples, const GridCorner<T>& a, const GridCorner<T>& b,
                       const GridCorner<T>& c, T bound) {
@@ -322,21 +318,19 @@ GridWorst<T> worst_in(const GridSamples<T>& samples, const GridCorner<T>& a, con
       [&](typename K::Reals error, typename K::Ints inside, std::int32_t x0, std::int32_t y0,
           int width) __attribute__((always_inline)) {
         // NaN counts as greater.
-        unsigned hits =
+        const unsigned hits =
             bits_of((typename K::Ints)(~(error <= best - typename K::Reals{})) & inside);
-        if (__builtin_expect(hits == 0, 1)) return true;
-        for (; hits != 0; hits &= hits - 1) {
-          const int lane = __builtin_ctz(hits);
-          const std::int32_t x = x0 + (lane & (width - 1)), y = y0 + lane / width;
-          const T own = error[lane];
-          if (own != own) {
-            worst = {static_cast<T>(__builtin_inf()), 0};
-            return false;
-          }
-          if (!(own > best) || at(a, x, y) || at(b, x, y) || at(c, x, y)) continue;
-          best = own;
-          worst = {own, static_cast<std::uint32_t>(y) << 16 | static_cast<std::uint32_t>(x)};
+        if (hits == 0) return true;
+        if (bits_of((typename K::Ints)(error != error) & inside) != 0) {
+          worst = {static_cast<T>(__builtin_inf()), 0};
+          return false;
         }
+        const typename K::Reals own = (typename K::Reals)((typename K::Ints)error & inside);
+        best = K::greatest_lane(own);
+        const int lane =
+            __builtin_ctz(bits_of((typename K::Ints)(own == best - typename K::Reals{})));
+        const std::int32_t x = x0 + (lane & (width - 1)), y = y0 + lane / width;
+        worst = {best, static_cast<std::uint32_t>(y) << 16 | static_cast<std::uint32_t>(x)};
         return true;
       });
   return worst;
