@@ -124,7 +124,17 @@ void start_with_hull(Mesh& mesh) {
   candidates.erase(std::unique(candidates.begin(), candidates.end()), candidates.end());
   const std::vector<std::uint32_t> inner = hull_of(candidates, place);
   candidates.clear();
+  // Most are told at once: between four of the extremes, one in each quadrant about them.
+  const Sample& ne = samples[extreme[2]];
+  const Sample& nw = samples[extreme[6]];
+  const Sample& sw = samples[extreme[10]];
+  const Sample& se = samples[extreme[14]];
+  const Place2 low{std::max(nw.x, sw.x), std::max(sw.y, se.y)};
+  const Place2 high{std::min(ne.x, se.x), std::min(ne.y, nw.y)};
   for (std::uint32_t i = 0; i < count; ++i) {
+    const Sample& sample = samples[i];
+    if (sample.x > low[0] && sample.x < high[0] && sample.y > low[1] && sample.y < high[1])
+      continue;
     bool inside = inner.size() >= 3;
     for (std::size_t k = 0; k < inner.size() && inside; ++k)
       inside =
