@@ -59,17 +59,19 @@ class Checker {
         }
       }
       if (!(from <= to)) continue;
-      const auto first = static_cast<std::size_t>(std::ceil(from));
-      const auto last = static_cast<std::size_t>(to);  // rounded down
-      const std::size_t row = static_cast<std::size_t>(y) * window_.columns;
+      // Both are not negative. Signed numbers become doubles more quickly than unsigned ones.
+      auto first = static_cast<std::int64_t>(from);
+      if (static_cast<double>(first) < from) ++first;
+      const auto last = static_cast<std::int64_t>(to);
+      const std::int64_t row = static_cast<std::int64_t>(y) * window_.columns;
       const double rise_y = slope_y * (y - a[1]);
-      for (std::size_t x = first; x <= last; ++x) {
+      for (std::int64_t x = first; x <= last; ++x) {
         const auto column = static_cast<double>(x);
         const auto height = static_cast<double>(heights[x + row]);
         // Relative to a corner, so that nothing is lost where heights are large.
         const double error = std::fabs((height - a[2]) - (rise_y + slope_x * (column - a[0])));
         std::uint8_t& flag = flags[x + row];
-        if (!std::isfinite(error)) {
+        if (!std::isfinite(height)) {
           if (flag == 0 && inside(a, b, c, column, y)) {
             flag = 1;
             ++check_.nodata_covered;
