@@ -13,9 +13,6 @@ void GridSurface<T>::remove() {
   PolygonFill fill;
   Corner ring[kMaxRing];
   Corner removed{};
-  const auto cost_of = [&](std::size_t i, std::size_t m, std::size_t j, T limit) {
-    return cost(ring[i], ring[m], ring[j], removed, limit);
-  };
   const auto left = [&](std::size_t i, std::size_t m, std::size_t j) {
     return turn(ring[i], ring[m], ring[j]) > 0;
   };
@@ -23,8 +20,9 @@ void GridSurface<T>::remove() {
     return ground_.in_circle(ring[i], ring[m], ring[j], ring[p]);
   };
   const auto within = [&](std::size_t i, std::size_t m, std::size_t j) {
-    return cost_of(i, m, j, scan_bound_) <= scan_bound_;
+    return fits(ring[i], ring[m], ring[j], removed);
   };
+  AnyFill any(within, fill);
   for (std::uint32_t vertex = 0; vertex < corners_.size(); ++vertex) {
     const Corner& own = corners_[vertex];
     if (triangle_of[vertex] == kNone || own.x == 0 || own.y == 0 || own.x == columns_ - 1 ||
@@ -34,7 +32,7 @@ void GridSurface<T>::remove() {
     removed = own;
     for (std::size_t i = 0; i < size; ++i) ring[i] = corners_[star.ring(i)];
     const bool possible = (fill_delaunay(size, left, inside, fill) && star.all_of(fill, within)) ||
-                          (size > 3 && fill_least_worst(size, scan_bound_, cost_of, fill));
+                          (size > 3 && any.find(size));
     if (possible) star.replace(triangles_, fill, triangle_of, vertex);
   }
 }

@@ -4,16 +4,16 @@
 
 namespace {
 
-using Mask16 = std::int32_t __attribute__((vector_size(64)));
-using Mask8 = std::int64_t __attribute__((vector_size(64)));
+using Ints16 = std::int32_t __attribute__((vector_size(64)));
+using Ints8 = std::int64_t __attribute__((vector_size(64)));
 
 /// A bit for each lane that is true.
-[[gnu::always_inline]] inline unsigned bits_of(Mask16 mask) {
+[[gnu::always_inline]] inline unsigned bits_of(Ints16 mask) {
   unsigned bits = 0;
   for (int i = 0; i < 16; ++i) bits |= static_cast<unsigned>(mask[i] & 1) << i;
   return bits;
 }
-[[gnu::always_inline]] inline unsigned bits_of(Mask8 mask) {
+[[gnu::always_inline]] inline unsigned bits_of(Ints8 mask) {
   unsigned bits = 0;
   for (int i = 0; i < 8; ++i) bits |= static_cast<unsigned>(mask[i] & 1) << i;
   return bits;
@@ -21,12 +21,12 @@ using Mask8 = std::int64_t __attribute__((vector_size(64)));
 
 }  // namespace
 
-#include "grid_scan_impl.hpp"
+#include "grid_scan_masks.hpp"
 
 namespace terrace::tri::tin {
 
-const GridScan<float> kGridScanFloatPortable{worst_in<float>, most_in<float>};
-const GridScan<double> kGridScanDoublePortable{worst_in<double>, most_in<double>};
+const GridScan<float> kGridScanFloatPortable{worst_in<float>, within_in<float>};
+const GridScan<double> kGridScanDoublePortable{worst_in<double>, within_in<double>};
 
 #ifdef TERRACE_TRI_X86
 

@@ -45,11 +45,9 @@ struct GridScan {
   /// none. Infinite: there is a sample without data; the place is any.
   GridWorst<T> (*worst)(const GridSamples<T>& samples, const GridCorner<T>& a,
                         const GridCorner<T>& b, const GridCorner<T>& c, T bound);
-  /// An upper bound of the errors, which is at most `bound`, or infinity if that exceeds `limit`
-  /// (<= bound) or data is missing.
-  T(*most)
-  (const GridSamples<T>& samples, const GridCorner<T>& a, const GridCorner<T>& b,
-   const GridCorner<T>& c, T bound, T limit);
+  /// 1: all errors are certainly at most `bound`; 0: perhaps not, or data is missing; or kUnsure.
+  int (*within)(const GridSamples<T>& samples, const GridCorner<T>& a, const GridCorner<T>& b,
+                const GridCorner<T>& c, T bound);
 };
 
 enum class GridPath : std::uint8_t { kPortable, kAvx2, kAvx512 };

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-// Included once for each instruction set, with functions bits_of() for masks of 16 ints and of 8
-// longs defined before: what is here must not be shared between objects, so nothing has a name
-// outside its object, and no function of another header is called.
+// Included once for each instruction set, after what masks of lanes are there: functions
+// not_negative(), at_most(), both(), kept(), beyond(), equal(). What is here must not be shared
+// between objects, so nothing has a name outside its object, and no function of another header is
+// called.
 #include "grid_scan.hpp"
 
 namespace terrace::tri::tin {
@@ -200,9 +201,10 @@ template <int kWidth, class T, class Visit>
     const Reals down = static_cast<T>(y - a.y) + rows;
     const Reals difference = (z - base) - (rise_x + plane.gradient_y * down);
     const Reals error = (Reals)((Ints)difference & K::kSignless);
-    Ints inside = (edge[0] | edge[1] | edge[2]) >= 0;
+    auto inside = not_negative(edge[0] | edge[1] | edge[2]);
     if (plane.clipped)
-      inside &= (lane_x <= Int{plane.max_x - plane.min_x}) & (lane_y <= Int{plane.max_y - y});
+      inside = both(inside, both(at_most(lane_x, Int{plane.max_x - plane.min_x} - Ints{}),
+                                 at_most(lane_y, Int{plane.max_y - y} - Ints{})));
     if (!visit(error, inside, plane.min_x, y, kWidth)) return;
     for (int i = 0; i < 3; ++i) edge[i] += step[i];
     row += samples.stride * kHeight;
@@ -275,7 +277,7 @@ template <class T, class Visit>
       const Reals across = static_cast<T>(x - a.x) + columns;
       const Reals difference = (z - base) - (plane.gradient_x * across + rise_y);
       const Reals error = (Reals)((Ints)difference & K::kSignless);
-      const Ints inside = lane <= Int{right - x};
+      const auto inside = at_most(lane, Int{right - x} - Ints{});
       if (!visit(error, inside, x, y, K::kLanes)) return;
     }
   }
@@ -304,6 +306,7 @@ template <class T>
 GridWorst<T> worst_in(const GridSamples<T>& samples, const GridCorner<T>& a, const GridCorner<T>& b,
                       const GridCorner<T>& c, T bound) {
   using K = Kernel<T>;
+  using Reals = typename K::Reals;
   const Plane<T> plane(samples, a, b, c, bound);
   GridWorst<T> worst{0, 0};
   if (plane.empty) return worst;
@@ -315,53 +318,46 @@ GridWorst<T> worst_in(const GridSamples<T>& samples, const GridCorner<T>& a, con
   }
   scan_triangle(
       samples, plane, a, b, c,
-      [&](typename K::Reals error, typename K::Ints inside, std::int32_t x0, std::int32_t y0,
-          int width) __attribute__((always_inline)) {
-        // NaN counts as greater.
-        const unsigned hits =
-            bits_of((typename K::Ints)(~(error <= best - typename K::Reals{})) & inside);
-        if (hits == 0) return true;
-        if (bits_of((typename K::Ints)(error != error) & inside) != 0) {
-          worst = {static_cast<T>(__builtin_inf()), 0};
-          return false;
-        }
-        const typename K::Reals own = (typename K::Reals)((typename K::Ints)error & inside);
-        best = K::greatest_lane(own);
-        const int lane =
-            __builtin_ctz(bits_of((typename K::Ints)(own == best - typename K::Reals{})));
-        const std::int32_t x = x0 + (lane & (width - 1)), y = y0 + lane / width;
-        worst = {best, static_cast<std::uint32_t>(y) << 16 | static_cast<std::uint32_t>(x)};
-        return true;
-      });
+      [&](Reals error, auto inside, std::int32_t x0, std::int32_t y0, int width)
+          __attribute__((always_inline)) {
+            // NaN counts as greater.
+            if (beyond(error, best - Reals{}, inside) == 0) return true;
+            if (beyond(error, static_cast<T>(__builtin_inf()) - Reals{}, inside) != 0) {
+              worst = {static_cast<T>(__builtin_inf()), 0};
+              return false;
+            }
+            const Reals own = kept(error, inside);
+            best = K::greatest_lane(own);
+            const int lane = __builtin_ctz(equal(own, best - Reals{}));
+            const std::int32_t x = x0 + (lane & (width - 1)), y = y0 + lane / width;
+            worst = {best, static_cast<std::uint32_t>(y) << 16 | static_cast<std::uint32_t>(x)};
+            return true;
+          });
   return worst;
 }
 
 template <class T>
-T most_in(const GridSamples<T>& samples, const GridCorner<T>& a, const GridCorner<T>& b,
-          const GridCorner<T>& c, T bound, T limit) {
+int within_in(const GridSamples<T>& samples, const GridCorner<T>& a, const GridCorner<T>& b,
+              const GridCorner<T>& c, T bound) {
   using K = Kernel<T>;
   using Reals = typename K::Reals;
   const Plane<T> plane(samples, a, b, c, bound);
-  if (plane.empty) return 0;
-  T allowed = limit - plane.slack;
+  if (plane.empty) return 1;
+  T allowed = bound - plane.slack;
   if constexpr (K::kLanes == 16) {
-    if (!(plane.slack <= bound * 0x1p-8F)) return T{kUnsure};
+    if (!(plane.slack <= bound * 0x1p-8F)) return kUnsure;
   } else {
-    if (bound < 2 * plane.slack) allowed = greatest(allowed, plane.slack);
+    allowed = greatest(allowed, plane.slack);
   }
-  Reals most{};
   bool within = true;
   scan_triangle(
       samples, plane, a, b, c,
-      [&](Reals error, typename K::Ints inside, std::int32_t, std::int32_t, int)
+      [&](Reals error, auto inside, std::int32_t, std::int32_t, int)
           __attribute__((always_inline)) {
-            const Reals own = (Reals)((typename K::Ints)error & inside);
-            within = bits_of((typename K::Ints)(~(own <= allowed - Reals{}))) == 0;
-            most = own > most ? own : most;
+            within = beyond(error, allowed - Reals{}, inside) == 0;
             return within;
           });
-  if (!within) return static_cast<T>(__builtin_inf());
-  return least(static_cast<T>(K::greatest_lane(most) + plane.slack), bound);
+  return within ? 1 : 0;
 }
 
 }  // namespace

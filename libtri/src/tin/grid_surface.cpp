@@ -121,12 +121,11 @@ GridWorst<T> GridSurface<T>::worst(const Corner& a, const Corner& b, const Corne
 }
 
 template <class T>
-T GridSurface<T>::cost(const Corner& a, const Corner& b, const Corner& c, const Corner& removed,
-                       T limit) const {
-  constexpr T kNever = std::numeric_limits<T>::infinity();
+bool GridSurface<T>::fits(const Corner& a, const Corner& b, const Corner& c,
+                          const Corner& removed) const {
   const std::int64_t twice = turn(a, b, c);
-  if (twice <= 0 || !ground_.wide(a, b, c, twice)) return kNever;
-  if (gaps_ && !sees_all(a, b, c)) return gaps_->mixed(a, b, c) ? kNever : 0;
+  if (twice <= 0 || !ground_.wide(a, b, c, twice)) return false;
+  if (gaps_ && !sees_all(a, b, c)) return !gaps_->mixed(a, b, c);
   // Most that fail do so at the very vertex.
   const std::int64_t at_a = turn(b, c, removed), at_b = turn(c, a, removed);
   const std::int64_t at_c = twice - at_a - at_b;
@@ -136,13 +135,12 @@ T GridSurface<T>::cost(const Corner& a, const Corner& b, const Corner& c, const 
     const double sum = static_cast<double>(at_a) * static_cast<double>(a.z - own) +
                        static_cast<double>(at_b) * static_cast<double>(b.z - own) +
                        static_cast<double>(at_c) * static_cast<double>(c.z - own);
-    if (!(std::fabs(sum) <= bound_ * static_cast<double>(twice))) return kNever;
+    if (!(std::fabs(sum) <= bound_ * static_cast<double>(twice))) return false;
   }
-  const T found = scan_.most(samples_, a, b, c, scan_bound_, limit);
-  if (found != T{kUnsure}) return found;
+  const int found = scan_.within(samples_, a, b, c, scan_bound_);
+  if (found != kUnsure) return found != 0;
   const CarefulWorst sure = careful_worst(samples_, a, b, c);
-  if (sure.missing || sure.error > std::max(bound_ - sure.slack, sure.slack)) return kNever;
-  return std::min(static_cast<T>(sure.error), scan_bound_);
+  return !sure.missing && sure.error <= std::max(bound_ - sure.slack, sure.slack);
 }
 
 template <class T>

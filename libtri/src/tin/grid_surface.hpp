@@ -59,9 +59,9 @@ class GridSurface {
   /// Sets the triangle's place and error.
   void judge(Triangle& triangle) const;
   GridWorst<T> worst(const Corner& a, const Corner& b, const Corner& c) const;
-  /// An upper bound of the errors of a triangle that is to help to fill the star of `removed`, or
-  /// infinity: above `limit`, turned right, too thin, mixed.
-  T cost(const Corner& a, const Corner& b, const Corner& c, const Corner& removed, T limit) const;
+  /// Whether a triangle may help to fill the star of `removed`: within the bound,
+  /// counter-clockwise, not thin, not mixed.
+  bool fits(const Corner& a, const Corner& b, const Corner& c, const Corner& removed) const;
   void fit_vertex(std::uint32_t vertex, std::uint32_t first);
 
   std::int32_t columns_, rows_;

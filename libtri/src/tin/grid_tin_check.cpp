@@ -12,9 +12,6 @@
 namespace terrace::tri {
 namespace {
 
-// Bits for a sample.
-constexpr std::uint8_t kCovered = 1;
-
 template <class T>
 class Checker {
  public:
@@ -41,6 +38,11 @@ class Checker {
     const double right = std::min(last_column, std::max({a[0], b[0], c[0]}) + tolerance_);
     const double top = std::max(0.0, std::ceil(std::min({a[1], b[1], c[1]}) - tolerance_));
     const double bottom = std::min(last_row, std::max({a[1], b[1], c[1]}) + tolerance_);
+    // Copies, as a write to a flag might change members.
+    double most = most_, squares = squares_;
+    std::size_t covered = check_.covered;
+    const T* const heights = window_.heights.data();
+    std::uint8_t* const flags = flags_.data();
     for (double y = top; y <= bottom; ++y) {
       double from = left, to = right;
       for (int i = 0; i < 3; ++i) {
@@ -57,31 +59,35 @@ class Checker {
         }
       }
       if (!(from <= to)) continue;
-      const auto first = static_cast<std::size_t>(std::ceil(from));
-      const auto last = static_cast<std::size_t>(to);  // rounded down
-      const std::size_t row = static_cast<std::size_t>(y) * window_.columns;
+      // Both are not negative. Signed numbers become doubles more quickly than unsigned ones.
+      auto first = static_cast<std::int64_t>(from);
+      if (static_cast<double>(first) < from) ++first;
+      const auto last = static_cast<std::int64_t>(to);
+      const std::int64_t row = static_cast<std::int64_t>(y) * window_.columns;
       const double rise_y = slope_y * (y - a[1]);
-      for (std::size_t x = first; x <= last; ++x) {
+      for (std::int64_t x = first; x <= last; ++x) {
         const auto column = static_cast<double>(x);
-        const auto height = static_cast<double>(window_.heights[row + x]);
+        const auto height = static_cast<double>(heights[x + row]);
         // Relative to a corner, so that nothing is lost where heights are large.
         const double error = std::fabs((height - a[2]) - (rise_y + slope_x * (column - a[0])));
-        std::uint8_t& flags = flags_[row + x];
-        if (error <= most_ && (flags & kCovered) != 0) continue;
+        std::uint8_t& flag = flags[x + row];
         if (!std::isfinite(height)) {
-          if ((flags & kCovered) == 0 && inside(a, b, c, column, y)) {
-            flags = kCovered;
+          if (flag == 0 && inside(a, b, c, column, y)) {
+            flag = 1;
             ++check_.nodata_covered;
           }
           continue;
         }
-        most_ = std::max(most_, error);
-        if ((flags & kCovered) != 0) continue;
-        flags = kCovered;
-        ++check_.covered;
-        squares_ += error * error;
+        most = error > most ? error : most;
+        const bool first_time = flag == 0;
+        flag = 1;
+        covered += first_time ? 1 : 0;
+        squares += first_time ? error * error : 0.0;
       }
     }
+    most_ = most;
+    squares_ = squares;
+    check_.covered = covered;
     return area;
   }
 
@@ -120,7 +126,7 @@ class Checker {
 
   const GridWindow<T>& window_;
   double tolerance_;
-  std::vector<std::uint8_t> flags_;
+  std::vector<std::uint8_t> flags_;  ///< of samples in a triangle
   GridTinCheck check_;
   double most_ = 0, squares_ = 0;
 };
