@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+
+#include "mesh.hpp"
+
+/// The triangles around a vertex and what may take their place.
+
+namespace terrace::tri::tin {
+
+/// Larger stars are left alone: filling one takes time in proportion to the third power.
+inline constexpr std::size_t kMaxRing = 16;
+
+/// How a polygon is cut into triangles: the triangle on the chord from i to j (i < j, the polygon's
+/// part i..j on its other side) has its third corner at apex[i][j]. The chord of the whole is the
+/// last side, from 0 to size - 1.
+struct PolygonFill {
+  std::array<std::array<std::uint8_t, kMaxRing>, kMaxRing> apex;
+};
+
+/// Of the ways to cut a polygon of `size` corners that is given counter-clockwise into triangles,
+/// the one whose worst triangle is the least bad. `worst(i, m, j, limit)`, for corners i < m < j:
+/// what the triangle costs, or anything above `limit`, if it is more than that or not
+/// counter-clockwise or not wanted. False: there is none of at most `limit`. Dynamic programming,
+/// O(size^3) calls at most: G. T. Klincsek, "Minimal triangulations of polygonal domains", 1980.
+///
+/// Triangles that are all counter-clockwise do not overlap, as the polygon winds round each point
+/// once only.
+template <class Cost, class Worst>
+bool fill_least_worst(std::size_t size, Cost limit, const Worst& worst, PolygonFill& fill) {
+  constexpr Cost kNever = std::numeric_limits<Cost>::infinity();
+  std::array<std::array<Cost, kMaxRing>, kMaxRing> cost;
+  for (std::size_t i = 0; i + 1 < size; ++i) cost[i][i + 1] = 0;
+  for (std::size_t length = 2; length < size; ++length) {
+    for (std::size_t i = 0; i + length < size; ++i) {
+      const std::size_t j = i + length;
+      Cost best = kNever;
+      for (std::size_t m = i + 1; m < j; ++m) {
+        const Cost parts = cost[i][m] > cost[m][j] ? cost[i][m] : cost[m][j];
+        if (parts > limit || parts >= best) continue;
+        const Cost allowed = best < limit ? best : limit;
+        const Cost own = worst(i, m, j, allowed);
+        if (own > allowed) continue;
+        const Cost all = own > parts ? own : parts;
+        if (all >= best) continue;
+        best = all;
+        fill.apex[i][j] = static_cast<std::uint8_t>(m);
+      }
+      cost[i][j] = best;
+    }
+  }
+  return cost[0][size - 1] <= limit;
+}
+
+/// The Delaunay triangles of a polygon that is the star of a vertex of a Delaunay triangulation.
+/// `left(i, m, j)`: whether the corners turn left; `inside(i, m, j, p)`: whether corner p lies
+/// strictly in the circle of those three. In other triangulations it may find none (false) or one
+/// that is not Delaunay. O(size^2).
+template <class Left, class Inside>
+bool fill_delaunay(std::size_t size, const Left& left, const Inside& inside, PolygonFill& fill) {
+  std::array<std::array<std::uint8_t, 2>, kMaxRing> stack;
+  std::size_t waiting = 0;
+  stack[waiting++] = {0, static_cast<std::uint8_t>(size - 1)};
+  while (waiting > 0) {
+    const auto [i, j] = stack[--waiting];
+    std::size_t best = kMaxRing;
+    for (std::size_t m = i + 1U; m < j; ++m)
+      if (left(i, m, j) && (best == kMaxRing || inside(i, best, j, m))) best = m;
+    if (best == kMaxRing) return false;
+    const auto apex = static_cast<std::uint8_t>(best);
+    fill.apex[i][j] = apex;
+    if (apex - i > 1) stack[waiting++] = {i, apex};
+    if (j - apex > 1) stack[waiting++] = {apex, j};
+  }
+  return true;
+}
+
+/// A vertex's triangles in counter-clockwise order.
+class Star {
+ public:
+  /// False: the vertex lies on the hull or has more than kMaxRing neighbours.
+  bool gather(const Triangles& triangles, std::uint32_t vertex, std::uint32_t first) {
+    size_ = 0;
+    std::uint32_t t = first;
+    do {
+      if (size_ == kMaxRing) return false;
+      const Triangle& triangle = triangles[t];
+      const unsigned at = corner_of(triangle, vertex);
+      ring_[size_] = triangle.corner[after(at)];
+      outer_[size_] = triangle.next[at];
+      slot_[size_++] = t;
+      t = triangle.next[after(at)];
+      if (t == kNone) return false;
+    } while (t != first);
+    for (std::size_t i = 0; i < size_; ++i)
+      if (outer_[i] != kNone)
+        back_[i] = static_cast<std::uint8_t>(side_to(triangles[outer_[i]], slot_[i]));
+    return true;
+  }
+
+  std::size_t size() const { return size_; }
+  std::uint32_t ring(std::size_t i) const { return ring_[i]; }
+  std::uint32_t triangle(std::size_t i) const { return slot_[i]; }  ///< with ring(i), ring(i + 1)
+
+  /// Calls visit(i, m, j) for each triangle of a fill.
+  template <class Visit>
+  bool all_of(const PolygonFill& fill, const Visit& visit) const {
+    return all_of(fill, 0, size_ - 1, visit);
+  }
+
+  /// Puts the triangles of a fill in the place of the vertex's. Two slots are empty afterwards.
+  /// `triangle_of` has a triangle of each vertex and is kept up to date.
+  void replace(Triangles& triangles, const PolygonFill& fill,
+               std::vector<std::uint32_t>& triangle_of, std::uint32_t vertex) {
+    used_ = 0;
+    const std::uint32_t last = put(triangles, fill, triangle_of, 0, size_ - 1);
+    link(triangles, last, 1, size_ - 1);
+    for (; used_ < size_; ++used_) triangles[slot_[used_]].corner[0] = kNone;
+    triangle_of[vertex] = kNone;
+  }
+
+ private:
+  template <class Visit>
+  bool all_of(const PolygonFill& fill, std::size_t i, std::size_t j, const Visit& visit) const {
+    if (j - i < 2) return true;
+    const std::size_t m = fill.apex[i][j];
+    return visit(i, m, j) && all_of(fill, i, m, visit) && all_of(fill, m, j, visit);
+  }
+
+  /// Side `side` of triangle t is side i of the ring.
+  void link(Triangles& triangles, std::uint32_t t, unsigned side, std::size_t i) {
+    triangles[t].next[side] = outer_[i];
+    if (outer_[i] != kNone) triangles[outer_[i]].next[back_[i]] = t;
+  }
+
+  /// Corners are (ring i, ring apex, ring j), so side 1 is the chord.
+  std::uint32_t put(Triangles& triangles, const PolygonFill& fill,
+                    std::vector<std::uint32_t>& triangle_of, std::size_t i, std::size_t j) {
+    const std::size_t m = fill.apex[i][j];
+    const std::uint32_t t = slot_[used_++];
+    triangles[t] = {{ring_[i], ring_[m], ring_[j]}, {kNone, kNone, kNone}, 0, 0.0F};
+    for (const std::uint32_t vertex : triangles[t].corner) triangle_of[vertex] = t;
+    attach(triangles, fill, triangle_of, t, 2, i, m);
+    attach(triangles, fill, triangle_of, t, 0, m, j);
+    return t;
+  }
+
+  void attach(Triangles& triangles, const PolygonFill& fill,
+              std::vector<std::uint32_t>& triangle_of, std::uint32_t t, unsigned side,
+              std::size_t i, std::size_t j) {
+    if (j - i == 1) return link(triangles, t, side, i);
+    const std::uint32_t part = put(triangles, fill, triangle_of, i, j);
+    triangles[t].next[side] = part;
+    triangles[part].next[1] = t;
+  }
+
+  std::size_t size_ = 0;
+  std::size_t used_ = 0;
+  std::array<std::uint32_t, kMaxRing> ring_;
+  std::array<std::uint32_t, kMaxRing> outer_;  ///< across the side from ring i to ring i + 1
+  std::array<std::uint8_t, kMaxRing> back_;    ///< its side towards the star
+  std::array<std::uint32_t, kMaxRing> slot_;
+};
+
+}  // namespace terrace::tri::tin
