@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Error-bounded surfaces of 4.2 million irregular points over fractal terrain (midpoint
+// displacement of exponent 0.8; a small one with TERRACE_BENCH_SMALL), one thread, at errors that
+// leave about 1 % and about half of the samples as vertices of the greedy surface. The counters
+// tell vertices, triangles, and the largest error as the independent measurement finds it (its time
+// is a benchmark of its own).
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <random>
+#include <vector>
+
+#include <benchmark/benchmark.h>
+
+#include "terrace/tri/point_tin.hpp"
+
+namespace {
+
+using terrace::tri::measure_surface;
+using terrace::tri::point_tin;
+using terrace::tri::PointTin;
+using terrace::tri::PointTinOptions;
+using terrace::tri::PointTinQuality;
+using terrace::tri::TinErrors;
+
+const bool kSmall = std::getenv("TERRACE_BENCH_SMALL") != nullptr;
+const std::size_t kSide = kSmall ? 65 : 2049;
+const std::size_t kCount = kSmall ? 4000 : 4'200'000;
+
+double unit(std::mt19937_64& random) { return static_cast<double>(random() >> 11) * 0x1p-53; }
+
+/// Diamond and square steps, heights of amplitude 1000 at the largest step.
+std::vector<double> terrain() {
+  std::vector<double> height(kSide * kSide, 0.0);
+  std::mt19937_64 random(1);
+  double amplitude = 1000;
+  for (std::size_t step = kSide - 1; step > 1; step /= 2, amplitude *= std::exp2(-0.8)) {
+    const std::size_t half = step / 2;
+    const auto at = [&](std::size_t i, std::size_t j) -> double& { return height[j * kSide + i]; };
+    for (std::size_t j = half; j < kSide; j += step)
+      for (std::size_t i = half; i < kSide; i += step)
+        at(i, j) = (at(i - half, j - half) + at(i + half, j - half) + at(i - half, j + half) +
+                    at(i + half, j + half)) /
+                       4 +
+                   amplitude * (2 * unit(random) - 1);
+    for (std::size_t j = 0; j < kSide; j += half) {
+      for (std::size_t i = (j / half + 1) % 2 * half; i < kSide; i += step) {
+        double sum = 0;
+        double count = 0;
+        const auto add = [&](std::size_t a, std::size_t b) {
+          sum += at(a, b);
+          ++count;
+        };
+        if (i >= half) add(i - half, j);
+        if (i + half < kSide) add(i + half, j);
+        if (j >= half) add(i, j - half);
+        if (j + half < kSide) add(i, j + half);
+        at(i, j) = sum / count + amplitude * (2 * unit(random) - 1);
+      }
+    }
+  }
+  return height;
+}
+
+struct Input {
+  std::vector<double> x, y, z;
+};
+const Input& input() {
+  static const Input made = [] {
+    const std::vector<double> height = terrain();
+    std::mt19937_64 random(2);
+    Input result;
+    const auto extent = static_cast<double>(kSide - 1);
+    for (std::size_t k = 0; k < kCount; ++k) {
+      const double x = unit(random) * extent;
+      const double y = unit(random) * extent;
+      const auto i = static_cast<std::size_t>(x);
+      const auto j = static_cast<std::size_t>(y);
+      const double u = x - static_cast<double>(i);
+      const double v = y - static_cast<double>(j);
+      const double* row = &height[j * kSide + i];
+      result.x.push_back(10 * x);
+      result.y.push_back(10 * y);
+      result.z.push_back((1 - v) * ((1 - u) * row[0] + u * row[1]) +
+                         v * ((1 - u) * row[kSide] + u * row[kSide + 1]));
+    }
+    return result;
+  }();
+  return made;
+}
+
+PointTin make(double max_error, PointTinQuality quality) {
+  PointTinOptions options;
+  options.max_error = max_error;
+  options.quality = quality;
+  return point_tin(input().x, input().y, input().z, {}, options);
+}
+
+void mesh(benchmark::State& state, double max_error, PointTinQuality quality) {
+  input();
+  PointTin tin;
+  for (auto _ : state) tin = make(max_error, quality);
+  const TinErrors errors =
+      measure_surface(input().x, input().y, input().z, tin.vertices, tin.triangles);
+  if (errors.largest > max_error || errors.uncovered > 0) state.SkipWithError("bound broken");
+  state.counters["vertices"] = static_cast<double>(tin.vertices.size());
+  state.counters["triangles"] = static_cast<double>(tin.triangles.size());
+  state.counters["largest"] = errors.largest;
+  state.counters["rms"] = errors.rms;
+}
+
+void measure(benchmark::State& state, double max_error) {
+  const PointTin tin = make(max_error, PointTinQuality::kGreedy);
+  for (auto _ : state)
+    benchmark::DoNotOptimize(
+        measure_surface(input().x, input().y, input().z, tin.vertices, tin.triangles));
+}
+
+constexpr double kOnePercent = 18;
+constexpr double kHalf = 0.7;
+#define TIN(name, ...) BENCHMARK_CAPTURE(mesh, name, __VA_ARGS__)->Unit(benchmark::kMillisecond)
+TIN(greedy_one_percent, kOnePercent, PointTinQuality::kGreedy);
+TIN(greedy_half, kHalf, PointTinQuality::kGreedy);
+BENCHMARK_CAPTURE(measure, one_percent, kOnePercent)->Unit(benchmark::kMillisecond);
+
+}  // namespace
+
+BENCHMARK_MAIN();

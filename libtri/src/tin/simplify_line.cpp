@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "lattice.hpp"
+
+namespace terrace::tri {
+namespace {
+
+using tin::on_lattice;
+using tin::to_whole;
+using tin::valid;
+
+void check(std::span<const double> t, std::span<const double> heights, double max_error,
+           const std::optional<TinLattice>& lattice) {
+  if (t.size() != heights.size())
+    throw std::invalid_argument("simplify_line: arrays of different lengths");
+  if (!(max_error >= 0)) throw std::invalid_argument("simplify_line: max_error is below 0");
+  if (lattice && !valid(*lattice))
+    throw std::invalid_argument("simplify_line: a lattice needs a step above 0");
+  for (std::size_t i = 0; i < t.size(); ++i) {
+    if (!std::isfinite(t[i]) || !std::isfinite(heights[i]))
+      throw std::invalid_argument("simplify_line: sample " + std::to_string(i) + " is not finite");
+    if (i > 0 && t[i] < t[i - 1])
+      throw std::invalid_argument("simplify_line: sample " + std::to_string(i) +
+                                  " is before the one in front of it");
+  }
+}
+
+LineVertex vertex_of(double t, double height, std::size_t sample,
+                     const std::optional<TinLattice>& lattice) {
+  const auto number = static_cast<std::uint32_t>(sample);
+  if (!lattice) return {t, height, number};
+  return {to_whole(t), on_lattice(*lattice, height), number};
+}
+
+/// Beyond the ends, which rounding may leave, the height is that of the end.
+double height_at(const LineVertex& a, const LineVertex& b, double t) {
+  if (!(t > a.t)) return a.height;
+  if (!(t < b.t)) return b.height;
+  return a.height + (b.height - a.height) * ((t - a.t) / (b.t - a.t));
+}
+
+/// Samples [first, last) between two vertices.
+struct Piece {
+  LineVertex from;
+  LineVertex to;
+  std::size_t first;
+  std::size_t last;
+};
+
+}  // namespace
+
+SimplifiedLine simplify_line(std::span<const double> t, std::span<const double> heights,
+                             double max_error, const std::optional<TinLattice>& lattice) {
+  check(t, heights, max_error, lattice);
+  SimplifiedLine result;
+  // Of samples at one place the first stands.
+  std::vector<std::size_t> samples;
+  for (std::size_t i = 0; i < t.size(); ++i)
+    if (i == 0 || t[i] != t[i - 1]) samples.push_back(i);
+  if (samples.empty()) return result;
+  const auto vertex = [&](std::size_t k) {
+    return vertex_of(t[samples[k]], heights[samples[k]], samples[k], lattice);
+  };
+  const LineVertex begin = vertex(0);
+  const LineVertex end = vertex(samples.size() - 1);
+  result.vertices.push_back(begin);
+  // Greatest error first splits every piece by itself, so the order of pieces does not matter.
+  std::vector<Piece> pieces{{begin, end, 0, samples.size()}};
+  while (!pieces.empty()) {
+    const Piece piece = pieces.back();
+    pieces.pop_back();
+    double worst = 0;
+    double worst_free = max_error;
+    std::size_t at = samples.size();
+    LineVertex middle;
+    for (std::size_t k = piece.first; k < piece.last; ++k) {
+      const std::size_t i = samples[k];
+      const double error = std::abs(height_at(piece.from, piece.to, t[i]) - heights[i]);
+      worst = std::max(worst, error);
+      if (!(error > worst_free)) continue;
+      const LineVertex candidate = vertex(k);
+      if (!(candidate.t > piece.from.t && candidate.t < piece.to.t)) continue;
+      worst_free = error;
+      middle = candidate;
+      at = k;
+    }
+    if (at == samples.size()) {
+      result.largest_error = std::max(result.largest_error, worst);
+      if (piece.to.t > result.vertices.back().t) result.vertices.push_back(piece.to);
+      continue;
+    }
+    // Rounding may put the vertex to either side of its own sample.
+    std::size_t cut = piece.first;
+    while (cut < piece.last && t[samples[cut]] <= middle.t) ++cut;
+    pieces.push_back({middle, piece.to, cut, piece.last});
+    pieces.push_back({piece.from, middle, piece.first, cut});
+  }
+  return result;
+}
+
+}  // namespace terrace::tri
