@@ -105,7 +105,7 @@ std::vector<GeoKey> GeoKeys::range(std::uint16_t first, std::uint16_t last) cons
     if (within(key)) found.push_back({.key = key, .text = text});
   }
   std::stable_sort(found.begin(), found.end(),
-            [](const GeoKey& a, const GeoKey& b) { return a.key < b.key; });
+                   [](const GeoKey& a, const GeoKey& b) { return a.key < b.key; });
   return found;
 }
 

@@ -125,9 +125,9 @@ class EpsgTest(unittest.TestCase):
                 system.close()
                 continue
             places = sample(system.area)
-            meridian = meridians[code]
-            # PROJ's geographic system counts from its own meridian.
-            expected += system.transform([(p[0] - meridian, p[1]) for p in places])
+            meridian, unit = meridians[code]
+            # PROJ's geographic system counts from its own meridian in its own unit.
+            expected += system.transform([((p[0] - meridian) / unit, p[1] / unit) for p in places])
             asked += [(code, p) for p in places]
             lines += [f'EPSG:{code} {p[0]!r} {p[1]!r}' for p in places]
             system.close()
@@ -137,7 +137,7 @@ class EpsgTest(unittest.TestCase):
         answers = result.stdout.splitlines()
         self.assertEqual(len(answers), len(asked))
         units = {code: unit for code, unit in projected_units()}
-        worst, compared, bad = 0.0, 0, {}
+        worst, compared, bad, lost = 0.0, 0, {}, {}
         for (code, place), (x, y), answer in zip(asked, expected, answers):
             u, v, longitude, latitude = map(float, answer.split())
             if not abs(x) < 1e29:
@@ -148,13 +148,14 @@ class EpsgTest(unittest.TestCase):
                 bad.setdefault(code, []).append((place, (x, y), (u, v)))
             worst = max(worst, difference)
             turn = (longitude - place[0] + 180) % 360 - 180
-            # Nanometres on the ground are 1e-14 degrees; 0.01 mm is asked.
-            self.assertLess(abs(latitude - place[1]), 1e-10, (code, place, answer))
-            if abs(place[1]) < 89:
-                self.assertLess(abs(turn), 1e-9, (code, place, answer))
+            # A millionth of a millimetre is 1e-14 degrees; 0.01 mm is asked.
+            if abs(latitude - place[1]) > 1e-10 or (abs(place[1]) < 89 and abs(turn) > 1e-9):
+                lost.setdefault(code, []).append((place, (longitude, latitude)))
         for code, cases in bad.items():
             print(code, len(cases), cases[0], file=sys.stderr)
-        self.assertEqual(len(bad), 0)
+        for code, cases in lost.items():
+            print(code, 'there and back', len(cases), cases[0], file=sys.stderr)
+        self.assertEqual(len(bad) + len(lost), 0)
         self.assertGreater(compared, 0.98 * PER_CODE * len(codes))
         print(f'{compared} places of {len(codes)} codes, at most {worst * 1e3:.6f} mm off')
 
@@ -176,7 +177,7 @@ def prime_meridians():
     base = {}
     for row in rows_of('Geographic'):
         fields = row.split(',')
-        base[int(fields[0])] = float(fields[2])
+        base[int(fields[0])] = float(fields[2]), float(fields[3])
     return {int(r.split(',')[0]): base[int(r.split(',')[1])] for r in rows_of('Projected')}
 
 

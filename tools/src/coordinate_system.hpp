@@ -80,8 +80,8 @@ class CoordinateSystem {
   std::shared_ptr<const Shift> shift_;
 };
 
-/// x, y of `from` to x, y of `to`, in place; nothing is done where they are the same. Systems of one
-/// datum need no shift. Throws: as to_geographic.
+/// x, y of `from` to x, y of `to`, in place; nothing is done where they are the same. Systems of
+/// one datum need no shift. Throws: as to_geographic.
 void transform(const CoordinateSystem& from, const CoordinateSystem& to, std::span<Point2> places);
 
 /// "dx,dy,dz" or "dx,dy,dz,rx,ry,rz,ds" of `--towgs84`. Throws: UsageError.

@@ -50,8 +50,7 @@ std::optional<CrsDefinition> definition_of_codes(std::string_view text) {
 
 /// A definition without a code gets the one that means the same, if there is exactly one.
 void find_code(CrsDefinition& definition) {
-  if (definition.epsg != 0 || !definition.method || definition.base_epsg == 0 ||
-      definition.shift) {
+  if (definition.epsg != 0 || !definition.method || definition.base_epsg == 0 || definition.shift) {
     return;
   }
   const EpsgProjected* only = nullptr;
@@ -60,8 +59,7 @@ void find_code(CrsDefinition& definition) {
       continue;
     }
     const EpsgConversion& conversion = *epsg_conversion(row.conversion);
-    if (conversion.method != *definition.method ||
-        conversion.parameters != definition.parameters) {
+    if (conversion.method != *definition.method || conversion.parameters != definition.parameters) {
       continue;
     }
     if (only != nullptr) return;
@@ -117,17 +115,16 @@ std::optional<CoordinateSystem> CoordinateSystem::of(const stream::Crs& crs,
       definition = definition_of_wkt(wkt);
       if (crs.epsg != 0 && definition.epsg != 0 &&
           definition_of_epsg(crs.epsg).epsg != definition.epsg) {
-        throw CrsError("its CRS is EPSG:" + std::to_string(crs.epsg) + " by code and EPSG:" +
-                           std::to_string(definition.epsg) + " by WKT",
+        throw CrsError("its CRS is EPSG:" + std::to_string(crs.epsg) +
+                           " by code and EPSG:" + std::to_string(definition.epsg) + " by WKT",
                        "say which is meant with --crs EPSG:n");
       }
     } else if (crs.epsg != 0) {
       definition = definition_of_epsg(crs.epsg);
       if (!crs.geo_keys.empty()) check_geo_keys(crs, definition);
-    } else if (std::any_of(crs.geo_keys.begin(), crs.geo_keys.end(),
-                           [](const stream::GeoKey& key) {
-                             return key.key >= 2048 && key.key < 4096 && !key.values.empty();
-                           })) {
+    } else if (std::any_of(crs.geo_keys.begin(), crs.geo_keys.end(), [](const stream::GeoKey& key) {
+                 return key.key >= 2048 && key.key < 4096 && !key.values.empty();
+               })) {
       definition = definition_of_geo_keys(crs);
     } else if (crs.vertical_epsg != 0) {
       // Heights alone do not say where they are; a wrong code is an error all the same.
@@ -142,8 +139,8 @@ std::optional<CoordinateSystem> CoordinateSystem::of(const stream::Crs& crs,
     }
     const auto unit = metres_in_unit(crs.horizontal_unit);
     if (definition.method && unit && std::abs(*unit / definition.metres_per_unit - 1) > 1e-9) {
-      throw CrsError("its CRS EPSG:" + std::to_string(definition.epsg) +
-                         " contradicts its unit, " + crs.horizontal_unit,
+      throw CrsError("its CRS EPSG:" + std::to_string(definition.epsg) + " contradicts its unit, " +
+                         crs.horizontal_unit,
                      "say what is meant with --crs EPSG:n");
     }
     if (const auto height = metres_in_unit(crs.vertical_unit)) {

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "crs_geo_keys.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -7,7 +9,6 @@
 #include <utility>
 
 #include "crs_definition.hpp"
-#include "crs_geo_keys.hpp"
 #include "crs_names.hpp"
 #include "epsg_table.hpp"
 #include "portable_math.hpp"
@@ -25,31 +26,22 @@ using P = ProjectionParameters;
 
 struct KeyOfParameter {
   std::uint16_t key;
-  double P::* member;
+  double P::*member;
   enum class Kind { angle, length, scale } kind;
 };
 using Kind = KeyOfParameter::Kind;
 
 // Several keys set one member; a file has one of them.
 constexpr std::array<KeyOfParameter, 19> kParameters{{
-    {3078, &P::parallel1, Kind::angle},
-    {3079, &P::parallel2, Kind::angle},
-    {3080, &P::longitude, Kind::angle},
-    {3081, &P::latitude, Kind::angle},
-    {3082, &P::false_easting, Kind::length},
-    {3083, &P::false_northing, Kind::length},
-    {3084, &P::longitude, Kind::angle},
-    {3085, &P::latitude, Kind::angle},
-    {3086, &P::false_easting, Kind::length},
-    {3087, &P::false_northing, Kind::length},
-    {3088, &P::longitude, Kind::angle},
-    {3089, &P::latitude, Kind::angle},
-    {3090, &P::false_easting, Kind::length},
-    {3091, &P::false_northing, Kind::length},
-    {3092, &P::scale, Kind::scale},
-    {3093, &P::scale, Kind::scale},
-    {3094, &P::azimuth, Kind::angle},
-    {3095, &P::longitude, Kind::angle},
+    {3078, &P::parallel1, Kind::angle},      {3079, &P::parallel2, Kind::angle},
+    {3080, &P::longitude, Kind::angle},      {3081, &P::latitude, Kind::angle},
+    {3082, &P::false_easting, Kind::length}, {3083, &P::false_northing, Kind::length},
+    {3084, &P::longitude, Kind::angle},      {3085, &P::latitude, Kind::angle},
+    {3086, &P::false_easting, Kind::length}, {3087, &P::false_northing, Kind::length},
+    {3088, &P::longitude, Kind::angle},      {3089, &P::latitude, Kind::angle},
+    {3090, &P::false_easting, Kind::length}, {3091, &P::false_northing, Kind::length},
+    {3092, &P::scale, Kind::scale},          {3093, &P::scale, Kind::scale},
+    {3094, &P::azimuth, Kind::angle},        {3095, &P::longitude, Kind::angle},
     {3096, &P::skew, Kind::angle},
 }};
 
@@ -170,8 +162,7 @@ void read_base(const Keys& keys, CrsDefinition& definition) {
       if (const auto inverse = keys.number(2059)) {
         definition.ellipsoid.inverse_flattening = *inverse;
       } else if (const auto minor = keys.number(2058)) {
-        definition.ellipsoid.inverse_flattening =
-            *minor == *major ? 0 : *major / (*major - *minor);
+        definition.ellipsoid.inverse_flattening = *minor == *major ? 0 : *major / (*major - *minor);
       } else {
         fail("its ellipsoid has a size and no shape (GeoKeys 2058, 2059)");
       }
@@ -237,9 +228,9 @@ ProjectionMethod method_of(const Keys& keys, const ProjectionParameters& p) {
     case 1024:
       return M::web_mercator;
     default:
-      fail(code == 0 ? "its projection has no method (GeoKey 3075)"
-                     : "its projection method " + std::to_string(code) +
-                           " (GeoKey 3075) is not known");
+      fail(code == 0
+               ? "its projection has no method (GeoKey 3075)"
+               : "its projection method " + std::to_string(code) + " (GeoKey 3075) is not known");
   }
 }
 
@@ -324,7 +315,7 @@ void check_geo_keys(const stream::Crs& crs, const CrsDefinition& definition) {
       return false;
     }();
     if (!value || !known) continue;
-    const double given = *value * (parameter.kind == Kind::angle ? angle
+    const double given = *value * (parameter.kind == Kind::angle                 ? angle
                                    : parameter.kind == Kind::length && unit != 0 ? unit
                                                                                  : 1.0);
     const double meant = definition.parameters.*parameter.member;

@@ -32,7 +32,9 @@ constexpr ParameterName kTwoParallels[] = {
     {&P::false_northing, Kind::length, "Northing at false origin", 8827}};
 constexpr ParameterName kPolarB[] = {
     {&P::parallel1, Kind::angle, "Latitude of standard parallel", 8832},
-    {&P::longitude, Kind::angle, "Longitude of origin", 8833}, kNatural[3], kNatural[4]};
+    {&P::longitude, Kind::angle, "Longitude of origin", 8833},
+    kNatural[3],
+    kNatural[4]};
 constexpr ParameterName kMercatorB[] = {kTwoParallels[2], kNatural[1], kNatural[3], kNatural[4]};
 constexpr ParameterName kHotineA[] = {
     {&P::latitude, Kind::angle, "Latitude of projection centre", 8811},
@@ -40,9 +42,14 @@ constexpr ParameterName kHotineA[] = {
     {&P::azimuth, Kind::angle, "Azimuth of initial line", 8813},
     {&P::skew, Kind::angle, "Angle from Rectified to Skew Grid", 8814},
     {&P::scale, Kind::scale, "Scale factor on initial line", 8815},
-    kNatural[3], kNatural[4]};
+    kNatural[3],
+    kNatural[4]};
 constexpr ParameterName kHotineB[] = {
-    kHotineA[0], kHotineA[1], kHotineA[2], kHotineA[3], kHotineA[4],
+    kHotineA[0],
+    kHotineA[1],
+    kHotineA[2],
+    kHotineA[3],
+    kHotineA[4],
     {&P::false_easting, Kind::length, "Easting at projection centre", 8816},
     {&P::false_northing, Kind::length, "Northing at projection centre", 8817}};
 

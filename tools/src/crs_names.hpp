@@ -13,7 +13,7 @@ namespace terrace::tools {
 
 /// A parameter: which member it is, what kind of number, and EPSG's name and code of it.
 struct ParameterName {
-  double ProjectionParameters::* member;
+  double ProjectionParameters::*member;
   enum class Kind { angle, length, scale } kind;
   const char* name;
   int code;

@@ -71,8 +71,7 @@ void check_axes(const WktNode& node, bool vertical) {
 }
 
 void read_geographic(const WktNode& node, CrsDefinition& definition) {
-  const WktNode* const datum =
-      node.find({"DATUM", "GEODETICDATUM", "TRF", "ENSEMBLE", "DYNAMIC"});
+  const WktNode* const datum = node.find({"DATUM", "GEODETICDATUM", "TRF", "ENSEMBLE", "DYNAMIC"});
   const WktNode* const named =
       datum != nullptr && datum->text == "DYNAMIC" ? node.find({"DATUM", "TRF"}) : datum;
   if (named == nullptr) fail("the geographic CRS \"" + node.name() + "\" has no datum");
@@ -206,17 +205,17 @@ void read_vertical(const WktNode& node, CrsDefinition& definition) {
     const double unit = definition.metres_per_height;
     set_vertical_epsg(definition, code);
     if (std::abs(definition.metres_per_height / unit - 1) > 1e-6) {
-      fail("the vertical CRS \"" + node.name() + "\" contradicts its code EPSG:" +
-           std::to_string(code) + " in the unit");
+      fail("the vertical CRS \"" + node.name() +
+           "\" contradicts its code EPSG:" + std::to_string(code) + " in the unit");
     }
     return;
   }
   // OGC's type 2002 and ESRI's geodetic datum below a vertical system: above the ellipsoid.
   const WktNode* const datum = node.find({"VERT_DATUM", "VDATUM", "VERTICALDATUM", "DATUM"});
   const bool ellipsoidal =
-      datum != nullptr && (datum->text == "DATUM" || (datum->text == "VERT_DATUM" &&
-                                                      datum->parts.size() > 1 &&
-                                                      datum->parts[1].text == "2002"));
+      datum != nullptr &&
+      (datum->text == "DATUM" ||
+       (datum->text == "VERT_DATUM" && datum->parts.size() > 1 && datum->parts[1].text == "2002"));
   definition.heights = ellipsoidal ? Heights::ellipsoidal : Heights::orthometric;
   definition.vertical_name = node.name();
 }

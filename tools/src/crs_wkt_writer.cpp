@@ -22,10 +22,10 @@ std::string quoted(const std::string& text) {
 std::string id(int code) { return code == 0 ? "" : ",ID[\"EPSG\"," + std::to_string(code) + "]"; }
 
 std::string length_unit(double metres) {
-  const std::string name = metres == 1                        ? "metre"
-                           : metres == 0.3048                 ? "foot"
+  const std::string name = metres == 1                           ? "metre"
+                           : metres == 0.3048                    ? "foot"
                            : metres > 0.3048 && metres < 0.30481 ? "US survey foot"
-                                                              : "unknown";
+                                                                 : "unknown";
   return "LENGTHUNIT[" + quoted(name) + "," + number_text(metres) + "]";
 }
 

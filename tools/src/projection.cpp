@@ -47,6 +47,29 @@ std::unique_ptr<const Projection> with_meridian(Library library, const Parameter
       WithMeridian<Library>(std::move(library), latitude), p);
 }
 
+/// Albers. Cones open to the south are computed in the mirror of the equator: the inverse of
+/// GeographicLib 2.1.2 gives their latitudes with the wrong sign.
+class Albers {
+ public:
+  Albers(const Parameters& p, const Ellipsoid& ellipsoid)
+      : sign_(p.parallel1 + p.parallel2 < 0 ? -1.0 : 1.0),
+        cone_(GeographicLib::AlbersEqualArea(ellipsoid.semi_major, ellipsoid.flattening(),
+                                             sign_ * p.parallel1, sign_ * p.parallel2, p.scale),
+              sign_ * p.latitude) {}
+  [[nodiscard]] Point2 forward(double turn, double latitude) const {
+    const Point2 plane = cone_.forward(turn, sign_ * latitude);
+    return {plane[0], sign_ * plane[1]};
+  }
+  [[nodiscard]] Point2 reverse(double x, double y) const {
+    const Point2 place = cone_.reverse(x, sign_ * y);
+    return {place[0], sign_ * place[1]};
+  }
+
+ private:
+  double sign_;
+  WithMeridian<GeographicLib::AlbersEqualArea> cone_;
+};
+
 class Polar {
  public:
   Polar(const GeographicLib::PolarStereographic& library, bool north)
@@ -110,15 +133,14 @@ std::unique_ptr<const Projection> make(ProjectionMethod method, const Parameters
       return with_meridian(LambertConformalConic(a, f, p.parallel1, p.parallel2, p.scale), p,
                            p.latitude);
     case ProjectionMethod::albers:
-      return with_meridian(
-          GeographicLib::AlbersEqualArea(a, f, p.parallel1, p.parallel2, p.scale), p, p.latitude);
+      return std::make_unique<ProjectionBatch<Albers>>(Albers(p, ellipsoid), p);
     case ProjectionMethod::mercator_a:
       // A cone that touches at the equator.
       return with_meridian(LambertConformalConic(a, f, 0, p.scale), p, 0);
     case ProjectionMethod::mercator_b: {
-      LambertConformalConic library(a, f, 0, 1);
-      library.SetScale(p.parallel1, p.scale);
-      return with_meridian(library, p, 0);
+      double x = 0, y = 0, convergence = 0, scale = 1;
+      LambertConformalConic(a, f, 0, 1).Forward(0, p.parallel1, 0, x, y, convergence, scale);
+      return with_meridian(LambertConformalConic(a, f, 0, p.scale / scale), p, 0);
     }
     case ProjectionMethod::polar_stereographic_a:
       return polar_stereographic(p, ellipsoid, false);

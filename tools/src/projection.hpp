@@ -35,8 +35,8 @@ enum class ProjectionMethod : std::uint8_t {
   mercator_a,             ///< 9804: scale on the equator
   mercator_b,             ///< 9805: parallel1 is the latitude of true scale
   oblique_stereographic,  ///< 9809
-  hotine_a,               ///< 9812: false origin where the centre line meets the aposphere's equator
-  hotine_b,               ///< 9815: false origin in the centre
+  hotine_a,  ///< 9812: false origin where the centre line meets the aposphere's equator
+  hotine_b,  ///< 9815: false origin in the centre
 };
 
 /// Degrees and metres. Which of them count depends on the method.
@@ -64,11 +64,11 @@ class Projection {
 };
 
 /// Transverse Mercator, conic, polar and Mercator ones are GeographicLib's (a few nanometres);
-/// Lambert's azimuthal, the oblique ones and Web Mercator follow IOGP Publication 373-7-2, Geomatics
-/// Guidance Note 7 part 2 (2019), and J. P. Snyder, Map Projections - A Working Manual (1987), USGS
-/// Professional Paper 1395, with GeographicLib's auxiliary latitudes; all invert each other within
-/// a micrometre in their area of use.
-/// Throws: std::invalid_argument for parameters that make no projection.
+/// Lambert's azimuthal, the oblique ones and Web Mercator follow IOGP Publication 373-7-2,
+/// Geomatics Guidance Note 7 part 2 (2019), and J. P. Snyder, Map Projections - A Working Manual
+/// (1987), USGS Professional Paper 1395, with GeographicLib's auxiliary latitudes; all invert each
+/// other within a micrometre in their area of use. Throws: std::invalid_argument for parameters
+/// that make no projection.
 std::unique_ptr<const Projection> make_projection(ProjectionMethod method,
                                                   const ProjectionParameters& parameters,
                                                   const Ellipsoid& ellipsoid);

@@ -8,9 +8,9 @@
 #include "portable_math.hpp"
 #include "projection_batch.hpp"
 
-// Formulas of IOGP Publication 373-7-2 (2019), "Guidance Note 7-2", under their method codes, and of
-// Snyder (1987). What they write with the powers and logarithms of sines is GeographicLib's authalic,
-// conformal and isometric latitude here, which loses nothing near the poles.
+// Formulas of IOGP Publication 373-7-2 (2019), "Guidance Note 7-2", under their method codes, and
+// of Snyder (1987). What they write with the powers and logarithms of sines is GeographicLib's
+// authalic, conformal and isometric latitude here, which loses nothing near the poles.
 namespace terrace::tools {
 namespace {
 
@@ -84,8 +84,8 @@ class ObliqueStereographic {
     turns_ = std::sqrt(1 + e2 * std::pow(origin.cosine, 4) / (1 - e2));
     const double psi = turns_ * earth_.IsometricLatitude(p.latitude) * kDegree;
     const double sine = std::tanh(psi);
-    offset_ = 0.5 * std::log((turns_ + origin.sine) * (1 - sine) /
-                             ((turns_ - origin.sine) * (1 + sine)));
+    offset_ =
+        0.5 * std::log((turns_ + origin.sine) * (1 - sine) / ((turns_ - origin.sine) * (1 + sine)));
     centre_ = SineCosine(on_sphere(p.latitude));
   }
 
@@ -125,8 +125,7 @@ class Hotine {
     const double w2 = 1 - e2 * centre.sine * centre.sine;
     b_ = std::sqrt(1 + e2 * std::pow(centre.cosine, 4) / (1 - e2));
     a_ = ellipsoid.semi_major * b_ * p.scale * std::sqrt(1 - e2) / w2;
-    const double d =
-        std::max(1.0, b_ * std::sqrt(1 - e2) / (centre.cosine * std::sqrt(w2)));
+    const double d = std::max(1.0, b_ * std::sqrt(1 - e2) / (centre.cosine * std::sqrt(w2)));
     const double root = std::copysign(std::sqrt(d * d - 1), p.latitude);
     log_h_ = std::log(d + root) - b_ * isometric(p.latitude);
     const double sine = azimuth.sine / d;
@@ -156,8 +155,7 @@ class Hotine {
     if (!(std::abs(sine) < 1)) return {kNowhere, kNowhere};
     const double psi = (std::atanh(sine) - log_h_) / b_;
     const double turn =
-        node_ * kDegree -
-        std::atan2(s * cosine_ - std::sin(along) * sine_, std::cos(along)) / b_;
+        node_ * kDegree - std::atan2(s * cosine_ - std::sin(along) * sine_, std::cos(along)) / b_;
     return {turn / kDegree, earth_.InverseIsometricLatitude(psi / kDegree)};
   }
 
@@ -192,16 +190,17 @@ std::unique_ptr<const Projection> make_oblique_stereographic(const ProjectionPar
   if (std::abs(p.latitude) == 90) {
     throw std::invalid_argument("an oblique stereographic projection is not centred on a pole");
   }
-  return std::make_unique<ProjectionBatch<ObliqueStereographic>>(
-      ObliqueStereographic(p, ellipsoid), p);
+  return std::make_unique<ProjectionBatch<ObliqueStereographic>>(ObliqueStereographic(p, ellipsoid),
+                                                                 p);
 }
 
 std::unique_ptr<const Projection> make_hotine(const ProjectionParameters& p,
                                               const Ellipsoid& ellipsoid,
                                               bool rectified_at_centre) {
   if (std::abs(p.latitude) == 90 || p.latitude == 0) {
-    throw std::invalid_argument("the centre of an oblique Mercator projection is a pole or lies "
-                                "on the equator");
+    throw std::invalid_argument(
+        "the centre of an oblique Mercator projection is a pole or lies "
+        "on the equator");
   }
   return std::make_unique<ProjectionBatch<Hotine>>(Hotine(p, ellipsoid, rectified_at_centre), p);
 }

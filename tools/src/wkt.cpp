@@ -64,7 +64,8 @@ class Parser {
       return node;
     }
     const std::size_t begin = at_;
-    while (at_ < text_.size() && std::string_view("[](), \t\r\n\"").find(text_[at_]) == text_.npos) {
+    while (at_ < text_.size() &&
+           std::string_view("[](), \t\r\n\"").find(text_[at_]) == text_.npos) {
       ++at_;
     }
     node.text = text_.substr(begin, at_ - begin);

@@ -23,9 +23,8 @@ TEST(CoordinateSystem, KnowsWhatTheCodesMeasureIn) {
 }
 
 TEST(CoordinateSystem, RefusesOtherText) {
-  for (const char* text :
-       {"", "32632", "EPSG:", "EPSG:x", "EPSG:12", "EPSG:99999", "EPSG:4326 ", "EPSG:4326+",
-        "EPSG:4326+4326", "EPSG:5703", "no/such/file.prj"}) {
+  for (const char* text : {"", "32632", "EPSG:", "EPSG:x", "EPSG:12", "EPSG:99999", "EPSG:4326 ",
+                           "EPSG:4326+", "EPSG:4326+4326", "EPSG:5703", "no/such/file.prj"}) {
     EXPECT_THROW(CoordinateSystem::parse(text), UsageError) << text;
   }
 }
