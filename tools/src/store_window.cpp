@@ -12,6 +12,8 @@
 namespace terrace::tools {
 namespace {
 
+constexpr std::uint64_t kInnerBytes = std::uint64_t{4} << 20;
+
 StoredBox flat(const stream::Box3& box) {
   return {{box.min[0], box.min[1]}, {box.max[0], box.max[1]}};
 }
@@ -19,7 +21,10 @@ StoredBox flat(const stream::Box3& box) {
 }  // namespace
 
 StoreWindow::StoreWindow(const stream::Store& store, std::uint64_t cache_bytes)
-    : store_(store), cache_bytes_(cache_bytes), wanted_(store.top() + 1) {
+    : store_(store),
+      leaves_{.most_bytes = cache_bytes},
+      inner_{.most_bytes = kInnerBytes},
+      wanted_(store.top() + 1) {
   fill(root_, store.root());
 }
 
@@ -27,8 +32,9 @@ void StoreWindow::fill(Node& node, stream::ClusterId id) {
   const unsigned level = stream::level_of(id);
   store_.read(id, points_);
   node.id = id;
-  node.positions.assign(points_.positions.begin(), points_.positions.end());
-  node.children.assign(points_.children.begin(), points_.children.end());
+  // Not copied: the next cluster is read into what the node held before.
+  std::swap(node.positions, points_.positions);
+  std::swap(node.children, points_.children);
   node.boxes.clear();
   for (std::size_t i = 0; i < node.positions.size(); ++i) {
     for (unsigned below = 0; below < level; ++below) {
@@ -42,33 +48,38 @@ void StoreWindow::fill(Node& node, stream::ClusterId id) {
                node.boxes.capacity() * sizeof(StoredBox) + sizeof(Node) + 64;
 }
 
+void StoreWindow::Cache::drop(Nodes& to) {
+  by_id.erase(static_cast<std::uint64_t>(nodes.back().id));
+  held_bytes -= nodes.back().bytes;
+  to.splice(to.begin(), nodes, std::prev(nodes.end()));
+}
+
 const StoreWindow::Node& StoreWindow::node(stream::ClusterId id) {
   if (id == root_.id) return root_;
-  const auto key = static_cast<std::uint64_t>(id);
-  if (const auto found = by_id_.find(key); found != by_id_.end()) {
-    nodes_.splice(nodes_.begin(), nodes_, found->second);
-    return nodes_.front();
+  Cache& cache = stream::level_of(id) == 0 ? leaves_ : inner_;
+  if (cache.most_bytes == 0) {
+    fill(passing_, id);
+    return passing_;
   }
-  // A node that has to go lends its memory to the one that comes. Until the new one is whole it is
-  // in no map, so damage leaves nothing behind.
-  Nodes fresh;
-  if (held_bytes_ >= cache_bytes_ && !nodes_.empty()) {
-    by_id_.erase(static_cast<std::uint64_t>(nodes_.back().id));
-    held_bytes_ -= nodes_.back().bytes;
-    fresh.splice(fresh.begin(), nodes_, std::prev(nodes_.end()));
+  const auto key = static_cast<std::uint64_t>(id);
+  if (const auto found = cache.by_id.find(key); found != cache.by_id.end()) {
+    cache.nodes.splice(cache.nodes.begin(), cache.nodes, found->second);
+    return cache.nodes.front();
+  }
+  // A node that has to go lends its memory to the one that comes. Until that one is whole it is in
+  // no map, so damage leaves nothing behind.
+  Nodes fresh, gone;
+  if (cache.held_bytes >= cache.most_bytes && !cache.nodes.empty()) {
+    cache.drop(fresh);
   } else {
     fresh.emplace_front();
   }
   fill(fresh.front(), id);
-  held_bytes_ += fresh.front().bytes;
-  nodes_.splice(nodes_.begin(), fresh);
-  by_id_[key] = nodes_.begin();
-  while (held_bytes_ > cache_bytes_ && nodes_.size() > 1) {
-    by_id_.erase(static_cast<std::uint64_t>(nodes_.back().id));
-    held_bytes_ -= nodes_.back().bytes;
-    nodes_.pop_back();
-  }
-  return nodes_.front();
+  cache.held_bytes += fresh.front().bytes;
+  cache.nodes.splice(cache.nodes.begin(), fresh);
+  cache.by_id[key] = cache.nodes.begin();
+  while (cache.held_bytes > cache.most_bytes && cache.nodes.size() > 1) cache.drop(gone);
+  return cache.nodes.front();
 }
 
 template <class Visit>

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <list>
 #include <span>
 #include <unordered_map>
@@ -59,9 +60,10 @@ struct WindowPoints {
 /// All functions throw stream::Error on a damaged store and Interrupted on Ctrl-C.
 class StoreWindow {
  public:
-  /// cache_bytes: decoded clusters to keep, those used last. The root is kept besides.
-  explicit StoreWindow(const stream::Store& store,
-                       std::uint64_t cache_bytes = std::uint64_t{16} << 20);
+  /// cache_bytes: decoded clusters of level 0 to keep, those used last: for users that ask for near
+  /// places again. Without it, windows that do not overlap are read fastest. What leads to them
+  /// is kept anyhow: the root and 4 MiB of the clusters above level 0.
+  explicit StoreWindow(const stream::Store& store, std::uint64_t cache_bytes = 0);
   StoreWindow(const StoreWindow&) = delete;
   StoreWindow& operator=(const StoreWindow&) = delete;
 
@@ -89,6 +91,16 @@ class StoreWindow {
   };
   using Nodes = std::list<Node>;
 
+  /// Nodes up to a number of bytes, the one used last in front.
+  struct Cache {
+    std::uint64_t most_bytes = 0, held_bytes = 0;
+    Nodes nodes{};
+    std::unordered_map<std::uint64_t, Nodes::iterator> by_id{};
+
+    /// Takes out the node that was not used for longest and puts it into `to`.
+    void drop(Nodes& to);
+  };
+
   void fill(Node& node, stream::ClusterId id);
   const Node& node(stream::ClusterId id);
   template <class Visit>
@@ -97,11 +109,8 @@ class StoreWindow {
   void scatter(const LatticeWindow& window, std::span<Height> out, unsigned level);
 
   const stream::Store& store_;
-  std::uint64_t cache_bytes_;
-  std::uint64_t held_bytes_ = 0;
-  Node root_;
-  Nodes nodes_;  ///< the one used last in front
-  std::unordered_map<std::uint64_t, Nodes::iterator> by_id_;
+  Node root_, passing_;  ///< passing: what is not kept
+  Cache leaves_, inner_;
   stream::ClusterPoints points_;
   std::vector<std::vector<std::uint64_t>> wanted_;  ///< per level, ordinals on the way down
 };
