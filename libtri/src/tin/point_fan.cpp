@@ -8,7 +8,7 @@
 #include <emmintrin.h>
 #endif
 
-namespace terrace::tri::tin {
+namespace terrace::tri::tin::points {
 
 void Fan::start(const Vertex& apex, bool open) {
   apex_ = apex;
@@ -35,8 +35,9 @@ void Fan::finish() {
   }
 }
 
-// A sample is in sector i where it is left of (or on) ray i and right of ray i + 1. Where rounding,
-// next to the apex, leaves none or two, any will do: surfaces are equal there.
+// A sample is in sector i where it is left of (or on) ray i and right of ray i + 1. Where rounding
+// leaves none or two, next to the apex, any will do: surfaces are equal there. Beside an open fan
+// it is one at that end.
 std::size_t Fan::sector_of(double dx, double dy) const {
   const std::size_t rays = rays_.size();
   const double* pair = pairs_.data();
@@ -60,7 +61,8 @@ std::size_t Fan::sector_of(double dx, double dy) const {
   left &= ~std::uint64_t{0} >> (64 - rays);
   const std::uint64_t next = left >> 1 | (open_ ? 0 : (left & 1) << (rays - 1));
   const std::uint64_t found = left & ~next & (~std::uint64_t{0} >> (64 - sectors_.size()));
-  return found == 0 ? 0 : static_cast<std::size_t>(std::countr_zero(found));
+  if (found != 0) return static_cast<std::size_t>(std::countr_zero(found));
+  return (left & 1) == 0 ? 0 : sectors_.size() - 1;
 }
 
 std::size_t Fan::sector_of_many(double dx, double dy) const {
@@ -71,7 +73,7 @@ std::size_t Fan::sector_of_many(double dx, double dy) const {
   };
   for (std::size_t i = 0; i < sectors_.size(); ++i)
     if (left(i) && !left(i + 1 == rays ? 0 : i + 1)) return i;
-  return 0;
+  return left(0) ? sectors_.size() - 1 : 0;
 }
 
 double Fan::height_without_plane(std::size_t sector, const Sample& sample) const {
@@ -109,4 +111,4 @@ void Fan::close() {
   for (Sector& sector : sectors_) *sector.end = kNone;
 }
 
-}  // namespace terrace::tri::tin
+}  // namespace terrace::tri::tin::points

@@ -6,7 +6,7 @@
 
 #include "point_mesh.hpp"
 
-namespace terrace::tri::tin {
+namespace terrace::tri::tin::points {
 
 /// The triangles around a new vertex, as sectors that samples are dealt to.
 class Fan {
@@ -44,4 +44,4 @@ class Fan {
   std::vector<Sector> sectors_;
 };
 
-}  // namespace terrace::tri::tin
+}  // namespace terrace::tri::tin::points

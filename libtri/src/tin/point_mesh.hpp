@@ -8,7 +8,7 @@
 #include "../pool.hpp"
 #include "point_samples.hpp"
 
-namespace terrace::tri::tin {
+namespace terrace::tri::tin::points {
 
 using Kernel = planar::DoubleKernel;
 using Place2 = std::array<double, 2>;
@@ -17,20 +17,8 @@ struct Vertex {
   double x;
   double y;
   double z;
-  std::uint32_t sample;    ///< index in Samples::all; kNone: of the frame
-  std::uint32_t triangle;  ///< one at it, set by link_vertices()
+  std::uint32_t sample;  ///< index in Samples::all; kNone: of the frame
 };
-
-struct Triangle {
-  std::array<std::uint32_t, 3> vertex;     ///< counter-clockwise
-  std::array<std::uint32_t, 3> neighbour;  ///< opposite to vertex[i]; kNone beyond the border
-  std::uint32_t head;                      ///< of its samples
-  std::uint32_t worst;                     ///< the sample to be inserted next
-  float error;                             ///< of that sample; 0: all are within the bound
-};
-
-constexpr unsigned next3(unsigned i) { return i == 2 ? 0 : i + 1; }
-constexpr unsigned previous3(unsigned i) { return i == 0 ? 2 : i - 1; }
 
 /// Where a walk ended.
 struct Spot {
@@ -42,15 +30,10 @@ struct Spot {
 struct Mesh {
   Pool<Sample>* samples = nullptr;
   Pool<Vertex> vertices;
-  Pool<Triangle> triangles;  ///< vertex[0] == kNone: a free slot
+  Triangles triangles;        ///< `place`: the sample to be inserted next
+  Pool<std::uint32_t> heads;  ///< of the triangles' lists of samples, kNone: empty
 
   [[nodiscard]] Place2 place(std::uint32_t v) const { return {vertices[v].x, vertices[v].y}; }
-  [[nodiscard]] bool alive(std::uint32_t t) const { return triangles[t].vertex[0] != kNone; }
-  /// The index in `triangle` of its neighbour `other`.
-  [[nodiscard]] unsigned side_to(std::uint32_t triangle, std::uint32_t other) const {
-    const auto& n = triangles[triangle].neighbour;
-    return n[0] == other ? 0 : n[1] == other ? 1 : 2;
-  }
   /// Walks from a triangle to the one that contains p, exactly. The region is convex, so a border
   /// edge with p beyond it is the proof that p is outside.
   [[nodiscard]] Spot locate(const Place2& p, std::uint32_t start) const {
@@ -64,19 +47,19 @@ struct Mesh {
       bool moved = false;
       random = random * 1664525u + 1013904223u;
       unsigned i = (random >> 16) % 3;
-      for (unsigned k = 0; k < 3; ++k, i = next3(i)) {
-        if (t.neighbour[i] == from && from != kNone) continue;
+      for (unsigned k = 0; k < 3; ++k, i = after(i)) {
+        if (t.next[i] == from && from != kNone) continue;
         const int side =
-            Kernel::orientation(place(t.vertex[next3(i)]), place(t.vertex[previous3(i)]), p);
+            Kernel::orientation(place(t.corner[after(i)]), place(t.corner[before(i)]), p);
         if (side > 0) continue;
         if (side == 0) {
           ++spot.zeros;
           spot.edge = i;
           continue;
         }
-        if (t.neighbour[i] == kNone) return {};
+        if (t.next[i] == kNone) return {};
         from = at;
-        at = t.neighbour[i];
+        at = t.next[i];
         moved = true;
         break;
       }
@@ -126,15 +109,14 @@ inline double height_in(const Vertex& a, const Vertex& b, const Vertex& c, doubl
     const double dc = cx * cx + cy * cy;
     return da <= db && da <= dc ? a.z : db <= dc ? b.z : c.z;
   }
-  // About a vertex: exact where heights are equal.
+  // Exact at the vertices, and where heights are equal.
+  if (wb == sum) return b.z;
+  if (wc == sum) return c.z;
   return a.z + (wb * (b.z - a.z) + wc * (c.z - a.z)) / sum;
 }
 inline double height_in(const Mesh& mesh, const Triangle& t, double x, double y) {
-  return height_in(mesh.vertices[t.vertex[0]], mesh.vertices[t.vertex[1]],
-                   mesh.vertices[t.vertex[2]], x, y);
+  return height_in(mesh.vertices[t.corner[0]], mesh.vertices[t.corner[1]],
+                   mesh.vertices[t.corner[2]], x, y);
 }
 
-/// One triangle at every vertex.
-void link_vertices(Mesh& mesh);
-
-}  // namespace terrace::tri::tin
+}  // namespace terrace::tri::tin::points

@@ -2,6 +2,7 @@
 #include "point_samples.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 #include <stdexcept>
@@ -10,10 +11,8 @@
 
 #include "../curve_sort.hpp"
 
-namespace terrace::tri::tin {
+namespace terrace::tri::tin::points {
 namespace {
-
-using Order = std::span<std::uint32_t>;
 
 /// Every other bit.
 std::uint32_t spread(std::uint32_t bits) {
@@ -23,65 +22,75 @@ std::uint32_t spread(std::uint32_t bits) {
   return (bits | bits << 1) & 0x55555555u;
 }
 
-/// A raster of 2^16 x 2^16 cells over some samples, along the Z curve.
+/// A raster of 2^16 x 2^16 cells over some places, along the Z curve.
 class Cells {
  public:
-  Cells(const double* x, const double* y, std::span<const std::uint32_t> order) : x_(x), y_(y) {
-    const auto [low_x, high_x] = range(x, order);
-    const auto [low_y, high_y] = range(y, order);
-    low_x_ = low_x;
-    low_y_ = low_y;
-    // Halves: the extent of finite doubles may overflow.
-    extent_ = std::max(high_x / 2 - low_x / 2, high_y / 2 - low_y / 2);
+  template <class PlaceOf>
+  Cells(std::size_t count, const PlaceOf& place_of) : low_(place_of(0)) {
+    std::array<double, 2> high = low_;
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::array<double, 2> place = place_of(i);
+      for (std::size_t k = 0; k < 2; ++k) {
+        low_[k] = std::min(low_[k], place[k]);
+        high[k] = std::max(high[k], place[k]);
+      }
+    }
+    extent_ = std::max(high[0] - low_[0], high[1] - low_[1]);
   }
   [[nodiscard]] bool single() const { return !(extent_ > 0); }
-  [[nodiscard]] std::uint32_t key(std::uint32_t i) const {
-    return spread(cell(x_[i], low_x_)) | spread(cell(y_[i], low_y_)) << 1;
+  [[nodiscard]] std::uint32_t key(double x, double y) const {
+    return spread(cell(x, low_[0])) | spread(cell(y, low_[1])) << 1;
   }
 
  private:
-  static std::array<double, 2> range(const double* values, std::span<const std::uint32_t> order) {
-    double low = values[order[0]];
-    double high = low;
-    for (const std::uint32_t i : order) {
-      low = std::min(low, values[i]);
-      high = std::max(high, values[i]);
-    }
-    return {low, high};
-  }
   [[nodiscard]] std::uint32_t cell(double c, double low) const {
-    const double part = (c / 2 - low / 2) / extent_ * 65536;
+    const double part = (c - low) / extent_ * 65536;
     return part < 65535 ? static_cast<std::uint32_t>(part) : 65535;
   }
 
-  const double* x_;
-  const double* y_;
-  double low_x_ = 0;
-  double low_y_ = 0;
+  std::array<double, 2> low_;
   double extent_ = 0;
+};
+
+/// The same for numbers of samples, as sort_along_curve() asks for it.
+struct NumberCells {
+  const double* x;
+  const double* y;
+  Cells cells;
+
+  NumberCells(const double* xs, const double* ys, std::span<const std::uint32_t> order)
+      : x(xs), y(ys), cells(order.size(), [&](std::size_t i) {
+          return std::array<double, 2>{xs[order[i]], ys[order[i]]};
+        }) {}
+  [[nodiscard]] bool single() const { return cells.single(); }
+  [[nodiscard]] std::uint32_t key(std::uint32_t i) const { return cells.key(x[i], y[i]); }
 };
 
 /// Orders so that samples of one place are beside each other, the smaller number first. Samples of
 /// one cell are so few that sorting them by place does not spoil the curve.
-void group_places(const double* x, const double* y, Order order) {
+void group_places(std::span<Sample> samples) {
   constexpr std::size_t kFew = 3000;
-  const auto sort_places = [x, y](Order part) {
-    std::sort(part.begin(), part.end(), [x, y](std::uint32_t a, std::uint32_t b) {
-      if (x[a] != x[b]) return x[a] < x[b];
-      if (y[a] != y[b]) return y[a] < y[b];
-      return a < b;
+  const auto sort_places = [](std::span<Sample> part) {
+    std::sort(part.begin(), part.end(), [](const Sample& a, const Sample& b) {
+      if (a.x != b.x) return a.x < b.x;
+      if (a.y != b.y) return a.y < b.y;
+      return a.id < b.id;
     });
   };
-  const Cells cells(x, y, order);
-  if (order.size() < kFew || cells.single()) return sort_places(order);
+  if (samples.size() < kFew) return sort_places(samples);
+  const Cells cells(samples.size(), [&](std::size_t i) {
+    return std::array<double, 2>{samples[i].x, samples[i].y};
+  });
+  if (cells.single()) return sort_places(samples);
+  const auto key_of = [&](std::size_t i) { return cells.key(samples[i].x, samples[i].y); };
   std::size_t begin = 0;
-  std::uint32_t key = cells.key(order[0]);
-  for (std::size_t i = 1; i <= order.size(); ++i) {
-    const std::uint32_t next = i < order.size() ? cells.key(order[i]) : ~key;
+  std::uint32_t key = key_of(0);
+  for (std::size_t i = 1; i <= samples.size(); ++i) {
+    const std::uint32_t next = i < samples.size() ? key_of(i) : ~key;
     if (next == key) continue;
-    const Order part = order.subspan(begin, i - begin);
+    const std::span<Sample> part = samples.subspan(begin, i - begin);
     if (part.size() >= kFew) {
-      group_places(x, y, part);
+      group_places(part);
     } else if (part.size() > 1) {
       sort_places(part);
     }
@@ -90,18 +99,17 @@ void group_places(const double* x, const double* y, Order order) {
   }
 }
 
-double merged_height(const double* z, Order group, PointDuplicates duplicates) {
-  double height = z[group[0]];
+double merged_height(std::span<const Sample> group, PointDuplicates duplicates) {
+  double height = group[0].z;
   if (duplicates == PointDuplicates::kMin || duplicates == PointDuplicates::kMax) {
-    for (const std::uint32_t i : group)
-      height =
-          duplicates == PointDuplicates::kMin ? std::min(height, z[i]) : std::max(height, z[i]);
+    for (const Sample& sample : group)
+      height = duplicates == PointDuplicates::kMin ? std::min(height, sample.z)
+                                                   : std::max(height, sample.z);
   } else if (duplicates == PointDuplicates::kMean) {
-    // Differences from the first: the sum of heights may overflow, and equal ones stay as they are.
+    // Differences from the first, so that equal ones stay as they are.
     double sum = 0;
-    const auto count = static_cast<double>(group.size());
-    for (const std::uint32_t i : group) sum += z[i] / count - height / count;
-    height += sum;
+    for (const Sample& sample : group) sum += sample.z - group[0].z;
+    height += sum / static_cast<double>(group.size());
   }
   return height;
 }
@@ -128,30 +136,34 @@ Samples take_samples(std::span<const double> x, std::span<const double> y,
   if (count == 0) return samples;
   Pool<std::uint32_t> numbers;
   numbers.resize(count);
-  const Order order = span_of(numbers);
+  const std::span<std::uint32_t> order = span_of(numbers);
   std::iota(order.begin(), order.end(), 0u);
-  if (count >= 3000)
-    sort_along_curve<32>(order, [&](std::span<const std::uint32_t> part) {
-      return Cells(x.data(), y.data(), part);
-    });
-  group_places(x.data(), y.data(), order);
-  samples.all.resize(count);
+  sort_along_curve<32>(order, [&](std::span<const std::uint32_t> part) {
+    return NumberCells(x.data(), y.data(), part);
+  });
+  Pool<Sample>& all = samples.all;
+  all.resize(count);
+  for (std::uint32_t k = 0; k < count; ++k) {
+    const std::uint32_t i = order[k];
+    all[k] = {x[i], y[i], z[i], kUnlisted, i};
+  }
+  numbers.release();
+  group_places(span_of(all));
   std::uint32_t kept = 0;
   for (std::uint32_t begin = 0; begin < count;) {
-    const std::uint32_t first = order[begin];
+    Sample first = all[begin];
     std::uint32_t end = begin + 1;
-    while (end < count && x[order[end]] == x[first] && y[order[end]] == y[first]) ++end;
+    while (end < count && all[end].x == first.x && all[end].y == first.y) ++end;
     if (end - begin > 1 && duplicates == PointDuplicates::kError)
-      throw std::invalid_argument("point_tin: sample " + std::to_string(order[begin + 1]) +
-                                  " has the place of sample " + std::to_string(first));
-    samples.all[kept++] = {x[first], y[first],
-                           merged_height(z.data(), order.subspan(begin, end - begin), duplicates),
-                           kUnlisted, first};
+      throw std::invalid_argument("point_tin: sample " + std::to_string(all[begin + 1].id) +
+                                  " has the place of sample " + std::to_string(first.id));
+    first.z = merged_height(span_of(all).subspan(begin, end - begin), duplicates);
+    all[kept++] = first;
     begin = end;
   }
   samples.duplicates = count - kept;
-  samples.all.resize(kept);
+  all.resize(kept);
   return samples;
 }
 
-}  // namespace terrace::tri::tin
+}  // namespace terrace::tri::tin::points

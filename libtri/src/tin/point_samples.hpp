@@ -6,11 +6,11 @@
 #include <span>
 
 #include "../pool.hpp"
+#include "mesh.hpp"
 #include "terrace/tri/point_tin.hpp"
 
-namespace terrace::tri::tin {
+namespace terrace::tri::tin::points {
 
-inline constexpr std::uint32_t kNone = 0xFFFFFFFFu;
 inline constexpr std::uint32_t kOutside = 0xFFFFFFFEu;
 inline constexpr std::uint32_t kIsVertex = 0xFFFFFFFDu;
 inline constexpr std::uint32_t kUnlisted = 0xFFFFFFFCu;
@@ -41,4 +41,4 @@ struct Samples {
 Samples take_samples(std::span<const double> x, std::span<const double> y,
                      std::span<const double> z, PointDuplicates duplicates);
 
-}  // namespace terrace::tri::tin
+}  // namespace terrace::tri::tin::points

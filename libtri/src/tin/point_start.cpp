@@ -9,7 +9,7 @@
 
 #include "terrace/tri/delaunay2.hpp"
 
-namespace terrace::tri::tin {
+namespace terrace::tri::tin::points {
 namespace {
 
 /// Triangulates the vertices that are there.
@@ -24,14 +24,15 @@ void triangulate(Mesh& mesh) {
   std::uint32_t count = 0;
   for (const TriangleId t : delaunay.all_triangles()) triangle_of[slot(t)] = count++;
   for (const TriangleId t : delaunay.all_triangles()) {
-    Triangle made{{}, {}, kNone, kNone, 0};
+    Triangle made{{}, {}, kNone, 0.0F};
     const auto corners = delaunay.vertices(t);
     const auto neighbours = delaunay.neighbours(t);
     for (std::size_t i = 0; i < 3; ++i) {
-      made.vertex[i] = vertex_of[slot(corners[i])];
-      made.neighbour[i] = neighbours[i] == kNoTriangle ? kNone : triangle_of[slot(neighbours[i])];
+      made.corner[i] = vertex_of[slot(corners[i])];
+      made.next[i] = neighbours[i] == kNoTriangle ? kNone : triangle_of[slot(neighbours[i])];
     }
     mesh.triangles.push_back(made);
+    mesh.heads.push_back(kNone);
   }
 }
 
@@ -67,7 +68,7 @@ void start_with_frame(Mesh& mesh, std::span<const Point3> frame) {
   for (std::size_t i = 0; i < frame.size(); ++i) {
     for (const double c : frame[i])
       if (!(std::abs(c) < kLargest)) refuse_frame(i, "is not finite or too large");
-    mesh.vertices.push_back({frame[i][0], frame[i][1], frame[i][2], kNone, kNone});
+    mesh.vertices.push_back({frame[i][0], frame[i][1], frame[i][2], kNone});
   }
   // Convex everywhere and once around: along the lexicographic order up once and down once.
   const auto count = static_cast<std::uint32_t>(frame.size());
@@ -134,31 +135,10 @@ void start_with_hull(Mesh& mesh) {
   const std::vector<std::uint32_t> hull = hull_of(candidates, place);
   if (hull.size() < 3) return;
   for (const std::uint32_t i : hull) {
-    mesh.vertices.push_back({samples[i].x, samples[i].y, samples[i].z, i, kNone});
+    mesh.vertices.push_back({samples[i].x, samples[i].y, samples[i].z, i});
     samples[i].next = kIsVertex;
   }
   triangulate(mesh);
 }
 
-std::size_t list_samples(Mesh& mesh, std::uint32_t first, std::uint32_t step) {
-  Pool<Sample>& samples = *mesh.samples;
-  std::size_t outside = 0;
-  std::uint32_t at = 0;
-  for (std::uint64_t i = first; i < samples.size(); i += step) {
-    const auto index = static_cast<std::uint32_t>(i);
-    Sample& sample = samples[index];
-    if (sample.next != kUnlisted) continue;
-    const Spot spot = mesh.locate({sample.x, sample.y}, at);
-    if (spot.triangle == kNone) {
-      sample.next = kOutside;
-      ++outside;
-      continue;
-    }
-    at = spot.triangle;
-    sample.next = mesh.triangles[at].head;
-    mesh.triangles[at].head = index;
-  }
-  return outside;
-}
-
-}  // namespace terrace::tri::tin
+}  // namespace terrace::tri::tin::points

@@ -5,7 +5,7 @@
 
 #include "point_mesh.hpp"
 
-namespace terrace::tri::tin {
+namespace terrace::tri::tin::points {
 
 /// The first mesh: the frame's vertices alone. Throws as point_tin() does where it is no convex
 /// polygon.
@@ -14,9 +14,4 @@ void start_with_frame(Mesh& mesh, std::span<const Point3> frame);
 /// The first mesh: the corners of the samples' hull. None where all samples are on one line.
 void start_with_hull(Mesh& mesh);
 
-/// Puts samples first, first + step, ... into the lists of the triangles that contain them (exact),
-/// those of vertices left out; in front of what the lists have. Those outside get kOutside as
-/// `next`. Returns their number.
-std::size_t list_samples(Mesh& mesh, std::uint32_t first, std::uint32_t step);
-
-}  // namespace terrace::tri::tin
+}  // namespace terrace::tri::tin::points

@@ -9,14 +9,15 @@
 
 #include "lattice.hpp"
 #include "point_greedy.hpp"
-#include "point_measure.hpp"
+#include "point_lists.hpp"
 #include "point_samples.hpp"
 #include "point_start.hpp"
 
 namespace terrace::tri {
 namespace {
 
-using namespace tin;
+using namespace tin::points;
+using tin::kNone;
 
 constexpr std::size_t kUnlimited = std::numeric_limits<std::size_t>::max();
 
@@ -26,7 +27,7 @@ void check_options(const PointTinOptions& options, std::span<const Point3> frame
   if (!(options.min_angle_degrees >= 0 && options.min_angle_degrees <= 30))
     throw std::invalid_argument("point_tin: min_angle_degrees is not within 0 to 30");
   if (!options.lattice) return;
-  if (!valid(*options.lattice))
+  if (!tin::valid(*options.lattice))
     throw std::invalid_argument("point_tin: a lattice needs a step above 0");
   if (frame.empty()) throw std::invalid_argument("point_tin: a lattice needs a frame");
   for (std::size_t i = 0; i < frame.size(); ++i)
@@ -38,14 +39,14 @@ void check_options(const PointTinOptions& options, std::span<const Point3> frame
 
 /// While triangles are large, few of their samples choose the vertices as well as all, and need not
 /// be dealt anew each time.
-void insert_greedily(Mesh& mesh, Greedy& greedy, std::size_t max_vertices) {
+void insert_greedily(Mesh& mesh, Greedy& greedy, double bound, std::size_t max_vertices) {
   constexpr std::uint32_t kSteps[] = {64, 8, 1};
   constexpr std::size_t kSamplesPerTriangle = 8;
   for (const std::uint32_t step : kSteps) {
     const std::size_t listed = mesh.samples->size() / step;
     if (step > 1 && listed < 1024) continue;
-    list_samples(mesh, 0, step);
-    greedy.measure_all();
+    list_samples(mesh, step, bound);
+    greedy.take_all();
     greedy.run(max_vertices, step > 1 ? listed / kSamplesPerTriangle : kUnlimited);
   }
 }
@@ -70,17 +71,16 @@ PointTin point_tin(std::span<const double> x, std::span<const double> y, std::sp
   const std::size_t fixed = mesh.vertices.size();
   const std::size_t max_vertices = options.max_points == 0 ? kUnlimited : options.max_points;
   Greedy greedy(mesh, options.max_error, !frame.empty(), options.lattice);
-  insert_greedily(mesh, greedy, max_vertices);
-  Measured measured = measure_lists(mesh, options.max_error);
+  insert_greedily(mesh, greedy, options.max_error, max_vertices);
+  Measured measured = list_samples(mesh, 1, options.max_error);
   // What rounding hid from the lists, next to never.
   while (measured.to_mend > 0 && mesh.vertices.size() < max_vertices) {
-    greedy.measure_all();
+    greedy.take_all();
     greedy.run(max_vertices, kUnlimited);
-    measured = measure_lists(mesh, options.max_error);
+    measured = list_samples(mesh, 1, options.max_error);
   }
   result.inserted = mesh.vertices.size() - fixed;
   result.errors = measured.errors;
-  result.errors.uncovered = samples.all.size() - measured.errors.covered;
   result.stuck = measured.above - measured.to_mend;
   for (std::uint32_t v = 0; v < mesh.vertices.size(); ++v) {
     const Vertex& vertex = mesh.vertices[v];
@@ -88,8 +88,8 @@ PointTin point_tin(std::span<const double> x, std::span<const double> y, std::sp
     result.sample.push_back(vertex.sample == kNone ? kNoSample
                                                    : number(samples.all[vertex.sample]));
   }
-  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t)
-    if (mesh.alive(t)) result.triangles.push_back(mesh.triangles[t].vertex);
+  for (const tin::Triangle& triangle : mesh.triangles)
+    if (triangle.live()) result.triangles.push_back(triangle.corner);
   return result;
 }
 

@@ -74,9 +74,9 @@ struct GridTin {
 /// The vertices on a side of a window, or on any line of samples. A line is simplified to within a
 /// little less than `max_error`, the greatest error first; both ends are vertices. `beside` and
 /// `other_beside` are the lines next to it, on either side and equally long, or empty where the
-/// raster ends (or has data everywhere): where they lack data near a sample, it and its
-/// neighbours on the line are vertices. Both windows at a side must give the same three lines, in
-/// any order of the latter two. O(n log n) as a rule.
+/// raster ends (or has data everywhere): a sample with data that has a neighbour
+/// without, on any of the three, is a vertex. Both windows at a side must give the same three
+/// lines, in any order of the latter two. O(n log n) as a rule.
 ///
 /// Throws std::invalid_argument for lines of different lengths, heights beyond 1e150 and a bound
 /// that is negative or not a number.

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <limits>
+
+#include "grid_surface.hpp"
+#include "star.hpp"
+
+namespace terrace::tri::tin {
+
+template <class T>
+void GridSurface<T>::remove() {
+  std::vector<std::uint32_t> triangle_of = triangle_of_vertices(triangles_, corners_.size());
+  Star star;
+  PolygonFill fill;
+  Corner ring[kMaxRing];
+  const auto cost_of = [&](std::size_t i, std::size_t m, std::size_t j, T limit) {
+    return cost(ring[i], ring[m], ring[j], limit);
+  };
+  const auto left = [&](std::size_t i, std::size_t m, std::size_t j) {
+    return turn(ring[i], ring[m], ring[j]) > 0;
+  };
+  const auto inside = [&](std::size_t i, std::size_t m, std::size_t j, std::size_t p) {
+    return ground_.in_circle(ring[i], ring[m], ring[j], ring[p]);
+  };
+  const auto within = [&](std::size_t i, std::size_t m, std::size_t j) {
+    return cost_of(i, m, j, scan_bound_) <= scan_bound_;
+  };
+  for (std::uint32_t vertex = 0; vertex < corners_.size(); ++vertex) {
+    const Corner& own = corners_[vertex];
+    if (triangle_of[vertex] == kNone || own.x == 0 || own.y == 0 || own.x == columns_ - 1 ||
+        own.y == rows_ - 1 || !star.gather(triangles_, vertex, triangle_of[vertex]))
+      continue;
+    const std::size_t size = star.size();
+    for (std::size_t i = 0; i < size; ++i) ring[i] = corners_[star.ring(i)];
+    const bool possible = (fill_delaunay(size, left, inside, fill) && star.all_of(fill, within)) ||
+                          (size > 3 && fill_least_worst(size, scan_bound_, cost_of, fill));
+    if (possible) star.replace(triangles_, fill, triangle_of, vertex);
+  }
+}
+
+template void GridSurface<float>::remove();
+template void GridSurface<double>::remove();
+
+}  // namespace terrace::tri::tin

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "cavity.hpp"
+#include "grid_gaps.hpp"
+#include "grid_scan.hpp"
+#include "ground.hpp"
+#include "mesh.hpp"
+#include "terrace/tri/grid_tin.hpp"
+
+namespace terrace::tri::tin {
+
+/// A triangulation of a window while it is being made. T: what errors are computed in.
+template <class T>
+class GridSurface {
+ public:
+  /// `sides_fixed`: no vertex is put on the window's sides but by insert_sides().
+  template <class Sample>
+  GridSurface(const GridWindow<Sample>& window, const GridTinOptions& options, bool sides_fixed,
+              GridPath path);
+
+  void insert_sides(const GridSides& sides);
+  /// Inserts samples until none is worse than the bound or there are `most` vertices with data.
+  /// Queue: ErrorBuckets or ErrorHeap.
+  template <class Queue>
+  void refine(std::size_t most);
+  /// Removes inner vertices where the bound still holds without them, in the order of their
+  /// insertion.
+  void remove();
+  /// Moves heights of inner vertices to the middle of what the samples around them allow.
+  void fit();
+
+  GridTin result() const;  ///< with row and column steps of the options, not measured
+
+ private:
+  using Corner = GridCorner<T>;
+
+  const Corner& corner(const Triangle& triangle, unsigned i) const {
+    return corners_[triangle.corner[i]];
+  }
+  bool sees(const Corner& a) const { return a.z == a.z; }
+  bool sees_all(const Corner& a, const Corner& b, const Corner& c) const {
+    return sees(a) && sees(b) && sees(c);
+  }
+
+  std::uint32_t add_vertex(std::int32_t x, std::int32_t y);
+  /// The triangle that contains a sample, found by walking from triangle t.
+  std::uint32_t locate(std::int32_t x, std::int32_t y, std::uint32_t t) const;
+  /// Inserts a sample that lies in triangle t. The triangles made are cavity_.created().
+  void insert(std::int32_t x, std::int32_t y, std::uint32_t t);
+  /// Sets the triangle's place and error.
+  void judge(Triangle& triangle) const;
+  GridWorst<T> worst(const Corner& a, const Corner& b, const Corner& c) const;
+  /// An upper bound of a new triangle's errors, or infinity: above `limit`, turned right, too thin,
+  /// mixed.
+  T cost(const Corner& a, const Corner& b, const Corner& c, T limit) const;
+  void fit_vertex(std::uint32_t vertex, std::uint32_t first);
+
+  std::int32_t columns_, rows_;
+  bool rows_turned_;  ///< counter-clockwise on the lattice is clockwise on the ground
+  bool sides_fixed_;
+  double bound_;
+  T scan_bound_;  ///< bound_, rounded down
+  Ground ground_;
+  const GridScan<T>& scan_;
+  std::vector<T> heights_;
+  GridSamples<T> samples_;
+  std::optional<GridGaps> gaps_;
+  std::vector<Corner> corners_;
+  Triangles triangles_;
+  Cavity cavity_;
+};
+
+}  // namespace terrace::tri::tin

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "check_window.hpp"
+#include "terrace/tri/grid_tin.hpp"
+
+namespace terrace::tri {
+namespace {
+
+/// Which samples of a line must be vertices: the ends, and where data is missing nearby. Data ends
+/// at a vertex, and a sample with data but a neighbour without, on the line or beside it, is a
+/// vertex. So all samples inside a longer segment with data are
+/// surrounded by data, and the triangles on it can be.
+template <class T>
+std::vector<std::uint8_t> needed_on(std::span<const T> line, std::span<const T> beside,
+                                    std::span<const T> other_beside) {
+  const std::size_t count = line.size();
+  std::vector<std::uint8_t> needed(count, 0);
+  needed.front() = needed.back() = 1;
+  const auto has = [&](std::size_t i) { return std::isfinite(line[i]); };
+  const auto near_gap = [&](std::size_t i) {
+    for (std::size_t k = i == 0 ? 0 : i - 1; k < count && k <= i + 1; ++k)
+      if (!has(k) || (!beside.empty() && !std::isfinite(beside[k])) ||
+          (!other_beside.empty() && !std::isfinite(other_beside[k])))
+        return true;
+    return false;
+  };
+  for (std::size_t i = 0; i < count; ++i) {
+    const bool next_has = i + 1 < count && has(i + 1);
+    if (i + 1 < count && has(i) != next_has) needed[i] = needed[i + 1] = 1;
+    if (has(i) && near_gap(i)) needed[i] = 1;
+  }
+  return needed;
+}
+
+/// Splits between a and b until the bound holds.
+template <class T>
+void simplify(std::span<const T> line, std::size_t a, std::size_t b, double limit,
+              std::vector<std::uint8_t>& kept) {
+  std::vector<std::pair<std::size_t, std::size_t>> waiting{{a, b}};
+  while (!waiting.empty()) {
+    const auto [from, to] = waiting.back();
+    waiting.pop_back();
+    const auto start = static_cast<double>(line[from]);
+    const double rise = static_cast<double>(line[to]) - start;
+    const auto length = static_cast<double>(to - from);
+    double most = limit;
+    std::size_t worst = from;
+    for (std::size_t i = from + 1; i < to; ++i) {
+      const double error = std::fabs(static_cast<double>(line[i]) - start -
+                                     rise * (static_cast<double>(i - from) / length));
+      if (error <= most) continue;
+      most = error;
+      worst = i;
+    }
+    if (worst == from) continue;
+    kept[worst] = 1;
+    waiting.push_back({from, worst});
+    waiting.push_back({worst, to});
+  }
+}
+
+}  // namespace
+
+template <class T>
+std::vector<std::uint32_t> settle_side(std::span<const T> line, std::span<const T> beside,
+                                       std::span<const T> other_beside, double max_error) {
+  for (const std::span<const T> other : {beside, other_beside})
+    if (!other.empty() && other.size() != line.size())
+      throw std::invalid_argument("settle_side: lines of different lengths");
+  if (!(max_error >= 0)) throw std::invalid_argument("settle_side: max_error must not be negative");
+  for (const T z : line)
+    if (std::isfinite(z) && std::fabs(static_cast<double>(z)) > 1e150)
+      throw std::invalid_argument("settle_side: a height beyond 1e150");
+  std::vector<std::uint32_t> vertices;
+  if (line.empty()) return vertices;
+  std::vector<std::uint8_t> kept = needed_on(line, beside, other_beside);
+  // Less than the bound, so that rounding later cannot exceed it.
+  const double limit = max_error * (1 - 1e-5);
+  for (std::size_t a = 0, b = 1; b < line.size(); ++b) {
+    if (kept[b] == 0) continue;
+    if (std::isfinite(line[a]) && std::isfinite(line[b])) simplify(line, a, b, limit, kept);
+    a = b;
+  }
+  for (std::size_t i = 0; i < line.size(); ++i)
+    if (kept[i] != 0) vertices.push_back(static_cast<std::uint32_t>(i));
+  return vertices;
+}
+
+template <class T>
+GridSides settle_sides(const GridWindow<T>& window, double max_error) {
+  tin::check_shape(window, "settle_sides");
+  const std::size_t columns = window.columns, rows = window.rows;
+  const auto row = [&](std::size_t y) {
+    return y < rows ? window.heights.subspan(y * columns, columns) : std::span<const T>();
+  };
+  const auto column = [&](std::size_t x) {
+    std::vector<T> result;
+    if (x < columns)
+      for (std::size_t y = 0; y < rows; ++y) result.push_back(window.heights[y * columns + x]);
+    return result;
+  };
+  const auto settle = [&](std::span<const T> line, std::span<const T> beside) {
+    return settle_side<T>(line, beside, {}, max_error);
+  };
+  return {settle(row(0), row(1)), settle(row(rows - 1), row(rows - 2)),
+          settle(column(0), column(1)), settle(column(columns - 1), column(columns - 2))};
+}
+
+template std::vector<std::uint32_t> settle_side(std::span<const float>, std::span<const float>,
+                                                std::span<const float>, double);
+template std::vector<std::uint32_t> settle_side(std::span<const double>, std::span<const double>,
+                                                std::span<const double>, double);
+template GridSides settle_sides(const GridWindow<float>&, double);
+template GridSides settle_sides(const GridWindow<double>&, double);
+
+}  // namespace terrace::tri
