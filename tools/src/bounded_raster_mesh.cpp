@@ -124,7 +124,7 @@ WindowTinOptions RasterMesher::window_options(double max_error) const {
     out.fill = [lowest](std::int64_t, std::int64_t) { return lowest; };
   } else if (fill_) {
     out.fill = [fill = fill_](std::int64_t column, std::int64_t row) {
-      return fill->height(column, row);
+      return fill->height(static_cast<double>(column), static_cast<double>(row));
     };
   }
   return out;

@@ -107,10 +107,9 @@ RasterFill::RasterFill(const stream::Store& store) {
   grid_ = std::move(grid);
 }
 
-double RasterFill::height(std::int64_t column, std::int64_t row) const {
-  return between(grid_.heights, grid_.columns, grid_.rows,
-                 (static_cast<double>(column) + 0.5) / reduction_,
-                 (static_cast<double>(row) + 0.5) / reduction_);
+double RasterFill::height(double column, double row) const {
+  return between(grid_.heights, grid_.columns, grid_.rows, (column + 0.5) / reduction_,
+                 (row + 0.5) / reduction_);
 }
 
 }  // namespace terrace::tools

@@ -19,8 +19,9 @@ class RasterFill {
   /// Throws: stream::Error on a damaged store, or if it has no point at all.
   explicit RasterFill(const stream::Store& store);
 
-  /// The height at a sample, in the vertical unit of the store.
-  [[nodiscard]] double height(std::int64_t column, std::int64_t row) const;
+  /// The height at a place of the lattice, in the vertical unit of the store. Outside the raster
+  /// that of its border.
+  [[nodiscard]] double height(double column, double row) const;
 
  private:
   struct Grid {

@@ -22,7 +22,7 @@ struct Pieces {
   std::vector<std::array<std::uint32_t, 3>> triangles;
   std::unordered_map<std::uint32_t, std::uint32_t> by_place;  ///< vertices on sides of leaves
   double max_error = 0.0;
-  std::uint64_t samples = 0;
+  bool has_data = false;
 
   std::uint32_t side_vertex(const SideVertex& vertex) {
     const std::uint32_t place = vertex.v << 16 | vertex.u;
@@ -34,15 +34,14 @@ struct Pieces {
 };
 
 /// The error of a leaf whose samples have heights in `range`, if none becomes a vertex.
-double flat_error(const std::vector<SideVertex>& frame, double step,
-                  const std::pair<double, double>& range) {
+double flat_error(const std::vector<SideVertex>& frame, double step, const HeightRange& range) {
   double low = std::numeric_limits<double>::infinity(), high = -low;
   for (const SideVertex& vertex : frame) {
     const double height = static_cast<double>(vertex.height) * step;
     low = std::min(low, height);
     high = std::max(high, height);
   }
-  return std::max(range.second - low, high - range.first);
+  return std::max(range.high - low, high - range.low);
 }
 
 void mesh_leaf(const TileAddress& tile, const TileLeaf& leaf, const ZoomPlan& plan,
@@ -54,9 +53,10 @@ void mesh_leaf(const TileAddress& tile, const TileLeaf& leaf, const ZoomPlan& pl
   bool measured = false;
   if (range) {
     const double error = flat_error(frame, plan.height_step, *range);
-    if (error <= plan.max_error) {
+    if (error <= plan.max_error && (range->certain || pieces.has_data)) {
       // Whatever the triangles: nothing needs to be read.
       pieces.max_error = std::max(pieces.max_error, error);
+      pieces.has_data = true;
     } else {
       surface.samples(box, samples);
       measured = true;
@@ -83,7 +83,7 @@ void mesh_leaf(const TileAddress& tile, const TileLeaf& leaf, const ZoomPlan& pl
   options.lattice = tri::TinLattice{0.0, plan.height_step};
   const tri::PointTin tin = tri::point_tin(u, v, samples.height, corners, options);
   if (measured) pieces.max_error = std::max(pieces.max_error, tin.errors.largest);
-  pieces.samples += tin.errors.covered;
+  if (tin.errors.covered > 0) pieces.has_data = true;
 
   std::vector<std::uint32_t> number;
   number.reserve(tin.vertices.size());
@@ -208,7 +208,7 @@ MadeTile make_tile(const TileAddress& tile, const ZoomPlan& plan, TileSurface& s
   }
   MadeTile made;
   made.max_error = pieces.max_error;
-  made.samples = pieces.samples;
+  made.has_data = pieces.has_data;
   set_heights(pieces, plan.height_step, made.mesh);
   made.mesh.triangles = std::move(pieces.triangles);
   order_vertices(made.mesh);

@@ -23,8 +23,8 @@ struct TileMeshOptions {
 struct MadeTile {
   TileMesh mesh;
   TileHeader header;
-  double max_error = 0.0;     ///< metres, of what a client decodes; never too small
-  std::uint64_t samples = 0;  ///< that were measured or bounded
+  double max_error = 0.0;  ///< metres, of what a client decodes; never too small
+  bool has_data = false;   ///< whether a sample lies in the tile
 };
 
 /// The heights of a tile do not fit into its zoom's steps: take larger ones.

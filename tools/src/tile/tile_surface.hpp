@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <array>
+#include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include "tile/tile_address.hpp"
@@ -23,6 +23,12 @@ struct SurfaceSamples {
   }
 };
 
+/// Bounds on the heights of samples, not always reached.
+struct HeightRange {
+  double low = 0.0, high = 0.0;  ///< metres above the ellipsoid
+  bool certain = false;          ///< that there is a sample at all
+};
+
 /// What tiles are made of: samples that they must not miss, and a surface through them that has a
 /// height everywhere on the globe. One object per thread; all of one store answer alike, whatever
 /// they were asked before.
@@ -36,9 +42,8 @@ class TileSurface {
   [[nodiscard]] virtual double spacing() const = 0;
   /// Replaces `out` by the samples in the box, borders included.
   virtual void samples(const GeographicBox& box, SurfaceSamples& out) = 0;
-  /// Lowest and highest height that samples in the box can have, cheaply: bounds, not always
-  /// reached. Nothing if there is none.
-  virtual std::optional<std::pair<double, double>> range(const GeographicBox& box) = 0;
+  /// Of the heights of samples in the box, cheaply. Nothing if there is no sample.
+  virtual std::optional<HeightRange> range(const GeographicBox& box) = 0;
   /// The surface's heights at places, filled where there are no samples: never NaN.
   virtual void heights(std::span<const double> longitude, std::span<const double> latitude,
                        std::span<double> out) = 0;

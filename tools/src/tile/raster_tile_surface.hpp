@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+
+#include <terrace/stream/store.hpp>
+
+#include "coordinate_system.hpp"
+#include "raster_fill.hpp"
+#include "store_window.hpp"
+#include "tile/height_blocks.hpp"
+#include "tile/tile_surface.hpp"
+#include "world.hpp"
+
+namespace terrace::tools {
+
+/// What all threads know of a raster store that is tiled.
+struct TiledRaster {
+  const stream::Store& store;
+  CoordinateSystem crs;
+  Placement placement;
+  double metres_per_height = 1.0;
+  /// Added to heights in metres at a longitude and latitude, to make them ellipsoidal; may be
+  /// empty.
+  std::function<double(double longitude, double latitude)> geoid{};
+  /// Heights where there is no data: nothing takes those around, else this height in metres.
+  std::optional<double> flat_fill{};
+  /// A sample of this height (in the store's unit) is water; without, one that has no data is.
+  std::optional<double> water_height{};
+
+  RasterFill fill;
+  HeightBlocks blocks;
+  GeographicBox bounds{};
+  double spacing = 0.0;
+
+  /// Reads the store twice. Throws: stream::Error if no place of it can be told on the globe.
+  TiledRaster(const stream::Store& tiled, CoordinateSystem system);
+};
+
+/// The surface of a raster store: bilinear between four samples with data, filled elsewhere.
+class RasterTileSurface final : public TileSurface {
+ public:
+  explicit RasterTileSurface(const TiledRaster& raster);
+
+  [[nodiscard]] GeographicBox bounds() const override { return raster_.bounds; }
+  [[nodiscard]] double spacing() const override { return raster_.spacing; }
+  void samples(const GeographicBox& box, SurfaceSamples& out) override;
+  std::optional<HeightRange> range(const GeographicBox& box) override;
+  void heights(std::span<const double> longitude, std::span<const double> latitude,
+               std::span<double> out) override;
+  void water(std::span<const double> longitude, std::span<const double> latitude,
+             std::span<std::uint8_t> out) override;
+
+ private:
+  /// Calls visit(i, place on the lattice, window that has the samples around it, its heights) for
+  /// each place, in an order that reads little.
+  template <class Visit>
+  void visit_places(std::span<const double> longitude, std::span<const double> latitude,
+                    const Visit& visit);
+  [[nodiscard]] LatticeWindow window_around(const GeographicBox& box) const;
+  [[nodiscard]] double metres(double height, double longitude, double latitude) const;
+
+  const TiledRaster& raster_;
+  StoreWindow reader_;
+  std::vector<double> heights_;
+  std::vector<Point2> places_;
+};
+
+}  // namespace terrace::tools
