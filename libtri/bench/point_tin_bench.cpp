@@ -116,11 +116,14 @@ void measure(benchmark::State& state, double max_error) {
         measure_surface(input().x, input().y, input().z, tin.vertices, tin.triangles));
 }
 
-constexpr double kOnePercent = 18;
-constexpr double kHalf = 0.7;
+constexpr double kOnePercent = 15.5;
+constexpr double kHalf = 0.85;
 #define TIN(name, ...) BENCHMARK_CAPTURE(mesh, name, __VA_ARGS__)->Unit(benchmark::kMillisecond)
 TIN(greedy_one_percent, kOnePercent, PointTinQuality::kGreedy);
+TIN(removal_one_percent, kOnePercent, PointTinQuality::kRemoval);
+TIN(fitted_one_percent, kOnePercent, PointTinQuality::kFitted);
 TIN(greedy_half, kHalf, PointTinQuality::kGreedy);
+TIN(removal_half, kHalf, PointTinQuality::kRemoval);
 BENCHMARK_CAPTURE(measure, one_percent, kOnePercent)->Unit(benchmark::kMillisecond);
 
 }  // namespace

@@ -497,6 +497,19 @@ TEST(PointTin, PlanesNeedNoVertices) {
   EXPECT_EQ(tin.triangles.size(), 2u);
 }
 
+TEST(PointTin, BetterQualityMeansFewerTriangles) {
+  const Cloud cloud = make_cloud(PointSet::kUniform, 20000, 15);
+  std::size_t triangles[3];
+  for (std::size_t q = 0; q < 3; ++q) {
+    PointTinOptions options;
+    options.max_error = 2;
+    options.quality = kQualities[q];
+    triangles[q] = make(cloud, {}, options).triangles.size();
+  }
+  EXPECT_LT(static_cast<double>(triangles[1]), 0.8 * static_cast<double>(triangles[0]));
+  EXPECT_LT(static_cast<double>(triangles[2]), 0.97 * static_cast<double>(triangles[1]));
+}
+
 template <class Call>
 std::string refused(Call call) {
   try {

@@ -60,11 +60,12 @@ class Checker {
       const auto first = static_cast<std::size_t>(std::ceil(from));
       const auto last = static_cast<std::size_t>(to);  // rounded down
       const std::size_t row = static_cast<std::size_t>(y) * window_.columns;
-      const double start = a[2] + slope_y * (y - a[1]);
+      const double rise_y = slope_y * (y - a[1]);
       for (std::size_t x = first; x <= last; ++x) {
         const auto column = static_cast<double>(x);
         const auto height = static_cast<double>(window_.heights[row + x]);
-        const double error = std::fabs(height - (start + slope_x * (column - a[0])));
+        // Relative to a corner, so that nothing is lost where heights are large.
+        const double error = std::fabs((height - a[2]) - (rise_y + slope_x * (column - a[0])));
         std::uint8_t& flags = flags_[row + x];
         if (error <= most_ && (flags & kCovered) != 0) continue;
         if (!std::isfinite(height)) {

@@ -32,7 +32,7 @@ class Raster {
         }
       }
     }
-    const double per_axis = std::sqrt(static_cast<double>(triangles.size()) / 2);
+    const double per_axis = std::sqrt(static_cast<double>(triangles.size()));
     side_ = static_cast<std::size_t>(std::clamp(per_axis, 1.0, 4096.0));
     start_.assign(side_ * side_ + 1, 0);
     for (const Corners& corners : triangles)
@@ -89,7 +89,7 @@ class Raster {
     }
   }
 
-  /// The columns that a triangle reaches in a row of cells, and one more on each side.
+  /// The columns that a triangle reaches in a row of cells, and a little more.
   [[nodiscard]] std::array<std::size_t, 2> columns_in(const Corners& corners,
                                                       std::size_t row) const {
     // A band that is a little wider than the row.
@@ -114,8 +114,8 @@ class Raster {
       if (a[1] == b[1]) right = std::max(right, b[0]), left = std::min(left, b[0]);
     }
     if (left > right) return {1, 0};
-    const std::size_t from = cell_of(left, 0);
-    return {from == 0 ? 0 : from - 1, cell_of(right, 0) + 1};
+    const double margin = 1e-9 * (high_[0] - low_[0]);
+    return {cell_of(left - margin, 0), cell_of(right + margin, 0)};
   }
 
   std::span<const Point3> vertices_;

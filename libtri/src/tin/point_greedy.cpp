@@ -38,9 +38,8 @@ void Greedy::rescan(std::uint32_t triangle) {
   enqueue(triangle, worst);
 }
 
-void Greedy::take_all() {
-  for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t)
-    if (mesh_.triangles[t].error > 0) queue_.push(mesh_.triangles[t].error, t);
+void Greedy::take(std::span<const std::uint32_t> triangles) {
+  for (const std::uint32_t t : triangles) queue_.push(mesh_.triangles[t].error, t);
 }
 
 void Greedy::run(std::size_t max_vertices, std::size_t max_triangles) {
@@ -66,8 +65,12 @@ bool Greedy::insert(std::uint32_t index, std::uint32_t triangle) {
   // Rounding may have dealt it to another list.
   if (!lattice_ && spot.triangle != triangle) move(index, triangle, spot.triangle);
   cavity_.dig(mesh_.triangles, spot.triangle, [&](const Triangle& t) {
-    return Kernel::in_circle(mesh_.place(t.corner[0]), mesh_.place(t.corner[1]),
-                             mesh_.place(t.corner[2]), p) > 0;
+    const Place2 a = mesh_.place(t.corner[0]);
+    const Place2 b = mesh_.place(t.corner[1]);
+    const Place2 c = mesh_.place(t.corner[2]);
+    if (delaunay_) return Kernel::in_circle(a, b, c, p) > 0;
+    return Kernel::orientation(a, b, p) >= 0 && Kernel::orientation(b, c, p) >= 0 &&
+           Kernel::orientation(c, a, p) >= 0;
   });
   mesh_.vertices.push_back(vertex);
   cavity_.fill(mesh_.triangles, mesh_.vertices.size() - 1,

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <span>
 
 #include "cavity.hpp"
 #include "error_queue.hpp"
@@ -21,8 +22,12 @@ class Greedy {
   Greedy(Mesh& mesh, double max_error, bool fixed_border, const std::optional<TinLattice>& lattice)
       : mesh_(mesh), bound_(max_error), fixed_border_(fixed_border), lattice_(lattice) {}
 
-  /// Puts all triangles with an error into the queue.
-  void take_all();
+  /// From now on a new vertex only cuts the triangles that contain it: for meshes that are not
+  /// Delaunay any more.
+  void stop_delaunay() { delaunay_ = false; }
+  /// Puts triangles into the queue, which have an error. Their order is that of insertion among
+  /// nearly equal errors: memory is in the cache if neighbours are near each other.
+  void take(std::span<const std::uint32_t> triangles);
   /// Inserts samples until none that can become a vertex exceeds the bound, or there are
   /// max_vertices, or more than max_triangles.
   void run(std::size_t max_vertices, std::size_t max_triangles);
@@ -40,6 +45,7 @@ class Greedy {
   Mesh& mesh_;
   double bound_;
   bool fixed_border_;
+  bool delaunay_ = true;
   std::optional<TinLattice> lattice_;
   ErrorBuckets queue_{1e-30F};
   Cavity cavity_;

@@ -51,6 +51,7 @@ Measured list_samples(Mesh& mesh, std::uint32_t step, double bound) {
     ++result.above;
     if (stuck(sample)) continue;
     ++result.to_mend;
+    if (!(triangle.error > 0)) result.waiting.push_back(at);
     if (rounded_up(error) > triangle.error) {
       triangle.error = rounded_up(error);
       triangle.place = index;

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <vector>
 
 #include "point_mesh.hpp"
 
@@ -11,6 +13,8 @@ struct Measured {
   TinErrors errors;         ///< of samples listed and of vertices; uncovered: those outside
   std::size_t above = 0;    ///< samples beyond the bound
   std::size_t to_mend = 0;  ///< of these, such as may become vertices
+  /// The triangles with such samples, neighbours near each other.
+  std::vector<std::uint32_t> waiting;
 };
 
 /// Makes all lists anew, of the samples 0, step, 2 * step, ... that are no vertices, each in the

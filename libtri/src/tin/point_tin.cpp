@@ -10,6 +10,7 @@
 #include "lattice.hpp"
 #include "point_greedy.hpp"
 #include "point_lists.hpp"
+#include "point_removal.hpp"
 #include "point_samples.hpp"
 #include "point_start.hpp"
 
@@ -37,18 +38,135 @@ void check_options(const PointTinOptions& options, std::span<const Point3> frame
                                     " of the frame is not on the lattice");
 }
 
-/// While triangles are large, few of their samples choose the vertices as well as all, and need not
-/// be dealt anew each time.
-void insert_greedily(Mesh& mesh, Greedy& greedy, double bound, std::size_t max_vertices) {
-  constexpr std::uint32_t kSteps[] = {64, 8, 1};
-  constexpr std::size_t kSamplesPerTriangle = 8;
-  for (const std::uint32_t step : kSteps) {
-    const std::size_t listed = mesh.samples->size() / step;
-    if (step > 1 && listed < 1024) continue;
-    list_samples(mesh, step, bound);
-    greedy.take_all();
-    greedy.run(max_vertices, step > 1 ? listed / kSamplesPerTriangle : kUnlimited);
+/// Makes the mesh, for one bound after another.
+class Maker {
+ public:
+  Maker(Samples& samples, std::span<const Point3> frame, const PointTinOptions& options)
+      : samples_(samples.all), frame_(frame), options_(options) {}
+
+  /// False: there is no surface.
+  bool make(double bound, std::size_t max_vertices, PointTinQuality quality) {
+    mesh_ = {};
+    mesh_.samples = &samples_;
+    for (Sample& sample : span_of(samples_)) {
+      sample.next = kUnlisted;
+      sample.id = number(sample);
+    }
+    if (frame_.empty()) {
+      start_with_hull(mesh_);
+    } else {
+      start_with_frame(mesh_, frame_);
+    }
+    if (mesh_.triangles.empty()) return false;
+    const std::size_t fixed = mesh_.vertices.size();
+    Greedy greedy(mesh_, bound, !frame_.empty(), options_.lattice);
+    insert_greedily(greedy, bound, max_vertices);
+    mend(greedy, bound, max_vertices);
+    inserted_ = mesh_.vertices.size() - fixed;
+    removed_ = 0;
+    if (quality == PointTinQuality::kGreedy) return true;
+    greedy.stop_delaunay();
+    const auto remove = [&] {
+      removed_ += remove_vertices(mesh_, fixed, bound, options_.min_angle_degrees);
+    };
+    remove();
+    if (quality == PointTinQuality::kFitted) {
+      // Moved vertices have errors at their own samples.
+      for (Sample& sample : span_of(samples_))
+        if (sample.next == kIsVertex) sample.next = kUnlisted;
+      list_samples(mesh_, 1, bound);
+      fit_heights(mesh_, fixed, bound, options_.lattice);
+      remove();
+    }
+    mend(greedy, bound, max_vertices);
+    return true;
   }
+
+  [[nodiscard]] const Measured& measured() const { return measured_; }
+  [[nodiscard]] std::size_t vertices() const { return mesh_.vertices.size() - removed_; }
+
+  void publish(PointTin& result) const {
+    result.errors = measured_.errors;
+    result.stuck = measured_.above - measured_.to_mend;
+    result.inserted = inserted_;
+    result.removed = removed_;
+    std::vector<std::uint32_t> number_of =
+        tin::triangle_of_vertices(mesh_.triangles, mesh_.vertices.size());
+    for (std::uint32_t v = 0; v < mesh_.vertices.size(); ++v) {
+      if (number_of[v] == kNone) continue;
+      number_of[v] = static_cast<std::uint32_t>(result.vertices.size());
+      const Vertex& vertex = mesh_.vertices[v];
+      result.vertices.push_back({vertex.x, vertex.y, vertex.z});
+      result.sample.push_back(vertex.sample == kNone ? kNoSample : number(samples_[vertex.sample]));
+    }
+    for (const tin::Triangle& t : mesh_.triangles)
+      if (t.live())
+        result.triangles.push_back(
+            {number_of[t.corner[0]], number_of[t.corner[1]], number_of[t.corner[2]]});
+  }
+
+ private:
+  /// While triangles are large, few of their samples choose the vertices as well as all, and need
+  /// not be dealt anew each time.
+  void insert_greedily(Greedy& greedy, double bound, std::size_t max_vertices) {
+    constexpr std::uint32_t kSteps[] = {64, 8, 1};
+    constexpr std::size_t kSamplesPerTriangle = 8;
+    for (const std::uint32_t step : kSteps) {
+      const std::size_t listed = samples_.size() / step;
+      if (step > 1 && listed < 1024) continue;
+      greedy.take(list_samples(mesh_, step, bound).waiting);
+      greedy.run(max_vertices, step > 1 ? listed / kSamplesPerTriangle : kUnlimited);
+    }
+  }
+
+  /// Measures; and inserts what rounding hid from the lists, next to never.
+  void mend(Greedy& greedy, double bound, std::size_t max_vertices) {
+    measured_ = list_samples(mesh_, 1, bound);
+    while (measured_.to_mend > 0 && mesh_.vertices.size() < max_vertices) {
+      greedy.take(measured_.waiting);
+      greedy.run(max_vertices, kUnlimited);
+      measured_ = list_samples(mesh_, 1, bound);
+    }
+  }
+
+  Pool<Sample>& samples_;
+  std::span<const Point3> frame_;
+  const PointTinOptions& options_;
+  Mesh mesh_;
+  Measured measured_;
+  std::size_t inserted_ = 0;
+  std::size_t removed_ = 0;
+};
+
+/// The smallest bound that leaves at most max_points after removal, nearly: where greedy insertion
+/// stops at max_points is too large a bound, as removal then leaves about 0.6 of them; the number
+/// of vertices is about a power of the bound.
+bool make_of_points(Maker& maker, const PointTinOptions& options) {
+  constexpr int kTries = 6;
+  constexpr double kFull = 0.98;
+  const std::size_t limit = options.max_points;
+  if (!maker.make(options.max_error, limit, PointTinQuality::kGreedy)) return false;
+  if (options.quality == PointTinQuality::kGreedy) return true;
+  double best = std::max(maker.measured().errors.largest, options.max_error);
+  double bound = best;
+  double too_small = options.max_error;
+  double last = bound;
+  for (int i = 0; i < kTries && bound > 0; ++i) {
+    maker.make(bound, kUnlimited, options.quality);
+    last = bound;
+    const double part = static_cast<double>(maker.vertices()) / static_cast<double>(limit);
+    if (part <= 1) {
+      best = bound;
+      if (part >= kFull || bound <= options.max_error) break;
+    } else {
+      too_small = bound;
+    }
+    // Vertices go down about as the inverse of the bound; a little to the safe side.
+    bound = std::max(last * part * 1.01, options.max_error);
+    if (!(bound > too_small && bound < best)) bound = (too_small + best) / 2;
+  }
+  if (last != best) maker.make(best, kUnlimited, options.quality);
+  return true;
 }
 
 }  // namespace
@@ -57,39 +175,13 @@ PointTin point_tin(std::span<const double> x, std::span<const double> y, std::sp
                    std::span<const Point3> frame, const PointTinOptions& options) {
   check_options(options, frame);
   Samples samples = take_samples(x, y, z, options.duplicates);
-  Mesh mesh;
-  mesh.samples = &samples.all;
-  if (frame.empty()) {
-    start_with_hull(mesh);
-  } else {
-    start_with_frame(mesh, frame);
-  }
   PointTin result;
   result.duplicates = samples.duplicates;
   result.errors.uncovered = samples.all.size();
-  if (mesh.triangles.size() == 0) return result;
-  const std::size_t fixed = mesh.vertices.size();
-  const std::size_t max_vertices = options.max_points == 0 ? kUnlimited : options.max_points;
-  Greedy greedy(mesh, options.max_error, !frame.empty(), options.lattice);
-  insert_greedily(mesh, greedy, options.max_error, max_vertices);
-  Measured measured = list_samples(mesh, 1, options.max_error);
-  // What rounding hid from the lists, next to never.
-  while (measured.to_mend > 0 && mesh.vertices.size() < max_vertices) {
-    greedy.take_all();
-    greedy.run(max_vertices, kUnlimited);
-    measured = list_samples(mesh, 1, options.max_error);
-  }
-  result.inserted = mesh.vertices.size() - fixed;
-  result.errors = measured.errors;
-  result.stuck = measured.above - measured.to_mend;
-  for (std::uint32_t v = 0; v < mesh.vertices.size(); ++v) {
-    const Vertex& vertex = mesh.vertices[v];
-    result.vertices.push_back({vertex.x, vertex.y, vertex.z});
-    result.sample.push_back(vertex.sample == kNone ? kNoSample
-                                                   : number(samples.all[vertex.sample]));
-  }
-  for (const tin::Triangle& triangle : mesh.triangles)
-    if (triangle.live()) result.triangles.push_back(triangle.corner);
+  Maker maker(samples, frame, options);
+  if (options.max_points == 0 ? maker.make(options.max_error, kUnlimited, options.quality)
+                              : make_of_points(maker, options))
+    maker.publish(result);
   return result;
 }
 

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <utility>
@@ -46,11 +47,11 @@ void simplify(std::span<const T> line, std::size_t a, std::size_t b, double limi
     const auto start = static_cast<double>(line[from]);
     const double rise = static_cast<double>(line[to]) - start;
     const auto length = static_cast<double>(to - from);
-    double most = limit;
+    double most = std::max(limit, 0x1p-50 * std::fabs(rise));  // rounding is no error
     std::size_t worst = from;
     for (std::size_t i = from + 1; i < to; ++i) {
       const double error = std::fabs(static_cast<double>(line[i]) - start -
-                                     rise * (static_cast<double>(i - from) / length));
+                                     rise * static_cast<double>(i - from) / length);
       if (error <= most) continue;
       most = error;
       worst = i;

@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "terrace/tri/grid_tin_check.hpp"
+
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "grid_windows.hpp"
+
+namespace {
+
+using namespace terrace::tri;
+using Triangles = std::vector<std::array<std::uint32_t, 3>>;
+
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
+const std::vector<Point3> kSquare{{0, 0, 0}, {3, 0, 0}, {3, 3, 0}, {0, 3, 0}};
+const Triangles kHalves{{0, 1, 2}, {0, 2, 3}};
+
+TEST(GridTinCheck, FindsErrorsEverywhere) {
+  for (std::size_t at = 0; at < 16; ++at) {
+    std::vector<double> heights(16, 0.0);
+    heights[at] = -7;
+    const GridTinCheck check = check_grid_tin<double>({4, 4, heights}, kSquare, kHalves);
+    EXPECT_EQ(check.max_error, 7);
+    EXPECT_NEAR(check.rms_error, 7.0 / 4, 1e-12);
+    EXPECT_EQ(check.covered, 16U);
+    EXPECT_EQ(check.turned, 0U);
+  }
+}
+
+TEST(GridTinCheck, CountsWhatIsNotCovered) {
+  std::vector<double> heights(16, 1.0);
+  GridTinCheck check = check_grid_tin<double>({4, 4, heights}, kSquare, Triangles{{0, 1, 2}});
+  EXPECT_EQ(check.samples, 16U);
+  EXPECT_EQ(check.covered, 10U);
+  EXPECT_EQ(check.uncovered, 6U);
+  EXPECT_EQ(check.uncovered_inner, 6U);
+  EXPECT_EQ(check.max_error, 1);
+  heights[12] = kNone;  // column 0, row 3: its 3 neighbours are not inner then
+  check = check_grid_tin<double>({4, 4, heights}, kSquare, Triangles{{0, 1, 2}});
+  EXPECT_EQ(check.samples, 15U);
+  EXPECT_EQ(check.uncovered, 5U);
+  EXPECT_EQ(check.uncovered_inner, 2U);
+  EXPECT_EQ(check.nodata_covered, 0U);
+  check = check_grid_tin<double>({4, 4, heights}, kSquare, kHalves);
+  EXPECT_EQ(check.nodata_covered, 1U);
+  EXPECT_EQ(check.uncovered, 0U);
+}
+
+TEST(GridTinCheck, CountsTurnedTriangles) {
+  const std::vector<double> heights(16, 0.0);
+  EXPECT_EQ(
+      check_grid_tin<double>({4, 4, heights}, kSquare, Triangles{{0, 1, 2}, {0, 3, 2}}).turned, 1U);
+  EXPECT_EQ(
+      check_grid_tin<double>({4, 4, heights}, kSquare, Triangles{{0, 1, 2}, {0, 0, 2}}).turned, 1U);
+}
+
+TEST(GridTinCheck, CornersOffTheLattice) {
+  std::vector<double> heights;
+  for (int y = 0; y < 4; ++y)
+    for (int x = 0; x < 4; ++x) heights.push_back(2 * x - 3 * y);
+  std::vector<Point3> moved;
+  for (const auto& [x, y, z] : kSquare) {
+    const double u = x == 0 ? x + 0.001 : x - 0.001, v = y == 0 ? y + 0.001 : y - 0.001;
+    moved.push_back({u, v, 2 * u - 3 * v});
+  }
+  GridTinCheck check = check_grid_tin<double>({4, 4, heights}, moved, kHalves);
+  EXPECT_EQ(check.covered, 4U);
+  check = check_grid_tin<double>({4, 4, heights}, moved, kHalves, 0.002);
+  EXPECT_EQ(check.covered, 16U);
+  EXPECT_LE(check.max_error, 1e-12);
+  // Data that is missing is covered only if it is really inside.
+  heights[0] = kNone;
+  EXPECT_EQ(check_grid_tin<double>({4, 4, heights}, moved, kHalves, 0.002).nodata_covered, 0U);
+  heights[5] = kNone;
+  EXPECT_EQ(check_grid_tin<double>({4, 4, heights}, moved, kHalves, 0.002).nodata_covered, 1U);
+}
+
+TEST(GridTinCheck, AgreesWithAllSamplesInAllTriangles) {
+  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const auto owned =
+        make_window<float>(Relief::kNoise, seed % 2 == 0 ? Gaps::kBlobs : Gaps::kNone, 12, 9, seed);
+    std::mt19937_64 random(seed);
+    std::vector<Point3> points;
+    for (int i = 0; i < 12; ++i)
+      points.push_back({static_cast<double>(random() % 1000) / 64 - 1.5,
+                        static_cast<double>(random() % 1000) / 64 - 1.5,
+                        static_cast<double>(random() % 1000)});
+    Triangles triangles;
+    for (std::uint32_t i = 0; i + 2 < 12; ++i) triangles.push_back({i, i + 1, i + 2});
+    double most = 0;
+    std::size_t covered = 0, missing = 0;
+    for (std::uint32_t y = 0; y < 9; ++y) {
+      for (std::uint32_t x = 0; x < 12; ++x) {
+        bool in_any = false;
+        const double z = static_cast<double>(owned.at(x, y));
+        for (const auto& t : triangles) {
+          const Point3 &a = points[t[0]], &b = points[t[1]], &c = points[t[2]];
+          const auto area = [&](const Point3& p, const Point3& q, double u, double v) {
+            return (q[0] - p[0]) * (v - p[1]) - (q[1] - p[1]) * (u - p[0]);
+          };
+          double w[3] = {area(b, c, x, y), area(c, a, x, y), area(a, b, x, y)};
+          const double sum = w[0] + w[1] + w[2];
+          if (sum == 0 || w[0] / sum < 0 || w[1] / sum < 0 || w[2] / sum < 0) continue;
+          in_any = true;
+          const double plane = (w[0] * a[2] + w[1] * b[2] + w[2] * c[2]) / sum;
+          if (std::isfinite(z)) most = std::max(most, std::fabs(plane - z));
+        }
+        covered += in_any && std::isfinite(z) ? 1 : 0;
+        missing += in_any && !std::isfinite(z) ? 1 : 0;
+      }
+    }
+    const GridTinCheck check = check_grid_tin<float>(owned.window(), points, triangles);
+    EXPECT_NEAR(check.max_error, most, 1e-6 * (1 + most));
+    EXPECT_EQ(check.covered, covered);
+    EXPECT_EQ(check.nodata_covered, missing);
+  }
+}
+
+TEST(GridTinCheck, MisuseIsRefused) {
+  const std::vector<double> heights(16, 0.0);
+  const GridWindow<double> window{4, 4, heights};
+  EXPECT_THROW(check_grid_tin<double>({4, 5, heights}, kSquare, kHalves), std::invalid_argument);
+  EXPECT_THROW(check_grid_tin<double>(window, kSquare, Triangles{{0, 1, 4}}),
+               std::invalid_argument);
+  EXPECT_THROW(check_grid_tin<double>(window, kSquare, kHalves, 2), std::invalid_argument);
+  EXPECT_THROW(check_grid_tin<double>(window, kSquare, kHalves, kNone), std::invalid_argument);
+  for (const double bad : {kNone, 1e30, std::numeric_limits<double>::infinity()}) {
+    std::vector<Point3> points = kSquare;
+    points[2][1] = bad;
+    EXPECT_THROW(check_grid_tin<double>(window, points, kHalves), std::invalid_argument);
+  }
+}
+
+}  // namespace

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <cmath>
+#include <limits>
+#include <random>
+#include <stdexcept>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "terrace/tri/grid_tin.hpp"
+
+namespace {
+
+using namespace terrace::tri;
+using Line = std::vector<double>;
+
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
+std::vector<std::uint32_t> settle(const Line& line, const Line& beside, const Line& other,
+                                  double bound) {
+  return settle_side<double>(line, beside, other, bound);
+}
+
+TEST(SettleSide, EndsOnlyWhereStraight) {
+  EXPECT_EQ(settle({1, 2, 3, 4}, {}, {}, 0), (std::vector<std::uint32_t>{0, 3}));
+  EXPECT_EQ(settle({5}, {}, {}, 0), (std::vector<std::uint32_t>{0}));
+  EXPECT_EQ(settle({5, 9}, {}, {}, 0), (std::vector<std::uint32_t>{0, 1}));
+  EXPECT_TRUE(settle({}, {}, {}, 0).empty());
+  EXPECT_EQ(settle({kNone, kNone, kNone, kNone}, {}, {}, 0), (std::vector<std::uint32_t>{0, 3}));
+}
+
+TEST(SettleSide, GreatestErrorFirst) {
+  EXPECT_EQ(settle({0, 3, 10, 3, 0}, {}, {}, 2.5), (std::vector<std::uint32_t>{0, 2, 4}));
+  EXPECT_EQ(settle({0, 3, 10, 3, 0}, {}, {}, 1.5), (std::vector<std::uint32_t>{0, 1, 2, 3, 4}));
+  EXPECT_EQ(settle({0, 3, 10, 3, 0}, {}, {}, 10.5), (std::vector<std::uint32_t>{0, 4}));
+}
+
+TEST(SettleSide, DataEndsAtVertices) {
+  EXPECT_EQ(settle({0, 0, 0, kNone, kNone, kNone, 0, 0, 0, 0}, {}, {}, 1),
+            (std::vector<std::uint32_t>{0, 2, 3, 5, 6, 9}));
+}
+
+TEST(SettleSide, MissingDataBesideMakesVertices) {
+  const Line line(7, 1.0);
+  Line beside = line;
+  beside[3] = kNone;
+  const std::vector<std::uint32_t> expected{0, 2, 3, 4, 6};
+  EXPECT_EQ(settle(line, beside, {}, 1), expected);
+  EXPECT_EQ(settle(line, {}, beside, 1), expected);
+  EXPECT_EQ(settle(line, beside, line, 1), settle(line, line, beside, 1));
+}
+
+TEST(SettleSide, WithinTheBound) {
+  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937_64 random(seed);
+    Line line;
+    const std::size_t count = 1 + random() % 80;
+    const bool gaps = seed % 3 == 0;
+    double z = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      z += static_cast<double>(random() % 21) - 10;
+      line.push_back(gaps && random() % 10 == 0 ? kNone : z);
+    }
+    const double bound = static_cast<double>(random() % 30);
+    const auto vertices = settle(line, {}, {}, bound);
+    ASSERT_EQ(vertices.front(), 0U);
+    ASSERT_EQ(vertices.back(), count - 1);
+    for (std::size_t k = 1; k < vertices.size(); ++k) {
+      const std::uint32_t a = vertices[k - 1], b = vertices[k];
+      ASSERT_LT(a, b);
+      const bool has = std::isfinite(line[a]) && std::isfinite(line[b]);
+      for (std::uint32_t i = a + 1; i < b; ++i) {
+        ASSERT_EQ(std::isfinite(line[i]), has);
+        if (!has) continue;
+        const double there = line[a] + (line[b] - line[a]) * (i - a) / (b - a);
+        EXPECT_LE(std::fabs(line[i] - there), bound);
+      }
+    }
+  }
+}
+
+TEST(SettleSide, MisuseIsRefused) {
+  EXPECT_THROW(settle({1, 2, 3}, {1, 2}, {}, 1), std::invalid_argument);
+  EXPECT_THROW(settle({1, 2, 3}, {}, {1, 2, 3, 4}, 1), std::invalid_argument);
+  EXPECT_THROW(settle({1, 2, 3}, {}, {}, -1), std::invalid_argument);
+  EXPECT_THROW(settle({1, 2, 3}, {}, {}, kNone), std::invalid_argument);
+  EXPECT_THROW(settle({1, 1e151}, {}, {}, 1), std::invalid_argument);
+}
+
+}  // namespace
