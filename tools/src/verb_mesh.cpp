@@ -9,6 +9,7 @@
 #include <terrace/stream/store.hpp>
 
 #include "bounded_mesh.hpp"
+#include "crs_options.hpp"
 #include "detail.hpp"
 #include "error.hpp"
 #include "mesh_output.hpp"
@@ -66,7 +67,8 @@ class MeshCommand final : public Command {
                    "(holes), flat (at the lowest height), interpolate")
         ->capture_default_str()
         ->type_name("NAME");
-    not_yet(app, {"--overlay", "--base", "--region-crs", "--to-crs"});
+    not_yet(app, {"--overlay", "--base"});
+    crs_.define(app);
   }
 
   Summary run(const CommonOptions& common) override {
@@ -96,9 +98,14 @@ class MeshCommand final : public Command {
     options.quality = parse_quality(quality_);
     options.duplicates = parse_duplicates(duplicates_);
     options.fill = parse_fill(fill_);
-    if (!region_.empty()) options.region = Region::parse(region_);
     options.path = output_;
     const stream::Store store = stream::Store::open(store_);
+    if (!region_.empty()) options.region = crs_.regions(store)(Region::parse(region_));
+    if (crs_.places(store).has_effect()) {
+      throw UsageError(
+          "--to-crs: between other coordinates the triangles would be other surfaces, and the bound "
+          "would not hold; write the mesh in the store's CRS");
+    }
     options.writer = {.format = format_, .replace = may_replace(output_, common.force)};
     const BoundedMeshResult result = store.schema().grid
                                          ? bounded_raster_mesh(store, options, common)
@@ -133,10 +140,12 @@ class MeshCommand final : public Command {
     }
     const MeshOptions options{parse_smoothing(smooth_), MetricChoice::parse(metric_)};
     const stream::Store store = stream::Store::open(store_);
-    const Detail detail = Detail::parse(store, level_, region_, focuses_);
+    const Detail detail = Detail::parse(store, level_, region_, focuses_, crs_.regions(store));
+    const PlaceConversion places = crs_.places(store);
     const bool replace = may_replace(output_, common.force);
-    const TriangleMesh mesh =
+    TriangleMesh mesh =
         mesh_of_store(store, detail, common.memory_or(machine_memory_bytes() / 2), options);
+    places(mesh.positions);
     write_mesh(output_, format_, mesh, replace);
 
     Summary summary;
@@ -154,6 +163,7 @@ class MeshCommand final : public Command {
   std::string max_points_, quality_ = "removal", duplicates_ = "error", fill_ = "none";
   std::optional<double> max_error_;
   std::vector<std::string> focuses_;
+  CrsOptions crs_;
 };
 
 }  // namespace

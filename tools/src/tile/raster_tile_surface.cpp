@@ -108,10 +108,13 @@ void find_bounds(TiledRaster& raster) {
 
 }  // namespace
 
-TiledRaster::TiledRaster(const stream::Store& tiled, CoordinateSystem system)
+TiledRaster::TiledRaster(const stream::Store& tiled, CoordinateSystem system,
+                         EllipsoidalHeights heights)
     : store(tiled),
       crs(std::move(system)),
       placement(placement_of(tiled.schema())),
+      geography(crs, tiled.schema().world),
+      vertical(std::move(heights)),
       fill(tiled),
       blocks(tiled) {
   if (tiled.schema().columns < 2 || tiled.schema().rows < 2) {
@@ -125,11 +128,6 @@ TiledRaster::TiledRaster(const stream::Store& tiled, CoordinateSystem system)
 
 RasterTileSurface::RasterTileSurface(const TiledRaster& raster)
     : raster_(raster), reader_(raster.store, std::uint64_t{8} << 20) {}
-
-double RasterTileSurface::metres(double height, double longitude, double latitude) const {
-  const double metres = height * raster_.metres_per_height;
-  return raster_.geoid ? metres + raster_.geoid(longitude, latitude) : metres;
-}
 
 LatticeWindow RasterTileSurface::window_around(const GeographicBox& box) const {
   // Only where the raster is: far from it a projection may have no places.
@@ -173,33 +171,25 @@ void RasterTileSurface::samples(const GeographicBox& box, SurfaceSamples& out) {
   const LatticeWindow window = window_around(box);
   if (window.size() == 0) return;
   heights_.resize(window.size());
+  longitude_.resize(window.size());
+  latitude_.resize(window.size());
   reader_.heights(window, std::span<double>(heights_));
-  places_.resize(static_cast<std::size_t>(window.columns));
-  for (std::int64_t row = 0; row < window.rows; ++row) {
-    const double* const heights = heights_.data() + row * window.columns;
-    for (std::int64_t column = 0; column < window.columns; ++column) {
-      places_[static_cast<std::size_t>(column)] =
-          world_place(raster_.placement, static_cast<double>(window.column + column),
-                      static_cast<double>(window.row + row));
+  raster_.geography.window(window.column, window.row, static_cast<std::size_t>(window.columns),
+                           static_cast<std::size_t>(window.rows), longitude_, latitude_);
+  for (std::size_t i = 0; i < heights_.size(); ++i) {
+    const double longitude = wrapped(longitude_[i]), latitude = latitude_[i];
+    // Written so that NaN is outside.
+    const bool inside = longitude >= box.west && longitude <= box.east && latitude >= box.south &&
+                        latitude <= box.north;
+    if (!inside) continue;
+    if (std::isnan(heights_[i])) {
+      if (!raster_.flat_fill) continue;
+      out.height.push_back(*raster_.flat_fill);
+    } else {
+      out.height.push_back(raster_.vertical.convert({longitude, latitude}, heights_[i]));
     }
-    raster_.crs.to_geographic(places_);
-    for (std::int64_t column = 0; column < window.columns; ++column) {
-      const double longitude = wrapped(places_[static_cast<std::size_t>(column)][0]);
-      const double latitude = places_[static_cast<std::size_t>(column)][1];
-      // Written so that NaN is outside.
-      const bool inside = longitude >= box.west && longitude <= box.east && latitude >= box.south &&
-                          latitude <= box.north;
-      if (!inside) continue;
-      const double height = heights[column];
-      if (std::isnan(height)) {
-        if (!raster_.flat_fill) continue;
-        out.height.push_back(*raster_.flat_fill);
-      } else {
-        out.height.push_back(metres(height, longitude, latitude));
-      }
-      out.longitude.push_back(longitude);
-      out.latitude.push_back(latitude);
-    }
+    out.longitude.push_back(longitude);
+    out.latitude.push_back(latitude);
   }
 }
 
@@ -209,15 +199,15 @@ std::optional<HeightRange> RasterTileSurface::range(const GeographicBox& box) {
   const auto range = raster_.blocks.range(window);
   if (!range) return std::nullopt;
   HeightRange out;
-  const double low = range->low * raster_.metres_per_height;
-  const double high = range->high * raster_.metres_per_height;
+  const double low = range->low * raster_.vertical.metres_per_unit();
+  const double high = range->high * raster_.vertical.metres_per_unit();
   out.low = std::min(low, high);
   out.high = std::max(low, high);
   if (raster_.flat_fill) {
     out.low = std::min(out.low, *raster_.flat_fill);
     out.high = std::max(out.high, *raster_.flat_fill);
   }
-  if (raster_.geoid) {
+  if (raster_.vertical.has_geoid()) {
     // No geoid leaves these bounds.
     constexpr double kLowestGeoid = -110.0, kHighestGeoid = 90.0;
     out.low += kLowestGeoid;
@@ -314,11 +304,12 @@ void RasterTileSurface::heights(std::span<const double> longitude, std::span<con
             weighed((1.0 - fy) * (1.0 - fx), at[0]) + weighed((1.0 - fy) * fx, at[1]) +
             weighed(fy * (1.0 - fx), at[window.columns]) + weighed(fy * fx, at[window.columns + 1]);
         if (!std::isnan(height)) {
-          out[i] = metres(height, longitude[i], latitude[i]);
+          out[i] = raster_.vertical.convert({longitude[i], latitude[i]}, height);
         } else if (raster_.flat_fill) {
           out[i] = *raster_.flat_fill;
         } else {
-          out[i] = metres(raster_.fill.height(p[0], p[1]), longitude[i], latitude[i]);
+          out[i] = raster_.vertical.convert({longitude[i], latitude[i]},
+                                                      raster_.fill.height(p[0], p[1]));
         }
       });
 }

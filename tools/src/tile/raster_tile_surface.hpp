@@ -2,13 +2,15 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
-#include <memory>
 #include <optional>
+#include <span>
+#include <vector>
 
 #include <terrace/stream/store.hpp>
 
 #include "coordinate_system.hpp"
+#include "geoid_heights.hpp"
+#include "grid_geography.hpp"
 #include "raster_fill.hpp"
 #include "store_window.hpp"
 #include "tile/height_blocks.hpp"
@@ -37,7 +39,7 @@ struct TiledRaster {
   double spacing = 0.0;
 
   /// Reads the store twice. Throws: stream::Error if no place of it can be told on the globe.
-  TiledRaster(const stream::Store& tiled, CoordinateSystem system);
+  TiledRaster(const stream::Store& tiled, CoordinateSystem system, EllipsoidalHeights heights);
 };
 
 /// The surface of a raster store: bilinear between four samples with data, filled elsewhere.
@@ -61,12 +63,10 @@ class RasterTileSurface final : public TileSurface {
   void visit_places(std::span<const double> longitude, std::span<const double> latitude,
                     const Visit& visit);
   [[nodiscard]] LatticeWindow window_around(const GeographicBox& box) const;
-  [[nodiscard]] double metres(double height, double longitude, double latitude) const;
 
   const TiledRaster& raster_;
   StoreWindow reader_;
-  std::vector<double> heights_;
-  std::vector<Point2> places_;
+  std::vector<double> heights_, longitude_, latitude_;
 };
 
 }  // namespace terrace::tools

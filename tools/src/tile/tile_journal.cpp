@@ -33,7 +33,7 @@ TileJournal::TileJournal(const std::string& folder, const std::string& fingerpri
         FinishedTile finished;
         std::string end;
         if (!(words >> tile.zoom >> tile.x >> tile.y >> finished.bytes >> finished.checksum >>
-              finished.max_error >> end) ||
+              finished.max_error >> finished.height_step >> end) ||
             end != ".") {
           break;
         }
@@ -63,7 +63,8 @@ const FinishedTile* TileJournal::find(const TileAddress& tile) const {
 
 void TileJournal::add(const TileAddress& tile, const FinishedTile& finished) {
   file_ << tile.zoom << ' ' << tile.x << ' ' << tile.y << ' ' << finished.bytes << ' '
-        << finished.checksum << ' ' << number_text(finished.max_error) << " .\n";
+        << finished.checksum << ' ' << number_text(finished.max_error) << ' '
+        << number_text(finished.height_step) << " .\n";
   file_.flush();
   if (!file_) throw stream::system_error(path_, "cannot be written", errno);
 }

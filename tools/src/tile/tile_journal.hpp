@@ -16,7 +16,8 @@ namespace terrace::tools {
 struct FinishedTile {
   std::uint64_t bytes = 0;
   std::uint64_t checksum = 0;
-  double max_error = 0.0;  ///< metres
+  double max_error = 0.0;    ///< metres
+  double height_step = 0.0;  ///< metres: tiles of a zoom fit together only if it is the same
 };
 
 /// A checksum of 64 bits: FNV-1a.
