@@ -309,7 +309,7 @@ void RasterTileSurface::heights(std::span<const double> longitude, std::span<con
           out[i] = *raster_.flat_fill;
         } else {
           out[i] = raster_.vertical.convert({longitude[i], latitude[i]},
-                                                      raster_.fill.height(p[0], p[1]));
+                                            raster_.fill.height(p[0], p[1]));
         }
       });
 }

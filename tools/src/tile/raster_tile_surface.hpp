@@ -24,10 +24,8 @@ struct TiledRaster {
   const stream::Store& store;
   CoordinateSystem crs;
   Placement placement;
-  double metres_per_height = 1.0;
-  /// Added to heights in metres at a longitude and latitude, to make them ellipsoidal; may be
-  /// empty.
-  std::function<double(double longitude, double latitude)> geoid{};
+  GridGeography geography;
+  EllipsoidalHeights vertical;
   /// Heights where there is no data: nothing takes those around, else this height in metres.
   std::optional<double> flat_fill{};
   /// A sample of this height (in the store's unit) is water; without, one that has no data is.

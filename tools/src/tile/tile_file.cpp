@@ -7,9 +7,8 @@
 
 #include <fcntl.h>
 #include <sys/stat.h>
-#include <unistd.h>
-
 #include <terrace/stream/error.hpp>
+#include <unistd.h>
 
 namespace terrace::tools {
 namespace {
@@ -73,10 +72,10 @@ void write_tile_file(const std::string& path, std::span<const std::byte> bytes) 
   if (error) {
     throw stream::system_error(target.parent_path().string(), "cannot be made", error.value());
   }
-  const std::string temporary =
-      (target.parent_path() / ("." + target.filename().string() + ".tmp")).string();
-  Descriptor file(
-      ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, S_IRUSR | S_IWUSR | S_IRGRP | S_IROTH));
+  std::string temporary = target.parent_path().string();
+  temporary.append("/.").append(target.filename().string()).append(".tmp");
+  Descriptor file(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC,
+                         S_IRUSR | S_IWUSR | S_IRGRP | S_IROTH));
   if (file.number() < 0) throw stream::system_error(path, "cannot be created", errno);
   if (!write_all(file.number(), bytes) || !file.close() ||
       ::rename(temporary.c_str(), path.c_str()) != 0) {

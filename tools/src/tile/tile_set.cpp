@@ -118,8 +118,8 @@ Written TileSetWriter::write_tile(const TileAddress& tile, const ZoomPlan& plan,
   if (options_.metadata) made.mesh.metadata = children_json(tile, deeper_);
   std::vector<std::byte> bytes = encode_tile(made.mesh, made.header);
   if (options_.gzip) bytes = stream::gzip(bytes);
-  Written written{true, bytes == before,
-                  {bytes.size(), checksum_of(bytes), made.max_error, plan.height_step}};
+  Written written{
+      true, bytes == before, {bytes.size(), checksum_of(bytes), made.max_error, plan.height_step}};
   if (!written.kept) write_tile_file(path, bytes);
   return written;
 }
@@ -203,12 +203,13 @@ std::uint64_t remove_others(const std::string& folder,
 }
 
 std::string fingerprint_of(const TileSetOptions& options) {
-  std::string text = "1 " + options.source_fingerprint;
+  std::string text = "1 ";
+  text += options.source_fingerprint;
   for (const double number : {static_cast<double>(options.first_zoom),
                               static_cast<double>(options.last_zoom), options.max_error}) {
-    text += " " + number_text(number);
+    text.append(" ").append(number_text(number));
   }
-  text += " " + std::to_string(static_cast<int>(options.mesh.quality));
+  text.append(" ").append(std::to_string(static_cast<int>(options.mesh.quality)));
   for (const bool flag :
        {options.mesh.normals, options.mesh.water, options.gzip, options.metadata}) {
     text += flag ? " yes" : " no";
