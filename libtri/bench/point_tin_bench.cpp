@@ -3,7 +3,7 @@
 // displacement of exponent 0.8; a small one with TERRACE_BENCH_SMALL), one thread, at errors that
 // leave about 1 % and about half of the samples as vertices of the greedy surface. The counters
 // tell vertices, triangles, and the largest error as the independent measurement finds it (its time
-// is a benchmark of its own).
+// is a benchmark of its own). `tile`: samples on a lattice, within a frame.
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -17,6 +17,7 @@
 namespace {
 
 using terrace::tri::measure_surface;
+using terrace::tri::Point3;
 using terrace::tri::point_tin;
 using terrace::tri::PointTin;
 using terrace::tri::PointTinOptions;
@@ -116,6 +117,39 @@ void measure(benchmark::State& state, double max_error) {
         measure_surface(input().x, input().y, input().z, tin.vertices, tin.triangles));
 }
 
+/// The samples of a 16th of the area as a tile on its lattice of 15 bits, its sides of 33 vertices.
+void tile(benchmark::State& state, double max_error) {
+  const double extent = 10 * static_cast<double>(kSide - 1) / 4;
+  const double scale = 32767 / extent;
+  std::vector<double> x, y, z;
+  for (std::size_t i = 0; i < kCount; ++i) {
+    if (input().x[i] > extent || input().y[i] > extent) continue;
+    x.push_back(input().x[i] * scale);
+    y.push_back(input().y[i] * scale);
+    z.push_back(input().z[i]);
+  }
+  std::vector<Point3> frame;
+  for (int side = 0; side < 4; ++side) {
+    for (int k = 0; k < 32; ++k) {
+      const double t = std::floor(32767.0 * k / 32);
+      const double u = 32767 - t;
+      frame.push_back(side == 0   ? Point3{t, 0, 0}
+                      : side == 1 ? Point3{32767, t, 0}
+                      : side == 2 ? Point3{u, 32767, 0}
+                                  : Point3{0, u, 0});
+    }
+  }
+  PointTinOptions options;
+  options.max_error = max_error;
+  options.lattice = terrace::tri::TinLattice{-4000, 8000.0 / 32767};
+  PointTin tin;
+  for (auto _ : state) tin = point_tin(x, y, z, frame, options);
+  state.SetItemsProcessed(static_cast<std::int64_t>(state.iterations() * x.size()));
+  state.counters["samples"] = static_cast<double>(x.size());
+  state.counters["vertices"] = static_cast<double>(tin.vertices.size());
+  state.counters["stuck"] = static_cast<double>(tin.stuck);
+}
+
 constexpr double kOnePercent = 15.5;
 constexpr double kHalf = 0.85;
 #define TIN(name, ...) BENCHMARK_CAPTURE(mesh, name, __VA_ARGS__)->Unit(benchmark::kMillisecond)
@@ -124,6 +158,8 @@ TIN(removal_one_percent, kOnePercent, PointTinQuality::kRemoval);
 TIN(fitted_one_percent, kOnePercent, PointTinQuality::kFitted);
 TIN(greedy_half, kHalf, PointTinQuality::kGreedy);
 TIN(removal_half, kHalf, PointTinQuality::kRemoval);
+BENCHMARK_CAPTURE(tile, one_percent, kOnePercent)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(tile, tenth_of_it, kOnePercent / 10)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(measure, one_percent, kOnePercent)->Unit(benchmark::kMillisecond);
 
 }  // namespace

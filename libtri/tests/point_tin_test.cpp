@@ -157,7 +157,7 @@ TEST(PointTin, KeepsTheErrorOverTheHull) {
   for (const PointSet kind : kPointSets) {
     if (kind == PointSet::kHuge || kind == PointSet::kTiny) continue;
     for (const std::uint64_t seed : {1u, 2u}) {
-      const Cloud cloud = make_cloud(kind, 1500, seed);
+      const Cloud cloud = make_cloud(kind, 800, seed);
       for (const double error : {0.0, 0.5, 5.0, 200.0}) {
         for (const PointTinQuality quality : kQualities) {
           SCOPED_TRACE(name(kind) + ", seed " + std::to_string(seed) + ", error " +
@@ -194,6 +194,29 @@ TEST(PointTin, KeepsTheErrorOverTheHull) {
             }
           }
         }
+      }
+    }
+  }
+}
+
+// So many samples that the first vertices are chosen by few of them, and the last in parts.
+TEST(PointTin, KeepsTheErrorOfManySamples) {
+  for (const PointSet kind : {PointSet::kUniform, PointSet::kGrid, PointSet::kClusters}) {
+    const Cloud cloud = make_cloud(kind, 70000, 17);
+    for (const double error : {0.6, 10.0}) {
+      for (const PointTinQuality quality : kQualities) {
+        SCOPED_TRACE(name(kind) + ", error " + std::to_string(error) + ", quality " +
+                     std::to_string(static_cast<int>(quality)));
+        PointTinOptions options;
+        options.max_error = error;
+        options.quality = quality;
+        const PointTin tin = make(cloud, {}, options);
+        check_mesh(tin);
+        EXPECT_LE(tin.errors.largest, error);
+        const TinErrors measured = measure(cloud, tin);
+        EXPECT_EQ(measured.uncovered, 0u);
+        EXPECT_LE(measured.largest, error + 1e-9);
+        EXPECT_GE(tin.vertices.size(), 3 + tin.inserted - tin.removed);
       }
     }
   }

@@ -19,7 +19,12 @@ void Greedy::enqueue(std::uint32_t triangle, double worst) {
   t.error = 0;
   if (!(worst > bound_)) return;
   t.error = rounded_up(worst);
-  queue_.push(t.error, triangle);
+  const std::size_t part = t.place / together_;
+  if (part > part_) {
+    later_[part].push_back(triangle);
+  } else {
+    queue_.push(t.error, triangle);
+  }
 }
 
 void Greedy::rescan(std::uint32_t triangle) {
@@ -38,13 +43,29 @@ void Greedy::rescan(std::uint32_t triangle) {
   enqueue(triangle, worst);
 }
 
-void Greedy::take(std::span<const std::uint32_t> triangles) {
-  for (const std::uint32_t t : triangles) queue_.push(mesh_.triangles[t].error, t);
+void Greedy::start(std::span<const std::uint32_t> triangles, std::size_t together) {
+  queue_ = ErrorBuckets(kLeastError);
+  together_ = std::max<std::size_t>(together, 1);
+  part_ = 0;
+  later_.assign(mesh_.samples->size() / together_ + 1, {});
+  for (const std::uint32_t t : triangles) later_[mesh_.triangles[t].place / together_].push_back(t);
+}
+
+std::uint32_t Greedy::next_triangle() {
+  for (;;) {
+    const std::uint32_t t = queue_.pop(mesh_.triangles);
+    if (t != kNone) return t;
+    while (part_ < later_.size() && later_[part_].empty()) ++part_;
+    if (part_ == later_.size()) return kNone;
+    for (const std::uint32_t waiting : later_[part_])
+      if (mesh_.triangles[waiting].error > 0) queue_.push(mesh_.triangles[waiting].error, waiting);
+    later_[part_] = {};
+  }
 }
 
 void Greedy::run(std::size_t max_vertices, std::size_t max_triangles) {
   while (mesh_.vertices.size() < max_vertices && mesh_.triangles.size() <= max_triangles) {
-    const std::uint32_t t = queue_.pop(mesh_.triangles);
+    const std::uint32_t t = next_triangle();
     if (t == kNone) return;
     const std::uint32_t sample = mesh_.triangles[t].place;
     if (insert(sample, t)) continue;

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "cavity.hpp"
 #include "error_queue.hpp"
@@ -25,9 +26,10 @@ class Greedy {
   /// From now on a new vertex only cuts the triangles that contain it: for meshes that are not
   /// Delaunay any more.
   void stop_delaunay() { delaunay_ = false; }
-  /// Puts triangles into the queue, which have an error. Their order is that of insertion among
-  /// nearly equal errors: memory is in the cache if neighbours are near each other.
-  void take(std::span<const std::uint32_t> triangles);
+  /// Begins with these triangles, which have an error, of lists made anew. Samples are handled in
+  /// parts of `together` numbers, which are near each other: one after the other they and their
+  /// triangles stay in the cache, and the result is as good as if all were handled together.
+  void start(std::span<const std::uint32_t> triangles, std::size_t together);
   /// Inserts samples until none that can become a vertex exceeds the bound, or there are
   /// max_vertices, or more than max_triangles.
   void run(std::size_t max_vertices, std::size_t max_triangles);
@@ -41,13 +43,20 @@ class Greedy {
   void move(std::uint32_t index, std::uint32_t from, std::uint32_t to);
   void rescan(std::uint32_t triangle);
   void enqueue(std::uint32_t triangle, double worst);
+  /// The next triangle, kNone: none in any part.
+  std::uint32_t next_triangle();
 
   Mesh& mesh_;
   double bound_;
   bool fixed_border_;
   bool delaunay_ = true;
+  std::size_t together_ = 0;
+  std::size_t part_ = 0;  ///< the present one
+  /// Triangles that later parts begin with, by part; some of them may have changed since.
+  std::vector<std::vector<std::uint32_t>> later_;
   std::optional<TinLattice> lattice_;
-  ErrorBuckets queue_{1e-30F};
+  static constexpr float kLeastError = 1e-30F;
+  ErrorBuckets queue_{kLeastError};
   Cavity cavity_;
   Fan fan_;
 };

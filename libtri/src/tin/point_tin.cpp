@@ -59,12 +59,18 @@ class Maker {
     }
     if (mesh_.triangles.empty()) return false;
     const std::size_t fixed = mesh_.vertices.size();
+    // So much that growing, which takes twice the memory for a moment, is rare; what is not used
+    // costs addresses alone.
+    mesh_.triangles.reserve(mesh_.triangles.size() + samples_.size());
     Greedy greedy(mesh_, bound, !frame_.empty(), options_.lattice);
     insert_greedily(greedy, bound, max_vertices);
-    mend(greedy, bound, max_vertices);
-    inserted_ = mesh_.vertices.size() - fixed;
     removed_ = 0;
-    if (quality == PointTinQuality::kGreedy) return true;
+    if (quality == PointTinQuality::kGreedy) {
+      mend(greedy, bound, max_vertices);
+      inserted_ = mesh_.vertices.size() - fixed;
+      return true;
+    }
+    inserted_ = mesh_.vertices.size() - fixed;
     greedy.stop_delaunay();
     const auto remove = [&] {
       removed_ += remove_vertices(mesh_, fixed, bound, options_.min_angle_degrees);
@@ -85,20 +91,29 @@ class Maker {
   [[nodiscard]] const Measured& measured() const { return measured_; }
   [[nodiscard]] std::size_t vertices() const { return mesh_.vertices.size() - removed_; }
 
-  void publish(PointTin& result) const {
+  /// Leaves nothing behind.
+  void publish(PointTin& result) {
     result.errors = measured_.errors;
     result.stuck = measured_.above - measured_.to_mend;
     result.inserted = inserted_;
     result.removed = removed_;
+    // Memory for the result comes after that of the samples is gone.
+    for (Vertex& vertex : span_of(mesh_.vertices))
+      vertex.sample = vertex.sample == kNone ? kNoSample : number(samples_[vertex.sample]);
+    samples_.release();
+    mesh_.heads.release();
     std::vector<std::uint32_t> number_of =
         tin::triangle_of_vertices(mesh_.triangles, mesh_.vertices.size());
+    result.vertices.reserve(vertices());
+    result.sample.reserve(vertices());
     for (std::uint32_t v = 0; v < mesh_.vertices.size(); ++v) {
       if (number_of[v] == kNone) continue;
       number_of[v] = static_cast<std::uint32_t>(result.vertices.size());
       const Vertex& vertex = mesh_.vertices[v];
       result.vertices.push_back({vertex.x, vertex.y, vertex.z});
-      result.sample.push_back(vertex.sample == kNone ? kNoSample : number(samples_[vertex.sample]));
+      result.sample.push_back(vertex.sample);
     }
+    result.triangles.reserve(2 * vertices());
     for (const tin::Triangle& t : mesh_.triangles)
       if (t.live())
         result.triangles.push_back(
@@ -111,10 +126,13 @@ class Maker {
   void insert_greedily(Greedy& greedy, double bound, std::size_t max_vertices) {
     constexpr std::uint32_t kSteps[] = {64, 8, 1};
     constexpr std::size_t kSamplesPerTriangle = 8;
+    // So few that they and their triangles stay in the cache.
+    constexpr std::size_t kTogether = 8192;
     for (const std::uint32_t step : kSteps) {
       const std::size_t listed = samples_.size() / step;
       if (step > 1 && listed < 1024) continue;
-      greedy.take(list_samples(mesh_, step, bound).waiting);
+      const bool last = step == 1 && max_vertices == kUnlimited;
+      greedy.start(list_samples(mesh_, step, bound).waiting, last ? kTogether : samples_.size());
       greedy.run(max_vertices, step > 1 ? listed / kSamplesPerTriangle : kUnlimited);
     }
   }
@@ -123,7 +141,7 @@ class Maker {
   void mend(Greedy& greedy, double bound, std::size_t max_vertices) {
     measured_ = list_samples(mesh_, 1, bound);
     while (measured_.to_mend > 0 && mesh_.vertices.size() < max_vertices) {
-      greedy.take(measured_.waiting);
+      greedy.start(measured_.waiting, samples_.size());
       greedy.run(max_vertices, kUnlimited);
       measured_ = list_samples(mesh_, 1, bound);
     }

@@ -48,7 +48,7 @@ struct PointTinOptions {
   PointDuplicates duplicates = PointDuplicates::kFirst;
   /// At most this many vertices, those of the frame (or the hull's corners) included and never
   /// dropped; 0: no limit. Where it is reached first, max_error is not kept and
-  /// PointTin::largest_error tells what was reached.
+  /// PointTin::errors tells what was reached.
   std::size_t max_points = 0;
   /// Removal makes no triangle with a smaller angle (in the plane), unless it is Delaunay. 0 to 30.
   double min_angle_degrees = 5;
@@ -82,7 +82,7 @@ struct PointTin {
   /// Samples beyond max_error that cannot become vertices: they lie on the frame's sides, which are
   /// kept, or their place on the lattice is taken or on a side.
   std::size_t stuck = 0;
-  std::size_t inserted = 0;  ///< vertices of the greedy surface beside the frame's
+  std::size_t inserted = 0;  ///< vertices of the greedy surface beside the frame's or the corners
   std::size_t removed = 0;   ///< of these, removed again
 };
 
@@ -96,8 +96,13 @@ struct PointTin {
 /// become vertices only where the error asks for it. Samples that are all on one line (or fewer
 /// than 3) have no surface: no vertex, all uncovered.
 ///
-/// Depends on the arguments alone. One thread. About n log n for n samples; 33 to 40 bytes per
-/// sample and about 80 per vertex besides the result.
+/// Depends on the arguments alone: the same bytes on every machine; the order of samples at
+/// different places hardly matters. One thread. About n log n for n samples: on a processor of 2024
+/// 0.2 us per sample and 1.3 us per vertex made on the way, removal as much again; 36 bytes per
+/// sample, and about 100 per vertex made on the way, the result included.
+///
+/// max_points: greedy insertion stops there; for the other qualities the bound that leaves nearly
+/// as many is searched for, which takes up to 8 times as long.
 ///
 /// Throws std::invalid_argument naming the index of a coordinate or height that is not finite or of
 /// a size above 1e100, of a frame vertex where the polygon is not convex, of a duplicate with
