@@ -20,7 +20,10 @@ void GridSurface<T>::refine(std::size_t most) {
   std::size_t with_data = 0;
   for (const Corner& vertex : corners_) with_data += sees(vertex) ? 1 : 0;
   for (;;) {
-    const std::uint32_t t = queue.pop(triangles_);
+    const std::uint32_t t = queue.pop(triangles_, tiles_.count(), [&](const Triangle& triangle) {
+      return tiles_.of(static_cast<std::int32_t>(triangle.place & 0xFFFF),
+                       static_cast<std::int32_t>(triangle.place >> 16));
+    });
     if (t == kNone || with_data >= most) return;
     if (triangles_[t].error == kMixed) {
       // Its cure may lie outside it and have become a vertex since.

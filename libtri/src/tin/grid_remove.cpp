@@ -12,8 +12,9 @@ void GridSurface<T>::remove() {
   Star star;
   PolygonFill fill;
   Corner ring[kMaxRing];
+  Corner removed{};
   const auto cost_of = [&](std::size_t i, std::size_t m, std::size_t j, T limit) {
-    return cost(ring[i], ring[m], ring[j], limit);
+    return cost(ring[i], ring[m], ring[j], removed, limit);
   };
   const auto left = [&](std::size_t i, std::size_t m, std::size_t j) {
     return turn(ring[i], ring[m], ring[j]) > 0;
@@ -30,6 +31,7 @@ void GridSurface<T>::remove() {
         own.y == rows_ - 1 || !star.gather(triangles_, vertex, triangle_of[vertex]))
       continue;
     const std::size_t size = star.size();
+    removed = own;
     for (std::size_t i = 0; i < size; ++i) ring[i] = corners_[star.ring(i)];
     const bool possible = (fill_delaunay(size, left, inside, fill) && star.all_of(fill, within)) ||
                           (size > 3 && fill_least_worst(size, scan_bound_, cost_of, fill));

@@ -20,6 +20,17 @@ struct Kernel<float> {
   using Ints = std::int32_t __attribute__((vector_size(64)));
   using Quarter = float __attribute__((vector_size(16)));
   using Half = float __attribute__((vector_size(32)));
+  [[gnu::always_inline]] static float greatest_lane(Reals lanes) {
+    const Half low = __builtin_shufflevector(lanes, lanes, 0, 1, 2, 3, 4, 5, 6, 7);
+    const Half high = __builtin_shufflevector(lanes, lanes, 8, 9, 10, 11, 12, 13, 14, 15);
+    const Half eight = high > low ? high : low;
+    const Quarter first = __builtin_shufflevector(eight, eight, 0, 1, 2, 3);
+    const Quarter second = __builtin_shufflevector(eight, eight, 4, 5, 6, 7);
+    Quarter four = second > first ? second : first;
+    const Quarter swapped = __builtin_shufflevector(four, four, 2, 3, 0, 1);
+    four = swapped > four ? swapped : four;
+    return four[1] > four[0] ? four[1] : four[0];
+  }
   static constexpr Ints kLane = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
   static constexpr Int kSignless = 0x7FFFFFFF;
   static constexpr float kRounding = 0x1p-24F;
@@ -54,6 +65,11 @@ struct Kernel<double> {
   using Reals = double __attribute__((vector_size(64)));
   using Ints = std::int64_t __attribute__((vector_size(64)));
   using Half = double __attribute__((vector_size(32)));
+  [[gnu::always_inline]] static double greatest_lane(Reals lanes) {
+    double greatest = lanes[0];
+    for (int i = 1; i < kLanes; ++i) greatest = lanes[i] > greatest ? lanes[i] : greatest;
+    return greatest;
+  }
   static constexpr Ints kLane = {0, 1, 2, 3, 4, 5, 6, 7};
   static constexpr Int kSignless = 0x7FFFFFFFFFFFFFFF;
   static constexpr double kRounding = 0x1p-53;
@@ -107,6 +123,7 @@ struct Plane {
     clipped = max_x != right || max_y != bottom;
     // Twice the area 1 or a box of 2 x 2: no samples but the corners.
     empty = area <= 1 || (right - left <= 1 && bottom - top <= 1) || min_x > max_x || min_y > max_y;
+    if (empty) return;
     const double inverse = 1.0 / static_cast<double>(area);
     const double bz = static_cast<double>(b.z) - static_cast<double>(a.z);
     const double cz = static_cast<double>(c.z) - static_cast<double>(a.z);
@@ -114,16 +131,16 @@ struct Plane {
     const double slope_y = (cz * static_cast<double>(bx) - bz * static_cast<double>(cx)) * inverse;
     gradient_x = static_cast<T>(slope_x);
     gradient_y = static_cast<T>(slope_y);
-    // Rounded are: the gradients (in double several times, in proportion to the terms of their
-    // sums), 2 products, 3 sums. The terms of a slope's sum over the area are bounded by
-    // |difference of heights| * extent / area.
+    // Rounded are: the gradients, 2 products, 3 sums. In double the gradients are rounded several
+    // times, in proportion to the terms of their sums, which are bounded by |difference of heights|
+    // * extent / area.
     const double width = right - left, height = bottom - top;
     const double rise = __builtin_fabs(slope_x) * width + __builtin_fabs(slope_y) * height;
-    const double terms =
-        (__builtin_fabs(bz) + __builtin_fabs(cz)) * (2.0 * width * height * inverse);
-    constexpr double kRounding = Kernel<T>::kRounding;
-    slack = static_cast<T>(kRounding * (6.0 * rise + 4.0 * static_cast<double>(bound)) +
-                           0x1p-50 * terms);
+    double rounded = Kernel<T>::kRounding * (6.5 * rise + 4.0 * static_cast<double>(bound));
+    if (Kernel<T>::kLanes == 8)
+      rounded +=
+          0x1p-50 * (__builtin_fabs(bz) + __builtin_fabs(cz)) * (2.0 * width * height * inverse);
+    slack = static_cast<T>(rounded);
   }
 };
 
@@ -282,11 +299,7 @@ template <class T, class Visit>
   }
 }
 
-template <class T>
-[[gnu::always_inline]] inline bool at(const GridCorner<T>& corner, std::int32_t x, std::int32_t y) {
-  return corner.x == x && corner.y == y;
-}
-
+/// Corners are never the worst: their errors are at most `slack`, which is at most `best`.
 template <class T>
 GridWorst<T> worst_in(const GridSamples<T>& samples, const GridCorner<T>& a, const GridCorner<T>& b,
                       const GridCorner<T>& c, T bound) {
@@ -305,21 +318,19 @@ GridWorst<T> worst_in(const GridSamples<T>& samples, const GridCorner<T>& a, con
       [&](typename K::Reals error, typename K::Ints inside, std::int32_t x0, std::int32_t y0,
           int width) __attribute__((always_inline)) {
         // NaN counts as greater.
-        unsigned hits =
+        const unsigned hits =
             bits_of((typename K::Ints)(~(error <= best - typename K::Reals{})) & inside);
-        if (__builtin_expect(hits == 0, 1)) return true;
-        for (; hits != 0; hits &= hits - 1) {
-          const int lane = __builtin_ctz(hits);
-          const std::int32_t x = x0 + (lane & (width - 1)), y = y0 + lane / width;
-          const T own = error[lane];
-          if (own != own) {
-            worst = {static_cast<T>(__builtin_inf()), 0};
-            return false;
-          }
-          if (!(own > best) || at(a, x, y) || at(b, x, y) || at(c, x, y)) continue;
-          best = own;
-          worst = {own, static_cast<std::uint32_t>(y) << 16 | static_cast<std::uint32_t>(x)};
+        if (hits == 0) return true;
+        if (bits_of((typename K::Ints)(error != error) & inside) != 0) {
+          worst = {static_cast<T>(__builtin_inf()), 0};
+          return false;
         }
+        const typename K::Reals own = (typename K::Reals)((typename K::Ints)error & inside);
+        best = K::greatest_lane(own);
+        const int lane =
+            __builtin_ctz(bits_of((typename K::Ints)(own == best - typename K::Reals{})));
+        const std::int32_t x = x0 + (lane & (width - 1)), y = y0 + lane / width;
+        worst = {best, static_cast<std::uint32_t>(y) << 16 | static_cast<std::uint32_t>(x)};
         return true;
       });
   return worst;
@@ -350,9 +361,7 @@ T most_in(const GridSamples<T>& samples, const GridCorner<T>& a, const GridCorne
             return within;
           });
   if (!within) return static_cast<T>(__builtin_inf());
-  T result = 0;
-  for (int i = 0; i < K::kLanes; ++i) result = greatest(result, static_cast<T>(most[i]));
-  return least(static_cast<T>(result + plane.slack), bound);
+  return least(static_cast<T>(K::greatest_lane(most) + plane.slack), bound);
 }
 
 }  // namespace

@@ -30,6 +30,7 @@ GridSurface<T>::GridSurface(const GridWindow<Sample>& window, const GridTinOptio
       rows_(static_cast<std::int32_t>(window.rows)),
       rows_turned_((options.column_step < 0) != (options.row_step < 0)),
       sides_fixed_(sides_fixed),
+      tiles_(columns_, rows_),
       bound_(options.max_error),
       scan_bound_(rounded_down<T>(options.max_error)),
       ground_(options.column_step, options.row_step, std::max(columns_, rows_)),
@@ -120,11 +121,23 @@ GridWorst<T> GridSurface<T>::worst(const Corner& a, const Corner& b, const Corne
 }
 
 template <class T>
-T GridSurface<T>::cost(const Corner& a, const Corner& b, const Corner& c, T limit) const {
+T GridSurface<T>::cost(const Corner& a, const Corner& b, const Corner& c, const Corner& removed,
+                       T limit) const {
   constexpr T kNever = std::numeric_limits<T>::infinity();
   const std::int64_t twice = turn(a, b, c);
   if (twice <= 0 || !ground_.wide(a, b, c, twice)) return kNever;
   if (gaps_ && !sees_all(a, b, c)) return gaps_->mixed(a, b, c) ? kNever : 0;
+  // Most that fail do so at the very vertex.
+  const std::int64_t at_a = turn(b, c, removed), at_b = turn(c, a, removed);
+  const std::int64_t at_c = twice - at_a - at_b;
+  if ((at_a | at_b | at_c) >= 0) {
+    const T own = heights_[static_cast<std::size_t>(removed.y) * samples_.stride +
+                           static_cast<std::size_t>(removed.x)];
+    const double sum = static_cast<double>(at_a) * static_cast<double>(a.z - own) +
+                       static_cast<double>(at_b) * static_cast<double>(b.z - own) +
+                       static_cast<double>(at_c) * static_cast<double>(c.z - own);
+    if (!(std::fabs(sum) <= bound_ * static_cast<double>(twice))) return kNever;
+  }
   const T found = scan_.most(samples_, a, b, c, scan_bound_, limit);
   if (found != T{kUnsure}) return found;
   const CarefulWorst sure = careful_worst(samples_, a, b, c);

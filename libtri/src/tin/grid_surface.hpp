@@ -9,6 +9,7 @@
 #include "cavity.hpp"
 #include "grid_gaps.hpp"
 #include "grid_scan.hpp"
+#include "grid_tiles.hpp"
 #include "ground.hpp"
 #include "mesh.hpp"
 #include "terrace/tri/grid_tin.hpp"
@@ -29,8 +30,10 @@ class GridSurface {
   /// Queue: ErrorBuckets or ErrorHeap.
   template <class Queue>
   void refine(std::size_t most);
+  /// Brings vertices and triangles that are near each other in the plane near each other in memory.
+  void arrange();
   /// Removes inner vertices where the bound still holds without them, in the order of their
-  /// insertion.
+  /// numbers.
   void remove();
   /// Moves heights of inner vertices to the middle of what the samples around them allow.
   void fit();
@@ -56,14 +59,15 @@ class GridSurface {
   /// Sets the triangle's place and error.
   void judge(Triangle& triangle) const;
   GridWorst<T> worst(const Corner& a, const Corner& b, const Corner& c) const;
-  /// An upper bound of a new triangle's errors, or infinity: above `limit`, turned right, too thin,
-  /// mixed.
-  T cost(const Corner& a, const Corner& b, const Corner& c, T limit) const;
+  /// An upper bound of the errors of a triangle that is to help to fill the star of `removed`, or
+  /// infinity: above `limit`, turned right, too thin, mixed.
+  T cost(const Corner& a, const Corner& b, const Corner& c, const Corner& removed, T limit) const;
   void fit_vertex(std::uint32_t vertex, std::uint32_t first);
 
   std::int32_t columns_, rows_;
   bool rows_turned_;  ///< counter-clockwise on the lattice is clockwise on the ground
   bool sides_fixed_;
+  GridTiles tiles_;
   double bound_;
   T scan_bound_;  ///< bound_, rounded down
   Ground ground_;

@@ -95,7 +95,10 @@ GridTin make(const GridWindow<T>& window, const GridSides& sides, const GridTinO
   GridSurface<Real> surface(window, options, true, path);
   surface.insert_sides(sides);
   surface.template refine<ErrorBuckets>(std::numeric_limits<std::size_t>::max());
-  if (options.quality != TinQuality::kGreedy) surface.remove();
+  if (options.quality != TinQuality::kGreedy) {
+    surface.arrange();
+    surface.remove();
+  }
   if (options.quality == TinQuality::kFitted) {
     surface.fit();
     surface.remove();
