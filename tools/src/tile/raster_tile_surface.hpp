@@ -47,6 +47,7 @@ class RasterTileSurface final : public TileSurface {
 
   [[nodiscard]] GeographicBox bounds() const override { return raster_.bounds; }
   [[nodiscard]] double spacing() const override { return raster_.spacing; }
+  void expect(const GeographicBox& box) override;
   void samples(const GeographicBox& box, SurfaceSamples& out) override;
   std::optional<HeightRange> range(const GeographicBox& box) override;
   void heights(std::span<const double> longitude, std::span<const double> latitude,
@@ -55,16 +56,24 @@ class RasterTileSurface final : public TileSurface {
              std::span<std::uint8_t> out) override;
 
  private:
-  /// Calls visit(i, place on the lattice, window that has the samples around it, its heights) for
-  /// each place, in an order that reads little.
+  /// Calls visit(i, place on the lattice, the sample north-west of it, distance to the next row)
+  /// for each place, in an order that reads little. The sample's right neighbour follows it.
   template <class Visit>
   void visit_places(std::span<const double> longitude, std::span<const double> latitude,
                     const Visit& visit);
+  /// The heights of a window: of the one that is held, or read into it.
+  struct View {
+    const double* first = nullptr;
+    std::int64_t stride = 0;
+  };
+  View view(const LatticeWindow& window);
   [[nodiscard]] LatticeWindow window_around(const GeographicBox& box) const;
 
   const TiledRaster& raster_;
   StoreWindow reader_;
-  std::vector<double> heights_, longitude_, latitude_;
+  LatticeWindow held_{};
+  std::vector<double> heights_;  ///< of the held window
+  std::vector<double> longitude_, latitude_;
 };
 
 }  // namespace terrace::tools

@@ -204,6 +204,9 @@ MadeTile make_tile(const TileAddress& tile, const ZoomPlan& plan, TileSurface& s
   Pieces pieces;
   TileSides sides(tile, plan, surface);
   for (const TileLeaf& leaf : leaves_of(tile, plan, surface.bounds())) {
+    const auto range = surface.range(box_of(tile, leaf));
+    // Where heights differ less than the bound, nothing but the sides is read as a rule.
+    if (range && range->high - range->low > plan.max_error) surface.expect(box_of(tile, leaf));
     mesh_leaf(tile, leaf, plan, surface, options.quality, sides.around(leaf), pieces);
   }
   MadeTile made;

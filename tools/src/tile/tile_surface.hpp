@@ -40,6 +40,8 @@ class TileSurface {
   [[nodiscard]] virtual GeographicBox bounds() const = 0;
   /// The smallest distance of neighbouring samples along a parallel or meridian, degrees.
   [[nodiscard]] virtual double spacing() const = 0;
+  /// Says that samples and heights in the box will be asked for next: they are read once then.
+  virtual void expect(const GeographicBox& box) = 0;
   /// Replaces `out` by the samples in the box, borders included.
   virtual void samples(const GeographicBox& box, SurfaceSamples& out) = 0;
   /// Of the heights of samples in the box, cheaply. Nothing if there is no sample.
