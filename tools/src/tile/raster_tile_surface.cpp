@@ -170,27 +170,50 @@ void RasterTileSurface::samples(const GeographicBox& box, SurfaceSamples& out) {
   out.clear();
   const LatticeWindow window = window_around(box);
   if (window.size() == 0) return;
-  heights_.resize(window.size());
+  const View view = this->view(window);
   longitude_.resize(window.size());
   latitude_.resize(window.size());
-  reader_.heights(window, std::span<double>(heights_));
   raster_.geography.window(window.column, window.row, static_cast<std::size_t>(window.columns),
                            static_cast<std::size_t>(window.rows), longitude_, latitude_);
-  for (std::size_t i = 0; i < heights_.size(); ++i) {
-    const double longitude = wrapped(longitude_[i]), latitude = latitude_[i];
-    // Written so that NaN is outside.
-    const bool inside = longitude >= box.west && longitude <= box.east && latitude >= box.south &&
-                        latitude <= box.north;
-    if (!inside) continue;
-    if (std::isnan(heights_[i])) {
-      if (!raster_.flat_fill) continue;
-      out.height.push_back(*raster_.flat_fill);
-    } else {
-      out.height.push_back(raster_.vertical.convert({longitude, latitude}, heights_[i]));
+  for (std::int64_t row = 0, i = 0; row < window.rows; ++row) {
+    for (std::int64_t column = 0; column < window.columns; ++column, ++i) {
+      const double longitude = wrapped(longitude_[static_cast<std::size_t>(i)]);
+      const double latitude = latitude_[static_cast<std::size_t>(i)];
+      // Written so that NaN is outside.
+      const bool inside = longitude >= box.west && longitude <= box.east && latitude >= box.south &&
+                          latitude <= box.north;
+      if (!inside) continue;
+      const double height = view.first[row * view.stride + column];
+      if (std::isnan(height)) {
+        if (!raster_.flat_fill) continue;
+        out.height.push_back(*raster_.flat_fill);
+      } else {
+        out.height.push_back(raster_.vertical.convert({longitude, latitude}, height));
+      }
+      out.longitude.push_back(longitude);
+      out.latitude.push_back(latitude);
     }
-    out.longitude.push_back(longitude);
-    out.latitude.push_back(latitude);
   }
+}
+
+RasterTileSurface::View RasterTileSurface::view(const LatticeWindow& window) {
+  const std::int64_t column = window.column - held_.column, row = window.row - held_.row;
+  const bool holds = column >= 0 && row >= 0 && column + window.columns <= held_.columns &&
+                     row + window.rows <= held_.rows;
+  if (holds) return {heights_.data() + row * held_.columns + column, held_.columns};
+  held_ = {};  // if reading fails nothing is held
+  heights_.resize(window.size());
+  reader_.heights(window, std::span<double>(heights_));
+  held_ = window;
+  return {heights_.data(), held_.columns};
+}
+
+void RasterTileSurface::expect(const GeographicBox& box) {
+  LatticeWindow window = window_around(box);
+  if (window.size() == 0) return;
+  // What lies around places on the box's sides, outside the raster too.
+  window = {window.column - 2, window.row - 2, window.columns + 4, window.rows + 4};
+  view(window);
 }
 
 std::optional<HeightRange> RasterTileSurface::range(const GeographicBox& box) {
@@ -258,8 +281,11 @@ void RasterTileSurface::visit_places(std::span<const double> longitude,
     return std::pair{static_cast<std::int64_t>(std::floor(places[i][1])) / kBlock,
                      static_cast<std::int64_t>(std::floor(places[i][0])) / kBlock};
   };
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::uint32_t a, std::uint32_t b) { return block(a) < block(b); });
+  const auto before = [&](std::uint32_t a, std::uint32_t b) { return block(a) < block(b); };
+  // Sides come in order already.
+  if (!std::is_sorted(order.begin(), order.end(), before)) {
+    std::stable_sort(order.begin(), order.end(), before);
+  }
 
   for (std::size_t from = 0; from < order.size();) {
     std::int64_t c0 = 0, r0 = 0, c1 = 0, r1 = 0;
@@ -280,53 +306,49 @@ void RasterTileSurface::visit_places(std::span<const double> longitude,
       r1 = nr1;
     }
     const LatticeWindow window{c0, r0, c1 - c0 + 1, r1 - r0 + 1};
-    heights_.resize(window.size());
-    reader_.heights(window, std::span<double>(heights_));
-    for (; from < to; ++from) visit(order[from], places[order[from]], window, heights_.data());
+    const View view = this->view(window);
+    for (; from < to; ++from) {
+      const Point2& p = places[order[from]];
+      const auto column = static_cast<std::int64_t>(std::floor(p[0])) - window.column;
+      const auto row = static_cast<std::int64_t>(std::floor(p[1])) - window.row;
+      visit(order[from], p, view.first + row * view.stride + column, view.stride);
+    }
   }
 }
 
 void RasterTileSurface::heights(std::span<const double> longitude, std::span<const double> latitude,
                                 std::span<double> out) {
-  visit_places(
-      longitude, latitude,
-      [&](std::size_t i, const Point2& p, const LatticeWindow& window, const double* heights) {
-        const double column = std::floor(p[0]), row = std::floor(p[1]);
-        const auto c = static_cast<std::int64_t>(column) - window.column;
-        const auto r = static_cast<std::int64_t>(row) - window.row;
-        const double* const at = heights + r * window.columns + c;
-        const double fx = p[0] - column, fy = p[1] - row;
-        // A sample that has no weight need not be there.
-        const auto weighed = [](double weight, double height) {
-          return weight > 0.0 ? weight * height : 0.0;
-        };
-        const double height =
-            weighed((1.0 - fy) * (1.0 - fx), at[0]) + weighed((1.0 - fy) * fx, at[1]) +
-            weighed(fy * (1.0 - fx), at[window.columns]) + weighed(fy * fx, at[window.columns + 1]);
-        if (!std::isnan(height)) {
-          out[i] = raster_.vertical.convert({longitude[i], latitude[i]}, height);
-        } else if (raster_.flat_fill) {
-          out[i] = *raster_.flat_fill;
-        } else {
-          out[i] = raster_.vertical.convert({longitude[i], latitude[i]},
-                                            raster_.fill.height(p[0], p[1]));
-        }
-      });
+  visit_places(longitude, latitude,
+               [&](std::size_t i, const Point2& p, const double* at, std::int64_t stride) {
+                 const double fx = p[0] - std::floor(p[0]), fy = p[1] - std::floor(p[1]);
+                 // A sample that has no weight need not be there.
+                 const auto weighed = [](double weight, double height) {
+                   return weight > 0.0 ? weight * height : 0.0;
+                 };
+                 const double height =
+                     weighed((1.0 - fy) * (1.0 - fx), at[0]) + weighed((1.0 - fy) * fx, at[1]) +
+                     weighed(fy * (1.0 - fx), at[stride]) + weighed(fy * fx, at[stride + 1]);
+                 const Point2 place{longitude[i], latitude[i]};
+                 if (!std::isnan(height)) {
+                   out[i] = raster_.vertical.convert(place, height);
+                 } else if (raster_.flat_fill) {
+                   out[i] = *raster_.flat_fill;
+                 } else {
+                   out[i] = raster_.vertical.convert(place, raster_.fill.height(p[0], p[1]));
+                 }
+               });
 }
 
 void RasterTileSurface::water(std::span<const double> longitude, std::span<const double> latitude,
                               std::span<std::uint8_t> out) {
-  visit_places(
-      longitude, latitude,
-      [&](std::size_t i, const Point2& p, const LatticeWindow& window, const double* heights) {
-        const auto c = static_cast<std::int64_t>(std::floor(p[0])) - window.column +
-                       (p[0] - std::floor(p[0]) >= 0.5 ? 1 : 0);
-        const auto r = static_cast<std::int64_t>(std::floor(p[1])) - window.row +
-                       (p[1] - std::floor(p[1]) >= 0.5 ? 1 : 0);
-        const double height = heights[r * window.columns + c];
-        out[i] = raster_.water_height ? height == *raster_.water_height
-                                      : static_cast<std::uint8_t>(std::isnan(height));
-      });
+  visit_places(longitude, latitude,
+               [&](std::size_t i, const Point2& p, const double* at, std::int64_t stride) {
+                 const double height = at[(p[0] - std::floor(p[0]) >= 0.5 ? 1 : 0) +
+                                          (p[1] - std::floor(p[1]) >= 0.5 ? stride : 0)];
+                 const bool wet =
+                     raster_.water_height ? height == *raster_.water_height : std::isnan(height);
+                 out[i] = wet ? 1 : 0;
+               });
 }
 
 }  // namespace terrace::tools
