@@ -17,6 +17,7 @@ std::unique_ptr<Command> make_points();
 std::unique_ptr<Command> make_render();
 std::unique_ptr<Command> make_surface();
 std::unique_ptr<Command> make_synth();
+std::unique_ptr<Command> make_tile();
 std::unique_ptr<Command> make_verify();
 
 }  // namespace terrace::tools
