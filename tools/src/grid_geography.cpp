@@ -13,7 +13,7 @@ namespace terrace::tools {
 namespace {
 
 constexpr std::size_t kNodes = 4;
-constexpr std::size_t kPatch = 64;   // samples along a side at first
+constexpr std::size_t kPatch = 64;    // samples along a side at first
 constexpr std::size_t kSmallest = 8;  // below it polynomials cost more than they spare
 
 /// Chebyshev's nodes in [0, 1]: the error of the polynomial through them is spread evenly, with
@@ -23,12 +23,8 @@ constexpr std::array<double, kNodes> kNode{0.03806023374435663, 0.30865828381745
                                            0.69134171618254486, 0.96193976625564337};
 constexpr double kInner = 0.14644660940672624;
 /// Where the polynomials are checked: each sign of the error along one axis with each of the other.
-constexpr std::array<Point2, 6> kChecks{{{0, 0},
-                                         {1, kInner},
-                                         {1 - kInner, 1},
-                                         {kInner, 1 - kInner},
-                                         {0.5, 0.5},
-                                         {0, 1}}};
+constexpr std::array<Point2, 6> kChecks{
+    {{0, 0}, {1, kInner}, {1 - kInner, 1}, {kInner, 1 - kInner}, {0.5, 0.5}, {0, 1}}};
 
 /// Coefficients of the polynomial in t through values at the nodes: row k gives those of t^k.
 using Matrix = std::array<std::array<double, kNodes>, kNodes>;
@@ -64,7 +60,8 @@ struct Surface {
     std::array<Cubic, kNodes> along{};
     for (std::size_t j = 0; j < kNodes; ++j) {
       for (std::size_t k = 0; k < kNodes; ++k) {
-        for (std::size_t i = 0; i < kNodes; ++i) along[k][j] += matrix[k][i] * values[j * kNodes + i];
+        for (std::size_t i = 0; i < kNodes; ++i)
+          along[k][j] += matrix[k][i] * values[j * kNodes + i];
       }
     }
     for (std::size_t k = 0; k < kNodes; ++k) {
@@ -120,9 +117,9 @@ void GridGeography::exact(const Patch& patch, const Output& output) const {
   for (std::size_t j = 0; j < patch.rows; ++j) {
     const std::size_t row = patch.row + j;
     for (std::size_t i = 0; i < patch.columns; ++i) {
-      places[i] = {static_cast<double>(output.first_column +
-                                       static_cast<std::int64_t>(patch.column + i)),
-                   static_cast<double>(output.first_row + static_cast<std::int64_t>(row))};
+      places[i] = {
+          static_cast<double>(output.first_column + static_cast<std::int64_t>(patch.column + i)),
+          static_cast<double>(output.first_row + static_cast<std::int64_t>(row))};
     }
     exact(places);
     for (std::size_t i = 0; i < patch.columns; ++i) {
@@ -167,9 +164,8 @@ bool GridGeography::interpolated(const Patch& patch, const Output& output) const
   for (std::size_t k = 0; k < kChecks.size(); ++k) {
     const Point2& truth = places[kNodes * kNodes + k];
     const Point2& where = kChecks[k];
-    const double off = std::max(
-        std::abs(value(longitude.at_row(where[1]), where[0]) - truth[0]),
-        std::abs(value(latitude.at_row(where[1]), where[0]) - truth[1]));
+    const double off = std::max(std::abs(value(longitude.at_row(where[1]), where[0]) - truth[0]),
+                                std::abs(value(latitude.at_row(where[1]), where[0]) - truth[1]));
     // Between the places checked the error may be some times larger.
     if (!(off <= kTolerance / 8)) return false;
   }
