@@ -10,7 +10,7 @@
 namespace terrace::tools {
 
 /// Longitudes and latitudes of a raster's samples by column and row, fast: exact places on a few
-/// points of a patch, between them a polynomial of third degree in each direction, checked against
+/// points of a patch, between them a polynomial of fifth degree in each direction, checked against
 /// exact places where it is worst. Patches where it is off by more than kTolerance are quartered,
 /// down to samples that are computed one by one (near poles, across the antimeridian).
 ///
