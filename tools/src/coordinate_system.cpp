@@ -228,14 +228,14 @@ bool CoordinateSystem::same_places(const CoordinateSystem& other) const {
                      (a.uncertainty >= 0 || a.datum == b.datum);
   if (!datum || a.method != b.method) return false;
   if (!a.method) return a.degrees_per_unit == b.degrees_per_unit;
-  return a.parameters == b.parameters && a.metres_per_unit == b.metres_per_unit;
+  return nearly_equal(a.parameters, b.parameters) && a.metres_per_unit == b.metres_per_unit;
 }
 
 void transform(const CoordinateSystem& from, const CoordinateSystem& to, std::span<Point2> places) {
   if (from.same_places(to)) return;
   const CrsDefinition &a = from.definition(), &b = to.definition();
   // Datums that count as WGS 84 are one; another that both have needs no shift.
-  const bool one = a.datum == b.datum && a.shift == b.shift;
+  const bool one = a.datum == b.datum && a.ellipsoid == b.ellipsoid && a.shift == b.shift;
   if (one) {
     from.to_own_geographic(places);
     to.from_own_geographic(places);

@@ -59,7 +59,8 @@ void find_code(CrsDefinition& definition) {
       continue;
     }
     const EpsgConversion& conversion = *epsg_conversion(row.conversion);
-    if (conversion.method != *definition.method || conversion.parameters != definition.parameters) {
+    if (conversion.method != *definition.method ||
+        !nearly_equal(conversion.parameters, definition.parameters)) {
       continue;
     }
     if (only != nullptr) return;
@@ -105,9 +106,9 @@ CoordinateSystem CoordinateSystem::parse(const std::string& text,
 std::optional<CrsDefinition> definition_of(const stream::Crs& crs) {
   CrsDefinition definition;
   constexpr std::string_view kEsri = "ESRI PE String = ";
-  const std::string wkt = !crs.wkt.empty()               ? crs.wkt
+  const std::string wkt = !crs.wkt.empty()              ? crs.wkt
                           : crs.name.starts_with(kEsri) ? crs.name.substr(kEsri.size())
-                                                         : std::string();
+                                                        : std::string();
   const bool has_keys =
       std::any_of(crs.geo_keys.begin(), crs.geo_keys.end(), [](const stream::GeoKey& key) {
         return key.key >= 2048 && key.key < 4096 && !key.values.empty();
@@ -132,11 +133,11 @@ std::optional<CrsDefinition> definition_of(const stream::Crs& crs) {
   if (crs.vertical_epsg != 0) set_vertical_epsg(definition, crs.vertical_epsg);
   const auto unit = metres_in_unit(crs.horizontal_unit);
   if (definition.method && unit && std::abs(*unit / definition.metres_per_unit - 1) > 1e-9) {
-    throw ContradictoryCrs(
-        "its CRS " + (definition.epsg != 0 ? "EPSG:" + std::to_string(definition.epsg)
-                                           : '"' + definition.name + '"') +
-            " contradicts its unit, " + crs.horizontal_unit,
-        "say what is meant with --crs EPSG:n");
+    throw ContradictoryCrs("its CRS " +
+                               (definition.epsg != 0 ? "EPSG:" + std::to_string(definition.epsg)
+                                                     : '"' + definition.name + '"') +
+                               " contradicts its unit, " + crs.horizontal_unit,
+                           "say what is meant with --crs EPSG:n");
   }
   if (const auto height = metres_in_unit(crs.vertical_unit)) {
     definition.metres_per_height = *height;

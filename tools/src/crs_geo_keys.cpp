@@ -286,7 +286,7 @@ void check_geo_keys(const stream::Crs& crs, const CrsDefinition& definition) {
   const std::string code = "EPSG:" + std::to_string(definition.epsg);
   const auto contradict = [&code](const std::string& what) {
     throw ContradictoryCrs("the GeoKeys contradict each other: " + code + " and " + what,
-                   "say which is meant with --crs EPSG:n");
+                           "say which is meant with --crs EPSG:n");
   };
   const int model = keys.code(1024);
   if ((model == 1 && !definition.method) || (model == 2 && definition.method)) {
@@ -318,8 +318,13 @@ void check_geo_keys(const stream::Crs& crs, const CrsDefinition& definition) {
     const double given = *value * (parameter.kind == Kind::angle                 ? angle
                                    : parameter.kind == Kind::length && unit != 0 ? unit
                                                                                  : 1.0);
-    const double meant = definition.parameters.*parameter.member;
-    if (std::abs(given - meant) > 1e-8 * std::max({1.0, std::abs(given), std::abs(meant)})) {
+    const ProjectionParameters& p = definition.parameters;
+    const auto means = [given](double meant) {
+      return std::abs(given - meant) <= 1e-8 * std::max({1.0, std::abs(given), std::abs(meant)});
+    };
+    // Two parallels mean the same in either order.
+    const bool parallel = parameter.member == &P::parallel1 || parameter.member == &P::parallel2;
+    if (!means(p.*parameter.member) && !(parallel && (means(p.parallel1) || means(p.parallel2)))) {
       contradict("GeoKey " + std::to_string(parameter.key) + " of " + std::to_string(*value));
     }
   }

@@ -28,8 +28,7 @@ CoordinateSystem system_of(const stream::Store& store) {
 }
 
 RegionConversion::RegionConversion(const stream::Store& store, const CoordinateSystem& from)
-    : systems_({from, system_of(store),
-                world_box(placement_of(store.schema()), store.bounds())}) {}
+    : systems_({from, system_of(store), world_box(placement_of(store.schema()), store.bounds())}) {}
 
 Region RegionConversion::operator()(Region region) const {
   if (!systems_) return region;
@@ -45,7 +44,8 @@ void PlaceConversion::operator()(std::span<stream::Point3> points) const {
   std::array<Point2, 1024> places{};
   for (std::size_t first = 0; first < points.size(); first += places.size()) {
     const std::size_t count = std::min(places.size(), points.size() - first);
-    for (std::size_t i = 0; i < count; ++i) places[i] = {points[first + i][0], points[first + i][1]};
+    for (std::size_t i = 0; i < count; ++i)
+      places[i] = {points[first + i][0], points[first + i][1]};
     transform(systems_->from, systems_->to, std::span(places).first(count));
     for (std::size_t i = 0; i < count; ++i) {
       stream::Point3& p = points[first + i];

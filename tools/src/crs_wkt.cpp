@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "crs_definition.hpp"
 #include "crs_names.hpp"
@@ -205,8 +206,9 @@ void read_vertical(const WktNode& node, CrsDefinition& definition) {
     const double unit = definition.metres_per_height;
     set_vertical_epsg(definition, code);
     if (std::abs(definition.metres_per_height / unit - 1) > 1e-6) {
-throw ContradictoryCrs("the vertical CRS \"" + node.name() +
-           "\" contradicts its code EPSG:" + std::to_string(code) + " in the unit", kByCode);
+      throw ContradictoryCrs("the vertical CRS \"" + node.name() + "\" contradicts its code EPSG:" +
+                                 std::to_string(code) + " in the unit",
+                             kByCode);
     }
     return;
   }
@@ -236,7 +238,11 @@ void take_code(const WktNode& node, CrsDefinition& definition) {
   }
   if (known.method && definition.method) {
     if (differs(known.metres_per_unit, definition.metres_per_unit, 1)) what = "the unit";
-    const ProjectionParameters &a = known.parameters, &b = definition.parameters;
+    const ProjectionParameters& a = known.parameters;
+    ProjectionParameters b = definition.parameters;
+    if ((a.parallel1 < a.parallel2) != (b.parallel1 < b.parallel2)) {
+      std::swap(b.parallel1, b.parallel2);
+    }
     if (*known.method == *definition.method) {
       for (const ParameterName& name : method_name(*known.method).parameters) {
         const bool turn = name.member == &ProjectionParameters::azimuth ||
@@ -247,8 +253,9 @@ void take_code(const WktNode& node, CrsDefinition& definition) {
     }
   }
   if (!what.empty()) {
-throw ContradictoryCrs("the WKT of \"" + node.name() + "\" contradicts its code EPSG:" + std::to_string(code) +
-         " in " + what, kByCode);
+    throw ContradictoryCrs("the WKT of \"" + node.name() + "\" contradicts its code EPSG:" +
+                               std::to_string(code) + " in " + what,
+                           kByCode);
   }
   known.shift = definition.uncertainty >= 0 ? std::nullopt : definition.shift;
   definition = known;

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <array>
+#include <charconv>
 #include <string>
+#include <system_error>
 
 #include "crs_definition.hpp"
 #include "crs_names.hpp"
-#include "units.hpp"
 
 namespace terrace::tools {
 namespace {
@@ -19,6 +21,19 @@ std::string quoted(const std::string& text) {
   return result + '"';
 }
 
+/// In full, never with an exponent, which not every reader takes.
+std::string plain(double value) {
+  std::array<char, 400> text{};
+  const auto [end, error] =
+      std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::fixed);
+  return error == std::errc{} ? std::string(text.data(), end) : std::string("0");
+}
+
+std::string ellipsoid_name(const Ellipsoid& ellipsoid) {
+  if (ellipsoid == Ellipsoid{}) return "WGS 84";
+  return ellipsoid == Ellipsoid{6378137, 298.257222101} ? "GRS 1980" : "unnamed";
+}
+
 std::string id(int code) { return code == 0 ? "" : ",ID[\"EPSG\"," + std::to_string(code) + "]"; }
 
 std::string length_unit(double metres) {
@@ -26,20 +41,20 @@ std::string length_unit(double metres) {
                            : metres == 0.3048                    ? "foot"
                            : metres > 0.3048 && metres < 0.30481 ? "US survey foot"
                                                                  : "unknown";
-  return "LENGTHUNIT[" + quoted(name) + "," + number_text(metres) + "]";
+  return "LENGTHUNIT[" + quoted(name) + "," + plain(metres) + "]";
 }
 
 std::string angle_unit(double degrees) {
   const std::string name = degrees == 1 ? "degree" : degrees == 0.9 ? "grad" : "unknown";
-  return "ANGLEUNIT[" + quoted(name) + "," + number_text(degrees * kDegreeInRadians) + "]";
+  return "ANGLEUNIT[" + quoted(name) + "," + plain(degrees * kDegreeInRadians) + "]";
 }
 
 std::string datum_of(const CrsDefinition& d) {
-  std::string text = "DATUM[" + quoted(d.datum) + ",ELLIPSOID[\"of " + d.datum + "\"," +
-                     number_text(d.ellipsoid.semi_major) + "," +
-                     number_text(d.ellipsoid.inverse_flattening) + "," + length_unit(1) + "]]";
+  std::string text = "DATUM[" + quoted(d.datum) + ",ELLIPSOID[" +
+                     quoted(ellipsoid_name(d.ellipsoid)) + "," + plain(d.ellipsoid.semi_major) +
+                     "," + plain(d.ellipsoid.inverse_flattening) + "," + length_unit(1) + "]]";
   if (d.prime_meridian != 0) {
-    text += ",PRIMEM[\"unknown\"," + number_text(d.prime_meridian) + "," + angle_unit(1) + "]";
+    text += ",PRIMEM[\"unknown\"," + plain(d.prime_meridian) + "," + angle_unit(1) + "]";
   }
   return text;
 }
@@ -64,8 +79,8 @@ std::string projected(const CrsDefinition& d) {
     const std::string unit = p.kind == ParameterName::Kind::angle    ? angle_unit(1)
                              : p.kind == ParameterName::Kind::length ? length_unit(1)
                                                                      : "SCALEUNIT[\"unity\",1]";
-    text += ",PARAMETER[" + quoted(p.name) + "," + number_text(d.parameters.*p.member) + "," +
-            unit + id(p.code) + "]";
+    text += ",PARAMETER[" + quoted(p.name) + "," + plain(d.parameters.*p.member) + "," + unit +
+            id(p.code) + "]";
   }
   const std::string unit = length_unit(d.metres_per_unit);
   return text + "],CS[Cartesian,2],AXIS[\"(E)\",east,ORDER[1]," + unit +
@@ -88,7 +103,7 @@ std::string bound(const CrsDefinition& d, const std::string& text) {
     // As a scale the difference is 1 + it; an abridged transformation has no units of its own.
     const double value = (*d.shift)[i];
     result += std::string(",PARAMETER[\"") + kNames[i] + "\"," +
-              number_text(i == 6 ? 1 + value * 1e-6 : value) + id(8605 + static_cast<int>(i)) + "]";
+              plain(i == 6 ? 1 + value * 1e-6 : value) + id(8605 + static_cast<int>(i)) + "]";
   }
   return result + "]]";
 }

@@ -44,9 +44,7 @@ GeoidGrid::~GeoidGrid() = default;
 GeoidGrid::GeoidGrid(GeoidGrid&&) noexcept = default;
 GeoidGrid& GeoidGrid::operator=(GeoidGrid&&) noexcept = default;
 
-double GeoidGrid::undulation(const Point2& place) const {
-  return (*geoid_)(place[1], place[0]);
-}
+double GeoidGrid::undulation(const Point2& place) const { return (*geoid_)(place[1], place[0]); }
 
 EllipsoidalHeights::EllipsoidalHeights(const stream::Schema& schema, const std::string& vertical,
                                        const std::string& geoid, std::uint64_t memory_bytes) {
@@ -60,8 +58,9 @@ EllipsoidalHeights::EllipsoidalHeights(const stream::Schema& schema, const std::
   }
   const std::string& recorded = schema.vertical;
   if (recorded == "ellipsoidal" && !geoid.empty()) {
-    throw UsageError("the store's heights are ellipsoidal already: leave --geoid out, or build the "
-                     "store with --vertical orthometric if they are not");
+    throw UsageError(
+        "the store's heights are ellipsoidal already: leave --geoid out, or build the "
+        "store with --vertical orthometric if they are not");
   }
   if (recorded != "ellipsoidal" && !said && geoid.empty()) {
     throw UsageError(

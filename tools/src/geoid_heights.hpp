@@ -17,8 +17,8 @@ class Geoid;
 namespace terrace::tools {
 
 /// How far a geoid lies above the ellipsoid, from a grid in GeographicLib's format (egm96-5.pgm,
-/// egm2008-2_5.pgm, ...), interpolated by its cubic of 12 samples. The whole grid is held in memory.
-/// Const members may be called by several threads at once.
+/// egm2008-2_5.pgm, ...), interpolated by its cubic of 12 samples. The whole grid is held in
+/// memory. Const members may be called by several threads at once.
 class GeoidGrid {
  public:
   /// file: with its folder and ending. Throws: stream::Error if it cannot be read, is damaged, or

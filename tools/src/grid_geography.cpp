@@ -12,23 +12,20 @@
 namespace terrace::tools {
 namespace {
 
-constexpr std::size_t kNodes = 4;
-constexpr std::size_t kPatch = 64;   // samples along a side at first
+constexpr std::size_t kNodes = 6;
+constexpr std::size_t kPatch = 64;    // samples along a side at first
 constexpr std::size_t kSmallest = 8;  // below it polynomials cost more than they spare
 
 /// Chebyshev's nodes in [0, 1]: the error of the polynomial through them is spread evenly, with
-/// extremes at kExtremes. C. W. Clenshaw, A. R. Curtis 1960; L. N. Trefethen, Approximation Theory
-/// and Approximation Practice (2013), chapter 2.
-constexpr std::array<double, kNodes> kNode{0.03806023374435663, 0.30865828381745514,
-                                           0.69134171618254486, 0.96193976625564337};
-constexpr double kInner = 0.14644660940672624;
+/// extremes at (1 - cos(k pi / 6)) / 2. C. W. Clenshaw, A. R. Curtis 1960; L. N. Trefethen,
+/// Approximation Theory and Approximation Practice (2013), chapter 2.
+constexpr std::array<double, kNodes> kNode{0.01703708685546585, 0.14644660940672624,
+                                           0.37059047744873963, 0.62940952255126037,
+                                           0.85355339059327376, 0.98296291314453415};
+constexpr double kInner = 0.06698729810778066;
 /// Where the polynomials are checked: each sign of the error along one axis with each of the other.
-constexpr std::array<Point2, 6> kChecks{{{0, 0},
-                                         {1, kInner},
-                                         {1 - kInner, 1},
-                                         {kInner, 1 - kInner},
-                                         {0.5, 0.5},
-                                         {0, 1}}};
+constexpr std::array<Point2, 6> kChecks{
+    {{0, 0}, {1, kInner}, {1 - kInner, 1}, {kInner, 1 - kInner}, {0.5, 0.5}, {0, 1}}};
 
 /// Coefficients of the polynomial in t through values at the nodes: row k gives those of t^k.
 using Matrix = std::array<std::array<double, kNodes>, kNodes>;
@@ -36,7 +33,7 @@ Matrix monomials() {
   Matrix matrix{};
   for (std::size_t i = 0; i < kNodes; ++i) {
     // The product of (t - node) over the others, divided by its value at node i.
-    std::array<double, kNodes> product{1, 0, 0, 0};
+    std::array<double, kNodes> product{1};
     double scale = 1;
     std::size_t degree = 0;
     for (std::size_t j = 0; j < kNodes; ++j) {
@@ -52,19 +49,22 @@ Matrix monomials() {
   return matrix;
 }
 
-using Cubic = std::array<double, kNodes>;
+using Quintic = std::array<double, kNodes>;
 
-double value(const Cubic& c, double t) { return ((c[3] * t + c[2]) * t + c[1]) * t + c[0]; }
+double value(const Quintic& c, double t) {
+  return ((((c[5] * t + c[4]) * t + c[3]) * t + c[2]) * t + c[1]) * t + c[0];
+}
 
 /// A polynomial in both directions: coefficient[k][m] of s^k t^m, s along rows of the lattice.
 struct Surface {
-  std::array<Cubic, kNodes> coefficients{};
+  std::array<Quintic, kNodes> coefficients{};
 
   Surface(const std::array<double, kNodes * kNodes>& values, const Matrix& matrix) {
-    std::array<Cubic, kNodes> along{};
+    std::array<Quintic, kNodes> along{};
     for (std::size_t j = 0; j < kNodes; ++j) {
       for (std::size_t k = 0; k < kNodes; ++k) {
-        for (std::size_t i = 0; i < kNodes; ++i) along[k][j] += matrix[k][i] * values[j * kNodes + i];
+        for (std::size_t i = 0; i < kNodes; ++i)
+          along[k][j] += matrix[k][i] * values[j * kNodes + i];
       }
     }
     for (std::size_t k = 0; k < kNodes; ++k) {
@@ -73,8 +73,8 @@ struct Surface {
       }
     }
   }
-  [[nodiscard]] Cubic at_row(double t) const {
-    Cubic row{};
+  [[nodiscard]] Quintic at_row(double t) const {
+    Quintic row{};
     for (std::size_t k = 0; k < kNodes; ++k) row[k] = value(coefficients[k], t);
     return row;
   }
@@ -120,9 +120,9 @@ void GridGeography::exact(const Patch& patch, const Output& output) const {
   for (std::size_t j = 0; j < patch.rows; ++j) {
     const std::size_t row = patch.row + j;
     for (std::size_t i = 0; i < patch.columns; ++i) {
-      places[i] = {static_cast<double>(output.first_column +
-                                       static_cast<std::int64_t>(patch.column + i)),
-                   static_cast<double>(output.first_row + static_cast<std::int64_t>(row))};
+      places[i] = {
+          static_cast<double>(output.first_column + static_cast<std::int64_t>(patch.column + i)),
+          static_cast<double>(output.first_row + static_cast<std::int64_t>(row))};
     }
     exact(places);
     for (std::size_t i = 0; i < patch.columns; ++i) {
@@ -158,18 +158,20 @@ bool GridGeography::interpolated(const Patch& patch, const Output& output) const
     least = std::min(least, p[0]);
     most = std::max(most, p[0]);
   }
+  // Small numbers: powers of t amplify what is rounded.
+  const Point2 base = places[0];
   std::array<double, kNodes * kNodes> longitudes{}, latitudes{};
   for (std::size_t i = 0; i < longitudes.size(); ++i) {
-    longitudes[i] = places[i][0];
-    latitudes[i] = places[i][1];
+    longitudes[i] = places[i][0] - base[0];
+    latitudes[i] = places[i][1] - base[1];
   }
   const Surface longitude(longitudes, matrix), latitude(latitudes, matrix);
   for (std::size_t k = 0; k < kChecks.size(); ++k) {
     const Point2& truth = places[kNodes * kNodes + k];
     const Point2& where = kChecks[k];
-    const double off = std::max(
-        std::abs(value(longitude.at_row(where[1]), where[0]) - truth[0]),
-        std::abs(value(latitude.at_row(where[1]), where[0]) - truth[1]));
+    const double off =
+        std::max(std::abs(value(longitude.at_row(where[1]), where[0]) + base[0] - truth[0]),
+                 std::abs(value(latitude.at_row(where[1]), where[0]) + base[1] - truth[1]));
     // Between the places checked the error may be some times larger.
     if (!(off <= kTolerance / 8)) return false;
   }
@@ -179,15 +181,15 @@ bool GridGeography::interpolated(const Patch& patch, const Output& output) const
   const double step_across = 1.0 / width, step_down = 1.0 / height;
   for (std::size_t j = 0; j < patch.rows; ++j) {
     const double t = static_cast<double>(j) * step_down;
-    const Cubic a = longitude.at_row(t), b = latitude.at_row(t);
+    const Quintic a = longitude.at_row(t), b = latitude.at_row(t);
     const std::size_t start = (patch.row + j) * output.columns + patch.column;
     double* const x = output.longitude + start;
     double* const y = output.latitude + start;
     const int columns = static_cast<int>(patch.columns);
     for (int i = 0; i < columns; ++i) {
       const double s = static_cast<double>(i) * step_across;
-      x[i] = value(a, s);
-      y[i] = value(b, s);
+      x[i] = base[0] + value(a, s);
+      y[i] = base[1] + value(b, s);
     }
     if (within) continue;
     for (std::size_t i = 0; i < patch.columns; ++i) {

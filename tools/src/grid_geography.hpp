@@ -10,7 +10,7 @@
 namespace terrace::tools {
 
 /// Longitudes and latitudes of a raster's samples by column and row, fast: exact places on a few
-/// points of a patch, between them a polynomial of third degree in each direction, checked against
+/// points of a patch, between them a polynomial of fifth degree in each direction, checked against
 /// exact places where it is worst. Patches where it is off by more than kTolerance are quartered,
 /// down to samples that are computed one by one (near poles, across the antimeridian).
 ///
@@ -24,8 +24,8 @@ class GridGeography {
   /// has no way to WGS 84.
   GridGeography(const CoordinateSystem& system, const stream::WorldTransform& world);
 
-  /// WGS 84 of the samples (first_column + i, first_row + j), row-major: longitude[j * columns + i].
-  /// Both spans have columns * rows elements. What has no place is NaN; longitudes lie in
+  /// WGS 84 of the samples (first_column + i, first_row + j), row-major: longitude[j * columns +
+  /// i]. Both spans have columns * rows elements. What has no place is NaN; longitudes lie in
   /// [-180, 180], but those of a raster in degrees are left as they are. The same for every window
   /// that a sample is part of to within kTolerance, not to the last bit.
   /// Some 100 million samples per second.

@@ -49,13 +49,12 @@ class Ground {
 
   [[nodiscard]] std::array<double, 3> projected_scale(const stream::Point3& centre) const;
 
-
   Placement placement_;
   Kind kind_ = Kind::linear;
   std::optional<CoordinateSystem> system_;  ///< of projected ones
   double degrees_ = 1.0;                    ///< of a unit of x, y
-  double metres_horizontal_ = 1.0;  ///< of a unit of x, y
-  double metres_vertical_ = 1.0;    ///< of a unit of z, weighed
+  double metres_horizontal_ = 1.0;          ///< of a unit of x, y
+  double metres_vertical_ = 1.0;            ///< of a unit of z, weighed
   std::string assumption_;
 };
 

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "projection.hpp"
 
+#include <algorithm>
 #include <stdexcept>
+#include <utility>
 
 #include <GeographicLib/AlbersEqualArea.hpp>
 #include <GeographicLib/LambertConformalConic.hpp>
@@ -161,6 +163,22 @@ std::unique_ptr<const Projection> make(ProjectionMethod method, const Parameters
 }
 
 }  // namespace
+
+bool nearly_equal(const ProjectionParameters& one, const ProjectionParameters& other) {
+  // Two parallels mean the same in either order.
+  ProjectionParameters a = one, b = other;
+  for (ProjectionParameters* const p : {&a, &b}) {
+    if (p->parallel1 < p->parallel2) std::swap(p->parallel1, p->parallel2);
+  }
+  using P = ProjectionParameters;
+  for (double P::*const member :
+       {&P::latitude, &P::longitude, &P::scale, &P::parallel1, &P::parallel2, &P::azimuth, &P::skew,
+        &P::false_easting, &P::false_northing}) {
+    const double x = a.*member, y = b.*member;
+    if (std::abs(x - y) > 1e-11 * std::max({1.0, std::abs(x), std::abs(y)})) return false;
+  }
+  return true;
+}
 
 std::unique_ptr<const Projection> make_projection(ProjectionMethod method,
                                                   const ProjectionParameters& parameters,

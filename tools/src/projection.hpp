@@ -52,6 +52,9 @@ struct ProjectionParameters {
   friend bool operator==(const ProjectionParameters&, const ProjectionParameters&) = default;
 };
 
+/// Equal but for the last digits, as texts and units leave them: micrometres on the ground.
+bool nearly_equal(const ProjectionParameters& a, const ProjectionParameters& b);
+
 /// A projection. Const members may be called by several threads at once.
 class Projection {
  public:

@@ -84,8 +84,8 @@ SourceCrs crs_of_source(const stream::SourceInfo& info, const std::optional<Datu
     // A file that tells its own CRS needs no other; one beside it must not say anything else.
     const std::optional<CoordinateSystem> other = system_of_sidecars(info, sidecar);
     if (other && !other->same_places(*found.system)) {
-      fail(file, "its CRS is " + found.system->title() + ", that of " + sidecar + " is " +
-                     other->title(),
+      fail(file,
+           "its CRS is " + found.system->title() + ", that of " + sidecar + " is " + other->title(),
            "remove the wrong one, or say which is meant: --crs EPSG:n");
     }
   }

@@ -11,7 +11,7 @@ namespace terrace::tools {
 
 /// What is known of the CRS of a source.
 struct SourceCrs {
-  stream::Crs crs;                         ///< as a store records it
+  stream::Crs crs;  ///< as a store records it
   Heights heights = Heights::unknown;
   std::optional<CoordinateSystem> system;  ///< none: no CRS, or one that is not known
   std::string note;                        ///< what the user should know; empty: nothing

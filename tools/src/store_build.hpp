@@ -25,7 +25,7 @@ struct BuildRequest {
   std::optional<stream::Crs> crs;  ///< replaces the source's
   /// To WGS 84, for a CRS of another datum (see DatumShift).
   std::optional<std::array<double, 7>> datum_shift;
-  std::string vertical;            ///< "ellipsoidal", "orthometric" or empty
+  std::string vertical;  ///< "ellipsoidal", "orthometric" or empty
   std::size_t block_points = 10000;
   double facility_cost = 1.0;  ///< times the diagonal of a block
   cluster::Effort effort = cluster::Effort::standard;

@@ -58,8 +58,10 @@ class BuildCommand final : public Command {
         ->required();
     add_output(app, output_, "the store to write");
     app.add_option("--input-format", request_.input_format, "instead of telling it by content");
-    app.add_option("--crs", crs_, "EPSG:n, EPSG:n+m with the heights' system, or a file with WKT (.prj): in place of "
-                   "what the source says");
+    app.add_option(
+        "--crs", crs_,
+        "EPSG:n, EPSG:n+m with the heights' system, or a file with WKT (.prj): in place of "
+        "what the source says");
     app.add_option("--towgs84", shift_,
                    "dx,dy,dz[,rx,ry,rz,ds]: metres, arc-seconds and ppm (position vector) from "
                    "the CRS's datum to WGS 84");
