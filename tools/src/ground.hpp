@@ -39,6 +39,8 @@ class Ground {
   /// or Web Mercator it depends on the latitude; elsewhere it is the same everywhere.
   [[nodiscard]] GroundMap map(const stream::Box3& stored) const;
 
+  [[nodiscard]] bool same_everywhere() const { return kind_ == Kind::linear; }
+
   /// What had to be assumed because the source does not say; empty if nothing.
   [[nodiscard]] const std::string& assumption() const { return assumption_; }
 

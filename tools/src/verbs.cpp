@@ -20,7 +20,7 @@ std::span<const Verb> verbs() {
       {"surface", "write a 3D surface", "terrace surface scan.terrace -o scan.ply", make_surface},
       {"tile", "write terrain tiles for web globes", "terrace tile dem.terrace -o tiles", nullptr},
       {"sample", "answer heights and slopes at points",
-       "terrace sample dem.terrace --points places.csv", nullptr},
+       "terrace sample dem.terrace --points places.csv", make_sample},
       {"raster", "interpolate a GeoTIFF", "terrace raster dem.terrace --cell 90 -o coarse.tif",
        nullptr},
       {"profile", "write heights along a line",

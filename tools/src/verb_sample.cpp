@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <cerrno>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <CLI/CLI.hpp>
+#include <terrace/stream/atomic_file.hpp>
+#include <terrace/stream/error.hpp>
+#include <terrace/stream/store.hpp>
+
+#include "error.hpp"
+#include "output.hpp"
+#include "sample_run.hpp"
+#include "units.hpp"
+#include "verbs.hpp"
+
+namespace terrace::tools {
+namespace {
+
+/// Lines on their way to a file or to standard output.
+class TextOutput {
+ public:
+  TextOutput(const std::string& path, bool replace) {
+    if (path != "-") file_.emplace(path, replace);
+  }
+  void write(std::string_view text) {
+    if (file_) return file_->write(text);
+    if (std::fwrite(text.data(), 1, text.size(), stdout) == text.size()) return;
+    throw stream::system_error("standard output", "cannot write", errno);
+  }
+  void finish() {
+    if (file_) return file_->commit();
+    if (std::fflush(stdout) != 0) {
+      throw stream::system_error("standard output", "cannot write", errno);
+    }
+  }
+
+ private:
+  std::optional<stream::AtomicFile> file_;
+};
+
+class SampleCommand final : public Command {
+ public:
+  void define(CLI::App& app) override {
+    app.add_option("STORE", store_, "where the heights come from")->required();
+    app.add_option("--points", points_,
+                   "CSV of places, one a line; columns by name (x,y; lon,lat; longitude,latitude; "
+                   "easting,northing) or else the first two; - is standard input")
+        ->capture_default_str()
+        ->type_name("FILE");
+    app.add_option("-o,--output", output_,
+                   "the lines again, with height, gradient (rise per run), slope and aspect "
+                   "(degrees; aspect clockwise from north, downhill) behind; empty where there is "
+                   "no data")
+        ->capture_default_str()
+        ->type_name("FILE");
+    app.add_option("--method", method_,
+                   "linear: on the triangulated samples; natural: natural neighbours, smooth; "
+                   "nearest: the nearest sample")
+        ->capture_default_str()
+        ->type_name("NAME");
+    app.add_option("--level", level_, "only points of this level and above: a number or top")
+        ->capture_default_str();
+    not_yet(app, {"--points-crs", "--to-crs"});
+  }
+
+  Summary run(const CommonOptions& common) override {
+    const Stopwatch watch;
+    if (common.json && output_ == "-") {
+      throw UsageError("--json and the lines cannot both go to standard output; give -o FILE");
+    }
+    SamplerOptions options;
+    options.method = parse_interpolation(method_);
+    const std::optional<unsigned> level = parse_level(level_);
+    const stream::Store store = stream::Store::open(store_);
+    options.level = level.value_or(store.top());
+    options.threads = common.threads;
+    options.memory_bytes = common.memory_or(machine_memory_bytes() / 2);
+    PlaceFile places(points_);
+    TextOutput output(output_, may_replace(output_, common.force));
+    ProgressMeter meter(common.progress, "points");
+    const SampleCounts counts = answer_places(
+        store, options, places, {}, [&](std::string_view text) { output.write(text); },
+        [&](const SampleCounts& sum) { meter.update(sum.points, 0); });
+    output.finish();
+    if (counts.points > 0 && counts.answered == 0) {
+      common.say(
+          "no point has a height: are their coordinates in the CRS of the store? --points-crs "
+          "says otherwise");
+    }
+
+    Summary summary;
+    summary.json = {{"points", counts.points},
+                    {"answered", counts.answered},
+                    {"seconds", watch.seconds()},
+                    {"points_per_second", static_cast<double>(counts.points) / watch.seconds()},
+                    {"peak_rss_bytes", peak_rss_bytes()}};
+    summary.text = with_commas(counts.points) + " points, " +
+                   with_commas(counts.points - counts.answered) + " of them without a height, in " +
+                   readable_seconds(watch.seconds()) + ", " +
+                   readable_rate(static_cast<double>(counts.points) / watch.seconds()) + "\n";
+    return summary;
+  }
+
+ private:
+  std::string store_, points_ = "-", output_ = "-", method_ = "linear", level_ = "0";
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_sample() { return std::make_unique<SampleCommand>(); }
+
+}  // namespace terrace::tools
