@@ -120,12 +120,13 @@ TEST(GeoReference, GeographicKeysAndUserDefinedOnes) {
 
 TEST(GeoReference, KeysThatPointNowhereAreLeftOut) {
   const GeoKeys keys(
-      std::vector<std::uint16_t>{1, 1, 0, 500, 1026, 34737, 100, 0, 3072, 0, 1, 32632}, "short|");
+      std::vector<std::uint16_t>{1, 1, 0, 500, 1026, 34737, 100, 0, 3072, 0, 1, 32632}, {},
+      "short|");
   EXPECT_EQ(keys.text(1026), "");
   EXPECT_EQ(keys.number(3072), 32632);
   EXPECT_EQ(keys.faults().size(), 2u);
-  EXPECT_EQ(GeoKeys(std::vector<std::uint16_t>{1, 1}, "").faults().size(), 1u);
-  EXPECT_TRUE(GeoKeys({}, "").faults().empty());
+  EXPECT_EQ(GeoKeys(std::vector<std::uint16_t>{1, 1}, {}, "").faults().size(), 1u);
+  EXPECT_TRUE(GeoKeys({}, {}, "").faults().empty());
 }
 
 TEST(GeoReference, ScaleOffsetAndUnitOfABand) {

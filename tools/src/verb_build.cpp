@@ -14,7 +14,7 @@
 #include <CLI/CLI.hpp>
 #include <terrace/stream/error.hpp>
 
-#include "crs_option.hpp"
+#include "coordinate_system.hpp"
 #include "error.hpp"
 #include "store_build.hpp"
 #include "units.hpp"
@@ -86,7 +86,7 @@ class BuildCommand final : public Command {
     request_.store = output_;
     request_.replace = common.force;
     request_.effort = *effort_of(effort_);
-    if (!crs_.empty()) request_.crs = parse_crs(crs_);
+    if (!crs_.empty()) request_.crs = CoordinateSystem::parse(crs_).crs();
     if (block_ < 2 || block_ > 1'000'000) {
       throw UsageError("--block must be between 2 and 1000000, not " + std::to_string(block_));
     }
