@@ -102,51 +102,54 @@ CoordinateSystem CoordinateSystem::parse(const std::string& text,
   }
 }
 
+std::optional<CrsDefinition> definition_of(const stream::Crs& crs) {
+  CrsDefinition definition;
+  constexpr std::string_view kEsri = "ESRI PE String = ";
+  const std::string wkt = !crs.wkt.empty()               ? crs.wkt
+                          : crs.name.starts_with(kEsri) ? crs.name.substr(kEsri.size())
+                                                         : std::string();
+  const bool has_keys =
+      std::any_of(crs.geo_keys.begin(), crs.geo_keys.end(), [](const stream::GeoKey& key) {
+        return key.key >= 2048 && key.key < 4096 && !key.values.empty();
+      });
+  if (!wkt.empty()) {
+    definition = definition_of_wkt(wkt);
+    if (crs.epsg != 0 && definition.epsg != 0 &&
+        definition_of_epsg(crs.epsg).epsg != definition.epsg) {
+      throw ContradictoryCrs("its CRS is EPSG:" + std::to_string(crs.epsg) +
+                                 " by code and EPSG:" + std::to_string(definition.epsg) + " by WKT",
+                             "say which is meant with --crs EPSG:n");
+    }
+  } else if (crs.epsg != 0) {
+    definition = definition_of_epsg(crs.epsg);
+    if (!crs.geo_keys.empty()) check_geo_keys(crs, definition);
+  } else if (has_keys) {
+    definition = definition_of_geo_keys(crs);
+  } else {
+    return std::nullopt;
+  }
+  find_code(definition);
+  if (crs.vertical_epsg != 0) set_vertical_epsg(definition, crs.vertical_epsg);
+  const auto unit = metres_in_unit(crs.horizontal_unit);
+  if (definition.method && unit && std::abs(*unit / definition.metres_per_unit - 1) > 1e-9) {
+    throw ContradictoryCrs(
+        "its CRS " + (definition.epsg != 0 ? "EPSG:" + std::to_string(definition.epsg)
+                                           : '"' + definition.name + '"') +
+            " contradicts its unit, " + crs.horizontal_unit,
+        "say what is meant with --crs EPSG:n");
+  }
+  if (const auto height = metres_in_unit(crs.vertical_unit)) {
+    definition.metres_per_height = *height;
+  }
+  return definition;
+}
+
 std::optional<CoordinateSystem> CoordinateSystem::of(const stream::Crs& crs,
                                                      const std::string& file) {
   try {
-    CrsDefinition definition;
-    constexpr std::string_view kEsri = "ESRI PE String = ";
-    const bool esri = crs.name.starts_with(kEsri);
-    const std::string wkt = !crs.wkt.empty() ? crs.wkt
-                            : esri           ? crs.name.substr(kEsri.size())
-                                             : std::string();
-    if (!wkt.empty()) {
-      definition = definition_of_wkt(wkt);
-      if (crs.epsg != 0 && definition.epsg != 0 &&
-          definition_of_epsg(crs.epsg).epsg != definition.epsg) {
-        throw CrsError("its CRS is EPSG:" + std::to_string(crs.epsg) +
-                           " by code and EPSG:" + std::to_string(definition.epsg) + " by WKT",
-                       "say which is meant with --crs EPSG:n");
-      }
-    } else if (crs.epsg != 0) {
-      definition = definition_of_epsg(crs.epsg);
-      if (!crs.geo_keys.empty()) check_geo_keys(crs, definition);
-    } else if (std::any_of(crs.geo_keys.begin(), crs.geo_keys.end(), [](const stream::GeoKey& key) {
-                 return key.key >= 2048 && key.key < 4096 && !key.values.empty();
-               })) {
-      definition = definition_of_geo_keys(crs);
-    } else if (crs.vertical_epsg != 0) {
-      // Heights alone do not say where they are; a wrong code is an error all the same.
-      set_vertical_epsg(definition, crs.vertical_epsg);
-      return std::nullopt;
-    } else {
-      return std::nullopt;
-    }
-    find_code(definition);
-    if (crs.vertical_epsg != 0) {
-      set_vertical_epsg(definition, crs.vertical_epsg);
-    }
-    const auto unit = metres_in_unit(crs.horizontal_unit);
-    if (definition.method && unit && std::abs(*unit / definition.metres_per_unit - 1) > 1e-9) {
-      throw CrsError("its CRS EPSG:" + std::to_string(definition.epsg) + " contradicts its unit, " +
-                         crs.horizontal_unit,
-                     "say what is meant with --crs EPSG:n");
-    }
-    if (const auto height = metres_in_unit(crs.vertical_unit)) {
-      definition.metres_per_height = *height;
-    }
-    return CoordinateSystem(definition);
+    const std::optional<CrsDefinition> definition = definition_of(crs);
+    if (!definition) return std::nullopt;
+    return CoordinateSystem(*definition);
   } catch (const CrsError& error) {
     throw stream::Error(
         {.file = file, .where = {}, .cause = error.what(), .remedy = error.remedy()});

@@ -24,6 +24,12 @@ class CrsError : public std::runtime_error {
   std::string remedy_;
 };
 
+/// One that says two things at once: nothing may be done with it until it is known which is meant.
+class ContradictoryCrs : public CrsError {
+ public:
+  using CrsError::CrsError;
+};
+
 /// What heights refer to.
 enum class Heights : std::uint8_t {
   unknown,
@@ -73,6 +79,10 @@ std::string wkt_of(const CrsDefinition& definition);
 /// The system that the keys of a GeoTIFF describe by parameters (no EPSG code in them).
 /// Throws: CrsError.
 CrsDefinition definition_of_geo_keys(const stream::Crs& crs);
+
+/// What a source or a store says, whichever way; nothing if it says nothing of a CRS.
+/// Throws: CrsError.
+std::optional<CrsDefinition> definition_of(const stream::Crs& crs);
 
 /// The datum by the name or the ellipsoid of it that files without codes use: uncertainty, and
 /// base_epsg where there is one. Leaves another datum negative.

@@ -285,7 +285,7 @@ void check_geo_keys(const stream::Crs& crs, const CrsDefinition& definition) {
   const Keys keys(crs);
   const std::string code = "EPSG:" + std::to_string(definition.epsg);
   const auto contradict = [&code](const std::string& what) {
-    throw CrsError("the GeoKeys contradict each other: " + code + " and " + what,
+    throw ContradictoryCrs("the GeoKeys contradict each other: " + code + " and " + what,
                    "say which is meant with --crs EPSG:n");
   };
   const int model = keys.code(1024);

@@ -205,8 +205,8 @@ void read_vertical(const WktNode& node, CrsDefinition& definition) {
     const double unit = definition.metres_per_height;
     set_vertical_epsg(definition, code);
     if (std::abs(definition.metres_per_height / unit - 1) > 1e-6) {
-      fail("the vertical CRS \"" + node.name() +
-           "\" contradicts its code EPSG:" + std::to_string(code) + " in the unit");
+throw ContradictoryCrs("the vertical CRS \"" + node.name() +
+           "\" contradicts its code EPSG:" + std::to_string(code) + " in the unit", kByCode);
     }
     return;
   }
@@ -247,8 +247,8 @@ void take_code(const WktNode& node, CrsDefinition& definition) {
     }
   }
   if (!what.empty()) {
-    fail("the WKT of \"" + node.name() + "\" contradicts its code EPSG:" + std::to_string(code) +
-         " in " + what);
+throw ContradictoryCrs("the WKT of \"" + node.name() + "\" contradicts its code EPSG:" + std::to_string(code) +
+         " in " + what, kByCode);
   }
   known.shift = definition.uncertainty >= 0 ? std::nullopt : definition.shift;
   definition = known;

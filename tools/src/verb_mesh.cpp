@@ -6,6 +6,7 @@
 #include <CLI/CLI.hpp>
 #include <terrace/stream/store.hpp>
 
+#include "crs_options.hpp"
 #include "detail.hpp"
 #include "mesh_output.hpp"
 #include "output.hpp"
@@ -41,17 +42,20 @@ class MeshCommand final : public Command {
         ->capture_default_str()
         ->type_name("NAME");
     not_yet(app, {"--max-error", "--quality", "--max-points", "--duplicates", "--fill", "--overlay",
-                  "--base", "--region-crs", "--to-crs"});
+                  "--base"});
+    crs_.define(app);
   }
 
   Summary run(const CommonOptions& common) override {
     const Stopwatch watch;
     const MeshOptions options{parse_smoothing(smooth_), MetricChoice::parse(metric_)};
     const stream::Store store = stream::Store::open(store_);
-    const Detail detail = Detail::parse(store, level_, region_, focuses_);
+    const Detail detail = Detail::parse(store, level_, region_, focuses_, crs_.regions(store));
+    const PlaceConversion places = crs_.places(store);
     const bool replace = may_replace(output_, common.force);
-    const TriangleMesh mesh =
+    TriangleMesh mesh =
         mesh_of_store(store, detail, common.memory_or(machine_memory_bytes() / 2), options);
+    places(mesh.positions);
     write_mesh(output_, format_, mesh, replace);
 
     Summary summary;
@@ -68,6 +72,7 @@ class MeshCommand final : public Command {
  private:
   std::string store_, output_, format_, level_ = "0", region_, smooth_, metric_ = "euclidean";
   std::vector<std::string> focuses_;
+  CrsOptions crs_;
 };
 
 }  // namespace
