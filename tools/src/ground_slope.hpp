@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <memory>
+
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/interpolation.hpp>
 
@@ -24,7 +26,8 @@ class GroundSlope {
 
   /// Metres of height per metre on the ground going east and north (of the CRS), at that stored
   /// place. Metres on the ground are those of Ground: at the place's latitude where the CRS is
-  /// geographic or Web Mercator, the map's own metres otherwise.
+  /// geographic or Web Mercator; those of a projection are taken at the middle of 1/256 of the
+  /// store's width and height.
   [[nodiscard]] tri::Gradient on_ground(const Point2& stored, const SurfacePoint& surface) const;
 
   /// What had to be assumed of units; empty if nothing.
@@ -34,8 +37,13 @@ class GroundSlope {
   Placement placement_;
   Ground ground_;
   bool grid_;
-  bool same_everywhere_;
+  /// The map at the middle of each of kSide x kSide parts of the store's bounds, made when it is
+  /// asked for: a projection's scale costs far more than a gradient.
+  struct Table;
+  [[nodiscard]] GroundMap map_at(const Point2& stored) const;
+
   GroundMap map_{};  ///< where it is the same everywhere
+  std::shared_ptr<Table> table_;
 };
 
 }  // namespace terrace::tools

@@ -1,15 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <cerrno>
 #include <cstdio>
+#include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 
 #include <CLI/CLI.hpp>
 #include <terrace/stream/atomic_file.hpp>
 #include <terrace/stream/error.hpp>
 #include <terrace/stream/store.hpp>
 
+#include "coordinate_system.hpp"
+#include "crs_options.hpp"
 #include "error.hpp"
 #include "output.hpp"
 #include "sample_run.hpp"
@@ -63,7 +68,13 @@ class SampleCommand final : public Command {
         ->type_name("NAME");
     app.add_option("--level", level_, "only points of this level and above: a number or top")
         ->capture_default_str();
-    not_yet(app, {"--points-crs", "--to-crs"});
+    app.add_option("--points-crs", points_crs_,
+                   "the CRS of the places (EPSG:n or a WKT file; x,y is lon,lat), if it is not the "
+                   "store's");
+    app.add_option("--towgs84", shift_,
+                   "dx,dy,dz[,rx,ry,rz,ds] from the datum of --points-crs to WGS 84, if it is "
+                   "another");
+    not_yet(app, {"--to-crs"});
   }
 
   Summary run(const CommonOptions& common) override {
@@ -78,11 +89,19 @@ class SampleCommand final : public Command {
     options.level = level.value_or(store.top());
     options.threads = common.threads;
     options.memory_bytes = common.memory_or(machine_memory_bytes() / 2);
+    std::function<void(std::span<Point2>)> to_store;
+    if (!points_crs_.empty()) {
+      std::optional<DatumShift> shift;
+      if (!shift_.empty()) shift = parse_datum_shift(shift_);
+      const CoordinateSystem from = CoordinateSystem::parse(points_crs_, shift);
+      const CoordinateSystem to = system_of(store);
+      to_store = [from, to](std::span<Point2> here) { transform(from, to, here); };
+    }
     PlaceFile places(points_);
     TextOutput output(output_, may_replace(output_, common.force));
     ProgressMeter meter(common.progress, "points");
     const SampleCounts counts = answer_places(
-        store, options, places, {}, [&](std::string_view text) { output.write(text); },
+        store, options, places, to_store, [&](std::string_view text) { output.write(text); },
         [&](const SampleCounts& sum) { meter.update(sum.points, 0); });
     output.finish();
     if (counts.points > 0 && counts.answered == 0) {
@@ -105,7 +124,8 @@ class SampleCommand final : public Command {
   }
 
  private:
-  std::string store_, points_ = "-", output_ = "-", method_ = "linear", level_ = "0";
+  std::string store_, points_ = "-", output_ = "-", method_ = "linear", level_ = "0", points_crs_,
+                      shift_;
 };
 
 }  // namespace

@@ -22,7 +22,7 @@ std::span<const Verb> verbs() {
       {"sample", "answer heights and slopes at points",
        "terrace sample dem.terrace --points places.csv", make_sample},
       {"raster", "interpolate a GeoTIFF", "terrace raster dem.terrace --cell 90 -o coarse.tif",
-       nullptr},
+       make_raster},
       {"profile", "write heights along a line",
        "terrace profile dem.terrace --line path.geojson -o profile.csv", nullptr},
       {"contour", "write contour lines",

@@ -14,6 +14,7 @@ std::unique_ptr<Command> make_info();
 std::unique_ptr<Command> make_match();
 std::unique_ptr<Command> make_mesh();
 std::unique_ptr<Command> make_points();
+std::unique_ptr<Command> make_raster();
 std::unique_ptr<Command> make_render();
 std::unique_ptr<Command> make_sample();
 std::unique_ptr<Command> make_surface();
