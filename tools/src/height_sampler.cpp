@@ -19,7 +19,10 @@ std::unique_ptr<HeightSampler> make_sampler(const stream::Store& store,
                      ": its top is level " + std::to_string(store.top()));
   }
   if (store.schema().grid && options.level == 0) return make_lattice_sampler(store, options);
-  throw UsageError("not available yet");
+  throw UsageError(store.schema().grid
+                       ? "heights between the points of a coarser level are not available yet: "
+                         "leave --level out"
+                       : "heights between points are not available yet, only those of rasters");
 }
 
 }  // namespace terrace::tools

@@ -33,9 +33,7 @@ struct SamplerOptions {
 ///   terrace/tri/interpolation.hpp); nothing where one of them has no data.
 /// - nearest: the sample whose cell holds the place, up to half a cell around the lattice; of two
 ///   the one of the larger column and row. The gradient is the linear surface's at that sample.
-/// Points, and rasters at other levels: the same three on the Delaunay triangulation of the points
-/// in x and y (or column and row); of points at equal x,y the one of the highest level, then of the
-/// smallest id. Nothing outside the convex hull (nearest: outside the bounds of the points).
+/// Stores of points, and rasters at other levels, are refused.
 ///
 /// Places are sorted by windows of the store within a call, so give many at once; each window is
 /// read once. Results depend on neither threads, memory, nor the order of the places.
@@ -45,12 +43,12 @@ class HeightSampler {
 
   /// places: stored coordinates (column and row, or x and y); those that are not finite have no
   /// height. out: as many, in their order; heights in the store's vertical unit, gradients per unit
-  /// of stored coordinates. Throws: stream::Error on damage, or if places need more of the store at
-  /// once than memory allows; Interrupted.
+  /// of stored coordinates. Throws: stream::Error on damage; Interrupted.
   virtual void sample(std::span<const Point2> places, std::span<SurfacePoint> out) = 0;
 };
 
-/// The store must outlive the sampler. Throws: UsageError for a level that the store has not.
+/// The store must outlive the sampler. Throws: UsageError for a level that the store has not,
+/// and for what is refused.
 std::unique_ptr<HeightSampler> make_sampler(const stream::Store& store,
                                             const SamplerOptions& options);
 

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <cerrno>
-#include <cstdio>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -9,8 +7,6 @@
 #include <string_view>
 
 #include <CLI/CLI.hpp>
-#include <terrace/stream/atomic_file.hpp>
-#include <terrace/stream/error.hpp>
 #include <terrace/stream/store.hpp>
 
 #include "coordinate_system.hpp"
@@ -18,33 +14,12 @@
 #include "error.hpp"
 #include "output.hpp"
 #include "sample_run.hpp"
+#include "text_output.hpp"
 #include "units.hpp"
 #include "verbs.hpp"
 
 namespace terrace::tools {
 namespace {
-
-/// Lines on their way to a file or to standard output.
-class TextOutput {
- public:
-  TextOutput(const std::string& path, bool replace) {
-    if (path != "-") file_.emplace(path, replace);
-  }
-  void write(std::string_view text) {
-    if (file_) return file_->write(text);
-    if (std::fwrite(text.data(), 1, text.size(), stdout) == text.size()) return;
-    throw stream::system_error("standard output", "cannot write", errno);
-  }
-  void finish() {
-    if (file_) return file_->commit();
-    if (std::fflush(stdout) != 0) {
-      throw stream::system_error("standard output", "cannot write", errno);
-    }
-  }
-
- private:
-  std::optional<stream::AtomicFile> file_;
-};
 
 class SampleCommand final : public Command {
  public:
