@@ -144,7 +144,8 @@ class SampleTest(QueryTest):
     def test_places_in_another_reference_system(self):
         inside = self.somewhere(5, 1)[0]
         there = self.answers('%f,%f\n' % inside)[0]
-        lonlat = subprocess.run(['cs2cs', '-f', '%.12f', 'EPSG:32632', '+proj=longlat +datum=WGS84'],
+        lonlat = subprocess.run(['cs2cs', '-f', '%.12f', 'EPSG:32632', '+to', '+proj=longlat',
+                                 '+datum=WGS84'],
                                 input='%.6f %.6f\n' % inside, capture_output=True,
                                 text=True).stdout.split() if shutil.which('cs2cs') else None
         if lonlat is None:
