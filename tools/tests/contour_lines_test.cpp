@@ -117,7 +117,7 @@ TEST(ContourLines, DoNotDependOnBands) {
     SCOPED_TRACE(seed);
     const auto lattice = random_lattice(seed, 12, 9);
     using Key = std::tuple<std::int64_t, std::size_t, std::set<Point2>>;
-    const auto keys = [&](std::int64_t band) {
+    const auto lines_of = [&](std::int64_t band) {
       std::vector<Key> keys;
       for (const ContourLine& line : draw(lattice, 2, band).lines) {
         keys.emplace_back(line.level, line.points.size(),
@@ -126,9 +126,9 @@ TEST(ContourLines, DoNotDependOnBands) {
       std::sort(keys.begin(), keys.end());
       return keys;
     };
-    const auto whole = keys(kRows);
+    const auto whole = lines_of(kRows);
     EXPECT_FALSE(whole.empty());
-    for (const std::int64_t band : {1, 2, 7}) EXPECT_EQ(keys(band), whole) << band;
+    for (const std::int64_t band : {1, 2, 7}) EXPECT_EQ(lines_of(band), whole) << band;
   }
 }
 
