@@ -82,15 +82,18 @@ std::map<Edge, int> edges_of(const std::vector<double>& lattice) {
 TEST(ContourLines, CrossEveryEdgeWhoseEndsStraddleALevelAndEndAtBordersOnly) {
   for (std::uint64_t seed = 1; seed <= 30; ++seed) {
     SCOPED_TRACE(seed);
-    const auto lattice =
-        random_lattice(seed, seed % 3 == 0 ? 3 : 40, static_cast<int>(seed % 4) * 5);
+    auto lattice = random_lattice(seed, seed % 3 == 0 ? 3 : 40, static_cast<int>(seed % 4) * 5);
     const double interval = seed % 2 == 0 ? 1 : 3.5;
+    if (seed % 2 == 1) {
+      // No sample lies at a level.
+      for (double& height : lattice) height += 0.25;
+    }
     const Drawn drawn = draw(lattice, interval, kRows);
     std::uint64_t sides = 0, ends = 0;
     for (const auto& [edge, triangles] : edges_of(lattice)) {
       const double a = lattice[static_cast<std::size_t>(edge.first)];
       const double b = lattice[static_cast<std::size_t>(edge.second)];
-      for (double level = 0; level <= 40; level += interval) {
+      for (double level = 0; level <= 45; level += interval) {
         if ((a > level) == (b > level)) continue;
         sides += static_cast<std::uint64_t>(triangles);
         if (triangles == 1) ++ends;
@@ -106,9 +109,11 @@ TEST(ContourLines, CrossEveryEdgeWhoseEndsStraddleALevelAndEndAtBordersOnly) {
         ++open;
       }
     }
-    // Lines that shrink to a point are not written, so there may be fewer.
+    // Where samples lie at levels, lines may shrink to points, which are not written.
     EXPECT_LE(2 * open, ends);
-    EXPECT_GE(2 * open + 60, ends);
+    if (seed % 2 == 1) {
+      EXPECT_EQ(2 * open, ends);
+    }
   }
 }
 
