@@ -41,6 +41,10 @@ class Ground {
   /// CRS it is the same everywhere.
   [[nodiscard]] GroundMap map(const stream::Box3& stored) const;
 
+  [[nodiscard]] bool same_everywhere() const { return kind_ == Kind::linear; }
+  /// Whether the map is a projection's scale, which changes little over a hundredth of an area.
+  [[nodiscard]] bool projected() const { return kind_ == Kind::projected; }
+
   /// What had to be assumed because the source does not say; empty if nothing.
   [[nodiscard]] const std::string& assumption() const { return assumption_; }
 
