@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/stream/gzip.hpp"
+
+#include <cassert>
+#include <memory>
+#include <new>
+
+#include <libdeflate.h>
+
+#include "terrace/stream/error.hpp"
+
+namespace terrace::stream {
+namespace {
+
+struct Free {
+  void operator()(libdeflate_compressor* c) const { libdeflate_free_compressor(c); }
+  void operator()(libdeflate_decompressor* d) const { libdeflate_free_decompressor(d); }
+};
+
+[[noreturn]] void refuse(const std::string& name, const std::string& cause) {
+  throw Error({.file = name, .where = "gzip", .cause = cause, .remedy = "make the file anew"});
+}
+
+// The size that the last four bytes state, modulo 2^32.
+std::uint64_t stated_size(std::span<const std::byte> bytes) {
+  std::uint64_t size = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    size |= std::to_integer<std::uint64_t>(bytes[bytes.size() - 4 + i]) << (8 * i);
+  }
+  return size;
+}
+
+// A header of 10 bytes and a trailer of 8.
+constexpr std::size_t kLeast = 18;
+
+}  // namespace
+
+bool is_gzip(std::span<const std::byte> bytes) {
+  return bytes.size() >= 2 && bytes[0] == std::byte{0x1F} && bytes[1] == std::byte{0x8B};
+}
+
+std::vector<std::byte> gzip(std::span<const std::byte> bytes, int level) {
+  assert(level >= 1 && level <= 12);
+  const std::unique_ptr<libdeflate_compressor, Free> compressor(libdeflate_alloc_compressor(level));
+  if (!compressor) throw std::bad_alloc();
+  std::vector<std::byte> out(libdeflate_gzip_compress_bound(compressor.get(), bytes.size()));
+  const std::size_t size = libdeflate_gzip_compress(compressor.get(), bytes.data(), bytes.size(),
+                                                    out.data(), out.size());
+  assert(size != 0);
+  out.resize(size);
+  return out;
+}
+
+std::vector<std::byte> gunzip(std::span<const std::byte> bytes, std::uint64_t most,
+                              const std::string& name) {
+  if (!is_gzip(bytes) || bytes.size() < kLeast) refuse(name, "no gzip, or cut short");
+  const std::uint64_t size = stated_size(bytes);
+  if (size > most) {
+    refuse(name, "states " + std::to_string(size) + " bytes, more than the " +
+                     std::to_string(most) + " that it may hold");
+  }
+  const std::unique_ptr<libdeflate_decompressor, Free> decompressor(
+      libdeflate_alloc_decompressor());
+  if (!decompressor) throw std::bad_alloc();
+  std::vector<std::byte> out(size);
+  std::size_t used = 0, made = 0;
+  const libdeflate_result result = libdeflate_gzip_decompress_ex(
+      decompressor.get(), bytes.data(), bytes.size(), out.data(), out.size(), &used, &made);
+  if (result != LIBDEFLATE_SUCCESS || made != size || used != bytes.size()) {
+    refuse(name, "damaged: it does not unpack to what its checksum says");
+  }
+  return out;
+}
+
+}  // namespace terrace::stream
