@@ -198,6 +198,16 @@ class GeodesyTest(unittest.TestCase):
         error = self.refused(1, 'build', unit_unknown, '-o', self.path('none'))
         self.assertIn('EPSG:5514', error)
 
+    def test_info_says_what_counts_as_wgs84(self):
+        etrs = self.raster({1024: 1, 1025: 1, 3072: 25832, 3076: 9001, 4096: 5783})
+        self.assertIn('counts as WGS 84 within 1 m', self.ok('info', etrs))
+        self.assertEqual(self.info(etrs)['vertical'], 'orthometric')
+        self.assertIn('counts as WGS 84 within 1 m', self.ok('info', self.build(etrs)))
+        british = self.raster({1024: 1, 1025: 1, 3072: 27700, 3076: 9001})
+        self.assertIn('without a shift', self.ok('info', british))
+        wrong = self.raster({1024: 1, 1025: 1, 3072: 32632, 3076: 9002})
+        self.assertIn('contradict', self.ok('info', wrong))
+
     def test_without_a_system_nothing_is_converted(self):
         store = self.build(self.raster({1025: 1}))
         self.assertIsNone(self.info(store)['crs'])
