@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <optional>
@@ -43,17 +44,17 @@ class NaturalBlock {
     const LatticeWindow window{begin(tile_column, raster.columns, columns_),
                                begin(tile_row, raster.rows, rows_), columns_, rows_};
     reader.heights(window, std::span(heights_).subspan(first_, window.size()));
-    queries_.clear();
+    // One by one: together, the way to a place and with it the last bit of its height would depend
+    // on the other places.
     for (const std::uint32_t i : numbers) {
-      queries_.push_back({places[i][0] - static_cast<double>(window.column),
-                          places[i][1] - static_cast<double>(window.row)});
-    }
-    const std::vector<double> heights = tri::heights_at(triangulation_, heights_, queries_,
-                                                        tri::Interpolation::kNaturalNeighbour, 1);
-    const std::vector<tri::Gradient> gradients = tri::gradients_at(
-        triangulation_, heights_, queries_, tri::GradientFrom::kNaturalNeighbours, 1);
-    for (std::size_t k = 0; k < numbers.size(); ++k) {
-      out[numbers[k]] = {heights[k], gradients[k].x, gradients[k].y};
+      const std::array<tri::Point2, 1> place{
+          tri::Point2{places[i][0] - static_cast<double>(window.column),
+                      places[i][1] - static_cast<double>(window.row)}};
+      const double height = tri::heights_at(triangulation_, heights_, place,
+                                            tri::Interpolation::kNaturalNeighbour, 1)[0];
+      const tri::Gradient gradient = tri::gradients_at(triangulation_, heights_, place,
+                                                       tri::GradientFrom::kNaturalNeighbours, 1)[0];
+      out[i] = {height, gradient.x, gradient.y};
     }
   }
 
@@ -62,7 +63,6 @@ class NaturalBlock {
   tri::Delaunay2<std::int32_t> triangulation_;
   std::size_t first_ = 0;
   std::vector<double> heights_;
-  std::vector<tri::Point2> queries_;
 };
 
 /// What one thread works with.
