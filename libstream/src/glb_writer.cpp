@@ -232,6 +232,10 @@ Point3 glb_origin(const Box3& bounds) {
   return origin;
 }
 
+float glb_coordinate(double coordinate, double origin) {
+  return static_cast<float>(coordinate - origin);
+}
+
 std::unique_ptr<MeshWriter> open_glb_writer(const std::string& path, const MeshHeader& header,
                                             bool replace) {
   return std::make_unique<GlbWriter>(path, header, replace);

@@ -111,7 +111,7 @@ Point3 MeshRounding::operator()(const Point3& p) const {
   Point3 read;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const double origin = (*origin_)[axis];
-    read[axis] = origin + static_cast<double>(static_cast<float>(p[axis] - origin));
+    read[axis] = origin + static_cast<double>(glb_coordinate(p[axis], origin));
   }
   return read;
 }
