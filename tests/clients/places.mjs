@@ -11,8 +11,8 @@ export function* numbers(seed) {
 
 /// count places anywhere in the set's bounds, count / 2 on borders between tiles of the deepest
 /// zoom, and count / 2 where four of them meet: {place: [longitude, latitude], tiles}, the tiles that
-/// touch it.
-export function placesOf(set, count) {
+/// touch it. Without borders where `borders` is false.
+export function placesOf(set, count, borders = true) {
   const random = numbers(7);
   const next = () => random.next().value;
   const z = set.deepest, side = 180 / 2 ** z;
@@ -24,6 +24,7 @@ export function placesOf(set, count) {
     const place = [west + next() * (east - west), south + next() * (north - south)];
     places.push({place, tiles: [set.deepestAt(...place)]});
   }
+  if (!borders) return places;
   const touching = (x, y, i, j) => {
     const tiles = [];
     for (const tx of i ? [x] : [x - 1, x]) {
