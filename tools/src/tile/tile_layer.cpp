@@ -123,8 +123,8 @@ std::string layer_json(const TileLayer& layer) {
         {"maxErrors", layer.max_errors},
         {"fingerprint", layer.fingerprint}}},
   };
-  // Without it CesiumJS fails at every tile with metadata; with it, it goes by the tiles alone: each
-  // lists what is one zoom below.
+  // Without it CesiumJS fails at every tile with metadata; with it, it goes by the tiles alone:
+  // each lists what is one zoom below.
   if (std::ranges::find(layer.extensions, "metadata") != layer.extensions.end()) {
     json["metadataAvailability"] = 1;
   }
