@@ -1,9 +1,10 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# clients_test.sh BUILD: installs the clients below BUILD, unless they are there, and tests terrace's
-# tiles and meshes in them. TERRACE names the command. Exits with 77 where a client cannot be had.
+# clients_test.sh BUILD: installs the clients below BUILD, unless they are there, and tests in them
+# the tiles and meshes of terrace. TERRACE names the command. Exits with 77 where a client cannot be
+# had.
 set -eu
-source=$(cd "$(dirname "$0")" && pwd)
+source=$(cd "${0%/*}" && pwd)
 packages=$1/clients
 skip() {
   echo "clients are not tested: $*"
@@ -19,9 +20,10 @@ cp "$source/package.json" "$source/package-lock.json" "$packages"
 # The list of what is installed is put there last.
 if ! cmp -s "$packages/package-lock.json" "$packages/node_modules/.clients"; then
   if ! npm ci --prefix "$packages" --ignore-scripts --no-audit --no-fund --prefer-offline \
-      --fetch-retries=1 --fetch-timeout=30000 > "$packages/npm.log" 2>&1; then
-    if grep -Eq 'ENOTFOUND|EAI_AGAIN|ECONN|ETIMEDOUT|ENETUNREACH|EHOSTUNREACH|ENOTCACHED|FETCH_ERROR' \
-        "$packages/npm.log"; then
+      --fetch-retries=1 --fetch-retry-mintimeout=1000 --fetch-timeout=30000 \
+      > "$packages/npm.log" 2>&1; then
+    unreachable='ENOTFOUND|EAI_AGAIN|ECONN|ETIMEDOUT|ENETUNREACH|EHOSTUNREACH|ENOTCACHED'
+    if grep -Eq "$unreachable" "$packages/npm.log"; then
       skip 'the packages of npm cannot be downloaded here'
     fi
     cat "$packages/npm.log"

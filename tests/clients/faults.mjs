@@ -8,16 +8,21 @@ const zoomOf = path => /\.terrain$/.test(path) ? parseInt(path) : undefined;
 /// survey must make.
 export const FAULTS = {
   'the deepest zoom is listed and missing': {
-    drawn: true, complaint: /is (not drawn|drawn from its parent)/,
+    drawn: true,
+    complaint: /is (not drawn|drawn from its parent)/,
     fault: set => path => zoomOf(path) === set.deepest ? {status: 404} : {},
   },
   'tiles of the deepest zoom are truncated': {
-    drawn: true, complaint: /is (not drawn|drawn from its parent)/,
+    drawn: true,
+    complaint: /is (not drawn|drawn from its parent)/,
     fault: set => (path, bytes) => zoomOf(path) === set.deepest ?
-        {bytes: bytes.subarray(0, bytes.length * 0.7), encoding: undefined} : {},
+        {bytes: bytes.subarray(0, bytes.length * 0.7), encoding: undefined} :
+        {},
   },
   'compressed tiles are sent without Content-Encoding': {
-    gzip: true, complaint: /sampleTerrainMostDetailed/, fault: () => () => ({encoding: undefined}),
+    gzip: true,
+    complaint: /sampleTerrainMostDetailed/,
+    fault: () => () => ({encoding: undefined}),
   },
   'layer.json is missing': {
     complaint: /sampleTerrainMostDetailed/,

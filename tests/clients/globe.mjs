@@ -11,15 +11,21 @@ import {UNITS} from './quantized_mesh.mjs';
 
 const {chromium} = load('playwright-core');
 
-const SIZE = {width: 800, height: 450};
+const SIZE = {
+  width: 800,
+  height: 450
+};
 const EARTH = 6371000;
 
 export function launch() {
   return chromium.launch({
-    executablePath: process.env.CHROMIUM, headless: true,
-    args: ['--no-sandbox', '--use-gl=angle', '--use-angle=swiftshader',
-           '--enable-unsafe-swiftshader', '--disable-background-networking',
-           '--disable-component-update', '--disable-sync', '--no-first-run'],
+    executablePath: process.env.CHROMIUM,
+    headless: true,
+    args: [
+      '--no-sandbox', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader',
+      '--disable-background-networking', '--disable-component-update', '--disable-sync',
+      '--no-first-run'
+    ],
   });
 }
 
@@ -41,8 +47,10 @@ class Record {
     });
     page.on('response', response => {
       const path = response.url().slice(base.length);
-      if (response.status() >= 400) this.refused.push(`${path} (${response.status()})`);
-      else this.answered.add(path);
+      if (response.status() >= 400)
+        this.refused.push(`${path} (${response.status()})`);
+      else
+        this.answered.add(path);
     });
     page.on('console', message => message.type() === 'error' && this.errors.push(message.text()));
     page.on('pageerror', error => this.errors.push(error.message));
@@ -57,8 +65,11 @@ async function open(url) {
   window.provider = provider;
   window.providerErrors = [];
   provider.errorEvent.addEventListener(error => window.providerErrors.push(error.message));
-  return {normals: provider.hasVertexNormals, water: provider.hasWaterMask,
-          metadata: provider.hasMetadata};
+  return {
+    normals: provider.hasVertexNormals,
+    water: provider.hasWaterMask,
+    metadata: provider.hasMetadata
+  };
 }
 
 /// In the page: heights at places, [longitude, latitude] in degrees; a text where it failed.
@@ -76,8 +87,13 @@ async function sample(places) {
 /// some frames.
 async function draw({target, range, lowest, highest}) {
   const widget = new Cesium.CesiumWidget('globe', {
-    terrainProvider: window.provider, baseLayer: false, skyBox: false, skyAtmosphere: false,
-    msaaSamples: 1, creditContainer: 'credits', contextOptions: {webgl: {preserveDrawingBuffer: true}},
+    terrainProvider: window.provider,
+    baseLayer: false,
+    skyBox: false,
+    skyAtmosphere: false,
+    msaaSamples: 1,
+    creditContainer: 'credits',
+    contextOptions: {webgl: {preserveDrawingBuffer: true}},
   });
   window.widget = widget;
   const {scene} = widget;
@@ -96,16 +112,19 @@ async function draw({target, range, lowest, highest}) {
     paint.fillStyle = `rgb(${i}, ${Math.round(90 + 0.6 * i)}, ${Math.round(70 + 0.7 * i)})`;
     paint.fillRect(i, 0, 1, 1);
   }
-  globe.material = Cesium.Material.fromType('ElevationRamp',
-      {image: ramp, minimumHeight: lowest, maximumHeight: highest});
-  widget.camera.lookAt(Cesium.Cartesian3.fromDegrees(...target),
+  globe.material = Cesium.Material.fromType(
+      'ElevationRamp', {image: ramp, minimumHeight: lowest, maximumHeight: highest});
+  widget.camera.lookAt(
+      Cesium.Cartesian3.fromDegrees(...target),
       new Cesium.HeadingPitchRange(Cesium.Math.toRadians(20), Cesium.Math.toRadians(-35), range));
   let still = 0;
   const start = performance.now();
   return new Promise(resolve => scene.postRender.addEventListener(() => {
     still = globe.tilesLoaded ? still + 1 : 0;
-    if (still > 5) resolve(true);
-    else if (performance.now() - start > 60000) resolve(false);
+    if (still > 5)
+      resolve(true);
+    else if (performance.now() - start > 60000)
+      resolve(false);
   }));
 }
 
@@ -140,8 +159,13 @@ function look({z, lowest, highest}) {
       const around = [pick(x, y), pick(x - 1, y), pick(x + 1, y), pick(x, y - 1), pick(x, y + 1)];
       if (around.some(height => height === undefined)) continue;
       const red = paint.getImageData(x, y, 1, 1).data[0];
-      pixels.push({x, y, byRay: around[0], spread: Math.max(...around) - Math.min(...around),
-                   byColour: lowest + (highest - lowest) * (red + 0.5) / 256});
+      pixels.push({
+        x,
+        y,
+        byRay: around[0],
+        spread: Math.max(...around) - Math.min(...around),
+        byColour: lowest + (highest - lowest) * (red + 0.5) / 256
+      });
     }
   }
   return {tiles, pixels};
@@ -154,9 +178,13 @@ async function light() {
   scene.globe.dynamicAtmosphereLighting = false;
   scene.globe.lambertDiffuseMultiplier = 1.2;
   const {directionWC: down, rightWC: right} = scene.camera;
-  scene.light = new Cesium.DirectionalLight({direction: Cesium.Cartesian3.normalize(
-      Cesium.Cartesian3.add(Cesium.Cartesian3.multiplyByScalar(right, 1.5, new Cesium.Cartesian3()),
-          down, new Cesium.Cartesian3()), new Cesium.Cartesian3())});
+  scene.light = new Cesium.DirectionalLight({
+    direction: Cesium.Cartesian3.normalize(
+        Cesium.Cartesian3.add(
+            Cesium.Cartesian3.multiplyByScalar(right, 1.5, new Cesium.Cartesian3()), down,
+            new Cesium.Cartesian3()),
+        new Cesium.Cartesian3())
+  });
   let frames = 0;
   return new Promise(resolve => scene.postRender.addEventListener(() => ++frames > 4 && resolve()));
 }
@@ -167,7 +195,8 @@ export function viewOf(set) {
   let best;
   for (const [x, y] of set.at(z)) {
     let whole = true;
-    for (let i = -2; i <= 2; ++i) for (let j = -2; j <= 2; ++j) whole &&= set.has(z, x + i, y + j);
+    for (let i = -2; i <= 2; ++i)
+      for (let j = -2; j <= 2; ++j) whole &&= set.has(z, x + i, y + j);
     if (!whole) continue;
     const tile = set.tile(z, x, y);
     if (best && tile.highest - tile.lowest <= best.tile.highest - best.tile.lowest) continue;
@@ -177,14 +206,20 @@ export function viewOf(set) {
   const side = 180 / 2 ** z;
   const [longitude, latitude] = [-180 + (x + 0.5) * side, -90 + (y + 0.5) * side];
   const deepest = set.at(z).map(([i, j]) => set.tile(z, i, j));
-  return {z, x, y, target: [longitude, latitude, (tile.lowest + tile.highest) / 2],
-          range: side * Math.PI / 180 * EARTH * 1.7,
-          lowest: Math.min(...deepest.map(({lowest}) => lowest)),
-          highest: Math.max(...deepest.map(({highest}) => highest))};
+  return {
+    z,
+    x,
+    y,
+    target: [longitude, latitude, (tile.lowest + tile.highest) / 2],
+    range: side * Math.PI / 180 * EARTH * 1.7,
+    lowest: Math.min(...deepest.map(({lowest}) => lowest)),
+    highest: Math.max(...deepest.map(({highest}) => highest))
+  };
 }
 
 /// The complaints about set as it comes from base + name. places: [longitude, latitude] with the
-/// tiles that may answer. pictures: a path without ending for the views; without it nothing is drawn.
+/// tiles that may answer. pictures: a path without ending for the views; without it nothing is
+/// drawn.
 export async function survey(browser, base, name, set, places, {pictures} = {}) {
   const context = await browser.newContext({viewport: SIZE});
   const page = await context.newPage();
@@ -201,10 +236,13 @@ export async function survey(browser, base, name, set, places, {pictures} = {}) 
       return {complaints, facts};
     }
     const heights = await page.evaluate(sample, places.map(({place}) => place));
-    if (typeof heights === 'string') complain(heights);
-    else compareSamples(set, places, heights, complain, facts);
+    if (typeof heights === 'string')
+      complain(heights);
+    else
+      compareSamples(set, places, heights, complain, facts);
     if (pictures) await surveyView(page, set, pictures, complain, facts);
-    for (const error of await page.evaluate(() => window.providerErrors)) complain(`provider: ${error}`);
+    for (const error of await page.evaluate(() => window.providerErrors))
+      complain(`provider: ${error}`);
     compareRequests(name, set, places, record, complain);
     return {complaints, facts};
   } finally {
@@ -234,14 +272,18 @@ async function surveyView(page, set, pictures, complain, facts) {
   if (!await page.evaluate(draw, view)) complain('the tiles in view were not loaded in a minute');
   const seen = await page.evaluate(look, view);
   await page.screenshot({path: `${pictures}-heights.png`});
-  await page.evaluate(light);
-  await page.screenshot({path: `${pictures}-lit.png`});
+  if (facts.extensions.normals) {
+    await page.evaluate(light);
+    await page.screenshot({path: `${pictures}-lit.png`});
+  }
 
   // The client counts rows from the north.
   for (const tile of seen.tiles) tile.y = 2 ** tile.z - 1 - tile.row;
   const mine = seen.tiles.find(({z, x, y}) => z === view.z && x === view.x && y === view.y);
-  if (!mine) complain(`tile ${view.z}/${view.x}/${view.y} in the middle of the view is not drawn`);
-  else if (mine.upsampled) complain(`tile ${view.z}/${view.x}/${view.y} is drawn from its parent`);
+  if (!mine)
+    complain(`tile ${view.z}/${view.x}/${view.y} in the middle of the view is not drawn`);
+  else if (mine.upsampled)
+    complain(`tile ${view.z}/${view.x}/${view.y} is drawn from its parent`);
   facts.drawn = seen.tiles.length;
   const deepest = seen.tiles.filter(({vertices}) => vertices);
   facts.drawnDeepest = deepest.length;
@@ -266,7 +308,8 @@ async function surveyView(page, set, pictures, complain, facts) {
   // Where the height changes by more than two colours from pixel to pixel, nothing can be told.
   const flat = seen.pixels.filter(({spread}) => spread < 2 * step);
   facts.pixels = flat.length;
-  if (flat.length < 15) complain(`only ${flat.length} pixels of ${seen.pixels.length} show terrain`);
+  if (flat.length < 15)
+    complain(`only ${flat.length} pixels of ${seen.pixels.length} show terrain`);
   for (const {x, y, byRay, byColour} of flat) {
     if (Math.abs(byRay - byColour) > 3 * step) {
       complain(`pixel ${x}, ${y} has the colour of ${byColour} m; the ray meets ${byRay} m`);
@@ -279,8 +322,9 @@ function compareRequests(name, set, places, record, complain) {
   for (const url of record.refused) complain(`refused: ${url}`);
   for (const text of record.errors) complain(`console: ${text}`);
   for (const {tiles} of places) {
-    const some = tiles.some(({z, x, y}) =>
-        record.answered.has(join(name, `${z}/${x}/${y}.terrain?v=${set.layer.version}`)));
+    const some = tiles.some(
+        ({z, x, y}) =>
+            record.answered.has(join(name, `${z}/${x}/${y}.terrain?v=${set.layer.version}`)));
     if (!some) complain(`tile ${tiles.map(({z, x, y}) => `${z}/${x}/${y}`)} was not asked for`);
   }
 }

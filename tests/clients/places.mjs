@@ -10,8 +10,8 @@ export function* numbers(seed) {
 }
 
 /// count places anywhere in the set's bounds, count / 2 on borders between tiles of the deepest
-/// zoom, and count / 2 where four of them meet: {place: [longitude, latitude], tiles}, the tiles that
-/// touch it. Without borders where `borders` is false.
+/// zoom, and count / 2 where four of them meet: {place: [longitude, latitude], tiles}, the tiles
+/// that touch it. Without borders where `borders` is false.
 export function placesOf(set, count, borders = true) {
   const random = numbers(7);
   const next = () => random.next().value;
@@ -42,7 +42,8 @@ export function placesOf(set, count, borders = true) {
       --wanted;
     }
   };
-  add(Math.ceil(count / 2), () => next() < 0.5 ? [0, 0.001 + 0.998 * next()] : [0.001 + 0.998 * next(), 0]);
+  add(Math.ceil(count / 2),
+      () => next() < 0.5 ? [0, 0.001 + 0.998 * next()] : [0.001 + 0.998 * next(), 0]);
   add(Math.ceil(count / 2), () => [0, 0]);
   return places;
 }

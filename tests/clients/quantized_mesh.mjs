@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Tiles of quantized-mesh 1.0 read by the letter of the format.
 
-import {readFileSync, readdirSync} from 'node:fs';
+import {readdirSync, readFileSync} from 'node:fs';
 import {join} from 'node:path';
 import {gunzipSync} from 'node:zlib';
 
@@ -26,8 +26,13 @@ export function decodeTile(bytes) {
   const u16 = () => take(2, bytes.readUInt16LE);
   const list = (count, get) => Array.from({length: count}, get);
 
-  const header = {centre: list(3, f64), lowest: f32(), highest: f32(), sphere: list(4, f64),
-                  horizon: list(3, f64)};
+  const header = {
+    centre: list(3, f64),
+    lowest: f32(),
+    highest: f32(),
+    sphere: list(4, f64),
+    horizon: list(3, f64)
+  };
   const size = u32();
   const deltas = () => {
     let value = 0;
@@ -62,8 +67,8 @@ export function heightAt(tile, u, v) {
   const {triangles} = tile;
   for (let t = 0; t < triangles.length; t += 3) {
     const [a, b, c] = triangles.slice(t, t + 3);
-    const side = (i, j) => (tile.u[j] - tile.u[i]) * (v - tile.v[i]) -
-        (tile.v[j] - tile.v[i]) * (u - tile.u[i]);
+    const side = (i, j) =>
+        (tile.u[j] - tile.u[i]) * (v - tile.v[i]) - (tile.v[j] - tile.v[i]) * (u - tile.u[i]);
     const [over, right, left] = [side(b, c), side(c, a), side(a, b)];
     const whole = over + right + left;
     // A point on an edge may come out on the wrong side of both triangles.
@@ -86,18 +91,23 @@ export class TileSet {
     this.deepest = Math.max(...[...this.tiles.keys()].map(key => parseInt(key)));
   }
 
-  has(z, x, y) { return this.tiles.has(`${z}/${x}/${y}`); }
+  has(z, x, y) {
+    return this.tiles.has(`${z}/${x}/${y}`);
+  }
 
   tile(z, x, y) {
     const key = `${z}/${x}/${y}`;
-    if (!this.tiles.get(key)) this.tiles.set(key, decodeTile(tileBytes(join(this.folder, `${key}.terrain`))));
+    if (!this.tiles.get(key))
+      this.tiles.set(key, decodeTile(tileBytes(join(this.folder, `${key}.terrain`))));
     return this.tiles.get(key);
   }
 
   /// The x and y of the tiles at zoom z.
   at(z) {
-    return [...this.tiles.keys()].map(key => key.split('/').map(Number))
-        .filter(([zoom]) => zoom === z).map(([, x, y]) => [x, y]);
+    return [...this.tiles.keys()]
+        .map(key => key.split('/').map(Number))
+        .filter(([zoom]) => zoom === z)
+        .map(([, x, y]) => [x, y]);
   }
 
   /// The deepest tile at a place.
@@ -115,7 +125,8 @@ export class TileSet {
     const side = 180 / 2 ** z;
     const tile = this.tile(z, x, y);
     const within = value => Math.min(Math.max(value, 0), 1) * UNITS;
-    const height = heightAt(tile, within((longitude + 180) / side - x), within((latitude + 90) / side - y));
+    const height =
+        heightAt(tile, within((longitude + 180) / side - x), within((latitude + 90) / side - y));
     return {height, rounding: (tile.highest - tile.lowest) / UNITS / 2};
   }
 }

@@ -6,10 +6,18 @@ import {createReadStream, readFileSync, statSync} from 'node:fs';
 import {createServer} from 'node:http';
 import {extname, join, normalize} from 'node:path';
 
-const TYPES = {'.css': 'text/css', '.html': 'text/html', '.js': 'text/javascript',
-               '.json': 'application/json', '.jpg': 'image/jpeg', '.png': 'image/png',
-               '.svg': 'image/svg+xml', '.wasm': 'application/wasm', '.xml': 'text/xml',
-               '.terrain': 'application/vnd.quantized-mesh'};
+const TYPES = {
+  '.css': 'text/css',
+  '.html': 'text/html',
+  '.js': 'text/javascript',
+  '.json': 'application/json',
+  '.jpg': 'image/jpeg',
+  '.png': 'image/png',
+  '.svg': 'image/svg+xml',
+  '.wasm': 'application/wasm',
+  '.xml': 'text/xml',
+  '.terrain': 'application/vnd.quantized-mesh'
+};
 
 const isGzip = bytes => bytes.length > 1 && bytes[0] === 0x1f && bytes[1] === 0x8b;
 
@@ -32,8 +40,12 @@ export function serve(mounts) {
       return;
     }
     const bytes = readFileSync(file);
-    const sent = {status: 200, bytes, encoding: isGzip(bytes) ? 'gzip' : undefined,
-                  ...mount.fault?.(path.slice(name.length + 2), bytes)};
+    const sent = {
+      status: 200,
+      bytes,
+      encoding: isGzip(bytes) ? 'gzip' : undefined,
+      ...mount.fault?.(path.slice(name.length + 2), bytes)
+    };
     if (sent.encoding) response.setHeader('Content-Encoding', sent.encoding);
     response.writeHead(sent.status).end(sent.status === 200 ? sent.bytes : undefined);
   });
