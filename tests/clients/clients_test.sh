@@ -5,7 +5,6 @@
 # had.
 set -eu
 source=$(cd "${0%/*}" && pwd)
-packages=$1/clients
 skip() {
   echo "clients are not tested: $*"
   exit 77
@@ -15,7 +14,8 @@ for program in node npm chromium; do
 done
 [ "$(node -p 'process.versions.node.split(".")[0]')" -ge 20 ] || skip 'node is older than 20'
 
-mkdir -p "$packages"
+mkdir -p "$1/clients"
+packages=$(cd "$1/clients" && pwd)
 cp "$source/package.json" "$source/package-lock.json" "$packages"
 # The list of what is installed is put there last.
 if ! cmp -s "$packages/package-lock.json" "$packages/node_modules/.clients"; then
