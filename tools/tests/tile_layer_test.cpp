@@ -79,6 +79,14 @@ TEST_F(TileLayerFile, ReadsBack) {
   EXPECT_EQ(back.fingerprint, "abc");
 }
 
+TEST(TileLayerText, TellsThatMetadataListsTheZoomBelow) {
+  TileLayer layer;
+  layer.available = {{{0, 0, 1, 0}}};
+  EXPECT_FALSE(nlohmann::json::parse(layer_json(layer)).contains("metadataAvailability"));
+  layer.extensions = {"metadata"};
+  EXPECT_EQ(nlohmann::json::parse(layer_json(layer)).at("metadataAvailability"), 1);
+}
+
 TEST_F(TileLayerFile, RefusesWhatIsNoTileSet) {
   EXPECT_THROW(read_layer(path_), stream::Error);  // no file
   TileLayer layer;

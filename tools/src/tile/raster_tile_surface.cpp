@@ -331,12 +331,28 @@ void RasterTileSurface::heights(std::span<const double> longitude, std::span<con
                  const Point2 place{longitude[i], latitude[i]};
                  if (!std::isnan(height)) {
                    out[i] = raster_.vertical.convert(place, height);
-                 } else if (raster_.flat_fill) {
-                   out[i] = *raster_.flat_fill;
-                 } else {
-                   out[i] = raster_.vertical.convert(place, raster_.fill.height(p[0], p[1]));
+                   return;
+                 }
+                 // Samples that are not there are filled one by one: the surface goes through those
+                 // that are, up to the last.
+                 out[i] = 0.0;
+                 for (unsigned k = 0; k < 4; ++k) {
+                   const unsigned right = k & 1, down = k >> 1;
+                   const double weight = (right != 0 ? fx : 1.0 - fx) * (down != 0 ? fy : 1.0 - fy);
+                   if (weight > 0.0) {
+                     const double sample = at[down * stride + right];
+                     const Point2 corner{std::floor(p[0]) + right, std::floor(p[1]) + down};
+                     out[i] += weight * corner_height(place, sample, corner);
+                   }
                  }
                });
+}
+
+double RasterTileSurface::corner_height(const Point2& place, double sample,
+                                        const Point2& corner) const {
+  if (!std::isnan(sample)) return raster_.vertical.convert(place, sample);
+  if (raster_.flat_fill) return *raster_.flat_fill;
+  return raster_.vertical.convert(place, raster_.fill.height(corner[0], corner[1]));
 }
 
 void RasterTileSurface::water(std::span<const double> longitude, std::span<const double> latitude,

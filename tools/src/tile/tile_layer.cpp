@@ -104,7 +104,7 @@ std::string layer_json(const TileLayer& layer) {
     }
     available.push_back(std::move(list));
   }
-  const Json json{
+  Json json{
       {"tilejson", "2.1.0"},
       {"name", layer.name},
       {"version", "1.0.0"},
@@ -123,6 +123,11 @@ std::string layer_json(const TileLayer& layer) {
         {"maxErrors", layer.max_errors},
         {"fingerprint", layer.fingerprint}}},
   };
+  // Without it CesiumJS fails at every tile with metadata; with it, it goes by the tiles alone:
+  // each lists what is one zoom below.
+  if (std::ranges::find(layer.extensions, "metadata") != layer.extensions.end()) {
+    json["metadataAvailability"] = 1;
+  }
   return json.dump(1) + "\n";
 }
 

@@ -111,6 +111,40 @@ bool TileSides::is_cut(const Side& side) const {
   return meet(box, data_);
 }
 
+void TileSides::add_samples(const Side& side, std::vector<double>& t,
+                            std::vector<double>& longitude, std::vector<double>& latitude) {
+  // Tiles on both sides of 180 degrees do not see the same samples.
+  if (!side.along_parallel && std::abs(longitude.front()) == 180.0) return;
+  // Of what both tiles beside the side have alike: its ends, and a unit to either side.
+  const double unit = width_at(tile_.zoom) / kTileUnits;
+  const double reach_longitude = side.along_parallel ? 0.0 : unit;
+  const double reach_latitude = side.along_parallel ? unit : 0.0;
+  SurfaceSamples near;
+  surface_.samples({longitude.front() - reach_longitude, latitude.front() - reach_latitude,
+                    longitude.back() + reach_longitude, latitude.back() + reach_latitude},
+                   near);
+  if (near.size() == 0) return;
+  const std::size_t before = t.size();
+  const double from = t.front(), to = t.back();
+  for (std::size_t i = 0; i < near.size(); ++i) {
+    const double at = side.along_parallel ? (near.longitude[i] - longitude[0]) / unit
+                                          : (near.latitude[i] - latitude[0]) / unit;
+    // A vertex can stand at whole numbers only.
+    const double whole = from + std::round(at);
+    if (whole > from && whole < to) t.push_back(whole);
+  }
+  std::sort(t.begin(), t.end());
+  t.erase(std::unique(t.begin(), t.end()), t.end());
+  if (t.size() == before) return;
+  const double across = leaf_unit(side.line, side.depth);
+  longitude.clear();
+  latitude.clear();
+  for (const double at : t) {
+    longitude.push_back(longitude_at(tile_, side.along_parallel ? at : across));
+    latitude.push_back(latitude_at(tile_, side.along_parallel ? across : at));
+  }
+}
+
 std::vector<SideVertex> TileSides::settle(const Side& side) {
   if (is_cut(side)) {
     const Side first{side.along_parallel, side.depth + 1, 2 * side.line, 2 * side.k};
@@ -130,7 +164,7 @@ std::vector<SideVertex> TileSides::settle(const Side& side) {
   const double wanted = std::min(2.0 * length / surface_.spacing(), kMostPlaces);
   const auto parts =
       static_cast<std::size_t>(std::clamp(std::ceil(wanted), 1.0, static_cast<double>(to - from)));
-  std::vector<double> t, longitude, latitude, height(parts + 1);
+  std::vector<double> t, longitude, latitude, height;
   for (std::size_t i = 0; i <= parts; ++i) {
     const double at =
         from + static_cast<double>(to - from) * static_cast<double>(i) / static_cast<double>(parts);
@@ -138,6 +172,8 @@ std::vector<SideVertex> TileSides::settle(const Side& side) {
     longitude.push_back(longitude_at(tile_, side.along_parallel ? at : across));
     latitude.push_back(latitude_at(tile_, side.along_parallel ? across : at));
   }
+  add_samples(side, t, longitude, latitude);
+  height.resize(t.size());
   surface_.heights(longitude, latitude, height);
   const tri::SimplifiedLine line = tri::simplify_line(t, height, kSideShare * plan_.max_error,
                                                       tri::TinLattice{0.0, plan_.height_step});

@@ -69,6 +69,9 @@ class TileSides {
   };
   const std::vector<SideVertex>& vertices(const Side& side);
   std::vector<SideVertex> settle(const Side& side);
+  /// Adds to the places at which a side is looked at those of samples that lie on it.
+  void add_samples(const Side& side, std::vector<double>& t, std::vector<double>& longitude,
+                   std::vector<double>& latitude);
   [[nodiscard]] bool is_cut(const Side& side) const;
 
   TileAddress tile_;

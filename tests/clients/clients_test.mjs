@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// clients_test.mjs PACKAGES: tiles of terrace in CesiumJS and in another decoder, meshes in the
+// validator of glTF. TERRACE names the command, CHROMIUM the browser, TERRACE_DATA a folder with a
+// DEM of the Alps; without it the DEM is synthetic. Pictures of the globe stay in PACKAGES.
+
+import assert from 'node:assert/strict';
+import {spawnSync} from 'node:child_process';
+import {existsSync, mkdtempSync, readFileSync, rmSync} from 'node:fs';
+import {tmpdir} from 'node:os';
+import {dirname, join} from 'node:path';
+import {after, before, test} from 'node:test';
+import {fileURLToPath} from 'node:url';
+
+import {FAULTS} from './faults.mjs';
+import {launch, survey} from './globe.mjs';
+import {load, packages} from './packages.mjs';
+import {placesOf} from './places.mjs';
+import {tileBytes, TileSet} from './quantized_mesh.mjs';
+import {serve} from './tile_server.mjs';
+
+const ALPS = join(process.env.TERRACE_DATA ?? '', 'dem', 'N46E008_alps_point.tif');
+const folder = mkdtempSync(join(tmpdir(), 'terrace-clients-'));
+const here = dirname(fileURLToPath(import.meta.url));
+const NAMES = ['plain', 'extended', 'metadata'];
+const sets = {};
+let browser, server, base;
+
+function terrace(...args) {
+  const {status, stderr, error} =
+      spawnSync(process.env.TERRACE, args, {cwd: folder, encoding: 'utf8'});
+  assert.equal(status, 0, `terrace ${args.join(' ')}: ${error ?? stderr}`);
+}
+
+before(async () => {
+  terrace(
+      'synth', 'dem', '--size', '600x500', '--cell', '0.001', '--crs', 'EPSG:4326', '--roughness',
+      '12', '--type', 'float32', '-o', 'synthetic.tif');
+  terrace('build', 'synthetic.tif', '-o', 'synthetic.terrace', '-q');
+  const real = process.env.TERRACE_DATA && existsSync(ALPS);
+  if (real) terrace('build', ALPS, '-o', 'real.terrace', '-q');
+  terrace('tile', 'synthetic.terrace', '--vertical', 'ignore', '-q', '-o', 'plain');
+  terrace(
+      'tile', real ? 'real.terrace' : 'synthetic.terrace', '--vertical', 'ignore', '--normals',
+      '--water', 'nodata', '--gzip', '-q', '-o', 'extended');
+  terrace(
+      'tile', 'synthetic.terrace', '--vertical', 'ignore', '--metadata', '-q', '-o', 'metadata');
+  for (const name of NAMES) sets[name] = new TileSet(join(folder, name));
+  const mounts = {
+    page: {folder: here},
+    cesium: {folder: join(packages, 'node_modules/cesium/Build/Cesium')},
+    ...sets
+  };
+  Object.values(FAULTS).forEach(({fault, gzip}, i) => {
+    const set = gzip ? sets.extended : sets.plain;
+    mounts[`fault${i}`] = {folder: set.folder, fault: fault(set)};
+  });
+  server = await serve(mounts);
+  base = `http://127.0.0.1:${server.address().port}/`;
+  browser = await launch();
+});
+
+after(async () => {
+  await browser?.close();
+  server?.close();
+  server?.closeAllConnections();
+  rmSync(folder, {recursive: true, force: true});
+});
+
+for (const name of NAMES) {
+  test(`the globe shows the ${name} tiles`, async () => {
+    // By metadata the client finds out zoom by zoom what is there; on a border it may look for it
+    // in the tile of one side, and ask that of the other.
+    const borders = name !== 'metadata';
+    const places = placesOf(sets[name], borders ? 120 : 200, borders);
+    assert.ok(places.length >= 200, `${places.length} places`);
+    const pictures = join(packages, `globe-${name}`);
+    const {complaints, facts} = await survey(browser, base, name, sets[name], places, {pictures});
+    console.log(`${name}: ${JSON.stringify(facts)}`);
+    console.log(
+        `look at ${pictures}-heights.png${facts.extensions?.normals ? ' and -lit.png' : ''}`);
+    assert.deepEqual(complaints, []);
+    const extended = name === 'extended';
+    assert.deepEqual(
+        facts.extensions, {normals: extended, water: extended, metadata: name === 'metadata'});
+    assert.ok(facts.drawnVertices > 200);
+  });
+}
+
+Object.entries(FAULTS).forEach(([name, {complaint, drawn, gzip}], i) => {
+  test(`found: ${name}`, async () => {
+    const set = gzip ? sets.extended : sets.plain;
+    const pictures = drawn ? join(packages, `globe-fault${i}`) : undefined;
+    const {complaints} =
+        await survey(browser, base, `fault${i}`, set, placesOf(set, 20), {pictures});
+    assert.match(complaints.join('\n'), new RegExp(complaint, 'm'));
+  });
+});
+
+for (const name of NAMES) {
+  test(`another decoder reads the ${name} tiles alike`, () => {
+    const decode = load('@here/quantized-mesh-decoder');
+    const set = sets[name];
+    for (const key of set.tiles.keys()) {
+      const mine = set.tile(...key.split('/'));
+      const bytes = tileBytes(join(set.folder, `${key}.terrain`));
+      // It decodes in place, and wants a buffer of its own.
+      const theirs = (decode.default ?? decode)(new Uint8Array(bytes).buffer);
+      assert.deepEqual(
+          Object.values(theirs.header),
+          [...mine.centre, mine.lowest, mine.highest, ...mine.sphere, ...mine.horizon], key);
+      assert.deepEqual([...theirs.vertexData], [...mine.u, ...mine.v, ...mine.height], key);
+      assert.deepEqual([...theirs.triangleIndices], mine.triangles, key);
+      for (const side of ['west', 'south', 'east', 'north']) {
+        assert.deepEqual([...theirs[`${side}Indices`]], mine[side], `${key} ${side}`);
+      }
+      const {vertexNormals, waterMask, metadata} = theirs.extensions;
+      for (const [id, theirs] of [[1, vertexNormals], [2, waterMask]]) {
+        const same =
+            theirs ? mine.extensions[id]?.equals(new Uint8Array(theirs)) : !mine.extensions[id];
+        assert.ok(same, `${key}: extension ${id}`);
+      }
+      assert.deepEqual(
+          metadata, mine.extensions[4] && JSON.parse(mine.extensions[4].subarray(4)), key);
+      assert.equal(vertexNormals?.length, name === 'extended' ? 2 * mine.u.length : undefined, key);
+      assert.equal(!!metadata, name === 'metadata', key);
+    }
+    assert.ok(set.tiles.size > 100);
+  });
+}
+
+for (const options
+         of [['--max-error', '20'], ['--max-error', '20', '--quality', 'fitted'],
+             ['--level', 'top'], ['--level', '0', '--to-crs', 'EPSG:32632']]) {
+  test(`the validator of glTF passes mesh ${options.join(' ')}`, async () => {
+    const {validateBytes} = load('gltf-validator');
+    terrace('mesh', 'synthetic.terrace', ...options, '-o', 'mesh.glb', '--force', '-q');
+    const glb = readFileSync(join(folder, 'mesh.glb'));
+    const {issues, info} = await validateBytes(new Uint8Array(glb), {maxIssues: 20});
+    assert.deepEqual(issues.messages.filter(({severity}) => severity < 2), []);
+    assert.equal(issues.numErrors, 0);
+    assert.ok(info.totalVertexCount > 100 && info.totalTriangleCount > 100, JSON.stringify(info));
+    // What is cut short is refused.
+    const cut =
+        await validateBytes(new Uint8Array(glb.subarray(0, glb.length - 8))).catch(error => error);
+    assert.ok(cut instanceof Error || cut.issues.numErrors > 0);
+  });
+}

@@ -1,0 +1,34 @@
+#!/bin/sh
+# SPDX-License-Identifier: GPL-3.0-or-later
+# clients_test.sh BUILD: installs the clients below BUILD, unless they are there, and tests in them
+# the tiles and meshes of terrace. TERRACE names the command. Exits with 77 where a client cannot be
+# had.
+set -eu
+source=$(cd "${0%/*}" && pwd)
+skip() {
+  echo "clients are not tested: $*"
+  exit 77
+}
+for program in node npm chromium; do
+  command -v "$program" > /dev/null || skip "$program is not installed"
+done
+[ "$(node -p 'process.versions.node.split(".")[0]')" -ge 20 ] || skip 'node is older than 20'
+
+mkdir -p "$1/clients"
+packages=$(cd "$1/clients" && pwd)
+cp "$source/package.json" "$source/package-lock.json" "$packages"
+# The list of what is installed is put there last.
+if ! cmp -s "$packages/package-lock.json" "$packages/node_modules/.clients"; then
+  if ! npm ci --prefix "$packages" --ignore-scripts --no-audit --no-fund --prefer-offline \
+      --fetch-retries=1 --fetch-retry-mintimeout=1000 --fetch-timeout=30000 \
+      > "$packages/npm.log" 2>&1; then
+    unreachable='ENOTFOUND|EAI_AGAIN|ECONN|ETIMEDOUT|ENETUNREACH|EHOSTUNREACH|ENOTCACHED'
+    if grep -Eq "$unreachable" "$packages/npm.log"; then
+      skip 'the packages of npm cannot be downloaded here'
+    fi
+    cat "$packages/npm.log"
+    exit 1
+  fi
+  cp "$packages/package-lock.json" "$packages/node_modules/.clients"
+fi
+CHROMIUM=$(command -v chromium) exec node "$source/clients_test.mjs" "$packages"

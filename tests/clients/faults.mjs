@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What goes wrong with sets of tiles on servers: each must be found. A fault changes what is sent
+// for a path of a set.
+
+const zoomOf = path => /\.terrain$/.test(path) ? parseInt(path) : undefined;
+
+/// What goes wrong: fault(set) makes what tile_server.mjs wants, complaint is among those that a
+/// survey must make.
+export const FAULTS = {
+  'the deepest zoom is listed and missing': {
+    drawn: true,
+    complaint: /is (not drawn|drawn from its parent)/,
+    fault: set => path => zoomOf(path) === set.deepest ? {status: 404} : {},
+  },
+  'tiles of the deepest zoom are truncated': {
+    drawn: true,
+    complaint: /is (not drawn|drawn from its parent)/,
+    fault: set => (path, bytes) => zoomOf(path) === set.deepest ?
+        {bytes: bytes.subarray(0, bytes.length * 0.7), encoding: undefined} :
+        {},
+  },
+  'compressed tiles are sent without Content-Encoding': {
+    gzip: true,
+    complaint: /sampleTerrainMostDetailed/,
+    fault: () => () => ({encoding: undefined}),
+  },
+  'layer.json is missing': {
+    complaint: /sampleTerrainMostDetailed/,
+    fault: () => path => path === 'layer.json' ? {status: 404} : {},
+  },
+  'layer.json lists no available tiles': {
+    complaint: /sampleTerrainMostDetailed/,
+    fault: () => (path, bytes) => {
+      if (path !== 'layer.json') return {};
+      const {available, ...rest} = JSON.parse(bytes);
+      return {bytes: Buffer.from(JSON.stringify(rest))};
+    },
+  },
+  'heights are a metre off': {
+    complaint: /^height .* off by/,
+    fault: set => (path, bytes) => {
+      if (zoomOf(path) !== set.deepest) return {};
+      const higher = Buffer.from(bytes);
+      for (const at of [24, 28]) higher.writeFloatLE(higher.readFloatLE(at) + 1, at);
+      return {bytes: higher};
+    },
+  },
+};

@@ -1,0 +1,8 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The packages of npm that clients_test.sh installed.
+
+import {createRequire} from 'node:module';
+import {join} from 'node:path';
+
+export const packages = process.argv[2];
+export const load = createRequire(join(packages, 'package.json'));
