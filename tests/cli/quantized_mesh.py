@@ -50,7 +50,7 @@ def oct_decode(a, b):
 class Tile:
     def __init__(self, data, zoom, x, y):
         self.zoom, self.x, self.y = zoom, x, y
-        if data[:2] == b'\x1f\x8b':
+        if data[:3] == b'\x1f\x8b\x08':
             data = gzip.decompress(data)
         self.data = data
         self.centre = struct.unpack_from('<3d', data, 0)

@@ -169,6 +169,14 @@ class VerifyTest(TileTestCase):
             self.assertEqual([line['zoom'] for line in verdict['zooms']], list(range(10)))
             self.assertEqual(verdict['samples'], sum(line['samples'] for line in verdict['zooms']))
 
+    def test_a_tile_that_begins_as_gzip_does(self):
+        key = self.inner_tile()
+        # The last bits of the centre: less than a millionth of a metre.
+        self.change(key, b'\x1f\x8b\x08' + self.set.tiles[key].data[3:])
+        self.found()
+        self.change(key, b'\x1f\x8b\x08' + self.set.tiles[key].data[3:-4])
+        self.assertFalse(self.verify('damaged')['ok'])
+
     def test_missing_and_stray_tiles(self):
         key = self.inner_tile()
         os.remove(os.path.join(self.dir, '/'.join(map(str, key)) + '.terrain'))

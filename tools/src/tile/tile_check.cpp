@@ -51,6 +51,21 @@ std::uint64_t byte_of(std::string_view where) {
   return byte;
 }
 
+/// Decodes a tile, compressed or not.
+DecodedTile unpack_tile(const std::vector<std::byte>& bytes, const std::string& name) {
+  if (!stream::is_gzip(bytes)) return decode_tile(bytes, name);
+  try {
+    return decode_tile(stream::gunzip(bytes, kMostBytes, name), name);
+  } catch (const stream::Error& packed) {
+    // One plain tile of 65536 begins as gzip does.
+    try {
+      return decode_tile(bytes, name);
+    } catch (const stream::Error&) {
+      throw packed;
+    }
+  }
+}
+
 void take_sides(const TileMesh& mesh, Checked& checked) {
   const TileEdges edges = edges_of(mesh);
   const auto take = [&](const std::vector<std::uint32_t>& list,
@@ -123,9 +138,7 @@ Checked SetCheck::check(const TileAddress& tile, unsigned worker) const {
   DecodedTile decoded;
   try {
     const std::string path = path_of(tile);
-    std::vector<std::byte> bytes = read_tile_file(path);
-    if (stream::is_gzip(bytes)) bytes = stream::gunzip(bytes, kMostBytes, path);
-    decoded = decode_tile(bytes, path);
+    decoded = unpack_tile(read_tile_file(path), path);
   } catch (const stream::Error& error) {
     checked.faults.push_back({byte_of(error.parts().where), error.parts().cause});
     return checked;
