@@ -1,50 +1,164 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <CLI/CLI.hpp>
+#include <terrace/stream/error.hpp>
 #include <terrace/stream/store.hpp>
 
+#include "crs_options.hpp"
+#include "error.hpp"
+#include "geoid_heights.hpp"
+#include "tile/raster_tile_surface.hpp"
+#include "tile/tile_check.hpp"
 #include "units.hpp"
 #include "verbs.hpp"
 
 namespace terrace::tools {
 namespace {
 
+/// What a thread needs: a tile, the samples of a part of it and what is kept of the store.
+constexpr std::uint64_t kBytesPerThread = std::uint64_t{96} << 20;
+/// Blocks of the raster, and the lists of tiles.
+constexpr std::uint64_t kBytesBeside = std::uint64_t{80} << 20;
+
+/// The problems in the summary's two forms.
+void add_problem(const stream::Problem& problem, nlohmann::ordered_json& list, std::string& text) {
+  list.push_back({{"file", problem.file}, {"offset", problem.offset}, {"what", problem.what}});
+  text += problem.file + ": byte " + std::to_string(problem.offset) + ": " + problem.what + "\n";
+}
+
 class VerifyCommand final : public Command {
  public:
   void define(CLI::App& app) override {
-    app.add_option("STORE", store_, "the store to check")->required();
-    not_yet(app, {"--store", "--max-error"});
+    app.add_option("PATH", path_, "the store, or the folder of tiles, to check")->required();
+    app.add_option("--store", store_,
+                   "where the tiles' samples come from: heights are checked against all of them");
+    app.add_option(
+           "--max-error", max_error_,
+           "metres that the deepest zoom may be off, twice as much at each zoom above; else "
+           "what layer.json states")
+        ->type_name("METRES");
+    app.add_option("--vertical", vertical_,
+                   "ellipsoidal: the store's heights are above the ellipsoid; ignore: take them as "
+                   "if");
+    app.add_option("--geoid", geoid_, "the geoid grid that the tiles were made with")
+        ->type_name("FILE");
   }
 
-  Summary run(const CommonOptions& /*common*/) override {
-    const Stopwatch watch;
-    const stream::Store store = stream::Store::open(store_);
-    Summary summary;
-    nlohmann::ordered_json problems = nlohmann::ordered_json::array();
-    const bool ok = store.verify([&](const stream::Problem& problem) {
-      problems.push_back(
-          {{"file", problem.file}, {"offset", problem.offset}, {"what", problem.what}});
-      summary.text +=
-          problem.file + ": byte " + std::to_string(problem.offset) + ": " + problem.what + "\n";
-    });
-    std::uint64_t clusters = 0;
-    for (const stream::LevelInfo& level : store.levels()) clusters += level.clusters;
-    summary.json = {
-        {"ok", ok}, {"problems", problems}, {"clusters", clusters}, {"points", store.points()}};
-    summary.text += std::string(ok ? "sound: " : "damaged: ") + with_commas(store.points()) +
-                    " points in " + with_commas(clusters) + " clusters, " +
-                    readable_bytes(store.bytes()) + ", checked in " +
-                    readable_seconds(watch.seconds()) + "\n";
-    summary.exit_code = ok ? 0 : 1;
-    return summary;
+  Summary run(const CommonOptions& common) override {
+    if (is_tile_folder(path_)) return tiles(common);
+    if (!store_.empty() || max_error_ || !vertical_.empty() || !geoid_.empty()) {
+      throw UsageError("--store, --max-error, --vertical and --geoid are for tile sets, and " +
+                       path_ + " is none");
+    }
+    return store();
   }
 
  private:
-  std::string store_;
+  [[nodiscard]] Summary store() const;
+  [[nodiscard]] Summary tiles(const CommonOptions& common) const;
+
+  std::string path_, store_, vertical_, geoid_;
+  std::optional<double> max_error_;
 };
+
+Summary VerifyCommand::store() const {
+  const Stopwatch watch;
+  const stream::Store store = stream::Store::open(path_);
+  Summary summary;
+  nlohmann::ordered_json problems = nlohmann::ordered_json::array();
+  const bool ok = store.verify(
+      [&](const stream::Problem& problem) { add_problem(problem, problems, summary.text); });
+  std::uint64_t clusters = 0;
+  for (const stream::LevelInfo& level : store.levels()) clusters += level.clusters;
+  summary.json = {
+      {"ok", ok}, {"problems", problems}, {"clusters", clusters}, {"points", store.points()}};
+  summary.text += std::string(ok ? "sound: " : "damaged: ") + with_commas(store.points()) +
+                  " points in " + with_commas(clusters) + " clusters, " +
+                  readable_bytes(store.bytes()) + ", checked in " +
+                  readable_seconds(watch.seconds()) + "\n";
+  summary.exit_code = ok ? 0 : 1;
+  return summary;
+}
+
+Summary VerifyCommand::tiles(const CommonOptions& common) const {
+  const Stopwatch watch;
+  if (max_error_ && !(*max_error_ > 0.0 && std::isfinite(*max_error_))) {
+    throw UsageError("--max-error: a number of metres above 0");
+  }
+  if (store_.empty() && (max_error_ || !vertical_.empty() || !geoid_.empty())) {
+    throw UsageError("--max-error, --vertical and --geoid have a meaning with --store alone");
+  }
+  const std::uint64_t memory = common.memory_or(0);
+  if (memory < kBytesBeside + kBytesPerThread) {
+    throw stream::Error(
+        {.file = path_,
+         .where = {},
+         .cause = "the check needs " + std::to_string((kBytesBeside + kBytesPerThread) >> 20) +
+                  "M of memory, --memory allows " + std::to_string(memory >> 20) + "M",
+         .remedy = "allow more"});
+  }
+  const auto threads = static_cast<unsigned>(
+      std::min<std::uint64_t>(common.threads, (memory - kBytesBeside) / kBytesPerThread));
+
+  std::optional<stream::Store> store;
+  std::optional<TiledRaster> raster;
+  std::vector<std::unique_ptr<TileSurface>> surfaces;
+  if (!store_.empty()) {
+    store.emplace(stream::Store::open(store_));
+    if (!store->schema().grid) {
+      throw stream::Error({.file = store_,
+                           .where = {},
+                           .cause = "tiles are made of rasters, and this store holds irregular "
+                                    "points",
+                           .remedy = "name the store that the tiles were made of"});
+    }
+    EllipsoidalHeights heights(store->schema(), vertical_, geoid_, memory / 4);
+    if (!heights.note().empty()) common.say(heights.note());
+    raster.emplace(*store, system_of(*store), std::move(heights));
+    for (unsigned i = 0; i < threads; ++i) {
+      surfaces.push_back(std::make_unique<RasterTileSurface>(*raster));
+    }
+  }
+  const TileCheckResult result =
+      check_tile_set({.folder = path_, .max_error = max_error_}, threads, surfaces, common);
+
+  Summary summary;
+  nlohmann::ordered_json problems = nlohmann::ordered_json::array();
+  for (const stream::Problem& problem : result.problems) {
+    add_problem(problem, problems, summary.text);
+  }
+  nlohmann::ordered_json zooms = nlohmann::ordered_json::array();
+  for (const ZoomCheck& zoom : result.zooms) {
+    nlohmann::ordered_json line{{"zoom", zoom.zoom}, {"tiles", zoom.tiles}};
+    summary.text += "zoom " + std::to_string(zoom.zoom) + ": " + with_commas(zoom.tiles) + " tiles";
+    if (store) {
+      line["samples"] = zoom.samples;
+      line["max_error"] = zoom.max_error;
+      summary.text += ", " + with_commas(zoom.samples) + " samples within " +
+                      number_text(zoom.max_error) + " m";
+    }
+    summary.text += "\n";
+    zooms.push_back(std::move(line));
+  }
+  const bool ok = result.problems.empty();
+  summary.json = {{"ok", ok},
+                  {"problems", problems},
+                  {"tiles", result.tiles},
+                  {"samples", result.samples},
+                  {"zooms", zooms}};
+  summary.text += std::string(ok ? "sound: " : "damaged: ") + with_commas(result.tiles) +
+                  " tiles, checked in " + readable_seconds(watch.seconds()) + "\n";
+  summary.exit_code = ok ? 0 : 1;
+  return summary;
+}
 
 }  // namespace
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <tuple>
 #include <utility>
 
 #include <terrace/stream/error.hpp>
@@ -30,6 +31,53 @@ Point2 world_place(const Placement& placement, double column, double row) {
 double wrapped(double longitude) {
   if (longitude >= -180.0 && longitude <= 180.0) return longitude;
   return longitude - 360.0 * std::floor((longitude + 180.0) / 360.0);
+}
+
+/// A longitude of the turn that a raster in degrees is in: in it, or as near to it as can be. Both
+/// numbers of the line of 180 degrees give the same.
+double in_turn(const TiledRaster& raster, double longitude) {
+  const double first = raster.first_longitude, last = raster.last_longitude;
+  const double after = longitude - 360.0 * std::floor((longitude - first) / 360.0);
+  return after > last && after - last > first + 360.0 - after ? after - 360.0 : after;
+}
+
+/// Places on the globe to those of the raster's lattice, in place.
+void find_on_lattice(const TiledRaster& raster, std::span<Point2> places) {
+  raster.crs.from_geographic(places);
+  if (raster.crs.is_geographic()) {
+    for (Point2& p : places) p[0] = in_turn(raster, p[0]);
+  }
+  to_lattice(raster.placement, places);
+}
+
+/// Corners of what a raster in degrees has of the box around some places, in all turns.
+std::vector<Point2> in_all_turns(const TiledRaster& raster, std::span<const Point2> places) {
+  constexpr double kRounding = 1e-9;
+  stream::Box3 box;
+  for (const Point2& p : places) box.include(stream::Point3{p[0], p[1], 0.0});
+  std::vector<Point2> corners;
+  for (int turn = -2; turn <= 2; ++turn) {
+    const double west = std::max(box.min[0] + 360.0 * turn, raster.first_longitude - kRounding);
+    const double east = std::min(box.max[0] + 360.0 * turn, raster.last_longitude + kRounding);
+    if (west > east) continue;
+    for (const double x : {west, east}) {
+      for (const double y : {box.min[1], box.max[1]}) corners.push_back({x, y});
+    }
+  }
+  return corners;
+}
+
+/// The raster's own longitudes, which may go beyond 180.
+void find_turn(TiledRaster& raster) {
+  if (!raster.crs.is_geographic()) return;
+  const double columns = static_cast<double>(raster.store.schema().columns - 1);
+  const double rows = static_cast<double>(raster.store.schema().rows - 1);
+  const auto longitude = [&](double column, double row) {
+    return world_place(raster.placement, column, row)[0];
+  };
+  std::tie(raster.first_longitude, raster.last_longitude) =
+      std::minmax({longitude(0.0, 0.0), longitude(columns, 0.0), longitude(0.0, rows),
+                   longitude(columns, rows)});
 }
 
 /// Where the raster lies on the globe, and how close its samples are.
@@ -123,6 +171,7 @@ TiledRaster::TiledRaster(const stream::Store& tiled, CoordinateSystem system,
                          .cause = "a raster of one line of samples has no surface to tile",
                          .remedy = {}});
   }
+  find_turn(*this);
   find_bounds(*this);
 }
 
@@ -146,6 +195,7 @@ LatticeWindow RasterTileSurface::window_around(const GeographicBox& box) const {
     }
   }
   raster_.crs.from_geographic(places);
+  if (straight) places = in_all_turns(raster_, places);
   to_lattice(raster_.placement, places);
   stream::Box3 around;
   for (const Point2& p : places) around.include(stream::Point3{p[0], p[1], 0.0});
@@ -263,10 +313,11 @@ void RasterTileSurface::visit_places(std::span<const double> longitude,
   constexpr std::int64_t kMostSamples = 32768;  // of a window that is read for a run of them
   std::vector<Point2> places(longitude.size());
   for (std::size_t i = 0; i < places.size(); ++i) {
-    places[i] = {wrapped(longitude[i]), std::clamp(latitude[i], -90.0, 90.0)};
+    // One of the two numbers that the line of 180 degrees has: tiles on both sides ask for it.
+    const double turned = wrapped(longitude[i]);
+    places[i] = {turned == 180.0 ? -180.0 : turned, std::clamp(latitude[i], -90.0, 90.0)};
   }
-  raster_.crs.from_geographic(places);
-  to_lattice(raster_.placement, places);
+  find_on_lattice(raster_, places);
   const stream::Schema& schema = raster_.store.schema();
   const double last_column = static_cast<double>(schema.columns - 1);
   const double last_row = static_cast<double>(schema.rows - 1);

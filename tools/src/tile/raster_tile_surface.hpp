@@ -35,6 +35,8 @@ struct TiledRaster {
   HeightBlocks blocks;
   GeographicBox bounds{};
   double spacing = 0.0;
+  /// Of a raster in degrees: the longitudes that it gives its samples, which may go beyond 180.
+  double first_longitude = 0.0, last_longitude = 0.0;
 
   /// Reads the store twice. Throws: stream::Error if no place of it can be told on the globe.
   TiledRaster(const stream::Store& tiled, CoordinateSystem system, EllipsoidalHeights heights);

@@ -68,9 +68,14 @@ void mesh_leaf(const TileAddress& tile, const TileLeaf& leaf, const ZoomPlan& pl
   std::vector<double> u, v;
   u.reserve(samples.size());
   v.reserve(samples.size());
+  // Rounding must not take a sample on a side out of both leaves.
+  const auto unit = [&](double degrees, double from, std::uint32_t part) {
+    return std::clamp((degrees - from) * units, static_cast<double>(leaf_unit(part, leaf.depth)),
+                      static_cast<double>(leaf_unit(part + 1, leaf.depth)));
+  };
   for (std::size_t i = 0; i < samples.size(); ++i) {
-    u.push_back((samples.longitude[i] - whole.west) * units);
-    v.push_back((samples.latitude[i] - whole.south) * units);
+    u.push_back(unit(samples.longitude[i], whole.west, leaf.x));
+    v.push_back(unit(samples.latitude[i], whole.south, leaf.y));
   }
   std::vector<tri::Point3> corners;
   for (const SideVertex& vertex : frame) {

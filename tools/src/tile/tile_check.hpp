@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <terrace/stream/store.hpp>
+
+#include "cli.hpp"
+#include "tile/tile_surface.hpp"
+
+namespace terrace::tools {
+
+struct TileCheckOptions {
+  std::string folder;
+  /// The bound at the deepest zoom, metres, twice as much at each zoom above; without, what
+  /// layer.json states, or else what globes expect of each zoom.
+  std::optional<double> max_error;
+};
+
+struct ZoomCheck {
+  unsigned zoom = 0;
+  std::uint64_t tiles = 0;    ///< that are there
+  std::uint64_t samples = 0;  ///< measured; those on borders of tiles in each of them
+  double max_error = 0.0;     ///< metres; 0 if none was measured
+};
+
+struct TileCheckResult {
+  std::vector<stream::Problem> problems;  ///< by zoom, row, column
+  std::uint64_t tiles = 0, samples = 0;
+  std::vector<ZoomCheck> zooms;
+};
+
+/// Whether `folder` is one of tiles, whole or begun.
+bool is_tile_folder(const std::string& folder);
+
+/// Decodes and checks every tile of a set: layer.json against the files, each tile by itself
+/// (check_tile_mesh), the sides that neighbours share, and the heights against every sample of
+/// `surfaces` if there are any (all of the same samples, one per thread). Depends on the files
+/// alone, not on the number of threads. Memory: of one row of tiles' borders, and of a tile and a
+/// part of its samples per thread. Throws: stream::Error if layer.json cannot be read or the store
+/// is damaged; Interrupted.
+TileCheckResult check_tile_set(const TileCheckOptions& options, unsigned threads,
+                               const std::vector<std::unique_ptr<TileSurface>>& surfaces,
+                               const CommonOptions& common);
+
+}  // namespace terrace::tools

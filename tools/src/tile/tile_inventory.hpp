@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <terrace/stream/store.hpp>
+
+#include "tile/tile_address.hpp"
+#include "tile/tile_layer.hpp"
+
+namespace terrace::tools {
+
+/// What of a tile set lies in its folder.
+struct TileInventory {
+  /// Per zoom the tiles that are there, sorted by row, then column.
+  std::vector<std::vector<TileAddress>> tiles;
+  std::vector<stream::Problem> problems;
+};
+
+/// Compares layer.json with the files: each tile that it names is there, each that is there is
+/// named once, nothing is left over from a run that did not end. Throws: stream::Error if the
+/// folder cannot be read.
+TileInventory take_inventory(const std::string& folder, const TileLayer& layer);
+
+}  // namespace terrace::tools

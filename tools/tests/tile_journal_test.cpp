@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "src/tile/tile_journal.hpp"
+
+#include <filesystem>
+#include <iterator>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace terrace::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+class TileJournalFile : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
+    folder_ = fs::path(::testing::TempDir()) / (std::string("journal-") + test->name());
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  [[nodiscard]] fs::path path() const { return folder_ / TileJournal::kName; }
+  [[nodiscard]] std::string text() const {
+    std::ifstream file(path(), std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+  void write(const std::string& text) const { std::ofstream(path(), std::ios::binary) << text; }
+
+  static FinishedTile tile(unsigned i) {
+    return {100 + i, 0xFFFFFFFFFFFFFFF0u + i, 0.1 * i, 0x1p-11 * (1U << i)};
+  }
+  static TileAddress address(unsigned i) { return {9 - i / 3, 500 + i, 380}; }
+  static bool same(const FinishedTile* found, unsigned i) {
+    const FinishedTile right = tile(i);
+    return found != nullptr && found->bytes == right.bytes && found->checksum == right.checksum &&
+           found->max_error == right.max_error && found->height_step == right.height_step;
+  }
+
+  fs::path folder_;
+};
+
+constexpr unsigned kTiles = 7;
+
+TEST_F(TileJournalFile, KnowsWhatWasFinished) {
+  {
+    TileJournal journal(folder_.string(), "a b", false);
+    for (unsigned i = 0; i < kTiles; ++i) journal.add(address(i), tile(i));
+    // Only what an earlier run did counts.
+    EXPECT_EQ(journal.find(address(0)), nullptr);
+  }
+  const TileJournal journal(folder_.string(), "a b", true);
+  for (unsigned i = 0; i < kTiles; ++i) EXPECT_TRUE(same(journal.find(address(i)), i)) << i;
+  EXPECT_EQ(journal.find({9, 499, 380}), nullptr);
+}
+
+TEST_F(TileJournalFile, AnotherFingerprintOrNoResumeBeginsAnew) {
+  for (const bool resume : {false, true}) {
+    {
+      TileJournal journal(folder_.string(), "a b", false);
+      journal.add(address(0), tile(0));
+    }
+    const TileJournal journal(folder_.string(), resume ? "a c" : "a b", resume);
+    EXPECT_EQ(journal.find(address(0)), nullptr);
+    EXPECT_EQ(text().find("500"), std::string::npos);
+  }
+}
+
+TEST_F(TileJournalFile, ALineCutShortEndsWhatIsBelieved) {
+  {
+    TileJournal journal(folder_.string(), "a b", false);
+    for (unsigned i = 0; i < kTiles; ++i) journal.add(address(i), tile(i));
+  }
+  const std::string whole = text();
+  for (std::size_t length = 0; length <= whole.size(); ++length) {
+    SCOPED_TRACE(length);
+    write(whole.substr(0, length));
+    std::size_t lines = 0;
+    for (std::size_t i = 0; i < length; ++i) lines += whole[i] == '\n' ? 1 : 0;
+    {
+      TileJournal journal(folder_.string(), "a b", true);
+      for (unsigned i = 0; i < kTiles; ++i) {
+        const FinishedTile* found = journal.find(address(i));
+        // The first line is the head.
+        if (i + 1 < lines) {
+          EXPECT_TRUE(same(found, i)) << i;
+        } else {
+          EXPECT_EQ(found, nullptr) << i;
+        }
+      }
+      journal.add({3, 1, 1}, tile(1));
+    }
+    // What is added after the cut is read again.
+    const TileJournal again(folder_.string(), "a b", true);
+    EXPECT_TRUE(same(again.find({3, 1, 1}), 1));
+    if (lines > 1) {
+      EXPECT_TRUE(same(again.find(address(0)), 0));
+    }
+  }
+}
+
+TEST_F(TileJournalFile, DamagedLinesEndWhatIsBelieved) {
+  {
+    TileJournal journal(folder_.string(), "a b", false);
+    for (unsigned i = 0; i < kTiles; ++i) journal.add(address(i), tile(i));
+  }
+  std::string damaged = text();
+  // In the third line of tiles.
+  std::size_t at = 0;
+  for (int line = 0; line < 3; ++line) at = damaged.find('\n', at) + 1;
+  damaged[at] = 'x';
+  write(damaged);
+  const TileJournal journal(folder_.string(), "a b", true);
+  EXPECT_TRUE(same(journal.find(address(1)), 1));
+  EXPECT_EQ(journal.find(address(2)), nullptr);
+  EXPECT_EQ(journal.find(address(3)), nullptr);
+}
+
+TEST(TileChecksum, IsFnv1a) {
+  const auto sum = [](const std::string& text) {
+    return checksum_of(std::as_bytes(std::span(text)));
+  };
+  // Test vectors of the algorithm's authors.
+  EXPECT_EQ(sum(""), 0xCBF29CE484222325u);
+  EXPECT_EQ(sum("a"), 0xAF63DC4C8601EC8Cu);
+  EXPECT_EQ(sum("foobar"), 0x85944171F73967E8u);
+}
+
+}  // namespace
+}  // namespace terrace::tools
