@@ -61,8 +61,6 @@ tri::Detail in_stored_coordinates(const Detail& detail, const Placement& placeme
   return stored;
 }
 
-/// Smoothing: heights of two steps, the vertices, and 16 bytes per edge end.
-constexpr std::uint64_t kBytesToSmooth = 3 * 8 + 4 + 6 * 16;
 /// The triangles of a field of metrics.
 constexpr std::uint64_t kBytesToFlip = 120;
 
@@ -88,47 +86,6 @@ void check_memory(const stream::Store& store, const Detail& detail, std::uint64_
                                 "M of memory, --memory allows " +
                                 std::to_string(memory_bytes >> 20) + "M",
                        .remedy = "take a coarser --level or a smaller --region"});
-}
-
-/// The root mean square of the height differences along all edges.
-template <class Coord>
-double rms_step(const tri::Multiresolution2<Coord>& model) {
-  const auto& triangulation = model.triangulation();
-  double sum = 0.0, edges = 0.0;
-  for (const tri::TriangleId t : triangulation.all_triangles()) {
-    const auto corners = triangulation.vertices(t);
-    for (std::size_t k = 0; k < 3; ++k) {
-      const double step = model.height(corners[k]) - model.height(corners[(k + 1) % 3]);
-      sum += step * step;
-      edges += 1.0;
-    }
-  }
-  return edges > 0.0 ? std::sqrt(sum / edges) : 0.0;
-}
-
-/// The smoothed heights by slot.
-template <class Coord>
-std::vector<double> smoothed(const tri::Multiresolution2<Coord>& model, const Placement& placement,
-                             const std::optional<Region>& region, tri::SmoothingOptions options) {
-  const auto& triangulation = model.triangulation();
-  std::vector<double> heights(triangulation.vertex_slots(), 0.0);
-  std::vector<tri::VertexId> inside;
-  for (const tri::VertexId v : triangulation.all_vertices()) {
-    heights[tri::slot(v)] = model.height(v);
-    const auto p = triangulation.point(v);
-    if (!region ||
-        region->contains(world_point(
-            placement, {static_cast<double>(p[0]), static_cast<double>(p[1]), model.height(v)}))) {
-      inside.push_back(v);
-    }
-  }
-  if (options.edge_height == 0.0) options.edge_height = 4.0 * rms_step(model);
-  // Without any step there is nothing to smooth.
-  if (options.edge_height == 0.0) return heights;
-  for (const auto& [vertex, height] : tri::smooth(triangulation, heights, inside, options)) {
-    heights[tri::slot(vertex)] = height;
-  }
-  return heights;
 }
 
 /// The metric in the coordinates of the triangulation.
@@ -168,6 +125,7 @@ tri::MetricField2 field_of(const MetricChoice& metric, const stream::Store& stor
   return tri::MetricField2(std::move(regions));
 }
 
+/// `heights`: by slot in real units; empty: the model's.
 template <class Coord>
 TriangleMesh mesh_of_model(const tri::Multiresolution2<Coord>& model, const Placement& placement,
                            const std::optional<Region>& region, const std::vector<double>& heights,
@@ -175,8 +133,10 @@ TriangleMesh mesh_of_model(const tri::Multiresolution2<Coord>& model, const Plac
   const auto& triangulation = model.triangulation();
   const auto position = [&](tri::VertexId v) {
     const auto p = triangulation.point(v);
-    const double height = heights.empty() ? model.height(v) : heights[tri::slot(v)];
-    return world_point(placement, {static_cast<double>(p[0]), static_cast<double>(p[1]), height});
+    stream::Point3 place = world_point(
+        placement, {static_cast<double>(p[0]), static_cast<double>(p[1]), model.height(v)});
+    if (!heights.empty()) place[2] = heights[tri::slot(v)];
+    return place;
   };
   const std::array<double, 6>& m = placement.world.xy;
   const bool mirrored = m[0] * m[4] - m[1] * m[3] < 0;
@@ -228,7 +188,9 @@ TriangleMesh mesh_of(const stream::Store& store, const Detail& detail, const Mes
                                            {.deltas = false});
   check_interrupt();
   std::vector<double> heights;
-  if (options.smoothing) heights = smoothed(model, placement, detail.region, *options.smoothing);
+  if (options.heights.any()) {
+    heights = changed_heights(model, placement, detail.region, options.heights);
+  }
   return mesh_of_model(model, placement, detail.region, heights, field);
 }
 
@@ -242,7 +204,7 @@ TriangleMesh mesh_of_store(const stream::Store& store, const Detail& detail,
                      options.metric.text);
   }
   check_memory(store, detail, memory_bytes,
-               (options.smoothing ? kBytesToSmooth : 0) +
+               options.heights.bytes_per_vertex() +
                    (kind == MetricChoice::Kind::elliptical ? kBytesToFlip : 0));
   return store.schema().grid ? mesh_of<std::int32_t>(store, detail, options)
                              : mesh_of<double>(store, detail, options);

@@ -2,11 +2,9 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
-
-#include <terrace/tri/smoothing.hpp>
 
 #include "detail.hpp"
+#include "mesh_heights.hpp"
 #include "metric_option.hpp"
 #include "scene.hpp"
 #include "terrace/stream/store.hpp"
@@ -14,10 +12,7 @@
 namespace terrace::tools {
 
 struct MeshOptions {
-  /// Heights are smoothed, with a region only inside it, its border staying: on the triangulation
-  /// as it is made, so of rasters on the unit grid. An edge_height of 0 becomes four times the root
-  /// mean square of the height differences along edges.
-  std::optional<tri::SmoothingOptions> smoothing;
+  HeightOptions heights;
   /// Elliptical: triangles within a region suit its metric on the ground (see
   /// tri::metric_triangles); outside all regions nothing changes.
   MetricChoice metric;

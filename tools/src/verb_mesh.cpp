@@ -6,6 +6,8 @@
 #include <vector>
 
 #include <CLI/CLI.hpp>
+#include <terrace/stream/error.hpp>
+#include <terrace/stream/overlay.hpp>
 #include <terrace/stream/store.hpp>
 
 #include "bounded_mesh.hpp"
@@ -40,6 +42,13 @@ class MeshCommand final : public Command {
            "laplacian, taubin (keeps what is wide) or bilateral (keeps steps), :STEPS behind "
            "if wanted (10); with --region only inside it")
         ->type_name("METHOD");
+    app.add_option("--overlay", overlay_,
+                   "a file of --save-overlay: its heights in place of the store's")
+        ->type_name("FILE");
+    app.add_option("--save-overlay", save_overlay_,
+                   "with --smooth: write the heights that changed to this file beside the store, "
+                   "which stays as it is")
+        ->type_name("FILE");
     app.add_option(
            "--metric", metric_,
            "euclidean, or elliptical:FILE (JSON regions as for cluster): triangles follow the "
@@ -68,7 +77,7 @@ class MeshCommand final : public Command {
                    "(holes), flat (at the lowest height), interpolate")
         ->capture_default_str()
         ->type_name("NAME");
-    not_yet(app, {"--overlay", "--base"});
+    not_yet(app, {"--base"});
     crs_.define(app);
   }
 
@@ -79,10 +88,11 @@ class MeshCommand final : public Command {
  private:
   Summary bounded(const CommonOptions& common) const {
     const Stopwatch watch;
-    if (level_ != "0" || !focuses_.empty() || !smooth_.empty() || metric_ != "euclidean") {
+    if (level_ != "0" || !focuses_.empty() || !smooth_.empty() || !overlay_.empty() ||
+        metric_ != "euclidean") {
       throw UsageError(
-          "--max-error and --max-points are about all samples: without --level, --focus, --smooth "
-          "and --metric");
+          "--max-error and --max-points are about all samples as they are: without --level, "
+          "--focus, --smooth, --overlay and --metric");
     }
     BoundedMeshOptions options;
     if (max_error_ && !max_points_.empty()) {
@@ -104,7 +114,8 @@ class MeshCommand final : public Command {
     if (!region_.empty()) options.region = crs_.regions(store)(Region::parse(region_));
     if (crs_.places(store).has_effect()) {
       throw UsageError(
-          "--to-crs: between other coordinates the triangles would be other surfaces, and the bound "
+          "--to-crs: between other coordinates the triangles would be other surfaces, and the "
+          "bound "
           "would not hold; write the mesh in the store's CRS");
     }
     options.writer = {.format = format_, .replace = may_replace(output_, common.force)};
@@ -139,15 +150,29 @@ class MeshCommand final : public Command {
     if (quality_ != "removal" || duplicates_ != "error" || fill_ != "none") {
       throw UsageError("--quality, --duplicates and --fill belong to --max-error and --max-points");
     }
-    const MeshOptions options{parse_smoothing(smooth_), MetricChoice::parse(metric_)};
+    MeshOptions options{{.smoothing = parse_smoothing(smooth_)}, MetricChoice::parse(metric_)};
+    const bool save = !save_overlay_.empty();
+    if (save && smooth_.empty()) throw UsageError("--save-overlay needs --smooth");
+    if (save && save_overlay_ == output_) {
+      throw UsageError("--save-overlay and --output are the same file");
+    }
     const stream::Store store = stream::Store::open(store_);
     const Detail detail = Detail::parse(store, level_, region_, focuses_, crs_.regions(store));
     const PlaceConversion places = crs_.places(store);
     const bool replace = may_replace(output_, common.force);
+    std::optional<stream::Overlay> overlay;
+    if (!overlay_.empty()) options.heights.overlay = &overlay.emplace(open_overlay(store));
+    std::optional<stream::OverlayWriter> writer;
+    if (save) {
+      options.heights.save =
+          &writer.emplace(save_overlay_, store, store.schema().coordinates[2].name,
+                          may_replace(save_overlay_, common.force));
+    }
     TriangleMesh mesh =
         mesh_of_store(store, detail, common.memory_or(machine_memory_bytes() / 2), options);
     places(mesh.positions);
     write_mesh(output_, format_, mesh, replace);
+    if (writer) writer->finish();
 
     Summary summary;
     summary.json = {{"vertices", mesh.positions.size()},
@@ -157,10 +182,28 @@ class MeshCommand final : public Command {
     summary.text = output_ + ": " + with_commas(mesh.positions.size()) + " vertices, " +
                    with_commas(mesh.triangles.size()) + " triangles in " +
                    readable_seconds(watch.seconds()) + "\n";
+    if (writer) {
+      summary.json["overlay_values"] = writer->values();
+      summary.text += save_overlay_ + ": " + with_commas(writer->values()) + " changed heights\n";
+    }
     return summary;
   }
 
+  [[nodiscard]] stream::Overlay open_overlay(const stream::Store& store) const {
+    stream::Overlay overlay = stream::Overlay::open(overlay_, store);
+    const std::string& heights = store.schema().coordinates[2].name;
+    if (overlay.channel() != heights) {
+      throw stream::Error({.file = overlay_,
+                           .where = {},
+                           .cause = "has other values of '" + overlay.channel() +
+                                    "', not of the heights '" + heights + "'",
+                           .remedy = "name an overlay that terrace mesh has written"});
+    }
+    return overlay;
+  }
+
   std::string store_, output_, format_, level_ = "0", region_, smooth_, metric_ = "euclidean";
+  std::string overlay_, save_overlay_;
   std::string max_points_, quality_ = "removal", duplicates_ = "error", fill_ = "none";
   std::optional<double> max_error_;
   std::vector<std::string> focuses_;

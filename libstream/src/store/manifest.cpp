@@ -22,12 +22,6 @@ constexpr std::string_view kChecksumKey = "\"checksum\": \"";
 constexpr std::string_view kClosing = "\"\n}\n";
 constexpr std::string_view kZeros = "00000000";
 
-std::string hexadecimal(std::uint32_t value) {
-  std::string text(8, '0');
-  for (std::size_t i = 8; i-- > 0; value >>= 4) text[i] = "0123456789abcdef"[value & 15];
-  return text;
-}
-
 std::uint32_t from_hexadecimal(const std::string& text) {
   std::uint32_t value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, 16);
@@ -239,6 +233,12 @@ void check_counts(const Manifest& m) {
 
 }  // namespace
 
+std::string hexadecimal(std::uint32_t value) {
+  std::string text(8, '0');
+  for (std::size_t i = 8; i-- > 0; value >>= 4) text[i] = "0123456789abcdef"[value & 15];
+  return text;
+}
+
 std::string to_text(const Manifest& manifest) {
   Json json = to_json(manifest);
   json["checksum"] = kZeros;
@@ -273,12 +273,14 @@ Manifest parse_manifest(const std::string& text, const std::filesystem::path& fi
     const std::size_t at = text.size() - kClosing.size() - kZeros.size();
     std::string zeroed = text;
     zeroed.replace(at, kZeros.size(), kZeros);
+    const std::uint32_t checksum = crc32(0, zeroed.data(), zeroed.size());
     if (text.compare(text.size() - tail, kChecksumKey.size(), kChecksumKey) != 0 ||
-        text.substr(at, kZeros.size()) != hexadecimal(crc32(0, zeroed.data(), zeroed.size()))) {
+        text.substr(at, kZeros.size()) != hexadecimal(checksum)) {
       damaged(file, "its checksum is wrong");
     }
     Manifest manifest = from_json(json);
     check_counts(manifest);
+    manifest.checksum = checksum;
     return manifest;
   } catch (const Json::exception& error) {
     damaged(file, error.what());

@@ -35,7 +35,11 @@ struct Manifest {
   Box3 bounds;
   double mean_height = 0.0;
   std::vector<LevelEntry> levels;  ///< level 0 first
+  std::uint32_t checksum = 0;      ///< of the text; set by parse_manifest()
 };
+
+/// Eight lower-case digits.
+std::string hexadecimal(std::uint32_t value);
 
 /// The manifest as JSON text, its own checksum included.
 std::string to_text(const Manifest& manifest);

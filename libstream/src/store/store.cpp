@@ -85,6 +85,7 @@ const std::filesystem::path& Store::path() const { return impl_->path; }
 unsigned Store::top() const { return static_cast<unsigned>(impl_->levels.size()) - 1; }
 std::span<const LevelInfo> Store::levels() const { return impl_->infos; }
 std::uint64_t Store::points() const { return impl_->manifest.points; }
+std::uint32_t Store::checksum() const { return impl_->manifest.checksum; }
 std::uint64_t Store::bytes() const { return impl_->bytes; }
 const Box3& Store::bounds() const { return impl_->manifest.bounds; }
 double Store::mean_height() const { return impl_->manifest.mean_height; }

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// The page of an overlay: refused with Damage, or consistent and the same after writing it again.
+#include <cstdint>
+#include <cstdlib>
+#include <vector>
+
+#include "../src/store/overlay_page.hpp"
+
+namespace {
+
+void require(bool condition) {
+  if (!condition) std::abort();
+}
+
+}  // namespace
+
+/// The first byte is the number of values, the others the page without its checksum.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace terrace::stream;
+  using namespace terrace::stream::store;
+  if (size < 1) return 0;
+  static const std::vector<LevelInfo> levels{{.level = 0, .clusters = 1000000},
+                                             {.level = 1, .clusters = 5000},
+                                             {.level = 2, .clusters = 1}};
+  Bytes bytes(data + 1, data + size);
+  put(bytes, crc32(bytes));  // nobody guesses a checksum: the parser behind it is the target
+  OverlayPage page;
+  try {
+    decode_overlay_page(bytes, data[0], levels, page);
+  } catch (const Damage&) {
+    return 0;
+  }
+  require(page.values.size() == data[0]);
+  require(page.first.size() == page.clusters.size() + 1 && page.first.back() == data[0]);
+  const Bytes again = encode_overlay_page(page);
+  require(again.size() <= bytes.size());  // the same number may have been written in more bytes
+  OverlayPage second;
+  decode_overlay_page(again, data[0], levels, second);
+  require(second == page);
+  return 0;
+}

@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/stream/overlay.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "files.hpp"
+#include "manifest.hpp"
+#include "overlay_page.hpp"
+#include "terrace/stream/error.hpp"
+
+namespace terrace::stream {
+
+using namespace store;
+
+namespace {
+
+constexpr const char* kRemedy = "restore the file or make the overlay anew";
+
+InputFile open_file(const std::filesystem::path& path) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) {
+    throw Error({.file = path.string(),
+                 .where = {},
+                 .cause = "there is no overlay here",
+                 .remedy = "name a file that terrace mesh --save-overlay has written"});
+  }
+  return {path, std::filesystem::file_size(path)};
+}
+
+struct PageEntry {
+  std::uint64_t first_cluster = 0, offset = 0, values = 0;
+};
+
+constexpr std::size_t kNoPage = std::numeric_limits<std::size_t>::max();
+
+}  // namespace
+
+struct Overlay::Impl {
+  InputFile file;
+  std::vector<LevelInfo> levels;  // of the store
+  std::string channel{};
+  std::uint64_t values = 0;
+  std::vector<PageEntry> pages{};
+  std::uint64_t pages_end = 0;
+  std::size_t loaded = kNoPage;
+  OverlayPage page{};
+
+  [[nodiscard]] Error damaged(std::uint64_t offset, const std::string& cause) const {
+    return Error({.file = file.path().string(),
+                  .where = "byte " + std::to_string(offset),
+                  .cause = cause,
+                  .remedy = kRemedy});
+  }
+
+  void read_header(const Store& store);
+  void read_directory(std::uint64_t count, std::uint64_t header_end, std::uint64_t most_values);
+  void load_page(std::size_t number);
+};
+
+void Overlay::Impl::read_header(const Store& store) {
+  try {
+    Bytes bytes(std::min<std::uint64_t>(file.size(), kOverlayHeadBytes));
+    file.read(0, bytes);
+    if (bytes.size() < kOverlayMarkBytes + 4 ||
+        !std::equal(kOverlayMark, kOverlayMark + kOverlayMarkBytes, bytes.begin())) {
+      throw Damage("the file does not say that it is an overlay");
+    }
+    // Before anything that a newer version may do otherwise.
+    const auto version = load<std::uint32_t>(bytes.data() + kOverlayMarkBytes);
+    if (version > kOverlayVersion) {
+      throw Error({.file = file.path().string(),
+                   .where = {},
+                   .cause = "overlay version " + std::to_string(version) +
+                            " was written by a newer terrace; this one reads up to version " +
+                            std::to_string(kOverlayVersion),
+                   .remedy = "update"});
+    }
+    ByteReader in(ByteView(bytes).subspan(kOverlayMarkBytes + 4));
+    const auto made_for = in.get<std::uint32_t>();
+    const auto count = in.get<std::uint64_t>();
+    pages_end = in.get<std::uint64_t>();
+    const auto name = in.get<std::uint32_t>();
+    const std::uint64_t end = kOverlayHeadBytes + std::uint64_t{name} + 4;
+    if (name > kMostOverlayNameBytes || end > file.size()) {
+      throw Damage("the header has an impossible size");
+    }
+    Bytes rest(name + std::size_t{4});
+    file.read(kOverlayHeadBytes, rest);
+    const std::uint32_t checksum = crc32(crc32(bytes), rest.data(), name);
+    if (checksum != load<std::uint32_t>(rest.data() + name) || version < 1) {
+      throw Damage("the checksum of the header is wrong");
+    }
+    channel.assign(rest.begin(), rest.begin() + static_cast<std::ptrdiff_t>(name));
+    if (made_for != store.checksum()) {
+      throw Error({.file = file.path().string(),
+                   .where = {},
+                   .cause = "was made for the store with the checksum " + hexadecimal(made_for) +
+                            ", " + store.path().string() + " has " + hexadecimal(store.checksum()),
+                   .remedy = "name the store that it was made for, or make the overlay anew"});
+    }
+    read_directory(count, end, store.points());
+  } catch (const Damage& damage) {
+    throw damaged(0, damage.what());
+  }
+}
+
+void Overlay::Impl::read_directory(std::uint64_t count, std::uint64_t header_end,
+                                   std::uint64_t most_values) {
+  if (pages_end < header_end || pages_end > file.size() - 4 ||
+      count != (file.size() - 4 - pages_end) / kOverlayEntryBytes ||
+      count * kOverlayEntryBytes != file.size() - 4 - pages_end) {
+    throw Damage("the directory does not have the size that the header tells");
+  }
+  try {
+    // In pieces: the entries are all that is kept.
+    std::uint32_t checksum = 0;
+    Bytes bytes;
+    std::uint64_t at = pages_end;
+    for (std::uint64_t left = count; left > 0;) {
+      const std::uint64_t piece = std::min<std::uint64_t>(left, 4096);
+      bytes.resize(piece * kOverlayEntryBytes);
+      file.read(at, bytes);
+      checksum = crc32(checksum, bytes.data(), bytes.size());
+      ByteReader in(bytes);
+      for (std::uint64_t i = 0; i < piece; ++i) {
+        PageEntry entry;
+        entry.first_cluster = in.get<std::uint64_t>();
+        entry.offset = in.get<std::uint64_t>();
+        entry.values = in.get<std::uint32_t>();
+        const bool first = pages.empty();
+        if (entry.values == 0 || entry.values > most_values - values) {
+          throw Damage("a page has an impossible number of values");
+        }
+        if (entry.offset >= pages_end ||
+            (first ? entry.offset != header_end
+                   : entry.offset <= pages.back().offset ||
+                         entry.first_cluster <= pages.back().first_cluster)) {
+          throw Damage("the pages do not follow one another");
+        }
+        values += entry.values;
+        pages.push_back(entry);
+      }
+      at += bytes.size();
+      left -= piece;
+    }
+    bytes.resize(4);
+    file.read(at, bytes);
+    if (checksum != load<std::uint32_t>(bytes.data())) {
+      throw Damage("the checksum of the directory is wrong");
+    }
+    if (pages.empty() && pages_end != header_end) {
+      throw Damage("bytes that belong to no page");
+    }
+  } catch (const Damage& damage) {
+    throw damaged(pages_end, damage.what());
+  }
+}
+
+void Overlay::Impl::load_page(std::size_t number) {
+  if (number == loaded) return;
+  loaded = kNoPage;
+  const PageEntry& entry = pages[number];
+  const bool last = number + 1 == pages.size();
+  const std::uint64_t size = (last ? pages_end : pages[number + 1].offset) - entry.offset;
+  try {
+    if (size > most_overlay_page_bytes(entry.values)) {
+      throw Damage("the page is too long for its values");
+    }
+    Bytes bytes(size);
+    file.read(entry.offset, bytes);
+    decode_overlay_page(bytes, entry.values, levels, page);
+    if (static_cast<std::uint64_t>(page.clusters.front()) != entry.first_cluster ||
+        (!last &&
+         static_cast<std::uint64_t>(page.clusters.back()) >= pages[number + 1].first_cluster)) {
+      throw Damage("the page does not have the clusters that the directory tells");
+    }
+  } catch (const Damage& damage) {
+    throw damaged(entry.offset, damage.what());
+  }
+  loaded = number;
+}
+
+Overlay::Overlay(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Overlay::~Overlay() = default;
+Overlay::Overlay(Overlay&&) noexcept = default;
+Overlay& Overlay::operator=(Overlay&&) noexcept = default;
+
+Overlay Overlay::open(const std::filesystem::path& path, const Store& store) {
+  auto impl = std::make_unique<Impl>(
+      Impl{.file = open_file(path), .levels = {store.levels().begin(), store.levels().end()}});
+  impl->read_header(store);
+  return Overlay(std::move(impl));
+}
+
+const std::filesystem::path& Overlay::path() const { return impl_->file.path(); }
+const std::string& Overlay::channel() const { return impl_->channel; }
+std::uint64_t Overlay::values() const { return impl_->values; }
+
+std::span<const OverlayValue> Overlay::find(ClusterId cluster) {
+  const auto id = static_cast<std::uint64_t>(cluster);
+  const auto& pages = impl_->pages;
+  const auto next = std::upper_bound(
+      pages.begin(), pages.end(), id,
+      [](std::uint64_t value, const PageEntry& entry) { return value < entry.first_cluster; });
+  if (next == pages.begin()) return {};
+  impl_->load_page(static_cast<std::size_t>(next - pages.begin()) - 1);
+  const auto& clusters = impl_->page.clusters;
+  const auto found = std::lower_bound(clusters.begin(), clusters.end(), cluster);
+  if (found == clusters.end() || *found != cluster) return {};
+  return impl_->page.of(static_cast<std::size_t>(found - clusters.begin()));
+}
+
+void Overlay::for_each(const std::function<void(ClusterId, std::span<const OverlayValue>)>& visit) {
+  for (std::size_t p = 0; p < impl_->pages.size(); ++p) {
+    impl_->load_page(p);
+    for (std::size_t c = 0; c < impl_->page.clusters.size(); ++c) {
+      visit(impl_->page.clusters[c], impl_->page.of(c));
+    }
+  }
+}
+
+}  // namespace terrace::stream

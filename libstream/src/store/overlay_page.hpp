@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "bytes.hpp"
+#include "terrace/stream/overlay.hpp"
+
+namespace terrace::stream::store {
+
+inline constexpr char kOverlayMark[] = "terrace overlay\n";
+inline constexpr std::size_t kOverlayMarkBytes = sizeof kOverlayMark - 1;
+inline constexpr std::uint32_t kOverlayVersion = 1;
+/// Mark, version, checksum of the store, pages, offset of the directory, length of the name.
+inline constexpr std::size_t kOverlayHeadBytes = kOverlayMarkBytes + 4 + 4 + 8 + 8 + 4;
+inline constexpr std::size_t kMostOverlayNameBytes = 65535;
+/// A page ends with the cluster that brings it to so many values.
+inline constexpr std::size_t kOverlayPageValues = 4096;
+/// In the directory: first cluster, offset, number of values.
+inline constexpr std::size_t kOverlayEntryBytes = 8 + 8 + 4;
+
+/// The most bytes that a page of so many values can have: each in a cluster of its own.
+constexpr std::uint64_t most_overlay_page_bytes(std::uint64_t values) {
+  return 4 + values * (10 + 5 + 5 + 8) + 4;
+}
+
+/// Some clusters of an overlay, whole. Cluster clusters[c] has values[first[c]] ... first[c + 1].
+struct OverlayPage {
+  std::vector<ClusterId> clusters;
+  std::vector<std::size_t> first{0};  ///< one more than clusters
+  std::vector<OverlayValue> values;
+
+  /// `cluster` not below the last one; of one cluster ascending indices.
+  void add(ClusterId cluster, const OverlayValue& value);
+  void clear();
+  [[nodiscard]] std::span<const OverlayValue> of(std::size_t cluster) const {
+    return std::span(values).subspan(first[cluster], first[cluster + 1] - first[cluster]);
+  }
+
+  friend bool operator==(const OverlayPage&, const OverlayPage&) = default;
+};
+
+/// The bytes of a page, its CRC-32 at the end.
+Bytes encode_overlay_page(const OverlayPage& page);
+
+/// Into `page`; the checksum too is checked. Throws: Damage unless it has `values` values in
+/// ascending order of clusters and indices, all finite, of clusters that the levels have.
+void decode_overlay_page(ByteView bytes, std::uint64_t values, std::span<const LevelInfo> levels,
+                         OverlayPage& page);
+
+}  // namespace terrace::stream::store
