@@ -41,7 +41,8 @@ class GeoTiffRaster final : public Raster {
     info_.rows = layout_.rows;
     info_.block_columns = std::min(layout_.block_columns, layout_.columns);
     info_.block_rows = std::min(layout_.block_rows, layout_.rows);
-    const GeoKeys keys(handle_.shorts(kGeoKeyDirectory), handle_.text(kGeoAsciiParams));
+    const GeoKeys keys(handle_.shorts(kGeoKeyDirectory), handle_.doubles(kGeoDoubleParams),
+                       handle_.text(kGeoAsciiParams));
     info_.crs = crs_of(keys);
     info_.world = geotiff_transform(handle_, keys, info_.comments);
     info_.nodata = nodata_.value;

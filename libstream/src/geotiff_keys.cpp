@@ -2,6 +2,7 @@
 #include "geotiff_keys.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "geotiff_tags.hpp"
 
@@ -40,7 +41,8 @@ int epsg_of(std::optional<std::uint16_t> code) {
 
 }  // namespace
 
-GeoKeys::GeoKeys(std::span<const std::uint16_t> directory, const std::string& ascii) {
+GeoKeys::GeoKeys(std::span<const std::uint16_t> directory, std::span<const double> doubles,
+                 const std::string& ascii) {
   if (directory.empty()) return;
   if (directory.size() < 4) {
     faults_.push_back("GeoKeyDirectory is cut short");
@@ -68,6 +70,13 @@ GeoKeys::GeoKeys(std::span<const std::uint16_t> directory, const std::string& as
       std::string text = ascii.substr(value, length);
       while (!text.empty() && (text.back() == '|' || text.back() == '\0')) text.pop_back();
       texts_[key] = text;
+    } else if (place == kGeoDoubleParams) {
+      if (value > doubles.size() || length > doubles.size() - value) {
+        faults_.push_back("GeoKey " + std::to_string(key) + " points outside GeoDoubleParams");
+        continue;
+      }
+      const auto part = doubles.subspan(value, length);
+      doubles_[key].assign(part.begin(), part.end());
     }
   }
 }
@@ -81,6 +90,23 @@ std::optional<std::uint16_t> GeoKeys::number(std::uint16_t key) const {
 std::string GeoKeys::text(std::uint16_t key) const {
   const auto found = texts_.find(key);
   return found == texts_.end() ? std::string() : found->second;
+}
+
+std::vector<GeoKey> GeoKeys::range(std::uint16_t first, std::uint16_t last) const {
+  std::vector<GeoKey> found;
+  const auto within = [first, last](std::uint16_t key) { return first <= key && key <= last; };
+  for (const auto& [key, value] : numbers_) {
+    if (within(key)) found.push_back({.key = key, .values = {static_cast<double>(value)}});
+  }
+  for (const auto& [key, values] : doubles_) {
+    if (within(key)) found.push_back({.key = key, .values = values});
+  }
+  for (const auto& [key, text] : texts_) {
+    if (within(key)) found.push_back({.key = key, .text = text});
+  }
+  std::stable_sort(found.begin(), found.end(),
+                   [](const GeoKey& a, const GeoKey& b) { return a.key < b.key; });
+  return found;
 }
 
 Crs crs_of(const GeoKeys& keys) {
@@ -104,6 +130,9 @@ Crs crs_of(const GeoKeys& keys) {
     crs.horizontal_unit = unit_name(keys.number(kLinearUnit).value_or(0));
   }
   crs.vertical_unit = unit_name(keys.number(kVerticalUnit).value_or(0));
+  constexpr std::uint16_t kLastOfCrs = 5119;  // of the vertical keys
+  crs.geo_keys = keys.range(kGTModelType, kGTModelType);
+  for (GeoKey& key : keys.range(kGeodeticCrs, kLastOfCrs)) crs.geo_keys.push_back(std::move(key));
   return crs;
 }
 

@@ -16,16 +16,22 @@ namespace terrace::stream {
 /// or are cut short, are left out and listed in `faults`.
 class GeoKeys {
  public:
-  GeoKeys(std::span<const std::uint16_t> directory, const std::string& ascii);
+  GeoKeys(std::span<const std::uint16_t> directory, std::span<const double> doubles,
+          const std::string& ascii);
 
   [[nodiscard]] std::optional<std::uint16_t> number(std::uint16_t key) const;
   [[nodiscard]] std::string text(std::uint16_t key) const;  ///< empty if there is none
-  [[nodiscard]] bool empty() const { return numbers_.empty() && texts_.empty(); }
+  /// All keys from `first` to `last`, ascending.
+  [[nodiscard]] std::vector<GeoKey> range(std::uint16_t first, std::uint16_t last) const;
+  [[nodiscard]] bool empty() const {
+    return numbers_.empty() && texts_.empty() && doubles_.empty();
+  }
   [[nodiscard]] const std::vector<std::string>& faults() const { return faults_; }
 
  private:
   std::unordered_map<std::uint16_t, std::uint16_t> numbers_;
   std::unordered_map<std::uint16_t, std::string> texts_;
+  std::unordered_map<std::uint16_t, std::vector<double>> doubles_;
   std::vector<std::string> faults_;
 };
 

@@ -64,10 +64,7 @@ class GlbWriter final : public MeshWriter {
       refuse("GLB holds at most 4 GiB");
     }
     if (header.bounds && !header.bounds->empty()) {
-      const Box3& box = *header.bounds;
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        origin_[axis] = box.min[axis] * 0.5 + box.max[axis] * 0.5;
-      }
+      origin_ = glb_origin(*header.bounds);
       origin_known_ = true;
     }
     // The longest numbers show how much room the JSON may need; blanks fill what is left.
@@ -226,6 +223,14 @@ class GlbWriter final : public MeshWriter {
 };
 
 }  // namespace
+
+Point3 glb_origin(const Box3& bounds) {
+  Point3 origin;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    origin[axis] = bounds.min[axis] * 0.5 + bounds.max[axis] * 0.5;
+  }
+  return origin;
+}
 
 std::unique_ptr<MeshWriter> open_glb_writer(const std::string& path, const MeshHeader& header,
                                             bool replace) {

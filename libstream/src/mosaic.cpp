@@ -119,7 +119,8 @@ void check_crs(const RasterInfo& first, const RasterInfo& other) {
   const Crs &a = first.crs, &b = other.crs;
   const bool same_name = a.epsg != 0 || a.name == b.name;
   if (a.epsg == b.epsg && same_name && a.vertical_epsg == b.vertical_epsg &&
-      a.geographic == b.geographic && a.horizontal_unit == b.horizontal_unit) {
+      a.geographic == b.geographic && a.horizontal_unit == b.horizontal_unit &&
+      (a.epsg != 0 || a.geo_keys == b.geo_keys)) {
     return;
   }
   differ(first.files.front(), other.files.front(),

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "writers.hpp"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <filesystem>
 
 #include "input.hpp"
@@ -87,6 +89,31 @@ std::unique_ptr<PointWriter> open_point_writer(const std::string& path, const Po
 std::unique_ptr<MeshWriter> open_mesh_writer(const std::string& path, const MeshHeader& header,
                                              const WriterOptions& options) {
   return kMeshOpeners[choose_format(kMeshFormats, path, options)](path, header, options.replace);
+}
+
+MeshRounding::MeshRounding(const std::string& path, const Box3& bounds,
+                           const WriterOptions& options) {
+  if (kMeshFormats[choose_format(kMeshFormats, path, options)].name != "glb" || bounds.empty()) {
+    return;
+  }
+  origin_ = glb_origin(bounds);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    // Half a unit in the last of 24 bits, and what doubles lose when the origin is taken off and
+    // added again.
+    const double half =
+        std::max(bounds.max[axis] - (*origin_)[axis], (*origin_)[axis] - bounds.min[axis]);
+    largest_[axis] = half * 0x1p-24 + (half + std::abs((*origin_)[axis])) * 0x1p-51;
+  }
+}
+
+Point3 MeshRounding::operator()(const Point3& p) const {
+  if (!origin_) return p;
+  Point3 read;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double origin = (*origin_)[axis];
+    read[axis] = origin + static_cast<double>(static_cast<float>(p[axis] - origin));
+  }
+  return read;
 }
 
 }  // namespace terrace::stream

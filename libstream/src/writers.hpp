@@ -45,6 +45,9 @@ std::unique_ptr<MeshWriter> open_obj_writer(const std::string& path, const MeshH
 std::unique_ptr<MeshWriter> open_glb_writer(const std::string& path, const MeshHeader& header,
                                             bool replace);
 
+/// The local origin of a GLB file whose vertices lie in `bounds`.
+Point3 glb_origin(const Box3& bounds);
+
 /// Holds a mesh writer's caller to its promises.
 class MeshCounts {
  public:

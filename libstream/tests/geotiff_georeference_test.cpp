@@ -118,14 +118,33 @@ TEST(GeoReference, GeographicKeysAndUserDefinedOnes) {
   EXPECT_EQ(own.crs.name, "my grid");
 }
 
+TEST(GeoReference, KeysOfTheCrsAreDeliveredAsTheyStand) {
+  const GeoKeys keys(
+      std::vector<std::uint16_t>{1,    1,     0, 5, 1024, 0,     1, 1, 3072, 0,     1, 32767,
+                                 3080, 34736, 1, 1, 3092, 34736, 1, 0, 3073, 34737, 4, 0},
+      std::vector<double>{0.9996, 9.0}, "own|");
+  const std::vector<GeoKey> found = crs_of(keys).geo_keys;
+  ASSERT_EQ(found.size(), 5u);
+  EXPECT_EQ(found[0], (GeoKey{1024, {1}, ""}));
+  EXPECT_EQ(found[1], (GeoKey{3072, {32767}, ""}));
+  EXPECT_EQ(found[2], (GeoKey{3073, {}, "own"}));
+  EXPECT_EQ(found[3], (GeoKey{3080, {9.0}, ""}));
+  EXPECT_EQ(found[4], (GeoKey{3092, {0.9996}, ""}));
+  const GeoKeys cut(std::vector<std::uint16_t>{1, 1, 0, 1, 3080, 34736, 2, 1},
+                    std::vector<double>{1.0, 2.0}, "");
+  EXPECT_EQ(cut.faults().size(), 1u);
+  EXPECT_TRUE(crs_of(cut).geo_keys.empty());
+}
+
 TEST(GeoReference, KeysThatPointNowhereAreLeftOut) {
   const GeoKeys keys(
-      std::vector<std::uint16_t>{1, 1, 0, 500, 1026, 34737, 100, 0, 3072, 0, 1, 32632}, "short|");
+      std::vector<std::uint16_t>{1, 1, 0, 500, 1026, 34737, 100, 0, 3072, 0, 1, 32632}, {},
+      "short|");
   EXPECT_EQ(keys.text(1026), "");
   EXPECT_EQ(keys.number(3072), 32632);
   EXPECT_EQ(keys.faults().size(), 2u);
-  EXPECT_EQ(GeoKeys(std::vector<std::uint16_t>{1, 1}, "").faults().size(), 1u);
-  EXPECT_TRUE(GeoKeys({}, "").faults().empty());
+  EXPECT_EQ(GeoKeys(std::vector<std::uint16_t>{1, 1}, {}, "").faults().size(), 1u);
+  EXPECT_TRUE(GeoKeys({}, {}, "").faults().empty());
 }
 
 TEST(GeoReference, ScaleOffsetAndUnitOfABand) {

@@ -88,7 +88,9 @@ TEST(GeoTiffWriter, WhatIsWrittenIsReadBack) {
     ASSERT_EQ(whole.info.rows, options.rows);
     ASSERT_EQ(whole.samples, samples);
     ASSERT_EQ(whole.info.world, options.world);
-    ASSERT_EQ(whole.info.crs, options.crs);
+    Crs crs = whole.info.crs;
+    crs.geo_keys.clear();
+    ASSERT_EQ(crs, options.crs);
     ASSERT_EQ(whole.info.nodata, options.nodata);
     options.sample.name = "height";
     ASSERT_EQ(whole.info.sample, options.sample);

@@ -181,6 +181,7 @@ TEST_F(MeshFile, GlbKeepsPositionsAboutItsOrigin) {
     if (with_bounds) header.bounds = bounds;
     const std::string file = path(with_bounds ? "a.glb" : "b.glb");
     write(file, mesh, header, {}, 700);
+    const MeshRounding rounding(file, bounds);
     const Glb glb(read_text(file));
     EXPECT_EQ(glb.json["asset"]["version"], "2.0");
     const auto& node = glb.json["nodes"][0];
@@ -208,6 +209,10 @@ TEST_F(MeshFile, GlbKeepsPositionsAboutItsOrigin) {
       for (std::size_t k = 0; k < 3; ++k) {
         const double reach = with_bounds ? 1000 : 2000;
         EXPECT_NEAR(back[k], mesh.positions[i][k], reach * 0x1p-24 + 1e-9);
+        if (with_bounds) {
+          EXPECT_LE(std::abs(back[k] - mesh.positions[i][k]), rounding.largest()[k]);
+          EXPECT_EQ(back[k], rounding(mesh.positions[i])[k]);
+        }
       }
       EXPECT_EQ(glb.value<float>(level, i, 0), mesh.levels[i]);
     }
@@ -222,6 +227,18 @@ TEST_F(MeshFile, GlbKeepsPositionsAboutItsOrigin) {
       }
     }
   }
+}
+
+TEST_F(MeshFile, OtherFormatsRoundNothing) {
+  const Box3 bounds{{691000, 5338000, 0}, {692000, 5340000, 500}};
+  const Point3 p{691000.1, 5338000.2, 0.3};
+  for (const char* name : {"a.ply", "a.obj"}) {
+    const MeshRounding rounding(path(name), bounds);
+    EXPECT_EQ(rounding(p), p);
+    EXPECT_EQ(rounding.largest(), Point3{});
+  }
+  EXPECT_NE(MeshRounding(path("a.ply"), bounds, {.format = "glb"})(p), p);
+  EXPECT_THROW(MeshRounding(path("a.stl"), bounds), Error);
 }
 
 TEST_F(MeshFile, GlbWithoutTrianglesIsACloudAndWithoutVerticesAnEmptyScene) {

@@ -9,11 +9,27 @@
 #include <utility>
 #include <vector>
 
+#include "interpolation/blocks.hpp"
 #include "pool.hpp"
 
 /// Sorting of points by the cell of a space-filling curve that they are in.
 
 namespace terrace::tri {
+
+/// Calls work(from, to) for ranges of 0 .. count - 1, in several threads where that pays.
+template <class Work>
+void for_ranges(std::uint32_t count, unsigned threads, const Work& work) {
+  constexpr std::uint32_t kRange = 16384;
+  if (threads < 2 || count < 2 * kRange) {
+    work(0, count);
+    return;
+  }
+  for_blocks(
+      count, kRange, threads, [] { return 0; },
+      [&](std::size_t from, std::size_t to, int) {
+        work(static_cast<std::uint32_t>(from), static_cast<std::uint32_t>(to));
+      });
+}
 
 struct CurveEntry {
   std::uint32_t key;
@@ -42,9 +58,10 @@ void radix_sort(Pool<CurveEntry>& entries) {
 /// Sorts a range of point numbers. cells_of(range) lays a raster over these points: single() tells
 /// that they are all in one place, key(number) is the place of a point's cell on the curve, of
 /// kKeyBits bits. What one raster does not tell apart the next, over fewer points, does, so
-/// recursion is never deep.
+/// recursion is never deep. Threads compute keys.
 template <unsigned kKeyBits, class CellsOf>
-void sort_along_curve(std::span<std::uint32_t> order, const CellsOf& cells_of) {
+void sort_along_curve(std::span<std::uint32_t> order, const CellsOf& cells_of,
+                      unsigned threads = 1) {
   // Runs of equal keys up to this length stay as they are.
   constexpr std::size_t kLeaf = 16;
   // Below this, counters would cost more than points.
@@ -57,7 +74,9 @@ void sort_along_curve(std::span<std::uint32_t> order, const CellsOf& cells_of) {
   // Few points are told apart by the curve's coarse cells, and if not, in the runs below.
   const bool few = count < kFew;
   const unsigned shift = few ? kKeyBits - 16 : 0;
-  for (std::uint32_t i = 0; i < count; ++i) entries[i] = {cells.key(order[i]) >> shift, order[i]};
+  for_ranges(count, threads, [&](std::uint32_t from, std::uint32_t to) {
+    for (std::uint32_t i = from; i < to; ++i) entries[i] = {cells.key(order[i]) >> shift, order[i]};
+  });
   if (few) {
     radix_sort<8, 2>(entries);
   } else {

@@ -14,7 +14,7 @@
 #include <terrace/stream/geotiff_writer.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "crs_option.hpp"
+#include "coordinate_system.hpp"
 #include "ground.hpp"
 #include "store_build.hpp"
 #include "temporary_folder.hpp"
@@ -49,7 +49,7 @@ Shape cluster(const Twin& twin, const std::filesystem::path& folder) {
   options.rows = twin.rows;
   options.sample.type = stream::ScalarType::f32;
   options.world.xy = {cell_x / twin.unit_x, 0, twin.x0, 0, -cell_y / twin.unit_y, twin.y0};
-  options.crs = tools::parse_crs(twin.crs);
+  options.crs = tools::CoordinateSystem::parse(twin.crs).crs();
   options.replace = true;
   std::vector<float> samples;
   for (std::uint32_t row = 0; row < twin.rows; ++row) {

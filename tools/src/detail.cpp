@@ -26,13 +26,14 @@ unsigned checked(std::optional<unsigned> level, const stream::Store& store) {
 }  // namespace
 
 Detail Detail::parse(const stream::Store& store, const std::string& level,
-                     const std::string& region, const std::vector<std::string>& focuses) {
+                     const std::string& region, const std::vector<std::string>& focuses,
+                     const RegionConversion& conversion) {
   Detail detail;
   detail.level = checked(parse_level(level), store);
-  if (!region.empty()) detail.region = Region::parse(region);
+  if (!region.empty()) detail.region = conversion(Region::parse(region));
   for (const std::string& text : focuses) {
     Focus focus = parse_focus(text);
-    detail.focuses.push_back({std::move(focus.region), checked(focus.level, store)});
+    detail.focuses.push_back({conversion(std::move(focus.region)), checked(focus.level, store)});
   }
   return detail;
 }

@@ -8,6 +8,7 @@
 
 #include <terrace/stream/store.hpp>
 
+#include "crs_options.hpp"
 #include "region.hpp"
 
 namespace terrace::tools {
@@ -23,8 +24,10 @@ struct FinerRegion {
 struct Detail {
   /// The levels as asked for (nothing: the top), checked against the store.
   /// Throws: UsageError for a level above the store's top.
+  /// conversion: of regions that are given in another CRS.
   static Detail parse(const stream::Store& store, const std::string& level,
-                      const std::string& region, const std::vector<std::string>& focuses);
+                      const std::string& region, const std::vector<std::string>& focuses,
+                      const RegionConversion& conversion = {});
 
   unsigned level = 0;
   std::optional<Region> region;

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "coordinate_system.hpp"
 #include "terrace/stream/point.hpp"
 #include "world.hpp"
 
@@ -35,20 +36,29 @@ class Ground {
   /// z_weight: what heights are multiplied by besides, `--z-weight`.
   explicit Ground(Placement placement, double z_weight = 1.0);
 
-  /// The map near the centre of `stored`, a box in stored coordinates. Where the CRS is geographic
-  /// or Web Mercator it depends on the latitude; elsewhere it is the same everywhere.
+  /// The map near the centre of `stored`, a box in stored coordinates: the local scale of the
+  /// projection, on the axes of the CRS (its east and north, not the meridian's). Without a known
+  /// CRS it is the same everywhere.
   [[nodiscard]] GroundMap map(const stream::Box3& stored) const;
+
+  [[nodiscard]] bool same_everywhere() const { return kind_ == Kind::linear; }
+  /// Whether the map is a projection's scale, which changes little over a hundredth of an area.
+  [[nodiscard]] bool projected() const { return kind_ == Kind::projected; }
 
   /// What had to be assumed because the source does not say; empty if nothing.
   [[nodiscard]] const std::string& assumption() const { return assumption_; }
 
  private:
-  enum class Kind : std::uint8_t { linear, geographic, web_mercator };
+  enum class Kind : std::uint8_t { linear, geographic, web_mercator, projected };
+
+  [[nodiscard]] std::array<double, 3> projected_scale(const stream::Point3& centre) const;
 
   Placement placement_;
   Kind kind_ = Kind::linear;
-  double metres_horizontal_ = 1.0;  ///< of a unit of x, y
-  double metres_vertical_ = 1.0;    ///< of a unit of z, weighed
+  std::optional<CoordinateSystem> system_;  ///< of projected ones
+  double degrees_ = 1.0;                    ///< of a unit of x, y
+  double metres_horizontal_ = 1.0;          ///< of a unit of x, y
+  double metres_vertical_ = 1.0;            ///< of a unit of z, weighed
   std::string assumption_;
 };
 

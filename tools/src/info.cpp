@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "info.hpp"
 
+#include <optional>
+
+#include "crs_definition.hpp"
 #include "units.hpp"
 
 namespace terrace::tools {
@@ -45,6 +48,15 @@ std::string text_of(const stream::Crs& crs) {
   if (!crs.name.empty()) text += text.empty() ? crs.name : " (" + crs.name + ")";
   if (text.empty()) text = crs.wkt.empty() ? "unknown" : crs.wkt.substr(0, 60) + "...";
   if (crs.vertical_epsg != 0) text += " + EPSG:" + std::to_string(crs.vertical_epsg);
+  try {
+    const std::optional<CrsDefinition> known = definition_of(crs);
+    if (!known || known->shift || known->uncertainty == 0) return text;
+    text += known->uncertainty < 0
+                ? ", datum " + known->datum + " without a shift to WGS 84"
+                : ", counts as WGS 84 within " + number_text(known->uncertainty) + " m";
+  } catch (const CrsError& error) {
+    text += std::string(", ") + error.what();
+  }
   return text;
 }
 

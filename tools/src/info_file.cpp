@@ -8,6 +8,8 @@
 
 #include "info.hpp"
 #include "interrupt.hpp"
+#include "source_crs.hpp"
+#include "terrace/stream/error.hpp"
 #include "units.hpp"
 
 namespace terrace::tools {
@@ -79,6 +81,14 @@ Summary info_of_file(const std::string& path, const CommonOptions& common) {
   if (path != "-") source = stream::read_ahead(std::move(source));
   const Contents contents = stream_through(*source, common);
   const stream::SourceInfo& info = source->info();
+  SourceCrs crs;
+  try {
+    crs = crs_of_source(info);
+  } catch (const stream::Error& error) {
+    // What a build would refuse is told, with the rest of the file.
+    crs.crs = info.crs;
+    crs.note = error.what();
+  }
   const stream::Channel& z = info.coordinates[2];
   const auto real = [&z](double raw) { return raw * z.scale + z.offset; };
 
@@ -91,8 +101,9 @@ Summary info_of_file(const std::string& path, const CommonOptions& common) {
   json["nodata"] = contents.nodata;
   json["levels"] = nlohmann::ordered_json::array();
   json["bounds"] = json_of(contents.world);
-  json["crs"] = json_of(info.crs);
-  json["vertical"] = nullptr;
+  json["crs"] = json_of(crs.crs);
+  json["vertical"] = crs.heights == Heights::unknown ? nlohmann::ordered_json(nullptr)
+                                                     : nlohmann::ordered_json(name_of(crs.heights));
   if (info.grid) {
     json["columns"] = info.columns;
     json["rows"] = info.rows;
@@ -126,7 +137,9 @@ Summary info_of_file(const std::string& path, const CommonOptions& common) {
             (info.nodata ? ", value " + number_text(*info.nodata) : std::string()) + '\n';
   }
   text += "points:    " + with_commas(contents.points) + '\n';
-  text += "crs:       " + text_of(info.crs) + '\n';
+  text += "crs:       " + text_of(crs.crs) + '\n';
+  if (!crs.note.empty()) text += "note:      " + crs.note + '\n';
+  if (crs.heights != Heights::unknown) text += "vertical:  " + name_of(crs.heights) + '\n';
   text += "bounds:    " + text_of(contents.world) + '\n';
   if (contents.points > 0) {
     text += "heights:   " + number_text(json["height"]["min"].get<double>()) + " to " +

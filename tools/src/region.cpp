@@ -195,11 +195,16 @@ Region Region::parse(const std::string& text) {
     }
     return region;
   }
-  region.polygons_ = read_geojson(text);
+  return of_polygons(read_geojson(text), -kInfinity, kInfinity);
+}
+
+Region Region::of_polygons(std::vector<Polygon> polygons, double low, double high) {
+  Region region;
+  region.polygons_ = std::move(polygons);
   for (const Polygon& polygon : region.polygons_) {
     for (const Point2& p : polygon.front()) {
-      region.box_.include(stream::Point3{p[0], p[1], -kInfinity});
-      region.box_.include(stream::Point3{p[0], p[1], kInfinity});
+      region.box_.include(stream::Point3{p[0], p[1], low});
+      region.box_.include(stream::Point3{p[0], p[1], high});
     }
   }
   return region;

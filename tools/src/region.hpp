@@ -32,6 +32,9 @@ class Region {
   /// Throws: UsageError for numbers that are no box, stream::Error for a file that is no region.
   static Region parse(const std::string& text);
 
+  /// The union of polygons, each with heights from `low` to `high`.
+  static Region of_polygons(std::vector<Polygon> polygons, double low, double high);
+
   /// The smallest box around the region. Without heights its z is unbounded.
   [[nodiscard]] const stream::Box3& box() const { return box_; }
   [[nodiscard]] const std::vector<Polygon>& polygons() const { return polygons_; }

@@ -14,6 +14,7 @@
 
 #include "ground.hpp"
 #include "interrupt.hpp"
+#include "source_crs.hpp"
 #include "store_sink.hpp"
 #include "units.hpp"
 #include "world.hpp"
@@ -27,14 +28,25 @@ constexpr std::array<std::pair<const char*, cluster::Effort>, 4> kEfforts{
      {"fine", cluster::Effort::fine},
      {"full", cluster::Effort::full}}};
 
-stream::Schema schema_of(const stream::SourceInfo& info, const BuildRequest& request) {
+stream::Schema schema_of(const stream::SourceInfo& info, const SourceCrs& crs,
+                         const BuildRequest& request) {
   stream::Schema schema;
   schema.grid = info.grid;
   schema.coordinates = info.coordinates;
   schema.attributes = info.attributes;
   schema.world = info.world;
-  schema.crs = info.crs;
-  schema.vertical = request.vertical;
+  schema.crs = crs.crs;
+  schema.vertical = request.vertical.empty() ? name_of(crs.heights) : request.vertical;
+  if (schema.vertical != name_of(crs.heights)) {
+    // What was said of the heights goes before what the file says of them.
+    schema.crs.vertical_epsg = 0;
+    if (crs.system) {
+      CrsDefinition definition = crs.system->definition();
+      definition.heights = Heights::unknown;
+      definition.vertical_name.clear();
+      schema.crs.wkt = wkt_of(definition);
+    }
+  }
   schema.columns = info.columns;
   schema.rows = info.rows;
   schema.format = info.format;
@@ -164,8 +176,12 @@ BuildOutcome build_store(const BuildRequest& request, const BuildProgress& progr
   source_options.crs = request.crs;
   auto source = stream::open_source(request.inputs, source_options);
   const stream::SourceInfo& info = source->info();
-  const Ground ground(placement_of(info), request.z_weight);
+  const SourceCrs crs = crs_of_source(info, request.datum_shift);
+  Placement placement = placement_of(info);
+  placement.crs = crs.crs;
+  const Ground ground(placement, request.z_weight);
   BuildOutcome outcome;
+  if (!crs.note.empty()) outcome.notes.push_back(crs.note);
   if (!ground.assumption().empty()) outcome.notes.push_back(ground.assumption());
   const unsigned threads = threads_within_memory(request, payload_size(info));
   if (info.grid) {
@@ -175,7 +191,7 @@ BuildOutcome build_store(const BuildRequest& request, const BuildProgress& progr
   }
   source = stream::read_ahead(std::move(source), kBlocksAhead);
 
-  const stream::Schema schema = schema_of(source->info(), request);
+  const stream::Schema schema = schema_of(source->info(), crs, request);
   stream::StoreWriter writer(request.store, schema, request.replace);
   StoreSink sink(writer);
   cluster::HierarchyOptions options;

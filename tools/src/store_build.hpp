@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -22,7 +23,9 @@ struct BuildRequest {
   bool replace = false;
   std::string input_format;        ///< empty: told by content
   std::optional<stream::Crs> crs;  ///< replaces the source's
-  std::string vertical;            ///< "ellipsoidal", "orthometric" or empty
+  /// To WGS 84, for a CRS of another datum (see DatumShift).
+  std::optional<std::array<double, 7>> datum_shift;
+  std::string vertical;  ///< "ellipsoidal", "orthometric" or empty
   std::size_t block_points = 10000;
   double facility_cost = 1.0;  ///< times the diagonal of a block
   cluster::Effort effort = cluster::Effort::standard;

@@ -14,7 +14,7 @@
 #include <CLI/CLI.hpp>
 #include <terrace/stream/error.hpp>
 
-#include "crs_option.hpp"
+#include "coordinate_system.hpp"
 #include "error.hpp"
 #include "store_build.hpp"
 #include "units.hpp"
@@ -58,7 +58,13 @@ class BuildCommand final : public Command {
         ->required();
     add_output(app, output_, "the store to write");
     app.add_option("--input-format", request_.input_format, "instead of telling it by content");
-    app.add_option("--crs", crs_, "EPSG:n, assigned in place of what the source says");
+    app.add_option(
+        "--crs", crs_,
+        "EPSG:n, EPSG:n+m with the heights' system, or a file with WKT (.prj): in place of "
+        "what the source says");
+    app.add_option("--towgs84", shift_,
+                   "dx,dy,dz[,rx,ry,rz,ds]: metres, arc-seconds and ppm (position vector) from "
+                   "the CRS's datum to WGS 84");
     app.add_option("--vertical", request_.vertical, "what heights refer to")
         ->check(CLI::IsMember({"ellipsoidal", "orthometric"}));
     app.add_option("--band", request_.band, "of rasters, from 1")->check(CLI::PositiveNumber);
@@ -86,7 +92,8 @@ class BuildCommand final : public Command {
     request_.store = output_;
     request_.replace = common.force;
     request_.effort = *effort_of(effort_);
-    if (!crs_.empty()) request_.crs = parse_crs(crs_);
+    if (!crs_.empty()) request_.crs = CoordinateSystem::parse(crs_).crs();
+    if (!shift_.empty()) request_.datum_shift = parse_datum_shift(shift_);
     if (block_ < 2 || block_ > 1'000'000) {
       throw UsageError("--block must be between 2 and 1000000, not " + std::to_string(block_));
     }
@@ -178,7 +185,7 @@ class BuildCommand final : public Command {
   }
 
   BuildRequest request_;
-  std::string output_, crs_, effort_ = "default", metric_ = "euclidean";
+  std::string output_, crs_, shift_, effort_ = "default", metric_ = "euclidean";
   std::uint64_t block_ = 10000;
   bool dry_run_ = false;
 };

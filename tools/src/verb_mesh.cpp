@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <string>
@@ -9,6 +10,8 @@
 #include <terrace/stream/overlay.hpp>
 #include <terrace/stream/store.hpp>
 
+#include "bounded_mesh.hpp"
+#include "crs_options.hpp"
 #include "detail.hpp"
 #include "error.hpp"
 #include "mesh_output.hpp"
@@ -52,12 +55,100 @@ class MeshCommand final : public Command {
            "ellipses inside the regions")
         ->capture_default_str()
         ->type_name("NAME");
-    not_yet(app, {"--max-error", "--quality", "--max-points", "--duplicates", "--fill", "--base",
-                  "--region-crs", "--to-crs"});
+    app.add_option("--max-error", max_error_,
+                   "the fewest triangles that are vertically within this many metres of every "
+                   "sample, checked on the values written")
+        ->type_name("METRES");
+    app.add_option("--max-points", max_points_,
+                   "the mesh of at most this many points with the smallest error")
+        ->type_name("N");
+    app.add_option("--quality", quality_,
+                   "of an error-bounded mesh: greedy (Delaunay), removal (fewer triangles), fitted "
+                   "(fewer again; heights leave the samples)")
+        ->capture_default_str()
+        ->type_name("NAME");
+    app.add_option("--duplicates", duplicates_,
+                   "which of several irregular samples at one x,y counts: min, max, mean, first, "
+                   "error (refuse them)")
+        ->capture_default_str()
+        ->type_name("NAME");
+    app.add_option("--fill", fill_,
+                   "what a raster's cells without data become in an error-bounded mesh: none "
+                   "(holes), flat (at the lowest height), interpolate")
+        ->capture_default_str()
+        ->type_name("NAME");
+    not_yet(app, {"--base"});
+    crs_.define(app);
   }
 
   Summary run(const CommonOptions& common) override {
+    return max_error_ || !max_points_.empty() ? bounded(common) : multiresolution(common);
+  }
+
+ private:
+  Summary bounded(const CommonOptions& common) const {
     const Stopwatch watch;
+    if (level_ != "0" || !focuses_.empty() || !smooth_.empty() || metric_ != "euclidean" ||
+        !overlay_.empty() || !save_overlay_.empty()) {
+      throw UsageError(
+          "--max-error and --max-points are about all samples: without --level, --focus, --smooth, "
+          "--overlay and --metric");
+    }
+    BoundedMeshOptions options;
+    if (max_error_ && !max_points_.empty()) {
+      throw UsageError("either --max-error or --max-points, not both");
+    }
+    if (max_error_ && !(*max_error_ >= 0.0 && std::isfinite(*max_error_))) {
+      throw UsageError("--max-error: a number of metres that is not negative");
+    }
+    options.max_error = max_error_.value_or(0.0);
+    if (!max_points_.empty()) {
+      options.max_points = parse_count(max_points_);
+      if (options.max_points < 4) throw UsageError("--max-points: at least 4");
+    }
+    options.quality = parse_quality(quality_);
+    options.duplicates = parse_duplicates(duplicates_);
+    options.fill = parse_fill(fill_);
+    options.path = output_;
+    const stream::Store store = stream::Store::open(store_);
+    if (!region_.empty()) options.region = crs_.regions(store)(Region::parse(region_));
+    if (crs_.places(store).has_effect()) {
+      throw UsageError(
+          "--to-crs: between other coordinates the triangles would be other surfaces, and the "
+          "bound would not hold; write the mesh in the store's CRS");
+    }
+    options.writer = {.format = format_, .replace = may_replace(output_, common.force)};
+    const BoundedMeshResult result = store.schema().grid
+                                         ? bounded_raster_mesh(store, options, common)
+                                         : bounded_point_mesh(store, options, common);
+    Summary summary;
+    summary.json = {{"vertices", result.vertices},
+                    {"triangles", result.triangles},
+                    {"max_error", result.max_error},
+                    {"rms_error", result.rms_error},
+                    {"samples", result.samples},
+                    {"duplicates", result.duplicates},
+                    {"seconds", watch.seconds()},
+                    {"reading_seconds", result.reading_seconds},
+                    {"meshing_seconds", result.meshing_seconds},
+                    {"peak_rss_bytes", peak_rss_bytes()}};
+    summary.text = output_ + ": " + with_commas(result.vertices) + " vertices, " +
+                   with_commas(result.triangles) + " triangles, within " +
+                   number_text(result.max_error) + " m of all " + with_commas(result.samples) +
+                   " samples (RMS " + number_text(result.rms_error) + " m), in " +
+                   readable_seconds(watch.seconds()) + "\n";
+    if (result.duplicates > 0) {
+      summary.text += with_commas(result.duplicates) +
+                      " samples at the place of another: --duplicates " + duplicates_ + "\n";
+    }
+    return summary;
+  }
+
+  Summary multiresolution(const CommonOptions& common) const {
+    const Stopwatch watch;
+    if (quality_ != "removal" || duplicates_ != "error" || fill_ != "none") {
+      throw UsageError("--quality, --duplicates and --fill belong to --max-error and --max-points");
+    }
     MeshOptions options{{.smoothing = parse_smoothing(smooth_)}, MetricChoice::parse(metric_)};
     const bool save = !save_overlay_.empty();
     if (save && smooth_.empty()) throw UsageError("--save-overlay needs --smooth");
@@ -65,7 +156,8 @@ class MeshCommand final : public Command {
       throw UsageError("--save-overlay and --output are the same file");
     }
     const stream::Store store = stream::Store::open(store_);
-    const Detail detail = Detail::parse(store, level_, region_, focuses_);
+    const Detail detail = Detail::parse(store, level_, region_, focuses_, crs_.regions(store));
+    const PlaceConversion places = crs_.places(store);
     const bool replace = may_replace(output_, common.force);
     std::optional<stream::Overlay> overlay;
     if (!overlay_.empty()) options.heights.overlay = &overlay.emplace(open_overlay(store));
@@ -75,8 +167,9 @@ class MeshCommand final : public Command {
           &writer.emplace(save_overlay_, store, store.schema().coordinates[2].name,
                           may_replace(save_overlay_, common.force));
     }
-    const TriangleMesh mesh =
+    TriangleMesh mesh =
         mesh_of_store(store, detail, common.memory_or(machine_memory_bytes() / 2), options);
+    places(mesh.positions);
     write_mesh(output_, format_, mesh, replace);
     if (writer) writer->finish();
 
@@ -95,7 +188,6 @@ class MeshCommand final : public Command {
     return summary;
   }
 
- private:
   [[nodiscard]] stream::Overlay open_overlay(const stream::Store& store) const {
     stream::Overlay overlay = stream::Overlay::open(overlay_, store);
     const std::string& heights = store.schema().coordinates[2].name;
@@ -111,7 +203,10 @@ class MeshCommand final : public Command {
 
   std::string store_, output_, format_, level_ = "0", region_, smooth_, overlay_, save_overlay_,
                                         metric_ = "euclidean";
+  std::string max_points_, quality_ = "removal", duplicates_ = "error", fill_ = "none";
+  std::optional<double> max_error_;
   std::vector<std::string> focuses_;
+  CrsOptions crs_;
 };
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <terrace/stream/point_writer.hpp>
 #include <terrace/stream/store.hpp>
 
+#include "crs_options.hpp"
 #include "detail.hpp"
 #include "interrupt.hpp"
 #include "output.hpp"
@@ -23,10 +24,12 @@ namespace {
 /// wanted where it lies: with a region, only what is inside it or inside a focus.
 class PointOutput {
  public:
-  PointOutput(const stream::Store& store, const Detail& detail, stream::PointWriter& writer)
+  PointOutput(const stream::Store& store, const Detail& detail, PlaceConversion places,
+              stream::PointWriter& writer)
       : schema_(store.schema()),
         placement_(placement_of(schema_)),
         detail_(detail),
+        places_(std::move(places)),
         writer_(writer) {
     for (const stream::Channel& channel : schema_.attributes) {
       stream::Column column;
@@ -53,6 +56,7 @@ class PointOutput {
   }
 
   void flush() {
+    places_(block_.positions);
     if (!block_.empty()) writer_.append(block_);
     block_.clear();
   }
@@ -71,6 +75,7 @@ class PointOutput {
   const stream::Schema& schema_;
   Placement placement_;
   const Detail& detail_;
+  PlaceConversion places_;
   stream::PointWriter& writer_;
   stream::PointBlock block_;
 };
@@ -89,17 +94,18 @@ class PointsCommand final : public Command {
     app.add_option("--focus", focuses_,
                    "BOX:L, points of level L and above inside the box; repeatable")
         ->allow_extra_args(false);
-    not_yet(app, {"--max-points", "--region-crs", "--to-crs", "--overlay"});
+    crs_.define(app);
+    not_yet(app, {"--max-points", "--overlay"});
   }
 
   Summary run(const CommonOptions& common) override {
     const Stopwatch watch;
     const stream::Store store = stream::Store::open(store_);
-    const Detail detail = Detail::parse(store, level_, region_, focuses_);
+    const Detail detail = Detail::parse(store, level_, region_, focuses_, crs_.regions(store));
     const auto writer = stream::open_point_writer(
         output_, {.attributes = store.schema().attributes, .comments = {kWriterMark}},
         {.format = format_, .replace = may_replace(output_, common.force)});
-    PointOutput output(store, detail, *writer);
+    PointOutput output(store, detail, crs_.places(store), *writer);
     for_each_wanted(store, detail,
                     [&output](stream::ClusterId, const stream::ClusterRecord&,
                               const stream::ClusterPoints& points) { output.add(points); });
@@ -120,6 +126,7 @@ class PointsCommand final : public Command {
  private:
   std::string store_, output_, format_, level_ = "0", region_;
   std::vector<std::string> focuses_;
+  CrsOptions crs_;
 };
 
 }  // namespace

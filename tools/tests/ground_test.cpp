@@ -108,6 +108,36 @@ TEST(Ground, UndoesTheGrowthOfWebMercator) {
   }
 }
 
+// Oracle: geodesics across a cell in the map's directions.
+TEST(Ground, KnowsTheLocalScaleOfProjections) {
+  const auto& wgs84 = GeographicLib::Geodesic::WGS84();
+  struct Case {
+    int code;
+    double x, y, unit;
+  };
+  for (const Case& test : {Case{32632, 500000, 5200000, 1}, Case{32632, 200000, 5200000, 1},
+                           Case{3035, 5500000, 1700000, 1}, Case{5070, -1900000, 2900000, 1},
+                           Case{3413, 500000, -900000, 1}, Case{2154, 200000, 6900000, 1},
+                           Case{2263, 1000000, 200000, 1200.0 / 3937.0}}) {
+    SCOPED_TRACE(test.code);
+    const CoordinateSystem system(definition_of_epsg(test.code));
+    Placement placement;
+    placement.world.xy = {10, 0, test.x, 0, -10, test.y};
+    placement.crs = system.crs();
+    const Ground ground(placement);
+    const GroundMap map = ground.map({.min = {-1, -1, 0}, .max = {1, 1, 1}});
+    for (const auto& [dx, dy] : {std::pair{1.0, 0.0}, {0.0, 1.0}, {1.0, 1.0}, {1.0, -1.0}}) {
+      Point2 ends[2] = {{test.x - 100 * dx, test.y - 100 * dy},
+                        {test.x + 100 * dx, test.y + 100 * dy}};
+      system.to_own_geographic(ends);
+      double metres = 0;
+      wgs84.Inverse(ends[0][1], ends[0][0], ends[1][1], ends[1][0], metres);
+      const stream::Point3 step = apply(map, {20 * dx, -20 * dy, 0});
+      EXPECT_NEAR(std::hypot(step[0], step[1]) / metres, 1, 3e-5);
+    }
+  }
+}
+
 TEST(World, BoxOfARotatedRasterHoldsAllCorners) {
   Placement placement;
   placement.world.xy = {0.8, -0.6, 100, 0.6, 0.8, 200};

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 
+#include "../curve_sort.hpp"
 #include "double_kernel.hpp"
 #include "elliptical_kernel.hpp"
 #include "flat.hpp"
@@ -25,15 +26,19 @@ constexpr std::uint32_t kInParts = 8192;
 template <class Kernel>
 std::vector<VertexId> number_vertices(Mesh<Kernel>& mesh,
                                       std::span<const typename Kernel::Point> points,
-                                      std::uint32_t begin) {
-  Pool<std::uint32_t> order = hilbert_order<Kernel>(points);
+                                      std::uint32_t begin, unsigned threads) {
+  Pool<std::uint32_t> order = hilbert_order<Kernel>(points, threads);
   const auto count = static_cast<std::uint32_t>(points.size());
   mesh.vertex.reserve(begin + count);
   mesh.vertex.resize(begin + count);
-  for (std::uint32_t i = 0; i < count; ++i)
-    mesh.vertex[begin + i] = {points[order[i]], kNoIncident};
   std::vector<VertexId> vertex_of(count);
-  for (std::uint32_t i = 0; i < count; ++i) vertex_of[order[i]] = VertexId{begin + i};
+  for_ranges(count, threads, [&](std::uint32_t from, std::uint32_t to) {
+    for (std::uint32_t i = from; i < to; ++i) {
+      mesh.vertex[begin + i] = {points[order[i]], kNoIncident};
+      vertex_of[order[i]] = VertexId{begin + i};
+    }
+  });
+  for (const auto& p : points) mesh.lattice.add(p);
   mesh.vertex_count = count;
   return vertex_of;
 }
@@ -99,9 +104,9 @@ void insert_all(Mesh<Kernel>& mesh, std::uint32_t begin, std::uint32_t end,
     }
     // With fewer the border of the parts is everywhere.
     if (count / step < kInParts) {
-      for (const std::uint32_t v : going) insert_slot(mesh, v);
+      for (const std::uint32_t v : going) insert_slot(mesh, v, mesh.last_vertex);
     } else {
-      insert_in_parts(mesh, begin, end, going, threads);
+      insert_in_parts(mesh, {begin, end, step}, going, threads);
     }
   }
 }
@@ -114,7 +119,7 @@ std::vector<VertexId> build(Mesh<Kernel>& mesh, std::span<const typename Kernel:
   mesh.forget_slots();
   if (points.empty()) return {};
   const std::uint32_t begin = mesh.vertex.size();
-  std::vector<VertexId> vertex_of = number_vertices(mesh, points, begin);
+  std::vector<VertexId> vertex_of = number_vertices(mesh, points, begin, threads);
   const std::uint32_t end = mesh.vertex.size();
   mesh.basis.clear();
   std::uint32_t apex = begin;

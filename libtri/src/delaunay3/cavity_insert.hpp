@@ -45,7 +45,7 @@ class CavityInsertion {
   bool collect(const typename Kernel::Point& p, std::uint32_t conflict) {
     const Tetrahedron* const tetrahedron = mesh_.tetrahedron.data();
     std::uint8_t* const mark = mesh_.mark.data();
-    const Conflicts<Kernel> conflicts(mesh_.vertex.data(), tetrahedron, p);
+    const Conflicts<Kernel> conflicts(mesh_, p);
     inside_count_ = 0;
     facet_count_ = 0;
     if constexpr (!Part::kWhole) {
@@ -77,7 +77,7 @@ class CavityInsertion {
         if (mark[other] == kUnknown) {
           const Tetrahedron& tested = tetrahedron[other];
           if (filtered[i] == Verdict::kIn ||
-              (filtered[i] != Verdict::kOut && conflicts.decide(tested, filtered[i]))) {
+              (filtered[i] == Verdict::kOpen && conflicts.decide(tested))) {
             mark[other] = kTaken;
             cavity_.inside[inside_count_++] = other;
             for (const Side mate : tested.mate) {

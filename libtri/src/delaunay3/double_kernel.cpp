@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "double_kernel.hpp"
 
+#include <bit>
+
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 
 #include "../delaunay2/double_kernel.hpp"
@@ -34,6 +36,18 @@ bool to_integers(const std::array<const DoubleKernel::Point*, N>& points,
 }
 
 }  // namespace
+
+void DoubleKernel::Lattice::add(double c) {
+  const auto bits = std::bit_cast<std::uint64_t>(c);
+  const std::uint64_t fraction = bits & ((std::uint64_t{1} << 52) - 1);
+  const int biased = static_cast<int>(bits >> 52 & 0x7FF);
+  if (biased == 0 && fraction == 0) return;
+  const int lowest = biased - 1075 + std::countr_zero(fraction | std::uint64_t{1} << 52);
+  if (lowest >= exponent_) return;
+  exponent_ = lowest;
+  // All powers of the differences are far from underflow and overflow then.
+  exact_fifth_ = exponent_ < kLeast ? 0 : std::ldexp(kExactFifth, 10 * exponent_);
+}
 
 int DoubleKernel::orientation_exact(const Point& a, const Point& b, const Point& c,
                                     const Point& d) {

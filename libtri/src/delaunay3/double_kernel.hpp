@@ -43,31 +43,56 @@ struct DoubleKernel {
   /// Whether a, b, c lie on one line.
   static bool collinear(const Point& a, const Point& b, const Point& c);
 
+  /// What all points of a mesh have in common: all coordinates are whole multiples of 2^k, k as
+  /// large as can be. On a grid differences are then small multiples, for which doubles are exact.
+  class Lattice {
+   public:
+    void add(const Point& p) {
+      if (exponent_ < kLeast) return;
+      for (const double c : p) add(c);
+    }
+    /// Sphere tests are exact where the fifth power of the largest square is below this.
+    [[nodiscard]] double exact_fifth() const { return exact_fifth_; }
+
+   private:
+    static constexpr int kLeast = -80;
+    static constexpr int kMost = 80;
+    void add(double c);
+    int exponent_ = kMost;
+    double exact_fifth_ = kExactFifth * 0x1p800;
+  };
+
   /// A point to be tested against many spheres.
   class Probe {
    public:
-    explicit Probe(const Point& p) : x_{p[0], p[0]}, y_{p[1], p[1]}, z_{p[2], p[2]} {}
+    Probe(const Point& p, const Lattice& lattice)
+        : x_{p[0], p[0]}, y_{p[1], p[1]}, z_{p[2], p[2]}, exact_fifth_(lattice.exact_fifth()) {}
 
-    /// Where the point lies with respect to the sphere through four vertices in order.
+    /// Where the point lies with respect to the sphere through four vertices in order, after the
+    /// perturbation.
     [[gnu::always_inline]] Verdict side(const Vertex& a, const Vertex& b, const Vertex& c,
                                         const Vertex& d) const {
       const auto pairs = [](const Vertex& v, const Vertex& w, std::size_t k) {
         return Pair{v.point[k], w.point[k]};
       };
-      const InSphere test =
-          in_sphere_value({pairs(a, b, 0) - x_, pairs(c, d, 0) - x_, pairs(a, b, 1) - y_,
-                           pairs(c, d, 1) - y_, pairs(a, b, 2) - z_, pairs(c, d, 2) - z_});
+      const Rows rows = {pairs(a, b, 0) - x_, pairs(c, d, 0) - x_, pairs(a, b, 1) - y_,
+                         pairs(c, d, 1) - y_, pairs(a, b, 2) - z_, pairs(c, d, 2) - z_};
+      const InSphere test = in_sphere_value(rows);
       // As in IntKernel, and one relative error for each of the five differences in a product: 16 *
       // 12 u < 2.2e-14. Sizes near underflow and overflow are left to the exact test.
       const double fifth = test.largest * test.largest * test.largest * test.largest * test.largest;
-      if (test.value * test.value > 4.9e-28 * fifth && fifth > 0x1p-900 && fifth < 0x1p900)
-          [[likely]]
-        return test.value > 0 ? Verdict::kIn : Verdict::kOut;
-      return Verdict::kOpen;
+      if (!(test.value * test.value > 4.9e-28 * fifth && fifth > 0x1p-900 && fifth < 0x1p900))
+          [[unlikely]] {
+        if (!(fifth < exact_fifth_)) return Verdict::kOpen;
+        if (test.value == 0)
+          return inside_small_perturbed_sphere(rows) ? Verdict::kIn : Verdict::kOut;
+      }
+      return test.value > 0 ? Verdict::kIn : Verdict::kOut;
     }
 
    private:
     Pair x_, y_, z_;
+    double exact_fifth_;
   };
 
   /// > 0 where p lies inside the sphere through a, b, c, d, which are in order; 0 where on it.

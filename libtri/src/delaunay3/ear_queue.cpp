@@ -129,7 +129,8 @@ class EarQueue {
     const auto at = [&](std::uint32_t k) -> const auto& { return mesh_.vertex[hole_.vertex[k]]; };
     for (std::uint32_t k = 1; k < hole_.vertex.size(); ++k) {
       if (k == a || k == b || k == c || k == ear.apex) continue;
-      if (inside_sphere<Kernel>(at(ear.apex), at(a), at(b), at(c), hole_.point[k])) return false;
+      if (inside_sphere<Kernel>(at(ear.apex), at(a), at(b), at(c), hole_.point[k], mesh_.lattice))
+        return false;
     }
     return true;
   }

@@ -144,8 +144,7 @@ class Inspection {
     const std::uint32_t opposite = beyond.corner[k];
     expect(opposite != at.corner[i], "tetrahedra ", t, " and ", other, " are the same");
     if (!fault_.empty() || opposite == kGhost) return;
-    const Conflicts<Kernel> conflicts(mesh_.vertex.data(), mesh_.tetrahedron.data(),
-                                      mesh_.vertex[opposite].point);
+    const Conflicts<Kernel> conflicts(mesh_, mesh_.vertex[opposite].point);
     expect(!conflicts(at), "vertex ", opposite, " is inside the sphere of tetrahedron ", t);
   }
 

@@ -74,7 +74,8 @@ std::uint32_t hilbert_key(const std::array<std::uint32_t, 3>& cell) {
   return key;
 }
 
-/// Maps points of a set to cells of its bounding cube.
+/// Maps points of a set to cells of its bounding cube. The cube is filled, so that the middle of
+/// the curve is a plane between two halves of points spread evenly.
 template <class Kernel>
 class Cells {
  public:
@@ -91,11 +92,9 @@ class Cells {
       }
     }
     if constexpr (std::is_integral_v<Coord>) {
-      const Coord extent = std::max({high[0] - low_[0], high[1] - low_[1], high[2] - low_[2]});
-      // The extent uses the key's first bit, so that no set is left in one cell.
-      while (extent >> down_ >= Coord{1} << kBits) ++down_;
-      while (extent > 0 && extent << up_ < Coord{1} << (kBits - 1)) ++up_;
-      single_ = extent == 0;
+      extent_ = std::max({high[0] - low_[0], high[1] - low_[1], high[2] - low_[2]});
+      scale_ = (std::uint64_t{1} << (32 + kBits)) / (static_cast<std::uint64_t>(extent_) + 1);
+      single_ = extent_ == 0;
     } else {
       // Halves: the extent of finite doubles may overflow.
       extent_ = std::max(
@@ -114,7 +113,7 @@ class Cells {
  private:
   [[nodiscard]] std::uint32_t cell(Coord c, Coord low) const {
     if constexpr (std::is_integral_v<Coord>) {
-      return static_cast<std::uint32_t>(c - low) >> down_ << up_;
+      return static_cast<std::uint32_t>(static_cast<std::uint64_t>(c - low) * scale_ >> 32);
     } else {
       constexpr double kCells = 1 << kBits;
       const double part = (c / 2 - low / 2) / extent_ * kCells;
@@ -125,28 +124,30 @@ class Cells {
   std::span<const Point> points_;
   Point low_;
   Coord extent_ = 0;
-  unsigned down_ = 0;
-  unsigned up_ = 0;
+  std::uint64_t scale_ = 0;  ///< cells of 2^-32 per unit, for integers
   bool single_ = false;
 };
 
 }  // namespace
 
 template <class Kernel>
-Pool<std::uint32_t> hilbert_order(std::span<const typename Kernel::Point> points) {
+Pool<std::uint32_t> hilbert_order(std::span<const typename Kernel::Point> points,
+                                  unsigned threads) {
   Pool<std::uint32_t> order;
   order.resize(static_cast<std::uint32_t>(points.size()));
   const std::span<std::uint32_t> all = span_of(order);
   std::iota(all.begin(), all.end(), 0u);
   if (all.empty()) return order;
   sort_along_curve<3 * kBits>(
-      all, [&](std::span<const std::uint32_t> range) { return Cells<Kernel>(points, range); });
+      all, [&](std::span<const std::uint32_t> range) { return Cells<Kernel>(points, range); },
+      threads);
   return order;
 }
 
-template Pool<std::uint32_t> hilbert_order<IntKernel>(std::span<const IntKernel::Point>);
-template Pool<std::uint32_t> hilbert_order<DoubleKernel>(std::span<const DoubleKernel::Point>);
+template Pool<std::uint32_t> hilbert_order<IntKernel>(std::span<const IntKernel::Point>, unsigned);
+template Pool<std::uint32_t> hilbert_order<DoubleKernel>(std::span<const DoubleKernel::Point>,
+                                                         unsigned);
 template Pool<std::uint32_t> hilbert_order<EllipticalKernel>(
-    std::span<const EllipticalKernel::Point>);
+    std::span<const EllipticalKernel::Point>, unsigned);
 
 }  // namespace terrace::tri::spatial

@@ -12,6 +12,7 @@ namespace terrace::tri::spatial {
 /// the result are close in space. Points too close to tell apart by 10 bits per axis are sorted in
 /// their own cube. Points are valid. O(n); 16 bytes per point while it runs besides the result.
 template <class Kernel>
-Pool<std::uint32_t> hilbert_order(std::span<const typename Kernel::Point> points);
+Pool<std::uint32_t> hilbert_order(std::span<const typename Kernel::Point> points,
+                                  unsigned threads = 1);
 
 }  // namespace terrace::tri::spatial

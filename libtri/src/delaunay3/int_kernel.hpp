@@ -51,12 +51,18 @@ struct IntKernel {
     return u.y * v.z == u.z * v.y && u.z * v.x == u.x * v.z && u.x * v.y == u.y * v.x;
   }
 
+  /// What all points of a mesh have in common: nothing to know of whole numbers.
+  struct Lattice {
+    static void add(const Point&) {}
+  };
+
   /// A point to be tested against many spheres.
   class Probe {
    public:
-    explicit Probe(const Point& p) : at_{p[0], p[1], p[2], 0} {}
+    Probe(const Point& p, Lattice) : at_{p[0], p[1], p[2], 0} {}
 
-    /// Where the point lies with respect to the sphere through four vertices in order.
+    /// Where the point lies with respect to the sphere through four vertices in order, after the
+    /// perturbation.
     [[gnu::always_inline]] Verdict side(const Vertex& a, const Vertex& b, const Vertex& c,
                                         const Vertex& d) const {
       const Lanes ra = load(a) - at_, rb = load(b) - at_, rc = load(c) - at_, rd = load(d) - at_;
@@ -64,19 +70,19 @@ struct IntKernel {
       const Lanes xy23 = __builtin_shufflevector(rc, rd, 0, 4, 1, 5);
       const Lanes z01 = __builtin_shufflevector(ra, rb, 2, 6, 3, 7);
       const Lanes z23 = __builtin_shufflevector(rc, rd, 2, 6, 3, 7);
-      const InSphere test =
-          in_sphere_value({low(xy01), low(xy23), high(xy01), high(xy23), low(z01), low(z23)});
+      const Rows rows = {low(xy01), low(xy23), high(xy01), high(xy23), low(z01), low(z23)};
+      const InSphere test = in_sphere_value(rows);
       // Let L be the largest squared length of a row. A 2 x 2 minor is at most L in absolute value,
       // summed over its products, a 3 x 3 minor 3 L^1.5, the value 12 L^2.5. Of relative errors of
       // u = 2^-53 there are 2 in a minor, 3 more in the next one, 3 in a square, 1 in the product,
       // 2 in the sums: 11 * 12 u < 1.5e-14.
       const double fifth = test.largest * test.largest * test.largest * test.largest * test.largest;
-      if (test.value * test.value > 2.25e-28 * fifth)
-        return test.value > 0 ? Verdict::kIn : Verdict::kOut;
-      // All intermediate results are integers below 2^53: 12 L^2.5 < 2^53.
-      if (fifth < 5.6e29)
-        return test.value > 0 ? Verdict::kIn : test.value < 0 ? Verdict::kOut : Verdict::kOn;
-      return Verdict::kOpen;
+      if (!(test.value * test.value > 2.25e-28 * fifth)) [[unlikely]] {
+        if (!(fifth < kExactFifth)) return Verdict::kOpen;
+        if (test.value == 0)
+          return inside_small_perturbed_sphere(rows) ? Verdict::kIn : Verdict::kOut;
+      }
+      return test.value > 0 ? Verdict::kIn : Verdict::kOut;
     }
 
    private:

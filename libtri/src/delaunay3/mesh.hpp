@@ -43,6 +43,8 @@ struct Mesh {
   using Vertex = typename Kernel::Vertex;  ///< point and incident
 
   Pool<Vertex> vertex;  ///< slot 0 is the ghost
+  /// Of all points there have been since the slots were forgotten.
+  typename Kernel::Lattice lattice;
   // By tetrahedron slot. Empty while all points are coplanar ("flat").
   Pool<Tetrahedron> tetrahedron;
   Pool<std::uint8_t> mark;  ///< kUnknown between two operations
@@ -71,6 +73,7 @@ struct Mesh {
   void forget_slots() {
     assert(vertex_count == 0 && flat);
     vertex.resize(1);
+    lattice = {};
     tetrahedron.resize(0);
     mark.resize(0);
     free_vertex = kFreeVertexBit - 1;
@@ -99,6 +102,7 @@ struct Mesh {
   std::uint32_t new_vertex(const Point& p) {
     std::uint32_t v = free_vertex;
     const bool again = v != kFreeVertexBit - 1;
+    lattice.add(p);
     if (!again) v = vertex.size();
     if (journal.on()) journal.touch_vertex(v, false, p);
     if (again) {

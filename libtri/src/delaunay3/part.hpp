@@ -14,7 +14,7 @@ namespace terrace::tri::spatial {
 class Part {
  public:
   static constexpr bool kWhole = false;
-  static constexpr std::uint32_t kBlock = 64;
+  static constexpr std::uint32_t kBlock = 128;  ///< marks of two cache lines
 
   /// Vertices first, first + 1, ..., `size` of `all` in a circle that begins at `begin`.
   struct Range {
@@ -38,6 +38,7 @@ class Part {
         room_(blocks * kBlock),
         free_(free_list) {}
 
+  [[nodiscard]] const Range& range() const { return range_; }
   [[nodiscard]] bool owns(std::uint32_t corner) const {
     return range_.has(corner) || corner == kGhost;
   }

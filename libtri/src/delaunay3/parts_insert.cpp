@@ -37,12 +37,29 @@ std::thread in_thread(const Work& work) {
   }
 }
 
-/// What one thread does.
+/// The vertex on the curve nearest before v, else after it, that has tetrahedra and is in the
+/// range, or kNone. Few steps, as one in four comes from coarser passes.
 template <class Kernel>
-class Worker {
+std::uint32_t near_vertex(const Mesh<Kernel>& mesh, const Curve& curve, const Part::Range& range,
+                          std::uint32_t v) {
+  const auto is_there = [&](std::uint32_t u) { return mesh.vertex[u].incident < kLocalBit; };
+  for (std::uint32_t u = v; u - curve.begin >= curve.step && range.has(u - curve.step);) {
+    u -= curve.step;
+    if (is_there(u)) return u;
+  }
+  for (std::uint32_t u = v; curve.end - u > curve.step && range.has(u + curve.step);) {
+    u += curve.step;
+    if (is_there(u)) return u;
+  }
+  return kNone;
+}
+
+/// What one thread does. Threads write to their own cache lines.
+template <class Kernel>
+class alignas(128) Worker {
  public:
-  Worker(Mesh<Kernel>& mesh, const Part& its_part, std::uint32_t hint)
-      : part(its_part), mesh_(mesh), insertion_(mesh, cavity_, part), hint_(hint) {}
+  Worker(Mesh<Kernel>& mesh, const Curve& curve, const Part& its_part)
+      : part(its_part), mesh_(mesh), curve_(curve), insertion_(mesh, cavity_, part) {}
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
 
@@ -66,8 +83,9 @@ class Worker {
  private:
   bool insert(std::uint32_t v) {
     const auto& p = mesh_.vertex[v].point;
-    if (hint_ == kNone) return false;
-    const WalkEnd end = walk(mesh_, p, mesh_.vertex[hint_].incident, part);
+    const std::uint32_t hint = near_vertex(mesh_, curve_, part.range(), v);
+    if (hint == kNone) return false;
+    const WalkEnd end = walk(mesh_, p, mesh_.vertex[hint].incident, part);
     if (end.tetrahedron == kNone) return false;
     if (!end.outside) {
       const std::uint32_t equal = equal_corner(mesh_, end.tetrahedron, p);
@@ -80,27 +98,25 @@ class Worker {
       out_of_room_ = insertion_.out_of_room();
       return false;
     }
-    hint_ = v;
     return true;
   }
 
   Mesh<Kernel>& mesh_;
+  const Curve& curve_;
   Cavity cavity_;
   CavityInsertion<Kernel, Part> insertion_;
-  std::uint32_t hint_;
   bool out_of_room_ = false;
 };
 
 template <class Kernel>
 class Round {
  public:
-  /// Parts of the circle of vertices begin, ..., end - 1, the first from number `cut` on.
-  Round(Mesh<Kernel>& mesh, std::uint32_t begin, std::uint32_t end, std::uint32_t cut)
-      : mesh_(mesh) {
-    const std::uint32_t all = end - begin;
+  /// Parts of the circle of the curve's vertices, the first from number `cut` on.
+  Round(Mesh<Kernel>& mesh, const Curve& curve, std::uint32_t cut) : mesh_(mesh), curve_(curve) {
+    const std::uint32_t all = curve.end - curve.begin;
     const std::uint32_t half = all / 2;
-    ranges_ = {Part::Range{begin, all, begin + cut, half},
-               Part::Range{begin, all, begin + (cut + half) % all, all - half}};
+    ranges_ = {Part::Range{curve.begin, all, curve.begin + cut, half},
+               Part::Range{curve.begin, all, curve.begin + (cut + half) % all, all - half}};
   }
 
   /// Turns `going` (sorted) round to begin with the first part. Returns what could not be inserted,
@@ -114,12 +130,13 @@ class Round {
                                                           std::span(split, going.end())};
     std::vector<std::uint32_t> put_off;
     while (!lists[0].empty() || !lists[1].empty()) {
+      fill_block();
       const std::uint32_t base = mesh_.tetrahedron.size();
       make_room(lists[0].size() + lists[1].size());
       const std::uint32_t blocks = (mesh_.tetrahedron.size() - base) / (kParts * Part::kBlock);
-      Worker<Kernel> first(mesh_, Part(ranges_[0], base, kParts, 0, blocks, mesh_.free_tetrahedron),
-                           hint(0));
-      Worker<Kernel> second(mesh_, Part(ranges_[1], base, kParts, 1, blocks, kNone), hint(1));
+      Worker<Kernel> first(mesh_, curve_,
+                           Part(ranges_[0], base, kParts, 0, blocks, mesh_.free_tetrahedron));
+      Worker<Kernel> second(mesh_, curve_, Part(ranges_[1], base, kParts, 1, blocks, kNone));
       if (threads > 1) {
         std::thread other = in_thread<Kernel>([&] { second.run(lists[1]); });
         first.run(lists[0]);
@@ -145,6 +162,18 @@ class Round {
   }
 
  private:
+  /// Frees slots up to a whole number of blocks, so that blocks are those of cache lines.
+  void fill_block() {
+    while (mesh_.tetrahedron.size() % Part::kBlock != 0) {
+      const std::uint32_t t = mesh_.tetrahedron.size();
+      if (t >= kMaxTetrahedra) return;
+      mesh_.tetrahedron.resize(t + 1);
+      mesh_.mark.resize(t + 1);
+      mesh_.mark[t] = kUnknown;
+      mesh_.free_tetrahedron_slot(t);
+    }
+  }
+
   /// Slots for tetrahedra of so many new vertices, whole blocks. What is reserved anyway is taken
   /// where it is nearly enough.
   void make_room(std::size_t vertices) {
@@ -160,18 +189,6 @@ class Round {
     mesh_.tetrahedron.resize(static_cast<std::uint32_t>(after));
     mesh_.mark.resize(static_cast<std::uint32_t>(after));
     std::fill(mesh_.mark.data() + size, mesh_.mark.data() + after, kUnknown);
-  }
-
-  /// Some vertex of the part that has tetrahedra, or kNone. Vertices of coarser passes are spread
-  /// over every part.
-  std::uint32_t hint(std::size_t number) const {
-    const Part::Range& range = ranges_[number];
-    for (std::uint32_t i = 0; i < range.size; ++i) {
-      std::uint32_t v = range.first + i;
-      if (v >= range.begin + range.all) v -= range.all;
-      if (mesh_.vertex[v].incident < kLocalBit) return v;
-    }
-    return kNone;
   }
 
   /// Gives the slots that the parts have not used back.
@@ -194,15 +211,16 @@ class Round {
   }
 
   Mesh<Kernel>& mesh_;
+  const Curve& curve_;
   std::array<Part::Range, kParts> ranges_;
 };
 
 }  // namespace
 
 template <class Kernel>
-void insert_slot(Mesh<Kernel>& mesh, std::uint32_t vertex) {
+void insert_slot(Mesh<Kernel>& mesh, std::uint32_t vertex, std::uint32_t hint) {
   const auto& p = mesh.vertex[vertex].point;
-  const WalkEnd end = walk(mesh, p, mesh.vertex[mesh.last_vertex].incident);
+  const WalkEnd end = walk(mesh, p, mesh.vertex[hint].incident);
   if (!end.outside) {
     const std::uint32_t equal = equal_corner(mesh, end.tetrahedron, p);
     if (equal != kNone) {
@@ -215,23 +233,27 @@ void insert_slot(Mesh<Kernel>& mesh, std::uint32_t vertex) {
 }
 
 template <class Kernel>
-void insert_in_parts(Mesh<Kernel>& mesh, std::uint32_t begin, std::uint32_t end,
-                     std::span<std::uint32_t> going, unsigned threads) {
+void insert_in_parts(Mesh<Kernel>& mesh, const Curve& curve, std::span<std::uint32_t> going,
+                     unsigned threads) {
   // A Hilbert curve goes through the halves of space one after the other, and so do its two middle
   // quarters and its two outer ones, with the cut across.
-  std::vector<std::uint32_t> left = Round<Kernel>(mesh, begin, end, 0).run(going, threads);
-  left = Round<Kernel>(mesh, begin, end, (end - begin) / 4).run(left, threads);
-  for (const std::uint32_t v : left) insert_slot(mesh, v);
+  const std::uint32_t all = curve.end - curve.begin;
+  std::vector<std::uint32_t> left = Round<Kernel>(mesh, curve, 0).run(going, threads);
+  left = Round<Kernel>(mesh, curve, all / 4).run(left, threads);
+  const Part::Range everywhere = {curve.begin, all, curve.begin, all};
+  for (const std::uint32_t v : left) {
+    const std::uint32_t hint = near_vertex(mesh, curve, everywhere, v);
+    insert_slot(mesh, v, hint == kNone ? mesh.last_vertex : hint);
+  }
 }
 
-template void insert_slot(Mesh<IntKernel>&, std::uint32_t);
-template void insert_slot(Mesh<DoubleKernel>&, std::uint32_t);
-template void insert_slot(Mesh<EllipticalKernel>&, std::uint32_t);
-template void insert_in_parts(Mesh<IntKernel>&, std::uint32_t, std::uint32_t,
-                              std::span<std::uint32_t>, unsigned);
-template void insert_in_parts(Mesh<DoubleKernel>&, std::uint32_t, std::uint32_t,
-                              std::span<std::uint32_t>, unsigned);
-template void insert_in_parts(Mesh<EllipticalKernel>&, std::uint32_t, std::uint32_t,
-                              std::span<std::uint32_t>, unsigned);
+template void insert_slot(Mesh<IntKernel>&, std::uint32_t, std::uint32_t);
+template void insert_slot(Mesh<DoubleKernel>&, std::uint32_t, std::uint32_t);
+template void insert_slot(Mesh<EllipticalKernel>&, std::uint32_t, std::uint32_t);
+template void insert_in_parts(Mesh<IntKernel>&, const Curve&, std::span<std::uint32_t>, unsigned);
+template void insert_in_parts(Mesh<DoubleKernel>&, const Curve&, std::span<std::uint32_t>,
+                              unsigned);
+template void insert_in_parts(Mesh<EllipticalKernel>&, const Curve&, std::span<std::uint32_t>,
+                              unsigned);
 
 }  // namespace terrace::tri::spatial

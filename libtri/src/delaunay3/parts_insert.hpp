@@ -11,15 +11,20 @@ namespace terrace::tri::spatial {
 /// the vertex that stands for it.
 inline constexpr std::uint32_t kAlias = kFreeVertexBit;
 
-/// Inserts vertex slots `going` (sorted, then in any order) of begin, ..., end - 1, which follow
-/// each other along a curve, by at most two threads at once. The result, slots included, does not
-/// depend on their number.
-template <class Kernel>
-void insert_in_parts(Mesh<Kernel>& mesh, std::uint32_t begin, std::uint32_t end,
-                     std::span<std::uint32_t> going, unsigned threads);
+/// Vertices begin, ..., end - 1 follow each other along a curve; begin + step, begin + 2 step, ...
+/// of them are there or are going to be inserted.
+struct Curve {
+  std::uint32_t begin, end, step;
+};
 
-/// Inserts one, near mesh.last_vertex.
+/// Inserts vertex slots `going` (sorted, then in any order) of a curve, by at most two threads at
+/// once. The result, slots included, does not depend on their number.
 template <class Kernel>
-void insert_slot(Mesh<Kernel>& mesh, std::uint32_t vertex);
+void insert_in_parts(Mesh<Kernel>& mesh, const Curve& curve, std::span<std::uint32_t> going,
+                     unsigned threads);
+
+/// Inserts one, walking from a vertex `hint`.
+template <class Kernel>
+void insert_slot(Mesh<Kernel>& mesh, std::uint32_t vertex, std::uint32_t hint);
 
 }  // namespace terrace::tri::spatial

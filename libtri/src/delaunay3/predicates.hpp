@@ -64,17 +64,9 @@ bool inside_sphere_exactly(const typename Kernel::Point& a, const typename Kerne
 template <class Kernel>
 bool inside_sphere(const typename Kernel::Vertex& a, const typename Kernel::Vertex& b,
                    const typename Kernel::Vertex& c, const typename Kernel::Vertex& d,
-                   const typename Kernel::Point& p) {
-  switch (typename Kernel::Probe(p).side(a, b, c, d)) {
-    case Verdict::kIn:
-      return true;
-    case Verdict::kOut:
-      return false;
-    case Verdict::kOn:
-      return inside_perturbed_sphere<Kernel>(a.point, b.point, c.point, d.point, p);
-    case Verdict::kOpen:
-      break;
-  }
+                   const typename Kernel::Point& p, const typename Kernel::Lattice& lattice) {
+  const Verdict filtered = typename Kernel::Probe(p, lattice).side(a, b, c, d);
+  if (filtered != Verdict::kOpen) return filtered == Verdict::kIn;
   return inside_sphere_exactly<Kernel>(a.point, b.point, c.point, d.point, p);
 }
 
@@ -85,8 +77,11 @@ class Conflicts {
   using Point = typename Kernel::Point;
   using Vertex = typename Kernel::Vertex;
 
-  Conflicts(const Vertex* vertex, const Tetrahedron* tetrahedron, const Point& p)
-      : vertex_(vertex), tetrahedron_(tetrahedron), point_(p), probe_(p) {}
+  Conflicts(const Mesh<Kernel>& mesh, const Point& p)
+      : vertex_(mesh.vertex.data()),
+        tetrahedron_(mesh.tetrahedron.data()),
+        point_(p),
+        probe_(p, mesh.lattice) {}
 
   /// The filter's answer; for ghosts kOpen.
   [[gnu::always_inline]] Verdict filter(const Tetrahedron& t) const {
@@ -96,29 +91,28 @@ class Conflicts {
     return probe_.side(vertex_[a], vertex_[b], vertex_[c], vertex_[d]);
   }
   /// Whether the point, no corner of it, is in conflict with a tetrahedron of which filter() says
-  /// kOn or kOpen.
-  [[nodiscard, gnu::noinline]] bool decide(const Tetrahedron& t, Verdict filtered) const {
+  /// kOpen.
+  [[nodiscard, gnu::noinline]] bool decide(const Tetrahedron& t) const {
     const std::uint32_t ghost = ghost_index(t.corner);
-    if (ghost == 4) return decide_finite(t, filtered);
+    if (ghost == 4) return decide_finite(t);
     // Beyond the hull facet; in its plane the sphere of the finite tetrahedron there cuts the
     // circle of the facet out, perturbed in the same way.
     const int side = orientation_with<Kernel>(vertex_, t, ghost, point_);
     if (side != 0) return side > 0;
-    return decide_finite(tetrahedron_[tetrahedron_of(t.mate[ghost])], Verdict::kOpen);
+    return decide_finite(tetrahedron_[tetrahedron_of(t.mate[ghost])]);
   }
   [[nodiscard]] bool operator()(const Tetrahedron& t) const {
     const Verdict filtered = filter(t);
-    return filtered == Verdict::kIn || (filtered != Verdict::kOut && decide(t, filtered));
+    return filtered == Verdict::kIn || (filtered == Verdict::kOpen && decide(t));
   }
 
  private:
-  [[nodiscard]] bool decide_finite(const Tetrahedron& t, Verdict filtered) const {
+  [[nodiscard]] bool decide_finite(const Tetrahedron& t) const {
     const auto& a = vertex_[t.corner[0]].point;
     const auto& b = vertex_[t.corner[1]].point;
     const auto& c = vertex_[t.corner[2]].point;
     const auto& d = vertex_[t.corner[3]].point;
-    return filtered == Verdict::kOn ? inside_perturbed_sphere<Kernel>(a, b, c, d, point_)
-                                    : inside_sphere_exactly<Kernel>(a, b, c, d, point_);
+    return inside_sphere_exactly<Kernel>(a, b, c, d, point_);
   }
 
   const Vertex* vertex_;

@@ -116,7 +116,7 @@ class Wrapping {
   bool beats(std::uint32_t d, std::uint32_t best, std::uint32_t a, std::uint32_t b,
              std::uint32_t c) const {
     const auto at = [&](std::uint32_t k) -> const auto& { return mesh_.vertex[hole_.vertex[k]]; };
-    return inside_sphere<Kernel>(at(best), at(a), at(b), at(c), hole_.point[d]);
+    return inside_sphere<Kernel>(at(best), at(a), at(b), at(c), hole_.point[d], mesh_.lattice);
   }
 
   /// The facet for scan(); false where bounds of errors could not be trusted.

@@ -35,7 +35,7 @@ bool Flips3::is_delaunay(std::uint32_t t, std::uint32_t i) const {
   if (region[e] != number_) return true;
   const Corners& c = tetrahedron[t].corner;
   return !inside_sphere<EllipticalKernel>(vertex[c[0]], vertex[c[1]], vertex[c[2]], vertex[c[3]],
-                                          vertex[e].point);
+                                          vertex[e].point, {});
 }
 
 std::size_t Flips3::settle(std::uint32_t number, const std::vector<std::uint32_t>& own) {

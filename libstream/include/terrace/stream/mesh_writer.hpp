@@ -60,4 +60,22 @@ class MeshWriter {
 std::unique_ptr<MeshWriter> open_mesh_writer(const std::string& path, const MeshHeader& header,
                                              const WriterOptions& options = {});
 
+/// What a mesh file does to positions.
+class MeshRounding {
+ public:
+  /// For the file that open_mesh_writer() writes with the same path and options, and `bounds` in
+  /// its header. Throws: Error as that does for a format that is not known.
+  MeshRounding(const std::string& path, const Box3& bounds, const WriterOptions& options = {});
+
+  /// The position that a reader of the file gets back for `p`.
+  [[nodiscard]] Point3 operator()(const Point3& p) const;
+  /// By how much a coordinate of a point in `bounds` may change, per axis: 0 where the format is
+  /// exact.
+  [[nodiscard]] const Point3& largest() const { return largest_; }
+
+ private:
+  std::optional<Point3> origin_;  ///< float32 about it; else exact
+  Point3 largest_{};
+};
+
 }  // namespace terrace::stream

@@ -36,6 +36,15 @@ struct Channel {
   friend bool operator==(const Channel&, const Channel&) = default;
 };
 
+/// A GeoKey of a GeoTIFF that tells of its CRS, as it stands in the file.
+struct GeoKey {
+  std::uint16_t key = 0;
+  std::vector<double> values{};  ///< numbers of any type
+  std::string text{};
+
+  friend bool operator==(const GeoKey&, const GeoKey&) = default;
+};
+
 /// A coordinate reference system as the file names it. Nothing here interprets it.
 struct Crs {
   int epsg = 0;                 ///< EPSG code of the horizontal CRS; 0 if none is given
@@ -45,6 +54,8 @@ struct Crs {
   bool geographic = false;      ///< x, y are longitude and latitude
   std::string horizontal_unit;  ///< "metre", "foot", "US survey foot", "degree"; empty if unknown
   std::string vertical_unit;    ///< likewise for heights
+  /// Of a GeoTIFF, in ascending order: datum, projection and their parameters. Not kept in a store.
+  std::vector<GeoKey> geo_keys{};
 
   friend bool operator==(const Crs&, const Crs&) = default;
 };

@@ -97,6 +97,9 @@ class Delaunay3 {
   /// is invalid.
   void insert(std::span<const Point> points, std::span<Insertion> results,
               VertexId hint = kNoVertex);
+  /// Usually changes the tetrahedra at the vertex only. But where the hole that it leaves (or that
+  /// a very large set leaves) has so many vertices that filling it would cost more than making all
+  /// tetrahedra anew, that is done: vertices keep their handles, no tetrahedron does.
   void remove(VertexId vertex);
   /// Removes a set (all different): what its tetrahedra leave is filled as a whole, with whatever
   /// other vertices stand inside it. Two to five times as fast as one by one where it is compact.

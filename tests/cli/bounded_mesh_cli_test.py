@@ -1,0 +1,334 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Error-bounded meshes as their users meet them, checked against every sample by other code.
+
+TERRACE=path/to/terrace bounded_mesh_cli_test.py
+"""
+
+import array
+import collections
+import json
+import math
+import os
+import random
+import struct
+import subprocess
+import tempfile
+import unittest
+
+TERRACE = os.environ.get('TERRACE', 'terrace')
+CELL, WEST, NORTH = 30.0, 500000.0, 5100000.0
+NODATA = -9999.0
+
+
+def terrace(*args):
+    return subprocess.run([TERRACE, *map(str, args)], capture_output=True, text=True, timeout=200)
+
+
+def write_tiff(path, columns, rows, heights, nodata=True):
+    """A GeoTIFF of float32 in one strip, UTM zone 32."""
+    values = array.array('f', heights)
+    extra = b''
+    offset = 8 + len(values) * 4
+
+    def put(data):
+        nonlocal extra
+        at = offset + len(extra)
+        extra += data + b'\0' * (len(data) % 2)
+        return at
+
+    scale = put(struct.pack('<3d', CELL, CELL, 0))
+    tie = put(struct.pack('<6d', 0, 0, 0, WEST, NORTH, 0))
+    keys = (1, 1, 0, 3, 1024, 0, 1, 1, 1025, 0, 1, 1, 3072, 0, 1, 32632)
+    key_at = put(struct.pack(f'<{len(keys)}H', *keys))
+    mark = b'-9999\0'
+    mark_at = put(mark)
+    tags = [(256, 4, 1, columns), (257, 4, 1, rows), (258, 3, 1, 32), (259, 3, 1, 1),
+            (262, 3, 1, 1), (273, 4, 1, 8), (277, 3, 1, 1), (278, 4, 1, rows),
+            (279, 4, 1, len(values) * 4), (339, 3, 1, 3), (33550, 12, 3, scale),
+            (33922, 12, 6, tie), (34735, 3, len(keys), key_at)]
+    if nodata:
+        tags.append((42113, 2, len(mark), mark_at))
+    directory = struct.pack('<H', len(tags))
+    directory += b''.join(struct.pack('<HHII', *tag) for tag in tags) + struct.pack('<I', 0)
+    with open(path, 'wb') as file:
+        file.write(struct.pack('<2sHI', b'II', 42, offset + len(extra)))
+        file.write(values.tobytes() + extra + directory)
+
+
+def read_obj(path):
+    vertices, faces = [], []
+    with open(path) as file:
+        for line in file:
+            words = line.split()
+            if words[:1] == ['v']:
+                vertices.append(tuple(map(float, words[1:4])))
+            elif words[:1] == ['f']:
+                faces.append([int(word.split('/')[0]) - 1 for word in words[1:4]])
+    return vertices, faces
+
+
+class Raster:
+    """Samples, and a check of a mesh against them in whole numbers."""
+
+    def __init__(self, columns, rows, heights):
+        self.columns, self.rows = columns, rows
+        self.heights = array.array('f', heights)
+
+    def valid(self, column, row):
+        return self.heights[row * self.columns + column] != NODATA
+
+    def inner(self, column, row):
+        """Whether a sample and its neighbours have data."""
+        return all(self.valid(c, r)
+                   for r in range(max(row - 1, 0), min(row + 2, self.rows))
+                   for c in range(max(column - 1, 0), min(column + 2, self.columns)))
+
+    def measure(self, vertices, faces):
+        """Largest error and the number of inner samples that no triangle covers. Fails on samples
+        without data in a triangle and on triangles that overlap or turn."""
+        places = []
+        for x, y, z in vertices:
+            column, row = (x - WEST) / CELL - 0.5, (NORTH - y) / CELL - 0.5
+            assert abs(column - round(column)) < 1e-6 and abs(row - round(row)) < 1e-6
+            places.append((round(column), round(row), z))
+        largest, twice_area, covered = 0.0, 0, bytearray(self.columns * self.rows)
+        box = [math.inf, math.inf, -math.inf, -math.inf]
+        for face in faces:
+            (ax, ay, az), (bx, by, bz), (cx, cy, cz) = (places[v] for v in face)
+            # Rows grow southward, so counter-clockwise on the ground is clockwise here.
+            area = (cx - ax) * (by - ay) - (bx - ax) * (cy - ay)
+            assert area > 0, 'a triangle without area or turned'
+            twice_area += area
+            for row in range(min(ay, by, cy), max(ay, by, cy) + 1):
+                for column in range(min(ax, bx, cx), max(ax, bx, cx) + 1):
+                    u = (cx - bx) * (row - by) - (column - bx) * (cy - by)
+                    v = (ax - cx) * (row - cy) - (column - cx) * (ay - cy)
+                    w = (bx - ax) * (row - ay) - (column - ax) * (by - ay)
+                    if u > 0 or v > 0 or w > 0:
+                        continue
+                    assert self.valid(column, row), f'covers nodata at {column},{row}'
+                    place = row * self.columns + column
+                    covered[place] = 1
+                    height = -(u * az + v * bz + w * cz) / area
+                    largest = max(largest, abs(height - self.heights[place]))
+        for x, y, _ in places:
+            box = [min(box[0], x), min(box[1], y), max(box[2], x), max(box[3], y)]
+        missed = sum(1 for row in range(self.rows) for column in range(self.columns)
+                     if not covered[row * self.columns + column] and self.inner(column, row))
+        return largest, missed, twice_area
+
+
+def border_edges(faces):
+    edges = collections.Counter()
+    for face in faces:
+        for k in range(3):
+            edges[face[k], face[(k + 1) % 3]] += 1
+    assert max(edges.values()) == 1, 'an edge with two triangles on one side'
+    return [edge for edge in edges if edge[::-1] not in edges]
+
+
+def hills(columns, rows, seed):
+    """Waves, noise, and a flat lake."""
+    noise = random.Random(seed)
+    heights = []
+    for row in range(rows):
+        for column in range(columns):
+            z = 200 + 120 * math.sin(column / 37) * math.cos(row / 53) + noise.uniform(-2, 2)
+            heights.append(max(z, 180.0))
+    return heights
+
+
+class BoundedMeshTest(unittest.TestCase):
+    COLUMNS, ROWS = 1100, 800  # four windows
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.raster = Raster(cls.COLUMNS, cls.ROWS, hills(cls.COLUMNS, cls.ROWS, 1))
+        write_tiff(cls.path('dem.tif'), cls.COLUMNS, cls.ROWS, cls.raster.heights)
+        cls.store = cls.build('dem.tif')
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.folder.cleanup()
+
+    @classmethod
+    def path(cls, name):
+        return os.path.join(cls.folder.name, name)
+
+    @classmethod
+    def build(cls, name):
+        store = cls.path(name.rsplit('.', 1)[0] + '.terrace')
+        result = terrace('build', cls.path(name), '-o', store)
+        assert result.returncode == 0, result.stderr
+        return store
+
+    def mesh(self, store, name, *options):
+        out = self.path(name)
+        result = terrace('mesh', store, '-o', out, '--json', '--force', *options)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return json.loads(result.stdout), out
+
+    def refuse(self, code, text, *args):
+        result = terrace(*args)
+        self.assertEqual(result.returncode, code, result.stderr)
+        self.assertIn(text, result.stderr)
+
+    def test_every_sample_is_within_the_bound(self):
+        counts = {}
+        for quality in ('greedy', 'removal', 'fitted'):
+            with self.subTest(quality):
+                summary, out = self.mesh(self.store, f'{quality}.obj', '--max-error', 3,
+                                         '--quality', quality)
+                vertices, faces = read_obj(out)
+                self.assertEqual((summary['vertices'], summary['triangles']),
+                                 (len(vertices), len(faces)))
+                self.assertEqual(summary['samples'], self.COLUMNS * self.ROWS)
+                largest, missed, twice_area = self.raster.measure(vertices, faces)
+                self.assertLessEqual(largest, 3 * (1 + 1e-9))
+                self.assertAlmostEqual(summary['max_error'], largest, places=6)
+                self.assertGreater(summary['rms_error'], 0)
+                self.assertLess(summary['rms_error'], largest)
+                self.assertEqual(missed, 0)
+                self.assertEqual(twice_area, 2 * (self.COLUMNS - 1) * (self.ROWS - 1))
+                # One piece without cracks: its only border is the raster's.
+                for a, b in border_edges(faces):
+                    x = {vertices[a][0], vertices[b][0]}
+                    y = {vertices[a][1], vertices[b][1]}
+                    self.assertTrue(len(x) == 1 or len(y) == 1)
+                    place = (min(x) - WEST) / CELL if len(x) == 1 else (NORTH - min(y)) / CELL
+                    ends = (0.5, (self.COLUMNS if len(x) == 1 else self.ROWS) - 0.5)
+                    self.assertIn(place, ends)
+                counts[quality] = len(faces)
+        self.assertLess(counts['removal'], 0.85 * counts['greedy'])
+        self.assertLess(counts['fitted'], counts['removal'])
+
+    def test_bytes_do_not_depend_on_threads_and_memory(self):
+        texts = set()
+        for threads, memory in ((1, '1G'), (2, '4G'), (5, '400M')):
+            _, out = self.mesh(self.store, 'same.ply', '--max-error', 2, '--threads', threads,
+                               '--memory', memory)
+            with open(out, 'rb') as file:
+                texts.add(file.read())
+        self.assertEqual(len(texts), 1)
+        self.assertEqual(sorted(name for name in os.listdir(self.folder.name) if 'tmp' in name), [])
+
+    def test_max_points_is_kept_and_used(self):
+        summary, out = self.mesh(self.store, 'few.obj', '--max-points', '5k')
+        vertices, faces = read_obj(out)
+        self.assertLessEqual(len(vertices), 5000)
+        self.assertGreater(len(vertices), 4000)
+        largest, missed, _ = self.raster.measure(vertices, faces)
+        self.assertAlmostEqual(summary['max_error'], largest, places=6)
+        self.assertEqual(missed, 0)
+        summary, _ = self.mesh(self.store, 'few.obj', '--max-points', 4)
+        self.assertEqual(summary['vertices'], 4)
+
+    def test_a_region_is_covered(self):
+        box = [WEST + 200.3 * CELL, NORTH - 500.2 * CELL, WEST + 700.9 * CELL, NORTH - 300.4 * CELL]
+        summary, out = self.mesh(self.store, 'part.obj', '--max-error', 3, '--region',
+                                 ','.join(map(str, box)))
+        vertices, faces = read_obj(out)
+        largest, _, twice_area = self.raster.measure(vertices, faces)
+        self.assertLessEqual(largest, 3)
+        self.assertGreaterEqual(twice_area / 2, 500 * 199)
+        self.assertLess(summary['samples'], 510 * 210)
+        xs, ys = [v[0] for v in vertices], [v[1] for v in vertices]
+        self.assertTrue(min(xs) <= box[0] and max(xs) >= box[2])
+        self.assertTrue(min(ys) <= box[1] and max(ys) >= box[3])
+        self.refuse(2, '--region', 'mesh', self.store, '-o', self.path('none.obj'),
+                    '--max-error', 3, '--region', '0,0,1,1')
+
+    def test_glb_keeps_the_bound_on_its_own_numbers(self):
+        summary, _ = self.mesh(self.store, 'mesh.glb', '--max-error', 3)
+        self.assertLessEqual(summary['max_error'], 3)
+        self.refuse(1, 'write PLY', 'mesh', self.store, '-o', self.path('fine.glb'),
+                    '--max-error', '1e-7')
+
+    def test_holes_stay_open(self):
+        columns, rows = 640, 560
+        heights = hills(columns, rows, 2)
+        noise = random.Random(3)
+        for row in range(rows):
+            for column in range(columns):
+                island = math.hypot(column - 300, row - 250) < 60
+                sea = math.hypot(column - 320, row - 260) < 150 + 8 * math.sin(row / 5)
+                if (sea and not island) or noise.random() < 0.0005:
+                    heights[row * columns + column] = NODATA
+        raster = Raster(columns, rows, heights)
+        write_tiff(self.path('sea.tif'), columns, rows, heights)
+        store = self.build('sea.tif')
+        for quality in ('greedy', 'removal', 'fitted'):
+            with self.subTest(quality):
+                summary, out = self.mesh(store, 'sea.obj', '--max-error', 4, '--quality', quality)
+                largest, missed, _ = raster.measure(*read_obj(out))
+                self.assertLessEqual(largest, 4 * (1 + 1e-9))
+                self.assertEqual(missed, 0)
+                self.assertEqual(summary['samples'], columns * rows - heights.count(NODATA))
+        # The shores need many points at any error.
+        self.refuse(1, 'too few', 'mesh', store, '-o', self.path('none.obj'), '--max-points', 9)
+        self.assertFalse(os.path.exists(self.path('none.obj')))
+        for fill in ('flat', 'interpolate'):
+            with self.subTest(fill):
+                summary, out = self.mesh(store, 'filled.obj', '--max-error', 4, '--fill', fill)
+                vertices, faces = read_obj(out)
+                self.assertLessEqual(summary['max_error'], 4)
+                area = sum((vertices[b][0] - vertices[a][0]) * (vertices[c][1] - vertices[a][1]) -
+                           (vertices[c][0] - vertices[a][0]) * (vertices[b][1] - vertices[a][1])
+                           for a, b, c in faces) / 2
+                self.assertAlmostEqual(area, (columns - 1) * (rows - 1) * CELL ** 2, delta=1)
+                low, high = min(v[2] for v in vertices), max(v[2] for v in vertices)
+                self.assertGreaterEqual(low, 179)
+                self.assertLessEqual(high, 330)
+
+    def test_irregular_points(self):
+        noise = random.Random(4)
+        points = [(noise.uniform(0, 1000), noise.uniform(0, 800)) for _ in range(20000)]
+        with open(self.path('points.xyz'), 'w') as file:
+            for x, y in points:
+                file.write(f'{x} {y} {50 * math.sin(x / 90) * math.cos(y / 70)}\n')
+        store = self.build('points.xyz')
+        counts = {}
+        for quality in ('greedy', 'removal'):
+            summary, out = self.mesh(store, 'points.obj', '--max-error', 1, '--quality', quality)
+            self.assertLessEqual(summary['max_error'], 1)
+            self.assertEqual(summary['samples'], len(points))
+            counts[quality] = summary['triangles']
+        self.assertLess(counts['removal'], counts['greedy'])
+        self.assertLess(counts['greedy'], 10000)
+        with open(self.path('points.xyz'), 'a') as file:
+            file.write('500 400 10\n500 400 20\n')
+        store = self.path('twice.terrace')
+        self.assertEqual(terrace('build', self.path('points.xyz'), '-o', store).returncode, 0)
+        self.refuse(1, '--duplicates', 'mesh', store, '-o', self.path('twice.obj'),
+                    '--max-error', 1)
+        summary, _ = self.mesh(store, 'twice.obj', '--max-error', 1, '--duplicates', 'max')
+        self.assertEqual(summary['duplicates'], 1)
+        self.refuse(2, '--fill', 'mesh', store, '-o', self.path('none.obj'), '--max-error', 1,
+                    '--fill', 'flat')
+
+    def test_wrong_usage(self):
+        mesh = ('mesh', self.store, '-o', self.path('none.obj'))
+        for text, *options in (('not both', '--max-error', 1, '--max-points', 10),
+                               ('not negative', '--max-error', -1),
+                               ('not negative', '--max-error', 'nan'),
+                               ('at least 4', '--max-points', 3),
+                               ('--level', '--max-error', 1, '--level', 1),
+                               ('greedy', '--max-error', 1, '--quality', 'best'),
+                               ('flat', '--max-error', 1, '--fill', 'water'),
+                               ('belong', '--quality', 'greedy')):
+            with self.subTest(options):
+                self.refuse(2, text, *mesh, *options)
+        self.refuse(1, '--memory', *mesh, '--max-error', 1, '--memory', '20M')
+        self.assertFalse(os.path.exists(self.path('none.obj')))
+
+    def test_flat_land_is_few_triangles(self):
+        write_tiff(self.path('flat.tif'), 700, 700, [5.0] * 490000)
+        summary, _ = self.mesh(self.build('flat.tif'), 'flat.obj', '--max-error', 0)
+        self.assertEqual(summary['max_error'], 0)
+        self.assertLessEqual(summary['triangles'], 20)
+
+
+if __name__ == '__main__':
+    unittest.main()

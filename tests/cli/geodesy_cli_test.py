@@ -1,0 +1,327 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Reference systems as users meet them: build, info, points and mesh.
+
+TERRACE=path/to/terrace geodesy_cli_test.py
+What compares with PROJ (cs2cs) or GDAL is skipped where those are not installed.
+"""
+
+import json
+import os
+import random
+import shutil
+import struct
+import subprocess
+import tempfile
+import unittest
+
+TERRACE = os.environ.get('TERRACE', 'terrace')
+ESRI_UTM = ('PROJCS["WGS_1984_UTM_Zone_32N",GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984",'
+            'SPHEROID["WGS_1984",6378137.0,298.257223563]],PRIMEM["Greenwich",0.0],'
+            'UNIT["Degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],'
+            'PARAMETER["False_Easting",500000.0],PARAMETER["False_Northing",0.0],'
+            'PARAMETER["Central_Meridian",9.0],PARAMETER["Scale_Factor",0.9996],'
+            'PARAMETER["Latitude_Of_Origin",0.0],UNIT["Meter",1.0]]')
+
+
+def terrace(*args):
+    return subprocess.run([TERRACE, *map(str, args)], capture_output=True, text=True, timeout=120)
+
+
+def write_tiff(name, keys, corner=(500000, 5200000), cell=10.0, size=6, matrix=None):
+    """An uncompressed float32 GeoTIFF; keys: {number: integer, float or text}."""
+    pixels = struct.pack(f'<{size * size}f', *range(size * size))
+    shorts, doubles, text = [], [], ''
+    for key, value in sorted(keys.items()):
+        if isinstance(value, str):
+            shorts += [key, 34737, len(value) + 1, len(text)]
+            text += value + '|'
+        elif isinstance(value, float):
+            shorts += [key, 34736, 1, len(doubles)]
+            doubles.append(value)
+        else:
+            shorts += [key, 0, 1, value]
+    shorts = [1, 1, 0, len(keys)] + shorts
+    entries = [(256, 3, [size]), (257, 3, [size]), (258, 3, [32]), (259, 3, [1]), (262, 3, [1]),
+               (273, 4, [8]), (277, 3, [1]), (278, 3, [size]), (279, 4, [len(pixels)]),
+               (339, 3, [3]), (34735, 3, shorts)]
+    if matrix:
+        entries.append((34264, 12, matrix))
+    else:
+        entries += [(33550, 12, [cell, cell, 0.0]), (33922, 12, [0.0, 0.0, 0.0, *map(float, corner), 0.0])]
+    if doubles:
+        entries.append((34736, 12, doubles))
+    if text:
+        entries.append((34737, 2, [text.encode() + b'\0']))
+    forms = {2: ('s', 1), 3: ('H', 2), 4: ('I', 4), 12: ('d', 8)}
+    directory, extra = b'', b''
+    start = 8 + len(pixels)
+    behind = start + 2 + 12 * len(entries) + 4
+    for tag, kind, values in sorted(entries):
+        form, width = forms[kind]
+        data = values[0] if kind == 2 else struct.pack(f'<{len(values)}{form}', *values)
+        count = len(data) // width
+        if len(data) <= 4:
+            value = data.ljust(4, b'\0')
+        else:
+            value = struct.pack('<I', behind + len(extra))
+            extra += data + b'\0' * (len(data) % 2)
+        directory += struct.pack('<HHI', tag, kind, count) + value
+    with open(name, 'wb') as file:
+        file.write(struct.pack('<2sHI', b'II', 42, start) + pixels)
+        file.write(struct.pack('<H', len(entries)) + directory + struct.pack('<I', 0) + extra)
+
+
+class GeodesyTest(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+
+    def tearDown(self):
+        self.folder.cleanup()
+
+    def path(self, name):
+        return os.path.join(self.folder.name, name)
+
+    def ok(self, *args):
+        result = terrace(*args)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return result.stdout
+
+    def refused(self, code, *args):
+        result = terrace(*args)
+        self.assertEqual(result.returncode, code, result.stderr)
+        self.assertEqual(result.stdout, '')
+        self.assertEqual(len(result.stderr.splitlines()), 1, result.stderr)
+        return result.stderr
+
+    def build(self, *args):
+        store = self.path(f'store{len(os.listdir(self.folder.name))}')
+        self.ok('build', *args, '-o', store, '-q')
+        return store
+
+    def info(self, path):
+        return json.loads(self.ok('info', path, '--json'))
+
+    def points(self, *args):
+        text = self.ok('points', *args, '-o', '-', '--format', 'xyz', '-q')
+        return [tuple(map(float, line.split()[:3])) for line in text.splitlines()]
+
+    def raster(self, keys, name='dem.tif', **options):
+        write_tiff(self.path(name), keys, **options)
+        return self.path(name)
+
+    def cloud(self, places, name='points.xyz'):
+        with open(self.path(name), 'w', encoding='utf-8') as file:
+            for i, (x, y) in enumerate(places):
+                file.write(f'{x!r} {y!r} {i}\n')
+        return self.path(name)
+
+    def test_the_store_records_code_name_and_wkt(self):
+        store = self.build(self.raster({1024: 1, 1025: 1, 3072: 32632, 3076: 9001}))
+        crs = self.info(store)['crs']
+        self.assertEqual(crs['epsg'], 32632)
+        self.assertEqual(crs['name'], 'WGS 84 / UTM zone 32N')
+        self.assertIn('METHOD["Transverse Mercator"', crs['wkt'])
+        if shutil.which('projinfo'):
+            result = subprocess.run(['projinfo', crs['wkt'], '-o', 'PROJ', '-q'],
+                                    capture_output=True, text=True, check=False)
+            self.assertIn('+proj=utm +zone=32', result.stdout, result.stderr)
+            self.assertNotIn('arning', result.stderr)
+
+    def test_user_defined_parameters_are_used(self):
+        own = {1024: 1, 1025: 1, 2048: 4258, 3072: 32767, 3074: 32767, 3075: 1, 3076: 9001,
+               3080: 10.5, 3081: 40.0, 3082: 200000.0, 3083: 1000.0, 3092: 0.99995}
+        store = self.build(self.raster(own, corner=(210000, 500000)))
+        self.assertIsNone(self.info(store)['crs']['epsg'])
+        self.compare_with_proj(store, '+proj=tmerc +lon_0=10.5 +lat_0=40 +k=0.99995 +x_0=200000 '
+                                      '+y_0=1000 +ellps=GRS80')
+
+    def compare_with_proj(self, store, proj):
+        if not shutil.which('cs2cs'):
+            self.skipTest('cs2cs is not installed')
+        plane = self.points(store)
+        result = subprocess.run(
+            ['cs2cs', '-f', '%.12f', *proj.split(), '+type=crs', '+to', '+proj=longlat',
+             '+ellps=GRS80', '+type=crs'],
+            input='\n'.join(f'{x!r} {y!r}' for x, y, _ in plane), capture_output=True, text=True,
+            check=True)
+        expected = [tuple(map(float, line.split()[:2])) for line in result.stdout.splitlines()]
+        found = self.points(store, '--to-crs', 'EPSG:4258')
+        self.assertEqual(len(found), len(expected))
+        for (x, y, _), (a, b) in zip(found, expected):
+            self.assertAlmostEqual(x, a, delta=1e-9)
+            self.assertAlmostEqual(y, b, delta=1e-9)
+
+    def test_a_prj_file_beside_the_source_counts(self):
+        raster = self.raster({1025: 1})
+        with open(self.path('dem.prj'), 'w', encoding='utf-8') as file:
+            file.write(ESRI_UTM)
+        self.assertEqual(self.info(self.build(raster))['crs']['epsg'], 32632)
+        places = self.cloud([(500000 + 3 * i, 5200000 + i * i) for i in range(20)])
+        shutil.copy(self.path('dem.prj'), self.path('points.prj'))
+        self.assertEqual(self.info(self.build(places))['crs']['epsg'], 32632)
+        # --crs goes before it.
+        self.assertEqual(self.info(self.build(places, '--crs', 'EPSG:25832'))['crs']['epsg'], 25832)
+        # One that says something else than the file's own keys is a contradiction.
+        other = self.raster({1024: 1, 1025: 1, 3072: 32633, 3076: 9001}, name='dem.tif')
+        error = self.refused(1, 'build', other, '-o', self.path('none'))
+        self.assertIn('EPSG:32633', error)
+        self.assertIn('dem.prj', error)
+        with open(self.path('points.prj'), 'w', encoding='utf-8') as file:
+            file.write(ESRI_UTM[:60])
+        self.assertIn('points.prj', self.refused(1, 'build', places, '-o', self.path('none')))
+
+    def test_contradictory_keys_are_an_error_that_names_them(self):
+        for keys, words in (
+                ({1024: 1, 3072: 32632, 3076: 9002}, ['EPSG:32632', 'metres', '--crs']),
+                ({1024: 1, 2048: 4269, 3072: 32632, 3076: 9001}, ['EPSG:4269', '--crs']),
+                ({1024: 1, 3072: 32632, 3076: 9001, 3092: 0.5}, ['3092', '--crs'])):
+            raster = self.raster({1025: 1, **keys})
+            error = self.refused(1, 'build', raster, '-o', self.path('none'))
+            for word in words + ['dem.tif']:
+                self.assertIn(word, error)
+            self.assertFalse(os.path.exists(self.path('none')))
+            self.build(raster, '--crs', 'EPSG:32632')
+
+    def test_an_unknown_system_is_named_and_never_guessed(self):
+        error = self.refused(2, 'build', self.raster({1025: 1}), '-o', self.path('none'), '--crs',
+                             'EPSG:32299')
+        self.assertIn('EPSG:32299', error)
+        # Krovak: a method that is not there. Distances can be measured in its unit all the same.
+        krovak = self.raster({1024: 1, 1025: 1, 3072: 5514, 3076: 9001})
+        result = terrace('build', krovak, '-o', self.path('krovak'))
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn('EPSG:5514', result.stderr)
+        error = self.refused(1, 'points', self.path('krovak'), '-o', '-', '--to-crs', 'EPSG:4326')
+        self.assertIn('EPSG:5514', error)
+        unit_unknown = self.raster({1024: 1, 1025: 1, 3072: 5514})
+        error = self.refused(1, 'build', unit_unknown, '-o', self.path('none'))
+        self.assertIn('EPSG:5514', error)
+
+    def test_info_says_what_counts_as_wgs84(self):
+        etrs = self.raster({1024: 1, 1025: 1, 3072: 25832, 3076: 9001, 4096: 5783})
+        self.assertIn('counts as WGS 84 within 1 m', self.ok('info', etrs))
+        self.assertEqual(self.info(etrs)['vertical'], 'orthometric')
+        self.assertIn('counts as WGS 84 within 1 m', self.ok('info', self.build(etrs)))
+        british = self.raster({1024: 1, 1025: 1, 3072: 27700, 3076: 9001})
+        self.assertIn('without a shift', self.ok('info', british))
+        wrong = self.raster({1024: 1, 1025: 1, 3072: 32632, 3076: 9002})
+        self.assertIn('contradict', self.ok('info', wrong))
+
+    def test_without_a_system_nothing_is_converted(self):
+        store = self.build(self.raster({1025: 1}))
+        self.assertIsNone(self.info(store)['crs'])
+        for option in (('--to-crs', 'EPSG:4326'),
+                       ('--region', '0,0,1,1', '--region-crs', 'EPSG:4326')):
+            error = self.refused(1, 'points', store, '-o', '-', *option)
+            self.assertIn('no CRS', error)
+            self.assertIn('--crs', error)
+
+    def test_another_datum_needs_its_shift(self):
+        shift = '446.448,-125.157,542.060,0.1502,0.2470,0.8421,-20.4894'
+        random.seed(1)
+        cloud = self.cloud([(random.uniform(2e5, 6e5), random.uniform(1e5, 9e5))
+                            for _ in range(50)])
+        bare = self.build(cloud, '--crs', 'EPSG:27700')
+        error = self.refused(1, 'points', bare, '-o', '-', '--to-crs', 'EPSG:4326')
+        self.assertIn('--towgs84', error)
+        self.assertIn('EPSG:27700', error)
+        shifted = self.build(cloud, '--crs', 'EPSG:27700', f'--towgs84={shift}')
+        self.assertIn('BOUNDCRS', self.info(shifted)['crs']['wkt'])
+        found = self.points(shifted, '--to-crs', 'EPSG:4326')
+        self.assertEqual(len(found), 50)
+        self.refused(1, 'build', cloud, '-o', self.path('none'), '--crs', 'EPSG:32632',
+                     f'--towgs84={shift}')
+        self.refused(2, 'build', cloud, '-o', self.path('none'), '--crs', 'EPSG:27700',
+                     '--towgs84', '1,2')
+        if not shutil.which('cs2cs'):
+            self.skipTest('cs2cs is not installed')
+        result = subprocess.run(
+            ['cs2cs', '-f', '%.12f', '+proj=tmerc', '+lat_0=49', '+lon_0=-2', '+k=0.9996012717',
+             '+x_0=400000', '+y_0=-100000', '+ellps=airy', f'+towgs84={shift}', '+type=crs', '+to',
+             '+proj=longlat', '+datum=WGS84', '+type=crs'],
+            input='\n'.join(f'{x!r} {y!r}' for x, y, _ in self.points(bare)), capture_output=True,
+            text=True, check=True)
+        for (x, y, _), line in zip(found, result.stdout.splitlines()):
+            a, b = map(float, line.split()[:2])
+            self.assertAlmostEqual(x, a, delta=1e-8)
+            self.assertAlmostEqual(y, b, delta=1e-8)
+
+    def test_heights_come_from_the_keys_or_from_what_is_said(self):
+        utm = {1024: 1, 1025: 1, 3072: 25832, 3076: 9001}
+        self.assertIsNone(self.info(self.build(self.raster(utm)))['vertical'])
+        raster = self.raster({**utm, 4096: 5783, 4099: 9001})
+        info = self.info(self.build(raster))
+        self.assertEqual(info['vertical'], 'orthometric')
+        self.assertEqual(info['crs']['vertical_epsg'], 5783)
+        info = self.info(self.build(raster, '--vertical', 'ellipsoidal'))
+        self.assertEqual(info['vertical'], 'ellipsoidal')
+        self.assertIsNone(info['crs']['vertical_epsg'])
+        info = self.info(self.build(self.raster({**utm, 4096: 5030})))
+        self.assertEqual(info['vertical'], 'ellipsoidal')
+        geographic = self.raster({1024: 2, 1025: 1, 2048: 4979}, corner=(8, 47), cell=0.001)
+        self.assertEqual(self.info(self.build(geographic))['vertical'], 'ellipsoidal')
+        store = self.build(self.raster(utm), '--crs', 'EPSG:25832+7837')
+        self.assertEqual(self.info(store)['vertical'], 'orthometric')
+
+    def test_a_rotated_raster_lands_where_gdal_says(self):
+        matrix = [8.0, 6.0, 0.0, 500000.0, 6.0, -8.0, 0.0, 5200000.0, 0.0, 0.0, 0.0, 0.0,
+                  0.0, 0.0, 0.0, 1.0]
+        raster = self.raster({1024: 1, 1025: 1, 3072: 32632, 3076: 9001}, matrix=matrix)
+        found = self.points(self.build(raster), '--to-crs', 'EPSG:4326')
+        if not shutil.which('gdaltransform'):
+            self.skipTest('gdaltransform is not installed')
+        cells = [(z % 6, z // 6) for _, _, z in found]
+        result = subprocess.run(
+            ['gdaltransform', '-t_srs', 'EPSG:4326', raster],
+            input='\n'.join(f'{column + 0.5} {row + 0.5}' for column, row in cells),
+            capture_output=True, text=True, check=True)
+        for (x, y, _), line in zip(found, result.stdout.splitlines()):
+            a, b = map(float, line.split()[:2])
+            self.assertAlmostEqual(x, a, delta=1e-9)
+            self.assertAlmostEqual(y, b, delta=1e-9)
+
+    def test_regions_in_another_system(self):
+        random.seed(2)
+        cloud = self.cloud([(random.uniform(3e5, 7e5), random.uniform(5e6, 6e6))
+                            for _ in range(3000)])
+        store = self.build(cloud, '--crs', 'EPSG:32632', '--block', 500)
+        degrees = {z: (x, y) for x, y, z in self.points(store, '--to-crs', 'EPSG:4326')}
+        inside = {z for z, (x, y) in degrees.items() if 8 <= x <= 10 and 46 <= y <= 49}
+        found = self.points(store, '--region', '8,46,10,49', '--region-crs', 'EPSG:4326')
+        self.assertEqual({z for _, _, z in found}, inside)
+        self.assertGreater(len(inside), 100)
+        outside = self.points(store, '--region', '100,46,101,49', '--region-crs', 'EPSG:4326')
+        self.assertEqual(outside, [])
+        for box in ('8,46,10,95', '-170,-80,170,80'):
+            error = self.refused(1, 'points', store, f'--region={box}', '--region-crs', 'EPSG:4326',
+                                 '-o', '-')
+            self.assertIn('region', error)
+        mesh = self.path('mesh.ply')
+        self.ok('mesh', store, '--region', '8,46,10,49', '--region-crs', 'EPSG:4326', '--to-crs',
+                'EPSG:4326', '-o', mesh, '--format', 'ply-ascii')
+        with open(mesh, encoding='utf-8') as file:
+            lines = file.read().split('end_header\n')[1].splitlines()
+        x, y, _ = map(float, lines[0].split()[:3])
+        self.assertTrue(5 < x < 13 and 44 < y < 55)
+
+    def test_across_the_antimeridian(self):
+        cloud = self.cloud([(179 + 0.1 * i if i < 11 else -181 + 0.1 * i, -20 + 0.1 * j)
+                            for i in range(21) for j in range(10)])
+        store = self.build(cloud, '--crs', 'EPSG:4326')
+        there = self.points(store, '--to-crs', 'EPSG:32660')
+        self.assertTrue(all(6e5 < x < 9.5e5 for x, _, _ in there))
+        box = self.points(store, '--region', '179.45,-21,180.45,-10', '--region-crs', 'EPSG:4326')
+        self.assertEqual(len(box), 100)
+        self.assertEqual({x > 0 for x, _, _ in box}, {True, False})
+
+    def test_a_point_that_has_no_place_there_is_named(self):
+        cloud = self.cloud([(10, 10), (20, 20), (30, 90), (40, 40)])
+        store = self.build(cloud, '--crs', 'EPSG:4326')
+        error = self.refused(1, 'points', store, '--to-crs', 'EPSG:3857', '-o', '-')
+        self.assertIn('30 90', error)
+        self.assertIn('EPSG:3857', error)
+
+
+if __name__ == '__main__':
+    unittest.main()

@@ -1,0 +1,364 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Questions to a store as their users ask them: sample, raster, profile, contour.
+
+TERRACE=path/to/terrace query_cli_test.py
+"""
+
+import array
+import csv
+import filecmp
+import io
+import json
+import math
+import os
+import random
+import shutil
+import subprocess
+import tempfile
+import unittest
+
+TERRACE = os.environ.get('TERRACE', 'terrace')
+SIZE = 300
+CELL = 30
+
+
+def terrace(*args, text=None):
+    return subprocess.run([TERRACE, *map(str, args)], capture_output=True, text=True, input=text,
+                          timeout=120)
+
+
+def needs(*programs):
+    missing = [p for p in programs if shutil.which(p) is None]
+    return unittest.skipIf(missing, 'not installed: ' + ', '.join(missing))
+
+
+class QueryTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.dem = cls.path('dem.tif')
+        cls.store = cls.path('dem.terrace')
+        cls.run_ok('synth', 'dem', '--size', f'{SIZE}x{SIZE}', '--cell', CELL, '--type', 'float32',
+                   '-o', cls.dem)
+        cls.run_ok('build', cls.dem, '-o', cls.store, '--block', 3000)
+        info = json.loads(cls.run_ok('info', cls.store, '--json'))
+        cls.low, cls.high = info['bounds']['min'], info['bounds']['max']
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.folder.cleanup()
+
+    @classmethod
+    def path(cls, name):
+        return os.path.join(cls.folder.name, name)
+
+    @staticmethod
+    def run_ok(*args, text=None):
+        result = terrace(*args, text=text)
+        assert result.returncode == 0, result.stderr
+        return result.stdout
+
+    def expect_error(self, code, *args, text=None):
+        result = terrace(*args, text=text)
+        self.assertEqual(result.returncode, code, result.stderr)
+        self.assertEqual(result.stdout, '')
+        self.assertEqual(len(result.stderr.splitlines()), 1, result.stderr)
+        return result.stderr
+
+    def samples(self, file):
+        """The samples of a GeoTIFF by rows, by GDAL."""
+        raw = self.path('samples.raw')
+        subprocess.run(['gdal_translate', '-q', '-of', 'ENVI', '-ot', 'Float32', file, raw], check=True)
+        values = array.array('f')
+        with open(raw, 'rb') as stream:
+            values.frombytes(stream.read())
+        return values
+
+    def answers(self, lines, *options):
+        return list(csv.reader(io.StringIO(self.run_ok('sample', self.store, *options, text=lines))))
+
+    def somewhere(self, seed, count):
+        generator = random.Random(seed)
+        return [(generator.uniform(self.low[0], self.high[0]),
+                 generator.uniform(self.low[1], self.high[1])) for _ in range(count)]
+
+
+class SampleTest(QueryTest):
+    def test_help_ends_with_an_example(self):
+        for verb in 'sample', 'raster', 'profile', 'contour':
+            self.assertIn('Example:\n  terrace ' + verb, self.run_ok(verb, '--help'))
+
+    def test_lines_are_kept_and_answered_in_order(self):
+        x, y = self.low[0] + 100, self.low[1] + 100
+        text = (f'# places\nname,Lat,"Lon"\n"a, b",{y},{x}\n\nfar,{y - 1e6},{x}\n'
+                f'no number,,{x}\r\nlast,{y},{x}')
+        lines = self.run_ok('sample', self.store, text=text).split('\n')
+        self.assertEqual(lines[0], '# places')
+        self.assertEqual(lines[1], 'name,Lat,"Lon",height,gradient,slope,aspect')
+        self.assertTrue(lines[2].startswith(f'"a, b",{y},{x},'))
+        self.assertEqual(lines[3], '')
+        self.assertEqual(lines[4], f'far,{y - 1e6},{x},,,,')
+        self.assertEqual(lines[5], f'no number,,{x},,,,')
+        self.assertEqual(lines[6].split(',')[-4:], lines[2].split(',')[-4:])
+        self.assertEqual(lines[7:], [''])
+
+    def test_slope_and_aspect_belong_to_the_gradient(self):
+        for row in self.answers('\n'.join(f'{x},{y}' for x, y in self.somewhere(1, 200))):
+            gradient, slope, aspect = map(float, row[3:])
+            self.assertAlmostEqual(math.degrees(math.atan(gradient)), slope, places=5)
+            self.assertTrue(0 <= aspect < 360)
+
+    def test_the_gradient_is_that_of_the_heights(self):
+        step = 1e-3
+        for x, y in self.somewhere(2, 60):
+            text = '\n'.join(f'{x + dx},{y + dy}' for dx, dy in ((0, 0), (step, 0), (0, step)))
+            rows = [[float(cell) for cell in row] for row in self.answers(text)]
+            east, north = ((rows[i][2] - rows[0][2]) / step for i in (1, 2))
+            # Heights have five decimals; a step over an edge of a triangle is rare.
+            if abs(math.hypot(east, north) - rows[0][3]) > 0.02:
+                continue
+            if rows[0][3] > 0.3:
+                downhill = math.degrees(math.atan2(-east, -north)) % 360
+                turn = abs(downhill - rows[0][5])
+                self.assertLess(min(turn, 360 - turn), 5)
+
+    @needs('gdal_translate')
+    def test_on_samples_every_method_gives_the_sample(self):
+        values = self.samples(self.dem)
+        cells = [(random.Random(3 + i).randrange(SIZE), random.Random(900 + i).randrange(SIZE))
+                 for i in range(100)] + [(0, 0), (SIZE - 1, SIZE - 1)]
+        text = '\n'.join(f'{self.low[0] + CELL * c},{self.high[1] - CELL * r}' for c, r in cells)
+        for method in 'linear', 'nearest', 'natural':
+            for (c, r), row in zip(cells, self.answers(text, '--method', method)):
+                self.assertAlmostEqual(float(row[2]), values[r * SIZE + c], places=3)
+
+    def test_threads_memory_and_batches_do_not_change_a_byte(self):
+        text = 'x,y\n' + ''.join(f'{x},{y}\n' for x, y in self.somewhere(4, 30000))
+        for method in 'linear', 'natural':
+            one = self.run_ok('sample', self.store, '--method', method, '--threads', 1, text=text)
+            self.assertEqual(one, self.run_ok('sample', self.store, '--method', method, '--threads', 3,
+                                              '--memory', '2M', text=text))
+            self.assertEqual(one.count('\n'), 30001)
+
+    def test_places_in_another_reference_system(self):
+        inside = self.somewhere(5, 1)[0]
+        there = self.answers('%f,%f\n' % inside)[0]
+        lonlat = subprocess.run(['cs2cs', '-f', '%.12f', 'EPSG:32632', '+to', '+proj=longlat',
+                                 '+datum=WGS84'],
+                                input='%.6f %.6f\n' % inside, capture_output=True,
+                                text=True).stdout.split() if shutil.which('cs2cs') else None
+        if lonlat is None:
+            self.skipTest('not installed: cs2cs')
+        row = self.answers(f'lon,lat\n{lonlat[0]},{lonlat[1]}\n', '--points-crs', 'EPSG:4326')[1]
+        self.assertAlmostEqual(float(row[2]), float(there[2]), places=3)
+
+    def test_bad_lines_name_the_line(self):
+        self.assertIn('line 3', self.expect_error(1, 'sample', self.store, text='x,y\n1,2\n1,two\n'))
+        self.assertIn('columns', self.expect_error(1, 'sample', self.store, text='x,y\n1\n'))
+        self.assertIn('one column', self.expect_error(1, 'sample', self.store, text='just words\n'))
+        self.expect_error(1, 'sample', self.store, '--points', self.path('nowhere.csv'))
+        self.expect_error(2, 'sample', self.store, '--method', 'cubic', text='1,2\n')
+        self.expect_error(2, 'sample', self.store, '--json', text='1,2\n')
+        self.expect_error(2, 'sample', self.store, '--level', 99, text='1,2\n')
+
+    def test_nothing_in_nothing_out(self):
+        self.assertEqual(self.run_ok('sample', self.store, text=''), '')
+
+    def test_summary(self):
+        out = self.path('answers.csv')
+        x, y = self.somewhere(6, 1)[0]
+        summary = json.loads(self.run_ok('sample', self.store, '--json', '-o', out,
+                                         text=f'{x},{y}\n0,0\n'))
+        self.assertEqual((summary['points'], summary['answered']), (2, 1))
+        self.expect_error(1, 'sample', self.store, '-o', out, text='1,2\n')
+
+
+class RasterTest(QueryTest):
+    @needs('gdal_translate', 'gdalinfo')
+    def test_the_lattice_itself_comes_back(self):
+        out = self.path('same.tif')
+        self.run_ok('raster', self.store, '-o', out)
+        self.assertEqual(self.samples(out), self.samples(self.dem))
+        ours, theirs = (json.loads(subprocess.run(['gdalinfo', '-json', f], capture_output=True,
+                                                  text=True).stdout) for f in (out, self.dem))
+        for key in 'size', 'geoTransform', 'cornerCoordinates':
+            self.assertEqual(ours[key], theirs[key])
+        self.assertIn('32632', ours['coordinateSystem']['wkt'])
+
+    @needs('gdaldem', 'gdal_translate')
+    def test_slope_aspect_and_hillshade_are_those_of_gdaldem(self):
+        # gdaldem takes the map's metres; those on the ground differ by the projection's scale.
+        for value, nodata, tolerance in (('slope', -9999, 0.03), ('aspect', -9999, 0.5),
+                                         ('hillshade', 0, 1)):
+            ours, theirs = self.path(value + '.tif'), self.path(value + '-gdal.tif')
+            self.run_ok('raster', self.store, '--value', value, '-o', ours)
+            subprocess.run(['gdaldem', value, '-q', self.dem, theirs], check=True)
+            a, b = self.samples(ours), self.samples(theirs)
+            self.assertEqual(sum(v == nodata for v in a), sum(v == nodata for v in b))
+            off = 0
+            for x, y in zip(a, b):
+                d = abs(x - y)
+                if value == 'aspect':
+                    d = min(d, 360 - d)
+                off += d > tolerance
+            # The direction of what is nearly level is anybody's.
+            self.assertLessEqual(off, SIZE * SIZE // 500 if value == 'aspect' else 0, value)
+
+    @needs('gdallocationinfo')
+    def test_cells_are_what_sample_answers(self):
+        out = self.path('coarse.tif')
+        self.run_ok('raster', self.store, '--cell', 97, '-o', out)
+        text, cells = '', [(0, 0), (3, 5), (40, 17), (91, 91)]
+        for c, r in cells:
+            text += f'{self.low[0] - CELL / 2 + 97 * (c + 0.5)},{self.high[1] + CELL / 2 - 97 * (r + 0.5)}\n'
+        for (c, r), row in zip(cells, self.answers(text)):
+            value = subprocess.run(['gdallocationinfo', '-valonly', out, str(c), str(r)],
+                                   capture_output=True, text=True).stdout
+            self.assertAlmostEqual(float(value), float(row[2]), places=3)
+
+    def test_threads_and_memory_do_not_change_a_byte(self):
+        one, two = self.path('one.tif'), self.path('two.tif')
+        for value in 'height', 'hillshade':
+            self.run_ok('raster', self.store, '--cell', 11, '--value', value, '--threads', 1, '--force',
+                        '-o', one)
+            self.run_ok('raster', self.store, '--cell', 11, '--value', value, '--threads', 3, '--force',
+                        '--memory', '30M', '-o', two)
+            self.assertTrue(filecmp.cmp(one, two, shallow=False))
+
+    def test_regions(self):
+        box = [self.low[0] + 300, self.low[1] + 600, self.low[0] + 1200, self.low[1] + 1800]
+        summary = json.loads(self.run_ok('raster', self.store, '--region', ','.join(map(str, box)),
+                                         '-o', self.path('region.tif'), '--json'))
+        self.assertEqual((summary['columns'], summary['rows']), (31, 41))
+        out = self.path('outside.tif')
+        self.assertIn('does not meet', self.expect_error(1, 'raster', self.store, '--region',
+                                                         '0,0,10,10', '-o', out))
+        self.assertFalse(os.path.exists(out))
+        self.expect_error(2, 'raster', self.store, '--cell', 0, '-o', out)
+        self.expect_error(2, 'raster', self.store, '--value', 'mood', '-o', out)
+        self.expect_error(2, 'raster', self.store, '--cell', 1e-9, '-o', out)
+
+    @needs('gdalinfo')
+    def test_another_reference_system(self):
+        out = self.path('degrees.tif')
+        self.run_ok('raster', self.store, '--to-crs', 'EPSG:4326', '-o', out)
+        info = json.loads(subprocess.run(['gdalinfo', '-json', out], capture_output=True,
+                                         text=True).stdout)
+        self.assertIn('4326', info['coordinateSystem']['wkt'])
+
+
+class ContourTest(QueryTest):
+    def lines(self, *options):
+        out = self.path('lines.geojson')
+        self.run_ok('contour', self.store, '-o', out, '--force', *options)
+        with open(out) as file:
+            return json.load(file)['features']
+
+    @needs('gdal_contour')
+    def test_lengths_are_those_of_gdal_contour(self):
+        # On smooth ground: where it is rough, lines across squares and lines across triangles differ.
+        smooth, store, theirs = (self.path(name) for name in ('smooth.tif', 'smooth.terrace',
+                                                              'gdal.geojson'))
+        box = [self.low[0] + 1000, self.low[1] + 1000, self.low[0] + 2800, self.low[1] + 2800]
+        self.run_ok('raster', self.store, '--method', 'natural', '--cell', 6, '--region',
+                    ','.join(map(str, box)), '-o', smooth)
+        self.run_ok('build', smooth, '-o', store)
+        out = self.path('smooth.geojson')
+        self.run_ok('contour', store, '--interval', 10, '-o', out)
+        with open(out) as file:
+            lines = json.load(file)['features']
+        subprocess.run(['gdal_contour', '-q', '-i', '10', '-a', 'elev', '-f', 'GeoJSON', smooth,
+                        theirs], check=True)
+        with open(theirs) as file:
+            other = json.load(file)['features']
+
+        def metres(points):
+            # On a sphere: within half a per cent, and so is the map's scale.
+            for (x0, y0), (x1, y1) in zip(points, points[1:]):
+                degree = math.pi / 180 * 6371000
+                yield math.hypot((x1 - x0) * degree * math.cos(math.radians((y0 + y1) / 2)),
+                                 (y1 - y0) * degree)
+
+        ours, gdal = {}, {}
+        for feature in lines:
+            elev = feature['properties']['elev']
+            ours[elev] = ours.get(elev, 0) + sum(metres(feature['geometry']['coordinates']))
+        for feature in other:
+            elev, points = feature['properties']['elev'], feature['geometry']['coordinates']
+            # GDAL writes the raster's CRS or degrees, as its version has it.
+            length = (sum(metres(points)) if abs(points[0][0]) <= 180 else
+                      sum(math.dist(p, q) for p, q in zip(points, points[1:])))
+            gdal[elev] = gdal.get(elev, 0) + length
+        self.assertEqual(set(ours), set(gdal))
+        self.assertAlmostEqual(sum(ours.values()) / sum(gdal.values()), 1, delta=0.03)
+
+    def test_lines_lie_at_their_height_and_end_at_the_border_only(self):
+        features = self.lines('--interval', 100)
+        self.assertGreater(len(features), 5)
+        for feature in features:
+            points = feature['geometry']['coordinates']
+            self.assertGreaterEqual(len(points), 2)
+            text = 'lon,lat\n' + ''.join(f'{x},{y}\n' for x, y in points[:50])
+            for row in self.answers(text, '--points-crs', 'EPSG:4326')[1:]:
+                if row[2]:
+                    self.assertAlmostEqual(float(row[2]), feature['properties']['elev'], delta=0.01)
+
+    def test_threads_do_not_change_a_byte(self):
+        one = self.run_ok('contour', self.store, '--interval', 20, '--threads', 1, '-o', '-')
+        self.assertEqual(one, self.run_ok('contour', self.store, '--interval', 20, '--threads', 3,
+                                          '--memory', '64M', '-o', '-'))
+
+    def test_bad_values(self):
+        out = self.path('none.geojson')
+        self.expect_error(2, 'contour', self.store, '--interval', 0, '-o', out)
+        self.expect_error(1, 'contour', self.store, '--interval', 9, '--region', '0,0,1,1', '-o', out)
+        self.assertFalse(os.path.exists(out))
+
+
+class ProfileTest(QueryTest):
+    def rows(self, *options):
+        text = self.run_ok('profile', self.store, '-o', '-', *options)
+        return [[float(cell) if cell else None for cell in row.values()]
+                for row in csv.DictReader(io.StringIO(text))]
+
+    def test_rows_are_on_the_surface_and_distances_grow(self):
+        (x0, y0), (x1, y1) = self.somewhere(8, 2)
+        rows = self.rows('--line', f'{x0},{y0},{x1},{y1}')
+        self.assertGreater(len(rows), 20)
+        self.assertEqual(rows[0][:3], [0, x0, y0])
+        self.assertEqual(rows[-1][1:3], [x1, y1])
+        for a, b in zip(rows, rows[1:]):
+            self.assertLess(a[0], b[0] + 1e-9)
+        heights = self.answers(''.join(f'{r[1]!r},{r[2]!r}\n' for r in rows))
+        for row, answer in zip(rows, heights):
+            self.assertAlmostEqual(row[3], float(answer[2]), places=3)
+        # Between rows the surface is straight.
+        middles = [((a[1] + b[1]) / 2, (a[2] + b[2]) / 2, (a[3] + b[3]) / 2)
+                   for a, b in zip(rows, rows[1:])]
+        for (_, _, z), answer in zip(middles, self.answers(''.join(f'{x!r},{y!r}\n' for x, y, _ in middles))):
+            self.assertAlmostEqual(z, float(answer[2]), places=3)
+
+    def test_steps_are_metres_on_the_ground(self):
+        (x0, y0), (x1, y1) = self.somewhere(9, 2)
+        rows = self.rows('--line', f'{x0},{y0},{x1},{y1}', '--step', 100)
+        for i, row in enumerate(rows[:-1]):
+            self.assertAlmostEqual(row[0], 100 * i, places=3)
+        # A UTM zone's scale is within 0.1 per cent.
+        self.assertAlmostEqual(rows[-1][0] / math.hypot(x1 - x0, y1 - y0), 1, delta=0.001)
+
+    def test_lines_of_files_and_bad_ones(self):
+        (x0, y0), (x1, y1) = self.somewhere(10, 2)
+        name = self.path('line.geojson')
+        with open(name, 'w') as file:
+            json.dump({'type': 'Feature', 'properties': {}, 'geometry': {
+                'type': 'LineString', 'coordinates': [[x0, y0], [x1, y1]]}}, file)
+        self.assertEqual(self.rows('--line', name), self.rows('--line', f'{x0},{y0},{x1},{y1}'))
+        out = self.path('none.csv')
+        self.expect_error(2, 'profile', self.store, '--line', '1,2,3', '-o', out)
+        self.expect_error(1, 'profile', self.store, '--line', self.path('nowhere'), '-o', out)
+        self.expect_error(2, 'profile', self.store, '--line', '1,2,3,4', '--step', 0, '-o', out)
+
+
+if __name__ == '__main__':
+    unittest.main()

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include <terrace/stream/mesh_writer.hpp>
+#include <terrace/stream/store.hpp>
+#include <terrace/tri/grid_tin.hpp>
+#include <terrace/tri/point_tin.hpp>
+
+#include "cli.hpp"
+#include "region.hpp"
+
+/// Meshes with an error that is verified: what `mesh --max-error` and `mesh --max-points` write.
+
+namespace terrace::tools {
+
+/// What a raster's cells without data become.
+enum class Fill : std::uint8_t {
+  none,         ///< holes
+  flat,         ///< samples at the lowest height of the store
+  interpolate,  ///< samples between the heights around
+};
+/// "none", "flat", "interpolate". Throws: UsageError.
+Fill parse_fill(const std::string& text);
+/// "greedy", "removal", "fitted". Throws: UsageError.
+tri::TinQuality parse_quality(const std::string& text);
+/// "min", "max", "mean", "first", "error". Throws: UsageError.
+tri::PointDuplicates parse_duplicates(const std::string& text);
+
+struct BoundedMeshOptions {
+  double max_error = 0.0;        ///< metres
+  std::uint64_t max_points = 0;  ///< 0: no limit; else max_error is not used
+  tri::TinQuality quality = tri::TinQuality::kRemoval;
+  tri::PointDuplicates duplicates = tri::PointDuplicates::kError;
+  Fill fill = Fill::none;
+  std::optional<Region> region;
+  std::string path;                ///< of the mesh
+  stream::WriterOptions writer{};  ///< its format
+};
+
+/// What was measured on the mesh as a reader of the file gets it back, at every sample of the
+/// region at full resolution that has data.
+struct BoundedMeshResult {
+  std::uint64_t vertices = 0, triangles = 0;
+  double max_error = 0.0, rms_error = 0.0;  ///< metres
+  std::uint64_t samples = 0;                ///< with data
+  std::uint64_t duplicates = 0;             ///< samples at the place of another
+  double reading_seconds = 0.0;             ///< of all threads together, decoding included
+  double meshing_seconds = 0.0;             ///< likewise, the check included
+};
+
+/// The mesh of a raster store, window by window: windows depend on the data and the bound alone,
+/// what lies on their sides on the samples there alone. A finished window is spooled beside `path`
+/// and forgotten. Throws: stream::Error on a damaged store, if --memory does not suffice (says what
+/// it needs), or if the format's numbers are too coarse for the bound; UsageError.
+BoundedMeshResult bounded_raster_mesh(const stream::Store& store, const BoundedMeshOptions& options,
+                                      const CommonOptions& common);
+
+/// The mesh of any other store, in memory as a whole.
+BoundedMeshResult bounded_point_mesh(const stream::Store& store, const BoundedMeshOptions& options,
+                                     const CommonOptions& common);
+
+}  // namespace terrace::tools

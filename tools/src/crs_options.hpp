@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+
+#include "coordinate_system.hpp"
+#include "region.hpp"
+#include "terrace/stream/store.hpp"
+
+namespace CLI {
+class App;
+}
+
+namespace terrace::tools {
+
+/// The CRS of a store. Throws: stream::Error if it has none, or one that is not known.
+CoordinateSystem system_of(const stream::Store& store);
+
+/// Regions of `--region-crs` as regions in the store's CRS; without the option as they are.
+class RegionConversion {
+ public:
+  RegionConversion() = default;
+  RegionConversion(const stream::Store& store, const CoordinateSystem& from);
+  /// Throws: as region_in.
+  [[nodiscard]] Region operator()(Region region) const;
+
+ private:
+  struct Systems {
+    CoordinateSystem from, to;
+    stream::Box3 bounds;
+  };
+  std::optional<Systems> systems_;
+};
+
+/// Places of the store's CRS in that of `--to-crs`; without the option as they are. Heights stay.
+class PlaceConversion {
+ public:
+  PlaceConversion() = default;
+  PlaceConversion(const CoordinateSystem& from, const CoordinateSystem& to);
+  /// x and y in place. Throws: stream::Error for a point that has no place there.
+  void operator()(std::span<stream::Point3> points) const;
+  [[nodiscard]] bool has_effect() const { return systems_.has_value(); }
+
+ private:
+  struct Systems {
+    CoordinateSystem from, to;
+  };
+  std::optional<Systems> systems_;
+};
+
+/// The options --region-crs, --to-crs and --towgs84 of a verb on stores.
+class CrsOptions {
+ public:
+  void define(CLI::App& app);
+  /// Throws: UsageError for a CRS that is none, stream::Error if the store has none.
+  [[nodiscard]] RegionConversion regions(const stream::Store& store) const;
+  [[nodiscard]] PlaceConversion places(const stream::Store& store) const;
+  /// The CRS of --to-crs; nothing without it.
+  [[nodiscard]] std::optional<CoordinateSystem> to() const;
+
+ private:
+  [[nodiscard]] CoordinateSystem parsed(const std::string& text) const;
+
+  std::string region_, to_, shift_;
+};
+
+}  // namespace terrace::tools

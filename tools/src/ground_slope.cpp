@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "ground_slope.hpp"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <deque>
+#include <mutex>
+#include <vector>
+
+#include "world.hpp"
+
+namespace terrace::tools {
+
+struct GroundSlope::Table {
+  static constexpr std::size_t kSide = 256;
+
+  stream::Box3 bounds;
+  std::mutex mutex;  ///< of what makes maps
+  std::vector<std::atomic<const GroundMap*>> maps;
+  std::deque<GroundMap> made;
+
+  explicit Table(const stream::Box3& box) : bounds(box), maps(kSide * kSide) {}
+
+  GroundMap at(const Ground& ground, const Point2& stored) {
+    std::array<std::size_t, 2> part{};
+    stream::Box3 box;
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      const double width = (bounds.max[axis] - bounds.min[axis]) / kSide;
+      if (width > 0) {
+        part[axis] = static_cast<std::size_t>(
+            std::clamp((stored[axis] - bounds.min[axis]) / width, 0.0, kSide - 1.0));
+      }
+      box.min[axis] = box.max[axis] =
+          bounds.min[axis] + width * (static_cast<double>(part[axis]) + 0.5);
+    }
+    box.min[2] = box.max[2] = 0;
+    std::atomic<const GroundMap*>& slot = maps[part[1] * kSide + part[0]];
+    if (const GroundMap* map = slot.load(std::memory_order_acquire)) return *map;
+    const std::lock_guard lock(mutex);
+    if (slot.load() == nullptr) slot = &made.emplace_back(ground.map(box));
+    return *slot.load();
+  }
+};
+
+GroundSlope::GroundSlope(const stream::Store& store)
+    : placement_(placement_of(store.schema())), ground_(placement_), grid_(store.schema().grid) {
+  if (ground_.same_everywhere()) map_ = ground_.map({});
+  if (ground_.projected()) table_ = std::make_shared<Table>(store.bounds());
+}
+
+GroundMap GroundSlope::map_at(const Point2& stored) const {
+  if (ground_.same_everywhere()) return map_;
+  if (table_ != nullptr) return table_->at(ground_, stored);
+  const stream::Point3 p{stored[0], stored[1], 0};
+  return ground_.map({p, p});
+}
+
+Point2 GroundSlope::stored(const Point2& world) const {
+  const std::array<double, 6>& m = placement_.world.xy;
+  const double x = world[0] - m[2], y = world[1] - m[5];
+  Point2 place;
+  if (m[1] == 0 && m[3] == 0) {
+    place = {x / m[0], y / m[4]};
+  } else {
+    const double determinant = m[0] * m[4] - m[1] * m[3];
+    place = {(m[4] * x - m[1] * y) / determinant, (m[0] * y - m[3] * x) / determinant};
+  }
+  if (grid_) {
+    for (double& c : place) {
+      const double whole = std::nearbyint(c);
+      if (std::abs(c - whole) <= 1e-6) c = whole;
+    }
+  }
+  return place;
+}
+
+Point2 GroundSlope::world(const Point2& stored) const {
+  const stream::Point3 p = world_point(placement_, {stored[0], stored[1], 0});
+  return {p[0], p[1]};
+}
+
+tri::Gradient GroundSlope::on_ground(const Point2& stored, const SurfacePoint& surface) const {
+  if (!(surface.per_column == surface.per_column)) return {};
+  const GroundMap m = map_at(stored);
+  // ground = A * stored, so the gradient goes by the inverse of A's transpose.
+  const double metres = m[8] / placement_.coordinates[2].scale;
+  const double factor = metres / (m[0] * m[4] - m[1] * m[3]);
+  return {(m[4] * surface.per_column - m[3] * surface.per_row) * factor,
+          (m[0] * surface.per_row - m[1] * surface.per_column) * factor};
+}
+
+}  // namespace terrace::tools

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "parallel.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <exception>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+namespace terrace::tools {
+
+void parallel_for(std::size_t items, unsigned threads,
+                  const std::function<void(unsigned, std::size_t)>& work) {
+  std::atomic<std::size_t> next{0};
+  std::mutex mutex;
+  std::exception_ptr failure;
+  std::size_t failed_item = items;
+  const auto run = [&](unsigned thread) {
+    for (std::size_t item = next++; item < items; item = next++) {
+      try {
+        work(thread, item);
+      } catch (...) {
+        const std::lock_guard lock(mutex);
+        // All items before this one have begun, so the smallest that fails is found.
+        if (item < failed_item) {
+          failed_item = item;
+          failure = std::current_exception();
+        }
+        next = items;
+      }
+    }
+  };
+  {
+    std::vector<std::jthread> helpers;
+    const std::size_t wanted = std::min<std::size_t>(threads, items);
+    for (unsigned thread = 1; thread < wanted; ++thread) helpers.emplace_back(run, thread);
+    run(0);
+  }
+  if (failure) std::rethrow_exception(failure);
+}
+
+}  // namespace terrace::tools

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <terrace/stream/store.hpp>
+
+namespace terrace::tools {
+
+/// Heights for the cells of a raster that have no data, from those around: a smooth surface made by
+/// averaging upward and filling downward over halved grids (S. J. Gortler et al., The Lumigraph,
+/// 1996, doi:10.1145/237170.237200, "pull-push"). It depends on the store alone and is the same
+/// from whichever window it is asked.
+class RasterFill {
+ public:
+  /// Reads one level of the store. Memory: at most 8 MiB for the finest grid and a third more.
+  /// Throws: stream::Error on a damaged store, or if it has no point at all.
+  explicit RasterFill(const stream::Store& store);
+
+  /// The height at a place of the lattice, in the vertical unit of the store. Outside the raster
+  /// that of its border.
+  [[nodiscard]] double height(double column, double row) const;
+
+ private:
+  struct Grid {
+    std::size_t columns = 0, rows = 0;
+    std::vector<float> heights;
+  };
+  Grid grid_;
+  double reduction_ = 1.0;  ///< samples per cell of the grid
+};
+
+}  // namespace terrace::tools

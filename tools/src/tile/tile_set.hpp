@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "cli.hpp"
+#include "tile/tile_layer.hpp"
+#include "tile/tile_mesher.hpp"
+#include "tile/tile_surface.hpp"
+
+namespace terrace::tools {
+
+struct TileSetOptions {
+  std::string folder;
+  std::string name;  ///< in layer.json
+  unsigned first_zoom = 0, last_zoom = 0;
+  /// The bound at the deepest zoom, metres; twice as much at each zoom above. 0: what the client
+  /// expects of each zoom.
+  double max_error = 0.0;
+  TileMeshOptions mesh;
+  bool gzip = false;
+  bool metadata = false;  ///< the tiles below each tile, in the tile
+  bool resume = false;    ///< keeps finished tiles of an interrupted run with equal fingerprint
+  bool replace = false;
+  /// What the tiles depend on, besides the options here.
+  std::string source_fingerprint;
+};
+
+struct ZoomSummary {
+  unsigned zoom = 0;
+  std::uint64_t tiles = 0;
+  double max_error = 0.0;  ///< verified, metres
+};
+
+struct TileSetResult {
+  std::uint64_t tiles = 0, bytes = 0;
+  std::uint64_t kept = 0;     ///< of these, that were there already, whole and the same
+  std::uint64_t removed = 0;  ///< tiles of an earlier set that this one does not have
+  std::vector<ZoomSummary> zooms;
+};
+
+/// The bound of a zoom by the options.
+double max_error_of(const TileSetOptions& options, unsigned zoom);
+/// The zoom at which a 64th of a tile is not wider than the distance of samples.
+unsigned native_zoom(double spacing);
+
+/// Writes a tile set. surfaces: one per thread, all of the same samples.
+///
+/// Tiles are written beside their names and renamed one by one, and the disk is asked once, at the
+/// end, to keep them all; layer.json comes last. A tile whose bytes are there already is not
+/// touched. The bytes do not depend on the number of threads. Interrupted, a run can go on with
+/// `resume`: it checks what a journal in the folder says is finished.
+/// Throws: stream::Error, Interrupted.
+TileSetResult write_tile_set(const std::vector<std::unique_ptr<TileSurface>>& surfaces,
+                             const TileSetOptions& options, const CommonOptions& common);
+
+/// Whether `folder` may be written: it is not there, or empty, or `force` and a tile set of ours,
+/// or `resume` and a begun one. Throws: stream::Error with the remedy.
+void check_tile_folder(const std::string& folder, bool force, bool resume);
+
+}  // namespace terrace::tools

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tile/tile_sides.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "portable_math.hpp"
+#include "tile/ellipsoid.hpp"
+#include "tile/quantized_mesh.hpp"
+
+namespace terrace::tools {
+namespace {
+
+/// Samples that a leaf should have at most, each way.
+constexpr double kSamplesPerLeaf = 512.0;
+/// A leaf has at least this many units each way.
+constexpr unsigned kDeepestLeaf = 8;
+/// Places at which a side of one leaf is looked at, at most.
+constexpr double kMostPlaces = 4096.0;
+/// Share of the bound that sides are settled to. Samples so close to a side that no vertex fits
+/// between have what the side has.
+constexpr double kSideShare = 0.75;
+
+/// Of a tile, or of its part at a depth; exact.
+double width_at(unsigned zoom, unsigned depth = 0) {
+  return std::ldexp(180.0, -static_cast<int>(zoom + depth));
+}
+
+bool meet(const GeographicBox& a, const GeographicBox& b) {
+  return a.west <= b.east && b.west <= a.east && a.south <= b.north && b.south <= a.north;
+}
+
+}  // namespace
+
+ZoomPlan plan_zoom(unsigned zoom, double max_error, double range, const TileSurface& surface) {
+  ZoomPlan plan;
+  plan.zoom = zoom;
+  plan.max_error = max_error;
+  // All heights of a tile must fit into 32767 steps, and be exact as floats. A step is never below
+  // half a millimetre.
+  plan.height_step = 0x1p-11;
+  while (plan.height_step * (kTileUnits - 2) < range) plan.height_step *= 2.0;
+  // A chord of angle a lies R a^2 / 8 below its arc at most: half of the error that the client
+  // expects of the zoom.
+  plan.longest_edge = std::sqrt(8.0 * 0.5 * expected_error(zoom) / kEquatorialRadius) / kDegree;
+  plan.widest_leaf = kSamplesPerLeaf * surface.spacing();
+  return plan;
+}
+
+std::uint32_t leaf_unit(std::uint32_t k, unsigned depth) {
+  return (std::uint32_t{kTileUnits} * k + (1U << depth) / 2) >> depth;
+}
+
+double longitude_at(const TileAddress& tile, double units) {
+  return -180.0 + width_at(tile.zoom) * (tile.x + units / kTileUnits);
+}
+
+double latitude_at(const TileAddress& tile, double units) {
+  return -90.0 + width_at(tile.zoom) * (tile.y + units / kTileUnits);
+}
+
+GeographicBox box_of(const TileAddress& tile, const TileLeaf& leaf) {
+  return {longitude_at(tile, leaf_unit(leaf.x, leaf.depth)),
+          latitude_at(tile, leaf_unit(leaf.y, leaf.depth)),
+          longitude_at(tile, leaf_unit(leaf.x + 1, leaf.depth)),
+          latitude_at(tile, leaf_unit(leaf.y + 1, leaf.depth))};
+}
+
+std::vector<TileLeaf> leaves_of(const TileAddress& tile, const ZoomPlan& plan,
+                                const GeographicBox& data) {
+  std::vector<TileLeaf> leaves, open{{}};
+  while (!open.empty()) {
+    const TileLeaf leaf = open.back();
+    open.pop_back();
+    const double width = width_at(tile.zoom, leaf.depth);
+    const bool wide =
+        width > plan.longest_edge || (width > plan.widest_leaf && meet(box_of(tile, leaf), data));
+    if (!wide || leaf.depth == kDeepestLeaf) {
+      leaves.push_back(leaf);
+      continue;
+    }
+    for (unsigned quarter = 4; quarter-- > 0;) {
+      open.push_back({leaf.depth + 1, 2 * leaf.x + (quarter & 1), 2 * leaf.y + (quarter >> 1)});
+    }
+  }
+  return leaves;
+}
+
+TileSides::TileSides(const TileAddress& tile, const ZoomPlan& plan, TileSurface& surface)
+    : tile_(tile), plan_(plan), surface_(surface), data_(surface.bounds()) {}
+
+bool TileSides::is_cut(const Side& side) const {
+  if (side.depth == kDeepestLeaf) return false;
+  // A leaf beside the side lies within its length on either side of it, and is cut if this is: so
+  // the side is cut wherever a leaf of its length is.
+  const double width = width_at(tile_.zoom, side.depth);
+  if (width > plan_.longest_edge) return true;
+  if (width <= plan_.widest_leaf) return false;
+  const double from = leaf_unit(side.k, side.depth), to = leaf_unit(side.k + 1, side.depth);
+  const double line = leaf_unit(side.line, side.depth);
+  // A little more than the length: units are rounded.
+  const double reach = 1.01 * width;
+  GeographicBox box;
+  if (side.along_parallel) {
+    const double latitude = latitude_at(tile_, line);
+    box = {longitude_at(tile_, from), latitude - reach, longitude_at(tile_, to), latitude + reach};
+  } else {
+    const double longitude = longitude_at(tile_, line);
+    box = {longitude - reach, latitude_at(tile_, from), longitude + reach, latitude_at(tile_, to)};
+  }
+  return meet(box, data_);
+}
+
+std::vector<SideVertex> TileSides::settle(const Side& side) {
+  if (is_cut(side)) {
+    const Side first{side.along_parallel, side.depth + 1, 2 * side.line, 2 * side.k};
+    Side second = first;
+    ++second.k;
+    std::vector<SideVertex> all = vertices(first);
+    const std::vector<SideVertex>& rest = vertices(second);
+    all.insert(all.end(), rest.begin() + 1, rest.end());
+    return all;
+  }
+  const std::uint32_t from = leaf_unit(side.k, side.depth);
+  const std::uint32_t to = leaf_unit(side.k + 1, side.depth);
+  const std::uint32_t across = leaf_unit(side.line, side.depth);
+
+  // Two places per sample, at equal distances.
+  const double length = width_at(tile_.zoom, side.depth);
+  const double wanted = std::min(2.0 * length / surface_.spacing(), kMostPlaces);
+  const auto parts =
+      static_cast<std::size_t>(std::clamp(std::ceil(wanted), 1.0, static_cast<double>(to - from)));
+  std::vector<double> t, longitude, latitude, height(parts + 1);
+  for (std::size_t i = 0; i <= parts; ++i) {
+    const double at =
+        from + static_cast<double>(to - from) * static_cast<double>(i) / static_cast<double>(parts);
+    t.push_back(at);
+    longitude.push_back(longitude_at(tile_, side.along_parallel ? at : across));
+    latitude.push_back(latitude_at(tile_, side.along_parallel ? across : at));
+  }
+  surface_.heights(longitude, latitude, height);
+  const tri::SimplifiedLine line = tri::simplify_line(t, height, kSideShare * plan_.max_error,
+                                                      tri::TinLattice{0.0, plan_.height_step});
+  std::vector<SideVertex> vertices;
+  for (const tri::LineVertex& vertex : line.vertices) {
+    const auto at = static_cast<std::uint32_t>(vertex.t);
+    vertices.push_back({side.along_parallel ? at : across, side.along_parallel ? across : at,
+                        std::llround(vertex.height / plan_.height_step)});
+  }
+  return vertices;
+}
+
+const std::vector<SideVertex>& TileSides::vertices(const Side& side) {
+  const auto key = std::make_tuple(side.along_parallel, side.depth, side.line, side.k);
+  if (const auto found = known_.find(key); found != known_.end()) return found->second;
+  std::vector<SideVertex> settled = settle(side);
+  return known_[key] = std::move(settled);
+}
+
+std::vector<SideVertex> TileSides::around(const TileLeaf& leaf) {
+  const auto side = [&](bool along_parallel, std::uint32_t line, std::uint32_t k) {
+    return vertices({along_parallel, leaf.depth, line, k});
+  };
+  std::vector<SideVertex> ring;
+  const auto add = [&](std::vector<SideVertex> part, bool backward) {
+    if (backward) std::reverse(part.begin(), part.end());
+    ring.insert(ring.end(), part.begin(), part.end() - 1);
+  };
+  add(side(true, leaf.y, leaf.x), false);
+  add(side(false, leaf.x + 1, leaf.y), false);
+  add(side(true, leaf.y + 1, leaf.x), true);
+  add(side(false, leaf.x, leaf.y), true);
+  return ring;
+}
+
+}  // namespace terrace::tools

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <tuple>
+#include <vector>
+
+#include <terrace/tri/point_tin.hpp>
+
+#include "tile/tile_address.hpp"
+#include "tile/tile_surface.hpp"
+
+namespace terrace::tools {
+
+/// What all tiles of a zoom have in common.
+struct ZoomPlan {
+  unsigned zoom = 0;
+  double max_error = 0.0;     ///< metres
+  double height_step = 0.0;   ///< a power of two: heights of vertices are multiples of it
+  double longest_edge = 0.0;  ///< degrees: longer ones would cut off too much of the Earth's curve
+  double widest_leaf = 0.0;   ///< degrees: wider parts of a tile with samples are cut in four
+};
+/// surface: for the distance of its samples. range: of heights within any tile of the zoom.
+ZoomPlan plan_zoom(unsigned zoom, double max_error, double range, const TileSurface& surface);
+
+/// A square part of a tile, 1 / 2^depth of it wide. Place x, y counts such parts from the tile's
+/// south-west corner.
+struct TileLeaf {
+  unsigned depth = 0;
+  std::uint32_t x = 0, y = 0;
+};
+/// Units of the tile's lattice at k / 2^depth of its width.
+std::uint32_t leaf_unit(std::uint32_t k, unsigned depth);
+/// The meridian and the parallel at `units` of a tile's lattice. On a border they are the same
+/// numbers for both tiles.
+double longitude_at(const TileAddress& tile, double units);
+double latitude_at(const TileAddress& tile, double units);
+GeographicBox box_of(const TileAddress& tile, const TileLeaf& leaf);
+
+/// The parts that a tile is meshed in, so that no edge is too long and no part has too many
+/// samples.
+std::vector<TileLeaf> leaves_of(const TileAddress& tile, const ZoomPlan& plan,
+                                const GeographicBox& data);
+
+/// A vertex on the side of a leaf: units of the tile, and multiples of the height step.
+struct SideVertex {
+  std::uint32_t u = 0, v = 0;
+  std::int64_t height = 0;
+};
+
+/// Finds the vertices on the sides of a tile's leaves. They depend on the zoom's plan and on the
+/// surface along the side alone, not on the tile or leaf that asks: what neighbours share is equal,
+/// and leaves of different size fit together, because a side is cut wherever a leaf beside it is.
+class TileSides {
+ public:
+  TileSides(const TileAddress& tile, const ZoomPlan& plan, TileSurface& surface);
+
+  /// Counter-clockwise from the south-west corner, each vertex once.
+  std::vector<SideVertex> around(const TileLeaf& leaf);
+
+ private:
+  /// A side: from place k to k + 1 of 2^depth along `line` of 2^depth.
+  struct Side {
+    bool along_parallel = false;  ///< from west to east; else from south to north
+    unsigned depth = 0;
+    std::uint32_t line = 0, k = 0;
+  };
+  const std::vector<SideVertex>& vertices(const Side& side);
+  std::vector<SideVertex> settle(const Side& side);
+  [[nodiscard]] bool is_cut(const Side& side) const;
+
+  TileAddress tile_;
+  const ZoomPlan& plan_;
+  TileSurface& surface_;
+  GeographicBox data_;
+  std::map<std::tuple<bool, unsigned, std::uint32_t, std::uint32_t>, std::vector<SideVertex>>
+      known_;
+};
+
+}  // namespace terrace::tools

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "tile/tile_address.hpp"
+
+namespace terrace::tools {
+
+/// Places in degrees with heights in metres above the ellipsoid.
+struct SurfaceSamples {
+  std::vector<double> longitude, latitude, height;
+
+  [[nodiscard]] std::size_t size() const { return height.size(); }
+  void clear() {
+    longitude.clear();
+    latitude.clear();
+    height.clear();
+  }
+};
+
+/// Bounds on the heights of samples, not always reached.
+struct HeightRange {
+  double low = 0.0, high = 0.0;  ///< metres above the ellipsoid
+  bool certain = false;          ///< that there is a sample at all
+};
+
+/// What tiles are made of: samples that they must not miss, and a surface through them that has a
+/// height everywhere on the globe. One object per thread; all of one store answer alike, whatever
+/// they were asked before.
+class TileSurface {
+ public:
+  virtual ~TileSurface() = default;
+
+  /// Around all samples.
+  [[nodiscard]] virtual GeographicBox bounds() const = 0;
+  /// The smallest distance of neighbouring samples along a parallel or meridian, degrees.
+  [[nodiscard]] virtual double spacing() const = 0;
+  /// Says that samples and heights in the box will be asked for next: they are read once then.
+  virtual void expect(const GeographicBox& box) = 0;
+  /// Replaces `out` by the samples in the box, borders included.
+  virtual void samples(const GeographicBox& box, SurfaceSamples& out) = 0;
+  /// Of the heights of samples in the box, cheaply. Nothing if there is no sample.
+  virtual std::optional<HeightRange> range(const GeographicBox& box) = 0;
+  /// The surface's heights at places, filled where there are no samples: never NaN.
+  virtual void heights(std::span<const double> longitude, std::span<const double> latitude,
+                       std::span<double> out) = 0;
+  /// What a water mask shows: whether there is water at each place.
+  virtual void water(std::span<const double> longitude, std::span<const double> latitude,
+                     std::span<std::uint8_t> out) = 0;
+};
+
+}  // namespace terrace::tools

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <memory>
+#include <string>
+
+#include <CLI/CLI.hpp>
+#include <terrace/stream/store.hpp>
+
+#include "contour_run.hpp"
+#include "crs_options.hpp"
+#include "error.hpp"
+#include "output.hpp"
+#include "text_output.hpp"
+#include "units.hpp"
+#include "verbs.hpp"
+
+namespace terrace::tools {
+namespace {
+
+class ContourCommand final : public Command {
+ public:
+  void define(CLI::App& app) override {
+    app.add_option("STORE", store_, "where the heights come from")->required();
+    add_output(
+        app, output_,
+        "GeoJSON: lines in longitude and latitude, elev is the height; - is standard output");
+    app.add_option("--interval", interval_,
+                   "height from line to line, in the store's vertical unit: lines at its multiples")
+        ->required()
+        ->type_name("HEIGHT");
+    app.add_option("--region", region_,
+                   "only what is inside: minx,miny,maxx,maxy or a GeoJSON file");
+    app.add_option("--region-crs", region_crs_,
+                   "the CRS of the region (EPSG:n or a WKT file; x,y is lon,lat), if it is not the "
+                   "store's");
+  }
+
+  Summary run(const CommonOptions& common) override {
+    const Stopwatch watch;
+    ContourRequest request;
+    request.interval = parse_number(interval_, "--interval");
+    if (!(request.interval > 0)) throw UsageError("--interval must be above 0");
+    if (common.json && output_ == "-") {
+      throw UsageError("--json and the lines cannot both go to standard output; give -o FILE");
+    }
+    const stream::Store store = stream::Store::open(store_);
+    if (!region_.empty()) {
+      request.region = Region::parse(region_);
+      if (!region_crs_.empty()) {
+        request.region =
+            RegionConversion(store, CoordinateSystem::parse(region_crs_))(*request.region);
+      }
+    }
+    request.threads = common.threads;
+    request.memory_bytes = common.memory_or(machine_memory_bytes() / 2);
+    TextOutput output(output_, may_replace(output_, common.force));
+    ProgressMeter meter(common.progress, "lines");
+    const ContourOutcome outcome = write_contours(
+        store, request, [&](std::string_view text) { output.write(text); },
+        [&](std::uint64_t lines, double share) { meter.update(lines, share); });
+    output.finish();
+
+    Summary summary;
+    summary.json = {{"lines", outcome.lines},
+                    {"closed", outcome.closed},
+                    {"points", outcome.points},
+                    {"seconds", watch.seconds()},
+                    {"peak_rss_bytes", peak_rss_bytes()}};
+    summary.text = output_ + ": " + with_commas(outcome.lines) + " lines, " +
+                   with_commas(outcome.closed) + " of them closed, " + with_commas(outcome.points) +
+                   " points in " + readable_seconds(watch.seconds()) + "\n";
+    return summary;
+  }
+
+ private:
+  std::string store_, output_, interval_, region_, region_crs_;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_contour() { return std::make_unique<ContourCommand>(); }
+
+}  // namespace terrace::tools

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <CLI/CLI.hpp>
+#include <terrace/stream/store.hpp>
+
+#include "coordinate_system.hpp"
+#include "crs_options.hpp"
+#include "error.hpp"
+#include "output.hpp"
+#include "profile_run.hpp"
+#include "text_output.hpp"
+#include "units.hpp"
+#include "verbs.hpp"
+
+namespace terrace::tools {
+namespace {
+
+class ProfileCommand final : public Command {
+ public:
+  void define(CLI::App& app) override {
+    app.add_option("STORE", store_, "where the heights come from")->required();
+    add_output(app, output_,
+               "CSV: distance (metres along the line), x, y, height; - is standard output");
+    app.add_option("--line", line_, "x1,y1,x2,y2[,...] or a GeoJSON file with one LineString")
+        ->required()
+        ->type_name("LINE");
+    app.add_option("--line-crs", line_crs_,
+                   "the CRS of the line's places (EPSG:n or a WKT file; x,y is lon,lat), if it is "
+                   "not the store's; between them the line is straight in the store's");
+    app.add_option("--step", step_,
+                   "metres from row to row (default: a row wherever the line crosses the lattice "
+                   "or a diagonal of it)")
+        ->type_name("METRES");
+    app.add_option("--method", method_, "linear, natural or nearest")
+        ->capture_default_str()
+        ->type_name("NAME");
+    app.add_option("--level", level_, "only points of this level and above: a number or top")
+        ->capture_default_str();
+  }
+
+  Summary run(const CommonOptions& common) override {
+    const Stopwatch watch;
+    if (common.json && output_ == "-") {
+      throw UsageError("--json and the rows cannot both go to standard output; give -o FILE");
+    }
+    ProfileRequest request;
+    request.sampler.method = parse_interpolation(method_);
+    const std::optional<unsigned> level = parse_level(level_);
+    if (!step_.empty()) {
+      request.step = parse_number(step_, "--step");
+      if (!(*request.step > 0)) throw UsageError("--step must be above 0");
+    }
+    request.line = parse_line(line_);
+    const stream::Store store = stream::Store::open(store_);
+    if (!line_crs_.empty()) {
+      transform(CoordinateSystem::parse(line_crs_), system_of(store), request.line);
+    }
+    request.sampler.level = level.value_or(store.top());
+    request.sampler.threads = common.threads;
+    request.sampler.memory_bytes = common.memory_or(machine_memory_bytes() / 2);
+    TextOutput output(output_, may_replace(output_, common.force));
+    const ProfileOutcome outcome =
+        write_profile(store, request, [&](std::string_view text) { output.write(text); });
+    output.finish();
+    if (outcome.answered == 0) common.say("the line does not meet the store's data");
+
+    Summary summary;
+    summary.json = {{"points", outcome.points},
+                    {"answered", outcome.answered},
+                    {"metres", outcome.metres},
+                    {"seconds", watch.seconds()},
+                    {"peak_rss_bytes", peak_rss_bytes()}};
+    summary.text = output_ + ": " + with_commas(outcome.points) + " places on " +
+                   number_text(std::round(outcome.metres * 10) / 10) + " metres in " +
+                   readable_seconds(watch.seconds()) + "\n";
+    return summary;
+  }
+
+ private:
+  std::string store_, output_, line_, line_crs_, step_, method_ = "linear", level_ = "0";
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_profile() { return std::make_unique<ProfileCommand>(); }
+
+}  // namespace terrace::tools

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <cmath>
+#include <memory>
+#include <string>
+
+#include <CLI/CLI.hpp>
+#include <terrace/stream/store.hpp>
+
+#include "crs_options.hpp"
+#include "error.hpp"
+#include "output.hpp"
+#include "raster_run.hpp"
+#include "units.hpp"
+#include "verbs.hpp"
+
+namespace terrace::tools {
+namespace {
+
+class RasterCommand final : public Command {
+ public:
+  void define(CLI::App& app) override {
+    app.add_option("STORE", store_, "where the heights come from")->required();
+    add_output(app, output_, "the GeoTIFF to write");
+    app.add_option("--value", value_,
+                   "height; slope in degrees; aspect in degrees clockwise from north, downhill; "
+                   "hillshade, 1 to 255")
+        ->capture_default_str()
+        ->type_name("NAME");
+    app.add_option("--cell", cell_,
+                   "width and height of a cell in units of the output's CRS (default: the "
+                   "raster's own cells)")
+        ->type_name("SIZE");
+    app.add_option("--region", region_,
+                   "only what is inside: minx,miny,maxx,maxy or a GeoJSON file");
+    app.add_option("--method", method_, "between samples: linear, natural or nearest")
+        ->capture_default_str()
+        ->type_name("NAME");
+    app.add_option("--level", level_, "only points of this level and above: a number or top")
+        ->capture_default_str();
+    crs_.define(app);
+  }
+
+  Summary run(const CommonOptions& common) override {
+    const Stopwatch watch;
+    RasterRequest request;
+    request.value = parse_raster_value(value_);
+    request.sampler.method = parse_interpolation(method_);
+    const std::optional<unsigned> level = parse_level(level_);
+    if (!cell_.empty()) {
+      request.cell = parse_number(cell_, "--cell");
+      if (!(*request.cell > 0)) throw UsageError("--cell must be above 0");
+    }
+    if (output_ == "-") throw UsageError("a GeoTIFF cannot go to standard output; name a file");
+    const stream::Store store = stream::Store::open(store_);
+    request.sampler.level = level.value_or(store.top());
+    request.sampler.threads = common.threads;
+    request.sampler.memory_bytes = common.memory_or(machine_memory_bytes() / 2);
+    if (!region_.empty()) request.region = crs_.regions(store)(Region::parse(region_));
+    if (crs_.places(store).has_effect()) request.to = crs_.to();
+    request.output = output_;
+    request.replace = may_replace(output_, common.force);
+    ProgressMeter meter(common.progress, "cells");
+    const RasterOutcome outcome = write_raster(
+        store, request, [&](std::uint64_t cells, double share) { meter.update(cells, share); });
+    if (!outcome.assumption.empty()) common.say(outcome.assumption);
+
+    Summary summary;
+    summary.json = {{"columns", outcome.columns},
+                    {"rows", outcome.rows},
+                    {"cells", outcome.columns * outcome.rows},
+                    {"nodata", outcome.columns * outcome.rows - outcome.cells_with_data},
+                    {"seconds", watch.seconds()},
+                    {"peak_rss_bytes", peak_rss_bytes()}};
+    summary.text = output_ + ": " + with_commas(outcome.columns) + " x " +
+                   with_commas(outcome.rows) + " cells, " +
+                   with_commas(outcome.columns * outcome.rows - outcome.cells_with_data) +
+                   " without data, in " + readable_seconds(watch.seconds()) + "\n";
+    return summary;
+  }
+
+ private:
+  std::string store_, output_, value_ = "height", cell_, region_, method_ = "linear", level_ = "0";
+  CrsOptions crs_;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_raster() { return std::make_unique<RasterCommand>(); }
+
+}  // namespace terrace::tools

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include <CLI/CLI.hpp>
+#include <terrace/stream/store.hpp>
+
+#include "coordinate_system.hpp"
+#include "crs_options.hpp"
+#include "error.hpp"
+#include "output.hpp"
+#include "sample_run.hpp"
+#include "text_output.hpp"
+#include "units.hpp"
+#include "verbs.hpp"
+
+namespace terrace::tools {
+namespace {
+
+class SampleCommand final : public Command {
+ public:
+  void define(CLI::App& app) override {
+    app.add_option("STORE", store_, "where the heights come from")->required();
+    app.add_option("--points", points_,
+                   "CSV of places, one a line; columns by name (x,y; lon,lat; longitude,latitude; "
+                   "easting,northing) or else the first two; - is standard input")
+        ->capture_default_str()
+        ->type_name("FILE");
+    app.add_option("-o,--output", output_,
+                   "the lines again, with height, gradient (rise per run), slope and aspect "
+                   "(degrees; aspect clockwise from north, downhill) behind; empty where there is "
+                   "no data")
+        ->capture_default_str()
+        ->type_name("FILE");
+    app.add_option("--method", method_,
+                   "linear: on the triangulated samples; natural: natural neighbours, smooth; "
+                   "nearest: the nearest sample")
+        ->capture_default_str()
+        ->type_name("NAME");
+    app.add_option("--level", level_, "only points of this level and above: a number or top")
+        ->capture_default_str();
+    app.add_option("--points-crs", points_crs_,
+                   "the CRS of the places (EPSG:n or a WKT file; x,y is lon,lat), if it is not the "
+                   "store's");
+    app.add_option("--towgs84", shift_,
+                   "dx,dy,dz[,rx,ry,rz,ds] from the datum of --points-crs to WGS 84, if it is "
+                   "another");
+    not_yet(app, {"--to-crs"});
+  }
+
+  Summary run(const CommonOptions& common) override {
+    const Stopwatch watch;
+    if (common.json && output_ == "-") {
+      throw UsageError("--json and the lines cannot both go to standard output; give -o FILE");
+    }
+    SamplerOptions options;
+    options.method = parse_interpolation(method_);
+    const std::optional<unsigned> level = parse_level(level_);
+    const stream::Store store = stream::Store::open(store_);
+    options.level = level.value_or(store.top());
+    options.threads = common.threads;
+    options.memory_bytes = common.memory_or(machine_memory_bytes() / 2);
+    std::function<void(std::span<Point2>)> to_store;
+    if (!points_crs_.empty()) {
+      std::optional<DatumShift> shift;
+      if (!shift_.empty()) shift = parse_datum_shift(shift_);
+      const CoordinateSystem from = CoordinateSystem::parse(points_crs_, shift);
+      const CoordinateSystem to = system_of(store);
+      to_store = [from, to](std::span<Point2> here) { transform(from, to, here); };
+    }
+    PlaceFile places(points_);
+    TextOutput output(output_, may_replace(output_, common.force));
+    ProgressMeter meter(common.progress, "points");
+    const SampleCounts counts = answer_places(
+        store, options, places, to_store, [&](std::string_view text) { output.write(text); },
+        [&](const SampleCounts& sum) { meter.update(sum.points, 0); });
+    output.finish();
+    if (counts.points > 0 && counts.answered == 0) {
+      common.say(
+          "no point has a height: are their coordinates in the CRS of the store? --points-crs "
+          "says otherwise");
+    }
+
+    Summary summary;
+    summary.json = {{"points", counts.points},
+                    {"answered", counts.answered},
+                    {"seconds", watch.seconds()},
+                    {"points_per_second", static_cast<double>(counts.points) / watch.seconds()},
+                    {"peak_rss_bytes", peak_rss_bytes()}};
+    summary.text = with_commas(counts.points) + " points, " +
+                   with_commas(counts.points - counts.answered) + " of them without a height, in " +
+                   readable_seconds(watch.seconds()) + ", " +
+                   readable_rate(static_cast<double>(counts.points) / watch.seconds()) + "\n";
+    return summary;
+  }
+
+ private:
+  std::string store_, points_ = "-", output_ = "-", method_ = "linear", level_ = "0", points_crs_,
+                      shift_;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_sample() { return std::make_unique<SampleCommand>(); }
+
+}  // namespace terrace::tools

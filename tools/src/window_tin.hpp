@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include <terrace/stream/mesh_writer.hpp>
+#include <terrace/stream/store.hpp>
+#include <terrace/tri/grid_tin.hpp>
+
+#include "raster_fill.hpp"
+#include "store_window.hpp"
+#include "world.hpp"
+
+namespace terrace::tools {
+
+/// How the windows of a raster are meshed. Heights in the store's vertical unit.
+struct WindowTinOptions {
+  double bound = 0.0;  ///< what readers of the file may see
+  double aim = 0.0;    ///< what is meshed to: less, where the file rounds positions
+  tri::GridTinOptions tin;
+  LatticeWindow whole;  ///< of which the windows are parts
+  /// What a sample without data becomes; nothing: it stays without.
+  std::function<double(std::int64_t column, std::int64_t row)> fill;
+};
+
+/// The mesh of one window.
+struct WindowTin {
+  LatticeWindow window;
+  std::vector<tri::GridVertex> vertices;  ///< columns and rows count from the window's first
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  tri::GridTinCheck check;  ///< of what a reader gets back
+  /// With data before any was filled; those on the first row and column count in the window before.
+  std::uint64_t samples = 0;
+  double reading_seconds = 0.0, meshing_seconds = 0.0;
+};
+
+/// Meshes windows of one raster store. One object per thread.
+class WindowMesher {
+ public:
+  WindowMesher(const stream::Store& store, WindowTinOptions options,
+               const stream::MeshRounding& rounding);
+
+  /// What lies on a side depends on the samples at that side and beside it alone, so two windows
+  /// that share one have the same vertices there.
+  /// Throws: stream::Error on a damaged store, and where the rounded positions break the bound.
+  WindowTin mesh(const LatticeWindow& window);
+  /// How many vertices it has by greedy insertion alone, unchecked.
+  std::size_t count_greedy(const LatticeWindow& window);
+
+  /// The position in the CRS of a vertex of a window.
+  [[nodiscard]] stream::Point3 position(const LatticeWindow& window,
+                                        const tri::GridVertex& vertex) const;
+
+ private:
+  template <class T>
+  struct Samples;
+  template <class T>
+  Samples<T> read(const LatticeWindow& window);
+  template <class T>
+  WindowTin mesh_as(const LatticeWindow& window, tri::TinQuality quality, bool checked);
+  void check(WindowTin& tin,
+             const std::function<tri::GridTinCheck(std::span<const tri::Point3>, double tolerance)>&
+                 measure) const;
+
+  const stream::Store& store_;
+  WindowTinOptions options_;
+  const stream::MeshRounding& rounding_;
+  Placement placement_;
+  StoreWindow reader_;
+};
+
+}  // namespace terrace::tools

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "src/ordered_work.hpp"
+
+#include <atomic>
+#include <memory>
+#include <stdexcept>
+
+#include <gtest/gtest.h>
+
+namespace terrace::tools {
+namespace {
+
+TEST(OrderedWork, CommitsEachResultOnceInOrder) {
+  for (const unsigned threads : {1U, 2U, 7U}) {
+    for (const std::size_t count : {0, 1, 2, 500}) {
+      SCOPED_TRACE(testing::Message() << threads << " threads, " << count);
+      std::atomic<unsigned> made = 0;
+      std::vector<std::size_t> committed;
+      in_order(
+          count, threads,
+          [&](unsigned worker, std::size_t i) {
+            EXPECT_LT(worker, threads);
+            ++made;
+            if (i % 3 == 0) std::this_thread::yield();
+            return std::make_unique<std::size_t>(i * i);  // need not be copyable
+          },
+          [&](std::size_t i, const std::unique_ptr<std::size_t>& result) {
+            EXPECT_EQ(*result, i * i);
+            committed.push_back(i);
+          });
+      EXPECT_EQ(made, count);
+      ASSERT_EQ(committed.size(), count);
+      for (std::size_t i = 0; i < count; ++i) EXPECT_EQ(committed[i], i);
+    }
+  }
+}
+
+TEST(OrderedWork, TheFirstErrorComesOut) {
+  for (const unsigned threads : {1U, 4U}) {
+    std::size_t last = 0;
+    const auto run = [&] {
+      in_order(
+          1000, threads,
+          [](unsigned, std::size_t i) {
+            if (i >= 40) throw std::runtime_error("at " + std::to_string(i));
+            return i;
+          },
+          [&](std::size_t i, std::size_t) { last = i; });
+    };
+    try {
+      run();
+      FAIL();
+    } catch (const std::runtime_error& error) {
+      EXPECT_STREQ(error.what(), "at 40");
+    }
+    EXPECT_EQ(last, 39U);
+  }
+}
+
+TEST(OrderedWork, AnErrorOfACommitEndsTheWork) {
+  std::atomic<unsigned> made = 0;
+  EXPECT_THROW(in_order(
+                   1000, 4,
+                   [&](unsigned, std::size_t i) {
+                     ++made;
+                     return i;
+                   },
+                   [](std::size_t i, std::size_t) {
+                     if (i == 10) throw std::runtime_error("full");
+                   }),
+               std::runtime_error);
+  EXPECT_LT(made, 1000U);
+}
+
+}  // namespace
+}  // namespace terrace::tools
