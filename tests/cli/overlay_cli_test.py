@@ -187,6 +187,8 @@ class OverlayTest(unittest.TestCase):
             2, 'mesh', self.store, '-o', out, '--save-overlay', self.path('u.overlay')))
         self.assertIn('same file', self.expect_error(
             2, 'mesh', self.store, '-o', out, '--smooth', 'taubin', '--save-overlay', out))
+        self.assertIn('--overlay', self.expect_error(
+            2, 'mesh', self.store, '-o', out, '--max-error', 1, '--overlay', self.overlay))
         self.assertFalse(os.path.exists(out))
 
 

@@ -88,11 +88,11 @@ class MeshCommand final : public Command {
  private:
   Summary bounded(const CommonOptions& common) const {
     const Stopwatch watch;
-    if (level_ != "0" || !focuses_.empty() || !smooth_.empty() || !overlay_.empty() ||
-        metric_ != "euclidean") {
+    if (level_ != "0" || !focuses_.empty() || !smooth_.empty() || metric_ != "euclidean" ||
+        !overlay_.empty() || !save_overlay_.empty()) {
       throw UsageError(
-          "--max-error and --max-points are about all samples as they are: without --level, "
-          "--focus, --smooth, --overlay and --metric");
+          "--max-error and --max-points are about all samples: without --level, --focus, --smooth, "
+          "--overlay and --metric");
     }
     BoundedMeshOptions options;
     if (max_error_ && !max_points_.empty()) {
@@ -115,8 +115,7 @@ class MeshCommand final : public Command {
     if (crs_.places(store).has_effect()) {
       throw UsageError(
           "--to-crs: between other coordinates the triangles would be other surfaces, and the "
-          "bound "
-          "would not hold; write the mesh in the store's CRS");
+          "bound would not hold; write the mesh in the store's CRS");
     }
     options.writer = {.format = format_, .replace = may_replace(output_, common.force)};
     const BoundedMeshResult result = store.schema().grid
