@@ -186,7 +186,7 @@ class TileSet:
 
     def check_sides(self):
         for (zoom, x, y), tile in self.tiles.items():
-            for there, own, other in (((zoom, x + 1, y), 'east', 'west'),
+            for there, own, other in (((zoom, (x + 1) % 2 ** (zoom + 1), y), 'east', 'west'),
                                       ((zoom, x, y + 1), 'north', 'south')):
                 if there not in self.tiles:
                     continue

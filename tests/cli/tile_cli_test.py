@@ -67,9 +67,9 @@ class TileTest(TileTestCase):
         self.assertEqual(layer['available'][:2], [[], []])
         self.assertEqual(len(layer['available']), 9)
         places = [p[:2] for p in dem.samples()]
-        for got, right in zip(layer['bounds'], (min(p[0] for p in places), min(p[1] for p in places),
-                                                max(p[0] for p in places),
-                                                max(p[1] for p in places))):
+        lons, lats = [p[0] for p in places], [p[1] for p in places]
+        box = (min(lons), min(lats), max(lons), max(lats))
+        for got, right in zip(layer['bounds'], box):
             self.assertAlmostEqual(got, right, places=9)
         self.assertEqual(layer['tiles'], ['{z}/{x}/{y}.terrain?v={version}'])
         # Exactly the tiles that have samples.

@@ -104,7 +104,9 @@ class SetCheck {
         surfaces_(surfaces),
         common_(common) {}
 
-  void zoom(unsigned zoom, const std::vector<TileAddress>& tiles);
+  /// Of all zooms together, so that the few large tiles of the upper ones share the threads.
+  void tiles(const std::vector<TileAddress>& tiles);
+  /// tiles: of one zoom.
   void absent(unsigned zoom, const std::vector<TileAddress>& tiles);
 
   TileCheckResult result;
@@ -117,6 +119,7 @@ class SetCheck {
   [[nodiscard]] Checked check(const TileAddress& tile, unsigned worker) const;
   void compare(const TileAddress& tile, const char* side, const Side& own,
                const TileAddress& neighbour, const Side& other);
+  void add(unsigned zoom, const TileHeights& heights);
 
   const TileCheckOptions& options_;
   TileLayer layer_;
@@ -172,8 +175,7 @@ void SetCheck::compare(const TileAddress& tile, const char* side, const Side& ow
        std::string("its ") + side + " side and that of " + tile_path(neighbour) + " have " + what});
 }
 
-void SetCheck::zoom(unsigned zoom, const std::vector<TileAddress>& tiles) {
-  ZoomCheck summary{.zoom = zoom, .tiles = tiles.size()};
+void SetCheck::tiles(const std::vector<TileAddress>& tiles) {
   // Northern sides of the row below and of this row, by column, and the eastern side of the tile
   // before this one.
   std::map<std::uint32_t, Side> below, row;
@@ -188,8 +190,9 @@ void SetCheck::zoom(unsigned zoom, const std::vector<TileAddress>& tiles) {
         for (TileFault& fault : checked.faults) {
           result.problems.push_back({path_of(tile), fault.offset, std::move(fault.what)});
         }
-        if (!last || last->y != tile.y) {
-          below = last && last->y + 1 == tile.y ? std::move(row) : std::map<std::uint32_t, Side>{};
+        if (!last || last->zoom != tile.zoom || last->y != tile.y) {
+          const bool next = last && last->zoom == tile.zoom && last->y + 1 == tile.y;
+          below = next ? std::move(row) : std::map<std::uint32_t, Side>{};
           row.clear();
           before.clear();
         }
@@ -198,21 +201,25 @@ void SetCheck::zoom(unsigned zoom, const std::vector<TileAddress>& tiles) {
             compare(tile, "western", checked.west, *last, before);
           }
           if (const auto under = below.find(tile.x); under != below.end()) {
-            compare(tile, "southern", checked.south, {zoom, tile.x, tile.y - 1}, under->second);
+            compare(tile, "southern", checked.south, {tile.zoom, tile.x, tile.y - 1},
+                    under->second);
           }
           row[tile.x] = std::move(checked.north);
-          summary.samples += checked.heights.samples;
-          summary.max_error = std::max(summary.max_error, checked.heights.max_error);
         }
         before = std::move(checked.east);
         last = tile;
-        meter.update(result.tiles + i,
-                     static_cast<double>(i + 1) / static_cast<double>(tiles.size()));
+        add(tile.zoom, checked.heights);
+        meter.update(i + 1, static_cast<double>(i + 1) / static_cast<double>(tiles.size()));
       });
-  result.tiles += summary.tiles;
-  result.samples += summary.samples;
-  if (!surfaces_.empty() && zoom >= layer_.first_zoom) absent(zoom, tiles);
-  if (zoom >= layer_.first_zoom) result.zooms.push_back(summary);
+}
+
+void SetCheck::add(unsigned zoom, const TileHeights& heights) {
+  ZoomCheck& sum = result.zooms[zoom];
+  ++sum.tiles;
+  sum.samples += heights.samples;
+  sum.max_error = std::max(sum.max_error, heights.max_error);
+  ++result.tiles;
+  result.samples += heights.samples;
 }
 
 void SetCheck::absent(unsigned zoom, const std::vector<TileAddress>& tiles) {
@@ -251,11 +258,21 @@ TileCheckResult check_tile_set(const TileCheckOptions& options, unsigned threads
   }
   TileLayer layer = read_layer(layer_path);
   TileInventory inventory = take_inventory(options.folder, layer);
+  const unsigned first = layer.first_zoom;
   SetCheck check(options, std::move(layer), threads, surfaces, common);
   check.result.problems = std::move(inventory.problems);
+  std::vector<TileAddress> all;
   for (unsigned zoom = 0; zoom < inventory.tiles.size(); ++zoom) {
-    check.zoom(zoom, inventory.tiles[zoom]);
+    check.result.zooms.push_back({.zoom = zoom});
+    all.insert(all.end(), inventory.tiles[zoom].begin(), inventory.tiles[zoom].end());
   }
+  check.tiles(all);
+  if (!surfaces.empty()) {
+    for (unsigned zoom = first; zoom < inventory.tiles.size(); ++zoom) {
+      check.absent(zoom, inventory.tiles[zoom]);
+    }
+  }
+  check.result.zooms.erase(check.result.zooms.begin(), check.result.zooms.begin() + first);
   return std::move(check.result);
 }
 

@@ -29,7 +29,7 @@ struct ZoomCheck {
 };
 
 struct TileCheckResult {
-  std::vector<stream::Problem> problems;  ///< by zoom, row, column
+  std::vector<stream::Problem> problems;  ///< of layer.json, then by zoom, row, column
   std::uint64_t tiles = 0, samples = 0;
   std::vector<ZoomCheck> zooms;
 };

@@ -107,6 +107,11 @@ bool TileSides::is_cut(const Side& side) const {
   } else {
     const double longitude = longitude_at(tile_, line);
     box = {longitude - reach, latitude_at(tile_, from), longitude + reach, latitude_at(tile_, to)};
+    // The line of 180 degrees has two numbers, and tiles on both sides of it.
+    if (std::abs(longitude) == 180.0) {
+      const GeographicBox other{-longitude - reach, box.south, -longitude + reach, box.north};
+      if (meet(other, data_)) return true;
+    }
   }
   return meet(box, data_);
 }
