@@ -122,8 +122,8 @@ TEST(EllipticalKernel3, SignsAreExact) {
       tied += side == 0;
       using Corner = EllipticalKernel::Vertex;
       // It may leave anything open.
-      const auto verdict = EllipticalKernel::Probe(p[4], {}).side(
-          Corner{c[0], 0}, Corner{c[1], 0}, Corner{c[2], 0}, Corner{c[3], 0});
+      const auto verdict = EllipticalKernel::Probe(p[4], {}).side(Corner{c[0], 0}, Corner{c[1], 0},
+                                                                  Corner{c[2], 0}, Corner{c[3], 0});
       if (verdict != spatial::Verdict::kOpen) {
         ASSERT_EQ(side, verdict == spatial::Verdict::kIn ? 1 : -1);
       }
