@@ -21,7 +21,7 @@ std::vector<std::byte> some_bytes(std::size_t size, unsigned seed) {
 }
 
 TEST(Gzip, UnpacksToTheSameBytes) {
-  for (const std::size_t size : {0, 1, 2, 1000, 100000}) {
+  for (const std::size_t size : {0U, 1U, 2U, 1000U, 100000U}) {
     for (const int level : {1, 6, 12}) {
       const auto bytes = some_bytes(size, static_cast<unsigned>(size));
       const auto packed = gzip(bytes, level);

@@ -96,10 +96,13 @@ bool TileSides::is_cut(const Side& side) const {
   const double width = width_at(tile_.zoom, side.depth);
   if (width > plan_.longest_edge) return true;
   if (width <= plan_.widest_leaf) return false;
+  // A little more than the length: units are rounded.
+  return is_near_data(side, 1.01 * width);
+}
+
+bool TileSides::is_near_data(const Side& side, double reach) const {
   const double from = leaf_unit(side.k, side.depth), to = leaf_unit(side.k + 1, side.depth);
   const double line = leaf_unit(side.line, side.depth);
-  // A little more than the length: units are rounded.
-  const double reach = 1.01 * width;
   GeographicBox box;
   if (side.along_parallel) {
     const double latitude = latitude_at(tile_, line);
@@ -164,9 +167,11 @@ std::vector<SideVertex> TileSides::settle(const Side& side) {
   const std::uint32_t to = leaf_unit(side.k + 1, side.depth);
   const std::uint32_t across = leaf_unit(side.line, side.depth);
 
-  // Two places per sample, at equal distances.
+  // Two places per sample, at equal distances; away from all samples the ends will do.
   const double length = width_at(tile_.zoom, side.depth);
-  const double wanted = std::min(2.0 * length / surface_.spacing(), kMostPlaces);
+  const double unit = width_at(tile_.zoom) / kTileUnits;
+  const bool near_data = is_near_data(side, 2.0 * (unit + surface_.spacing()));
+  const double wanted = near_data ? std::min(2.0 * length / surface_.spacing(), kMostPlaces) : 1.0;
   const auto parts =
       static_cast<std::size_t>(std::clamp(std::ceil(wanted), 1.0, static_cast<double>(to - from)));
   std::vector<double> t, longitude, latitude, height;
@@ -177,7 +182,7 @@ std::vector<SideVertex> TileSides::settle(const Side& side) {
     longitude.push_back(longitude_at(tile_, side.along_parallel ? at : across));
     latitude.push_back(latitude_at(tile_, side.along_parallel ? across : at));
   }
-  add_samples(side, t, longitude, latitude);
+  if (near_data) add_samples(side, t, longitude, latitude);
   height.resize(t.size());
   surface_.heights(longitude, latitude, height);
   const tri::SimplifiedLine line = tri::simplify_line(t, height, kSideShare * plan_.max_error,

@@ -73,6 +73,8 @@ class TileSides {
   void add_samples(const Side& side, std::vector<double>& t, std::vector<double>& longitude,
                    std::vector<double>& latitude);
   [[nodiscard]] bool is_cut(const Side& side) const;
+  /// Whether there may be samples within `reach` (degrees) of a side; the same for both tiles.
+  [[nodiscard]] bool is_near_data(const Side& side, double reach) const;
 
   TileAddress tile_;
   const ZoomPlan& plan_;

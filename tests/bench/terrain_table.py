@@ -1,0 +1,122 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Times error-bounded meshes, web-globe tiles and heights at points as whole processes.
+
+Prints three Markdown tables, medians of the runs. Meshes: triangles, seconds of reading (decoding with
+checksums) and of meshing (checks at every sample included; of all threads together), wall clock.
+Tiles: of the raster as longitudes and latitudes, zoom 0 to the one that shows every sample. Points: a
+million random places in one call.
+
+usage: terrain_table.py TERRACE [--size 2049x2049] [--runs 3] [--errors 20,5,1] [--points 1000000]
+                        [--dem FILE.tif] [--tile-dem FILE.tif]
+"""
+import argparse
+import json
+import os
+import random
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+
+
+def terrace(command, *args):
+    """Runs a verb; returns its summary, with wall and CPU seconds of the process."""
+    before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.monotonic()
+    result = subprocess.run([command, *map(str, args), '--json', '-q'], capture_output=True, text=True)
+    if result.returncode != 0:
+        sys.exit(f"failed: terrace {' '.join(map(str, args))}\n{result.stderr}")
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    summary = json.loads(result.stdout)
+    summary['wall'] = time.monotonic() - start
+    summary['cpu'] = after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
+    return summary
+
+
+def median(runs, key):
+    return statistics.median(run[key] for run in runs)
+
+
+def mesh_table(options, store, folder):
+    print('| mesh | threads | triangles | max error | reading s | meshing s | wall s | peak MiB |')
+    print('|---|---|---|---|---|---|---|---|')
+    for error in options.errors.split(','):
+        for quality in ('greedy', 'removal', 'fitted'):
+            for threads in (1, 2):
+                runs = [terrace(options.terrace, 'mesh', store, '-o', os.path.join(folder, 'm.ply'),
+                                '--force', '--max-error', error, '--quality', quality, '--threads',
+                                threads) for _ in range(options.runs)]
+                print(f"| {quality}, {error} m | {threads} | {runs[0]['triangles']:,} "
+                      f"| {runs[0]['max_error']:.5f} | {median(runs, 'reading_seconds'):.3f} "
+                      f"| {median(runs, 'meshing_seconds'):.3f} | {median(runs, 'wall'):.2f} "
+                      f"| {runs[0]['peak_rss_bytes'] / 2**20:.0f} |", flush=True)
+
+
+def tile_table(options, store, folder):
+    print('\n| tiles | threads | number | bytes | deepest zoom, error | CPU s | wall s | peak MiB |')
+    print('|---|---|---|---|---|---|---|---|')
+    for quality in ('greedy', 'removal'):
+        for bound in ((), ('--max-error', '0.94')):
+            for threads in (1, 2):
+                runs = []
+                for k in range(options.runs):
+                    out = os.path.join(folder, f'tiles-{quality}-{len(bound)}-{threads}-{k}')
+                    runs.append(terrace(options.terrace, 'tile', store, '-o', out, '--vertical',
+                                        'ignore', '--quality', quality, '--threads', threads, *bound))
+                last = runs[0]['zooms'][-1]
+                print(f"| {quality}{', 0.94 m' if bound else ''} | {threads} | {runs[0]['tiles']:,} "
+                      f"| {runs[0]['bytes']:,} | {last['zoom']}, {last['max_error']:.3f} m "
+                      f"| {median(runs, 'cpu'):.2f} | {median(runs, 'wall'):.2f} "
+                      f"| {runs[0]['peak_rss_bytes'] / 2**20:.0f} |", flush=True)
+
+
+def sample_table(options, store, folder):
+    box = terrace(options.terrace, 'info', store)['bounds']
+    places = os.path.join(folder, 'places.csv')
+    choice = random.Random(1)
+    with open(places, 'w') as file:
+        file.write('x,y\n')
+        for _ in range(options.points):
+            x, y = (choice.uniform(box['min'][k], box['max'][k]) for k in (0, 1))
+            file.write(f'{x:.3f},{y:.3f}\n')
+    print('\n| heights | threads | points | CPU s | wall s | M points/s |')
+    print('|---|---|---|---|---|---|')
+    for method in ('linear', 'natural', 'nearest'):
+        for threads in (1, 2):
+            runs = [terrace(options.terrace, 'sample', store, '--points', places, '--method', method,
+                            '-o', os.path.join(folder, 'h.csv'), '--force', '--threads', threads)
+                    for _ in range(options.runs)]
+            print(f"| {method} | {threads} | {options.points:,} | {median(runs, 'cpu'):.2f} "
+                  f"| {median(runs, 'wall'):.2f} | {options.points / median(runs, 'wall') / 1e6:.2f} |",
+                  flush=True)
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument('terrace')
+    parser.add_argument('--size', default='2049x2049')
+    parser.add_argument('--runs', type=int, default=3)
+    parser.add_argument('--errors', default='20,5,1')
+    parser.add_argument('--points', type=int, default=1000000)
+    parser.add_argument('--dem')
+    parser.add_argument('--tile-dem')
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        def store_of(raster, name, *crs):
+            if not raster:
+                raster = os.path.join(folder, f'{name}.tif')
+                terrace(options.terrace, 'synth', 'dem', '--size', options.size, '-o', raster, *crs)
+            store = os.path.join(folder, f'{name}.terrace')
+            terrace(options.terrace, 'build', raster, '-o', store)
+            return store
+
+        store = store_of(options.dem, 'plane')
+        mesh_table(options, store, folder)
+        tile_table(options, store_of(options.tile_dem, 'tiled', '--crs', 'EPSG:32632'), folder)
+        sample_table(options, store, folder)
+
+
+if __name__ == '__main__':
+    main()
