@@ -178,7 +178,7 @@ TEST_P(Sampler, NaturalIsThatOfTheWholeLattice) {
       if (queries[i][0] < 0 || queries[i][1] < 0) continue;
       // A corner of the square without data is always a neighbour of a place inside.
       bool hole = false;
-      for (int corner = 0; corner < 4; ++corner) {
+      for (unsigned corner = 0; corner < 4; ++corner) {
         const auto column = static_cast<std::size_t>(queries[i][0]) + (corner & 1);
         const auto row = static_cast<std::size_t>(queries[i][1]) + (corner >> 1);
         hole = hole || column >= GetParam().columns || row >= GetParam().rows ||

@@ -135,8 +135,8 @@ std::int64_t RasterMesher::window_cells(const WindowTinOptions& options) const {
   const LatticePlan plan(whole_, kWindowCells);
   WindowMesher mesher(store_, options, rounding_);
   std::size_t vertices = 0, windows = 0;
-  for (const std::size_t y : {1, 3}) {
-    for (const std::size_t x : {1, 3}) {
+  for (const std::size_t y : {1U, 3U}) {
+    for (const std::size_t x : {1U, 3U}) {
       const std::size_t i = plan.down() * y / 4 * plan.across() + plan.across() * x / 4;
       vertices += mesher.count_greedy(plan.window(i));
       ++windows;

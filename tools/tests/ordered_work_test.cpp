@@ -12,7 +12,7 @@ namespace {
 
 TEST(OrderedWork, CommitsEachResultOnceInOrder) {
   for (const unsigned threads : {1U, 2U, 7U}) {
-    for (const std::size_t count : {0, 1, 2, 500}) {
+    for (const std::size_t count : {0U, 1U, 2U, 500U}) {
       SCOPED_TRACE(testing::Message() << threads << " threads, " << count);
       std::atomic<unsigned> made = 0;
       std::vector<std::size_t> committed;

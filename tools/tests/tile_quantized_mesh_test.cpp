@@ -125,7 +125,7 @@ TEST(QuantizedMesh, TheBytesAreThoseOfTheSpecification) {
   };
   EXPECT_EQ(word(88), 4);                                                 // vertices
   EXPECT_EQ(word(116), 2);                                                // triangles
-  for (const std::size_t i : {0, 1, 2}) EXPECT_EQ(word(120 + 2 * i), 0);  // three new vertices
+  for (const std::size_t i : {0U, 1U, 2U}) EXPECT_EQ(word(120 + 2 * i), 0);  // three new vertices
   EXPECT_EQ(word(126), 3);                                                // the first one again
 }
 
