@@ -123,10 +123,10 @@ TEST(QuantizedMesh, TheBytesAreThoseOfTheSpecification) {
     std::memcpy(&value, bytes.data() + at, 2);
     return value;
   };
-  EXPECT_EQ(word(88), 4);                                                 // vertices
-  EXPECT_EQ(word(116), 2);                                                // triangles
+  EXPECT_EQ(word(88), 4);                                                    // vertices
+  EXPECT_EQ(word(116), 2);                                                   // triangles
   for (const std::size_t i : {0U, 1U, 2U}) EXPECT_EQ(word(120 + 2 * i), 0);  // three new vertices
-  EXPECT_EQ(word(126), 3);                                                // the first one again
+  EXPECT_EQ(word(126), 3);                                                   // the first one again
 }
 
 TEST(QuantizedMesh, EveryShortenedTileIsRefused) {
