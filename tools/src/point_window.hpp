@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -9,6 +10,7 @@
 #include <terrace/tri/delaunay2.hpp>
 #include <terrace/tri/heights.hpp>
 
+#include "circle_cover.hpp"
 #include "cluster_frontier.hpp"
 #include "lattice_surface.hpp"
 #include "region.hpp"
@@ -73,7 +75,53 @@ class PointWindow {
   [[nodiscard]] SurfacePoint at(const Point2& place) const;
 
  private:
-  // (to come)
+  using Triangulation = tri::Delaunay2<double>;
+  /// Where a vertex comes from: the sequence of its cluster in read_, and its place in that.
+  struct Origin {
+    std::uint32_t cluster = 0xFFFFFFFF, index = 0;
+  };
+  /// A triangle, or a hull edge (no triangle), that needs what lies in its cover.
+  struct Suspect {
+    CircleCover cover;
+    tri::TriangleId triangle = tri::kNoTriangle;
+  };
+
+  void take(const StoreWindow::Node& node);
+  void insert_taken();
+  [[nodiscard]] bool stands_before(const Origin& a, const Origin& b) const;
+  void find_suspects();
+  void find_suspect_circles();
+  void find_suspect_hull();
+  /// False: nothing is missing.
+  bool read_more();
+  void make_hints();
+  [[nodiscard]] std::size_t hint_cell(const Point2& place) const;
+  [[nodiscard]] SurfacePoint at_vertex(tri::VertexId vertex, tri::TriangleId triangle) const;
+  [[nodiscard]] std::array<Point2, 3> corners(tri::TriangleId triangle) const;
+
+  const stream::Store& store_;
+  std::uint64_t memory_bytes_;
+  double scale_, offset_;  ///< of heights
+  ClusterFrontier frontier_;
+  StoredBox box_{}, inner_{};  ///< loaded; where all points were read
+  Reach reach_ = Reach::kTriangles;
+  Triangulation triangulation_;
+  std::vector<double> heights_;          ///< by slot of vertex
+  std::vector<Origin> origins_;          ///< by slot of vertex
+  std::vector<std::uint8_t> certain_;    ///< by slot of triangle
+  std::vector<stream::ClusterId> read_;  ///< in their order
+  // What was read and not inserted yet.
+  std::vector<Triangulation::Point> taken_;
+  std::vector<double> taken_heights_;
+  std::vector<Origin> taken_origins_;
+  std::vector<Triangulation::Insertion> inserted_;
+  std::vector<Suspect> suspects_;
+  std::vector<std::uint8_t> near_circle_;  ///< by slot of triangle, for Reach::kCircles
+  std::vector<std::uint32_t> open_near_, chosen_;
+  // A vertex near each cell of a grid over the box.
+  std::vector<tri::VertexId> hints_;
+  std::uint32_t hint_columns_ = 1, hint_rows_ = 1;
+  std::array<double, 2> hint_scale_{};
 };
 
 }  // namespace terrace::tools
