@@ -111,10 +111,12 @@ class PointWindow {
     StoredBox box;
     std::size_t begin = 0, count = 0;
   };
-  /// A triangle, or a hull edge (no triangle), that needs all points in its cover.
+  /// A triangle, or its hull edge, that needs all points in its cover.
   struct Suspect {
+    static constexpr std::uint8_t kNone = 3;
     CircleCover cover;
     tri::TriangleId triangle = tri::kNoTriangle;
+    std::uint8_t edge = kNone;
   };
   enum State : std::uint8_t { kUnknown, kSuspect, kCertain };
 
@@ -153,10 +155,11 @@ class PointWindow {
   StoredBox box_{}, inner_{};  ///< loaded; where all points are inserted
   Reach reach_ = Reach::kTriangles;
   Triangulation triangulation_;
-  std::vector<double> heights_;          ///< by slot of vertex
-  std::vector<Origin> origins_;          ///< by slot of vertex
-  std::vector<std::uint8_t> states_;     ///< by slot of triangle
-  std::vector<stream::ClusterId> read_;  ///< in their order
+  std::vector<double> heights_;             ///< by slot of vertex
+  std::vector<Origin> origins_;             ///< by slot of vertex
+  std::vector<std::uint8_t> states_;        ///< by slot of triangle
+  std::vector<std::uint8_t> hull_certain_;  ///< by slot of triangle, a bit for each edge
+  std::vector<stream::ClusterId> read_;     ///< in their order
   std::vector<Pending> pending_, taken_;
   std::vector<Group> groups_;
   std::vector<Triangulation::Point> places_;  ///< of taken_

@@ -76,7 +76,10 @@ void PointWindow::examine_all() {
 
 void PointWindow::examine_changes() {
   triangulation_.take_changes(changes_);
-  for (const tri::TriangleId t : changes_.removed_triangles) states_[tri::slot(t)] = kUnknown;
+  for (const tri::TriangleId t : changes_.removed_triangles) {
+    states_[tri::slot(t)] = kUnknown;
+    hull_certain_[tri::slot(t)] = 0;
+  }
   suspects_.resize(suspect_triangles_);
   std::erase_if(suspects_, [&](const Suspect& suspect) {
     return states_[tri::slot(suspect.triangle)] != kSuspect;
@@ -107,10 +110,10 @@ void PointWindow::find_suspect_hull() {
     const auto next = triangulation_.neighbours(t);
     const std::array<Point2, 3> corner = corners(t);
     for (std::size_t i = 0; i < 3; ++i) {
-      if (next[i] != tri::kNoTriangle) continue;
+      if (next[i] != tri::kNoTriangle || (hull_certain_[tri::slot(t)] >> i & 1) != 0) continue;
       const CircleCover cover = CircleCover::of_plane(corner[(i + 1) % 3], corner[(i + 2) % 3]);
       if (cover.meets(box_) || (reach_ == Reach::kCircles && circle(t).meets(box_))) {
-        suspects_.push_back({cover, tri::kNoTriangle});
+        suspects_.push_back({cover, t, static_cast<std::uint8_t>(i)});
       }
     }
   }
@@ -151,8 +154,12 @@ bool PointWindow::add_missing() {
   chosen_.clear();
   for (Suspect& suspect : suspects_) {
     if (find_missing(suspect, holds(wide, suspect.cover.bounds()))) continue;
-    if (suspect.triangle == tri::kNoTriangle) continue;
-    states_[tri::slot(suspect.triangle)] = kCertain;
+    const std::uint32_t at = tri::slot(suspect.triangle);
+    if (suspect.edge == Suspect::kNone) {
+      states_[at] = kCertain;
+    } else {
+      hull_certain_[at] = static_cast<std::uint8_t>(hull_certain_[at] | 1U << suspect.edge);
+    }
   }
   // Clusters are read to look into them: what they hold is found in the next round.
   const bool has_read = read_missing();
