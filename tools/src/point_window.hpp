@@ -100,7 +100,7 @@ class PointWindow {
   struct Origin {
     std::uint32_t cluster = 0xFFFFFFFF, index = 0;
   };
-  /// A point that was read and is not inserted.
+  /// A point that was read; taken for inserting where its cluster is no number.
   struct Pending {
     Triangulation::Point place{};
     double height = 0;
@@ -136,6 +136,7 @@ class PointWindow {
   /// False: nothing is missing.
   bool add_missing();
   bool read_missing();
+  void gather_near(const StoredBox& wide);
   bool find_missing(const Suspect& suspect, bool is_near);
   [[nodiscard]] CircleCover circle(tri::TriangleId triangle) const;
 
@@ -167,7 +168,8 @@ class PointWindow {
   std::vector<Suspect> suspects_;  ///< hull edges behind the first suspect_triangles_
   std::size_t suspect_triangles_ = 0;
   std::vector<tri::TriangleId> hull_;  ///< triangles that have or had a hull edge
-  std::vector<std::uint32_t> open_near_, groups_near_, chosen_;
+  std::vector<std::uint32_t> open_near_, chosen_;
+  std::vector<std::pair<double, std::size_t>> points_near_;  ///< x and place in pending_
   Triangulation::Changes changes_;
   // A vertex near each cell of a grid over the box.
   std::vector<tri::VertexId> hints_;
