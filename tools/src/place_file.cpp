@@ -193,4 +193,19 @@ Point2 place_of(std::string_view line, const PlaceLayout& layout, const std::str
   return place;
 }
 
+void append_moved(std::string& text, std::string_view line, const PlaceLayout& layout,
+                  const Point2& place, const FixedText& numbers) {
+  const char* const end = line.data() + line.size();
+  for (std::size_t column = 0;; ++column) {
+    const std::string_view cell = take_text(line, layout.separator);
+    if (column == layout.x || column == layout.y) {
+      numbers.append(text, place[column == layout.x ? 0 : 1]);
+    } else {
+      text += cell;
+    }
+    if (cell.data() + cell.size() == end) return;
+    text += layout.separator;
+  }
+}
+
 }  // namespace terrace::tools

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "fixed_text.hpp"
 #include "region.hpp"
 
 /// Tables of places as text, one a line: read in batches, each line kept as it is so that answers
@@ -74,5 +75,10 @@ bool is_no_place(std::string_view line);
 /// Throws: stream::Error naming file and line if there is no number where one should be.
 Point2 place_of(std::string_view line, const PlaceLayout& layout, const std::string& file,
                 std::uint64_t line_number);
+
+/// Appends the line with other coordinates in its place, empty where one is NaN; the other columns
+/// as they are.
+void append_moved(std::string& text, std::string_view line, const PlaceLayout& layout,
+                  const Point2& place, const FixedText& numbers);
 
 }  // namespace terrace::tools

@@ -62,12 +62,14 @@ class Answers {
 
   SampleCounts answer(const PlaceBatch& batch,
                       const std::function<void(std::span<Point2>)>& to_store,
+                      const std::optional<OutputPlaces>& written,
                       const std::function<void(std::string_view)>& write) {
     find_layout(batch);
     const std::size_t lines = batch.size(), pieces = (lines + kLines - 1) / kLines;
     const auto end_of = [&](std::size_t piece) { return std::min((piece + 1) * kLines, lines); };
     places_.assign(lines, Point2{NAN, NAN});
     surface_.assign(lines, SurfacePoint{});
+    if (written) moved_.assign(lines, Point2{NAN, NAN});
     if (layout_) {
       parallel_for(pieces, options_.threads, [&](unsigned, std::size_t piece) {
         for (std::size_t i = piece * kLines; i < end_of(piece); ++i) {
@@ -76,6 +78,11 @@ class Answers {
         }
         const std::span<Point2> here(places_.data() + piece * kLines,
                                      end_of(piece) - piece * kLines);
+        if (written) {
+          const std::span<Point2> moved(moved_.data() + piece * kLines, here.size());
+          std::copy(here.begin(), here.end(), moved.begin());
+          written->convert(moved);
+        }
         if (to_store) to_store(here);
         for (Point2& p : here) p = ground_.stored(p);
       });
@@ -84,11 +91,16 @@ class Answers {
     texts_.resize(pieces);
     counts_.assign(pieces, {});
     const AnswerText numbers(store_, layout_ ? layout_->separator : ',');
+    const FixedText coordinates(written ? written->decimals : 0);
     parallel_for(pieces, options_.threads, [&](unsigned, std::size_t piece) {
       std::string& text = texts_[piece];
       text.clear();
       for (std::size_t i = piece * kLines; i < end_of(piece); ++i) {
-        text += batch.line(i);
+        if (written && is_place(batch, i)) {
+          append_moved(text, batch.line(i), *layout_, moved_[i], coordinates);
+        } else {
+          text += batch.line(i);
+        }
         if (is_header(batch, i)) {
           for (const char* name : {"height", "gradient", "slope", "aspect"}) {
             (text += layout_->separator) += name;
@@ -133,7 +145,7 @@ class Answers {
   GroundSlope ground_;
   std::optional<PlaceLayout> layout_;
   std::uint64_t header_line_ = 0;  ///< none
-  std::vector<Point2> places_;
+  std::vector<Point2> places_, moved_;
   std::vector<SurfacePoint> surface_;
   std::vector<std::string> texts_;
   std::vector<SampleCounts> counts_;
@@ -144,6 +156,7 @@ class Answers {
 SampleCounts answer_places(const stream::Store& store, const SamplerOptions& options,
                            PlaceFile& places,
                            const std::function<void(std::span<Point2>)>& to_store,
+                           const std::optional<OutputPlaces>& written,
                            const std::function<void(std::string_view)>& write,
                            const std::function<void(const SampleCounts&)>& progress) {
   Answers answers(store, options, places);
@@ -154,7 +167,7 @@ SampleCounts answer_places(const stream::Store& store, const SamplerOptions& opt
   PlaceBatch batch;
   SampleCounts sum;
   while (places.next(batch, bytes, lines)) {
-    const SampleCounts counts = answers.answer(batch, to_store, write);
+    const SampleCounts counts = answers.answer(batch, to_store, written, write);
     sum.points += counts.points;
     sum.answered += counts.answered;
     if (progress) progress(sum);

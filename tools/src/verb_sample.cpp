@@ -37,19 +37,26 @@ class SampleCommand final : public Command {
         ->capture_default_str()
         ->type_name("FILE");
     app.add_option("--method", method_,
-                   "linear: on the triangulated samples; natural: natural neighbours, smooth; "
-                   "nearest: the nearest sample")
+                   "linear: on the triangulated points; natural: natural neighbours, smooth; "
+                   "nearest: the nearest point")
         ->capture_default_str()
         ->type_name("NAME");
+    app.add_option(
+           "--max-edge", max_edge_,
+           "of irregular points and coarser levels: triangles with a longer side (metres on "
+           "the ground) are no data, as over water and in shadows (default: none)")
+        ->type_name("METRES");
     app.add_option("--level", level_, "only points of this level and above: a number or top")
         ->capture_default_str();
     app.add_option("--points-crs", points_crs_,
                    "the CRS of the places (EPSG:n or a WKT file; x,y is lon,lat), if it is not the "
                    "store's");
     app.add_option("--towgs84", shift_,
-                   "dx,dy,dz[,rx,ry,rz,ds] from the datum of --points-crs to WGS 84, if it is "
-                   "another");
-    not_yet(app, {"--to-crs"});
+                   "dx,dy,dz[,rx,ry,rz,ds] from the datum of --points-crs and --to-crs to WGS 84, "
+                   "if it is another");
+    app.add_option("--to-crs", to_crs_,
+                   "the CRS of the places as they are written (EPSG:n or a WKT file; x,y is "
+                   "lon,lat): x and y are replaced, the other columns stay");
   }
 
   Summary run(const CommonOptions& common) override {
@@ -59,24 +66,34 @@ class SampleCommand final : public Command {
     }
     SamplerOptions options;
     options.method = parse_interpolation(method_);
+    options.max_edge = parse_max_edge(max_edge_);
     const std::optional<unsigned> level = parse_level(level_);
     const stream::Store store = stream::Store::open(store_);
     options.level = level.value_or(store.top());
     options.threads = common.threads;
     options.memory_bytes = common.memory_or(machine_memory_bytes() / 2);
     std::function<void(std::span<Point2>)> to_store;
+    std::optional<DatumShift> shift;
+    if (!shift_.empty()) shift = parse_datum_shift(shift_);
     if (!points_crs_.empty()) {
-      std::optional<DatumShift> shift;
-      if (!shift_.empty()) shift = parse_datum_shift(shift_);
       const CoordinateSystem from = CoordinateSystem::parse(points_crs_, shift);
       const CoordinateSystem to = system_of(store);
       to_store = [from, to](std::span<Point2> here) { transform(from, to, here); };
+    }
+    std::optional<OutputPlaces> written;
+    if (!to_crs_.empty()) {
+      const CoordinateSystem from =
+          points_crs_.empty() ? system_of(store) : CoordinateSystem::parse(points_crs_, shift);
+      const CoordinateSystem to = CoordinateSystem::parse(to_crs_, shift);
+      written = OutputPlaces{[from, to](std::span<Point2> here) { transform(from, to, here); },
+                             to.is_geographic() ? 9 : 4};
     }
     PlaceFile places(points_);
     TextOutput output(output_, may_replace(output_, common.force));
     ProgressMeter meter(common.progress, "points");
     const SampleCounts counts = answer_places(
-        store, options, places, to_store, [&](std::string_view text) { output.write(text); },
+        store, options, places, to_store, written,
+        [&](std::string_view text) { output.write(text); },
         [&](const SampleCounts& sum) { meter.update(sum.points, 0); });
     output.finish();
     if (counts.points > 0 && counts.answered == 0) {
@@ -100,7 +117,7 @@ class SampleCommand final : public Command {
 
  private:
   std::string store_, points_ = "-", output_ = "-", method_ = "linear", level_ = "0", points_crs_,
-                      shift_;
+                      shift_, to_crs_, max_edge_;
 };
 
 }  // namespace
