@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "grid_path.hpp"
+
 /// The inner loop of TINs of rasters: the samples in a triangle against its plane.
 
 namespace terrace::tri::tin {
@@ -55,11 +57,8 @@ struct GridScan {
                 const GridCorner<T>& c, T bound);
 };
 
-enum class GridPath : std::uint8_t { kPortable, kAvx2, kAvx512 };
-bool supported(GridPath path);
 template <class T>
 const GridScan<T>& grid_scan(GridPath path);  ///< of a supported path
-GridPath best_grid_path();
 
 extern const GridScan<float> kGridScanFloatPortable, kGridScanFloatAvx2, kGridScanFloatAvx512;
 extern const GridScan<double> kGridScanDoublePortable, kGridScanDoubleAvx2, kGridScanDoubleAvx512;
