@@ -58,15 +58,7 @@ GroundMap GroundSlope::map_at(const Point2& stored) const {
 }
 
 Point2 GroundSlope::stored(const Point2& world) const {
-  const std::array<double, 6>& m = placement_.world.xy;
-  const double x = world[0] - m[2], y = world[1] - m[5];
-  Point2 place;
-  if (m[1] == 0 && m[3] == 0) {
-    place = {x / m[0], y / m[4]};
-  } else {
-    const double determinant = m[0] * m[4] - m[1] * m[3];
-    place = {(m[4] * x - m[1] * y) / determinant, (m[0] * y - m[3] * x) / determinant};
-  }
+  Point2 place = stored_place(placement_, world);
   if (grid_) {
     for (double& c : place) {
       const double whole = std::nearbyint(c);

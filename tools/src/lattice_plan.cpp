@@ -27,14 +27,13 @@ LatticeWindow lattice_of(const stream::Store& store, const std::optional<Region>
   const auto columns = static_cast<std::int64_t>(schema.columns);
   const auto rows = static_cast<std::int64_t>(schema.rows);
   if (!region) return {0, 0, columns, rows};
-  const std::array<double, 6>& m = schema.world.xy;
-  const double determinant = m[0] * m[4] - m[1] * m[3];
+  const Placement placement = placement_of(schema);
   stream::Box3 box;
   for (unsigned corner = 0; corner < 4; ++corner) {
-    const double x = ((corner & 1) != 0 ? region->box().max : region->box().min)[0] - m[2];
-    const double y = ((corner & 2) != 0 ? region->box().max : region->box().min)[1] - m[5];
-    box.include(stream::Point3{(m[4] * x - m[1] * y) / determinant,
-                               (m[0] * y - m[3] * x) / determinant, 0.0});
+    const Point2 stored =
+        stored_place(placement, {((corner & 1) != 0 ? region->box().max : region->box().min)[0],
+                                 ((corner & 2) != 0 ? region->box().max : region->box().min)[1]});
+    box.include(stream::Point3{stored[0], stored[1], 0.0});
   }
   const auto first = [](double low, std::int64_t count) {
     return static_cast<std::int64_t>(

@@ -28,14 +28,11 @@ constexpr std::uint64_t kBytesPerVertex = 66 + 20 + 32 + 24 + 4 + 1 + 2 * 12;
 
 /// The box in stored coordinates around a box in the CRS. Heights are left free where `world` is.
 tri::Box3 stored_box(const Placement& placement, const stream::Box3& world) {
-  const std::array<double, 6>& m = placement.world.xy;
-  const double determinant = m[0] * m[4] - m[1] * m[3];
   stream::Box3 stored;
   for (unsigned corner = 0; corner < 4; ++corner) {
-    const double x = (corner & 1 ? world.max : world.min)[0] - m[2];
-    const double y = (corner & 2 ? world.max : world.min)[1] - m[5];
-    stored.include(stream::Point3{(m[4] * x - m[1] * y) / determinant,
-                                  (m[0] * y - m[3] * x) / determinant, 0});
+    const Point2 place = stored_place(placement, {(corner & 1 ? world.max : world.min)[0],
+                                                  (corner & 2 ? world.max : world.min)[1]});
+    stored.include(stream::Point3{place[0], place[1], 0});
   }
   const stream::Channel& z = placement.coordinates[2];
   double low = (world.min[2] - z.offset) / z.scale, high = (world.max[2] - z.offset) / z.scale;

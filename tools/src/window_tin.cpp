@@ -104,9 +104,6 @@ stream::Point3 WindowMesher::position(const LatticeWindow& window,
 void WindowMesher::check(
     WindowTin& tin,
     const std::function<tri::GridTinCheck(std::span<const tri::Point3>, double)>& measure) const {
-  // Back from the CRS onto the window's lattice.
-  const std::array<double, 6>& m = placement_.world.xy;
-  const double determinant = m[0] * m[4] - m[1] * m[3];
   const stream::Point3& moved = rounding_.largest();
   const bool exact = moved == stream::Point3{};
   std::vector<tri::Point3> read;
@@ -115,15 +112,14 @@ void WindowMesher::check(
     tri::Point3 p{static_cast<double>(vertex.column), static_cast<double>(vertex.row),
                   vertex.height};
     if (!exact) {
-      const stream::Point3 written = position(tin.window, vertex);
-      const stream::Point3 back = rounding_(written);
-      const double dx = back[0] - written[0], dy = back[1] - written[1];
-      p[0] += (m[4] * dx - m[1] * dy) / determinant;
-      p[1] += (m[0] * dy - m[3] * dx) / determinant;
-      p[2] = back[2];
+      const stream::Point3 back = rounding_(position(tin.window, vertex));
+      const std::array<double, 2> stored = stored_place(placement_, {back[0], back[1]});
+      p = {stored[0] - static_cast<double>(tin.window.column),
+           stored[1] - static_cast<double>(tin.window.row), back[2]};
     }
     read.push_back(p);
   }
+  const std::array<double, 6>& m = placement_.world.xy;
   const double cell = std::min(std::hypot(m[0], m[3]), std::hypot(m[1], m[4]));
   const double tolerance = std::min(1.0, 2.0 * std::hypot(moved[0], moved[1]) / cell);
   tin.check = measure(read, tolerance);

@@ -20,6 +20,14 @@ stream::Point3 world_point(const Placement& placement, const stream::Point3& sto
           stored[2] * placement.coordinates[2].scale + placement.coordinates[2].offset};
 }
 
+std::array<double, 2> stored_place(const Placement& placement, const std::array<double, 2>& world) {
+  const std::array<double, 6>& xy = placement.world.xy;
+  const double x = world[0] - xy[2], y = world[1] - xy[5];
+  if (xy[1] == 0.0 && xy[3] == 0.0) return {x / xy[0], y / xy[4]};
+  const double determinant = xy[0] * xy[4] - xy[1] * xy[3];
+  return {(xy[4] * x - xy[1] * y) / determinant, (xy[0] * y - xy[3] * x) / determinant};
+}
+
 stream::Box3 world_box(const Placement& placement, const stream::Box3& stored) {
   stream::Box3 box;
   if (stored.empty()) return box;

@@ -24,6 +24,9 @@ Placement placement_of(const stream::Schema& schema);
 /// Coordinates of the CRS for a point in stored coordinates.
 stream::Point3 world_point(const Placement& placement, const stream::Point3& stored);
 
+/// Stored x, y (column and row of a raster) of a place in the CRS: world_point() back.
+std::array<double, 2> stored_place(const Placement& placement, const std::array<double, 2>& world);
+
 /// The axis-aligned box in the CRS of a box in stored coordinates; empty stays empty. For rotated
 /// rasters it is larger than the rotated box.
 stream::Box3 world_box(const Placement& placement, const stream::Box3& stored);

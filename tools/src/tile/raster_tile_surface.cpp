@@ -14,12 +14,7 @@ namespace {
 
 /// Lattice coordinates (column, row) of places in the CRS, in place, and back.
 void to_lattice(const Placement& placement, std::span<Point2> places) {
-  const std::array<double, 6>& m = placement.world.xy;
-  const double determinant = m[0] * m[4] - m[1] * m[3];
-  for (Point2& p : places) {
-    const double x = p[0] - m[2], y = p[1] - m[5];
-    p = {(m[4] * x - m[1] * y) / determinant, (m[0] * y - m[3] * x) / determinant};
-  }
+  for (Point2& p : places) p = stored_place(placement, p);
 }
 
 Point2 world_place(const Placement& placement, double column, double row) {
