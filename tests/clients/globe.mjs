@@ -7,6 +7,7 @@
 import {join} from 'node:path';
 
 import {load} from './packages.mjs';
+import {tilesToAskFor} from './places.mjs';
 import {UNITS} from './quantized_mesh.mjs';
 
 const {chromium} = load('playwright-core');
@@ -36,6 +37,11 @@ class Record {
     this.refused = [];
     this.errors = [];
     this.answered = new Set();
+  }
+
+  /// Whether a tile was answered.
+  has(name, set, {z, x, y}) {
+    return this.answered.has(join(name, `${z}/${x}/${y}.terrain?v=${set.layer.version}`));
   }
 
   async watch(context, page, base) {
@@ -81,6 +87,22 @@ async function sample(places) {
   } catch (error) {
     return `sampleTerrainMostDetailed: ${error.message ?? error}`;
   }
+}
+
+/// In the page: whether the client thinks that tiles are there: true, false or undefined. Tiles by
+/// zoom, column and row from the north.
+function available(tiles) {
+  return tiles.map(
+      ({z, x, row}) => window.provider.getTileDataAvailable(x, row, z) ?? 'unknown');
+}
+
+/// In the page: the extensions of tiles as the client has them, in numbers.
+async function extensionsOf(tiles) {
+  return Promise.all(tiles.map(async ({z, x, row}) => {
+    const {_encodedNormals: normals, _waterMask: water} =
+        await window.provider.requestTileGeometry(x, row, z);
+    return {normals: normals && Array.from(normals), water: water && Array.from(water)};
+  }));
 }
 
 /// In the page: draws the globe seen towards a place; resolves when its tiles have been there for
@@ -191,12 +213,12 @@ async function light() {
 
 /// A tile of the deepest zoom, all tiles around it there, with the most relief; and its peak.
 export function viewOf(set) {
-  const z = set.deepest;
+  const z = set.deepest, around = 2 ** (z + 1);
   let best;
   for (const [x, y] of set.at(z)) {
     let whole = true;
     for (let i = -2; i <= 2; ++i)
-      for (let j = -2; j <= 2; ++j) whole &&= set.has(z, x + i, y + j);
+      for (let j = -2; j <= 2; ++j) whole &&= set.has(z, (x + i + around) % around, y + j);
     if (!whole) continue;
     const tile = set.tile(z, x, y);
     if (best && tile.highest - tile.lowest <= best.tile.highest - best.tile.lowest) continue;
@@ -240,6 +262,8 @@ export async function survey(browser, base, name, set, places, {pictures} = {}) 
       complain(heights);
     else
       compareSamples(set, places, heights, complain, facts);
+    await compareAvailability(page, name, set, record, complain, facts);
+    await compareExtensions(page, set, complain, facts);
     if (pictures) await surveyView(page, set, pictures, complain, facts);
     for (const error of await page.evaluate(() => window.providerErrors))
       complain(`provider: ${error}`);
@@ -253,7 +277,16 @@ export async function survey(browser, base, name, set, places, {pictures} = {}) 
 function compareSamples(set, places, heights, complain, facts) {
   facts.sampled = heights.length;
   facts.furthest = 0;
-  places.forEach(({place, tiles}, i) => {
+  facts.widest = 0;
+  const borders = new Map();
+  places.forEach(({place, tiles, border}, i) => {
+    if (border !== undefined) {
+      const first = borders.get(border) ?? borders.set(border, heights[i]).get(border);
+      const gap = Math.abs(first - heights[i]);
+      facts.widest = Math.max(facts.widest, gap);
+      // A millimetre, and what a slope makes of the place beside the border.
+      if (!(gap <= 2e-3)) complain(`a gap of ${gap} m beside the border at ${place}`);
+    }
     // On a border any of the tiles may answer; interpolation has roundings of its own.
     const off = tiles.map(tile => {
       const {height, rounding} = set.height(tile, ...place);
@@ -265,6 +298,47 @@ function compareSamples(set, places, heights, complain, facts) {
       facts.furthest = Math.max(facts.furthest, Math.min(...off.map(({off}) => off)));
     }
   });
+}
+
+/// A tile's row from the north, as the client counts.
+const fromNorth = ({z, x, y}) => ({z, x, row: 2 ** z - 1 - y});
+
+/// What the client knows of tiles must be so. With metadata it knows those below the tiles that it
+/// has loaded.
+async function compareAvailability(page, name, set, record, complain, facts) {
+  const loaded = ({z, x, y}) => z === 0 || record.has(name, set, {z: z - 1, x: x >> 1, y: y >> 1});
+  const tiles = tilesToAskFor(set, 300).filter(
+      tile => !facts.extensions.metadata || loaded(tile));
+  const answers = await page.evaluate(available, tiles.map(fromNorth));
+  facts.asked = {there: 0, missing: 0};
+  tiles.forEach((tile, i) => {
+    const there = set.has(tile.z, tile.x, tile.y);
+    ++facts.asked[there ? 'there' : 'missing'];
+    if (answers[i] !== there)
+      complain(`tile ${tile.z}/${tile.x}/${tile.y} is ${there ? '' : 'not '}there; the client ` +
+               `takes it for ${answers[i]}`);
+  });
+}
+
+/// Normals and water masks must come as they stand in the files.
+async function compareExtensions(page, set, complain, facts) {
+  if (!facts.extensions.normals && !facts.extensions.water) return;
+  const tiles = set.at(set.deepest).filter((_, i) => i % 7 === 0).slice(0, 40).map(
+      ([x, y]) => ({z: set.deepest, x, y}));
+  let theirs;
+  try {
+    theirs = await page.evaluate(extensionsOf, tiles.map(fromNorth));
+  } catch (error) {
+    return complain(`extensions: ${error.message}`);
+  }
+  const same = (bytes, numbers) => numbers ? bytes?.equals(new Uint8Array(numbers)) : !bytes;
+  tiles.forEach(({z, x, y}, i) => {
+    const {extensions} = set.tile(z, x, y);
+    for (const [what, id] of [['normals', 1], ['water', 2]]) {
+      if (!same(extensions[id], theirs[i][what])) complain(`tile ${z}/${x}/${y}: other ${what}`);
+    }
+  });
+  facts.extended = tiles.length;
 }
 
 async function surveyView(page, set, pictures, complain, facts) {
@@ -322,9 +396,6 @@ function compareRequests(name, set, places, record, complain) {
   for (const url of record.refused) complain(`refused: ${url}`);
   for (const text of record.errors) complain(`console: ${text}`);
   for (const {tiles} of places) {
-    const some = tiles.some(
-        ({z, x, y}) =>
-            record.answered.has(join(name, `${z}/${x}/${y}.terrain?v=${set.layer.version}`)));
-    if (!some) complain(`tile ${tiles.map(({z, x, y}) => `${z}/${x}/${y}`)} was not asked for`);
+    if (!tiles.some(tile => record.has(name, set, tile))) complain(`tile ${tiles.map(({z, x, y}) => `${z}/${x}/${y}`)} was not asked for`);
   }
 }

@@ -47,8 +47,8 @@ class SampleCommand final : public Command {
                    "the CRS of the places (EPSG:n or a WKT file; x,y is lon,lat), if it is not the "
                    "store's");
     app.add_option("--towgs84", shift_,
-                   "dx,dy,dz[,rx,ry,rz,ds] from the datum of --points-crs to WGS 84, if it is "
-                   "another");
+                   "dx,dy,dz[,rx,ry,rz,ds] to WGS 84 from the datum of --points-crs, or of the "
+                   "store, if it is another");
     not_yet(app, {"--to-crs"});
   }
 
@@ -66,11 +66,10 @@ class SampleCommand final : public Command {
     options.memory_bytes = common.memory_or(machine_memory_bytes() / 2);
     std::function<void(std::span<Point2>)> to_store;
     if (!points_crs_.empty()) {
-      std::optional<DatumShift> shift;
-      if (!shift_.empty()) shift = parse_datum_shift(shift_);
-      const CoordinateSystem from = CoordinateSystem::parse(points_crs_, shift);
-      const CoordinateSystem to = system_of(store);
-      to_store = [from, to](std::span<Point2> here) { transform(from, to, here); };
+      const SystemPair systems = systems_of(store, points_crs_, shift_);
+      to_store = [systems](std::span<Point2> here) {
+        transform(systems.named, systems.store, here);
+      };
     }
     PlaceFile places(points_);
     TextOutput output(output_, may_replace(output_, common.force));
