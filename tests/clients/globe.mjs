@@ -211,12 +211,13 @@ async function light() {
   return new Promise(resolve => scene.postRender.addEventListener(() => ++frames > 4 && resolve()));
 }
 
-/// A tile of the deepest zoom, all tiles around it there, with the most relief; and its peak.
-export function viewOf(set) {
+/// A tile of the deepest zoom, all tiles around it there, with the most relief; and its peak. column:
+/// its x.
+function viewOf(set, column) {
   const z = set.deepest, around = 2 ** (z + 1);
   let best;
   for (const [x, y] of set.at(z)) {
-    let whole = true;
+    let whole = column === undefined || x === column;
     for (let i = -2; i <= 2; ++i)
       for (let j = -2; j <= 2; ++j) whole &&= set.has(z, (x + i + around) % around, y + j);
     if (!whole) continue;
@@ -241,8 +242,8 @@ export function viewOf(set) {
 
 /// The complaints about set as it comes from base + name. places: [longitude, latitude] with the
 /// tiles that may answer. pictures: a path without ending for the views; without it nothing is
-/// drawn.
-export async function survey(browser, base, name, set, places, {pictures} = {}) {
+/// drawn. column: of the tile that is looked at.
+export async function survey(browser, base, name, set, places, {pictures, column} = {}) {
   const context = await browser.newContext({viewport: SIZE});
   const page = await context.newPage();
   const record = new Record();
@@ -264,7 +265,7 @@ export async function survey(browser, base, name, set, places, {pictures} = {}) 
       compareSamples(set, places, heights, complain, facts);
     await compareAvailability(page, name, set, record, complain, facts);
     await compareExtensions(page, set, complain, facts);
-    if (pictures) await surveyView(page, set, pictures, complain, facts);
+    if (pictures) await surveyView(page, set, {pictures, column}, complain, facts);
     for (const error of await page.evaluate(() => window.providerErrors))
       complain(`provider: ${error}`);
     compareRequests(name, set, places, record, complain);
@@ -341,8 +342,8 @@ async function compareExtensions(page, set, complain, facts) {
   facts.extended = tiles.length;
 }
 
-async function surveyView(page, set, pictures, complain, facts) {
-  const view = viewOf(set);
+async function surveyView(page, set, {pictures, column}, complain, facts) {
+  const view = viewOf(set, column);
   if (!await page.evaluate(draw, view)) complain('the tiles in view were not loaded in a minute');
   const seen = await page.evaluate(look, view);
   await page.screenshot({path: `${pictures}-heights.png`});
