@@ -62,12 +62,18 @@ before(async () => {
     keys: GEOGRAPHIC,
     height: (i, j) => Math.hypot(i - 360, j - 190) < 70 ? NaN : hills(i, j)
   });
-  writeRaster(
-      join(folder, 'pole.tif'),
-      {columns: 240, rows: 240, west: -230e3, north: 250e3, cell: 2000, keys: ARCTIC, height: hills});
+  writeRaster(join(folder, 'pole.tif'), {
+    columns: 240,
+    rows: 240,
+    west: -230e3,
+    north: 250e3,
+    cell: 2000,
+    keys: ARCTIC,
+    height: hills
+  });
   for (const [name, ...options] of [
-    ['dateline', '--metadata', '--normals', '--water', 'nodata'], ['pole', '--normals', '--gzip']
-  ]) {
+           ['dateline', '--metadata', '--normals', '--water', 'nodata'],
+           ['pole', '--normals', '--gzip']]) {
     terrace('build', `${name}.tif`, '-o', `${name}.terrace`, '-q');
     terrace('tile', `${name}.terrace`, '--vertical', 'ignore', ...options, '-q', '-o', name);
   }
@@ -96,14 +102,15 @@ after(async () => {
 for (const name of NAMES) {
   test(`the globe shows the ${name} tiles`, async () => {
     // Of a border the client may find the tile of one side by metadata and ask that of the other,
-    // since it rounds twice: there, and everywhere else as well, both sides are asked by themselves.
+    // since it rounds twice: there, and everywhere else as well, both sides are asked by
+    // themselves.
     const places = [
       ...sets[name].layer.metadataAvailability ? [] : placesOf(sets[name], 80),
       ...placesOf(sets[name], 80, {beside: true})
     ];
     assert.ok(places.length >= 200, `${places.length} places`);
-    // At the pole the client's triangles are so large that they cut through the globe: what is drawn
-    // there tells nothing of heights.
+    // At the pole the client's triangles are so large that they cut through the globe: what is
+    // drawn there tells nothing of heights.
     const pictures = name === 'pole' ? undefined : join(packages, `globe-${name}`);
     // Of the dateline's the one that begins there.
     const column = name === 'dateline' ? 0 : undefined;

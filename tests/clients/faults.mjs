@@ -57,7 +57,7 @@ export const FAULTS = {
   },
   'metadata says nothing of the deepest zoom': {
     of: 'metadata',
-    complaint: /is there; the client takes it for false/,
+    complaint: /^height .* off by/,
     fault: set => (path, bytes) => {
       if (zoomOf(path) !== set.deepest - 1) return {};
       const at = bytes.lastIndexOf('{"available"');

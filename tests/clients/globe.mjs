@@ -92,8 +92,7 @@ async function sample(places) {
 /// In the page: whether the client thinks that tiles are there: true, false or undefined. Tiles by
 /// zoom, column and row from the north.
 function available(tiles) {
-  return tiles.map(
-      ({z, x, row}) => window.provider.getTileDataAvailable(x, row, z) ?? 'unknown');
+  return tiles.map(({z, x, row}) => window.provider.getTileDataAvailable(x, row, z) ?? 'unknown');
 }
 
 /// In the page: the extensions of tiles as the client has them, in numbers.
@@ -211,8 +210,8 @@ async function light() {
   return new Promise(resolve => scene.postRender.addEventListener(() => ++frames > 4 && resolve()));
 }
 
-/// A tile of the deepest zoom, all tiles around it there, with the most relief; and its peak. column:
-/// its x.
+/// A tile of the deepest zoom, all tiles around it there, with the most relief; and its peak.
+/// column: its x.
 function viewOf(set, column) {
   const z = set.deepest, around = 2 ** (z + 1);
   let best;
@@ -308,24 +307,26 @@ const fromNorth = ({z, x, y}) => ({z, x, row: 2 ** z - 1 - y});
 /// has loaded.
 async function compareAvailability(page, name, set, record, complain, facts) {
   const loaded = ({z, x, y}) => z === 0 || record.has(name, set, {z: z - 1, x: x >> 1, y: y >> 1});
-  const tiles = tilesToAskFor(set, 300).filter(
-      tile => !facts.extensions.metadata || loaded(tile));
+  const tiles = tilesToAskFor(set, 300).filter(tile => !facts.extensions.metadata || loaded(tile));
   const answers = await page.evaluate(available, tiles.map(fromNorth));
   facts.asked = {there: 0, missing: 0};
   tiles.forEach((tile, i) => {
     const there = set.has(tile.z, tile.x, tile.y);
     ++facts.asked[there ? 'there' : 'missing'];
     if (answers[i] !== there)
-      complain(`tile ${tile.z}/${tile.x}/${tile.y} is ${there ? '' : 'not '}there; the client ` +
-               `takes it for ${answers[i]}`);
+      complain(
+          `tile ${tile.z}/${tile.x}/${tile.y} is ${there ? '' : 'not '}there; the client ` +
+          `takes it for ${answers[i]}`);
   });
 }
 
 /// Normals and water masks must come as they stand in the files.
 async function compareExtensions(page, set, complain, facts) {
   if (!facts.extensions.normals && !facts.extensions.water) return;
-  const tiles = set.at(set.deepest).filter((_, i) => i % 7 === 0).slice(0, 40).map(
-      ([x, y]) => ({z: set.deepest, x, y}));
+  const tiles = set.at(set.deepest)
+                    .filter((_, i) => i % 7 === 0)
+                    .slice(0, 40)
+                    .map(([x, y]) => ({z: set.deepest, x, y}));
   let theirs;
   try {
     theirs = await page.evaluate(extensionsOf, tiles.map(fromNorth));
@@ -397,6 +398,7 @@ function compareRequests(name, set, places, record, complain) {
   for (const url of record.refused) complain(`refused: ${url}`);
   for (const text of record.errors) complain(`console: ${text}`);
   for (const {tiles} of places) {
-    if (!tiles.some(tile => record.has(name, set, tile))) complain(`tile ${tiles.map(({z, x, y}) => `${z}/${x}/${y}`)} was not asked for`);
+    if (!tiles.some(tile => record.has(name, set, tile)))
+      complain(`tile ${tiles.map(({z, x, y}) => `${z}/${x}/${y}`)} was not asked for`);
   }
 }

@@ -3,9 +3,11 @@
 
 import {writeFileSync} from 'node:fs';
 
-export const GEOGRAPHIC = [1, 1, 0, 4, 1024, 0, 1, 2, 1025, 0, 1, 1, 2048, 0, 1, 4326, 2054, 0, 1, 9102];
+export const GEOGRAPHIC =
+    [1, 1, 0, 4, 1024, 0, 1, 2, 1025, 0, 1, 1, 2048, 0, 1, 4326, 2054, 0, 1, 9102];
 /// Polar stereographic, EPSG:3413.
-export const ARCTIC = [1, 1, 0, 4, 1024, 0, 1, 1, 1025, 0, 1, 1, 3072, 0, 1, 3413, 3076, 0, 1, 9001];
+export const ARCTIC =
+    [1, 1, 0, 4, 1024, 0, 1, 1, 1025, 0, 1, 1, 3072, 0, 1, 3413, 3076, 0, 1, 9001];
 
 /// A GeoTIFF of float32 in one strip, cells of one side from its north-western corner on:
 /// height(column, row), NaN where there is no data.
@@ -52,5 +54,6 @@ export function writeRaster(path, {columns, rows, west, north, cell, keys, heigh
 /// Hills and ridges, some hundred metres high: a height for columns and rows.
 export function hills(column, row) {
   return 600 + 250 * Math.sin(column / 9 + row / 31) * Math.cos(row / 13) +
-      120 * Math.sin(column / 3.7) * Math.sin(row / 4.3 + column / 50) + (column * 7 + row * 13) % 11;
+      120 * Math.sin(column / 3.7) * Math.sin(row / 4.3 + column / 50) +
+      (column * 7 + row * 13) % 11;
 }
