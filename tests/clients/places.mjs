@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Places at which the heights of a set of tiles are compared.
+// Places at which the heights of a set of tiles are compared, tiles that a client is asked for, and
+// where it looks.
+
+const EARTH = 6371000;
 
 /// Numbers in [0, 1), always the same.
 export function* numbers(seed) {
@@ -87,4 +90,33 @@ export function tilesToAskFor(set, count) {
     }
   }
   return [...some(there), ...some(missing)];
+}
+
+/// A tile of the deepest zoom, all tiles around it there, with the most relief; and its peak.
+/// column: its x.
+export function viewOf(set, column) {
+  const z = set.deepest, around = 2 ** (z + 1);
+  let best;
+  for (const [x, y] of set.at(z)) {
+    let whole = column === undefined || x === column;
+    for (let i = -2; i <= 2; ++i)
+      for (let j = -2; j <= 2; ++j) whole &&= set.has(z, (x + i + around) % around, y + j);
+    if (!whole) continue;
+    const tile = set.tile(z, x, y);
+    if (best && tile.highest - tile.lowest <= best.tile.highest - best.tile.lowest) continue;
+    best = {z, x, y, tile};
+  }
+  const {x, y, tile} = best;
+  const side = 180 / 2 ** z;
+  const [longitude, latitude] = [-180 + (x + 0.5) * side, -90 + (y + 0.5) * side];
+  const deepest = set.at(z).map(([i, j]) => set.tile(z, i, j));
+  return {
+    z,
+    x,
+    y,
+    target: [longitude, latitude, (tile.lowest + tile.highest) / 2],
+    range: side * Math.PI / 180 * EARTH * 1.7,
+    lowest: Math.min(...deepest.map(({lowest}) => lowest)),
+    highest: Math.max(...deepest.map(({highest}) => highest))
+  };
 }
