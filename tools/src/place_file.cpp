@@ -193,17 +193,13 @@ Point2 place_of(std::string_view line, const PlaceLayout& layout, const std::str
   return place;
 }
 
-void append_moved(std::string& text, std::string_view line, const PlaceLayout& layout,
-                  const Point2& place, const FixedText& numbers) {
-  const char* const end = line.data() + line.size();
+void append_with_place(std::string& text, std::string_view line, const PlaceLayout& layout,
+                       std::string_view x, std::string_view y) {
   for (std::size_t column = 0;; ++column) {
+    const std::string_view before = line;
     const std::string_view cell = take_text(line, layout.separator);
-    if (column == layout.x || column == layout.y) {
-      numbers.append(text, place[column == layout.x ? 0 : 1]);
-    } else {
-      text += cell;
-    }
-    if (cell.data() + cell.size() == end) return;
+    text += column == layout.x ? x : column == layout.y ? y : cell;
+    if (cell.size() == before.size()) return;
     text += layout.separator;
   }
 }

@@ -10,7 +10,6 @@
 #include <string_view>
 #include <vector>
 
-#include "fixed_text.hpp"
 #include "region.hpp"
 
 /// Tables of places as text, one a line: read in batches, each line kept as it is so that answers
@@ -76,9 +75,8 @@ bool is_no_place(std::string_view line);
 Point2 place_of(std::string_view line, const PlaceLayout& layout, const std::string& file,
                 std::uint64_t line_number);
 
-/// Appends the line with other coordinates in its place, empty where one is NaN; the other columns
-/// as they are.
-void append_moved(std::string& text, std::string_view line, const PlaceLayout& layout,
-                  const Point2& place, const FixedText& numbers);
+/// Appends the line to `text`, in the columns of its place x and y instead.
+void append_with_place(std::string& text, std::string_view line, const PlaceLayout& layout,
+                       std::string_view x, std::string_view y);
 
 }  // namespace terrace::tools

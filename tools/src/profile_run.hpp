@@ -38,9 +38,8 @@ struct ProfileOutcome {
 /// levels, an edge of their triangulation: between them the linear surface is straight, so the
 /// profile is the surface itself.
 ///
-/// Distances are geodesics on WGS 84 (GeographicLib, C. F. F. Karney, "Algorithms for geodesics",
-/// doi:10.1007/s00190-012-0578-z) summed over pieces so short that the line's bend does not show;
-/// without a CRS they are the map's. Memory: some thousand rows at a time.
+/// Distances are geodesics (line_distance.hpp) summed over pieces so short that the line's bend
+/// does not show; without a CRS they are the map's. Memory: some thousand rows at a time.
 /// Throws: stream::Error on a damaged store, Interrupted, UsageError as make_sampler().
 ProfileOutcome write_profile(const stream::Store& store, const ProfileRequest& request,
                              const std::function<void(std::string_view)>& write);
