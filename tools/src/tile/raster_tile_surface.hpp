@@ -8,6 +8,7 @@
 
 #include "store_window.hpp"
 #include "tile/height_cache.hpp"
+#include "tile/raster_tile_digest.hpp"
 #include "tile/tile_surface.hpp"
 #include "tile/tiled_raster.hpp"
 
@@ -31,6 +32,7 @@ class RasterTileSurface final : public TileSurface {
                std::span<double> out) override;
   void water(std::span<const double> longitude, std::span<const double> latitude,
              std::span<std::uint8_t> out) override;
+  std::uint64_t digest(const GeographicBox& box) override { return digest_of(raster_, box); }
 
  private:
   /// Calls visit(i, place on the lattice, the sample north-west of it, distance to the next row)
