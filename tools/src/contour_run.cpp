@@ -71,12 +71,12 @@ ContourOutcome write_contours(const stream::Store& store, const ContourRequest& 
       .store = store,
       .request = request,
       .emit = [&](const ContourLine& line) { text.add(line); },
-      .limit = {.points = request.memory_bytes / 2 / kBytesPerPoint,
+      .limit = {.points = request.memory_bytes / 3 / kBytesPerPoint,
                 .exceeded =
                     [&] {
                       throw failure(store,
                                     "contour lines that are not at their ends have more than " +
-                                        with_commas(request.memory_bytes / 2 / kBytesPerPoint) +
+                                        with_commas(request.memory_bytes / 3 / kBytesPerPoint) +
                                         " points, too many for --memory",
                                     "raise --memory or --interval, or take a smaller --region");
                     }},
@@ -85,11 +85,11 @@ ContourOutcome write_contours(const stream::Store& store, const ContourRequest& 
             if (progress) progress(text.outcome().lines, share);
           },
   };
-  if (!store.schema().grid) {
-    throw failure(store, "contour lines are made of rasters, and this store holds points",
-                  "build a store of a raster");
+  if (store.schema().grid && request.level == 0) {
+    draw_lattice_contours(parts);
+  } else {
+    draw_point_contours(parts);
   }
-  draw_lattice_contours(parts);
   text.finish();
   return text.outcome();
 }

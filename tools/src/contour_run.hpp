@@ -15,9 +15,9 @@ namespace terrace::tools {
 struct ContourRequest {
   double interval = 0;  ///< in the store's vertical unit, above 0
   unsigned level = 0;   ///< the points of this level and above
-  std::optional<double>
-      max_edge;  ///< metres on the ground; triangles with a longer side are left out
-  std::optional<Region> region;  ///< in the store's CRS
+  /// Triangles with a longer side, in metres on the ground, are left out.
+  std::optional<double> max_edge{};
+  std::optional<Region> region{};  ///< in the store's CRS
   unsigned threads = 1;
   std::uint64_t memory_bytes = std::uint64_t{1} << 30;
 };

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <memory>
+#include <optional>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -32,6 +33,8 @@ class ContourCommand final : public Command {
     app.add_option("--region-crs", region_crs_,
                    "the CRS of the region (EPSG:n or a WKT file; x,y is lon,lat), if it is not the "
                    "store's");
+    app.add_option("--level", level_, "only points of this level and above: a number or top")
+        ->capture_default_str();
   }
 
   Summary run(const CommonOptions& common) override {
@@ -39,6 +42,7 @@ class ContourCommand final : public Command {
     ContourRequest request;
     request.interval = parse_number(interval_, "--interval");
     if (!(request.interval > 0)) throw UsageError("--interval must be above 0");
+    const std::optional<unsigned> level = parse_level(level_);
     if (common.json && output_ == "-") {
       throw UsageError("--json and the lines cannot both go to standard output; give -o FILE");
     }
@@ -50,6 +54,7 @@ class ContourCommand final : public Command {
             RegionConversion(store, CoordinateSystem::parse(region_crs_))(*request.region);
       }
     }
+    request.level = level.value_or(store.top());
     request.threads = common.threads;
     request.memory_bytes = common.memory_or(machine_memory_bytes() / 2);
     TextOutput output(output_, may_replace(output_, common.force));
@@ -72,7 +77,7 @@ class ContourCommand final : public Command {
   }
 
  private:
-  std::string store_, output_, interval_, region_, region_crs_;
+  std::string store_, output_, interval_, region_, region_crs_, level_ = "0";
 };
 
 }  // namespace
