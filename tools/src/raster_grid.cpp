@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -68,12 +70,23 @@ stream::Box3 converted(const stream::Box3& box, const CoordinateSystem& from,
   return result;
 }
 
+/// To two digits.
+double rounded(double value) {
+  std::array<char, 32> digits{};
+  const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), value,
+                                 std::chars_format::scientific, 1);
+  double result = 0;
+  std::from_chars(digits.data(), end.ptr, result);
+  return result;
+}
+
 /// The distance between neighbouring points in units of the store's CRS.
-double spacing_of(const stream::Store& store, const stream::Box3& area) {
+double spacing_of(const stream::Store& store, const stream::Box3& area, unsigned level) {
   const std::array<double, 6>& m = store.schema().world.xy;
-  if (store.schema().grid) return std::sqrt(std::abs(m[0] * m[4] - m[1] * m[3]));
+  if (store.schema().grid && level == 0) return std::sqrt(std::abs(m[0] * m[4] - m[1] * m[3]));
   const double size = (area.max[0] - area.min[0]) * (area.max[1] - area.min[1]);
-  return std::sqrt(size / static_cast<double>(std::max<std::uint64_t>(store.points(), 1)));
+  const std::uint64_t points = std::max<std::uint64_t>(store.levels()[level].points, 1);
+  return rounded(std::sqrt(size / static_cast<double>(points)));
 }
 
 std::uint32_t count_of(double cells) {
@@ -87,6 +100,11 @@ std::uint32_t count_of(double cells) {
 }  // namespace
 
 RasterGrid raster_grid(const stream::Store& store, const RasterRequest& request) {
+  const unsigned level = request.sampler.level;
+  if (level > store.top()) {
+    throw UsageError("the store has no level " + std::to_string(level) + ": its top is level " +
+                     std::to_string(store.top()));
+  }
   const stream::Box3 area = area_of(store);
   stream::Box3 box = area;
   if (request.region) {
@@ -102,7 +120,7 @@ RasterGrid raster_grid(const stream::Store& store, const RasterRequest& request)
   const std::array<double, 6>& m = store.schema().world.xy;
   const bool straight = m[1] == 0 && m[3] == 0;
   RasterGrid grid;
-  if (!request.cell && !request.to && store.schema().grid && straight) {
+  if (!request.cell && !request.to && store.schema().grid && straight && level == 0) {
     // The lattice itself: the samples within the box.
     std::array<double, 2> first{}, last{};
     for (std::size_t axis = 0; axis < 2; ++axis) {
@@ -123,7 +141,7 @@ RasterGrid raster_grid(const stream::Store& store, const RasterRequest& request)
     grid.rows = count_of(last[1] - first[1] + 1);
     return grid;
   }
-  double cell = request.cell.value_or(spacing_of(store, area));
+  double cell = request.cell.value_or(spacing_of(store, area, level));
   if (request.to) {
     const CoordinateSystem from = system_of(store);
     const Point2 centre{0.5 * (box.min[0] + box.max[0]), 0.5 * (box.min[1] + box.max[1])};

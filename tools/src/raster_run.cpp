@@ -7,6 +7,7 @@
 #include <limits>
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <terrace/stream/geotiff_writer.hpp>
@@ -24,6 +25,39 @@ namespace {
 constexpr std::int64_t kTile = 256;
 /// Peak bytes per cell of the tiles at work: places twice, sorting, surface, heights.
 constexpr std::uint64_t kBytesPerCell = 130;
+
+/// Most tiles along a side of what is sampled at a time.
+constexpr std::int64_t kMostSide = 8;
+
+constexpr std::uint64_t bytes_of(std::int64_t side) {
+  return static_cast<std::uint64_t>(side * side * kTile * kTile) * kBytesPerCell;
+}
+
+/// A tile by its column and row among the tiles.
+struct TilePlace {
+  std::int64_t column = 0, row = 0;
+};
+
+constexpr std::int64_t power_of_two(std::int64_t at_least) {
+  std::int64_t power = 1;
+  while (power < at_least) power *= 2;
+  return power;
+}
+
+/// Calls visit(corner) for the squares of `side` tiles in the square of `size` at `corner` that
+/// begin before `end`, quarter by quarter: so tiles come in the same order for any side, and those
+/// of near places near each other. Both sizes are powers of two.
+template <class Visit>
+void for_each_square(TilePlace corner, std::int64_t size, std::int64_t side, TilePlace end,
+                     const Visit& visit) {
+  if (corner.column >= end.column || corner.row >= end.row) return;
+  if (size <= side) return visit(corner);
+  const std::int64_t half = size / 2;
+  for (const auto& [column, row] : {std::pair{0, 0}, {1, 0}, {0, 1}, {1, 1}}) {
+    for_each_square({corner.column + column * half, corner.row + row * half}, half, side, end,
+                    visit);
+  }
+}
 
 class RasterRun {
  public:
@@ -53,29 +87,21 @@ class RasterRun {
     stream::GeoTiffWriter writer(request_.output, options);
     const std::int64_t across = (grid_.columns + kTile - 1) / kTile;
     const std::int64_t down = (grid_.rows + kTile - 1) / kTile;
-    const auto at_once = static_cast<std::int64_t>(std::clamp<std::uint64_t>(
-        request_.sampler.memory_bytes / 2 / (kTile * kTile * kBytesPerCell), 1, 32));
-    for (std::int64_t row = 0; row < down; ++row) {
-      for (std::int64_t first = 0; first < across; first += at_once) {
-        const std::int64_t count = std::min(at_once, across - first);
-        sample(first * kTile, row * kTile, count * kTile);
-        tiles_.resize(static_cast<std::size_t>(count));
-        counts_.assign(tiles_.size(), 0);
-        parallel_for(tiles_.size(), request_.sampler.threads, [&](unsigned, std::size_t i) {
-          make_tile(i, (first + static_cast<std::int64_t>(i)) * kTile, row * kTile);
-        });
-        for (std::size_t i = 0; i < tiles_.size(); ++i) {
-          if (counts_[i] == 0) continue;
-          outcome_.cells_with_data += counts_[i];
-          writer.write_tile(static_cast<std::uint32_t>(first) + static_cast<std::uint32_t>(i),
-                            static_cast<std::uint32_t>(row), tiles_[i]);
-        }
-        const double share = (static_cast<double>(row) +
-                              static_cast<double>(first + count) / static_cast<double>(across)) /
-                             static_cast<double>(down);
-        if (progress) progress(outcome_.cells_with_data, share);
-      }
-    }
+    std::int64_t side = 1;
+    while (side < kMostSide && bytes_of(2 * side) <= request_.sampler.memory_bytes / 2) side *= 2;
+    std::vector<TilePlace> block;
+    double done = 0;
+    for_each_square({0, 0}, power_of_two(std::max(across, down)), side, {across, down},
+                    [&](TilePlace corner) {
+                      block.clear();
+                      for_each_square(corner, side, 1, {across, down},
+                                      [&](TilePlace tile) { block.push_back(tile); });
+                      sample(corner, side);
+                      make_tiles(block, writer);
+                      done += static_cast<double>(block.size());
+                      const double all = static_cast<double>(across) * static_cast<double>(down);
+                      if (progress) progress(outcome_.cells_with_data, done / all);
+                    });
     writer.commit();
     outcome_.columns = grid_.columns;
     outcome_.rows = grid_.rows;
@@ -96,22 +122,28 @@ class RasterRun {
                : -9999;
   }
 
-  /// The surface at the cells of a row of tiles and one cell around, by rows in heights_.
-  void sample(std::int64_t column, std::int64_t row, std::int64_t columns) {
-    width_ = static_cast<std::size_t>(std::min<std::int64_t>(columns, grid_.columns - column)) + 2;
-    const std::size_t height =
-        static_cast<std::size_t>(std::min<std::int64_t>(kTile, grid_.rows - row)) + 2;
+  /// The surface at the cells of a square of tiles and, if slopes are made of it, one cell around,
+  /// by rows in heights_.
+  void sample(TilePlace corner, std::int64_t side) {
+    const std::int64_t around = request_.value == RasterValue::height ? 0 : 1;
+    first_column_ = corner.column * kTile - around;
+    first_row_ = corner.row * kTile - around;
+    const auto size = [&](std::int64_t first, std::int64_t all) {
+      return static_cast<std::size_t>(std::min(side * kTile + 2 * around, all + around - first));
+    };
+    width_ = size(first_column_, grid_.columns);
+    const std::size_t height = size(first_row_, grid_.rows);
     places_.resize(width_ * height);
     surface_.resize(places_.size());
     heights_.resize(places_.size());
     parallel_for(height, request_.sampler.threads, [&](unsigned, std::size_t j) {
       const std::span<Point2> line(places_.data() + j * width_, width_);
-      const double y =
-          grid_.y + grid_.step_y * static_cast<double>(row + static_cast<std::int64_t>(j) - 1);
+      const auto cell = [](std::int64_t first, std::size_t i) {
+        return static_cast<double>(first + static_cast<std::int64_t>(i));
+      };
+      const double y = grid_.y + grid_.step_y * cell(first_row_, j);
       for (std::size_t i = 0; i < width_; ++i) {
-        line[i] = {
-            grid_.x + grid_.step_x * static_cast<double>(column + static_cast<std::int64_t>(i) - 1),
-            y};
+        line[i] = {grid_.x + grid_.step_x * cell(first_column_, i), y};
       }
       if (from_) transform(*request_.to, *from_, line);
       for (Point2& p : line) {
@@ -122,7 +154,20 @@ class RasterRun {
     });
     sampler_->sample(places_, surface_);
     for (std::size_t i = 0; i < surface_.size(); ++i) heights_[i] = surface_[i].height;
-    first_column_ = column;
+  }
+
+  void make_tiles(std::span<const TilePlace> block, stream::GeoTiffWriter& writer) {
+    tiles_.resize(block.size());
+    counts_.assign(block.size(), 0);
+    parallel_for(block.size(), request_.sampler.threads, [&](unsigned, std::size_t i) {
+      make_tile(i, block[i].column * kTile, block[i].row * kTile);
+    });
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      if (counts_[i] == 0) continue;
+      outcome_.cells_with_data += counts_[i];
+      writer.write_tile(static_cast<std::uint32_t>(block[i].column),
+                        static_cast<std::uint32_t>(block[i].row), tiles_[i]);
+    }
   }
 
   void make_tile(std::size_t number, std::int64_t column, std::int64_t row) {
@@ -140,8 +185,9 @@ class RasterRun {
       for (std::int64_t i = 0; i < kTile; ++i) {
         double value = NAN;
         if (i < columns && j < rows) {
-          const double* z = heights_.data() + static_cast<std::size_t>(j + 1) * width_ +
-                            static_cast<std::size_t>(column - first_column_ + i + 1);
+          const double* z = heights_.data() +
+                            static_cast<std::size_t>(row - first_row_ + j) * width_ +
+                            static_cast<std::size_t>(column - first_column_ + i);
           value = request_.value == RasterValue::height
                       ? *z
                       : shader_(z, static_cast<std::ptrdiff_t>(width_), scale);
@@ -173,7 +219,7 @@ class RasterRun {
   RasterOutcome outcome_;
 
   // The tiles at work.
-  std::int64_t first_column_ = 0;
+  std::int64_t first_column_ = 0, first_row_ = 0;  ///< of heights_
   std::size_t width_ = 0;
   std::vector<Point2> places_;
   std::vector<SurfacePoint> surface_;
