@@ -47,11 +47,11 @@ class PointWindow {
   /// Afterwards every triangle of the whole triangulation that meets the box, which is closed, is
   /// in triangulation() and certain. There are others around, certain or not.
   ///
-  /// Reads the clusters that meet the box and triangulates their points in bulk; then, while a
-  /// triangle that meets the box has a circumcircle, or a hull edge that the box sees from outside
-  /// a half-plane, which meets the box of a cluster that was not read, reads that cluster, coarse
-  /// levels first. So no width is guessed, and voids and hulls cost a few clusters of coarse levels
-  /// more. About 0.7 us per point.
+  /// Reads the clusters that meet the box and triangulates their points in the box in bulk; then,
+  /// while a triangle that meets the box has a circumcircle, or a hull edge that the box sees from
+  /// outside has a half-plane, in which a point may be missing, adds one: of what was read, or else
+  /// of the clusters whose boxes it meets, coarse levels first. So no width is guessed, and voids
+  /// and hulls cost a few clusters of coarse levels more. About 0.7 us per point.
   ///
   /// Throws: stream::Error on a damaged store, or where memory_bytes do not suffice, saying what
   /// would be needed; Interrupted. After that it can only be loaded again or destroyed.
@@ -61,7 +61,7 @@ class PointWindow {
   [[nodiscard]] const tri::Delaunay2<double>& triangulation() const { return triangulation_; }
   /// Whether it is a triangle of the whole. Requires a living triangle.
   [[nodiscard]] bool is_certain(tri::TriangleId triangle) const {
-    return certain_[tri::slot(triangle)] != 0;
+    return states_[tri::slot(triangle)] == kCertain;
   }
   /// In the store's vertical unit (scale and offset of the channel applied).
   [[nodiscard]] double height(tri::VertexId vertex) const { return heights_[tri::slot(vertex)]; }
@@ -80,20 +80,43 @@ class PointWindow {
   struct Origin {
     std::uint32_t cluster = 0xFFFFFFFF, index = 0;
   };
-  /// A triangle, or a hull edge (no triangle), that needs what lies in its cover.
+  /// A point that was read and is not inserted.
+  struct Pending {
+    Triangulation::Point place{};
+    double height = 0;
+    Origin origin;
+  };
+  /// Those of one cluster: pending_[begin] and the next ones.
+  struct Group {
+    StoredBox box;
+    std::size_t begin = 0, count = 0;
+  };
+  /// A triangle, or a hull edge (no triangle), that needs all points in its cover.
   struct Suspect {
     CircleCover cover;
     tri::TriangleId triangle = tri::kNoTriangle;
   };
+  enum State : std::uint8_t { kUnknown, kSuspect, kCertain };
 
+  void clear();
   void take(const StoreWindow::Node& node);
+  void take_inner();
+  void move_pending(Group& group, std::size_t at);
   void insert_taken();
   [[nodiscard]] bool stands_before(const Origin& a, const Origin& b) const;
-  void find_suspects();
-  void find_suspect_circles();
+  void check_memory(std::size_t more) const;
+
+  void examine_all();
+  void examine_changes();
+  void examine(tri::TriangleId triangle);
+  void consider(tri::TriangleId triangle, const CircleCover& cover);
   void find_suspect_hull();
   /// False: nothing is missing.
-  bool read_more();
+  bool add_missing();
+  bool read_missing();
+  bool find_missing(const Suspect& suspect, bool is_near);
+  [[nodiscard]] CircleCover circle(tri::TriangleId triangle) const;
+
   void make_hints();
   [[nodiscard]] std::size_t hint_cell(const Point2& place) const;
   [[nodiscard]] SurfacePoint at_vertex(tri::VertexId vertex, tri::TriangleId triangle) const;
@@ -103,21 +126,22 @@ class PointWindow {
   std::uint64_t memory_bytes_;
   double scale_, offset_;  ///< of heights
   ClusterFrontier frontier_;
-  StoredBox box_{}, inner_{};  ///< loaded; where all points were read
+  StoredBox box_{}, inner_{};  ///< loaded; where all points are inserted
   Reach reach_ = Reach::kTriangles;
   Triangulation triangulation_;
   std::vector<double> heights_;          ///< by slot of vertex
   std::vector<Origin> origins_;          ///< by slot of vertex
-  std::vector<std::uint8_t> certain_;    ///< by slot of triangle
+  std::vector<std::uint8_t> states_;     ///< by slot of triangle
   std::vector<stream::ClusterId> read_;  ///< in their order
-  // What was read and not inserted yet.
-  std::vector<Triangulation::Point> taken_;
-  std::vector<double> taken_heights_;
-  std::vector<Origin> taken_origins_;
+  std::vector<Pending> pending_, taken_;
+  std::vector<Group> groups_;
+  std::vector<Triangulation::Point> places_;  ///< of taken_
   std::vector<Triangulation::Insertion> inserted_;
-  std::vector<Suspect> suspects_;
-  std::vector<std::uint8_t> near_circle_;  ///< by slot of triangle, for Reach::kCircles
-  std::vector<std::uint32_t> open_near_, chosen_;
+  std::vector<Suspect> suspects_;  ///< hull edges behind the first suspect_triangles_
+  std::size_t suspect_triangles_ = 0;
+  std::vector<tri::TriangleId> hull_;  ///< triangles that have or had a hull edge
+  std::vector<std::uint32_t> open_near_, groups_near_, chosen_;
+  Triangulation::Changes changes_;
   // A vertex near each cell of a grid over the box.
   std::vector<tri::VertexId> hints_;
   std::uint32_t hint_columns_ = 1, hint_rows_ = 1;
