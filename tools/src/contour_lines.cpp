@@ -16,7 +16,7 @@ constexpr std::uint64_t kHorizontal = 0, kVertical = 1, kFalling = 2, kRising = 
 }  // namespace
 
 ContourLines::ContourLines(std::int64_t columns, double interval,
-                           std::function<void(const ContourLine&)> emit, OpenLineLimit limit)
+                           std::function<void(ContourLine&&)> emit, OpenLineLimit limit)
     : columns_(columns), contour_levels_(interval), joiner_(std::move(emit), std::move(limit)) {}
 
 std::size_t ContourLines::Hash::operator()(const Crossing& c) const {

@@ -22,7 +22,7 @@ class ContourLines {
  public:
   /// columns: of the lattice. emit: takes every line once it is whole, in an order that depends on
   /// the lattice alone. Lines that shrink to a point are left out.
-  ContourLines(std::int64_t columns, double interval, std::function<void(const ContourLine&)> emit,
+  ContourLines(std::int64_t columns, double interval, std::function<void(ContourLine&&)> emit,
                OpenLineLimit limit = {});
 
   /// The next band: `rows` rows of heights (NaN: no data), of which the first is the last of the

@@ -20,7 +20,7 @@ namespace terrace::tools {
 struct ContourParts {
   const stream::Store& store;
   const ContourRequest& request;
-  std::function<void(const ContourLine&)> emit;  ///< as ContourText::add() wants them
+  std::function<void(ContourLine&&)> emit;  ///< as ContourText::add() wants them
   OpenLineLimit limit;
   std::function<void(double share)> progress;
   /// The parts in which points are triangulated; the order of the lines depends on it.

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include <terrace/stream/error.hpp>
 
@@ -66,11 +67,11 @@ ContourOutcome write_contours(const stream::Store& store, const ContourRequest& 
                     "give a larger --interval");
     }
   }
-  ContourText text(store, request.interval, write);
+  ContourText text(store, request.interval, request.threads, write);
   ContourParts parts{
       .store = store,
       .request = request,
-      .emit = [&](const ContourLine& line) { text.add(line); },
+      .emit = [&](ContourLine&& line) { text.add(std::move(line)); },
       .limit = {.points = request.memory_bytes / 3 / kBytesPerPoint,
                 .exceeded =
                     [&] {

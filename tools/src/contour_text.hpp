@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <string>
 #include <string_view>
@@ -21,24 +22,29 @@ namespace terrace::tools {
 class ContourText {
  public:
   /// write: takes the text in large pieces. Throws: stream::Error if the store has no CRS.
-  ContourText(const stream::Store& store, double interval,
+  ContourText(const stream::Store& store, double interval, unsigned threads,
               std::function<void(std::string_view)> write);
 
   /// line: in stored coordinates, higher ground on the left where the second one grows upwards.
-  void add(const ContourLine& line);
+  void add(ContourLine&& line);
   void finish();
   [[nodiscard]] const ContourOutcome& outcome() const { return outcome_; }
 
  private:
+  void append(std::string& text, const ContourLine& line, std::vector<Point2>& places) const;
+  void flush();
+
   CoordinateSystem system_;
   GroundSlope ground_;
   bool reverse_;  ///< higher ground is on the left in the CRS
   double interval_;
+  unsigned threads_;
   std::function<void(std::string_view)> write_;
   FixedText degrees_;
   ContourOutcome outcome_;
-  std::string text_;
-  std::vector<Point2> places_;
+  std::vector<ContourLine> lines_;  ///< not written yet
+  std::size_t points_ = 0;          ///< of these
+  bool first_ = true;
 };
 
 }  // namespace terrace::tools

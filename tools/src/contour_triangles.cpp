@@ -10,7 +10,7 @@
 
 namespace terrace::tools {
 
-ContourTriangles::ContourTriangles(double interval, std::function<void(const ContourLine&)> emit,
+ContourTriangles::ContourTriangles(double interval, std::function<void(ContourLine&&)> emit,
                                    OpenLineLimit limit)
     : levels_(interval), joiner_(std::move(emit), std::move(limit)) {}
 

@@ -35,7 +35,7 @@ class ContourTriangles {
 
   /// emit: takes every line once it is whole, in an order that depends on that of the triangles
   /// alone. Lines that shrink to a point are left out.
-  ContourTriangles(double interval, std::function<void(const ContourLine&)> emit,
+  ContourTriangles(double interval, std::function<void(ContourLine&&)> emit,
                    OpenLineLimit limit = {});
 
   /// The triangles of the next part; those that no level crosses may be left out.

@@ -54,13 +54,11 @@ void draw_lattice_contours(const ContourParts& parts) {
     return Point2{p[0] + static_cast<double>(lattice.column),
                   p[1] + static_cast<double>(lattice.row)};
   };
-  ContourLine placed;
   ContourLines lines(
       lattice.columns, request.interval,
-      [&](const ContourLine& line) {
-        placed = line;
-        for (Point2& p : placed.points) p = stored(p);
-        parts.emit(placed);
+      [&](ContourLine&& line) {
+        for (Point2& p : line.points) p = stored(p);
+        parts.emit(std::move(line));
       },
       parts.limit);
   std::function<bool(std::int64_t, std::int64_t)> wanted;

@@ -37,7 +37,7 @@ template <class Crossing, class Hash>
 class LineJoiner {
  public:
   /// emit: takes every line once it is whole. Lines that shrink to a point are left out.
-  explicit LineJoiner(std::function<void(const ContourLine&)> emit, OpenLineLimit limit = {})
+  explicit LineJoiner(std::function<void(ContourLine&&)> emit, OpenLineLimit limit = {})
       : emit_(std::move(emit)), limit_(std::move(limit)) {}
 
   void add(const Crossing& from, Point2 from_place, const Crossing& to, Point2 to_place) {
@@ -130,10 +130,10 @@ class LineJoiner {
     for (const Point2& p : line.points) {
       if (result.points.empty() || result.points.back() != p) result.points.push_back(p);
     }
-    if (result.points.size() > 1) emit_(result);
+    if (result.points.size() > 1) emit_(std::move(result));
   }
 
-  std::function<void(const ContourLine&)> emit_;
+  std::function<void(ContourLine&&)> emit_;
   OpenLineLimit limit_;
   std::uint64_t open_points_ = 0, segments_ = 0, next_line_ = 0;
   std::map<std::uint64_t, Line> lines_;  ///< by number: an order that does not depend on hashing
