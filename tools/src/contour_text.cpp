@@ -3,8 +3,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <utility>
+
+#include <terrace/stream/error.hpp>
 
 #include "crs_options.hpp"
 #include "parallel.hpp"
@@ -22,7 +25,8 @@ constexpr std::size_t kPoints = std::size_t{1} << 17;
 
 ContourText::ContourText(const stream::Store& store, double interval, unsigned threads,
                          std::function<void(std::string_view)> write)
-    : system_(system_of(store)),
+    : file_(store.path().string()),
+      system_(system_of(store)),
       ground_(store),
       interval_(interval),
       threads_(std::max(1U, threads)),
@@ -47,6 +51,16 @@ void ContourText::append(std::string& text, const ContourLine& line,
   for (const Point2& p : line.points) places.push_back(ground_.world(p));
   if (reverse_) std::reverse(places.begin(), places.end());
   system_.to_geographic(places);
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    if (std::isfinite(places[i][0]) && std::isfinite(places[i][1])) continue;
+    const Point2 at = ground_.world(line.points[reverse_ ? places.size() - 1 - i : i]);
+    throw stream::Error({.file = file_,
+                         .where = {},
+                         .cause = number_text(at[0]) + ',' + number_text(at[1]) +
+                                  " has no longitude and latitude in " + system_.title(),
+                         .remedy = "say with `terrace build --crs` which CRS it is, or leave the "
+                                   "place out with --region"});
+  }
   text += "{\"type\":\"Feature\",\"properties\":{\"elev\":" +
           number_text(static_cast<double>(line.level) * interval_) +
           "},\"geometry\":{\"type\":\"LineString\",\"coordinates\":[";

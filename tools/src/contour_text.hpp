@@ -21,7 +21,8 @@ namespace terrace::tools {
 /// Contour lines of a store as a GeoJSON FeatureCollection (RFC 7946), higher ground on the right.
 class ContourText {
  public:
-  /// write: takes the text in large pieces. Throws: stream::Error if the store has no CRS.
+  /// write: takes the text in large pieces. Throws: stream::Error if the store has no CRS; add()
+  /// and finish() also for a place without longitude and latitude.
   ContourText(const stream::Store& store, double interval, unsigned threads,
               std::function<void(std::string_view)> write);
 
@@ -34,6 +35,7 @@ class ContourText {
   void append(std::string& text, const ContourLine& line, std::vector<Point2>& places) const;
   void flush();
 
+  std::string file_;
   CoordinateSystem system_;
   GroundSlope ground_;
   bool reverse_;  ///< higher ground is on the left in the CRS
