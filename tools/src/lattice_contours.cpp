@@ -43,7 +43,9 @@ void draw_lattice_contours(const ContourParts& parts) {
   const stream::Store& store = parts.store;
   const ContourRequest& request = parts.request;
   if (request.max_edge) {
-    throw UsageError("--max-edge is for points, and this store holds a raster: leave it out");
+    throw UsageError(
+        "--max-edge is for irregular points and coarser levels: the samples of a raster say "
+        "themselves where there is no data");
   }
   const GroundSlope ground(store);
   const LatticeWindow lattice = lattice_of(store, ground, request.region);

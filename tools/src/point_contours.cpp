@@ -13,8 +13,8 @@
 #include "contour_triangles.hpp"
 #include "interrupt.hpp"
 #include "ordered_work.hpp"
-#include "point_parts.hpp"
 #include "point_window.hpp"
+#include "window_tree.hpp"
 
 namespace terrace::tools {
 namespace {
@@ -44,8 +44,8 @@ class PointContours {
         request_(parts.request),
         ground_(parts.store),
         levels_(request_.interval),
-        plane_(parts.store, request_.level, parts.points_per_part),
-        rank_(plane_.size(), kNowhere) {
+        tree_(parts.store, request_.level, parts.points_per_part),
+        rank_(tree_.size(), kNowhere) {
     const stream::Box3& bounds = parts.store.bounds();
     bounds_ = {{bounds.min[0], bounds.min[1]}, {bounds.max[0], bounds.max[1]}};
     StoredBox wanted = bounds_;
@@ -60,8 +60,8 @@ class PointContours {
       }
       if (!wanted.meets(bounds_)) throw_region_outside(parts.store);
     }
-    for (std::size_t part = 0; part < plane_.size(); ++part) {
-      if (!plane_.box(part).meets(wanted)) continue;
+    for (std::size_t part = 0; part < tree_.size(); ++part) {
+      if (!tree_.box(part).meets(wanted)) continue;
       rank_[part] = static_cast<std::uint32_t>(at_work_.size());
       at_work_.push_back(part);
     }
@@ -81,7 +81,7 @@ class PointContours {
           if (window == nullptr) {
             window = std::make_unique<PointWindow>(parts_.store, request_.level, memory / threads);
           }
-          window->load(clipped(plane_.box(at_work_[i])));
+          window->load(tree_.box(at_work_[i]));
           return crossed(*window, static_cast<std::uint32_t>(i));
         },
         [&](std::size_t i, const Crossed& triangles) {
@@ -102,15 +102,10 @@ class PointContours {
   }
 
  private:
-  [[nodiscard]] StoredBox clipped(StoredBox box) const {
-    for (std::size_t axis = 0; axis < 2; ++axis) {
-      box.min[axis] = std::clamp(box.min[axis], bounds_.min[axis], bounds_.max[axis]);
-      box.max[axis] = std::clamp(box.max[axis], bounds_.min[axis], bounds_.max[axis]);
-    }
-    return box;
-  }
-
   [[nodiscard]] bool wanted(const Triangle& t) const {
+    for (std::size_t i = 0; request_.max_edge && i < 3; ++i) {
+      if (ground_.metres(t[i].place, t[(i + 1) % 3].place) > *request_.max_edge) return false;
+    }
     if (!request_.region) return true;
     Point2 middle{};
     for (std::size_t axis = 0; axis < 2; ++axis) {
@@ -125,7 +120,7 @@ class PointContours {
     std::vector<std::uint32_t> part_of(whole.vertex_slots());
     for (const tri::VertexId vertex : whole.all_vertices()) {
       level_of[tri::slot(vertex)] = levels_.at_or_above(window.height(vertex));
-      part_of[tri::slot(vertex)] = rank_[plane_.part_of(whole.point(vertex))];
+      part_of[tri::slot(vertex)] = rank_[tree_.window_of(whole.point(vertex))];
     }
     Crossed result;
     for (const tri::TriangleId id : whole.all_triangles()) {
@@ -151,7 +146,7 @@ class PointContours {
   const ContourRequest& request_;
   GroundSlope ground_;
   ContourLevels levels_;
-  PointParts plane_;
+  WindowTree tree_;
   StoredBox bounds_;
   std::vector<std::uint32_t> rank_;   ///< by part: its place in at_work_
   std::vector<std::size_t> at_work_;  ///< parts that meet the region

@@ -4,6 +4,8 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <utility>
 #include <vector>
 
 #include <terrace/stream/store.hpp>
@@ -68,11 +70,29 @@ class PointWindow {
   /// By slot of vertex, as libtri wants them.
   [[nodiscard]] const std::vector<double>& heights() const { return heights_; }
 
+  /// A point of the surface.
+  struct Corner {
+    Point2 place;
+    double height = 0;
+  };
+  [[nodiscard]] Corner corner(tri::VertexId vertex) const;
+  /// Counter-clockwise.
+  [[nodiscard]] std::array<Corner, 3> corners_with_heights(tri::TriangleId triangle) const;
+
+  /// Whether an edge between two places is so long that triangles with it are no surface.
+  using TooLong = std::function<bool(const Point2&, const Point2&)>;
+  void set_limit(TooLong too_long) { too_long_ = std::move(too_long); }
+
   /// The linear surface at a place of the box. On an edge and on a vertex the height comes from the
   /// points there alone and the gradient is the mean of the triangles that meet there. NaN outside
   /// the hull. While all points are on one line, or there is only one, the hull is the segment
-  /// between the outermost; there are heights but no gradients. The same bits whatever the window.
+  /// between the outermost; there are heights but no gradients. With a limit, triangles beyond it
+  /// are left out; shorter edges and vertices that have no other have heights but no gradients.
+  /// The same bits whatever the window.
   [[nodiscard]] SurfacePoint at(const Point2& place) const;
+
+  /// Whether a place lies inside an edge, exactly.
+  [[nodiscard]] bool is_on_edge(const Point2& place) const;
 
  private:
   using Triangulation = tri::Delaunay2<double>;
@@ -119,12 +139,16 @@ class PointWindow {
 
   void make_hints();
   [[nodiscard]] std::size_t hint_cell(const Point2& place) const;
+  [[nodiscard]] SurfacePoint at_edge(tri::TriangleId triangle, std::size_t edge,
+                                     const Point2& place) const;
   [[nodiscard]] SurfacePoint at_vertex(tri::VertexId vertex, tri::TriangleId triangle) const;
+  [[nodiscard]] bool is_surface(tri::TriangleId triangle) const;
   [[nodiscard]] std::array<Point2, 3> corners(tri::TriangleId triangle) const;
 
   const stream::Store& store_;
   std::uint64_t memory_bytes_;
   double scale_, offset_;  ///< of heights
+  TooLong too_long_;
   ClusterFrontier frontier_;
   StoredBox box_{}, inner_{};  ///< loaded; where all points are inserted
   Reach reach_ = Reach::kTriangles;

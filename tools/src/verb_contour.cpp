@@ -35,6 +35,10 @@ class ContourCommand final : public Command {
                    "store's");
     app.add_option("--level", level_, "only points of this level and above: a number or top")
         ->capture_default_str();
+    app.add_option("--max-edge", max_edge_,
+                   "of points: triangles with a longer side, on the ground, are no data (default: "
+                   "none is too long)")
+        ->type_name("METRES");
   }
 
   Summary run(const CommonOptions& common) override {
@@ -43,6 +47,10 @@ class ContourCommand final : public Command {
     request.interval = parse_number(interval_, "--interval");
     if (!(request.interval > 0)) throw UsageError("--interval must be above 0");
     const std::optional<unsigned> level = parse_level(level_);
+    if (!max_edge_.empty()) {
+      request.max_edge = parse_number(max_edge_, "--max-edge");
+      if (!(*request.max_edge > 0)) throw UsageError("--max-edge must be above 0");
+    }
     if (common.json && output_ == "-") {
       throw UsageError("--json and the lines cannot both go to standard output; give -o FILE");
     }
@@ -77,7 +85,7 @@ class ContourCommand final : public Command {
   }
 
  private:
-  std::string store_, output_, interval_, region_, region_crs_, level_ = "0";
+  std::string store_, output_, interval_, region_, region_crs_, level_ = "0", max_edge_;
 };
 
 }  // namespace
