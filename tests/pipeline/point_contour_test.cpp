@@ -105,7 +105,7 @@ std::multiset<Segment> segments_of(const std::vector<Triangle>& triangles, doubl
                                    const std::function<bool(const Triangle&)>& wanted) {
   std::multiset<Segment> segments;
   for (const Triangle& t : triangles) {
-    if (wanted && !wanted(t)) continue;
+    if (!wanted(t)) continue;
     const auto [lowest, highest] = std::minmax({t[0][2], t[1][2], t[2][2]});
     for (auto level = static_cast<std::int64_t>(std::floor(lowest / interval)) - 1;
          static_cast<double>(level) * interval < highest; ++level) {
@@ -149,14 +149,15 @@ std::vector<tools::ContourLine> lines_of(const stream::Store& store,
 /// The lines are those of the whole, in the same order for any number of threads and memory.
 void expect_contours(const stream::Store& store, tools::ContourRequest request,
                      const std::vector<Triangle>& triangles) {
-  std::function<bool(const Triangle&)> wanted;
-  if (request.region) {
-    wanted = [&](const Triangle& t) {
-      const stream::Point3 middle{(t[0][0] + t[1][0] + t[2][0]) / 3,
-                                  (t[0][1] + t[1][1] + t[2][1]) / 3, 0};
-      return request.region->contains(middle);
-    };
-  }
+  const auto wanted = [&](const Triangle& t) {
+    for (std::size_t i = 0; request.max_edge && i < 3; ++i) {
+      const stream::Point3 &a = t[i], &b = t[(i + 1) % 3];
+      if (std::hypot(a[0] - b[0], a[1] - b[1]) > *request.max_edge) return false;
+    }
+    const stream::Point3 middle{(t[0][0] + t[1][0] + t[2][0]) / 3,
+                                (t[0][1] + t[1][1] + t[2][1]) / 3, 0};
+    return !request.region || request.region->contains(middle);
+  };
   const auto expected = segments_of(triangles, request.interval, wanted);
   for (const std::uint64_t most : {1u << 20, 900u, 70u}) {
     SCOPED_TRACE("parts of " + std::to_string(most));
@@ -194,6 +195,19 @@ TEST(PointContours, AreThoseOfTheWholeTriangulationAtAnyLevel) {
       expect_contours(store, {.interval = seed % 2 == 0 ? 2.0 : 3.3, .level = level}, triangles);
     }
   }
+}
+
+TEST(PointContours, EndAtTrianglesWithALongerSideThanAllowed) {
+  const tests::TemporaryFolder folder;
+  const stream::Store store = cloud(folder.path(), lake_shore(6, false));
+  const std::vector<Triangle> triangles = triangles_of(store, 0);
+  for (const double most : {0.5, 12.0, 40.0, 1e6}) {
+    SCOPED_TRACE(most);
+    expect_contours(store, {.interval = 3, .max_edge = most}, triangles);
+  }
+  expect_contours(store,
+                  {.interval = 3, .max_edge = 20, .region = tools::Region::parse("0,0,200,400")},
+                  triangles);
 }
 
 TEST(PointContours, OfARegionAreThoseOfTheTrianglesWhoseMiddlesLieInside) {
