@@ -107,6 +107,7 @@ void PointWindow::insert_taken() {
   heights_.resize(triangulation_.vertex_slots(), std::numeric_limits<double>::quiet_NaN());
   origins_.resize(triangulation_.vertex_slots());
   states_.resize(triangulation_.triangle_slots(), kUnknown);
+  hull_certain_.resize(triangulation_.triangle_slots(), 0);
   for (std::size_t i = 0; i < taken_.size(); ++i) {
     const std::uint32_t at = tri::slot(inserted_[i].vertex);
     if (!stands_before(taken_[i].origin, origins_[at])) continue;
@@ -122,6 +123,7 @@ void PointWindow::clear() {
   heights_.clear();
   origins_.clear();
   states_.clear();
+  hull_certain_.clear();
   read_.clear();
   pending_.clear();
   taken_.clear();

@@ -100,7 +100,7 @@ class PointWindow {
   struct Origin {
     std::uint32_t cluster = 0xFFFFFFFF, index = 0;
   };
-  /// A point that was read and is not inserted.
+  /// A point that was read; taken for inserting where its cluster is no number.
   struct Pending {
     Triangulation::Point place{};
     double height = 0;
@@ -111,10 +111,12 @@ class PointWindow {
     StoredBox box;
     std::size_t begin = 0, count = 0;
   };
-  /// A triangle, or a hull edge (no triangle), that needs all points in its cover.
+  /// A triangle, or its hull edge, that needs all points in its cover.
   struct Suspect {
+    static constexpr std::uint8_t kNone = 3;
     CircleCover cover;
     tri::TriangleId triangle = tri::kNoTriangle;
+    std::uint8_t edge = kNone;
   };
   enum State : std::uint8_t { kUnknown, kSuspect, kCertain };
 
@@ -134,6 +136,7 @@ class PointWindow {
   /// False: nothing is missing.
   bool add_missing();
   bool read_missing();
+  void gather_near(const StoredBox& wide);
   bool find_missing(const Suspect& suspect, bool is_near);
   [[nodiscard]] CircleCover circle(tri::TriangleId triangle) const;
 
@@ -153,10 +156,11 @@ class PointWindow {
   StoredBox box_{}, inner_{};  ///< loaded; where all points are inserted
   Reach reach_ = Reach::kTriangles;
   Triangulation triangulation_;
-  std::vector<double> heights_;          ///< by slot of vertex
-  std::vector<Origin> origins_;          ///< by slot of vertex
-  std::vector<std::uint8_t> states_;     ///< by slot of triangle
-  std::vector<stream::ClusterId> read_;  ///< in their order
+  std::vector<double> heights_;             ///< by slot of vertex
+  std::vector<Origin> origins_;             ///< by slot of vertex
+  std::vector<std::uint8_t> states_;        ///< by slot of triangle
+  std::vector<std::uint8_t> hull_certain_;  ///< by slot of triangle, a bit for each edge
+  std::vector<stream::ClusterId> read_;     ///< in their order
   std::vector<Pending> pending_, taken_;
   std::vector<Group> groups_;
   std::vector<Triangulation::Point> places_;  ///< of taken_
@@ -164,7 +168,8 @@ class PointWindow {
   std::vector<Suspect> suspects_;  ///< hull edges behind the first suspect_triangles_
   std::size_t suspect_triangles_ = 0;
   std::vector<tri::TriangleId> hull_;  ///< triangles that have or had a hull edge
-  std::vector<std::uint32_t> open_near_, groups_near_, chosen_;
+  std::vector<std::uint32_t> open_near_, chosen_;
+  std::vector<std::pair<double, std::size_t>> points_near_;  ///< x and place in pending_
   Triangulation::Changes changes_;
   // A vertex near each cell of a grid over the box.
   std::vector<tri::VertexId> hints_;

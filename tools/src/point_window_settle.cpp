@@ -76,7 +76,10 @@ void PointWindow::examine_all() {
 
 void PointWindow::examine_changes() {
   triangulation_.take_changes(changes_);
-  for (const tri::TriangleId t : changes_.removed_triangles) states_[tri::slot(t)] = kUnknown;
+  for (const tri::TriangleId t : changes_.removed_triangles) {
+    states_[tri::slot(t)] = kUnknown;
+    hull_certain_[tri::slot(t)] = 0;
+  }
   suspects_.resize(suspect_triangles_);
   std::erase_if(suspects_, [&](const Suspect& suspect) {
     return states_[tri::slot(suspect.triangle)] != kSuspect;
@@ -107,10 +110,10 @@ void PointWindow::find_suspect_hull() {
     const auto next = triangulation_.neighbours(t);
     const std::array<Point2, 3> corner = corners(t);
     for (std::size_t i = 0; i < 3; ++i) {
-      if (next[i] != tri::kNoTriangle) continue;
+      if (next[i] != tri::kNoTriangle || (hull_certain_[tri::slot(t)] >> i & 1) != 0) continue;
       const CircleCover cover = CircleCover::of_plane(corner[(i + 1) % 3], corner[(i + 2) % 3]);
       if (cover.meets(box_) || (reach_ == Reach::kCircles && circle(t).meets(box_))) {
-        suspects_.push_back({cover, tri::kNoTriangle});
+        suspects_.push_back({cover, t, static_cast<std::uint8_t>(i)});
       }
     }
   }
@@ -132,58 +135,88 @@ bool PointWindow::add_missing() {
       if (!read_missing()) return false;
     }
   }
-  // Most circles reach a little over the border; what is far from there is left out for these.
+  // Most circles reach a little over the border; for these only what is near is looked at.
   StoredBox wide = inner_;
   for (std::size_t k = 0; k < 2; ++k) {
     const double more = 0.1 * (inner_.max[k] - inner_.min[k]);
     wide.min[k] -= more;
     wide.max[k] += more;
   }
-  open_near_.clear();
-  groups_near_.clear();
-  const auto open = frontier_.open();
-  for (std::uint32_t k = 0; k < open.size(); ++k) {
-    if (open[k].box.meets(wide)) open_near_.push_back(k);
-  }
-  for (std::uint32_t k = 0; k < groups_.size(); ++k) {
-    if (groups_[k].count > 0 && groups_[k].box.meets(wide)) groups_near_.push_back(k);
-  }
+  gather_near(wide);
   chosen_.clear();
-  for (Suspect& suspect : suspects_) {
+  for (const Suspect& suspect : suspects_) {
     if (find_missing(suspect, holds(wide, suspect.cover.bounds()))) continue;
-    if (suspect.triangle == tri::kNoTriangle) continue;
-    states_[tri::slot(suspect.triangle)] = kCertain;
+    const std::uint32_t at = tri::slot(suspect.triangle);
+    if (suspect.edge == Suspect::kNone) {
+      states_[at] = kCertain;
+    } else {
+      hull_certain_[at] = static_cast<std::uint8_t>(hull_certain_[at] | 1U << suspect.edge);
+    }
   }
   // Clusters are read to look into them: what they hold is found in the next round.
   const bool has_read = read_missing();
   return has_read || !taken_.empty();
 }
 
+void PointWindow::gather_near(const StoredBox& wide) {
+  constexpr double kAll = std::numeric_limits<double>::infinity();
+  StoredBox around{{kAll, kAll}, {-kAll, -kAll}};
+  for (const Suspect& suspect : suspects_) {
+    const StoredBox bounds = suspect.cover.bounds();
+    if (!holds(wide, bounds)) continue;
+    for (std::size_t k = 0; k < 2; ++k) {
+      around.min[k] = std::min(around.min[k], bounds.min[k]);
+      around.max[k] = std::max(around.max[k], bounds.max[k]);
+    }
+  }
+  open_near_.clear();
+  points_near_.clear();
+  const auto open = frontier_.open();
+  for (std::uint32_t k = 0; k < open.size(); ++k) {
+    if (open[k].box.meets(around)) open_near_.push_back(k);
+  }
+  for (const Group& group : groups_) {
+    if (!group.box.meets(around)) continue;
+    for (std::size_t at = group.begin; at < group.begin + group.count; ++at) {
+      const Pending& p = pending_[at];
+      if (p.origin.cluster == kNone || !around.contains({p.place[0], p.place[1], 0})) continue;
+      points_near_.emplace_back(p.place[0], at);
+    }
+  }
+  std::sort(points_near_.begin(), points_near_.end());
+}
+
 bool PointWindow::find_missing(const Suspect& suspect, bool is_near) {
   const CircleCover& cover = suspect.cover;
   // Of points that were read the one farthest inside: what is left afterwards is smallest.
-  Group* group = nullptr;
-  std::size_t point = 0;
+  std::size_t point = pending_.size();
   double depth = std::numeric_limits<double>::infinity();
-  const auto look_into = [&](Group& one) {
-    if (!cover.meets(one.box)) return;
-    for (std::size_t at = one.begin; at < one.begin + one.count; ++at) {
-      const StoredBox box{pending_[at].place, pending_[at].place};
-      if (!cover.meets(box)) continue;
-      const double d = cover.depth(box);
-      if (group != nullptr && !(d < depth)) continue;
-      group = &one;
-      point = at;
-      depth = d;
-    }
+  const auto look_at_point = [&](std::size_t at) {
+    const Pending& p = pending_[at];
+    if (p.origin.cluster == kNone) return;  // taken
+    const StoredBox box{p.place, p.place};
+    if (!cover.meets(box)) return;
+    const double d = cover.depth(box);
+    if (point < pending_.size() && !(d < depth)) return;
+    point = at;
+    depth = d;
   };
   if (is_near) {
-    for (const std::uint32_t k : groups_near_) look_into(groups_[k]);
+    const StoredBox bounds = cover.bounds();
+    auto one = std::lower_bound(points_near_.begin(), points_near_.end(),
+                                std::pair(bounds.min[0], std::size_t{0}));
+    for (; one != points_near_.end() && one->first <= bounds.max[0]; ++one) {
+      look_at_point(one->second);
+    }
   } else {
-    for (Group& one : groups_) look_into(one);
+    for (const Group& group : groups_) {
+      if (!cover.meets(group.box)) continue;
+      for (std::size_t k = 0; k < group.count; ++k) look_at_point(group.begin + k);
+    }
   }
-  if (group != nullptr) {
-    move_pending(*group, point);
+  if (point < pending_.size()) {
+    taken_.push_back(pending_[point]);
+    pending_[point].origin.cluster = kNone;
     return true;
   }
   // Else of the clusters that may hold some one of the highest level.
