@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <terrace/stream/error.hpp>
 
 #include "detail.hpp"
+#include "digest.hpp"
 #include "interrupt.hpp"
 
 namespace terrace::tools {
@@ -110,6 +112,29 @@ RasterFill::RasterFill(const stream::Store& store) {
 double RasterFill::height(double column, double row) const {
   return between(grid_.heights, grid_.columns, grid_.rows, (column + 0.5) / reduction_,
                  (row + 0.5) / reduction_);
+}
+
+std::uint64_t RasterFill::digest(const LatticeWindow& window) const {
+  Digest digest;
+  if (window.columns <= 0 || window.rows <= 0) return digest.value();
+  // The first and the last cell that between() takes.
+  const auto cells = [this](std::int64_t first, std::int64_t count, std::size_t number) {
+    const auto cell = [&](std::int64_t place) {
+      const double at = (static_cast<double>(place) + 0.5) / reduction_ - 0.5;
+      return static_cast<std::size_t>(std::clamp(at, 0.0, static_cast<double>(number - 1)));
+    };
+    return std::pair{cell(first), std::min(cell(first + count - 1) + 1, number - 1)};
+  };
+  const auto [left, right] = cells(window.column, window.columns, grid_.columns);
+  const auto [top, bottom] = cells(window.row, window.rows, grid_.rows);
+  for (std::size_t row = top; row <= bottom; ++row) {
+    for (std::size_t column = left; column <= right; ++column) {
+      const std::size_t cell = row * grid_.columns + column;
+      digest.add(std::uint64_t{cell});
+      digest.add(static_cast<double>(grid_.heights[cell]));
+    }
+  }
+  return digest.value();
 }
 
 }  // namespace terrace::tools

@@ -7,6 +7,8 @@
 
 #include <terrace/stream/store.hpp>
 
+#include "store_window.hpp"
+
 namespace terrace::tools {
 
 /// Heights for the cells of a raster that have no data, from those around: a smooth surface made by
@@ -22,6 +24,10 @@ class RasterFill {
   /// The height at a place of the lattice, in the vertical unit of the store. Outside the raster
   /// that of its border.
   [[nodiscard]] double height(double column, double row) const;
+
+  /// A number of what height() depends on for places in the window, borders included: of two
+  /// rasters of equal size with the same number it gives the same there.
+  [[nodiscard]] std::uint64_t digest(const LatticeWindow& window) const;
 
  private:
   struct Grid {

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "src/digest.hpp"
 #include "src/tile/tile_surface.hpp"
 
 namespace terrace::tools {
@@ -49,6 +50,19 @@ class AnalyticSurface final : public TileSurface {
     });
   }
 
+  bool rows(const GeographicBox& box, SurfaceRows& out) override {
+    out = {};
+    if (!in_rows) return false;
+    int row_before = -1;
+    visit(box, [&](int column, int row, double height) {
+      if (row != row_before) out.latitude.push_back(latitude(row));
+      row_before = row;
+      if (out.latitude.size() == 1) out.longitude.push_back(longitude(column));
+      out.height.push_back(height);
+    });
+    return true;
+  }
+
   std::optional<HeightRange> range(const GeographicBox& box) override {
     constexpr double kFar = std::numeric_limits<double>::infinity();
     HeightRange range{kFar, -kFar, true};
@@ -71,6 +85,17 @@ class AnalyticSurface final : public TileSurface {
       out[i] = height_(longitude[i], latitude[i]) <= 0.0 ? 1 : 0;
     }
   }
+
+  /// Of all samples: the function between them is known by nothing else.
+  std::uint64_t digest(const GeographicBox& /*box*/) override {
+    Digest digest;
+    for (const double height : samples_) digest.add(height);
+    for (const double number : {west_, south_, step_}) digest.add(number);
+    digest.add(static_cast<std::uint64_t>(columns_));
+    return digest.value();
+  }
+
+  bool in_rows = true;  ///< whether it says so
 
  private:
   [[nodiscard]] double longitude(int column) const { return west_ + step_ * column; }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -44,12 +45,45 @@ double flat_error(const std::vector<SideVertex>& frame, double step, const Heigh
   return std::max(range.high - low, high - range.low);
 }
 
+/// Degrees along one axis to units of the tile; rounding takes no sample out of the leaf.
+struct LeafUnits {
+  double from = 0.0, units = 0.0;
+  double low = 0.0, high = 0.0;  ///< the leaf's sides
+
+  void convert(std::vector<double>& degrees) const {
+    for (double& at : degrees) at = std::clamp((at - from) * units, low, high);
+  }
+};
+
+tri::PointTin tin_of(const TileAddress& tile, const TileLeaf& leaf, TileSurface& surface,
+                     bool measured, std::span<const tri::Point3> frame,
+                     const tri::PointTinOptions& options) {
+  const GeographicBox whole = box_of(tile);
+  const double units = kTileUnits / (whole.east - whole.west);
+  const auto units_along = [&](double from, std::uint32_t part) {
+    return LeafUnits{from, units, static_cast<double>(leaf_unit(part, leaf.depth)),
+                     static_cast<double>(leaf_unit(part + 1, leaf.depth))};
+  };
+  const LeafUnits across = units_along(whole.west, leaf.x);
+  const LeafUnits down = units_along(whole.south, leaf.y);
+  if (!measured) return tri::point_tin(tri::SampleRows{}, frame, options);
+  if (SurfaceRows rows; surface.rows(box_of(tile, leaf), rows)) {
+    across.convert(rows.longitude);
+    down.convert(rows.latitude);
+    return tri::point_tin(tri::SampleRows{rows.longitude, rows.latitude, rows.height}, frame,
+                          options);
+  }
+  SurfaceSamples samples;
+  surface.samples(box_of(tile, leaf), samples);
+  across.convert(samples.longitude);
+  down.convert(samples.latitude);
+  return tri::point_tin(samples.longitude, samples.latitude, samples.height, frame, options);
+}
+
 void mesh_leaf(const TileAddress& tile, const TileLeaf& leaf, const ZoomPlan& plan,
                TileSurface& surface, tri::PointTinQuality quality,
                const std::vector<SideVertex>& frame, Pieces& pieces) {
-  SurfaceSamples samples;
-  const GeographicBox box = box_of(tile, leaf);
-  const auto range = surface.range(box);
+  const auto range = surface.range(box_of(tile, leaf));
   bool measured = false;
   if (range) {
     const double error = flat_error(frame, plan.height_step, *range);
@@ -58,26 +92,11 @@ void mesh_leaf(const TileAddress& tile, const TileLeaf& leaf, const ZoomPlan& pl
       pieces.max_error = std::max(pieces.max_error, error);
       pieces.has_data = true;
     } else {
-      surface.samples(box, samples);
       measured = true;
     }
   }
-  // From degrees to units of the tile.
-  const GeographicBox whole = box_of(tile);
-  const double units = kTileUnits / (whole.east - whole.west);
-  std::vector<double> u, v;
-  u.reserve(samples.size());
-  v.reserve(samples.size());
-  // Rounding must not take a sample on a side out of both leaves.
-  const auto unit = [&](double degrees, double from, std::uint32_t part) {
-    return std::clamp((degrees - from) * units, static_cast<double>(leaf_unit(part, leaf.depth)),
-                      static_cast<double>(leaf_unit(part + 1, leaf.depth)));
-  };
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    u.push_back(unit(samples.longitude[i], whole.west, leaf.x));
-    v.push_back(unit(samples.latitude[i], whole.south, leaf.y));
-  }
   std::vector<tri::Point3> corners;
+  corners.reserve(frame.size());
   for (const SideVertex& vertex : frame) {
     corners.push_back({static_cast<double>(vertex.u), static_cast<double>(vertex.v),
                        static_cast<double>(vertex.height) * plan.height_step});
@@ -86,7 +105,7 @@ void mesh_leaf(const TileAddress& tile, const TileLeaf& leaf, const ZoomPlan& pl
   options.max_error = plan.max_error;
   options.quality = quality;
   options.lattice = tri::TinLattice{0.0, plan.height_step};
-  const tri::PointTin tin = tri::point_tin(u, v, samples.height, corners, options);
+  const tri::PointTin tin = tin_of(tile, leaf, surface, measured, corners, options);
   if (measured) pieces.max_error = std::max(pieces.max_error, tin.errors.largest);
   if (tin.errors.covered > 0) pieces.has_data = true;
 

@@ -23,6 +23,13 @@ struct SurfaceSamples {
   }
 };
 
+/// Samples in rows along parallels and columns along meridians, at equal distances.
+struct SurfaceRows {
+  std::vector<double> longitude;  ///< of the columns, ascending
+  std::vector<double> latitude;   ///< of the rows, ascending
+  std::vector<double> height;     ///< metres above the ellipsoid, row by row; NaN: no sample
+};
+
 /// Bounds on the heights of samples, not always reached.
 struct HeightRange {
   double low = 0.0, high = 0.0;  ///< metres above the ellipsoid
@@ -44,6 +51,12 @@ class TileSurface {
   virtual void expect(const GeographicBox& box) = 0;
   /// Replaces `out` by the samples in the box, borders included.
   virtual void samples(const GeographicBox& box, SurfaceSamples& out) = 0;
+  /// The same where samples stand in rows and columns, which is faster; false where they do not.
+  virtual bool rows(const GeographicBox& box, SurfaceRows& out) {
+    static_cast<void>(box);
+    static_cast<void>(out);
+    return false;
+  }
   /// Of the heights of samples in the box, cheaply. Nothing if there is no sample.
   virtual std::optional<HeightRange> range(const GeographicBox& box) = 0;
   /// The surface's heights at places, filled where there are no samples: never NaN.
@@ -52,6 +65,13 @@ class TileSurface {
   /// What a water mask shows: whether there is water at each place.
   virtual void water(std::span<const double> longitude, std::span<const double> latitude,
                      std::span<std::uint8_t> out) = 0;
+
+  /// A number of all that the answers above depend on for places in the box, which may reach beyond
+  /// 180 degrees and the poles: bounds(), spacing(), and samples, ranges, heights and water there.
+  /// Surfaces of two stores that have the same number answer alike in the box, so that what was
+  /// made of one need not be made again of the other. A number of the whole store is right, but
+  /// says of every change that it is everywhere. Cheap beside reading the samples.
+  virtual std::uint64_t digest(const GeographicBox& box) = 0;
 };
 
 }  // namespace terrace::tools
