@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
 #include <cmath>
-#include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -18,7 +18,7 @@
 #include "ordered_work.hpp"
 #include "point_mesh_joiner.hpp"
 #include "point_mesh_plan.hpp"
-#include "point_mesh_reader.hpp"
+#include "point_mesh_samples.hpp"
 #include "point_mesh_scan.hpp"
 #include "point_mesh_sides.hpp"
 #include "point_mesh_window.hpp"
@@ -64,6 +64,7 @@ class PointMesher {
   stream::MeshRounding rounding_;
   PointMeshScan scan_;
   PointMeshPlan plan_;
+  std::optional<PointMeshSamples> samples_;
   unsigned threads_ = 1;
   double reading_seconds_ = 0.0;
 };
@@ -84,27 +85,17 @@ PointMesher::PointMesher(const stream::Store& store, const BoundedMeshOptions& o
 }
 
 void PointMesher::plan_windows() {
-  PointMeshReader reader(store_, options_.region);
-  MeshSamples samples;
-  const CoordinatesBetween between = [&](unsigned axis, const PlaneBox& box, double a, double b) {
-    PlaneBox gap = box;
-    gap.min[axis] = std::nextafter(a, b);
-    gap.max[axis] = b;
-    reader.read(gap, samples);
-    return axis == 0 ? samples.x : samples.y;
-  };
-  plan_ = plan_point_mesh(std::move(scan_.some), scan_.period, scan_.hull, options_.window_points,
-                          between);
+  plan_ = plan_point_mesh(std::move(scan_.some), scan_.period, scan_.hull, options_.window_points);
   scan_.some = {};
+  samples_.emplace(store_, options_.region, plan_, options_.path);
 }
 
 unsigned PointMesher::threads_within_memory() const {
-  double most = static_cast<double>(scan_.whole ? scan_.whole->size() : 0);
-  for (const PointMeshPlan::Window& window : plan_.windows) {
-    most = std::max(most, window.samples);
-  }
   const bool single = scan_.whole.has_value();
-  const auto points = static_cast<std::uint64_t>(most);
+  std::uint64_t points = single ? scan_.whole->size() : 0;
+  for (std::size_t i = 0; i < plan_.windows.size(); ++i) {
+    points = std::max<std::uint64_t>(points, samples_->count(i));
+  }
   const std::uint64_t beside = single ? 0 : kBytesBeside;
   const std::uint64_t each = points * kBytesPerPoint + (single ? 0 : kBytesPerReader);
   const std::uint64_t memory = common_.memory_or(0);
@@ -168,12 +159,9 @@ BoundedMeshResult PointMesher::run(double max_error, MeshSpool& spool,
     result = run_whole(options, spool);
   } else {
     options = mesh_options(max_error);
-    PointMeshSides sides(plan_, options.tin.duplicates, options.tin.max_error);
-    std::vector<std::unique_ptr<PointWindowMesher>> meshers;
-    for (unsigned i = 0; i < threads_; ++i) {
-      meshers.push_back(std::make_unique<PointWindowMesher>(store_, options_.region, plan_, sides,
-                                                            options, rounding_));
-    }
+    PointMeshSides sides(plan_, *samples_, options.tin.duplicates, options.tin.max_error);
+    const PointWindowMesher mesher(plan_, *samples_, sides, options, rounding_,
+                                   store_.path().string());
     PointMeshJoiner joiner(plan_, sides, spool);
     ProgressMeter meter(common_.progress, "samples");
     double squares = 0.0, covered = 0.0;
@@ -181,9 +169,9 @@ BoundedMeshResult PointMesher::run(double max_error, MeshSpool& spool,
     try {
       in_order(
           plan_.windows.size(), threads_,
-          [&](unsigned worker, std::size_t i) {
+          [&](unsigned, std::size_t i) {
             check_interrupt();
-            return meshers[worker]->mesh(i);
+            return mesher.mesh(i);
           },
           [&](std::size_t i, const PointWindowTin& tin) {
             joiner.add(i, tin);

@@ -7,7 +7,7 @@
 #include <terrace/tri/delaunay2.hpp>
 #include <terrace/tri/point_tin.hpp>
 
-#include "point_mesh_reader.hpp"
+#include "point_mesh_samples.hpp"
 
 namespace terrace::tools {
 

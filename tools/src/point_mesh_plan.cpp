@@ -21,18 +21,17 @@ constexpr double kSlack = 0.05;
 class Planner {
  public:
   Planner(std::vector<Point2> some, std::uint64_t period, std::span<const Point2> hull,
-          std::size_t most, const CoordinatesBetween& between)
+          std::size_t most)
       : some_(std::move(some)),
         period_(static_cast<double>(period)),
         hull_(hull),
-        most_(static_cast<double>(most)),
-        between_(between) {}
+        most_(static_cast<double>(most)) {}
 
   PointMeshPlan make() {
     Node root;
     root.end = some_.size();
     root.corners.assign(hull_.begin(), hull_.end());
-    divide(std::move(root));
+    plan_.root = divide(std::move(root));
     add_sides();
     return std::move(plan_);
   }
@@ -58,24 +57,23 @@ class Planner {
     bool balanced = false;
   };
 
-  void divide(Node node);
+  std::uint32_t divide(Node node);
   std::optional<Line> line_for(const Node& node, double share, double slack);
   std::optional<Line> line_along(const Node& node, unsigned axis, double share, double slack);
   std::uint32_t add_cut(const Node& node, const Line& line);
-  void add_window(Node node);
+  std::uint32_t add_window(Node node);
   void add_sides();
 
   std::vector<Point2> some_;
   double period_;
   std::span<const Point2> hull_;
   double most_;
-  const CoordinatesBetween& between_;
   std::vector<Cut> cuts_;
   std::vector<std::array<std::array<std::uint32_t, 2>, 2>> window_cuts_;
   PointMeshPlan plan_;
 };
 
-void Planner::divide(Node node) {
+std::uint32_t Planner::divide(Node node) {
   const double count = static_cast<double>(node.end - node.begin) * period_;
   if (count <= most_) return add_window(std::move(node));
   if (node.parts < 2.0) node.parts = std::max(2.0, std::ceil(count / (kFullness * most_)));
@@ -96,8 +94,12 @@ void Planner::divide(Node node) {
   upper.parts = line->balanced ? upper.parts - lower_parts : 0.0;
   std::erase_if(lower.corners, [&](const Point2& p) { return !below(p); });
   std::erase_if(upper.corners, below);
-  divide(std::move(lower));
-  divide(std::move(upper));
+  const auto number = static_cast<std::uint32_t>(plan_.nodes.size());
+  plan_.nodes.push_back({axis, line->at, {}});
+  const std::uint32_t first = divide(std::move(lower));
+  const std::uint32_t second = divide(std::move(upper));
+  plan_.nodes[number].next = {first, second};
+  return number;
 }
 
 std::optional<Planner::Line> Planner::line_for(const Node& node, double share, double slack) {
@@ -150,19 +152,6 @@ std::optional<Planner::Line> Planner::line_along(const Node& node, unsigned axis
     }
   }
   if (!(best > 0.0)) return std::nullopt;
-  if (period_ > 1.0) {
-    std::vector<double> all = between_(axis, node.box, lower, upper);
-    all.push_back(lower);
-    all.push_back(upper);
-    std::sort(all.begin(), all.end());
-    double widest = 0.0;
-    for (std::size_t i = 1; i < all.size(); ++i) {
-      if (all[i] - all[i - 1] <= widest) continue;
-      widest = all[i] - all[i - 1];
-      lower = all[i - 1];
-      upper = all[i];
-    }
-  }
   double line = number_between(lower, upper);
   // Where no number fits between, the line runs through samples: they belong above.
   if (line == lower) {
@@ -203,7 +192,7 @@ std::uint32_t Planner::add_cut(const Node& node, const Line& line) {
   return number;
 }
 
-void Planner::add_window(Node node) {
+std::uint32_t Planner::add_window(Node node) {
   PointMeshPlan::Window window;
   window.box = node.box;
   const auto count = static_cast<double>(node.end - node.begin);
@@ -221,6 +210,7 @@ void Planner::add_window(Node node) {
   window.corners = std::move(node.corners);
   plan_.windows.push_back(std::move(window));
   window_cuts_.push_back(node.cuts);
+  return PointMeshPlan::kLeaf + static_cast<std::uint32_t>(plan_.windows.size() - 1);
 }
 
 void Planner::add_sides() {
@@ -275,9 +265,8 @@ double number_between(double a, double b) {
 }
 
 PointMeshPlan plan_point_mesh(std::vector<Point2> some, std::uint64_t period,
-                              std::span<const Point2> hull, std::size_t most,
-                              const CoordinatesBetween& between) {
-  return Planner(std::move(some), period, hull, most, between).make();
+                              std::span<const Point2> hull, std::size_t most) {
+  return Planner(std::move(some), period, hull, most).make();
 }
 
 }  // namespace terrace::tools

@@ -4,7 +4,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <limits>
 #include <span>
 #include <vector>
@@ -51,20 +50,35 @@ struct PointMeshPlan {
   std::vector<Knot> knots;
   std::vector<Side> sides;
   std::vector<Window> windows;  ///< neighbours mostly near in order
+
+  /// A node of the tree of cuts: what is below the line and what is not.
+  struct Node {
+    unsigned axis = 0;
+    double line = 0.0;
+    std::array<std::uint32_t, 2> next{};  ///< nodes, or kLeaf + a window
+  };
+  static constexpr std::uint32_t kLeaf = 0x80000000U;
+  std::vector<Node> nodes;
+  std::uint32_t root = kLeaf;
+
+  [[nodiscard]] std::uint32_t window_of(const Point2& p) const {
+    std::uint32_t at = root;
+    while (at < kLeaf) {
+      const Node& node = nodes[at];
+      at = node.next[p[node.axis] < node.line ? 0 : 1];
+    }
+    return at - kLeaf;
+  }
 };
 
 /// A cut of samples into windows of at most `most` of them, and hardly fewer, unless too many have
 /// one place. `some`: every n-th of the samples, n = `period`. `hull`: of all, with an area.
 ///
-/// Lines run between samples wherever there is room for a number, in the widest gap near the
-/// wanted one. between(axis, box, a, b): the coordinates of the samples in the box above a and
-/// below b; asked where `some` are not all.
+/// Lines run between samples of `some` wherever there is room for a number, in the widest gap near
+/// the wanted one. Others may lie on a line: they belong to the window above.
 /// Depends on the arguments alone. O(n log n) for n of `some`.
-using CoordinatesBetween =
-    std::function<std::vector<double>(unsigned axis, const PlaneBox& box, double a, double b)>;
 PointMeshPlan plan_point_mesh(std::vector<Point2> some, std::uint64_t period,
-                              std::span<const Point2> hull, std::size_t most,
-                              const CoordinatesBetween& between);
+                              std::span<const Point2> hull, std::size_t most);
 
 /// A number strictly between a and b of few binary digits, not close to either; a if there is none
 /// between. Requires a < b.

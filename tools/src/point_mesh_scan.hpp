@@ -8,7 +8,7 @@
 
 #include <terrace/stream/store.hpp>
 
-#include "point_mesh_reader.hpp"
+#include "point_mesh_samples.hpp"
 #include "region.hpp"
 
 namespace terrace::tools {

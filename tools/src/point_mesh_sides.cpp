@@ -17,12 +17,6 @@ constexpr double kReach = 3.0;
 /// More samples than this around a knot are not looked at.
 constexpr std::size_t kManySamples = 20000;
 
-void append(const MeshSamples& more, MeshSamples& to) {
-  to.x.insert(to.x.end(), more.x.begin(), more.x.end());
-  to.y.insert(to.y.end(), more.y.begin(), more.y.end());
-  to.z.insert(to.z.end(), more.z.begin(), more.z.end());
-}
-
 std::optional<double> nearest_height(const MeshSamples& samples, const Point2& place) {
   double best = std::numeric_limits<double>::infinity();
   std::optional<double> height;
@@ -37,20 +31,12 @@ std::optional<double> nearest_height(const MeshSamples& samples, const Point2& p
   return height;
 }
 
-/// The common part of two boxes; it may be empty.
-PlaneBox common_part(PlaneBox a, const PlaneBox& b) {
-  for (std::size_t k = 0; k < 2; ++k) {
-    a.min[k] = std::max(a.min[k], b.min[k]);
-    a.max[k] = std::min(a.max[k], b.max[k]);
-  }
-  return a;
-}
-
 }  // namespace
 
-PointMeshSides::PointMeshSides(const PointMeshPlan& plan, tri::PointDuplicates duplicates,
-                               double max_error)
+PointMeshSides::PointMeshSides(const PointMeshPlan& plan, PointMeshSamples& samples,
+                               tri::PointDuplicates duplicates, double max_error)
     : plan_(plan),
+      samples_(samples),
       duplicates_(duplicates),
       side_error_(kSideShare * max_error),
       windows_at_(plan.knots.size()),
@@ -66,14 +52,13 @@ PointMeshSides::PointMeshSides(const PointMeshPlan& plan, tri::PointDuplicates d
   }
 }
 
-std::shared_ptr<const SideVertices> PointMeshSides::vertices(std::uint32_t side,
-                                                             PointMeshReader& reader) {
+std::shared_ptr<const SideVertices> PointMeshSides::vertices(std::uint32_t side) {
   {
     const std::lock_guard lock(mutex_);
     if (known_[side]) return known_[side];
   }
   // Two threads may both do it; they find the same.
-  auto settled = std::make_shared<const SideVertices>(settle(plan_.sides[side], reader));
+  auto settled = std::make_shared<const SideVertices>(settle(plan_.sides[side]));
   const std::lock_guard lock(mutex_);
   if (!known_[side]) known_[side] = std::move(settled);
   return known_[side];
@@ -84,18 +69,18 @@ void PointMeshSides::drop(std::uint32_t side) {
   known_[side].reset();
 }
 
-double PointMeshSides::height_at(std::uint32_t knot, PointMeshReader& reader) {
+double PointMeshSides::height_at(std::uint32_t knot) {
   {
     const std::lock_guard lock(mutex_);
     if (heights_[knot]) return *heights_[knot];
   }
-  const double height = settle_knot(knot, reader);
+  const double height = settle_knot(knot);
   const std::lock_guard lock(mutex_);
   heights_[knot] = height;
   return height;
 }
 
-double PointMeshSides::settle_knot(std::uint32_t knot, PointMeshReader& reader) const {
+double PointMeshSides::settle_knot(std::uint32_t knot) const {
   const Point2 place = plan_.knots[knot].place;
   double reach = std::numeric_limits<double>::infinity(), most = 0.0;
   for (const std::uint32_t w : windows_at_[knot]) {
@@ -103,13 +88,12 @@ double PointMeshSides::settle_knot(std::uint32_t knot, PointMeshReader& reader) 
     if (spacing > 0.0) reach = std::min(reach, 2.0 * spacing);
     most = std::max(most, spacing * plan_.windows[w].samples);
   }
-  MeshSamples around, part;
+  MeshSamples around;
   for (;; reach *= 2.0) {
     const PlaneBox box{{place[0] - reach, place[1] - reach}, {place[0] + reach, place[1] + reach}};
     around = {};
     for (const std::uint32_t w : windows_at_[knot]) {
-      reader.read(common_part(box, plan_.windows[w].box), part);
-      append(part, around);
+      samples_.read(w, box, around);
     }
     if (around.size() >= 3) {
       if (const auto height = LocalSurface(around, duplicates_).height(place)) return *height;
@@ -119,25 +103,23 @@ double PointMeshSides::settle_knot(std::uint32_t knot, PointMeshReader& reader) 
   return nearest_height(around, place).value_or(0.0);
 }
 
-MeshSamples PointMeshSides::near_side(const PointMeshPlan::Side& side,
-                                      PointMeshReader& reader) const {
-  MeshSamples near, part;
+MeshSamples PointMeshSides::near_side(const PointMeshPlan::Side& side) const {
+  MeshSamples near;
   for (const std::size_t upper : {0U, 1U}) {
     const PointMeshPlan::Window& window = plan_.windows[side.windows[upper]];
     const double reach = kReach * window.spacing;
     PlaneBox strip;
-    strip.min[side.axis] = upper != 0 ? side.line : side.line - reach;
-    strip.max[side.axis] = upper != 0 ? side.line + reach : side.line;
+    strip.min[side.axis] = side.line - reach;
+    strip.max[side.axis] = side.line + reach;
     strip.min[1 - side.axis] = plan_.knots[side.knots[0]].place[1 - side.axis] - reach;
     strip.max[1 - side.axis] = plan_.knots[side.knots[1]].place[1 - side.axis] + reach;
-    reader.read(common_part(strip, window.box), part);
-    append(part, near);
+    samples_.read(side.windows[upper], strip, near);
   }
   return near;
 }
 
-SideVertices PointMeshSides::settle(const PointMeshPlan::Side& side, PointMeshReader& reader) {
-  const MeshSamples near = near_side(side, reader);
+SideVertices PointMeshSides::settle(const PointMeshPlan::Side& side) {
+  const MeshSamples near = near_side(side);
   const double from = plan_.knots[side.knots[0]].place[1 - side.axis];
   const double to = plan_.knots[side.knots[1]].place[1 - side.axis];
   std::vector<ProfilePlace> profile;
@@ -151,7 +133,7 @@ SideVertices PointMeshSides::settle(const PointMeshPlan::Side& side, PointMeshRe
       const auto height = nearest_height(near, plan_.knots[knot].place);
       if (height) return *height;
     }
-    return height_at(knot, reader);
+    return height_at(knot);
   };
   std::vector<double> at{from}, height{end_height(0)};
   for (const ProfilePlace& p : profile) {
@@ -162,6 +144,15 @@ SideVertices PointMeshSides::settle(const PointMeshPlan::Side& side, PointMeshRe
   at.push_back(to);
   height.push_back(end_height(1));
   SideVertices vertices;
+  if (!(side_error_ > 0.0)) {
+    // Samples may lie on the line: without any error only what is level can be left out for sure.
+    for (std::size_t i = 0; i < at.size(); ++i) {
+      const bool level =
+          i > 0 && i + 1 < at.size() && height[i] == height[i - 1] && height[i] == height[i + 1];
+      if (!level) vertices.push_back({at[i], height[i]});
+    }
+    return vertices;
+  }
   for (const tri::LineVertex& v : tri::simplify_line(at, height, side_error_).vertices) {
     vertices.push_back({v.t, v.height});
   }

@@ -10,7 +10,7 @@
 #include <terrace/tri/point_tin.hpp>
 
 #include "point_mesh_plan.hpp"
-#include "point_mesh_reader.hpp"
+#include "point_mesh_samples.hpp"
 
 namespace terrace::tools {
 
@@ -27,20 +27,21 @@ using SideVertices = std::vector<SideVertex>;
 class PointMeshSides {
  public:
   /// max_error: of the mesh, in the unit of heights.
-  PointMeshSides(const PointMeshPlan& plan, tri::PointDuplicates duplicates, double max_error);
+  PointMeshSides(const PointMeshPlan& plan, PointMeshSamples& samples,
+                 tri::PointDuplicates duplicates, double max_error);
 
   /// The vertices of a side, its knots included, ascending. Kept until drop().
-  std::shared_ptr<const SideVertices> vertices(std::uint32_t side, PointMeshReader& reader);
+  std::shared_ptr<const SideVertices> vertices(std::uint32_t side);
   void drop(std::uint32_t side);
 
  private:
-  [[nodiscard]] SideVertices settle(const PointMeshPlan::Side& side, PointMeshReader& reader);
-  [[nodiscard]] MeshSamples near_side(const PointMeshPlan::Side& side,
-                                      PointMeshReader& reader) const;
-  [[nodiscard]] double height_at(std::uint32_t knot, PointMeshReader& reader);
-  [[nodiscard]] double settle_knot(std::uint32_t knot, PointMeshReader& reader) const;
+  [[nodiscard]] SideVertices settle(const PointMeshPlan::Side& side);
+  [[nodiscard]] MeshSamples near_side(const PointMeshPlan::Side& side) const;
+  [[nodiscard]] double height_at(std::uint32_t knot);
+  [[nodiscard]] double settle_knot(std::uint32_t knot) const;
 
   const PointMeshPlan& plan_;
+  PointMeshSamples& samples_;
   tri::PointDuplicates duplicates_;
   double side_error_;
   std::vector<std::vector<std::uint32_t>> windows_at_;  ///< per knot

@@ -91,24 +91,23 @@ PointWindowTin mesh_samples(const MeshSamples& samples, const std::vector<tri::P
   return out;
 }
 
-PointWindowMesher::PointWindowMesher(const stream::Store& store,
-                                     const std::optional<Region>& region, const PointMeshPlan& plan,
+PointWindowMesher::PointWindowMesher(const PointMeshPlan& plan, PointMeshSamples& samples,
                                      PointMeshSides& sides, const PointMeshOptions& options,
-                                     const stream::MeshRounding& rounding)
+                                     const stream::MeshRounding& rounding, std::string source)
     : plan_(plan),
+      samples_(samples),
       sides_(sides),
       options_(options),
       rounding_(rounding),
-      source_(store.path().string()),
-      reader_(store, region) {}
+      source_(std::move(source)) {}
 
-PointWindowTin PointWindowMesher::mesh(std::size_t number) {
+PointWindowTin PointWindowMesher::mesh(std::size_t number) const {
   const PointMeshPlan::Window& window = plan_.windows[number];
   const Stopwatch reading;
   std::vector<std::shared_ptr<const SideVertices>> sides;
-  for (const std::uint32_t side : window.sides) sides.push_back(sides_.vertices(side, reader_));
+  for (const std::uint32_t side : window.sides) sides.push_back(sides_.vertices(side));
   MeshSamples samples;
-  reader_.read(window.box, samples);
+  samples_.read(number, {}, samples);
   const double reading_seconds = reading.seconds();
 
   const Stopwatch meshing;

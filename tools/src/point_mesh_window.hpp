@@ -13,7 +13,7 @@
 #include <terrace/tri/point_tin.hpp>
 
 #include "point_mesh_plan.hpp"
-#include "point_mesh_reader.hpp"
+#include "point_mesh_samples.hpp"
 #include "point_mesh_sides.hpp"
 
 namespace terrace::tools {
@@ -46,22 +46,23 @@ PointWindowTin mesh_samples(const MeshSamples& samples, const std::vector<tri::P
                             const PlaneBox& box, const PointMeshOptions& options,
                             const stream::MeshRounding& rounding, const std::string& source);
 
-/// Meshes the windows of a plan. One object per thread.
+/// Meshes the windows of a plan, by any number of threads at once.
 class PointWindowMesher {
  public:
-  PointWindowMesher(const stream::Store& store, const std::optional<Region>& region,
-                    const PointMeshPlan& plan, PointMeshSides& sides,
-                    const PointMeshOptions& options, const stream::MeshRounding& rounding);
+  /// source: what errors name.
+  PointWindowMesher(const PointMeshPlan& plan, PointMeshSamples& samples, PointMeshSides& sides,
+                    const PointMeshOptions& options, const stream::MeshRounding& rounding,
+                    std::string source);
 
-  PointWindowTin mesh(std::size_t window);
+  [[nodiscard]] PointWindowTin mesh(std::size_t window) const;
 
  private:
   const PointMeshPlan& plan_;
+  PointMeshSamples& samples_;
   PointMeshSides& sides_;
   const PointMeshOptions& options_;
   const stream::MeshRounding& rounding_;
   std::string source_;
-  PointMeshReader reader_;
 };
 
 }  // namespace terrace::tools
