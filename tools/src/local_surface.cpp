@@ -64,15 +64,16 @@ std::vector<ProfilePlace> LocalSurface::profile(unsigned axis, double c) const {
       if (!(a[axis] < c && c <= b[axis])) continue;
       const double za = heights_[slot(low)], zb = heights_[slot(high)];
       if (b[axis] == c) {
-        places.push_back({b[along], zb});
+        places.push_back({b[along], zb, true});
         continue;
       }
       const double part = (c - a[axis]) / (b[axis] - a[axis]);
-      places.push_back({a[along] + (b[along] - a[along]) * part, za + (zb - za) * part});
+      places.push_back({a[along] + (b[along] - a[along]) * part, za + (zb - za) * part, false});
     }
   }
   std::sort(places.begin(), places.end(), [](const ProfilePlace& p, const ProfilePlace& q) {
-    return p.at != q.at ? p.at < q.at : p.height < q.height;
+    if (p.at != q.at) return p.at < q.at;
+    return p.sample != q.sample ? p.sample : p.height < q.height;
   });
   const auto same = [](const ProfilePlace& p, const ProfilePlace& q) { return p.at == q.at; };
   places.erase(std::unique(places.begin(), places.end(), same), places.end());

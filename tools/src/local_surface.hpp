@@ -14,6 +14,7 @@ namespace terrace::tools {
 /// A height along a line.
 struct ProfilePlace {
   double at = 0.0, height = 0.0;
+  bool sample = false;  ///< lies there
 };
 
 /// The Delaunay triangulation of some samples as a surface.

@@ -74,8 +74,9 @@ class OuterSides {
   std::array<std::vector<OuterSide>, 4> chains_;
 };
 
-/// The samples of `side` that have to be vertices, in order, each once.
-std::vector<tri::Point3> simplify(OuterSide& side, double from_height, double to_height,
+/// The samples of `side` that have to be vertices, in order, each once. level: whether all samples
+/// of the window have one height.
+std::vector<tri::Point3> simplify(OuterSide& side, double from_height, double to_height, bool level,
                                   const tri::PointTinOptions& options) {
   if (side.samples.empty()) return {};
   const unsigned axis =
@@ -105,10 +106,8 @@ std::vector<tri::Point3> simplify(OuterSide& side, double from_height, double to
     for (std::size_t i = 1; i + 1 < line.size(); ++i) chosen.push_back(places[line[i].sample]);
     return chosen;
   }
-  // Without any error only what is level can be left out for sure.
-  for (std::size_t i = 1; i + 1 < at.size(); ++i) {
-    if (height[i] != height[i - 1] || height[i] != height[i + 1]) chosen.push_back(places[i]);
-  }
+  // What is no vertex would be off by a rounding error, unless all is level.
+  if (!level) chosen.assign(places.begin() + 1, places.end());
   return chosen;
 }
 
@@ -170,12 +169,15 @@ PointMeshFrame frame_of(const PointMeshPlan& plan, const PointMeshPlan::Window& 
     assert(settled || !v.samples.empty());
     return settled ? v.height : merged_height(v.samples, options.duplicates);
   };
+  const auto [low, high] = std::minmax_element(samples.z.begin(), samples.z.end());
+  const bool level = low == high || *low == *high;
   for (std::size_t i = 0; i < ring.size(); ++i) {
     frame.vertices.push_back({ring[i][0], ring[i][1], height_at(ring[i])});
     frame.shared.push_back(vertices.at(ring[i]).shared);
     if (on_border(window.box, ring[i], after(i))) continue;
     OuterSide& side = outer.between(ring[i], after(i));
-    for (const tri::Point3& p : simplify(side, height_at(ring[i]), height_at(after(i)), options)) {
+    for (const tri::Point3& p :
+         simplify(side, height_at(ring[i]), height_at(after(i)), level, options)) {
       frame.vertices.push_back(p);
       frame.shared.emplace_back();
     }

@@ -11,7 +11,7 @@ namespace terrace::tools {
 namespace {
 
 /// Share of the bound that sides are settled to: the rest is left to the triangles at them.
-constexpr double kSideShare = 0.75;
+constexpr double kSideShare = 0.9;
 /// How far samples that settle a side lie from it, in distances of neighbours.
 constexpr double kReach = 3.0;
 /// More samples than this around a knot are not looked at.
@@ -136,19 +136,21 @@ SideVertices PointMeshSides::settle(const PointMeshPlan::Side& side) {
     return height_at(knot);
   };
   std::vector<double> at{from}, height{end_height(0)};
+  std::vector<char> sample{1};
   for (const ProfilePlace& p : profile) {
     if (!(p.at > from && p.at < to)) continue;
     at.push_back(p.at);
     height.push_back(p.height);
+    sample.push_back(p.sample ? 1 : 0);
   }
   at.push_back(to);
   height.push_back(end_height(1));
+  sample.push_back(1);
   SideVertices vertices;
   if (!(side_error_ > 0.0)) {
-    // Samples may lie on the line: without any error only what is level can be left out for sure.
+    // A sample on the line that is no vertex would be off by a rounding error.
     for (std::size_t i = 0; i < at.size(); ++i) {
-      const bool level =
-          i > 0 && i + 1 < at.size() && height[i] == height[i - 1] && height[i] == height[i + 1];
+      const bool level = sample[i] == 0 && height[i] == height[i - 1] && height[i] == height[i + 1];
       if (!level) vertices.push_back({at[i], height[i]});
     }
     return vertices;

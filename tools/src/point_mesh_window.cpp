@@ -2,6 +2,8 @@
 #include "point_mesh_window.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <map>
 #include <memory>
 #include <numeric>
 #include <stdexcept>
@@ -46,6 +48,37 @@ tri::TinErrors measure_rounded(const MeshSamples& samples, const PlaneBox& box,
   return tri::measure_surface(moved.x, moved.y, moved.z, read, tin.triangles);
 }
 
+/// Takes out the samples that the vertices of a frame stand for; returns the number of their
+/// places. In triangles at a vertex its own sample is off by a rounding error, which counts where
+/// no error is allowed.
+std::size_t take_out_vertices(const std::vector<tri::Point3>& frame,
+                              tri::PointDuplicates duplicates, MeshSamples& samples) {
+  std::map<Point2, std::vector<std::size_t>> at;
+  for (const tri::Point3& v : frame) at.try_emplace({v[0], v[1]});
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const auto found = at.find({samples.x[i], samples.y[i]});
+    if (found != at.end()) found->second.push_back(i);
+  }
+  std::vector<char> out(samples.size(), 0);
+  std::size_t places = 0;
+  std::vector<double> heights;
+  for (const tri::Point3& v : frame) {
+    const std::vector<std::size_t>& own = at[{v[0], v[1]}];
+    if (own.empty()) continue;
+    heights.clear();
+    for (const std::size_t i : own) heights.push_back(samples.z[i]);
+    if (merged_height(heights, duplicates) != v[2]) continue;
+    ++places;
+    for (const std::size_t i : own) out[i] = 1;
+  }
+  MeshSamples left;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    if (out[i] == 0) left.add({samples.x[i], samples.y[i], samples.z[i]});
+  }
+  samples = std::move(left);
+  return places;
+}
+
 }  // namespace
 
 PointWindowTin mesh_samples(const MeshSamples& samples, const std::vector<tri::Point3>& frame,
@@ -54,17 +87,36 @@ PointWindowTin mesh_samples(const MeshSamples& samples, const std::vector<tri::P
   const auto fail = [&](const std::string& cause, const std::string& remedy) {
     throw stream::Error({.file = source, .where = {}, .cause = cause, .remedy = remedy});
   };
-  tri::PointTin tin;
-  try {
-    tin = tri::point_tin(samples.x, samples.y, samples.z, frame, options.tin);
-  } catch (const std::invalid_argument& error) {
-    const std::string place = shared_place(samples);
-    if (place.empty() || options.tin.duplicates != tri::PointDuplicates::kError) {
-      fail(error.what(), "look at the store's points");
-    }
+  const auto fail_duplicates = [&](const std::string& place) {
     fail("several samples have one place, the first at " + place,
          "say with --duplicates which of them counts");
+  };
+  const bool refuse = options.tin.duplicates == tri::PointDuplicates::kError;
+  MeshSamples left;
+  const MeshSamples* taken = &samples;
+  std::size_t vertex_places = 0;
+  if (!frame.empty() && options.tin.max_error == 0.0) {
+    left = samples;
+    vertex_places = take_out_vertices(frame, options.tin.duplicates, left);
+    if (refuse && samples.size() - left.size() > vertex_places) {
+      fail_duplicates(shared_place(samples));
+    }
+    taken = &left;
   }
+  tri::PointTin tin;
+  try {
+    tin = tri::point_tin(taken->x, taken->y, taken->z, frame, options.tin);
+  } catch (const std::invalid_argument& error) {
+    const std::string place = shared_place(samples);
+    if (place.empty() || !refuse) fail(error.what(), "look at the store's points");
+    fail_duplicates(place);
+  }
+  // Those taken out have no error.
+  tin.errors.rms *=
+      std::sqrt(static_cast<double>(tin.errors.covered) /
+                std::max(1.0, static_cast<double>(tin.errors.covered + vertex_places)));
+  tin.errors.covered += vertex_places;
+  tin.duplicates += samples.size() - taken->size() - vertex_places;
   PointWindowTin out;
   out.samples = samples.size();
   out.duplicates = tin.duplicates;
