@@ -17,6 +17,11 @@ namespace {
 
 constexpr std::size_t kPiece = 65536;  // vertices or triangles at a time
 
+std::filesystem::path beside(const std::string& path, const char* ending) {
+  if (path != "-") return path + ending;
+  return std::filesystem::temp_directory_path() / ("terrace-" + std::to_string(getpid()) + ending);
+}
+
 // Calls take(span of T) for the whole file, piece by piece.
 template <class T, class Take>
 void read_back(stream::AtomicFile& file, std::uint64_t count, const Take& take) {
@@ -37,14 +42,9 @@ void read_back(stream::AtomicFile& file, std::uint64_t count, const Take& take) 
 
 }  // namespace
 
-std::filesystem::path spool_path(const std::string& path, const char* ending) {
-  if (path != "-") return path + ending;
-  return std::filesystem::temp_directory_path() / ("terrace-" + std::to_string(getpid()) + ending);
-}
-
 MeshSpool::MeshSpool(const std::string& path)
-    : vertex_file_(spool_path(path, ".vertices"), true),
-      triangle_file_(spool_path(path, ".triangles"), true) {}
+    : vertex_file_(beside(path, ".vertices"), true),
+      triangle_file_(beside(path, ".triangles"), true) {}
 
 void MeshSpool::add_vertex(const stream::Point3& position) {
   if (vertices_ == std::numeric_limits<std::uint32_t>::max()) {

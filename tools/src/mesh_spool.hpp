@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <span>
 #include <string>
 
@@ -11,10 +10,6 @@
 #include <terrace/stream/point.hpp>
 
 namespace terrace::tools {
-
-/// Where to keep what a mesh file is made from: beside it; for "-" in the folder for temporary
-/// files.
-std::filesystem::path spool_path(const std::string& path, const char* ending);
 
 /// Keeps a mesh that comes in pieces on disk, beside the file that it will become, until its counts
 /// are known and it can be written. What is kept goes with the object.

@@ -2,12 +2,14 @@
 #include "point_mesh_samples.hpp"
 
 #include <algorithm>
+#include <filesystem>
+#include <numeric>
 
 #include <terrace/stream/error.hpp>
+#include <unistd.h>
 
 #include "detail.hpp"
 #include "interrupt.hpp"
-#include "mesh_spool.hpp"
 #include "world.hpp"
 
 namespace terrace::tools {
@@ -15,6 +17,12 @@ namespace {
 
 constexpr std::size_t kBufferBytes = std::size_t{16} << 20;
 constexpr std::size_t kLeastChunk = 40, kMostChunk = 4096;  // points
+
+std::filesystem::path place_for(const std::string& path) {
+  if (path != "-") return path + ".samples";
+  return std::filesystem::temp_directory_path() /
+         ("terrace-" + std::to_string(getpid()) + ".samples");
+}
 
 }  // namespace
 
@@ -33,13 +41,14 @@ double merged_height(std::span<const double> heights, tri::PointDuplicates dupli
 }
 
 PointMeshSamples::PointMeshSamples(const stream::Store& store, const std::optional<Region>& region,
-                                   const PointMeshPlan& plan, const std::string& path)
-    : file_(spool_path(path, ".samples"), true),
-      chunk_points_(std::clamp(kBufferBytes / sizeof(stream::Point3) / plan.windows.size(),
+                                   const PointMeshCuts& cuts, const std::string& path)
+    : cuts_(cuts),
+      file_(place_for(path), true),
+      chunk_points_(std::clamp(kBufferBytes / sizeof(stream::Point3) / cuts.cells.size(),
                                kLeastChunk, kMostChunk)),
-      counts_(plan.windows.size(), 0),
-      waiting_(plan.windows.size()),
-      chunks_(plan.windows.size()) {
+      counts_(cuts.cells.size(), 0),
+      waiting_(cuts.cells.size()),
+      chunks_(cuts.cells.size()) {
   const Placement placement = placement_of(store.schema());
   Detail detail;
   detail.region = region;
@@ -49,7 +58,7 @@ PointMeshSamples::PointMeshSamples(const stream::Store& store, const std::option
         check_interrupt();
         for (const stream::Point3& stored : cluster.positions) {
           const stream::Point3 p = world_point(placement, stored);
-          if (!region || region->contains(p)) deal(plan.window_of({p[0], p[1]}), p);
+          if (!region || region->contains(p)) deal(cuts.cell_of({p[0], p[1]}), p);
         }
       });
   // What is left takes no more than its room; nothing is buffered any more.
@@ -57,18 +66,30 @@ PointMeshSamples::PointMeshSamples(const stream::Store& store, const std::option
   file_.read_at(0, {});
 }
 
-void PointMeshSamples::deal(std::size_t window, const stream::Point3& p) {
-  std::vector<stream::Point3>& waiting = waiting_[window];
+void PointMeshSamples::deal(std::size_t cell, const stream::Point3& p) {
+  std::vector<stream::Point3>& waiting = waiting_[cell];
   if (waiting.capacity() < chunk_points_) waiting.reserve(chunk_points_);
   waiting.push_back(p);
-  ++counts_[window];
+  ++counts_[cell];
   if (waiting.size() < chunk_points_) return;
   file_.write(std::as_bytes(std::span(waiting)));
-  chunks_[window].push_back(written_++);
+  chunks_[cell].push_back(written_++);
   waiting.clear();
 }
 
-void PointMeshSamples::read(std::size_t window, const PlaneBox& box, MeshSamples& out) {
+std::size_t PointMeshSamples::count(std::uint32_t first_cell, std::uint32_t cells) const {
+  const auto first = counts_.begin() + first_cell;
+  return std::accumulate(first, first + cells, std::size_t{0});
+}
+
+void PointMeshSamples::read(std::uint32_t first_cell, std::uint32_t cells, const PlaneBox& box,
+                            MeshSamples& out) {
+  for (std::uint32_t cell = first_cell; cell < first_cell + cells; ++cell) {
+    if (cuts_.cells[cell].box.meets(box)) read_cell(cell, box, out);
+  }
+}
+
+void PointMeshSamples::read_cell(std::size_t cell, const PlaneBox& box, MeshSamples& out) {
   const auto take = [&](std::span<const stream::Point3> points) {
     for (const stream::Point3& p : points) {
       if (box.contains({p[0], p[1]})) out.add(p);
@@ -76,7 +97,7 @@ void PointMeshSamples::read(std::size_t window, const PlaneBox& box, MeshSamples
   };
   std::vector<stream::Point3> chunk(chunk_points_);
   const auto bytes = std::as_writable_bytes(std::span(chunk));
-  for (const std::uint32_t number : chunks_[window]) {
+  for (const std::uint32_t number : chunks_[cell]) {
     std::size_t got = 0;
     {
       const std::lock_guard lock(mutex_);
@@ -90,7 +111,7 @@ void PointMeshSamples::read(std::size_t window, const PlaneBox& box, MeshSamples
     }
     take(chunk);
   }
-  take(waiting_[window]);
+  take(waiting_[cell]);
 }
 
 }  // namespace terrace::tools

@@ -93,7 +93,7 @@ double PointMeshSides::settle_knot(std::uint32_t knot) const {
     const PlaneBox box{{place[0] - reach, place[1] - reach}, {place[0] + reach, place[1] + reach}};
     around = {};
     for (const std::uint32_t w : windows_at_[knot]) {
-      samples_.read(w, box, around);
+      samples_.read(plan_.windows[w].first_cell, plan_.windows[w].cells, box, around);
     }
     if (around.size() >= 3) {
       if (const auto height = LocalSurface(around, duplicates_).height(place)) return *height;
@@ -113,7 +113,7 @@ MeshSamples PointMeshSides::near_side(const PointMeshPlan::Side& side) const {
     strip.max[side.axis] = side.line + reach;
     strip.min[1 - side.axis] = plan_.knots[side.knots[0]].place[1 - side.axis] - reach;
     strip.max[1 - side.axis] = plan_.knots[side.knots[1]].place[1 - side.axis] + reach;
-    samples_.read(side.windows[upper], strip, near);
+    samples_.read(window.first_cell, window.cells, strip, near);
   }
   return near;
 }

@@ -159,7 +159,8 @@ PointWindowTin PointWindowMesher::mesh(std::size_t number) const {
   std::vector<std::shared_ptr<const SideVertices>> sides;
   for (const std::uint32_t side : window.sides) sides.push_back(sides_.vertices(side));
   MeshSamples samples;
-  samples_.read(number, {}, samples);
+  samples.reserve(samples_.count(window.first_cell, window.cells));
+  samples_.read(window.first_cell, window.cells, {}, samples);
   const double reading_seconds = reading.seconds();
 
   const Stopwatch meshing;
