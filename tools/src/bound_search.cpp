@@ -13,6 +13,7 @@ double search_bound(const BoundSearch& search,
   const auto most = static_cast<double>(search.most);
   // Bounds between which the answer lies, and the number of vertices at the larger.
   double many_bound = 0.0, few_bound = -1.0, few = 0.0, last = -1.0;
+  bool many_known = false;
   double bound = std::min(search.start, search.range);
   for (int round = 0; round < kMostRuns; ++round) {
     const std::uint64_t vertices = run(bound);
@@ -24,6 +25,7 @@ double search_bound(const BoundSearch& search,
     } else {
       if (bound >= search.range) return -1.0;
       many_bound = bound;
+      many_known = true;
     }
     if (few_bound < 0.0) {
       // Guesses are off by little, so at first steps are small.
@@ -31,7 +33,7 @@ double search_bound(const BoundSearch& search,
       continue;
     }
     if (many_bound > 0.0 && few_bound / many_bound < kLeastStep) break;
-    if (few_bound < 1e-6 * search.range && many_bound == 0.0) {
+    if (few_bound < 1e-6 * search.range && !many_known) {
       bound = 0.0;
       continue;
     }

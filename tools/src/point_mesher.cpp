@@ -28,7 +28,7 @@ constexpr std::uint64_t kBytesPerPoint = 24 + 40 + 200;
 constexpr std::uint64_t kBytesPerSample = 80;
 /// Cells become one window where that has no more vertices than this, so that those on its sides,
 /// which cannot be removed, are few among them; and only so many.
-constexpr double kVerticesPerWindow = 4000.0;
+constexpr double kVerticesPerWindow = 10000.0;
 constexpr double kMostCells = 4.0;
 /// What a thread needs to read, and what is there besides.
 constexpr std::uint64_t kBytesPerReader = std::uint64_t{12} << 20;
