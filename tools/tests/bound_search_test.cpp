@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bound_search.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 
@@ -16,13 +17,13 @@ TEST(BoundSearch, FindsWhatIsNearlyFullInAFewRuns) {
       SCOPED_TRACE(guess);
       // 1e6 vertices at 0.1, 4 at least.
       const auto vertices = [&](double bound) {
-        return static_cast<std::uint64_t>(4 + 1e6 * std::pow(0.1 / std::max(bound, 1e-9), power));
+        return static_cast<std::uint64_t>(4 + 1e6 * std::pow(0.1 / std::max(bound, 1e-6), power));
       };
       const double exact = 0.1 * std::pow(1e6 / 5000, 1 / power);
       int runs = 0;
       double last = -1;
       const double found =
-          search_bound({5000, 1e9, exact * guess}, [&](double bound) -> std::uint64_t {
+          search_bound({5000, 1e4, exact * guess}, [&](double bound) -> std::uint64_t {
             ++runs;
             last = bound;
             return vertices(bound) > 5000 ? 5001 : vertices(bound);
