@@ -178,6 +178,7 @@ class CloudQueryTest(unittest.TestCase):
         plain = self.run_ok('sample', self.store, text=text)
         there = self.run_ok('sample', self.store, '--to-crs', 'EPSG:4326', text=text)
         rows = list(csv.reader(io.StringIO(there)))
+        self.assertEqual(rows[0][:4], ['name', 'latitude', 'longitude', 'note'])
         for before, after in zip(list(csv.reader(io.StringIO(plain)))[1:51], rows[1:51]):
             self.assertEqual(before[0], after[0])
             self.assertEqual(before[3:], after[3:])

@@ -92,8 +92,8 @@ class ProfileCommand final : public Command {
   }
 
  private:
-  std::string store_, output_, line_, line_crs_, shift_, step_, method_ = "linear", level_ = "0";
-  std::string max_edge_;
+  std::string store_, output_, line_, line_crs_, shift_, step_, method_ = "linear", level_ = "0",
+              max_edge_;
 };
 
 }  // namespace

@@ -120,8 +120,8 @@ class SampleCommand final : public Command {
     return conversions;
   }
 
-  std::string store_, points_ = "-", output_ = "-", method_ = "linear", level_ = "0", max_edge_,
-                      points_crs_, to_crs_, shift_;
+  std::string store_, points_ = "-", output_ = "-", method_ = "linear", level_ = "0", points_crs_,
+                      to_crs_, shift_, max_edge_;
 };
 
 }  // namespace

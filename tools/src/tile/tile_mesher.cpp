@@ -50,8 +50,17 @@ struct LeafUnits {
   double from = 0.0, units = 0.0;
   double low = 0.0, high = 0.0;  ///< the leaf's sides
 
+  [[nodiscard]] double at(double degrees) const {
+    return std::clamp((degrees - from) * units, low, high);
+  }
   void convert(std::vector<double>& degrees) const {
-    for (double& at : degrees) at = std::clamp((at - from) * units, low, high);
+    for (double& place : degrees) place = at(place);
+  }
+  /// Of places without a height too: those may lie outside, and nothing holds them back.
+  void convert(std::vector<double>& degrees, std::span<const double> heights) const {
+    for (std::size_t i = 0; i < degrees.size(); ++i) {
+      degrees[i] = std::isnan(heights[i]) ? (degrees[i] - from) * units : at(degrees[i]);
+    }
   }
 };
 
@@ -72,6 +81,12 @@ tri::PointTin tin_of(const TileAddress& tile, const TileLeaf& leaf, TileSurface&
     down.convert(rows.latitude);
     return tri::point_tin(tri::SampleRows{rows.longitude, rows.latitude, rows.height}, frame,
                           options);
+  }
+  if (SurfaceGrid grid; surface.grid(box_of(tile, leaf), grid)) {
+    across.convert(grid.longitude, grid.height);
+    down.convert(grid.latitude, grid.height);
+    return tri::point_tin(tri::SampleGrid{grid.columns, grid.longitude, grid.latitude, grid.height},
+                          frame, options);
   }
   SurfaceSamples samples;
   surface.samples(box_of(tile, leaf), samples);
