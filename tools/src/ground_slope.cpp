@@ -73,6 +73,13 @@ Point2 GroundSlope::world(const Point2& stored) const {
   return {p[0], p[1]};
 }
 
+double GroundSlope::metres(const Point2& a, const Point2& b) const {
+  const double dx = b[0] - a[0], dy = b[1] - a[1];
+  const GroundMap m = map_at({a[0] + 0.5 * dx, a[1] + 0.5 * dy});
+  const double east = m[0] * dx + m[1] * dy, north = m[3] * dx + m[4] * dy;
+  return std::sqrt(east * east + north * north);
+}
+
 tri::Gradient GroundSlope::on_ground(const Point2& stored, const SurfacePoint& surface) const {
   if (!(surface.per_column == surface.per_column)) return {};
   const GroundMap m = map_at(stored);
@@ -81,6 +88,13 @@ tri::Gradient GroundSlope::on_ground(const Point2& stored, const SurfacePoint& s
   const double factor = metres / (m[0] * m[4] - m[1] * m[3]);
   return {(m[4] * surface.per_column - m[3] * surface.per_row) * factor,
           (m[0] * surface.per_row - m[1] * surface.per_column) * factor};
+}
+
+std::function<bool(const Point2&, const Point2&)> longer_than(const stream::Store& store,
+                                                              double metres) {
+  return [ground = GroundSlope(store), metres](const Point2& a, const Point2& b) {
+    return ground.metres(a, b) > metres;
+  };
 }
 
 }  // namespace terrace::tools

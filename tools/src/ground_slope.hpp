@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <functional>
 #include <memory>
 
 #include <terrace/stream/store.hpp>
@@ -30,6 +31,9 @@ class GroundSlope {
   /// store's width and height.
   [[nodiscard]] tri::Gradient on_ground(const Point2& stored, const SurfacePoint& surface) const;
 
+  /// Metres on the ground between two stored places, straight, as the place between them has it.
+  [[nodiscard]] double metres(const Point2& a, const Point2& b) const;
+
   /// What had to be assumed of units; empty if nothing.
   [[nodiscard]] const std::string& assumption() const { return ground_.assumption(); }
 
@@ -45,5 +49,9 @@ class GroundSlope {
   GroundMap map_{};  ///< where it is the same everywhere
   std::shared_ptr<Table> table_;
 };
+
+/// Whether two stored places are more than so many metres apart on the ground.
+std::function<bool(const Point2&, const Point2&)> longer_than(const stream::Store& store,
+                                                              double metres);
 
 }  // namespace terrace::tools

@@ -2,6 +2,7 @@
 #include "height_sampler.hpp"
 
 #include "error.hpp"
+#include "units.hpp"
 
 namespace terrace::tools {
 
@@ -12,17 +13,26 @@ tri::Interpolation parse_interpolation(const std::string& text) {
   throw UsageError("'" + text + "' is no --method; write linear, natural or nearest");
 }
 
+std::optional<double> parse_max_edge(const std::string& text) {
+  if (text.empty()) return std::nullopt;
+  const double metres = parse_number(text, "--max-edge");
+  if (!(metres > 0)) throw UsageError("--max-edge must be above 0");
+  return metres;
+}
+
 std::unique_ptr<HeightSampler> make_sampler(const stream::Store& store,
                                             const SamplerOptions& options) {
   if (options.level > store.top()) {
     throw UsageError("the store has no level " + std::to_string(options.level) +
                      ": its top is level " + std::to_string(store.top()));
   }
-  if (store.schema().grid && options.level == 0) return make_lattice_sampler(store, options);
-  throw UsageError(store.schema().grid
-                       ? "heights between the points of a coarser level are not available yet: "
-                         "leave --level out"
-                       : "heights between points are not available yet, only those of rasters");
+  if (!store.schema().grid || options.level > 0) return make_point_sampler(store, options);
+  if (options.max_edge) {
+    throw UsageError(
+        "--max-edge is for irregular points and coarser levels: the samples of a "
+        "raster say themselves where there is no data");
+  }
+  return make_lattice_sampler(store, options);
 }
 
 }  // namespace terrace::tools

@@ -80,7 +80,6 @@ class StoreWindow {
   /// Replaces `out` by the points of `level` and above in the box.
   void points(const StoredBox& box, WindowPoints& out, unsigned level = 0);
 
- private:
   /// A decoded cluster and where the clusters are that its members head.
   struct Node {
     stream::ClusterId id{};
@@ -89,6 +88,10 @@ class StoreWindow {
     std::vector<std::uint64_t> children;  ///< as in stream::ClusterPoints
     std::vector<StoredBox> boxes;         ///< of the children, in parallel
   };
+  /// One cluster, for those that find their own way down. Valid until the next call of anything.
+  const Node& node(stream::ClusterId id);
+
+ private:
   using Nodes = std::list<Node>;
 
   /// Nodes up to a number of bytes, the one used last in front.
@@ -102,7 +105,6 @@ class StoreWindow {
   };
 
   void fill(Node& node, stream::ClusterId id);
-  const Node& node(stream::ClusterId id);
   template <class Visit>
   void descend(const StoredBox& box, unsigned level, const Visit& visit);
   template <class Height>

@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Windows of the triangulation of a store's points against the triangulation of all of them.
+#include "point_window.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <terrace/stream/error.hpp>
+#include <terrace/stream/store.hpp>
+#include <terrace/tri/delaunay2.hpp>
+#include <terrace/tri/interpolation.hpp>
+
+#include "cloud_case.hpp"
+#include "temporary_folder.hpp"
+
+namespace terrace {
+namespace {
+
+using tests::cloud_store;
+using tests::Points;
+using tests::points_of;
+using tests::Random;
+using tests::raster_store;
+using tests::Triangle;
+using tests::Whole;
+using tools::Point2;
+using tools::PointWindow;
+using tools::StoredBox;
+using tools::SurfacePoint;
+/// Whether no line separates them, in long double.
+bool meets(const Triangle& t, const StoredBox& box) {
+  using Number = long double;
+  const std::array<Point2, 4> corner{Point2{box.min[0], box.min[1]}, Point2{box.max[0], box.min[1]},
+                                     Point2{box.max[0], box.max[1]},
+                                     Point2{box.min[0], box.max[1]}};
+  for (std::size_t k = 0; k < 2; ++k) {
+    if (std::max({t[0][k], t[1][k], t[2][k]}) < box.min[k]) return false;
+    if (std::min({t[0][k], t[1][k], t[2][k]}) > box.max[k]) return false;
+  }
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Point2 &a = t[i], &b = t[(i + 1) % 3];
+    if (std::all_of(corner.begin(), corner.end(), [&](const Point2& p) {
+          return (Number{b[0]} - a[0]) * (Number{p[1]} - a[1]) <
+                 (Number{b[1]} - a[1]) * (Number{p[0]} - a[0]);
+        })) {
+      return false;
+    }
+  }
+  return true;
+}
+
+bool same_bits(double a, double b) {
+  return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b) ||
+         (std::isnan(a) && std::isnan(b));
+}
+
+StoredBox random_box(const stream::Box3& bounds, Random& random, std::uint64_t i) {
+  StoredBox box;
+  for (std::size_t k = 0; k < 2; ++k) {
+    const double size = bounds.max[k] - bounds.min[k];
+    const double share = std::array{0.02, 0.3, 0.0, 1.1, 0.1}[i % 5];
+    box.min[k] = bounds.min[k] + (random.unit() * 1.4 - 0.2) * size;
+    if (i % 3 == 0) box.min[k] = std::round(box.min[k]);
+    box.max[k] = box.min[k] + share * random.unit() * size;
+    if (i % 3 == 0) box.max[k] = std::round(box.max[k]);
+  }
+  return box;
+}
+
+void check(const stream::Store& store, unsigned level, int boxes) {
+  const Whole whole(store, level);
+  PointWindow window(store, level, 0), other(store, level, 0);
+  Random random(level + 3);
+  for (int i = 0; i < boxes; ++i) {
+    SCOPED_TRACE("level " + std::to_string(level) + ", box " + std::to_string(i));
+    const StoredBox box = random_box(store.bounds(), random, static_cast<std::uint64_t>(i));
+    const auto reach = i % 2 == 0 ? PointWindow::Reach::kTriangles : PointWindow::Reach::kCircles;
+    window.load(box, reach);
+    std::map<Triangle, std::array<double, 3>> certain;
+    for (const tri::TriangleId t : window.triangulation().all_triangles()) {
+      if (!window.is_certain(t)) continue;
+      Whole::add_triangle(window.triangulation(), window.heights(), t, certain);
+    }
+    for (const auto& [corners, heights] : certain) {
+      const auto found = whole.triangles.find(corners);
+      ASSERT_TRUE(found != whole.triangles.end());
+      ASSERT_EQ(heights, found->second);
+    }
+    for (const auto& [corners, heights] : whole.triangles) {
+      if (meets(corners, box)) {
+        ASSERT_TRUE(certain.contains(corners));
+      }
+    }
+    // Places of the box, some on points and between them; the same from another window.
+    std::vector<Point2> places;
+    for (int k = 0; k < 60; ++k) {
+      Point2 p;
+      for (std::size_t axis = 0; axis < 2; ++axis) {
+        p[axis] = box.min[axis] + random.unit() * (box.max[axis] - box.min[axis]);
+        if (k % 3 == 1) p[axis] = std::round(p[axis] * 2) / 2;
+        p[axis] = std::clamp(p[axis], box.min[axis], box.max[axis]);
+      }
+      places.push_back(p);
+    }
+    for (const tri::VertexId v : window.triangulation().all_vertices()) {
+      const Point2 p = window.triangulation().point(v);
+      if (places.size() < 90 && box.contains({p[0], p[1], 0})) places.push_back(p);
+    }
+    StoredBox larger = box;
+    for (std::size_t k = 0; k < 2; ++k) {
+      larger.min[k] -= random.unit() * (1e-300 + store.bounds().max[k] - store.bounds().min[k]);
+    }
+    other.load(larger);
+    const std::vector<double> expected =
+        tri::heights_at(whole.triangulation, whole.heights, places, tri::Interpolation::kLinear, 1);
+    for (std::size_t k = 0; k < places.size(); ++k) {
+      SCOPED_TRACE("place " + std::to_string(k));
+      const SurfacePoint found = window.at(places[k]), again = other.at(places[k]);
+      ASSERT_EQ(std::isnan(found.height), std::isnan(expected[k]));
+      if (!std::isnan(expected[k])) {
+        ASSERT_NEAR(found.height, expected[k], 1e-7);
+      }
+      ASSERT_TRUE(same_bits(found.height, again.height));
+      ASSERT_TRUE(same_bits(found.per_column, again.per_column));
+      ASSERT_TRUE(same_bits(found.per_row, again.per_row));
+    }
+  }
+}
+
+class Clouds : public testing::TestWithParam<std::string> {};
+
+TEST_P(Clouds, WindowsHaveTheTrianglesOfTheWhole) {
+  const tests::TemporaryFolder folder;
+  const stream::Store store =
+      stream::Store::open(cloud_store(folder.path(), points_of(GetParam())));
+  check(store, 0, 40);
+  for (unsigned level = 1; level <= store.top(); ++level) check(store, level, 12);
+}
+
+INSTANTIATE_TEST_SUITE_P(PointWindow, Clouds,
+                         testing::Values("random", "lattice", "duplicates", "voids", "clusters",
+                                         "turned", "circle", "parabola", "far", "huge", "tiny",
+                                         "line", "nearly a line", "one", "two", "one place"),
+                         [](const auto& one) {
+                           std::string name = one.param;
+                           std::replace(name.begin(), name.end(), ' ', '_');
+                           return name;
+                         });
+
+TEST(PointWindow, TakesTheCoarserLevelsOfRasters) {
+  const tests::TemporaryFolder folder;
+  const stream::Store store = stream::Store::open(raster_store(folder.path()));
+  ASSERT_GE(store.top(), 2U);
+  for (unsigned level = 0; level <= store.top(); ++level) check(store, level, 20);
+}
+
+TEST(PointWindow, ReadsLittleMoreThanItNeeds) {
+  const tests::TemporaryFolder folder;
+  for (const char* const kind : {"random", "voids", "turned"}) {
+    SCOPED_TRACE(kind);
+    const stream::Store store =
+        stream::Store::open(cloud_store(folder.path() / kind, points_of(kind)));
+    PointWindow window(store, 0, 0);
+    Random random(4);
+    std::size_t read = 0;
+    for (int i = 0; i < 200; ++i) {
+      StoredBox box;
+      for (std::size_t k = 0; k < 2; ++k) {
+        const double size = store.bounds().max[k] - store.bounds().min[k];
+        box.min[k] = store.bounds().min[k] + 0.95 * random.unit() * size;
+        box.max[k] = box.min[k] + 0.05 * size;
+      }
+      window.load(box);
+      read += window.triangulation().vertex_count();
+    }
+    // A box has one 400th of the area: about ten points. The coarse levels come to it, and
+    // where it sees the hull what lies along that.
+    EXPECT_LT(static_cast<double>(read) / 200, 0.1 * static_cast<double>(store.points()));
+  }
+}
+
+TEST(PointWindow, SaysWhatMemoryItNeeds) {
+  const tests::TemporaryFolder folder;
+  Random random(1);
+  Points points;
+  for (int i = 0; i < 60000; ++i) points.push_back({random.unit(), random.unit(), 0});
+  const stream::Store store = stream::Store::open(cloud_store(folder.path(), points));
+  PointWindow window(store, 0, std::uint64_t{14} << 20);
+  window.load({{0.4, 0.4}, {0.5, 0.5}});
+  EXPECT_GT(window.triangulation().triangle_count(), 500U);
+  try {
+    window.load({{0, 0}, {1, 1}});
+    FAIL();
+  } catch (const stream::Error& error) {
+    EXPECT_NE(std::string(error.what()).find("M of memory"), std::string::npos) << error.what();
+  }
+  window.load({{0.4, 0.4}, {0.5, 0.5}});
+  EXPECT_GT(window.triangulation().triangle_count(), 500U);
+}
+
+}  // namespace
+}  // namespace terrace
