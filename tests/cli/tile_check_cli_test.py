@@ -189,6 +189,14 @@ class VerifyTest(TileTestCase):
         problems = self.found('/'.join(map(str, key)) + '.terrain: not the bytes')
         self.assertEqual(len(problems), 1)
 
+    def test_a_step_on_the_line_of_180_degrees(self):
+        tile = self.set.tiles[0, 0, 0]
+        heights = [h + 20 if u == 0 else h for u, h in zip(tile.u, tile.h)]
+        self.assertLess(max(heights), UNITS)
+        self.change((0, 0, 0), self.columns(tile, h=heights))
+        self.found('0/1/0.terrain: its eastern side and that of 0/0/0.terrain have heights',
+                   also=('sphere', 'horizon'))
+
     def test_missing_and_stray_tiles(self):
         key = self.inner_tile()
         os.remove(os.path.join(self.dir, '/'.join(map(str, key)) + '.terrain'))

@@ -114,7 +114,9 @@ Checked SetCheck::check(const TileAddress& tile, unsigned worker) const {
     return checked;
   }
   checked.decoded = true;
-  checked.faults = check_tile_mesh(tile, decoded, layer_.extensions);
+  for (TileFault& fault : check_tile_mesh(tile, decoded, layer_.extensions)) {
+    checked.faults.push_back(std::move(fault));
+  }
   checked.borders = borders_of(decoded.mesh);
   if (surfaces_.empty()) return checked;
   checked.heights = measure_tile(tile, decoded.mesh, *surfaces_[worker]);
