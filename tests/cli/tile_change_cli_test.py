@@ -161,6 +161,7 @@ class ChangeTest(TileTestCase):
     def test_damage_is_mended(self):
         store = self.build(self.dem(10.13, 46.71, 0.002), 'damage')
         options = ('--max-error', '2')
+        shutil.rmtree(self.path('fresh'), ignore_errors=True)
         whole = self.tile(store, 'fresh', *options)
         expected = everything(self.path('fresh'))
         names = sorted(name for name in expected if name.endswith('.terrain'))
