@@ -12,7 +12,7 @@
 namespace terrace::tools {
 
 RasterTileSurface::RasterTileSurface(const TiledRaster& raster)
-    : raster_(raster), reader_(raster.store, std::uint64_t{32} << 20) {}
+    : raster_(raster), reader_(raster.store, std::uint64_t{24} << 20) {}
 
 RasterTileSurface::View RasterTileSurface::view(const LatticeWindow& window) {
   const std::int64_t column = window.column - held_.column, row = window.row - held_.row;

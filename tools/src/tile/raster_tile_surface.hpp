@@ -15,7 +15,7 @@
 namespace terrace::tools {
 
 /// The surface of a raster store: bilinear between four samples with data, filled elsewhere.
-/// Memory: 44 MiB, and of the largest box that was asked for 8 bytes per sample, or 24 where
+/// Memory: 36 MiB, and of the largest box that was asked for 8 bytes per sample, or 24 where
 /// samples() are.
 class RasterTileSurface final : public TileSurface {
  public:
