@@ -10,8 +10,10 @@
 
 #include "camera.hpp"
 #include "ground.hpp"
+#include "tile/crowded_leaf.hpp"
 #include "tile/ellipsoid.hpp"
 #include "tile/quantized_mesh_layout.hpp"
+#include "tile/sample_parts.hpp"
 
 namespace terrace::tools {
 namespace {
@@ -50,7 +52,7 @@ void mesh_leaf(const TileAddress& tile, const TileLeaf& leaf, const ZoomPlan& pl
   SurfaceSamples samples;
   const GeographicBox box = box_of(tile, leaf);
   const auto range = surface.range(box);
-  bool measured = false;
+  bool measured = false, crowded = false;
   if (range) {
     const double error = flat_error(frame, plan.height_step, *range);
     if (error <= plan.max_error && (range->certain || pieces.has_data)) {
@@ -58,24 +60,18 @@ void mesh_leaf(const TileAddress& tile, const TileLeaf& leaf, const ZoomPlan& pl
       pieces.max_error = std::max(pieces.max_error, error);
       pieces.has_data = true;
     } else {
-      surface.samples(box, samples);
       measured = true;
+      crowded = is_to_be_cut(box, surface);
+      if (!crowded) surface.samples(box, samples);
     }
   }
-  // From degrees to units of the tile.
-  const GeographicBox whole = box_of(tile);
-  const double units = kTileUnits / (whole.east - whole.west);
+  const LeafUnits units(tile, leaf);
   std::vector<double> u, v;
   u.reserve(samples.size());
   v.reserve(samples.size());
-  // Rounding must not take a sample on a side out of both leaves.
-  const auto unit = [&](double degrees, double from, std::uint32_t part) {
-    return std::clamp((degrees - from) * units, static_cast<double>(leaf_unit(part, leaf.depth)),
-                      static_cast<double>(leaf_unit(part + 1, leaf.depth)));
-  };
   for (std::size_t i = 0; i < samples.size(); ++i) {
-    u.push_back(unit(samples.longitude[i], whole.west, leaf.x));
-    v.push_back(unit(samples.latitude[i], whole.south, leaf.y));
+    u.push_back(units.u(samples.longitude[i]));
+    v.push_back(units.v(samples.latitude[i]));
   }
   std::vector<tri::Point3> corners;
   for (const SideVertex& vertex : frame) {
@@ -86,9 +82,17 @@ void mesh_leaf(const TileAddress& tile, const TileLeaf& leaf, const ZoomPlan& pl
   options.max_error = plan.max_error;
   options.quality = quality;
   options.lattice = tri::TinLattice{0.0, plan.height_step};
-  const tri::PointTin tin = tri::point_tin(u, v, samples.height, corners, options);
-  if (measured) pieces.max_error = std::max(pieces.max_error, tin.errors.largest);
-  if (tin.errors.covered > 0) pieces.has_data = true;
+  tri::PointTin tin;
+  if (crowded) {
+    CrowdedTin made = mesh_crowded_leaf(tile, leaf, corners, options, surface);
+    tin = std::move(made.tin);
+    pieces.max_error = std::max(pieces.max_error, made.largest);
+    pieces.has_data = pieces.has_data || made.has_data;
+  } else {
+    tin = tri::point_tin(u, v, samples.height, corners, options);
+    if (measured) pieces.max_error = std::max(pieces.max_error, tin.errors.largest);
+    if (tin.errors.covered > 0) pieces.has_data = true;
+  }
 
   std::vector<std::uint32_t> number;
   number.reserve(tin.vertices.size());
@@ -208,7 +212,7 @@ MadeTile make_tile(const TileAddress& tile, const ZoomPlan& plan, TileSurface& s
                    const TileMeshOptions& options) {
   Pieces pieces;
   TileSides sides(tile, plan, surface);
-  for (const TileLeaf& leaf : leaves_of(tile, plan, surface.bounds())) {
+  for (const TileLeaf& leaf : leaves_of(tile, plan, surface)) {
     const auto range = surface.range(box_of(tile, leaf));
     // Where heights differ less than the bound, nothing but the sides is read as a rule.
     if (range && range->high - range->low > plan.max_error) surface.expect(box_of(tile, leaf));

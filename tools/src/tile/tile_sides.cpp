@@ -11,8 +11,6 @@
 namespace terrace::tools {
 namespace {
 
-/// Samples that a leaf should have at most, each way.
-constexpr double kSamplesPerLeaf = 512.0;
 /// A leaf has at least this many units each way.
 constexpr unsigned kDeepestLeaf = 8;
 /// Places at which a side of one leaf is looked at, at most.
@@ -43,7 +41,7 @@ ZoomPlan plan_zoom(unsigned zoom, double max_error, double range, const TileSurf
   // A chord of angle a lies R a^2 / 8 below its arc at most: half of the error that the client
   // expects of the zoom.
   plan.longest_edge = std::sqrt(8.0 * 0.5 * expected_error(zoom) / kEquatorialRadius) / kDegree;
-  plan.widest_leaf = kSamplesPerLeaf * surface.spacing();
+  plan.widest_leaf = surface.widest_part();
   return plan;
 }
 
@@ -67,15 +65,19 @@ GeographicBox box_of(const TileAddress& tile, const TileLeaf& leaf) {
 }
 
 std::vector<TileLeaf> leaves_of(const TileAddress& tile, const ZoomPlan& plan,
-                                const GeographicBox& data) {
+                                TileSurface& surface) {
+  const GeographicBox data = surface.bounds();
   std::vector<TileLeaf> leaves, open{{}};
   while (!open.empty()) {
     const TileLeaf leaf = open.back();
     open.pop_back();
-    const double width = width_at(tile.zoom, leaf.depth);
-    const bool wide =
-        width > plan.longest_edge || (width > plan.widest_leaf && meet(box_of(tile, leaf), data));
-    if (!wide || leaf.depth == kDeepestLeaf) {
+    const auto wide = [&] {
+      const double width = width_at(tile.zoom, leaf.depth);
+      if (width > plan.longest_edge) return true;
+      const GeographicBox box = box_of(tile, leaf);
+      return (width > plan.widest_leaf && meet(box, data)) || surface.crowded(box);
+    };
+    if (leaf.depth == kDeepestLeaf || !wide()) {
       leaves.push_back(leaf);
       continue;
     }
@@ -95,9 +97,34 @@ bool TileSides::is_cut(const Side& side) const {
   // the side is cut wherever a leaf of its length is.
   const double width = width_at(tile_.zoom, side.depth);
   if (width > plan_.longest_edge) return true;
-  if (width <= plan_.widest_leaf) return false;
   // A little more than the length: units are rounded.
-  return is_near_data(side, 1.01 * width);
+  if (width > plan_.widest_leaf && is_near_data(side, 1.01 * width)) return true;
+  return is_crowded(side);
+}
+
+bool TileSides::is_crowded(const Side& side) const {
+  const std::uint32_t parts = 1U << side.depth;
+  const std::uint32_t columns = tile_columns(tile_.zoom), rows = tile_rows(tile_.zoom);
+  for (const bool before : {true, false}) {
+    // By the numbers that the leaf's own tile has.
+    TileAddress tile = tile_;
+    TileLeaf leaf{side.depth, side.k, side.k};
+    std::uint32_t& across = side.along_parallel ? leaf.y : leaf.x;
+    std::uint32_t& place = side.along_parallel ? tile.y : tile.x;
+    if (before && side.line == 0) {
+      if (side.along_parallel && place == 0) continue;
+      place = place == 0 ? columns - 1 : place - 1;
+      across = parts - 1;
+    } else if (!before && side.line == parts) {
+      if (side.along_parallel && place == rows - 1) continue;
+      place = !side.along_parallel && place == columns - 1 ? 0 : place + 1;
+      across = 0;
+    } else {
+      across = before ? side.line - 1 : side.line;
+    }
+    if (surface_.crowded(box_of(tile, leaf))) return true;
+  }
+  return false;
 }
 
 bool TileSides::is_near_data(const Side& side, double reach) const {
@@ -119,31 +146,45 @@ bool TileSides::is_near_data(const Side& side, double reach) const {
   return meet(box, data_);
 }
 
-void TileSides::add_samples(const Side& side, std::vector<double>& t,
-                            std::vector<double>& longitude, std::vector<double>& latitude) {
+TileSides::SamplesAt TileSides::add_samples(const Side& side, std::vector<double>& t,
+                                            std::vector<double>& longitude,
+                                            std::vector<double>& latitude) {
+  SamplesAt found;
   // Tiles on both sides of 180 degrees do not see the same samples.
-  if (!side.along_parallel && std::abs(longitude.front()) == 180.0) return;
+  if (!side.along_parallel && std::abs(longitude.front()) == 180.0) return found;
   // Of what both tiles beside the side have alike: its ends, and a unit to either side.
   const double unit = width_at(tile_.zoom) / kTileUnits;
   const double reach_longitude = side.along_parallel ? 0.0 : unit;
   const double reach_latitude = side.along_parallel ? unit : 0.0;
-  SurfaceSamples near;
-  surface_.samples({longitude.front() - reach_longitude, latitude.front() - reach_latitude,
-                    longitude.back() + reach_longitude, latitude.back() + reach_latitude},
-                   near);
-  if (near.size() == 0) return;
+  const GeographicBox band{longitude.front() - reach_longitude, latitude.front() - reach_latitude,
+                           longitude.back() + reach_longitude, latitude.back() + reach_latitude};
   const std::size_t before = t.size();
   const double from = t.front(), to = t.back();
-  for (std::size_t i = 0; i < near.size(); ++i) {
-    const double at = side.along_parallel ? (near.longitude[i] - longitude[0]) / unit
-                                          : (near.latitude[i] - latitude[0]) / unit;
-    // A vertex can stand at whole numbers only.
-    const double whole = from + std::round(at);
-    if (whole > from && whole < to) t.push_back(whole);
+  if (surface_.crowded(band)) {
+    // Of the smallest leaves, which have few places.
+    for (double at = from + 1.0; at < to; at += 1.0) t.push_back(at);
+  } else {
+    SurfaceSamples near;
+    surface_.samples(band, near);
+    for (std::size_t i = 0; i < near.size(); ++i) {
+      const double east = (near.longitude[i] - longitude[0]) / unit;
+      const double north = (near.latitude[i] - latitude[0]) / unit;
+      // A vertex can stand at whole numbers only.
+      const double whole = from + std::round(side.along_parallel ? east : north);
+      if (!(whole > from && whole < to)) continue;
+      t.push_back(whole);
+      // Farther ones become vertices inside.
+      if (!surface_.sides_take_samples() || std::abs(side.along_parallel ? north : east) > 0.5) {
+        continue;
+      }
+      const double height = near.height[i];
+      const auto [at, fresh] = found.try_emplace(whole, Samples{height, height});
+      at->second = {std::min(at->second.low, height), std::max(at->second.high, height)};
+    }
   }
   std::sort(t.begin(), t.end());
   t.erase(std::unique(t.begin(), t.end()), t.end());
-  if (t.size() == before) return;
+  if (t.size() == before) return found;
   const double across = leaf_unit(side.line, side.depth);
   longitude.clear();
   latitude.clear();
@@ -151,6 +192,22 @@ void TileSides::add_samples(const Side& side, std::vector<double>& t,
     longitude.push_back(longitude_at(tile_, side.along_parallel ? at : across));
     latitude.push_back(latitude_at(tile_, side.along_parallel ? across : at));
   }
+  return found;
+}
+
+std::optional<TileSides::Samples> TileSides::samples_at_corner(double longitude, double latitude) {
+  if (!surface_.sides_take_samples() || std::abs(longitude) == 180.0) return std::nullopt;
+  const auto [known, fresh] = corners_.try_emplace({longitude, latitude}, std::nullopt);
+  if (!fresh) return known->second;
+  const double half = 0.5 * width_at(tile_.zoom) / kTileUnits;
+  const GeographicBox box{longitude - half, latitude - half, longitude + half, latitude + half};
+  if (surface_.crowded(box)) return std::nullopt;
+  SurfaceSamples near;
+  surface_.samples(box, near);
+  if (near.size() == 0) return std::nullopt;
+  const auto [low, high] = std::minmax_element(near.height.begin(), near.height.end());
+  known->second = Samples{*low, *high};
+  return known->second;
 }
 
 std::vector<SideVertex> TileSides::settle(const Side& side) {
@@ -182,9 +239,20 @@ std::vector<SideVertex> TileSides::settle(const Side& side) {
     longitude.push_back(longitude_at(tile_, side.along_parallel ? at : across));
     latitude.push_back(latitude_at(tile_, side.along_parallel ? across : at));
   }
-  if (near_data) add_samples(side, t, longitude, latitude);
+  SamplesAt samples;
+  if (near_data) samples = add_samples(side, t, longitude, latitude);
+  for (const std::size_t end : {std::size_t{0}, t.size() - 1}) {
+    if (const auto corner = samples_at_corner(longitude[end], latitude[end])) {
+      samples[t[end]] = *corner;
+    }
+  }
   height.resize(t.size());
   surface_.heights(longitude, latitude, height);
+  for (const auto& [at, between] : samples) {
+    const auto place = std::lower_bound(t.begin(), t.end(), at) - t.begin();
+    // In the middle, so that none is farther off than it must be.
+    height[static_cast<std::size_t>(place)] = between.low + 0.5 * (between.high - between.low);
+  }
   const tri::SimplifiedLine line = tri::simplify_line(t, height, kSideShare * plan_.max_error,
                                                       tri::TinLattice{0.0, plan_.height_step});
   std::vector<SideVertex> vertices;

@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include <terrace/tri/point_tin.hpp>
@@ -40,9 +41,9 @@ double latitude_at(const TileAddress& tile, double units);
 GeographicBox box_of(const TileAddress& tile, const TileLeaf& leaf);
 
 /// The parts that a tile is meshed in, so that no edge is too long and no part has too many
-/// samples.
+/// samples. The smallest may have.
 std::vector<TileLeaf> leaves_of(const TileAddress& tile, const ZoomPlan& plan,
-                                const GeographicBox& data);
+                                TileSurface& surface);
 
 /// A vertex on the side of a leaf: units of the tile, and multiples of the height step.
 struct SideVertex {
@@ -69,10 +70,20 @@ class TileSides {
   };
   const std::vector<SideVertex>& vertices(const Side& side);
   std::vector<SideVertex> settle(const Side& side);
-  /// Adds to the places at which a side is looked at those of samples that lie on it.
-  void add_samples(const Side& side, std::vector<double>& t, std::vector<double>& longitude,
-                   std::vector<double>& latitude);
+  /// Lowest and highest samples nearest to a place on a side.
+  struct Samples {
+    double low = 0.0, high = 0.0;
+  };
+  using SamplesAt = std::map<double, Samples>;
+  /// Adds to the places at which a side is looked at those of samples that lie on it, and returns
+  /// their heights if the surface wants sides to go through them.
+  SamplesAt add_samples(const Side& side, std::vector<double>& t, std::vector<double>& longitude,
+                        std::vector<double>& latitude);
+  /// Of samples at the end of a side: the same for all sides and tiles that meet there.
+  std::optional<Samples> samples_at_corner(double longitude, double latitude);
   [[nodiscard]] bool is_cut(const Side& side) const;
+  /// Whether a leaf beside a side has too many samples; the same for both tiles.
+  [[nodiscard]] bool is_crowded(const Side& side) const;
   /// Whether there may be samples within `reach` (degrees) of a side; the same for both tiles.
   [[nodiscard]] bool is_near_data(const Side& side, double reach) const;
 
@@ -80,6 +91,7 @@ class TileSides {
   const ZoomPlan& plan_;
   TileSurface& surface_;
   GeographicBox data_;
+  std::map<std::pair<double, double>, std::optional<Samples>> corners_;
   std::map<std::tuple<bool, unsigned, std::uint32_t, std::uint32_t>, std::vector<SideVertex>>
       known_;
 };
