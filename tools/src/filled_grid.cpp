@@ -5,6 +5,8 @@
 #include <cassert>
 #include <utility>
 
+#include "digest.hpp"
+
 namespace terrace::tools {
 namespace {
 
@@ -75,6 +77,29 @@ FilledGrid::FilledGrid(std::size_t columns, std::size_t rows, std::vector<double
 
 double FilledGrid::height(double x, double y) const {
   return between(heights_, columns_, rows_, x, y);
+}
+
+std::uint64_t FilledGrid::digest(const std::array<double, 2>& first,
+                                 const std::array<double, 2>& last) const {
+  // The first and the last cell that between() takes.
+  const auto cells = [&](std::size_t axis, std::size_t number) {
+    const auto cell = [number](double place) {
+      return static_cast<std::size_t>(
+          std::clamp(place - 0.5, 0.0, static_cast<double>(number - 1)));
+    };
+    return std::pair{cell(first[axis]), std::min(cell(last[axis]) + 1, number - 1)};
+  };
+  const auto [left, right] = cells(0, columns_);
+  const auto [top, bottom] = cells(1, rows_);
+  Digest digest;
+  for (std::size_t row = top; row <= bottom; ++row) {
+    for (std::size_t column = left; column <= right; ++column) {
+      const std::size_t cell = row * columns_ + column;
+      digest.add(std::uint64_t{cell});
+      digest.add(static_cast<double>(heights_[cell]));
+    }
+  }
+  return digest.value();
 }
 
 }  // namespace terrace::tools

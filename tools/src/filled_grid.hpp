@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 namespace terrace::tools {
@@ -19,6 +21,11 @@ class FilledGrid {
   /// Bilinear between the centres of cells; x, y in cells, the first cell's centre at 0.5. Outside
   /// the grid the height at its border.
   [[nodiscard]] double height(double x, double y) const;
+
+  /// A number of what height() depends on for places from `first` to `last`, both included: of two
+  /// grids of equal size with the same number it gives the same there.
+  [[nodiscard]] std::uint64_t digest(const std::array<double, 2>& first,
+                                     const std::array<double, 2>& last) const;
 
  private:
   std::size_t columns_ = 0, rows_ = 0;

@@ -8,6 +8,7 @@
 #include <terrace/stream/error.hpp>
 
 #include "detail.hpp"
+#include "digest.hpp"
 #include "interrupt.hpp"
 
 namespace terrace::tools {
@@ -55,6 +56,16 @@ RasterFill::RasterFill(const stream::Store& store) {
 
 double RasterFill::height(double column, double row) const {
   return grid_->height((column + 0.5) / reduction_, (row + 0.5) / reduction_);
+}
+
+std::uint64_t RasterFill::digest(const LatticeWindow& window) const {
+  if (window.columns <= 0 || window.rows <= 0) return Digest().value();
+  const auto cell = [this](std::int64_t place) {
+    return (static_cast<double>(place) + 0.5) / reduction_;
+  };
+  return grid_->digest(
+      {cell(window.column), cell(window.row)},
+      {cell(window.column + window.columns - 1), cell(window.row + window.rows - 1)});
 }
 
 }  // namespace terrace::tools

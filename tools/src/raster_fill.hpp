@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstdint>
 #include <optional>
 
 #include <terrace/stream/store.hpp>
 
 #include "filled_grid.hpp"
+#include "store_window.hpp"
 
 namespace terrace::tools {
 
@@ -20,6 +22,10 @@ class RasterFill {
   /// The height at a place of the lattice, in the vertical unit of the store. Outside the raster
   /// that of its border.
   [[nodiscard]] double height(double column, double row) const;
+
+  /// A number of what height() depends on for places in the window, borders included: of two
+  /// rasters of equal size with the same number it gives the same there.
+  [[nodiscard]] std::uint64_t digest(const LatticeWindow& window) const;
 
  private:
   std::optional<FilledGrid> grid_;

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "src/digest.hpp"
 #include "src/tile/tile_surface.hpp"
 
 namespace terrace::tools {
@@ -70,6 +71,15 @@ class AnalyticSurface final : public TileSurface {
     for (std::size_t i = 0; i < out.size(); ++i) {
       out[i] = height_(longitude[i], latitude[i]) <= 0.0 ? 1 : 0;
     }
+  }
+
+  /// Of all samples: the function between them is known by nothing else.
+  std::uint64_t digest(const GeographicBox& /*box*/) override {
+    Digest digest;
+    for (const double height : samples_) digest.add(height);
+    for (const double number : {west_, south_, step_}) digest.add(number);
+    digest.add(static_cast<std::uint64_t>(columns_));
+    return digest.value();
   }
 
  private:

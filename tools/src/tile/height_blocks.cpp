@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "digest.hpp"
 #include "interrupt.hpp"
 
 namespace terrace::tools {
@@ -23,6 +24,13 @@ float rounded_up(double height) {
   return static_cast<double>(near) < height ? std::nextafter(near, kInfinity) : near;
 }
 
+std::uint64_t sample_digest(std::uint64_t place, double height) {
+  Digest digest;
+  digest.add(place);
+  digest.add(height);
+  return digest.value();
+}
+
 }  // namespace
 
 HeightBlocks::HeightBlocks(const stream::Store& store)
@@ -32,32 +40,57 @@ HeightBlocks::HeightBlocks(const stream::Store& store)
   while (count(columns_) * count(rows_) > kMostBlocks) side_ *= 2;
   across_ = count(columns_);
   down_ = count(rows_);
-  blocks_.assign(static_cast<std::size_t>(across_ * down_), {kInfinity, -kInfinity});
+  const auto blocks = static_cast<std::size_t>(across_ * down_);
+  blocks_.assign(blocks, {kInfinity, -kInfinity});
+  digests_.assign(blocks, 0);
+  samples_.assign(blocks, 0);
   const stream::Channel& channel = store.schema().coordinates[2];
   for (unsigned level = 0; level <= store.top(); ++level) {
     store.for_each(level, [&](stream::ClusterId, const stream::ClusterRecord&,
                               const stream::ClusterPoints& cluster) {
       check_interrupt();
       for (const stream::Point3& p : cluster.positions) {
-        const std::int64_t x = static_cast<std::int64_t>(p[0]) / side_;
-        const std::int64_t y = static_cast<std::int64_t>(p[1]) / side_;
-        Block& block = blocks_[static_cast<std::size_t>(y * across_ + x)];
+        const auto column = static_cast<std::int64_t>(p[0]), row = static_cast<std::int64_t>(p[1]);
+        const auto at = static_cast<std::size_t>(row / side_ * across_ + column / side_);
+        Block& block = blocks_[at];
         const double height = p[2] * channel.scale + channel.offset;
         block.low = std::min(block.low, rounded_down(height));
         block.high = std::max(block.high, rounded_up(height));
+        // A sum: samples come in the order of their clusters.
+        digests_[at] += sample_digest(static_cast<std::uint64_t>(row * columns_ + column), height);
+        ++samples_[at];
       }
     });
   }
 }
 
+HeightBlocks::Blocks HeightBlocks::blocks_of(const LatticeWindow& window) const {
+  const std::int64_t right = std::min(window.column + window.columns, columns_);
+  const std::int64_t bottom = std::min(window.row + window.rows, rows_);
+  return {std::max<std::int64_t>(window.column, 0) / side_,
+          std::max<std::int64_t>(window.row, 0) / side_, (right + side_ - 1) / side_,
+          (bottom + side_ - 1) / side_};
+}
+
+std::uint64_t HeightBlocks::digest(const LatticeWindow& window) const {
+  const Blocks part = blocks_of(window);
+  Digest digest;
+  for (const std::int64_t side : {part.x0, part.y0, part.x1, part.y1}) {
+    digest.add(static_cast<std::uint64_t>(side));
+  }
+  for (std::int64_t y = part.y0; y < part.y1; ++y) {
+    for (std::int64_t x = part.x0; x < part.x1; ++x) {
+      digest.add(digests_[static_cast<std::size_t>(y * across_ + x)]);
+    }
+  }
+  return digest.value();
+}
+
 std::optional<HeightBlocks::Range> HeightBlocks::range(const LatticeWindow& window) const {
-  const std::int64_t x0 = std::max<std::int64_t>(window.column, 0) / side_;
-  const std::int64_t y0 = std::max<std::int64_t>(window.row, 0) / side_;
-  const std::int64_t x1 = std::min(window.column + window.columns, columns_);
-  const std::int64_t y1 = std::min(window.row + window.rows, rows_);
+  const Blocks part = blocks_of(window);
   Block all{kInfinity, -kInfinity};
-  for (std::int64_t y = y0; y * side_ < y1; ++y) {
-    for (std::int64_t x = x0; x * side_ < x1; ++x) {
+  for (std::int64_t y = part.y0; y < part.y1; ++y) {
+    for (std::int64_t x = part.x0; x < part.x1; ++x) {
       all.low = std::min(all.low, at(x, y).low);
       all.high = std::max(all.high, at(x, y).high);
     }
@@ -81,8 +114,7 @@ std::optional<LatticeWindow> HeightBlocks::some_block_within(const LatticeWindow
     for (std::int64_t j = 0; j < width; ++j) {
       const std::int64_t x = x0 + (j + width / 2) % width;
       if (at(x, y).low > at(x, y).high) continue;
-      return LatticeWindow{x * side_, y * side_, std::min(side_, columns_ - x * side_),
-                           std::min(side_, rows_ - y * side_)};
+      return rectangle(x, y);
     }
   }
   return std::nullopt;

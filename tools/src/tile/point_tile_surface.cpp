@@ -8,6 +8,7 @@
 #include <numeric>
 #include <utility>
 
+#include "digest.hpp"
 #include "tile/cloud_spacing.hpp"
 
 namespace terrace::tools {
@@ -248,6 +249,19 @@ void PointTileSurface::water(std::span<const double> longitude, std::span<const 
   for (std::size_t i = 0; i < out.size(); ++i) {
     out[i] = std::abs(heights[i] - level) <= slack ? 1 : 0;
   }
+}
+
+std::uint64_t PointTileSurface::digest(const GeographicBox& /*box*/) {
+  Digest digest;
+  digest.add(std::uint64_t{cloud_.store.checksum()});
+  digest.add(cloud_.store.points());
+  digest.add(cloud_.vertical.metres_per_unit());
+  digest.add(std::uint64_t{cloud_.vertical.has_geoid()});
+  for (const std::optional<double>& option : {cloud_.flat_fill, cloud_.water_height}) {
+    digest.add(std::uint64_t{option.has_value()});
+    digest.add(option.value_or(0.0));
+  }
+  return digest.value();
 }
 
 }  // namespace terrace::tools

@@ -58,6 +58,8 @@ class PointTileSurface final : public TileSurface {
                std::span<double> out) override;
   void water(std::span<const double> longitude, std::span<const double> latitude,
              std::span<std::uint8_t> out) override;
+  /// Of the whole store: a point changes the triangles around it, and the fill, far away.
+  std::uint64_t digest(const GeographicBox& box) override;
 
  private:
   /// Of the store's places, kept for the box asked for last.

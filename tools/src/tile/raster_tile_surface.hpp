@@ -14,6 +14,7 @@
 #include "raster_fill.hpp"
 #include "store_window.hpp"
 #include "tile/height_blocks.hpp"
+#include "tile/raster_tile_digest.hpp"
 #include "tile/tile_surface.hpp"
 #include "world.hpp"
 
@@ -56,6 +57,7 @@ class RasterTileSurface final : public TileSurface {
                std::span<double> out) override;
   void water(std::span<const double> longitude, std::span<const double> latitude,
              std::span<std::uint8_t> out) override;
+  std::uint64_t digest(const GeographicBox& box) override { return digest_of(raster_, box); }
 
  private:
   /// Calls visit(i, place on the lattice, the sample north-west of it, distance to the next row)

@@ -61,6 +61,13 @@ class TileSurface {
   /// What a water mask shows: whether there is water at each place.
   virtual void water(std::span<const double> longitude, std::span<const double> latitude,
                      std::span<std::uint8_t> out) = 0;
+
+  /// A number of all that the answers above depend on for places in the box, which may reach beyond
+  /// 180 degrees and the poles: bounds(), spacing(), and samples, ranges, heights and water there.
+  /// Surfaces of two stores that have the same number answer alike in the box, so that what was
+  /// made of one need not be made again of the other. A number of the whole store is right, but
+  /// says of every change that it is everywhere. Cheap beside reading the samples.
+  virtual std::uint64_t digest(const GeographicBox& box) = 0;
 };
 
 }  // namespace terrace::tools
