@@ -23,6 +23,13 @@ struct SurfaceSamples {
   }
 };
 
+/// Samples in rows along parallels and columns along meridians, at equal distances.
+struct SurfaceRows {
+  std::vector<double> longitude;  ///< of the columns, ascending
+  std::vector<double> latitude;   ///< of the rows, ascending
+  std::vector<double> height;     ///< metres above the ellipsoid, row by row; NaN: no sample
+};
+
 /// Bounds on the heights of samples, not always reached.
 struct HeightRange {
   double low = 0.0, high = 0.0;  ///< metres above the ellipsoid
@@ -53,6 +60,12 @@ class TileSurface {
   [[nodiscard]] virtual bool sides_take_samples() const { return false; }
   /// Replaces `out` by the samples in the box, borders included.
   virtual void samples(const GeographicBox& box, SurfaceSamples& out) = 0;
+  /// The same where samples stand in rows and columns, which is faster; false where they do not.
+  virtual bool rows(const GeographicBox& box, SurfaceRows& out) {
+    static_cast<void>(box);
+    static_cast<void>(out);
+    return false;
+  }
   /// Of the heights of samples in the box, cheaply. Nothing if there is no sample.
   virtual std::optional<HeightRange> range(const GeographicBox& box) = 0;
   /// The surface's heights at places, filled where there are no samples: never NaN.
