@@ -15,7 +15,7 @@ namespace terrace::tools {
 namespace {
 
 constexpr std::uint64_t kSeeds = 32;
-constexpr std::uint64_t kMostPoints = 3000;
+constexpr double kMostPoints = 3000;
 constexpr unsigned kRank = 8;
 
 /// A point, and a box around points near it.

@@ -23,6 +23,18 @@ bool holds(const StoredBox& box, const stream::Box3& other) {
          box.max[1] >= other.max[1];
 }
 
+/// Of a box that meets another: 1 of one without width or height that lies in it.
+double share_inside(const StoredBox& box, const stream::Box3& other) {
+  double share = 1.0;
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    const double length = other.max[axis] - other.min[axis];
+    const double inside =
+        std::min(box.max[axis], other.max[axis]) - std::max(box.min[axis], other.min[axis]);
+    if (length > 0.0) share *= inside / length;
+  }
+  return share;
+}
+
 }  // namespace
 
 ClusterCensus::ClusterCensus(const stream::Store& store) : store_(store) {
@@ -97,12 +109,12 @@ void ClusterCensus::walk(const StoredBox& box, const Take& take, const Opens& op
   }
 }
 
-std::uint64_t ClusterCensus::count(const StoredBox& box, std::uint64_t limit) {
-  std::uint64_t sum = 0;
+double ClusterCensus::count(const StoredBox& box, double limit) {
+  double sum = 0.0;
   walk(
       box,
       [&](const stream::Point3&, const Entry& entry) {
-        sum += entry.descendants;
+        sum += static_cast<double>(entry.descendants) * share_inside(box, entry.box);
         return sum <= limit;
       },
       [](const Entry&) { return true; });

@@ -13,9 +13,9 @@
 
 namespace terrace::tools {
 
-/// What the index of a store tells of the points in a box, without their being read: how many there
-/// are at most and between which heights. Clusters that lie in the box as a whole count as a whole;
-/// of those on its border the ones of level 0 do.
+/// What the index of a store tells of the points in a box, without their being read: about how many
+/// there are and between which heights. Clusters that lie in the box as a whole count as a whole;
+/// of those on its border the ones of level 0 do, by the share of their boxes inside.
 ///
 /// One object per thread; any number of them share a Store. All functions throw stream::Error on a
 /// damaged store.
@@ -25,9 +25,8 @@ class ClusterCensus {
   ClusterCensus(const ClusterCensus&) = delete;
   ClusterCensus& operator=(const ClusterCensus&) = delete;
 
-  /// The points of the clusters of level 0 that meet the box, or more than `limit` if there are
-  /// more: then it ends early. Never less in a box around another than in that one.
-  std::uint64_t count(const StoredBox& box, std::uint64_t limit);
+  /// About the number of points in the box. Above `limit` any number above it: then it ends early.
+  double count(const StoredBox& box, double limit);
 
   struct Heights {
     double low = 0.0, high = 0.0;  ///< stored; of the clusters counted

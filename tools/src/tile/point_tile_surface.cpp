@@ -15,11 +15,11 @@ namespace terrace::tools {
 namespace {
 
 /// Samples that are taken at once, at most.
-constexpr std::uint64_t kMostSamples = std::uint64_t{1} << 18;
+constexpr double kMostSamples = 1U << 18;
 /// Degrees: in a box so narrow more points are as good as one place, and cutting it does not help.
 constexpr double kNarrowest = 1e-9;
 /// Points that are triangulated at once where places ask for it, at most.
-constexpr std::uint64_t kMostTogether = std::uint64_t{1} << 15;
+constexpr double kMostTogether = 1U << 15;
 
 StoredBox box_around(std::span<const Point2> stored, std::span<const std::uint32_t> part) {
   StoredBox box{stored[part.front()], stored[part.front()]};
@@ -65,7 +65,7 @@ void PointTileSurface::expect(const GeographicBox& box) {
 
 bool PointTileSurface::crowded(const GeographicBox& box) {
   if (box.east - box.west < kNarrowest || box.north - box.south < kNarrowest) return false;
-  std::uint64_t count = 0;
+  double count = 0.0;
   for (const StoredBox& window : windows(box)) {
     count += census_.count(window, kMostSamples);
     if (count > kMostSamples) return true;

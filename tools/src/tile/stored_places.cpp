@@ -172,9 +172,8 @@ std::vector<StoredBox> StoredPlaces::windows(const GeographicBox& box) const {
     }
     return windows;
   }
-  // Within it the map is near to a linear one, and no pole lies inside.
-  const bool small = high[0] - low[0] < 2.0 && high[1] - low[1] < 2.0 &&
-                     std::max(std::abs(low[1]), std::abs(high[1])) < 88.0;
+  // The outline of what is small says all: at a pole, too, it is a narrow wedge.
+  const bool small = high[0] - low[0] < 2.0 && high[1] - low[1] < 2.0;
   const unsigned steps = small ? kSmallSteps : kSteps;
   std::vector<Point2> places;
   for (unsigned j = 0; j <= steps; ++j) {

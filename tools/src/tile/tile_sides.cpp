@@ -19,8 +19,8 @@ constexpr double kMostPlaces = 4096.0;
 /// between have what the side has.
 constexpr double kSideShare = 0.75;
 
-/// Of a tile, or of its part at a depth; exact.
-double width_at(unsigned zoom, unsigned depth = 0) {
+/// Of a tile's part at a depth; exact.
+double width_at(unsigned zoom, unsigned depth) {
   return std::ldexp(180.0, -static_cast<int>(zoom + depth));
 }
 
@@ -49,12 +49,14 @@ std::uint32_t leaf_unit(std::uint32_t k, unsigned depth) {
   return (std::uint32_t{kTileUnits} * k + (1U << depth) / 2) >> depth;
 }
 
+double tile_width(unsigned zoom) { return std::ldexp(180.0, -static_cast<int>(zoom)); }
+
 double longitude_at(const TileAddress& tile, double units) {
-  return -180.0 + width_at(tile.zoom) * (tile.x + units / kTileUnits);
+  return -180.0 + tile_width(tile.zoom) * (tile.x + units / kTileUnits);
 }
 
 double latitude_at(const TileAddress& tile, double units) {
-  return -90.0 + width_at(tile.zoom) * (tile.y + units / kTileUnits);
+  return -90.0 + tile_width(tile.zoom) * (tile.y + units / kTileUnits);
 }
 
 GeographicBox box_of(const TileAddress& tile, const TileLeaf& leaf) {
@@ -146,70 +148,6 @@ bool TileSides::is_near_data(const Side& side, double reach) const {
   return meet(box, data_);
 }
 
-TileSides::SamplesAt TileSides::add_samples(const Side& side, std::vector<double>& t,
-                                            std::vector<double>& longitude,
-                                            std::vector<double>& latitude) {
-  SamplesAt found;
-  // Tiles on both sides of 180 degrees do not see the same samples.
-  if (!side.along_parallel && std::abs(longitude.front()) == 180.0) return found;
-  // Of what both tiles beside the side have alike: its ends, and a unit to either side.
-  const double unit = width_at(tile_.zoom) / kTileUnits;
-  const double reach_longitude = side.along_parallel ? 0.0 : unit;
-  const double reach_latitude = side.along_parallel ? unit : 0.0;
-  const GeographicBox band{longitude.front() - reach_longitude, latitude.front() - reach_latitude,
-                           longitude.back() + reach_longitude, latitude.back() + reach_latitude};
-  const std::size_t before = t.size();
-  const double from = t.front(), to = t.back();
-  if (surface_.crowded(band)) {
-    // Of the smallest leaves, which have few places.
-    for (double at = from + 1.0; at < to; at += 1.0) t.push_back(at);
-  } else {
-    SurfaceSamples near;
-    surface_.samples(band, near);
-    for (std::size_t i = 0; i < near.size(); ++i) {
-      const double east = (near.longitude[i] - longitude[0]) / unit;
-      const double north = (near.latitude[i] - latitude[0]) / unit;
-      // A vertex can stand at whole numbers only.
-      const double whole = from + std::round(side.along_parallel ? east : north);
-      if (!(whole > from && whole < to)) continue;
-      t.push_back(whole);
-      // Farther ones become vertices inside.
-      if (!surface_.sides_take_samples() || std::abs(side.along_parallel ? north : east) > 0.5) {
-        continue;
-      }
-      const double height = near.height[i];
-      const auto [at, fresh] = found.try_emplace(whole, Samples{height, height});
-      at->second = {std::min(at->second.low, height), std::max(at->second.high, height)};
-    }
-  }
-  std::sort(t.begin(), t.end());
-  t.erase(std::unique(t.begin(), t.end()), t.end());
-  if (t.size() == before) return found;
-  const double across = leaf_unit(side.line, side.depth);
-  longitude.clear();
-  latitude.clear();
-  for (const double at : t) {
-    longitude.push_back(longitude_at(tile_, side.along_parallel ? at : across));
-    latitude.push_back(latitude_at(tile_, side.along_parallel ? across : at));
-  }
-  return found;
-}
-
-std::optional<TileSides::Samples> TileSides::samples_at_corner(double longitude, double latitude) {
-  if (!surface_.sides_take_samples() || std::abs(longitude) == 180.0) return std::nullopt;
-  const auto [known, fresh] = corners_.try_emplace({longitude, latitude}, std::nullopt);
-  if (!fresh) return known->second;
-  const double half = 0.5 * width_at(tile_.zoom) / kTileUnits;
-  const GeographicBox box{longitude - half, latitude - half, longitude + half, latitude + half};
-  if (surface_.crowded(box)) return std::nullopt;
-  SurfaceSamples near;
-  surface_.samples(box, near);
-  if (near.size() == 0) return std::nullopt;
-  const auto [low, high] = std::minmax_element(near.height.begin(), near.height.end());
-  known->second = Samples{*low, *high};
-  return known->second;
-}
-
 std::vector<SideVertex> TileSides::settle(const Side& side) {
   if (is_cut(side)) {
     const Side first{side.along_parallel, side.depth + 1, 2 * side.line, 2 * side.k};
@@ -226,7 +164,7 @@ std::vector<SideVertex> TileSides::settle(const Side& side) {
 
   // Two places per sample, at equal distances; away from all samples the ends will do.
   const double length = width_at(tile_.zoom, side.depth);
-  const double unit = width_at(tile_.zoom) / kTileUnits;
+  const double unit = tile_width(tile_.zoom) / kTileUnits;
   const bool near_data = is_near_data(side, 2.0 * (unit + surface_.spacing()));
   const double wanted = near_data ? std::min(2.0 * length / surface_.spacing(), kMostPlaces) : 1.0;
   const auto parts =

@@ -34,6 +34,8 @@ struct TileLeaf {
 };
 /// Units of the tile's lattice at k / 2^depth of its width.
 std::uint32_t leaf_unit(std::uint32_t k, unsigned depth);
+/// Degrees; exact.
+double tile_width(unsigned zoom);
 /// The meridian and the parallel at `units` of a tile's lattice. On a border they are the same
 /// numbers for both tiles.
 double longitude_at(const TileAddress& tile, double units);
@@ -70,15 +72,22 @@ class TileSides {
   };
   const std::vector<SideVertex>& vertices(const Side& side);
   std::vector<SideVertex> settle(const Side& side);
-  /// Lowest and highest samples nearest to a place on a side.
+  /// Lowest and highest samples within a unit of a place on a side: of those within half a unit, if
+  /// there are some.
   struct Samples {
     double low = 0.0, high = 0.0;
+    bool any = false, on = false;
+
+    void add(double height, double units);
   };
   using SamplesAt = std::map<double, Samples>;
   /// Adds to the places at which a side is looked at those of samples that lie on it, and returns
   /// their heights if the surface wants sides to go through them.
   SamplesAt add_samples(const Side& side, std::vector<double>& t, std::vector<double>& longitude,
                         std::vector<double>& latitude);
+  /// Samples in a box around places on a side or at its end, the same for all tiles there; nothing
+  /// if they may be too many.
+  std::optional<SurfaceSamples> samples_near(const GeographicBox& box);
   /// Of samples at the end of a side: the same for all sides and tiles that meet there.
   std::optional<Samples> samples_at_corner(double longitude, double latitude);
   [[nodiscard]] bool is_cut(const Side& side) const;
