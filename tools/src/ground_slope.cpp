@@ -73,6 +73,13 @@ Point2 GroundSlope::world(const Point2& stored) const {
   return {p[0], p[1]};
 }
 
+double GroundSlope::metres(const Point2& a, const Point2& b) const {
+  const double dx = b[0] - a[0], dy = b[1] - a[1];
+  const GroundMap m = map_at({a[0] + 0.5 * dx, a[1] + 0.5 * dy});
+  const double east = m[0] * dx + m[1] * dy, north = m[3] * dx + m[4] * dy;
+  return std::sqrt(east * east + north * north);
+}
+
 tri::Gradient GroundSlope::on_ground(const Point2& stored, const SurfacePoint& surface) const {
   if (!(surface.per_column == surface.per_column)) return {};
   const GroundMap m = map_at(stored);

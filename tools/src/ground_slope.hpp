@@ -30,6 +30,9 @@ class GroundSlope {
   /// store's width and height.
   [[nodiscard]] tri::Gradient on_ground(const Point2& stored, const SurfacePoint& surface) const;
 
+  /// Metres on the ground between two stored places, straight, as the place between them has it.
+  [[nodiscard]] double metres(const Point2& a, const Point2& b) const;
+
   /// What had to be assumed of units; empty if nothing.
   [[nodiscard]] const std::string& assumption() const { return ground_.assumption(); }
 

@@ -18,11 +18,13 @@ std::unique_ptr<HeightSampler> make_sampler(const stream::Store& store,
     throw UsageError("the store has no level " + std::to_string(options.level) +
                      ": its top is level " + std::to_string(store.top()));
   }
-  if (store.schema().grid && options.level == 0) return make_lattice_sampler(store, options);
-  throw UsageError(store.schema().grid
-                       ? "heights between the points of a coarser level are not available yet: "
-                         "leave --level out"
-                       : "heights between points are not available yet, only those of rasters");
+  if (!store.schema().grid || options.level > 0) return make_point_sampler(store, options);
+  if (options.max_edge) {
+    throw UsageError(
+        "--max-edge is for irregular points and coarser levels: the samples of a "
+        "raster say themselves where there is no data");
+  }
+  return make_lattice_sampler(store, options);
 }
 
 }  // namespace terrace::tools

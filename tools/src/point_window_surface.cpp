@@ -11,11 +11,7 @@
 namespace terrace::tools {
 namespace {
 
-/// A point of the surface.
-struct Corner {
-  Point2 place;
-  double height = 0;
-};
+using Corner = PointWindow::Corner;
 
 bool before(const Corner& a, const Corner& b) { return a.place < b.place; }
 
@@ -67,6 +63,15 @@ double on_edge(Corner a, Corner b, const Point2& place) {
 
 }  // namespace
 
+PointWindow::Corner PointWindow::corner(tri::VertexId vertex) const {
+  return {triangulation_.point(vertex), height(vertex)};
+}
+
+std::array<PointWindow::Corner, 3> PointWindow::corners_with_heights(tri::TriangleId t) const {
+  const auto v = triangulation_.vertices(t);
+  return {corner(v[0]), corner(v[1]), corner(v[2])};
+}
+
 void PointWindow::make_hints() {
   constexpr std::size_t kMost = 1024;
   const auto side =
@@ -98,55 +103,75 @@ std::size_t PointWindow::hint_cell(const Point2& place) const {
   return cell(1, hint_rows_) * hint_columns_ + cell(0, hint_columns_);
 }
 
+bool PointWindow::is_surface(tri::TriangleId triangle) const {
+  if (!too_long_) return true;
+  const std::array<Point2, 3> p = corners(triangle);
+  return !too_long_(p[0], p[1]) && !too_long_(p[1], p[2]) && !too_long_(p[2], p[0]);
+}
+
 SurfacePoint PointWindow::at(const Point2& place) const {
   if (triangulation_.vertex_count() == 0) return {};
-  const auto corner = [&](tri::VertexId v) { return Corner{triangulation_.point(v), height(v)}; };
-  const tri::VertexId near = hints_[hint_cell(place)];
   if (triangulation_.triangle_count() == 0) {
     std::vector<tri::VertexWeight> weights;
     tri::weights_at(triangulation_, place, tri::Interpolation::kLinear, weights);
     SurfacePoint result;
     if (weights.size() == 1) result.height = height(weights[0].vertex);
     if (weights.size() == 2) {
-      result.height = on_edge(corner(weights[0].vertex), corner(weights[1].vertex), place);
+      const Corner a = corner(weights[0].vertex), b = corner(weights[1].vertex);
+      if (!too_long_ || !too_long_(a.place, b.place)) result.height = on_edge(a, b, place);
     }
     return result;
   }
-  const tri::Location found = triangulation_.locate(place, near);
-  if (found.place == tri::Place::kOutside) return {};
-  const auto v = triangulation_.vertices(found.triangle);
-  const auto plane = [&](tri::TriangleId t) {
-    const auto w = triangulation_.vertices(t);
-    return on_plane({corner(w[0]), corner(w[1]), corner(w[2])}, place);
-  };
-  if (found.place == tri::Place::kInside) return plane(found.triangle);
-  if (found.place == tri::Place::kEdge) {
-    SurfacePoint result = plane(found.triangle);
-    const tri::TriangleId other = triangulation_.neighbours(found.triangle)[found.edge];
-    if (other != tri::kNoTriangle) {
-      const SurfacePoint beyond = plane(other);
-      result.per_column = 0.5 * (result.per_column + beyond.per_column);
-      result.per_row = 0.5 * (result.per_row + beyond.per_row);
-    }
-    result.height =
-        on_edge(corner(v[(found.edge + 1) % 3]), corner(v[(found.edge + 2) % 3]), place);
-    return result;
+  const tri::Location found = triangulation_.locate(place, hints_[hint_cell(place)]);
+  switch (found.place) {
+    case tri::Place::kVertex:
+      return at_vertex(found.vertex, found.triangle);
+    case tri::Place::kEdge:
+      return at_edge(found.triangle, found.edge, place);
+    case tri::Place::kInside:
+      if (!is_surface(found.triangle)) return {};
+      return on_plane(corners_with_heights(found.triangle), place);
+    case tri::Place::kOutside:
+      break;
   }
-  return at_vertex(found.vertex, found.triangle);
+  return {};
+}
+
+bool PointWindow::is_on_edge(const Point2& place) const {
+  if (triangulation_.triangle_count() == 0) return false;
+  return triangulation_.locate(place, hints_[hint_cell(place)]).place == tri::Place::kEdge;
+}
+
+SurfacePoint PointWindow::at_edge(tri::TriangleId triangle, std::size_t edge,
+                                  const Point2& place) const {
+  const auto v = triangulation_.vertices(triangle);
+  const Corner a = corner(v[(edge + 1) % 3]), b = corner(v[(edge + 2) % 3]);
+  if (too_long_ && too_long_(a.place, b.place)) return {};
+  SurfacePoint result{on_edge(a, b, place)};
+  double per_column = 0, per_row = 0;
+  int count = 0;
+  for (const tri::TriangleId t : {triangle, triangulation_.neighbours(triangle)[edge]}) {
+    if (t == tri::kNoTriangle || !is_surface(t)) continue;
+    const SurfacePoint one = on_plane(corners_with_heights(t), place);
+    per_column += one.per_column;
+    per_row += one.per_row;
+    ++count;
+  }
+  if (count > 0) {
+    result.per_column = per_column / count;
+    result.per_row = per_row / count;
+  }
+  return result;
 }
 
 SurfacePoint PointWindow::at_vertex(tri::VertexId vertex, tri::TriangleId triangle) const {
   // The triangles round it. They are added up in an order of their own.
   std::vector<std::pair<std::array<Point2, 3>, SurfacePoint>> round;
   const auto add = [&](tri::TriangleId t) {
-    const auto v = triangulation_.vertices(t);
-    std::array<Corner, 3> corner;
-    std::array<Point2, 3> key;
-    for (std::size_t k = 0; k < 3; ++k) corner[k] = {triangulation_.point(v[k]), height(v[k])};
-    std::rotate(corner.begin(), std::min_element(corner.begin(), corner.end(), before),
-                corner.end());
-    for (std::size_t k = 0; k < 3; ++k) key[k] = corner[k].place;
-    round.emplace_back(key, on_plane(corner, triangulation_.point(vertex)));
+    if (!is_surface(t)) return;
+    std::array<Point2, 3> key = corners(t);
+    std::rotate(key.begin(), std::min_element(key.begin(), key.end()), key.end());
+    round.emplace_back(key, on_plane(corners_with_heights(t), triangulation_.point(vertex)));
   };
   const auto turn = [&](tri::TriangleId t, std::size_t by) {
     const auto v = triangulation_.vertices(t);
@@ -161,16 +186,18 @@ SurfacePoint PointWindow::at_vertex(tri::VertexId vertex, tri::TriangleId triang
   if (t == tri::kNoTriangle) {  // met the hull: the other way for the rest
     for (t = turn(triangle, 2); t != tri::kNoTriangle; t = turn(t, 2)) add(t);
   }
+  SurfacePoint result{height(vertex)};
+  if (round.empty()) return result;
   std::sort(round.begin(), round.end(),
             [](const auto& a, const auto& b) { return a.first < b.first; });
-  SurfacePoint result{height(vertex), 0, 0};
+  double per_column = 0, per_row = 0;
   for (const auto& [key, one] : round) {
-    result.per_column += one.per_column;
-    result.per_row += one.per_row;
+    per_column += one.per_column;
+    per_row += one.per_row;
   }
   const auto count = static_cast<double>(round.size());
-  result.per_column /= count;
-  result.per_row /= count;
+  result.per_column = per_column / count;
+  result.per_row = per_row / count;
   return result;
 }
 

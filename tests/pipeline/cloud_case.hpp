@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <map>
+#include <random>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <terrace/stream/geotiff_writer.hpp>
+#include <terrace/stream/store.hpp>
+#include <terrace/tri/delaunay2.hpp>
+
+#include "region.hpp"
+#include "store_build.hpp"
+#include "store_window.hpp"
+
+/// Clouds of many kinds in small stores of many clusters, and the triangulation of all their
+/// points.
+
+namespace terrace::tests {
+
+using Points = std::vector<stream::Point3>;
+using Triangle = std::array<tools::Point2, 3>;
+using tools::Point2;
+
+class Random {
+ public:
+  explicit Random(std::uint64_t seed) : engine_(seed) {}
+  double unit() { return static_cast<double>(engine_() >> 11) * 0x1p-53; }
+  std::uint64_t below(std::uint64_t n) { return engine_() % n; }
+
+ private:
+  std::mt19937_64 engine_;
+};
+
+inline Points points_of(const std::string& kind) {
+  Random random(7);
+  Points points;
+  const auto add = [&](double x, double y) { points.push_back({x, y, 10 * random.unit()}); };
+  if (kind == "random") {
+    for (int i = 0; i < 4000; ++i) add(random.unit() * 1000, random.unit() * 700);
+  } else if (kind == "lattice") {
+    for (int i = 0; i < 3600; ++i) add(i % 60, i / 60);
+  } else if (kind == "duplicates") {
+    for (int i = 0; i < 3000; ++i) {
+      add(random.unit() * 30, random.unit() * 30);
+      for (std::uint64_t k = random.below(4); k > 0; --k) add(points.back()[0], points.back()[1]);
+    }
+    for (int i = 0; i < 1500; ++i) {
+      add(static_cast<double>(random.below(30)), static_cast<double>(random.below(30)));
+    }
+  } else if (kind == "voids") {
+    for (int i = 0; i < 6000; ++i) {
+      const double x = random.unit() * 1000, y = random.unit() * 1000;
+      const bool lake = std::hypot(x - 400, y - 600) < 250 || std::abs(y - x + 500) < 60;
+      if (!lake) add(x, y);
+    }
+  } else if (kind == "clusters") {
+    for (int k = 0; k < 12; ++k) {
+      const double x = random.unit() * 1e5, y = random.unit() * 1e5, r = random.unit() * 500;
+      for (int i = 0; i < 250; ++i) add(x + random.unit() * r, y + random.unit() * r);
+    }
+  } else if (kind == "turned") {  // a narrow strip: most of its box is outside the hull
+    for (int i = 0; i < 3000; ++i) {
+      const double t = random.unit() * 1000, s = random.unit() * 60;
+      add(0.8 * t - 0.6 * s, 0.6 * t + 0.8 * s);
+    }
+  } else if (kind == "circle") {  // slivers along the hull, all the same circle within
+    for (int i = 0; i < 700; ++i) add(std::cos(i * 0.1) * 1000, std::sin(i * 0.1) * 1000);
+  } else if (kind == "parabola") {
+    for (int i = 0; i < 800; ++i) add(i, 1e-5 * i * i);
+  } else if (kind == "far") {
+    for (int i = 0; i < 2500; ++i) add(4e15 + 2 * i % 77, -8e15 + random.unit() * 2e3);
+  } else if (kind == "huge") {
+    for (int i = 0; i < 600; ++i) add(random.unit() * 1e148, random.unit() * 1e148);
+  } else if (kind == "tiny") {
+    for (int i = 0; i < 300; ++i) add(random.unit() * 1e-170, random.unit() * 1e-170);
+  } else if (kind == "line") {
+    for (int i = 0; i < 700; ++i) add(3 * i, 5 - 2 * i);
+  } else if (kind == "nearly a line") {
+    for (int i = 0; i < 900; ++i) add(i % 450, 0);
+    add(225, 1);
+  } else if (kind == "one") {
+    add(4, 5);
+  } else if (kind == "two") {
+    add(4, 5);
+    add(6, 5);
+  } else if (kind == "one place") {
+    for (int i = 0; i < 400; ++i) add(2.5, 7.5);
+  }
+  return points;
+}
+
+inline std::filesystem::path cloud_store(const std::filesystem::path& folder,
+                                         const Points& points) {
+  std::filesystem::create_directories(folder);
+  std::ofstream out(folder / "cloud.xyz");
+  out.precision(17);
+  for (const stream::Point3& p : points) out << p[0] << ' ' << p[1] << ' ' << p[2] << '\n';
+  out.close();
+  tools::BuildRequest request;
+  request.inputs = {(folder / "cloud.xyz").string()};
+  request.store = folder / "cloud.store";
+  request.block_points = 100;
+  tools::build_store(request);
+  return request.store;
+}
+
+inline Triangle turned(Triangle t) {
+  std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
+  return t;
+}
+
+inline std::filesystem::path raster_store(const std::filesystem::path& folder) {
+  stream::GeoTiffOptions options;
+  options.columns = 150;
+  options.rows = 120;
+  options.sample.type = stream::ScalarType::i16;
+  options.sample.scale = 0.25;
+  options.sample.offset = 100;
+  options.world.xy = {30, 0, 500000, 0, -30, 5200000};
+  options.nodata = -1;
+  std::vector<std::int16_t> samples;
+  for (int i = 0; i < 150 * 120; ++i) {
+    const double x = i % 150, y = i / 150;
+    samples.push_back(std::hypot(x - 60, y - 50) < 30 ? std::int16_t{-1}
+                                                      : static_cast<std::int16_t>(i * 7 % 1009));
+  }
+  stream::GeoTiffWriter writer(folder / "dem.tif", options);
+  writer.write_rows(std::as_bytes(std::span(samples)));
+  writer.commit();
+  tools::BuildRequest request;
+  request.inputs = {(folder / "dem.tif").string()};
+  request.store = folder / "dem.store";
+  request.block_points = 300;
+  tools::build_store(request);
+  return request.store;
+}
+
+/// All points of a level and above in one triangulation.
+struct Whole {
+  tri::Delaunay2<double> triangulation;
+  std::vector<double> heights;
+  std::map<Triangle, std::array<double, 3>> triangles;
+
+  Whole(const stream::Store& store, unsigned level) {
+    constexpr double kAll = std::numeric_limits<double>::infinity();
+    tools::StoreWindow reader(store);
+    tools::WindowPoints points;
+    reader.points({{-kAll, -kAll}, {kAll, kAll}}, points, level);
+    const stream::Channel& z = store.schema().coordinates[2];
+    for (const stream::Point3& p : points.positions) {
+      const auto inserted = triangulation.insert({p[0], p[1]});
+      if (!inserted.created) continue;  // the first stands for all
+      heights.resize(triangulation.vertex_slots());
+      heights[tri::slot(inserted.vertex)] = p[2] * z.scale + z.offset;
+    }
+    for (const tri::TriangleId t : triangulation.all_triangles()) {
+      add_triangle(triangulation, heights, t, triangles);
+    }
+  }
+
+  static void add_triangle(const tri::Delaunay2<double>& of, const std::vector<double>& heights,
+                           tri::TriangleId t, std::map<Triangle, std::array<double, 3>>& to) {
+    const auto v = of.vertices(t);
+    Triangle corners;
+    std::map<Point2, double> height;
+    for (std::size_t k = 0; k < 3; ++k) {
+      corners[k] = of.point(v[k]);
+      height[corners[k]] = heights[tri::slot(v[k])];
+    }
+    corners = turned(corners);
+    to[corners] = {height[corners[0]], height[corners[1]], height[corners[2]]};
+  }
+};
+
+}  // namespace terrace::tests

@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Heights between the points of stores against libtri's on the triangulation of all points.
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <numeric>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <terrace/stream/store.hpp>
+#include <terrace/tri/delaunay2.hpp>
+#include <terrace/tri/interpolation.hpp>
+
+#include "cloud_case.hpp"
+#include "error.hpp"
+#include "height_sampler.hpp"
+#include "temporary_folder.hpp"
+
+namespace terrace {
+namespace {
+
+using tests::Random;
+using tests::Whole;
+using tools::Point2;
+using tools::SurfacePoint;
+using tri::Interpolation;
+
+bool same_bits(double a, double b) {
+  return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b) ||
+         (std::isnan(a) && std::isnan(b));
+}
+
+bool same_bits(const SurfacePoint& a, const SurfacePoint& b) {
+  return same_bits(a.height, b.height) && same_bits(a.per_column, b.per_column) &&
+         same_bits(a.per_row, b.per_row);
+}
+
+/// Some around the store, some on its points, some in the middle of its edges.
+std::vector<Point2> places_of(const stream::Store& store, const Whole& whole, std::size_t count) {
+  Random random(17);
+  std::vector<Point2> places;
+  std::vector<Point2> points;
+  for (const tri::VertexId v : whole.triangulation.all_vertices()) {
+    points.push_back(whole.triangulation.point(v));
+  }
+  const stream::Box3& box = store.bounds();
+  for (std::size_t i = 0; i < count; ++i) {
+    Point2 p{};
+    for (std::size_t k = 0; k < 2; ++k) {
+      p[k] = box.min[k] + (random.unit() * 1.2 - 0.1) * (box.max[k] - box.min[k]);
+      if (i % 5 == 1) p[k] = std::round(2 * p[k]) / 2;
+    }
+    if (i % 5 == 2) p = points[random.below(points.size())];
+    if (i % 5 == 3) {
+      const Point2 a = points[random.below(points.size())], b = points[random.below(points.size())];
+      const double t = 0.1 * random.unit();
+      p = {a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])};
+    }
+    places.push_back(p);
+  }
+  places.push_back({NAN, 0});
+  places.push_back({0, INFINITY});
+  return places;
+}
+
+/// Answers, and that neither threads, memory nor what else is asked changes a bit.
+std::vector<SurfacePoint> sampled(const stream::Store& store, tools::SamplerOptions options,
+                                  const std::vector<Point2>& places) {
+  std::vector<SurfacePoint> out(places.size()), again(1);
+  tools::make_sampler(store, options)->sample(places, out);
+  options.threads = 3;
+  options.memory_bytes = std::uint64_t{100} << 20;
+  const auto other = tools::make_sampler(store, options);
+  Random random(23);
+  std::vector<std::size_t> order(places.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[random.below(i)]);
+  for (std::size_t begin = 0; begin < order.size(); begin += 70) {
+    const std::size_t end = std::min(begin + 70, order.size());
+    std::vector<Point2> some;
+    for (std::size_t k = begin; k < end; ++k) some.push_back(places[order[k]]);
+    again.resize(some.size());
+    other->sample(some, again);
+    for (std::size_t k = begin; k < end; ++k) {
+      EXPECT_TRUE(same_bits(out[order[k]], again[k - begin])) << order[k];
+    }
+  }
+  return out;
+}
+
+void check(const stream::Store& store, unsigned level, std::size_t count) {
+  const Whole whole(store, level);
+  const auto& triangulation = whole.triangulation;
+  const std::vector<Point2> places = places_of(store, whole, count);
+  const std::size_t finite = places.size() - 2;
+  const std::span<const Point2> asked(places.data(), finite);
+  for (const Interpolation method :
+       {Interpolation::kLinear, Interpolation::kNaturalNeighbour, Interpolation::kNearest}) {
+    SCOPED_TRACE("method " + std::to_string(static_cast<int>(method)));
+    const auto found = sampled(store, {.method = method, .level = level}, places);
+    EXPECT_TRUE(std::isnan(found[finite].height) && std::isnan(found[finite + 1].height));
+    const auto heights = tri::heights_at(triangulation, whole.heights, asked, method, 1);
+    const auto gradients = tri::gradients_at(triangulation, whole.heights, asked,
+                                             method == Interpolation::kNaturalNeighbour
+                                                 ? tri::GradientFrom::kNaturalNeighbours
+                                                 : tri::GradientFrom::kTriangles,
+                                             1);
+    for (std::size_t i = 0; i < finite; ++i) {
+      SCOPED_TRACE("place " + std::to_string(i));
+      ASSERT_EQ(std::isnan(found[i].height), std::isnan(heights[i]));
+      if (!std::isnan(heights[i])) {
+        ASSERT_NEAR(found[i].height, heights[i], 1e-7);
+      }
+      if (method == Interpolation::kNearest) continue;
+      const tri::Location location = triangulation.locate(places[i]);
+      const bool linear = method == Interpolation::kLinear;
+      if (linear && location.place != tri::Place::kInside) continue;  // another mean
+      ASSERT_EQ(std::isnan(found[i].per_column), std::isnan(gradients[i].x));
+      if (std::isnan(gradients[i].x)) continue;
+      const double size = std::hypot(gradients[i].x, gradients[i].y);
+      ASSERT_NEAR(found[i].per_column, gradients[i].x, 1e-6 * size);
+      ASSERT_NEAR(found[i].per_row, gradients[i].y, 1e-6 * size);
+    }
+  }
+}
+
+class CloudHeights : public testing::TestWithParam<std::string> {};
+
+TEST_P(CloudHeights, AreThoseOfTheWholeTriangulation) {
+  const tests::TemporaryFolder folder;
+  const stream::Store store =
+      stream::Store::open(tests::cloud_store(folder.path(), tests::points_of(GetParam())));
+  check(store, 0, 700);
+  check(store, store.top(), 150);
+}
+
+INSTANTIATE_TEST_SUITE_P(PointSampler, CloudHeights,
+                         testing::Values("random", "lattice", "duplicates", "voids", "clusters",
+                                         "turned", "line", "nearly a line", "one", "two",
+                                         "one place"),
+                         [](const auto& one) {
+                           std::string name = one.param;
+                           std::replace(name.begin(), name.end(), ' ', '_');
+                           return name;
+                         });
+
+TEST(PointSampler, AnswersTheCoarserLevelsOfRasters) {
+  const tests::TemporaryFolder folder;
+  const stream::Store store = stream::Store::open(tests::raster_store(folder.path()));
+  for (unsigned level = 1; level <= store.top(); ++level) check(store, level, 400);
+}
+
+TEST(PointSampler, GivesNothingInTrianglesWithLongSides) {
+  const tests::TemporaryFolder folder;
+  const stream::Store store =
+      stream::Store::open(tests::cloud_store(folder.path(), tests::points_of("voids")));
+  const Whole whole(store, 0);
+  const std::vector<Point2> places = places_of(store, whole, 500);
+  for (const Interpolation method :
+       {Interpolation::kLinear, Interpolation::kNaturalNeighbour, Interpolation::kNearest}) {
+    const auto all = sampled(store, {.method = method}, places);
+    for (const double limit : {8.0, 25.0, 70.0}) {
+      SCOPED_TRACE(limit);
+      const auto some = sampled(store, {.method = method, .max_edge = limit}, places);
+      int left_out = 0;
+      for (std::size_t i = 0; i + 2 < places.size(); ++i) {
+        SCOPED_TRACE(i);
+        const tri::Location found = whole.triangulation.locate(places[i]);
+        if (found.place == tri::Place::kVertex || found.place == tri::Place::kEdge) continue;
+        bool is_long = found.place == tri::Place::kOutside;
+        if (found.place == tri::Place::kInside) {
+          const auto v = whole.triangulation.vertices(found.triangle);
+          for (std::size_t k = 0; k < 3; ++k) {
+            const Point2 a = whole.triangulation.point(v[k]);
+            const Point2 b = whole.triangulation.point(v[(k + 1) % 3]);
+            is_long = is_long || std::hypot(b[0] - a[0], b[1] - a[1]) > limit;
+          }
+        }
+        ASSERT_EQ(std::isnan(some[i].height), is_long);
+        if (!is_long) {
+          ASSERT_TRUE(same_bits(some[i].height, all[i].height));
+        }
+        left_out += is_long ? 1 : 0;
+      }
+      EXPECT_GT(left_out, 30);
+    }
+  }
+}
+
+TEST(PointSampler, RefusesALimitOfEdgesForRasters) {
+  const tests::TemporaryFolder folder;
+  const stream::Store store = stream::Store::open(tests::raster_store(folder.path()));
+  EXPECT_THROW(tools::make_sampler(store, {.max_edge = 5.0}), tools::UsageError);
+  EXPECT_THROW(tools::make_sampler(store, {.level = store.top() + 1}), tools::UsageError);
+}
+
+}  // namespace
+}  // namespace terrace
