@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "grid_windows.hpp"
+#include "tin/grid_make.hpp"
 
 namespace {
 
@@ -80,45 +81,95 @@ TEST(GridTinCheck, CornersOffTheLattice) {
   EXPECT_EQ(check_grid_tin<double>({4, 4, heights}, moved, kHalves, 0.002).nodata_covered, 1U);
 }
 
+/// A window of relief, with gaps for even seeds, and triangles across it that overlap and hang
+/// over.
+struct Tangle {
+  OwnedWindow<float> owned;
+  std::vector<Point3> points;
+  Triangles triangles;
+};
+
+Tangle tangle(std::uint32_t columns, std::uint32_t rows, std::uint64_t seed) {
+  Tangle result{make_window<float>(Relief::kNoise, seed % 2 == 0 ? Gaps::kBlobs : Gaps::kNone,
+                                   columns, rows, seed),
+                {},
+                {}};
+  std::mt19937_64 random(seed);
+  const auto place = [&](std::uint32_t count) {
+    return static_cast<double>(random() % (64 * (count + 3))) / 64 - 1.5;
+  };
+  for (int i = 0; i < 12; ++i)
+    result.points.push_back({place(columns), place(rows), static_cast<double>(random() % 1000)});
+  for (std::uint32_t i = 0; i + 2 < 12; ++i) result.triangles.push_back({i, i + 1, i + 2});
+  return result;
+}
+
+void compare_with_all(std::uint32_t columns, std::uint32_t rows, std::uint64_t seed) {
+  SCOPED_TRACE("seed " + std::to_string(seed) + ", " + std::to_string(columns) + " columns");
+  const auto [owned, points, triangles] = tangle(columns, rows, seed);
+  double most = 0;
+  std::size_t covered = 0, missing = 0;
+  for (std::uint32_t y = 0; y < rows; ++y) {
+    for (std::uint32_t x = 0; x < columns; ++x) {
+      bool in_any = false;
+      const double z = static_cast<double>(owned.at(x, y));
+      for (const auto& t : triangles) {
+        const Point3 &a = points[t[0]], &b = points[t[1]], &c = points[t[2]];
+        const auto area = [&](const Point3& p, const Point3& q, double u, double v) {
+          return (q[0] - p[0]) * (v - p[1]) - (q[1] - p[1]) * (u - p[0]);
+        };
+        double w[3] = {area(b, c, x, y), area(c, a, x, y), area(a, b, x, y)};
+        const double sum = w[0] + w[1] + w[2];
+        if (sum == 0 || w[0] / sum < 0 || w[1] / sum < 0 || w[2] / sum < 0) continue;
+        in_any = true;
+        const double plane = (w[0] * a[2] + w[1] * b[2] + w[2] * c[2]) / sum;
+        if (std::isfinite(z)) most = std::max(most, std::fabs(plane - z));
+      }
+      covered += in_any && std::isfinite(z) ? 1 : 0;
+      missing += in_any && !std::isfinite(z) ? 1 : 0;
+    }
+  }
+  const GridTinCheck check = check_grid_tin<float>(owned.window(), points, triangles);
+  EXPECT_NEAR(check.max_error, most, 1e-6 * (1 + most));
+  EXPECT_EQ(check.covered, covered);
+  EXPECT_EQ(check.nodata_covered, missing);
+}
+
 TEST(GridTinCheck, AgreesWithAllSamplesInAllTriangles) {
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {
-    SCOPED_TRACE("seed " + std::to_string(seed));
-    const auto owned =
-        make_window<float>(Relief::kNoise, seed % 2 == 0 ? Gaps::kBlobs : Gaps::kNone, 12, 9, seed);
-    std::mt19937_64 random(seed);
-    std::vector<Point3> points;
-    for (int i = 0; i < 12; ++i)
-      points.push_back({static_cast<double>(random() % 1000) / 64 - 1.5,
-                        static_cast<double>(random() % 1000) / 64 - 1.5,
-                        static_cast<double>(random() % 1000)});
-    Triangles triangles;
-    for (std::uint32_t i = 0; i + 2 < 12; ++i) triangles.push_back({i, i + 1, i + 2});
-    double most = 0;
-    std::size_t covered = 0, missing = 0;
-    for (std::uint32_t y = 0; y < 9; ++y) {
-      for (std::uint32_t x = 0; x < 12; ++x) {
-        bool in_any = false;
-        const double z = static_cast<double>(owned.at(x, y));
-        for (const auto& t : triangles) {
-          const Point3 &a = points[t[0]], &b = points[t[1]], &c = points[t[2]];
-          const auto area = [&](const Point3& p, const Point3& q, double u, double v) {
-            return (q[0] - p[0]) * (v - p[1]) - (q[1] - p[1]) * (u - p[0]);
-          };
-          double w[3] = {area(b, c, x, y), area(c, a, x, y), area(a, b, x, y)};
-          const double sum = w[0] + w[1] + w[2];
-          if (sum == 0 || w[0] / sum < 0 || w[1] / sum < 0 || w[2] / sum < 0) continue;
-          in_any = true;
-          const double plane = (w[0] * a[2] + w[1] * b[2] + w[2] * c[2]) / sum;
-          if (std::isfinite(z)) most = std::max(most, std::fabs(plane - z));
-        }
-        covered += in_any && std::isfinite(z) ? 1 : 0;
-        missing += in_any && !std::isfinite(z) ? 1 : 0;
-      }
+    compare_with_all(12, 9, seed);
+    compare_with_all(3, 40, seed);
+    compare_with_all(61, 35, seed);
+    compare_with_all(130, 17, seed);
+  }
+}
+
+template <class T>
+void expect_same_on_every_processor(const GridWindow<T>& window, const Tangle& any) {
+  for (const double tolerance : {0.0, 0.3}) {
+    const GridTinCheck expected = tin::check_grid_tin_by(window, any.points, any.triangles,
+                                                         tolerance, tin::GridPath::kPortable);
+    EXPECT_GT(expected.covered, 0U);
+    for (const tin::GridPath path : {tin::GridPath::kAvx2, tin::GridPath::kAvx512}) {
+      if (!tin::supported(path)) continue;
+      const GridTinCheck check =
+          tin::check_grid_tin_by(window, any.points, any.triangles, tolerance, path);
+      EXPECT_EQ(check.max_error, expected.max_error);
+      EXPECT_EQ(check.rms_error, expected.rms_error);
+      EXPECT_EQ(check.covered, expected.covered);
+      EXPECT_EQ(check.uncovered_inner, expected.uncovered_inner);
+      EXPECT_EQ(check.nodata_covered, expected.nodata_covered);
     }
-    const GridTinCheck check = check_grid_tin<float>(owned.window(), points, triangles);
-    EXPECT_NEAR(check.max_error, most, 1e-6 * (1 + most));
-    EXPECT_EQ(check.covered, covered);
-    EXPECT_EQ(check.nodata_covered, missing);
+  }
+}
+
+TEST(GridTinCheck, SameBitsOnEveryProcessor) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Tangle any = tangle(seed % 3 == 0 ? 11 : 150, 33, seed);
+    expect_same_on_every_processor(any.owned.window(), any);
+    const std::vector<double> heights(any.owned.heights.begin(), any.owned.heights.end());
+    expect_same_on_every_processor<double>({any.owned.columns, any.owned.rows, heights}, any);
   }
 }
 

@@ -4,8 +4,10 @@
 #include <array>
 #include <cstdint>
 #include <cstdlib>
+#include <fstream>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <benchmark/benchmark.h>
@@ -13,8 +15,13 @@
 
 #include "../pipeline/temporary_folder.hpp"
 #include "cli.hpp"
+#include "height_sampler.hpp"
+#include "place_file.hpp"
+#include "portable_math.hpp"
+#include "sample_run.hpp"
 #include "store_build.hpp"
 #include "store_window.hpp"
+#include "world.hpp"
 
 namespace {
 
@@ -74,6 +81,64 @@ void same_window(benchmark::State& state) {
   state.SetItemsProcessed(state.iterations() * side * side);
 }
 BENCHMARK(same_window)->Arg(64)->Arg(256)->Unit(benchmark::kMillisecond);
+
+std::size_t place_count() { return small() ? 2000 : 1000000; }
+
+/// Columns and rows in random order anywhere on the lattice.
+std::vector<terrace::tools::Point2> random_places() {
+  const auto columns = static_cast<double>(store().schema().columns - 1);
+  const auto rows = static_cast<double>(store().schema().rows - 1);
+  std::vector<terrace::tools::Point2> places(place_count());
+  std::uint64_t seed = 1;
+  const auto next = [&seed] {
+    seed = terrace::tools::scramble(seed);
+    return terrace::tools::unit_interval(seed);
+  };
+  for (terrace::tools::Point2& place : places) place = {next() * columns, next() * rows};
+  return places;
+}
+
+/// Heights and gradients at a million places in one call on one thread; the argument is the method.
+void sample(benchmark::State& state) {
+  const std::array<const char*, 3> methods{"linear", "natural", "nearest"};
+  const char* const method = methods[static_cast<std::size_t>(state.range(0))];
+  state.SetLabel(method);
+  terrace::tools::SamplerOptions options;
+  options.method = terrace::tools::parse_interpolation(method);
+  const Store& source = store();
+  const auto places = random_places();
+  std::vector<terrace::tools::SurfacePoint> surface(places.size());
+  for (auto _ : state) {
+    terrace::tools::make_sampler(source, options)->sample(places, surface);
+    benchmark::DoNotOptimize(surface.data());
+  }
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(places.size()));
+}
+BENCHMARK(sample)->DenseRange(0, 2)->Unit(benchmark::kMillisecond);
+
+/// The same, linear, as the command does it: lines of CSV read, answered and written.
+void sample_lines(benchmark::State& state) {
+  const Store& source = store();
+  static const terrace::tests::TemporaryFolder folder;
+  const std::string name = (folder.path() / "places.csv").string();
+  const terrace::tools::Placement placement = terrace::tools::placement_of(source.schema());
+  std::ofstream file(name);
+  file.precision(12);
+  for (const auto& [column, row] : random_places()) {
+    const terrace::stream::Point3 p = terrace::tools::world_point(placement, {column, row, 0});
+    file << p[0] << ',' << p[1] << '\n';
+  }
+  file.close();
+  std::size_t bytes = 0;
+  for (auto _ : state) {
+    terrace::tools::PlaceFile places(name);
+    terrace::tools::answer_places(source, {}, places, {},
+                                  [&bytes](std::string_view text) { bytes += text.size(); }, {});
+  }
+  benchmark::DoNotOptimize(bytes);
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(place_count()));
+}
+BENCHMARK(sample_lines)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 

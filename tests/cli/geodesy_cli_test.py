@@ -234,6 +234,14 @@ class GeodesyTest(unittest.TestCase):
                      f'--towgs84={shift}')
         self.refused(2, 'build', cloud, '-o', self.path('none'), '--crs', 'EPSG:27700',
                      '--towgs84', '1,2')
+        # The shift may come as late as the other system does.
+        late = f'--towgs84={shift}'
+        self.assertEqual(self.points(bare, '--to-crs', 'EPSG:4326', late), found)
+        x, y, _ = found[7]
+        box = f'--region={x - 1e-6},{y - 1e-6},{x + 1e-6},{y + 1e-6}'
+        self.assertEqual(self.points(bare, box, '--region-crs', 'EPSG:4326', late),
+                         self.points(bare)[7:8])
+        self.query_with_shift(late)
         if not shutil.which('cs2cs'):
             self.skipTest('cs2cs is not installed')
         result = subprocess.run(
@@ -246,6 +254,40 @@ class GeodesyTest(unittest.TestCase):
             a, b = map(float, line.split()[:2])
             self.assertAlmostEqual(x, a, delta=1e-8)
             self.assertAlmostEqual(y, b, delta=1e-8)
+
+    def query_with_shift(self, late):
+        store = self.build(self.raster({1024: 1, 1025: 1, 3072: 27700, 3076: 9001},
+                                       corner=(400000, 300000)))
+        found = self.points(store, '--to-crs', 'EPSG:4326', late)
+        with open(self.path('places.csv'), 'w', encoding='utf-8') as file:
+            file.write('lon,lat\n' + ''.join(f'{x!r},{y!r}\n' for x, y, _ in found))
+        places = ('--points', self.path('places.csv'), '--points-crs', 'EPSG:4326', '--method', 'nearest')
+        lines = self.ok('sample', store, *places, late).splitlines()[1:]
+        heights = [float(line.split(',')[2]) for line in lines]
+        self.assertEqual(heights, [z for _, _, z in found])
+        self.assertIn('--towgs84', self.refused(1, 'sample', store, *places))
+        line = ('--line', ','.join(f'{v!r}' for place in (found[7], found[28]) for v in place[:2]), '--line-crs',
+                'EPSG:4326', '--step', '50', '-o', '-')
+        rows = self.ok('profile', store, *line, late).splitlines()[1:]
+        plane = self.points(store)
+        for row, (x, y, _) in ((rows[0], plane[7]), (rows[-1], plane[28])):
+            self.assertAlmostEqual(float(row.split(',')[1]), x, delta=0.01)
+            self.assertAlmostEqual(float(row.split(',')[2]), y, delta=0.01)
+        self.assertIn('--towgs84', self.refused(1, 'profile', store, *line))
+
+    def test_contours_of_a_region_on_another_datum(self):
+        store = self.build(self.raster({1024: 1, 1025: 1, 3072: 32632, 3076: 9001}))
+        # ED50, some hundred metres away.
+        shift = '-87,-98,-121'
+        region = ('--region', '9,46,9.0013,47.5', '--region-crs', 'EPSG:4230')
+        contour = ('contour', store, '--interval', '1', '-o', '-')
+        self.assertIn('--towgs84', self.refused(1, *contour, *region))
+        whole = json.loads(self.ok(*contour))['features']
+        part = json.loads(self.ok(*contour, *region, f'--towgs84={shift}'))['features']
+        self.assertTrue(0 < len(part) <= len(whole))
+        east = max(x for f in part for x, *_ in f['geometry']['coordinates'])
+        most = max(x for f in whole for x, *_ in f['geometry']['coordinates'])
+        self.assertLess(east, most)
 
     def test_heights_come_from_the_keys_or_from_what_is_said(self):
         utm = {1024: 1, 1025: 1, 3072: 25832, 3076: 9001}

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Overlays as their users meet them: mesh --save-overlay and mesh --overlay.
+"""Overlays as their users meet them: mesh --save-overlay, and --overlay of mesh and points.
 
 TERRACE=path/to/terrace overlay_cli_test.py
 """
@@ -145,6 +145,33 @@ class OverlayTest(unittest.TestCase):
         self.run_ok('mesh', store, '-o', over, '--force')
         self.assertNotEqual(read(over), read(smooth))
 
+    def points(self, *options):
+        out = self.path('points.xyz')
+        summary = json.loads(self.run_ok('points', self.store, '-o', out, '--force', '--json', *options))
+        with open(out) as file:
+            rows = [tuple(map(float, line.split()[:3])) for line in file]
+        return {(x, y): z for x, y, z in rows}, summary
+
+    def test_points_have_the_heights_of_the_overlay(self):
+        plain, summary = self.points()
+        self.assertEqual(len(plain), SIZE * SIZE)
+        self.assertNotIn('overlay_values', summary)
+        over, summary = self.points('--overlay', self.overlay)
+        self.assertEqual(summary['overlay_values'], self.summary['overlay_values'])
+        changed = {place for place in plain if plain[place] != over[place]}
+        self.assertEqual(len(changed), summary['overlay_values'])
+        smooth = self.heights_in(self.smoothed)
+        self.assertLessEqual(set(self.changed()), changed)
+        for place in changed:
+            # The mesh is text of fewer digits.
+            self.assertAlmostEqual(over[place], smooth[place], delta=1e-3)
+        for options in [('--level', 1), ('--region', self.region), ('--level', 'top'),
+                        ('--level', 1, '--focus', f'{self.region}:0')]:
+            part, summary = self.points('--overlay', self.overlay, *options)
+            raw, _ = self.points(*options)
+            self.assertEqual(part, {place: over[place] for place in raw})
+            self.assertEqual(summary['overlay_values'], len(changed & set(raw)))
+
     def test_another_store_is_refused(self):
         other = self.make_store('other', 2)
         out = self.path('none.ply')
@@ -152,6 +179,7 @@ class OverlayTest(unittest.TestCase):
         for store in (self.store, other):
             with open(os.path.join(store, 'manifest.json')) as file:
                 self.assertIn(json.load(file)['checksum'], text)
+        self.assertEqual(text, self.expect_error(1, 'points', other, '--overlay', self.overlay, '-o', out))
         self.assertIn('no overlay', self.expect_error(
             1, 'mesh', self.store, '--overlay', self.path('missing'), '-o', out))
         damaged = self.path('damaged.overlay')

@@ -168,12 +168,12 @@ class TileSet:
             return file.read()
 
     def files(self):
-        """Every file under the folder but layer.json: bytes by name."""
+        """Every file under the folder but layer.json and the journal: bytes by name."""
         found = {}
         for folder, _, names in os.walk(self.folder):
             for name in names:
                 path = os.path.join(folder, name)
-                if name != 'layer.json':
+                if name not in ('layer.json', '.terrace-tiles'):
                     with open(path, 'rb') as file:
                         found[os.path.relpath(path, self.folder)] = file.read()
         return found

@@ -141,6 +141,28 @@ class SampleTest(QueryTest):
                                               '--memory', '2M', text=text))
             self.assertEqual(one.count('\n'), 30001)
 
+    def test_places_are_written_in_another_reference_system(self):
+        places = self.somewhere(6, 50)
+        text = 'easting;name;northing\n' + ''.join(f'{x:.4f};"a;b";{y:.4f}\n' for x, y in places)
+        plain = [row.split(';') for row in self.run_ok('sample', self.store, text=text).splitlines()]
+        degrees = self.run_ok('sample', self.store, '--to-crs', 'EPSG:4326', text=text)
+        there = [row.split(';') for row in degrees.splitlines()]
+        self.assertEqual(there[0], ['longitude', 'name', 'latitude', *plain[0][3:]])
+        for row, other in zip(plain[1:], there[1:]):
+            self.assertEqual(row[1:3] + row[4:], other[1:3] + other[4:])
+            self.assertNotEqual(row[0], other[0])
+        back = self.run_ok('sample', self.store, '--points-crs', 'EPSG:4326', '--to-crs', 'EPSG:32632',
+                           text=''.join(f'{row[0]},{row[3]}\n' for row in there[1:]))
+        for (x, y), line, row in zip(places, back.splitlines(), plain[1:]):
+            east, north, height = map(float, line.split(',')[:3])
+            self.assertAlmostEqual(east, x, delta=2e-4)
+            self.assertAlmostEqual(north, y, delta=2e-4)
+            self.assertAlmostEqual(height, float(row[4]), delta=1e-3)
+        # The sea of the plane ends: no place, no height.
+        far = self.run_ok('sample', self.store, '--points-crs', 'EPSG:4326', '--to-crs', 'EPSG:3857',
+                          text='0,90\n')
+        self.assertEqual(far, ',,,,,\n')
+
     def test_places_in_another_reference_system(self):
         inside = self.somewhere(5, 1)[0]
         there = self.answers('%f,%f\n' % inside)[0]

@@ -166,6 +166,48 @@ class SurfaceTest(unittest.TestCase):
         with open(self.path('plain.obj')) as plain, open(self.path('metric.obj')) as other:
             self.assertEqual(plain.read(), other.read())
 
+    def test_other_systems_for_regions_and_for_what_is_written(self):
+        # The ball lies on the central meridian of a UTM zone, 47 degrees north.
+        north, scale = 5205000.0, 111170.0
+        with open(self.path('utm.xyz'), 'w') as file:
+            file.writelines(f'{500000 + x} {north + y} {z}\n' for x, y, z in sphere(3000))
+        store = self.path('utm.terrace')
+        result = terrace('build', self.path('utm.xyz'), '-o', store, '--crs', 'EPSG:32632')
+        self.assertEqual(result.returncode, 0, result.stderr)
+
+        def surface(name, *options):
+            out = self.path(name)
+            result = terrace('surface', store, '-o', out, '--json', '--force', *options)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            return json.loads(result.stdout), out
+
+        plain, out = surface('plane.obj')
+        vertices, faces = self.read_obj(out)
+        there, out = surface('degrees.ply', '--format', 'ply-ascii', '--to-crs', 'EPSG:4326')
+        self.assertEqual({**plain, 'seconds': 0, 'peak_rss_bytes': 0},
+                         {**there, 'seconds': 0, 'peak_rss_bytes': 0})
+        with open(out) as file:
+            lines = file.read().split('end_header\n')[1].splitlines()
+        moved = [tuple(map(float, line.split()[:3])) for line in lines[:len(vertices)]]
+        self.assertEqual([tuple(map(int, line.split()[1:4])) for line in lines[len(vertices):]],
+                         [tuple(face) for face in faces])
+        middle = sum(y for _, y, _ in moved) / len(moved)
+        self.assertAlmostEqual(middle, 46.99, delta=0.1)
+        for (x, y, z), (lon, lat, height) in zip(vertices, moved):
+            self.assertAlmostEqual(height, z, delta=1e-5)
+            self.assertAlmostEqual((lon - 9) * scale * math.cos(math.radians(middle)), x - 500000,
+                                   delta=0.05)
+            self.assertAlmostEqual((lat - middle) * scale, y - north, delta=0.05)
+        # The eastern half, by longitude.
+        half, out = surface('half.obj', '--region', '9,46,10,48', '--region-crs', 'EPSG:4326')
+        self.assertTrue(all(x > 499999 for x, _, _ in self.read_obj(out)[0]))
+        self.assertTrue(1400 < half['vertices'] < 1700, half)
+        tetrahedra, _ = surface('degrees.vtk', '--tetrahedra', '--to-crs', 'EPSG:4326')
+        self.assertAlmostEqual(tetrahedra['volume'], plain['volume'], places=6)
+        result = terrace('surface', store, '-o', self.path('none.ply'), '--to-crs', 'EPSG:27700')
+        self.assertEqual(result.returncode, 1, result.stderr)
+        self.assertIn('--towgs84', result.stderr)
+
     def test_errors_are_one_line(self):
         boxed = self.write_metric('boxed.json', box=[0, 0, 1, 1], semi_axes=[2, 1])
         round_one = self.write_metric('round.json', semi_axes=[1, 1])

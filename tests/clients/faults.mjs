@@ -5,7 +5,7 @@
 const zoomOf = path => /\.terrain$/.test(path) ? parseInt(path) : undefined;
 
 /// What goes wrong: fault(set) makes what tile_server.mjs wants, complaint is among those that a
-/// survey must make.
+/// survey must make. of: the set, else the plain one.
 export const FAULTS = {
   'the deepest zoom is listed and missing': {
     drawn: true,
@@ -20,7 +20,7 @@ export const FAULTS = {
         {},
   },
   'compressed tiles are sent without Content-Encoding': {
-    gzip: true,
+    of: 'extended',
     complaint: /sampleTerrainMostDetailed/,
     fault: () => () => ({encoding: undefined}),
   },
@@ -43,6 +43,26 @@ export const FAULTS = {
       const higher = Buffer.from(bytes);
       for (const at of [24, 28]) higher.writeFloatLE(higher.readFloatLE(at) + 1, at);
       return {bytes: higher};
+    },
+  },
+  'every other tile is a metre too high': {
+    complaint: /^a gap of/,
+    fault: set => (path, bytes) => {
+      const [z, x, y] = path.split(/[/.]/).map(Number);
+      if (z !== set.deepest || (x + y) % 2) return {};
+      const higher = Buffer.from(bytes);
+      for (const at of [24, 28]) higher.writeFloatLE(higher.readFloatLE(at) + 1, at);
+      return {bytes: higher};
+    },
+  },
+  'metadata says nothing of the deepest zoom': {
+    of: 'metadata',
+    complaint: /^height .* off by/,
+    fault: set => (path, bytes) => {
+      if (zoomOf(path) !== set.deepest - 1) return {};
+      const at = bytes.lastIndexOf('{"available"');
+      const nothing = Buffer.from('{"available":[[]]}'.padEnd(bytes.length - at));
+      return {bytes: Buffer.concat([bytes.subarray(0, at), nothing])};
     },
   },
 };

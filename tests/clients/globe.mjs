@@ -6,7 +6,9 @@
 
 import {join} from 'node:path';
 
+import {available, draw, extensionsOf, light, look, open, sample} from './globe_page.mjs';
 import {load} from './packages.mjs';
+import {tilesToAskFor, viewOf} from './places.mjs';
 import {UNITS} from './quantized_mesh.mjs';
 
 const {chromium} = load('playwright-core');
@@ -15,7 +17,6 @@ const SIZE = {
   width: 800,
   height: 450
 };
-const EARTH = 6371000;
 
 export function launch() {
   return chromium.launch({
@@ -38,6 +39,11 @@ class Record {
     this.answered = new Set();
   }
 
+  /// Whether a tile was answered.
+  has(name, set, {z, x, y}) {
+    return this.answered.has(join(name, `${z}/${x}/${y}.terrain?v=${set.layer.version}`));
+  }
+
   async watch(context, page, base) {
     await context.route('**/*', route => {
       const url = route.request().url();
@@ -57,170 +63,10 @@ class Record {
   }
 }
 
-/// In the page: a provider of the tiles.
-async function open(url) {
-  Cesium.Ion.defaultAccessToken = '';
-  const provider = await Cesium.CesiumTerrainProvider.fromUrl(
-      url, {requestVertexNormals: true, requestWaterMask: true});
-  window.provider = provider;
-  window.providerErrors = [];
-  provider.errorEvent.addEventListener(error => window.providerErrors.push(error.message));
-  return {
-    normals: provider.hasVertexNormals,
-    water: provider.hasWaterMask,
-    metadata: provider.hasMetadata
-  };
-}
-
-/// In the page: heights at places, [longitude, latitude] in degrees; a text where it failed.
-async function sample(places) {
-  try {
-    const points = places.map(place => Cesium.Cartographic.fromDegrees(...place));
-    await Cesium.sampleTerrainMostDetailed(window.provider, points, true);
-    return points.map(point => point.height);
-  } catch (error) {
-    return `sampleTerrainMostDetailed: ${error.message ?? error}`;
-  }
-}
-
-/// In the page: draws the globe seen towards a place; resolves when its tiles have been there for
-/// some frames.
-async function draw({target, range, lowest, highest}) {
-  const widget = new Cesium.CesiumWidget('globe', {
-    terrainProvider: window.provider,
-    baseLayer: false,
-    skyBox: false,
-    skyAtmosphere: false,
-    msaaSamples: 1,
-    creditContainer: 'credits',
-    contextOptions: {webgl: {preserveDrawingBuffer: true}},
-  });
-  window.widget = widget;
-  const {scene} = widget;
-  const {globe} = scene;
-  scene.fog.enabled = false;
-  scene.highDynamicRange = false;
-  scene.backgroundColor = Cesium.Color.fromCssColorString('#aac4dd');
-  globe.showGroundAtmosphere = false;
-  globe.showWaterEffect = false;
-  // Red tells the height, from 0 to 255.
-  const ramp = document.createElement('canvas');
-  ramp.width = 256;
-  ramp.height = 1;
-  const paint = ramp.getContext('2d');
-  for (let i = 0; i < 256; ++i) {
-    paint.fillStyle = `rgb(${i}, ${Math.round(90 + 0.6 * i)}, ${Math.round(70 + 0.7 * i)})`;
-    paint.fillRect(i, 0, 1, 1);
-  }
-  globe.material = Cesium.Material.fromType(
-      'ElevationRamp', {image: ramp, minimumHeight: lowest, maximumHeight: highest});
-  widget.camera.lookAt(
-      Cesium.Cartesian3.fromDegrees(...target),
-      new Cesium.HeadingPitchRange(Cesium.Math.toRadians(20), Cesium.Math.toRadians(-35), range));
-  let still = 0;
-  const start = performance.now();
-  return new Promise(resolve => scene.postRender.addEventListener(() => {
-    still = globe.tilesLoaded ? still + 1 : 0;
-    if (still > 5)
-      resolve(true);
-    else if (performance.now() - start > 60000)
-      resolve(false);
-  }));
-}
-
-/// In the page: what was drawn: tiles, with the vertices of the deepest zoom's as the client has
-/// them (u and v to 1, metres), and at pixels the height by the colour and by the ray.
-function look({z, lowest, highest}) {
-  const {scene, camera} = window.widget;
-  const {globe} = scene;
-  const tiles = globe._surface._tilesToRender.map(tile => {
-    const drawn = {z: tile.level, x: tile.x, row: tile.y, upsampled: tile.upsampledFromParent};
-    if (tile.level !== z || tile.upsampledFromParent) return drawn;
-    const {vertices, encoding, vertexCountWithoutSkirts} = tile.data.renderedMesh;
-    drawn.vertices = Array.from({length: vertexCountWithoutSkirts}, (_, i) => {
-      const place = encoding.decodeTextureCoordinates(vertices, i, new Cesium.Cartesian2());
-      return [place.x, place.y, encoding.decodeHeight(vertices, i)];
-    });
-    return drawn;
-  });
-  const copy = document.createElement('canvas');
-  copy.width = scene.canvas.width;
-  copy.height = scene.canvas.height;
-  const paint = copy.getContext('2d', {willReadFrequently: true});
-  paint.drawImage(scene.canvas, 0, 0);
-  const pick = (x, y) => {
-    const ray = camera.getPickRay(new Cesium.Cartesian2(x + 0.5, y + 0.5));
-    const hit = globe.pick(ray, scene);
-    return hit && Cesium.Cartographic.fromCartesian(hit).height;
-  };
-  const pixels = [];
-  for (let x = 60; x < copy.width; x += 85) {
-    for (let y = 40; y < copy.height; y += 52) {
-      const around = [pick(x, y), pick(x - 1, y), pick(x + 1, y), pick(x, y - 1), pick(x, y + 1)];
-      if (around.some(height => height === undefined)) continue;
-      const red = paint.getImageData(x, y, 1, 1).data[0];
-      pixels.push({
-        x,
-        y,
-        byRay: around[0],
-        spread: Math.max(...around) - Math.min(...around),
-        byColour: lowest + (highest - lowest) * (red + 0.5) / 256
-      });
-    }
-  }
-  return {tiles, pixels};
-}
-
-/// In the page: the same view lit from the side, for eyes.
-async function light() {
-  const {scene} = window.widget;
-  scene.globe.enableLighting = true;
-  scene.globe.dynamicAtmosphereLighting = false;
-  scene.globe.lambertDiffuseMultiplier = 1.2;
-  const {directionWC: down, rightWC: right} = scene.camera;
-  scene.light = new Cesium.DirectionalLight({
-    direction: Cesium.Cartesian3.normalize(
-        Cesium.Cartesian3.add(
-            Cesium.Cartesian3.multiplyByScalar(right, 1.5, new Cesium.Cartesian3()), down,
-            new Cesium.Cartesian3()),
-        new Cesium.Cartesian3())
-  });
-  let frames = 0;
-  return new Promise(resolve => scene.postRender.addEventListener(() => ++frames > 4 && resolve()));
-}
-
-/// A tile of the deepest zoom, all tiles around it there, with the most relief; and its peak.
-export function viewOf(set) {
-  const z = set.deepest;
-  let best;
-  for (const [x, y] of set.at(z)) {
-    let whole = true;
-    for (let i = -2; i <= 2; ++i)
-      for (let j = -2; j <= 2; ++j) whole &&= set.has(z, x + i, y + j);
-    if (!whole) continue;
-    const tile = set.tile(z, x, y);
-    if (best && tile.highest - tile.lowest <= best.tile.highest - best.tile.lowest) continue;
-    best = {z, x, y, tile};
-  }
-  const {x, y, tile} = best;
-  const side = 180 / 2 ** z;
-  const [longitude, latitude] = [-180 + (x + 0.5) * side, -90 + (y + 0.5) * side];
-  const deepest = set.at(z).map(([i, j]) => set.tile(z, i, j));
-  return {
-    z,
-    x,
-    y,
-    target: [longitude, latitude, (tile.lowest + tile.highest) / 2],
-    range: side * Math.PI / 180 * EARTH * 1.7,
-    lowest: Math.min(...deepest.map(({lowest}) => lowest)),
-    highest: Math.max(...deepest.map(({highest}) => highest))
-  };
-}
-
 /// The complaints about set as it comes from base + name. places: [longitude, latitude] with the
 /// tiles that may answer. pictures: a path without ending for the views; without it nothing is
-/// drawn.
-export async function survey(browser, base, name, set, places, {pictures} = {}) {
+/// drawn. column: of the tile that is looked at.
+export async function survey(browser, base, name, set, places, {pictures, column} = {}) {
   const context = await browser.newContext({viewport: SIZE});
   const page = await context.newPage();
   const record = new Record();
@@ -240,7 +86,9 @@ export async function survey(browser, base, name, set, places, {pictures} = {}) 
       complain(heights);
     else
       compareSamples(set, places, heights, complain, facts);
-    if (pictures) await surveyView(page, set, pictures, complain, facts);
+    await compareAvailability(page, name, set, record, complain, facts);
+    await compareExtensions(page, set, complain, facts);
+    if (pictures) await surveyView(page, set, {pictures, column}, complain, facts);
     for (const error of await page.evaluate(() => window.providerErrors))
       complain(`provider: ${error}`);
     compareRequests(name, set, places, record, complain);
@@ -253,7 +101,16 @@ export async function survey(browser, base, name, set, places, {pictures} = {}) 
 function compareSamples(set, places, heights, complain, facts) {
   facts.sampled = heights.length;
   facts.furthest = 0;
-  places.forEach(({place, tiles}, i) => {
+  facts.widest = 0;
+  const borders = new Map();
+  places.forEach(({place, tiles, border}, i) => {
+    if (border !== undefined) {
+      const first = borders.get(border) ?? borders.set(border, heights[i]).get(border);
+      const gap = Math.abs(first - heights[i]);
+      facts.widest = Math.max(facts.widest, gap);
+      // A millimetre, and what a slope makes of the place beside the border.
+      if (!(gap <= 2e-3)) complain(`a gap of ${gap} m beside the border at ${place}`);
+    }
     // On a border any of the tiles may answer; interpolation has roundings of its own.
     const off = tiles.map(tile => {
       const {height, rounding} = set.height(tile, ...place);
@@ -267,8 +124,51 @@ function compareSamples(set, places, heights, complain, facts) {
   });
 }
 
-async function surveyView(page, set, pictures, complain, facts) {
-  const view = viewOf(set);
+/// A tile's row from the north, as the client counts.
+const fromNorth = ({z, x, y}) => ({z, x, row: 2 ** z - 1 - y});
+
+/// What the client knows of tiles must be so. With metadata it knows those below the tiles that it
+/// has loaded.
+async function compareAvailability(page, name, set, record, complain, facts) {
+  const loaded = ({z, x, y}) => z === 0 || record.has(name, set, {z: z - 1, x: x >> 1, y: y >> 1});
+  const tiles = tilesToAskFor(set, 300).filter(tile => !facts.extensions.metadata || loaded(tile));
+  const answers = await page.evaluate(available, tiles.map(fromNorth));
+  facts.asked = {there: 0, missing: 0};
+  tiles.forEach((tile, i) => {
+    const there = set.has(tile.z, tile.x, tile.y);
+    ++facts.asked[there ? 'there' : 'missing'];
+    if (answers[i] !== there)
+      complain(
+          `tile ${tile.z}/${tile.x}/${tile.y} is ${there ? '' : 'not '}there; the client ` +
+          `takes it for ${answers[i]}`);
+  });
+}
+
+/// Normals and water masks must come as they stand in the files.
+async function compareExtensions(page, set, complain, facts) {
+  if (!facts.extensions.normals && !facts.extensions.water) return;
+  const tiles = set.at(set.deepest)
+                    .filter((_, i) => i % 7 === 0)
+                    .slice(0, 40)
+                    .map(([x, y]) => ({z: set.deepest, x, y}));
+  let theirs;
+  try {
+    theirs = await page.evaluate(extensionsOf, tiles.map(fromNorth));
+  } catch (error) {
+    return complain(`extensions: ${error.message}`);
+  }
+  const same = (bytes, numbers) => numbers ? bytes?.equals(new Uint8Array(numbers)) : !bytes;
+  tiles.forEach(({z, x, y}, i) => {
+    const {extensions} = set.tile(z, x, y);
+    for (const [what, id] of [['normals', 1], ['water', 2]]) {
+      if (!same(extensions[id], theirs[i][what])) complain(`tile ${z}/${x}/${y}: other ${what}`);
+    }
+  });
+  facts.extended = tiles.length;
+}
+
+async function surveyView(page, set, {pictures, column}, complain, facts) {
+  const view = viewOf(set, column);
   if (!await page.evaluate(draw, view)) complain('the tiles in view were not loaded in a minute');
   const seen = await page.evaluate(look, view);
   await page.screenshot({path: `${pictures}-heights.png`});
@@ -322,9 +222,7 @@ function compareRequests(name, set, places, record, complain) {
   for (const url of record.refused) complain(`refused: ${url}`);
   for (const text of record.errors) complain(`console: ${text}`);
   for (const {tiles} of places) {
-    const some = tiles.some(
-        ({z, x, y}) =>
-            record.answered.has(join(name, `${z}/${x}/${y}.terrain?v=${set.layer.version}`)));
-    if (!some) complain(`tile ${tiles.map(({z, x, y}) => `${z}/${x}/${y}`)} was not asked for`);
+    if (!tiles.some(tile => record.has(name, set, tile)))
+      complain(`tile ${tiles.map(({z, x, y}) => `${z}/${x}/${y}`)} was not asked for`);
   }
 }

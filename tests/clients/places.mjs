@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Places at which the heights of a set of tiles are compared.
+// Places at which the heights of a set of tiles are compared, tiles that a client is asked for, and
+// where it looks.
+
+const EARTH = 6371000;
 
 /// Numbers in [0, 1), always the same.
 export function* numbers(seed) {
@@ -9,41 +12,111 @@ export function* numbers(seed) {
   }
 }
 
-/// count places anywhere in the set's bounds, count / 2 on borders between tiles of the deepest
-/// zoom, and count / 2 where four of them meet: {place: [longitude, latitude], tiles}, the tiles
-/// that touch it. Without borders where `borders` is false.
-export function placesOf(set, count, borders = true) {
+/// Degrees from a border to a place beside it: a hundredth of a millimetre.
+const BESIDE = 1e-10;
+
+/// count places anywhere in tiles of the deepest zoom, count / 2 on borders between them, and
+/// count / 2 where four of them meet: {place: [longitude, latitude], tiles}, the tiles that touch
+/// it. beside: in place of one on a border, one in each of its tiles at its very edge; they have
+/// the border's number as `border`, since their heights must be one.
+export function placesOf(set, count, {beside = false} = {}) {
   const random = numbers(7);
   const next = () => random.next().value;
-  const z = set.deepest, side = 180 / 2 ** z;
+  const z = set.deepest, side = 180 / 2 ** z, around = 2 ** (z + 1);
   const deepest = set.at(z).sort((a, b) => a[0] - b[0] || a[1] - b[1]);
   const anyTile = () => deepest[Math.floor(next() * deepest.length)];
-  const [west, south, east, north] = set.layer.bounds;
   const places = [];
   while (places.length < count) {
-    const place = [west + next() * (east - west), south + next() * (north - south)];
-    places.push({place, tiles: [set.deepestAt(...place)]});
+    const [x, y] = anyTile();
+    const [i, j] = [0.001 + 0.998 * next(), 0.001 + 0.998 * next()];
+    places.push({place: [-180 + (x + i) * side, -90 + (y + j) * side], tiles: [{z, x, y}]});
   }
-  if (!borders) return places;
+  // Tiles that touch a place of tile x/y, each with the corner or side there as it counts it.
   const touching = (x, y, i, j) => {
     const tiles = [];
-    for (const tx of i ? [x] : [x - 1, x]) {
-      for (const ty of j ? [y] : [y - 1, y]) tiles.push({z, x: tx, y: ty});
+    for (const [tx, ti] of i ? [[x, i]] : [[(x - 1 + around) % around, 1], [x, 0]]) {
+      for (const [ty, tj] of j ? [[y, j]] : [[y - 1, 1], [y, 0]])
+        tiles.push({z, x: tx, y: ty, i: ti, j: tj});
     }
     return tiles;
   };
+  let border = 0;
   const add = (wanted, fractions) => {
     for (let tries = 0; wanted > 0 && tries < 100000; ++tries) {
       const [x, y] = anyTile();
       const [i, j] = fractions();
       const tiles = touching(x, y, i, j);
       if (!tiles.every(tile => set.has(tile.z, tile.x, tile.y))) continue;
-      places.push({place: [-180 + (x + i) * side, -90 + (y + j) * side], tiles});
       --wanted;
+      ++border;
+      if (!beside) {
+        places.push({place: [-180 + (x + i) * side, -90 + (y + j) * side], tiles});
+        continue;
+      }
+      const inward = fraction => fraction === 0 ? BESIDE : fraction === 1 ? -BESIDE : 0;
+      for (const tile of tiles) {
+        const longitude = -180 + (tile.x + tile.i) * side + inward(tile.i);
+        const latitude = -90 + (tile.y + tile.j) * side + inward(tile.j);
+        places.push({place: [longitude, latitude], tiles: [tile], border});
+      }
     }
   };
   add(Math.ceil(count / 2),
       () => next() < 0.5 ? [0, 0.001 + 0.998 * next()] : [0.001 + 0.998 * next(), 0]);
   add(Math.ceil(count / 2), () => [0, 0]);
   return places;
+}
+
+/// Tiles that are there and tiles beside them that are not, at every zoom: at most count of each.
+export function tilesToAskFor(set, count) {
+  const random = numbers(11);
+  const some = list => {
+    const chosen = new Map();
+    for (let i = 0; i < count && list.length > 0; ++i) {
+      const tile = list[Math.floor(random.next().value * list.length)];
+      chosen.set(`${tile.z}/${tile.x}/${tile.y}`, tile);
+    }
+    return [...chosen.values()];
+  };
+  const there = [], missing = [];
+  for (let z = 0; z <= set.deepest; ++z) {
+    for (const [x, y] of set.at(z)) {
+      there.push({z, x, y});
+      for (const [i, j] of [[-1, 0], [1, 0], [0, -1], [0, 1]]) {
+        const tile = {z, x: x + i, y: y + j};
+        const inside = tile.x >= 0 && tile.y >= 0 && tile.x < 2 ** (z + 1) && tile.y < 2 ** z;
+        if (inside && !set.has(z, tile.x, tile.y)) missing.push(tile);
+      }
+    }
+  }
+  return [...some(there), ...some(missing)];
+}
+
+/// A tile of the deepest zoom, all tiles around it there, with the most relief; and its peak.
+/// column: its x.
+export function viewOf(set, column) {
+  const z = set.deepest, around = 2 ** (z + 1);
+  let best;
+  for (const [x, y] of set.at(z)) {
+    let whole = column === undefined || x === column;
+    for (let i = -2; i <= 2; ++i)
+      for (let j = -2; j <= 2; ++j) whole &&= set.has(z, (x + i + around) % around, y + j);
+    if (!whole) continue;
+    const tile = set.tile(z, x, y);
+    if (best && tile.highest - tile.lowest <= best.tile.highest - best.tile.lowest) continue;
+    best = {z, x, y, tile};
+  }
+  const {x, y, tile} = best;
+  const side = 180 / 2 ** z;
+  const [longitude, latitude] = [-180 + (x + 0.5) * side, -90 + (y + 0.5) * side];
+  const deepest = set.at(z).map(([i, j]) => set.tile(z, i, j));
+  return {
+    z,
+    x,
+    y,
+    target: [longitude, latitude, (tile.lowest + tile.highest) / 2],
+    range: side * Math.PI / 180 * EARTH * 1.7,
+    lowest: Math.min(...deepest.map(({lowest}) => lowest)),
+    highest: Math.max(...deepest.map(({highest}) => highest))
+  };
 }

@@ -399,15 +399,16 @@ TEST(CrowdedLeaf, IsWithinTheBoundOfAllItsSamples) {
     for (const double bound : {500.0, 60.0, 5.0}) {
       SCOPED_TRACE(bound);
       options.max_error = bound;
-      const tools::CrowdedTin made = mesh_crowded_leaf(tile, leaf, frame, options, surface);
+      const tri::PointTin made = mesh_crowded_leaf(tile, leaf, frame, options, surface);
       const tri::TinErrors errors =
-          tri::measure_surface(u, v, samples.height, made.tin.vertices, made.tin.triangles);
-      EXPECT_TRUE(made.has_data);
+          tri::measure_surface(u, v, samples.height, made.vertices, made.triangles);
       EXPECT_EQ(errors.uncovered, 0U);
-      EXPECT_EQ(errors.largest, made.largest);
+      EXPECT_EQ(errors.covered, made.errors.covered);
+      EXPECT_EQ(errors.largest, made.errors.largest);
+      EXPECT_NEAR(errors.rms, made.errors.rms, 1e-9 * errors.rms);
       // As near as if they had been taken at once, or within the bound.
       const tri::PointTin once = tri::point_tin(u, v, samples.height, frame, options);
-      EXPECT_LE(made.largest, std::max(bound, 1.3 * once.errors.largest));
+      EXPECT_LE(made.errors.largest, std::max(bound, 1.3 * once.errors.largest));
     }
   }
 }

@@ -27,8 +27,23 @@ CoordinateSystem system_of(const stream::Store& store) {
   return *std::move(system);
 }
 
-RegionConversion::RegionConversion(const stream::Store& store, const CoordinateSystem& from)
-    : systems_({from, system_of(store), world_box(placement_of(store.schema()), store.bounds())}) {}
+SystemPair systems_of(const stream::Store& store, const std::string& named,
+                      const std::string& shift) {
+  std::optional<DatumShift> values;
+  if (!shift.empty()) values = parse_datum_shift(shift);
+  SystemPair pair{system_of(store), CoordinateSystem::parse(named, values)};
+  const bool used = pair.named.definition().uncertainty < 0;
+  if (values && !used && !pair.store.reaches_wgs84()) {
+    CrsDefinition shifted = pair.store.definition();
+    shifted.shift = values;
+    pair.store = CoordinateSystem(shifted);
+  }
+  return pair;
+}
+
+RegionConversion::RegionConversion(const stream::Store& store, const SystemPair& systems)
+    : systems_({systems.named, systems.store,
+                world_box(placement_of(store.schema()), store.bounds())}) {}
 
 Region RegionConversion::operator()(Region region) const {
   if (!systems_) return region;
@@ -62,34 +77,35 @@ void PlaceConversion::operator()(std::span<stream::Point3> points) const {
 }
 
 void CrsOptions::define(CLI::App& app) {
+  define_region(app);
+  app.add_option("--to-crs", to_, "the CRS of what is written; heights stay as they are");
+}
+
+void CrsOptions::define_region(CLI::App& app) {
   app.add_option("--region-crs", region_,
                  "the CRS of regions and focuses (EPSG:n or a WKT file; x,y is lon,lat), if it is "
                  "not the store's");
-  app.add_option("--to-crs", to_, "the CRS of what is written; heights stay as they are");
   app.add_option("--towgs84", shift_,
-                 "dx,dy,dz[,rx,ry,rz,ds] from the datum of those to WGS 84, if it is another");
-}
-
-CoordinateSystem CrsOptions::parsed(const std::string& text) const {
-  std::optional<DatumShift> shift;
-  if (!shift_.empty()) shift = parse_datum_shift(shift_);
-  return CoordinateSystem::parse(text, shift);
+                 "dx,dy,dz[,rx,ry,rz,ds] to WGS 84 from the datum of such a CRS, or of the store, "
+                 "if it is another");
 }
 
 RegionConversion CrsOptions::regions(const stream::Store& store) const {
   if (region_.empty()) return {};
-  return RegionConversion(store, parsed(region_));
+  return RegionConversion(store, systems_of(store, region_, shift_));
 }
 
 PlaceConversion CrsOptions::places(const stream::Store& store) const {
-  const std::optional<CoordinateSystem> target = to();
-  if (!target) return {};
-  return PlaceConversion(system_of(store), *target);
+  if (to_.empty()) return {};
+  const SystemPair pair = systems_of(store, to_, shift_);
+  return PlaceConversion(pair.store, pair.named);
 }
 
 std::optional<CoordinateSystem> CrsOptions::to() const {
   if (to_.empty()) return std::nullopt;
-  return parsed(to_);
+  std::optional<DatumShift> shift;
+  if (!shift_.empty()) shift = parse_datum_shift(shift_);
+  return CoordinateSystem::parse(to_, shift);
 }
 
 }  // namespace terrace::tools

@@ -18,11 +18,21 @@ namespace terrace::tools {
 /// The CRS of a store. Throws: stream::Error if it has none, or one that is not known.
 CoordinateSystem system_of(const stream::Store& store);
 
+/// A store's CRS and another that the user names. `--towgs84` is the shift of the one whose datum
+/// is not WGS 84's; of the named one if both are others.
+struct SystemPair {
+  CoordinateSystem store, named;
+};
+/// shift: the option's text, may be empty. Throws: UsageError for a CRS or a shift that is none,
+/// stream::Error if the store has no CRS.
+SystemPair systems_of(const stream::Store& store, const std::string& named,
+                      const std::string& shift);
+
 /// Regions of `--region-crs` as regions in the store's CRS; without the option as they are.
 class RegionConversion {
  public:
   RegionConversion() = default;
-  RegionConversion(const stream::Store& store, const CoordinateSystem& from);
+  RegionConversion(const stream::Store& store, const SystemPair& systems);
   /// Throws: as region_in.
   [[nodiscard]] Region operator()(Region region) const;
 
@@ -54,15 +64,15 @@ class PlaceConversion {
 class CrsOptions {
  public:
   void define(CLI::App& app);
-  /// Throws: UsageError for a CRS that is none, stream::Error if the store has none.
+  /// Without --to-crs.
+  void define_region(CLI::App& app);
+  /// Throws: as systems_of.
   [[nodiscard]] RegionConversion regions(const stream::Store& store) const;
   [[nodiscard]] PlaceConversion places(const stream::Store& store) const;
   /// The CRS of --to-crs; nothing without it.
   [[nodiscard]] std::optional<CoordinateSystem> to() const;
 
  private:
-  [[nodiscard]] CoordinateSystem parsed(const std::string& text) const;
-
   std::string region_, to_, shift_;
 };
 

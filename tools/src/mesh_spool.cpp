@@ -47,19 +47,27 @@ MeshSpool::MeshSpool(const std::string& path)
       triangle_file_(beside(path, ".triangles"), true) {}
 
 void MeshSpool::add_vertex(const stream::Point3& position) {
-  if (vertices_ == std::numeric_limits<std::uint32_t>::max()) {
+  add_vertices(std::span(&position, 1));
+}
+
+void MeshSpool::add_vertices(std::span<const stream::Point3> positions) {
+  if (positions.size() > std::numeric_limits<std::uint32_t>::max() - vertices_) {
     throw stream::Error({.file = vertex_file_.target().string(),
                          .where = {},
                          .cause = "the mesh has more than 4,294,967,295 vertices",
                          .remedy = "mesh smaller regions, or allow a larger error"});
   }
-  vertex_file_.write(std::as_bytes(std::span(position)));
-  ++vertices_;
+  vertex_file_.write(std::as_bytes(positions));
+  vertices_ += positions.size();
 }
 
 void MeshSpool::add_triangle(const stream::TriangleIndices& triangle) {
-  triangle_file_.write(std::as_bytes(std::span(triangle)));
-  ++triangles_;
+  add_triangles(std::span(&triangle, 1));
+}
+
+void MeshSpool::add_triangles(std::span<const stream::TriangleIndices> triangles) {
+  triangle_file_.write(std::as_bytes(triangles));
+  triangles_ += triangles.size();
 }
 
 void MeshSpool::write(const std::string& path, const stream::WriterOptions& options,

@@ -21,9 +21,11 @@ class MeshSpool {
   [[nodiscard]] std::uint64_t vertices() const { return vertices_; }
   [[nodiscard]] std::uint64_t triangles() const { return triangles_; }
 
-  /// Both throw stream::Error if the disk is full or the like. Vertices must be fewer than 2^32.
+  /// All throw stream::Error if the disk is full or the like. Vertices must be fewer than 2^32.
   void add_vertex(const stream::Point3& position);
+  void add_vertices(std::span<const stream::Point3> positions);
   void add_triangle(const stream::TriangleIndices& triangle);
+  void add_triangles(std::span<const stream::TriangleIndices> triangles);
 
   /// Writes the file. bounds: what the writer is told, see stream::MeshHeader.
   void write(const std::string& path, const stream::WriterOptions& options,

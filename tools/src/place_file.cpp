@@ -193,4 +193,15 @@ Point2 place_of(std::string_view line, const PlaceLayout& layout, const std::str
   return place;
 }
 
+void append_with_place(std::string& text, std::string_view line, const PlaceLayout& layout,
+                       std::string_view x, std::string_view y) {
+  for (std::size_t column = 0;; ++column) {
+    const std::string_view before = line;
+    const std::string_view cell = take_text(line, layout.separator);
+    text += column == layout.x ? x : column == layout.y ? y : cell;
+    if (cell.size() == before.size()) return;
+    text += layout.separator;
+  }
+}
+
 }  // namespace terrace::tools

@@ -75,4 +75,8 @@ bool is_no_place(std::string_view line);
 Point2 place_of(std::string_view line, const PlaceLayout& layout, const std::string& file,
                 std::uint64_t line_number);
 
+/// Appends the line to `text`, in the columns of its place x and y instead.
+void append_with_place(std::string& text, std::string_view line, const PlaceLayout& layout,
+                       std::string_view x, std::string_view y);
+
 }  // namespace terrace::tools

@@ -8,16 +8,15 @@
 #include <limits>
 #include <memory>
 
-#include <GeographicLib/Geodesic.hpp>
 #include <nlohmann/json.hpp>
 #include <terrace/stream/error.hpp>
 
-#include "coordinate_system.hpp"
 #include "error.hpp"
 #include "fixed_text.hpp"
 #include "ground.hpp"
 #include "ground_slope.hpp"
 #include "interrupt.hpp"
+#include "line_distance.hpp"
 #include "units.hpp"
 
 namespace terrace::tools {
@@ -38,29 +37,6 @@ void collect_line(const nlohmann::json& object, std::vector<std::vector<Point2>>
   }
 }
 
-/// Metres between places of the store's CRS.
-class Distance {
- public:
-  explicit Distance(const stream::Store& store)
-      : system_(CoordinateSystem::of(store.schema().crs, store.path().string())) {
-    const auto unit = metres_in_unit(store.schema().crs.horizontal_unit);
-    if (unit) metres_ = *unit;
-  }
-  [[nodiscard]] double operator()(const Point2& a, const Point2& b) const {
-    if (system_ && system_->reaches_wgs84()) {
-      const Point2 p = system_->to_geographic(a), q = system_->to_geographic(b);
-      double metres = 0;
-      GeographicLib::Geodesic::WGS84().Inverse(p[1], p[0], q[1], q[0], metres);
-      if (std::isfinite(metres)) return metres;
-    }
-    return metres_ * std::hypot(b[0] - a[0], b[1] - a[1]);
-  }
-
- private:
-  std::optional<CoordinateSystem> system_;
-  double metres_ = 1;
-};
-
 Point2 between(const Point2& a, const Point2& b, double t) {
   return {a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])};
 }
@@ -72,7 +48,7 @@ class ProfileRun {
       : request_(request),
         write_(write),
         ground_(store),
-        distance_(store),
+        distance_(LineDistance::of(store)),
         sampler_(make_sampler(store, request.sampler)),
         heights_(FixedText::for_numbers_up_to(largest(store))) {}
 
@@ -103,11 +79,12 @@ class ProfileRun {
   /// Every so many metres of the leg.
   void walk(const Point2& a, const Point2& b) {
     const double step = *request_.step;
-    const double pieces = std::clamp(std::ceil(4 * distance_(a, b) / step), 16.0, 1e9);
+    // So short that neither the line's bend nor the map's changing scale shows.
+    const double pieces = std::clamp(distance_.pieces(a, b, std::min(1000.0, step / 4)), 16.0, 1e9);
     Point2 from = a;
     for (double i = 1; i <= pieces; ++i) {
       const Point2 to = i == pieces ? b : between(a, b, i / pieces);
-      const double length = distance_(from, to);
+      const double length = distance_.between(from, to);
       for (double next = next_step_ * step; next <= outcome_.metres + length;
            next = ++next_step_ * step) {
         if (!(length > 0)) break;
@@ -153,12 +130,12 @@ class ProfileRun {
       // Where lines of the lattice meet, rounding may tell them apart: one row is enough.
       if (t - last_t <= 1e-12 && last_t > 0) continue;
       const Point2 here = between(a, b, t);
-      outcome_.metres += distance_(last, here);
+      outcome_.metres += distance_.along(last, here);
       add(here, outcome_.metres, stored);
       last = here;
       last_t = t;
     }
-    outcome_.metres += distance_(last, b);
+    outcome_.metres += distance_.along(last, b);
     add(b, outcome_.metres);
   }
 
@@ -197,7 +174,7 @@ class ProfileRun {
   const ProfileRequest& request_;
   const std::function<void(std::string_view)>& write_;
   GroundSlope ground_;
-  Distance distance_;
+  LineDistance distance_;
   std::unique_ptr<HeightSampler> sampler_;
   FixedText heights_, metres_text_{4};
   ProfileOutcome outcome_;

@@ -37,9 +37,8 @@ struct ProfileOutcome {
 /// crosses a column, a row or a diagonal of a raster's lattice: between them the linear surface is
 /// straight, so the profile is the surface itself.
 ///
-/// Distances are geodesics on WGS 84 (GeographicLib, C. F. F. Karney, "Algorithms for geodesics",
-/// doi:10.1007/s00190-012-0578-z) summed over pieces so short that the line's bend does not show;
-/// without a CRS they are the map's. Memory: some thousand rows at a time.
+/// Distances are geodesics (line_distance.hpp) summed over pieces so short that the line's bend
+/// does not show; without a CRS they are the map's. Memory: some thousand rows at a time.
 /// Throws: UsageError without a step for a store that is no raster, or at another level than 0.
 ProfileOutcome write_profile(const stream::Store& store, const ProfileRequest& request,
                              const std::function<void(std::string_view)>& write);

@@ -130,19 +130,19 @@ std::unique_ptr<const Projection> make(ProjectionMethod method, const Parameters
     case ProjectionMethod::transverse_mercator:
       return with_meridian(GeographicLib::TransverseMercator(a, f, p.scale), p, p.latitude);
     case ProjectionMethod::lambert_1sp:
-      return with_meridian(LambertConformalConic(a, f, p.latitude, p.scale), p, p.latitude);
+      return make_conformal_cone(LambertConformalConic(a, f, p.latitude, p.scale), p, p.latitude);
     case ProjectionMethod::lambert_2sp:
-      return with_meridian(LambertConformalConic(a, f, p.parallel1, p.parallel2, p.scale), p,
-                           p.latitude);
+      return make_conformal_cone(LambertConformalConic(a, f, p.parallel1, p.parallel2, p.scale), p,
+                                 p.latitude);
     case ProjectionMethod::albers:
       return std::make_unique<ProjectionBatch<Albers>>(Albers(p, ellipsoid), p);
     case ProjectionMethod::mercator_a:
       // A cone that touches at the equator.
-      return with_meridian(LambertConformalConic(a, f, 0, p.scale), p, 0);
+      return make_conformal_cone(LambertConformalConic(a, f, 0, p.scale), p, 0);
     case ProjectionMethod::mercator_b: {
       double x = 0, y = 0, convergence = 0, scale = 1;
       LambertConformalConic(a, f, 0, 1).Forward(0, p.parallel1, 0, x, y, convergence, scale);
-      return with_meridian(LambertConformalConic(a, f, 0, p.scale / scale), p, 0);
+      return make_conformal_cone(LambertConformalConic(a, f, 0, p.scale / scale), p, 0);
     }
     case ProjectionMethod::polar_stereographic_a:
       return polar_stereographic(p, ellipsoid, false);
@@ -153,7 +153,9 @@ std::unique_ptr<const Projection> make(ProjectionMethod method, const Parameters
     case ProjectionMethod::lambert_azimuthal:
       return make_lambert_azimuthal(p, ellipsoid);
     case ProjectionMethod::oblique_stereographic:
-      return make_oblique_stereographic(p, ellipsoid);
+      // On a pole, where its sphere has no size, it is the polar one.
+      return std::abs(p.latitude) == 90 ? polar_stereographic(p, ellipsoid, false)
+                                        : make_oblique_stereographic(p, ellipsoid);
     case ProjectionMethod::hotine_a:
       return make_hotine(p, ellipsoid, false);
     case ProjectionMethod::hotine_b:
@@ -194,6 +196,10 @@ std::unique_ptr<const Projection> make_projection(ProjectionMethod method,
     }
   }
   if (!(p.scale > 0)) throw std::invalid_argument("its scale factor is not positive");
+  if (!(ellipsoid.semi_major > 0 && std::isfinite(ellipsoid.semi_major) &&
+        ellipsoid.flattening() >= 0 && ellipsoid.flattening() < 0.5)) {
+    throw std::invalid_argument("its ellipsoid is impossible");
+  }
   try {
     return make(method, p, ellipsoid);
   } catch (const GeographicLib::GeographicErr& error) {

@@ -9,6 +9,10 @@
 
 #include "projection.hpp"
 
+namespace GeographicLib {
+class LambertConformalConic;
+}
+
 namespace terrace::tools {
 
 inline constexpr double kNowhere = std::numeric_limits<double>::quiet_NaN();
@@ -51,6 +55,11 @@ class ProjectionBatch final : public Projection {
   double longitude_, east_, north_;
 };
 
+/// y counts from `latitude`. Throws: std::invalid_argument where a parallel lies at a pole, or the
+/// origin at infinity.
+std::unique_ptr<const Projection> make_conformal_cone(
+    const GeographicLib::LambertConformalConic& library, const ProjectionParameters& p,
+    double latitude);
 std::unique_ptr<const Projection> make_lambert_azimuthal(const ProjectionParameters& p,
                                                          const Ellipsoid& ellipsoid);
 std::unique_ptr<const Projection> make_oblique_stereographic(const ProjectionParameters& p,

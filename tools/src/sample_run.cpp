@@ -16,8 +16,8 @@ namespace {
 
 /// Lines handled by a thread at a time.
 constexpr std::size_t kLines = 8192;
-/// Peak bytes per line besides its text: place, sorting, surface, answer.
-constexpr std::uint64_t kBytesPerLine = 250;
+/// Peak bytes per line besides its text: places, sorting, surface, answer.
+constexpr std::uint64_t kBytesPerLine = 266;
 constexpr std::size_t kMostLines = std::size_t{1} << 21, kMostBytes = std::size_t{128} << 20;
 
 constexpr double kDegrees = 180 / std::numbers::pi;
@@ -60,14 +60,14 @@ class Answers {
         sampler_(make_sampler(store, options)),
         ground_(store) {}
 
-  SampleCounts answer(const PlaceBatch& batch,
-                      const std::function<void(std::span<Point2>)>& to_store,
+  SampleCounts answer(const PlaceBatch& batch, const PlaceConversions& conversions,
                       const std::function<void(std::string_view)>& write) {
     find_layout(batch);
     const std::size_t lines = batch.size(), pieces = (lines + kLines - 1) / kLines;
     const auto end_of = [&](std::size_t piece) { return std::min((piece + 1) * kLines, lines); };
     places_.assign(lines, Point2{NAN, NAN});
     surface_.assign(lines, SurfacePoint{});
+    if (conversions.to_written) written_.resize(lines);
     if (layout_) {
       parallel_for(pieces, options_.threads, [&](unsigned, std::size_t piece) {
         for (std::size_t i = piece * kLines; i < end_of(piece); ++i) {
@@ -76,7 +76,12 @@ class Answers {
         }
         const std::span<Point2> here(places_.data() + piece * kLines,
                                      end_of(piece) - piece * kLines);
-        if (to_store) to_store(here);
+        if (conversions.to_written) {
+          const std::span<Point2> there(written_.data() + piece * kLines, here.size());
+          std::copy(here.begin(), here.end(), there.begin());
+          conversions.to_written(there);
+        }
+        if (conversions.to_store) conversions.to_store(here);
         for (Point2& p : here) p = ground_.stored(p);
       });
       sampler_->sample(places_, surface_);
@@ -88,7 +93,7 @@ class Answers {
       std::string& text = texts_[piece];
       text.clear();
       for (std::size_t i = piece * kLines; i < end_of(piece); ++i) {
-        text += batch.line(i);
+        append_line(text, batch, i, conversions);
         if (is_header(batch, i)) {
           for (const char* name : {"height", "gradient", "slope", "aspect"}) {
             (text += layout_->separator) += name;
@@ -111,6 +116,25 @@ class Answers {
   }
 
  private:
+  /// The line as it was, but for the place.
+  void append_line(std::string& text, const PlaceBatch& batch, std::size_t i,
+                   const PlaceConversions& conversions) const {
+    const std::string_view line = batch.line(i);
+    if (!conversions.to_written || !layout_ || is_no_place(line)) {
+      text += line;
+    } else if (is_header(batch, i)) {
+      const bool degrees = conversions.writes_degrees;
+      append_with_place(text, line, *layout_, degrees ? "longitude" : "x",
+                        degrees ? "latitude" : "y");
+    } else {
+      // A hundredth of a millimetre, or a tenth.
+      const FixedText number(conversions.writes_degrees ? 10 : 4);
+      std::string x, y;
+      number.append(x, written_[i][0]);
+      number.append(y, written_[i][1]);
+      append_with_place(text, line, *layout_, x, y);
+    }
+  }
   /// The first line that is no comment says how all are to be read.
   void find_layout(const PlaceBatch& batch) {
     for (std::size_t i = 0; !layout_ && i < batch.size(); ++i) {
@@ -133,7 +157,7 @@ class Answers {
   GroundSlope ground_;
   std::optional<PlaceLayout> layout_;
   std::uint64_t header_line_ = 0;  ///< none
-  std::vector<Point2> places_;
+  std::vector<Point2> places_, written_;
   std::vector<SurfacePoint> surface_;
   std::vector<std::string> texts_;
   std::vector<SampleCounts> counts_;
@@ -142,8 +166,7 @@ class Answers {
 }  // namespace
 
 SampleCounts answer_places(const stream::Store& store, const SamplerOptions& options,
-                           PlaceFile& places,
-                           const std::function<void(std::span<Point2>)>& to_store,
+                           PlaceFile& places, const PlaceConversions& conversions,
                            const std::function<void(std::string_view)>& write,
                            const std::function<void(const SampleCounts&)>& progress) {
   Answers answers(store, options, places);
@@ -154,7 +177,7 @@ SampleCounts answer_places(const stream::Store& store, const SamplerOptions& opt
   PlaceBatch batch;
   SampleCounts sum;
   while (places.next(batch, bytes, lines)) {
-    const SampleCounts counts = answers.answer(batch, to_store, write);
+    const SampleCounts counts = answers.answer(batch, conversions, write);
     sum.points += counts.points;
     sum.answered += counts.answered;
     if (progress) progress(sum);

@@ -29,9 +29,7 @@ class ContourCommand final : public Command {
         ->type_name("HEIGHT");
     app.add_option("--region", region_,
                    "only what is inside: minx,miny,maxx,maxy or a GeoJSON file");
-    app.add_option("--region-crs", region_crs_,
-                   "the CRS of the region (EPSG:n or a WKT file; x,y is lon,lat), if it is not the "
-                   "store's");
+    crs_.define_region(app);
   }
 
   Summary run(const CommonOptions& common) override {
@@ -43,13 +41,7 @@ class ContourCommand final : public Command {
       throw UsageError("--json and the lines cannot both go to standard output; give -o FILE");
     }
     const stream::Store store = stream::Store::open(store_);
-    if (!region_.empty()) {
-      request.region = Region::parse(region_);
-      if (!region_crs_.empty()) {
-        request.region =
-            RegionConversion(store, CoordinateSystem::parse(region_crs_))(*request.region);
-      }
-    }
+    if (!region_.empty()) request.region = crs_.regions(store)(Region::parse(region_));
     request.threads = common.threads;
     request.memory_bytes = common.memory_or(machine_memory_bytes() / 2);
     TextOutput output(output_, may_replace(output_, common.force));
@@ -72,7 +64,8 @@ class ContourCommand final : public Command {
   }
 
  private:
-  std::string store_, output_, interval_, region_, region_crs_;
+  std::string store_, output_, interval_, region_;
+  CrsOptions crs_;
 };
 
 }  // namespace

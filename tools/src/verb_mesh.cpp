@@ -6,7 +6,6 @@
 #include <vector>
 
 #include <CLI/CLI.hpp>
-#include <terrace/stream/error.hpp>
 #include <terrace/stream/overlay.hpp>
 #include <terrace/stream/store.hpp>
 
@@ -14,6 +13,7 @@
 #include "crs_options.hpp"
 #include "detail.hpp"
 #include "error.hpp"
+#include "height_overlay.hpp"
 #include "mesh_output.hpp"
 #include "output.hpp"
 #include "smooth_option.hpp"
@@ -160,7 +160,8 @@ class MeshCommand final : public Command {
     const PlaceConversion places = crs_.places(store);
     const bool replace = may_replace(output_, common.force);
     std::optional<stream::Overlay> overlay;
-    if (!overlay_.empty()) options.heights.overlay = &overlay.emplace(open_overlay(store));
+    if (!overlay_.empty())
+      options.heights.overlay = &overlay.emplace(open_height_overlay(overlay_, store));
     std::optional<stream::OverlayWriter> writer;
     if (save) {
       options.heights.save =
@@ -186,19 +187,6 @@ class MeshCommand final : public Command {
       summary.text += save_overlay_ + ": " + with_commas(writer->values()) + " changed heights\n";
     }
     return summary;
-  }
-
-  [[nodiscard]] stream::Overlay open_overlay(const stream::Store& store) const {
-    stream::Overlay overlay = stream::Overlay::open(overlay_, store);
-    const std::string& heights = store.schema().coordinates[2].name;
-    if (overlay.channel() != heights) {
-      throw stream::Error({.file = overlay_,
-                           .where = {},
-                           .cause = "has other values of '" + overlay.channel() +
-                                    "', not of the heights '" + heights + "'",
-                           .remedy = "name an overlay that terrace mesh has written"});
-    }
-    return overlay;
   }
 
   std::string store_, output_, format_, level_ = "0", region_, smooth_, metric_ = "euclidean";

@@ -31,6 +31,10 @@ class ProfileCommand final : public Command {
     app.add_option("--line-crs", line_crs_,
                    "the CRS of the line's places (EPSG:n or a WKT file; x,y is lon,lat), if it is "
                    "not the store's; between them the line is straight in the store's");
+    app.add_option(
+        "--towgs84", shift_,
+        "dx,dy,dz[,rx,ry,rz,ds] to WGS 84 from the datum of --line-crs, or of the store, "
+        "if it is another");
     app.add_option("--step", step_,
                    "metres from row to row (default: a row wherever the line crosses the lattice "
                    "or a diagonal of it)")
@@ -57,7 +61,8 @@ class ProfileCommand final : public Command {
     request.line = parse_line(line_);
     const stream::Store store = stream::Store::open(store_);
     if (!line_crs_.empty()) {
-      transform(CoordinateSystem::parse(line_crs_), system_of(store), request.line);
+      const SystemPair systems = systems_of(store, line_crs_, shift_);
+      transform(systems.named, systems.store, request.line);
     }
     request.sampler.level = level.value_or(store.top());
     request.sampler.threads = common.threads;
@@ -81,7 +86,7 @@ class ProfileCommand final : public Command {
   }
 
  private:
-  std::string store_, output_, line_, line_crs_, step_, method_ = "linear", level_ = "0";
+  std::string store_, output_, line_, line_crs_, shift_, step_, method_ = "linear", level_ = "0";
 };
 
 }  // namespace

@@ -46,10 +46,11 @@ class SampleCommand final : public Command {
     app.add_option("--points-crs", points_crs_,
                    "the CRS of the places (EPSG:n or a WKT file; x,y is lon,lat), if it is not the "
                    "store's");
-    app.add_option("--towgs84", shift_,
-                   "dx,dy,dz[,rx,ry,rz,ds] from the datum of --points-crs to WGS 84, if it is "
-                   "another");
-    not_yet(app, {"--to-crs"});
+    app.add_option("--to-crs", to_crs_, "the CRS of the places in what is written");
+    app.add_option(
+        "--towgs84", shift_,
+        "dx,dy,dz[,rx,ry,rz,ds] to WGS 84 from the datum of such a CRS, or of the store, "
+        "if it is another");
   }
 
   Summary run(const CommonOptions& common) override {
@@ -64,19 +65,12 @@ class SampleCommand final : public Command {
     options.level = level.value_or(store.top());
     options.threads = common.threads;
     options.memory_bytes = common.memory_or(machine_memory_bytes() / 2);
-    std::function<void(std::span<Point2>)> to_store;
-    if (!points_crs_.empty()) {
-      std::optional<DatumShift> shift;
-      if (!shift_.empty()) shift = parse_datum_shift(shift_);
-      const CoordinateSystem from = CoordinateSystem::parse(points_crs_, shift);
-      const CoordinateSystem to = system_of(store);
-      to_store = [from, to](std::span<Point2> here) { transform(from, to, here); };
-    }
+    const PlaceConversions conversions = conversions_for(store);
     PlaceFile places(points_);
     TextOutput output(output_, may_replace(output_, common.force));
     ProgressMeter meter(common.progress, "points");
     const SampleCounts counts = answer_places(
-        store, options, places, to_store, [&](std::string_view text) { output.write(text); },
+        store, options, places, conversions, [&](std::string_view text) { output.write(text); },
         [&](const SampleCounts& sum) { meter.update(sum.points, 0); });
     output.finish();
     if (counts.points > 0 && counts.answered == 0) {
@@ -99,8 +93,29 @@ class SampleCommand final : public Command {
   }
 
  private:
+  [[nodiscard]] PlaceConversions conversions_for(const stream::Store& store) const {
+    PlaceConversions conversions;
+    std::optional<CoordinateSystem> from;
+    if (!points_crs_.empty()) {
+      const SystemPair systems = systems_of(store, points_crs_, shift_);
+      conversions.to_store = [systems](std::span<Point2> here) {
+        transform(systems.named, systems.store, here);
+      };
+      from = systems.named;
+    }
+    if (!to_crs_.empty()) {
+      const SystemPair systems = systems_of(store, to_crs_, shift_);
+      if (!from) from = systems.store;
+      conversions.to_written = [from = *from, to = systems.named](std::span<Point2> here) {
+        transform(from, to, here);
+      };
+      conversions.writes_degrees = systems.named.is_geographic();
+    }
+    return conversions;
+  }
+
   std::string store_, points_ = "-", output_ = "-", method_ = "linear", level_ = "0", points_crs_,
-                      shift_;
+                      to_crs_, shift_;
 };
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 #include <terrace/stream/store.hpp>
 
+#include "crs_options.hpp"
 #include "detail.hpp"
 #include "error.hpp"
 #include "library_call.hpp"
@@ -47,7 +48,7 @@ class SurfaceCommand final : public Command {
         ->capture_default_str()
         ->type_name("METRIC");
     app.add_flag("--tetrahedra", tetrahedra_, "write the tetrahedra inside instead");
-    not_yet(app, {"--region-crs", "--to-crs"});
+    crs_.define(app);
   }
 
   Summary run(const CommonOptions& common) override {
@@ -57,13 +58,15 @@ class SurfaceCommand final : public Command {
     const bool vtk = output_.ends_with(".vtk");
     if (tetrahedra_ != vtk) throw UsageError("--tetrahedra and an output named .vtk go together");
     const stream::Store store = stream::Store::open(store_);
-    const Detail detail = Detail::parse(store, level_, region_, focuses_);
+    const Detail detail = Detail::parse(store, level_, region_, focuses_, crs_.regions(store));
+    const PlaceConversion places = crs_.places(store);
     const bool replace = may_replace(output_, common.force);
     SurfaceOutcome outcome;
     call_library(store_, criterion_, [&] {
       outcome = surface_of_store(store, detail, options, tetrahedra_,
                                  common.memory_or(machine_memory_bytes() / 2));
     });
+    places(outcome.mesh.positions);
     if (tetrahedra_) {
       write_vtk(output_, outcome.mesh.positions, outcome.mesh.levels, outcome.tetrahedra, replace);
     } else {
@@ -102,6 +105,7 @@ class SurfaceCommand final : public Command {
                                         metric_ = "euclidean";
   std::vector<std::string> focuses_;
   bool tetrahedra_ = false;
+  CrsOptions crs_;
 };
 
 }  // namespace

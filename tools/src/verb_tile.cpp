@@ -16,6 +16,7 @@
 #include "bounded_mesh.hpp"
 #include "error.hpp"
 #include "tile/tile_file.hpp"
+#include "tile/tile_inputs.hpp"
 #include "tile/tile_journal.hpp"
 #include "tile/tile_set.hpp"
 #include "tile/tile_source.hpp"
@@ -80,7 +81,9 @@ class TileCommand final : public Command {
                    "ellipsoidal: heights are above the ellipsoid; ignore: take them as if");
     app.add_option("--geoid", geoid_, "a geoid grid of GeographicLib, added to the heights")
         ->type_name("FILE");
-    app.add_flag("--resume", resume_, "go on with a run that was interrupted");
+    app.add_flag(
+        "--resume", resume_,
+        "go on with a run that was interrupted, or mend a finished set: what is whole is kept");
     app.add_option("--name", name_, "of the tile set, in layer.json");
   }
 
@@ -96,11 +99,10 @@ class TileCommand final : public Command {
   bool gzip_ = false, normals_ = false, metadata_ = false, resume_ = false;
 };
 
-/// Of what the tiles depend on beside the options of the set.
-std::string fingerprint_of(const stream::Store& store, const std::string& options) {
+/// Of the store that the tiles depend on.
+std::string fingerprint_of(const stream::Store& store) {
   const std::vector<std::byte> manifest = read_tile_file((store.path() / "manifest.json").string());
-  const auto text = std::as_bytes(std::span(options));
-  return std::to_string(checksum_of(manifest)) + " " + std::to_string(checksum_of(text));
+  return std::to_string(checksum_of(manifest));
 }
 
 TileSetOptions TileCommand::options_for(const stream::Store& store, double spacing,
@@ -125,8 +127,9 @@ TileSetOptions TileCommand::options_for(const stream::Store& store, double spaci
   options.metadata = metadata_;
   options.resume = resume_;
   options.replace = common.force;
-  options.source_fingerprint =
-      fingerprint_of(store, fill_ + "\n" + water_ + "\n" + vertical_ + "\n" + geoid_);
+  options.source_fingerprint = fingerprint_of(store);
+  options.source_options = fill_ + "\n" + water_ + "\n" + vertical_;
+  if (!geoid_.empty()) options.source_options += "\n" + std::to_string(digest_of_file(geoid_));
   return options;
 }
 
@@ -176,15 +179,16 @@ Summary TileCommand::run(const CommonOptions& common) {
                  " m was asked for, less than what the 15 bits of a tile's coordinates show here");
     }
   }
-  summary.json = {{"tiles", result.tiles},
-                  {"bytes", result.bytes},
-                  {"kept", result.kept},
-                  {"removed", result.removed},
-                  {"zooms", zooms},
-                  {"seconds", watch.seconds()},
-                  {"peak_rss_bytes", peak_rss_bytes()}};
+  summary.json = {{"tiles", result.tiles},      {"bytes", result.bytes},
+                  {"made", result.made},        {"kept", result.kept},
+                  {"removed", result.removed},  {"zooms", zooms},
+                  {"seconds", watch.seconds()}, {"peak_rss_bytes", peak_rss_bytes()}};
   summary.text += output_ + ": " + with_commas(result.tiles) + " tiles, " +
-                  readable_bytes(result.bytes) + ", in " + readable_seconds(watch.seconds()) + "\n";
+                  readable_bytes(result.bytes) + ", in " + readable_seconds(watch.seconds());
+  if (result.made < result.tiles) {
+    summary.text += "; " + with_commas(result.tiles - result.made) + " were there already";
+  }
+  summary.text += "\n";
   return summary;
 }
 

@@ -2,9 +2,8 @@
 #include "window_joiner.hpp"
 
 #include <limits>
+#include <span>
 #include <utility>
-
-#include "region_overlap.hpp"
 
 namespace terrace::tools {
 namespace {
@@ -13,11 +12,8 @@ constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
 }  // namespace
 
-WindowJoiner::WindowJoiner(const LatticePlan& plan, const WindowMesher& mesher,
-                           const std::optional<Region>& region, MeshSpool& spool)
+WindowJoiner::WindowJoiner(const LatticePlan& plan, MeshSpool& spool)
     : plan_(plan),
-      mesher_(mesher),
-      region_(region),
       spool_(spool),
       above_(static_cast<std::size_t>(plan.whole().columns), kNone),
       below_(above_) {}
@@ -33,7 +29,7 @@ std::uint32_t* WindowJoiner::shared(const WindowTin& tin, const tri::GridVertex&
   return nullptr;
 }
 
-void WindowJoiner::add(std::size_t i, const WindowTin& tin) {
+void WindowJoiner::add(std::size_t i, WindowTin&& tin) {
   const auto rows = static_cast<std::size_t>(tin.window.rows);
   if (i % plan_.across() == 0) {
     if (i > 0) above_ = std::exchange(below_, std::vector<std::uint32_t>(below_.size(), kNone));
@@ -43,26 +39,26 @@ void WindowJoiner::add(std::size_t i, const WindowTin& tin) {
   }
   right_.assign(rows, kNone);
 
-  std::vector<std::uint32_t> numbers(tin.vertices.size(), kNone);
-  const auto number_of = [&](std::uint32_t vertex) {
-    std::uint32_t& number = numbers[vertex];
-    if (number != kNone) return number;
-    std::uint32_t* const at_side = shared(tin, tin.vertices[vertex]);
-    if (at_side != nullptr && *at_side != kNone) return number = *at_side;
-    number = static_cast<std::uint32_t>(spool_.vertices());
-    spool_.add_vertex(mesher_.position(tin.window, tin.vertices[vertex]));
-    if (at_side != nullptr) *at_side = number;
-    return number;
-  };
-  for (const auto& triangle : tin.triangles) {
-    if (region_) {
-      const auto corner = [&](std::size_t k) {
-        return mesher_.position(tin.window, tin.vertices[triangle[k]]);
-      };
-      if (!touches(*region_, {corner(0), corner(1), corner(2)})) continue;
+  // Vertices that are there already make room for those behind them.
+  std::vector<std::uint32_t> numbers;
+  numbers.reserve(tin.vertices.size());
+  const auto first = static_cast<std::uint32_t>(spool_.vertices());
+  std::uint32_t fresh = 0;
+  for (std::size_t k = 0; k < tin.vertices.size(); ++k) {
+    std::uint32_t* const at_side = shared(tin, tin.vertices[k]);
+    if (at_side != nullptr && *at_side != kNone) {
+      numbers.push_back(*at_side);
+      continue;
     }
-    spool_.add_triangle({number_of(triangle[0]), number_of(triangle[1]), number_of(triangle[2])});
+    numbers.push_back(first + fresh);
+    tin.positions[fresh++] = tin.positions[k];
+    if (at_side != nullptr) *at_side = numbers.back();
   }
+  for (auto& triangle : tin.triangles) {
+    for (std::uint32_t& vertex : triangle) vertex = numbers[vertex];
+  }
+  spool_.add_vertices(std::span(tin.positions).first(fresh));
+  spool_.add_triangles(tin.triangles);
 }
 
 }  // namespace terrace::tools

@@ -2,12 +2,10 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <vector>
 
 #include "lattice_plan.hpp"
 #include "mesh_spool.hpp"
-#include "region.hpp"
 #include "window_tin.hpp"
 
 namespace terrace::tools {
@@ -16,19 +14,15 @@ namespace terrace::tools {
 /// one vertex. Memory: 4 bytes per column of the raster, and the spool.
 class WindowJoiner {
  public:
-  /// With a region only the triangles that reach into it are taken, with their vertices.
-  WindowJoiner(const LatticePlan& plan, const WindowMesher& mesher,
-               const std::optional<Region>& region, MeshSpool& spool);
+  WindowJoiner(const LatticePlan& plan, MeshSpool& spool);
 
   /// Adds window i; windows come in order.
-  void add(std::size_t i, const WindowTin& tin);
+  void add(std::size_t i, WindowTin&& tin);
 
  private:
   [[nodiscard]] std::uint32_t* shared(const WindowTin& tin, const tri::GridVertex& vertex);
 
   const LatticePlan& plan_;
-  const WindowMesher& mesher_;
-  const std::optional<Region>& region_;
   MeshSpool& spool_;
   // Numbers of the vertices on the lines of sides above and below the row of windows at hand, and
   // on the left and right side of the window.

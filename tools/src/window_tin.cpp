@@ -3,14 +3,47 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <utility>
 
 #include <terrace/stream/error.hpp>
 
+#include "region_overlap.hpp"
 #include "summary.hpp"
 
 namespace terrace::tools {
+namespace {
+
+void keep_what_touches(WindowTin& tin, const Region& region) {
+  std::erase_if(tin.triangles, [&](const std::array<std::uint32_t, 3>& t) {
+    return !touches(region, {tin.positions[t[0]], tin.positions[t[1]], tin.positions[t[2]]});
+  });
+}
+
+void order_by_use(WindowTin& tin) {
+  constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+  std::vector<std::uint32_t> numbers(tin.vertices.size(), kNone);
+  std::vector<tri::GridVertex> vertices;
+  std::vector<stream::Point3> positions;
+  vertices.reserve(tin.vertices.size());
+  positions.reserve(tin.vertices.size());
+  for (auto& triangle : tin.triangles) {
+    for (std::uint32_t& vertex : triangle) {
+      std::uint32_t& number = numbers[vertex];
+      if (number == kNone) {
+        number = static_cast<std::uint32_t>(vertices.size());
+        vertices.push_back(tin.vertices[vertex]);
+        positions.push_back(tin.positions[vertex]);
+      }
+      vertex = number;
+    }
+  }
+  tin.vertices = std::move(vertices);
+  tin.positions = std::move(positions);
+}
+
+}  // namespace
 
 /// The samples of a window and of the lines around it, as far as the raster has them.
 template <class T>
@@ -93,12 +126,17 @@ WindowMesher::Samples<T> WindowMesher::read(const LatticeWindow& window) {
   return samples;
 }
 
-stream::Point3 WindowMesher::position(const LatticeWindow& window,
-                                      const tri::GridVertex& vertex) const {
-  stream::Point3 p = world_point(placement_, {static_cast<double>(window.column + vertex.column),
-                                              static_cast<double>(window.row + vertex.row), 0.0});
-  p[2] = vertex.height;
-  return p;
+std::vector<stream::Point3> WindowMesher::positions(const WindowTin& tin) const {
+  std::vector<stream::Point3> positions;
+  positions.reserve(tin.vertices.size());
+  for (const tri::GridVertex& vertex : tin.vertices) {
+    stream::Point3 p =
+        world_point(placement_, {static_cast<double>(tin.window.column + vertex.column),
+                                 static_cast<double>(tin.window.row + vertex.row), 0.0});
+    p[2] = vertex.height;
+    positions.push_back(p);
+  }
+  return positions;
 }
 
 void WindowMesher::check(
@@ -108,11 +146,12 @@ void WindowMesher::check(
   const bool exact = moved == stream::Point3{};
   std::vector<tri::Point3> read;
   read.reserve(tin.vertices.size());
-  for (const tri::GridVertex& vertex : tin.vertices) {
+  for (std::size_t i = 0; i < tin.vertices.size(); ++i) {
+    const tri::GridVertex& vertex = tin.vertices[i];
     tri::Point3 p{static_cast<double>(vertex.column), static_cast<double>(vertex.row),
                   vertex.height};
     if (!exact) {
-      const stream::Point3 back = rounding_(position(tin.window, vertex));
+      const stream::Point3 back = rounding_(tin.positions[i]);
       const std::array<double, 2> stored = stored_place(placement_, {back[0], back[1]});
       p = {stored[0] - static_cast<double>(tin.window.column),
            stored[1] - static_cast<double>(tin.window.row), back[2]};
@@ -183,9 +222,12 @@ WindowTin WindowMesher::mesh_as(const LatticeWindow& window, tri::TinQuality qua
   out.vertices = std::move(tin.vertices);
   out.triangles = std::move(tin.triangles);
   if (checked) {
+    out.positions = positions(out);
     check(out, [&](std::span<const tri::Point3> points, double tolerance) {
       return tri::check_grid_tin<T>(grid, points, out.triangles, tolerance);
     });
+    if (options_.region) keep_what_touches(out, *options_.region);
+    order_by_use(out);
   }
   out.meshing_seconds = meshing.seconds();
   return out;
@@ -197,11 +239,10 @@ WindowTin WindowMesher::mesh(const LatticeWindow& window) {
                                   : mesh_as<double>(window, quality, true);
 }
 
-std::size_t WindowMesher::count_greedy(const LatticeWindow& window) {
-  constexpr tri::TinQuality kGreedy = tri::TinQuality::kGreedy;
-  return (reader_.float_is_exact() ? mesh_as<float>(window, kGreedy, false)
-                                   : mesh_as<double>(window, kGreedy, false))
-      .vertices.size();
+WindowCount WindowMesher::count(const LatticeWindow& window, tri::TinQuality quality) {
+  const WindowTin tin = reader_.float_is_exact() ? mesh_as<float>(window, quality, false)
+                                                 : mesh_as<double>(window, quality, false);
+  return {tin.vertices.size(), tin.reading_seconds, tin.meshing_seconds};
 }
 
 }  // namespace terrace::tools

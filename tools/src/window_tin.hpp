@@ -12,6 +12,7 @@
 #include <terrace/tri/grid_tin.hpp>
 
 #include "raster_fill.hpp"
+#include "region.hpp"
 #include "store_window.hpp"
 #include "world.hpp"
 
@@ -23,18 +24,26 @@ struct WindowTinOptions {
   double aim = 0.0;    ///< what is meshed to: less, where the file rounds positions
   tri::GridTinOptions tin;
   LatticeWindow whole;  ///< of which the windows are parts
+  /// With a region the meshes have only the triangles that reach into it.
+  std::optional<Region> region;
   /// What a sample without data becomes; nothing: it stays without.
   std::function<double(std::int64_t column, std::int64_t row)> fill;
 };
 
-/// The mesh of one window.
+/// The mesh of one window. Vertices are in the order in which the triangles use them first.
 struct WindowTin {
   LatticeWindow window;
   std::vector<tri::GridVertex> vertices;  ///< columns and rows count from the window's first
+  std::vector<stream::Point3> positions;  ///< of the vertices, in the CRS
   std::vector<std::array<std::uint32_t, 3>> triangles;
   tri::GridTinCheck check;  ///< of what a reader gets back
   /// With data before any was filled; those on the first row and column count in the window before.
   std::uint64_t samples = 0;
+  double reading_seconds = 0.0, meshing_seconds = 0.0;
+};
+
+struct WindowCount {
+  std::size_t vertices = 0;
   double reading_seconds = 0.0, meshing_seconds = 0.0;
 };
 
@@ -48,12 +57,8 @@ class WindowMesher {
   /// that share one have the same vertices there.
   /// Throws: stream::Error on a damaged store, and where the rounded positions break the bound.
   WindowTin mesh(const LatticeWindow& window);
-  /// How many vertices it has by greedy insertion alone, unchecked.
-  std::size_t count_greedy(const LatticeWindow& window);
-
-  /// The position in the CRS of a vertex of a window.
-  [[nodiscard]] stream::Point3 position(const LatticeWindow& window,
-                                        const tri::GridVertex& vertex) const;
+  /// How many vertices it has, unchecked, and how long that took.
+  WindowCount count(const LatticeWindow& window, tri::TinQuality quality);
 
  private:
   template <class T>
@@ -62,6 +67,7 @@ class WindowMesher {
   Samples<T> read(const LatticeWindow& window);
   template <class T>
   WindowTin mesh_as(const LatticeWindow& window, tri::TinQuality quality, bool checked);
+  [[nodiscard]] std::vector<stream::Point3> positions(const WindowTin& tin) const;
   void check(WindowTin& tin,
              const std::function<tri::GridTinCheck(std::span<const tri::Point3>, double tolerance)>&
                  measure) const;

@@ -50,6 +50,19 @@ class AnalyticSurface final : public TileSurface {
     });
   }
 
+  bool rows(const GeographicBox& box, SurfaceRows& out) override {
+    out = {};
+    if (!in_rows) return false;
+    int row_before = -1;
+    visit(box, [&](int column, int row, double height) {
+      if (row != row_before) out.latitude.push_back(latitude(row));
+      row_before = row;
+      if (out.latitude.size() == 1) out.longitude.push_back(longitude(column));
+      out.height.push_back(height);
+    });
+    return true;
+  }
+
   std::optional<HeightRange> range(const GeographicBox& box) override {
     constexpr double kFar = std::numeric_limits<double>::infinity();
     HeightRange range{kFar, -kFar, true};
@@ -81,6 +94,8 @@ class AnalyticSurface final : public TileSurface {
     digest.add(static_cast<std::uint64_t>(columns_));
     return digest.value();
   }
+
+  bool in_rows = true;  ///< whether it says so
 
  private:
   [[nodiscard]] double longitude(int column) const { return west_ + step_ * column; }

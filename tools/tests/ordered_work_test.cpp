@@ -2,6 +2,7 @@
 #include "src/ordered_work.hpp"
 
 #include <atomic>
+#include <chrono>
 #include <memory>
 #include <stdexcept>
 
@@ -33,6 +34,34 @@ TEST(OrderedWork, CommitsEachResultOnceInOrder) {
       for (std::size_t i = 0; i < count; ++i) EXPECT_EQ(committed[i], i);
     }
   }
+}
+
+TEST(OrderedWork, OneCommitAtATimeAndNoMoreThreadsThanAsked) {
+  std::atomic<int> committing = 0, working = 0, most = 0;
+  std::vector<std::atomic<unsigned>> made(3);
+  const auto enter = [&] {
+    const int now = ++working;
+    for (int seen = most; now > seen && !most.compare_exchange_weak(seen, now);) {
+    }
+  };
+  in_order(
+      300, 3,
+      [&](unsigned worker, std::size_t i) {
+        enter();
+        ++made[worker];
+        if (i % 7 == 0) std::this_thread::sleep_for(std::chrono::microseconds(300));
+        --working;
+        return i;
+      },
+      [&](std::size_t i, std::size_t) {
+        enter();
+        EXPECT_EQ(++committing, 1);
+        if (i % 11 == 0) std::this_thread::sleep_for(std::chrono::microseconds(300));
+        --committing;
+        --working;
+      });
+  EXPECT_LE(most, 3);
+  for (const std::atomic<unsigned>& own : made) EXPECT_GT(own, 0U);
 }
 
 TEST(OrderedWork, TheFirstErrorComesOut) {

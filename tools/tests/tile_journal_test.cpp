@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "src/tile/tile_journal.hpp"
 
+#include <algorithm>
 #include <filesystem>
 #include <iterator>
 #include <string>
@@ -31,13 +32,11 @@ class TileJournalFile : public ::testing::Test {
   void write(const std::string& text) const { std::ofstream(path(), std::ios::binary) << text; }
 
   static FinishedTile tile(unsigned i) {
-    return {100 + i, 0xFFFFFFFFFFFFFFF0u + i, 0.1 * i, 0x1p-11 * (1U << i)};
+    return {100 + i, 0xFFFFFFFFFFFFFFF0u + i, 0x9E3779B97F4A7C15u * (i + 1), 0.1 * i};
   }
   static TileAddress address(unsigned i) { return {9 - i / 3, 500 + i, 380}; }
   static bool same(const FinishedTile* found, unsigned i) {
-    const FinishedTile right = tile(i);
-    return found != nullptr && found->bytes == right.bytes && found->checksum == right.checksum &&
-           found->max_error == right.max_error && found->height_step == right.height_step;
+    return found != nullptr && *found == tile(i);
   }
 
   fs::path folder_;
@@ -47,31 +46,79 @@ constexpr unsigned kTiles = 7;
 
 TEST_F(TileJournalFile, KnowsWhatWasFinished) {
   {
-    TileJournal journal(folder_.string(), "a b", false);
+    TileJournal journal(folder_.string());
     for (unsigned i = 0; i < kTiles; ++i) journal.add(address(i), tile(i));
     // Only what an earlier run did counts.
     EXPECT_EQ(journal.find(address(0)), nullptr);
   }
-  const TileJournal journal(folder_.string(), "a b", true);
+  const TileJournal journal(folder_.string());
   for (unsigned i = 0; i < kTiles; ++i) EXPECT_TRUE(same(journal.find(address(i)), i)) << i;
   EXPECT_EQ(journal.find({9, 499, 380}), nullptr);
 }
 
-TEST_F(TileJournalFile, AnotherFingerprintOrNoResumeBeginsAnew) {
-  for (const bool resume : {false, true}) {
-    {
-      TileJournal journal(folder_.string(), "a b", false);
-      journal.add(address(0), tile(0));
-    }
-    const TileJournal journal(folder_.string(), resume ? "a c" : "a b", resume);
-    EXPECT_EQ(journal.find(address(0)), nullptr);
-    EXPECT_EQ(text().find("500"), std::string::npos);
+TEST_F(TileJournalFile, AnotherVersionBeginsAnew) {
+  {
+    TileJournal journal(folder_.string());
+    journal.add(address(0), tile(0));
   }
+  const std::string good = text();
+  const std::string line = good.substr(good.find('\n') + 1);
+  for (const char* head : {"terrace tiles a b\n", "terrace tiles 2 0.0.0\n", "\n", "{}\n", ""}) {
+    write(head + line);
+    const TileJournal journal(folder_.string());
+    EXPECT_EQ(journal.find(address(0)), nullptr);
+    EXPECT_EQ(text(), good.substr(0, good.find('\n') + 1));
+  }
+}
+
+TEST_F(TileJournalFile, TheLastLineOfATileCounts) {
+  {
+    TileJournal journal(folder_.string());
+    for (unsigned i = 0; i < kTiles; ++i) journal.add(address(0), tile(i));
+  }
+  {
+    TileJournal journal(folder_.string());
+    EXPECT_TRUE(same(journal.find(address(0)), kTiles - 1));
+    journal.add(address(0), tile(2));
+  }
+  EXPECT_TRUE(same(TileJournal(folder_.string()).find(address(0)), 2));
+}
+
+TEST_F(TileJournalFile, AFinishedOneSaysWhatIsThere) {
+  std::vector<TileJournal::Record> records;
+  for (unsigned i = 0; i < kTiles; ++i) records.emplace_back(address(i), tile(i));
+  {
+    TileJournal journal(folder_.string());
+    for (unsigned i = 0; i < kTiles; ++i) journal.add(address(i), tile(i + 1));
+    journal.finish(records);
+  }
+  std::vector<TileJournal::Record> sorted(records.rbegin(), records.rend());
+  std::sort(sorted.begin(), sorted.end(),
+            [](const auto& a, const auto& b) { return a.first < b.first; });
+  EXPECT_EQ(read_tile_records(folder_.string()), sorted);
+  const std::string whole = text();
+  // In whatever order they come; and not written if nothing is new.
+  const auto time = fs::last_write_time(path());
+  {
+    TileJournal journal(folder_.string());
+    journal.finish({records.rbegin(), records.rend()});
+  }
+  EXPECT_EQ(text(), whole);
+  EXPECT_EQ(fs::last_write_time(path()), time);
+  {
+    TileJournal journal(folder_.string());
+    journal.add(address(3), tile(9));
+    records.pop_back();
+    journal.finish(records);
+  }
+  EXPECT_EQ(read_tile_records(folder_.string()).size(), records.size());
+  EXPECT_TRUE(same(TileJournal(folder_.string()).find(address(3)), 3));
+  EXPECT_TRUE(read_tile_records((folder_ / "none").string()).empty());
 }
 
 TEST_F(TileJournalFile, ALineCutShortEndsWhatIsBelieved) {
   {
-    TileJournal journal(folder_.string(), "a b", false);
+    TileJournal journal(folder_.string());
     for (unsigned i = 0; i < kTiles; ++i) journal.add(address(i), tile(i));
   }
   const std::string whole = text();
@@ -81,7 +128,7 @@ TEST_F(TileJournalFile, ALineCutShortEndsWhatIsBelieved) {
     std::size_t lines = 0;
     for (std::size_t i = 0; i < length; ++i) lines += whole[i] == '\n' ? 1 : 0;
     {
-      TileJournal journal(folder_.string(), "a b", true);
+      TileJournal journal(folder_.string());
       for (unsigned i = 0; i < kTiles; ++i) {
         const FinishedTile* found = journal.find(address(i));
         // The first line is the head.
@@ -94,7 +141,7 @@ TEST_F(TileJournalFile, ALineCutShortEndsWhatIsBelieved) {
       journal.add({3, 1, 1}, tile(1));
     }
     // What is added after the cut is read again.
-    const TileJournal again(folder_.string(), "a b", true);
+    const TileJournal again(folder_.string());
     EXPECT_TRUE(same(again.find({3, 1, 1}), 1));
     if (lines > 1) {
       EXPECT_TRUE(same(again.find(address(0)), 0));
@@ -104,7 +151,7 @@ TEST_F(TileJournalFile, ALineCutShortEndsWhatIsBelieved) {
 
 TEST_F(TileJournalFile, DamagedLinesEndWhatIsBelieved) {
   {
-    TileJournal journal(folder_.string(), "a b", false);
+    TileJournal journal(folder_.string());
     for (unsigned i = 0; i < kTiles; ++i) journal.add(address(i), tile(i));
   }
   std::string damaged = text();
@@ -113,7 +160,7 @@ TEST_F(TileJournalFile, DamagedLinesEndWhatIsBelieved) {
   for (int line = 0; line < 3; ++line) at = damaged.find('\n', at) + 1;
   damaged[at] = 'x';
   write(damaged);
-  const TileJournal journal(folder_.string(), "a b", true);
+  const TileJournal journal(folder_.string());
   EXPECT_TRUE(same(journal.find(address(1)), 1));
   EXPECT_EQ(journal.find(address(2)), nullptr);
   EXPECT_EQ(journal.find(address(3)), nullptr);

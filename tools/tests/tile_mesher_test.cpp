@@ -191,16 +191,19 @@ TEST(TileMesher, EveryQualityKeepsTheBound) {
   AnalyticSurface surface = alps();
   const TileAddress tile{8, tiles_in(surface.bounds(), 8).x0, tiles_in(surface.bounds(), 8).y0};
   const ZoomPlan plan = plan_of(8, 10, surface);
-  std::vector<std::size_t> triangles;
-  for (const auto quality : {tri::PointTinQuality::kGreedy, tri::PointTinQuality::kRemoval,
-                             tri::PointTinQuality::kFitted}) {
-    const MadeTile made = make_tile(tile, plan, surface, {.quality = quality});
-    expect_sound(tile, made);
-    expect_bound(tile, made, plan, surface);
-    triangles.push_back(made.mesh.triangles.size());
+  for (const bool in_rows : {false, true}) {
+    surface.in_rows = in_rows;
+    std::vector<std::size_t> triangles;
+    for (const auto quality : {tri::PointTinQuality::kGreedy, tri::PointTinQuality::kRemoval,
+                               tri::PointTinQuality::kFitted}) {
+      const MadeTile made = make_tile(tile, plan, surface, {.quality = quality});
+      expect_sound(tile, made);
+      expect_bound(tile, made, plan, surface);
+      triangles.push_back(made.mesh.triangles.size());
+    }
+    EXPECT_GT(triangles[0], triangles[1]);
+    EXPECT_GT(triangles[1], triangles[2]);
   }
-  EXPECT_GT(triangles[0], triangles[1]);
-  EXPECT_GT(triangles[1], triangles[2]);
 }
 
 TEST(TileMesher, NormalsAndWaterAreThoseOfTheSurface) {

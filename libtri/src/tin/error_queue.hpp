@@ -19,6 +19,8 @@ namespace terrace::tri::tin {
 /// first out. As good as the exact order in what comes out, and several times as fast.
 class ErrorBuckets {
  public:
+  static constexpr bool kExact = false;
+
   /// Errors below `least` are put on a level with it.
   explicit ErrorBuckets(float least) : base_(octave_quarter(least)) {
     buckets_.resize(octave_quarter(kHighest) - base_ + 1);
@@ -101,6 +103,8 @@ class ErrorBuckets {
 /// Exactly the greatest error first; of equal ones the smallest number.
 class ErrorHeap {
  public:
+  static constexpr bool kExact = true;
+
   explicit ErrorHeap(float) {}
 
   void push(float error, std::uint32_t triangle) {

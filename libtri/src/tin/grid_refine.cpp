@@ -12,6 +12,8 @@ template <class T>
 template <class Queue>
 void GridSurface<T>::refine(std::size_t most) {
   Queue queue(static_cast<float>(bound_));
+  coarse_first_ = !Queue::kExact;
+  if (coarse_first_) make_coarse();
   const auto look = [&](std::uint32_t t) {
     judge(triangles_[t]);
     if (triangles_[t].error > 0) queue.push(triangles_[t].error, t);

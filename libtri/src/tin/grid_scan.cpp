@@ -25,8 +25,10 @@ using Ints8 = std::int64_t __attribute__((vector_size(64)));
 
 namespace terrace::tri::tin {
 
-const GridScan<float> kGridScanFloatPortable{worst_in<float>, within_in<float>};
-const GridScan<double> kGridScanDoublePortable{worst_in<double>, within_in<double>};
+const GridScan<float> kGridScanFloatPortable{worst_in<float, 1>, worst_in<float, kGridCoarse>,
+                                             within_in<float>};
+const GridScan<double> kGridScanDoublePortable{worst_in<double, 1>, worst_in<double, kGridCoarse>,
+                                               within_in<double>};
 
 #ifdef TERRACE_TRI_X86
 

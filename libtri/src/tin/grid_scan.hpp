@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "grid_path.hpp"
+
 /// The inner loop of TINs of rasters: the samples in a triangle against its plane.
 
 namespace terrace::tri::tin {
@@ -27,6 +29,7 @@ struct GridSamples {
 };
 inline constexpr std::size_t kScanPadRight = 16;
 inline constexpr std::size_t kScanPadBelow = 4;
+inline constexpr int kGridCoarse = 4;
 
 template <class T>
 struct GridWorst {
@@ -45,16 +48,17 @@ struct GridScan {
   /// none. Infinite: there is a sample without data; the place is any.
   GridWorst<T> (*worst)(const GridSamples<T>& samples, const GridCorner<T>& a,
                         const GridCorner<T>& b, const GridCorner<T>& c, T bound);
+  /// The same of samples that are every kGridCoarse-th column and row of the lattice, from its
+  /// first on. `samples` counts these; corners and the result have columns and rows of the lattice.
+  GridWorst<T> (*coarse)(const GridSamples<T>& samples, const GridCorner<T>& a,
+                         const GridCorner<T>& b, const GridCorner<T>& c, T bound);
   /// 1: all errors are certainly at most `bound`; 0: perhaps not, or data is missing; or kUnsure.
   int (*within)(const GridSamples<T>& samples, const GridCorner<T>& a, const GridCorner<T>& b,
                 const GridCorner<T>& c, T bound);
 };
 
-enum class GridPath : std::uint8_t { kPortable, kAvx2, kAvx512 };
-bool supported(GridPath path);
 template <class T>
 const GridScan<T>& grid_scan(GridPath path);  ///< of a supported path
-GridPath best_grid_path();
 
 extern const GridScan<float> kGridScanFloatPortable, kGridScanFloatAvx2, kGridScanFloatAvx512;
 extern const GridScan<double> kGridScanDoublePortable, kGridScanDoubleAvx2, kGridScanDoubleAvx512;

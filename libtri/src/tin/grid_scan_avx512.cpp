@@ -25,6 +25,26 @@ using Reals8 = double __attribute__((vector_size(64)));
 [[gnu::always_inline]] inline __mmask8 at_most(Ints8 a, Ints8 b) {
   return _mm512_cmple_epi64_mask((__m512i)a, (__m512i)b);
 }
+[[gnu::always_inline]] inline __mmask16 more(Ints16 a, Ints16 b) {
+  return _mm512_cmpgt_epi32_mask((__m512i)a, (__m512i)b);
+}
+[[gnu::always_inline]] inline __mmask8 more(Ints8 a, Ints8 b) {
+  return _mm512_cmpgt_epi64_mask((__m512i)a, (__m512i)b);
+}
+[[gnu::always_inline]] inline __mmask16 either(__mmask16 a, __mmask16 b) {
+  return static_cast<__mmask16>(a | b);
+}
+[[gnu::always_inline]] inline __mmask8 either(__mmask8 a, __mmask8 b) {
+  return static_cast<__mmask8>(a | b);
+}
+[[gnu::always_inline]] inline Ints16 chosen(__mmask16 mask, Ints16 a, Ints16 b) {
+  return (Ints16)_mm512_mask_mov_epi32((__m512i)b, mask, (__m512i)a);
+}
+[[gnu::always_inline]] inline Ints8 chosen(__mmask8 mask, Ints8 a, Ints8 b) {
+  return (Ints8)_mm512_mask_mov_epi64((__m512i)b, mask, (__m512i)a);
+}
+[[gnu::always_inline]] inline unsigned bits_of(__mmask16 mask) { return mask; }
+[[gnu::always_inline]] inline unsigned bits_of(__mmask8 mask) { return mask; }
 [[gnu::always_inline]] inline __mmask16 both(__mmask16 a, __mmask16 b) {
   return static_cast<__mmask16>(a & b);
 }
@@ -43,11 +63,11 @@ using Reals8 = double __attribute__((vector_size(64)));
 [[gnu::always_inline]] inline unsigned beyond(Reals8 lanes, Reals8 limit, __mmask8 mask) {
   return _mm512_mask_cmp_pd_mask(mask, (__m512d)lanes, (__m512d)limit, _CMP_NLE_UQ);
 }
-[[gnu::always_inline]] inline unsigned equal(Reals16 a, Reals16 b) {
-  return _mm512_cmp_ps_mask((__m512)a, (__m512)b, _CMP_EQ_OQ);
+[[gnu::always_inline]] inline unsigned equal(Ints16 a, Ints16 b) {
+  return _mm512_cmpeq_epi32_mask((__m512i)a, (__m512i)b);
 }
-[[gnu::always_inline]] inline unsigned equal(Reals8 a, Reals8 b) {
-  return _mm512_cmp_pd_mask((__m512d)a, (__m512d)b, _CMP_EQ_OQ);
+[[gnu::always_inline]] inline unsigned equal(Ints8 a, Ints8 b) {
+  return _mm512_cmpeq_epi64_mask((__m512i)a, (__m512i)b);
 }
 
 }  // namespace
@@ -56,7 +76,9 @@ using Reals8 = double __attribute__((vector_size(64)));
 
 namespace terrace::tri::tin {
 
-const GridScan<float> kGridScanFloatAvx512{worst_in<float>, within_in<float>};
-const GridScan<double> kGridScanDoubleAvx512{worst_in<double>, within_in<double>};
+const GridScan<float> kGridScanFloatAvx512{worst_in<float, 1>, worst_in<float, kGridCoarse>,
+                                           within_in<float>};
+const GridScan<double> kGridScanDoubleAvx512{worst_in<double, 1>, worst_in<double, kGridCoarse>,
+                                             within_in<double>};
 
 }  // namespace terrace::tri::tin

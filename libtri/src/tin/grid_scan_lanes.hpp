@@ -19,14 +19,16 @@ struct Kernel<float> {
   using Ints = std::int32_t __attribute__((vector_size(64)));
   using Quarter = float __attribute__((vector_size(16)));
   using Half = float __attribute__((vector_size(32)));
-  [[gnu::always_inline]] static float greatest_lane(Reals lanes) {
-    const Half low = __builtin_shufflevector(lanes, lanes, 0, 1, 2, 3, 4, 5, 6, 7);
-    const Half high = __builtin_shufflevector(lanes, lanes, 8, 9, 10, 11, 12, 13, 14, 15);
-    const Half eight = high > low ? high : low;
-    const Quarter first = __builtin_shufflevector(eight, eight, 0, 1, 2, 3);
-    const Quarter second = __builtin_shufflevector(eight, eight, 4, 5, 6, 7);
-    Quarter four = second > first ? second : first;
-    const Quarter swapped = __builtin_shufflevector(four, four, 2, 3, 0, 1);
+  [[gnu::always_inline]] static Int greatest_lane(Ints lanes) {
+    using IntQuarter = std::int32_t __attribute__((vector_size(16)));
+    using IntHalf = std::int32_t __attribute__((vector_size(32)));
+    const IntHalf low = __builtin_shufflevector(lanes, lanes, 0, 1, 2, 3, 4, 5, 6, 7);
+    const IntHalf high = __builtin_shufflevector(lanes, lanes, 8, 9, 10, 11, 12, 13, 14, 15);
+    const IntHalf eight = high > low ? high : low;
+    const IntQuarter first = __builtin_shufflevector(eight, eight, 0, 1, 2, 3);
+    const IntQuarter second = __builtin_shufflevector(eight, eight, 4, 5, 6, 7);
+    IntQuarter four = second > first ? second : first;
+    const IntQuarter swapped = __builtin_shufflevector(four, four, 2, 3, 0, 1);
     four = swapped > four ? swapped : four;
     return four[1] > four[0] ? four[1] : four[0];
   }
@@ -64,8 +66,8 @@ struct Kernel<double> {
   using Reals = double __attribute__((vector_size(64)));
   using Ints = std::int64_t __attribute__((vector_size(64)));
   using Half = double __attribute__((vector_size(32)));
-  [[gnu::always_inline]] static double greatest_lane(Reals lanes) {
-    double greatest = lanes[0];
+  [[gnu::always_inline]] static Int greatest_lane(Ints lanes) {
+    Int greatest = lanes[0];
     for (int i = 1; i < kLanes; ++i) greatest = lanes[i] > greatest ? lanes[i] : greatest;
     return greatest;
   }

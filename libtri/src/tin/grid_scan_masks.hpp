@@ -15,6 +15,17 @@ using Reals8 = double __attribute__((vector_size(64)));
 [[gnu::always_inline]] inline Ints8 not_negative(Ints8 lanes) { return (Ints8)(lanes >= 0); }
 [[gnu::always_inline]] inline Ints16 at_most(Ints16 a, Ints16 b) { return (Ints16)(a <= b); }
 [[gnu::always_inline]] inline Ints8 at_most(Ints8 a, Ints8 b) { return (Ints8)(a <= b); }
+[[gnu::always_inline]] inline Ints16 more(Ints16 a, Ints16 b) { return (Ints16)(a > b); }
+[[gnu::always_inline]] inline Ints8 more(Ints8 a, Ints8 b) { return (Ints8)(a > b); }
+[[gnu::always_inline]] inline Ints16 either(Ints16 a, Ints16 b) { return a | b; }
+[[gnu::always_inline]] inline Ints8 either(Ints8 a, Ints8 b) { return a | b; }
+/// Lanes of a where the mask is set, else of b.
+[[gnu::always_inline]] inline Ints16 chosen(Ints16 mask, Ints16 a, Ints16 b) {
+  return (a & mask) | (b & ~mask);
+}
+[[gnu::always_inline]] inline Ints8 chosen(Ints8 mask, Ints8 a, Ints8 b) {
+  return (a & mask) | (b & ~mask);
+}
 [[gnu::always_inline]] inline Ints16 both(Ints16 a, Ints16 b) { return a & b; }
 [[gnu::always_inline]] inline Ints8 both(Ints8 a, Ints8 b) { return a & b; }
 /// The others become 0.
@@ -31,12 +42,10 @@ using Reals8 = double __attribute__((vector_size(64)));
 [[gnu::always_inline]] inline unsigned beyond(Reals8 lanes, Reals8 limit, Ints8 mask) {
   return bits_of(~(Ints8)(lanes <= limit) & mask);
 }
-[[gnu::always_inline]] inline unsigned equal(Reals16 a, Reals16 b) {
+[[gnu::always_inline]] inline unsigned equal(Ints16 a, Ints16 b) {
   return bits_of((Ints16)(a == b));
 }
-[[gnu::always_inline]] inline unsigned equal(Reals8 a, Reals8 b) {
-  return bits_of((Ints8)(a == b));
-}
+[[gnu::always_inline]] inline unsigned equal(Ints8 a, Ints8 b) { return bits_of((Ints8)(a == b)); }
 
 }  // namespace
 

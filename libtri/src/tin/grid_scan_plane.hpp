@@ -18,8 +18,9 @@ template <class V>
 }
 
 /// The triangle's plane relative to its first corner, the box of the samples to look at, and what
-/// rounding may do to an error.
-template <class T>
+/// rounding may do to an error. The samples are those of every kStep-th column and row; the box
+/// counts them, corners have columns and rows.
+template <class T, int kStep>
 struct Plane {
   using Real = T;
   T gradient_x, gradient_y;
@@ -37,11 +38,11 @@ struct Plane {
     const std::int32_t right = greatest(a.x, greatest(b.x, c.x));
     const std::int32_t top = least(a.y, least(b.y, c.y));
     const std::int32_t bottom = greatest(a.y, greatest(b.y, c.y));
-    min_x = greatest(left, samples.first_x);
-    max_x = least(right, samples.last_x);
-    min_y = greatest(top, samples.first_y);
-    max_y = least(bottom, samples.last_y);
-    clipped = max_x != right || max_y != bottom;
+    min_x = greatest((left + kStep - 1) / kStep, samples.first_x);
+    max_x = least(right / kStep, samples.last_x);
+    min_y = greatest((top + kStep - 1) / kStep, samples.first_y);
+    max_y = least(bottom / kStep, samples.last_y);
+    clipped = max_x != right / kStep || max_y != bottom / kStep;
     // Twice the area 1 or a box of 2 x 2: no samples but the corners.
     empty = area <= 1 || (right - left <= 1 && bottom - top <= 1) || min_x > max_x || min_y > max_y;
     if (empty) return;
@@ -65,51 +66,50 @@ struct Plane {
   }
 };
 
-/// Edge functions: not negative for samples on the left of a side or on it.
-template <class T>
+/// Edge functions of the samples: not negative for those on the left of a side or on it.
+template <class T, int kStep>
 struct Sides {
   typename Kernel<T>::Int along_x[3], along_y[3], start[3];
 
-  [[gnu::always_inline]] Sides(const Plane<T>& plane, const GridCorner<T>& a,
+  [[gnu::always_inline]] Sides(const Plane<T, kStep>& plane, const GridCorner<T>& a,
                                const GridCorner<T>& b, const GridCorner<T>& c) {
     set(0, plane, a, b);
     set(1, plane, b, c);
     set(2, plane, c, a);
   }
-  [[gnu::always_inline]] void set(int i, const Plane<T>& plane, const GridCorner<T>& p,
+  [[gnu::always_inline]] void set(int i, const Plane<T, kStep>& plane, const GridCorner<T>& p,
                                   const GridCorner<T>& q) {
     along_x[i] = p.y - q.y;
     along_y[i] = q.x - p.x;
-    start[i] = along_x[i] * (plane.min_x - p.x) + along_y[i] * (plane.min_y - p.y);
+    start[i] = along_x[i] * (kStep * plane.min_x - p.x) + along_y[i] * (kStep * plane.min_y - p.y);
+    along_x[i] *= kStep;
+    along_y[i] *= kStep;
   }
 };
 
-/// The columns of a row that lie in a triangle, exactly: quotients are off integers by half of
+/// The samples of a row that lie in a triangle, exactly: quotients are off integers by half of
 /// their unit, far more than doubles round.
-template <class T>
+template <class T, int kStep>
 struct Spans {
   double start[3], step[3], sign[3], scale[3];
-  std::int32_t offset[3];
 
-  [[gnu::always_inline]] Spans(const Plane<T>& plane, const GridCorner<T>& a,
+  [[gnu::always_inline]] Spans(const Plane<T, kStep>& plane, const GridCorner<T>& a,
                                const GridCorner<T>& b, const GridCorner<T>& c) {
     set(0, plane, a, b);
     set(1, plane, b, c);
     set(2, plane, c, a);
   }
-  [[gnu::always_inline]] void set(int i, const Plane<T>& plane, const GridCorner<T>& p,
+  [[gnu::always_inline]] void set(int i, const Plane<T, kStep>& plane, const GridCorner<T>& p,
                                   const GridCorner<T>& q) {
     const double along_x = p.y - q.y, along_y = q.x - p.x;
-    const double size = __builtin_fabs(along_x);
+    const double size = __builtin_fabs(along_x), unit = kStep * size;
     sign[i] = along_x;
-    // left: x >= p.x + ceil(n / size), right: x <= p.x + floor(n / size)
+    // left: sample >= ceil(n / unit), right: sample <= floor(n / unit)
     const double towards = along_x > 0 ? -along_y : along_y;
-    const double half = along_x > 0 ? size - 0.5 : 0.5;
-    const double inverse = along_x == 0 ? 0.0 : 1.0 / size;
-    step[i] = towards;
-    start[i] = towards * (plane.min_y - p.y) + half;
-    scale[i] = inverse;
-    offset[i] = p.x;
+    const double half = along_x > 0 ? unit - 0.5 : 0.5;
+    step[i] = kStep * towards;
+    start[i] = towards * (kStep * plane.min_y - p.y) + p.x * size + half;
+    scale[i] = along_x == 0 ? 0.0 : 1.0 / unit;
   }
   /// Of row plane.min_y + down.
   [[gnu::always_inline]] void row(double down, std::int32_t& left, std::int32_t& right) const {
@@ -118,7 +118,7 @@ struct Spans {
       constexpr double kFar = 131072.0;
       const double at = (start[i] + step[i] * down) * scale[i];
       const double kept = at < -kFar ? -kFar : at > kFar ? kFar : at;
-      const std::int32_t x = static_cast<std::int32_t>(kept + kFar) - 131072 + offset[i];
+      const std::int32_t x = static_cast<std::int32_t>(kept + kFar) - 131072;
       if (sign[i] > 0) {
         left = greatest(left, x);
       } else {

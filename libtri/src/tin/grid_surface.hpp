@@ -51,6 +51,7 @@ class GridSurface {
     return sees(a) && sees(b) && sees(c);
   }
 
+  void make_coarse();
   std::uint32_t add_vertex(std::int32_t x, std::int32_t y);
   /// The triangle that contains a sample, found by walking from triangle t.
   std::uint32_t locate(std::int32_t x, std::int32_t y, std::uint32_t t) const;
@@ -59,6 +60,8 @@ class GridSurface {
   /// Sets the triangle's place and error.
   void judge(Triangle& triangle) const;
   GridWorst<T> worst(const Corner& a, const Corner& b, const Corner& c) const;
+  /// The same, or one that is bad enough.
+  GridWorst<T> worst_to_insert(const Corner& a, const Corner& b, const Corner& c) const;
   /// Whether a triangle may help to fill the star of `removed`: within the bound,
   /// counter-clockwise, not thin, not mixed.
   bool fits(const Corner& a, const Corner& b, const Corner& c, const Corner& removed) const;
@@ -72,8 +75,9 @@ class GridSurface {
   T scan_bound_;  ///< bound_, rounded down
   Ground ground_;
   const GridScan<T>& scan_;
-  std::vector<T> heights_;
-  GridSamples<T> samples_;
+  std::vector<T> heights_, coarse_heights_;
+  GridSamples<T> samples_, coarse_;  ///< all, and those of every kGridCoarse-th column and row
+  bool coarse_first_ = false;        ///< large triangles are judged by coarse_, if it suffices
   std::optional<GridGaps> gaps_;
   std::vector<Corner> corners_;
   Triangles triangles_;

@@ -7,7 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "check_samples.hpp"
 #include "check_window.hpp"
+#include "grid_make.hpp"
 
 namespace terrace::tri {
 namespace {
@@ -15,93 +17,49 @@ namespace {
 template <class T>
 class Checker {
  public:
-  Checker(const GridWindow<T>& window, double tolerance)
-      : window_(window), tolerance_(tolerance), flags_(window.heights.size(), 0) {}
+  Checker(const GridWindow<T>& window, double tolerance, tin::GridPath path)
+      : columns_(window.columns),
+        rows_(window.rows),
+        heights_(window.heights.data()),
+        flags_(window.heights.size() + tin::kCheckLanes, 0),
+        window_{heights_, flags_.data(), window.columns, window.rows, tolerance},
+        check_samples_(tin::check_samples<T>(path)) {}
 
   /// Returns twice the area, as the points are given.
-  double visit(Point3 a, Point3 b, Point3 c) {
+  double visit(const Point3& a, Point3 b, Point3 c) {
     const double area = turn(a, b, c);
     if (area == 0) return area;
     if (area < 0) std::swap(b, c);
-    const double size = std::fabs(area);
-    const Point3* const corner[4] = {&a, &b, &c, &a};
-    double margin[3] = {0, 0, 0};
-    if (tolerance_ > 0)
+    tin::CheckTriangle triangle{a.data(), b.data(), c.data(), std::fabs(area), {0, 0, 0}};
+    if (window_.tolerance > 0) {
+      const Point3* const corner[4] = {&a, &b, &c, &a};
       for (int i = 0; i < 3; ++i)
-        margin[i] = tolerance_ * std::hypot((*corner[i + 1])[0] - (*corner[i])[0],
-                                            (*corner[i + 1])[1] - (*corner[i])[1]);
-    const double bz = b[2] - a[2], cz = c[2] - a[2];
-    const double slope_x = (bz * (c[1] - a[1]) - cz * (b[1] - a[1])) / size;
-    const double slope_y = (cz * (b[0] - a[0]) - bz * (c[0] - a[0])) / size;
-    const double last_column = window_.columns - 1.0, last_row = window_.rows - 1.0;
-    const double left = std::max(0.0, std::min({a[0], b[0], c[0]}) - tolerance_);
-    const double right = std::min(last_column, std::max({a[0], b[0], c[0]}) + tolerance_);
-    const double top = std::max(0.0, std::ceil(std::min({a[1], b[1], c[1]}) - tolerance_));
-    const double bottom = std::min(last_row, std::max({a[1], b[1], c[1]}) + tolerance_);
-    // Copies, as a write to a flag might change members.
-    double most = most_, squares = squares_;
-    std::size_t covered = check_.covered;
-    const T* const heights = window_.heights.data();
-    std::uint8_t* const flags = flags_.data();
-    for (double y = top; y <= bottom; ++y) {
-      double from = left, to = right;
-      for (int i = 0; i < 3; ++i) {
-        const Point3 &p = *corner[i], &q = *corner[i + 1];
-        // Inside: along_x (x - p.x) + rest >= 0.
-        const double along_x = p[1] - q[1];
-        const double rest = (q[0] - p[0]) * (y - p[1]) + margin[i];
-        if (along_x > 0) {
-          from = std::max(from, p[0] - rest / along_x);
-        } else if (along_x < 0) {
-          to = std::min(to, p[0] - rest / along_x);
-        } else if (rest < 0) {
-          to = -1;
-        }
-      }
-      if (!(from <= to)) continue;
-      // Both are not negative. Signed numbers become doubles more quickly than unsigned ones.
-      auto first = static_cast<std::int64_t>(from);
-      if (static_cast<double>(first) < from) ++first;
-      const auto last = static_cast<std::int64_t>(to);
-      const std::int64_t row = static_cast<std::int64_t>(y) * window_.columns;
-      const double rise_y = slope_y * (y - a[1]);
-      for (std::int64_t x = first; x <= last; ++x) {
-        const auto column = static_cast<double>(x);
-        const auto height = static_cast<double>(heights[x + row]);
-        // Relative to a corner, so that nothing is lost where heights are large.
-        const double error = std::fabs((height - a[2]) - (rise_y + slope_x * (column - a[0])));
-        std::uint8_t& flag = flags[x + row];
-        if (!std::isfinite(height)) {
-          if (flag == 0 && inside(a, b, c, column, y)) {
-            flag = 1;
-            ++check_.nodata_covered;
-          }
-          continue;
-        }
-        most = error > most ? error : most;
-        const bool first_time = flag == 0;
-        flag = 1;
-        covered += first_time ? 1 : 0;
-        squares += first_time ? error * error : 0.0;
-      }
+        triangle.margin[i] = window_.tolerance * std::hypot((*corner[i + 1])[0] - (*corner[i])[0],
+                                                            (*corner[i + 1])[1] - (*corner[i])[1]);
     }
-    most_ = most;
-    squares_ = squares;
-    check_.covered = covered;
+    if (check_samples_(window_, triangle, sums_)) count_missing(a, b, c);
     return area;
   }
 
   GridTinCheck finish() {
-    const std::size_t columns = window_.columns, rows = window_.rows;
-    for (std::size_t i = 0; i < flags_.size(); ++i) {
-      if (!std::isfinite(window_.heights[i])) continue;
-      ++check_.samples;
-      if (flags_[i] == 0) check_.uncovered_inner += inner(i % columns, i / columns, rows) ? 1 : 0;
+    double squares = 0;
+    for (int i = 0; i < tin::kCheckLanes; ++i) {
+      check_.max_error = std::max(check_.max_error, sums_.most[i]);
+      squares += sums_.squares[i];
+      check_.covered += static_cast<std::size_t>(sums_.covered[i]);
+    }
+    const std::size_t count = columns_ * rows_;
+    for (std::size_t i = 0; i < count; ++i)
+      check_.samples += heights_[i] - heights_[i] == T{0} ? 1 : 0;  // finite, as vectors compute it
+    for (const std::uint8_t *at = flags_.data(), *const end = at + count;; ++at) {
+      at = std::find(at, end, std::uint8_t{0});
+      if (at == end) break;
+      const auto i = static_cast<std::size_t>(at - flags_.data());
+      if (std::isfinite(heights_[i]) && inner(i % columns_, i / columns_)) ++check_.uncovered_inner;
     }
     check_.uncovered = check_.samples - check_.covered;
-    check_.max_error = most_;
     if (check_.covered > 0)
-      check_.rms_error = std::sqrt(squares_ / static_cast<double>(check_.covered));
+      check_.rms_error = std::sqrt(squares / static_cast<double>(check_.covered));
     return check_;
   }
 
@@ -117,18 +75,38 @@ class Checker {
     return turn(a, b, p) >= 0 && turn(b, c, p) >= 0 && turn(c, a, p) >= 0;
   }
 
-  bool inner(std::size_t x, std::size_t y, std::size_t rows) const {
-    for (std::size_t v = y == 0 ? 0 : y - 1; v < rows && v <= y + 1; ++v)
-      for (std::size_t u = x == 0 ? 0 : x - 1; u < window_.columns && u <= x + 1; ++u)
-        if (!std::isfinite(window_.heights[v * window_.columns + u])) return false;
+  /// Those in a triangle, without tolerance.
+  void count_missing(const Point3& a, const Point3& b, const Point3& c) {
+    const auto begin = [](double least) { return std::max(0.0, std::ceil(least)); };
+    const auto end = [](double most, std::size_t count) {
+      return std::min(static_cast<double>(count - 1), most);
+    };
+    const double bottom = end(std::max({a[1], b[1], c[1]}), rows_);
+    const double right = end(std::max({a[0], b[0], c[0]}), columns_);
+    for (double y = begin(std::min({a[1], b[1], c[1]})); y <= bottom; ++y) {
+      for (double x = begin(std::min({a[0], b[0], c[0]})); x <= right; ++x) {
+        const std::size_t at = static_cast<std::size_t>(y) * columns_ + static_cast<std::size_t>(x);
+        if (std::isfinite(heights_[at]) || flags_[at] != 0 || !inside(a, b, c, x, y)) continue;
+        flags_[at] = 1;
+        ++check_.nodata_covered;
+      }
+    }
+  }
+
+  bool inner(std::size_t x, std::size_t y) const {
+    for (std::size_t v = y == 0 ? 0 : y - 1; v < rows_ && v <= y + 1; ++v)
+      for (std::size_t u = x == 0 ? 0 : x - 1; u < columns_ && u <= x + 1; ++u)
+        if (!std::isfinite(heights_[v * columns_ + u])) return false;
     return true;
   }
 
-  const GridWindow<T>& window_;
-  double tolerance_;
+  std::size_t columns_, rows_;
+  const T* heights_;
   std::vector<std::uint8_t> flags_;  ///< of samples in a triangle
+  tin::CheckWindow<T> window_;
+  tin::CheckSamples<T> check_samples_;
+  tin::CheckSums sums_;
   GridTinCheck check_;
-  double most_ = 0, squares_ = 0;
 };
 
 void check_input(std::span<const Point3> points,
@@ -150,15 +128,17 @@ void check_input(std::span<const Point3> points,
 
 }  // namespace
 
+namespace tin {
+
 template <class T>
-GridTinCheck check_grid_tin(const GridWindow<T>& window, std::span<const Point3> points,
-                            std::span<const std::array<std::uint32_t, 3>> triangles,
-                            double tolerance) {
-  tin::check_shape(window, "check_grid_tin");
+GridTinCheck check_grid_tin_by(const GridWindow<T>& window, std::span<const Point3> points,
+                               std::span<const std::array<std::uint32_t, 3>> triangles,
+                               double tolerance, GridPath path) {
+  check_shape(window, "check_grid_tin");
   if (!(tolerance >= 0 && tolerance <= 1))
     throw std::invalid_argument("check_grid_tin: tolerance must be in [0, 1]");
   check_input(points, triangles, window.columns, window.rows);
-  Checker<T> checker(window, tolerance);
+  Checker<T> checker(window, tolerance, path);
   bool first_left = false;
   for (std::size_t i = 0; i < triangles.size(); ++i) {
     const auto& [a, b, c] = triangles[i];
@@ -167,6 +147,22 @@ GridTinCheck check_grid_tin(const GridWindow<T>& window, std::span<const Point3>
     if (area == 0 || (area > 0) != first_left) checker.count_turned();
   }
   return checker.finish();
+}
+
+template GridTinCheck check_grid_tin_by(const GridWindow<float>&, std::span<const Point3>,
+                                        std::span<const std::array<std::uint32_t, 3>>, double,
+                                        GridPath);
+template GridTinCheck check_grid_tin_by(const GridWindow<double>&, std::span<const Point3>,
+                                        std::span<const std::array<std::uint32_t, 3>>, double,
+                                        GridPath);
+
+}  // namespace tin
+
+template <class T>
+GridTinCheck check_grid_tin(const GridWindow<T>& window, std::span<const Point3> points,
+                            std::span<const std::array<std::uint32_t, 3>> triangles,
+                            double tolerance) {
+  return tin::check_grid_tin_by(window, points, triangles, tolerance, tin::best_grid_path());
 }
 
 template GridTinCheck check_grid_tin(const GridWindow<float>&, std::span<const Point3>,

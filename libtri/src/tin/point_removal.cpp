@@ -4,10 +4,7 @@
 #include <cmath>
 
 namespace terrace::tri::tin::points {
-namespace {
 
-/// By the first terms of the series: results must not depend on a library's tangent. Exact to
-/// 1e-9 up to 30 degrees.
 double tangent_of(double degrees) {
   constexpr double kRadians = 0.017453292519943295;
   const double a = degrees * kRadians;
@@ -16,6 +13,8 @@ double tangent_of(double degrees) {
   const double cosine = 1 - s / 2 * (1 - s / 12 * (1 - s / 30 * (1 - s / 56)));
   return sine / cosine;
 }
+
+namespace {
 
 class Remover {
  public:

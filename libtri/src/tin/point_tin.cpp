@@ -11,18 +11,13 @@
 #include "point_greedy.hpp"
 #include "point_lists.hpp"
 #include "point_removal.hpp"
+#include "point_rows.hpp"
 #include "point_samples.hpp"
 #include "point_start.hpp"
 
 namespace terrace::tri {
-namespace {
 
-using namespace tin::points;
-using tin::kNone;
-
-constexpr std::size_t kUnlimited = std::numeric_limits<std::size_t>::max();
-
-void check_options(const PointTinOptions& options, std::span<const Point3> frame) {
+void tin::points::check_options(const PointTinOptions& options, std::span<const Point3> frame) {
   if (!(options.max_error >= 0) || !std::isfinite(options.max_error))
     throw std::invalid_argument("point_tin: max_error is not a number of at least 0");
   if (!(options.min_angle_degrees >= 0 && options.min_angle_degrees <= 30))
@@ -37,6 +32,13 @@ void check_options(const PointTinOptions& options, std::span<const Point3> frame
         throw std::invalid_argument("point_tin: vertex " + std::to_string(i) +
                                     " of the frame is not on the lattice");
 }
+
+namespace {
+
+using namespace tin::points;
+using tin::kNone;
+
+constexpr std::size_t kUnlimited = std::numeric_limits<std::size_t>::max();
 
 /// Makes the mesh, for one bound after another.
 class Maker {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "tile/sample_parts.hpp"
@@ -78,9 +79,9 @@ class Extremes {
 
 }  // namespace
 
-CrowdedTin mesh_crowded_leaf(const TileAddress& tile, const TileLeaf& leaf,
-                             std::span<const tri::Point3> frame,
-                             const tri::PointTinOptions& options, TileSurface& surface) {
+tri::PointTin mesh_crowded_leaf(const TileAddress& tile, const TileLeaf& leaf,
+                                std::span<const tri::Point3> frame,
+                                const tri::PointTinOptions& options, TileSurface& surface) {
   const LeafUnits units(tile, leaf);
   const GeographicBox box = box_of(tile, leaf);
   Places taken;
@@ -90,31 +91,33 @@ CrowdedTin mesh_crowded_leaf(const TileAddress& tile, const TileLeaf& leaf,
                   [&](const SurfaceSamples& samples) { extremes.add(on_units(samples, units)); });
     taken = extremes.places();
   }
-  CrowdedTin made;
-  made.has_data = !taken.u.empty();
+  tri::PointTin best;
   double before = std::numeric_limits<double>::infinity();
   for (unsigned round = 0; round < kRounds; ++round) {
     tri::PointTin tin = tri::point_tin(taken.u, taken.v, taken.height, frame, options);
-    double largest = 0.0;
+    tri::TinErrors all;
+    double squares = 0.0;
     for_each_part(box, surface, [&](const SurfaceSamples& samples) {
       const Places places = on_units(samples, units);
       const tri::TinErrors errors =
           tri::measure_surface(places.u, places.v, places.height, tin.vertices, tin.triangles);
-      largest = std::max(largest, errors.largest);
+      all.covered += errors.covered;
+      all.uncovered += errors.uncovered;
+      all.largest = std::max(all.largest, errors.largest);
+      squares += errors.rms * errors.rms * static_cast<double>(errors.covered);
       if (errors.largest > options.max_error) {
         const std::size_t worst = errors.largest_at;
         taken.add(places.u[worst], places.v[worst], places.height[worst]);
       }
     });
-    if (largest < before) {
-      made.tin = std::move(tin);
-      made.largest = largest;
-    }
+    if (all.covered > 0) all.rms = std::sqrt(squares / static_cast<double>(all.covered));
+    tin.errors = all;
+    if (all.largest < before) best = std::move(tin);
     // What more samples do not better is due to the lattice of places and heights.
-    if (largest <= options.max_error || !(largest < before)) break;
-    before = largest;
+    if (all.largest <= options.max_error || !(all.largest < before)) break;
+    before = all.largest;
   }
-  return made;
+  return best;
 }
 
 }  // namespace terrace::tools

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <span>
+#include <vector>
 
 #include <terrace/tri/point_tin.hpp>
 
@@ -31,6 +32,12 @@ class LeafUnits {
   [[nodiscard]] double v(double latitude) const {
     return std::clamp((latitude - whole_.south) * units_, south_, north_);
   }
+  void to_u(std::vector<double>& longitudes) const {
+    for (double& at : longitudes) at = u(at);
+  }
+  void to_v(std::vector<double>& latitudes) const {
+    for (double& at : latitudes) at = v(at);
+  }
   [[nodiscard]] double west() const { return west_; }
   [[nodiscard]] double south() const { return south_; }
   [[nodiscard]] double width() const { return east_ - west_; }
@@ -41,18 +48,13 @@ class LeafUnits {
   double units_, west_, south_, east_, north_;
 };
 
-struct CrowdedTin {
-  tri::PointTin tin;      ///< its errors are those of some samples
-  double largest = 0.0;   ///< of all samples
-  bool has_data = false;  ///< whether there is a sample
-};
-
 /// Meshes a leaf that cannot be cut further and has too many samples to be taken at once: by the
 /// lowest and the highest of each quarter of a unit, then by those, too, that are beyond the bound
-/// when all are measured, part after part, and so on some rounds. Memory: of a part, and of 2^19
-/// samples.
-CrowdedTin mesh_crowded_leaf(const TileAddress& tile, const TileLeaf& leaf,
-                             std::span<const tri::Point3> frame,
-                             const tri::PointTinOptions& options, TileSurface& surface);
+/// when all are measured, part after part, and so on some rounds. The errors of what it returns are
+/// those of all samples; PointTin::sample and the counts of vertices have no meaning. Memory: of a
+/// part, and of 2^19 samples.
+tri::PointTin mesh_crowded_leaf(const TileAddress& tile, const TileLeaf& leaf,
+                                std::span<const tri::Point3> frame,
+                                const tri::PointTinOptions& options, TileSurface& surface);
 
 }  // namespace terrace::tools

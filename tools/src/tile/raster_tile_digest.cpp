@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "digest.hpp"
-#include "tile/raster_tile_surface.hpp"
+#include "tile/tiled_raster.hpp"
 
 namespace terrace::tools {
 namespace {

@@ -6,44 +6,17 @@
 #include <span>
 #include <vector>
 
-#include <terrace/stream/store.hpp>
-
-#include "coordinate_system.hpp"
-#include "geoid_heights.hpp"
-#include "grid_geography.hpp"
-#include "raster_fill.hpp"
 #include "store_window.hpp"
-#include "tile/height_blocks.hpp"
+#include "tile/height_cache.hpp"
 #include "tile/raster_tile_digest.hpp"
 #include "tile/tile_surface.hpp"
-#include "world.hpp"
+#include "tile/tiled_raster.hpp"
 
 namespace terrace::tools {
 
-/// What all threads know of a raster store that is tiled.
-struct TiledRaster {
-  const stream::Store& store;
-  CoordinateSystem crs;
-  Placement placement;
-  GridGeography geography;
-  EllipsoidalHeights vertical;
-  /// Heights where there is no data: nothing takes those around, else this height in metres.
-  std::optional<double> flat_fill{};
-  /// A sample of this height (in the store's unit) is water; without, one that has no data is.
-  std::optional<double> water_height{};
-
-  RasterFill fill;
-  HeightBlocks blocks;
-  GeographicBox bounds{};
-  double spacing = 0.0;
-  /// Of a raster in degrees: the longitudes that it gives its samples, which may go beyond 180.
-  double first_longitude = 0.0, last_longitude = 0.0;
-
-  /// Reads the store twice. Throws: stream::Error if no place of it can be told on the globe.
-  TiledRaster(const stream::Store& tiled, CoordinateSystem system, EllipsoidalHeights heights);
-};
-
 /// The surface of a raster store: bilinear between four samples with data, filled elsewhere.
+/// Memory: 44 MiB, and of the largest box that was asked for 8 bytes per sample, or 24 where
+/// samples() are.
 class RasterTileSurface final : public TileSurface {
  public:
   explicit RasterTileSurface(const TiledRaster& raster);
@@ -52,6 +25,7 @@ class RasterTileSurface final : public TileSurface {
   [[nodiscard]] double spacing() const override { return raster_.spacing; }
   void expect(const GeographicBox& box) override;
   void samples(const GeographicBox& box, SurfaceSamples& out) override;
+  bool rows(const GeographicBox& box, SurfaceRows& out) override;
   std::optional<HeightRange> range(const GeographicBox& box) override;
   void heights(std::span<const double> longitude, std::span<const double> latitude,
                std::span<double> out) override;
@@ -75,10 +49,9 @@ class RasterTileSurface final : public TileSurface {
     std::int64_t stride = 0;
   };
   View view(const LatticeWindow& window);
-  [[nodiscard]] LatticeWindow window_around(const GeographicBox& box) const;
 
   const TiledRaster& raster_;
-  StoreWindow reader_;
+  HeightCache reader_;
   LatticeWindow held_{};
   std::vector<double> heights_;  ///< of the held window
   std::vector<double> longitude_, latitude_;

@@ -10,7 +10,6 @@
 #include <terrace/stream/error.hpp>
 
 #include "interrupt.hpp"
-#include "tile/tile_journal.hpp"
 #include "units.hpp"
 
 namespace terrace::tools {
@@ -71,7 +70,7 @@ void Inventory::files() {
     const std::string name = entry->path().lexically_relative(folder_).generic_string();
     if (const auto tile = parse_tile_path(name); tile && tile->zoom < result.tiles.size()) {
       result.tiles[tile->zoom].push_back(*tile);
-    } else if (name == TileJournal::kName || name.ends_with(".terrain") || name.ends_with(".tmp")) {
+    } else if (name.ends_with(".terrain") || name.ends_with(".tmp")) {
       strange.push_back(name);
     }
   }

@@ -4,9 +4,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <fstream>
-#include <map>
 #include <span>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "tile/tile_address.hpp"
 
@@ -14,33 +15,48 @@ namespace terrace::tools {
 
 /// What is known of a finished tile.
 struct FinishedTile {
-  std::uint64_t bytes = 0;
+  std::uint64_t bytes = 0;  ///< of its file; 0: there is no such tile, because it has no data
   std::uint64_t checksum = 0;
+  std::uint64_t inputs = 0;  ///< TileInputs::digest: of all that its bytes depend on
   double max_error = 0.0;    ///< metres
-  double height_step = 0.0;  ///< metres: tiles of a zoom fit together only if it is the same
+
+  friend bool operator==(const FinishedTile&, const FinishedTile&) = default;
 };
 
 /// A checksum of 64 bits: FNV-1a.
 std::uint64_t checksum_of(std::span<const std::byte> bytes);
 
-/// The file in the folder of a tile set that says which tiles are finished while the set is not. A
-/// line that is cut short, as a crash leaves it, ends what is believed.
+/// The file in the folder of a tile set that says which tiles are finished and what they were made
+/// from. It is there while the set is made, so that an interrupted run can go on, and stays, so
+/// that a later run makes only what changed. One line per tile; of several lines of a tile the last
+/// counts. A line that is cut short, as a crash leaves it, ends what is believed; what is believed
+/// is checked against the tile's file anyhow.
 class TileJournal {
  public:
   static constexpr const char* kName = ".terrace-tiles";
+  using Record = std::pair<TileAddress, FinishedTile>;
 
-  /// Reads the journal of an earlier run where there is one with the same fingerprint (`resume`),
-  /// and goes on with it; else begins a new one. Throws: stream::Error.
-  TileJournal(const std::string& folder, const std::string& fingerprint, bool resume);
+  /// Reads the journal in the folder, if there is one that this version wrote, and goes on with it;
+  /// else begins a new one. Memory: 48 bytes per tile. Throws: stream::Error.
+  explicit TileJournal(const std::string& folder);
 
-  /// What the earlier run has finished; nullptr if not this tile.
+  /// What an earlier run has finished; nullptr if not this tile.
   [[nodiscard]] const FinishedTile* find(const TileAddress& tile) const;
+  /// Of a tile that is not known as such yet.
   void add(const TileAddress& tile, const FinishedTile& finished);
+  /// Replaces all lines by these, sorted by address, if they say anything else. Nothing is added
+  /// after that. Throws: stream::Error.
+  void finish(std::vector<Record> records);
 
  private:
   std::string path_;
-  std::map<TileAddress, FinishedTile> earlier_;
+  std::vector<Record> earlier_;  ///< sorted by address
+  std::uint64_t lines_ = 0;
   std::ofstream file_;
 };
+
+/// The records of a finished set, sorted by address; none where there is no journal that this
+/// version can read.
+std::vector<TileJournal::Record> read_tile_records(const std::string& folder);
 
 }  // namespace terrace::tools

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -46,13 +47,31 @@ double flat_error(const std::vector<SideVertex>& frame, double step, const Heigh
   return std::max(range.high - low, high - range.low);
 }
 
+tri::PointTin tin_of(const TileAddress& tile, const TileLeaf& leaf, TileSurface& surface,
+                     bool measured, std::span<const tri::Point3> frame,
+                     const tri::PointTinOptions& options) {
+  if (!measured) return tri::point_tin(tri::SampleRows{}, frame, options);
+  const GeographicBox box = box_of(tile, leaf);
+  const LeafUnits units(tile, leaf);
+  if (is_to_be_cut(box, surface)) return mesh_crowded_leaf(tile, leaf, frame, options, surface);
+  if (SurfaceRows rows; surface.rows(box, rows)) {
+    units.to_u(rows.longitude);
+    units.to_v(rows.latitude);
+    return tri::point_tin(tri::SampleRows{rows.longitude, rows.latitude, rows.height}, frame,
+                          options);
+  }
+  SurfaceSamples samples;
+  surface.samples(box, samples);
+  units.to_u(samples.longitude);
+  units.to_v(samples.latitude);
+  return tri::point_tin(samples.longitude, samples.latitude, samples.height, frame, options);
+}
+
 void mesh_leaf(const TileAddress& tile, const TileLeaf& leaf, const ZoomPlan& plan,
                TileSurface& surface, tri::PointTinQuality quality,
                const std::vector<SideVertex>& frame, Pieces& pieces) {
-  SurfaceSamples samples;
-  const GeographicBox box = box_of(tile, leaf);
-  const auto range = surface.range(box);
-  bool measured = false, crowded = false;
+  const auto range = surface.range(box_of(tile, leaf));
+  bool measured = false;
   if (range) {
     const double error = flat_error(frame, plan.height_step, *range);
     if (error <= plan.max_error && (range->certain || pieces.has_data)) {
@@ -61,19 +80,10 @@ void mesh_leaf(const TileAddress& tile, const TileLeaf& leaf, const ZoomPlan& pl
       pieces.has_data = true;
     } else {
       measured = true;
-      crowded = is_to_be_cut(box, surface);
-      if (!crowded) surface.samples(box, samples);
     }
   }
-  const LeafUnits units(tile, leaf);
-  std::vector<double> u, v;
-  u.reserve(samples.size());
-  v.reserve(samples.size());
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    u.push_back(units.u(samples.longitude[i]));
-    v.push_back(units.v(samples.latitude[i]));
-  }
   std::vector<tri::Point3> corners;
+  corners.reserve(frame.size());
   for (const SideVertex& vertex : frame) {
     corners.push_back({static_cast<double>(vertex.u), static_cast<double>(vertex.v),
                        static_cast<double>(vertex.height) * plan.height_step});
@@ -82,17 +92,9 @@ void mesh_leaf(const TileAddress& tile, const TileLeaf& leaf, const ZoomPlan& pl
   options.max_error = plan.max_error;
   options.quality = quality;
   options.lattice = tri::TinLattice{0.0, plan.height_step};
-  tri::PointTin tin;
-  if (crowded) {
-    CrowdedTin made = mesh_crowded_leaf(tile, leaf, corners, options, surface);
-    tin = std::move(made.tin);
-    pieces.max_error = std::max(pieces.max_error, made.largest);
-    pieces.has_data = pieces.has_data || made.has_data;
-  } else {
-    tin = tri::point_tin(u, v, samples.height, corners, options);
-    if (measured) pieces.max_error = std::max(pieces.max_error, tin.errors.largest);
-    if (tin.errors.covered > 0) pieces.has_data = true;
-  }
+  const tri::PointTin tin = tin_of(tile, leaf, surface, measured, corners, options);
+  if (measured) pieces.max_error = std::max(pieces.max_error, tin.errors.largest);
+  if (tin.errors.covered > 0) pieces.has_data = true;
 
   std::vector<std::uint32_t> number;
   number.reserve(tin.vertices.size());

@@ -24,10 +24,10 @@ struct TileSetOptions {
   TileMeshOptions mesh;
   bool gzip = false;
   bool metadata = false;  ///< the tiles below each tile, in the tile
-  bool resume = false;    ///< keeps finished tiles of an interrupted run with equal fingerprint
-  bool replace = false;
-  /// What the tiles depend on, besides the options here.
-  std::string source_fingerprint;
+  bool resume = false;    ///< goes on with an interrupted run, or mends a finished set
+  bool replace = false;   ///< a finished set may be another one
+  /// What of the store and of the options that the surfaces depend on the whole set depends on.
+  std::string source_fingerprint, source_options;
 };
 
 struct ZoomSummary {
@@ -38,7 +38,8 @@ struct ZoomSummary {
 
 struct TileSetResult {
   std::uint64_t tiles = 0, bytes = 0;
-  std::uint64_t kept = 0;     ///< of these, that were there already, whole and the same
+  std::uint64_t made = 0;     ///< of these, that were not known to be there and the same
+  std::uint64_t kept = 0;     ///< of these, whose files were whole and the same: not touched
   std::uint64_t removed = 0;  ///< tiles of an earlier set that this one does not have
   std::vector<ZoomSummary> zooms;
 };
@@ -51,10 +52,14 @@ unsigned native_zoom(double spacing);
 /// Writes a tile set. surfaces: one per thread, all of the same samples.
 ///
 /// Tiles are written beside their names and renamed one by one, and the disk is asked once, at the
-/// end, to keep them all; layer.json comes last. A tile whose bytes are there already is not
-/// touched. The bytes do not depend on the number of threads. Interrupted, a run can go on with
-/// `resume`: it checks what a journal in the folder says is finished.
-/// Throws: stream::Error, Interrupted.
+/// end, to keep them all; layer.json comes last. The bytes do not depend on the number of threads.
+///
+/// A journal stays in the folder and says of each tile what it was made from (digest_of()) and the
+/// checksum of its file. A tile for which both are as they were is not made again, be it that the
+/// run before was interrupted or that samples changed elsewhere; one that is made again and comes
+/// out the same is not touched. So the folder is the same as if it had been empty before.
+/// `resume` without `replace` is refused for a finished set of other samples or options.
+/// Throws: stream::Error, Interrupted, UsageError for options that do not go together.
 TileSetResult write_tile_set(const std::vector<std::unique_ptr<TileSurface>>& surfaces,
                              const TileSetOptions& options, const CommonOptions& common);
 

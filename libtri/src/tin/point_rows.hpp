@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <span>
+
+#include "point_rows_scan.hpp"
+#include "terrace/tri/point_tin.hpp"
+
+namespace terrace::tri::tin {
+
+namespace points {
+
+/// Throws as point_tin() does.
+void check_options(const PointTinOptions& options, std::span<const Point3> frame);
+
+}  // namespace points
+
+namespace rows {
+
+/// point_tin() of samples in rows and columns, with a given instruction set.
+PointTin make_tin(const SampleRows& samples, std::span<const Point3> frame,
+                  const PointTinOptions& options, RowPath path);
+
+}  // namespace rows
+}  // namespace terrace::tri::tin

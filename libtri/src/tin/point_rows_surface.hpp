@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "cavity.hpp"
+#include "grid_tiles.hpp"
+#include "mesh.hpp"
+#include "point_rows_scan.hpp"
+#include "star.hpp"
+#include "terrace/tri/point_tin.hpp"
+
+namespace terrace::tri::tin::rows {
+
+/// Coordinates of vertices are below this: predicates are exact in 128 bits.
+inline constexpr double kFarthest = 0x1p20;
+/// Columns and rows are at most as many: both fit into Triangle::place.
+inline constexpr std::size_t kMostRows = 65535;
+
+/// Whether the frame is an upright rectangle with whole coordinates from 0 to kFarthest, its
+/// vertices counter-clockwise along the sides, the corners among them.
+bool is_rectangle(std::span<const Point3> frame);
+
+/// A mesh over samples in rows and columns, on a lattice, in an upright rectangle. The sides of the
+/// rectangle are kept.
+///
+/// As with point_tin(), but no triangle has a list of its samples: they are found by their rows and
+/// columns, which is several times as fast.
+class RowSurface {
+ public:
+  /// frame: see is_rectangle(). Throws as point_tin() does for heights of samples.
+  RowSurface(const SampleRows& samples, std::span<const Point3> frame,
+             const PointTinOptions& options, RowPath path);
+
+  /// Inserts samples until all that can become vertices are within the bound: Delaunay.
+  void refine();
+  /// Puts vertices and triangles that are near each other near each other in memory.
+  void arrange();
+  /// One pass of removals that keep the bound at all samples. Returns their number.
+  std::size_t remove();
+  /// With every sample measured.
+  PointTin result();
+
+ private:
+  struct Vertex {
+    std::int32_t x, y;
+    double z;
+    std::uint32_t sample;  ///< row << 16 | column; kNone: of the frame
+  };
+  struct Spot {
+    std::uint32_t triangle;  ///< kNone: outside
+    bool taken;              ///< a vertex is there
+    bool border;             ///< it is on the border
+  };
+
+  [[nodiscard]] RowCorner corner(const Vertex& vertex) const {
+    return {static_cast<double>(vertex.x), static_cast<double>(vertex.y), vertex.z};
+  }
+  [[nodiscard]] const Vertex& vertex(const Triangle& triangle, unsigned i) const {
+    return vertices_[triangle.corner[i]];
+  }
+  [[nodiscard]] std::size_t at(std::uint32_t place) const {
+    return (place >> 16) * samples_.stride + (place & 0xFFFF);
+  }
+  [[nodiscard]] Spot locate(const Vertex& p, std::uint32_t triangle) const;
+  void copy(const SampleRows& samples, std::span<const Point3> frame);
+  void start(std::span<const Point3> frame);
+  void insert(std::uint32_t vertex, std::uint32_t triangle);
+  /// Finds the triangle's worst sample.
+  void judge(Triangle& triangle) const;
+  [[nodiscard]] bool fits(const Vertex& a, const Vertex& b, const Vertex& c) const;
+  [[nodiscard]] bool wide(const Vertex& a, const Vertex& b, const Vertex& c) const;
+  /// Whether a triangle keeps the bound at a sample, if it contains it; cheaper than fits().
+  [[nodiscard]] bool keeps(const Vertex& a, const Vertex& b, const Vertex& c,
+                           const RowCorner& sample) const;
+  void measure(PointTin& tin) const;
+
+  const PointTinOptions& options_;
+  const TinLattice lattice_;
+  double tangent_;  ///< of the smallest angle
+  std::vector<double> x_, y_, heights_;
+  RowSamples samples_{};
+  std::size_t known_ = 0;  ///< samples that are there
+  const RowScan& scan_;
+  GridTiles tiles_;
+  std::uint32_t fixed_ = 0;  ///< vertices of the frame
+  std::vector<Vertex> vertices_;
+  Triangles triangles_;
+  Cavity cavity_;
+  /// Samples that cannot become vertices: not seen while vertices are inserted.
+  std::vector<std::pair<std::size_t, double>> stuck_;
+};
+
+}  // namespace terrace::tri::tin::rows

@@ -1,0 +1,361 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tin/point_rows.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <random>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "delaunay2/double_kernel.hpp"
+#include "terrace/tri/point_tin.hpp"
+
+namespace terrace::tri {
+namespace {
+
+using planar::DoubleKernel;
+using tin::rows::RowPath;
+
+constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
+constexpr PointTinQuality kQualities[] = {PointTinQuality::kGreedy, PointTinQuality::kRemoval,
+                                          PointTinQuality::kFitted};
+
+double unit(std::mt19937_64& random) { return static_cast<double>(random() >> 11) * 0x1p-53; }
+
+struct Grid {
+  std::vector<double> x, y, z;
+
+  [[nodiscard]] SampleRows rows() const { return {x, y, z}; }
+};
+
+struct Shape {
+  std::size_t columns, rows;
+  double extent;  ///< of the frame
+  double first;   ///< place of the first column and row, in steps from the frame's side
+};
+
+double rough(double u, double v) {
+  return 40 * std::sin(5 * u + 2 * v) + 25 * std::sin(11 * v - 3 * u) + 6 * std::sin(31 * u * v) +
+         2 * std::sin(97 * u + 41 * v);
+}
+
+/// `gaps`: the share of samples that are not there.
+Grid make_grid(const Shape& shape, double gaps, std::uint64_t seed) {
+  Grid grid;
+  std::mt19937_64 random(seed);
+  const auto places = [&](std::size_t count, std::vector<double>& out) {
+    const double step = shape.extent / std::max(1.0, static_cast<double>(count - 1));
+    for (std::size_t i = 0; i < count; ++i)
+      out.push_back((static_cast<double>(i) + shape.first) * step);
+  };
+  places(shape.columns, grid.x);
+  places(shape.rows, grid.y);
+  for (const double y : grid.y) {
+    for (const double x : grid.x) {
+      const double u = x / shape.extent, v = y / shape.extent;
+      const bool hole = std::hypot(u - 0.3, v - 0.6) < 0.1 && gaps > 0;
+      const bool gap = hole || unit(random) < gaps;
+      grid.z.push_back(gap ? kMissing : rough(u, v) + (u > 0.7 ? 30 : 0) + unit(random));
+    }
+  }
+  return grid;
+}
+
+std::vector<Point3> make_frame(double extent, std::size_t per_side, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::vector<Point3> frame;
+  for (std::size_t side = 0; side < 4; ++side) {
+    for (std::size_t k = 0; k < per_side; ++k) {
+      const double t = std::floor(extent * static_cast<double>(k) / static_cast<double>(per_side));
+      const double height = std::floor(20 * unit(random));
+      if (side == 0) frame.push_back({t, 0, height});
+      if (side == 1) frame.push_back({extent, t, height});
+      if (side == 2) frame.push_back({extent - t, extent, height});
+      if (side == 3) frame.push_back({0, extent - t, height});
+    }
+  }
+  return frame;
+}
+
+PointTinOptions options_of(double error, PointTinQuality quality, double step = 0x1p-8) {
+  PointTinOptions options;
+  options.max_error = error;
+  options.quality = quality;
+  options.lattice = TinLattice{-100, step};
+  return options;
+}
+
+/// Triangles counter-clockwise, every edge once in each direction, but for those of the frame.
+void check_mesh(const PointTin& tin, const std::vector<Point3>& frame) {
+  ASSERT_EQ(tin.sample.size(), tin.vertices.size());
+  const auto place = [&](std::uint32_t v) {
+    return std::array<double, 2>{tin.vertices[v][0], tin.vertices[v][1]};
+  };
+  std::set<std::array<std::uint32_t, 2>> edges;
+  std::vector<bool> used(tin.vertices.size(), false);
+  for (const auto& t : tin.triangles) {
+    ASSERT_GT(DoubleKernel::orientation(place(t[0]), place(t[1]), place(t[2])), 0);
+    for (std::size_t i = 0; i < 3; ++i) {
+      used[t[i]] = true;
+      ASSERT_TRUE(edges.insert({t[i], t[(i + 1) % 3]}).second) << "an edge has two left sides";
+    }
+  }
+  EXPECT_EQ(std::count(used.begin(), used.end(), false), 0) << "unused vertices";
+  std::size_t border = 0;
+  for (const auto& e : edges) border += edges.contains({e[1], e[0]}) ? 0 : 1;
+  ASSERT_EQ(border, frame.size());
+  EXPECT_EQ(tin.triangles.size(), 2 * tin.vertices.size() - 2 - border);
+  for (std::uint32_t i = 0; i < frame.size(); ++i) {
+    EXPECT_EQ(tin.vertices[i], frame[i]);
+    EXPECT_EQ(tin.sample[i], kNoSample);
+    const auto next = static_cast<std::uint32_t>((i + 1) % frame.size());
+    EXPECT_TRUE(edges.contains({i, next})) << "side " << i;
+  }
+}
+
+/// What the tin says of its errors, against measure_surface(), which knows nothing of rows.
+void check_errors(const Grid& grid, const PointTin& tin, double bound) {
+  std::vector<double> x, y, z;
+  for (std::size_t i = 0; i < grid.z.size(); ++i) {
+    if (std::isnan(grid.z[i])) continue;
+    x.push_back(grid.x[i % grid.x.size()]);
+    y.push_back(grid.y[i / grid.x.size()]);
+    z.push_back(grid.z[i]);
+  }
+  const TinErrors measured = measure_surface(x, y, z, tin.vertices, tin.triangles);
+  EXPECT_EQ(tin.errors.covered, measured.covered);
+  EXPECT_EQ(tin.errors.uncovered, measured.uncovered);
+  EXPECT_NEAR(tin.errors.largest, measured.largest, 1e-9);
+  EXPECT_NEAR(tin.errors.rms, measured.rms, 1e-9);
+  if (tin.stuck == 0) {
+    EXPECT_LE(tin.errors.largest, bound);
+  }
+  if (tin.errors.largest_at != kNoSample && measured.largest_at != kNoSample) {
+    EXPECT_FALSE(std::isnan(grid.z.at(tin.errors.largest_at)));
+  }
+}
+
+void check_lattice(const Grid& grid, const PointTin& tin, const TinLattice& lattice) {
+  for (std::size_t v = 0; v < tin.vertices.size(); ++v) {
+    const std::uint32_t s = tin.sample[v];
+    if (s == kNoSample) continue;
+    EXPECT_EQ(tin.vertices[v][0], std::floor(grid.x[s % grid.x.size()] + 0.5));
+    EXPECT_EQ(tin.vertices[v][1], std::floor(grid.y[s / grid.x.size()] + 0.5));
+    EXPECT_NEAR(tin.vertices[v][2], grid.z[s], lattice.height_step / 2);
+    const double steps = (tin.vertices[v][2] - lattice.height_origin) / lattice.height_step;
+    EXPECT_EQ(steps, std::floor(steps));
+  }
+}
+
+void check_delaunay(const PointTin& tin) {
+  const auto place = [&](std::uint32_t v) {
+    return std::array<double, 2>{tin.vertices[v][0], tin.vertices[v][1]};
+  };
+  for (const auto& t : tin.triangles) {
+    for (std::uint32_t v = 0; v < tin.vertices.size(); ++v) {
+      if (v == t[0] || v == t[1] || v == t[2]) continue;
+      ASSERT_LE(DoubleKernel::in_circle(place(t[0]), place(t[1]), place(t[2]), place(v)), 0);
+    }
+  }
+}
+
+TEST(PointRows, KeepTheErrorOnALattice) {
+  const Shape shapes[] = {{60, 45, 32767, 0},  {33, 80, 32767, -4.3}, {64, 64, 300, 0.5},
+                          {90, 90, 40, 0},     {7, 5, 32767, -0.4},   {120, 3, 1000, 0.2},
+                          {2, 100, 1000, 0.1}, {130, 130, 1e6, -10.2}};
+  for (const Shape& shape : shapes) {
+    for (const double gaps : {0.0, 0.1}) {
+      for (const double error : {0.7, 3.0, 30.0}) {
+        for (const PointTinQuality quality : kQualities) {
+          SCOPED_TRACE(std::to_string(shape.columns) + " x " + std::to_string(shape.rows) +
+                       ", extent " + std::to_string(shape.extent) + ", gaps " +
+                       std::to_string(gaps) + ", error " + std::to_string(error) + ", quality " +
+                       std::to_string(static_cast<int>(quality)));
+          const Grid grid = make_grid(shape, gaps, 3);
+          const std::vector<Point3> frame = make_frame(shape.extent, 5, 4);
+          const PointTinOptions options = options_of(error, quality);
+          const PointTin tin = point_tin(grid.rows(), frame, options);
+          check_mesh(tin, frame);
+          check_errors(grid, tin, error);
+          if (quality != PointTinQuality::kFitted) check_lattice(grid, tin, *options.lattice);
+          if (quality == PointTinQuality::kGreedy && tin.vertices.size() < 800) check_delaunay(tin);
+        }
+      }
+    }
+  }
+}
+
+TEST(PointRows, AsFewTrianglesAsOfPoints) {
+  const Grid grid = make_grid({300, 300, 32767, 0}, 0.0, 5);
+  const std::vector<Point3> frame = make_frame(32767, 9, 6);
+  std::vector<double> x, y;
+  for (std::size_t i = 0; i < grid.z.size(); ++i) {
+    x.push_back(grid.x[i % grid.x.size()]);
+    y.push_back(grid.y[i / grid.x.size()]);
+  }
+  for (const double error : {0.7, 2.0, 10.0}) {
+    for (const PointTinQuality quality : {PointTinQuality::kGreedy, PointTinQuality::kRemoval}) {
+      SCOPED_TRACE("error " + std::to_string(error) + ", quality " +
+                   std::to_string(static_cast<int>(quality)));
+      const PointTinOptions options = options_of(error, quality);
+      const PointTin tin = point_tin(grid.rows(), frame, options);
+      const PointTin of_points = point_tin(x, y, grid.z, frame, options);
+      EXPECT_LE(static_cast<double>(tin.triangles.size()),
+                1.04 * static_cast<double>(of_points.triangles.size()));
+      if (quality == PointTinQuality::kRemoval) {
+        EXPECT_GT(tin.removed, tin.inserted / 5);
+        EXPECT_EQ(tin.vertices.size(), frame.size() + tin.inserted - tin.removed);
+      }
+    }
+  }
+}
+
+TEST(PointRows, AllPathsGiveTheSame) {
+  for (const double gaps : {0.0, 0.05}) {
+    for (const double extent : {32767.0, 100.0}) {
+      SCOPED_TRACE("gaps " + std::to_string(gaps) + ", extent " + std::to_string(extent));
+      const Grid grid = make_grid({150, 170, extent, -2.7}, gaps, 7);
+      const std::vector<Point3> frame = make_frame(extent, 3, 8);
+      const PointTinOptions options = options_of(1.0, PointTinQuality::kRemoval);
+      const PointTin portable =
+          tin::rows::make_tin(grid.rows(), frame, options, RowPath::kPortable);
+      EXPECT_GT(portable.triangles.size(), 100u);
+      for (const RowPath path : {RowPath::kAvx2, RowPath::kAvx512}) {
+        if (!tin::rows::supported(path)) continue;
+        const PointTin other = tin::rows::make_tin(grid.rows(), frame, options, path);
+        EXPECT_EQ(portable.vertices, other.vertices);
+        EXPECT_EQ(portable.triangles, other.triangles);
+        EXPECT_EQ(portable.sample, other.sample);
+        EXPECT_EQ(portable.errors.largest, other.errors.largest);
+        EXPECT_EQ(portable.errors.rms, other.errors.rms);
+        EXPECT_EQ(portable.errors.largest_at, other.errors.largest_at);
+      }
+    }
+  }
+}
+
+// Several samples for each place of the lattice, and cliffs between them.
+TEST(PointRows, LatticeTooCoarseForTheError) {
+  Grid grid = make_grid({120, 120, 20, 0}, 0.0, 9);
+  std::mt19937_64 random(9);
+  for (double& z : grid.z) z = 100 * unit(random);
+  const std::vector<Point3> frame = make_frame(20, 1, 10);
+  for (const PointTinQuality quality : {PointTinQuality::kGreedy, PointTinQuality::kRemoval}) {
+    const PointTin tin = point_tin(grid.rows(), frame, options_of(1.0, quality));
+    check_mesh(tin, frame);
+    check_errors(grid, tin, 1.0);
+    EXPECT_GT(tin.stuck, 1000u);
+    EXPECT_GT(tin.vertices.size(), 300u);
+  }
+}
+
+TEST(PointRows, ErrorZero) {
+  const Grid grid = make_grid({20, 20, 1000, 0}, 0.1, 11);
+  const std::vector<Point3> frame = make_frame(1000, 2, 12);
+  const PointTin tin = point_tin(grid.rows(), frame, options_of(0.0, PointTinQuality::kRemoval));
+  check_mesh(tin, frame);
+  check_errors(grid, tin, 0.0);
+  // All inside are vertices: their heights are rounded.
+  EXPECT_GT(tin.vertices.size(), 250u);
+}
+
+TEST(PointRows, SamplesOnTheFrameAndAHairOutside) {
+  Grid grid;
+  grid.x = {0, 250, 500, 750, std::nextafter(1000.0, 2000.0)};
+  grid.y = {std::nextafter(0.0, -1.0), 250, 500, 750, 1000};
+  grid.z.assign(25, 0.0);
+  const std::vector<Point3> frame{{0, 0, 0}, {1000, 0, 0}, {1000, 1000, 0}, {0, 1000, 0}};
+  const PointTin flat = point_tin(grid.rows(), frame, options_of(0.5, PointTinQuality::kGreedy));
+  EXPECT_EQ(flat.errors.covered, 16u);
+  EXPECT_EQ(flat.errors.uncovered, 9u);
+  EXPECT_EQ(flat.triangles.size(), 2u);
+  // Beyond the bound outside, on a side, inside.
+  grid.z[4] = grid.z[9] = grid.z[22] = grid.z[12] = 300;
+  const PointTin tin = point_tin(grid.rows(), frame, options_of(0.5, PointTinQuality::kGreedy));
+  check_mesh(tin, frame);
+  check_errors(grid, tin, 0.5);
+  EXPECT_EQ(tin.stuck, 1u);
+  EXPECT_EQ(tin.errors.largest_at, 22u);
+  EXPECT_EQ(std::count(tin.sample.begin(), tin.sample.end(), 12u), 1);
+}
+
+TEST(PointRows, FewSamples) {
+  const std::vector<Point3> frame{{0, 0, 1}, {10, 0, 2}, {10, 10, 3}, {0, 10, 4}};
+  const PointTinOptions options = options_of(0.5, PointTinQuality::kRemoval);
+  Grid grid;
+  EXPECT_EQ(point_tin(grid.rows(), frame, options).triangles.size(), 2u);
+  grid.x = {5};
+  grid.y = {4};
+  grid.z = {100};
+  const PointTin one = point_tin(grid.rows(), frame, options);
+  check_mesh(one, frame);
+  EXPECT_EQ(one.triangles.size(), 4u);
+  EXPECT_EQ(one.errors.covered, 1u);
+  grid.z = {kMissing};
+  const PointTin none = point_tin(grid.rows(), frame, options);
+  EXPECT_EQ(none.triangles.size(), 2u);
+  EXPECT_EQ(none.errors.covered + none.errors.uncovered, 0u);
+  grid.x = {2, 4, 6, 8};
+  grid.z = {0, 50, kMissing, 7};
+  const PointTin row = point_tin(grid.rows(), frame, options);
+  check_mesh(row, frame);
+  check_errors(grid, row, 0.5);
+  EXPECT_EQ(row.errors.covered, 3u);
+}
+
+// What has no fast way goes the other, with the numbers of rows and columns.
+TEST(PointRows, IrregularPlacesAndFrames) {
+  Grid grid = make_grid({40, 40, 1000, 0}, 0.05, 13);
+  grid.x[7] += 10;
+  const std::vector<Point3> frame = make_frame(1000, 2, 14);
+  const PointTinOptions options = options_of(1.0, PointTinQuality::kRemoval);
+  const PointTin uneven = point_tin(grid.rows(), frame, options);
+  check_mesh(uneven, frame);
+  check_errors(grid, uneven, 1.0);
+  check_lattice(grid, uneven, *options.lattice);
+  const std::vector<Point3> triangle{{0, 0, 1}, {1000, 0, 2}, {0, 1000, 3}};
+  const Grid even = make_grid({40, 40, 1000, 0}, 0.0, 13);
+  const PointTin part = point_tin(even.rows(), triangle, options);
+  check_mesh(part, triangle);
+  check_errors(even, part, 1.0);
+  EXPECT_GT(part.errors.uncovered, 0u);
+  PointTinOptions few = options;
+  few.max_points = 50;
+  EXPECT_LE(point_tin(even.rows(), frame, few).vertices.size(), 50u);
+  PointTinOptions free = options;
+  free.lattice.reset();
+  check_errors(even, point_tin(even.rows(), {}, free), 1.0);
+}
+
+TEST(PointRows, RefuseBadInput) {
+  Grid grid = make_grid({10, 10, 1000, 0}, 0.0, 15);
+  const std::vector<Point3> frame = make_frame(1000, 1, 16);
+  const PointTinOptions options = options_of(1.0, PointTinQuality::kGreedy);
+  const auto refused = [&](const std::string& what) {
+    try {
+      static_cast<void>(point_tin(grid.rows(), frame, options));
+    } catch (const std::invalid_argument& error) {
+      return std::string(error.what()).find(what) != std::string::npos;
+    }
+    return false;
+  };
+  grid.z[37] = std::numeric_limits<double>::infinity();
+  EXPECT_TRUE(refused("z of sample 37"));
+  grid.z.pop_back();
+  EXPECT_TRUE(refused("row and column"));
+  grid = make_grid({10, 10, 1000, 0}, 0.0, 15);
+  grid.x[3] = kMissing;
+  EXPECT_TRUE(refused("x of sample"));
+  PointTinOptions bad = options;
+  bad.max_error = -1;
+  EXPECT_THROW(static_cast<void>(point_tin(grid.rows(), frame, bad)), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace terrace::tri
