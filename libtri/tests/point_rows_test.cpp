@@ -15,6 +15,7 @@
 
 #include "delaunay2/double_kernel.hpp"
 #include "terrace/tri/point_tin.hpp"
+#include "tin/point_rows_places.hpp"
 
 namespace terrace::tri {
 namespace {
@@ -32,6 +33,19 @@ struct Grid {
   std::vector<double> x, y, z;
 
   [[nodiscard]] SampleRows rows() const { return {x, y, z}; }
+};
+
+/// The places of all samples.
+struct Places {
+  std::vector<double> x, y;
+
+  Places() = default;
+  explicit Places(const Grid& grid) {
+    for (std::size_t i = 0; i < grid.z.size(); ++i) {
+      x.push_back(grid.x[i % grid.x.size()]);
+      y.push_back(grid.y[i / grid.x.size()]);
+    }
+  }
 };
 
 struct Shape {
@@ -120,13 +134,14 @@ void check_mesh(const PointTin& tin, const std::vector<Point3>& frame) {
 }
 
 /// What the tin says of its errors, against measure_surface(), which knows nothing of rows.
-void check_errors(const Grid& grid, const PointTin& tin, double bound) {
+void check_errors(const Places& places, const std::vector<double>& heights, const PointTin& tin,
+                  double bound) {
   std::vector<double> x, y, z;
-  for (std::size_t i = 0; i < grid.z.size(); ++i) {
-    if (std::isnan(grid.z[i])) continue;
-    x.push_back(grid.x[i % grid.x.size()]);
-    y.push_back(grid.y[i / grid.x.size()]);
-    z.push_back(grid.z[i]);
+  for (std::size_t i = 0; i < heights.size(); ++i) {
+    if (std::isnan(heights[i])) continue;
+    x.push_back(places.x[i]);
+    y.push_back(places.y[i]);
+    z.push_back(heights[i]);
   }
   const TinErrors measured = measure_surface(x, y, z, tin.vertices, tin.triangles);
   EXPECT_EQ(tin.errors.covered, measured.covered);
@@ -137,17 +152,18 @@ void check_errors(const Grid& grid, const PointTin& tin, double bound) {
     EXPECT_LE(tin.errors.largest, bound);
   }
   if (tin.errors.largest_at != kNoSample && measured.largest_at != kNoSample) {
-    EXPECT_FALSE(std::isnan(grid.z.at(tin.errors.largest_at)));
+    EXPECT_FALSE(std::isnan(heights.at(tin.errors.largest_at)));
   }
 }
 
-void check_lattice(const Grid& grid, const PointTin& tin, const TinLattice& lattice) {
+void check_lattice(const Places& places, const std::vector<double>& heights, const PointTin& tin,
+                   const TinLattice& lattice) {
   for (std::size_t v = 0; v < tin.vertices.size(); ++v) {
     const std::uint32_t s = tin.sample[v];
     if (s == kNoSample) continue;
-    EXPECT_EQ(tin.vertices[v][0], std::floor(grid.x[s % grid.x.size()] + 0.5));
-    EXPECT_EQ(tin.vertices[v][1], std::floor(grid.y[s / grid.x.size()] + 0.5));
-    EXPECT_NEAR(tin.vertices[v][2], grid.z[s], lattice.height_step / 2);
+    EXPECT_EQ(tin.vertices[v][0], std::floor(places.x[s] + 0.5));
+    EXPECT_EQ(tin.vertices[v][1], std::floor(places.y[s] + 0.5));
+    EXPECT_NEAR(tin.vertices[v][2], heights[s], lattice.height_step / 2);
     const double steps = (tin.vertices[v][2] - lattice.height_origin) / lattice.height_step;
     EXPECT_EQ(steps, std::floor(steps));
   }
@@ -167,8 +183,8 @@ void check_delaunay(const PointTin& tin) {
 
 TEST(PointRows, KeepTheErrorOnALattice) {
   const Shape shapes[] = {{60, 45, 32767, 0},  {33, 80, 32767, -4.3}, {64, 64, 300, 0.5},
-                          {90, 90, 40, 0},     {7, 5, 32767, -0.4},   {120, 3, 1000, 0.2},
-                          {2, 100, 1000, 0.1}, {130, 130, 1e6, -10.2}};
+                          {70, 70, 40, 0},     {7, 5, 32767, -0.4},   {120, 3, 1000, 0.2},
+                          {2, 100, 1000, 0.1}, {80, 80, 1e6, -10.2}};
   for (const Shape& shape : shapes) {
     for (const double gaps : {0.0, 0.1}) {
       for (const double error : {0.7, 3.0, 30.0}) {
@@ -182,8 +198,67 @@ TEST(PointRows, KeepTheErrorOnALattice) {
           const PointTinOptions options = options_of(error, quality);
           const PointTin tin = point_tin(grid.rows(), frame, options);
           check_mesh(tin, frame);
-          check_errors(grid, tin, error);
-          if (quality != PointTinQuality::kFitted) check_lattice(grid, tin, *options.lattice);
+          check_errors(Places(grid), grid.z, tin, error);
+          if (quality != PointTinQuality::kFitted)
+            check_lattice(Places(grid), grid.z, tin, *options.lattice);
+          if (quality == PointTinQuality::kGreedy && tin.vertices.size() < 800) check_delaunay(tin);
+        }
+      }
+    }
+  }
+}
+
+/// A grid turned and bent, as rasters of other projections are.
+struct Bend {
+  double degrees;
+  bool mirrored;
+  double bulge;  ///< shares of the extent
+};
+
+Places bent(const Grid& grid, double extent, const Bend& bend) {
+  Places places(grid);
+  const double angle = bend.degrees * 3.14159265358979 / 180;
+  for (std::size_t i = 0; i < places.x.size(); ++i) {
+    const double u = places.x[i] / extent - 0.5, v = places.y[i] / extent - 0.5;
+    const double bulged = u + bend.bulge * v * v, own = bend.mirrored ? -v : v;
+    places.x[i] = (bulged * std::cos(angle) - own * std::sin(angle) + 0.5) * extent;
+    places.y[i] = (bulged * std::sin(angle) + own * std::cos(angle) + 0.5) * extent;
+  }
+  return places;
+}
+
+constexpr Bend kBends[] = {{0, false, 0},      {0, true, 0},      {1.3, false, 0.002},
+                           {-2.5, true, 0.01}, {30, false, 0.02}, {90, false, 0.1},
+                           {180, true, 0.004}, {0, false, 1.0}};
+
+TEST(PointRows, TurnedAndBentGridsKeepTheError) {
+  for (const Shape& shape : {Shape{60, 45, 32767, 0},
+                             {64, 64, 300, 0.5},
+                             {60, 80, 40, -3.2},
+                             {120, 3, 1000, 0.2},
+                             {2, 100, 1000, 0.1},
+                             {90, 90, 32767, -20}}) {
+    for (const Bend& bend : kBends) {
+      for (const double error : {2.0}) {
+        for (const PointTinQuality quality : kQualities) {
+          SCOPED_TRACE(std::to_string(shape.columns) + " x " + std::to_string(shape.rows) +
+                       ", extent " + std::to_string(shape.extent) + ", turned by " +
+                       std::to_string(bend.degrees) + ", mirrored " +
+                       std::to_string(bend.mirrored) + ", bulge " + std::to_string(bend.bulge) +
+                       ", error " + std::to_string(error) + ", quality " +
+                       std::to_string(static_cast<int>(quality)));
+          Grid grid = make_grid(shape, 0.05, 3);
+          Places places = bent(grid, shape.extent, bend);
+          // What has no place has no height.
+          places.x[5] = places.y[5] = grid.z[5] = kMissing;
+          const std::vector<Point3> frame = make_frame(shape.extent, 5, 4);
+          const PointTinOptions options = options_of(error, quality);
+          const PointTin tin =
+              point_tin(SampleGrid{shape.columns, places.x, places.y, grid.z}, frame, options);
+          check_mesh(tin, frame);
+          check_errors(places, grid.z, tin, error);
+          if (quality != PointTinQuality::kFitted)
+            check_lattice(places, grid.z, tin, *options.lattice);
           if (quality == PointTinQuality::kGreedy && tin.vertices.size() < 800) check_delaunay(tin);
         }
       }
@@ -216,25 +291,38 @@ TEST(PointRows, AsFewTrianglesAsOfPoints) {
   }
 }
 
+void expect_same(const PointTin& a, const PointTin& b) {
+  EXPECT_EQ(a.vertices, b.vertices);
+  EXPECT_EQ(a.triangles, b.triangles);
+  EXPECT_EQ(a.sample, b.sample);
+  EXPECT_EQ(a.errors.largest, b.errors.largest);
+  EXPECT_EQ(a.errors.rms, b.errors.rms);
+  EXPECT_EQ(a.errors.largest_at, b.errors.largest_at);
+}
+
 TEST(PointRows, AllPathsGiveTheSame) {
   for (const double gaps : {0.0, 0.05}) {
     for (const double extent : {32767.0, 100.0}) {
       SCOPED_TRACE("gaps " + std::to_string(gaps) + ", extent " + std::to_string(extent));
       const Grid grid = make_grid({150, 170, extent, -2.7}, gaps, 7);
+      const Places places = bent(grid, extent, {2, true, 0.003});
+      const SampleGrid turned{150, places.x, places.y, grid.z};
       const std::vector<Point3> frame = make_frame(extent, 3, 8);
+      ASSERT_TRUE(tin::rows::padded_samples(grid.rows(), frame));
+      ASSERT_TRUE(tin::rows::padded_samples(turned, frame));
       const PointTinOptions options = options_of(1.0, PointTinQuality::kRemoval);
-      const PointTin portable =
-          tin::rows::make_tin(grid.rows(), frame, options, RowPath::kPortable);
-      EXPECT_GT(portable.triangles.size(), 100u);
+      const auto of_rows = [&](RowPath path) {
+        return tin::rows::make_tin(grid.rows(), frame, options, path);
+      };
+      const auto of_turned = [&](RowPath path) {
+        return tin::rows::make_tin(turned, frame, options, path);
+      };
+      EXPECT_GT(of_rows(RowPath::kPortable).triangles.size(), 100u);
+      EXPECT_GT(of_turned(RowPath::kPortable).triangles.size(), 100u);
       for (const RowPath path : {RowPath::kAvx2, RowPath::kAvx512}) {
         if (!tin::rows::supported(path)) continue;
-        const PointTin other = tin::rows::make_tin(grid.rows(), frame, options, path);
-        EXPECT_EQ(portable.vertices, other.vertices);
-        EXPECT_EQ(portable.triangles, other.triangles);
-        EXPECT_EQ(portable.sample, other.sample);
-        EXPECT_EQ(portable.errors.largest, other.errors.largest);
-        EXPECT_EQ(portable.errors.rms, other.errors.rms);
-        EXPECT_EQ(portable.errors.largest_at, other.errors.largest_at);
+        expect_same(of_rows(RowPath::kPortable), of_rows(path));
+        expect_same(of_turned(RowPath::kPortable), of_turned(path));
       }
     }
   }
@@ -249,7 +337,7 @@ TEST(PointRows, LatticeTooCoarseForTheError) {
   for (const PointTinQuality quality : {PointTinQuality::kGreedy, PointTinQuality::kRemoval}) {
     const PointTin tin = point_tin(grid.rows(), frame, options_of(1.0, quality));
     check_mesh(tin, frame);
-    check_errors(grid, tin, 1.0);
+    check_errors(Places(grid), grid.z, tin, 1.0);
     EXPECT_GT(tin.stuck, 1000u);
     EXPECT_GT(tin.vertices.size(), 300u);
   }
@@ -260,7 +348,7 @@ TEST(PointRows, ErrorZero) {
   const std::vector<Point3> frame = make_frame(1000, 2, 12);
   const PointTin tin = point_tin(grid.rows(), frame, options_of(0.0, PointTinQuality::kRemoval));
   check_mesh(tin, frame);
-  check_errors(grid, tin, 0.0);
+  check_errors(Places(grid), grid.z, tin, 0.0);
   // All inside are vertices: their heights are rounded.
   EXPECT_GT(tin.vertices.size(), 250u);
 }
@@ -279,7 +367,7 @@ TEST(PointRows, SamplesOnTheFrameAndAHairOutside) {
   grid.z[4] = grid.z[9] = grid.z[22] = grid.z[12] = 300;
   const PointTin tin = point_tin(grid.rows(), frame, options_of(0.5, PointTinQuality::kGreedy));
   check_mesh(tin, frame);
-  check_errors(grid, tin, 0.5);
+  check_errors(Places(grid), grid.z, tin, 0.5);
   EXPECT_EQ(tin.stuck, 1u);
   EXPECT_EQ(tin.errors.largest_at, 22u);
   EXPECT_EQ(std::count(tin.sample.begin(), tin.sample.end(), 12u), 1);
@@ -305,7 +393,7 @@ TEST(PointRows, FewSamples) {
   grid.z = {0, 50, kMissing, 7};
   const PointTin row = point_tin(grid.rows(), frame, options);
   check_mesh(row, frame);
-  check_errors(grid, row, 0.5);
+  check_errors(Places(grid), grid.z, row, 0.5);
   EXPECT_EQ(row.errors.covered, 3u);
 }
 
@@ -317,20 +405,20 @@ TEST(PointRows, IrregularPlacesAndFrames) {
   const PointTinOptions options = options_of(1.0, PointTinQuality::kRemoval);
   const PointTin uneven = point_tin(grid.rows(), frame, options);
   check_mesh(uneven, frame);
-  check_errors(grid, uneven, 1.0);
-  check_lattice(grid, uneven, *options.lattice);
+  check_errors(Places(grid), grid.z, uneven, 1.0);
+  check_lattice(Places(grid), grid.z, uneven, *options.lattice);
   const std::vector<Point3> triangle{{0, 0, 1}, {1000, 0, 2}, {0, 1000, 3}};
   const Grid even = make_grid({40, 40, 1000, 0}, 0.0, 13);
   const PointTin part = point_tin(even.rows(), triangle, options);
   check_mesh(part, triangle);
-  check_errors(even, part, 1.0);
+  check_errors(Places(even), even.z, part, 1.0);
   EXPECT_GT(part.errors.uncovered, 0u);
   PointTinOptions few = options;
   few.max_points = 50;
   EXPECT_LE(point_tin(even.rows(), frame, few).vertices.size(), 50u);
   PointTinOptions free = options;
   free.lattice.reset();
-  check_errors(even, point_tin(even.rows(), {}, free), 1.0);
+  check_errors(Places(even), even.z, point_tin(even.rows(), {}, free), 1.0);
 }
 
 TEST(PointRows, RefuseBadInput) {
@@ -354,6 +442,16 @@ TEST(PointRows, RefuseBadInput) {
   EXPECT_TRUE(refused("x of sample"));
   PointTinOptions bad = options;
   bad.max_error = -1;
+  const Grid good = make_grid({10, 10, 1000, 0}, 0.0, 15);
+  const Places places(good);
+  EXPECT_THROW(
+      static_cast<void>(point_tin(SampleGrid{7, places.x, places.y, good.z}, frame, options)),
+      std::invalid_argument);
+  EXPECT_THROW(
+      static_cast<void>(point_tin(SampleGrid{10, places.x, good.y, good.z}, frame, options)),
+      std::invalid_argument);
+  EXPECT_THROW(static_cast<void>(point_tin(SampleGrid{0, {}, {}, good.z}, frame, options)),
+               std::invalid_argument);
   EXPECT_THROW(static_cast<void>(point_tin(grid.rows(), frame, bad)), std::invalid_argument);
 }
 

@@ -308,6 +308,53 @@ class BoundedMeshTest(unittest.TestCase):
         self.refuse(2, '--fill', 'mesh', store, '-o', self.path('none.obj'), '--max-error', 1,
                     '--fill', 'flat')
 
+    def test_irregular_points_in_windows(self):
+        """More points than one window takes: out of core, one piece, whatever the threads."""
+        noise = random.Random(5)
+        columns, rows = 640, 450  # a jittered lattice
+        points = array.array('d')
+        for row in range(rows):
+            for column in range(columns):
+                x, y = column + noise.uniform(-0.4, 0.4), row + noise.uniform(-0.4, 0.4)
+                points.extend((x, y, 80 * math.sin(x / 61) * math.cos(y / 47) + noise.uniform(-1, 1)))
+        count = columns * rows
+        with open(self.path('many.ply'), 'wb') as file:
+            file.write(b'ply\nformat binary_little_endian 1.0\nelement vertex %d\n' % count +
+                       b'property double x\nproperty double y\nproperty double z\nend_header\n')
+            file.write(points.tobytes())
+        store = self.build('many.ply')
+        texts = set()
+        for threads, memory in ((1, '256M'), (2, '256M'), (3, '2G')):
+            summary, out = self.mesh(store, 'many.obj', '--max-error', 4, '--threads', threads,
+                                     '--memory', memory)
+            self.assertLessEqual(summary['max_error'], 4)
+            self.assertEqual(summary['samples'], count)
+            self.assertLess(summary['peak_rss_bytes'], 256 << 20)
+            with open(out, 'rb') as file:
+                texts.add(file.read())
+        self.assertEqual(len(texts), 1)
+        vertices, faces = read_obj(out)
+        edges = border_edges(faces)
+        following = dict(edges)
+        self.assertEqual(len(following), len(edges))
+        at, around = edges[0][0], 0
+        while around == 0 or at != edges[0][0]:
+            at, around = following[at], around + 1
+        self.assertEqual(around, len(edges))
+        area = sum(vertices[a][0] * vertices[b][1] - vertices[b][0] * vertices[a][1]
+                   for a, b in edges) / 2
+        inside = sum((vertices[b][0] - vertices[a][0]) * (vertices[c][1] - vertices[a][1]) -
+                     (vertices[c][0] - vertices[a][0]) * (vertices[b][1] - vertices[a][1])
+                     for a, b, c in faces) / 2
+        self.assertAlmostEqual(area, inside, delta=1e-6 * area)
+        self.refuse(1, '--memory', 'mesh', store, '-o', self.path('none.obj'), '--max-error', 4,
+                    '--memory', '40M')
+        summary, _ = self.mesh(store, 'many.obj', '--max-points', 2000)
+        self.assertLessEqual(summary['vertices'], 2000)
+        self.assertGreater(summary['vertices'], 1900)
+        left = [name for name in os.listdir(self.folder.name) if 'tmp' in name or 'samples' in name]
+        self.assertEqual(left, [])
+
     def test_wrong_usage(self):
         mesh = ('mesh', self.store, '-o', self.path('none.obj'))
         for text, *options in (('not both', '--max-error', 1, '--max-points', 10),

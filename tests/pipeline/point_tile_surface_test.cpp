@@ -390,7 +390,7 @@ TEST(CrowdedLeaf, IsWithinTheBoundOfAllItsSamples) {
     tools::SurfaceSamples samples;
     surface.samples(box_of(tile, leaf), samples);
     ASSERT_GT(samples.size(), 50U);
-    const tools::LeafUnits units(tile, leaf);
+    const tools::LeafPlaces units(tile, leaf);
     std::vector<double> u, v;
     for (std::size_t i = 0; i < samples.size(); ++i) {
       u.push_back(units.u(samples.longitude[i]));

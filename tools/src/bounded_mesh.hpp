@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -30,6 +31,9 @@ tri::TinQuality parse_quality(const std::string& text);
 /// "min", "max", "mean", "first", "error". Throws: UsageError.
 tri::PointDuplicates parse_duplicates(const std::string& text);
 
+/// Irregular samples meshed at once, at most.
+inline constexpr std::size_t kWindowPoints = std::size_t{1} << 18;
+
 struct BoundedMeshOptions {
   double max_error = 0.0;        ///< metres
   std::uint64_t max_points = 0;  ///< 0: no limit; else max_error is not used
@@ -39,6 +43,7 @@ struct BoundedMeshOptions {
   std::optional<Region> region;
   std::string path;                ///< of the mesh
   stream::WriterOptions writer{};  ///< its format
+  std::size_t window_points = kWindowPoints;
 };
 
 /// What was measured on the mesh as a reader of the file gets it back, at every sample of the
@@ -59,7 +64,9 @@ struct BoundedMeshResult {
 BoundedMeshResult bounded_raster_mesh(const stream::Store& store, const BoundedMeshOptions& options,
                                       const CommonOptions& common);
 
-/// The mesh of any other store, in memory as a whole.
+/// The mesh of any other store: of its samples' convex hull. As a whole where it has no more than
+/// options.window_points, else likewise window by window, after one pass over the samples that
+/// finds the hull and the windows.
 BoundedMeshResult bounded_point_mesh(const stream::Store& store, const BoundedMeshOptions& options,
                                      const CommonOptions& common);
 

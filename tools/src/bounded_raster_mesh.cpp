@@ -5,6 +5,7 @@
 #include <terrace/stream/error.hpp>
 
 #include "bounded_mesh.hpp"
+#include "keep_memory.hpp"
 #include "least_error.hpp"
 #include "mesh_spool.hpp"
 #include "raster_mesher.hpp"
@@ -43,6 +44,7 @@ BoundedMeshResult best_of_points(RasterMesher& mesher, const BoundedMeshOptions&
 
 BoundedMeshResult bounded_raster_mesh(const stream::Store& store, const BoundedMeshOptions& options,
                                       const CommonOptions& common) {
+  keep_freed_memory();
   RasterMesher mesher(store, options, common);
   const double metres = mesher.metres_vertical();
   BoundedMeshResult result;

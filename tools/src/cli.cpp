@@ -167,19 +167,6 @@ int dispatch(const std::vector<std::string>& arguments) {
 
 }  // namespace
 
-std::uint64_t CommonOptions::memory_or(std::uint64_t standard) const {
-  if (memory_bytes) return *memory_bytes;
-  return standard != 0 ? standard : machine_memory_bytes() / 2;
-}
-
-void CommonOptions::say(const std::string& line) const {
-  if (!quiet) std::fprintf(stderr, "terrace: %s\n", line.c_str());
-}
-
-void CommonOptions::explain(const std::string& line) const {
-  if (verbose && !quiet) std::fprintf(stderr, "terrace: %s\n", line.c_str());
-}
-
 void not_yet(CLI::App& app, std::initializer_list<const char*> names) {
   for (const char* name : names) {
     app.add_option_function<std::vector<std::string>>(

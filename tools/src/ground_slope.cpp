@@ -90,4 +90,11 @@ tri::Gradient GroundSlope::on_ground(const Point2& stored, const SurfacePoint& s
           (m[0] * surface.per_row - m[1] * surface.per_column) * factor};
 }
 
+std::function<bool(const Point2&, const Point2&)> longer_than(const stream::Store& store,
+                                                              double metres) {
+  return [ground = GroundSlope(store), metres](const Point2& a, const Point2& b) {
+    return ground.metres(a, b) > metres;
+  };
+}
+
 }  // namespace terrace::tools

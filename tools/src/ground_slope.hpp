@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <functional>
 #include <memory>
 
 #include <terrace/stream/store.hpp>
@@ -48,5 +49,9 @@ class GroundSlope {
   GroundMap map_{};  ///< where it is the same everywhere
   std::shared_ptr<Table> table_;
 };
+
+/// Whether two stored places are more than so many metres apart on the ground.
+std::function<bool(const Point2&, const Point2&)> longer_than(const stream::Store& store,
+                                                              double metres);
 
 }  // namespace terrace::tools

@@ -2,6 +2,7 @@
 #include "height_sampler.hpp"
 
 #include "error.hpp"
+#include "units.hpp"
 
 namespace terrace::tools {
 
@@ -10,6 +11,13 @@ tri::Interpolation parse_interpolation(const std::string& text) {
   if (text == "natural") return tri::Interpolation::kNaturalNeighbour;
   if (text == "nearest") return tri::Interpolation::kNearest;
   throw UsageError("'" + text + "' is no --method; write linear, natural or nearest");
+}
+
+std::optional<double> parse_max_edge(const std::string& text) {
+  if (text.empty()) return std::nullopt;
+  const double metres = parse_number(text, "--max-edge");
+  if (!(metres > 0)) throw UsageError("--max-edge must be above 0");
+  return metres;
 }
 
 std::unique_ptr<HeightSampler> make_sampler(const stream::Store& store,

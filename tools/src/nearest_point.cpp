@@ -56,7 +56,12 @@ Point2 NearestPoint::operator()(const Point2& place) {
   check_interrupt();
   branches_.clear();
   nearest_.clear();
+  // The last answer is no farther than it is; it will be found again if there is nothing nearer.
   bound_ = std::numeric_limits<double>::infinity();
+  if (last_) {
+    const double square = square_of((*last_)[0] - place[0], (*last_)[1] - place[1]);
+    bound_ = square * (1 + kDoubt);
+  }
   look_into(reader_.node(root_), place);
   while (!branches_.empty()) {
     std::pop_heap(branches_.begin(), branches_.end(),
@@ -70,6 +75,7 @@ Point2 NearestPoint::operator()(const Point2& place) {
     return square_of(p[0] - place[0], p[1] - place[1]) > bound_;
   });
   if (nearest_.empty()) return {NAN, NAN};
+  last_ = nearest_.front();
   if (std::all_of(nearest_.begin(), nearest_.end(),
                   [&](const Point2& p) { return p == nearest_.front(); })) {
     return nearest_.front();

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include <terrace/stream/store.hpp>
@@ -38,6 +39,7 @@ class NearestPoint {
   unsigned level_;
   std::vector<Branch> branches_;  ///< a heap, the least on top
   std::vector<Point2> nearest_;   ///< as near as rounding can tell, and maybe farther ones before
+  std::optional<Point2> last_;
   double bound_ = 0;              ///< the square of the distance of the nearest, or a little more
 };
 

@@ -62,10 +62,7 @@ class PointSampler final : public HeightSampler {
         std::clamp<std::uint64_t>(memory / kThreadBytes, 1, std::max(1U, options.threads));
     workers_.resize(threads);
     worker_bytes_ = memory / threads;
-    if (options.max_edge) {
-      too_long_ = [ground = GroundSlope(store), most = *options.max_edge](
-                      const Point2& a, const Point2& b) { return ground.metres(a, b) > most; };
-    }
+    if (options.max_edge) too_long_ = longer_than(store, *options.max_edge);
   }
 
   void sample(std::span<const Point2> places, std::span<SurfacePoint> out) override {

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <limits>
 #include <memory>
+#include <optional>
 
 #include <nlohmann/json.hpp>
 #include <terrace/stream/error.hpp>
@@ -17,6 +18,7 @@
 #include "ground_slope.hpp"
 #include "interrupt.hpp"
 #include "line_distance.hpp"
+#include "surface_crossings.hpp"
 #include "units.hpp"
 
 namespace terrace::tools {
@@ -50,7 +52,11 @@ class ProfileRun {
         ground_(store),
         distance_(LineDistance::of(store)),
         sampler_(make_sampler(store, request.sampler)),
-        heights_(FixedText::for_numbers_up_to(largest(store))) {}
+        heights_(FixedText::for_numbers_up_to(largest(store))) {
+    if (!request.step && (!store.schema().grid || request.sampler.level > 0)) {
+      crossings_.emplace(store, request.sampler);
+    }
+  }
 
   ProfileOutcome run() {
     write_("distance,x,y,height\n");
@@ -59,6 +65,8 @@ class ProfileRun {
       const Point2 &a = request_.line[leg], &b = request_.line[leg + 1];
       if (request_.step) {
         walk(a, b);
+      } else if (crossings_) {
+        cross_triangles(a, b);
       } else {
         cross(a, b);
       }
@@ -139,11 +147,26 @@ class ProfileRun {
     add(b, outcome_.metres);
   }
 
+  /// At each crossing with an edge of the triangulation.
+  void cross_triangles(const Point2& a, const Point2& b) {
+    Point2 last = a;
+    (*crossings_)(ground_.stored(a), ground_.stored(b), [&](const auto& crossing) {
+      const Point2 here = between(a, b, crossing.t);
+      outcome_.metres += distance_(last, here);
+      add(here, outcome_.metres, crossing.place, crossing.height);
+      last = here;
+    });
+    outcome_.metres += distance_(last, b);
+    add(b, outcome_.metres);
+  }
+
   void add(const Point2& place, double metres) { add(place, metres, ground_.stored(place)); }
-  void add(const Point2& place, double metres, const Point2& stored) {
+  /// known: the linear surface's height there, where it was met anyhow.
+  void add(const Point2& place, double metres, const Point2& stored, double known = NAN) {
     places_.push_back(place);
     metres_.push_back(metres);
     stored_.push_back(stored);
+    known_.push_back(known);
     last_ = metres;
     if (places_.size() >= kRowsAtOnce) flush();
   }
@@ -151,7 +174,18 @@ class ProfileRun {
   void flush() {
     check_interrupt();
     surface_.assign(stored_.size(), {});
+    const tri::Interpolation method = request_.sampler.method;
+    if (method == tri::Interpolation::kLinear) {
+      for (std::size_t i = 0; i < stored_.size(); ++i) {
+        if (!std::isnan(known_[i])) stored_[i] = {NAN, NAN};  // need not be asked
+      }
+    }
     sampler_->sample(stored_, surface_);
+    for (std::size_t i = 0; i < stored_.size(); ++i) {
+      // On an edge, where rounding may lead outside.
+      const bool missed = std::isnan(surface_[i].height);
+      if (missed && method != tri::Interpolation::kNearest) surface_[i].height = known_[i];
+    }
     std::string text;
     for (std::size_t i = 0; i < places_.size(); ++i) {
       metres_text_.append(text, metres_[i]);
@@ -169,6 +203,7 @@ class ProfileRun {
     places_.clear();
     metres_.clear();
     stored_.clear();
+    known_.clear();
   }
 
   const ProfileRequest& request_;
@@ -180,7 +215,8 @@ class ProfileRun {
   ProfileOutcome outcome_;
   double next_step_ = 1, last_ = 0;
   std::vector<Point2> places_, stored_;
-  std::vector<double> metres_;
+  std::vector<double> metres_, known_;
+  std::optional<SurfaceCrossings> crossings_;
   std::vector<SurfacePoint> surface_;
 };
 
@@ -219,9 +255,6 @@ std::vector<Point2> parse_line(const std::string& text) {
 
 ProfileOutcome write_profile(const stream::Store& store, const ProfileRequest& request,
                              const std::function<void(std::string_view)>& write) {
-  if (!request.step && (!store.schema().grid || request.sampler.level != 0)) {
-    throw UsageError("only rasters at level 0 have a lattice to cross: give --step METRES");
-  }
   return ProfileRun(store, request, write).run();
 }
 

@@ -34,12 +34,13 @@ struct ProfileOutcome {
 /// and the height, empty where there is none.
 ///
 /// With a step, every so many metres and at the end. Without, at the line's places and wherever it
-/// crosses a column, a row or a diagonal of a raster's lattice: between them the linear surface is
-/// straight, so the profile is the surface itself.
+/// crosses a column, a row or a diagonal of a raster's lattice, or, of irregular points and coarser
+/// levels, an edge of their triangulation: between them the linear surface is straight, so the
+/// profile is the surface itself.
 ///
 /// Distances are geodesics (line_distance.hpp) summed over pieces so short that the line's bend
 /// does not show; without a CRS they are the map's. Memory: some thousand rows at a time.
-/// Throws: UsageError without a step for a store that is no raster, or at another level than 0.
+/// Throws: stream::Error on a damaged store, Interrupted, UsageError as make_sampler().
 ProfileOutcome write_profile(const stream::Store& store, const ProfileRequest& request,
                              const std::function<void(std::string_view)>& write);
 

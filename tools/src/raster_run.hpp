@@ -36,10 +36,11 @@ struct RasterOutcome {
 
 /// Writes a tiled GeoTIFF, PixelIsArea: the value of a cell is that of the surface in its centre.
 ///
-/// The grid: without a cell size and in the store's CRS it is a raster's own lattice (rotated ones
-/// have none); else cells of that size from the upper left corner of the region, or of the store's
-/// area, on. It never reaches beyond the store's area; cells whose centres lie outside the region's
-/// polygons are nodata.
+/// The grid: without a cell size, at level 0 and in the store's CRS it is a raster's own lattice
+/// (rotated ones have none); else cells of that size from the upper left corner of the region, or
+/// of the store's area, on. Without a cell size they have about the area that a point of the level
+/// has on average, the size rounded to two digits. The grid never reaches beyond the store's area;
+/// cells whose centres lie outside the region's polygons are nodata.
 ///
 /// Slope, aspect and hillshade come from the 3 x 3 heights around a cell of this grid by Horn's
 /// formula (B. K. P. Horn, "Hill shading and the reflectance map", doi:10.1109/PROC.1981.11918),
@@ -47,8 +48,9 @@ struct RasterOutcome {
 /// in degrees; aspect in degrees clockwise from north, downhill, nodata where it is level;
 /// hillshade 1 to 255 (0: nodata) under a light from 315 degrees, 45 degrees high.
 ///
-/// Memory: some tiles at a time within options.memory_bytes. Throws: stream::Error if the region
-/// does not meet the store; UsageError for a grid of more than 2^31 columns or rows.
+/// Tiles come in the order of a quadtree, so that a store of points is triangulated little more
+/// than once. Memory: some tiles at a time within options.memory_bytes. Throws: stream::Error if
+/// the region does not meet the store; UsageError for a grid of more than 2^31 columns or rows.
 RasterOutcome write_raster(const stream::Store& store, const RasterRequest& request,
                            const std::function<void(std::uint64_t cells, double share)>& progress);
 

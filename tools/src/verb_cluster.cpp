@@ -8,8 +8,10 @@
 
 #include <CLI/CLI.hpp>
 
+#include "cluster_channels.hpp"
 #include "cluster_output.hpp"
 #include "cluster_run.hpp"
+#include "cluster_summary.hpp"
 #include "dendrogram_file.hpp"
 #include "error.hpp"
 #include "interrupt.hpp"
@@ -128,7 +130,7 @@ class ClusterCommand final : public Command {
     std::transform(table.positions.begin(), table.positions.end(), positions.begin(), ground);
     const std::vector<double> weights =
         weight_.empty() ? std::vector<double>() : table.column(weight_);
-    const ChannelTable channels = read_channels(table);
+    const ChannelTable channels = read_channels(table, channels_);
 
     cluster::FacilityPoints problem;
     problem.points = positions;
@@ -158,14 +160,13 @@ class ClusterCommand final : public Command {
     const std::uint64_t points = table.size();
     if (!output_.empty())
       write_clustered(output_, format_, std::move(table), outcome, replace_points);
-    return summary_of(outcome, points, outliers, watch);
+    Summary summary = cluster_summary(outcome, points, outliers, watch.seconds());
+    // Costs are a result; they stay out of the way of another one on standard output.
+    summary.text_is_result = output_ != "-" && labels_ != "-" && dendrogram_ != "-";
+    return summary;
   }
 
  private:
-  struct ChannelTable {
-    std::vector<double> values, weights;
-  };
-
   void check_usage(const CommonOptions& common) {
     const auto method = cluster_method_of(method_);
     if (!method) {
@@ -211,88 +212,6 @@ class ClusterCommand final : public Command {
     }
     const int on_output = (output_ == "-") + (labels_ == "-") + (dendrogram_ == "-") + common.json;
     if (on_output > 1) throw UsageError("only one thing can go to standard output");
-  }
-
-  [[nodiscard]] ChannelTable read_channels(const PointTable& table) const {
-    ChannelTable channels;
-    std::vector<std::vector<double>> columns;
-    for (const std::string& text : channels_) {
-      const std::size_t colon = text.rfind(':');
-      if (colon == std::string::npos || colon == 0) {
-        throw UsageError("--channel " + text + ": write NAME:WEIGHT, as in intensity:0.5");
-      }
-      channels.weights.push_back(
-          parse_number(text.substr(colon + 1), "the weight of --channel " + text));
-      if (!(channels.weights.back() >= 0)) {
-        throw UsageError("--channel " + text + ": the weight must not be negative");
-      }
-      columns.push_back(table.column(text.substr(0, colon)));
-    }
-    channels.values.resize(table.size() * columns.size());
-    for (std::size_t c = 0; c < columns.size(); ++c) {
-      for (std::size_t i = 0; i < table.size(); ++i) {
-        channels.values[i * columns.size() + c] = columns[c][i];
-      }
-    }
-    return channels;
-  }
-
-  [[nodiscard]] Summary summary_of(const ClusterOutcome& outcome, std::uint64_t points,
-                                   std::size_t outliers, const Stopwatch& watch) const {
-    const auto number = [](const std::optional<double>& value) -> nlohmann::ordered_json {
-      return value ? nlohmann::ordered_json(*value) : nlohmann::ordered_json(nullptr);
-    };
-    std::optional<double> cost;
-    if (outcome.connection_cost) {
-      cost = *outcome.connection_cost + outcome.opening_cost.value_or(0.0) +
-             outcome.outlier_cost.value_or(0.0);
-    }
-    std::optional<double> gap;
-    if (cost && outcome.lower_bound && *outcome.lower_bound > 0) {
-      gap = std::max(0.0, *cost / *outcome.lower_bound - 1.0);
-    }
-    Summary summary;
-    summary.json = {{"points", points},
-                    {"clusters", outcome.representatives.size()},
-                    {"outliers", outliers},
-                    {"cost", number(cost)},
-                    {"opening_cost", number(outcome.opening_cost)},
-                    {"connection_cost", number(outcome.connection_cost)},
-                    {"outlier_cost", number(outcome.outlier_cost)},
-                    {"lower_bound", number(outcome.lower_bound)},
-                    {"gap", number(gap)},
-                    {"seconds", watch.seconds()},
-                    {"peak_rss_bytes", peak_rss_bytes()}};
-    std::string& text = summary.text;
-    text = with_commas(points) + " points, ";
-    if (!outcome.labels.empty()) {
-      text += with_commas(outcome.representatives.size()) + " clusters";
-      if (outliers > 0) text += " and " + with_commas(outliers) + " outliers";
-      text += ", ";
-    }
-    text += readable_seconds(watch.seconds()) + "\n";
-    if (cost) {
-      text += "cost " + rounded(*cost);
-      if (outcome.opening_cost) {
-        text += " = " + rounded(*outcome.opening_cost) + " for opening + " +
-                rounded(*outcome.connection_cost) + " for connecting";
-      }
-      if (outliers > 0) text += " + " + rounded(*outcome.outlier_cost) + " for outliers";
-      text += "\n";
-    }
-    if (gap) {
-      text += "lower bound " + rounded(*outcome.lower_bound) + ": at most " + rounded(100 * *gap) +
-              " % above the optimum\n";
-    }
-    // Costs are a result; they stay out of the way of another one on standard output.
-    summary.text_is_result = output_ != "-" && labels_ != "-" && dendrogram_ != "-";
-    return summary;
-  }
-
-  static std::string rounded(double value) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.6g", value);
-    return text;
   }
 
   ClusterRequest request_;

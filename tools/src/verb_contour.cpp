@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <memory>
+#include <optional>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -29,6 +30,12 @@ class ContourCommand final : public Command {
         ->type_name("HEIGHT");
     app.add_option("--region", region_,
                    "only what is inside: minx,miny,maxx,maxy or a GeoJSON file");
+    app.add_option("--level", level_, "only points of this level and above: a number or top")
+        ->capture_default_str();
+    app.add_option("--max-edge", max_edge_,
+                   "of points: triangles with a longer side, on the ground, are no data (default: "
+                   "none is too long)")
+        ->type_name("METRES");
     crs_.define_region(app);
   }
 
@@ -37,11 +44,17 @@ class ContourCommand final : public Command {
     ContourRequest request;
     request.interval = parse_number(interval_, "--interval");
     if (!(request.interval > 0)) throw UsageError("--interval must be above 0");
+    const std::optional<unsigned> level = parse_level(level_);
+    if (!max_edge_.empty()) {
+      request.max_edge = parse_number(max_edge_, "--max-edge");
+      if (!(*request.max_edge > 0)) throw UsageError("--max-edge must be above 0");
+    }
     if (common.json && output_ == "-") {
       throw UsageError("--json and the lines cannot both go to standard output; give -o FILE");
     }
     const stream::Store store = stream::Store::open(store_);
     if (!region_.empty()) request.region = crs_.regions(store)(Region::parse(region_));
+    request.level = level.value_or(store.top());
     request.threads = common.threads;
     request.memory_bytes = common.memory_or(machine_memory_bytes() / 2);
     TextOutput output(output_, may_replace(output_, common.force));
@@ -64,7 +77,7 @@ class ContourCommand final : public Command {
   }
 
  private:
-  std::string store_, output_, interval_, region_;
+  std::string store_, output_, interval_, region_, level_ = "0", max_edge_;
   CrsOptions crs_;
 };
 

@@ -37,11 +37,16 @@ class ProfileCommand final : public Command {
         "if it is another");
     app.add_option("--step", step_,
                    "metres from row to row (default: a row wherever the line crosses the lattice "
-                   "or a diagonal of it)")
+                   "or a diagonal of it, or an edge of the triangulated points)")
         ->type_name("METRES");
     app.add_option("--method", method_, "linear, natural or nearest")
         ->capture_default_str()
         ->type_name("NAME");
+    app.add_option(
+           "--max-edge", max_edge_,
+           "of irregular points and coarser levels: triangles with a longer side (metres on "
+           "the ground) are no data, as over water and in shadows (default: none)")
+        ->type_name("METRES");
     app.add_option("--level", level_, "only points of this level and above: a number or top")
         ->capture_default_str();
   }
@@ -53,6 +58,7 @@ class ProfileCommand final : public Command {
     }
     ProfileRequest request;
     request.sampler.method = parse_interpolation(method_);
+    request.sampler.max_edge = parse_max_edge(max_edge_);
     const std::optional<unsigned> level = parse_level(level_);
     if (!step_.empty()) {
       request.step = parse_number(step_, "--step");
@@ -86,7 +92,8 @@ class ProfileCommand final : public Command {
   }
 
  private:
-  std::string store_, output_, line_, line_crs_, shift_, step_, method_ = "linear", level_ = "0";
+  std::string store_, output_, line_, line_crs_, shift_, step_, method_ = "linear", level_ = "0",
+              max_edge_;
 };
 
 }  // namespace

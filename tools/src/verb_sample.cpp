@@ -37,10 +37,15 @@ class SampleCommand final : public Command {
         ->capture_default_str()
         ->type_name("FILE");
     app.add_option("--method", method_,
-                   "linear: on the triangulated samples; natural: natural neighbours, smooth; "
-                   "nearest: the nearest sample")
+                   "linear: on the triangulated points; natural: natural neighbours, smooth; "
+                   "nearest: the nearest point")
         ->capture_default_str()
         ->type_name("NAME");
+    app.add_option(
+           "--max-edge", max_edge_,
+           "of irregular points and coarser levels: triangles with a longer side (metres on "
+           "the ground) are no data, as over water and in shadows (default: none)")
+        ->type_name("METRES");
     app.add_option("--level", level_, "only points of this level and above: a number or top")
         ->capture_default_str();
     app.add_option("--points-crs", points_crs_,
@@ -60,6 +65,7 @@ class SampleCommand final : public Command {
     }
     SamplerOptions options;
     options.method = parse_interpolation(method_);
+    options.max_edge = parse_max_edge(max_edge_);
     const std::optional<unsigned> level = parse_level(level_);
     const stream::Store store = stream::Store::open(store_);
     options.level = level.value_or(store.top());
@@ -115,7 +121,7 @@ class SampleCommand final : public Command {
   }
 
   std::string store_, points_ = "-", output_ = "-", method_ = "linear", level_ = "0", points_crs_,
-                      to_crs_, shift_;
+                      to_crs_, shift_, max_edge_;
 };
 
 }  // namespace

@@ -8,7 +8,7 @@ namespace terrace::tools {
 namespace {
 
 constexpr std::uint32_t kWindow = std::uint32_t{1} << 31;
-constexpr std::uint64_t kMostCounted = std::uint64_t{1} << 20;
+constexpr std::uint64_t kMostCounted = std::uint64_t{1} << 18;
 /// Halvings of the store's area. More come only where points lie on each other.
 constexpr unsigned kDeepest = 48;
 

@@ -16,7 +16,7 @@ namespace terrace::tools {
 /// Parts a store's area into windows of about `points` points of a level and above: boxes, halved
 /// across until they hold so few. They depend on the points alone.
 ///
-/// Counts the points of a coarser level, as fine as 2^20 of them allow, and takes each for as many
+/// Counts the points of a coarser level, as fine as 2^18 of them allow, and takes each for as many
 /// as come on one. O(n log n) of those; they are read once.
 class WindowTree {
  public:

@@ -1,48 +1,52 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "point_rows.hpp"
 
-#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
-#include "lattice.hpp"
 #include "point_rows_surface.hpp"
 
 namespace terrace::tri {
 namespace {
 
-/// Ascending at distances that are equal but for a thousandth.
-bool regular(std::span<const double> places) {
-  const double first = places.front();
-  const double step = (places.back() - first) / static_cast<double>(places.size() - 1);
-  if (!(step > 0.0 && std::isfinite(step))) return places.size() == 1 && std::isfinite(first);
-  for (std::size_t i = 0; i < places.size(); ++i)
-    if (!(std::abs(places[i] - (first + static_cast<double>(i) * step)) <= 1e-3 * step))
-      return false;
-  return true;
-}
-
 /// Whether a RowSurface does what is asked for.
-bool has_surface(const SampleRows& samples, std::span<const Point3> frame,
-                 const PointTinOptions& options) {
-  const auto few = [](std::span<const double> places) {
-    return !places.empty() && places.size() <= tin::rows::kMostRows;
-  };
-  return options.lattice && options.max_points == 0 && few(samples.x) && few(samples.y) &&
-         options.quality != PointTinQuality::kFitted && regular(samples.x) && regular(samples.y) &&
-         tin::rows::is_rectangle(frame);
+bool has_surface(std::span<const Point3> frame, const PointTinOptions& options) {
+  return options.lattice && options.max_points == 0 && tin::rows::is_rectangle(frame);
 }
 
-PointTin tin_of_points(const SampleRows& samples, std::span<const Point3> frame,
+std::array<double, 2> place_of(const SampleRows& samples, std::size_t i) {
+  return {samples.x[i % samples.x.size()], samples.y[i / samples.x.size()]};
+}
+std::array<double, 2> place_of(const SampleGrid& samples, std::size_t i) {
+  return {samples.x[i], samples.y[i]};
+}
+
+void check_sizes(const SampleRows& samples) {
+  if (samples.x.size() * samples.y.size() != samples.z.size())
+    throw std::invalid_argument("point_tin: not a height for each row and column");
+}
+void check_sizes(const SampleGrid& samples) {
+  if (samples.x.size() != samples.z.size() || samples.y.size() != samples.z.size())
+    throw std::invalid_argument("point_tin: arrays of different lengths");
+  if (samples.columns == 0 ? !samples.z.empty() : samples.z.size() % samples.columns != 0)
+    throw std::invalid_argument("point_tin: not a height for each row and column");
+}
+
+template <class Samples>
+PointTin tin_of_points(const Samples& samples, std::span<const Point3> frame,
                        const PointTinOptions& options) {
   std::vector<double> x, y, z;
   std::vector<std::uint32_t> number;
   for (std::size_t i = 0; i < samples.z.size(); ++i) {
     if (std::isnan(samples.z[i])) continue;
-    x.push_back(samples.x[i % samples.x.size()]);
-    y.push_back(samples.y[i / samples.x.size()]);
+    const std::array<double, 2> place = place_of(samples, i);
+    x.push_back(place[0]);
+    y.push_back(place[1]);
     z.push_back(samples.z[i]);
     number.push_back(static_cast<std::uint32_t>(i));
   }
@@ -57,26 +61,42 @@ PointTin tin_of_points(const SampleRows& samples, std::span<const Point3> frame,
 
 namespace tin::rows {
 
-PointTin make_tin(const SampleRows& samples, std::span<const Point3> frame,
+template <class Samples>
+PointTin make_tin(const Samples& samples, std::span<const Point3> frame,
                   const PointTinOptions& options, RowPath path) {
   points::check_options(options, frame);
-  if (samples.x.size() * samples.y.size() != samples.z.size())
-    throw std::invalid_argument("point_tin: not a height for each row and column");
+  check_sizes(samples);
   if (samples.z.size() > std::size_t{1} << 29)
     throw std::length_error("point_tin: more than 2^29 samples");
-  if (!has_surface(samples, frame, options)) return tin_of_points(samples, frame, options);
-  RowSurface surface(samples, frame, options, path);
+  if (!has_surface(frame, options)) return tin_of_points(samples, frame, options);
+  std::optional<PaddedSamples> padded = padded_samples(samples, frame);
+  if (!padded) return tin_of_points(samples, frame, options);
+  RowSurface surface(*std::move(padded), frame, options, path);
   surface.refine();
   if (options.quality != PointTinQuality::kGreedy) {
     surface.arrange();
     surface.remove();
   }
+  if (options.quality == PointTinQuality::kFitted) {
+    surface.fit();
+    surface.remove();
+  }
   return surface.result();
 }
+
+template PointTin make_tin(const SampleRows&, std::span<const Point3>, const PointTinOptions&,
+                           RowPath);
+template PointTin make_tin(const SampleGrid&, std::span<const Point3>, const PointTinOptions&,
+                           RowPath);
 
 }  // namespace tin::rows
 
 PointTin point_tin(const SampleRows& samples, std::span<const Point3> frame,
+                   const PointTinOptions& options) {
+  return tin::rows::make_tin(samples, frame, options, tin::rows::best_row_path());
+}
+
+PointTin point_tin(const SampleGrid& samples, std::span<const Point3> frame,
                    const PointTinOptions& options) {
   return tin::rows::make_tin(samples, frame, options, tin::rows::best_row_path());
 }

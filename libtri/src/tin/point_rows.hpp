@@ -17,8 +17,9 @@ void check_options(const PointTinOptions& options, std::span<const Point3> frame
 
 namespace rows {
 
-/// point_tin() of samples in rows and columns, with a given instruction set.
-PointTin make_tin(const SampleRows& samples, std::span<const Point3> frame,
+/// point_tin() of SampleRows or SampleGrid, with a given instruction set.
+template <class Samples>
+PointTin make_tin(const Samples& samples, std::span<const Point3> frame,
                   const PointTinOptions& options, RowPath path);
 
 }  // namespace rows

@@ -19,7 +19,7 @@ using Ints = std::int64_t __attribute__((vector_size(64)));
 
 namespace terrace::tri::tin::rows {
 
-const RowScan kRowScanPortable{worst_in, within_in, measure_in};
+const RowScan kRowScanPortable = scan_of();
 
 #ifdef TERRACE_TRI_X86
 

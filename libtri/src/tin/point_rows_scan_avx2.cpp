@@ -21,6 +21,6 @@ using Ints = std::int64_t __attribute__((vector_size(64)));
 
 namespace terrace::tri::tin::rows {
 
-const RowScan kRowScanAvx2{worst_in, within_in, measure_in};
+const RowScan kRowScanAvx2 = scan_of();
 
 }  // namespace terrace::tri::tin::rows

@@ -31,6 +31,6 @@ using Reals = double __attribute__((vector_size(64)));
 
 namespace terrace::tri::tin::rows {
 
-const RowScan kRowScanAvx512{worst_in, within_in, measure_in};
+const RowScan kRowScanAvx512 = scan_of();
 
 }  // namespace terrace::tri::tin::rows

@@ -4,198 +4,120 @@
 // Included once for each instruction set, after what masks of lanes are there: type Mask, functions
 // at_least(), above(), both(), either_of(), bits_of(). What is here must not be shared between
 // objects, so nothing has a name outside its object, and no function of another header is called.
-#include "point_rows_scan.hpp"
+#include "point_rows_scan_face.hpp"
 
 namespace terrace::tri::tin::rows {
 namespace {
 
-using Half = double __attribute__((vector_size(32)));
-constexpr int kLanes = 8;
-constexpr double kColumnMargin = 0.01;
-
-[[gnu::always_inline]] inline Reals load(const double* from) {
-  Reals lanes;
-  __builtin_memcpy(&lanes, from, sizeof lanes);
-  return lanes;
-}
-/// Four of one row and four of another.
-[[gnu::always_inline]] inline Reals load_two(const double* upper, const double* lower) {
-  Half a, b;
-  __builtin_memcpy(&a, upper, sizeof a);
-  __builtin_memcpy(&b, lower, sizeof b);
-  return __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7);
-}
-[[gnu::always_inline]] inline Reals size_of(Reals lanes) {
-  return (Reals)((Ints)lanes & 0x7FFFFFFFFFFFFFFF);
-}
-[[gnu::always_inline]] inline double least(double a, double b) { return b < a ? b : a; }
-[[gnu::always_inline]] inline double greatest(double a, double b) { return b > a ? b : a; }
-
-/// The first of `count` ascending places that is not below `from`.
-[[gnu::always_inline]] inline std::int32_t first_not_below(const double* places, std::int32_t count,
-                                                           double per_unit, double from) {
-  const double guess = least(greatest((from - places[0]) * per_unit, 0.0), count);
-  auto at = static_cast<std::int32_t>(guess);
-  while (places[at] < from) ++at;
-  while (places[at - 1] >= from) --at;
-  return at;
-}
-/// The first that is above `to`.
-[[gnu::always_inline]] inline std::int32_t first_above(const double* places, std::int32_t count,
-                                                       double per_unit, double to) {
-  const double guess = least(greatest((to - places[0]) * per_unit + 1.0, 0.0), count);
-  auto at = static_cast<std::int32_t>(guess);
-  while (places[at] <= to) ++at;
-  while (places[at - 1] > to) --at;
-  return at;
+/// Which samples lie in the triangle, rounding allowed for.
+template <bool kUpright, class Edge>
+[[gnu::always_inline]] inline auto inside(const Face<kUpright>& face, const Edge& edge) {
+  const Reals margin = face.margin - Reals{};
+  return both(at_least(edge(0), margin),
+              both(at_least(edge(1), margin), at_least(edge(2), margin)));
 }
 
-/// What a scan knows of its triangle before it looks at samples.
-struct Face {
-  double gradient_x, gradient_y;
-  double slack;   ///< what rounding may do to an error
-  double margin;  ///< what it may do to an edge function, negative
-  double start_x[3], start_y[3], along_x[3], along_y[3];  ///< of the sides
-  std::int32_t first_column, last_column, first_row, last_row;
-  bool empty;
-
-  [[gnu::always_inline]] Face(const RowSamples& samples, const RowCorner& a, const RowCorner& b,
-                              const RowCorner& c) {
-    const double min_x = least(a.x, least(b.x, c.x)), max_x = greatest(a.x, greatest(b.x, c.x));
-    const double min_y = least(a.y, least(b.y, c.y)), max_y = greatest(a.y, greatest(b.y, c.y));
-    first_row = first_not_below(samples.y, samples.rows, samples.rows_per_y, min_y);
-    last_row = first_above(samples.y, samples.rows, samples.rows_per_y, max_y) - 1;
-    first_column = first_not_below(samples.x, samples.columns, samples.columns_per_x, min_x);
-    last_column = first_above(samples.x, samples.columns, samples.columns_per_x, max_x) - 1;
-    empty = first_row > last_row || first_column > last_column;
-    if (empty) return;
-    const double bx = b.x - a.x, by = b.y - a.y, bz = b.z - a.z;
-    const double cx = c.x - a.x, cy = c.y - a.y, cz = c.z - a.z;
-    const double inverse = 1.0 / (bx * cy - by * cx);
-    gradient_x = (bz * cy - cz * by) * inverse;
-    gradient_y = (cz * bx - bz * cx) * inverse;
-    const double width = max_x - min_x, height = max_y - min_y;
-    // Rounded are: the gradients several times, in proportion to the terms of their sums; 2
-    // products, differences of places and heights and 2 sums.
-    const double rise = __builtin_fabs(gradient_x) * width + __builtin_fabs(gradient_y) * height;
-    const double heights = __builtin_fabs(a.z) + __builtin_fabs(bz) + __builtin_fabs(cz);
-    slack = 0x1p-51 * (rise + heights) +
-            0x1p-50 * (__builtin_fabs(bz) + __builtin_fabs(cz)) * (2.0 * width * height * inverse);
-    margin = -0x1p-49 * (width * height);
-    const RowCorner* const corner[3] = {&a, &b, &c};
-    for (int i = 0; i < 3; ++i) {
-      const RowCorner& from = *corner[i];
-      const RowCorner& to = *corner[i == 2 ? 0 : i + 1];
-      start_x[i] = from.x;
-      start_y[i] = from.y;
-      along_x[i] = to.x - from.x;
-      along_y[i] = to.y - from.y;
-    }
+/// Blocks of two rows of four samples, for boxes that are no wider. Calls visit(heights above the
+/// plane, edge, column, row, log2 of the columns) until it returns false; edge(i) is the edge
+/// function of side i.
+template <bool kUpright, class Visit>
+[[gnu::always_inline]] inline void scan_blocks(const RowSamples& samples,
+                                               const Face<kUpright>& face, const RowCorner& a,
+                                               const Visit& visit) {
+  const std::int32_t column = face.box.first_column;
+  Reals x{}, across[3]{};
+  if constexpr (kUpright) {
+    x = load_two(samples.x + column, samples.x + column);
+    for (int i = 0; i < 3; ++i) across[i] = face.along_y[i] * (x - face.start_x[i]);
   }
-};
-
-/// Blocks of two rows of four samples, for boxes that are no wider. Calls visit(errors, inside(),
-/// column, row, log2 of the columns) until it returns false.
-template <class Visit>
-[[gnu::always_inline]] inline void scan_blocks(const RowSamples& samples, const Face& face,
-                                               const RowCorner& a, const Visit& visit) {
-  const std::int32_t column = face.first_column;
-  const Reals x = load_two(samples.x + column, samples.x + column);
-  const Reals rise_x = face.gradient_x * (x - a.x);
-  Reals across[3];
-  for (int i = 0; i < 3; ++i) across[i] = face.along_y[i] * (x - face.start_x[i]);
-  for (std::int32_t row = face.first_row; row <= face.last_row; row += 2) {
-    const double* const z = samples.z + static_cast<std::size_t>(row) * samples.stride + column;
-    const double upper = samples.y[row], lower = samples.y[row + 1];
-    const Reals y = {upper, upper, upper, upper, lower, lower, lower, lower};
-    const Reals error =
-        size_of((load_two(z, z + samples.stride) - a.z) - (rise_x + face.gradient_y * (y - a.y)));
-    const auto inside = [&]() __attribute__((always_inline)) {
-      Reals edge[3];
-      for (int i = 0; i < 3; ++i) edge[i] = face.along_x[i] * (y - face.start_y[i]) - across[i];
-      return both(
-          at_least(edge[0], face.margin - Reals{}),
-          both(at_least(edge[1], face.margin - Reals{}), at_least(edge[2], face.margin - Reals{})));
+  for (std::int32_t row = face.box.first_row; row <= face.box.last_row; row += 2) {
+    const std::size_t at =
+        static_cast<std::size_t>(row) * samples.stride + static_cast<std::size_t>(column);
+    const double* const z = samples.z + at;
+    Reals y;
+    if constexpr (kUpright) {
+      const double upper = samples.y[row], lower = samples.y[row + 1];
+      y = Reals{upper, upper, upper, upper, lower, lower, lower, lower};
+    } else {
+      x = load_two(samples.x + at, samples.x + at + samples.stride);
+      y = load_two(samples.y + at, samples.y + at + samples.stride);
+    }
+    const Reals above_plane = (load_two(z, z + samples.stride) - a.z) -
+                              (face.gradient_x * (x - a.x) + face.gradient_y * (y - a.y));
+    const auto edge = [&](int i) __attribute__((always_inline)) {
+      const Reals up = face.along_x[i] * (y - face.start_y[i]);
+      if constexpr (kUpright) return up - across[i];
+      return up - face.along_y[i] * (x - face.start_x[i]);
     };
-    if (!visit(error, inside, column, row, 2)) return;
+    if (!visit(above_plane, edge, column, row, 2)) return;
   }
 }
 
-/// Row by row. Of wide triangles each row has its own range of columns, a little too wide.
-template <class Visit>
-[[gnu::always_inline]] inline void scan_rows(const RowSamples& samples, const Face& face,
-                                             const RowCorner& a, const Visit& visit) {
-  const bool wide = face.last_column - face.first_column >= 2 * kLanes;
-  // The columns of the sides' starts, and columns per height along the sides.
-  double base[3], slope[3];
-  for (int i = 0; i < 3 && wide; ++i) {
-    const double sign = face.along_y[i] < 0.0 ? -1.0 : 1.0;
-    slope[i] =
-        face.along_y[i] == 0.0 ? 0.0 : face.along_x[i] / face.along_y[i] * samples.columns_per_x;
-    base[i] = (face.start_x[i] - samples.x[0]) * samples.columns_per_x;
-    // Places are off equal distances by less than that, and quotients are rounded.
-    base[i] += sign * (kColumnMargin +
-                       0x1p-48 * (__builtin_fabs(base[i]) +
-                                  __builtin_fabs(face.along_x[i]) * samples.columns_per_x));
-  }
-  for (std::int32_t row = face.first_row; row <= face.last_row; ++row) {
-    const double y = samples.y[row];
-    std::int32_t first = face.first_column, last = face.last_column;
-    double across[3];
-    for (int i = 0; i < 3; ++i) across[i] = face.along_x[i] * (y - face.start_y[i]);
-    if (wide) {
-      double left = first, right = last;
-      for (int i = 0; i < 3; ++i) {
-        const double at = base[i] + slope[i] * (y - face.start_y[i]);
-        // A side that goes down is on the left.
-        left = face.along_y[i] < 0.0 ? greatest(left, at) : left;
-        right = face.along_y[i] > 0.0 ? least(right, at) : right;
-      }
-      if (right < left) continue;
-      first = static_cast<std::int32_t>(left + (1.0 - kColumnMargin / 2));
-      last = static_cast<std::int32_t>(right);
+/// Row by row. Of wide triangles each row has its own range of columns.
+template <bool kUpright, class Visit>
+[[gnu::always_inline]] inline void scan_rows(const RowSamples& samples, const Face<kUpright>& face,
+                                             const RowCorner& a, const RowCorner& b,
+                                             const RowCorner& c, const Visit& visit) {
+  const bool wide = face.box.last_column - face.box.first_column >= 2 * kLanes;
+  const Spans spans(samples, a, b, c);
+  for (std::int32_t row = face.box.first_row; row <= face.box.last_row; ++row) {
+    std::int32_t first = face.box.first_column, last = face.box.last_column;
+    if (wide) spans.row(row, first, last);
+    const std::size_t start = static_cast<std::size_t>(row) * samples.stride;
+    double up[3]{}, rise_y = 0.0;
+    if constexpr (kUpright) {
+      const double y = samples.y[row];
+      for (int i = 0; i < 3; ++i) up[i] = face.along_x[i] * (y - face.start_y[i]);
+      rise_y = face.gradient_y * (y - a.y);
     }
-    const double* const z = samples.z + static_cast<std::size_t>(row) * samples.stride;
-    const double rise_y = face.gradient_y * (y - a.y);
     for (std::int32_t column = first; column <= last; column += kLanes) {
-      const Reals x = load(samples.x + column);
-      const Reals error =
-          size_of((load(z + column) - a.z) - (face.gradient_x * (x - a.x) + rise_y));
-      const auto inside = [&]() __attribute__((always_inline)) {
-        Reals edge[3];
-        for (int i = 0; i < 3; ++i) edge[i] = across[i] - face.along_y[i] * (x - face.start_x[i]);
-        return both(at_least(edge[0], face.margin - Reals{}),
-                    both(at_least(edge[1], face.margin - Reals{}),
-                         at_least(edge[2], face.margin - Reals{})));
+      const std::size_t at = start + static_cast<std::size_t>(column);
+      const Reals z = load(samples.z + at);
+      Reals x, y{}, above_plane;
+      if constexpr (kUpright) {
+        x = load(samples.x + column);
+        above_plane = (z - a.z) - (face.gradient_x * (x - a.x) + rise_y);
+      } else {
+        x = load(samples.x + at);
+        y = load(samples.y + at);
+        above_plane = (z - a.z) - (face.gradient_x * (x - a.x) + face.gradient_y * (y - a.y));
+      }
+      const auto edge = [&](int i) __attribute__((always_inline)) {
+        const Reals side = face.along_y[i] * (x - face.start_x[i]);
+        if constexpr (kUpright) return up[i] - side;
+        return face.along_x[i] * (y - face.start_y[i]) - side;
       };
-      if (!visit(error, inside, column, row, 3)) return;
+      if (!visit(above_plane, edge, column, row, 3)) return;
     }
   }
 }
 
-template <class Visit>
-[[gnu::always_inline]] inline void scan(const RowSamples& samples, const Face& face,
-                                        const RowCorner& a, const Visit& visit) {
-  if (face.last_column - face.first_column < 4) {
+template <bool kUpright, class Visit>
+[[gnu::always_inline]] inline void scan(const RowSamples& samples, const Face<kUpright>& face,
+                                        const RowCorner& a, const RowCorner& b, const RowCorner& c,
+                                        const Visit& visit) {
+  if (face.box.last_column - face.box.first_column < 4) {
     scan_blocks(samples, face, a, visit);
   } else {
-    scan_rows(samples, face, a, visit);
+    scan_rows(samples, face, a, b, c, visit);
   }
 }
 
+template <bool kUpright>
 RowWorst worst_in(const RowSamples& samples, const RowCorner& a, const RowCorner& b,
                   const RowCorner& c, double bound) {
-  const Face face(samples, a, b, c);
+  const Face<kUpright> face(samples, a, b, c);
   RowWorst worst{0, 0};
   if (face.empty) return worst;
   double best = greatest(bound - face.slack, face.slack);
   scan(
-      samples, face, a,
-      [&](Reals error, const auto& inside, std::int32_t column, std::int32_t row, int bits)
+      samples, face, a, b, c,
+      [&](Reals above_plane, const auto& edge, std::int32_t column, std::int32_t row, int bits)
           __attribute__((always_inline)) {
+            const Reals error = size_of(above_plane);
             const auto candidates = above(error, best - Reals{});
             if (bits_of(candidates) == 0) return true;
-            unsigned found = bits_of(both(candidates, inside()));
+            unsigned found = bits_of(both(candidates, inside(face, edge)));
             for (; found != 0; found &= found - 1) {
               const int lane = __builtin_ctz(found);
               if (!(error[lane] > best)) continue;
@@ -208,42 +130,79 @@ RowWorst worst_in(const RowSamples& samples, const RowCorner& a, const RowCorner
   return worst;
 }
 
+template <bool kUpright>
 bool within_in(const RowSamples& samples, const RowCorner& a, const RowCorner& b,
                const RowCorner& c, double bound) {
-  const Face face(samples, a, b, c);
+  const Face<kUpright> face(samples, a, b, c);
   if (face.empty) return true;
   const double allowed = greatest(bound - face.slack, face.slack);
   bool within = true;
   scan(
-      samples, face, a,
-      [&](Reals error, const auto& inside, std::int32_t, std::int32_t, int)
+      samples, face, a, b, c,
+      [&](Reals above_plane, const auto& edge, std::int32_t, std::int32_t, int)
           __attribute__((always_inline)) {
-            const auto candidates = above(error, allowed - Reals{});
+            const auto candidates = above(size_of(above_plane), allowed - Reals{});
             if (bits_of(candidates) == 0) return true;
-            within = bits_of(both(candidates, inside())) == 0;
+            within = bits_of(both(candidates, inside(face, edge))) == 0;
             return within;
           });
   return within;
 }
 
+template <bool kUpright>
 void measure_in(const RowSamples& samples, const RowCorner& a, const RowCorner& b,
                 const RowCorner& c, double* errors) {
-  const Face face(samples, a, b, c);
+  const Face<kUpright> face(samples, a, b, c);
   if (face.empty) return;
   scan(
-      samples, face, a,
-      [&](Reals error, const auto& inside, std::int32_t column, std::int32_t row, int bits)
+      samples, face, a, b, c,
+      [&](Reals above_plane, const auto& edge, std::int32_t column, std::int32_t row,
+          int bits) __attribute__((always_inline)) {
+        double* const to = errors + static_cast<std::size_t>(row) * samples.stride + column;
+        const Reals sure = size_of(above_plane) + face.slack;
+        const Reals known = bits == 2 ? load_two(to, to + samples.stride) : load(to);
+        const Reals raised = either_of(both(above(sure, known), inside(face, edge)), sure, known);
+        __builtin_memcpy(to, &raised, bits == 2 ? sizeof(Half) : sizeof(Reals));
+        if (bits == 2)
+          __builtin_memcpy(to + samples.stride, reinterpret_cast<const double*>(&raised) + 4,
+                           sizeof(Half));
+        return true;
+      });
+}
+
+template <bool kUpright>
+void narrow_in(const RowSamples& samples, const RowCorner& a, const RowCorner& b,
+               const RowCorner& c, double bound, RowInterval& rises) {
+  // Below this share of the weights the corner has no say.
+  constexpr double kLeast = 1e-9;
+  const Face<kUpright> face(samples, a, b, c);
+  if (face.empty) return;
+  const double allowed = greatest(bound - face.slack, 0.0);
+  RowInterval found = rises;
+  scan(
+      samples, face, a, b, c,
+      [&](Reals above_plane, const auto& edge, std::int32_t, std::int32_t, int)
           __attribute__((always_inline)) {
-            double* const to = errors + static_cast<std::size_t>(row) * samples.stride + column;
-            const Reals sure = error + face.slack;
-            const Reals known = bits == 2 ? load_two(to, to + samples.stride) : load(to);
-            const Reals raised = either_of(both(above(sure, known), inside()), sure, known);
-            __builtin_memcpy(to, &raised, bits == 2 ? sizeof(Half) : sizeof(Reals));
-            if (bits == 2)
-              __builtin_memcpy(to + samples.stride, reinterpret_cast<const double*>(&raised) + 4,
-                               sizeof(Half));
+            unsigned lanes = bits_of(inside(face, edge));
+            if (lanes == 0) return true;
+            const Reals weights = edge(1) * face.inverse;
+            for (; lanes != 0; lanes &= lanes - 1) {
+              const int lane = __builtin_ctz(lanes);
+              const double weight = weights[lane], rise = above_plane[lane];
+              if (!(weight > kLeast) || rise != rise) continue;
+              found.low = greatest(found.low, (rise - allowed) / weight);
+              found.high = least(found.high, (rise + allowed) / weight);
+            }
             return true;
           });
+  rises = found;
+}
+
+constexpr RowScan scan_of() {
+  return {{worst_in<false>, worst_in<true>},
+          {within_in<false>, within_in<true>},
+          {measure_in<false>, measure_in<true>},
+          {narrow_in<false>, narrow_in<true>}};
 }
 
 }  // namespace

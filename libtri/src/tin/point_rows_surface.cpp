@@ -4,139 +4,31 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
-#include <string>
+#include <utility>
 
 #include "error_queue.hpp"
 #include "lattice.hpp"
 #include "point_lists.hpp"
 #include "point_removal.hpp"
-#include "point_samples.hpp"
+#include "point_rows_ground.hpp"
 
 namespace terrace::tri::tin::rows {
-namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-/// With what RowSamples wants before and after.
-std::vector<double> padded(std::span<const double> places) {
-  std::vector<double> all{-kInfinity};
-  all.reserve(places.size() + 1 + kRowPad);
-  all.insert(all.end(), places.begin(), places.end());
-  all.insert(all.end(), kRowPad, kInfinity);
-  return all;
-}
-
-double per_unit(std::span<const double> places) {
-  const double extent = places.back() - places.front();
-  return extent > 0.0 ? static_cast<double>(places.size() - 1) / extent : 0.0;
-}
-
-/// > 0: a, b, c turn left; exact.
-template <class P>
-std::int64_t turn(const P& a, const P& b, const P& c) {
-  return std::int64_t{b.x - a.x} * (c.y - a.y) - std::int64_t{b.y - a.y} * (c.x - a.x);
-}
-
-template <class P>
-bool in_circle(const P& a, const P& b, const P& c, const P& p) {
-  __extension__ typedef __int128 Wide;
-  const std::int64_t ax = a.x - p.x, ay = a.y - p.y;
-  const std::int64_t bx = b.x - p.x, by = b.y - p.y;
-  const std::int64_t cx = c.x - p.x, cy = c.y - p.y;
-  return Wide{bx * cy - by * cx} * (ax * ax + ay * ay) +
-             Wide{cx * ay - cy * ax} * (bx * bx + by * by) +
-             Wide{ax * by - ay * bx} * (cx * cx + cy * cy) >
-         0;
-}
-
-}  // namespace
-
-bool is_rectangle(std::span<const Point3> frame) {
-  if (frame.size() < 4) return false;
-  std::array<double, 2> low{kFarthest, kFarthest}, high{0.0, 0.0};
-  for (const Point3& p : frame) {
-    if (!(std::abs(p[2]) < points::kLargest)) return false;
-    for (std::size_t k = 0; k < 2; ++k) {
-      if (!(p[k] >= 0.0 && p[k] < kFarthest && p[k] == std::floor(p[k]))) return false;
-      low[k] = std::min(low[k], p[k]);
-      high[k] = std::max(high[k], p[k]);
-    }
-  }
-  const double width = high[0] - low[0], height = high[1] - low[1];
-  if (!(width > 0.0 && height > 0.0)) return false;
-  // Places along the sides, from the south-west corner on.
-  const double whole = 2.0 * (width + height);
-  const auto along = [&](const Point3& p) {
-    if (p[1] == low[1]) return p[0] - low[0];
-    if (p[0] == high[0]) return width + (p[1] - low[1]);
-    if (p[1] == high[1]) return width + height + (high[0] - p[0]);
-    return p[0] == low[0] ? 2.0 * width + height + (high[1] - p[1]) : -1.0;
-  };
-  unsigned corners = 0, turns = 0;
-  for (std::size_t i = 0; i < frame.size(); ++i) {
-    const double here = along(frame[i]), next = along(frame[i + 1 == frame.size() ? 0 : i + 1]);
-    if (here < 0.0 || here >= whole || here == next) return false;
-    turns += next < here ? 1 : 0;
-    corners +=
-        here == 0.0 || here == width || here == width + height || here == 2.0 * width + height ? 1
-                                                                                               : 0;
-  }
-  return corners == 4 && turns == 1;
-}
-
-RowSurface::RowSurface(const SampleRows& samples, std::span<const Point3> frame,
+RowSurface::RowSurface(PaddedSamples padded, std::span<const Point3> frame,
                        const PointTinOptions& options, RowPath path)
     : options_(options),
       lattice_(*options.lattice),
       tangent_(points::tangent_of(options.min_angle_degrees)),
-      x_(padded(samples.x)),
-      y_(padded(samples.y)),
+      padded_(std::move(padded)),
+      samples_(padded_.view()),
       scan_(row_scan(path)),
-      tiles_(static_cast<std::int32_t>(samples.x.size()),
-             static_cast<std::int32_t>(samples.y.size())) {
-  samples_ = {x_.data() + 1,
-              y_.data() + 1,
-              nullptr,
-              samples.x.size() + kRowPad,
-              static_cast<std::int32_t>(samples.x.size()),
-              static_cast<std::int32_t>(samples.y.size()),
-              per_unit(samples.x),
-              per_unit(samples.y)};
-  copy(samples, frame);
+      tiles_(samples_.columns, samples_.rows) {
   start(frame);
 }
 
-void RowSurface::copy(const SampleRows& samples, std::span<const Point3> frame) {
-  constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
-  Point3 low = frame[0], high = frame[0];
-  for (const Point3& p : frame) {
-    for (std::size_t k = 0; k < 2; ++k) {
-      low[k] = std::min(low[k], p[k]);
-      high[k] = std::max(high[k], p[k]);
-    }
-  }
-  const std::size_t columns = samples.x.size(), rows = samples.y.size();
-  heights_.resize((rows + 1) * samples_.stride);
-  for (std::size_t row = 0; row < rows; ++row) {
-    const double* const from = samples.z.data() + row * columns;
-    double* const to = heights_.data() + row * samples_.stride;
-    const bool within = samples.y[row] >= low[1] && samples.y[row] <= high[1];
-    for (std::size_t i = 0; i < columns; ++i) {
-      to[i] = from[i];
-      if (std::isnan(from[i])) continue;
-      if (!(std::abs(from[i]) < points::kLargest))
-        throw std::invalid_argument("point_tin: z of sample " + std::to_string(row * columns + i) +
-                                    " is not finite or too large");
-      ++known_;
-      // Those outside, be it by a hair, have no influence.
-      if (!within || samples.x[i] < low[0] || samples.x[i] > high[0]) to[i] = kMissing;
-    }
-    std::fill(to + columns, to + samples_.stride, kMissing);
-  }
-  std::fill(heights_.end() - static_cast<std::ptrdiff_t>(samples_.stride), heights_.end(),
-            kMissing);
-  samples_.z = heights_.data();
+RowCorner RowSurface::sample(std::uint32_t place) const {
+  const std::size_t i = at(place);
+  if (samples_.upright) return {samples_.x[place & 0xFFFF], samples_.y[place >> 16], samples_.z[i]};
+  return {samples_.x[i], samples_.y[i], samples_.z[i]};
 }
 
 void RowSurface::start(std::span<const Point3> frame) {
@@ -224,13 +116,13 @@ void RowSurface::refine() {
     if (t == kNone) break;
     const std::uint32_t place = triangles_[t].place;
     // Next to a side it is a sample of two triangles, and the other has given it up.
-    if (std::isnan(heights_[at(place)])) {
+    const RowCorner own = sample(place);
+    if (std::isnan(own.z)) {
       look(t);
       continue;
     }
-    const Vertex p{static_cast<std::int32_t>(to_whole(samples_.x[place & 0xFFFF])),
-                   static_cast<std::int32_t>(to_whole(samples_.y[place >> 16])),
-                   on_lattice(lattice_, heights_[at(place)]), place};
+    const Vertex p{static_cast<std::int32_t>(to_whole(own.x)),
+                   static_cast<std::int32_t>(to_whole(own.y)), on_lattice(lattice_, own.z), place};
     const Spot spot = locate(p, t);
     bool reached = false;
     if (spot.triangle != kNone && !spot.taken && !spot.border) {
@@ -243,77 +135,15 @@ void RowSurface::refine() {
     }
     if (reached) continue;
     // It would be tried again, but its place is taken.
-    stuck_.emplace_back(at(place), heights_[at(place)]);
-    heights_[at(place)] = std::numeric_limits<double>::quiet_NaN();
+    stuck_.emplace_back(at(place), own.z);
+    padded_.z[at(place)] = std::numeric_limits<double>::quiet_NaN();
     look(t);
   }
-  for (const auto& [index, height] : stuck_) heights_[index] = height;
-}
-
-bool RowSurface::wide(const Vertex& a, const Vertex& b, const Vertex& c) const {
-  const auto square = [](const Vertex& p, const Vertex& q) {
-    const std::int64_t x = q.x - p.x, y = q.y - p.y;
-    return x * x + y * y;
-  };
-  const std::int64_t ab = square(a, b), bc = square(b, c), ca = square(c, a);
-  // The scalar product at the smallest angle, which is opposite to the shortest side.
-  const std::int64_t twice = ab + bc + ca - 2 * std::min({ab, bc, ca});
-  return 2.0 * static_cast<double>(turn(a, b, c)) >= tangent_ * static_cast<double>(twice);
-}
-
-bool RowSurface::fits(const Vertex& a, const Vertex& b, const Vertex& c) const {
-  return scan_.within(samples_, corner(a), corner(b), corner(c), options_.max_error);
-}
-
-bool RowSurface::keeps(const Vertex& a, const Vertex& b, const Vertex& c,
-                       const RowCorner& sample) const {
-  const auto area = [&](const Vertex& p, const Vertex& q) {
-    return (p.x - sample.x) * (q.y - sample.y) - (p.y - sample.y) * (q.x - sample.x);
-  };
-  const double at_a = area(b, c), at_b = area(c, a), at_c = area(a, b);
-  if (!(at_a >= 0.0 && at_b >= 0.0 && at_c >= 0.0)) return true;
-  const double sum = at_a * (a.z - sample.z) + at_b * (b.z - sample.z) + at_c * (c.z - sample.z);
-  return std::abs(sum) <= options_.max_error * (at_a + at_b + at_c);
-}
-
-std::size_t RowSurface::remove() {
-  std::vector<std::uint32_t> triangle_of = triangle_of_vertices(triangles_, vertices_.size());
-  Star star;
-  PolygonFill fill;
-  Vertex ring[kMaxRing];
-  RowCorner own{};  // the removed vertex's sample
-  const auto left = [&](std::size_t i, std::size_t m, std::size_t j) {
-    return turn(ring[i], ring[m], ring[j]) > 0;
-  };
-  const auto inside = [&](std::size_t i, std::size_t m, std::size_t j, std::size_t p) {
-    return in_circle(ring[i], ring[m], ring[j], ring[p]);
-  };
-  const auto within = [&](std::size_t i, std::size_t m, std::size_t j) {
-    return keeps(ring[i], ring[m], ring[j], own) && fits(ring[i], ring[m], ring[j]);
-  };
-  const auto good = [&](std::size_t i, std::size_t m, std::size_t j) {
-    return turn(ring[i], ring[m], ring[j]) > 0 && wide(ring[i], ring[m], ring[j]) &&
-           within(i, m, j);
-  };
-  AnyFill any(good, fill);
-  std::size_t count = 0;
-  for (std::uint32_t v = fixed_; v < vertices_.size(); ++v) {
-    if (triangle_of[v] == kNone || !star.gather(triangles_, v, triangle_of[v])) continue;
-    const std::size_t size = star.size();
-    const std::uint32_t sample = vertices_[v].sample;
-    own = {samples_.x[sample & 0xFFFF], samples_.y[sample >> 16], heights_[at(sample)]};
-    for (std::size_t i = 0; i < size; ++i) ring[i] = vertices_[star.ring(i)];
-    if (!(fill_delaunay(size, left, inside, fill) && star.all_of(fill, within)) &&
-        !(size > 3 && any.find(size)))
-      continue;
-    star.replace(triangles_, fill, triangle_of, v);
-    ++count;
-  }
-  return count;
+  for (const auto& [index, height] : stuck_) padded_.z[index] = height;
 }
 
 void RowSurface::measure(PointTin& tin) const {
-  std::vector<double> errors(heights_.size(), -1.0);
+  std::vector<double> errors(padded_.z.size(), -1.0);
   for (const Triangle& t : triangles_)
     if (t.live())
       scan_.measure(samples_, corner(vertex(t, 0)), corner(vertex(t, 1)), corner(vertex(t, 2)),
@@ -334,7 +164,7 @@ void RowSurface::measure(PointTin& tin) const {
       }
     }
   }
-  all.uncovered = known_ - all.covered;
+  all.uncovered = padded_.known - all.covered;
   if (all.covered > 0) all.rms = std::sqrt(squares / static_cast<double>(all.covered));
 }
 

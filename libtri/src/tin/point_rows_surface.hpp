@@ -10,20 +10,12 @@
 #include "cavity.hpp"
 #include "grid_tiles.hpp"
 #include "mesh.hpp"
+#include "point_rows_places.hpp"
 #include "point_rows_scan.hpp"
 #include "star.hpp"
 #include "terrace/tri/point_tin.hpp"
 
 namespace terrace::tri::tin::rows {
-
-/// Coordinates of vertices are below this: predicates are exact in 128 bits.
-inline constexpr double kFarthest = 0x1p20;
-/// Columns and rows are at most as many: both fit into Triangle::place.
-inline constexpr std::size_t kMostRows = 65535;
-
-/// Whether the frame is an upright rectangle with whole coordinates from 0 to kFarthest, its
-/// vertices counter-clockwise along the sides, the corners among them.
-bool is_rectangle(std::span<const Point3> frame);
 
 /// A mesh over samples in rows and columns, on a lattice, in an upright rectangle. The sides of the
 /// rectangle are kept.
@@ -32,9 +24,9 @@ bool is_rectangle(std::span<const Point3> frame);
 /// columns, which is several times as fast.
 class RowSurface {
  public:
-  /// frame: see is_rectangle(). Throws as point_tin() does for heights of samples.
-  RowSurface(const SampleRows& samples, std::span<const Point3> frame,
-             const PointTinOptions& options, RowPath path);
+  /// frame: see is_rectangle().
+  RowSurface(PaddedSamples padded, std::span<const Point3> frame, const PointTinOptions& options,
+             RowPath path);
 
   /// Inserts samples until all that can become vertices are within the bound: Delaunay.
   void refine();
@@ -42,6 +34,9 @@ class RowSurface {
   void arrange();
   /// One pass of removals that keep the bound at all samples. Returns their number.
   std::size_t remove();
+  /// One sweep over the vertices: each is moved to the middle of the heights that keep the bound
+  /// at the samples of its triangles.
+  void fit();
   /// With every sample measured.
   PointTin result();
 
@@ -66,8 +61,8 @@ class RowSurface {
   [[nodiscard]] std::size_t at(std::uint32_t place) const {
     return (place >> 16) * samples_.stride + (place & 0xFFFF);
   }
+  [[nodiscard]] RowCorner sample(std::uint32_t place) const;
   [[nodiscard]] Spot locate(const Vertex& p, std::uint32_t triangle) const;
-  void copy(const SampleRows& samples, std::span<const Point3> frame);
   void start(std::span<const Point3> frame);
   void insert(std::uint32_t vertex, std::uint32_t triangle);
   /// Finds the triangle's worst sample.
@@ -82,9 +77,8 @@ class RowSurface {
   const PointTinOptions& options_;
   const TinLattice lattice_;
   double tangent_;  ///< of the smallest angle
-  std::vector<double> x_, y_, heights_;
-  RowSamples samples_{};
-  std::size_t known_ = 0;  ///< samples that are there
+  PaddedSamples padded_;
+  RowSamples samples_;
   const RowScan& scan_;
   GridTiles tiles_;
   std::uint32_t fixed_ = 0;  ///< vertices of the frame

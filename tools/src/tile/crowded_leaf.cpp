@@ -26,7 +26,7 @@ struct Places {
   }
 };
 
-Places on_units(const SurfaceSamples& samples, const LeafUnits& units) {
+Places on_units(const SurfaceSamples& samples, const LeafPlaces& units) {
   Places places;
   for (std::size_t i = 0; i < samples.size(); ++i) {
     places.add(units.u(samples.longitude[i]), units.v(samples.latitude[i]), samples.height[i]);
@@ -37,7 +37,7 @@ Places on_units(const SurfaceSamples& samples, const LeafUnits& units) {
 /// The lowest and the highest sample of each cell of a leaf.
 class Extremes {
  public:
-  explicit Extremes(const LeafUnits& units) : units_(units) {
+  explicit Extremes(const LeafPlaces& units) : units_(units) {
     columns_ = static_cast<std::size_t>(units.width() * kPartsOfUnit) + 1;
     const std::size_t rows = static_cast<std::size_t>(units.height() * kPartsOfUnit) + 1;
     lowest_.resize(columns_ * rows);
@@ -72,7 +72,7 @@ class Extremes {
   struct Sample {
     double u = 0.0, v = 0.0, height = std::numeric_limits<double>::quiet_NaN();
   };
-  const LeafUnits& units_;
+  const LeafPlaces& units_;
   std::size_t columns_ = 0;
   std::vector<Sample> lowest_, highest_;
 };
@@ -82,7 +82,7 @@ class Extremes {
 tri::PointTin mesh_crowded_leaf(const TileAddress& tile, const TileLeaf& leaf,
                                 std::span<const tri::Point3> frame,
                                 const tri::PointTinOptions& options, TileSurface& surface) {
-  const LeafUnits units(tile, leaf);
+  const LeafPlaces units(tile, leaf);
   const GeographicBox box = box_of(tile, leaf);
   Places taken;
   {

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <span>
-#include <vector>
 
 #include <terrace/tri/point_tin.hpp>
 
@@ -16,9 +15,9 @@ namespace terrace::tools {
 
 /// Degrees to units of a tile, of the samples of a leaf. Rounding must not take a sample on a side
 /// out of both leaves.
-class LeafUnits {
+class LeafPlaces {
  public:
-  LeafUnits(const TileAddress& tile, const TileLeaf& leaf)
+  LeafPlaces(const TileAddress& tile, const TileLeaf& leaf)
       : whole_(box_of(tile)),
         units_(kTileUnits / (whole_.east - whole_.west)),
         west_(leaf_unit(leaf.x, leaf.depth)),
@@ -31,12 +30,6 @@ class LeafUnits {
   }
   [[nodiscard]] double v(double latitude) const {
     return std::clamp((latitude - whole_.south) * units_, south_, north_);
-  }
-  void to_u(std::vector<double>& longitudes) const {
-    for (double& at : longitudes) at = u(at);
-  }
-  void to_v(std::vector<double>& latitudes) const {
-    for (double& at : latitudes) at = v(at);
   }
   [[nodiscard]] double west() const { return west_; }
   [[nodiscard]] double south() const { return south_; }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <optional>
 #include <utility>
@@ -52,33 +53,43 @@ void take(std::span<const double> places, const Part& part, std::vector<double>&
 RasterTileSurface::RasterTileSurface(const TiledRaster& raster)
     : raster_(raster), reader_(raster.store, std::uint64_t{32} << 20) {}
 
+bool RasterTileSurface::grid(const GeographicBox& box, SurfaceGrid& out) {
+  const LatticeWindow window = window_around(raster_, box);
+  out.columns = static_cast<std::size_t>(window.columns);
+  out.longitude.resize(window.size());
+  out.latitude.resize(window.size());
+  out.height.resize(window.size());
+  if (window.size() == 0) return true;
+  const View view = this->view(window);
+  raster_.geography.window(window.column, window.row, out.columns,
+                           static_cast<std::size_t>(window.rows), out.longitude, out.latitude);
+  for (std::size_t i = 0; i < out.height.size(); ++i) {
+    const double longitude = wrapped(out.longitude[i]), latitude = out.latitude[i];
+    out.longitude[i] = longitude;
+    // Written so that NaN is outside.
+    const bool inside = longitude >= box.west && longitude <= box.east && latitude >= box.south &&
+                        latitude <= box.north;
+    const double height = view.first[static_cast<std::int64_t>(i / out.columns) * view.stride +
+                                     static_cast<std::int64_t>(i % out.columns)];
+    if (!inside) {
+      out.height[i] = std::numeric_limits<double>::quiet_NaN();
+    } else if (std::isnan(height)) {
+      out.height[i] = raster_.flat_fill.value_or(height);
+    } else {
+      out.height[i] = raster_.vertical.convert({longitude, latitude}, height);
+    }
+  }
+  return true;
+}
+
 void RasterTileSurface::samples(const GeographicBox& box, SurfaceSamples& out) {
   out.clear();
-  const LatticeWindow window = window_around(raster_, box);
-  if (window.size() == 0) return;
-  const View view = this->view(window);
-  longitude_.resize(window.size());
-  latitude_.resize(window.size());
-  raster_.geography.window(window.column, window.row, static_cast<std::size_t>(window.columns),
-                           static_cast<std::size_t>(window.rows), longitude_, latitude_);
-  for (std::int64_t row = 0, i = 0; row < window.rows; ++row) {
-    for (std::int64_t column = 0; column < window.columns; ++column, ++i) {
-      const double longitude = wrapped(longitude_[static_cast<std::size_t>(i)]);
-      const double latitude = latitude_[static_cast<std::size_t>(i)];
-      // Written so that NaN is outside.
-      const bool inside = longitude >= box.west && longitude <= box.east && latitude >= box.south &&
-                          latitude <= box.north;
-      if (!inside) continue;
-      const double height = view.first[row * view.stride + column];
-      if (std::isnan(height)) {
-        if (!raster_.flat_fill) continue;
-        out.height.push_back(*raster_.flat_fill);
-      } else {
-        out.height.push_back(raster_.vertical.convert({longitude, latitude}, height));
-      }
-      out.longitude.push_back(longitude);
-      out.latitude.push_back(latitude);
-    }
+  grid(box, grid_);
+  for (std::size_t i = 0; i < grid_.height.size(); ++i) {
+    if (std::isnan(grid_.height[i])) continue;
+    out.longitude.push_back(grid_.longitude[i]);
+    out.latitude.push_back(grid_.latitude[i]);
+    out.height.push_back(grid_.height[i]);
   }
 }
 

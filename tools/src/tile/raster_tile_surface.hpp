@@ -26,6 +26,7 @@ class RasterTileSurface final : public TileSurface {
   void expect(const GeographicBox& box) override;
   void samples(const GeographicBox& box, SurfaceSamples& out) override;
   bool rows(const GeographicBox& box, SurfaceRows& out) override;
+  bool grid(const GeographicBox& box, SurfaceGrid& out) override;
   std::optional<HeightRange> range(const GeographicBox& box) override;
   void heights(std::span<const double> longitude, std::span<const double> latitude,
                std::span<double> out) override;
@@ -54,7 +55,7 @@ class RasterTileSurface final : public TileSurface {
   HeightCache reader_;
   LatticeWindow held_{};
   std::vector<double> heights_;  ///< of the held window
-  std::vector<double> longitude_, latitude_;
+  SurfaceGrid grid_;
 };
 
 }  // namespace terrace::tools

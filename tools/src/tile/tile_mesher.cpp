@@ -47,23 +47,56 @@ double flat_error(const std::vector<SideVertex>& frame, double step, const Heigh
   return std::max(range.high - low, high - range.low);
 }
 
+/// Degrees along one axis to units of the tile; rounding takes no sample out of the leaf.
+struct LeafUnits {
+  double from = 0.0, units = 0.0;
+  double low = 0.0, high = 0.0;  ///< the leaf's sides
+
+  [[nodiscard]] double at(double degrees) const {
+    return std::clamp((degrees - from) * units, low, high);
+  }
+  void convert(std::vector<double>& degrees) const {
+    for (double& place : degrees) place = at(place);
+  }
+  /// Of places without a height too: those may lie outside, and nothing holds them back.
+  void convert(std::vector<double>& degrees, std::span<const double> heights) const {
+    for (std::size_t i = 0; i < degrees.size(); ++i) {
+      degrees[i] = std::isnan(heights[i]) ? (degrees[i] - from) * units : at(degrees[i]);
+    }
+  }
+};
+
 tri::PointTin tin_of(const TileAddress& tile, const TileLeaf& leaf, TileSurface& surface,
                      bool measured, std::span<const tri::Point3> frame,
                      const tri::PointTinOptions& options) {
+  const GeographicBox whole = box_of(tile);
+  const double units = kTileUnits / (whole.east - whole.west);
+  const auto units_along = [&](double from, std::uint32_t part) {
+    return LeafUnits{from, units, static_cast<double>(leaf_unit(part, leaf.depth)),
+                     static_cast<double>(leaf_unit(part + 1, leaf.depth))};
+  };
+  const LeafUnits across = units_along(whole.west, leaf.x);
+  const LeafUnits down = units_along(whole.south, leaf.y);
   if (!measured) return tri::point_tin(tri::SampleRows{}, frame, options);
-  const GeographicBox box = box_of(tile, leaf);
-  const LeafUnits units(tile, leaf);
-  if (is_to_be_cut(box, surface)) return mesh_crowded_leaf(tile, leaf, frame, options, surface);
-  if (SurfaceRows rows; surface.rows(box, rows)) {
-    units.to_u(rows.longitude);
-    units.to_v(rows.latitude);
+  if (is_to_be_cut(box_of(tile, leaf), surface)) {
+    return mesh_crowded_leaf(tile, leaf, frame, options, surface);
+  }
+  if (SurfaceRows rows; surface.rows(box_of(tile, leaf), rows)) {
+    across.convert(rows.longitude);
+    down.convert(rows.latitude);
     return tri::point_tin(tri::SampleRows{rows.longitude, rows.latitude, rows.height}, frame,
                           options);
   }
+  if (SurfaceGrid grid; surface.grid(box_of(tile, leaf), grid)) {
+    across.convert(grid.longitude, grid.height);
+    down.convert(grid.latitude, grid.height);
+    return tri::point_tin(tri::SampleGrid{grid.columns, grid.longitude, grid.latitude, grid.height},
+                          frame, options);
+  }
   SurfaceSamples samples;
-  surface.samples(box, samples);
-  units.to_u(samples.longitude);
-  units.to_v(samples.latitude);
+  surface.samples(box_of(tile, leaf), samples);
+  across.convert(samples.longitude);
+  down.convert(samples.latitude);
   return tri::point_tin(samples.longitude, samples.latitude, samples.height, frame, options);
 }
 

@@ -30,6 +30,13 @@ struct SurfaceRows {
   std::vector<double> height;     ///< metres above the ellipsoid, row by row; NaN: no sample
 };
 
+/// Samples that stand about in rows and columns: number row * columns + column.
+struct SurfaceGrid {
+  std::size_t columns = 0;
+  std::vector<double> longitude, latitude;
+  std::vector<double> height;  ///< NaN: no sample
+};
+
 /// Bounds on the heights of samples, not always reached.
 struct HeightRange {
   double low = 0.0, high = 0.0;  ///< metres above the ellipsoid
@@ -62,6 +69,13 @@ class TileSurface {
   virtual void samples(const GeographicBox& box, SurfaceSamples& out) = 0;
   /// The same where samples stand in rows and columns, which is faster; false where they do not.
   virtual bool rows(const GeographicBox& box, SurfaceRows& out) {
+    static_cast<void>(box);
+    static_cast<void>(out);
+    return false;
+  }
+  /// The same where they do so about, as in another projection; what lies outside the box is no
+  /// sample.
+  virtual bool grid(const GeographicBox& box, SurfaceGrid& out) {
     static_cast<void>(box);
     static_cast<void>(out);
     return false;

@@ -142,6 +142,42 @@ void find_bounds(TiledRaster& raster) {
   raster.spacing = spacing;
 }
 
+/// Places of a box, by rows.
+struct PlaceGrid {
+  GeographicBox box;
+  unsigned across = 1, down = 1;  ///< steps
+
+  [[nodiscard]] std::vector<Point2> places() const {
+    std::vector<Point2> places;
+    for (unsigned j = 0; j <= down; ++j) {
+      for (unsigned i = 0; i <= across; ++i) {
+        places.push_back({box.west + (box.east - box.west) * i / across,
+                          box.south + (box.north - box.south) * j / down});
+      }
+    }
+    return places;
+  }
+  /// The largest of a coordinate of what became of the places; infinite where one has none. Between
+  /// places a quadratic function is an eighth of it off a straight line.
+  [[nodiscard]] double second_difference(std::span<const Point2> made, std::size_t axis) const {
+    double largest = 0.0;
+    const auto look = [&](std::size_t at, std::size_t step) {
+      const double own =
+          std::abs(made[at - step][axis] - 2.0 * made[at][axis] + made[at + step][axis]);
+      largest = own <= largest ? largest : own;
+      if (std::isnan(own)) largest = std::numeric_limits<double>::infinity();
+    };
+    for (std::size_t j = 0; j <= down; ++j) {
+      for (std::size_t i = 0; i <= across; ++i) {
+        const std::size_t at = j * (across + 1) + i;
+        if (i > 0 && i < across) look(at, 1);
+        if (j > 0 && j < down) look(at, across + 1);
+      }
+    }
+    return largest;
+  }
+};
+
 }  // namespace
 
 TiledRaster::TiledRaster(const stream::Store& tiled, CoordinateSystem system,
@@ -179,16 +215,16 @@ LatticeWindow window_around(const TiledRaster& raster, const GeographicBox& box)
   const GeographicBox part{std::max(box.west, all.west), std::max(box.south, all.south),
                            std::min(box.east, all.east), std::min(box.north, all.north)};
   if (!(part.west <= part.east && part.south <= part.north)) return {};
-  const stream::Schema& schema = raster.store.schema();
   const bool straight = raster.crs.is_geographic();
-  const unsigned steps = straight ? 1 : 24;
-  std::vector<Point2> places;
-  for (unsigned j = 0; j <= steps; ++j) {
-    for (unsigned i = 0; i <= steps; ++i) {
-      places.push_back({part.west + (part.east - part.west) * i / steps,
-                        part.south + (part.north - part.south) * j / steps});
-    }
-  }
+  // Up to here second differences tell how much projections bulge.
+  constexpr double kNear = 1.0;
+  constexpr unsigned kManySteps = 24, kFewSteps = 6;
+  const bool near = part.east - part.west <= kNear && part.north - part.south <= kNear;
+  const auto steps_of = [&](double degrees) {
+    return straight || degrees <= raster.spacing ? 1U : near ? kFewSteps : kManySteps;
+  };
+  const PlaceGrid grid{part, steps_of(part.east - part.west), steps_of(part.north - part.south)};
+  std::vector<Point2> places = grid.places();
   raster.crs.from_geographic(places);
   if (straight) places = in_all_turns(raster, places);
   to_lattice(raster.placement, places);
@@ -199,15 +235,16 @@ LatticeWindow window_around(const TiledRaster& raster, const GeographicBox& box)
   const auto span = [&](std::size_t axis, std::uint64_t count, std::int64_t& first,
                         std::int64_t& size) {
     // What bulges between the places looked at.
-    const double margin = 1.0 + (straight ? 0.0 : (around.max[axis] - around.min[axis]) / steps);
+    double margin = straight ? 0.0 : (around.max[axis] - around.min[axis]) / kManySteps;
+    if (near && !straight) margin = 2.0 * grid.second_difference(places, axis);
     const double last = static_cast<double>(count - 1);
-    const double low = std::clamp(std::floor(around.min[axis] - margin), 0.0, last);
-    const double high = std::clamp(std::ceil(around.max[axis] + margin), 0.0, last);
+    const double low = std::clamp(std::floor(around.min[axis] - 1.0 - margin), 0.0, last);
+    const double high = std::clamp(std::ceil(around.max[axis] + 1.0 + margin), 0.0, last);
     first = static_cast<std::int64_t>(low);
     size = static_cast<std::int64_t>(high - low) + 1;
   };
-  span(0, schema.columns, window.column, window.columns);
-  span(1, schema.rows, window.row, window.rows);
+  span(0, raster.store.schema().columns, window.column, window.columns);
+  span(1, raster.store.schema().rows, window.row, window.rows);
   return window;
 }
 

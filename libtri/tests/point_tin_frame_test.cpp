@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "point_tin_oracle.hpp"
+#include "terrace/tri/point_tin.hpp"
+
+namespace terrace::tri {
+namespace {
+
+using namespace point_tin_oracle;
+
+std::vector<Point3> square_frame(double size, std::size_t per_side, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::vector<Point3> frame;
+  const auto steps = static_cast<double>(per_side);
+  for (std::size_t side = 0; side < 4; ++side) {
+    for (std::size_t k = 0; k < per_side; ++k) {
+      const double t = std::floor(static_cast<double>(k) / steps * size);
+      const double height = 20 * to_unit(random());
+      if (side == 0) frame.push_back({t, 0, height});
+      if (side == 1) frame.push_back({size, t, height});
+      if (side == 2) frame.push_back({size - t, size, height});
+      if (side == 3) frame.push_back({0, size - t, height});
+    }
+  }
+  return frame;
+}
+
+TEST(PointTin, KeepsTheFrame) {
+  for (const std::uint64_t seed : {5u, 6u, 7u}) {
+    for (const PointTinQuality quality : kQualities) {
+      SCOPED_TRACE("seed " + std::to_string(seed) + ", quality " +
+                   std::to_string(static_cast<int>(quality)));
+      const std::vector<Point3> frame = square_frame(1000, 1 + 6 * (seed - 5), seed);
+      Cloud cloud;
+      std::mt19937_64 random(seed);
+      std::size_t inside = 0;
+      for (std::size_t i = 0; i < 3000; ++i) {
+        const double x = 1200 * to_unit(random()) - 100;
+        const double y = 1200 * to_unit(random()) - 100;
+        inside += x >= 0 && x <= 1000 && y >= 0 && y <= 1000 ? 1 : 0;
+        cloud.add(x, y, rough(x / 1000, y / 1000));
+      }
+      // A hair outside and on the sides, where the frame's heights stand.
+      cloud.add(500, std::nextafter(1000.0, 2000.0), 0);
+      cloud.add(std::nextafter(0.0, -1.0), 20, 0);
+      cloud.add(500, 1000, 500);
+      cloud.add(0, 0, -300);
+      inside += 2;
+      PointTinOptions options;
+      options.max_error = 2;
+      options.quality = quality;
+      const PointTin tin = make(cloud, frame, options);
+      check_frame(tin, frame);
+      EXPECT_EQ(tin.errors.covered, inside);
+      EXPECT_EQ(tin.errors.uncovered, cloud.size() - inside);
+      EXPECT_EQ(tin.stuck, 2u);
+      EXPECT_GT(tin.errors.largest, 300);
+      const TinErrors measured = measure(cloud, tin);
+      EXPECT_EQ(measured.covered, inside);
+      EXPECT_NEAR(measured.largest, tin.errors.largest, 1e-9);
+      // All but these two keep the error.
+      cloud.z[cloud.size() - 1] = frame[0][2];
+      cloud.x[cloud.size() - 2] = 2000;
+      EXPECT_LE(measure(cloud, tin).largest, 2 + 1e-9);
+      if (quality == PointTinQuality::kGreedy) check_delaunay(tin);
+    }
+  }
+}
+
+TEST(PointTin, KeepsTheErrorOnALattice) {
+  for (const double size : {40.0, 300.0, 32767.0}) {
+    for (const PointTinQuality quality : kQualities) {
+      SCOPED_TRACE("size " + std::to_string(size) + ", quality " +
+                   std::to_string(static_cast<int>(quality)));
+      const std::vector<Point3> frame = square_frame(size, 5, 8);
+      Cloud cloud;
+      std::mt19937_64 random(8);
+      for (std::size_t i = 0; i < 4000; ++i) {
+        const double x = (1.02 * to_unit(random()) - 0.01) * size;
+        const double y = (1.02 * to_unit(random()) - 0.01) * size;
+        cloud.add(x, y, rough(x / size, y / size));
+      }
+      PointTinOptions options;
+      options.max_error = 1.5;
+      options.quality = quality;
+      options.lattice = TinLattice{-100, 0.01};
+      const PointTin tin = make(cloud, frame, options);
+      check_frame(tin, frame);
+      for (std::size_t v = frame.size(); v < tin.vertices.size(); ++v) {
+        const Point3& p = tin.vertices[v];
+        EXPECT_EQ(p[0], std::floor(p[0]));
+        EXPECT_EQ(p[1], std::floor(p[1]));
+        const double steps = (p[2] + 100) / 0.01;
+        EXPECT_NEAR(steps, std::round(steps), 1e-6);
+        EXPECT_EQ(p[0], std::floor(cloud.x[tin.sample[v]] + 0.5));
+        EXPECT_EQ(p[1], std::floor(cloud.y[tin.sample[v]] + 0.5));
+      }
+      const TinErrors measured = measure(cloud, tin);
+      EXPECT_EQ(measured.covered, tin.errors.covered);
+      EXPECT_NEAR(measured.largest, tin.errors.largest, 1e-9);
+      // A coarse lattice cannot show the terrain, and says so.
+      if (tin.stuck == 0) {
+        EXPECT_LE(tin.errors.largest, 1.5);
+      } else {
+        EXPECT_GT(tin.errors.largest, 1.5);
+      }
+      std::size_t above = 0;
+      for (std::size_t i = 0; i < cloud.size(); ++i) {
+        const Cloud one{{cloud.x[i]}, {cloud.y[i]}, {cloud.z[i]}};
+        above += i < 400 && measure(one, tin).largest > 1.5 ? 1 : 0;
+      }
+      EXPECT_LE(above, tin.stuck);
+    }
+  }
+}
+
+TEST(PointTin, LatticeTooCoarseForTheError) {
+  Cloud cloud;
+  std::mt19937_64 random(9);
+  for (std::size_t i = 0; i < 2000; ++i)
+    cloud.add(20 * to_unit(random()), 20 * to_unit(random()), 100 * to_unit(random()));
+  PointTinOptions options;
+  options.lattice = TinLattice{0, 5};
+  const std::vector<Point3> frame{{0, 0, 0}, {20, 0, 0}, {20, 20, 0}, {0, 20, 0}};
+  for (const PointTinQuality quality : kQualities) {
+    options.quality = quality;
+    const PointTin tin = make(cloud, frame, options);
+    check_frame(tin, frame);
+    EXPECT_GT(tin.stuck, 0u);
+    EXPECT_GT(tin.errors.largest, 0);
+    EXPECT_NEAR(measure(cloud, tin).largest, tin.errors.largest, 1e-9);
+  }
+}
+
+}  // namespace
+}  // namespace terrace::tri

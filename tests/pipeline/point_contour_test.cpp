@@ -1,0 +1,329 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Contour lines of stores of points, and of rasters above level 0, against the segments of every
+// triangle of the whole triangulation.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <random>
+#include <set>
+#include <span>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <terrace/stream/error.hpp>
+#include <terrace/stream/geotiff_writer.hpp>
+#include <terrace/stream/store.hpp>
+#include <terrace/tri/delaunay2.hpp>
+
+#include "contour_parts.hpp"
+#include "error.hpp"
+#include "store_build.hpp"
+#include "store_window.hpp"
+#include "temporary_folder.hpp"
+
+namespace terrace {
+namespace {
+
+using tools::Point2;
+using Segment = std::tuple<std::int64_t, Point2, Point2>;
+using Triangle = std::array<stream::Point3, 3>;
+
+stream::Store store_of(const std::filesystem::path& input, std::size_t block_points) {
+  tools::BuildRequest request;
+  request.inputs = {input.string()};
+  request.store = input.string() + ".store";
+  request.block_points = block_points;  // few: more clusters, more levels
+  tools::build_store(request);
+  return stream::Store::open(request.store);
+}
+
+stream::Store cloud(const std::filesystem::path& folder, std::span<const stream::Point3> points) {
+  const auto file = folder / "cloud.xyz";
+  std::ofstream out(file);
+  out.precision(17);
+  for (const stream::Point3& p : points) out << p[0] << ' ' << p[1] << ' ' << p[2] << '\n';
+  out.close();
+  return store_of(file, 100);
+}
+
+/// Some thousand points around a lake, with twins. whole: whole numbers, many at levels.
+std::vector<stream::Point3> lake_shore(std::uint64_t seed, bool whole) {
+  std::mt19937_64 random(seed);
+  const auto unit = [&] { return static_cast<double>(random() >> 11) * 0x1p-53; };
+  std::vector<stream::Point3> points;
+  while (points.size() < 3000) {
+    stream::Point3 p{unit() * unit() * 1000 - 300, unit() * 500, 0};
+    if (std::hypot(p[0], p[1] - 250) < 140) continue;
+    p[2] = 20 * std::sin(p[0] / 50) + 15 * std::cos(p[1] / 70) + unit();
+    if (whole) p = {std::floor(p[0] / 8), std::floor(p[1] / 8), std::floor(p[2] / 3) * 2};
+    points.push_back(p);
+    if (random() % 40 == 0) points.push_back({p[0], p[1], p[2] + 3 * unit()});
+  }
+  return points;
+}
+
+/// The whole triangulation.
+std::vector<Triangle> triangles_of(const stream::Store& store, unsigned level) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  tools::WindowPoints points;
+  tools::StoreWindow(store).points({{-kInfinity, -kInfinity}, {kInfinity, kInfinity}}, points,
+                                   level);
+  std::vector<Point2> places;
+  for (const stream::Point3& p : points.positions) places.push_back({p[0], p[1]});
+  tri::Delaunay2<double> whole;
+  const std::vector<tri::VertexId> vertices = whole.build(places);
+  const stream::Channel& z = store.schema().coordinates[2];
+  std::vector<double> heights(whole.vertex_slots());
+  // The first of several stands for all.
+  for (std::size_t i = places.size(); i-- > 0;) {
+    heights[tri::slot(vertices[i])] = points.positions[i][2] * z.scale + z.offset;
+  }
+  std::vector<Triangle> triangles;
+  for (const tri::TriangleId id : whole.all_triangles()) {
+    Triangle triangle{};
+    for (std::size_t i = 0; i < 3; ++i) {
+      const tri::VertexId vertex = whole.vertices(id)[i];
+      const Point2 p = whole.point(vertex);
+      triangle[i] = {p[0], p[1], heights[tri::slot(vertex)]};
+    }
+    triangles.push_back(triangle);
+  }
+  return triangles;
+}
+
+/// Each triangle by itself, higher ground on the left by the gradient. Equal ends are left out.
+std::multiset<Segment> segments_of(const std::vector<Triangle>& triangles, double interval,
+                                   const std::function<bool(const Triangle&)>& wanted) {
+  std::multiset<Segment> segments;
+  for (const Triangle& t : triangles) {
+    if (!wanted(t)) continue;
+    const auto [lowest, highest] = std::minmax({t[0][2], t[1][2], t[2][2]});
+    for (auto level = static_cast<std::int64_t>(std::floor(lowest / interval)) - 1;
+         static_cast<double>(level) * interval < highest; ++level) {
+      const double h = static_cast<double>(level) * interval;
+      std::vector<Point2> ends;
+      Point2 up{};
+      for (std::size_t i = 0; i < 3; ++i) {
+        stream::Point3 a = t[i], b = t[(i + 1) % 3];
+        if (b < a) std::swap(a, b);
+        if ((a[2] > h) == (b[2] > h)) continue;
+        const double share = (h - a[2]) / (b[2] - a[2]);
+        const Point2 step{b[0] - a[0], b[1] - a[1]};
+        ends.push_back(share == 1 ? Point2{b[0], b[1]}
+                                  : Point2{a[0] + share * step[0], a[1] + share * step[1]});
+        up[0] += b[2] > a[2] ? step[0] : -step[0];
+        up[1] += b[2] > a[2] ? step[1] : -step[1];
+      }
+      if (ends.empty() || ends[0] == ends[1]) continue;
+      const double left = up[1] * (ends[1][0] - ends[0][0]) - up[0] * (ends[1][1] - ends[0][1]);
+      if (left < 0) std::swap(ends[0], ends[1]);
+      segments.insert({level, ends[0], ends[1]});
+    }
+  }
+  return segments;
+}
+
+std::vector<tools::ContourLine> lines_of(const stream::Store& store,
+                                         const tools::ContourRequest& request,
+                                         std::uint64_t points_per_part) {
+  std::vector<tools::ContourLine> lines;
+  tools::draw_point_contours(
+      {.store = store,
+       .request = request,
+       .emit = [&](const tools::ContourLine& line) { lines.push_back(line); },
+       .limit = {},
+       .progress = [](double) {},
+       .points_per_part = points_per_part});
+  return lines;
+}
+
+/// The lines are those of the whole, in the same order for any number of threads and memory.
+void expect_contours(const stream::Store& store, tools::ContourRequest request,
+                     const std::vector<Triangle>& triangles) {
+  const auto wanted = [&](const Triangle& t) {
+    for (std::size_t i = 0; request.max_edge && i < 3; ++i) {
+      const stream::Point3 &a = t[i], &b = t[(i + 1) % 3];
+      if (std::hypot(a[0] - b[0], a[1] - b[1]) > *request.max_edge) return false;
+    }
+    const stream::Point3 middle{(t[0][0] + t[1][0] + t[2][0]) / 3,
+                                (t[0][1] + t[1][1] + t[2][1]) / 3, 0};
+    return !request.region || request.region->contains(middle);
+  };
+  const auto expected = segments_of(triangles, request.interval, wanted);
+  for (const std::uint64_t most : {1u << 20, 900u, 70u}) {
+    SCOPED_TRACE("parts of " + std::to_string(most));
+    request.threads = 1;
+    request.memory_bytes = std::uint64_t{1} << 30;
+    const std::vector<tools::ContourLine> lines = lines_of(store, request, most);
+    std::multiset<Segment> segments;
+    for (const tools::ContourLine& line : lines) {
+      if (line.closed) {
+        EXPECT_EQ(line.points.front(), line.points.back());
+      }
+      for (std::size_t i = 0; i + 1 < line.points.size(); ++i) {
+        segments.insert({line.level, line.points[i], line.points[i + 1]});
+      }
+    }
+    EXPECT_EQ(segments.size(), expected.size());
+    EXPECT_TRUE(segments == expected);
+    request.threads = 3;
+    request.memory_bytes = std::uint64_t{64} << 20;
+    const std::vector<tools::ContourLine> again = lines_of(store, request, most);
+    ASSERT_EQ(again.size(), lines.size());
+    for (std::size_t i = 0; i < lines.size(); ++i) EXPECT_EQ(again[i].points, lines[i].points);
+  }
+}
+
+TEST(PointContours, AreThoseOfTheWholeTriangulationAtAnyLevel) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    SCOPED_TRACE(seed);
+    const tests::TemporaryFolder folder;
+    const stream::Store store = cloud(folder.path(), lake_shore(seed, seed % 2 == 0));
+    for (unsigned level = 0; level <= std::min(2U, store.top()); ++level) {
+      SCOPED_TRACE("level " + std::to_string(level));
+      const std::vector<Triangle> triangles = triangles_of(store, level);
+      ASSERT_FALSE(triangles.empty());
+      expect_contours(store, {.interval = seed % 2 == 0 ? 2.0 : 3.3, .level = level}, triangles);
+    }
+  }
+}
+
+TEST(PointContours, EndAtTrianglesWithALongerSideThanAllowed) {
+  const tests::TemporaryFolder folder;
+  const stream::Store store = cloud(folder.path(), lake_shore(6, false));
+  const std::vector<Triangle> triangles = triangles_of(store, 0);
+  for (const double most : {0.5, 12.0, 40.0, 1e6}) {
+    SCOPED_TRACE(most);
+    expect_contours(store, {.interval = 3, .max_edge = most}, triangles);
+  }
+  expect_contours(store,
+                  {.interval = 3, .max_edge = 20, .region = tools::Region::parse("0,0,200,400")},
+                  triangles);
+}
+
+TEST(PointContours, OfARegionAreThoseOfTheTrianglesWhoseMiddlesLieInside) {
+  const tests::TemporaryFolder folder;
+  const stream::Store store = cloud(folder.path(), lake_shore(9, false));
+  const std::vector<Triangle> triangles = triangles_of(store, 0);
+  std::mt19937_64 random(10);
+  const auto unit = [&] { return static_cast<double>(random() >> 11) * 0x1p-53; };
+  std::size_t strange = 0;
+  for (int i = 0; i < 12; ++i) {
+    SCOPED_TRACE(i);
+    // Every second one about the middle of a large triangle, far from its corners.
+    double x = unit() * 900 - 300, y = unit() * 450, size = 20 + 150 * unit();
+    if (i % 2 == 0) {
+      const auto area = [](const Triangle& t) {
+        return (t[1][0] - t[0][0]) * (t[2][1] - t[0][1]) -
+               (t[1][1] - t[0][1]) * (t[2][0] - t[0][0]);
+      };
+      std::vector<Triangle> large = triangles;
+      std::partial_sort(large.begin(), large.begin() + 40, large.end(),
+                        [&](const Triangle& s, const Triangle& t) { return area(s) > area(t); });
+      const Triangle& t = large[random() % 40];
+      size = 0.01;
+      x = (t[0][0] + t[1][0] + t[2][0]) / 3 - size / 2;
+      y = (t[0][1] + t[1][1] + t[2][1]) / 3 - size / 2;
+    }
+    const std::string text = std::to_string(x) + ',' + std::to_string(y) + ',' +
+                             std::to_string(x + size) + ',' + std::to_string(y + size);
+    const tools::Region region = tools::Region::parse(text);
+    for (const Triangle& t : triangles) {
+      strange += i % 2 == 0 && region.contains({(t[0][0] + t[1][0] + t[2][0]) / 3,
+                                                (t[0][1] + t[1][1] + t[2][1]) / 3, 0})
+                     ? 1
+                     : 0;
+    }
+    expect_contours(store, {.interval = 0.5, .region = region}, triangles);
+  }
+  EXPECT_GE(strange, 6u);
+  const tools::Region polygon = tools::Region::of_polygons(
+      {{{{-200, 10}, {400, 60}, {90, 480}}, {{0, 200}, {60, 200}, {30, 260}}}}, -1e9, 1e9);
+  expect_contours(store, {.interval = 2, .region = polygon}, triangles);
+  EXPECT_THROW(
+      lines_of(store, {.interval = 1, .region = tools::Region::parse("2000,0,2001,5")}, 100),
+      stream::Error);
+}
+
+TEST(PointContours, OfACoarserLevelOfARasterAreThoseOfItsSamples) {
+  const tests::TemporaryFolder folder;
+  stream::GeoTiffOptions options;
+  options.columns = 90;
+  options.rows = 70;
+  options.sample.type = stream::ScalarType::i16;
+  options.sample.scale = 0.5;
+  options.sample.offset = -10;
+  options.world.xy = {30, 0, 500000, 0, -30, 5200000};
+  options.nodata = -32768;
+  std::vector<std::int16_t> samples;
+  for (std::uint32_t row = 0; row < options.rows; ++row) {
+    for (std::uint32_t column = 0; column < options.columns; ++column) {
+      const bool hole = std::hypot(column - 30.0, row - 40.0) < 12;
+      samples.push_back(hole ? std::int16_t{-32768}
+                             : static_cast<std::int16_t>(300 * std::sin(column / 20.0) +
+                                                         200 * std::cos(row / 15.0)));
+    }
+  }
+  const auto file = folder.path() / "dem.tif";
+  stream::GeoTiffWriter writer(file, options);
+  writer.write_rows(std::as_bytes(std::span(samples)));
+  writer.commit();
+  const stream::Store store = store_of(file, 200);
+  ASSERT_GE(store.top(), 1u);
+  const std::vector<Triangle> triangles = triangles_of(store, 1);
+  expect_contours(store, {.interval = 7, .level = 1}, triangles);
+}
+
+TEST(PointContours, FewFlatAndCollinearPointsHaveNoLines) {
+  const std::vector<std::vector<stream::Point3>> clouds{
+      {{1, 2, 3}},
+      {{1, 2, 3}, {5, 9, 40}},
+      {{7, 7, 1}, {7, 7, 30}, {7, 7, 60}},
+      {{0, 0, 0}, {1, 1, 9}, {2, 2, 20}, {7, 7, 80}},
+      {{0, 0, 10}, {1, 0, 10}, {0, 1, 10}, {1, 1, 10}, {3, 3, 10}},
+  };
+  for (const auto& points : clouds) {
+    const tests::TemporaryFolder folder;
+    const stream::Store store = cloud(folder.path(), points);
+    for (const double interval : {10.0, 1e-3, 1e9}) {
+      EXPECT_TRUE(lines_of(store, {.interval = interval}, 2).empty());
+    }
+  }
+  const tests::TemporaryFolder folder;
+  const stream::Store one =
+      cloud(folder.path(), std::vector<stream::Point3>{{0, 0, 0}, {1, 0, 10}, {0, 1, 10}});
+  expect_contours(one, {.interval = 4}, triangles_of(one, 0));
+  // At 4 and 8; the one at 0 is the corner alone.
+  EXPECT_EQ(lines_of(one, {.interval = 4}, 2).size(), 2u);
+}
+
+TEST(PointContours, TooManyLevelsForMemoryAreToldInsteadOfTried) {
+  const tests::TemporaryFolder folder;
+  const stream::Store store =
+      cloud(folder.path(), std::vector<stream::Point3>{{0, 0, 0}, {1, 0, 10}, {0, 1, 10}});
+  tools::ContourRequest request{.interval = 1e-9};
+  EXPECT_THROW(tools::draw_point_contours(
+                   {.store = store,
+                    .request = request,
+                    .emit = [](const tools::ContourLine&) {},
+                    .limit = {.points = 10000,
+                              .exceeded =
+                                  [] {
+                                    throw stream::Error(
+                                        {.file = "", .where = {}, .cause = "many", .remedy = ""});
+                                  }},
+                    .progress = [](double) {}}),
+               stream::Error);
+}
+
+}  // namespace
+}  // namespace terrace
