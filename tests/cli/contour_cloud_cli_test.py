@@ -12,6 +12,7 @@ import math
 import os
 import random
 import shutil
+import struct
 import subprocess
 import sys
 import tempfile
@@ -336,6 +337,33 @@ class CloudRasterTest(CloudTestCase):
                 self.assertEqual(opened, closed)
                 seen.add('land')
         self.assertEqual(seen, {'lake', 'land'})
+
+    @unittest.skipIf(SCIPY is None, 'no SciPy')
+    @unittest.skipIf('TERRACE_DATA' not in os.environ, 'TERRACE_DATA does not name the data')
+    @needs('gdal_translate', 'gdalinfo')
+    def test_laser_data(self):
+        with open(os.path.join(os.environ['TERRACE_DATA'], 'lidar/4_6_crop.las'), 'rb') as file:
+            data = file.read()
+        first, = struct.unpack_from('<I', data, 96)
+        size, count = struct.unpack_from('<HI', data, 105)
+        scale, offset = struct.unpack_from('<3d', data, 131), struct.unpack_from('<3d', data, 155)
+        points = {}
+        for i in range(count):
+            raw = struct.unpack_from('<3i', data, first + i * size)
+            p = [round(c * s + o, 3) for c, s, o in zip(raw, scale, offset)]
+            points.setdefault(tuple(p[:2]), p)
+        self.assertGreater(len(points), 20000)
+        points = list(points.values())
+        store, out = self.build('laser', points), self.path('laser.tif')
+        self.run_ok('raster', store, '--cell', 1, '-o', out)
+        expected = self.oracle(points=points, cells=self.frame(out))
+        got = self.samples(out)
+        without = sum(e is None for e in expected)
+        self.assertLess(without, len(got) // 10)
+        self.assertLessEqual(abs(without - sum(z == -9999 for z in got)), 2)
+        # Four points on a circle have two triangulations.
+        differing = sum(e is not None and abs(z - e) > 2e-3 for z, e in zip(got, expected))
+        self.assertLess(differing, len(got) // 100)
 
     def test_few_points(self):
         out = self.path('few.tif')

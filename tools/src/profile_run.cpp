@@ -152,11 +152,11 @@ class ProfileRun {
     Point2 last = a;
     (*crossings_)(ground_.stored(a), ground_.stored(b), [&](const auto& crossing) {
       const Point2 here = between(a, b, crossing.t);
-      outcome_.metres += distance_(last, here);
+      outcome_.metres += distance_.along(last, here);
       add(here, outcome_.metres, crossing.place, crossing.height);
       last = here;
     });
-    outcome_.metres += distance_(last, b);
+    outcome_.metres += distance_.along(last, b);
     add(b, outcome_.metres);
   }
 

@@ -43,8 +43,8 @@ class RasterDigest : public ::testing::TestWithParam<Frame> {
       const double column = static_cast<double>(i % kColumns),
                    row = static_cast<double>(i / kColumns);
       const bool there = std::hypot(column - 150.0, row - 60.0) > 25.0 && random() < 0.99;
-      heights_.push_back(there ? static_cast<float>(300 * std::sin(column / 30) + 40 * random())
-                               : kNodata);
+      const double hills = 300 * std::sin(column / 30) + 40 * random();
+      heights_.push_back(there ? static_cast<float>(random() < 0.05 ? 77.0 : hills) : kNodata);
     }
   }
   void TearDown() override { fs::remove_all(folder_); }
@@ -199,6 +199,45 @@ TEST_P(RasterDigest, OptionsOfTheSurfaceCount) {
   EXPECT_NE(plain, flat);
   EXPECT_NE(flat, higher);
   EXPECT_NE(higher, one->surface.digest(all));
+}
+
+// Masks are placed part by part: they may differ from single places where a place lies between two
+// samples.
+TEST_P(RasterDigest, MasksAreThoseOfTheirPlaces) {
+  const auto one = tiled("one");
+  for (const std::optional<double>& height :
+       {std::optional<double>{}, std::optional<double>{77.0}}) {
+    one->raster.water_height = height;
+    int cells = 0, wet = 0, other = 0;
+    for (int round = 0; round < 40; ++round) {
+      const GeographicBox asked = box(one->raster.bounds);
+      constexpr std::size_t kSide = 48;
+      std::vector<double> longitude, latitude;
+      for (std::size_t i = 0; i < kSide * kSide; ++i) {
+        longitude.push_back(asked.west + (asked.east - asked.west) *
+                                             (static_cast<double>(i % kSide) + 0.5) / kSide);
+        latitude.push_back(asked.north - (asked.north - asked.south) *
+                                             (static_cast<double>(i / kSide) + 0.5) / kSide);
+      }
+      std::vector<std::uint8_t> mask(longitude.size()), single(mask);
+      one->surface.water(longitude, latitude, mask);
+      // Not in rows and columns any more.
+      std::reverse(longitude.begin() + 1, longitude.end());
+      std::reverse(latitude.begin() + 1, latitude.end());
+      one->surface.water(longitude, latitude, single);
+      std::reverse(single.begin() + 1, single.end());
+      for (std::size_t i = 0; i < mask.size(); ++i) {
+        ++cells;
+        wet += mask[i];
+        other += mask[i] != single[i] ? 1 : 0;
+      }
+    }
+    EXPECT_LE(other, cells / 500);
+    if (!height) {
+      EXPECT_GT(wet, cells / 20);
+      EXPECT_LT(wet, cells);
+    }
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(

@@ -86,6 +86,16 @@ std::uint64_t HeightBlocks::digest(const LatticeWindow& window) const {
   return digest.value();
 }
 
+bool HeightBlocks::is_complete(const LatticeWindow& window) const {
+  const Blocks part = blocks_of(window);
+  for (std::int64_t y = part.y0; y < part.y1; ++y) {
+    for (std::int64_t x = part.x0; x < part.x1; ++x) {
+      if (!is_complete(x, y)) return false;
+    }
+  }
+  return true;
+}
+
 std::optional<HeightBlocks::Range> HeightBlocks::range(const LatticeWindow& window) const {
   const Blocks part = blocks_of(window);
   Block all{kInfinity, -kInfinity};

@@ -32,14 +32,15 @@ class HeightBlocks {
   /// rasters of equal size, whatever the clusters of their stores, it is the same if these are.
   [[nodiscard]] std::uint64_t digest(const LatticeWindow& window) const;
 
+  /// Whether every block that meets the window has all its samples.
+  [[nodiscard]] bool is_complete(const LatticeWindow& window) const;
   /// Calls visit(lattice rectangle) for each block that meets the window and lacks a sample.
   template <class Visit>
   void for_each_incomplete(const LatticeWindow& window, const Visit& visit) const {
     const Blocks part = blocks_of(window);
     for (std::int64_t y = part.y0; y < part.y1; ++y) {
       for (std::int64_t x = part.x0; x < part.x1; ++x) {
-        const LatticeWindow block = rectangle(x, y);
-        if (samples_[static_cast<std::size_t>(y * across_ + x)] < block.size()) visit(block);
+        if (!is_complete(x, y)) visit(rectangle(x, y));
       }
     }
   }
@@ -53,6 +54,9 @@ class HeightBlocks {
   };
   /// Those that meet a window.
   [[nodiscard]] Blocks blocks_of(const LatticeWindow& window) const;
+  [[nodiscard]] bool is_complete(std::int64_t x, std::int64_t y) const {
+    return samples_[static_cast<std::size_t>(y * across_ + x)] == rectangle(x, y).size();
+  }
   [[nodiscard]] LatticeWindow rectangle(std::int64_t x, std::int64_t y) const {
     return {x * side_, y * side_, std::min(side_, columns_ - x * side_),
             std::min(side_, rows_ - y * side_)};

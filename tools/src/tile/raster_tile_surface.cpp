@@ -295,16 +295,4 @@ double RasterTileSurface::corner_height(const Point2& place, double sample,
   return raster_.vertical.convert(place, raster_.fill.height(corner[0], corner[1]));
 }
 
-void RasterTileSurface::water(std::span<const double> longitude, std::span<const double> latitude,
-                              std::span<std::uint8_t> out) {
-  visit_places(longitude, latitude,
-               [&](std::size_t i, const Point2& p, const double* at, std::int64_t stride) {
-                 const double height = at[(p[0] - std::floor(p[0]) >= 0.5 ? 1 : 0) +
-                                          (p[1] - std::floor(p[1]) >= 0.5 ? stride : 0)];
-                 const bool wet =
-                     raster_.water_height ? height == *raster_.water_height : std::isnan(height);
-                 out[i] = wet ? 1 : 0;
-               });
-}
-
 }  // namespace terrace::tools
