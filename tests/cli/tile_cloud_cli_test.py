@@ -262,13 +262,13 @@ class TileCloudTest(TileTestCase):
         cloud = Cloud(points)
         cloud.crs = lambda: 'EPSG:32661'
         store = self.build(cloud, 'pole')
-        summary = self.tile(store, 'pole', '--max-error', 8, '--zoom', '0-7')
+        summary = self.tile(store, 'pole', '--max-error', 16, '--zoom', '0-6')
         tiles = TileSet(self.path('pole'))
         tiles.check()
         verdict = self.verify('pole', '--store', store, *VERTICAL)
         self.assertEqual(verdict['problems'], [])
         for line in summary['zooms']:
-            self.assertLessEqual(line['max_error'], 8 * 2 ** (summary['zooms'][-1]['zoom'] -
+            self.assertLessEqual(line['max_error'], 16 * 2 ** (summary['zooms'][-1]['zoom'] -
                                                               line['zoom']))
         self.assertEqual(verdict['zooms'][0]['samples'], 2000)
         # All around the globe at its last row.

@@ -46,7 +46,8 @@ bool may_have_samples(const GeographicBox& box, TileSurface& surface) {
 }
 
 bool is_to_be_cut(const GeographicBox& box, TileSurface& surface) {
-  return box.east - box.west > surface.widest_part() || surface.crowded(box);
+  // A little more, for leaves of tiles are rounded to units.
+  return box.east - box.west > 1.01 * surface.widest_part() || surface.crowded(box);
 }
 
 void for_each_part(const GeographicBox& box, TileSurface& surface,
