@@ -115,6 +115,8 @@ class VerifyTest(TileTestCase):
     def setUp(self):
         self.dir = self.path('damaged')
         shutil.copytree(self.path('sound'), self.dir)
+        # It knows every byte: what the other checks find is to be seen.
+        os.remove(os.path.join(self.dir, '.terrace-tiles'))
 
     def tearDown(self):
         shutil.rmtree(self.dir)
@@ -176,6 +178,24 @@ class VerifyTest(TileTestCase):
         self.found()
         self.change(key, b'\x1f\x8b\x08' + self.set.tiles[key].data[3:-4])
         self.assertFalse(self.verify('damaged')['ok'])
+
+    def test_the_journal_knows_every_byte(self):
+        shutil.copy(self.path('sound/.terrace-tiles'), self.dir)
+        self.found()
+        key = self.inner_tile()
+        data = bytearray(self.set.tiles[key].data)
+        data[3] ^= 1  # of the centre: no other check can know
+        self.change(key, bytes(data))
+        problems = self.found('/'.join(map(str, key)) + '.terrain: not the bytes')
+        self.assertEqual(len(problems), 1)
+
+    def test_a_step_on_the_line_of_180_degrees(self):
+        tile = self.set.tiles[0, 0, 0]
+        heights = [h + 20 if u == 0 else h for u, h in zip(tile.u, tile.h)]
+        self.assertLess(max(heights), UNITS)
+        self.change((0, 0, 0), self.columns(tile, h=heights))
+        self.found('0/1/0.terrain: its eastern side and that of 0/0/0.terrain have heights',
+                   also=('sphere', 'horizon'))
 
     def test_missing_and_stray_tiles(self):
         key = self.inner_tile()

@@ -237,7 +237,8 @@ class TileTest(TileTestCase):
                                ('--zoom', '--zoom', 'all'), ('--max-error', '--max-error', 0),
                                ('--max-error', '--max-error', 'nan'), ('--fill', '--fill', 'sea'),
                                ('--format', '--format', 'png'), ('--water', '--water', 'deep'),
-                               ('--quality', '--quality', 'best')):
+                               ('--quality', '--quality', 'best'),
+                               ('--metadata', '--metadata', '--zoom', '3-9')):
             with self.subTest(options):
                 self.refuse(2, text, *tile, *vertical, *options)
         self.refuse(1, '--memory', *tile, *vertical, '--memory', '20M')

@@ -5,9 +5,10 @@
 
 #include <terrace/stream/error.hpp>
 
-#include "bound_search.hpp"
 #include "bounded_mesh.hpp"
 #include "error.hpp"
+#include "keep_memory.hpp"
+#include "least_error.hpp"
 #include "mesh_spool.hpp"
 #include "point_mesher.hpp"
 
@@ -18,6 +19,7 @@ BoundedMeshResult bounded_point_mesh(const stream::Store& store, const BoundedMe
   if (options.fill != Fill::none) {
     throw UsageError("--fill is for rasters: irregular points have no cells without data");
   }
+  keep_freed_memory();
   PointMesher mesher(store, options, common);
   const double metres = mesher.metres_vertical();
   BoundedMeshResult result;
@@ -31,9 +33,14 @@ BoundedMeshResult bounded_point_mesh(const stream::Store& store, const BoundedMe
   if (options.max_points == 0 || mesher.single()) {
     run(options.max_error / metres, ~std::uint64_t{0});
   } else {
-    const BoundSearch search{options.max_points, mesher.bounds().max[2] - mesher.bounds().min[2],
-                             mesher.guess_bound()};
-    if (search_bound(search, [&](double bound) { return run(bound, options.max_points); }) < 0.0) {
+    LeastErrorSearch search;
+    search.most = options.max_points;
+    search.range = mesher.bounds().max[2] - mesher.bounds().min[2];
+    if (mesher.can_estimate()) {
+      search.estimate = [&](double bound) { return mesher.estimate(bound); };
+    }
+    search.run = [&](double bound) { return static_cast<double>(run(bound, options.max_points)); };
+    if (!least_error(search)) {
       throw stream::Error({.file = options.path,
                            .where = {},
                            .cause = "--max-points " + std::to_string(options.max_points) +

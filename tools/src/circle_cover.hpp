@@ -150,7 +150,8 @@ struct CircleCover {
       if (out > 0) sum += out * out;
       if (out != out) return true;
     }
-    return !(std::sqrt(sum) > radius + 8 * kEpsilon * (doubt + radius));
+    const double limit = radius + 8 * kEpsilon * (doubt + radius);
+    return !(sum > limit * limit * (1 + 8 * kEpsilon));
   }
 };
 

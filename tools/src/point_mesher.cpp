@@ -110,6 +110,7 @@ BoundedMeshResult PointMesher::run_whole(const PointMeshOptions& options, MeshSp
   result.duplicates = tin.duplicates;
   for (const tri::Point3& p : tin.vertices) spool.add_vertex(p);
   for (const auto& triangle : tin.triangles) spool.add_triangle(triangle);
+  result.vertices = spool.vertices();
   result.meshing_seconds = meshing.seconds();
   return result;
 }
@@ -164,12 +165,12 @@ BoundedMeshResult PointMesher::run_windows(const PointMeshOptions& options, Mesh
         },
         [&](std::size_t i, const PointWindowTin& tin) {
           joiner.add(i, tin);
+          result.samples += tin.samples;
           if (spool.vertices() > most_vertices) throw Enough{};
           result.max_error = std::max(result.max_error, tin.errors.largest);
           const auto count = static_cast<double>(tin.errors.covered);
           squares += tin.errors.rms * tin.errors.rms * count;
           covered += count;
-          result.samples += tin.samples;
           result.duplicates += tin.duplicates;
           result.reading_seconds += tin.reading_seconds;
           result.meshing_seconds += tin.meshing_seconds;
@@ -177,26 +178,23 @@ BoundedMeshResult PointMesher::run_windows(const PointMeshOptions& options, Mesh
                        static_cast<double>(result.samples) / static_cast<double>(scan_.samples));
         });
   } catch (const Enough&) {
-    // The caller sees it by the number of vertices.
+    // The caller sees it by the number of vertices, told from the part that is made.
+    const double part =
+        std::max(1.0, static_cast<double>(result.samples)) / static_cast<double>(scan_.samples);
+    result.vertices = static_cast<std::uint64_t>(static_cast<double>(spool.vertices()) / part);
+    result.vertices = std::max(result.vertices, most_vertices + 1);
+    return result;
   }
+  result.vertices = spool.vertices();
   result.rms_error = covered > 0.0 ? std::sqrt(squares / covered) : 0.0;
   return result;
 }
 
-double PointMesher::guess_bound() const {
-  const double range = bounds_.max[2] - bounds_.min[2];
-  if (!samples_) return range;
-  const PointMeshEstimate estimate(cuts_, *samples_, options_.duplicates);
+double PointMesher::estimate(double max_error) const {
   // Removal leaves less than two thirds of what insertion makes.
   const double left = options_.quality == tri::TinQuality::kGreedy ? 1.0 : 0.6;
-  const double wanted =
-      static_cast<double>(options_.max_points) / (left * static_cast<double>(cuts_.cells.size()));
-  double many = range * 1e-6, few = range;
-  for (int round = 0; round < 16 && few > 1.02 * many; ++round) {
-    const double middle = std::sqrt(many * few);
-    (estimate.per_cell(middle) > wanted ? many : few) = middle;
-  }
-  return few;
+  return left * PointMeshEstimate(cuts_, *samples_, options_.duplicates).per_cell(max_error) *
+         static_cast<double>(cuts_.cells.size());
 }
 
 BoundedMeshResult PointMesher::run(double max_error, MeshSpool& spool,
@@ -216,7 +214,6 @@ BoundedMeshResult PointMesher::run(double max_error, MeshSpool& spool,
     result = run_whole(options, spool);
   }
   result.reading_seconds += reading_seconds_;
-  result.vertices = spool.vertices();
   result.triangles = spool.triangles();
   return result;
 }

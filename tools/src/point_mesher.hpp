@@ -25,13 +25,14 @@ class PointMesher {
   PointMesher(const stream::Store& store, const BoundedMeshOptions& options,
               const CommonOptions& common);
 
-  /// Meshes into the spool. max_error in the vertical unit. Stops early and returns fewer triangles
-  /// once there are more than `most_vertices`.
+  /// Meshes into the spool. max_error in the vertical unit. Stops early once there are more than
+  /// `most_vertices`, and tells about how many there would be.
   BoundedMeshResult run(double max_error, MeshSpool& spool, std::uint64_t most_vertices);
   /// Whether the samples are few enough for one window, which can have a limit of vertices itself.
   [[nodiscard]] bool single() const { return scan_.whole.has_value(); }
-  /// A bound, in the vertical unit, that about options.max_points vertices can keep.
-  [[nodiscard]] double guess_bound() const;
+  /// About how many vertices a bound takes, in the vertical unit, quickly.
+  [[nodiscard]] double estimate(double max_error) const;
+  [[nodiscard]] bool can_estimate() const { return samples_.has_value(); }
   [[nodiscard]] double metres_vertical() const {
     return Ground(placement_).map(store_.bounds())[8] / placement_.coordinates[2].scale;
   }

@@ -53,7 +53,8 @@ class PointWindow {
   /// while a triangle that meets the box has a circumcircle, or a hull edge that the box sees from
   /// outside has a half-plane, in which a point may be missing, adds one: of what was read, or else
   /// of the clusters whose boxes it meets, coarse levels first. So no width is guessed, and voids
-  /// and hulls cost a few clusters of coarse levels more. About 0.7 us per point.
+  /// and hulls cost a few clusters of coarse levels more. About 0.5 us per point, several times
+  /// that for windows that see much of the hull.
   ///
   /// Throws: stream::Error on a damaged store, or where memory_bytes do not suffice, saying what
   /// would be needed; Interrupted. After that it can only be loaded again or destroyed.

@@ -188,6 +188,7 @@ void PointWindow::gather_near(const StoredBox& wide) {
 
 bool PointWindow::find_missing(const Suspect& suspect, bool is_near) {
   const CircleCover& cover = suspect.cover;
+  const StoredBox bounds = cover.bounds();
   // Of points that were read the one farthest inside: what is left afterwards is smallest.
   std::size_t point = pending_.size();
   double depth = std::numeric_limits<double>::infinity();
@@ -195,14 +196,13 @@ bool PointWindow::find_missing(const Suspect& suspect, bool is_near) {
     const Pending& p = pending_[at];
     if (p.origin.cluster == kNone) return;  // taken
     const StoredBox box{p.place, p.place};
-    if (!cover.meets(box)) return;
+    if (!bounds.meets(box) || !cover.meets(box)) return;
     const double d = cover.depth(box);
     if (point < pending_.size() && !(d < depth)) return;
     point = at;
     depth = d;
   };
   if (is_near) {
-    const StoredBox bounds = cover.bounds();
     auto one = std::lower_bound(points_near_.begin(), points_near_.end(),
                                 std::pair(bounds.min[0], std::size_t{0}));
     for (; one != points_near_.end() && one->first <= bounds.max[0]; ++one) {
@@ -210,7 +210,7 @@ bool PointWindow::find_missing(const Suspect& suspect, bool is_near) {
     }
   } else {
     for (const Group& group : groups_) {
-      if (!cover.meets(group.box)) continue;
+      if (!bounds.meets(group.box) || !cover.meets(group.box)) continue;
       for (std::size_t k = 0; k < group.count; ++k) look_at_point(group.begin + k);
     }
   }
@@ -224,7 +224,7 @@ bool PointWindow::find_missing(const Suspect& suspect, bool is_near) {
   std::uint32_t best = kNone;
   const auto look_at = [&](std::uint32_t k) {
     if (best != kNone && open[k].level < open[best].level) return;
-    if (!cover.meets(open[k].box)) return;
+    if (!bounds.meets(open[k].box) || !cover.meets(open[k].box)) return;
     const double d = cover.depth(open[k].box);
     if (best != kNone && open[k].level == open[best].level && !(d < depth)) return;
     best = k;

@@ -16,7 +16,6 @@
 #include <terrace/stream/geotiff_writer.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "src/crs_options.hpp"
 #include "src/portable_math.hpp"
 #include "src/store_build.hpp"
 #include "src/tile/height_cache.hpp"
@@ -108,7 +107,8 @@ TEST_F(RasterOfDegrees, RowsAreTheSamples) {
                                                      {0.5, 0, 5, 0, -0.5, 72}}};
   for (const auto& world : worlds) {
     const stream::Store store = make<float>(stream::ScalarType::f32, world, 4326);
-    TiledRaster raster(store, system_of(store), {store.schema(), "ignore", "", 1 << 20});
+    TiledRaster raster(store, CoordinateSystem::of(store.schema().crs, "test").value(),
+                       {store.schema(), "ignore", "", 1 << 20});
     for (const bool flat : {false, true}) {
       if (flat) raster.flat_fill = 12.0;
       RasterTileSurface surface(raster), other(raster);
@@ -140,7 +140,8 @@ TEST_F(RasterOfDegrees, ProjectedOrTurnedRastersHaveNoRows) {
        {std::pair{std::array<double, 6>{30, 0, 400000, 0, -30, 5200000}, 32632},
         std::pair{std::array<double, 6>{0.01, 0.001, 10, -0.001, 0.01, 44}, 4326}}) {
     const stream::Store store = make<float>(stream::ScalarType::f32, world, epsg);
-    const TiledRaster raster(store, system_of(store), {store.schema(), "ignore", "", 1 << 20});
+    const TiledRaster raster(store, CoordinateSystem::of(store.schema().crs, "test").value(),
+                             {store.schema(), "ignore", "", 1 << 20});
     RasterTileSurface surface(raster);
     SurfaceRows rows;
     EXPECT_FALSE(surface.rows(surface.bounds(), rows));

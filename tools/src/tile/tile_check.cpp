@@ -6,14 +6,15 @@
 #include <cmath>
 #include <filesystem>
 #include <map>
+#include <span>
 #include <string_view>
 #include <utility>
 
 #include <terrace/stream/error.hpp>
-#include <terrace/stream/gzip.hpp>
 
 #include "interrupt.hpp"
 #include "ordered_work.hpp"
+#include "tile/tile_borders.hpp"
 #include "tile/tile_candidates.hpp"
 #include "tile/tile_file.hpp"
 #include "tile/tile_height_check.hpp"
@@ -26,21 +27,15 @@
 namespace terrace::tools {
 namespace {
 
-/// What a tile may unpack to.
-constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 28;
-/// Metres by which neighbours' heights may differ, and by which rounding may exceed a bound:
-/// samples are placed on the globe to a hundredth of a millimetre.
-constexpr double kBorderSlack = 1e-3;
+/// Metres by which rounding may exceed a bound: samples are placed on the globe to a hundredth of a
+/// millimetre.
 constexpr double kHeightSlack = 1e-4;
-
-/// Vertices on a side: place along it, and metres.
-using Side = std::vector<std::pair<std::uint16_t, double>>;
 
 /// A tile that was looked at.
 struct Checked {
   bool decoded = false;
   std::vector<TileFault> faults;
-  Side west, south, east, north;
+  TileBorders borders;
   TileHeights heights;
 };
 
@@ -52,49 +47,6 @@ std::uint64_t byte_of(std::string_view where) {
   return byte;
 }
 
-/// Decodes a tile, compressed or not.
-DecodedTile unpack_tile(const std::vector<std::byte>& bytes, const std::string& name) {
-  if (!stream::is_gzip(bytes)) return decode_tile(bytes, name);
-  try {
-    return decode_tile(stream::gunzip(bytes, kMostBytes, name), name);
-  } catch (const stream::Error& packed) {
-    // One plain tile of 65536 begins as gzip does.
-    try {
-      return decode_tile(bytes, name);
-    } catch (const stream::Error&) {
-      throw packed;
-    }
-  }
-}
-
-void take_sides(const TileMesh& mesh, Checked& checked) {
-  const TileEdges edges = edges_of(mesh);
-  const auto take = [&](const std::vector<std::uint32_t>& list,
-                        const std::vector<std::uint16_t>& along) {
-    Side side;
-    for (const std::uint32_t vertex : list) side.emplace_back(along[vertex], mesh.metres(vertex));
-    return side;
-  };
-  checked.west = take(edges.west, mesh.v);
-  checked.east = take(edges.east, mesh.v);
-  checked.south = take(edges.south, mesh.u);
-  checked.north = take(edges.north, mesh.u);
-}
-
-/// What is wrong between two sides; empty if they fit.
-std::string misfit(const Side& a, const Side& b) {
-  const bool same_places = a.size() == b.size() && std::equal(a.begin(), a.end(), b.begin(),
-                                                              [](const auto& p, const auto& q) {
-                                                                return p.first == q.first;
-                                                              });
-  if (!same_places) return "vertices at other places";
-  double most = 0.0;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    most = std::max(most, std::abs(a[i].second - b[i].second));
-  }
-  return most > kBorderSlack ? "heights that differ by up to " + number_text(most) + " m" : "";
-}
-
 class SetCheck {
  public:
   SetCheck(const TileCheckOptions& options, TileLayer layer, unsigned threads,
@@ -103,7 +55,8 @@ class SetCheck {
         layer_(std::move(layer)),
         threads_(threads),
         surfaces_(surfaces),
-        common_(common) {}
+        common_(common),
+        records_(read_tile_records(options.folder)) {}
 
   /// Of all zooms together, so that the few large tiles of the upper ones share the threads.
   void tiles(const std::vector<TileAddress>& tiles);
@@ -117,9 +70,10 @@ class SetCheck {
     return options_.folder + "/" + tile_path(tile);
   }
   [[nodiscard]] double bound_of(unsigned zoom) const;
+  [[nodiscard]] bool is_as_written(const TileAddress& tile, std::span<const std::byte> bytes) const;
   [[nodiscard]] Checked check(const TileAddress& tile, unsigned worker) const;
-  void compare(const TileAddress& tile, const char* side, const Side& own,
-               const TileAddress& neighbour, const Side& other);
+  void compare(const TileAddress& tile, const char* side, const BorderSide& own,
+               const TileAddress& neighbour, const BorderSide& other);
   void add(unsigned zoom, const TileHeights& heights);
 
   const TileCheckOptions& options_;
@@ -127,6 +81,7 @@ class SetCheck {
   unsigned threads_;
   const std::vector<std::unique_ptr<TileSurface>>& surfaces_;
   const CommonOptions& common_;
+  std::vector<TileJournal::Record> records_;  ///< what was written, where that is known
 };
 
 double SetCheck::bound_of(unsigned zoom) const {
@@ -136,20 +91,34 @@ double SetCheck::bound_of(unsigned zoom) const {
   return zoom < layer_.max_errors.size() ? layer_.max_errors[zoom] : expected_error(zoom);
 }
 
+bool SetCheck::is_as_written(const TileAddress& tile, std::span<const std::byte> bytes) const {
+  const auto record = std::lower_bound(
+      records_.begin(), records_.end(), tile,
+      [](const TileJournal::Record& a, const TileAddress& b) { return a.first < b; });
+  if (record == records_.end() || record->first != tile) return true;
+  return record->second.bytes == bytes.size() && record->second.checksum == checksum_of(bytes);
+}
+
 Checked SetCheck::check(const TileAddress& tile, unsigned worker) const {
   check_interrupt();
   Checked checked;
   DecodedTile decoded;
   try {
     const std::string path = path_of(tile);
-    decoded = unpack_tile(read_tile_file(path), path);
+    const std::vector<std::byte> bytes = read_tile_file(path);
+    if (!is_as_written(tile, bytes)) {
+      checked.faults.push_back({0, "not the bytes that were written: its checksum is another one"});
+    }
+    decoded = unpack_tile(bytes, path);
   } catch (const stream::Error& error) {
     checked.faults.push_back({byte_of(error.parts().where), error.parts().cause});
     return checked;
   }
   checked.decoded = true;
-  checked.faults = check_tile_mesh(tile, decoded, layer_.extensions);
-  take_sides(decoded.mesh, checked);
+  for (TileFault& fault : check_tile_mesh(tile, decoded, layer_.extensions)) {
+    checked.faults.push_back(std::move(fault));
+  }
+  checked.borders = borders_of(decoded.mesh);
   if (surfaces_.empty()) return checked;
   checked.heights = measure_tile(tile, decoded.mesh, *surfaces_[worker]);
   const TileHeights& heights = checked.heights;
@@ -167,8 +136,8 @@ Checked SetCheck::check(const TileAddress& tile, unsigned worker) const {
   return checked;
 }
 
-void SetCheck::compare(const TileAddress& tile, const char* side, const Side& own,
-                       const TileAddress& neighbour, const Side& other) {
+void SetCheck::compare(const TileAddress& tile, const char* side, const BorderSide& own,
+                       const TileAddress& neighbour, const BorderSide& other) {
   const std::string what = misfit(own, other);
   if (what.empty()) return;
   result.problems.push_back(
@@ -177,10 +146,10 @@ void SetCheck::compare(const TileAddress& tile, const char* side, const Side& ow
 }
 
 void SetCheck::tiles(const std::vector<TileAddress>& tiles) {
-  // Northern sides of the row below and of this row, by column, and the eastern side of the tile
-  // before this one.
-  std::map<std::uint32_t, Side> below, row;
-  Side before;
+  // Northern sides of the row below and of this row, by column, the eastern side of the tile before
+  // this one, and the western one of the row's first tile, which is beside the last.
+  std::map<std::uint32_t, BorderSide> below, row;
+  BorderSide before, first;
   std::optional<TileAddress> last;
   ProgressMeter meter(common_.progress, "tiles");
   in_order(
@@ -193,21 +162,26 @@ void SetCheck::tiles(const std::vector<TileAddress>& tiles) {
         }
         if (!last || last->zoom != tile.zoom || last->y != tile.y) {
           const bool next = last && last->zoom == tile.zoom && last->y + 1 == tile.y;
-          below = next ? std::move(row) : std::map<std::uint32_t, Side>{};
+          below = next ? std::move(row) : std::map<std::uint32_t, BorderSide>{};
           row.clear();
           before.clear();
+          first.clear();
         }
         if (checked.decoded) {
           if (!before.empty() && last && last->x + 1 == tile.x) {
-            compare(tile, "western", checked.west, *last, before);
+            compare(tile, "western", checked.borders.west, *last, before);
           }
           if (const auto under = below.find(tile.x); under != below.end()) {
-            compare(tile, "southern", checked.south, {tile.zoom, tile.x, tile.y - 1},
+            compare(tile, "southern", checked.borders.south, {tile.zoom, tile.x, tile.y - 1},
                     under->second);
           }
-          row[tile.x] = std::move(checked.north);
+          if (!first.empty() && tile.x + 1 == tile_columns(tile.zoom)) {
+            compare(tile, "eastern", checked.borders.east, {tile.zoom, 0, tile.y}, first);
+          }
+          if (tile.x == 0) first = std::move(checked.borders.west);
+          row[tile.x] = std::move(checked.borders.north);
         }
-        before = std::move(checked.east);
+        before = std::move(checked.borders.east);
         last = tile;
         add(tile.zoom, checked.heights);
         meter.update(i + 1, static_cast<double>(i + 1) / static_cast<double>(tiles.size()));

@@ -38,8 +38,9 @@ struct TileCheckResult {
 bool is_tile_folder(const std::string& folder);
 
 /// Decodes and checks every tile of a set: layer.json against the files, each tile by itself
-/// (check_tile_mesh), the sides that neighbours share, and the heights against every sample of
-/// `surfaces` if there are any (all of the same samples, one per thread). Depends on the files
+/// (check_tile_mesh), its bytes against the checksum in the journal where there is one, the sides
+/// that neighbours share, across the line of 180 degrees too, and the heights against every sample
+/// of `surfaces` if there are any (all of the same samples, one per thread). Depends on the files
 /// alone, not on the number of threads. Memory: of one row of tiles' borders, and of a tile and a
 /// part of its samples per thread. Throws: stream::Error if layer.json cannot be read or the store
 /// is damaged; Interrupted.

@@ -10,6 +10,7 @@
 
 #include "camera.hpp"
 #include "tile/quantized_mesh_layout.hpp"
+#include "tile/tile_header_check.hpp"
 #include "tile/tile_sides.hpp"
 #include "units.hpp"
 
@@ -18,16 +19,8 @@ namespace {
 
 using stream::Point3;
 
-/// Metres and shares that a header may be off: what rounding does, and no more.
-constexpr double kLengthSlack = 1e-3;
-constexpr double kShareSlack = 1e-3;
 /// Of a normal's upward part: a normal has 2 x 8 bits.
 constexpr double kNormalSlack = 0.02;
-
-double distance(const Point3& a, const Point3& b) {
-  const Point3 d{a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-  return std::sqrt(dot(d, d));
-}
 
 class MeshCheck {
  public:
@@ -47,14 +40,13 @@ class MeshCheck {
   void cover();
   void vertices();
   void edges();
-  void header();
   void normals();
   void extensions(const std::vector<std::string>& wanted);
 
   std::vector<TileFault> faults;
 
  private:
-  static constexpr std::uint64_t kSphereAt = 32, kHorizonAt = 64, kVerticesAt = 88;
+  static constexpr std::uint64_t kVerticesAt = 88;
 
   void fault(std::uint64_t offset, std::string what) {
     faults.push_back({offset, std::move(what)});
@@ -212,48 +204,6 @@ void MeshCheck::edges() {
   compare("north", tile_.edges.north, expected.north);
 }
 
-void MeshCheck::header() {
-  std::vector<Point3> points;
-  points.reserve(mesh_.size());
-  for (std::size_t i = 0; i < mesh_.size(); ++i) {
-    points.push_back(geocentric(longitude_at(address_, mesh_.u[i]),
-                                latitude_at(address_, mesh_.v[i]), mesh_.metres(i)));
-  }
-  const Sphere& sphere = tile_.header.sphere;
-  double farthest = 0.0;
-  for (const Point3& p : points) farthest = std::max(farthest, distance(p, sphere.centre));
-  if (farthest > sphere.radius + kLengthSlack) {
-    fault(kSphereAt, "the bounding sphere leaves out vertices by up to " +
-                         number_text(farthest - sphere.radius) + " m");
-  } else if (sphere.radius > farthest * (1.0 + kShareSlack) + kLengthSlack) {
-    fault(kSphereAt + 24, "the bounding sphere is " + number_text(sphere.radius / farthest) +
-                              " times as wide as its centre asks for");
-  }
-  if (distance(tile_.header.centre, bounding_sphere(points).centre) >
-      bounding_sphere(points).radius + kLengthSlack) {
-    fault(0, "the centre lies outside the sphere around the tile");
-  }
-  // The point may lie in any direction: what counts is how far out.
-  const Point3& given = tile_.header.horizon_occlusion;
-  const double length = std::sqrt(dot(given, given));
-  const Point3 towards{given[0] * kEquatorialRadius, given[1] * kEquatorialRadius,
-                       given[2] * kPolarRadius};
-  if (!(length > 0.0)) {
-    fault(kHorizonAt, "the horizon occlusion point is the centre of the Earth");
-    return;
-  }
-  const Point3 right = horizon_occlusion_point(towards, points);
-  const double needed = std::sqrt(dot(right, right));
-  if (length < needed * (1.0 - 1e-9)) {
-    fault(kHorizonAt, "the horizon occlusion point is hidden while a vertex is not: it is " +
-                          number_text(length) + " radii out, " + number_text(needed) +
-                          " are needed");
-  } else if (length > needed * (1.0 + kShareSlack)) {
-    fault(kHorizonAt, "the horizon occlusion point is " + number_text(length) + " radii out, " +
-                          number_text(needed) + " are needed");
-  }
-}
-
 void MeshCheck::normals() {
   std::uint64_t downward = 0, first = 0;
   for (std::size_t i = 0; i < mesh_.normals.size(); ++i) {
@@ -293,7 +243,7 @@ std::vector<TileFault> check_tile_mesh(const TileAddress& address, const Decoded
                                        const std::vector<std::string>& extensions) {
   MeshCheck check(address, tile);
   if (tile.mesh.size() == 0) return {{88, "no vertex"}};
-  check.header();
+  check.faults = check_tile_header(address, tile);
   check.vertices();
   check.triangles();
   check.cover();
