@@ -243,17 +243,12 @@ class TileTest(TileTestCase):
                 self.refuse(2, text, *tile, *vertical, *options)
         self.refuse(1, '--memory', *tile, *vertical, '--memory', '20M')
         self.assertFalse(os.path.exists(out))
-        # No CRS; a CRS nobody knows; points.
+        # No CRS.
         heights = [1.0] * 100
         write_tiff(self.path('bare.tif'), 10, 10, heights, 0, 0, 1, None)
         self.assertEqual(terrace('build', self.path('bare.tif'), '-o',
                                  self.path('bare.terrace')).returncode, 0)
         self.refuse(1, '--crs', 'tile', self.path('bare.terrace'), '-o', out, *vertical)
-        with open(self.path('points.xyz'), 'w') as file:
-            file.write('10 46 1\n10.1 46 2\n10 46.17 3\n10.3 46.4 3\n')
-        self.assertEqual(terrace('build', self.path('points.xyz'), '-o',
-                                 self.path('points.terrace'), '--crs', 'EPSG:4326').returncode, 0)
-        self.refuse(1, 'irregular', 'tile', self.path('points.terrace'), '-o', out, *vertical)
         self.assertFalse(os.path.exists(out))
         # Folders that are not ours.
         os.mkdir(self.path('full'))

@@ -16,6 +16,9 @@ class Geoid;
 
 namespace terrace::tools {
 
+/// Metres above the ellipsoid that no geoid leaves.
+inline constexpr double kLowestGeoid = -110.0, kHighestGeoid = 90.0;
+
 /// How far a geoid lies above the ellipsoid, from a grid in GeographicLib's format (egm96-5.pgm,
 /// egm2008-2_5.pgm, ...), interpolated by its cubic of 12 samples. The whole grid is held in
 /// memory. Const members may be called by several threads at once.

@@ -1,20 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
-#include <vector>
+#include <optional>
 
 #include <terrace/stream/store.hpp>
 
+#include "filled_grid.hpp"
 #include "store_window.hpp"
 
 namespace terrace::tools {
 
-/// Heights for the cells of a raster that have no data, from those around: a smooth surface made by
-/// averaging upward and filling downward over halved grids (S. J. Gortler et al., The Lumigraph,
-/// 1996, doi:10.1145/237170.237200, "pull-push"). It depends on the store alone and is the same
-/// from whichever window it is asked.
+/// Heights for the cells of a raster that have no data, from those around. It depends on the store
+/// alone and is the same from whichever window it is asked.
 class RasterFill {
  public:
   /// Reads one level of the store. Memory: at most 8 MiB for the finest grid and a third more.
@@ -30,11 +28,7 @@ class RasterFill {
   [[nodiscard]] std::uint64_t digest(const LatticeWindow& window) const;
 
  private:
-  struct Grid {
-    std::size_t columns = 0, rows = 0;
-    std::vector<float> heights;
-  };
-  Grid grid_;
+  std::optional<FilledGrid> grid_;
   double reduction_ = 1.0;  ///< samples per cell of the grid
 };
 

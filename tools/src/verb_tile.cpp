@@ -14,14 +14,12 @@
 #include <terrace/stream/store.hpp>
 
 #include "bounded_mesh.hpp"
-#include "crs_options.hpp"
 #include "error.hpp"
-#include "geoid_heights.hpp"
-#include "tile/raster_tile_surface.hpp"
 #include "tile/tile_file.hpp"
 #include "tile/tile_inputs.hpp"
 #include "tile/tile_journal.hpp"
 #include "tile/tile_set.hpp"
+#include "tile/tile_source.hpp"
 #include "units.hpp"
 #include "verbs.hpp"
 
@@ -30,7 +28,7 @@ namespace {
 
 /// What a thread needs: the samples of a leaf, their mesh and what is kept of the store.
 constexpr std::uint64_t kBytesPerThread = std::uint64_t{96} << 20;
-/// Fill and blocks of the raster, and the lists of tiles.
+/// Fill and blocks of the store, and the lists of tiles.
 constexpr std::uint64_t kBytesBeside = std::uint64_t{80} << 20;
 
 std::pair<unsigned, unsigned> parse_zooms(const std::string& text, unsigned native) {
@@ -56,7 +54,8 @@ std::pair<unsigned, unsigned> parse_zooms(const std::string& text, unsigned nati
 class TileCommand final : public Command {
  public:
   void define(CLI::App& app) override {
-    app.add_option("STORE", store_, "where the samples come from: a raster")->required();
+    app.add_option("STORE", store_, "where the samples come from: a raster, or irregular points")
+        ->required();
     add_output(app, output_, "the folder to write");
     app.add_option("--format", format_, "quantized-mesh")->capture_default_str();
     app.add_option("--zoom", zoom_, "FIRST-LAST; else from 0 to where tiles show every sample");
@@ -67,15 +66,15 @@ class TileCommand final : public Command {
     app.add_option("--quality", quality_, "greedy, removal (fewer triangles) or fitted")
         ->capture_default_str();
     app.add_option("--fill", fill_,
-                   "heights where there is no data: interpolate, flat (the store's lowest) or "
-                   "flat:METRES")
+                   "heights where there is no data, or beyond the hull of irregular points: "
+                   "interpolate, flat (the store's lowest) or flat:METRES")
         ->capture_default_str();
     app.add_flag("--gzip", gzip_,
                  "compressed tiles: the server must send Content-Encoding: gzip with them");
     app.add_flag("--normals", normals_, "with normals at the vertices, for lighting");
     app.add_option("--water", water_,
-                   "with a mask of what is water: nodata (what has no data), or a height of the "
-                   "store")
+                   "with a mask of what is water: nodata (what a raster has no data for), or a "
+                   "height of the store")
         ->type_name("nodata|HEIGHT");
     app.add_flag("--metadata", metadata_, "with the list of the tiles below in each tile");
     app.add_option("--vertical", vertical_,
@@ -91,7 +90,7 @@ class TileCommand final : public Command {
   Summary run(const CommonOptions& common) override;
 
  private:
-  [[nodiscard]] TileSetOptions options_for(const TiledRaster& raster,
+  [[nodiscard]] TileSetOptions options_for(const stream::Store& store, double spacing,
                                            const CommonOptions& common) const;
 
   std::string store_, output_, format_ = "quantized-mesh", zoom_, quality_ = "removal";
@@ -106,12 +105,12 @@ std::string fingerprint_of(const stream::Store& store) {
   return std::to_string(checksum_of(manifest));
 }
 
-TileSetOptions TileCommand::options_for(const TiledRaster& raster,
+TileSetOptions TileCommand::options_for(const stream::Store& store, double spacing,
                                         const CommonOptions& common) const {
   TileSetOptions options;
   options.folder = output_;
-  options.name = name_.empty() ? raster.store.path().stem().string() : name_;
-  const unsigned native = native_zoom(raster.spacing);
+  options.name = name_.empty() ? store.path().stem().string() : name_;
+  const unsigned native = native_zoom(spacing);
   std::tie(options.first_zoom, options.last_zoom) = parse_zooms(zoom_, native);
   if (options.last_zoom > native) {
     common.say("zoom " + std::to_string(native) + " shows every sample: deeper ones, to " +
@@ -128,7 +127,7 @@ TileSetOptions TileCommand::options_for(const TiledRaster& raster,
   options.metadata = metadata_;
   options.resume = resume_;
   options.replace = common.force;
-  options.source_fingerprint = fingerprint_of(raster.store);
+  options.source_fingerprint = fingerprint_of(store);
   options.source_options = fill_ + "\n" + water_ + "\n" + vertical_;
   if (!geoid_.empty()) options.source_options += "\n" + std::to_string(digest_of_file(geoid_));
   return options;
@@ -143,13 +142,6 @@ Summary TileCommand::run(const CommonOptions& common) {
     throw UsageError("--max-error: a number of metres above 0");
   }
   const stream::Store store = stream::Store::open(store_);
-  if (!store.schema().grid) {
-    throw stream::Error(
-        {.file = store_,
-         .where = {},
-         .cause = "tiles are made of rasters, and this store holds irregular points",
-         .remedy = "interpolate them first: terrace raster"});
-  }
   const std::uint64_t memory = common.memory_or(0);
   if (memory < kBytesBeside + kBytesPerThread) {
     throw stream::Error(
@@ -163,25 +155,16 @@ Summary TileCommand::run(const CommonOptions& common) {
   const unsigned threads = static_cast<unsigned>(
       std::min<std::uint64_t>(common.threads, (memory - kBytesBeside) / kBytesPerThread));
 
-  EllipsoidalHeights heights(store.schema(), vertical_, geoid_, memory / 4);
-  if (!heights.note().empty()) common.say(heights.note());
-  TiledRaster raster(store, system_of(store), std::move(heights));
-  if (fill_ == "flat") {
-    const stream::Channel& z = store.schema().coordinates[2];
-    raster.flat_fill =
-        (store.bounds().min[2] * z.scale + z.offset) * raster.vertical.metres_per_unit();
-  } else if (fill_.starts_with("flat:")) {
-    raster.flat_fill = parse_number(fill_.substr(5), "--fill flat");
-  } else if (fill_ != "interpolate") {
-    throw UsageError("--fill '" + fill_ + "': interpolate, flat or flat:METRES");
-  }
-  if (!water_.empty() && water_ != "nodata") raster.water_height = parse_number(water_, "--water");
-
-  const TileSetOptions options = options_for(raster, common);
-  std::vector<std::unique_ptr<TileSurface>> surfaces;
-  for (unsigned i = 0; i < threads; ++i) {
-    surfaces.push_back(std::make_unique<RasterTileSurface>(raster));
-  }
+  const std::unique_ptr<TileSource> source = open_tile_source(store,
+                                                              {.vertical = vertical_,
+                                                               .geoid = geoid_,
+                                                               .fill = fill_,
+                                                               .water = water_,
+                                                               .memory_bytes = memory,
+                                                               .threads = threads},
+                                                              common);
+  const std::vector<std::unique_ptr<TileSurface>>& surfaces = source->surfaces();
+  const TileSetOptions options = options_for(store, surfaces.front()->spacing(), common);
   const TileSetResult result = write_tile_set(surfaces, options, common);
 
   Summary summary;

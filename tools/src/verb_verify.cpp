@@ -12,11 +12,9 @@
 #include <terrace/stream/error.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "crs_options.hpp"
 #include "error.hpp"
-#include "geoid_heights.hpp"
-#include "tile/raster_tile_surface.hpp"
 #include "tile/tile_check.hpp"
+#include "tile/tile_source.hpp"
 #include "units.hpp"
 #include "verbs.hpp"
 
@@ -109,26 +107,21 @@ Summary VerifyCommand::tiles(const CommonOptions& common) const {
       std::min<std::uint64_t>(common.threads, (memory - kBytesBeside) / kBytesPerThread));
 
   std::optional<stream::Store> store;
-  std::optional<TiledRaster> raster;
-  std::vector<std::unique_ptr<TileSurface>> surfaces;
+  std::unique_ptr<TileSource> source;
   if (!store_.empty()) {
     store.emplace(stream::Store::open(store_));
-    if (!store->schema().grid) {
-      throw stream::Error({.file = store_,
-                           .where = {},
-                           .cause = "tiles are made of rasters, and this store holds irregular "
-                                    "points",
-                           .remedy = "name the store that the tiles were made of"});
-    }
-    EllipsoidalHeights heights(store->schema(), vertical_, geoid_, memory / 4);
-    if (!heights.note().empty()) common.say(heights.note());
-    raster.emplace(*store, system_of(*store), std::move(heights));
-    for (unsigned i = 0; i < threads; ++i) {
-      surfaces.push_back(std::make_unique<RasterTileSurface>(*raster));
-    }
+    source = open_tile_source(*store,
+                              {.vertical = vertical_,
+                               .geoid = geoid_,
+                               .fill = {"interpolate"},
+                               .water = {},
+                               .memory_bytes = memory,
+                               .threads = threads},
+                              common);
   }
-  const TileCheckResult result =
-      check_tile_set({.folder = path_, .max_error = max_error_}, threads, surfaces, common);
+  const std::vector<std::unique_ptr<TileSurface>> none;
+  const TileCheckResult result = check_tile_set({.folder = path_, .max_error = max_error_}, threads,
+                                                source ? source->surfaces() : none, common);
 
   Summary summary;
   nlohmann::ordered_json problems = nlohmann::ordered_json::array();

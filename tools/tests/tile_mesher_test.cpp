@@ -257,7 +257,7 @@ TEST(TileLeaves, CoverTheTileOnce) {
     SCOPED_TRACE(zoom);
     const TileRange range = tiles_in(surface.bounds(), zoom);
     const auto leaves =
-        leaves_of({zoom, range.x0, range.y0}, plan_of(zoom, 20, surface), surface.bounds());
+        leaves_of({zoom, range.x0, range.y0}, plan_of(zoom, 20, surface), surface);
     double area = 0;
     std::set<std::tuple<unsigned, std::uint32_t, std::uint32_t>> seen;
     for (const TileLeaf& leaf : leaves) {
@@ -278,7 +278,7 @@ TEST(TileSides, GoAroundTheirLeaf) {
   const TileRange range = tiles_in(surface.bounds(), 7);
   const TileAddress tile{7, range.x0, range.y0};
   TileSides sides(tile, plan, surface);
-  for (const TileLeaf& leaf : leaves_of(tile, plan, surface.bounds())) {
+  for (const TileLeaf& leaf : leaves_of(tile, plan, surface)) {
     const std::uint32_t west = leaf_unit(leaf.x, leaf.depth), south = leaf_unit(leaf.y, leaf.depth);
     const std::uint32_t east = leaf_unit(leaf.x + 1, leaf.depth);
     const std::uint32_t north = leaf_unit(leaf.y + 1, leaf.depth);

@@ -49,8 +49,6 @@ std::optional<HeightRange> RasterTileSurface::range(const GeographicBox& box) {
     out.high = std::max(out.high, *raster_.flat_fill);
   }
   if (raster_.vertical.has_geoid()) {
-    // No geoid leaves these bounds.
-    constexpr double kLowestGeoid = -110.0, kHighestGeoid = 90.0;
     out.low += kLowestGeoid;
     out.high += kHighestGeoid;
   }

@@ -32,6 +32,8 @@ inline constexpr std::uint32_t tile_rows(unsigned zoom) { return std::uint32_t{1
 /// Degrees; closed. Borders of neighbouring tiles are the same numbers.
 struct GeographicBox {
   double west = 0.0, south = 0.0, east = 0.0, north = 0.0;
+
+  friend bool operator==(const GeographicBox&, const GeographicBox&) = default;
 };
 GeographicBox box_of(const TileAddress& tile);
 

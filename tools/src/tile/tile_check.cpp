@@ -15,6 +15,7 @@
 #include "interrupt.hpp"
 #include "ordered_work.hpp"
 #include "tile/tile_borders.hpp"
+#include "tile/tile_candidates.hpp"
 #include "tile/tile_file.hpp"
 #include "tile/tile_height_check.hpp"
 #include "tile/tile_inventory.hpp"
@@ -197,18 +198,15 @@ void SetCheck::add(unsigned zoom, const TileHeights& heights) {
 }
 
 void SetCheck::absent(unsigned zoom, const std::vector<TileAddress>& tiles) {
-  const TileRange range = tiles_in(surfaces_.front()->bounds(), zoom);
+  TileSurface& surface = *surfaces_.front();
   auto at = tiles.begin();
-  for (std::uint32_t y = range.y0; y <= range.y1; ++y) {
-    for (std::uint32_t x = range.x0; x <= range.x1; ++x) {
-      const TileAddress tile{zoom, x, y};
-      while (at != tiles.end() && (at->y < y || (at->y == y && at->x < x))) ++at;
-      if (at != tiles.end() && *at == tile) continue;
-      const std::uint64_t samples = count_samples(tile, *surfaces_.front());
-      if (samples > 0) {
-        result.problems.push_back(
-            {path_of(tile), 0, "no tile where the store has " + with_commas(samples) + " samples"});
-      }
+  for (const TileAddress& tile : tiles_with_samples(surface, zoom)) {
+    while (at != tiles.end() && (at->y < tile.y || (at->y == tile.y && at->x < tile.x))) ++at;
+    if (at != tiles.end() && *at == tile) continue;
+    const std::uint64_t samples = count_samples(tile, surface);
+    if (samples > 0) {
+      result.problems.push_back(
+          {path_of(tile), 0, "no tile where the store has " + with_commas(samples) + " samples"});
     }
   }
 }

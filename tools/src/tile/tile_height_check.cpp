@@ -10,34 +10,10 @@
 #include <terrace/tri/point_tin.hpp>
 
 #include "interrupt.hpp"
+#include "tile/sample_parts.hpp"
 
 namespace terrace::tools {
 namespace {
-
-/// Samples that a part should have at most, each way.
-constexpr double kSamplesPerPart = 512.0;
-
-bool meet(const GeographicBox& a, const GeographicBox& b) {
-  return a.west <= b.east && b.west <= a.east && a.south <= b.north && b.south <= a.north;
-}
-
-/// The four parts of a box, from the south-west on.
-std::array<GeographicBox, 4> quarters(const GeographicBox& box) {
-  const double middle = box.west + (box.east - box.west) / 2.0;
-  const double centre = box.south + (box.north - box.south) / 2.0;
-  return {{{box.west, box.south, middle, centre},
-           {middle, box.south, box.east, centre},
-           {box.west, centre, middle, box.north},
-           {middle, centre, box.east, box.north}}};
-}
-
-/// Whether to look into a box, and whether to cut it before.
-bool has_samples(const GeographicBox& box, TileSurface& surface) {
-  return meet(box, surface.bounds()) && surface.range(box).has_value();
-}
-bool is_wide(const GeographicBox& box, const TileSurface& surface) {
-  return box.east - box.west > kSamplesPerPart * surface.spacing();
-}
 
 /// Measures the parts of one tile. Each gets the triangles that may lie over it.
 class Measurement {
@@ -81,16 +57,16 @@ bool Measurement::over(std::uint32_t triangle, const GeographicBox& box) const {
 }
 
 void Measurement::part(const GeographicBox& box, const std::vector<std::uint32_t>& triangles) {
-  if (!has_samples(box, surface_)) return;
+  if (!may_have_samples(box, surface_)) return;
   std::vector<std::uint32_t> here;
   for (const std::uint32_t t : triangles) {
     if (over(t, box)) here.push_back(t);
   }
-  if (!is_wide(box, surface_)) {
+  if (!is_to_be_cut(box, surface_)) {
     measure(box, here);
     return;
   }
-  for (const GeographicBox& quarter : quarters(box)) part(quarter, here);
+  for (const GeographicBox& quarter : quarters_of(box)) part(quarter, here);
 }
 
 void Measurement::measure(const GeographicBox& box, const std::vector<std::uint32_t>& triangles) {
@@ -150,26 +126,14 @@ TileHeights measure_tile(const TileAddress& address, const TileMesh& mesh, TileS
 std::uint64_t count_samples(const TileAddress& address, TileSurface& surface) {
   const GeographicBox whole = box_of(address);
   std::uint64_t count = 0;
-  SurfaceSamples samples;
-  std::vector<GeographicBox> open{whole};
-  while (!open.empty()) {
-    const GeographicBox box = open.back();
-    open.pop_back();
-    if (!has_samples(box, surface)) continue;
-    if (is_wide(box, surface)) {
-      for (const GeographicBox& quarter : quarters(box)) open.push_back(quarter);
-      continue;
-    }
-    check_interrupt();
-    surface.samples(box, samples);
+  for_each_part(whole, surface, [&](const SurfaceSamples& samples) {
     for (std::size_t i = 0; i < samples.size(); ++i) {
       const double longitude = samples.longitude[i], latitude = samples.latitude[i];
-      const bool once = longitude > whole.west && longitude < whole.east &&
-                        latitude > whole.south && latitude < whole.north &&
-                        (longitude < box.east && latitude < box.north);
-      count += once ? 1 : 0;
+      const bool inside = longitude > whole.west && longitude < whole.east &&
+                          latitude > whole.south && latitude < whole.north;
+      count += inside ? 1 : 0;
     }
-  }
+  });
   return count;
 }
 

@@ -11,8 +11,10 @@
 
 #include "camera.hpp"
 #include "ground.hpp"
+#include "tile/crowded_leaf.hpp"
 #include "tile/ellipsoid.hpp"
 #include "tile/quantized_mesh_layout.hpp"
+#include "tile/sample_parts.hpp"
 
 namespace terrace::tools {
 namespace {
@@ -76,6 +78,9 @@ tri::PointTin tin_of(const TileAddress& tile, const TileLeaf& leaf, TileSurface&
   const LeafUnits across = units_along(whole.west, leaf.x);
   const LeafUnits down = units_along(whole.south, leaf.y);
   if (!measured) return tri::point_tin(tri::SampleRows{}, frame, options);
+  if (is_to_be_cut(box_of(tile, leaf), surface)) {
+    return mesh_crowded_leaf(tile, leaf, frame, options, surface);
+  }
   if (SurfaceRows rows; surface.rows(box_of(tile, leaf), rows)) {
     across.convert(rows.longitude);
     down.convert(rows.latitude);
@@ -242,7 +247,7 @@ MadeTile make_tile(const TileAddress& tile, const ZoomPlan& plan, TileSurface& s
                    const TileMeshOptions& options) {
   Pieces pieces;
   TileSides sides(tile, plan, surface);
-  for (const TileLeaf& leaf : leaves_of(tile, plan, surface.bounds())) {
+  for (const TileLeaf& leaf : leaves_of(tile, plan, surface)) {
     const auto range = surface.range(box_of(tile, leaf));
     // Where heights differ less than the bound, nothing but the sides is read as a rule.
     if (range && range->high - range->low > plan.max_error) surface.expect(box_of(tile, leaf));

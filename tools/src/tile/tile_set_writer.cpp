@@ -13,6 +13,7 @@
 #include "interrupt.hpp"
 #include "ordered_work.hpp"
 #include "progress.hpp"
+#include "tile/tile_candidates.hpp"
 #include "tile/tile_file.hpp"
 #include "tile/tile_inputs.hpp"
 
@@ -23,16 +24,8 @@ namespace fs = std::filesystem;
 
 /// Tiles that may have data, sorted by row, then column. The two of zoom 0 always count.
 std::vector<TileAddress> candidates(unsigned zoom, TileSurface& surface) {
-  std::vector<TileAddress> tiles;
   if (zoom == 0) return {{0, 0, 0}, {0, 1, 0}};
-  const TileRange range = tiles_in(surface.bounds(), zoom);
-  for (std::uint32_t y = range.y0; y <= range.y1; ++y) {
-    for (std::uint32_t x = range.x0; x <= range.x1; ++x) {
-      const TileAddress tile{zoom, x, y};
-      if (surface.range(box_of(tile))) tiles.push_back(tile);
-    }
-  }
-  return tiles;
+  return tiles_with_samples(surface, zoom);
 }
 
 /// The largest difference of heights within a tile, as far as it is known without reading.

@@ -11,8 +11,6 @@
 namespace terrace::tools {
 namespace {
 
-/// Samples that a leaf should have at most, each way.
-constexpr double kSamplesPerLeaf = 512.0;
 /// A leaf has at least this many units each way.
 constexpr unsigned kDeepestLeaf = 8;
 /// Places at which a side of one leaf is looked at, at most.
@@ -21,8 +19,8 @@ constexpr double kMostPlaces = 4096.0;
 /// between have what the side has.
 constexpr double kSideShare = 0.75;
 
-/// Of a tile, or of its part at a depth; exact.
-double width_at(unsigned zoom, unsigned depth = 0) {
+/// Of a tile's part at a depth; exact.
+double width_at(unsigned zoom, unsigned depth) {
   return std::ldexp(180.0, -static_cast<int>(zoom + depth));
 }
 
@@ -43,7 +41,7 @@ ZoomPlan plan_zoom(unsigned zoom, double max_error, double range, const TileSurf
   // A chord of angle a lies R a^2 / 8 below its arc at most: half of the error that the client
   // expects of the zoom.
   plan.longest_edge = std::sqrt(8.0 * 0.5 * expected_error(zoom) / kEquatorialRadius) / kDegree;
-  plan.widest_leaf = kSamplesPerLeaf * surface.spacing();
+  plan.widest_leaf = surface.widest_part();
   return plan;
 }
 
@@ -51,12 +49,14 @@ std::uint32_t leaf_unit(std::uint32_t k, unsigned depth) {
   return (std::uint32_t{kTileUnits} * k + (1U << depth) / 2) >> depth;
 }
 
+double tile_width(unsigned zoom) { return std::ldexp(180.0, -static_cast<int>(zoom)); }
+
 double longitude_at(const TileAddress& tile, double units) {
-  return -180.0 + width_at(tile.zoom) * (tile.x + units / kTileUnits);
+  return -180.0 + tile_width(tile.zoom) * (tile.x + units / kTileUnits);
 }
 
 double latitude_at(const TileAddress& tile, double units) {
-  return -90.0 + width_at(tile.zoom) * (tile.y + units / kTileUnits);
+  return -90.0 + tile_width(tile.zoom) * (tile.y + units / kTileUnits);
 }
 
 GeographicBox box_of(const TileAddress& tile, const TileLeaf& leaf) {
@@ -67,15 +67,19 @@ GeographicBox box_of(const TileAddress& tile, const TileLeaf& leaf) {
 }
 
 std::vector<TileLeaf> leaves_of(const TileAddress& tile, const ZoomPlan& plan,
-                                const GeographicBox& data) {
+                                TileSurface& surface) {
+  const GeographicBox data = surface.bounds();
   std::vector<TileLeaf> leaves, open{{}};
   while (!open.empty()) {
     const TileLeaf leaf = open.back();
     open.pop_back();
-    const double width = width_at(tile.zoom, leaf.depth);
-    const bool wide =
-        width > plan.longest_edge || (width > plan.widest_leaf && meet(box_of(tile, leaf), data));
-    if (!wide || leaf.depth == kDeepestLeaf) {
+    const auto wide = [&] {
+      const double width = width_at(tile.zoom, leaf.depth);
+      if (width > plan.longest_edge) return true;
+      const GeographicBox box = box_of(tile, leaf);
+      return (width > plan.widest_leaf && meet(box, data)) || surface.crowded(box);
+    };
+    if (leaf.depth == kDeepestLeaf || !wide()) {
       leaves.push_back(leaf);
       continue;
     }
@@ -95,9 +99,34 @@ bool TileSides::is_cut(const Side& side) const {
   // the side is cut wherever a leaf of its length is.
   const double width = width_at(tile_.zoom, side.depth);
   if (width > plan_.longest_edge) return true;
-  if (width <= plan_.widest_leaf) return false;
   // A little more than the length: units are rounded.
-  return is_near_data(side, 1.01 * width);
+  if (width > plan_.widest_leaf && is_near_data(side, 1.01 * width)) return true;
+  return is_crowded(side);
+}
+
+bool TileSides::is_crowded(const Side& side) const {
+  const std::uint32_t parts = 1U << side.depth;
+  const std::uint32_t columns = tile_columns(tile_.zoom), rows = tile_rows(tile_.zoom);
+  for (const bool before : {true, false}) {
+    // By the numbers that the leaf's own tile has.
+    TileAddress tile = tile_;
+    TileLeaf leaf{side.depth, side.k, side.k};
+    std::uint32_t& across = side.along_parallel ? leaf.y : leaf.x;
+    std::uint32_t& place = side.along_parallel ? tile.y : tile.x;
+    if (before && side.line == 0) {
+      if (side.along_parallel && place == 0) continue;
+      place = place == 0 ? columns - 1 : place - 1;
+      across = parts - 1;
+    } else if (!before && side.line == parts) {
+      if (side.along_parallel && place == rows - 1) continue;
+      place = !side.along_parallel && place == columns - 1 ? 0 : place + 1;
+      across = 0;
+    } else {
+      across = before ? side.line - 1 : side.line;
+    }
+    if (surface_.crowded(box_of(tile, leaf))) return true;
+  }
+  return false;
 }
 
 bool TileSides::is_near_data(const Side& side, double reach) const {
@@ -119,40 +148,6 @@ bool TileSides::is_near_data(const Side& side, double reach) const {
   return meet(box, data_);
 }
 
-void TileSides::add_samples(const Side& side, std::vector<double>& t,
-                            std::vector<double>& longitude, std::vector<double>& latitude) {
-  // Tiles on both sides of 180 degrees do not see the same samples.
-  if (!side.along_parallel && std::abs(longitude.front()) == 180.0) return;
-  // Of what both tiles beside the side have alike: its ends, and a unit to either side.
-  const double unit = width_at(tile_.zoom) / kTileUnits;
-  const double reach_longitude = side.along_parallel ? 0.0 : unit;
-  const double reach_latitude = side.along_parallel ? unit : 0.0;
-  SurfaceSamples near;
-  surface_.samples({longitude.front() - reach_longitude, latitude.front() - reach_latitude,
-                    longitude.back() + reach_longitude, latitude.back() + reach_latitude},
-                   near);
-  if (near.size() == 0) return;
-  const std::size_t before = t.size();
-  const double from = t.front(), to = t.back();
-  for (std::size_t i = 0; i < near.size(); ++i) {
-    const double at = side.along_parallel ? (near.longitude[i] - longitude[0]) / unit
-                                          : (near.latitude[i] - latitude[0]) / unit;
-    // A vertex can stand at whole numbers only.
-    const double whole = from + std::round(at);
-    if (whole > from && whole < to) t.push_back(whole);
-  }
-  std::sort(t.begin(), t.end());
-  t.erase(std::unique(t.begin(), t.end()), t.end());
-  if (t.size() == before) return;
-  const double across = leaf_unit(side.line, side.depth);
-  longitude.clear();
-  latitude.clear();
-  for (const double at : t) {
-    longitude.push_back(longitude_at(tile_, side.along_parallel ? at : across));
-    latitude.push_back(latitude_at(tile_, side.along_parallel ? across : at));
-  }
-}
-
 std::vector<SideVertex> TileSides::settle(const Side& side) {
   if (is_cut(side)) {
     const Side first{side.along_parallel, side.depth + 1, 2 * side.line, 2 * side.k};
@@ -169,7 +164,7 @@ std::vector<SideVertex> TileSides::settle(const Side& side) {
 
   // Two places per sample, at equal distances; away from all samples the ends will do.
   const double length = width_at(tile_.zoom, side.depth);
-  const double unit = width_at(tile_.zoom) / kTileUnits;
+  const double unit = tile_width(tile_.zoom) / kTileUnits;
   const bool near_data = is_near_data(side, 2.0 * (unit + surface_.spacing()));
   const double wanted = near_data ? std::min(2.0 * length / surface_.spacing(), kMostPlaces) : 1.0;
   const auto parts =
@@ -182,9 +177,20 @@ std::vector<SideVertex> TileSides::settle(const Side& side) {
     longitude.push_back(longitude_at(tile_, side.along_parallel ? at : across));
     latitude.push_back(latitude_at(tile_, side.along_parallel ? across : at));
   }
-  if (near_data) add_samples(side, t, longitude, latitude);
+  SamplesAt samples;
+  if (near_data) samples = add_samples(side, t, longitude, latitude);
+  for (const std::size_t end : {std::size_t{0}, t.size() - 1}) {
+    if (const auto corner = samples_at_corner(longitude[end], latitude[end])) {
+      samples[t[end]] = *corner;
+    }
+  }
   height.resize(t.size());
   surface_.heights(longitude, latitude, height);
+  for (const auto& [at, between] : samples) {
+    const auto place = std::lower_bound(t.begin(), t.end(), at) - t.begin();
+    // In the middle, so that none is farther off than it must be.
+    height[static_cast<std::size_t>(place)] = between.low + 0.5 * (between.high - between.low);
+  }
   const tri::SimplifiedLine line = tri::simplify_line(t, height, kSideShare * plan_.max_error,
                                                       tri::TinLattice{0.0, plan_.height_step});
   std::vector<SideVertex> vertices;

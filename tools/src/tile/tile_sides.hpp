@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include <terrace/tri/point_tin.hpp>
@@ -33,6 +34,8 @@ struct TileLeaf {
 };
 /// Units of the tile's lattice at k / 2^depth of its width.
 std::uint32_t leaf_unit(std::uint32_t k, unsigned depth);
+/// Degrees; exact.
+double tile_width(unsigned zoom);
 /// The meridian and the parallel at `units` of a tile's lattice. On a border they are the same
 /// numbers for both tiles.
 double longitude_at(const TileAddress& tile, double units);
@@ -40,9 +43,9 @@ double latitude_at(const TileAddress& tile, double units);
 GeographicBox box_of(const TileAddress& tile, const TileLeaf& leaf);
 
 /// The parts that a tile is meshed in, so that no edge is too long and no part has too many
-/// samples.
+/// samples. The smallest may have.
 std::vector<TileLeaf> leaves_of(const TileAddress& tile, const ZoomPlan& plan,
-                                const GeographicBox& data);
+                                TileSurface& surface);
 
 /// A vertex on the side of a leaf: units of the tile, and multiples of the height step.
 struct SideVertex {
@@ -69,10 +72,27 @@ class TileSides {
   };
   const std::vector<SideVertex>& vertices(const Side& side);
   std::vector<SideVertex> settle(const Side& side);
-  /// Adds to the places at which a side is looked at those of samples that lie on it.
-  void add_samples(const Side& side, std::vector<double>& t, std::vector<double>& longitude,
-                   std::vector<double>& latitude);
+  /// Lowest and highest samples within a unit of a place on a side: of those within half a unit, if
+  /// there are some.
+  struct Samples {
+    double low = 0.0, high = 0.0;
+    bool any = false, on = false;
+
+    void add(double height, double units);
+  };
+  using SamplesAt = std::map<double, Samples>;
+  /// Adds to the places at which a side is looked at those of samples that lie on it, and returns
+  /// their heights if the surface wants sides to go through them.
+  SamplesAt add_samples(const Side& side, std::vector<double>& t, std::vector<double>& longitude,
+                        std::vector<double>& latitude);
+  /// Samples in a box around places on a side or at its end, the same for all tiles there; nothing
+  /// if they may be too many.
+  std::optional<SurfaceSamples> samples_near(const GeographicBox& box);
+  /// Of samples at the end of a side: the same for all sides and tiles that meet there.
+  std::optional<Samples> samples_at_corner(double longitude, double latitude);
   [[nodiscard]] bool is_cut(const Side& side) const;
+  /// Whether a leaf beside a side has too many samples; the same for both tiles.
+  [[nodiscard]] bool is_crowded(const Side& side) const;
   /// Whether there may be samples within `reach` (degrees) of a side; the same for both tiles.
   [[nodiscard]] bool is_near_data(const Side& side, double reach) const;
 
@@ -80,6 +100,7 @@ class TileSides {
   const ZoomPlan& plan_;
   TileSurface& surface_;
   GeographicBox data_;
+  std::map<std::pair<double, double>, std::optional<Samples>> corners_;
   std::map<std::tuple<bool, unsigned, std::uint32_t, std::uint32_t>, std::vector<SideVertex>>
       known_;
 };

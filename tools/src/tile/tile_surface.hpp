@@ -56,6 +56,15 @@ class TileSurface {
   [[nodiscard]] virtual double spacing() const = 0;
   /// Says that samples and heights in the box will be asked for next: they are read once then.
   virtual void expect(const GeographicBox& box) = 0;
+  /// Boxes that meet bounds() and are wider (degrees) are cut in four before their samples are
+  /// asked for.
+  [[nodiscard]] virtual double widest_part() const { return 512.0 * spacing(); }
+  /// Whether a box is to be cut however narrow it is, because it may hold too many samples to be
+  /// taken at once. Depends on the samples and the box alone.
+  virtual bool crowded(const GeographicBox& /*box*/) { return false; }
+  /// Whether the sides of tiles go through the samples on them rather than along the surface: it
+  /// need not go through those at its border.
+  [[nodiscard]] virtual bool sides_take_samples() const { return false; }
   /// Replaces `out` by the samples in the box, borders included.
   virtual void samples(const GeographicBox& box, SurfaceSamples& out) = 0;
   /// The same where samples stand in rows and columns, which is faster; false where they do not.

@@ -1,0 +1,417 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What tiles ask of a store of irregular points, against all of its points.
+#include "tile/point_tile_surface.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <random>
+#include <set>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <terrace/stream/store.hpp>
+#include <terrace/tri/delaunay2.hpp>
+
+#include "crs_options.hpp"
+#include "store_build.hpp"
+#include "temporary_folder.hpp"
+#include "tile/cloud_spacing.hpp"
+#include "tile/cluster_census.hpp"
+#include "tile/crowded_leaf.hpp"
+#include "tile/sample_parts.hpp"
+#include "tile/tile_candidates.hpp"
+#include "tile/tile_mesher.hpp"
+
+namespace terrace {
+namespace {
+
+using tools::GeographicBox;
+using tools::Point2;
+using tools::StoredBox;
+
+class Random {
+ public:
+  explicit Random(std::uint64_t seed) : engine_(seed) {}
+  double operator()(double low, double high) {
+    return low + (high - low) * (static_cast<double>(engine_() >> 11) * 0x1p-53);
+  }
+
+ private:
+  std::mt19937_64 engine_;
+};
+
+/// A cloud as it lies in its CRS.
+struct CloudCase {
+  std::string name, crs;
+  std::vector<stream::Point3> points;
+};
+
+std::vector<CloudCase> cases() {
+  std::vector<CloudCase> all;
+  Random random(11);
+  const auto height = [](double x, double y) { return 200 + 40 * std::sin(x) + 30 * std::cos(y); };
+  CloudCase utm{"utm", "EPSG:32632", {}};
+  for (int i = 0; i < 12000; ++i) {
+    // Denser to the west, and with a void.
+    const double x = 900 * random(0, 1) * random(0, 1), y = random(0, 700);
+    if (std::hypot(x - 300, y - 300) < 120) continue;
+    utm.points.push_back({480000 + x, 5200000 + y, height(x / 40, y / 50)});
+    if (i % 40 == 0) utm.points.push_back({480000 + x, 5200000 + y, 1000.0});
+  }
+  all.push_back(std::move(utm));
+  CloudCase degrees{"degrees", "EPSG:4326", {}};
+  for (int i = 0; i < 6000; ++i) {
+    const double x = random(179.9, 180.1), y = random(-16.6, -16.4);
+    degrees.points.push_back({x, y, height(90 * x, 100 * y)});
+  }
+  all.push_back(std::move(degrees));
+  CloudCase globe{"globe", "EPSG:4326", {}};
+  for (int i = 0; i < 5000; ++i) {
+    globe.points.push_back({random(0, 360), random(-90, 90), random(0, 3000)});
+  }
+  all.push_back(std::move(globe));
+  CloudCase pole{"pole", "EPSG:32661", {}};
+  for (int i = 0; i < 6000; ++i) {
+    const double x = random(-60000, 60000), y = random(-40000, 80000);
+    pole.points.push_back({2e6 + x, 2e6 + y, height(x / 4000, y / 5000)});
+  }
+  all.push_back(std::move(pole));
+  CloudCase line{"line", "EPSG:32601", {}};
+  for (int i = 0; i < 900; ++i) {
+    line.points.push_back({165000 + 3.0 * i, 600000 + 1.0 * i, height(i / 9.0, 0)});
+  }
+  all.push_back(std::move(line));
+  all.push_back({"one", "EPSG:3035", {{4321000, 3210000, 77.5}}});
+  return all;
+}
+
+/// A store of a case, and all that is known of it without an index.
+struct CloudStore {
+  tests::TemporaryFolder folder;
+  stream::Store store;
+  tools::CoordinateSystem crs;
+  std::vector<stream::Point3> firsts;  ///< of points at one x, y the one that counts
+  std::vector<Point2> globe;           ///< of these
+
+  explicit CloudStore(const CloudCase& cloud)
+      : store(build(cloud, folder.path())), crs(tools::system_of(store)) {
+    std::set<Point2> seen;
+    for (unsigned level = store.top() + 1; level-- > 0;) {
+      store.for_each(level, [&](stream::ClusterId, const stream::ClusterRecord&,
+                                const stream::ClusterPoints& points) {
+        for (const stream::Point3& p : points.positions) {
+          if (seen.insert({p[0], p[1]}).second) firsts.push_back(p);
+        }
+      });
+    }
+    for (const stream::Point3& p : firsts) globe.push_back({p[0], p[1]});
+    crs.to_geographic(globe);
+    for (Point2& p : globe) p[0] = tools::wrapped_longitude(p[0]);
+  }
+
+  [[nodiscard]] tools::TiledCloud tiled() const {
+    return {store, crs, tools::EllipsoidalHeights(store.schema(), "ellipsoidal", "", 0),
+            std::uint64_t{256} << 20};
+  }
+
+ private:
+  static stream::Store build(const CloudCase& cloud, const std::filesystem::path& folder) {
+    const auto file = folder / "cloud.xyz";
+    std::ofstream out(file);
+    out.precision(17);
+    for (const stream::Point3& p : cloud.points) out << p[0] << ' ' << p[1] << ' ' << p[2] << '\n';
+    out.close();
+    tools::BuildRequest request;
+    request.inputs = {file.string()};
+    request.store = folder / "cloud.store";
+    request.block_points = 300;  // few: more levels
+    request.crs = tools::CoordinateSystem::parse(cloud.crs).crs();
+    tools::build_store(request);
+    return stream::Store::open(request.store);
+  }
+};
+
+/// Boxes around points of a cloud, of all sizes, some of them with a border through the point.
+GeographicBox some_box(const CloudStore& cloud, Random& random, int i) {
+  const auto at = static_cast<std::size_t>(random(0, static_cast<double>(cloud.globe.size())));
+  const Point2 p = cloud.globe[std::min(at, cloud.globe.size() - 1)];
+  const double size = std::exp2(random(-18, i % 3 == 0 ? 8 : 0));
+  const double west = i % 2 == 0 ? p[0] : p[0] - random(0, size);
+  const double south = p[1] - random(0, size);
+  return {std::max(west, -180.0), std::max(south, -90.0), std::min(west + size, 180.0),
+          std::min(south + size * random(0.01, 1.5), 90.0)};
+}
+
+bool inside(const GeographicBox& box, const Point2& p) {
+  return p[0] >= box.west && p[0] <= box.east && p[1] >= box.south && p[1] <= box.north;
+}
+
+TEST(PointTileSurface, HasTheSamplesOfABoxAndTheirRange) {
+  for (const CloudCase& cloud : cases()) {
+    SCOPED_TRACE(cloud.name);
+    const CloudStore all(cloud);
+    const tools::TiledCloud tiled = all.tiled();
+    tools::PointTileSurface surface(tiled);
+    for (const Point2& p : all.globe)
+      ASSERT_TRUE(inside(surface.bounds(), p)) << p[0] << " " << p[1];
+    EXPECT_GT(surface.spacing(), 0.0);
+    Random random(23);
+    int certain = 0;
+    for (int i = 0; i < 150; ++i) {
+      const GeographicBox box = some_box(all, random, i);
+      SCOPED_TRACE(testing::Message() << i << ": " << box.west << " " << box.south << " "
+                                      << box.east << " " << box.north);
+      std::set<std::tuple<double, double, double>> expected;
+      double low = 1e9, high = -1e9;
+      for (std::size_t k = 0; k < all.firsts.size(); ++k) {
+        if (!inside(box, all.globe[k])) continue;
+        expected.insert({all.globe[k][0], all.globe[k][1], all.firsts[k][2]});
+        low = std::min(low, all.firsts[k][2]);
+        high = std::max(high, all.firsts[k][2]);
+      }
+      tools::SurfaceSamples found;
+      surface.samples(box, found);
+      std::set<std::tuple<double, double, double>> got;
+      for (std::size_t k = 0; k < found.size(); ++k) {
+        got.insert({found.longitude[k], found.latitude[k], found.height[k]});
+      }
+      EXPECT_EQ(found.size(), got.size());
+      ASSERT_EQ(got, expected);
+      const auto range = surface.range(box);
+      if (expected.empty()) {
+        EXPECT_FALSE(range && range->certain);
+        continue;
+      }
+      ASSERT_TRUE(range);
+      EXPECT_LE(range->low, low);
+      EXPECT_GE(range->high, high);
+      certain += range->certain ? 1 : 0;
+      // In parts it is the same, each sample once.
+      got.clear();
+      std::size_t count = 0;
+      tools::for_each_part(box, surface, [&](const tools::SurfaceSamples& part) {
+        count += part.size();
+        for (std::size_t k = 0; k < part.size(); ++k) {
+          got.insert({part.longitude[k], part.latitude[k], part.height[k]});
+        }
+      });
+      EXPECT_EQ(count, expected.size());
+      EXPECT_EQ(got, expected);
+    }
+    EXPECT_GT(certain, all.globe.size() > 1 ? 8 : -1);
+  }
+}
+
+TEST(PointTileSurface, IsThatOfAllPointsWhateverWasAskedBefore) {
+  for (const CloudCase& cloud : cases()) {
+    if (cloud.name == "one" || cloud.name == "line") continue;
+    SCOPED_TRACE(cloud.name);
+    const CloudStore all(cloud);
+    const tools::TiledCloud tiled = all.tiled();
+    tools::PointTileSurface surface(tiled), other(tiled);
+    tri::Delaunay2<double> whole;
+    std::map<Point2, double> height;
+    std::vector<tri::Point2> places;
+    for (const stream::Point3& p : all.firsts) {
+      height[{p[0], p[1]}] = p[2];
+      places.push_back({p[0], p[1]});
+    }
+    whole.build(places);
+    Random random(31);
+    for (int i = 0; i < 30; ++i) {
+      const GeographicBox box = some_box(all, random, i);
+      std::vector<double> longitude, latitude;
+      for (int k = 0; k < 40; ++k) {
+        longitude.push_back(random(box.west, box.east));
+        latitude.push_back(random(box.south, box.north));
+      }
+      // A point itself.
+      const auto at = static_cast<std::size_t>(random(0, static_cast<double>(all.globe.size())));
+      longitude.push_back(all.globe[at][0]);
+      latitude.push_back(all.globe[at][1]);
+      std::vector<double> found(longitude.size()), again(1);
+      if (i % 2 == 0) surface.expect(box);
+      surface.heights(longitude, latitude, found);
+      std::vector<Point2> stored;
+      for (std::size_t k = 0; k < found.size(); ++k) stored.push_back({longitude[k], latitude[k]});
+      tiled.places.to_stored(stored);
+      EXPECT_NEAR(found.back(), all.firsts[at][2], 1e-4);
+      for (std::size_t k = 0; k < found.size(); ++k) {
+        SCOPED_TRACE(testing::Message() << longitude[k] << " " << latitude[k]);
+        ASSERT_TRUE(std::isfinite(found[k]));
+        other.heights(std::span(&longitude[k], 1), std::span(&latitude[k], 1), again);
+        ASSERT_EQ(found[k], again[0]);
+        if (k + 1 == found.size()) continue;
+        const auto location = whole.locate({stored[k][0], stored[k][1]});
+        if (location.place != tri::Place::kInside) continue;
+        const tri::TriangleId triangle = location.triangle;
+        std::array<stream::Point3, 3> corner;
+        for (unsigned c = 0; c < 3; ++c) {
+          const tri::Point2 p = whole.point(whole.vertices(triangle)[c]);
+          corner[c] = {p[0], p[1], height.at({p[0], p[1]})};
+        }
+        const auto cross = [](const stream::Point3& a, const stream::Point3& b, const Point2& p) {
+          return (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
+        };
+        const double area = cross(corner[0], corner[1], {corner[2][0], corner[2][1]});
+        double sum = 0.0;
+        for (unsigned c = 0; c < 3; ++c) {
+          sum += corner[c][2] * cross(corner[(c + 1) % 3], corner[(c + 2) % 3], stored[k]) / area;
+        }
+        EXPECT_NEAR(found[k], sum, 1e-6 * (1 + std::abs(sum)));
+      }
+    }
+  }
+}
+
+TEST(ClusterCensus, CountsWhatTheClustersHave) {
+  const CloudStore all(cases().front());
+  tools::ClusterCensus census(all.store);
+  const stream::Box3& bounds = all.store.bounds();
+  // The index grows boxes a little.
+  EXPECT_NEAR(census.count({{bounds.min[0], bounds.min[1]}, {bounds.max[0], bounds.max[1]}}, 1e9),
+              static_cast<double>(all.store.points()), 1.0);
+  std::vector<std::pair<stream::Box3, std::uint64_t>> clusters;
+  for (std::uint64_t i = 0; i < all.store.levels()[0].clusters; ++i) {
+    const auto summary = all.store.record(stream::cluster_id(0, i)).summary;
+    clusters.emplace_back(summary.box, summary.descendants);
+  }
+  ASSERT_GT(all.store.top(), 1U);
+  Random random(41);
+  for (int i = 0; i < 300; ++i) {
+    const double x = random(479900, 481000), y = random(5199900, 5200800);
+    const StoredBox box{{x, y}, {x + std::exp2(random(-3, 10)), y + std::exp2(random(-3, 10))}};
+    double expected = 0;
+    double low = 1e9, high = -1e9;
+    int met = 0;
+    for (const auto& [around, count] : clusters) {
+      if (!box.meets({{around.min[0], around.min[1]}, {around.max[0], around.max[1]}})) continue;
+      double share = static_cast<double>(count);
+      for (std::size_t axis = 0; axis < 2; ++axis) {
+        const double from = std::max(box.min[axis], around.min[axis]);
+        const double to = std::min(box.max[axis], around.max[axis]);
+        if (around.max[axis] > around.min[axis]) {
+          share *= (to - from) / (around.max[axis] - around.min[axis]);
+        }
+      }
+      expected += share;
+      ++met;
+      low = std::min(low, around.min[2]);
+      high = std::max(high, around.max[2]);
+    }
+    EXPECT_NEAR(census.count(box, 1e9), expected, 1e-6 * expected);
+    EXPECT_EQ(census.count(box, 500) > 500, expected > 500);
+    const auto heights = census.heights(box);
+    ASSERT_EQ(heights.has_value(), met > 0);
+    if (!heights) continue;
+    EXPECT_EQ(heights->low, low);
+    EXPECT_EQ(heights->high, high);
+    for (const stream::Point3& p : heights->some) EXPECT_TRUE(box.contains(p));
+  }
+}
+
+TEST(CloudSpacing, IsThatOfALatticeOfTheSameDensity) {
+  CloudCase lattice{"lattice", "EPSG:4326", {}}, far = lattice;
+  Random random(5);
+  for (int i = 0; i < 80; ++i) {
+    for (int j = 0; j < 80; ++j) {
+      lattice.points.push_back(
+          {7 + 1e-4 * i / std::cos(46 * 3.14159265358979 / 180), 46 + 1e-4 * j, 5});
+      far.points.push_back({7 + random(0, 0.008), 46 + random(0, 0.008), 5});
+      if (j == 0) far.points.push_back({7 + random(0, 5), 46 + random(0, 3), 9});
+    }
+  }
+  const auto spacing = [](const CloudCase& cloud) {
+    const CloudStore all(cloud);
+    return tools::cloud_spacing(all.store, tools::StoredPlaces(all.store, all.crs));
+  };
+  EXPECT_NEAR(spacing(lattice), 1e-4, 0.15e-4);
+  EXPECT_NEAR(spacing(far), 1e-4 * std::sqrt(0.695), 0.25e-4);
+  EXPECT_EQ(spacing({"one", "EPSG:4326", {{7, 46, 5}, {7, 46, 5}, {7, 46, 9}}}), 180.0 / 64.0);
+}
+
+TEST(TileCandidates, AreAllThatMayHaveSamples) {
+  for (const CloudCase& cloud : cases()) {
+    SCOPED_TRACE(cloud.name);
+    const CloudStore all(cloud);
+    const tools::TiledCloud tiled = all.tiled();
+    tools::PointTileSurface surface(tiled);
+    for (const unsigned zoom : {0U, 1U, 4U, 9U}) {
+      const auto tiles = tools::tiles_with_samples(surface, zoom);
+      std::set<std::pair<std::uint32_t, std::uint32_t>> found;
+      for (const tools::TileAddress& tile : tiles) found.insert({tile.y, tile.x});
+      EXPECT_EQ(found.size(), tiles.size());
+      const double width = 180.0 / std::exp2(zoom);
+      for (const Point2& p : all.globe) {
+        const auto x = std::min(std::floor((p[0] + 180) / width), std::exp2(zoom + 1) - 1);
+        const auto y = std::min(std::floor((p[1] + 90) / width), std::exp2(zoom) - 1);
+        ASSERT_TRUE(found.contains({static_cast<std::uint32_t>(y), static_cast<std::uint32_t>(x)}))
+            << p[0] << " " << p[1];
+      }
+      EXPECT_TRUE(std::is_sorted(tiles.begin(), tiles.end(), [](const auto& a, const auto& b) {
+        return std::pair{a.y, a.x} < std::pair{b.y, b.x};
+      }));
+    }
+  }
+}
+
+TEST(CrowdedLeaf, IsWithinTheBoundOfAllItsSamples) {
+  const CloudStore all(cases().front());
+  const tools::TiledCloud tiled = all.tiled();
+  tools::PointTileSurface surface(tiled);
+  // All of the cloud in a few units of a leaf.
+  for (const unsigned zoom : {6U, 8U, 10U}) {
+    SCOPED_TRACE(zoom);
+    const tools::TileRange range = tools::tiles_in(surface.bounds(), zoom);
+    const tools::TileAddress tile{zoom, range.x0, range.y0};
+    const tools::ZoomPlan plan = tools::plan_zoom(zoom, 40, 2000, surface);
+    const double unit = tools::tile_width(zoom) / tools::kTileUnits;
+    const auto place = [&](double degrees, double from) {
+      return static_cast<std::uint32_t>((degrees - from) / unit) / 128;
+    };
+    const GeographicBox box = box_of(tile);
+    const tools::TileLeaf leaf{8, place(surface.bounds().west, box.west),
+                               place(surface.bounds().south, box.south)};
+    tools::TileSides sides(tile, plan, surface);
+    std::vector<tri::Point3> frame;
+    for (const tools::SideVertex& vertex : sides.around(leaf)) {
+      frame.push_back({static_cast<double>(vertex.u), static_cast<double>(vertex.v),
+                       static_cast<double>(vertex.height) * plan.height_step});
+    }
+    tri::PointTinOptions options;
+    options.lattice = tri::TinLattice{0.0, plan.height_step};
+    tools::SurfaceSamples samples;
+    surface.samples(box_of(tile, leaf), samples);
+    ASSERT_GT(samples.size(), 50U);
+    const tools::LeafPlaces units(tile, leaf);
+    std::vector<double> u, v;
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      u.push_back(units.u(samples.longitude[i]));
+      v.push_back(units.v(samples.latitude[i]));
+    }
+    for (const double bound : {500.0, 60.0, 5.0}) {
+      SCOPED_TRACE(bound);
+      options.max_error = bound;
+      const tri::PointTin made = mesh_crowded_leaf(tile, leaf, frame, options, surface);
+      const tri::TinErrors errors =
+          tri::measure_surface(u, v, samples.height, made.vertices, made.triangles);
+      EXPECT_EQ(errors.uncovered, 0U);
+      EXPECT_EQ(errors.covered, made.errors.covered);
+      EXPECT_EQ(errors.largest, made.errors.largest);
+      EXPECT_NEAR(errors.rms, made.errors.rms, 1e-9 * errors.rms);
+      // As near as if they had been taken at once, or within the bound.
+      const tri::PointTin once = tri::point_tin(u, v, samples.height, frame, options);
+      EXPECT_LE(made.errors.largest, std::max(bound, 1.3 * once.errors.largest));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace terrace
