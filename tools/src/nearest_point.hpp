@@ -40,7 +40,7 @@ class NearestPoint {
   std::vector<Branch> branches_;  ///< a heap, the least on top
   std::vector<Point2> nearest_;   ///< as near as rounding can tell, and maybe farther ones before
   std::optional<Point2> last_;
-  double bound_ = 0;              ///< the square of the distance of the nearest, or a little more
+  double bound_ = 0;  ///< the square of the distance of the nearest, or a little more
 };
 
 }  // namespace terrace::tools

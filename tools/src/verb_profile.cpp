@@ -93,7 +93,7 @@ class ProfileCommand final : public Command {
 
  private:
   std::string store_, output_, line_, line_crs_, shift_, step_, method_ = "linear", level_ = "0",
-              max_edge_;
+                                                                max_edge_;
 };
 
 }  // namespace

@@ -256,8 +256,7 @@ TEST(TileLeaves, CoverTheTileOnce) {
   for (unsigned zoom = 0; zoom < 12; ++zoom) {
     SCOPED_TRACE(zoom);
     const TileRange range = tiles_in(surface.bounds(), zoom);
-    const auto leaves =
-        leaves_of({zoom, range.x0, range.y0}, plan_of(zoom, 20, surface), surface);
+    const auto leaves = leaves_of({zoom, range.x0, range.y0}, plan_of(zoom, 20, surface), surface);
     double area = 0;
     std::set<std::tuple<unsigned, std::uint32_t, std::uint32_t>> seen;
     for (const TileLeaf& leaf : leaves) {
