@@ -11,6 +11,7 @@
 #include "error.hpp"
 #include "ground.hpp"
 #include "terrace/stream/error.hpp"
+#include "world.hpp"
 
 namespace terrace::tools {
 
@@ -69,11 +70,12 @@ EllipsoidalHeights::EllipsoidalHeights(const stream::Schema& schema, const std::
         ", and globes want heights above the ellipsoid: give --geoid FILE (a GeographicLib geoid "
         "grid), or --vertical ellipsoidal if they are that, or --vertical ignore");
   }
-  const auto unit = metres_in_unit(schema.coordinates[2].unit);
-  const auto vertical_unit = metres_in_unit(schema.crs.vertical_unit);
-  if (unit || vertical_unit) {
-    metres_per_unit_ = unit ? *unit : *vertical_unit;
-  } else {
+  // One unit in all verbs, whatever had to be assumed.
+  const Ground ground(placement_of(schema));
+  metres_per_unit_ = ground.metres_vertical();
+  note_ = ground.assumption();
+  if (note_.empty() && !metres_in_unit(schema.coordinates[2].unit) &&
+      !metres_in_unit(schema.crs.vertical_unit)) {
     note_ = "the unit of heights is unknown and taken as metres";
   }
   if (!geoid.empty()) geoid_.emplace(geoid, memory_bytes);

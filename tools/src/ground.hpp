@@ -47,6 +47,8 @@ class Ground {
 
   /// What had to be assumed because the source does not say; empty if nothing.
   [[nodiscard]] const std::string& assumption() const { return assumption_; }
+  /// Of a unit of heights, weighed.
+  [[nodiscard]] double metres_vertical() const { return metres_vertical_; }
 
  private:
   enum class Kind : std::uint8_t { linear, geographic, web_mercator, projected };

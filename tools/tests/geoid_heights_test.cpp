@@ -113,5 +113,18 @@ TEST_F(GeoidTest, WhatWasNotSaidOrContradictsIsRefused) {
   refused(schema_with("orthometric", "metre"), "sea", "");
 }
 
+TEST(EllipsoidalHeightsTest, AnUnknownUnitIsThatOfTheGroundAsInOtherVerbs) {
+  stream::Schema schema;
+  schema.vertical = "ellipsoidal";
+  schema.crs.horizontal_unit = "foot";
+  const EllipsoidalHeights feet(schema, {}, {}, kMemory);
+  EXPECT_EQ(feet.metres_per_unit(), 0.3048);
+  EXPECT_NE(feet.note().find("that of x and y"), std::string::npos) << feet.note();
+  schema.crs.horizontal_unit = "metre";
+  EXPECT_EQ(EllipsoidalHeights(schema, {}, {}, kMemory).metres_per_unit(), 1.0);
+  schema.coordinates[2].unit = "foot";
+  EXPECT_EQ(EllipsoidalHeights(schema, {}, {}, kMemory).metres_per_unit(), 0.3048);
+}
+
 }  // namespace
 }  // namespace terrace::tools
