@@ -96,6 +96,17 @@ struct CircleCover {
     }
     return sum;
   }
+  /// Not above depth() of any point in the box, but for rounding.
+  [[nodiscard]] double least_depth(const StoredBox& box) const {
+    if (has_plane) return plane.leftness(box);
+    double sum = 0;
+    for (std::size_t k = 0; k < 2; ++k) {
+      const double middle = near[k] + centre[k];
+      const double out = std::max({box.min[k] - middle, middle - box.max[k], 0.0});
+      sum += out * out;
+    }
+    return sum;
+  }
   /// Around the disk; everything where there is a half-plane.
   [[nodiscard]] StoredBox bounds() const {
     constexpr double kAll = std::numeric_limits<double>::infinity();

@@ -73,10 +73,9 @@ EllipsoidalHeights::EllipsoidalHeights(const stream::Schema& schema, const std::
   // One unit in all verbs, whatever had to be assumed.
   const Ground ground(placement_of(schema));
   metres_per_unit_ = ground.metres_vertical();
-  note_ = ground.assumption();
-  if (note_.empty() && !metres_in_unit(schema.coordinates[2].unit) &&
-      !metres_in_unit(schema.crs.vertical_unit)) {
-    note_ = "the unit of heights is unknown and taken as metres";
+  if (!metres_in_unit(schema.coordinates[2].unit) && !metres_in_unit(schema.crs.vertical_unit)) {
+    note_ = ground.assumption().empty() ? "the unit of heights is unknown and taken as metres"
+                                        : ground.assumption();
   }
   if (!geoid.empty()) geoid_.emplace(geoid, memory_bytes);
   const auto add = [this](const std::string& what) { note_ += (note_.empty() ? "" : "; ") + what; };

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <string>
+#include <utility>
 
 #include <terrace/stream/error.hpp>
 
@@ -15,6 +17,8 @@ namespace {
 
 /// Mean distances of points around the box.
 constexpr double kMargin = 3;
+/// Few, so that hardly more are looked at than lie near a circle's border; but boxes cost too.
+constexpr std::size_t kPointsPerGroup = 16;
 /// Peak bytes per point that was read, and more per point that is inserted: the triangulation and
 /// its bulk build, heights, origins and states by slots, a hint and a suspect's share.
 constexpr std::uint64_t kBytesRead = 2 * 32, kBytesInserted = 68 + 20 + 16 + 8 + 2 * (16 + 4) + 16;
@@ -60,18 +64,40 @@ void PointWindow::take(const StoreWindow::Node& node) {
   check_memory(node.positions.size());
   const auto cluster = static_cast<std::uint32_t>(read_.size());
   read_.push_back(node.id);
-  constexpr double kAll = std::numeric_limits<double>::infinity();
-  Group group{{{kAll, kAll}, {-kAll, -kAll}}, pending_.size(), node.positions.size()};
+  const std::size_t begin = pending_.size();
   for (std::size_t i = 0; i < node.positions.size(); ++i) {
     const stream::Point3& p = node.positions[i];
-    for (std::size_t k = 0; k < 2; ++k) {
-      group.box.min[k] = std::min(group.box.min[k], p[k]);
-      group.box.max[k] = std::max(group.box.max[k], p[k]);
-    }
     pending_.push_back(
         {{p[0], p[1]}, p[2] * scale_ + offset_, {cluster, static_cast<std::uint32_t>(i)}});
   }
-  if (group.count > 0) groups_.push_back(group);
+  add_groups(begin, node.positions.size());
+}
+
+void PointWindow::add_groups(std::size_t begin, std::size_t count) {
+  if (count == 0) return;
+  constexpr double kAll = std::numeric_limits<double>::infinity();
+  StoredBox box{{kAll, kAll}, {-kAll, -kAll}};
+  const std::span<Pending> points(pending_.data() + begin, count);
+  for (const Pending& p : points) {
+    for (std::size_t k = 0; k < 2; ++k) {
+      box.min[k] = std::min(box.min[k], p.place[k]);
+      box.max[k] = std::max(box.max[k], p.place[k]);
+    }
+  }
+  const std::size_t at = groups_.size();
+  groups_.push_back({box, begin, count, at + 1});
+  if (count <= kPointsPerGroup) return;
+  groups_[at].count = 0;
+  const std::size_t axis = box.max[0] - box.min[0] >= box.max[1] - box.min[1] ? 0 : 1;
+  const std::size_t half = count / 2;
+  std::nth_element(points.begin(), points.begin() + static_cast<std::ptrdiff_t>(half), points.end(),
+                   [axis](const Pending& a, const Pending& b) {
+                     return std::pair(a.place[axis], a.origin.index) <
+                            std::pair(b.place[axis], b.origin.index);
+                   });
+  add_groups(begin, half);
+  add_groups(begin + half, count - half);
+  groups_[at].next = groups_.size();
 }
 
 void PointWindow::move_pending(Group& group, std::size_t at) {

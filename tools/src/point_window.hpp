@@ -107,10 +107,11 @@ class PointWindow {
     double height = 0;
     Origin origin;
   };
-  /// Those of one cluster: pending_[begin] and the next ones.
+  /// Some of one cluster that lie together: pending_[begin] and the next ones; or, without any of
+  /// its own, those of the groups from the next one on up to `next`.
   struct Group {
     StoredBox box;
-    std::size_t begin = 0, count = 0;
+    std::size_t begin = 0, count = 0, next = 0;
   };
   /// A triangle, or its hull edge, that needs all points in its cover.
   struct Suspect {
@@ -123,6 +124,7 @@ class PointWindow {
 
   void clear();
   void take(const StoreWindow::Node& node);
+  void add_groups(std::size_t begin, std::size_t count);
   void take_inner();
   void move_pending(Group& group, std::size_t at);
   void insert_taken();

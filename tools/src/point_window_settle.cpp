@@ -175,8 +175,11 @@ void PointWindow::gather_near(const StoredBox& wide) {
   for (std::uint32_t k = 0; k < open.size(); ++k) {
     if (open[k].box.meets(around)) open_near_.push_back(k);
   }
-  for (const Group& group : groups_) {
-    if (!group.box.meets(around)) continue;
+  for (std::size_t g = 0; g < groups_.size();) {
+    const Group& group = groups_[g];
+    const bool meets = group.box.meets(around);
+    g = meets ? g + 1 : group.next;
+    if (!meets) continue;
     for (std::size_t at = group.begin; at < group.begin + group.count; ++at) {
       const Pending& p = pending_[at];
       if (p.origin.cluster == kNone || !around.contains({p.place[0], p.place[1], 0})) continue;
@@ -196,9 +199,9 @@ bool PointWindow::find_missing(const Suspect& suspect, bool is_near) {
     const Pending& p = pending_[at];
     if (p.origin.cluster == kNone) return;  // taken
     const StoredBox box{p.place, p.place};
-    if (!bounds.meets(box) || !cover.meets(box)) return;
     const double d = cover.depth(box);
     if (point < pending_.size() && !(d < depth)) return;
+    if (!bounds.meets(box) || !cover.meets(box)) return;
     point = at;
     depth = d;
   };
@@ -209,8 +212,12 @@ bool PointWindow::find_missing(const Suspect& suspect, bool is_near) {
       look_at_point(one->second);
     }
   } else {
-    for (const Group& group : groups_) {
-      if (!bounds.meets(group.box) || !cover.meets(group.box)) continue;
+    for (std::size_t g = 0; g < groups_.size();) {
+      const Group& group = groups_[g];
+      const bool may_hold = bounds.meets(group.box) && cover.meets(group.box) &&
+                            !(point < pending_.size() && cover.least_depth(group.box) > depth);
+      g = may_hold ? g + 1 : group.next;
+      if (!may_hold) continue;
       for (std::size_t k = 0; k < group.count; ++k) look_at_point(group.begin + k);
     }
   }
