@@ -274,6 +274,15 @@ class GeodesyTest(unittest.TestCase):
             self.assertAlmostEqual(float(row.split(',')[1]), x, delta=0.01)
             self.assertAlmostEqual(float(row.split(',')[2]), y, delta=0.01)
         self.assertIn('--towgs84', self.refused(1, 'profile', store, *line))
+        late_raster, early_raster = self.path('late.tif'), self.path('early.tif')
+        grid = ('raster', store, '--to-crs', 'EPSG:4326')
+        self.assertIn('--towgs84', self.refused(1, *grid, '-o', late_raster))
+        self.ok(*grid, late, '-o', late_raster)
+        early = self.build(self.raster({1024: 1, 1025: 1, 3072: 27700, 3076: 9001},
+                                       corner=(400000, 300000)), '--crs', 'EPSG:27700', late)
+        self.ok('raster', early, '--to-crs', 'EPSG:4326', '-o', early_raster)
+        with open(late_raster, 'rb') as a, open(early_raster, 'rb') as b:
+            self.assertEqual(a.read(), b.read())
 
     def test_contours_of_a_region_on_another_datum(self):
         store = self.build(self.raster({1024: 1, 1025: 1, 3072: 32632, 3076: 9001}))

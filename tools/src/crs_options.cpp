@@ -101,11 +101,9 @@ PlaceConversion CrsOptions::places(const stream::Store& store) const {
   return PlaceConversion(pair.store, pair.named);
 }
 
-std::optional<CoordinateSystem> CrsOptions::to() const {
-  if (to_.empty()) return std::nullopt;
-  std::optional<DatumShift> shift;
-  if (!shift_.empty()) shift = parse_datum_shift(shift_);
-  return CoordinateSystem::parse(to_, shift);
+std::optional<SystemPair> CrsOptions::to(const stream::Store& store) const {
+  if (!places(store).has_effect()) return std::nullopt;
+  return systems_of(store, to_, shift_);
 }
 
 }  // namespace terrace::tools

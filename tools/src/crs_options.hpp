@@ -69,8 +69,8 @@ class CrsOptions {
   /// Throws: as systems_of.
   [[nodiscard]] RegionConversion regions(const stream::Store& store) const;
   [[nodiscard]] PlaceConversion places(const stream::Store& store) const;
-  /// The CRS of --to-crs; nothing without it.
-  [[nodiscard]] std::optional<CoordinateSystem> to() const;
+  /// The store's CRS and that of --to-crs; nothing without it, or if they are the same.
+  [[nodiscard]] std::optional<SystemPair> to(const stream::Store& store) const;
 
  private:
   std::string region_, to_, shift_;

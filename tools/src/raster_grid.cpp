@@ -143,12 +143,12 @@ RasterGrid raster_grid(const stream::Store& store, const RasterRequest& request)
   }
   double cell = request.cell.value_or(spacing_of(store, area, level));
   if (request.to) {
-    const CoordinateSystem from = system_of(store);
+    const CoordinateSystem &from = request.to->store, &to = request.to->named;
     const Point2 centre{0.5 * (box.min[0] + box.max[0]), 0.5 * (box.min[1] + box.max[1])};
     std::vector<Point2> steps{centre, {centre[0] + cell, centre[1]}, {centre[0], centre[1] + cell}};
-    box = converted(box, from, *request.to, store);
+    box = converted(box, from, to, store);
     if (!request.cell) {
-      transform(from, *request.to, steps);
+      transform(from, to, steps);
       const auto length = [&](std::size_t i) {
         return std::hypot(steps[i][0] - steps[0][0], steps[i][1] - steps[0][1]);
       };

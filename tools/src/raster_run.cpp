@@ -64,13 +64,11 @@ class RasterRun {
   RasterRun(const stream::Store& store, const RasterRequest& request)
       : request_(request),
         grid_(raster_grid(store, request)),
-        crs_(request.to ? request.to->crs() : store.schema().crs),
+        crs_(request.to ? request.to->named.crs() : store.schema().crs),
         ground_(store),
         sampler_(make_sampler(store, request.sampler)),
         shader_(grid_, store.schema(), crs_, request.value),
-        nodata_(nodata(store, request.value)) {
-    if (request.to) from_ = system_of(store);
-  }
+        nodata_(nodata(store, request.value)) {}
 
   RasterOutcome run(const stream::Channel& heights,
                     const std::function<void(std::uint64_t, double)>& progress) {
@@ -145,7 +143,7 @@ class RasterRun {
       for (std::size_t i = 0; i < width_; ++i) {
         line[i] = {grid_.x + grid_.step_x * cell(first_column_, i), y};
       }
-      if (from_) transform(*request_.to, *from_, line);
+      if (request_.to) transform(request_.to->named, request_.to->store, line);
       for (Point2& p : line) {
         const bool wanted = !request_.region || request_.region->polygons().empty() ||
                             request_.region->contains({p[0], p[1], 0});
@@ -215,7 +213,6 @@ class RasterRun {
   std::unique_ptr<HeightSampler> sampler_;
   RasterShader shader_;
   double nodata_;
-  std::optional<CoordinateSystem> from_;
   RasterOutcome outcome_;
 
   // The tiles at work.

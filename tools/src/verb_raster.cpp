@@ -66,7 +66,7 @@ class RasterCommand final : public Command {
     request.sampler.threads = common.threads;
     request.sampler.memory_bytes = common.memory_or(machine_memory_bytes() / 2);
     if (!region_.empty()) request.region = crs_.regions(store)(Region::parse(region_));
-    if (crs_.places(store).has_effect()) request.to = crs_.to();
+    request.to = crs_.to(store);
     request.output = output_;
     request.replace = may_replace(output_, common.force);
     ProgressMeter meter(common.progress, "cells");
