@@ -21,8 +21,8 @@ using terrace::tri::Point3;
 using terrace::tri::point_tin;
 using terrace::tri::PointTin;
 using terrace::tri::PointTinOptions;
-using terrace::tri::PointTinQuality;
 using terrace::tri::TinErrors;
+using terrace::tri::TinQuality;
 
 const bool kSmall = std::getenv("TERRACE_BENCH_SMALL") != nullptr;
 const std::size_t kSide = kSmall ? 65 : 2049;
@@ -90,14 +90,14 @@ const Input& input() {
   return made;
 }
 
-PointTin make(double max_error, PointTinQuality quality) {
+PointTin make(double max_error, TinQuality quality) {
   PointTinOptions options;
   options.max_error = max_error;
   options.quality = quality;
   return point_tin(input().x, input().y, input().z, {}, options);
 }
 
-void mesh(benchmark::State& state, double max_error, PointTinQuality quality) {
+void mesh(benchmark::State& state, double max_error, TinQuality quality) {
   input();
   PointTin tin;
   for (auto _ : state) tin = make(max_error, quality);
@@ -111,7 +111,7 @@ void mesh(benchmark::State& state, double max_error, PointTinQuality quality) {
 }
 
 void measure(benchmark::State& state, double max_error) {
-  const PointTin tin = make(max_error, PointTinQuality::kGreedy);
+  const PointTin tin = make(max_error, TinQuality::kGreedy);
   for (auto _ : state)
     benchmark::DoNotOptimize(
         measure_surface(input().x, input().y, input().z, tin.vertices, tin.triangles));
@@ -153,11 +153,11 @@ void tile(benchmark::State& state, double max_error) {
 constexpr double kOnePercent = 15.5;
 constexpr double kHalf = 0.85;
 #define TIN(name, ...) BENCHMARK_CAPTURE(mesh, name, __VA_ARGS__)->Unit(benchmark::kMillisecond)
-TIN(greedy_one_percent, kOnePercent, PointTinQuality::kGreedy);
-TIN(removal_one_percent, kOnePercent, PointTinQuality::kRemoval);
-TIN(fitted_one_percent, kOnePercent, PointTinQuality::kFitted);
-TIN(greedy_half, kHalf, PointTinQuality::kGreedy);
-TIN(removal_half, kHalf, PointTinQuality::kRemoval);
+TIN(greedy_one_percent, kOnePercent, TinQuality::kGreedy);
+TIN(removal_one_percent, kOnePercent, TinQuality::kRemoval);
+TIN(fitted_one_percent, kOnePercent, TinQuality::kFitted);
+TIN(greedy_half, kHalf, TinQuality::kGreedy);
+TIN(removal_half, kHalf, TinQuality::kRemoval);
 BENCHMARK_CAPTURE(tile, one_percent, kOnePercent)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(tile, tenth_of_it, kOnePercent / 10)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(measure, one_percent, kOnePercent)->Unit(benchmark::kMillisecond);

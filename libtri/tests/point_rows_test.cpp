@@ -24,8 +24,8 @@ using planar::DoubleKernel;
 using tin::rows::RowPath;
 
 constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
-constexpr PointTinQuality kQualities[] = {PointTinQuality::kGreedy, PointTinQuality::kRemoval,
-                                          PointTinQuality::kFitted};
+constexpr TinQuality kQualities[] = {TinQuality::kGreedy, TinQuality::kRemoval,
+                                     TinQuality::kFitted};
 
 double unit(std::mt19937_64& random) { return static_cast<double>(random() >> 11) * 0x1p-53; }
 
@@ -97,7 +97,7 @@ std::vector<Point3> make_frame(double extent, std::size_t per_side, std::uint64_
   return frame;
 }
 
-PointTinOptions options_of(double error, PointTinQuality quality, double step = 0x1p-8) {
+PointTinOptions options_of(double error, TinQuality quality, double step = 0x1p-8) {
   PointTinOptions options;
   options.max_error = error;
   options.quality = quality;
@@ -188,7 +188,7 @@ TEST(PointRows, KeepTheErrorOnALattice) {
   for (const Shape& shape : shapes) {
     for (const double gaps : {0.0, 0.1}) {
       for (const double error : {0.7, 3.0, 30.0}) {
-        for (const PointTinQuality quality : kQualities) {
+        for (const TinQuality quality : kQualities) {
           SCOPED_TRACE(std::to_string(shape.columns) + " x " + std::to_string(shape.rows) +
                        ", extent " + std::to_string(shape.extent) + ", gaps " +
                        std::to_string(gaps) + ", error " + std::to_string(error) + ", quality " +
@@ -199,9 +199,9 @@ TEST(PointRows, KeepTheErrorOnALattice) {
           const PointTin tin = point_tin(grid.rows(), frame, options);
           check_mesh(tin, frame);
           check_errors(Places(grid), grid.z, tin, error);
-          if (quality != PointTinQuality::kFitted)
+          if (quality != TinQuality::kFitted)
             check_lattice(Places(grid), grid.z, tin, *options.lattice);
-          if (quality == PointTinQuality::kGreedy && tin.vertices.size() < 800) check_delaunay(tin);
+          if (quality == TinQuality::kGreedy && tin.vertices.size() < 800) check_delaunay(tin);
         }
       }
     }
@@ -240,7 +240,7 @@ TEST(PointRows, TurnedAndBentGridsKeepTheError) {
                              {90, 90, 32767, -20}}) {
     for (const Bend& bend : kBends) {
       for (const double error : {2.0}) {
-        for (const PointTinQuality quality : kQualities) {
+        for (const TinQuality quality : kQualities) {
           SCOPED_TRACE(std::to_string(shape.columns) + " x " + std::to_string(shape.rows) +
                        ", extent " + std::to_string(shape.extent) + ", turned by " +
                        std::to_string(bend.degrees) + ", mirrored " +
@@ -257,9 +257,8 @@ TEST(PointRows, TurnedAndBentGridsKeepTheError) {
               point_tin(SampleGrid{shape.columns, places.x, places.y, grid.z}, frame, options);
           check_mesh(tin, frame);
           check_errors(places, grid.z, tin, error);
-          if (quality != PointTinQuality::kFitted)
-            check_lattice(places, grid.z, tin, *options.lattice);
-          if (quality == PointTinQuality::kGreedy && tin.vertices.size() < 800) check_delaunay(tin);
+          if (quality != TinQuality::kFitted) check_lattice(places, grid.z, tin, *options.lattice);
+          if (quality == TinQuality::kGreedy && tin.vertices.size() < 800) check_delaunay(tin);
         }
       }
     }
@@ -275,7 +274,7 @@ TEST(PointRows, AsFewTrianglesAsOfPoints) {
     y.push_back(grid.y[i / grid.x.size()]);
   }
   for (const double error : {0.7, 2.0, 10.0}) {
-    for (const PointTinQuality quality : {PointTinQuality::kGreedy, PointTinQuality::kRemoval}) {
+    for (const TinQuality quality : {TinQuality::kGreedy, TinQuality::kRemoval}) {
       SCOPED_TRACE("error " + std::to_string(error) + ", quality " +
                    std::to_string(static_cast<int>(quality)));
       const PointTinOptions options = options_of(error, quality);
@@ -283,7 +282,7 @@ TEST(PointRows, AsFewTrianglesAsOfPoints) {
       const PointTin of_points = point_tin(x, y, grid.z, frame, options);
       EXPECT_LE(static_cast<double>(tin.triangles.size()),
                 1.04 * static_cast<double>(of_points.triangles.size()));
-      if (quality == PointTinQuality::kRemoval) {
+      if (quality == TinQuality::kRemoval) {
         EXPECT_GT(tin.removed, tin.inserted / 5);
         EXPECT_EQ(tin.vertices.size(), frame.size() + tin.inserted - tin.removed);
       }
@@ -310,7 +309,7 @@ TEST(PointRows, AllPathsGiveTheSame) {
       const std::vector<Point3> frame = make_frame(extent, 3, 8);
       ASSERT_TRUE(tin::rows::padded_samples(grid.rows(), frame));
       ASSERT_TRUE(tin::rows::padded_samples(turned, frame));
-      const PointTinOptions options = options_of(1.0, PointTinQuality::kRemoval);
+      const PointTinOptions options = options_of(1.0, TinQuality::kRemoval);
       const auto of_rows = [&](RowPath path) {
         return tin::rows::make_tin(grid.rows(), frame, options, path);
       };
@@ -334,7 +333,7 @@ TEST(PointRows, LatticeTooCoarseForTheError) {
   std::mt19937_64 random(9);
   for (double& z : grid.z) z = 100 * unit(random);
   const std::vector<Point3> frame = make_frame(20, 1, 10);
-  for (const PointTinQuality quality : {PointTinQuality::kGreedy, PointTinQuality::kRemoval}) {
+  for (const TinQuality quality : {TinQuality::kGreedy, TinQuality::kRemoval}) {
     const PointTin tin = point_tin(grid.rows(), frame, options_of(1.0, quality));
     check_mesh(tin, frame);
     check_errors(Places(grid), grid.z, tin, 1.0);
@@ -346,7 +345,7 @@ TEST(PointRows, LatticeTooCoarseForTheError) {
 TEST(PointRows, ErrorZero) {
   const Grid grid = make_grid({20, 20, 1000, 0}, 0.1, 11);
   const std::vector<Point3> frame = make_frame(1000, 2, 12);
-  const PointTin tin = point_tin(grid.rows(), frame, options_of(0.0, PointTinQuality::kRemoval));
+  const PointTin tin = point_tin(grid.rows(), frame, options_of(0.0, TinQuality::kRemoval));
   check_mesh(tin, frame);
   check_errors(Places(grid), grid.z, tin, 0.0);
   // All inside are vertices: their heights are rounded.
@@ -359,13 +358,13 @@ TEST(PointRows, SamplesOnTheFrameAndAHairOutside) {
   grid.y = {std::nextafter(0.0, -1.0), 250, 500, 750, 1000};
   grid.z.assign(25, 0.0);
   const std::vector<Point3> frame{{0, 0, 0}, {1000, 0, 0}, {1000, 1000, 0}, {0, 1000, 0}};
-  const PointTin flat = point_tin(grid.rows(), frame, options_of(0.5, PointTinQuality::kGreedy));
+  const PointTin flat = point_tin(grid.rows(), frame, options_of(0.5, TinQuality::kGreedy));
   EXPECT_EQ(flat.errors.covered, 16u);
   EXPECT_EQ(flat.errors.uncovered, 9u);
   EXPECT_EQ(flat.triangles.size(), 2u);
   // Beyond the bound outside, on a side, inside.
   grid.z[4] = grid.z[9] = grid.z[22] = grid.z[12] = 300;
-  const PointTin tin = point_tin(grid.rows(), frame, options_of(0.5, PointTinQuality::kGreedy));
+  const PointTin tin = point_tin(grid.rows(), frame, options_of(0.5, TinQuality::kGreedy));
   check_mesh(tin, frame);
   check_errors(Places(grid), grid.z, tin, 0.5);
   EXPECT_EQ(tin.stuck, 1u);
@@ -375,7 +374,7 @@ TEST(PointRows, SamplesOnTheFrameAndAHairOutside) {
 
 TEST(PointRows, FewSamples) {
   const std::vector<Point3> frame{{0, 0, 1}, {10, 0, 2}, {10, 10, 3}, {0, 10, 4}};
-  const PointTinOptions options = options_of(0.5, PointTinQuality::kRemoval);
+  const PointTinOptions options = options_of(0.5, TinQuality::kRemoval);
   Grid grid;
   EXPECT_EQ(point_tin(grid.rows(), frame, options).triangles.size(), 2u);
   grid.x = {5};
@@ -402,7 +401,7 @@ TEST(PointRows, IrregularPlacesAndFrames) {
   Grid grid = make_grid({40, 40, 1000, 0}, 0.05, 13);
   grid.x[7] += 10;
   const std::vector<Point3> frame = make_frame(1000, 2, 14);
-  const PointTinOptions options = options_of(1.0, PointTinQuality::kRemoval);
+  const PointTinOptions options = options_of(1.0, TinQuality::kRemoval);
   const PointTin uneven = point_tin(grid.rows(), frame, options);
   check_mesh(uneven, frame);
   check_errors(Places(grid), grid.z, uneven, 1.0);
@@ -424,7 +423,7 @@ TEST(PointRows, IrregularPlacesAndFrames) {
 TEST(PointRows, RefuseBadInput) {
   Grid grid = make_grid({10, 10, 1000, 0}, 0.0, 15);
   const std::vector<Point3> frame = make_frame(1000, 1, 16);
-  const PointTinOptions options = options_of(1.0, PointTinQuality::kGreedy);
+  const PointTinOptions options = options_of(1.0, TinQuality::kGreedy);
   const auto refused = [&](const std::string& what) {
     try {
       static_cast<void>(point_tin(grid.rows(), frame, options));

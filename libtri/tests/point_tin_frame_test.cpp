@@ -34,7 +34,7 @@ std::vector<Point3> square_frame(double size, std::size_t per_side, std::uint64_
 
 TEST(PointTin, KeepsTheFrame) {
   for (const std::uint64_t seed : {5u, 6u, 7u}) {
-    for (const PointTinQuality quality : kQualities) {
+    for (const TinQuality quality : kQualities) {
       SCOPED_TRACE("seed " + std::to_string(seed) + ", quality " +
                    std::to_string(static_cast<int>(quality)));
       const std::vector<Point3> frame = square_frame(1000, 1 + 6 * (seed - 5), seed);
@@ -69,14 +69,14 @@ TEST(PointTin, KeepsTheFrame) {
       cloud.z[cloud.size() - 1] = frame[0][2];
       cloud.x[cloud.size() - 2] = 2000;
       EXPECT_LE(measure(cloud, tin).largest, 2 + 1e-9);
-      if (quality == PointTinQuality::kGreedy) check_delaunay(tin);
+      if (quality == TinQuality::kGreedy) check_delaunay(tin);
     }
   }
 }
 
 TEST(PointTin, KeepsTheErrorOnALattice) {
   for (const double size : {40.0, 300.0, 32767.0}) {
-    for (const PointTinQuality quality : kQualities) {
+    for (const TinQuality quality : kQualities) {
       SCOPED_TRACE("size " + std::to_string(size) + ", quality " +
                    std::to_string(static_cast<int>(quality)));
       const std::vector<Point3> frame = square_frame(size, 5, 8);
@@ -129,7 +129,7 @@ TEST(PointTin, LatticeTooCoarseForTheError) {
   PointTinOptions options;
   options.lattice = TinLattice{0, 5};
   const std::vector<Point3> frame{{0, 0, 0}, {20, 0, 0}, {20, 20, 0}, {0, 20, 0}};
-  for (const PointTinQuality quality : kQualities) {
+  for (const TinQuality quality : kQualities) {
     options.quality = quality;
     const PointTin tin = make(cloud, frame, options);
     check_frame(tin, frame);

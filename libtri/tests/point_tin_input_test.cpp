@@ -71,7 +71,7 @@ TEST(PointTin, HugeAndTinyPlaces) {
       cloud.x[i] = cloud.x[i] * scale - scale / 2;
       cloud.y[i] *= scale;
     }
-    for (const PointTinQuality quality : kQualities) {
+    for (const TinQuality quality : kQualities) {
       SCOPED_TRACE(scale);
       PointTinOptions options;
       options.max_error = 3;

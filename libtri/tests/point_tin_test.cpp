@@ -21,7 +21,7 @@ TEST(PointTin, KeepsTheErrorOverTheHull) {
     for (const std::uint64_t seed : {1u, 2u}) {
       const Cloud cloud = make_cloud(kind, 800, seed);
       for (const double error : {0.0, 0.5, 5.0, 200.0}) {
-        for (const PointTinQuality quality : kQualities) {
+        for (const TinQuality quality : kQualities) {
           SCOPED_TRACE(name(kind) + ", seed " + std::to_string(seed) + ", error " +
                        std::to_string(error) + ", quality " +
                        std::to_string(static_cast<int>(quality)));
@@ -44,11 +44,11 @@ TEST(PointTin, KeepsTheErrorOverTheHull) {
           EXPECT_EQ(measured.covered, cloud.size());
           EXPECT_LE(measured.largest, error + 1e-9);
           EXPECT_NEAR(measured.largest, tin.errors.largest, 1e-9);
-          if (quality == PointTinQuality::kGreedy) {
+          if (quality == TinQuality::kGreedy) {
             check_delaunay(tin);
             EXPECT_EQ(tin.removed, 0u);
           }
-          if (quality != PointTinQuality::kFitted) {
+          if (quality != TinQuality::kFitted) {
             for (std::size_t v = 0; v < tin.vertices.size(); ++v) {
               const std::uint32_t s = tin.sample[v];
               ASSERT_LT(s, cloud.size());
@@ -66,7 +66,7 @@ TEST(PointTin, KeepsTheErrorOfManySamples) {
   for (const PointSet kind : {PointSet::kUniform, PointSet::kGrid, PointSet::kClusters}) {
     const Cloud cloud = make_cloud(kind, 70000, 17);
     for (const double error : {0.6, 10.0}) {
-      for (const PointTinQuality quality : kQualities) {
+      for (const TinQuality quality : kQualities) {
         SCOPED_TRACE(name(kind) + ", error " + std::to_string(error) + ", quality " +
                      std::to_string(static_cast<int>(quality)));
         PointTinOptions options;
@@ -108,7 +108,7 @@ TEST(PointTin, MaxPoints) {
   double before = std::numeric_limits<double>::infinity();
   for (const std::size_t points : {50u, 200u, 800u}) {
     double greedy = 0;
-    for (const PointTinQuality quality : kQualities) {
+    for (const TinQuality quality : kQualities) {
       SCOPED_TRACE(std::to_string(points) + " points, quality " +
                    std::to_string(static_cast<int>(quality)));
       PointTinOptions options;
@@ -119,7 +119,7 @@ TEST(PointTin, MaxPoints) {
       EXPECT_LE(tin.vertices.size(), points);
       EXPECT_GE(tin.vertices.size(), points * 8 / 10);
       EXPECT_NEAR(tin.errors.largest, measure(cloud, tin).largest, 1e-9);
-      if (quality == PointTinQuality::kGreedy) greedy = tin.errors.largest;
+      if (quality == TinQuality::kGreedy) greedy = tin.errors.largest;
       EXPECT_LE(tin.errors.largest, greedy);
     }
     EXPECT_LT(greedy, before);
@@ -147,7 +147,7 @@ TEST(PointTin, OrderOfSamplesDoesNotMatterForTheResult) {
     std::swap(shuffled.y[i], shuffled.y[k]);
     std::swap(shuffled.z[i], shuffled.z[k]);
   }
-  for (const PointTinQuality quality : kQualities) {
+  for (const TinQuality quality : kQualities) {
     PointTinOptions options;
     options.max_error = 1;
     options.quality = quality;

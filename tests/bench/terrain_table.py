@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Times error-bounded meshes, web-globe tiles and heights at points as whole processes.
 
-Prints three Markdown tables, medians of the runs. Meshes: triangles, seconds of reading (decoding with
+Prints four Markdown tables, medians of the runs. Meshes: triangles, seconds of reading (decoding with
 checksums) and of meshing (checks at every sample included; of all threads together), wall clock.
 Tiles: of the raster as longitudes and latitudes, zoom 0 to the one that shows every sample. Points: a
-million random places in one call.
+million random places in one call. Irregular points: the samples of the raster to tile as points.
 
 usage: terrain_table.py TERRACE [--size 2049x2049] [--runs 3] [--errors 20,5,1] [--points 1000000]
                         [--dem FILE.tif] [--tile-dem FILE.tif]
@@ -15,6 +15,7 @@ import json
 import os
 import random
 import resource
+import shutil
 import statistics
 import subprocess
 import sys
@@ -93,6 +94,38 @@ def sample_table(options, store, folder):
                   flush=True)
 
 
+def cloud_table(options, store, folder):
+    """The same verbs on the samples of a raster as irregular points."""
+    points, cloud = os.path.join(folder, 'cloud.xyz'), os.path.join(folder, 'cloud.terrace')
+    system = terrace(options.terrace, 'info', store)['crs']['epsg']
+    terrace(options.terrace, 'points', store, '-o', points)
+    terrace(options.terrace, 'build', points, '--crs', f'EPSG:{system}', '-o', cloud)
+    bounds = terrace(options.terrace, 'info', store)['bounds']
+    places = os.path.join(folder, 'cloud.csv')
+    choice = random.Random(1)
+    with open(places, 'w') as file:
+        for _ in range(options.points):
+            file.write(','.join(f"{choice.uniform(bounds['min'][k], bounds['max'][k]):.9f}"
+                                for k in (0, 1)) + '\n')
+    out = os.path.join(folder, 'cloud-out')
+    jobs = [(f'mesh, {error} m', ('mesh', cloud, '-o', f'{out}.ply', '--force', '--max-error', error), 'triangles')
+            for error in options.errors.split(',')]
+    jobs += [('tiles', ('tile', cloud, '-o', out, '--force', '--vertical', 'ignore'), 'tiles')]
+    jobs += [(f'heights, {method}', ('sample', cloud, '--points', places, '--method', method, '-o',
+                                    f'{out}.csv', '--force'), 'answered')
+             for method in ('linear', 'natural', 'nearest')]
+    print('\n| irregular points | threads | number | CPU s | wall s | peak MiB |')
+    print('|---|---|---|---|---|---|')
+    for name, verb, key in jobs:
+        for threads in (1, 2):
+            runs = []
+            for _ in range(options.runs):
+                shutil.rmtree(out, ignore_errors=True)  # else tiles that are there are kept
+                runs.append(terrace(options.terrace, *verb, '--threads', threads))
+            print(f"| {name} | {threads} | {runs[0][key]:,} | {median(runs, 'cpu'):.2f} "
+                  f"| {median(runs, 'wall'):.2f} | {runs[0]['peak_rss_bytes'] / 2**20:.0f} |", flush=True)
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument('terrace')
@@ -114,8 +147,10 @@ def main():
 
         store = store_of(options.dem, 'plane')
         mesh_table(options, store, folder)
-        tile_table(options, store_of(options.tile_dem, 'tiled', '--crs', 'EPSG:32632'), folder)
+        tiled = store_of(options.tile_dem, 'tiled', '--crs', 'EPSG:32632')
+        tile_table(options, tiled, folder)
         sample_table(options, store, folder)
+        cloud_table(options, tiled, folder)
 
 
 if __name__ == '__main__':

@@ -5,7 +5,10 @@
 #include <string_view>
 #include <utility>
 
+#include <terrace/stream/error.hpp>
+
 #include "error.hpp"
+#include "units.hpp"
 
 namespace terrace::tools {
 namespace {
@@ -27,6 +30,20 @@ Fill parse_fill(const std::string& text) {
   constexpr std::array<std::pair<std::string_view, Fill>, 3> kChoices{
       {{"none", Fill::none}, {"flat", Fill::flat}, {"interpolate", Fill::interpolate}}};
   return choice(text, "--fill", kChoices);
+}
+
+double aim_within(double bound, const stream::MeshRounding& rounding, const std::string& path) {
+  const stream::Point3& moved = rounding.largest();
+  if (moved == stream::Point3{}) return bound;
+  const double aim = bound * (15.0 / 16.0) - moved[2];
+  if (!(aim >= 0.0)) {
+    throw stream::Error({.file = path,
+                         .where = {},
+                         .cause = "its format rounds heights by up to " + number_text(moved[2]) +
+                                  ", too much for this --max-error",
+                         .remedy = "write PLY, which is exact"});
+  }
+  return aim;
 }
 
 tri::TinQuality parse_quality(const std::string& text) {

@@ -28,6 +28,11 @@ enum class Fill : std::uint8_t {
 Fill parse_fill(const std::string& text);
 /// "greedy", "removal", "fitted". Throws: UsageError.
 tri::TinQuality parse_quality(const std::string& text);
+
+/// What is to be meshed to so that a reader of the file sees no more than the bound: heights move
+/// by what they are rounded by, and a little with the places. Throws: stream::Error if the file's
+/// format rounds too coarsely for that.
+double aim_within(double bound, const stream::MeshRounding& rounding, const std::string& path);
 /// "min", "max", "mean", "first", "error". Throws: UsageError.
 tri::PointDuplicates parse_duplicates(const std::string& text);
 

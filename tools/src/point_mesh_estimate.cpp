@@ -16,7 +16,7 @@ constexpr std::size_t kFewSamples = 500;
 PointMeshEstimate::PointMeshEstimate(const PointMeshCuts& cuts, PointMeshSamples& samples,
                                      tri::PointDuplicates duplicates)
     : cuts_(cuts), samples_(samples) {
-  options_.quality = tri::PointTinQuality::kGreedy;
+  options_.quality = tri::TinQuality::kGreedy;
   // They are refused elsewhere.
   options_.duplicates =
       duplicates == tri::PointDuplicates::kError ? tri::PointDuplicates::kFirst : duplicates;

@@ -80,20 +80,9 @@ unsigned PointMesher::threads_within_memory(std::uint64_t each, std::uint64_t po
 PointMeshOptions PointMesher::mesh_options(double max_error) const {
   PointMeshOptions out;
   out.bound = max_error;
-  const bool exact = rounding_.largest() == stream::Point3{};
-  out.tin.max_error = exact ? max_error : max_error * (15.0 / 16.0) - rounding_.largest()[2];
-  if (out.tin.max_error < 0.0) {
-    throw stream::Error({.file = options_.path,
-                         .where = {},
-                         .cause = "its format rounds heights by up to " +
-                                  number_text(rounding_.largest()[2]) +
-                                  ", too much for this --max-error",
-                         .remedy = "write PLY, which is exact"});
-  }
+  out.tin.max_error = aim_within(max_error, rounding_, options_.path);
   out.tin.duplicates = options_.duplicates;
-  out.tin.quality = options_.quality == tri::TinQuality::kGreedy   ? tri::PointTinQuality::kGreedy
-                    : options_.quality == tri::TinQuality::kFitted ? tri::PointTinQuality::kFitted
-                                                                   : tri::PointTinQuality::kRemoval;
+  out.tin.quality = options_.quality;
   return out;
 }
 

@@ -92,19 +92,7 @@ std::vector<std::unique_ptr<WindowMesher>> RasterMesher::meshers(double max_erro
 WindowTinOptions RasterMesher::window_options(double max_error) const {
   WindowTinOptions out;
   out.bound = max_error;
-  out.aim = max_error;
-  const stream::Point3& moved = rounding_.largest();
-  if (moved != stream::Point3{}) {
-    // Heights move by what they are rounded by, and a little with the places.
-    out.aim = max_error * (15.0 / 16.0) - moved[2];
-    if (!(out.aim > 0.0)) {
-      throw stream::Error({.file = options_.path,
-                           .where = {},
-                           .cause = "its format rounds heights by up to " + number_text(moved[2]) +
-                                    ", too much for this --max-error",
-                           .remedy = "write PLY, which is exact"});
-    }
-  }
+  out.aim = aim_within(max_error, rounding_, options_.path);
   out.whole = whole_;
   out.region = options_.region;
   out.tin.quality = options_.quality;

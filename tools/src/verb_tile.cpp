@@ -117,10 +117,7 @@ TileSetOptions TileCommand::options_for(const stream::Store& store, double spaci
                std::to_string(options.last_zoom) + ", show no more");
   }
   options.max_error = max_error_.value_or(0.0);
-  const tri::TinQuality quality = parse_quality(quality_);
-  options.mesh.quality = quality == tri::TinQuality::kGreedy   ? tri::PointTinQuality::kGreedy
-                         : quality == tri::TinQuality::kFitted ? tri::PointTinQuality::kFitted
-                                                               : tri::PointTinQuality::kRemoval;
+  options.mesh.quality = parse_quality(quality_);
   options.mesh.normals = normals_;
   options.mesh.water = !water_.empty();
   options.gzip = gzip_;

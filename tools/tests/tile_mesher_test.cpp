@@ -194,8 +194,8 @@ TEST(TileMesher, EveryQualityKeepsTheBound) {
   for (const bool in_rows : {false, true}) {
     surface.in_rows = in_rows;
     std::vector<std::size_t> triangles;
-    for (const auto quality : {tri::PointTinQuality::kGreedy, tri::PointTinQuality::kRemoval,
-                               tri::PointTinQuality::kFitted}) {
+    for (const auto quality :
+         {tri::TinQuality::kGreedy, tri::TinQuality::kRemoval, tri::TinQuality::kFitted}) {
       const MadeTile made = make_tile(tile, plan, surface, {.quality = quality});
       expect_sound(tile, made);
       expect_bound(tile, made, plan, surface);

@@ -73,11 +73,11 @@ PointTin make_tin(const Samples& samples, std::span<const Point3> frame,
   if (!padded) return tin_of_points(samples, frame, options);
   RowSurface surface(*std::move(padded), frame, options, path);
   surface.refine();
-  if (options.quality != PointTinQuality::kGreedy) {
+  if (options.quality != TinQuality::kGreedy) {
     surface.arrange();
     surface.remove();
   }
-  if (options.quality == PointTinQuality::kFitted) {
+  if (options.quality == TinQuality::kFitted) {
     surface.fit();
     surface.remove();
   }

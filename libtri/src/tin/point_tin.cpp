@@ -47,7 +47,7 @@ class Maker {
       : samples_(samples.all), frame_(frame), options_(options) {}
 
   /// False: there is no surface.
-  bool make(double bound, std::size_t max_vertices, PointTinQuality quality) {
+  bool make(double bound, std::size_t max_vertices, TinQuality quality) {
     mesh_ = {};
     mesh_.samples = &samples_;
     for (Sample& sample : span_of(samples_)) {
@@ -67,7 +67,7 @@ class Maker {
     Greedy greedy(mesh_, bound, !frame_.empty(), options_.lattice);
     insert_greedily(greedy, bound, max_vertices);
     removed_ = 0;
-    if (quality == PointTinQuality::kGreedy) {
+    if (quality == TinQuality::kGreedy) {
       mend(greedy, bound, max_vertices);
       inserted_ = mesh_.vertices.size() - fixed;
       return true;
@@ -78,7 +78,7 @@ class Maker {
       removed_ += remove_vertices(mesh_, fixed, bound, options_.min_angle_degrees);
     };
     remove();
-    if (quality == PointTinQuality::kFitted) {
+    if (quality == TinQuality::kFitted) {
       // Moved vertices have errors at their own samples.
       for (Sample& sample : span_of(samples_))
         if (sample.next == kIsVertex) sample.next = kUnlisted;
@@ -165,8 +165,8 @@ bool make_of_points(Maker& maker, const PointTinOptions& options) {
   constexpr int kTries = 6;
   constexpr double kFull = 0.98;
   const std::size_t limit = options.max_points;
-  if (!maker.make(options.max_error, limit, PointTinQuality::kGreedy)) return false;
-  if (options.quality == PointTinQuality::kGreedy) return true;
+  if (!maker.make(options.max_error, limit, TinQuality::kGreedy)) return false;
+  if (options.quality == TinQuality::kGreedy) return true;
   double best = std::max(maker.measured().errors.largest, options.max_error);
   double bound = best;
   double too_small = options.max_error;

@@ -101,8 +101,8 @@ tri::PointTin tin_of(const TileAddress& tile, const TileLeaf& leaf, TileSurface&
 }
 
 void mesh_leaf(const TileAddress& tile, const TileLeaf& leaf, const ZoomPlan& plan,
-               TileSurface& surface, tri::PointTinQuality quality,
-               const std::vector<SideVertex>& frame, Pieces& pieces) {
+               TileSurface& surface, tri::TinQuality quality, const std::vector<SideVertex>& frame,
+               Pieces& pieces) {
   const auto range = surface.range(box_of(tile, leaf));
   bool measured = false;
   if (range) {

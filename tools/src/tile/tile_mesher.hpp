@@ -14,7 +14,7 @@
 namespace terrace::tools {
 
 struct TileMeshOptions {
-  tri::PointTinQuality quality = tri::PointTinQuality::kRemoval;
+  tri::TinQuality quality = tri::TinQuality::kRemoval;
   bool normals = false;
   bool water = false;
 };

@@ -155,7 +155,8 @@ void TileSetWriter::remove_others() {
   std::vector<fs::path> gone;
   for (const auto& entry : fs::recursive_directory_iterator(options_.folder)) {
     if (!entry.is_regular_file()) continue;
-    const auto tile = parse_tile_path(fs::relative(entry.path(), options_.folder).generic_string());
+    const auto tile =
+        parse_tile_path(entry.path().lexically_relative(options_.folder).generic_string());
     if (!tile) continue;
     const auto by_row = [](const TileAddress& a, const TileAddress& b) {
       return a.y != b.y ? a.y < b.y : a.x < b.x;

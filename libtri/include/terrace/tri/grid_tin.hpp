@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "terrace/tri/grid_tin_check.hpp"
+#include "terrace/tri/tin_quality.hpp"
 
 /// TINs of raster windows that are within a bound of every sample.
 ///
@@ -25,12 +26,6 @@
 /// the shore may run anywhere: land less than three samples wide can vanish.
 
 namespace terrace::tri {
-
-enum class TinQuality : std::uint8_t {
-  kGreedy,   ///< stays Delaunay, but for the sides
-  kRemoval,  ///< about 0.6 of the triangles; those that differ have angles of at least 5 degrees
-  kFitted,   ///< fewer again: heights of inner vertices leave the samples, within the bound
-};
 
 struct GridTinOptions {
   /// The bound, in the unit of heights. Not negative. Bounds below about 2^-45 of the range of

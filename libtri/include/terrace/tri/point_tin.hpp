@@ -8,6 +8,8 @@
 #include <span>
 #include <vector>
 
+#include "terrace/tri/tin_quality.hpp"
+
 /// Error-bounded triangulated surfaces (TINs) of irregular points: few vertices, and the surface is
 /// vertically within a given error of every sample.
 ///
@@ -18,13 +20,6 @@
 namespace terrace::tri {
 
 using Point3 = std::array<double, 3>;
-
-/// How hard to look for fewer triangles.
-enum class PointTinQuality : std::uint8_t {
-  kGreedy,   ///< insertion alone: a Delaunay triangulation of its vertices
-  kRemoval,  ///< then one pass of removals that keep the error
-  kFitted,   ///< then heights moved within the error, which opens room for a second pass
-};
 
 /// The height that stands for several samples at one x,y. It alone is measured.
 enum class PointDuplicates : std::uint8_t {
@@ -44,7 +39,7 @@ struct TinLattice {
 struct PointTinOptions {
   /// In the unit of heights, >= 0. 0 keeps every sample that is not exactly on the surface.
   double max_error = 0;
-  PointTinQuality quality = PointTinQuality::kRemoval;
+  TinQuality quality = TinQuality::kRemoval;
   PointDuplicates duplicates = PointDuplicates::kFirst;
   /// At most this many vertices, those of the frame (or the hull's corners) included and never
   /// dropped; 0: no limit. Where it is reached first, max_error is not kept and
