@@ -20,7 +20,7 @@ namespace {
 using windows::Discs;
 using windows::Unit;
 
-[[noreturn]] void fail(const std::string& what) {
+[[noreturn]] void refuse_large(const std::string& what) {
   throw std::invalid_argument("match_large: " + what);
 }
 
@@ -256,11 +256,12 @@ template <std::size_t D>
 LargeMatching match(std::span<const std::array<double, D>> points,
                     const LargeMatchingOptions& options) {
   if (!options.labels.empty() && options.labels.size() != points.size()) {
-    fail(std::to_string(options.labels.size()) + " labels for " + std::to_string(points.size()) +
-         " points; give one for each");
+    refuse_large(std::to_string(options.labels.size()) + " labels for " +
+                 std::to_string(points.size()) + " points; give one for each");
   }
-  if (options.window < 4) fail("window is " + std::to_string(options.window) + "; at least 4");
-  if (!(options.tolerance >= 0.0)) fail("tolerance must be a number and not negative");
+  if (options.window < 4)
+    refuse_large("window is " + std::to_string(options.window) + "; at least 4");
+  if (!(options.tolerance >= 0.0)) refuse_large("tolerance must be a number and not negative");
   LargeMatching result;
   if (options.labels.empty() && points.size() <= std::max<std::size_t>(options.exact_limit, 3)) {
     PointMatchingOptions exact;
@@ -273,12 +274,12 @@ LargeMatching match(std::span<const std::array<double, D>> points,
     result.optimal = true;
     return result;
   }
-  if (points.size() >= kNobody) fail("at most 2^32 - 2 points have numbers");
+  if (points.size() >= kNobody) refuse_large("at most 2^32 - 2 points have numbers");
   double largest = 0.0;
   for (std::size_t i = 0; i < points.size(); ++i) {
     for (const double c : points[i]) {
       if (!std::isfinite(c)) {
-        fail("a coordinate of point " + std::to_string(i) + " is not finite; leave it out");
+        refuse_large("a coordinate of point " + std::to_string(i) + " is not finite; leave it out");
       }
       largest = std::max(largest, std::abs(c));
     }
@@ -297,7 +298,8 @@ LargeMatching match(std::span<const std::array<double, D>> points,
     result.cost = std::ldexp(result.cost, shift);
     result.dual_bound = std::ldexp(result.dual_bound, shift);
   }
-  if (!std::isfinite(result.cost)) fail("the cost passes the range of double; scale the points");
+  if (!std::isfinite(result.cost))
+    refuse_large("the cost passes the range of double; scale the points");
   return result;
 }
 

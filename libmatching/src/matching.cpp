@@ -15,25 +15,27 @@ namespace {
 using blossom::Edge;
 using blossom::Solver;
 
-[[noreturn]] void fail(const std::string& what) {
+[[noreturn]] void refuse_edges(const std::string& what) {
   throw std::invalid_argument("min_weight_perfect_matching: " + what);
 }
 
 template <class AnyEdge>
 void check_ends(std::size_t vertex_count, std::span<const AnyEdge> edges) {
   if (vertex_count % 2 != 0) {
-    fail(std::to_string(vertex_count) +
-         " vertices, an odd number, have no perfect matching; add one with edges of weight 0");
+    refuse_edges(
+        std::to_string(vertex_count) +
+        " vertices, an odd number, have no perfect matching; add one with edges of weight 0");
   }
   if (vertex_count >= std::size_t{1} << 30) {
-    fail(std::to_string(vertex_count) + " vertices would need " +
-         std::to_string(vertex_count / 10000000) + " GB; at most 2^30 - 1 are possible");
+    refuse_edges(std::to_string(vertex_count) + " vertices would need " +
+                 std::to_string(vertex_count / 10000000) + " GB; at most 2^30 - 1 are possible");
   }
   for (std::size_t k = 0; k < edges.size(); ++k) {
     const AnyEdge& e = edges[k];
     if (e.i >= vertex_count || e.j >= vertex_count || e.i == e.j) {
-      fail("edge " + std::to_string(k) + " joins " + std::to_string(e.i) + " and " +
-           std::to_string(e.j) + "; ends must differ and be below " + std::to_string(vertex_count));
+      refuse_edges("edge " + std::to_string(k) + " joins " + std::to_string(e.i) + " and " +
+                   std::to_string(e.j) + "; ends must differ and be below " +
+                   std::to_string(vertex_count));
     }
   }
 }
@@ -43,7 +45,7 @@ Matching solve(std::size_t vertex_count, std::span<const AnyEdge> edges, int exp
                const std::vector<Edge>& doubled) {
   Solver solver(static_cast<std::uint32_t>(vertex_count), doubled);
   const std::uint32_t alone = solver.solve();
-  if (alone != blossom::kNone) fail(blossom::unmatchable(solver, alone));
+  if (alone != blossom::kNone) refuse_edges(blossom::unmatchable(solver, alone));
   Matching result = blossom::proof_of(solver);
   result.exponent = exponent;
   // Of parallel edges the least is the matched one.
@@ -174,7 +176,7 @@ Matching min_weight_perfect_matching(std::size_t vertex_count,
   double largest = 0.0;
   for (std::size_t k = 0; k < edges.size(); ++k) {
     if (!std::isfinite(edges[k].weight))
-      fail("edge " + std::to_string(k) + " has no finite weight");
+      refuse_edges("edge " + std::to_string(k) + " has no finite weight");
     largest = std::max(largest, std::abs(edges[k].weight));
   }
   int top = 0;
@@ -200,8 +202,8 @@ Matching min_weight_perfect_matching(std::size_t vertex_count, std::span<const I
   for (std::size_t k = 0; k < edges.size(); ++k) {
     const IntegerEdge& e = edges[k];
     if (e.weight > kLargest || e.weight < -kLargest) {
-      fail("edge " + std::to_string(k) + " weighs " + std::to_string(e.weight) +
-           "; weights up to 2^57 fit, divide them");
+      refuse_edges("edge " + std::to_string(k) + " weighs " + std::to_string(e.weight) +
+                   "; weights up to 2^57 fit, divide them");
     }
     doubled.push_back({e.i, e.j, 2 * e.weight});
   }

@@ -20,7 +20,7 @@ using blossom::PairCost;
 using blossom::Pricing;
 using blossom::Solver;
 
-[[noreturn]] void fail(const std::string& what) {
+[[noreturn]] void refuse_points(const std::string& what) {
   throw std::invalid_argument("match_points: " + what);
 }
 
@@ -53,27 +53,28 @@ class Problem {
  private:
   void check() const {
     if (given_.size() > std::size_t{1} << 29) {
-      fail(std::to_string(given_.size()) + " points would need about " +
-           std::to_string(given_.size() >> 20) + " GiB; at most 2^29 are possible");
+      refuse_points(std::to_string(given_.size()) + " points would need about " +
+                    std::to_string(given_.size() >> 20) + " GiB; at most 2^29 are possible");
     }
     for (std::size_t k = 0; k < given_.size(); ++k) {
       for (const double c : given_[k]) {
         if (!std::isfinite(c)) {
-          fail("a coordinate of point " + std::to_string(k) + " is not finite; leave it out");
+          refuse_points("a coordinate of point " + std::to_string(k) +
+                        " is not finite; leave it out");
         }
       }
     }
-    if (options_.neighbours == 0) fail("neighbours is 0; at least one is needed");
+    if (options_.neighbours == 0) refuse_points("neighbours is 0; at least one is needed");
     if (!(options_.metric.factor >= 0.0) || !(options_.metric.offset >= 0.0) ||
         !std::isfinite(options_.metric.factor) || !std::isfinite(options_.metric.offset)) {
-      fail("factor and offset of a metric must be finite and not negative");
+      refuse_points("factor and offset of a metric must be finite and not negative");
     }
     for (std::size_t k = 0; k < options_.candidates.size(); ++k) {
       const auto& [i, j] = options_.candidates[k];
       if (i >= given_.size() || j >= given_.size() || i == j) {
-        fail("candidate " + std::to_string(k) + " joins " + std::to_string(i) + " and " +
-             std::to_string(j) + "; ends must differ and be below " +
-             std::to_string(given_.size()));
+        refuse_points("candidate " + std::to_string(k) + " joins " + std::to_string(i) + " and " +
+                      std::to_string(j) + "; ends must differ and be below " +
+                      std::to_string(given_.size()));
       }
     }
   }
@@ -104,8 +105,8 @@ class Problem {
     cost_.distance = [this](std::uint32_t i, std::uint32_t j) {
       const double d = options_.metric.distance(order_[i], order_[j]);
       if (!std::isfinite(d)) {
-        fail("the metric's distance of points " + std::to_string(order_[i]) + " and " +
-             std::to_string(order_[j]) + " is not finite");
+        refuse_points("the metric's distance of points " + std::to_string(order_[i]) + " and " +
+                      std::to_string(order_[j]) + " is not finite");
       }
       return d;
     };
@@ -186,7 +187,8 @@ class Problem {
     proof.exponent = std::ilogb(cost_.scale) - shift;
     result.dual_bound = proof.dual_bound();
     proof.cost = result.cost;
-    if (!std::isfinite(result.cost)) fail("the cost passes the range of double; scale the points");
+    if (!std::isfinite(result.cost))
+      refuse_points("the cost passes the range of double; scale the points");
   }
 
   std::span<const Point> given_;

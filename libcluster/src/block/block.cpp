@@ -9,13 +9,12 @@
 #include "block/block_state.hpp"
 #include "block/engine.hpp"
 #include "block/exact_finish.hpp"
+#include "block/linear_block.hpp"
 #include "scaling.hpp"
 #include "terrace/cluster/local_search.hpp"
 
 namespace terrace::cluster {
 namespace {
-
-constexpr std::size_t kFullBelow = 2500;
 
 bool available(SimdPath path) {
 #ifdef TERRACE_CLUSTER_X86
@@ -63,7 +62,7 @@ double mean_of(std::span<const double> weights) {
 SearchPlan plan_of(const BlockOptions& options, std::size_t count) {
   SearchPlan plan;
   plan.seed = options.seed;
-  const Effort effort = count < kFullBelow ? Effort::full : options.effort;
+  const Effort effort = count < kFullSearchBelow ? Effort::full : options.effort;
   switch (effort) {
     case Effort::fast:
       plan.candidates = 1.5f;

@@ -14,7 +14,7 @@
 namespace terrace::cluster {
 namespace {
 
-[[noreturn]] void fail(const std::string& what) { throw std::invalid_argument(what); }
+[[noreturn]] void refuse(const std::string& what) { throw std::invalid_argument(what); }
 
 template <std::size_t kCorners>
 double corner_distance(const std::array<Point3, kCorners>& a,
@@ -55,28 +55,28 @@ double corner_distance(const std::array<Point3, kCorners>& a,
 
 void check(const EntityProblem& problem) {
   constexpr std::size_t kMost = 0xfffffffe;
-  if (problem.count == 0) fail("facility location without entities");
+  if (problem.count == 0) refuse("facility location without entities");
   if (problem.count > kMost) {
-    fail(std::to_string(problem.count) + " entities: at most " + std::to_string(kMost) +
-         " are possible");
+    refuse(std::to_string(problem.count) + " entities: at most " + std::to_string(kMost) +
+           " are possible");
   }
-  if (!problem.distance) fail("facility location of entities without a distance function");
+  if (!problem.distance) refuse("facility location of entities without a distance function");
   if (!problem.weights.empty() && problem.weights.size() != problem.count) {
-    fail("weights: " + std::to_string(problem.weights.size()) + " for " +
-         std::to_string(problem.count) + " entities");
+    refuse("weights: " + std::to_string(problem.weights.size()) + " for " +
+           std::to_string(problem.count) + " entities");
   }
   for (std::size_t i = 0; i < problem.weights.size(); ++i) {
     if (problem.weights[i] > 0.0 && std::isfinite(problem.weights[i])) continue;
-    fail("the weight of entity " + std::to_string(i) + " is " + std::to_string(problem.weights[i]) +
-         ": weights must be positive and finite");
+    refuse("the weight of entity " + std::to_string(i) + " is " +
+           std::to_string(problem.weights[i]) + ": weights must be positive and finite");
   }
   if (!(problem.facility_cost > 0.0) || !std::isfinite(problem.facility_cost)) {
-    fail("the facility cost is " + std::to_string(problem.facility_cost) +
-         ": it must be positive and finite, in the unit of the distances");
+    refuse("the facility cost is " + std::to_string(problem.facility_cost) +
+           ": it must be positive and finite, in the unit of the distances");
   }
   if (!(problem.outlier_price > 0.0)) {
-    fail("the price of an outlier is " + std::to_string(problem.outlier_price) +
-         ": it must be positive, in the unit of the distances (infinite: no outliers)");
+    refuse("the price of an outlier is " + std::to_string(problem.outlier_price) +
+           ": it must be positive, in the unit of the distances (infinite: no outliers)");
   }
 }
 

@@ -11,7 +11,7 @@
 namespace terrace::cluster {
 namespace {
 
-constexpr std::size_t kBlock = 64;  // facilities
+constexpr std::size_t kFacilitiesPerBlock = 64;  // facilities
 
 // Eight sums side by side: the order of addition is fixed, and a processor can do some at once.
 double paid(const double* duals, const double* costs, std::size_t n) {
@@ -30,9 +30,10 @@ double paid(const double* duals, const double* costs, std::size_t n) {
 void add_up(const CostRows& costs, std::span<const double> duals, unsigned threads,
             std::vector<double>& sums) {
   const std::size_t m = costs.facilities(), n = costs.clients();
-  parallel((m + kBlock - 1) / kBlock, threads, [&](std::size_t block) {
+  parallel((m + kFacilitiesPerBlock - 1) / kFacilitiesPerBlock, threads, [&](std::size_t block) {
     std::vector<double> scratch;
-    for (std::size_t j = block * kBlock; j < std::min(m, (block + 1) * kBlock); ++j) {
+    for (std::size_t j = block * kFacilitiesPerBlock;
+         j < std::min(m, (block + 1) * kFacilitiesPerBlock); ++j) {
       sums[j] = paid(duals.data(), costs.row(j, scratch), n);
     }
   });

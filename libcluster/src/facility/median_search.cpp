@@ -14,8 +14,8 @@
 namespace terrace::cluster {
 namespace {
 
-constexpr double kLeastGain = 1e-12;   // of the cost; what is below is rounding
-constexpr std::size_t kTogether = 32;  // exchanges judged on the same solution
+constexpr double kLeastExchangeGain = 1e-12;  // of the cost; what is below is rounding
+constexpr std::size_t kTogether = 32;         // exchanges judged on the same solution
 // So many costs per batch are worth a thread.
 constexpr std::size_t kWorthThreads = 200000;
 
@@ -130,7 +130,7 @@ void MedianSearch::descend(std::mt19937_64& random) {
     for (std::size_t b = 1; b < batch.size(); ++b) {
       if (exchanges[b].gain > exchanges[best].gain) best = b;
     }
-    if (!batch.empty() && exchanges[best].gain > kLeastGain * cost()) {
+    if (!batch.empty() && exchanges[best].gain > kLeastExchangeGain * cost()) {
       state_.open(batch[best]);
       state_.close(exchanges[best].leaving);
       refused = 0;  // and the batch once more: others of it may be good still

@@ -16,7 +16,7 @@ namespace {
 // More help nobody than they cost.
 constexpr unsigned kMostThreads = 256;
 
-[[noreturn]] void fail(const std::string& what) {
+[[noreturn]] void refuse_start(const std::string& what) {
   throw std::invalid_argument("the start of the search: " + what);
 }
 
@@ -33,25 +33,25 @@ void SearchEngine::replace(std::vector<std::uint32_t> facility, std::vector<doub
 void SearchEngine::start(const FacilitySolution& solution) {
   const std::size_t count = state_.size();
   const double price = state_.outlier_price();
-  if (solution.facilities.empty()) fail("no facility is open");
+  if (solution.facilities.empty()) refuse_start("no facility is open");
   if (solution.assignment.size() != count) {
-    fail(std::to_string(solution.assignment.size()) + " assignments for " + std::to_string(count) +
-         " clients");
+    refuse_start(std::to_string(solution.assignment.size()) + " assignments for " +
+                 std::to_string(count) + " clients");
   }
   std::vector<std::uint32_t> facility(count);
   for (std::uint32_t i = 0; i < count; ++i) {
     const std::uint32_t c = solution.assignment[i];
     if (c != kOutlier && c >= solution.facilities.size()) {
-      fail("client " + std::to_string(i) + " is in cluster " + std::to_string(c) + " of " +
-           std::to_string(solution.facilities.size()));
+      refuse_start("client " + std::to_string(i) + " is in cluster " + std::to_string(c) + " of " +
+                   std::to_string(solution.facilities.size()));
     }
     if (c == kOutlier && !std::isfinite(price)) {
-      fail("client " + std::to_string(i) + " is left out, but outliers have no price");
+      refuse_start("client " + std::to_string(i) + " is left out, but outliers have no price");
     }
     facility[i] = c == kOutlier ? kOutlier : solution.facilities[c];
   }
   for (const std::uint32_t j : solution.facilities) {
-    if (j >= count) fail("facility " + std::to_string(j) + " is not among the points");
+    if (j >= count) refuse_start("facility " + std::to_string(j) + " is not among the points");
     facility[j] = j;
   }
   std::vector<double> distances(count, price);

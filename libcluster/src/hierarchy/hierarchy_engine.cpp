@@ -13,7 +13,7 @@
 namespace terrace::cluster {
 namespace {
 
-constexpr unsigned kMostThreads = 1024;
+constexpr unsigned kMostBlocksAtOnce = 1024;
 
 HierarchyOptions checked(HierarchyOptions options) {
   if (options.block_size < 2 || options.block_size >= (std::size_t{1} << 24)) {
@@ -33,7 +33,7 @@ HierarchyOptions checked(HierarchyOptions options) {
   if (!options.channels.weights.empty() && !options.channels.read) {
     throw std::invalid_argument("channels have weights but no function that reads them");
   }
-  options.threads = std::clamp(options.threads, 1u, kMostThreads);
+  options.threads = std::clamp(options.threads, 1u, kMostBlocksAtOnce);
   return options;
 }
 

@@ -10,12 +10,9 @@
 namespace terrace::cluster {
 namespace {
 
-// A reduced search is up to 30 % off there (thesis table 7.5).
-constexpr std::size_t kFullBelow = 2500;
-
 SearchLength length_of(Effort effort, std::size_t count) {
   if (effort == Effort::full) return SearchLength::log2_full;
-  if (effort == Effort::fine || count < kFullBelow) return SearchLength::log10_full;
+  if (effort == Effort::fine || count < kFullSearchBelow) return SearchLength::log10_full;
   return SearchLength::tenth;
 }
 

@@ -74,13 +74,6 @@ struct ScaledWeights {
   }
 };
 
-double squared(const Point3& a, const Point3& b) {
-  const double x = a[0] - b[0];
-  const double y = a[1] - b[1];
-  const double z = a[2] - b[2];
-  return x * x + y * y + z * z;
-}
-
 /// One run of Lloyd's iteration. Everything is in scaled units.
 struct Run {
   Run(const KMeansTree& the_tree, ThreadTeam& team, std::vector<Point3> start)

@@ -7,13 +7,12 @@
 namespace terrace::cluster {
 namespace {
 
-constexpr std::size_t kBlock = KMeansTree::kBlock;
-
 /// Chunks are long beside k, so that their sums take less memory than the points.
 std::size_t chunk_level(const KMeansTree& tree, std::size_t clusters) {
   const std::size_t least = std::max<std::size_t>(8192, 4 * clusters);
   std::size_t level = 0;
-  for (std::size_t points = kBlock; points < least && level + 1 < tree.levels.size(); ++level) {
+  for (std::size_t points = KMeansTree::kBlock; points < least && level + 1 < tree.levels.size();
+       ++level) {
     points *= KMeansTree::kFan;
   }
   return level;
@@ -38,7 +37,7 @@ KMeansFilter::KMeansFilter(const KMeansTree& tree, std::size_t clusters, ThreadT
       clusters_(clusters),
       team_(team),
       chunk_level_(chunk_level(tree, clusters)),
-      cluster_(tree.block_count() * kBlock, kMixed),
+      cluster_(tree.block_count() * KMeansTree::kBlock, kMixed),
       owner_(tree.block_count(), kMixed),
       sums_(clusters),
       chunk_sums_(clusters * tree.levels[chunk_level_].size()),
@@ -156,7 +155,8 @@ void KMeansFilter::own(std::size_t level, std::size_t index, std::uint32_t clust
   for (std::size_t b = tree_.first_block(level, index); b < end; ++b) {
     if (owner_[b] == cluster) continue;
     owner_[b] = cluster;
-    for (std::size_t place = b * kBlock; place < (b + 1) * kBlock; ++place) {
+    for (std::size_t place = b * KMeansTree::kBlock; place < (b + 1) * KMeansTree::kBlock;
+         ++place) {
       scratch.changed = scratch.changed || cluster_[place] != cluster;
       cluster_[place] = cluster;
     }
@@ -166,13 +166,14 @@ void KMeansFilter::own(std::size_t level, std::size_t index, std::uint32_t clust
 template <int D>
 void KMeansFilter::assign_block(std::size_t block, const Candidates& candidates, Scratch& scratch,
                                 std::span<Sum> sums) {
-  const double* const x = &tree_.x[block * kBlock];
-  const double* const y = &tree_.y[block * kBlock];
-  const double* const z = &tree_.z[block * kBlock];
-  const double* const w = &tree_.w[block * kBlock];
-  std::array<double, kBlock> least;
-  std::array<double, kBlock> nearest{};  // a double, as the vectors of doubles select it
-  for (std::size_t i = 0; i < kBlock; ++i) {
+  const double* const x = &tree_.x[block * KMeansTree::kBlock];
+  const double* const y = &tree_.y[block * KMeansTree::kBlock];
+  const double* const z = &tree_.z[block * KMeansTree::kBlock];
+  const double* const w = &tree_.w[block * KMeansTree::kBlock];
+  std::array<double, KMeansTree::kBlock> least;
+  std::array<double, KMeansTree::kBlock>
+      nearest{};  // a double, as the vectors of doubles select it
+  for (std::size_t i = 0; i < KMeansTree::kBlock; ++i) {
     least[i] = distance2<D>(x[i], y[i], z[i], candidates.x[0], candidates.y[0], candidates.z[0]);
   }
   for (std::size_t k = 1; k < candidates.count; ++k) {
@@ -180,15 +181,15 @@ void KMeansFilter::assign_block(std::size_t block, const Candidates& candidates,
     const double cy = candidates.y[k];
     const double cz = candidates.z[k];
     const auto number = static_cast<double>(k);
-    for (std::size_t i = 0; i < kBlock; ++i) {
+    for (std::size_t i = 0; i < KMeansTree::kBlock; ++i) {
       const double d = distance2<D>(x[i], y[i], z[i], cx, cy, cz);
       nearest[i] = d < least[i] ? number : nearest[i];
       least[i] = d < least[i] ? d : least[i];
     }
   }
-  std::uint32_t* const cluster = &cluster_[block * kBlock];
+  std::uint32_t* const cluster = &cluster_[block * KMeansTree::kBlock];
   bool changed = false;
-  for (std::size_t i = 0; i < kBlock; ++i) {
+  for (std::size_t i = 0; i < KMeansTree::kBlock; ++i) {
     const std::uint32_t c = candidates.number[static_cast<std::size_t>(nearest[i])];
     changed = changed || cluster[i] != c;
     cluster[i] = c;
@@ -204,7 +205,7 @@ void KMeansFilter::assign_block(std::size_t block, const Candidates& candidates,
 
 void KMeansFilter::move_point(std::size_t place, std::uint32_t cluster) {
   cluster_[place] = cluster;
-  owner_[place / kBlock] = kMixed;
+  owner_[place / KMeansTree::kBlock] = kMixed;
   // The copies that fill the last block go with the last point: they must not count as a change.
   if (place + 1 == tree_.count) {
     std::fill(cluster_.begin() + static_cast<std::ptrdiff_t>(place), cluster_.end(), cluster);

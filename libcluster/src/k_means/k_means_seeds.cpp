@@ -10,15 +10,7 @@
 namespace terrace::cluster {
 namespace {
 
-constexpr std::size_t kBlock = KMeansTree::kBlock;
 constexpr std::size_t kFan = KMeansTree::kFan;
-
-double squared(const Point3& a, const Point3& b) {
-  const double x = a[0] - b[0];
-  const double y = a[1] - b[1];
-  const double z = a[2] - b[2];
-  return x * x + y * y + z * z;
-}
 
 /// Squared distance from a point to a box, less what rounding could add to it.
 double below_box(const Point3& p, const KMeansTree::Node& box) {
@@ -30,9 +22,9 @@ double below_box(const Point3& p, const KMeansTree::Node& box) {
   return sum * (1 - 1e-14);
 }
 
-class Seeder {
+class CentreSeeder {
  public:
-  explicit Seeder(const KMeansTree& tree)
+  explicit CentreSeeder(const KMeansTree& tree)
       : tree_(tree), cost_(tree.x.size(), std::numeric_limits<double>::infinity()) {
     for (const auto& level : tree.levels) {
       std::vector<State>& states = states_.emplace_back(level.size());
@@ -54,8 +46,8 @@ class Seeder {
       node = chosen(node * kFan, std::min((node + 1) * kFan, states_[level].size()), at,
                     [&](std::size_t k) { return states_[level][k].sum; });
     }
-    return chosen(node * kBlock, std::min((node + 1) * kBlock, tree_.count), at,
-                  [&](std::size_t place) { return first ? tree_.w[place] : cost(place); });
+    return chosen(node * KMeansTree::kBlock, std::min((node + 1) * KMeansTree::kBlock, tree_.count),
+                  at, [&](std::size_t place) { return first ? tree_.w[place] : cost(place); });
   }
 
   /// How much less total() would be with a seed there.
@@ -89,7 +81,8 @@ class Seeder {
     if (below_box(seed, tree_.levels[level][node]) >= states_[level][node].most) return 0.0;
     double sum = 0;
     if (level == 0) {
-      for (std::size_t place = node * kBlock; place < (node + 1) * kBlock; ++place) {
+      for (std::size_t place = node * KMeansTree::kBlock; place < (node + 1) * KMeansTree::kBlock;
+           ++place) {
         const double d = squared(tree_.point(place), seed);
         sum += tree_.w[place] * std::max(cost_[place] - d, 0.0);
       }
@@ -105,7 +98,8 @@ class Seeder {
     if (below_box(seed, tree_.levels[level][node]) >= state.most) return;
     state = {0, 0};
     if (level == 0) {
-      for (std::size_t place = node * kBlock; place < (node + 1) * kBlock; ++place) {
+      for (std::size_t place = node * KMeansTree::kBlock; place < (node + 1) * KMeansTree::kBlock;
+           ++place) {
         cost_[place] = std::min(cost_[place], squared(tree_.point(place), seed));
         state.most = std::max(state.most, cost_[place]);
         state.sum += cost(place);
@@ -129,7 +123,7 @@ class Seeder {
 
 std::vector<Point3> k_means_seeds(const KMeansTree& tree, std::size_t clusters,
                                   std::mt19937_64& random) {
-  Seeder seeder(tree);
+  CentreSeeder seeder(tree);
   std::vector<Point3> seeds{tree.point(seeder.draw(true, random))};
   seeder.add(seeds.front());
   // 0.7 is about the natural logarithm of two.

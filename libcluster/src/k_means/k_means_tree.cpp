@@ -33,15 +33,15 @@ struct Keyed {
 
 /// Stable, by the lowest `bits` of the keys.
 void radix_sort(std::vector<Keyed>& items, unsigned bits) {
-  constexpr unsigned kDigitBits = 10;
-  constexpr std::size_t kDigits = std::size_t{1} << kDigitBits;
+  constexpr unsigned kKeyDigitBits = 10;
+  constexpr std::size_t kKeyDigits = std::size_t{1} << kKeyDigitBits;
   std::vector<Keyed> other(items.size());
-  for (unsigned shift = 0; shift < bits; shift += kDigitBits) {
-    std::array<std::size_t, kDigits> place{};
-    for (const Keyed& item : items) ++place[(item.key >> shift) % kDigits];
+  for (unsigned shift = 0; shift < bits; shift += kKeyDigitBits) {
+    std::array<std::size_t, kKeyDigits> place{};
+    for (const Keyed& item : items) ++place[(item.key >> shift) % kKeyDigits];
     std::size_t sum = 0;
     for (std::size_t& p : place) sum += std::exchange(p, sum);
-    for (const Keyed& item : items) other[place[(item.key >> shift) % kDigits]++] = item;
+    for (const Keyed& item : items) other[place[(item.key >> shift) % kKeyDigits]++] = item;
     items.swap(other);
   }
 }

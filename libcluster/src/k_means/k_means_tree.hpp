@@ -11,6 +11,14 @@
 
 namespace terrace::cluster {
 
+/// The squared distance.
+inline double squared(const Point3& a, const Point3& b) {
+  const double x = a[0] - b[0];
+  const double y = a[1] - b[1];
+  const double z = a[2] - b[2];
+  return x * x + y * y + z * z;
+}
+
 /// Points in the order of a Z-order curve, in blocks of kBlock, and a tree over the blocks: each
 /// node has up to kFan children that follow each other, with a box and sums.
 struct KMeansTree {

@@ -81,7 +81,7 @@ void CompleteRounds<T>::list_others(std::uint32_t k, std::vector<std::uint32_t>&
   }
 }
 
-template class CompleteRounds<float>;
-template class CompleteRounds<double>;
+template void CompleteRounds<float>::bring_in(std::uint32_t, Columns&);
+template void CompleteRounds<double>::bring_in(std::uint32_t, Columns&);
 
 }  // namespace terrace::cluster

@@ -74,18 +74,18 @@ typename CompleteRounds<T>::Nearest CompleteRounds<T>::nearest_of(std::uint32_t 
 
 template <class T>
 void CompleteRounds<T>::merge_into(std::uint32_t a, std::uint32_t b) {
-  constexpr T kInfinity = std::numeric_limits<T>::infinity();
+  constexpr T kMerged = std::numeric_limits<T>::infinity();
   for (std::uint32_t c = 0; c < size(); ++c) {
     if (c == a || c == b) continue;
     T& from = entry(b, c);
     T& to = entry(a, c);
     to = std::max(to, from);
-    from = kInfinity;
+    from = kMerged;
   }
-  entry(a, b) = kInfinity;
+  entry(a, b) = kMerged;
 }
 
-template class CompleteRounds<float>;
-template class CompleteRounds<double>;
+template void CompleteRounds<float>::chain();
+template void CompleteRounds<double>::chain();
 
 }  // namespace terrace::cluster

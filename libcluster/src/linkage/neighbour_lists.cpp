@@ -8,13 +8,11 @@
 namespace terrace::cluster {
 namespace {
 
-constexpr std::size_t kLeaf = LinkageTree::kLeaf;
-constexpr unsigned kMost = NeighbourLists::kMost;
-constexpr std::size_t kLeavesPerBlock = 64;
+constexpr std::size_t kLeavesPerListBlock = 64;
 
 /// The best found so far for one point, ascending.
 struct Best {
-  TreeEdge edge[kMost];
+  TreeEdge edge[NeighbourLists::kMost];
   unsigned length;
 
   void clear(unsigned entries) {
@@ -34,10 +32,10 @@ struct Best {
 }  // namespace
 
 NeighbourLists::NeighbourLists(const LinkageTree& tree, unsigned threads)
-    : length_(static_cast<unsigned>(std::min<std::size_t>(kMost, tree.size() - 1))),
+    : length_(static_cast<unsigned>(std::min<std::size_t>(NeighbourLists::kMost, tree.size() - 1))),
       lists_(tree.size() * length_) {
   if (length_ == 0) return;
-  parallel_blocks(tree.leaves(), kLeavesPerBlock, threads,
+  parallel_blocks(tree.leaves(), kLeavesPerListBlock, threads,
                   [&](std::size_t begin, std::size_t end, unsigned) {
                     for (std::size_t leaf = begin; leaf < end; ++leaf) search(tree, leaf);
                   });
@@ -49,7 +47,7 @@ void NeighbourLists::search(const LinkageTree& tree, std::size_t leaf) {
   const std::size_t count = tree.leaf_begin(leaf + 1) - first;
   const std::size_t own = tree.leaf_node(leaf);
   const LinkageTree::Box& box = tree.box(own);
-  Best best[kLeaf];
+  Best best[LinkageTree::kLeaf];
   for (std::size_t q = 0; q < count; ++q) best[q].clear(length_);
   double reach = std::numeric_limits<double>::infinity();
 
@@ -64,15 +62,15 @@ void NeighbourLists::search(const LinkageTree& tree, std::size_t leaf) {
       const Point3 p = tree.point(first + q);
       const double limit = best[q].reach();
       if (squared_distance(p, tree.box(node)) <= limit) {
-        double square[kLeaf];
+        double square[LinkageTree::kLeaf];
         unsigned close = 0;
-        for (std::size_t k = 0; k < kLeaf; ++k) {
+        for (std::size_t k = 0; k < LinkageTree::kLeaf; ++k) {
           const double dx = p[0] - x[k];
           const double dy = p[1] - y[k];
           const double dz = p[2] - z[k];
           square[k] = dx * dx + dy * dy + dz * dz;
         }
-        for (unsigned k = 0; k < kLeaf; ++k) {
+        for (unsigned k = 0; k < LinkageTree::kLeaf; ++k) {
           close |= static_cast<unsigned>(square[k] <= limit) << k;
         }
         close &= (1u << size) - 1;

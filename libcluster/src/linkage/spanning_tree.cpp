@@ -12,8 +12,7 @@ namespace terrace::cluster {
 namespace {
 
 constexpr std::uint32_t kMixed = 0xffffffffu;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr std::size_t kBlock = 2048;
+constexpr std::size_t kPointsPerBlock = 2048;
 constexpr std::size_t kLeavesPerBlock = 256;
 
 }  // namespace
@@ -39,10 +38,11 @@ SpanningTree::SpanningTree(const LinkageTree& tree, unsigned threads)
     }
   }
   while (roots_.size() > 1) {
-    for (const std::uint32_t root : roots_) shortest_[root] = {kInfinity, kMixed, kMixed};
-    parallel_blocks(count_, kBlock, threads_, [this](std::size_t begin, std::size_t end, unsigned) {
-      take_from_lists(begin, end);
-    });
+    for (const std::uint32_t root : roots_)
+      shortest_[root] = {std::numeric_limits<double>::infinity(), kMixed, kMixed};
+    parallel_blocks(
+        count_, kPointsPerBlock, threads_,
+        [this](std::size_t begin, std::size_t end, unsigned) { take_from_lists(begin, end); });
     label_nodes();
     parallel_blocks(
         tree_.leaves(), kLeavesPerBlock, threads_,
@@ -83,7 +83,7 @@ void SpanningTree::take_from_lists(std::size_t begin, std::size_t end) {
 }
 
 void SpanningTree::label_nodes() {
-  parallel_blocks(tree_.leaves(), kBlock, threads_,
+  parallel_blocks(tree_.leaves(), kPointsPerBlock, threads_,
                   [this](std::size_t first, std::size_t last, unsigned) {
                     for (std::size_t leaf = first; leaf < last; ++leaf) {
                       const std::size_t begin = tree_.leaf_begin(leaf);
@@ -187,9 +187,11 @@ void SpanningTree::merge() {
     if (root != largest_ && sets_.unite(edge.low, edge.high)) edges_.push_back(edge);
   }
   for (const std::uint32_t root : roots_) sets_.flatten(root);
-  parallel_blocks(count_, kBlock, threads_, [this](std::size_t begin, std::size_t end, unsigned) {
-    for (std::size_t i = begin; i < end; ++i) component_[i] = sets_.root(component_[i]);
-  });
+  parallel_blocks(count_, kPointsPerBlock, threads_,
+                  [this](std::size_t begin, std::size_t end, unsigned) {
+                    for (std::size_t i = begin; i < end; ++i)
+                      component_[i] = sets_.root(component_[i]);
+                  });
   std::vector<std::uint32_t> size(count_, 0);
   for (const std::uint32_t component : component_) ++size[component];
   std::size_t kept = 0;

@@ -15,7 +15,7 @@ namespace {
 
 using tree::area_of;
 
-[[noreturn]] void fail(const std::string& what) {
+[[noreturn]] void refuse_volumes(const std::string& what) {
   throw std::invalid_argument("BoundingVolumeHierarchy: " + what);
 }
 
@@ -46,7 +46,7 @@ struct FloatBox {
 void check_costs(const SurfaceAreaCosts& costs) {
   const auto bad = [](double c) { return !(c >= 0.0) || !std::isfinite(c); };
   if (bad(costs.traversal) || bad(costs.intersection)) {
-    fail("the costs of the heuristic must be finite and not negative");
+    refuse_volumes("the costs of the heuristic must be finite and not negative");
   }
 }
 
@@ -152,7 +152,7 @@ BoundingVolumeHierarchy<D>::BoundingVolumeHierarchy(std::span<const TreeChildren
                                                     std::span<const Box<D>> boxes,
                                                     const HierarchyOptions& options) {
   check_costs(options.costs);
-  if (options.leaf_size == 0) fail("leaf_size is 0; a leaf takes one primitive at least");
+  if (options.leaf_size == 0) refuse_volumes("leaf_size is 0; a leaf takes one primitive at least");
   tree::check_rows(rows, boxes.size());
   tree::check_boxes(boxes);
   frame_ = frame_of(boxes);

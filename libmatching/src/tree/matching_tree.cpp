@@ -18,7 +18,7 @@
 namespace terrace::matching {
 namespace {
 
-[[noreturn]] void fail(const std::string& what) {
+[[noreturn]] void refuse_tree(const std::string& what) {
   throw std::invalid_argument("make_matching_tree: " + what);
 }
 
@@ -97,8 +97,8 @@ class Builder {
     const std::size_t n = points_.size();
     const auto differ = [&](std::size_t size, const char* what, const char* one) {
       if (size == 0 || size == n) return;
-      fail(std::to_string(size) + " " + what + " for " + std::to_string(n) + " points; give one " +
-           one + " per point or none");
+      refuse_tree(std::to_string(size) + " " + what + " for " + std::to_string(n) +
+                  " points; give one " + one + " per point or none");
     };
     differ(options_.labels.size(), "labels", "label");
     differ(options_.weights.size(), "weights", "weight");
@@ -109,16 +109,17 @@ class Builder {
     const bool fits =
         pages <= 0 || page <= 0 || needed <= static_cast<double>(pages) * static_cast<double>(page);
     if (n < kNobody / 2 && fits) return;
-    fail("the tree of " + std::to_string(n) + " points would need about " +
-         std::to_string(static_cast<std::uint64_t>(needed / (1024.0 * 1024.0))) +
-         " MiB, and at most 2^31 - 2 points have numbers; build trees of parts");
+    refuse_tree("the tree of " + std::to_string(n) + " points would need about " +
+                std::to_string(static_cast<std::uint64_t>(needed / (1024.0 * 1024.0))) +
+                " MiB, and at most 2^31 - 2 points have numbers; build trees of parts");
   }
 
   void check_values() const {
     for (std::size_t k = 0; k < points_.size(); ++k) {
       for (const double c : points_[k]) {
         if (!std::isfinite(c)) {
-          fail("a coordinate of point " + std::to_string(k) + " is not finite; leave it out");
+          refuse_tree("a coordinate of point " + std::to_string(k) +
+                      " is not finite; leave it out");
         }
       }
     }
@@ -126,12 +127,13 @@ class Builder {
     for (std::size_t k = 0; k < options_.weights.size(); ++k) {
       const double w = options_.weights[k];
       if (!(w > 0.0) || !std::isfinite(w)) {
-        fail("the weight of point " + std::to_string(k) + " is " + std::to_string(w) +
-             "; weights must be positive and finite");
+        refuse_tree("the weight of point " + std::to_string(k) + " is " + std::to_string(w) +
+                    "; weights must be positive and finite");
       }
       sum += w;
     }
-    if (!std::isfinite(sum)) fail("the weights' sum passes the range of double; divide them");
+    if (!std::isfinite(sum))
+      refuse_tree("the weights' sum passes the range of double; divide them");
   }
 
   [[nodiscard]] unsigned threads() const {
@@ -215,15 +217,15 @@ class Builder {
     }
     std::vector<std::uint32_t> mate = options_.matcher(positions);
     if (mate.size() != nodes.size()) {
-      fail("the matcher returned " + std::to_string(mate.size()) + " partners for " +
-           std::to_string(nodes.size()) + " nodes");
+      refuse_tree("the matcher returned " + std::to_string(mate.size()) + " partners for " +
+                  std::to_string(nodes.size()) + " nodes");
     }
     std::size_t alone = 0;
     for (std::uint32_t i = 0; i < mate.size(); ++i) {
       if (mate[i] == kNobody && ++alone <= mate.size() % 2) continue;
       if (mate[i] < mate.size() && mate[i] != i && mate[mate[i]] == i) continue;
-      fail("the matcher did not pair node " + std::to_string(i) + " of " +
-           std::to_string(mate.size()) + " with one that is paired with it");
+      refuse_tree("the matcher did not pair node " + std::to_string(i) + " of " +
+                  std::to_string(mate.size()) + " with one that is paired with it");
     }
     return mate;
   }
@@ -231,8 +233,8 @@ class Builder {
   Node pair(const Node& p, const Node& q, std::uint32_t row, std::uint32_t level) {
     const double apart = distance(p.position, q.position);
     if (!std::isfinite(apart)) {
-      fail("nodes " + std::to_string(p.number) + " and " + std::to_string(q.number) +
-           " are farther apart than double can say; scale the points");
+      refuse_tree("nodes " + std::to_string(p.number) + " and " + std::to_string(q.number) +
+                  " are farther apart than double can say; scale the points");
     }
     const Node made{static_cast<std::uint32_t>(points_.size()) + row, p.size + q.size, level,
                     p.weight + q.weight, midpoint(p.position, p.weight, q.position, q.weight)};

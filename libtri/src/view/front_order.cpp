@@ -7,11 +7,7 @@
 #include "terrace/tri/view_front.hpp"
 
 namespace terrace::tri {
-namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-}  // namespace
+namespace {}  // namespace
 
 bool ViewFront::less_wanted(const Candidate& a, const Candidate& b) {
   if (a.want != b.want) return a.want < b.want;
@@ -49,7 +45,7 @@ std::span<const ViewFront::Candidate> ViewFront::soon() {
 double ViewFront::key(Slot slot) const {
   const double keep = own_.keep[slot];
   if (keep > 0.0) return keep;
-  return keep < 0.0 ? -kInfinity : -1.0 - own_.distance[slot];
+  return keep < 0.0 ? -std::numeric_limits<double>::infinity() : -1.0 - own_.distance[slot];
 }
 
 void ViewFront::sort(double below) {
@@ -75,7 +71,8 @@ void ViewFront::sort(double below) {
     entry.points_before = points;
     points += tree_->size(entry.slot);
   }
-  order_.push_back({kInfinity, ClusterId{}, ClusterTree::kNoSlot, points});
+  order_.push_back(
+      {std::numeric_limits<double>::infinity(), ClusterId{}, ClusterTree::kNoSlot, points});
 }
 
 std::size_t ViewFront::points_below(double below) {

@@ -10,7 +10,6 @@ namespace {
 
 constexpr std::uint32_t kNone = 0xFFFFFFFFu;
 constexpr std::uint32_t kLeaf = 4;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // A point is in a triangle if no barycentric coordinate is less than minus this: what lies on an
 // edge must not fall between two triangles.
 constexpr double kRounding = 1e-9;
@@ -44,6 +43,7 @@ void HeightPatches::build() {
 
 // Halves at the median along the longer side of what the middles span; boxes come from below.
 void HeightPatches::split(std::uint32_t node, std::uint32_t first, std::uint32_t last) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   std::array<double, 4> box{kInfinity, kInfinity, -kInfinity, -kInfinity};
   const auto add = [&box](double x, double y) {
     box = {std::min(box[0], x), std::min(box[1], y), std::max(box[2], x), std::max(box[3], y)};

@@ -20,16 +20,16 @@ Point3 combine(double s, const Point3& a, double t, const Point3& b) {
   return {s * a[0] + t * b[0], s * a[1] + t * b[1], s * a[2] + t * b[2]};
 }
 
-void check(bool good, const char* what) {
+void check_camera(bool good, const char* what) {
   if (!good) throw std::invalid_argument(std::string("camera: ") + what);
 }
 
 void check_positive(double value, const char* what) {
-  check(std::isfinite(value) && value > 0.0, what);
+  check_camera(std::isfinite(value) && value > 0.0, what);
 }
 
 void check_finite(const Point3& p, const char* what) {
-  check(std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]), what);
+  check_camera(std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]), what);
 }
 
 Point3 unit(const Point3& v, const char* what) {
@@ -58,8 +58,8 @@ Frame frame(const Pose& pose) {
   Frame f;
   f.forward = unit(pose.direction, "the direction is null or not finite");
   f.right = cross(f.forward, unit(pose.up, "the up vector is null or not finite"));
-  check(std::hypot(f.right[0], f.right[1], f.right[2]) > 1e-9,
-        "the up vector is parallel to the direction; choose another");
+  check_camera(std::hypot(f.right[0], f.right[1], f.right[2]) > 1e-9,
+               "the up vector is parallel to the direction; choose another");
   f.right = unit(f.right, "the up vector is parallel to the direction");
   f.up = cross(f.right, f.forward);
   return f;
@@ -71,7 +71,7 @@ Point3 meet(const std::array<double, 4>& a, const std::array<double, 4>& b,
   const Point3 u{a[0], a[1], a[2]}, v{b[0], b[1], b[2]}, w{c[0], c[1], c[2]};
   const Point3 vw = cross(v, w), wu = cross(w, u), uv = cross(u, v);
   const double det = dot(u, vw);
-  check(std::isfinite(det) && det != 0.0, "the matrix is degenerate");
+  check_camera(std::isfinite(det) && det != 0.0, "the matrix is degenerate");
   return {-(a[3] * vw[0] + b[3] * wu[0] + c[3] * uv[0]) / det,
           -(a[3] * vw[1] + b[3] * wu[1] + c[3] * uv[1]) / det,
           -(a[3] * vw[2] + b[3] * wu[2] + c[3] * uv[2]) / det};
@@ -82,7 +82,7 @@ Point3 meet(const std::array<double, 4>& a, const std::array<double, 4>& b,
 Camera perspective_camera(const Pose& pose, double fov_y_degrees, double aspect,
                           double viewport_height_pixels) {
   check_positive(fov_y_degrees, "the field of view must be more than 0 degrees");
-  check(fov_y_degrees < 180.0, "the field of view must be less than 180 degrees");
+  check_camera(fov_y_degrees < 180.0, "the field of view must be less than 180 degrees");
   check_positive(aspect, "the aspect must be positive and finite");
   check_positive(viewport_height_pixels, "the viewport's height must be positive and finite");
   const Frame f = frame(pose);
@@ -126,7 +126,7 @@ Camera matrix_camera(const std::array<double, 16>& view_projection, double viewp
   check_positive(viewport_height_pixels, "the viewport's height must be positive and finite");
   std::array<std::array<double, 4>, 4> rows{};
   for (std::size_t i = 0; i < 16; ++i) {
-    check(std::isfinite(view_projection[i]), "a number of the matrix is not finite");
+    check_camera(std::isfinite(view_projection[i]), "a number of the matrix is not finite");
     rows[i / 4][i % 4] = view_projection[i];
   }
   const auto sum = [&](double sign, std::size_t row) {

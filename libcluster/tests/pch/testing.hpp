@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+// Compiled once for all tests; each test includes what it uses all the same.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <map>
+#include <random>
+#include <set>
+#include <span>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
