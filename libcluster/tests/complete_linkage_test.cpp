@@ -229,5 +229,14 @@ TEST(CompleteLinkage, MatricesBeyondTheLimitAreRefused) {
             "no exception");
 }
 
+// The tests of all paths pass over what the machine lacks: here is where they say so.
+TEST(InstructionSets, Avx2IsTested) {
+  if (best_simd_path() < SimdPath::avx2) GTEST_SKIP() << "the processor lacks AVX2";
+}
+
+TEST(InstructionSets, Avx512IsTested) {
+  if (best_simd_path() < SimdPath::avx512) GTEST_SKIP() << "the processor lacks AVX-512";
+}
+
 }  // namespace
 }  // namespace terrace::cluster

@@ -64,5 +64,14 @@ TYPED_TEST(ScanKernelsTyped, DoWhatTheySayOnEveryInstructionSet) {
   }
 }
 
+// The tests of all paths pass over what the machine lacks: here is where they say so.
+TEST(InstructionSets, Avx2IsTested) {
+  if (!has_scan_path(ScanPath::avx2)) GTEST_SKIP() << "the processor lacks AVX2";
+}
+
+TEST(InstructionSets, Avx512IsTested) {
+  if (!has_scan_path(ScanPath::avx512)) GTEST_SKIP() << "the processor lacks AVX-512";
+}
+
 }  // namespace
 }  // namespace terrace::matching

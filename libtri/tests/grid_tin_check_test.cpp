@@ -188,4 +188,13 @@ TEST(GridTinCheck, MisuseIsRefused) {
   }
 }
 
+// The tests of all paths pass over what the machine lacks: here is where they say so.
+TEST(InstructionSets, Avx2IsTested) {
+  if (!supported(tin::GridPath::kAvx2)) GTEST_SKIP() << "the processor lacks AVX2";
+}
+
+TEST(InstructionSets, Avx512IsTested) {
+  if (!supported(tin::GridPath::kAvx512)) GTEST_SKIP() << "the processor lacks AVX-512";
+}
+
 }  // namespace

@@ -1,0 +1,109 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Counts the cases of a run of `meson test`: not programs, but what they tested.
+
+tally.py LOG...   reads meson-logs/testlog.json of each build; names what was left out and why, and
+                  ends with the line "N passed, N failed, N skipped". Exit status 1 if a case failed,
+                  if none passed, or, with TERRACE_REQUIRE_ORACLES=1, if one was left out for want of
+                  a program or library that can be installed.
+"""
+
+import collections
+import json
+import os
+import re
+import sys
+
+# What no installation can mend: hardware, privileges, data that a machine need not have.
+MAY_LACK = re.compile(r'AVX|GPU|CUDA|nvidia|driver|privileges|TERRACE_DATA', re.IGNORECASE)
+
+GTEST = re.compile(r'^\[ +(OK|FAILED|SKIPPED) +\] ([\w/.]+)(?:, where .*)? \(\d+ ms\)', re.MULTILINE)
+GTEST_REASON = re.compile(r': Skipped\n(.*)\n')
+UNITTEST = re.compile(r'^Ran (\d+) tests? in .*\n\n(?:OK|FAILED)(?: \((.*)\))?', re.MULTILINE)
+UNITTEST_SKIP = re.compile(r"^(\w+) \([\w.]+\)(?:\n.*)? \.\.\. skipped ['\"](.*)['\"]$", re.MULTILINE)
+NODE = re.compile(r'^(?:#|ℹ) (pass|fail|skipped) (\d+)$', re.MULTILINE)
+
+
+class Tally:
+    """Cases that passed and failed, and the names of those left out by reason."""
+
+    def __init__(self):
+        self.passed = self.failed = self.skipped = 0
+        self.left_out = collections.defaultdict(list)
+
+    def skip(self, reason, name):
+        self.skipped += 1
+        self.left_out[reason].append(name)
+
+    def add(self, row):
+        """One line of testlog.json: a program and what it printed."""
+        text = (row.get('stdout') or '') + '\n' + (row.get('stderr') or '')
+        failed = self.failed
+        known = self.gtest(text) or self.unittest(text, row['name']) or self.node(text, row['name'])
+        kind = row['result']
+        if kind == 'SKIP':
+            self.skip((text.strip().splitlines() or ['no reason given'])[-1], row['name'])
+        elif kind not in ('OK', 'EXPECTEDFAIL'):
+            # It may have stopped before it could name a case.
+            self.failed += self.failed == failed
+        elif not known:
+            self.passed += 1
+
+    def gtest(self, text):
+        at = 0
+        for case in GTEST.finditer(text):
+            if case[1] == 'OK':
+                self.passed += 1
+            elif case[1] == 'FAILED':
+                self.failed += 1
+            else:
+                reasons = GTEST_REASON.findall(text, at, case.start())
+                self.skip(reasons[-1] if reasons else 'no reason given', case[2])
+            at = case.end()
+        return at > 0
+
+    def unittest(self, text, name):
+        runs = UNITTEST.findall(text)
+        for ran, rest in runs:
+            count = collections.Counter({k: int(v) for k, v in re.findall(r'([a-z ]+)=(\d+)', rest or '')})
+            failed = count['failures'] + count['errors'] + count['unexpected successes']
+            failed += count[' errors'] + count[' unexpected successes']
+            skipped = count['skipped'] + count[' skipped']
+            self.failed += failed
+            self.passed += max(0, int(ran) - failed - skipped)
+            reasons = UNITTEST_SKIP.findall(text)
+            for case, reason in reasons:
+                self.skip(reason, case)
+            for _ in range(skipped - len(reasons)):
+                self.skip('no reason given', name)
+        return bool(runs)
+
+    def node(self, text, name):
+        count = {kind: int(number) for kind, number in NODE.findall(text)}
+        self.passed += count.get('pass', 0)
+        self.failed += count.get('fail', 0)
+        for _ in range(count.get('skipped', 0)):
+            self.skip('no reason given', name)
+        return bool(count)
+
+
+def main(logs):
+    tally = Tally()
+    for log in logs:
+        with open(log, encoding='utf-8') as file:
+            for line in file:
+                tally.add(json.loads(line))
+    missing = 0
+    for reason, names in sorted(tally.left_out.items()):
+        shown = ', '.join(names[:4]) + (f' and {len(names) - 4} more' if len(names) > 4 else '')
+        print(f'left out: {len(names)}: {reason} ({shown})')
+        missing += 0 if MAY_LACK.search(reason) else len(names)
+    required = os.environ.get('TERRACE_REQUIRE_ORACLES') == '1'
+    if required and missing:
+        print(f'{missing} cases lack what can be installed (./dev oracles), and TERRACE_REQUIRE_ORACLES=1')
+    print(f'{tally.passed} passed, {tally.failed} failed, {tally.skipped} skipped')
+    return tally.failed != 0 or tally.passed == 0 or (required and missing != 0)
+
+
+if __name__ == '__main__':
+    sys.exit(main(sys.argv[1:]))
