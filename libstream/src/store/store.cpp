@@ -5,7 +5,9 @@
 #include <mutex>
 #include <utility>
 
+#include "../temporary.hpp"
 #include "level_reader.hpp"
+#include "terrace/stream/atomic_file.hpp"
 #include "verify.hpp"
 
 namespace terrace::stream {
@@ -54,7 +56,9 @@ Store::~Store() = default;
 Store Store::open(const std::filesystem::path& path) {
   const auto manifest_path = path / kManifestName;
   std::error_code error;
-  if (!std::filesystem::is_regular_file(manifest_path, error)) {
+  // A writer that was killed while it replaced the store may have left it without its name.
+  if (!std::filesystem::is_regular_file(manifest_path, error) &&
+      !put_back_replaced(follow_links(path))) {
     throw Error({.file = path.string(),
                  .where = {},
                  .cause = "there is no store here",

@@ -111,8 +111,9 @@ class StoreWriter {
   [[nodiscard]] Schema& schema();
 
   /// Writes the points of the top level (as a block of one cluster whose representative is
-  /// UINT32_MAX), syncs and publishes. Returns the bytes of the store.
-  std::uint64_t finish(const ClusteredBlock& root);
+  /// UINT32_MAX), syncs and publishes. Without `publish` it was a trial, and nothing stays. Returns
+  /// the bytes of the store.
+  std::uint64_t finish(const ClusteredBlock& root, bool publish = true);
 
  private:
   struct Impl;
