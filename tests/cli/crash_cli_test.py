@@ -144,15 +144,17 @@ class StoreCrashTest(CrashCase):
                 self.assertTrue(os.path.exists(self.path('s')))
             elif not os.path.exists(self.path('s')):
                 missing.append(step)
-                # In turn by a reader and by a writer that fails.
-                if len(missing) % 2 == 0:
-                    result = terrace('info', 's', cwd=self.folder)
+                # Readers first, in copies; then a writer that fails.
+                for reader in (['info', 's'], ['verify', 's'], ['points', 's', '-o', '-'],
+                               ['render', 's', '-o', 'p.png', '--size', '16x16']):
+                    copy = os.path.join(self.start(), 'copy')
+                    shutil.copytree(self.folder, copy)
+                    result = terrace(*reader, cwd=copy)
                     self.assertEqual(result.returncode, 0, result.stderr)
-                else:
-                    result = terrace('build', self.input('void.tif'), '-o', 's', '--force',
-                                     cwd=self.folder)
-                    self.assertEqual(result.returncode, 1)
-                    self.assertIn('not one point', result.stderr)
+                result = terrace('build', self.input('void.tif'), '-o', 's', '--force',
+                                 cwd=self.folder)
+                self.assertEqual(result.returncode, 1)
+                self.assertIn('not one point', result.stderr)
             found = {name: data for name, data in everything(self.folder).items()
                      if name.startswith('s/')}
             self.assertIn(found, (old, new))

@@ -56,9 +56,7 @@ Store::~Store() = default;
 Store Store::open(const std::filesystem::path& path) {
   const auto manifest_path = path / kManifestName;
   std::error_code error;
-  // A writer that was killed while it replaced the store may have left it without its name.
-  if (!std::filesystem::is_regular_file(manifest_path, error) &&
-      !put_back_replaced(follow_links(path))) {
+  if (!std::filesystem::is_regular_file(manifest_path, error) && !recover(path)) {
     throw Error({.file = path.string(),
                  .where = {},
                  .cause = "there is no store here",
@@ -81,6 +79,10 @@ Store Store::open(const std::filesystem::path& path) {
     impl->levels.push_back(std::make_unique<LevelReader>(path, impl->manifest, l));
   }
   return Store(std::move(impl));
+}
+
+bool Store::recover(const std::filesystem::path& path) {
+  return put_back_replaced(follow_links(path));
 }
 
 const Schema& Store::schema() const { return impl_->manifest.schema; }

@@ -162,6 +162,9 @@ class Store {
  public:
   /// Throws: Error if there is no store, a newer version, or a damaged manifest.
   static Store open(const std::filesystem::path& path);
+  /// A store that a writer moved aside to replace it gets its name back if the writer died then:
+  /// true if so. open() does it by itself.
+  static bool recover(const std::filesystem::path& path);
   Store(Store&&) noexcept;
   Store& operator=(Store&&) noexcept;
   ~Store();
