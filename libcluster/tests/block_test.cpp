@@ -295,6 +295,15 @@ TEST(BlockClusterer, PathsThatTheMachineLacksAreRefused) {
   EXPECT_NO_THROW(BlockClusterer{SimdPath::portable});
   EXPECT_NO_THROW(BlockClusterer{SimdPath::automatic});
   EXPECT_NO_THROW(BlockClusterer{best_simd_path()});
+  // Paths are numbered from the slowest on, and no machine has the last one.
+  constexpr auto kOfNoMachine = static_cast<SimdPath>(255);
+  for (const SimdPath path : {SimdPath::avx2, SimdPath::avx512, kOfNoMachine}) {
+    if (path <= best_simd_path()) {
+      EXPECT_NO_THROW(BlockClusterer{path}) << static_cast<int>(path);
+    } else {
+      EXPECT_THROW(BlockClusterer{path}, std::invalid_argument) << static_cast<int>(path);
+    }
+  }
 }
 
 }  // namespace

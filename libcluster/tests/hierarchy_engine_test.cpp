@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <limits>
 #include <mutex>
 #include <numeric>
@@ -17,6 +16,7 @@
 
 #include "hierarchy_laws.hpp"
 #include "recording_sink.hpp"
+#include "waiting_threads.hpp"
 
 /// How blocks are cut, clustered, committed and given up, with stand-ins for the clustering.
 
@@ -407,22 +407,26 @@ TEST(HierarchyEngine, ExceptionsComeOutOnce) {
   }
 }
 
-/// Its first block fails at once while the second is still being prepared.
+/// Its first block fails while another is being prepared by a thread that is not the caller's. That
+/// one lingers until all other threads wait for it, or the failure has come out.
 class LingeringSink : public RecordingSink {
  public:
   std::unique_ptr<Prepared> prepare(const FinishedBlock& block) override {
     if (block.block == 0) {
-      for (int ms = 0; inside == 0 && ms < 5000; ++ms) {
-        std::this_thread::sleep_for(std::chrono::milliseconds(1));
-      }
+      while (!lingers) std::this_thread::yield();
+      failed = true;
       throw Failure("first block");
     }
     ++inside;
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    const bool first = std::this_thread::get_id() != caller && !lingers.exchange(true);
+    while (!failed) std::this_thread::yield();
+    if (first) testing::wait_until_others_wait([this] { return come_out.load(); });
     --inside;
     return RecordingSink::prepare(block);
   }
+  std::thread::id caller = std::this_thread::get_id();
   std::atomic<int> inside = 0;
+  std::atomic<bool> lingers = false, failed = false, come_out = false;
 };
 
 TEST(HierarchyEngine, NoCallToTheSinkIsRunningWhenAnExceptionComesOut) {
@@ -434,6 +438,7 @@ TEST(HierarchyEngine, NoCallToTheSinkIsRunningWhenAnExceptionComesOut) {
   };
   EXPECT_THROW(build(), Failure);
   EXPECT_EQ(sink.inside, 0);
+  sink.come_out = true;
 }
 
 TEST(HierarchyEngine, FinishOnlyOnce) {
@@ -487,12 +492,12 @@ TEST(HierarchyEngine, DestructorStopsQuietly) {
   push_all(engine, line(550), 50);
 }
 
-/// Its first block is prepared only after a while, so that all others queue up behind it.
+/// Its first block is prepared only when all other threads wait for it.
 class SlowStartSink : public RecordingSink {
  public:
   std::unique_ptr<Prepared> prepare(const FinishedBlock& block) override {
     if (block.level == 0) {
-      if (block.block == 0) std::this_thread::sleep_for(std::chrono::milliseconds(100));
+      if (block.block == 0) testing::wait_until_others_wait();
       const int waiting = ++waiting_;
       int most = most_waiting;
       while (most < waiting && !most_waiting.compare_exchange_weak(most, waiting)) {

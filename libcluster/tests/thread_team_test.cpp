@@ -2,12 +2,13 @@
 #include "thread_team.hpp"
 
 #include <atomic>
-#include <chrono>
 #include <stdexcept>
 #include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
+
+#include "waiting_threads.hpp"
 
 namespace terrace::cluster {
 namespace {
@@ -26,7 +27,7 @@ TEST(ThreadTeam, EveryPieceIsDoneOnce) {
 TEST(ThreadTeam, ThreadsThatSleptWakeUp) {
   ThreadTeam team(4);
   for (int round = 0; round < 3; ++round) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    testing::wait_until_others_wait();
     // Two pieces that wait for each other need two threads.
     std::atomic<int> met = 0;
     team.run(2, [&](std::size_t) {

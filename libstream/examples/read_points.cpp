@@ -3,6 +3,7 @@
 //   read_points [FILE...]
 // Without a file it writes a small one first, so that it always has something to show.
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -10,6 +11,7 @@
 #include <terrace/stream/error.hpp>
 #include <terrace/stream/point_writer.hpp>
 #include <terrace/stream/source.hpp>
+#include <unistd.h>
 
 namespace stream = terrace::stream;
 
@@ -17,7 +19,9 @@ namespace {
 
 /// A hill of 100 x 100 points as binary PLY.
 std::string write_hill() {
-  const std::string path = std::filesystem::temp_directory_path() / "terrace_read_points.ply";
+  std::string path = std::filesystem::temp_directory_path() / "terrace-hill-XXXXXX.ply";
+  const int file = mkstemps(path.data(), 4);
+  if (file >= 0) close(file);
   const auto writer = stream::open_point_writer(path, {}, {.replace = true});
   stream::PointBlock block;
   for (int y = -50; y < 50; ++y) {

@@ -14,8 +14,9 @@ namespace stream = terrace::stream;
 
 int main() {
   try {
-    const auto folder = std::filesystem::temp_directory_path() / "terrace_write_mesh";
-    std::filesystem::create_directories(folder);
+    std::string name_of_folder = std::filesystem::temp_directory_path() / "terrace-mesh-XXXXXX";
+    if (mkdtemp(name_of_folder.data()) == nullptr) return 1;
+    const std::filesystem::path folder = name_of_folder;
     const std::array<stream::Point3, 4> corners{{{691000, 5338000, 500},
                                                  {691100, 5338000, 501},
                                                  {691100, 5338100, 502},

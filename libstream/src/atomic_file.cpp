@@ -16,6 +16,7 @@
 #include <unistd.h>
 
 #include "file_size_signal.hpp"
+#include "temporary.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::stream {
@@ -42,22 +43,12 @@ std::string remedy_for(int error_number) {
   }
 }
 
-/// Removes temporaries of dead writers: those whose lock can be had.
-void remove_abandoned(const fs::path& folder, const std::string& prefix) {
-  std::error_code ignored;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder, ignored)) {
-    if (!entry.path().filename().string().starts_with(prefix)) continue;
-    const int descriptor = ::open(entry.path().c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW);
-    if (descriptor < 0) continue;
-    if (::flock(descriptor, LOCK_EX | LOCK_NB) == 0) ::unlink(entry.path().c_str());
-    ::close(descriptor);
-  }
-}
-
 }  // namespace
 
 struct AtomicFile::Impl {
-  fs::path target, temporary;
+  fs::path target;  ///< as it was named
+  fs::path place;   ///< where links lead
+  fs::path temporary;
   bool replace = false;
   int descriptor = -1;
   std::uint64_t flushed = 0;  // bytes in the file; the buffer continues there
@@ -95,24 +86,20 @@ struct AtomicFile::Impl {
   }
 
   /// Creates and locks the temporary. Between the two steps another writer may take it for
-  /// abandoned and unlink it, hence the look at the link count.
+  /// abandoned: it has the lock then, or has had it and has removed the name.
   void create() {
-    const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
-    const std::string prefix = std::string(".").append(target.filename().string()).append(".tmp-");
-    remove_abandoned(folder, prefix);
-    const std::string name = prefix + std::to_string(::getpid());
+    sweep_temporaries(place);
     for (int attempt = 0;; ++attempt) {
-      temporary =
-          folder /
-          (attempt == 0 ? name : std::string(name).append("-").append(std::to_string(attempt)));
+      temporary = folder_of(place) / temporary_name(place, attempt);
       descriptor = ::open(temporary.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
       if (descriptor < 0) {
         if (errno == EEXIST && attempt < 1000) continue;
         fail("cannot be created", errno);
       }
-      ::flock(descriptor, LOCK_EX | LOCK_NB);  // without locks (some network disks) we go on
+      // Without locks (some network disks) we go on.
+      const bool taken = ::flock(descriptor, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
       struct stat status {};
-      if (::fstat(descriptor, &status) == 0 && status.st_nlink > 0) return;
+      if (!taken && ::fstat(descriptor, &status) == 0 && status.st_nlink > 0) return;
       ::close(std::exchange(descriptor, -1));
     }
   }
@@ -139,25 +126,25 @@ struct AtomicFile::Impl {
 
   void publish() {
     if (replace) {
-      if (::rename(temporary.c_str(), target.c_str()) != 0)
+      if (::rename(temporary.c_str(), place.c_str()) != 0)
         fail("cannot be renamed into place", errno);
       return;
     }
     // Linking, unlike renaming, refuses a name that has been taken meanwhile.
-    if (::link(temporary.c_str(), target.c_str()) == 0) {
+    if (::link(temporary.c_str(), place.c_str()) == 0) {
       ::unlink(temporary.c_str());
       return;
     }
     if (errno == EEXIST) fail_because_it_exists();
     check_target();  // a file system without hard links: look, then rename
-    if (::rename(temporary.c_str(), target.c_str()) != 0)
+    if (::rename(temporary.c_str(), place.c_str()) != 0)
       fail("cannot be renamed into place", errno);
   }
 
   /// Makes the new name durable; a folder that cannot be opened or synced has no say in that.
   void sync_folder() const {
-    const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
-    const int folder_descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    const int folder_descriptor =
+        ::open(folder_of(place).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     if (folder_descriptor < 0) return;
     ::fsync(folder_descriptor);
     ::close(folder_descriptor);
@@ -174,6 +161,7 @@ AtomicFile::AtomicFile(const fs::path& target, bool replace) : impl_(std::make_u
                  .remedy = "give the name of a file"});
   }
   impl_->check_target();
+  impl_->place = follow_links(target);
   impl_->create();
 }
 
@@ -235,5 +223,7 @@ void AtomicFile::commit() {
 }
 
 const fs::path& AtomicFile::target() const { return impl_->target; }
+
+void remove_abandoned(const fs::path& target) { sweep_temporaries(follow_links(target)); }
 
 }  // namespace terrace::stream

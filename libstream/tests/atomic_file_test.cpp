@@ -130,6 +130,26 @@ TEST(AtomicFile, RemovesWhatADeadWriterLeft) {
   EXPECT_EQ(content(target), "whole");
 }
 
+TEST(AtomicFile, LinksAreFollowed) {
+  const TempFolder folder;
+  fs::create_directory(folder.path() / "elsewhere");
+  const fs::path link = folder.path() / "link", real = folder.path() / "elsewhere" / "out.bin";
+  fs::create_symlink("elsewhere/out.bin", link);
+  for (const char* text : {"first", "second"}) {
+    AtomicFile file(link, std::string(text) == "second");
+    file.write(text);
+    file.commit();
+    EXPECT_EQ(content(real), text);
+    EXPECT_TRUE(fs::is_symlink(link));
+    EXPECT_EQ(entries(folder.path() / "elsewhere"), 1);
+  }
+  EXPECT_THROW(AtomicFile{link}, Error);
+  fs::create_symlink("round", folder.path() / "round");
+  EXPECT_THROW(AtomicFile(folder.path() / "round", true), Error);
+  fs::create_symlink("nowhere/out.bin", folder.path() / "dangling");
+  EXPECT_THROW(AtomicFile(folder.path() / "dangling", true), Error);
+}
+
 TEST(AtomicFile, AFileSizeLimitIsAnErrorAndLeavesNothing) {
   const TempFolder folder;
   const pid_t child = fork();

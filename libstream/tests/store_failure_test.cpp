@@ -2,7 +2,6 @@
 // What must not happen: half-written stores that open, damage that goes unnoticed, strangers' files
 // removed.
 #include <csignal>
-#include <cstdlib>
 #include <fstream>
 #include <iterator>
 #include <random>
@@ -20,6 +19,7 @@
 #include "store_inputs.hpp"
 #include "store_testing.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/stream/file_lock.hpp"
 #include "terrace/stream/store.hpp"
 
 namespace terrace::stream {
@@ -220,50 +220,119 @@ TEST(StoreWriting, AbandonedWritersLeaveNothing) {
   EXPECT_TRUE(names_in(folder.path()).empty());
 }
 
+/// Writes a store in a process that ends without a word before block `last`, if there are as many.
+/// True if it came to the end.
+bool writes_until(const fs::path& path, std::size_t last,
+                  const std::vector<testing::Block>& blocks) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    try {
+      StoreWriter writer(path, testing::grid_schema(ScalarType::i16));
+      StandInHierarchy hierarchy(writer,
+                                 {.block_points = 100, .cluster_points = 10, .scale = {1, 1, 1}});
+      for (std::size_t b = 0; b < blocks.size(); ++b) {
+        if (b == last) ::_exit(1);
+        hierarchy.push(blocks[b].positions);
+      }
+      if (last == blocks.size()) ::_exit(1);
+      hierarchy.finish();
+    } catch (...) {
+      ::_exit(2);
+    }
+    ::_exit(0);
+  }
+  int status = 0;
+  EXPECT_EQ(::waitpid(child, &status, 0), child);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) < 2) << status;
+  return WEXITSTATUS(status) == 0;
+}
+
+// Dying within a block, a sync or a rename is a test of the command: tests/cli/crash_cli_test.py.
 TEST(StoreWriting, KilledWritersLeaveNothingThatOpensAndAreCleanedUp) {
-  std::mt19937_64 random(8);
   const TemporaryFolder folder;
   const auto path = folder.path() / "s";
-  for (int round = 0; round < 12; ++round) {
-    // Dies after some block; in the last rounds, anywhere at all.
-    const std::uint64_t blocks = random() % 60;
-    const auto delay = static_cast<useconds_t>(random() % 60000);
-    const pid_t child = ::fork();
-    ASSERT_GE(child, 0);
-    if (child == 0) {
-      try {
-        StoreWriter writer(path, testing::grid_schema(ScalarType::i16));
-        StandInHierarchy hierarchy(writer,
-                                   {.block_points = 100, .cluster_points = 10, .scale = {1, 1, 1}});
-        std::uint64_t count = 0;
-        for (const auto& block :
-             testing::grid_blocks(ScalarType::i16, testing::Relief::fractal, 100, 60, 10, 9)) {
-          if (round < 6 && count++ == blocks) ::_exit(0);
-          hierarchy.push(block.positions);
-        }
-        hierarchy.finish();
-      } catch (...) {
-        ::_exit(1);
-      }
-      ::_exit(0);
-    }
-    if (round >= 6) {
-      ::usleep(delay);
-      ::kill(child, SIGKILL);
-    }
-    int status = 0;
-    ::waitpid(child, &status, 0);
-    if (fs::exists(path)) {
-      EXPECT_TRUE(Store::open(path).verify(testing::expect_no_problem));
-      fs::remove_all(path);
-    }
+  const auto blocks =
+      testing::grid_blocks(ScalarType::i16, testing::Relief::fractal, 100, 60, 10, 9);
+  ASSERT_GT(blocks.size(), 50U);
+  for (std::size_t last = 0; last <= blocks.size(); ++last) {
+    EXPECT_FALSE(writes_until(path, last, blocks)) << last;
+    EXPECT_EQ(names_in(folder.path()).size(), 2u) << "a folder and its lock";
+    EXPECT_FALSE(fs::exists(path));
   }
-  // What the dead have left the next one takes away; what a living one has, it does not touch.
-  StoreWriter living(path, testing::cloud_schema());
+  EXPECT_TRUE(writes_until(path, blocks.size() + 1, blocks));
+  EXPECT_EQ(names_in(folder.path()), (std::vector<std::string>{"s"}));
+  EXPECT_TRUE(Store::open(path).verify(testing::expect_no_problem));
+  fs::remove_all(path);
+  // What a living one has the next one does not touch.
+  EXPECT_FALSE(writes_until(path, 1, blocks));
+  const StoreWriter living(path, testing::cloud_schema());
   const auto with_living = names_in(folder.path());
-  EXPECT_EQ(with_living.size(), 2u) << "a folder and its lock";
+  EXPECT_EQ(with_living.size(), 2u);
   { const StoreWriter other(path, testing::cloud_schema()); }
   EXPECT_EQ(names_in(folder.path()), with_living);
+}
+
+TEST(StoreWriting, LinksAreFollowed) {
+  const TemporaryFolder folder;
+  fs::create_directory(folder.path() / "elsewhere");
+  fs::create_symlink("elsewhere/s", folder.path() / "link");
+  write_small(folder.path() / "link", 1);
+  const auto before = files_of(folder.path() / "elsewhere" / "s");
+  write_small(folder.path() / "link", 2, /*replace=*/true);
+  EXPECT_TRUE(fs::is_symlink(folder.path() / "link"));
+  EXPECT_NE(files_of(folder.path() / "elsewhere" / "s"), before);
+  EXPECT_EQ(names_in(folder.path()), (std::vector<std::string>{"elsewhere", "link"}));
+  EXPECT_EQ(names_in(folder.path() / "elsewhere"), (std::vector<std::string>{"s"}));
+}
+
+/// What a writer leaves that dies between the two renames of a replacement.
+TEST(StoreWriting, AStoreThatWasMovedAsideGetsItsNameBack) {
+  const TemporaryFolder folder;
+  const auto path = folder.path() / "s";
+  const auto aside = folder.path() / ".s.tmp-1-old";
+  write_small(path, 1);
+  const auto files = files_of(path);
+  fs::rename(path, aside);
+  {
+    // A living writer is about to finish by itself.
+    const FileLock lock(folder.path() / ".s.tmp-1.lock");
+    EXPECT_THROW(Store::open(path), Error);
+    const StoreWriter writer(path, testing::cloud_schema());
+    EXPECT_EQ(files_of(aside), files);
+  }
+  EXPECT_NO_THROW(Store::open(path));
+  EXPECT_EQ(files_of(path), files);
+  // So does a writer, before it refuses to replace it.
+  fs::rename(path, aside);
+  EXPECT_TRUE(contains(error_of([&] { write_small(path, 2); }), "exists"));
+  EXPECT_EQ(files_of(path), files);
+  // Beside a whole store it is what the new one has replaced, and without its manifest nothing.
+  fs::copy(path, aside);
+  write_small(path, 2, /*replace=*/true);
+  EXPECT_EQ(names_in(folder.path()), (std::vector<std::string>{"s"}));
+  fs::rename(path, aside);
+  fs::remove(aside / "manifest.json");
+  EXPECT_THROW(Store::open(path), Error);
+  write_small(path, 3);
+  EXPECT_EQ(names_in(folder.path()), (std::vector<std::string>{"s"}));
+}
+
+TEST(StoreWriting, TrialsLeaveNothing) {
+  const TemporaryFolder folder;
+  StoreWriter writer(folder.path() / "s", testing::cloud_schema());
+  const std::vector<Point3> points{{1, 2, 3}};
+  const std::vector<std::uint32_t> first{0, 1}, order{0}, representatives{UINT32_MAX};
+  EXPECT_GT(writer.finish({.level = 0,
+                           .positions = points,
+                           .payload = {},
+                           .children = {},
+                           .first = first,
+                           .order = order,
+                           .representatives = representatives,
+                           .summaries = {}},
+                          /*publish=*/false),
+            0u);
+  EXPECT_FALSE(fs::exists(folder.path() / "s"));
 }
 
 TEST(StoreWriting, OtherNamesAreNotTouched) {

@@ -5,6 +5,8 @@
 TERRACE=path/to/terrace cli_test.py [CLASS...]
 """
 
+import array
+import fcntl
 import json
 import os
 import resource
@@ -14,6 +16,7 @@ import struct
 import subprocess
 import sys
 import tempfile
+import termios
 import time
 import unittest
 import zlib
@@ -218,12 +221,106 @@ class ErrorTest(CommandTest):
             terrace('synth', 'uniform', '--points', '9', '-o', self.path('folder.ply'), '--force'), 1)
 
     def test_every_output_can_be_replaced_with_force(self):
-        dem, cloud = self.path('d.tif'), self.path('c.ply')
-        for _ in range(2):
-            self.run_ok('synth', 'dem', '--size', '64x64', '-o', dem, '--force')
-            self.run_ok('synth', 'surface', '--points', '500', '-o', cloud, '--force')
-            self.run_ok('convert', cloud, '-o', self.path('c.csv'), '--force')
-            self.run_ok('render', dem, '-o', self.path('p.png'), '--size', '64x48', '--force')
+        dem, hills = self.path('in.tif'), self.path('in.terrace')
+        self.run_ok('synth', 'dem', '--size', '40x30', '--crs', 'EPSG:32632', '-o', dem)
+        self.run_ok('build', dem, '-o', hills, '--block', '200')
+        clouds, scans, places = [], [], []
+        for n in (0, 1):
+            clouds.append(self.path(f'in{n}.ply'))
+            self.run_ok('synth', 'surface', '--points', 300 + n, '-o', clouds[n])
+            scans.append(self.path(f'in{n}.scan'))
+            self.run_ok('build', clouds[n], '-o', scans[n])
+            bounds = self.json_of('info', hills)['bounds']
+            places.append(self.path(f'places{n}.csv'))
+            with open(places[n], 'w') as file:
+                file.write('# of interest\nname,x,y\n')
+                for at in (0.4, 0.6):
+                    x, y = (low + (at + n / 20) * (high - low)
+                            for low, high in zip(bounds['min'][:2], bounds['max'][:2]))
+                    file.write(f'here,{x},{y}\n')
+        west, south, _ = bounds['min']
+        east, north, _ = bounds['max']
+        lines = (f'{west},{south},{east},{north}', f'{west},{north},{east},{south}')
+        # Commands that write -o FILE, each other bytes for 0 and 1.
+        outputs = {
+            'raster.tif': lambda n: ['synth', 'dem', '--size', f'{20 + n}x20'],
+            'numbers.xyz': lambda n: ['convert', clouds[n]],
+            'numbers.csv': lambda n: ['convert', clouds[n]],
+            'points.ply': lambda n: ['convert', clouds[n]],
+            'text.ply': lambda n: ['convert', clouds[n], '--format', 'ply-ascii'],
+            'level.ply': lambda n: ['points', hills, '--level', n],
+            'mesh.ply': lambda n: ['mesh', hills, '--level', n],
+            'mesh.obj': lambda n: ['mesh', hills, '--level', n],
+            'mesh.glb': lambda n: ['mesh', hills, '--level', n],
+            'bound.ply': lambda n: ['mesh', hills, '--max-error', 5 + 20 * n],
+            'surface.ply': lambda n: ['surface', scans[n]],
+            'inside.vtk': lambda n: ['surface', scans[n], '--tetrahedra'],
+            'clusters.csv': lambda n: ['cluster', clouds[n]],
+            'pairs.csv': lambda n: ['match', clouds[n]],
+            'tree.csv': lambda n: ['match', clouds[n], '--tree'],
+            'heights.csv': lambda n: ['sample', hills, '--points', places[n]],
+            'heights.tif': lambda n: ['raster', hills, '--cell', 30 + 10 * n],
+            'profile.csv': lambda n: ['profile', hills, '--line', lines[n]],
+            'lines.geojson': lambda n: ['contour', hills, '--interval', 20 + n],
+            'picture.png': lambda n: ['render', dem, '--size', f'{64 + n}x48'],
+            'store': lambda n: ['build', clouds[n]],
+        }
+        options = {'labels.txt': ('--labels', lambda n: ['cluster', clouds[n]]),
+                   'dendrogram.csv': ('--dendrogram', lambda n: ['cluster', clouds[n], '--method',
+                                                                 'complete', '-k', 2]),
+                   'smooth.overlay': ('--save-overlay', lambda n: [
+                       'mesh', hills, '--smooth', f'taubin:{2 + n}', '-o',
+                       self.path(f'smooth{n}.ply'), '--force'])}
+        cases = [(name, '-o', command) for name, command in outputs.items()]
+        cases += [(name, option, command) for name, (option, command) in options.items()]
+        for name, option, command in cases:
+            with self.subTest(name):
+                out, fresh = self.path(name), self.path('fresh-' + name)
+                self.run_ok(*command(1), option, fresh)
+                self.run_ok(*command(0), option, out)
+                old, new = self.bytes_of(out), self.bytes_of(fresh)
+                self.assertNotEqual(old, new)
+                if '--force' not in command(0):
+                    self.assert_one_line_error(terrace(*command(1), option, out), 1)
+                self.assertEqual(self.bytes_of(out), old)
+                self.run_ok(*command(1), option, out, '--force')
+                self.assertEqual(self.bytes_of(out), new)
+                if os.path.isdir(out):
+                    continue
+                with open(out, 'w') as file:
+                    file.write('A terrace, written by terrace and by hand.\n')
+                letter = self.bytes_of(out)
+                result = terrace(*command(1), option, out, '--force')
+                self.assert_one_line_error(result, 1)
+                self.assertIn('bears no mark of terrace', result.stderr)
+                self.assertEqual(self.bytes_of(out), letter)
+
+    @staticmethod
+    def bytes_of(path):
+        """Of a file, or by name of all files of a folder."""
+        if not os.path.isdir(path):
+            with open(path, 'rb') as file:
+                return file.read()
+        return {name: ErrorTest.bytes_of(os.path.join(path, name)) for name in os.listdir(path)}
+
+    def test_force_replaces_what_a_link_leads_to(self):
+        os.mkdir(self.path('elsewhere'))
+        for name in ('a.ply', 'a.xyz'):
+            real, link = self.path('elsewhere/' + name), self.path(name)
+            os.symlink('elsewhere/' + name, link)
+            # Nothing stands there yet: it is made there, as by any write to a link.
+            self.run_ok('synth', 'uniform', '--points', '10', '-o', link)
+            first = self.bytes_of(real)
+            self.assert_one_line_error(
+                terrace('synth', 'uniform', '--points', '9', '-o', link), 1)
+            self.run_ok('synth', 'uniform', '--points', '9', '-o', link, '--force')
+            self.assertTrue(os.path.islink(link))
+            self.assertNotEqual(self.bytes_of(real), first)
+            with open(real, 'w') as file:
+                file.write('a letter\n')
+            self.assert_one_line_error(
+                terrace('synth', 'uniform', '--points', '9', '-o', link, '--force'), 1)
+            self.assertEqual(self.bytes_of(real), b'a letter\n')
 
     def test_full_disk_leaves_nothing(self):
         def small_files():
@@ -253,7 +350,8 @@ class InterruptTest(CommandTest):
         command = subprocess.Popen(
             [TERRACE, 'synth', 'dem', '--size', '60000x60000', '-o', self.path('big.tif'),
              '--threads', '2'], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        time.sleep(0.5)
+        while not os.listdir(self.folder) and command.poll() is None:
+            time.sleep(0.001)  # until it writes
         command.send_signal(signal.SIGINT)
         out, error = command.communicate(timeout=60)
         self.assertEqual(command.returncode, 130, error)
@@ -265,7 +363,12 @@ class InterruptTest(CommandTest):
     def test_ctrl_c_ends_a_wait_for_standard_input(self):
         command = subprocess.Popen([TERRACE, 'info', '-'], stdin=subprocess.PIPE,
                                    stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        time.sleep(0.5)
+        command.stdin.write('1 2 3\n')
+        command.stdin.flush()
+        waiting = array.array('i', [1])
+        while waiting[0] > 0 and command.poll() is None:
+            time.sleep(0.001)  # until it has read what there is
+            fcntl.ioctl(command.stdin, termios.FIONREAD, waiting)
         command.send_signal(signal.SIGINT)
         try:
             command.wait(timeout=10)

@@ -309,12 +309,26 @@ class ClusterTest(unittest.TestCase):
         command = subprocess.Popen(
             [TERRACE, 'cluster', many, '--method', 'k-median', '-k', '50', '--labels', tree],
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        time.sleep(1.5)
+        self.wait_for_library(command, many)
         command.send_signal(signal.SIGINT)
         out, error = command.communicate(timeout=60)
         self.assertEqual(command.returncode, 130, error)
         self.assertEqual((out, error.count('\n')), ('', 1))
         self.assertFalse(os.path.exists(tree))
+
+    @staticmethod
+    def wait_for_library(command, path):
+        """Until the input is read and closed, and a second thread does the work."""
+        process = f'/proc/{command.pid}'
+        while command.poll() is None:
+            try:
+                files = [os.readlink(f'{process}/fd/{fd}') for fd in os.listdir(process + '/fd')]
+                threads = len(os.listdir(process + '/task'))
+            except FileNotFoundError:
+                continue  # closed meanwhile
+            if threads > 1 and os.path.realpath(path) not in files:
+                return
+            time.sleep(0.001)
 
     def test_cuda_without_a_device_is_a_clear_error(self):
         tree = self.path('cuda.csv')

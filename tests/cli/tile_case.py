@@ -22,8 +22,9 @@ def utm(zone):
     return (1, 1, 0, 3, 1024, 0, 1, 1, 1025, 0, 1, 1, 3072, 0, 1, 32600 + zone)
 
 
-def terrace(*args):
-    return subprocess.run([TERRACE, *map(str, args)], capture_output=True, text=True, timeout=250)
+def terrace(*args, **kwargs):
+    return subprocess.run([TERRACE, *map(str, args)], capture_output=True, text=True, timeout=250,
+                          **kwargs)
 
 
 def write_tiff(path, columns, rows, heights, west, north, cell, keys, matrix=None):

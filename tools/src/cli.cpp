@@ -88,7 +88,8 @@ void add_common_options(CLI::App& app, CommonOptions& common, std::string& memor
       ->type_name("N");
   app.add_flag("--json", common.json, "Print the summary as one JSON object on standard output")
       ->group(group);
-  app.add_flag("--force", common.force, "Replace an existing output that terrace wrote")
+  app.add_flag("--force", common.force,
+               "Replace an existing output if its format's own mark says that terrace wrote it")
       ->group(group);
   app.add_option_function<std::string>(
          "--progress",

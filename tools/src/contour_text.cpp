@@ -10,6 +10,7 @@
 #include <terrace/stream/error.hpp>
 
 #include "crs_options.hpp"
+#include "output.hpp"
 #include "parallel.hpp"
 #include "units.hpp"
 
@@ -91,8 +92,7 @@ void ContourText::flush() {
       append(texts[piece], lines_[i], places);
     }
   });
-  if (first_)
-    write_("{\"type\":\"FeatureCollection\",\"generator\":\"terrace contour\",\"features\":[");
+  if (first_) write_(kContourHead);
   for (const std::string& text : texts) write_(text);
   first_ = false;
   lines_.clear();

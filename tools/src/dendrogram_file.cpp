@@ -6,14 +6,13 @@
 
 #include "csv_rows.hpp"
 #include "error.hpp"
+#include "output.hpp"
 #include "terrace/stream/atomic_file.hpp"
 #include "terrace/stream/error.hpp"
 #include "units.hpp"
 
 namespace terrace::tools {
 namespace {
-
-constexpr std::string_view kHeader = "a,b,height,size";
 
 std::string row_text(const cluster::Merge& merge) {
   return std::to_string(merge.a) + ',' + std::to_string(merge.b) + ',' + number_text(merge.height) +
@@ -30,19 +29,19 @@ bool parse_row(std::string_view text, cluster::Merge& merge) {
 void write_dendrogram(const std::string& path, const cluster::Dendrogram& dendrogram,
                       bool replace) {
   if (path == "-") {
-    std::cout << kHeader << '\n';
+    std::cout << kDendrogramHead << '\n';
     for (const cluster::Merge& merge : dendrogram.merges) std::cout << row_text(merge);
     if (!std::cout.flush()) throw ClosedPipe();
     return;
   }
   stream::AtomicFile file(path, replace);
-  file.write(std::string(kHeader) + '\n');
+  file.write(std::string(kDendrogramHead) + '\n');
   for (const cluster::Merge& merge : dendrogram.merges) file.write(row_text(merge));
   file.commit();
 }
 
 std::optional<cluster::Dendrogram> read_dendrogram(const std::string& path) {
-  std::optional<CsvRows> rows = CsvRows::open(path, kHeader);
+  std::optional<CsvRows> rows = CsvRows::open(path, kDendrogramHead);
   if (!rows) return std::nullopt;
   cluster::Dendrogram dendrogram;
   const auto fail = [&](const std::string& where, const std::string& cause) {

@@ -7,14 +7,13 @@
 
 #include "csv_rows.hpp"
 #include "error.hpp"
+#include "output.hpp"
 #include "point_table.hpp"
 #include "terrace/stream/error.hpp"
 #include "units.hpp"
 
 namespace terrace::tools {
 namespace {
-
-constexpr std::string_view kPairs = "a,b,distance", kTree = "a,b,distance,size,level";
 
 /// Of a row as it stands in the file.
 struct Row {
@@ -81,7 +80,7 @@ class Checker {
 }  // namespace
 
 bool is_matching_result(const std::string& path) {
-  return CsvRows::open(path, kPairs) || CsvRows::open(path, kTree);
+  return CsvRows::open(path, kPairsHead) || CsvRows::open(path, kTreeHead);
 }
 
 MatchingResult read_matching_result(const std::string& path, std::size_t points) {
@@ -92,9 +91,9 @@ MatchingResult read_matching_result(const std::string& path, std::size_t points)
                          .remedy = "give the result of 'terrace match' as it was written, and with "
                                    "--points the file that it was made from"});
   };
-  std::optional<CsvRows> rows = CsvRows::open(path, kPairs);
+  std::optional<CsvRows> rows = CsvRows::open(path, kPairsHead);
   MatchingResult result{.points = points, .tree = !rows, .lines = {}};
-  if (result.tree) rows = CsvRows::open(path, kTree);
+  if (result.tree) rows = CsvRows::open(path, kTreeHead);
   if (!rows) fail("", "is no result of 'terrace match'");
   // Nodes of a tree are numbered in 32 bits.
   if (points > std::numeric_limits<std::uint32_t>::max() / 2) fail("", "is of too many points");
@@ -103,7 +102,7 @@ MatchingResult read_matching_result(const std::string& path, std::size_t points)
   for (std::string_view line; rows->next(line);) {
     Row row;
     if (!parse(line, result.tree, row)) {
-      fail(rows->where(), "is no row " + std::string(result.tree ? kTree : kPairs));
+      fail(rows->where(), "is no row " + std::string(result.tree ? kTreeHead : kPairsHead));
     }
     if (result.lines.size() == most) {
       fail(rows->where(), "is one row too many for " + with_commas(points) + " points");

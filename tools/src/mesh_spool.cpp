@@ -7,7 +7,6 @@
 #include <vector>
 
 #include <terrace/stream/error.hpp>
-#include <unistd.h>
 
 #include "interrupt.hpp"
 #include "output.hpp"
@@ -19,7 +18,7 @@ constexpr std::size_t kPiece = 65536;  // vertices or triangles at a time
 
 std::filesystem::path beside(const std::string& path, const char* ending) {
   if (path != "-") return path + ending;
-  return std::filesystem::temp_directory_path() / ("terrace-" + std::to_string(getpid()) + ending);
+  return std::filesystem::temp_directory_path() / (std::string("terrace") + ending);
 }
 
 // Calls take(span of T) for the whole file, piece by piece.

@@ -252,7 +252,7 @@ void define_picture_input(CLI::App& app, PictureSelection& selection) {
 PictureInput read_picture_input(const std::string& path, const PictureSelection& selection,
                                 const ImageSize& size, const CommonOptions& common) {
   const std::uint64_t most_cells = 2 * size.width * size.height;
-  if (std::filesystem::is_directory(path)) {
+  if (std::filesystem::is_directory(path) || stream::Store::recover(path)) {
     return from_store(path, selection, most_cells, common);
   }
   if (!selection.level.empty() || !selection.region.empty() || !selection.focuses.empty()) {

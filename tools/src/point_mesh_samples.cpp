@@ -6,7 +6,6 @@
 #include <numeric>
 
 #include <terrace/stream/error.hpp>
-#include <unistd.h>
 
 #include "detail.hpp"
 #include "interrupt.hpp"
@@ -20,8 +19,7 @@ constexpr std::size_t kLeastChunk = 40, kMostChunk = 4096;  // points
 
 std::filesystem::path place_for(const std::string& path) {
   if (path != "-") return path + ".samples";
-  return std::filesystem::temp_directory_path() /
-         ("terrace-" + std::to_string(getpid()) + ".samples");
+  return std::filesystem::temp_directory_path() / "terrace.samples";
 }
 
 }  // namespace

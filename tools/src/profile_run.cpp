@@ -18,6 +18,7 @@
 #include "ground_slope.hpp"
 #include "interrupt.hpp"
 #include "line_distance.hpp"
+#include "output.hpp"
 #include "surface_crossings.hpp"
 #include "units.hpp"
 
@@ -59,7 +60,7 @@ class ProfileRun {
   }
 
   ProfileOutcome run() {
-    write_("distance,x,y,height\n");
+    write_(std::string(kProfileHead) + '\n');
     add(request_.line.front(), 0);
     for (std::size_t leg = 0; leg + 1 < request_.line.size(); ++leg) {
       const Point2 &a = request_.line[leg], &b = request_.line[leg + 1];

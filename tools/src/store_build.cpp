@@ -193,7 +193,7 @@ BuildOutcome build_store(const BuildRequest& request, const BuildProgress& progr
 
   const stream::Schema schema = schema_of(source->info(), crs, request);
   stream::StoreWriter writer(request.store, schema, request.replace);
-  StoreSink sink(writer);
+  StoreSink sink(writer, request.most_points == 0);
   cluster::HierarchyOptions options;
   options.block_size = request.block_points;
   options.block.facility_cost = request.facility_cost;

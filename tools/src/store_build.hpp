@@ -35,7 +35,7 @@ struct BuildRequest {
   std::uint64_t seed = 1;
   unsigned threads = 1;
   std::uint64_t memory_bytes = std::uint64_t{256} << 20;
-  /// Stop after about this many points (a trial run); 0: read everything.
+  /// A trial run that stops after about this many points and leaves no store; 0: read everything.
   std::uint64_t most_points = 0;
 };
 

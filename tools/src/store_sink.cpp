@@ -47,7 +47,7 @@ void StoreSink::commit(unsigned /*level*/, std::unique_ptr<Prepared> prepared) {
 
 void StoreSink::root(const cluster::FinishedBlock& block) {
   const auto summaries = summaries_of(block);
-  store_bytes_ = writer_.finish(as_stored(block, summaries));
+  store_bytes_ = writer_.finish(as_stored(block, summaries), publish_);
 }
 
 }  // namespace terrace::tools

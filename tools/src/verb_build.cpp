@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
-#include <cerrno>
 #include <cstdint>
-#include <cstdlib>
 #include <filesystem>
-#include <limits>
 #include <memory>
 #include <string>
 #include <system_error>
@@ -25,30 +22,6 @@ namespace {
 
 /// The trial run behind --dry-run reads this many points and scales up.
 constexpr std::uint64_t kTrialPoints = 1'000'000;
-
-/// A folder beside the target that goes with the object.
-class TrialFolder {
- public:
-  explicit TrialFolder(const std::filesystem::path& parent) {
-    std::string name = (parent / ".terrace-dry-run-XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr) {
-      throw stream::system_error(name, "cannot make a folder for the trial", errno,
-                                 "choose an output in a folder that can be written");
-    }
-    path_ = name;
-  }
-  ~TrialFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  TrialFolder(const TrialFolder&) = delete;
-  TrialFolder& operator=(const TrialFolder&) = delete;
-
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
 
 class BuildCommand final : public Command {
  public:
@@ -142,16 +115,13 @@ class BuildCommand final : public Command {
     return summary;
   }
 
-  /// Builds a store of the first points beside the target, weighs it and removes it.
+  /// Builds a store of the first points, weighs it and does not keep it.
   Summary estimate() {
     if (std::find(request_.inputs.begin(), request_.inputs.end(), "-") != request_.inputs.end()) {
       throw UsageError("--dry-run reads its input before the build does: name files, not -");
     }
     const auto source = stream::open_source(request_.inputs, {.format = request_.input_format});
     const stream::SourceInfo& info = source->info();
-    const std::filesystem::path target = request_.store;
-    const TrialFolder folder(target.parent_path());
-    request_.store = folder.path() / "store";
     request_.most_points = kTrialPoints;
     const Stopwatch watch;
     const BuildOutcome trial = build_store(request_);

@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include <CLI/CLI.hpp>
+#include <terrace/stream/store.hpp>
 
 #include "info.hpp"
 #include "verbs.hpp"
@@ -19,8 +20,8 @@ class InfoCommand : public Command {
   }
 
   Summary run(const CommonOptions& common) override {
-    return std::filesystem::is_directory(input_) ? info_of_store(input_, common)
-                                                 : info_of_file(input_, common);
+    const bool store = std::filesystem::is_directory(input_) || stream::Store::recover(input_);
+    return store ? info_of_store(input_, common) : info_of_file(input_, common);
   }
 
  private:

@@ -119,7 +119,7 @@ class MatchCommand final : public Command {
   }
 
   std::string rows_of(const MatchOutcome& outcome, std::size_t& pairs) const {
-    std::string text = "a,b,distance\n";
+    std::string text = std::string(kPairsHead) + '\n';
     for (std::uint32_t a = 0; a < outcome.mate.size(); ++a) {
       const std::uint32_t b = outcome.mate[a];
       // Who has no partner has a number above all.
@@ -133,7 +133,7 @@ class MatchCommand final : public Command {
   }
 
   static std::string rows_of(const TreeOutcome& outcome) {
-    std::string text = "a,b,distance,size,level\n";
+    std::string text = std::string(kTreeHead) + '\n';
     for (const matching::MatchingTreeRow& row : outcome.tree.rows) {
       text += std::to_string(row.a) + ',' + std::to_string(row.b) + ',' +
               number_text(row.distance) + ',' + std::to_string(row.size) + ',' +

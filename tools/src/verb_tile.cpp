@@ -108,7 +108,6 @@ std::string fingerprint_of(const stream::Store& store) {
 TileSetOptions TileCommand::options_for(const stream::Store& store, double spacing,
                                         const CommonOptions& common) const {
   TileSetOptions options;
-  options.folder = output_;
   options.name = name_.empty() ? store.path().stem().string() : name_;
   const unsigned native = native_zoom(spacing);
   std::tie(options.first_zoom, options.last_zoom) = parse_zooms(zoom_, native);
@@ -148,7 +147,7 @@ Summary TileCommand::run(const CommonOptions& common) {
                   "M of memory, --memory allows " + std::to_string(memory >> 20) + "M",
          .remedy = "allow more"});
   }
-  check_tile_folder(output_, common.force, resume_);
+  const TileFolder folder(output_, common.force, resume_);
   const unsigned threads = static_cast<unsigned>(
       std::min<std::uint64_t>(common.threads, (memory - kBytesBeside) / kBytesPerThread));
 
@@ -161,7 +160,8 @@ Summary TileCommand::run(const CommonOptions& common) {
                                                                .threads = threads},
                                                               common);
   const std::vector<std::unique_ptr<TileSurface>>& surfaces = source->surfaces();
-  const TileSetOptions options = options_for(store, surfaces.front()->spacing(), common);
+  TileSetOptions options = options_for(store, surfaces.front()->spacing(), common);
+  options.folder = folder.path();
   const TileSetResult result = write_tile_set(surfaces, options, common);
 
   Summary summary;

@@ -142,10 +142,16 @@ Summary VerifyCommand::tiles(const CommonOptions& common) const {
     zooms.push_back(std::move(line));
   }
   const bool ok = result.problems.empty();
+  if (result.torn > 0) {
+    summary.text += with_commas(result.torn) + (result.torn == 1 ? " file" : " files") +
+                    " left over from a run that was killed, no part of the set: the next "
+                    "`terrace tile` into the folder removes them\n";
+  }
   summary.json = {{"ok", ok},
                   {"problems", problems},
                   {"tiles", result.tiles},
                   {"samples", result.samples},
+                  {"left_over", result.torn},
                   {"zooms", zooms}};
   summary.text += std::string(ok ? "sound: " : "damaged: ") + with_commas(result.tiles) +
                   " tiles, checked in " + readable_seconds(watch.seconds()) + "\n";

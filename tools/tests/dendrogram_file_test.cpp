@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "../../tests/pipeline/temporary_folder.hpp"
 #include "src/draw.hpp"
 #include "terrace/stream/error.hpp"
 
@@ -15,11 +16,10 @@ namespace {
 
 class DendrogramFile : public ::testing::Test {
  protected:
-  void SetUp() override { path_ = ::testing::TempDir() + "terrace_dendrogram.csv"; }
-  void TearDown() override { std::filesystem::remove(path_); }
   void hold(const std::string& text) const { std::ofstream(path_) << text; }
 
-  std::string path_;
+  tests::TemporaryFolder scratch_;
+  std::string path_ = scratch_.path() / "dendrogram.csv";
 };
 
 const cluster::Dendrogram kTree{4, {{0, 1, 0.1, 2}, {2, 3, 1.0 / 3.0, 2}, {4, 5, 1e20, 4}}};
@@ -37,7 +37,7 @@ TEST_F(DendrogramFile, OtherFilesAreNone) {
     hold(text);
     EXPECT_FALSE(read_dendrogram(path_)) << text;
   }
-  EXPECT_FALSE(read_dendrogram(::testing::TempDir()));
+  EXPECT_FALSE(read_dendrogram(scratch_.path()));
   EXPECT_FALSE(read_dendrogram(path_ + ".none"));
 }
 

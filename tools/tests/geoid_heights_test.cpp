@@ -9,6 +9,7 @@
 
 #include <gtest/gtest.h>
 
+#include "../../tests/pipeline/temporary_folder.hpp"
 #include "src/error.hpp"
 #include "terrace/stream/error.hpp"
 
@@ -19,13 +20,6 @@ constexpr std::uint64_t kMemory = std::uint64_t{1} << 30;
 
 class GeoidTest : public testing::Test {
  protected:
-  void SetUp() override {
-    folder_ = std::filesystem::path(testing::TempDir()) /
-              ("geoid" + std::to_string(reinterpret_cast<std::uintptr_t>(this)));
-    std::filesystem::create_directories(folder_);
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-
   /// A grid of GeographicLib's format, 5 degrees apart, of height 20 sin(latitude) + 50: smooth, so
   /// that the interpolation's error is small.
   std::string write_grid(const std::string& name) const {
@@ -51,7 +45,8 @@ class GeoidTest : public testing::Test {
     return 50 + 20 * std::sin(latitude * 3.14159265358979 / 180);
   }
 
-  std::filesystem::path folder_;
+  tests::TemporaryFolder scratch_;
+  const std::filesystem::path& folder_ = scratch_.path();
 };
 
 TEST_F(GeoidTest, InterpolatesTheGrid) {

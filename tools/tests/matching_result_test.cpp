@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "../../tests/pipeline/temporary_folder.hpp"
 #include "src/draw.hpp"
 #include "src/error.hpp"
 #include "terrace/stream/error.hpp"
@@ -19,8 +20,6 @@ constexpr const char* kTree = "a,b,distance,size,level\n";
 
 class MatchingResultFile : public ::testing::Test {
  protected:
-  void SetUp() override { path_ = ::testing::TempDir() + "terrace_matching.csv"; }
-  void TearDown() override { std::filesystem::remove(path_); }
   void hold(const std::string& text) const { std::ofstream(path_, std::ios::binary) << text; }
   /// What is wrong with the file's text.
   [[nodiscard]] stream::Error::Parts fault(const std::string& text, std::size_t points) const {
@@ -34,7 +33,8 @@ class MatchingResultFile : public ::testing::Test {
     return {};
   }
 
-  std::string path_;
+  tests::TemporaryFolder scratch_;
+  std::string path_ = scratch_.path() / "matching.csv";
 };
 
 TEST_F(MatchingResultFile, IsToldByItsFirstLine) {
@@ -50,7 +50,7 @@ TEST_F(MatchingResultFile, IsToldByItsFirstLine) {
   }
   hold(std::string("a,b,distance\0\n", 14));
   EXPECT_FALSE(is_matching_result(path_));
-  EXPECT_FALSE(is_matching_result(::testing::TempDir()));
+  EXPECT_FALSE(is_matching_result(scratch_.path()));
   EXPECT_FALSE(is_matching_result(path_ + ".none"));
 }
 
@@ -114,7 +114,6 @@ TEST_F(MatchingResultFile, PutsNodesAtTheMeansOfTheirPoints) {
   std::ofstream(points) << "x,y,z\n0,0,0\n3,0,0\n0,9,3\n3,3,3\n";
   hold(std::string(kTree) + "0,1,3,2,1\n2,4,1,3,2\n3,5,1,4,3\n");
   MatchingPicture picture = read_matching_picture(path_, points, {});
-  std::filesystem::remove(points);
   ASSERT_EQ(picture.positions.size(), 7u);
   const auto offset = [&](std::size_t node, std::size_t axis) {
     return picture.positions[node][axis] - picture.positions[0][axis];

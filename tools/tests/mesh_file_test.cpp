@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include "../../tests/pipeline/temporary_folder.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/mesh_writer.hpp"
 
@@ -16,12 +17,12 @@ namespace {
 
 class MeshFileTest : public ::testing::Test {
  protected:
-  void TearDown() override { std::filesystem::remove(path_); }
   std::optional<MeshFile> read(const std::string& name, const std::string& content) {
-    path_ = ::testing::TempDir() + "terrace_mesh_file_" + name;
+    path_ = scratch_.path() / name;
     std::ofstream(path_, std::ios::binary) << content;
     return read_mesh_file(path_);
   }
+  tests::TemporaryFolder scratch_;
   std::string path_;
 };
 
@@ -76,7 +77,7 @@ TEST_F(MeshFileTest, ReadsWhatTheLibraryWrites) {
   const std::vector<float> levels{1, 2, 7};
   const std::vector<stream::TriangleIndices> triangles{{0, 1, 2}};
   for (const char* format : {"ply", "ply-ascii", "obj"}) {
-    path_ = ::testing::TempDir() + "terrace_mesh_file_round." + (format[0] == 'o' ? "obj" : "ply");
+    path_ = scratch_.path() / (format[0] == 'o' ? "round.obj" : "round.ply");
     const auto writer = stream::open_mesh_writer(
         path_,
         {.vertices = 3, .triangles = 1, .attributes = {"level"}, .comments = {}, .bounds = {}},
@@ -91,7 +92,6 @@ TEST_F(MeshFileTest, ReadsWhatTheLibraryWrites) {
     if (format[0] == 'p') {
       EXPECT_EQ(file->mesh.levels, (std::vector<std::uint8_t>{1, 2, 7}));
     }
-    std::filesystem::remove(path_);
   }
 }
 

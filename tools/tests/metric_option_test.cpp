@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "../../tests/pipeline/temporary_folder.hpp"
 #include "src/error.hpp"
 #include "terrace/stream/error.hpp"
 
@@ -16,12 +17,9 @@ namespace {
 constexpr stream::Point3 kOrigin{0, 0, 0}, kOne{1, 1, 1};
 
 MetricChoice from_file(const std::string& json) {
-  const std::string path = ::testing::TempDir() + "terrace_metric.json";
+  const tests::TemporaryFolder scratch;
+  const std::string path = scratch.path() / "metric.json";
   std::ofstream(path) << json;
-  struct Remover {
-    const std::string& path;
-    ~Remover() { std::filesystem::remove(path); }
-  } remover{path};
   return MetricChoice::parse("elliptical:" + path);
 }
 

@@ -2,7 +2,7 @@
 #include "src/ordered_work.hpp"
 
 #include <atomic>
-#include <chrono>
+#include <latch>
 #include <memory>
 #include <stdexcept>
 
@@ -39,6 +39,7 @@ TEST(OrderedWork, CommitsEachResultOnceInOrder) {
 TEST(OrderedWork, OneCommitAtATimeAndNoMoreThreadsThanAsked) {
   std::atomic<int> committing = 0, working = 0, most = 0;
   std::vector<std::atomic<unsigned>> made(3);
+  std::latch all_at_work(3);
   const auto enter = [&] {
     const int now = ++working;
     for (int seen = most; now > seen && !most.compare_exchange_weak(seen, now);) {
@@ -49,14 +50,15 @@ TEST(OrderedWork, OneCommitAtATimeAndNoMoreThreadsThanAsked) {
       [&](unsigned worker, std::size_t i) {
         enter();
         ++made[worker];
-        if (i % 7 == 0) std::this_thread::sleep_for(std::chrono::microseconds(300));
+        if (i < 3) all_at_work.arrive_and_wait();
+        if (i % 7 == 0) std::this_thread::yield();
         --working;
         return i;
       },
       [&](std::size_t i, std::size_t) {
         enter();
         EXPECT_EQ(++committing, 1);
-        if (i % 11 == 0) std::this_thread::sleep_for(std::chrono::microseconds(300));
+        if (i % 11 == 0) std::this_thread::yield();
         --committing;
         --working;
       });

@@ -14,6 +14,7 @@
 #include <terrace/stream/geotiff_writer.hpp>
 #include <terrace/stream/store.hpp>
 
+#include "../../tests/pipeline/temporary_folder.hpp"
 #include "src/portable_math.hpp"
 #include "src/store_build.hpp"
 #include "src/tile/raster_tile_surface.hpp"
@@ -36,9 +37,6 @@ struct Frame {
 class RasterDigest : public ::testing::TestWithParam<Frame> {
  protected:
   void SetUp() override {
-    folder_ = fs::path(::testing::TempDir()) / (std::string("raster-digest-") + GetParam().name);
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
     for (std::int64_t i = 0; i < kColumns * kRows; ++i) {
       const double column = static_cast<double>(i % kColumns),
                    row = static_cast<double>(i / kColumns);
@@ -47,7 +45,6 @@ class RasterDigest : public ::testing::TestWithParam<Frame> {
       heights_.push_back(there ? static_cast<float>(random() < 0.05 ? 77.0 : hills) : kNodata);
     }
   }
-  void TearDown() override { fs::remove_all(folder_); }
 
   double random() {
     seed_ = scramble(seed_);
@@ -152,7 +149,8 @@ class RasterDigest : public ::testing::TestWithParam<Frame> {
 
   std::uint64_t seed_ = 31;
   std::vector<float> heights_;
-  fs::path folder_;
+  tests::TemporaryFolder scratch_;
+  const fs::path& folder_ = scratch_.path();
 };
 
 TEST_P(RasterDigest, EqualOnesGiveEqualAnswers) {

@@ -16,6 +16,7 @@
 #include <terrace/stream/geotiff_writer.hpp>
 #include <terrace/stream/store.hpp>
 
+#include "../../tests/pipeline/temporary_folder.hpp"
 #include "src/portable_math.hpp"
 #include "src/store_build.hpp"
 #include "src/tile/height_cache.hpp"
@@ -30,13 +31,6 @@ constexpr double kNodata = -9999.0;
 
 class RasterOfDegrees : public ::testing::Test {
  protected:
-  void SetUp() override {
-    folder_ = fs::path(::testing::TempDir()) / "raster-of-degrees";
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
   double random() {
     seed_ = scramble(seed_);
     return unit_interval(seed_);
@@ -70,7 +64,8 @@ class RasterOfDegrees : public ::testing::Test {
   }
 
   std::uint64_t seed_ = 23;
-  fs::path folder_;
+  tests::TemporaryFolder scratch_;
+  const fs::path& folder_ = scratch_.path();
 };
 
 using Heights = std::map<std::pair<double, double>, double>;

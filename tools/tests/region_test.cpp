@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include "../../tests/pipeline/temporary_folder.hpp"
 #include "src/error.hpp"
 #include "src/portable_math.hpp"
 #include "terrace/stream/error.hpp"
@@ -15,19 +16,15 @@
 namespace terrace::tools {
 namespace {
 
-/// A file in the test's own folder that goes with the object.
+/// A file that goes with the object.
 class TemporaryFile {
  public:
-  explicit TemporaryFile(const std::string& text)
-      : path_(::testing::TempDir() + "terrace_region_" + std::to_string(++count_) + ".geojson") {
-    std::ofstream(path_) << text;
-  }
-  ~TemporaryFile() { std::filesystem::remove(path_); }
+  explicit TemporaryFile(const std::string& text) { std::ofstream(path_) << text; }
   [[nodiscard]] const std::string& path() const { return path_; }
 
  private:
-  static inline int count_ = 0;
-  std::string path_;
+  tests::TemporaryFolder scratch_;
+  std::string path_ = scratch_.path() / "region.geojson";
 };
 
 Region region_of(const std::string& geojson) {

@@ -11,6 +11,7 @@
 #include <terrace/stream/geotiff_writer.hpp>
 #include <terrace/stream/store.hpp>
 
+#include "../../tests/pipeline/temporary_folder.hpp"
 #include "src/portable_math.hpp"
 #include "src/store_build.hpp"
 #include "src/tile/height_blocks.hpp"
@@ -26,9 +27,6 @@ constexpr float kNodata = -9999.0F;
 class HeightBlocksOfAStore : public ::testing::Test {
  protected:
   void SetUp() override {
-    folder_ = fs::path(::testing::TempDir()) / "height-blocks";
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
     for (std::int64_t row = 0; row < kRows; ++row) {
       for (std::int64_t column = 0; column < kColumns; ++column) {
         const double x = static_cast<double>(column), y = static_cast<double>(row);
@@ -53,7 +51,6 @@ class HeightBlocksOfAStore : public ::testing::Test {
     request.block_points = 500;
     build_store(request);
   }
-  void TearDown() override { fs::remove_all(folder_); }
 
   double random() {
     seed_ = scramble(seed_);
@@ -90,7 +87,8 @@ class HeightBlocksOfAStore : public ::testing::Test {
 
   std::uint64_t seed_ = 17;
   std::vector<float> heights_;
-  fs::path folder_;
+  tests::TemporaryFolder scratch_;
+  const fs::path& folder_ = scratch_.path();
 };
 
 TEST_F(HeightBlocksOfAStore, RangesAreThoseOfTheBlocks) {

@@ -12,6 +12,7 @@
 
 #include <gtest/gtest.h>
 
+#include "../../tests/pipeline/temporary_folder.hpp"
 #include "analytic_surface.hpp"
 
 namespace terrace::tools {
@@ -139,7 +140,8 @@ TEST(TileInputs, TheDigestTellsThemAll) {
 }
 
 TEST(TileInputs, FilesAreToldByTheirBytes) {
-  const std::string path = testing::TempDir() + "/inputs-digest";
+  const tests::TemporaryFolder scratch;
+  const std::string path = scratch.path() / "inputs";
   const auto digest = [&](const std::string& bytes) {
     std::ofstream(path, std::ios::binary) << bytes;
     return digest_of_file(path);

@@ -9,6 +9,8 @@
 
 #include <gtest/gtest.h>
 
+#include "../../tests/pipeline/temporary_folder.hpp"
+
 namespace terrace::tools {
 namespace {
 
@@ -16,14 +18,6 @@ namespace fs = std::filesystem;
 
 class TileJournalFile : public ::testing::Test {
  protected:
-  void SetUp() override {
-    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = fs::path(::testing::TempDir()) / (std::string("journal-") + test->name());
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
   [[nodiscard]] fs::path path() const { return folder_ / TileJournal::kName; }
   [[nodiscard]] std::string text() const {
     std::ifstream file(path(), std::ios::binary);
@@ -39,7 +33,8 @@ class TileJournalFile : public ::testing::Test {
     return found != nullptr && *found == tile(i);
   }
 
-  fs::path folder_;
+  tests::TemporaryFolder scratch_;
+  const fs::path& folder_ = scratch_.path();
 };
 
 constexpr unsigned kTiles = 7;
@@ -114,6 +109,28 @@ TEST_F(TileJournalFile, AFinishedOneSaysWhatIsThere) {
   EXPECT_EQ(read_tile_records(folder_.string()).size(), records.size());
   EXPECT_TRUE(same(TileJournal(folder_.string()).find(address(3)), 3));
   EXPECT_TRUE(read_tile_records((folder_ / "none").string()).empty());
+}
+
+TEST_F(TileJournalFile, AFinishedOneIsSortedThoughARunWasCutShortBefore) {
+  std::vector<TileJournal::Record> records;
+  for (unsigned i = 0; i < kTiles; ++i) records.emplace_back(address(i), tile(i));
+  const auto add_all = [&](TileJournal& journal) {
+    for (const auto& [address, finished] : records) journal.add(address, finished);
+  };
+  {
+    TileJournal journal(folder_.string());
+    add_all(journal);
+    journal.finish(records);
+  }
+  const std::string whole = text();
+  fs::remove(path());
+  {
+    TileJournal killed(folder_.string());
+    add_all(killed);
+  }
+  EXPECT_NE(text(), whole);
+  TileJournal(folder_.string()).finish(records);
+  EXPECT_EQ(text(), whole);
 }
 
 TEST_F(TileJournalFile, ALineCutShortEndsWhatIsBelieved) {

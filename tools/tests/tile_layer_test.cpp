@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <terrace/stream/error.hpp>
 
+#include "../../tests/pipeline/temporary_folder.hpp"
 #include "src/portable_math.hpp"
 
 namespace terrace::tools {
@@ -17,14 +18,10 @@ namespace fs = std::filesystem;
 
 class TileLayerFile : public ::testing::Test {
  protected:
-  void SetUp() override {
-    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
-    path_ = fs::path(::testing::TempDir()) / (std::string("layer-") + test->name() + ".json");
-  }
-  void TearDown() override { fs::remove(path_); }
   void write(const std::string& text) const { std::ofstream(path_) << text; }
 
-  fs::path path_;
+  tests::TemporaryFolder scratch_;
+  fs::path path_ = scratch_.path() / "layer.json";
 };
 
 TEST(TileRanges, CoverExactlyTheTiles) {

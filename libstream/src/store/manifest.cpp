@@ -294,7 +294,9 @@ bool looks_like_store(const std::filesystem::path& folder) {
   const auto path = folder / kManifestName;
   if (!std::filesystem::is_regular_file(path, error)) return false;
   try {
-    return read_whole(path, kMostManifestBytes).find(kFormatName) != std::string::npos;
+    const Json json = Json::parse(read_whole(path, kMostManifestBytes), nullptr, false);
+    const auto format = json.is_object() ? json.find("format") : json.end();
+    return format != json.end() && *format == kFormatName;
   } catch (const Error&) {
     return false;
   }

@@ -48,7 +48,7 @@ std::string to_text(const Manifest& manifest);
 /// or not the one that was written.
 Manifest parse_manifest(const std::string& text, const std::filesystem::path& file);
 
-/// Whether `folder` has a manifest that says it is a store, of whatever version, damaged or not.
+/// Whether `folder` has a manifest whose format is that of a store, of whatever version.
 bool looks_like_store(const std::filesystem::path& folder);
 
 }  // namespace terrace::stream::store

@@ -3,16 +3,16 @@
 
 #include <filesystem>
 
-#include "files.hpp"
+#include "terrace/stream/file_lock.hpp"
 
 namespace terrace::stream::store {
 
-/// The folder in which a store is written before it has its name: `.NAME.tmp-PID` beside it, with a
-/// locked file `.NAME.tmp-PID.lock` that tells living writers from dead ones. It is gone, whatever
-/// happens, unless published.
+/// The folder in which a store is written before it has its name (temporary.hpp). It is gone,
+/// whatever happens, unless published.
 class Staging {
  public:
-  /// Removes what dead writers of the same store have left, then makes a folder.
+  /// Sweeps what dead writers of the same store have left, then makes a folder. `target` may be a
+  /// link: the store is or will be where it leads.
   /// Throws: Error.
   explicit Staging(std::filesystem::path target);
   ~Staging();
@@ -21,16 +21,16 @@ class Staging {
 
   [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
   [[nodiscard]] const std::filesystem::path& target() const { return target_; }
-  /// Syncs the folder and gives it its name. With `replace` what bears the name is taken away after
-  /// the new one stands. Throws: Error; the target is then as it was.
+  /// Syncs the folder and gives it its name. With `replace` what bears the name is removed after
+  /// the new one stands. Where two names cannot be exchanged in one step, no store bears the name
+  /// for a moment; if the process dies then, Store::open() and the next writer give the old one its
+  /// name back. Throws: Error; the target is then as it was.
   void publish(bool replace);
 
  private:
-  void remove() noexcept;
-
-  std::filesystem::path target_, parent_, folder_, lock_path_;
-  Descriptor lock_;
-  bool published_ = false;
+  std::filesystem::path target_;  ///< where links lead
+  std::filesystem::path folder_;  ///< empty once published
+  FileLock lock_;
 };
 
 }  // namespace terrace::stream::store

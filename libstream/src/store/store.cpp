@@ -5,7 +5,9 @@
 #include <mutex>
 #include <utility>
 
+#include "../temporary.hpp"
 #include "level_reader.hpp"
+#include "terrace/stream/atomic_file.hpp"
 #include "verify.hpp"
 
 namespace terrace::stream {
@@ -54,7 +56,7 @@ Store::~Store() = default;
 Store Store::open(const std::filesystem::path& path) {
   const auto manifest_path = path / kManifestName;
   std::error_code error;
-  if (!std::filesystem::is_regular_file(manifest_path, error)) {
+  if (!std::filesystem::is_regular_file(manifest_path, error) && !recover(path)) {
     throw Error({.file = path.string(),
                  .where = {},
                  .cause = "there is no store here",
@@ -77,6 +79,10 @@ Store Store::open(const std::filesystem::path& path) {
     impl->levels.push_back(std::make_unique<LevelReader>(path, impl->manifest, l));
   }
   return Store(std::move(impl));
+}
+
+bool Store::recover(const std::filesystem::path& path) {
+  return put_back_replaced(follow_links(path));
 }
 
 const Schema& Store::schema() const { return impl_->manifest.schema; }

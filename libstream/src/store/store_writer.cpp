@@ -139,7 +139,7 @@ std::uint64_t StoreWriter::Impl::append(EncodedPtr encoded, bool root) {
 
 StoreWriter::StoreWriter(const std::filesystem::path& path, Schema schema, bool replace) {
   std::error_code error;
-  const auto status = std::filesystem::symlink_status(path, error);
+  const auto status = std::filesystem::status(path, error);
   if (std::filesystem::exists(status)) {
     if (!replace) {
       throw Error({.file = path.string(),
@@ -179,7 +179,7 @@ std::uint64_t StoreWriter::clusters(unsigned level) const {
 
 Schema& StoreWriter::schema() { return impl_->schema; }
 
-std::uint64_t StoreWriter::finish(const ClusteredBlock& root) {
+std::uint64_t StoreWriter::finish(const ClusteredBlock& root, bool publish) {
   Impl& w = *impl_;
   assert(root.representatives.size() == 1 && root.representatives[0] == UINT32_MAX);
   assert(w.levels.size() == root.level && "all levels below the top have clusters, no other has");
@@ -218,7 +218,7 @@ std::uint64_t StoreWriter::finish(const ClusteredBlock& root) {
   OutputFile file(path);
   file.write({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
   file.finish();
-  w.staging.publish(w.replace);
+  if (publish) w.staging.publish(w.replace);
   return bytes + text.size();
 }
 

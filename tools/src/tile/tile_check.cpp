@@ -233,6 +233,7 @@ TileCheckResult check_tile_set(const TileCheckOptions& options, unsigned threads
   const unsigned first = layer.first_zoom;
   SetCheck check(options, std::move(layer), threads, surfaces, common);
   check.result.problems = std::move(inventory.problems);
+  check.result.torn = inventory.torn;
   std::vector<TileAddress> all;
   for (unsigned zoom = 0; zoom < inventory.tiles.size(); ++zoom) {
     check.result.zooms.push_back({.zoom = zoom});

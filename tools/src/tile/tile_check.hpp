@@ -31,6 +31,7 @@ struct ZoomCheck {
 struct TileCheckResult {
   std::vector<stream::Problem> problems;  ///< of layer.json, then by zoom, row, column
   std::uint64_t tiles = 0, samples = 0;
+  std::uint64_t torn = 0;  ///< files that a killed run was writing: harmless
   std::vector<ZoomCheck> zooms;
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "tile/tile_file.hpp"
 
+#include <algorithm>
 #include <cerrno>
 #include <filesystem>
 #include <utility>
@@ -10,8 +11,12 @@
 #include <terrace/stream/error.hpp>
 #include <unistd.h>
 
+#include "tile/tile_address.hpp"
+
 namespace terrace::tools {
 namespace {
+
+constexpr const char* kTemporaryEnding = ".tmp";
 
 /// A file descriptor that closes itself.
 class Descriptor {
@@ -73,7 +78,8 @@ void write_tile_file(const std::string& path, std::span<const std::byte> bytes) 
     throw stream::system_error(target.parent_path().string(), "cannot be made", error.value());
   }
   std::string temporary = target.parent_path().string();
-  temporary.append("/.").append(target.filename().string()).append(".tmp");
+  temporary.append("/.").append(target.filename().string()).append(kTemporaryEnding);
+  temporary.append("-").append(std::to_string(::getpid()));
   Descriptor file(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC,
                          S_IRUSR | S_IWUSR | S_IRGRP | S_IROTH));
   if (file.number() < 0) throw stream::system_error(path, "cannot be created", errno);
@@ -86,9 +92,30 @@ void write_tile_file(const std::string& path, std::span<const std::byte> bytes) 
   }
 }
 
-void sync_folder(const std::string& folder) {
+bool is_torn_tile(std::string_view path) {
+  const std::string_view name = path.substr(path.rfind('/') + 1);
+  const std::size_t end = name.rfind(kTemporaryEnding);
+  if (!name.starts_with('.') || end == std::string_view::npos || end == 0) return false;
+  std::string_view pid = name.substr(end + std::string_view(kTemporaryEnding).size());
+  if (pid.starts_with('-')) pid.remove_prefix(1);  // versions before locks had no number
+  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
+  if (!std::all_of(pid.begin(), pid.end(), is_digit)) return false;
+  std::string tile(path.substr(0, path.size() - name.size()));
+  tile += name.substr(1, end - 1);
+  return parse_tile_path(tile).has_value();
+}
+
+void sync_files(const std::string& folder) {
   const Descriptor file(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (file.number() < 0 || ::syncfs(file.number()) != 0) {
+    throw stream::system_error(folder, "cannot be synced", errno);
+  }
+}
+
+void sync_names(const std::string& folder) {
+  const Descriptor file(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  // Some file systems cannot sync a folder and say so: nothing is lost by that.
+  if (file.number() < 0 || (::fsync(file.number()) != 0 && errno != EINVAL && errno != ENOTSUP)) {
     throw stream::system_error(folder, "cannot be synced", errno);
   }
 }

@@ -10,6 +10,7 @@
 #include <terrace/stream/error.hpp>
 
 #include "interrupt.hpp"
+#include "tile/tile_file.hpp"
 #include "units.hpp"
 
 namespace terrace::tools {
@@ -70,16 +71,16 @@ void Inventory::files() {
     const std::string name = entry->path().lexically_relative(folder_).generic_string();
     if (const auto tile = parse_tile_path(name); tile && tile->zoom < result.tiles.size()) {
       result.tiles[tile->zoom].push_back(*tile);
-    } else if (name.ends_with(".terrain") || name.ends_with(".tmp")) {
+    } else if (is_torn_tile(name)) {
+      ++result.torn;
+    } else if (name.ends_with(".terrain")) {
       strange.push_back(name);
     }
   }
   if (error) throw stream::system_error(folder_, "cannot be read", error.value());
   std::sort(strange.begin(), strange.end());
   for (const std::string& name : strange) {
-    problem(folder_ + "/" + name, name.ends_with(".terrain")
-                                      ? "a tile at a place that the set does not have"
-                                      : "left over from a run that did not end");
+    problem(folder_ + "/" + name, "a tile at a place that the set does not have");
   }
   for (auto& tiles : result.tiles) std::sort(tiles.begin(), tiles.end(), by_row);
 }

@@ -60,8 +60,8 @@ bool by_address(const TileJournal::Record& a, const TileJournal::Record& b) {
 
 struct Lines {
   std::vector<TileJournal::Record> records;  ///< sorted, of each tile the last
-  std::uint64_t lines = 0;
-  std::uint64_t good_bytes = 0;  ///< 0: it is no journal of this version
+  bool tidy = true;                          ///< sorted as they stand in the file, each tile once
+  std::uint64_t good_bytes = 0;              ///< 0: it is no journal of this version
 };
 
 Lines read_lines(const std::string& path) {
@@ -73,10 +73,10 @@ Lines read_lines(const std::string& path) {
   while (std::getline(file, line) && !file.eof()) {
     const auto record = parse_record(line);
     if (!record) break;
+    if (!read.records.empty()) read.tidy = read.tidy && by_address(read.records.back(), *record);
     read.records.push_back(*record);
     read.good_bytes += line.size() + 1;
   }
-  read.lines = read.records.size();
   // Of equal addresses the last comes first.
   std::reverse(read.records.begin(), read.records.end());
   std::stable_sort(read.records.begin(), read.records.end(), by_address);
@@ -106,7 +106,7 @@ TileJournal::TileJournal(const std::string& folder) : path_(folder + "/" + kName
     }
     if (error) throw stream::system_error(path_, "cannot be written", error.value());
     earlier_ = std::move(read.records);
-    lines_ = read.lines;
+    tidy_ = read.tidy;
     file_.open(path_, std::ios::binary | std::ios::app);
   } else {
     file_.open(path_, std::ios::binary | std::ios::trunc);
@@ -126,13 +126,13 @@ void TileJournal::add(const TileAddress& tile, const FinishedTile& finished) {
   file_ << line_of(tile, finished);
   file_.flush();
   if (!file_) throw stream::system_error(path_, "cannot be written", errno);
-  ++lines_;
+  tidy_ = false;
 }
 
 void TileJournal::finish(std::vector<Record> records) {
   file_.close();
   std::sort(records.begin(), records.end(), by_address);
-  if (lines_ == records.size() && records == earlier_) return;
+  if (tidy_ && records == earlier_) return;
   stream::AtomicFile file(path_, true);
   file.write(head_line() + "\n");
   for (const auto& [tile, finished] : records) file.write(line_of(tile, finished));

@@ -51,7 +51,7 @@ class TileJournal {
  private:
   std::string path_;
   std::vector<Record> earlier_;  ///< sorted by address
-  std::uint64_t lines_ = 0;
+  bool tidy_ = true;             ///< the file holds these, in this order
   std::ofstream file_;
 };
 

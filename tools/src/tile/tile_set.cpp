@@ -22,6 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kLayerName = "layer.json";
+constexpr const char* kLockName = ".terrace-tiles.lock";
 
 std::string fingerprint_of(const TileSetOptions& options) {
   std::string text = "1 ";
@@ -48,6 +49,17 @@ void refuse_another(const std::string& layer_path, const std::string& fingerprin
                        .remedy = "give --force to replace it: tiles that stay the same are kept"});
 }
 
+/// Whether there is anything in `folder` without a tile set, begun or finished.
+bool holds_others(const std::string& folder) {
+  if (fs::exists(folder + "/" + TileJournal::kName) || fs::exists(folder + "/" + kLayerName)) {
+    return false;
+  }
+  std::error_code none;  // such as no folder
+  const fs::directory_iterator entries(folder, none);
+  return std::any_of(fs::begin(entries), fs::end(entries),
+                     [](const auto& entry) { return entry.path().filename() != kLockName; });
+}
+
 /// Not touched if it says the same.
 void write_layer(const std::string& path, const std::string& text) {
   const std::vector<std::byte> before = read_tile_file(path);
@@ -71,33 +83,45 @@ unsigned native_zoom(double spacing) {
   return zoom;
 }
 
-void check_tile_folder(const std::string& folder, bool force, bool resume) {
+TileFolder::TileFolder(const std::string& folder, bool force, bool resume)
+    : path_(stream::follow_links(folder).string()) {
   const auto refuse = [&](const std::string& cause, const std::string& remedy) {
     throw stream::Error({.file = folder, .where = {}, .cause = cause, .remedy = remedy});
   };
-  if (!fs::exists(folder)) return;
-  if (!fs::is_directory(folder)) refuse("is no folder", "name another one");
-  if (fs::is_empty(folder)) return;
-  const bool begun = fs::exists(folder + "/" + TileJournal::kName);
-  const bool finished = fs::exists(folder + "/" + kLayerName);
-  if (!begun && !finished) {
+  if (fs::exists(path_) && !fs::is_directory(path_)) refuse("is no folder", "name another one");
+  // Nothing is made in a folder of somebody else, not even the lock.
+  if (holds_others(path_)) {
     refuse("is not empty and holds no tile set", "name another folder, or empty it yourself");
   }
-  if (finished) {
-    const TileLayer layer = read_layer(folder + "/" + kLayerName);
-    if (layer.fingerprint.empty()) {
+  std::error_code error;
+  made_ = fs::create_directories(path_, error);
+  if (error) throw stream::system_error(folder, "cannot be made", error.value());
+  lock_ = stream::FileLock(fs::path(path_) / kLockName);
+  if (!lock_.held()) {
+    refuse("another run is writing tiles to it", "wait until it ends, or name another folder");
+  }
+  const std::string layer_path = path_ + "/" + kLayerName;
+  const std::string journal_path = path_ + "/" + TileJournal::kName;
+  if (fs::exists(layer_path)) {
+    if (read_layer(layer_path).fingerprint.empty()) {
       refuse("holds a tile set that terrace did not write", "name another folder");
     }
     if (!force && !resume) {
       refuse("holds a tile set already",
              "give --force to replace it (what stays the same is kept), or name another folder");
     }
-    return;
-  }
-  if (!force && !resume) {
+  } else if (fs::exists(journal_path) && !force && !resume) {
     refuse("holds a tile set that was begun and not finished",
            "give --resume to go on, or --force to replace it");
   }
+  stream::remove_abandoned(layer_path);
+  stream::remove_abandoned(journal_path);
+}
+
+TileFolder::~TileFolder() {
+  lock_.release();
+  std::error_code ignored;
+  if (made_) fs::remove(path_, ignored);  // fails if it is not empty, as it should
 }
 
 TileSetResult write_tile_set(const std::vector<std::unique_ptr<TileSurface>>& surfaces,
@@ -107,9 +131,6 @@ TileSetResult write_tile_set(const std::vector<std::unique_ptr<TileSurface>>& su
                      std::to_string(options.last_zoom) + ", or go without");
   }
   const std::string layer_path = options.folder + "/" + kLayerName;
-  std::error_code error;
-  fs::create_directories(options.folder, error);
-  if (error) throw stream::system_error(options.folder, "cannot be made", error.value());
   const std::string fingerprint = fingerprint_of(options);
   if (options.resume && !options.replace) refuse_another(layer_path, fingerprint);
   TileSetWriter writer(surfaces, options, common, layer_path);

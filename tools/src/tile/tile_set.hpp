@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include <terrace/stream/file_lock.hpp>
+
 #include "cli.hpp"
 #include "tile/tile_layer.hpp"
 #include "tile/tile_mesher.hpp"
@@ -49,7 +51,7 @@ double max_error_of(const TileSetOptions& options, unsigned zoom);
 /// The zoom at which a 64th of a tile is not wider than the distance of samples.
 unsigned native_zoom(double spacing);
 
-/// Writes a tile set. surfaces: one per thread, all of the same samples.
+/// Writes a tile set into a TileFolder. surfaces: one per thread, all of the same samples.
 ///
 /// Tiles are written beside their names and renamed one by one, and the disk is asked once, at the
 /// end, to keep them all; layer.json comes last. The bytes do not depend on the number of threads.
@@ -63,8 +65,26 @@ unsigned native_zoom(double spacing);
 TileSetResult write_tile_set(const std::vector<std::unique_ptr<TileSurface>>& surfaces,
                              const TileSetOptions& options, const CommonOptions& common);
 
-/// Whether `folder` may be written: it is not there, or empty, or `force` and a tile set of ours,
-/// or `resume` and a begun one. Throws: stream::Error with the remedy.
-void check_tile_folder(const std::string& folder, bool force, bool resume);
+/// The folder of a tile set for as long as a run writes to it: made if need be, and locked against
+/// other runs.
+class TileFolder {
+ public:
+  /// `folder` may be written if it is not there, or empty, or `force` and a tile set of ours, or
+  /// `resume` and a begun one, and no other run writes to it. Throws: stream::Error with the
+  /// remedy.
+  TileFolder(const std::string& folder, bool force, bool resume);
+  /// A folder that was made here and stayed empty goes.
+  ~TileFolder();
+  TileFolder(const TileFolder&) = delete;
+  TileFolder& operator=(const TileFolder&) = delete;
+
+  /// Where links lead.
+  [[nodiscard]] const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+  bool made_ = false;
+  stream::FileLock lock_;
+};
 
 }  // namespace terrace::tools

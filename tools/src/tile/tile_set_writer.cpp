@@ -62,6 +62,8 @@ void TileSetWriter::begin_change() {
     std::error_code error;
     fs::remove(layer_path_, error);
     if (error) throw stream::system_error(layer_path_, "cannot be removed", error.value());
+    // Not to be there again after a power cut that tiles have survived.
+    sync_names(options_.folder);
   });
 }
 
@@ -152,11 +154,12 @@ void TileSetWriter::write_zoom(unsigned zoom) {
 }
 
 void TileSetWriter::remove_others() {
-  std::vector<fs::path> gone;
+  std::vector<fs::path> gone, torn;
   for (const auto& entry : fs::recursive_directory_iterator(options_.folder)) {
     if (!entry.is_regular_file()) continue;
-    const auto tile =
-        parse_tile_path(entry.path().lexically_relative(options_.folder).generic_string());
+    const std::string name = entry.path().lexically_relative(options_.folder).generic_string();
+    if (is_torn_tile(name)) torn.push_back(entry.path());
+    const auto tile = parse_tile_path(name);
     if (!tile) continue;
     const auto by_row = [](const TileAddress& a, const TileAddress& b) {
       return a.y != b.y ? a.y < b.y : a.x < b.x;
@@ -168,20 +171,22 @@ void TileSetWriter::remove_others() {
     }
   }
   if (!gone.empty()) begin_change();
-  for (const fs::path& path : gone) {
+  const auto remove = [](const fs::path& path) {
     fs::remove(path);
     // Fails on folders that are not empty, as it should.
     std::error_code ignored;
     if (fs::remove(path.parent_path(), ignored)) {
       fs::remove(path.parent_path().parent_path(), ignored);
     }
-  }
+  };
+  std::ranges::for_each(gone, remove);
+  std::ranges::for_each(torn, remove);
   result.removed = gone.size();
 }
 
 void TileSetWriter::finish() {
   remove_others();
-  sync_folder(options_.folder);
+  sync_files(options_.folder);
   journal_.finish(std::move(records_));
 }
 

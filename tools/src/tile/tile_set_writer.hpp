@@ -30,8 +30,8 @@ class TileSetWriter {
 
   /// The deepest first: its tiles are named in the metadata of those above.
   void write_zoom(unsigned zoom);
-  /// After all zooms: removes tiles of an earlier set that this one does not have, and has the
-  /// journal say what is there.
+  /// After all zooms: removes tiles of an earlier set that this one does not have and what killed
+  /// runs were writing, and has the journal say what is there.
   void finish();
 
   TileSetResult result;

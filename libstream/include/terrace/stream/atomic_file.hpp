@@ -15,7 +15,8 @@ namespace terrace::stream {
 /// Bytes go to a temporary file beside the target, `.NAME.tmp-PID`, which is locked while its
 /// writer lives. `commit()` syncs it and renames it to the target; an object destroyed before that,
 /// by an exception say, removes it. What a writer that was killed has left behind is removed by the
-/// next one for the same target.
+/// next one for the same target. Links are followed as any write follows them: what
+/// a link names is made or replaced, and the link stays.
 ///
 ///     AtomicFile file("out.ply");
 ///     file.write("ply\n");
@@ -53,5 +54,13 @@ class AtomicFile {
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
+
+/// Removes what writers of `target` that were killed have left beside it, as the next AtomicFile
+/// for it would.
+void remove_abandoned(const std::filesystem::path& target);
+
+/// Where a write to `path` arrives: the links that it names are followed, also to a place where
+/// nothing stands yet. Throws: Error if they go in a circle.
+std::filesystem::path follow_links(std::filesystem::path path);
 
 }  // namespace terrace::stream

@@ -111,8 +111,9 @@ class StoreWriter {
   [[nodiscard]] Schema& schema();
 
   /// Writes the points of the top level (as a block of one cluster whose representative is
-  /// UINT32_MAX), syncs and publishes. Returns the bytes of the store.
-  std::uint64_t finish(const ClusteredBlock& root);
+  /// UINT32_MAX), syncs and publishes. Without `publish` it was a trial, and nothing stays. Returns
+  /// the bytes of the store.
+  std::uint64_t finish(const ClusteredBlock& root, bool publish = true);
 
  private:
   struct Impl;
@@ -161,6 +162,9 @@ class Store {
  public:
   /// Throws: Error if there is no store, a newer version, or a damaged manifest.
   static Store open(const std::filesystem::path& path);
+  /// A store that a writer moved aside to replace it gets its name back if the writer died then:
+  /// true if so. open() does it by itself.
+  static bool recover(const std::filesystem::path& path);
   Store(Store&&) noexcept;
   Store& operator=(Store&&) noexcept;
   ~Store();

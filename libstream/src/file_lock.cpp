@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/stream/file_lock.hpp"
+
+#include <cerrno>
+#include <utility>
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "terrace/stream/error.hpp"
+
+namespace terrace::stream {
+namespace {
+
+int flock_now(int descriptor) {
+  while (::flock(descriptor, LOCK_EX | LOCK_NB) != 0) {
+    if (errno != EINTR) return errno;
+  }
+  return 0;
+}
+
+}  // namespace
+
+FileLock::FileLock(const std::filesystem::path& path) : path_(path) {
+  for (;;) {
+    constexpr int kFlags = O_RDWR | O_CLOEXEC | O_NOFOLLOW;
+    descriptor_ = ::open(path.c_str(), kFlags | O_CREAT | O_EXCL, 0666);
+    made_ = descriptor_ >= 0;
+    if (!made_ && errno == EEXIST) {
+      descriptor_ = ::open(path.c_str(), kFlags);
+      if (descriptor_ < 0 && errno == ENOENT) continue;  // removed meanwhile
+    }
+    if (descriptor_ < 0) throw system_error(path.string(), "cannot be created", errno);
+    const int error = flock_now(descriptor_);
+    exclusive_ = error == 0;
+    if (error == EWOULDBLOCK) {
+      ::close(std::exchange(descriptor_, -1));
+      return;
+    }
+    // A holder may have removed the name between our open and our lock: then what we hold is not
+    // what others will find.
+    struct stat ours {
+    }, named{};
+    if (::fstat(descriptor_, &ours) == 0 && ::stat(path.c_str(), &named) == 0 &&
+        ours.st_ino == named.st_ino && ours.st_dev == named.st_dev) {
+      return;
+    }
+    ::close(std::exchange(descriptor_, -1));
+  }
+}
+
+FileLock::FileLock(FileLock&& other) noexcept
+    : path_(std::move(other.path_)),
+      descriptor_(std::exchange(other.descriptor_, -1)),
+      exclusive_(other.exclusive_),
+      made_(other.made_) {}
+
+FileLock& FileLock::operator=(FileLock&& other) noexcept {
+  if (this != &other) {
+    release();
+    path_ = std::move(other.path_);
+    descriptor_ = std::exchange(other.descriptor_, -1);
+    exclusive_ = other.exclusive_;
+    made_ = other.made_;
+  }
+  return *this;
+}
+
+void FileLock::release() noexcept {
+  if (descriptor_ < 0) return;
+  // The name goes first: whoever opens it from now on makes a new one. Where nothing can be locked
+  // it may be somebody else's.
+  if (exclusive_ || made_) ::unlink(path_.c_str());
+  ::close(std::exchange(descriptor_, -1));
+}
+
+}  // namespace terrace::stream

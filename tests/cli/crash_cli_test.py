@@ -1,0 +1,403 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The command dies at each write, sync, rename and removal in turn: the old or the new stands.
+
+TERRACE=path/to/terrace FAULT_SHIM=path/to/libfault_shim.so crash_cli_test.py [CLASS...]
+"""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import unittest
+
+from tile_case import TERRACE, NODATA, Dem, terrace
+
+SHIM = os.environ['FAULT_SHIM']
+ENDLESS = 2000  # steps: no command here has as many
+
+
+def everything(folder):
+    """Every file below a folder: bytes by name."""
+    found = {}
+    for path, _, names in os.walk(folder):
+        for name in names:
+            with open(os.path.join(path, name), 'rb') as file:
+                found[os.path.relpath(os.path.join(path, name), folder)] = file.read()
+    return found
+
+
+class CrashCase(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.root = tempfile.mkdtemp(prefix='terrace-crash-')
+        cls.addClassCleanup(shutil.rmtree, cls.root)
+        # Inputs that no test changes.
+        cls.run_ok('synth', 'dem', '--size', '24x20', '-o', cls.input('a.tif'))
+        cls.run_ok('synth', 'dem', '--size', '24x20', '--seed', '2', '-o', cls.input('b.tif'))
+        Dem(8, 6, 10.13, 46.71, 0.01, height=lambda c, r: NODATA).write(cls.input('void.tif'))
+
+    def setUp(self):
+        self.folder = tempfile.mkdtemp(dir=self.root)
+
+    @classmethod
+    def input(cls, name):
+        return os.path.join(cls.root, name)
+
+    def path(self, name):
+        return os.path.join(self.folder, name)
+
+    @classmethod
+    def run_ok(cls, *args):
+        result = terrace(*args)
+        assert result.returncode == 0, (args, result.stderr)
+        return result
+
+    def environment(self, step=0, kind='kill', exchange=True):
+        env = dict(os.environ, LD_PRELOAD=SHIM, FAULT_STEP=str(step), FAULT_KIND=kind,
+                   FAULT_LOG=self.input('steps'))
+        if not exchange:
+            env['FAULT_NO_EXCHANGE'] = '1'
+        return env
+
+    def die_everywhere(self, start, command, check, exchange=True, least=8):
+        """Dies at each step of `command` in turn, each time in a copy of the folder `start`, and
+        calls check(step) in it. There must be so many steps, of all kinds."""
+        for kind in ('kill', 'power'):
+            for step in range(1, ENDLESS):
+                shutil.rmtree(self.folder)
+                shutil.copytree(start, self.folder, symlinks=True)
+                if os.path.exists(self.input('steps')):
+                    os.remove(self.input('steps'))
+                result = terrace(*command, cwd=self.folder,
+                                 env=self.environment(step, kind, exchange))
+                if result.returncode == 0:
+                    break
+                self.assertEqual(result.returncode, -signal.SIGKILL, result.stderr)
+                with self.subTest(kind=kind, step=step):
+                    check(step)
+            self.assertGreater(step - 1, least)
+            with open(self.input('steps'), encoding='ascii') as file:
+                steps = file.read().split()
+            self.assertEqual(len(steps), step - 1)
+            self.assertLessEqual({'create', 'write', 'sync'}, set(steps))
+            self.assertTrue({'rename', 'link'} & set(steps), steps)
+
+    def start(self):
+        """An empty folder to be filled with what is there before the command."""
+        return tempfile.mkdtemp(dir=self.root)
+
+
+class StoreCrashTest(CrashCase):
+    BLOCK = ('--block', '100', '--threads', '1')
+
+    def built(self, dem):
+        folder = self.start()
+        self.run_ok('build', self.input(dem), '-o', os.path.join(folder, 's'), *self.BLOCK)
+        return folder
+
+    def build(self, *options):
+        return ('build', self.input('b.tif'), '-o', 's', *self.BLOCK, *options)
+
+    def test_a_build_leaves_a_whole_store_or_none(self):
+        new = everything(self.built('b.tif'))
+
+        def check(_):
+            there = os.path.exists(self.path('s'))
+            if there:
+                self.assertEqual(everything(self.path('s')),
+                                 {name[2:]: data for name, data in new.items()})
+            result = terrace(*self.build(*(['--force'] if there else [])), cwd=self.folder)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertEqual(everything(self.folder), new)
+            self.assertEqual(os.listdir(self.folder), ['s'])
+
+        self.die_everywhere(self.start(), self.build(), check)
+
+    def test_a_trial_leaves_nothing(self):
+        def check(_):
+            result = terrace(*self.build('--dry-run'), cwd=self.folder)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertEqual(os.listdir(self.folder), [])
+
+        trial = self.build('--dry-run')
+        for step in range(1, ENDLESS):
+            result = terrace(*trial, cwd=self.folder, env=self.environment(step))
+            if result.returncode == 0:
+                break
+            self.assertEqual(result.returncode, -signal.SIGKILL, result.stderr)
+            with self.subTest(step=step):
+                check(step)
+        self.assertGreater(step, 8)
+
+    def replace(self, exchange):
+        """With `exchange` the name is never without a store; without it, opening the store, or the
+        next writer whatever comes of it, gives the old one its name back."""
+        start = self.built('a.tif')
+        old, new = everything(start), everything(self.built('b.tif'))
+        missing = []
+
+        def check(step):
+            if exchange:
+                self.assertTrue(os.path.exists(self.path('s')))
+            elif not os.path.exists(self.path('s')):
+                missing.append(step)
+                # Readers first, in copies; then a writer that fails.
+                for reader in (['info', 's'], ['verify', 's'], ['points', 's', '-o', '-'],
+                               ['render', 's', '-o', 'p.png', '--size', '16x16']):
+                    copy = os.path.join(self.start(), 'copy')
+                    shutil.copytree(self.folder, copy)
+                    result = terrace(*reader, cwd=copy)
+                    self.assertEqual(result.returncode, 0, result.stderr)
+                result = terrace('build', self.input('void.tif'), '-o', 's', '--force',
+                                 cwd=self.folder)
+                self.assertEqual(result.returncode, 1)
+                self.assertIn('not one point', result.stderr)
+            found = {name: data for name, data in everything(self.folder).items()
+                     if name.startswith('s/')}
+            self.assertIn(found, (old, new))
+            result = terrace(*self.build('--force'), cwd=self.folder)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertEqual(everything(self.folder), new)
+            self.assertEqual(os.listdir(self.folder), ['s'])
+
+        self.die_everywhere(start, self.build('--force'), check, exchange)
+        self.assertEqual(len(missing), 0 if exchange else 2)
+
+    def test_a_replaced_store_is_the_old_or_the_new(self):
+        self.replace(exchange=True)
+
+    def test_a_store_replaced_without_exchange_is_the_old_or_the_new(self):
+        self.replace(exchange=False)
+
+    def test_force_on_a_link_replaces_the_store_that_it_leads_to(self):
+        start = self.built('a.tif')
+        new = everything(self.built('b.tif'))
+        os.mkdir(self.path('elsewhere'))
+        shutil.move(os.path.join(start, 's'), self.path('elsewhere/s'))
+        os.symlink('elsewhere/s', self.path('s'))
+        result = terrace(*self.build(), cwd=self.folder)
+        self.assertEqual(result.returncode, 1)
+        self.assertIn('exists already', result.stderr)
+        result = terrace(*self.build('--force'), cwd=self.folder)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertTrue(os.path.islink(self.path('s')))
+        self.assertEqual(everything(self.path('elsewhere')), new)
+        self.assertEqual(os.listdir(self.path('elsewhere')), ['s'])
+        # A link to a place where nothing stands yet is where it is made.
+        shutil.rmtree(self.path('elsewhere/s'))
+        result = terrace(*self.build(), cwd=self.folder)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertTrue(os.path.islink(self.path('s')))
+        self.assertEqual(everything(self.path('elsewhere')), new)
+
+    def test_a_manifest_that_merely_names_the_format_is_no_store(self):
+        os.mkdir(self.path('s'))
+        for text in ('terrace-store', '{"note": "terrace-store"}', '{"format": ["terrace-store"]}',
+                     '["format", "terrace-store"]'):
+            with open(self.path('s/manifest.json'), 'w') as file:
+                file.write(text)
+            result = terrace(*self.build('--force'), cwd=self.folder)
+            self.assertEqual(result.returncode, 1, text)
+            self.assertIn('is not a store', result.stderr)
+            self.assertEqual(os.listdir(self.path('s')), ['manifest.json'])
+
+
+class FileCrashTest(CrashCase):
+    def one_file(self, name, old_command, command, **expected):
+        """Commands that write the file `name`; the first one's is replaced by the second one's."""
+        both = []
+        for arguments in (old_command, command):
+            folder = self.start()
+            result = terrace(*arguments, cwd=folder)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertEqual(os.listdir(folder), [name])
+            both.append(everything(folder))
+        old, new = both
+        self.assertNotEqual(old, new)
+        start = self.start()
+        with open(os.path.join(start, name), 'wb') as file:
+            file.write(old[name])
+
+        def check(_):
+            with open(self.path(name), 'rb') as file:
+                self.assertIn(file.read(), (old[name], new[name]))
+            self.next_run(command, new)
+
+        def check_first(_):
+            if os.path.exists(self.path(name)):
+                with open(self.path(name), 'rb') as file:
+                    self.assertEqual(file.read(), new[name])
+            self.next_run(command, new)
+
+        self.die_everywhere(start, (*command, '--force'), check, **expected)
+        self.die_everywhere(self.start(), command, check_first, **expected)
+
+    def next_run(self, command, new):
+        result = terrace(*command, '--force', cwd=self.folder)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(everything(self.folder), new)
+
+    def test_points(self):
+        self.one_file('p.ply', ('synth', 'uniform', '--points', '50', '-o', 'p.ply'),
+                      ('synth', 'uniform', '--points', '60', '-o', 'p.ply'), least=3)
+
+    def test_a_raster(self):
+        self.one_file('d.tif', ('synth', 'dem', '--size', '20x20', '-o', 'd.tif'),
+                      ('synth', 'dem', '--size', '30x20', '-o', 'd.tif'), least=4)
+
+    def test_a_mesh_with_a_bound(self):
+        store = self.input('bound.terrace')
+        self.run_ok('build', self.input('a.tif'), '-o', store)
+        self.one_file('m.ply', ('mesh', store, '-o', 'm.ply', '--max-error', '20'),
+                      ('mesh', store, '-o', 'm.ply', '--max-error', '10'), least=6)
+
+    def test_an_overlay(self):
+        store = self.input('smooth.terrace')
+        self.run_ok('build', self.input('a.tif'), '-o', store)
+
+        def smooth(steps):
+            return ('mesh', store, '-o', self.input(f'smooth{steps}.ply'), '--force', '--smooth',
+                    f'taubin:{steps}', '--save-overlay', 'o.overlay')
+
+        old, new = self.start(), self.start()
+        for steps, folder in ((2, old), (3, new)):
+            result = terrace(*smooth(steps), cwd=folder)
+            self.assertEqual(result.returncode, 0, result.stderr)
+        before, after = everything(old), everything(new)
+        self.assertNotEqual(before, after)
+
+        def check(_):
+            with open(self.path('o.overlay'), 'rb') as file:
+                self.assertIn(file.read(), (before['o.overlay'], after['o.overlay']))
+            result = terrace(*smooth(3), cwd=self.folder)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertEqual(everything(self.folder), after)
+
+        self.die_everywhere(old, smooth(3), check, least=6)
+
+
+class TileCrashTest(CrashCase):
+    OPTIONS = ('--vertical', 'ellipsoidal', '--threads', '1', '--zoom', '7-9')
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.stores = []
+        for name, bump in (('old', 0), ('new', 90)):
+            dem = Dem(40, 30, 10.13, 46.71, 0.02)
+            for column in range(30, 36):
+                dem.heights[8 * 40 + column] += bump
+            dem.write(cls.input(name + '.tif'))
+            cls.stores.append(cls.input(name + '.terrace'))
+            cls.run_ok('build', cls.input(name + '.tif'), '-o', cls.stores[-1])
+
+    def tile(self, store, *options):
+        return ('tile', store, '-o', 't', '--name', 'set', *self.OPTIONS, *options)
+
+    def made(self, store):
+        folder = self.start()
+        result = terrace(*self.tile(store), cwd=folder)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return folder
+
+    @staticmethod
+    def served(folder):
+        """What a web server gives out."""
+        return {name: data for name, data in everything(folder).items()
+                if not os.path.basename(name).startswith('.')}
+
+    def check_set(self, wholes, new):
+        """A set that is published is a whole one; one that is not goes on to be whole."""
+        result = terrace('verify', 't', cwd=self.folder)
+        if os.path.exists(self.path('t/layer.json')):
+            self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
+            self.assertIn(self.served(self.folder), wholes)
+            go_on = '--force'
+        else:
+            self.assertEqual(result.returncode, 1)
+            go_on = '--resume'
+        result = terrace(*self.tile(self.stores[1], go_on), cwd=self.folder)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(everything(self.folder), new)
+
+    def test_a_set_is_published_whole(self):
+        new = everything(self.made(self.stores[1]))
+        self.assertGreater(len(new), 8)
+        whole = {name: data for name, data in new.items() if '/.' not in name}
+        self.die_everywhere(self.start(), self.tile(self.stores[1]),
+                            lambda _: self.check_set((whole,), new), least=30)
+
+    def test_a_changed_set_is_whole_or_not_published(self):
+        old, new = self.made(self.stores[0]), everything(self.made(self.stores[1]))
+        wholes = self.served(old), {name: data for name, data in new.items() if '/.' not in name}
+        self.assertNotEqual(*wholes)
+        self.die_everywhere(old, self.tile(self.stores[1], '--force'),
+                            lambda _: self.check_set(wholes, new), least=10)
+
+    def test_a_second_run_is_refused_while_the_first_one_lives(self):
+        new = everything(self.made(self.stores[0]))
+        steps = 0
+        for step in range(1, ENDLESS, 7):
+            shutil.rmtree(self.folder)
+            os.mkdir(self.folder)
+            first = subprocess.Popen([TERRACE, *self.tile(self.stores[0])], cwd=self.folder,
+                                     env=self.environment(step, 'pause'),
+                                     stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+            _, status = os.waitpid(first.pid, os.WUNTRACED)
+            if os.WIFEXITED(status):
+                first.communicate()
+                break
+            steps += 1
+            self.assertTrue(os.WIFSTOPPED(status))
+            if step > 2:  # the folder and its lock are there
+                second = terrace(*self.tile(self.stores[1], '--force'), cwd=self.folder)
+                self.assertEqual(second.returncode, 1)
+                self.assertIn('another run is writing', second.stderr)
+            first.send_signal(signal.SIGCONT)
+            _, error = first.communicate()
+            self.assertEqual(first.returncode, 0, error)
+            self.assertEqual(everything(self.folder), new)
+        self.assertGreater(steps, 5)
+
+    def test_what_killed_runs_left_is_no_damage_and_goes(self):
+        start = self.made(self.stores[0])
+        new = everything(start)
+        shutil.rmtree(self.folder)
+        shutil.copytree(start, self.folder)
+        tile = next(name for name in new if name.endswith('.terrain'))
+        beside, name = os.path.split(tile)
+        torn = [os.path.join(beside, f'.{name}.tmp'), os.path.join(beside, f'.{name}.tmp-4711'),
+                't/.layer.json.tmp-4711', 't/.terrace-tiles.lock']
+        strangers = [os.path.join(beside, f'.{name}.tmp-notes'), 't/notes.tmp']
+        for left in torn + strangers:
+            with open(self.path(left), 'w') as file:
+                file.write('half')
+        result = terrace('verify', 't', cwd=self.folder)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn('2 files left over', result.stderr)
+        result = terrace(*self.tile(self.stores[0], '--resume'), cwd=self.folder)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        for left in strangers:
+            os.remove(self.path(left))
+        self.assertEqual(everything(self.folder), new)
+
+    def test_tiles_go_where_a_link_leads(self):
+        new = everything(os.path.join(self.made(self.stores[0]), 't'))
+        os.symlink('real', self.path('t'))
+        for options in ((), ('--force',)):
+            result = terrace(*self.tile(self.stores[0], *options), cwd=self.folder)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertEqual(everything(self.path('real')), new)
+            self.assertTrue(os.path.islink(self.path('t')))
+
+    def test_a_run_that_fails_leaves_no_folder(self):
+        result = terrace('tile', self.stores[0], '-o', 't', '--geoid', 'none.pgm', cwd=self.folder)
+        self.assertEqual(result.returncode, 1)
+        self.assertEqual(os.listdir(self.folder), [])
+
+
+if __name__ == '__main__':
+    unittest.main(argv=[sys.argv[0], '-v', *sys.argv[1:]])
