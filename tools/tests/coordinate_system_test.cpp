@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
+#include <limits>
 #include <random>
 #include <sstream>
 #include <string>
@@ -386,6 +387,43 @@ TEST(GeoKeys, ContradictionsAreRefusedAndNamed) {
                                          {3076, {9001}, ""},
                                          {3092, {0.9996}, ""}}),
                                    "dem.tif"));
+}
+
+TEST(GeoKeys, ACodeIsAWholeNumberOf16Bits) {
+  for (const double code : {4326.5, -4326.0, 1e300}) {
+    try {
+      CoordinateSystem::of(keys({{1024, {2}, ""}, {2048, {code}, ""}}), "dem.tif");
+      ADD_FAILURE() << code << " is accepted";
+    } catch (const stream::Error& error) {
+      EXPECT_NE(std::string(error.what()).find("GeoKey 2048"), std::string::npos) << error.what();
+    }
+  }
+}
+
+TEST(GeoKeys, ImpossibleNumbersAreRefused) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<std::vector<stream::GeoKey>> lists{
+      {{1024, {2}, ""}, {2048, {32767}, ""}, {2057, {-1}, ""}, {2059, {300}, ""}},
+      {{1024, {2}, ""}, {2048, {32767}, ""}, {2057, {6.4e6}, ""}, {2059, {1}, ""}},
+      {{1024, {2}, ""}, {2048, {32767}, ""}, {2056, {7004}, ""}, {2062, {1, 2, nan}, ""}},
+      {{1024, {2}, ""},
+       {2048, {32767}, ""},
+       {2057, {-1}, ""},
+       {2059, {300}, ""},
+       {2062, {1, 2, 3}, ""}},
+  };
+  for (const auto& list : lists) {
+    EXPECT_THROW(CoordinateSystem::of(keys(list), "dem.tif"), stream::Error);
+  }
+}
+
+TEST(Wkt, UnitsWithoutASizeAreRefused) {
+  for (const char* const unit : {"0", "-1"}) {
+    stream::Crs crs;
+    crs.wkt = std::string("GEOGCS[\"x\",DATUM[\"y\",SPHEROID[\"z\",6378137,298]],UNIT[\"u\",") +
+              unit + "]]";
+    EXPECT_THROW(CoordinateSystem::of(crs, "dem.tif"), stream::Error) << unit;
+  }
 }
 
 TEST(GeoKeys, WhatIsMissingIsNamed) {
