@@ -210,13 +210,12 @@ TEST(GeoTiffEncodings, OneCompressedStripLargerThanMemoryIsReadByRows) {
 TEST(GeoTiffEncodings, ALargeStripIsNotHeldDecoded) {
   const TempFolder folder;
   const std::string path = (folder.path() / "x.tif").string();
-  for (const std::uint16_t codec :
-       {COMPRESSION_ADOBE_DEFLATE, COMPRESSION_LZW, COMPRESSION_PACKBITS}) {
+  for (const int codec : {COMPRESSION_ADOBE_DEFLATE, COMPRESSION_LZW, COMPRESSION_PACKBITS}) {
     SCOPED_TRACE(codec);
     TiffSpec spec;
     spec.columns = 2000;
     spec.rows = 1500;
-    spec.compression = codec;
+    spec.compression = static_cast<std::uint16_t>(codec);
     std::vector<std::int16_t> values(std::size_t{spec.columns} * spec.rows);
     for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<std::int16_t>(i / 700);
     write_tiff(path, spec, as_samples(values));
