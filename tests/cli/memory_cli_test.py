@@ -237,7 +237,7 @@ class StoreMemoryTest(MemoryCase):
 
     def test_convert(self):
         text = self.path('converted.xyz')
-        needs = self.needed(30, text, 'convert', self.dem)
+        needs = self.needed(24, text, 'convert', self.dem)
         self.within(needs, 'convert', self.dem, '-o', text)
 
     def test_raster(self):
@@ -256,7 +256,7 @@ class StoreMemoryTest(MemoryCase):
     def test_tiles(self):
         tiles = self.path('tiles')
         tile = ('tile', self.store, '--zoom', '0-9', '--threads', 2, '--vertical', 'ellipsoidal')
-        needs = self.needed(16, tiles, *tile)
+        needs = self.needed(32, tiles, *tile)
         self.within(needs, *tile, '-o', tiles)
 
     def test_a_table_of_points(self):

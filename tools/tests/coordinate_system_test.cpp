@@ -391,8 +391,10 @@ TEST(GeoKeys, ContradictionsAreRefusedAndNamed) {
 
 TEST(GeoKeys, ACodeIsAWholeNumberOf16Bits) {
   for (const double code : {4326.5, -4326.0, 1e300}) {
+    stream::Crs crs;
+    crs.geo_keys = {{1024, {2}, ""}, {2048, {code}, ""}};
     try {
-      CoordinateSystem::of(keys({{1024, {2}, ""}, {2048, {code}, ""}}), "dem.tif");
+      CoordinateSystem::of(crs, "dem.tif");
       ADD_FAILURE() << code << " is accepted";
     } catch (const stream::Error& error) {
       EXPECT_NE(std::string(error.what()).find("GeoKey 2048"), std::string::npos) << error.what();
@@ -413,8 +415,26 @@ TEST(GeoKeys, ImpossibleNumbersAreRefused) {
        {2062, {1, 2, 3}, ""}},
   };
   for (const auto& list : lists) {
-    EXPECT_THROW(CoordinateSystem::of(keys(list), "dem.tif"), stream::Error);
+    stream::Crs crs;
+    crs.geo_keys = list;
+    EXPECT_THROW(CoordinateSystem::of(crs, "dem.tif"), stream::Error);
   }
+}
+
+/// What a store keeps of such a system used to be refused when it was read: it contradicted the
+/// code that the name had given it.
+TEST(Wkt, ANameDoesNotMakeADatumOfAnotherEllipsoid) {
+  stream::Crs crs;
+  crs.wkt =
+      "GEOGCS[\"WGS 84\",DATUM[\"WGS_1984\",SPHEROID[\"Bessel\",6377397.155,299.1528128]],"
+      "UNIT[\"degree\",0.0174532925199433]]";
+  const auto system = CoordinateSystem::of(crs, "dem.tif");
+  ASSERT_TRUE(system);
+  EXPECT_EQ(system->definition().epsg, 0);
+  EXPECT_FALSE(system->reaches_wgs84());
+  const auto kept = CoordinateSystem::of(system->crs(), "dem.store");
+  ASSERT_TRUE(kept);
+  EXPECT_EQ(kept->definition().ellipsoid, system->definition().ellipsoid);
 }
 
 TEST(Wkt, UnitsWithoutASizeAreRefused) {
