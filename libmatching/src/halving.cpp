@@ -12,8 +12,6 @@
 #include <thread>
 #include <utility>
 
-#include <unistd.h>
-
 #include "terrace/matching/assignment.hpp"
 
 namespace terrace::matching {
@@ -165,13 +163,10 @@ void monotone(std::uint32_t count, const Row& row, const HalvingOptions& options
   }
 }
 
-void check_memory(std::size_t count, unsigned threads) {
-  const long pages = sysconf(_SC_PHYS_PAGES), page = sysconf(_SC_PAGESIZE);
-  if (pages <= 0 || page <= 0) return;
-  const double machine = static_cast<double>(pages) * static_cast<double>(page);
+void check_memory(std::size_t count, unsigned threads, std::uint64_t limit) {
   const double half = 0.5 * static_cast<double>(count) + 1.0;
   const double needed = 8.0 * half * half * threads;
-  if (count < kNobody && needed <= machine) return;
+  if (count < kNobody && (limit == 0 || needed <= static_cast<double>(limit))) return;
   throw std::invalid_argument(
       "the distances between two halves of " + std::to_string(count) + " points would need " +
       std::to_string(static_cast<std::uint64_t>(needed / (1024.0 * 1024.0))) +
@@ -182,7 +177,7 @@ HalvingMatching run(std::size_t count, const Row& row, const HalvingOptions& opt
   unsigned threads = options.threads;
   if (threads == 0) threads = std::max(1u, std::thread::hardware_concurrency());
   if (options.method == Halving::monotone) threads = 1;
-  check_memory(count, threads);
+  check_memory(count, threads, options.memory_limit);
   const auto points = static_cast<std::uint32_t>(count);
   Search search(options.iterations > 0 ? options.iterations : std::max<std::uint64_t>(count, 1),
                 options);

@@ -172,7 +172,9 @@ TEST(Halving, BadInputIsNamed) {
   EXPECT_NE(message([&] { (void)match_by_halving(4, bad, {.iterations = 50}); }).find("1 and 3"),
             std::string::npos);
   const PairDistance one = [](std::uint32_t, std::uint32_t) { return 1.0; };
-  EXPECT_NE(message([&] { (void)match_by_halving(10'000'000, one); }).find("MiB"),
+  EXPECT_NE(message([&] {
+              (void)match_by_halving(10'000'000, one, {.memory_limit = 1u << 30});
+            }).find("MiB"),
             std::string::npos);
 }
 

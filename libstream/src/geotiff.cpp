@@ -13,6 +13,7 @@
 #include "geotiff_layout.hpp"
 #include "geotiff_tags.hpp"
 #include "raster_nodata.hpp"
+#include "raster_order.hpp"
 #include "terrace/stream/raster.hpp"
 
 namespace terrace::stream {
@@ -41,6 +42,7 @@ class GeoTiffRaster final : public Raster {
     info_.rows = layout_.rows;
     info_.block_columns = std::min(layout_.block_columns, layout_.columns);
     info_.block_rows = std::min(layout_.block_rows, layout_.rows);
+    info_.held_bytes = blocks_.held_bytes();
     const GeoKeys keys(handle_.shorts(kGeoKeyDirectory), handle_.doubles(kGeoDoubleParams),
                        handle_.text(kGeoAsciiParams));
     info_.crs = crs_of(keys);
@@ -88,16 +90,17 @@ bool looks_like_tiff(std::span<const std::byte> head) {
 std::unique_ptr<PointSource> open_points(std::span<const std::string> files,
                                          const SourceOptions& options) {
   RasterOptions raster{.band = options.band, .memory_bytes = options.memory_bytes};
-  raster.cache_bytes = options.memory_bytes / 8;
+  const std::uint64_t window = window_bytes(options);
+  raster.cache_bytes = window / 6;
   if (files.size() == 1) return points_of(open_geotiff(files.front(), raster), options);
   constexpr std::size_t kOpenAtOnce = 32;
   raster.cache_bytes /= kOpenAtOnce / 4;  // few of them meet in one window
   const RasterOpener opener = [raster](const std::string& file) {
     return open_geotiff(file, raster);
   };
-  return points_of(
-      open_mosaic({files.begin(), files.end()}, opener, options.crs.has_value(), kOpenAtOnce),
-      options);
+  return points_of(open_mosaic({files.begin(), files.end()}, opener, options.crs.has_value(),
+                               kOpenAtOnce, options.memory_bytes - window),
+                   options);
 }
 
 }  // namespace

@@ -17,6 +17,46 @@ constexpr char kDamaged[] = "fetch the file again; it is damaged or cut short";
 /// Codecs may store a block larger than it is, but not by much.
 constexpr std::uint64_t kMostGrowth = 4, kMostOverhead = 1u << 16;
 
+/// Strips larger than this are decoded row by row where the codec can: a file that is one strip
+/// then takes no more memory than its compressed bytes.
+constexpr std::uint64_t kMostWholeStrip = 4u << 20;
+
+constexpr std::uint64_t kRawBytes = 1u << 20;  // of an uncompressed block, read at a time
+
+/// Whether libtiff decodes a strip of this codec row by row without holding all of it decoded.
+bool decodes_by_rows(std::uint16_t compression) {
+  switch (compression) {
+    case COMPRESSION_LZW:
+    case COMPRESSION_PACKBITS:
+    case COMPRESSION_ADOBE_DEFLATE:
+    case COMPRESSION_DEFLATE:
+    case COMPRESSION_LZMA:
+    case COMPRESSION_ZSTD:
+      return true;
+    default:
+      return false;
+  }
+}
+
+/// What a codec holds for itself while it decodes a block.
+std::uint64_t codec_bytes(std::uint16_t compression, std::uint64_t block_bytes) {
+  constexpr std::uint64_t kOther = 256u << 10, kZstdWindow = 8u << 20, kLzmaWindow = 64u << 20;
+  switch (compression) {
+    case COMPRESSION_NONE:
+    case COMPRESSION_LZW:
+    case COMPRESSION_PACKBITS:
+    case COMPRESSION_ADOBE_DEFLATE:
+    case COMPRESSION_DEFLATE:
+      return kOther;
+    case COMPRESSION_ZSTD:
+      return kOther + std::min(block_bytes, kZstdWindow);
+    case COMPRESSION_LZMA:
+      return kOther + std::min(block_bytes, kLzmaWindow);
+    default:
+      return kOther + block_bytes;
+  }
+}
+
 void swap_bytes(std::byte* samples, std::size_t size, std::size_t count) {
   const auto n = static_cast<tmsize_t>(count);
   switch (size) {
@@ -46,11 +86,13 @@ GeoTiffBlocks::GeoTiffBlocks(GeoTiffHandle& handle, const GeoTiffLayout& layout,
   // Row and block sizes fit 64 bits: 2^31 columns x 2^16 samples x 2^6 bits x 2^31 rows do not, so
   // the rows are divided and not multiplied.
   const std::uint64_t row = layout_.row_bytes();
-  if (layout_.plain || row <= memory_bytes_ / layout_.block_rows) return;
-  if (!layout_.tiled && row <= memory_bytes_) {
-    by_rows_ = true;
-    return;
-  }
+  if (layout_.plain) return;
+  most_stored_ = most_stored();
+  const bool fits = row <= memory_bytes_ / layout_.block_rows;
+  const bool large = !fits || block_bytes() > kMostWholeStrip;
+  by_rows_ = !layout_.tiled && row <= memory_bytes_ && large &&
+             (!fits || decodes_by_rows(layout_.compression));
+  if (fits || by_rows_) return;
   const bool countable = row <= UINT64_MAX / layout_.block_rows;
   handle_.fail(
       {},
@@ -67,6 +109,38 @@ void GeoTiffBlocks::fail(const Part& part, std::uint64_t offset, std::string cau
                          std::string remedy) const {
   handle_.fail(layout_.place(part.across, part.down) + " (byte " + std::to_string(offset) + ")",
                std::move(cause), remedy.empty() ? kDamaged : std::move(remedy));
+}
+
+/// Bytes of the largest block of the band. Not more than the file has: larger claims are refused
+/// when the block is read.
+std::uint64_t GeoTiffBlocks::most_stored() const {
+  std::uint64_t most = 0;
+  const std::uint32_t first = layout_.block(0, 0);
+  const std::uint32_t count = layout_.blocks_across * layout_.blocks_down;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    int failed = 0;
+    const std::uint64_t bytes = TIFFGetStrileByteCountWithErr(handle_.tiff(), first + i, &failed);
+    if (failed == 0) most = std::max(most, bytes);
+  }
+  handle_.take_complaint();
+  return std::min(most, handle_.file_bytes());
+}
+
+std::uint64_t GeoTiffBlocks::held_bytes() const {
+  const std::uint64_t blocks = std::uint64_t{layout_.blocks_across} * layout_.blocks_down *
+                               (layout_.separate ? layout_.bands : 1);
+  const std::uint64_t tables = 2 * sizeof(std::uint64_t) * blocks;
+  if (layout_.plain) return tables + std::max(kRawBytes, layout_.row_bytes());
+  if (by_rows_) {
+    const bool fits = layout_.row_bytes() <= memory_bytes_ / layout_.block_rows;
+    return tables + codec_bytes(layout_.compression, fits ? block_bytes() : memory_bytes_) +
+           most_stored_ + 2 * layout_.row_bytes();
+  }
+  // Never more than all blocks of the band, which are fewer than 2^32.
+  const std::uint64_t all = std::min<std::uint64_t>(
+      std::uint64_t{layout_.blocks_across} * layout_.blocks_down, cache_bytes_ / block_bytes());
+  return tables + codec_bytes(layout_.compression, block_bytes()) + most_stored_ +
+         (1 + all) * block_bytes();
 }
 
 bool GeoTiffBlocks::read_over(const CellWindow& window, const CellBuffer& out) {
@@ -148,7 +222,7 @@ bool GeoTiffBlocks::read_plain(const Part& part, std::uint64_t offset, std::uint
   const std::uint64_t piece_bytes = whole ? row_bytes : part.columns * pixel_bytes;
   const std::uint64_t skip = whole ? 0 : part.column * pixel_bytes;
   const auto at_once = static_cast<std::uint32_t>(
-      whole ? std::clamp<std::uint64_t>((1u << 20) / row_bytes, 1, part.rows) : 1);
+      whole ? std::clamp<std::uint64_t>(kRawBytes / row_bytes, 1, part.rows) : 1);
   bool any = false;
   for (std::uint32_t row = 0; row < part.rows; row += at_once) {
     const std::uint32_t n = std::min(at_once, part.rows - row);
@@ -167,7 +241,7 @@ bool GeoTiffBlocks::read_plain(const Part& part, std::uint64_t offset, std::uint
   return any;
 }
 
-/// A compressed strip too large for memory: libtiff decodes it row by row, in order.
+/// A large compressed strip: libtiff decodes it row by row, in order.
 bool GeoTiffBlocks::read_by_rows(const Part& part, const CellBuffer& out) {
   if (block_.size() < layout_.row_bytes()) block_.resize(layout_.row_bytes());
   const std::uint64_t first = std::uint64_t{part.down} * layout_.block_rows + part.row;

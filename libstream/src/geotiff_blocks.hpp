@@ -24,6 +24,9 @@ class GeoTiffBlocks {
   GeoTiffBlocks(GeoTiffHandle& handle, const GeoTiffLayout& layout, NodataRule nodata,
                 std::uint64_t memory_bytes, std::uint64_t cache_bytes);
 
+  /// Most bytes that are held from one window to the next: see RasterInfo::held_bytes.
+  [[nodiscard]] std::uint64_t held_bytes() const;
+
   /// See Raster::read_over.
   bool read_over(const CellWindow& window, const CellBuffer& out);
 
@@ -37,6 +40,10 @@ class GeoTiffBlocks {
     std::uint8_t* valid;
   };
 
+  [[nodiscard]] std::uint64_t block_bytes() const {
+    return layout_.row_bytes() * layout_.block_rows;
+  }
+  [[nodiscard]] std::uint64_t most_stored() const;
   bool read_block(const Part& part, const CellBuffer& out);
   bool read_plain(const Part& part, std::uint64_t offset, std::uint64_t bytes,
                   const CellBuffer& out);
@@ -54,7 +61,8 @@ class GeoTiffBlocks {
   GeoTiffLayout layout_;
   NodataRule nodata_;
   std::uint64_t memory_bytes_, cache_bytes_;
-  bool by_rows_ = false;                  // strips too large to be decoded whole
+  bool by_rows_ = false;                  // strips that are not decoded whole
+  std::uint64_t most_stored_ = 0;         // bytes of the largest block in the file
   std::uint64_t next_row_ = 0;            // of the raster: the row libtiff decodes next, by rows
   std::vector<std::byte> raw_;            // as stored
   std::vector<std::byte> block_;          // decoded, native byte order

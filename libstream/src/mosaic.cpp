@@ -44,6 +44,7 @@ struct Member {
   std::string file;
   std::int64_t column = 0, row = 0;  // of its first cell, first in the frame of the first file
   std::uint64_t columns = 0, rows = 0;
+  std::uint64_t held_bytes = 0;
 };
 
 /// All four corners must lie on cells of the first raster, so cell sizes and rotation agree, too.
@@ -80,7 +81,8 @@ Member placed(const RasterInfo& first, const RasterInfo& other) {
           .column = static_cast<std::int64_t>(column),
           .row = static_cast<std::int64_t>(row),
           .columns = other.columns,
-          .rows = other.rows};
+          .rows = other.rows,
+          .held_bytes = other.held_bytes};
 }
 
 void check_samples(const RasterInfo& first, const RasterInfo& other) {
@@ -131,8 +133,8 @@ void check_crs(const RasterInfo& first, const RasterInfo& other) {
 class Mosaic final : public Raster {
  public:
   Mosaic(const std::vector<std::string>& files, RasterOpener opener, bool ignore_crs,
-         std::size_t open_at_once)
-      : opener_(std::move(opener)), open_at_once_(std::max<std::size_t>(open_at_once, 1)) {
+         std::size_t open_at_once, std::uint64_t open_bytes)
+      : opener_(std::move(opener)), open_at_once_(open_at_once), open_bytes_(open_bytes) {
     assert(!files.empty());
     std::optional<RasterInfo> first;
     for (const std::string& file : files) {
@@ -205,6 +207,7 @@ class Mosaic final : public Raster {
     info_.comments = std::move(comments);
     info_.files.clear();
     for (Member& member : members_) {
+      info_.held_bytes = std::max(info_.held_bytes, member.held_bytes);
       info_.files.push_back(member.file);
       member.column -= left;
       member.row -= top;
@@ -234,8 +237,13 @@ class Mosaic final : public Raster {
       open_.splice(open_.begin(), open_, found);
       return *open_.front().raster;
     }
-    if (open_.size() == open_at_once_) open_.pop_back();
+    const std::uint64_t more = members_[member].held_bytes;
+    while (!open_.empty() && (open_.size() >= open_at_once_ || held_bytes_ + more > open_bytes_)) {
+      held_bytes_ -= members_[open_.back().member].held_bytes;
+      open_.pop_back();
+    }
     open_.push_front({member, opener_(members_[member].file)});
+    held_bytes_ += more;
     const RasterInfo& info = open_.front().raster->info();
     if (info.columns != members_[member].columns || info.rows != members_[member].rows ||
         info.sample.type != info_.sample.type) {
@@ -249,6 +257,7 @@ class Mosaic final : public Raster {
 
   RasterOpener opener_;
   std::size_t open_at_once_;
+  std::uint64_t open_bytes_, held_bytes_ = 0;
   RasterInfo info_;
   std::vector<Member> members_;
   std::list<Open> open_;  // the latest used first
@@ -258,8 +267,8 @@ class Mosaic final : public Raster {
 
 std::unique_ptr<Raster> open_mosaic(const std::vector<std::string>& files,
                                     const RasterOpener& opener, bool ignore_crs,
-                                    std::size_t open_at_once) {
-  return std::make_unique<Mosaic>(files, opener, ignore_crs, open_at_once);
+                                    std::size_t open_at_once, std::uint64_t open_bytes) {
+  return std::make_unique<Mosaic>(files, opener, ignore_crs, open_at_once, open_bytes);
 }
 
 }  // namespace terrace::stream

@@ -59,12 +59,15 @@ class RasterSource final : public PointSource {
         aspect_(aspect_of(info_.world, options.cell_aspect)) {
     const std::size_t cell_bytes = size_of(raster_->info().sample.type) + 1;
     const std::uint64_t cells =
-        std::min(options.memory_bytes / 4 * 3 / cell_bytes, kMostTiles * block_points_ / 2);
+        std::min(window_bytes(options) / cell_bytes, kMostTiles * block_points_ / 2);
     window_size_ = window_size(raster_->info(), cells, block_points_, aspect_);
+    reading_bytes_ =
+        window_size_.columns * window_size_.rows * cell_bytes + raster_->info().held_bytes;
   }
 
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
   [[nodiscard]] Progress progress() const override { return progress_; }
+  [[nodiscard]] std::uint64_t reading_bytes() const { return reading_bytes_; }
 
   bool next(PointBlock& block) override {
     block.clear();
@@ -183,6 +186,7 @@ class RasterSource final : public PointSource {
   std::size_t block_points_;
   double aspect_;
   GridSize window_size_;
+  std::uint64_t reading_bytes_ = 0;
 
   std::uint64_t column_ = 0, row_ = 0;  // where the next window begins
   CellWindow window_;
@@ -201,6 +205,11 @@ class RasterSource final : public PointSource {
 std::unique_ptr<PointSource> points_of(std::unique_ptr<Raster> raster,
                                        const SourceOptions& options) {
   return std::make_unique<RasterSource>(std::move(raster), options);
+}
+
+std::uint64_t reading_bytes(const PointSource& source) {
+  const auto* const raster = dynamic_cast<const RasterSource*>(&source);
+  return raster == nullptr ? 0 : raster->reading_bytes();
 }
 
 }  // namespace terrace::stream

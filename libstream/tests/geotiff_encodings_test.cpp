@@ -205,6 +205,37 @@ TEST(GeoTiffEncodings, OneCompressedStripLargerThanMemoryIsReadByRows) {
   EXPECT_EQ(points, values.size());
 }
 
+/// Strips are read row by row where they are large, in windows in any order; and a file says what
+/// it holds: not the strip decoded.
+TEST(GeoTiffEncodings, ALargeStripIsNotHeldDecoded) {
+  const TempFolder folder;
+  const std::string path = (folder.path() / "x.tif").string();
+  for (const int codec : {COMPRESSION_ADOBE_DEFLATE, COMPRESSION_LZW, COMPRESSION_PACKBITS}) {
+    SCOPED_TRACE(codec);
+    TiffSpec spec;
+    spec.columns = 2000;
+    spec.rows = 1500;
+    spec.compression = static_cast<std::uint16_t>(codec);
+    std::vector<std::int16_t> values(std::size_t{spec.columns} * spec.rows);
+    for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<std::int16_t>(i / 700);
+    write_tiff(path, spec, as_samples(values));
+    const auto raster = open_geotiff(path);
+    EXPECT_LT(raster->info().held_bytes,
+              std::filesystem::file_size(path) + (std::uint64_t{1} << 20));
+    std::vector<std::int16_t> window(100 * 20);
+    std::vector<std::uint8_t> valid(window.size());
+    for (const std::uint64_t row : {0, 700, 710, 1480, 3}) {
+      raster->read_over({.column = 1900, .row = row, .columns = 100, .rows = 20},
+                        {.samples = reinterpret_cast<std::byte*>(window.data()),
+                         .valid = valid.data(),
+                         .stride = 100});
+      for (std::size_t i = 0; i < window.size(); ++i) {
+        ASSERT_EQ(window[i], values[(row + i / 100) * 2000 + 1900 + i % 100]) << row << ' ' << i;
+      }
+    }
+  }
+}
+
 TEST(GeoTiffEncodings, ATileLargerThanMemoryIsRefusedWithItsNeeds) {
   const TempFolder folder;
   const std::string path = (folder.path() / "x.tif").string();

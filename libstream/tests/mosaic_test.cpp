@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <random>
 #include <string>
 #include <utility>
@@ -85,7 +86,9 @@ TEST(Mosaic, TheLastValidSampleWinsAndEachCellIsOnePoint) {
     options.block_points = 1 + random() % 300;
     options.memory_bytes = 1000 + random() % 100000;
     const auto source =
-        points_of(open_mosaic(files.names(), plain_opener(), false, 1 + random() % 3), options);
+        points_of(open_mosaic(files.names(), plain_opener(), false, 1 + random() % 3,
+                              random() % 2 == 0 ? random() % 100000 : std::uint64_t{1} << 30),
+                  options);
     const SourceInfo& info = source->info();
     EXPECT_EQ(info.columns, static_cast<std::uint64_t>(right - left));
     EXPECT_EQ(info.rows, static_cast<std::uint64_t>(bottom - top));
@@ -122,6 +125,48 @@ void expect_misfit(const Files& files, bool ignore_crs = false) {
     for (const std::string& name : files.names()) {
       EXPECT_NE(std::string(error.what()).find(name), std::string::npos) << error.what();
     }
+  }
+}
+
+/// A raster of 8 x 8 zeros that counts how many of its kind are open.
+class CountedRaster final : public Raster {
+ public:
+  CountedRaster(const std::string& name, std::size_t& open) : open_(open) {
+    info_.files = {name};
+    info_.columns = info_.rows = 8;
+    info_.sample.type = ScalarType::u8;
+    info_.world.xy = {1, 0, 8 * std::stod(name), 0, -1, 0};
+    info_.held_bytes = 1000;
+    ++open_;
+  }
+  ~CountedRaster() override { --open_; }
+  [[nodiscard]] const RasterInfo& info() const override { return info_; }
+  bool read_over(const CellWindow&, const CellBuffer&) override { return false; }
+
+ private:
+  std::size_t& open_;
+  RasterInfo info_;
+};
+
+TEST(Mosaic, KeepsOpenWhatFitsIntoItsMemory) {
+  for (const std::size_t room : {0, 1, 2, 5, 40}) {
+    SCOPED_TRACE(room);
+    std::size_t open = 0, most = 0;
+    const RasterOpener opener = [&](const std::string& name) {
+      auto raster = std::make_unique<CountedRaster>(name, open);
+      most = std::max(most, open);
+      return raster;
+    };
+    const auto mosaic =
+        open_mosaic({"0", "1", "2", "3", "4", "5", "6", "7"}, opener, false, 32, 1000 * room + 999);
+    EXPECT_EQ(mosaic->info().held_bytes, 1000u);
+    std::vector<std::byte> samples(64 * 8);
+    std::vector<std::uint8_t> valid(64 * 8);
+    const CellBuffer out{.samples = samples.data(), .valid = valid.data(), .stride = 64};
+    for (int round = 0; round < 3; ++round) {
+      mosaic->read_over({.column = 0, .row = 0, .columns = 64, .rows = 8}, out);
+    }
+    EXPECT_EQ(most, std::clamp<std::size_t>(room, 1, 8));
   }
 }
 

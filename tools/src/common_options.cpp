@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
 #include <cstdio>
 
+#include "available_memory.hpp"
 #include "cli.hpp"
 #include "units.hpp"
 
@@ -9,7 +11,8 @@ namespace terrace::tools {
 
 std::uint64_t CommonOptions::memory_or(std::uint64_t standard) const {
   if (memory_bytes) return *memory_bytes;
-  return standard != 0 ? standard : machine_memory_bytes() / 2;
+  const std::uint64_t available = available_memory_bytes();
+  return standard != 0 ? std::min(standard, available) : available / 2;
 }
 
 void CommonOptions::say(const std::string& line) const {

@@ -54,6 +54,28 @@ std::string angle_name(double degrees) {
   return {};
 }
 
+/// What is impossible whichever way it was described. Throws: CrsError.
+void check_numbers(const CrsDefinition& definition, const std::string& title) {
+  const auto fail = [&title](const char* what) {
+    throw CrsError("the CRS " + title + " has " + what, "give another with --crs EPSG:n");
+  };
+  const auto is_size = [](double value) { return value > 0 && std::isfinite(value); };
+  const Ellipsoid& ellipsoid = definition.ellipsoid;
+  if (!is_size(ellipsoid.semi_major) ||
+      !(ellipsoid.flattening() >= 0 && ellipsoid.flattening() < 0.5)) {
+    fail("an impossible ellipsoid");
+  }
+  if (!is_size(definition.degrees_per_unit) || !is_size(definition.metres_per_unit) ||
+      !(definition.metres_per_height == 0 || is_size(definition.metres_per_height))) {
+    fail("a unit without a size");
+  }
+  if (!std::isfinite(definition.prime_meridian)) fail("no prime meridian");
+  if (!definition.shift) return;
+  for (const double value : *definition.shift) {
+    if (!std::isfinite(value)) fail("a shift to WGS 84 that is not finite");
+  }
+}
+
 }  // namespace
 
 /// From a datum's geocentric coordinates to those of WGS 84 and back, for places on the ellipsoid.
@@ -95,6 +117,7 @@ struct CoordinateSystem::Shift {
 CoordinateSystem::CoordinateSystem() : CoordinateSystem(definition_of_epsg(4326)) {}
 
 CoordinateSystem::CoordinateSystem(const CrsDefinition& definition) : definition_(definition) {
+  check_numbers(definition_, title());
   if (definition_.method) {
     try {
       projection_ =

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <array>
+#include <cmath>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -69,6 +70,14 @@ void recognise_datum(CrsDefinition& definition) {
   if (row == nullptr) row = row_of_datum(definition.datum);
   if (row == nullptr) row = row_of_datum(definition.base_name);
   if (row == nullptr) return;
+  // A name does not make it that datum where the ellipsoid is another.
+  const Ellipsoid& known = epsg_tables().ellipsoids[static_cast<std::size_t>(row->ellipsoid)];
+  const Ellipsoid& own = definition.ellipsoid;
+  if (std::abs(known.semi_major - own.semi_major) > 1e-9 * known.semi_major ||
+      std::abs(known.flattening() - own.flattening()) > 1e-9) {
+    definition.base_epsg = 0;
+    return;
+  }
   definition.base_epsg = row->code;
   definition.uncertainty = row->uncertainty;
   definition.datum = row->datum;

@@ -47,6 +47,14 @@ std::optional<double> GeoKeyValues::number(int key) const {
   return found->values.front();
 }
 
+int GeoKeyValues::code(int key) const {
+  const double value = number(key).value_or(0);
+  if (!(value >= 0 && value <= 65535 && value == std::floor(value))) {
+    fail_geo_keys("GeoKey " + std::to_string(key) + " is not a code");
+  }
+  return static_cast<int>(value);
+}
+
 std::string GeoKeyValues::text(int key) const {
   const stream::GeoKey* const found = find(key);
   return found == nullptr ? std::string() : found->text;

@@ -36,8 +36,8 @@ class GeoKeyValues {
   [[nodiscard]] const stream::GeoKey* find(int key) const;
   /// Nothing if there is none. Throws: CrsError if it is not finite.
   [[nodiscard]] std::optional<double> number(int key) const;
-  /// 0 if there is none.
-  [[nodiscard]] int code(int key) const { return static_cast<int>(number(key).value_or(0)); }
+  /// 0 if there is none. Throws: CrsError if it is not a whole number of 16 bits, as codes are.
+  [[nodiscard]] int code(int key) const;
   [[nodiscard]] std::string text(int key) const;
 
   /// Degrees in the angular unit, metres in the linear one (0 if the file names none).

@@ -56,6 +56,7 @@ matching::HalvingOptions halving_options(const MatchRequest& request) {
   if (request.seconds > 0) options.seconds = request.seconds;
   options.seed = request.seed;
   options.threads = request.threads;
+  options.memory_limit = request.memory_bytes;
   return options;
 }
 
@@ -134,6 +135,7 @@ TreeOutcome run_matching_tree(const MatchRequest& request, std::span<const Point
   matching::MatchingTreeOptions<Point3> options;
   options.labels = labels;
   options.threads = request.threads;
+  options.memory_limit = request.memory_bytes;
   if (halves(request.method)) {
     options.matcher = [&](std::span<const Point3> nodes) {
       matching::HalvingOptions halving = halving_options(request);

@@ -95,6 +95,10 @@ MetricChoice::Region region_of(const nlohmann::json& json, const Place& place) {
   }
   std::optional<stream::Box3> box;
   if (json.contains("box")) box = box_of(json["box"], place);
+  for (const double length : lengths) {
+    // Distances are divided by it.
+    if (length > 0 && std::isinf(1.0 / length)) place.fail("\"semi_axes\" are too small");
+  }
   try {
     return {box,
             cluster::Elliptical({lengths[0], lengths[1], lengths.size() > 2 ? lengths[2] : 1.0},

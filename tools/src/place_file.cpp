@@ -34,12 +34,12 @@ std::string_view take_text(std::string_view& rest, char separator) {
 
 std::string_view bare(std::string_view cell) {
   const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
-  while (!cell.empty() && blank(cell.front())) cell.remove_prefix(1);
-  while (!cell.empty() && blank(cell.back())) cell.remove_suffix(1);
-  if (cell.size() >= 2 && cell.front() == '"' && cell.back() == '"') {
-    return bare(cell.substr(1, cell.size() - 2));
+  for (;;) {
+    while (!cell.empty() && blank(cell.front())) cell.remove_prefix(1);
+    while (!cell.empty() && blank(cell.back())) cell.remove_suffix(1);
+    if (cell.size() < 2 || cell.front() != '"' || cell.back() != '"') return cell;
+    cell = cell.substr(1, cell.size() - 2);
   }
-  return cell;
 }
 
 std::optional<double> number_in(std::string_view cell) {

@@ -125,6 +125,8 @@ class PlyReader {
                  ", more than the file can hold");
       }
       if (element.name == "vertex") {
+        // Else the vertices of one would have properties that those of the other lack.
+        if (!file_.mesh.positions.empty()) in_.fail("a second element 'vertex'");
         read_vertices(element);
       } else {
         const bool strips = element.name == "tristrips";

@@ -10,6 +10,7 @@
 #include "interrupt.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/point_writer.hpp"
+#include "terrace/stream/raster.hpp"
 #include "units.hpp"
 #include "world.hpp"
 
@@ -40,11 +41,26 @@ void PointTable::drop(const std::string& name) {
   }
 }
 
+std::uint64_t reading_within_memory(const stream::PointSource& source, std::uint64_t memory_bytes) {
+  // The program itself and the blocks that are read ahead.
+  constexpr std::uint64_t kBeside = std::uint64_t{20} << 20;
+  const std::uint64_t reading = stream::reading_bytes(source);
+  if (reading == 0 || kBeside + reading <= memory_bytes) return reading;
+  throw stream::Error(
+      {.file = source.info().files.front(),
+       .where = {},
+       .cause = "reading it needs " + std::to_string(((kBeside + reading) >> 20) + 1) +
+                "M of memory, --memory allows " + std::to_string(memory_bytes >> 20) + "M",
+       .remedy = "raise --memory, or rewrite large strips and tiles as small "
+                 "tiles: gdal_translate -co TILED=YES"});
+}
+
 PointTable read_point_table(const std::string& file, const std::string& format,
                             std::uint64_t memory_bytes, const CommonOptions& common) {
   const std::array<std::string, 1> files{file};
   const std::unique_ptr<stream::PointSource> source =
       stream::open_source(files, {.format = format});
+  const std::uint64_t reading = reading_within_memory(*source, memory_bytes);
   PointTable table;
   table.info = source->info();
   table.attributes.resize(table.info.attributes.size());
@@ -59,7 +75,7 @@ PointTable read_point_table(const std::string& file, const std::string& format,
     check_interrupt();
     stream::to_world(table.info, block);
     // A vector that grows is there twice for a moment.
-    if (2 * bytes_per_point * (table.size() + block.size()) > memory_bytes) {
+    if (2 * bytes_per_point * (table.size() + block.size()) > memory_bytes - reading) {
       throw stream::Error({.file = file,
                            .where = {},
                            .cause = "has more points than " + readable_bytes(memory_bytes) +

@@ -26,6 +26,10 @@ struct PointTable {
   void drop(const std::string& name);
 };
 
+/// What reading the source takes, which is not left for anything else. Throws: stream::Error if it
+/// is more than memory_bytes, saying what it needs.
+std::uint64_t reading_within_memory(const stream::PointSource& source, std::uint64_t memory_bytes);
+
 /// Throws: stream::Error on bad data, on no points, and if the points take more than memory_bytes;
 /// Interrupted.
 PointTable read_point_table(const std::string& file, const std::string& format,

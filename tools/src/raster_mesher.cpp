@@ -69,12 +69,13 @@ unsigned RasterMesher::threads_within_memory() const {
   const std::uint64_t beside = kBytesBeside + 8 * static_cast<std::uint64_t>(whole_.columns) +
                                (options_.fill == Fill::interpolate ? std::uint64_t{32} << 20 : 0);
   if (memory < beside + kBytesPerThread) {
-    throw stream::Error(
-        {.file = store_.path().string(),
-         .where = {},
-         .cause = "a mesh with a bound needs " + std::to_string((beside + kBytesPerThread) >> 20) +
-                  "M of memory, --memory allows " + std::to_string(memory >> 20) + "M",
-         .remedy = "allow more"});
+    throw stream::Error({.file = store_.path().string(),
+                         .where = {},
+                         .cause = "a mesh with a bound needs " +
+                                  std::to_string(((beside + kBytesPerThread) >> 20) + 1) +
+                                  "M of memory, --memory allows " + std::to_string(memory >> 20) +
+                                  "M",
+                         .remedy = "allow more"});
   }
   return static_cast<unsigned>(
       std::min<std::uint64_t>(common_.threads, (memory - beside) / kBytesPerThread));

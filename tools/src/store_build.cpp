@@ -10,6 +10,7 @@
 
 #include <terrace/cluster/hierarchy.hpp>
 #include <terrace/stream/error.hpp>
+#include <terrace/stream/raster.hpp>
 #include <terrace/stream/store.hpp>
 
 #include "ground.hpp"
@@ -75,14 +76,15 @@ void pack(const stream::PointBlock& block, std::size_t payload_size,
   }
 }
 
-/// What the source may hold: the same whatever --memory says, since the order of a raster's tiles
-/// depends on how much of it is read at once and results must not.
+/// What a source takes, unless it says that it needs more. What --memory leaves over goes to the
+/// source as well, which keeps more files of a mosaic open by it.
 constexpr std::uint64_t kSourceMemory = std::uint64_t{64} << 20;
 constexpr std::size_t kBlocksAhead = 4;
 
-/// Bytes at the peak with so many threads: a generous estimate; a benchmark prints the true peak.
-std::uint64_t memory_needed(const BuildRequest& request, std::size_t payload_size,
-                            std::uint64_t threads) {
+/// Bytes at the peak with so many threads, beside the source's: a generous estimate; a benchmark
+/// prints the true peak.
+std::uint64_t memory_beside_source(const BuildRequest& request, std::size_t payload_size,
+                                   std::uint64_t threads) {
   const std::uint64_t point = sizeof(stream::Point3) + payload_size;
   // Blocks read ahead, being clustered or waiting their turn, one forming per level, with what is
   // worked out per point beside them; and those that the store writer holds back to train its
@@ -90,23 +92,29 @@ std::uint64_t memory_needed(const BuildRequest& request, std::size_t payload_siz
   const std::uint64_t blocks =
       (8 * threads + 8 + kBlocksAhead) * request.block_points * (point + 64) +
       64 * request.block_points * (point + 16);
-  return kSourceMemory + (std::uint64_t{32} << 20) + blocks;
+  return (std::uint64_t{32} << 20) + blocks;
 }
 
 /// As many threads as were asked for and fit into --memory: their number changes no result.
 /// Throws: stream::Error if not even one does.
-unsigned threads_within_memory(const BuildRequest& request, std::size_t payload_size) {
+unsigned threads_within_memory(const BuildRequest& request, std::size_t payload_size,
+                               std::uint64_t source_bytes) {
+  const auto needed = [&](unsigned threads) {
+    return source_bytes + memory_beside_source(request, payload_size, threads);
+  };
   for (unsigned threads = request.threads; threads > 0; --threads) {
-    if (memory_needed(request, payload_size, threads) <= request.memory_bytes) return threads;
+    if (needed(threads) <= request.memory_bytes) return threads;
   }
-  const std::uint64_t needed = memory_needed(request, payload_size, 1);
+  const auto in_mebibytes = [](std::uint64_t bytes) {
+    return std::to_string((bytes >> 20) + 1) + "M";
+  };
   throw stream::Error({.file = request.store.string(),
                        .where = {},
                        .cause = "--memory " + std::to_string(request.memory_bytes >> 20) +
-                                "M is not enough: blocks of " +
-                                std::to_string(request.block_points) + " points need " +
-                                std::to_string((needed >> 20) + 1) + "M",
-                       .remedy = "raise --memory or lower --block"});
+                                "M is not enough: the build needs " + in_mebibytes(needed(1)) +
+                                ", " + in_mebibytes(source_bytes) + " of it to read the input",
+                       .remedy = "raise --memory, lower --block, or rewrite large strips and tiles "
+                                 "as small tiles: gdal_translate -co TILED=YES"});
 }
 
 std::size_t payload_size(const stream::SourceInfo& info) {
@@ -171,7 +179,7 @@ BuildOutcome build_store(const BuildRequest& request, const BuildProgress& progr
   stream::SourceOptions source_options;
   source_options.format = request.input_format;
   source_options.block_points = request.block_points;
-  source_options.memory_bytes = kSourceMemory;
+  source_options.memory_bytes = std::max(kSourceMemory, request.memory_bytes);
   source_options.band = request.band;
   source_options.crs = request.crs;
   auto source = stream::open_source(request.inputs, source_options);
@@ -183,10 +191,14 @@ BuildOutcome build_store(const BuildRequest& request, const BuildProgress& progr
   BuildOutcome outcome;
   if (!crs.note.empty()) outcome.notes.push_back(crs.note);
   if (!ground.assumption().empty()) outcome.notes.push_back(ground.assumption());
-  const unsigned threads = threads_within_memory(request, payload_size(info));
+  const std::uint64_t source_bytes = std::max(kSourceMemory, stream::reading_bytes(*source));
+  const std::size_t payload_bytes = payload_size(info);
+  const unsigned threads = threads_within_memory(request, payload_bytes, source_bytes);
   if (info.grid) {
     // Tiles are to be square on the ground: only now is it known what a cell measures there.
     source_options.cell_aspect = cell_aspect(ground, info);
+    source_options.memory_bytes =
+        request.memory_bytes - memory_beside_source(request, payload_bytes, threads);
     source = stream::open_source(request.inputs, source_options);
   }
   source = stream::read_ahead(std::move(source), kBlocksAhead);

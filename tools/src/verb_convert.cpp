@@ -9,6 +9,7 @@
 #include "error.hpp"
 #include "interrupt.hpp"
 #include "output.hpp"
+#include "point_table.hpp"
 #include "terrace/stream/point_writer.hpp"
 #include "terrace/stream/source.hpp"
 #include "units.hpp"
@@ -40,6 +41,7 @@ class ConvertCommand : public Command {
     stream::SourceOptions options;
     options.format = input_format_;
     std::unique_ptr<stream::PointSource> source = stream::open_source(files, options);
+    reading_within_memory(*source, common.memory_or(0));
     // Standard input is read by this thread, which Ctrl-C reaches.
     if (input_ != "-") source = stream::read_ahead(std::move(source));
     const stream::SourceInfo& info = source->info();

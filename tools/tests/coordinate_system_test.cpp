@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
+#include <limits>
 #include <random>
 #include <sstream>
 #include <string>
@@ -386,6 +387,63 @@ TEST(GeoKeys, ContradictionsAreRefusedAndNamed) {
                                          {3076, {9001}, ""},
                                          {3092, {0.9996}, ""}}),
                                    "dem.tif"));
+}
+
+TEST(GeoKeys, ACodeIsAWholeNumberOf16Bits) {
+  for (const double code : {4326.5, -4326.0, 1e300}) {
+    stream::Crs crs;
+    crs.geo_keys = {{1024, {2}, ""}, {2048, {code}, ""}};
+    try {
+      CoordinateSystem::of(crs, "dem.tif");
+      ADD_FAILURE() << code << " is accepted";
+    } catch (const stream::Error& error) {
+      EXPECT_NE(std::string(error.what()).find("GeoKey 2048"), std::string::npos) << error.what();
+    }
+  }
+}
+
+TEST(GeoKeys, ImpossibleNumbersAreRefused) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<std::vector<stream::GeoKey>> lists{
+      {{1024, {2}, ""}, {2048, {32767}, ""}, {2057, {-1}, ""}, {2059, {300}, ""}},
+      {{1024, {2}, ""}, {2048, {32767}, ""}, {2057, {6.4e6}, ""}, {2059, {1}, ""}},
+      {{1024, {2}, ""}, {2048, {32767}, ""}, {2056, {7004}, ""}, {2062, {1, 2, nan}, ""}},
+      {{1024, {2}, ""},
+       {2048, {32767}, ""},
+       {2057, {-1}, ""},
+       {2059, {300}, ""},
+       {2062, {1, 2, 3}, ""}},
+  };
+  for (const auto& list : lists) {
+    stream::Crs crs;
+    crs.geo_keys = list;
+    EXPECT_THROW(CoordinateSystem::of(crs, "dem.tif"), stream::Error);
+  }
+}
+
+/// What a store keeps of such a system used to be refused when it was read: it contradicted the
+/// code that the name had given it.
+TEST(Wkt, ANameDoesNotMakeADatumOfAnotherEllipsoid) {
+  stream::Crs crs;
+  crs.wkt =
+      "GEOGCS[\"WGS 84\",DATUM[\"WGS_1984\",SPHEROID[\"Bessel\",6377397.155,299.1528128]],"
+      "UNIT[\"degree\",0.0174532925199433]]";
+  const auto system = CoordinateSystem::of(crs, "dem.tif");
+  ASSERT_TRUE(system);
+  EXPECT_EQ(system->definition().epsg, 0);
+  EXPECT_FALSE(system->reaches_wgs84());
+  const auto kept = CoordinateSystem::of(system->crs(), "dem.store");
+  ASSERT_TRUE(kept);
+  EXPECT_EQ(kept->definition().ellipsoid, system->definition().ellipsoid);
+}
+
+TEST(Wkt, UnitsWithoutASizeAreRefused) {
+  for (const char* const unit : {"0", "-1"}) {
+    stream::Crs crs;
+    crs.wkt = std::string("GEOGCS[\"x\",DATUM[\"y\",SPHEROID[\"z\",6378137,298]],UNIT[\"u\",") +
+              unit + "]]";
+    EXPECT_THROW(CoordinateSystem::of(crs, "dem.tif"), stream::Error) << unit;
+  }
 }
 
 TEST(GeoKeys, WhatIsMissingIsNamed) {

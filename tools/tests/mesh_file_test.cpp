@@ -120,6 +120,15 @@ TEST_F(MeshFileTest, SurvivesDamage) {
   }
 }
 
+// Their properties could differ, and there would be levels for some vertices only.
+TEST_F(MeshFileTest, RefusesASecondElementOfVertices) {
+  std::string twice = kSquare;
+  const std::string faces = "element face", row = "4 0 1 2 3";
+  twice.insert(twice.find(faces), "element vertex 1\nproperty float x\n");
+  twice.insert(twice.find(row), "7\n");
+  EXPECT_THROW(read("twice.ply", twice), stream::Error);
+}
+
 // Facts of the real scans, where they are.
 TEST(MeshFileReal, HasTheFactsOfItsReadme) {
   const char* data = std::getenv("TERRACE_DATA");

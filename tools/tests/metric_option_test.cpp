@@ -73,6 +73,7 @@ TEST(MetricOption, BadFilesAreNamedWithTheRegion) {
         R"({"regions": [{}]})", R"({"regions": [{"semi_axes": [1]}]})",
         R"({"regions": [{"semi_axes": [1, "2"]}]})", R"({"regions": [{"semi_axes": [1, 0]}]})",
         R"({"regions": [{"semi_axes": [1, -2]}]})", R"({"regions": [{"semi_axes": [1, 1e400]}]})",
+        R"({"regions": [{"semi_axes": [1, 1e-310]}]})",
         R"({"regions": [{"semi_axes": [1, 2], "angle": "x"}]})",
         R"({"regions": [{"semi_axes": [1, 2], "angel": 3}]})",
         R"({"regions": [{"semi_axes": [1, 2], "box": [0, 0, 1]}]})",

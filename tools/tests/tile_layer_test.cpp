@@ -109,5 +109,23 @@ TEST_F(TileLayerFile, RefusesWhatIsNoTileSet) {
   EXPECT_THROW(read_layer(path_), stream::Error);
 }
 
+TEST_F(TileLayerFile, RefusesNumbersThatCountNothing) {
+  TileLayer layer;
+  layer.available = {{{0, 0, 1, 0}}, {{0, 0, 3, 1}}};
+  const nlohmann::json good = nlohmann::json::parse(layer_json(layer));
+  for (const nlohmann::json& number :
+       {nlohmann::json(-1), nlohmann::json(0.5), nlohmann::json(1e300), nlohmann::json("1"),
+        nlohmann::json(std::uint64_t{1} << 32)}) {
+    nlohmann::json bad = good;
+    bad["available"][1][0]["startX"] = number;
+    write(bad.dump());
+    EXPECT_THROW(read_layer(path_), stream::Error) << number;
+    bad = good;
+    bad["minzoom"] = number;
+    write(bad.dump());
+    EXPECT_THROW(read_layer(path_), stream::Error) << number;
+  }
+}
+
 }  // namespace
 }  // namespace terrace::tools

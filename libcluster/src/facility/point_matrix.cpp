@@ -2,18 +2,18 @@
 #include "terrace/cluster/point_matrix.hpp"
 
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <string>
 
 #include "facility/point_space.hpp"
-#include "machine_memory.hpp"
 
 namespace terrace::cluster {
 
 PointMatrix point_matrix(const FacilityPoints& problem, std::uint64_t memory_limit) {
   check(problem);
   const std::uint64_t n = problem.points.size();
-  if (memory_limit == 0) memory_limit = memory_of_machine();
+  if (memory_limit == 0) memory_limit = std::numeric_limits<std::size_t>::max() / 2;
   // n is below 2^32, so that n^2 is in range and 8 n^2 may not be.
   if (n * n > memory_limit / sizeof(double)) {
     throw std::invalid_argument("the costs of " + std::to_string(n) + " points would need " +

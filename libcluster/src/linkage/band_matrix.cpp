@@ -11,7 +11,6 @@
 #include <sys/mman.h>
 #endif
 
-#include "machine_memory.hpp"
 #include "terrace/cluster/dendrogram.hpp"
 
 namespace terrace::cluster {
@@ -30,8 +29,9 @@ std::uint64_t checked_band_bytes(std::size_t n, std::size_t bytes_per_entry,
   }
   // Below 2^31 * 2^30 * 8, so there is no overflow.
   const std::uint64_t bytes = std::uint64_t{n} * band_width(n) * bytes_per_entry;
-  if (memory_limit == 0) memory_limit = memory_of_machine();
-  if (bytes > memory_limit || bytes > std::numeric_limits<std::size_t>::max() / 2) {
+  constexpr std::uint64_t kAddressable = std::numeric_limits<std::size_t>::max() / 2;
+  if (memory_limit == 0 || memory_limit > kAddressable) memory_limit = kAddressable;
+  if (bytes > memory_limit) {
     throw std::invalid_argument("the distances of " + std::to_string(n) + " points would need " +
                                 std::to_string(bytes) + " bytes of memory, but the limit is " +
                                 std::to_string(memory_limit) +

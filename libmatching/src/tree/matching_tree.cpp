@@ -10,8 +10,6 @@
 #include <string>
 #include <thread>
 
-#include <unistd.h>
-
 #include "label_groups.hpp"
 #include "tree/match_level.hpp"
 
@@ -105,9 +103,8 @@ class Builder {
     // The tree, the clusters, and what is kept of the nodes of a level.
     const double needed = static_cast<double>(n) *
                           (sizeof(MatchingTreeRow) + 2.0 * sizeof(Point) + 4 * sizeof(double));
-    const long pages = sysconf(_SC_PHYS_PAGES), page = sysconf(_SC_PAGESIZE);
     const bool fits =
-        pages <= 0 || page <= 0 || needed <= static_cast<double>(pages) * static_cast<double>(page);
+        options_.memory_limit == 0 || needed <= static_cast<double>(options_.memory_limit);
     if (n < kNobody / 2 && fits) return;
     refuse_tree("the tree of " + std::to_string(n) + " points would need about " +
                 std::to_string(static_cast<std::uint64_t>(needed / (1024.0 * 1024.0))) +

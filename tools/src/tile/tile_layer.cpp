@@ -2,6 +2,7 @@
 #include "tile/tile_layer.hpp"
 
 #include <algorithm>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -16,10 +17,17 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+/// The library would convert numbers of any kind and size.
+std::uint32_t count_from(const Json& json) {
+  if (!json.is_number_unsigned() || json.get<std::uint64_t>() > UINT32_MAX) {
+    throw std::runtime_error(json.dump() + " where a whole number from 0 up is due");
+  }
+  return json.get<std::uint32_t>();
+}
+
 TileRange range_from(const Json& json, unsigned zoom) {
-  const TileRange range{json.at("startX").get<std::uint32_t>(),
-                        json.at("startY").get<std::uint32_t>(),
-                        json.at("endX").get<std::uint32_t>(), json.at("endY").get<std::uint32_t>()};
+  const TileRange range{count_from(json.at("startX")), count_from(json.at("startY")),
+                        count_from(json.at("endX")), count_from(json.at("endY"))};
   if (range.x0 > range.x1 || range.y0 > range.y1 || range.x1 >= tile_columns(zoom) ||
       range.y1 >= tile_rows(zoom)) {
     throw std::runtime_error("a range of available tiles outside zoom " + std::to_string(zoom));
@@ -50,7 +58,9 @@ TileLayer layer_from(const Json& json) {
     }
   }
   layer.last_zoom = static_cast<unsigned>(available.size()) - 1;
-  layer.first_zoom = std::min(json.value("minzoom", 0U), layer.last_zoom);
+  if (const auto zoom = json.find("minzoom"); zoom != json.end()) {
+    layer.first_zoom = std::min<unsigned>(count_from(*zoom), layer.last_zoom);
+  }
   if (const auto own = json.find("terrace"); own != json.end()) {
     layer.max_errors = own->value("maxErrors", std::vector<double>{});
     layer.fingerprint = own->value("fingerprint", "");

@@ -13,7 +13,7 @@
 namespace terrace::cluster {
 
 /// Bytes of the entries of a band matrix. Throws std::invalid_argument, which says how many they
-/// are, if they exceed `memory_limit` (0: the memory of this machine).
+/// are, if they exceed `memory_limit` (0: no limit).
 [[nodiscard]] std::uint64_t checked_band_bytes(std::size_t n, std::size_t bytes_per_entry,
                                                std::uint64_t memory_limit);
 
@@ -21,7 +21,8 @@ namespace terrace::cluster {
 template <class T>
 class BandMatrix {
  public:
-  /// Throws std::invalid_argument if the entries do not fit the limit, see checked_band_bytes().
+  /// Throws std::invalid_argument if the entries do not fit the limit, see checked_band_bytes(),
+  /// and std::bad_alloc.
   explicit BandMatrix(std::size_t n, std::uint64_t memory_limit = 0)
       : n_(n), data_(allocate(checked_band_bytes(n, sizeof(T), memory_limit))) {}
 

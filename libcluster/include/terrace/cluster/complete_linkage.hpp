@@ -40,7 +40,7 @@ enum class MatrixEntry {
 struct CompleteLinkageOptions {
   unsigned threads = 1;  ///< never change the result
   MatrixEntry entry = MatrixEntry::float64;
-  std::uint64_t memory_limit = 0;  ///< bytes the matrix may take; 0: the memory of this machine
+  std::uint64_t memory_limit = 0;  ///< bytes the matrix may take; 0: no limit
   SimdPath path = SimdPath::automatic;
 };
 

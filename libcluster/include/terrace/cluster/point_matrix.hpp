@@ -20,9 +20,9 @@ struct PointMatrix {
 /// Every point is a facility and a client. A client whose connection would cost more than the price
 /// of leaving it out (outlier_price) pays that price to whatever facility it is connected to.
 /// 8 n^2 bytes, O(n^2) distances.
-/// Throws: std::invalid_argument as check(problem); if the bytes exceed `memory_limit` (0: the
-/// memory of this machine), saying how many they are; and if a cost is beyond the range of double,
-/// as check() of the matrix says it.
+/// Throws: std::invalid_argument as check(problem); if the bytes exceed `memory_limit` (0: no
+/// limit), saying how many they are; and if a cost is beyond the range of double, as check() of the
+/// matrix says it. std::bad_alloc.
 [[nodiscard]] PointMatrix point_matrix(const FacilityPoints& problem,
                                        std::uint64_t memory_limit = 0);
 

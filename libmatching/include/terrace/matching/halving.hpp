@@ -38,6 +38,7 @@ struct HalvingOptions {
   /// Iterations at once, of monte_carlo; 0: one per core. Never changes the result (but with
   /// `seconds`).
   unsigned threads = 1;
+  std::uint64_t memory_limit = 0;  ///< bytes that the matrices may take; 0: no limit
   /// Called by the caller's thread after each iteration (or a few) with those done and to do, and
   /// the least cost so far. False ends the search.
   std::function<bool(std::uint64_t done, std::uint64_t total, double cost)> progress = {};
@@ -62,8 +63,8 @@ using PairDistance = std::function<double(std::uint32_t, std::uint32_t)>;
 /// Matches points in the plane (z = 0) or in space, at Euclidean distances.
 /// Cost: an assignment of n/2 to n/2 per iteration, O(n^3) at worst; a matrix of n^2/4 doubles per
 /// thread. Throws: std::invalid_argument on a coordinate that is not finite (its index is named) or
-/// beyond 1e150, and if the matrices would not fit into the memory of the machine, saying how many
-/// bytes they take.
+/// beyond 1e150, and if the matrices would not fit into options.memory_limit, saying how many bytes
+/// they take; std::bad_alloc.
 [[nodiscard]] HalvingMatching match_by_halving(std::span<const Point3> points,
                                                const HalvingOptions& options = {});
 

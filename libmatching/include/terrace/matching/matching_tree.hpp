@@ -49,7 +49,8 @@ struct MatchingTreeOptions {
   /// The cluster of each point, any numbers. Each cluster becomes a tree, then the roots of these
   /// are matched in the same way. Empty: all one cluster.
   std::span<const std::uint32_t> labels{};
-  unsigned threads = 1;  ///< clusters at once, 0: one per core; never changes the result
+  unsigned threads = 1;            ///< clusters at once, 0: one per core; never changes the result
+  std::uint64_t memory_limit = 0;  ///< bytes that the tree may take; 0: no limit
   /// Called by the caller's thread now and then with the rows that are made and all there will be.
   /// False ends the work; the tree is empty then.
   std::function<bool(std::size_t done, std::size_t total)> progress{};
@@ -65,9 +66,9 @@ struct MatchingTreeOptions {
 /// Returns: the same for any number of threads.
 /// Throws: std::invalid_argument for a coordinate that is not finite, a weight that is not positive
 /// and finite (the index is named), weights whose sum passes the range of double, labels or weights
-/// of another number than the points, too many points for the numbering or for the memory of the
-/// machine (saying how many bytes), distances beyond the range of double, and a matcher that
-/// returns no matching.
+/// of another number than the points, too many points for the numbering or for
+/// options.memory_limit (saying how many bytes), distances beyond the range of double, and a
+/// matcher that returns no matching.
 ///
 /// Cost: about twice the time of matching each cluster once. 24 bytes and a position a point for
 /// the tree, 4 for the clusters, and what matching the largest clusters takes.

@@ -25,6 +25,9 @@ struct RasterInfo {
   /// The pieces in which the raster is stored: reading in multiples of them, counted from the
   /// raster's corner, decodes each once.
   std::uint64_t block_columns = 1, block_rows = 1;
+  /// Most bytes that reading takes beside the caller's window, as long as the raster is open; of a
+  /// mosaic, those of its largest file.
+  std::uint64_t held_bytes = 0;
   std::vector<std::string> comments;
 };
 
@@ -59,8 +62,10 @@ class Raster {
 };
 
 struct RasterOptions {
-  int band = 1;                            ///< counted from 1
-  std::uint64_t memory_bytes = 64u << 20;  ///< no decoded block may be larger than this
+  int band = 1;  ///< counted from 1
+  /// No decoded block may be larger than this. Of strips too large for it, and of large ones of the
+  /// usual codecs, a row is decoded at a time.
+  std::uint64_t memory_bytes = 64u << 20;
   /// Bytes of decoded blocks, of those that a window has used in part, to keep for the next one.
   std::uint64_t cache_bytes = 16u << 20;
 };
@@ -79,17 +84,25 @@ using RasterOpener = std::function<std::unique_ptr<Raster>(const std::string& fi
 
 /// Several rasters as one: where they overlap, the valid sample of the last named wins. They must
 /// agree in sample (type, scale, offset), cell size and phase (to 1/1000 cell) and, unless
-/// `ignore_crs`, in CRS. Keeps at most `open_at_once` of them open.
-/// Throws: Error naming two files and what differs, or if the union has 2^30 columns or rows.
+/// `ignore_crs`, in CRS. Keeps at most `open_at_once` of them open, and no more than hold
+/// `open_bytes` together (RasterInfo::held_bytes; one may always be open). Throws: Error naming two
+/// files and what differs, or if the union has 2^30 columns or rows.
 std::unique_ptr<Raster> open_mosaic(const std::vector<std::string>& files,
                                     const RasterOpener& opener, bool ignore_crs = false,
-                                    std::size_t open_at_once = 32);
+                                    std::size_t open_at_once = 32,
+                                    std::uint64_t open_bytes = 64u << 20);
 
 /// The cells of a raster as points (see SourceInfo::grid): in tiles that are square on the ground,
 /// of at most `options.block_points` cells, one block each. The raster is read in windows of about
-/// 16 x 16 tiles or more, less if they would not fit into `options.memory_bytes`; within a window
-/// the tiles follow a Hilbert curve. 64-bit integers have the attribute "sample".
+/// 16 x 16 tiles or more, less if they would not fit into three quarters of `options.memory_bytes`;
+/// within a window the tiles follow a Hilbert curve. Of memory beyond 64 MiB the window takes
+/// nothing, so that more memory does not change the order. 64-bit integers have the attribute
+/// "sample".
 std::unique_ptr<PointSource> points_of(std::unique_ptr<Raster> raster,
                                        const SourceOptions& options = {});
+
+/// What a source that points_of() made takes at least, in bytes: its window and what its raster
+/// holds. 0 for other sources. Memory beyond it keeps more files of a mosaic open.
+std::uint64_t reading_bytes(const PointSource& source);
 
 }  // namespace terrace::stream

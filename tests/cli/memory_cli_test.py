@@ -1,0 +1,288 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""--memory caps the peak of a run, whatever the layout of the input; what cannot fit says so first.
+
+TERRACE=path/to/terrace memory_cli_test.py
+"""
+
+import json
+import os
+import re
+import resource
+import struct
+import subprocess
+import tempfile
+import unittest
+import zlib
+
+TERRACE = os.environ.get('TERRACE', 'terrace')
+MIB = 1 << 20
+NODATA = -9999
+
+
+def run(*args, limits=()):
+    """Runs terrace: its exit code, both outputs, and its largest resident set in bytes."""
+    def confine():
+        for kind, size in limits:
+            resource.setrlimit(kind, (size, size))
+
+    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
+        child = subprocess.Popen([TERRACE, *map(str, args)], stdout=out, stderr=err,
+                                 preexec_fn=confine if limits else None)
+        # Of this child alone, where getrusage() would give the largest of all children.
+        _, status, usage = os.wait4(child.pid, 0)
+        child.returncode = os.waitstatus_to_exitcode(status)
+        out.seek(0)
+        err.seek(0)
+        return child.returncode, out.read().decode(), err.read().decode(), usage.ru_maxrss * 1024
+
+
+def rows_with_few_heights(columns, rows, bands=1):
+    """Rows of int16 samples, one in 40 with data in the first band; further bands are noise."""
+    empty = struct.pack('<h', NODATA) * columns
+    state = 1
+    for row in range(rows):
+        line = empty
+        if row % 40 == 0:
+            heights = []
+            for _ in range(columns):
+                state = (state * 1103515245 + 12345) & 0x7FFFFFFF
+                heights.append(500 + row // 8 + (state >> 28))
+            line = struct.pack(f'<{columns}h', *heights)
+        if bands > 1:
+            cells = bytearray(os.urandom(2 * columns * bands))
+            for byte in (0, 1):
+                cells[byte::2 * bands] = line[byte::2]
+            line = bytes(cells)
+        yield line
+
+
+class Tiff:
+    """Writes GeoTIFFs of one size and place apart: the blocks are made once and shared."""
+
+    def __init__(self, columns, rows, strip_rows=None, tile=None, deflate=True, bands=1):
+        self.columns, self.rows, self.tile, self.deflate, self.bands = columns, rows, tile, deflate, bands
+        self.strip_rows = strip_rows or rows
+        lines = rows_with_few_heights(columns, rows, bands)
+        if tile:
+            self.blocks = self.tiles(lines)
+        else:
+            self.blocks = []
+            for first in range(0, rows, self.strip_rows):
+                count = min(self.strip_rows, rows - first)
+                self.blocks.append(self.packed(next(lines) for _ in range(count)))
+
+    def packed(self, parts):
+        if not self.deflate:
+            return b''.join(parts)
+        packer = zlib.compressobj(1)
+        return b''.join([*(packer.compress(part) for part in parts), packer.flush()])
+
+    def tiles(self, lines):
+        width = 2 * self.tile
+        blocks = []
+        for first in range(0, self.rows, self.tile):
+            band = [next(lines) for _ in range(min(self.tile, self.rows - first))]
+            for column in range(0, 2 * self.columns, width):
+                parts = [line[column:column + width].ljust(width, b'\0') for line in band]
+                parts += [bytes(width)] * (self.tile - len(band))
+                blocks.append(self.packed(parts))
+        return blocks
+
+    def write(self, path, x, y):
+        """Its upper left corner at x, y; cells of 30 m in UTM zone 32N."""
+        places, at = [], 8
+        for block in self.blocks:
+            places.append(at)
+            at += len(block) + len(block) % 2
+        nodata = str(NODATA).encode() + b'\0'
+        fields = [(256, 'I', [self.columns]), (257, 'I', [self.rows]), (258, 'H', [16] * self.bands),
+                  (259, 'H', [8 if self.deflate else 1]), (262, 'H', [1]), (277, 'H', [self.bands]),
+                  (339, 'H', [2] * self.bands)]
+        if self.tile:
+            fields += [(322, 'I', [self.tile]), (323, 'I', [self.tile]), (324, 'I', places),
+                       (325, 'I', [len(block) for block in self.blocks])]
+        else:
+            fields += [(273, 'I', places), (278, 'I', [self.strip_rows]),
+                       (279, 'I', [len(block) for block in self.blocks])]
+        fields += [(33550, 'd', [30.0, 30.0, 0.0]), (33922, 'd', [0.0, 0.0, 0.0, x, y, 0.0]),
+                   (34735, 'H', [1, 1, 0, 3, 1024, 0, 1, 1, 1025, 0, 1, 1, 3072, 0, 1, 32632]),
+                   (42113, 's', nodata)]
+        codes = {'I': 4, 'H': 3, 'd': 12, 's': 2}
+        entries, behind = b'', b''
+        start = at + 2 + 12 * len(fields) + 4
+        for tag, kind, values in sorted(fields):
+            data = values if kind == 's' else struct.pack(f'<{len(values)}{kind}', *values)
+            if len(data) <= 4:
+                place = data.ljust(4, b'\0')
+            else:
+                place = struct.pack('<I', start + len(behind))
+                behind += data + b'\0' * (len(data) % 2)
+            entries += struct.pack('<HHI', tag, codes[kind], len(values)) + place
+        with open(path, 'wb') as file:
+            file.write(struct.pack('<2sHI', b'II', 42, at))
+            for block in self.blocks:
+                file.write(block + b'\0' * (len(block) % 2))
+            file.write(struct.pack('<H', len(fields)) + entries + bytes(4) + behind)
+
+
+class MemoryCase(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.folder.cleanup()
+
+    @classmethod
+    def path(cls, name):
+        return os.path.join(cls.folder.name, name)
+
+    @classmethod
+    def mosaic(cls, name, count, columns, rows, across=6, **layout):
+        """So many files side by side, each overlapping its neighbours by a cell; their names."""
+        tiff = Tiff(columns, rows, **layout)
+        names = []
+        for i in range(count):
+            names.append(cls.path(f'{name}-{i}.tif'))
+            tiff.write(names[-1], 400000 + i % across * 30 * (columns - 1),
+                       5000000 - i // across * 30 * (rows - 1))
+        return names
+
+    def within(self, memory, *args):
+        """The run succeeds and keeps within so many MiB, by its own account and the system's."""
+        code, out, err, peak = run(*args, '--memory', f'{memory}M', '--json')
+        self.assertEqual(code, 0, err)
+        summary = json.loads(out)
+        self.assertLessEqual(peak, memory * MIB, f'{peak >> 20} MiB')
+        self.assertLessEqual(summary['peak_rss_bytes'], memory * MIB)
+        self.assertGreater(summary['peak_rss_bytes'], 1 * MIB)
+        return summary
+
+    def needed(self, memory, output, *args):
+        """The run stops before it starts; what it says that it needs, in MiB, is enough."""
+        code, out, err, peak = run(*args, '-o', output, '--memory', f'{memory}M', '--json')
+        self.assertEqual((code, out), (1, ''), err)
+        self.assertEqual(len(err.splitlines()), 1, err)
+        self.assertLessEqual(peak, memory * MIB)
+        self.assertFalse(os.path.exists(output))
+        needs = int(re.search(r'needs? (?:about )?(\d+)\s?Mi?', err).group(1))
+        self.assertGreater(needs, memory)
+        return needs
+
+
+class BuildMemoryTest(MemoryCase):
+    MEMORY = 200
+
+    def build(self, name, files, memory=MEMORY):
+        return self.within(memory, 'build', *files, '-o', self.path(f'{name}.store'),
+                           '--threads', 2)
+
+    def test_mosaic_of_single_strips(self):
+        # 24 files of 26 MB decoded each: 620 MB
+        files = self.mosaic('strip', 24, 3601, 3601)
+        summary = self.build('strip', files)
+        self.assertEqual(summary['points'] + summary['nodata'], (6 * 3600 + 1) * (4 * 3600 + 1))
+        # Memory keeps more files open and changes no byte.
+        self.build('more', files, 700)
+        for name in sorted(os.listdir(self.path('strip.store'))):
+            with open(self.path(f'strip.store/{name}'), 'rb') as one, \
+                    open(self.path(f'more.store/{name}'), 'rb') as other:
+                self.assertEqual(one.read(), other.read(), name)
+
+    def test_mosaic_of_strips(self):
+        self.build('strips', self.mosaic('strips', 12, 3601, 3601, strip_rows=64))
+
+    def test_mosaic_of_tiles(self):
+        self.build('tiles', self.mosaic('tiles', 12, 3601, 3601, tile=512))
+
+    def test_mosaic_without_compression(self):
+        self.build('plain', self.mosaic('plain', 6, 3601, 3601, deflate=False))
+
+    def test_mosaic_of_single_strips_that_do_not_compress(self):
+        # Of two bands the second is noise: as many bytes in the file as decoded.
+        files = self.mosaic('noise', 6, 2400, 2400, across=3, bands=2)
+        self.assertGreater(os.path.getsize(files[0]), 8 * MIB)
+        self.build('noise', files)
+
+    def test_one_large_strip(self):
+        # 288 MB decoded
+        self.build('large', self.mosaic('large', 1, 12000, 12000))
+
+    def test_tiles_that_do_not_fit_are_refused_with_what_they_need(self):
+        # 128 MB each, decoded
+        files = self.mosaic('wide', 2, 8192, 8192, across=2, tile=8192)
+        store = self.path('wide.store')
+        needs = self.needed(self.MEMORY, store, 'build', *files, '--threads', 1)
+        self.within(needs, 'build', *files, '-o', store, '--threads', 1)
+
+
+class StoreMemoryTest(MemoryCase):
+    """The verbs on a store whose points take more than is allowed."""
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.dem, cls.store = cls.path('dem.tif'), cls.path('dem.store')
+        for args in (('synth', 'dem', '--size', '1500x1500', '-o', cls.dem),
+                     ('build', cls.dem, '-o', cls.store)):
+            code, _, err, _ = run(*args)
+            assert code == 0, err
+
+    def test_points(self):
+        # 2.25 million points: 54 MB and more in memory, 50 MB as text
+        self.within(40, 'points', self.store, '-o', self.path('all.xyz'))
+        self.within(40, 'points', self.store, '-o', self.path('all.ply'))
+
+    def test_convert(self):
+        text = self.path('converted.xyz')
+        needs = self.needed(24, text, 'convert', self.dem)
+        self.within(needs, 'convert', self.dem, '-o', text)
+
+    def test_raster(self):
+        self.within(64, 'raster', self.store, '-o', self.path('all.tif'), '--threads', 2)
+
+    def test_mesh(self):
+        needs = self.needed(64, self.path('all.obj'), 'mesh', self.store)
+        self.within(needs, 'mesh', self.store, '-o', self.path('all.obj'))
+        self.within(64, 'mesh', self.store, '--level', 1, '-o', self.path('coarse.obj'))
+
+    def test_mesh_with_a_bound(self):
+        mesh = self.path('bounded.ply')
+        needs = self.needed(64, mesh, 'mesh', self.store, '--max-error', 2)
+        self.within(needs, 'mesh', self.store, '--max-error', 2, '-o', mesh)
+
+    def test_tiles(self):
+        tiles = self.path('tiles')
+        tile = ('tile', self.store, '--zoom', '0-9', '--threads', 2, '--vertical', 'ellipsoidal')
+        needs = self.needed(32, tiles, *tile)
+        self.within(needs, *tile, '-o', tiles)
+
+    def test_a_table_of_points(self):
+        points = self.path('table.xyz')
+        code, _, err, _ = run('points', self.store, '--level', 1, '-o', points)
+        self.assertEqual(code, 0, err)
+        code, _, err, peak = run('cluster', points, '-o', self.path('none.xyz'), '--memory', '1M')
+        self.assertEqual(code, 1, err)
+        self.assertIn('--memory', err)
+
+
+class MachineMemoryTest(MemoryCase):
+    def test_a_limit_of_the_process_is_the_memory_there_is(self):
+        points = self.path('points.csv')
+        with open(points, 'w') as file:
+            file.write('x,y,z\n')
+            for i in range(300000):
+                file.write(f'{i % 600},{i // 600},0\n')
+        args = ('match', points, '--method', 'exact', '-o', self.path('pairs.csv'))
+        # 240 MB for an exact matching; half of what there is would be 200
+        for kind in (resource.RLIMIT_AS, resource.RLIMIT_DATA):
+            code, _, err, _ = run(*args, limits=[(kind, 400 * MIB)])
+            self.assertEqual(code, 1, err)
+            self.assertIn('takes about', err)
+            self.assertIn('--memory is 200 MiB', err)
+
+
+if __name__ == '__main__':
+    unittest.main()

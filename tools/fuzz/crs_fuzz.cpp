@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Coordinate reference systems. The first line says how they are given: "text" as --crs takes them
+// (WKT or codes), "wkt" as a source has them, "keys" as GeoKeys, one a line (number=values or
+// number="text"), "shift" as --towgs84. What is known maps places without fault, and what a store
+// would keep of it is read back.
+#include <charconv>
+#include <cmath>
+#include <vector>
+
+#include "coordinate_system.hpp"
+#include "error.hpp"
+#include "fuzz_target.hpp"
+#include "terrace/stream/error.hpp"
+
+namespace terrace::tools {
+namespace {
+
+stream::Crs crs_of_keys(std::string_view text) {
+  stream::Crs crs;
+  while (!text.empty() && crs.geo_keys.size() < 100) {
+    std::string_view line = take_line(text);
+    stream::GeoKey key;
+    const auto [end, error] = std::from_chars(line.data(), line.data() + line.size(), key.key);
+    if (error != std::errc{} || end == line.data() + line.size() || *end != '=') continue;
+    line.remove_prefix(static_cast<std::size_t>(end - line.data()) + 1);
+    if (line.starts_with('"')) {
+      key.text = line.substr(1, line.find('"', 1) - 1);
+    } else {
+      for (double value = 0; !line.empty();) {
+        const auto number = std::from_chars(line.data(), line.data() + line.size(), value);
+        if (number.ec != std::errc{}) break;
+        key.values.push_back(value);
+        line.remove_prefix(static_cast<std::size_t>(number.ptr - line.data()));
+        if (line.starts_with(',')) line.remove_prefix(1);
+      }
+    }
+    if (key.key == 1026 || key.key == 3073) crs.name = key.text;
+    crs.geo_keys.push_back(std::move(key));
+  }
+  return crs;
+}
+
+/// Places are mapped to places or to NaN.
+void use(const CoordinateSystem& system) {
+  std::vector<Point2> places{{0, 0},      {10, 50},   {500000, 5e6}, {-180, 90},
+                             {1e7, -1e7}, {1e300, 1}, {360, -90.001}};
+  std::vector<Point2> back = places;
+  system.to_own_geographic(places);
+  system.from_own_geographic(places);
+  if (system.reaches_wgs84()) system.to_geographic(back);
+  require(!system.title().empty(), "a title");
+  // A store keeps its CRS as WKT.
+  const stream::Crs kept = system.crs();
+  const auto again = CoordinateSystem::of(kept, "kept.wkt");
+  require(again.has_value(), "the CRS of a store is read back");
+  require(again->is_geographic() == system.is_geographic(), "of the same kind");
+}
+
+}  // namespace
+
+bool accepts(const std::uint8_t* data, std::size_t size) {
+  std::string_view text = text_of(data, size);
+  const std::string_view how = take_line(text);
+  std::optional<CoordinateSystem> system;
+  try {
+    if (how == "text") {
+      // Not the name of a file of this machine.
+      if (text.find_first_of("[(:") == std::string_view::npos) return false;
+      if (text.find('/') < text.find_first_of("[(:")) return false;
+      system = CoordinateSystem::parse(std::string(text));
+    } else if (how == "wkt") {
+      stream::Crs crs;
+      crs.wkt = text;
+      system = CoordinateSystem::of(crs, "fuzz.wkt");
+    } else if (how == "keys") {
+      system = CoordinateSystem::of(crs_of_keys(text), "fuzz.tif");
+    } else if (how == "shift") {
+      const DatumShift shift = parse_datum_shift(std::string(text));
+      for (const double value : shift) require(std::isfinite(value), "finite numbers of a shift");
+      system = CoordinateSystem::parse("EPSG:4277", shift);
+    }
+  } catch (const UsageError&) {
+    return false;
+  } catch (const stream::Error&) {
+    return false;
+  }
+  if (!system) return false;
+  use(*system);
+  return true;
+}
+
+}  // namespace terrace::tools

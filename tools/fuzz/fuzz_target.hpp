@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+#include <sys/mman.h>
+#include <unistd.h>
+
+/// What the fuzz targets of the command share. A target is one file with one function, accepts();
+/// fuzz_main.cpp hands it to libFuzzer, replay_main.cpp runs it over a corpus.
+
+namespace terrace::tools {
+
+/// Reads any bytes: true if they were read to their end and hold what they should, false if they
+/// were refused as bad input is. Ends the process by fail() where a promise was broken.
+bool accepts(const std::uint8_t* data, std::size_t size);
+
+/// Stops the fuzzer where the code broke a promise, in release builds too.
+inline void require(bool good, const char* what) {
+  if (good) return;
+  std::fprintf(stderr, "broken promise: %s\n", what);
+  std::abort();
+}
+
+/// Bytes as a file in memory, so that a reader takes its ordinary way.
+class MemoryFile {
+ public:
+  explicit MemoryFile(std::string_view bytes) : file_(memfd_create("fuzz", 0)) {
+    require(file_ >= 0 &&
+                write(file_, bytes.data(), bytes.size()) == static_cast<ssize_t>(bytes.size()),
+            "a file in memory");
+    name_ = "/proc/self/fd/" + std::to_string(file_);
+  }
+  ~MemoryFile() { close(file_); }
+  MemoryFile(const MemoryFile&) = delete;
+  MemoryFile& operator=(const MemoryFile&) = delete;
+
+  [[nodiscard]] const std::string& name() const { return name_; }
+
+ private:
+  int file_;
+  std::string name_;
+};
+
+/// A folder that goes with the process.
+class ScratchFolder {
+ public:
+  ScratchFolder() {
+    std::string name = (std::filesystem::temp_directory_path() / "terrace-fuzz-XXXXXX").string();
+    require(mkdtemp(name.data()) != nullptr, "a scratch folder");
+    path_ = name;
+  }
+  ~ScratchFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+inline std::string_view text_of(const std::uint8_t* data, std::size_t size) {
+  return {reinterpret_cast<const char*>(data), size};
+}
+
+/// The line at the beginning of `text`, without its end; takes it off.
+inline std::string_view take_line(std::string_view& text) {
+  const std::size_t end = text.find('\n');
+  const std::string_view line = text.substr(0, end);
+  text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+  return line;
+}
+
+}  // namespace terrace::tools

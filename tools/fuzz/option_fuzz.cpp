@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Values of options. The first line names the parser, the second is the value.
+#include <algorithm>
+#include <cmath>
+
+#include "bounded_mesh.hpp"
+#include "camera.hpp"
+#include "error.hpp"
+#include "fuzz_target.hpp"
+#include "height_sampler.hpp"
+#include "profile_run.hpp"
+#include "raster_run.hpp"
+#include "region.hpp"
+#include "smooth_option.hpp"
+#include "surface_run.hpp"
+#include "terrace/stream/error.hpp"
+#include "tile/tile_address.hpp"
+#include "units.hpp"
+
+namespace terrace::tools {
+namespace {
+
+bool parse(std::string_view name, const std::string& value) {
+  constexpr std::uint64_t kMost = std::uint64_t{1} << 63;
+  if (name == "memory") {
+    require(parse_memory(value) <= kMost, "no more than 2^63 bytes");
+  } else if (name == "count") {
+    static_cast<void>(with_commas(parse_count(value)));
+  } else if (name == "size") {
+    const ImageSize size = parse_size(value);
+    require(size.width > 0 && size.height > 0 && size.width <= INT32_MAX, "a picture has cells");
+  } else if (name == "number") {
+    const double number = parse_number(value, "a test");
+    require(std::isfinite(number), "a number is finite");
+    require(parse_number(number_text(number), "a test") == number, "a number is read back");
+  } else if (name == "numbers") {
+    const std::vector<double> numbers = parse_numbers(value, "a test");
+    require(numbers.size() == 1 + static_cast<std::size_t>(std::ranges::count(value, ',')),
+            "a number between any two commas");
+    for (const double number : numbers) require(std::isfinite(number), "numbers are finite");
+  } else if (name == "level") {
+    const auto level = parse_level(value);
+    require(!level || *level <= 255, "a level");
+  } else if (name == "smooth") {
+    const auto smoothing = parse_smoothing(value);
+    require(!smoothing || (smoothing->iterations >= 1 && smoothing->iterations <= 10000), "steps");
+  } else if (name == "view") {
+    static_cast<void>(parse_view(value));
+  } else if (name == "line") {
+    // Not the name of a file of this machine.
+    if (value.find_first_not_of("0123456789+-.,;eE ") != std::string::npos) return false;
+    for (const Point2& p : parse_line(value)) {
+      require(std::isfinite(p[0]) && std::isfinite(p[1]), "a line has places");
+    }
+  } else if (name == "line-file") {
+    const MemoryFile file(value);
+    require(parse_line(file.name()).size() >= 2, "a line has two places");
+  } else if (name == "criterion") {
+    static_cast<void>(parse_criterion(value));
+  } else if (name == "max-edge") {
+    const auto edge = parse_max_edge(value);
+    require(!edge || *edge > 0, "a length");
+  } else if (name == "tile") {
+    const auto tile = parse_tile_path(value);
+    if (!tile) return false;
+    require(tile_path(*tile) == value, "a tile has one path");
+  } else if (name == "names") {
+    // One of the many options that are one word of a few.
+    const auto known = [&](auto parser) {
+      try {
+        static_cast<void>(parser(value));
+        return true;
+      } catch (const UsageError&) {
+        return false;
+      }
+    };
+    const bool any = static_cast<int>(known(parse_fill)) + static_cast<int>(known(parse_quality)) +
+                         static_cast<int>(known(parse_duplicates)) +
+                         static_cast<int>(known(parse_raster_value)) +
+                         static_cast<int>(known(parse_interpolation)) >
+                     0;
+    return any;
+  } else {
+    return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+bool accepts(const std::uint8_t* data, std::size_t size) {
+  std::string_view text = text_of(data, size);
+  const std::string_view name = take_line(text);
+  try {
+    return parse(name, std::string(text));
+  } catch (const UsageError& error) {
+    require(*error.what() != '\0', "an error says what is wrong");
+  } catch (const stream::Error& error) {
+    require(!error.parts().cause.empty(), "a cause");
+  }
+  return false;
+}
+
+}  // namespace terrace::tools

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Regions and metrics: JSON files, and what the command line takes in their place. The first line
+// says which: "region" or "metric" for a file's text, "box" for a box or BOX:L.
+#include <cmath>
+
+#include <nlohmann/json.hpp>
+
+#include "error.hpp"
+#include "fuzz_target.hpp"
+#include "metric_option.hpp"
+#include "region.hpp"
+#include "terrace/stream/error.hpp"
+
+namespace terrace::tools {
+namespace {
+
+void use(const Region& region) {
+  const stream::Box3& box = region.box();
+  require(!box.empty(), "the box of a region is not empty");
+  for (const Polygon& polygon : region.polygons()) {
+    require(!polygon.empty(), "a polygon has a ring");
+    for (const std::vector<Point2>& ring : polygon) {
+      require(ring.size() >= 3, "a ring has three corners");
+      for (const Point2& p : ring) {
+        require(std::isfinite(p[0]) && std::isfinite(p[1]), "finite corners");
+      }
+    }
+    const Point2& corner = polygon.front().front();
+    static_cast<void>(region.contains({corner[0], corner[1], 0}));
+  }
+  // Far outside there is nothing.
+  require(!region.contains({std::numeric_limits<double>::infinity(), 0, 0}), "nothing at infinity");
+}
+
+void use(const MetricChoice& metric) {
+  if (metric.kind == MetricChoice::Kind::elliptical) {
+    require(!metric.regions.empty(), "an elliptical metric has a region");
+    const std::string text = metric.canonical();
+    const nlohmann::json list =
+        nlohmann::json::parse(text.substr(text.find(':') + 1), nullptr, false);
+    require(list.is_array() && list.size() == metric.regions.size(),
+            "what a store records is JSON");
+  }
+  const cluster::Metric ground = metric.on_ground({1, 2, 3}, {2, 2, 1});
+  const double far = cluster::distance(ground, {0, 0, 0}, {3, 4, 5});
+  require(!(far < 0), "distances are not negative");
+  require(cluster::distance(ground, {1, 1, 1}, {1, 1, 1}) == 0, "a point is at its own place");
+}
+
+}  // namespace
+
+bool accepts(const std::uint8_t* data, std::size_t size) {
+  std::string_view text = text_of(data, size);
+  const std::string_view how = take_line(text);
+  try {
+    if (how == "region") {
+      const MemoryFile file(text);
+      use(Region::parse(file.name()));
+    } else if (how == "metric") {
+      const MemoryFile file(text);
+      use(MetricChoice::parse("elliptical:" + file.name()));
+    } else if (how == "box") {
+      if (text.find_first_not_of("0123456789+-.,eE :top") != std::string_view::npos) return false;
+      if (text.find(':') == std::string_view::npos) {
+        use(Region::parse(std::string(text)));
+      } else {
+        const Focus focus = parse_focus(std::string(text));
+        use(focus.region);
+        require(!focus.level || *focus.level <= 255, "a level");
+      }
+    } else {
+      return false;
+    }
+  } catch (const UsageError&) {
+    return false;
+  } catch (const stream::Error& error) {
+    require(!error.parts().cause.empty(), "a cause");
+    return false;
+  }
+  return true;
+}
+
+}  // namespace terrace::tools

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Runs a fuzz target over the files of a corpus folder, so that the target compiles everywhere and
+// every input that once failed stays tested. A file whose name begins with "good" must be accepted,
+// any other be refused: a target that gives up on everything would find nothing.
+#include <fstream>
+#include <iterator>
+#include <vector>
+
+#include "fuzz_target.hpp"
+
+int main(int argc, char** argv) {
+  std::size_t good = 0, bad = 0, wrong = 0;
+  for (int i = 1; i < argc; ++i) {
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(argv[i])) {
+      if (!entry.is_regular_file()) continue;
+      std::ifstream file(entry.path(), std::ios::binary);
+      const std::vector<char> bytes{std::istreambuf_iterator<char>(file), {}};
+      const bool due = entry.path().filename().string().starts_with("good");
+      const bool accepted = terrace::tools::accepts(
+          reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
+      ++(due ? good : bad);
+      if (accepted == due) continue;
+      std::printf("%s was %s\n", entry.path().c_str(), accepted ? "accepted" : "refused");
+      ++wrong;
+    }
+  }
+  std::printf("%zu good and %zu bad inputs replayed\n", good, bad);
+  return good == 0 || bad == 0 || wrong > 0 ? 1 : 0;
+}
