@@ -112,7 +112,8 @@ Elliptical::Elliptical(const Point3& semi_axes, const LinearMap& axes) : map_{},
   least_scale_ = 1.0 / std::max({semi_axes[0], semi_axes[1], semi_axes[2]});
 }
 
-EllipticalField::EllipticalField(std::vector<Region> regions) : regions_(std::move(regions)) {
+EllipticalField::EllipticalField(std::vector<Region> regions, const std::optional<Frame>& frame)
+    : regions_(std::move(regions)), frame_(frame) {
   for (std::size_t r = 0; r < regions_.size(); ++r) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       if (regions_[r].box.min[axis] <= regions_[r].box.max[axis]) continue;
@@ -124,9 +125,21 @@ EllipticalField::EllipticalField(std::vector<Region> regions) : regions_(std::mo
   }
 }
 
+Point3 EllipticalField::framed(const Point3& position) const {
+  if (!frame_) return position;
+  const LinearMap& m = frame_->map;
+  Point3 out;
+  for (std::size_t i = 0; i < 3; ++i) {
+    out[i] = m[3 * i] * position[0] + m[3 * i + 1] * position[1] + m[3 * i + 2] * position[2] +
+             frame_->offset[i];
+  }
+  return out;
+}
+
 const EllipticalField::Region* EllipticalField::find(const Point3& position) const {
+  const Point3 place = framed(position);
   for (const Region& region : regions_) {
-    if (contains(region.box, position)) return &region;
+    if (contains(region.box, place)) return &region;
   }
   return nullptr;
 }
@@ -142,9 +155,25 @@ double EllipticalField::least_scale(const Point3& position) const {
 }
 
 std::optional<LinearMap> EllipticalField::uniform_in(const Bounds& box) const {
+  // Around the box as it lies in the frame.
+  Bounds around = box;
+  if (frame_ && box.min[0] <= box.max[0]) {
+    around = kEmptyBounds;
+    for (unsigned corner = 0; corner < 8; ++corner) {
+      const Point3 place =
+          framed({corner & 1u ? box.max[0] : box.min[0], corner & 2u ? box.max[1] : box.min[1],
+                  corner & 4u ? box.max[2] : box.min[2]});
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        around.min[axis] = std::min(around.min[axis], place[axis]);
+        around.max[axis] = std::max(around.max[axis], place[axis]);
+      }
+    }
+  }
   for (const Region& region : regions_) {
-    if (separate(region.box, box)) continue;
-    if (contains(region.box, box.min) && contains(region.box, box.max)) return region.metric.map();
+    if (separate(region.box, around)) continue;
+    if (contains(region.box, around.min) && contains(region.box, around.max)) {
+      return region.metric.map();
+    }
     return std::nullopt;
   }
   return kIdentityMap;

@@ -96,6 +96,21 @@ TEST(Metric, ADistanceInAFieldBelongsToTheRegionOfTheFacility) {
   EXPECT_FALSE(field.uniform_in({{-2, 1, 0}, {1, 2, 0}}));
 }
 
+TEST(Metric, TheBoxesOfAFieldMayBeInAnotherFrame) {
+  // A quarter turn, twice as long, and moved: (x, y) is at (3 - 2y, 2x, z) in the frame.
+  const EllipticalField field({{{{1, 0, -1}, {3, 10, 1}}, Elliptical(10.0, 10.0, 0.0, 10.0)}},
+                              EllipticalField::Frame{{0, -2, 0, 2, 0, 0, 0, 0, 1}, {3, 0, 0}});
+  for (double x = -2; x <= 7; x += 0.25) {
+    for (double y = -2; y <= 3; y += 0.25) {
+      const bool inside = y >= 0 && y <= 1 && x >= 0 && x <= 5;
+      EXPECT_EQ(field({x, y, 0})[0], inside ? 0.1 : 1.0) << x << ' ' << y;
+    }
+  }
+  EXPECT_EQ(field.uniform_in({{0, 0, 0}, {5, 1, 0}})->at(0), 0.1);
+  EXPECT_EQ(field.uniform_in({{5.25, 0, 0}, {7, 1, 0}}), kIdentityMap);
+  EXPECT_FALSE(field.uniform_in({{4, 0, 0}, {7, 1, 0}}));
+}
+
 // What a metric declares of itself holds for random points.
 TEST(Metric, DeclarationsHold) {
   std::mt19937_64 random(7);

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "foreign_format.hpp"
 #include "format_geotiff.hpp"
 #include "format_ply.hpp"
 #include "format_xyz.hpp"
@@ -35,8 +36,16 @@ std::string ending_of(const std::string& file) {
   return ending;
 }
 
+[[noreturn]] void refuse(const std::string& file, const ForeignFormat& format) {
+  throw Error({.file = file == kStandardStream ? "standard input" : file,
+               .where = {},
+               .cause = "is " + std::string(format.name) + ", which cannot be read",
+               .remedy = std::string(format.remedy)});
+}
+
 /// By name, else by content, else by ending. A file whose ending is known but whose content is not
-/// goes to the ending's reader, which can say best what is wrong with it.
+/// goes to the ending's reader, which can say best what is wrong with it. Formats that are known
+/// and not read are refused by content first too, as some of them look like text.
 const Format& format_of(const std::string& file, const SourceOptions& options) {
   if (!options.format.empty()) {
     for (const Format& format : formats()) {
@@ -48,6 +57,9 @@ const Format& format_of(const std::string& file, const SourceOptions& options) {
                  .remedy = "known are " + known_formats()});
   }
   const std::vector<char> head = peek_head(file, kHeadBytes);
+  if (const auto* foreign = foreign_format_of_content({head.data(), head.size()})) {
+    refuse(file, *foreign);
+  }
   for (const Format& format : formats()) {
     if (format.recognise(std::as_bytes(std::span(head)))) return format;
   }
@@ -56,6 +68,8 @@ const Format& format_of(const std::string& file, const SourceOptions& options) {
     const auto& known = format.endings;
     if (std::find(known.begin(), known.end(), ending) != known.end()) return format;
   }
+  const ForeignFormat* const foreign = foreign_format_of_ending(ending);
+  if (foreign != nullptr && !head.empty()) refuse(file, *foreign);
   throw Error(
       {.file = file,
        .where = {},

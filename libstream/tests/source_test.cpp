@@ -69,6 +69,69 @@ TEST_F(Source, RefusesWhatItDoesNotKnow) {
   EXPECT_NE(refusal({folder_.path().string()}).find("is a folder"), std::string::npos);
 }
 
+TEST_F(Source, NamesFormatsThatItDoesNotReadAndWhatToDo) {
+  using std::string_literals::operator""s;
+  const auto las = [](char point_type) {
+    std::string header = "LASF" + std::string(100, '\0') + point_type + std::string(300, '\0');
+    return header;
+  };
+  std::string copc = las('\x86');
+  copc.replace(377, 4, "copc");
+  std::string tar(512, '\0');
+  tar.replace(257, 5, "ustar");
+  std::string geopackage = "SQLite format 3" + std::string(85, '\0');
+  geopackage.replace(68, 4, "GPKG");
+  const std::vector<std::array<std::string, 3>> by_content{
+      {las('\x03'), "is LAS,", "pdal translate"},
+      {las('\x83'), "is LAZ", "pdal translate"},
+      {las('\x46'), "is LAZ", "pdal translate"},
+      {copc, "is COPC", "pdal translate"},
+      {"ASTM-E57\1\0"s, "is E57", "PLY"},
+      {"# .PCD v0.7\nFIELDS x y z\n", "is PCD", "pcl_pcd2ply"},
+      {"NCOLS 3\nNROWS 2\n1 2 3\n4 5 6\n", "ESRI ASCII grid", "gdal_translate"},
+      {"\x89HDF\r\n\x1a\n"s, "HDF5", "gdalinfo"},
+      {"CDF\1"s, "NetCDF", "gdal_translate"},
+      {"\0\0\0\x0cjP  \r\n"s, "JPEG 2000", "gdal_translate"},
+      {"\x89PNG\r\n\x1a\n"s, "PNG", "GeoTIFF"},
+      {"\0\0\x27\x0a\0\0\0\0"s, "shapefile", "ogr2ogr"},
+      {geopackage, "GeoPackage", "gdal_translate"},
+      {"\n<!DOCTYPE HTML>", "HTML", "download"},
+      {"glTF\2\0\0\0"s, "glTF", "PLY"},
+      {"solid cube\nfacet normal 0 0 1\n", "is STL", "PLY"},
+      {"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n", "is OFF", "PLY"},
+      {"\x1f\x8b\x08\0"s, "gzip", "gzip -dk"},
+      {"\xfd"
+       "7zXZ\0"s,
+       "by xz", "xz -dk"},
+      {"\x28\xb5\x2f\xfd"s, "zstd", "zstd -d"},
+      {"PK\3\4", "zip archive", "unzip"},
+      {"7z\xbc\xaf\x27\x1c", "7z archive", "7z x"},
+      {tar, "tar archive", "tar xf"},
+      {"version https://git-lfs.github.com/spec/v1\n", "Git LFS", "git lfs pull"}};
+  for (const auto& [content, name, remedy] : by_content) {
+    // Whatever it is called.
+    for (const char* file : {"a.tif", "b.xyz", "noending"}) {
+      const std::string text = refusal({put(file, content)});
+      EXPECT_NE(text.find(name), std::string::npos) << text;
+      EXPECT_NE(text.find(remedy), std::string::npos) << text;
+    }
+  }
+  const std::string binary("\1\2\3\4\0\0", 6);
+  for (const auto& [file, name] :
+       std::vector<std::pair<std::string, std::string>>{{"N46E008.HGT", "SRTM .hgt"},
+                                                        {"b.stl", "is STL"},
+                                                        {"c.laz", "is LAZ"},
+                                                        {"d.img", "ERDAS"},
+                                                        {"e.gltf", "glTF"},
+                                                        {"f.geojson", "GeoJSON"},
+                                                        {"g.obj", "OBJ"}}) {
+    const std::string text = refusal({put(file, binary)});
+    EXPECT_NE(text.find(name), std::string::npos) << text;
+  }
+  // What can be read is read, whatever its name says.
+  EXPECT_EQ(read_all({put("h.laz", "1 2 3\n")}).info.format, "xyz");
+}
+
 TEST_F(Source, ChainsFilesOfOneFormat) {
   const std::vector<std::string> files{put("1.xyz", "1 2 3 4\n5 6 7 8\n"), put("2.xyz", "9 9 9 9"),
                                        put("3.xyz", "# c\n0 0 0 0\n")};

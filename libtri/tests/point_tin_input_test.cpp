@@ -32,6 +32,28 @@ TEST(PointTin, Duplicates) {
     EXPECT_EQ(tin.sample[4], 4u);
     EXPECT_EQ(tin.errors.largest, 0);
   }
+  // All count: one of them is the vertex, and the other is measured there.
+  options.duplicates = PointDuplicates::kAll;
+  for (const TinQuality quality :
+       {TinQuality::kGreedy, TinQuality::kRemoval, TinQuality::kFitted}) {
+    options.quality = quality;
+    options.max_error = 5;
+    const PointTin close = make(cloud, {}, options);
+    EXPECT_EQ(close.duplicates, 2u);
+    EXPECT_EQ(close.duplicate_range, 5);
+    EXPECT_EQ(close.errors.covered, 6u);
+    EXPECT_LE(close.errors.largest, 5);
+    EXPECT_EQ(close.stuck, 0u);
+    EXPECT_LE(measure_surface(cloud.x, cloud.y, cloud.z, close.vertices, close.triangles).largest,
+              5);
+    options.max_error = 1;
+    const PointTin apart = make(cloud, {}, options);
+    EXPECT_EQ(apart.stuck, 1u);
+    EXPECT_GE(apart.errors.largest, 2.5);
+    EXPECT_EQ(measure_surface(cloud.x, cloud.y, cloud.z, apart.vertices, apart.triangles).largest,
+              apart.errors.largest);
+  }
+  options = {};
   options.duplicates = PointDuplicates::kError;
   try {
     make(cloud, {}, options);

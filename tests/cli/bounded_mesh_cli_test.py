@@ -114,6 +114,7 @@ class Raster:
                     largest = max(largest, abs(height - self.heights[place]))
         for x, y, _ in places:
             box = [min(box[0], x), min(box[1], y), max(box[2], x), max(box[3], y)]
+        self.covered = covered
         missed = sum(1 for row in range(self.rows) for column in range(self.columns)
                      if not covered[row * self.columns + column] and self.inner(column, row))
         return largest, missed, twice_area
@@ -266,6 +267,8 @@ class BoundedMeshTest(unittest.TestCase):
                 self.assertLessEqual(largest, 4 * (1 + 1e-9))
                 self.assertEqual(missed, 0)
                 self.assertEqual(summary['samples'], columns * rows - heights.count(NODATA))
+                self.assertEqual(summary['covered'], sum(raster.covered))
+                self.assertEqual(summary['covered'] + summary['uncovered'], summary['samples'])
         # The shores need many points at any error.
         self.refuse(1, 'too few', 'mesh', store, '-o', self.path('none.obj'), '--max-points', 9)
         self.assertFalse(os.path.exists(self.path('none.obj')))
@@ -274,6 +277,8 @@ class BoundedMeshTest(unittest.TestCase):
                 summary, out = self.mesh(store, 'filled.obj', '--max-error', 4, '--fill', fill)
                 vertices, faces = read_obj(out)
                 self.assertLessEqual(summary['max_error'], 4)
+                self.assertEqual((summary['covered'], summary['uncovered']),
+                                 (summary['samples'], 0))
                 area = sum((vertices[b][0] - vertices[a][0]) * (vertices[c][1] - vertices[a][1]) -
                            (vertices[c][0] - vertices[a][0]) * (vertices[b][1] - vertices[a][1])
                            for a, b, c in faces) / 2
@@ -281,6 +286,118 @@ class BoundedMeshTest(unittest.TestCase):
                 low, high = min(v[2] for v in vertices), max(v[2] for v in vertices)
                 self.assertGreaterEqual(low, 179)
                 self.assertLessEqual(high, 330)
+
+    def test_samples_on_no_triangle_are_counted_and_said(self):
+        """Beside voids, on the sides of windows too, and with a region that is no box."""
+        noise = random.Random(6)
+        heights = list(self.raster.heights)
+        for row in range(self.ROWS):
+            for column in range(self.COLUMNS):
+                # The sides of the four windows are near the middle.
+                near = min(abs(column - self.COLUMNS // 2), abs(row - self.ROWS // 2)) < 4
+                hole = math.hypot(column - 300, row - 200) < 90
+                if noise.random() < (0.3 if near else 0.0005) or hole:
+                    heights[row * self.COLUMNS + column] = NODATA
+        raster = Raster(self.COLUMNS, self.ROWS, heights)
+        write_tiff(self.path('holes.tif'), self.COLUMNS, self.ROWS, heights)
+        store = self.build('holes.tif')
+        out = self.path('holes.obj')
+        summary, _ = self.mesh(store, 'holes.obj', '--max-error', 3)
+        raster.measure(*read_obj(out))
+        self.assertEqual(summary['samples'], len(heights) - heights.count(NODATA))
+        self.assertEqual(summary['covered'], sum(raster.covered))
+        self.assertEqual(summary['covered'] + summary['uncovered'], summary['samples'])
+        self.assertGreater(summary['uncovered'], 1000)
+        text = terrace('mesh', store, '-o', out, '--max-error', 3, '--force').stderr
+        self.assertIn(f"of {summary['covered']:,} of {summary['samples']:,} samples", text)
+        self.assertIn(f"{summary['uncovered']:,} samples lie on no triangle", text)
+        self.assertNotIn('of all', text)
+
+        triangle = [(100.25, 90.25), (1000.25, 300.25), (350.25, 700.25)]  # columns and rows
+        ring = [[WEST + (c + 0.5) * CELL, NORTH - (r + 0.5) * CELL] for c, r in triangle]
+        with open(self.path('part.geojson'), 'w') as file:
+            json.dump({'type': 'Polygon', 'coordinates': [ring + ring[:1]]}, file)
+        summary, _ = self.mesh(store, 'holes.obj', '--max-error', 3, '--region',
+                               self.path('part.geojson'))
+        raster.measure(*read_obj(out))
+        inside = set()
+        for row in range(self.ROWS):
+            for column in range(self.COLUMNS):
+                turns = [(bx - ax) * (row - ay) - (column - ax) * (by - ay) > 0
+                         for (ax, ay), (bx, by) in zip(triangle, triangle[1:] + triangle[:1])]
+                if len(set(turns)) == 1 and raster.valid(column, row):
+                    inside.add(row * self.COLUMNS + column)
+        self.assertEqual(summary['samples'], len(inside))
+        self.assertEqual(summary['covered'], sum(raster.covered[i] for i in inside))
+        self.assertEqual(summary['uncovered'], len(inside) - summary['covered'])
+        self.assertGreater(summary['uncovered'], 100)
+
+    def test_several_samples_at_one_place(self):
+        """As in all laser data: each is within the bound, or the error says what can be done."""
+        noise = random.Random(7)
+        points = []
+        for _ in range(3000):
+            x, y = noise.randrange(4000) / 10, noise.randrange(3000) / 10
+            z = 20 * math.sin(x / 60) * math.cos(y / 50)
+            points.append((x, y, z))
+            if noise.random() < 0.3:
+                points.extend((x, y, z + noise.uniform(0, 0.7)) for _ in range(noise.randrange(3)))
+
+        def build(name, points):
+            with open(self.path(name + '.xyz'), 'w') as file:
+                file.writelines(f'{x!r} {y!r} {z!r}\n' for x, y, z in points)
+            return self.build(name + '.xyz')
+
+        def largest_error(vertices, faces):
+            largest, covered = 0.0, 0
+            for x, y, z in points:
+                found = None
+                for a, b, c in faces:
+                    (ax, ay, az), (bx, by, bz), (cx, cy, cz) = vertices[a], vertices[b], vertices[c]
+                    u = (bx - x) * (cy - y) - (cx - x) * (by - y)
+                    v = (cx - x) * (ay - y) - (ax - x) * (cy - y)
+                    w = (ax - x) * (by - y) - (bx - x) * (ay - y)
+                    if u >= -1e-9 and v >= -1e-9 and w >= -1e-9:
+                        found = (u * az + v * bz + w * cz) / (u + v + w)
+                        break
+                if found is not None:
+                    covered += 1
+                    largest = max(largest, abs(found - z))
+            return largest, covered
+
+        store = build('pulses', points)
+        summary, out = self.mesh(store, 'pulses.obj', '--max-error', 1)
+        largest, covered = largest_error(*read_obj(out))
+        self.assertEqual((summary['samples'], covered), (len(points), len(points)))
+        self.assertEqual((summary['covered'], summary['uncovered']), (covered, 0))
+        self.assertEqual(summary['duplicates'], len(points) - len({p[:2] for p in points}))
+        self.assertLessEqual(largest, 1 + 1e-9)
+        self.assertAlmostEqual(summary['max_error'], largest, places=6)
+        text = terrace('mesh', store, '-o', out, '--max-error', 1, '--force').stderr
+        self.assertIn(f"within {math.ceil(summary['max_error'] * 1000) / 1000:g} m of all "
+                      f"{len(points):,} samples", text)
+        self.assertIn(f"{summary['duplicates']:,} samples share the place of another: the bound "
+                      "holds for each", text)
+        # GLB rounds, which does not matter to the check.
+        self.assertLessEqual(self.mesh(store, 'pulses.glb', '--max-error', 1)[0]['max_error'], 1)
+        text = terrace('mesh', store, '-o', out, '--max-error', 1, '--force', '--duplicates',
+                       'max').stderr
+        self.assertIn('the bound holds for the highest of each place', text)
+        self.assertEqual(self.mesh(store, 'pulses.obj', '--max-points', 200)[0]['uncovered'], 0)
+        self.refuse(2, '--max-error', 'mesh', store, '-o', out, '--force', '--max-points', 200,
+                    '--duplicates', 'all')
+
+        # A tree and the ground below it.
+        x, y, z = points[0]
+        store = build('tree', points + [(x, y, z + 17.25)])
+        result = terrace('mesh', store, '-o', self.path('tree.obj'), '--max-error', 1)
+        self.assertEqual(result.returncode, 1, result.stderr)
+        places = collections.Counter(p[:2] for p in points + [(x, y, z)])
+        count = sum(1 for times in places.values() if times > 1)
+        self.assertIn(f'{count} places have several samples', result.stderr)
+        self.assertRegex(result.stderr, r'differ by up to 1[78]\.?\d* m \(at ')
+        self.assertIn('--duplicates min, max, mean or first', result.stderr)
+        self.assertFalse(os.path.exists(self.path('tree.obj')))
 
     def test_irregular_points(self):
         noise = random.Random(4)
@@ -301,8 +418,9 @@ class BoundedMeshTest(unittest.TestCase):
             file.write('500 400 10\n500 400 20\n')
         store = self.path('twice.terrace')
         self.assertEqual(terrace('build', self.path('points.xyz'), '-o', store).returncode, 0)
-        self.refuse(1, '--duplicates', 'mesh', store, '-o', self.path('twice.obj'),
-                    '--max-error', 1)
+        for duplicates in ((), ('--duplicates', 'error')):
+            self.refuse(1, '--duplicates', 'mesh', store, '-o', self.path('twice.obj'),
+                        '--max-error', 1, *duplicates)
         summary, _ = self.mesh(store, 'twice.obj', '--max-error', 1, '--duplicates', 'max')
         self.assertEqual(summary['duplicates'], 1)
         self.refuse(2, '--fill', 'mesh', store, '-o', self.path('none.obj'), '--max-error', 1,

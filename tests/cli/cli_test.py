@@ -8,7 +8,10 @@ TERRACE=path/to/terrace cli_test.py [CLASS...]
 import array
 import fcntl
 import json
+import math
 import os
+import random
+import re
 import resource
 import shutil
 import signal
@@ -202,6 +205,35 @@ class ErrorTest(CommandTest):
                     self.assert_one_line_error(result, 1)
                     self.assertIn(name, result.stderr)
         self.assertEqual(sorted(os.listdir(self.folder)), sorted(cases))
+
+    def test_formats_that_are_not_read_are_named_with_what_to_do(self):
+        las = b'LASF' + bytes(100) + b'%c' + bytes(300)
+        for content, name, remedy in (
+                (las % 3, 'is LAS,', 'pdal translate'), (las % 0x83, 'is LAZ ', 'pdal translate'),
+                (b'ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2\n3 4\n',
+                 'ESRI ASCII grid', 'gdal_translate'),
+                (b'\x89HDF\r\n\x1a\n', 'HDF5', 'gdalinfo'), (b'PK\x03\x04', 'zip', 'unzip'),
+                (b'\x28\xb5\x2f\xfd', 'zstd', 'zstd -d'), (b'solid a\n', 'STL', 'PLY')):
+            path = self.path('file')
+            with open(path, 'wb') as file:
+                file.write(content)
+            for args in (('info', path), ('build', path, '-o', self.path('a.terrace')),
+                         ('render', path, '-o', self.path('a.png')),
+                         ('cluster', path, '-o', self.path('a.ply')),
+                         ('convert', path, '-o', self.path('a.ply'))):
+                result = terrace(*args)
+                self.assert_one_line_error(result, 1)
+                self.assertIn(name, result.stderr, args)
+                self.assertIn(remedy, result.stderr, args)
+            result = subprocess.run([TERRACE, 'info', '-'], input=content, capture_output=True)
+            self.assertEqual(result.returncode, 1)
+            self.assertIn(name.encode(), result.stderr)
+        with open(self.path('N46E008.hgt'), 'wb') as file:
+            file.write(bytes(range(256)) * 8)
+        result = terrace('info', self.path('N46E008.hgt'))
+        self.assert_one_line_error(result, 1)
+        self.assertIn('SRTM', result.stderr)
+        self.assertIn('gdal_translate', result.stderr)
 
     def test_existing_output(self):
         out = self.path('a.xyz')
@@ -501,7 +533,130 @@ class InfoTest(CommandTest):
         self.assertEqual(result.stderr, '')
 
 
+class NumbersTest(CommandTest):
+    def test_numbers_for_people_are_rounded_and_those_for_programs_are_not(self):
+        noise = random.Random(2)
+        with open(self.path('cloud.xyz'), 'w') as file:
+            for _ in range(3000):
+                x, y = noise.uniform(0, 90), noise.uniform(0, 70)
+                file.write(f'{x!r} {y!r} {10 * math.sin(x / 9) + y / 7!r}\n')
+        with open(self.path('places.csv'), 'w') as file:
+            file.write('x,y,z\n')
+            file.writelines(f'{noise.uniform(5, 60)!r},{noise.uniform(5, 60)!r},0\n'
+                            for _ in range(40))
+        dem, store, cloud = self.path('dem.tif'), self.path('dem.store'), self.path('cloud.store')
+        runs = [
+            ('synth', 'dem', '--size', '700x300', '--type', 'float32', '-o', dem),
+            ('synth', 'uniform', '--points', 500, '-o', self.path('some.ply')),
+            ('build', dem, '-o', store), ('build', self.path('cloud.xyz'), '-o', cloud),
+            ('build', dem, '-o', self.path('dry.store'), '--dry-run'),
+            ('info', dem), ('info', store), ('info', cloud), ('info', self.path('cloud.xyz')),
+            ('verify', store),
+            ('points', store, '--level', 1, '-o', self.path('points.ply')),
+            ('mesh', store, '--level', 1, '-o', self.path('mesh.ply')),
+            ('mesh', store, '--max-error', 2.7, '-o', self.path('bounded.ply')),
+            ('mesh', cloud, '--max-error', 0.123456, '-o', self.path('bounded.ply')),
+            ('mesh', store, '--max-points', 300, '-o', self.path('few.ply')),
+            ('mesh', store, '--smooth', 'taubin', '-o', self.path('smooth.ply'),
+             '--save-overlay', self.path('overlay')),
+            ('surface', cloud, '-o', self.path('surface.ply')),
+            ('tile', store, '--vertical', 'ignore', '--zoom', '0-10', '-o', self.path('tiles')),
+            ('verify', self.path('tiles'), '--store', store, '--vertical', 'ignore'),
+            ('verify', self.path('tiles')),
+            ('sample', cloud, '--points', self.path('places.csv'), '-o', self.path('heights.csv')),
+            ('raster', store, '--value', 'slope', '-o', self.path('slope.tif')),
+            ('contour', store, '--interval', 50, '-o', self.path('lines.geojson')),
+            ('profile', cloud, '--line', '3.123,4,71.7,61.9', '-o', self.path('profile.csv')),
+            ('cluster', self.path('cloud.xyz'), '-o', self.path('clusters.ply')),
+            ('cluster', self.path('cloud.xyz'), '--method', 'k-means', '-k', 9, '-o',
+             self.path('means.ply')),
+            ('match', self.path('places.csv'), '-o', self.path('pairs.csv')),
+            ('match', self.path('places.csv'), '--tree', '-o', self.path('tree.csv')),
+            ('render', dem, '--view', '200,40', '-o', self.path('dem.png'), '--size', '90x60'),
+            ('render', self.path('tree.csv'), '--points', self.path('places.csv'), '-o',
+             self.path('tree.png'), '--size', '90x60'),
+            ('convert', self.path('cloud.xyz'), '-o', self.path('cloud.csv')),
+        ]
+        digits = re.compile(r'(?<![\w.])-?\d[\d,]*(?:\.\d+)?(?:e[+-]?\d+)?')
+        for args in runs:
+            with self.subTest(args[:3]):
+                result = self.run_ok(*args, '--force')
+                text = (result.stdout + result.stderr).replace(self.folder, '')
+                self.assertTrue(text)
+                self.assertNotRegex(text, r'\d[eE][+-]?\d')
+                for number in digits.findall(text):
+                    significant = number.replace(',', '').replace('.', '').lstrip('-0')
+                    whole = number.split('.')[0]
+                    # Coordinates have ten digits, heights and totals six, all others four.
+                    most = 10 if args[0] == 'info' else 6
+                    if '.' in number:
+                        self.assertLessEqual(len(significant), most, f'{number} in: {text}')
+                    elif args[0] != 'info' and len(whole.replace(',', '')) > 4:
+                        self.assertIn(',', whole, text)
+        exact = self.json_of('mesh', cloud, '--max-error', 0.123456, '-o', self.path('b.ply'))
+        self.assertGreater(len(repr(exact['max_error'])), 10)
+        shown = self.run_ok('mesh', cloud, '--max-error', 0.123456, '-o', self.path('c.ply')).stderr
+        bound = float(re.search(r'within ([\d.]+) m', shown)[1])
+        self.assertLessEqual(exact['max_error'], bound)
+        self.assertLess(bound, exact['max_error'] + 0.001)
+
+
 class RenderTest(CommandTest):
+    def test_colours_are_of_the_area_shown(self):
+        """A mesh that is fine in one place is coloured as the same surface without fine places."""
+        def write(path, fine):
+            vertices, faces = [], []
+
+            def grid(x0, y0, x1, y1, cells, height):
+                first = len(vertices)
+                for row in range(cells + 1):
+                    for column in range(cells + 1):
+                        x, y = x0 + (x1 - x0) * column / cells, y0 + (y1 - y0) * row / cells
+                        vertices.append((x, y, height(x, y)))
+                for row in range(cells):
+                    for column in range(cells):
+                        a = first + row * (cells + 1) + column + 1
+                        b = a + cells + 1
+                        faces.extend(((a, a + 1, b + 1), (a, b + 1, b)))
+
+            # A long slope, of which the upper end is fine.
+            grid(0, 0, 90, 100, 10, lambda x, y: x)
+            grid(90, 0, 100, 100, fine, lambda x, y: x)
+            with open(path, 'w') as file:
+                file.writelines('v %r %r %r\n' % v for v in vertices)
+                file.writelines('f %d %d %d\n' % f for f in faces)
+
+        pictures = []
+        for fine in (1, 150):
+            write(self.path('slope.obj'), fine)
+            self.run_ok('render', self.path('slope.obj'), '-o', self.path('a.png'), '--size',
+                        '100x100', '--color', 'height', '--force', '--exaggerate', 0.001)
+            pictures.append(png_pixels(self.path('a.png'))[2])
+        even, dense = ([rows[50][3 * x:3 * x + 3] for x in (10, 30, 50, 70, 85)]
+                       for rows in pictures)
+        for a, b in zip(even, dense):
+            self.assertLess(max(abs(p - q) for p, q in zip(a, b)), 12, (even, dense))
+        # From the valley's green to the mountains' grey.
+        self.assertGreater(max(abs(p - q) for p, q in zip(even[0], even[-1])), 30)
+
+    def test_colours_of_a_cloud_are_of_the_area_shown(self):
+        noise = random.Random(3)
+        with open(self.path('cloud.xyz'), 'w') as file:
+            for _ in range(60000):
+                x, y = noise.uniform(0, 100), noise.uniform(0, 100)
+                file.write(f'{x!r} {y!r} {x!r}\n')
+        store = self.path('cloud.store')
+        self.run_ok('build', self.path('cloud.xyz'), '-o', store, '--block', 1000, '--z-weight', 0)
+        pictures = []
+        for options in ([], ['--focus', '90,0,100,100:0']):
+            self.run_ok('render', store, '-o', self.path('a.png'), '--size', '100x100', '--color',
+                        'height', '--force', '--exaggerate', 0.001, *options)
+            pictures.append(png_pixels(self.path('a.png'))[2])
+        even, dense = ([sum(rows[y][3 * x] for y in range(20, 80)) / 60 for x in (20, 40, 60, 80)]
+                       for rows in pictures)
+        for a, b in zip(even, dense):
+            self.assertLess(abs(a - b), 30, (even, dense))
+
     def test_slope_to_the_light_is_brighter(self):
         # A roof: its north-western side is lit, the other in shadow.
         with open(self.path('roof.obj'), 'w') as file:

@@ -73,6 +73,21 @@ class ScanTest(unittest.TestCase):
         # A mesh has the same points.
         self.assertEqual(self.mesh_points('--level', 'top', '--focus', focus), found)
 
+    def test_a_focus_without_a_level_starts_from_the_top(self):
+        focus = ('--focus', '0,0,0,11,11,11:0')
+        top = self.points('--level', 'top', *focus)
+        self.assertLess(len(top), POINTS // 3)
+        self.assertEqual(self.points(*focus), top)
+        self.assertEqual(self.mesh_points(*focus), top)
+        summary = json.loads(self.run_ok('surface', self.store, '-o', self.path('focus.ply'),
+                                         '--json', '--force', *focus))
+        self.assertEqual(summary['vertices'], len(top))
+        summary, _ = self.picture(*focus)
+        self.assertEqual(summary['vertices'], len(top))
+        # Without a focus, or with a level, it is as it was.
+        self.assertEqual(len(self.points()), POINTS)
+        self.assertEqual(self.points('--level', 0, *focus), self.points())
+
     def test_focuses_of_several_levels_lie_in_each_other(self):
         focuses = ['--focus', '0,0,0,11,11,11:0', '--focus', '-11,-11,0,11,11,11:1']
         one = self.points('--level', 1)

@@ -10,9 +10,12 @@ import itertools
 import json
 import math
 import os
+import random
 import subprocess
 import tempfile
 import unittest
+
+from tile_case import utm, write_tiff
 
 TERRACE = os.environ.get('TERRACE', 'terrace')
 SIZE = 600
@@ -209,6 +212,75 @@ class StoreTest(unittest.TestCase):
 
         self.assertGreater(east(changed), east(plain - slanted) + 0.3)
         self.expect_error(2, 'mesh', self.store, '-o', self.path('none.ply'), '--metric', 'squared')
+
+    def test_a_metric_clusters_its_boxes_alone_in_the_crs(self):
+        """Under a projection whose scale depends on the direction, and for a turned raster."""
+        columns, rows, cell = 500, 500, 2048.0
+        noise = random.Random(1)
+        heights = [noise.uniform(0, 100) for _ in range(columns * rows)]
+        # Lambert's equal-area projection of Europe, 3,000 km off its centre: what is true to scale
+        # in x and y is 3 % longer along one diagonal than along the other.
+        laea = (1, 1, 0, 3, 1024, 0, 1, 1, 1025, 0, 1, 1, 3072, 0, 1, 3035)
+        turned = [0.6 * cell, 0.8 * cell, 0, 6.5e6, 0.8 * cell, -0.6 * cell, 0, 2.2e6,
+                  0, 0, 0, 0, 0, 0, 0, 1]
+        for name, keys, west, north, matrix in (('utm', utm(32), 0, 5.2e6, None),
+                                                ('laea', laea, 6.5e6, 2.2e6, None),
+                                                ('turned', laea, 6.5e6, 2.2e6, turned)):
+            with self.subTest(name):
+                dem, regions = self.path(f'{name}.tif'), self.path(f'{name}.json')
+                if matrix:
+                    write_tiff(dem, columns, rows, heights, 0, 0, cell, keys, matrix)
+                else:
+                    write_tiff(dem, columns, rows, heights, west, north, cell, keys)
+                m = matrix or [cell, 0, 0, west, 0, -cell, 0, north]
+
+                def place(column, row):
+                    column, row = column + 0.5, row + 0.5
+                    return (m[0] * column + m[1] * row + m[3], m[4] * column + m[5] * row + m[7])
+
+                # A box in the CRS about a place far from the raster's corner, 160 cells wide.
+                middle = place(380.3, 380.3)
+                half = 80 * cell
+                box = [middle[0] - half, middle[1] - half, middle[0] + half, middle[1] + half]
+                with open(regions, 'w') as file:
+                    json.dump({'regions': [{'box': box, 'semi_axes': [3, 3, 3]}]}, file)
+                counts = []
+                levels = []
+                for metric in ('euclidean', f'elliptical:{regions}'):
+                    store = self.path(f'{name}.terrace')
+                    self.run_ok('build', dem, '-o', store, '--force', '--metric', metric,
+                                '--facility-cost', 0.1, '--z-weight', 0)
+                    text = self.run_ok('points', store, '--level', 1, '-o', '-')
+                    points = {tuple(map(float, line.split()[:2])) for line in text.splitlines()}
+                    levels.append(points)
+                    # Inside and outside, in strips along the four sides.
+                    count = {}
+                    for x, y in points:
+                        off = [(x - middle[0]) / half, (y - middle[1]) / half]
+                        far = max(map(abs, off))
+                        axis = 0 if abs(off[0]) == far else 1
+                        side = (axis, off[axis] > 0)
+                        if 0.81 < far < 0.99:
+                            count[side, 'in'] = count.get((side, 'in'), 0) + 1
+                        elif 1.08 < far < 1.25:
+                            count[side, 'out'] = count.get((side, 'out'), 0) + 1
+                    counts.append(count)
+                plain, wider = counts
+                self.assertEqual(len(plain), 8)
+                for side, where in plain:
+                    share = wider[side, where] / plain[side, where]
+                    # A third of the distance takes 3^(-2/3) as many clusters.
+                    if where == 'in':
+                        self.assertLess(share, 0.7, side)
+                    else:
+                        self.assertGreater(share, 0.85, side)
+                # What is in blocks that do not meet the box stays as it is.
+                far = 225 * cell
+                apart = [{p for p in points
+                          if max(abs(p[0] - middle[0]), abs(p[1] - middle[1])) > far}
+                         for points in levels]
+                self.assertGreater(len(apart[0]), 3000)
+                self.assertEqual(*apart)
 
     def test_levels_that_are_not_there_are_wrong_usage(self):
         self.assertIn('top', self.expect_error(2, 'mesh', self.store, '--level', 9, '-o',

@@ -130,6 +130,69 @@ TEST_F(PointMesh, OfPointsOnOneLineIsEmpty) {
     EXPECT_EQ(result.triangles, 0U);
     EXPECT_EQ(result.vertices, 0U);
     EXPECT_EQ(result.samples, line.size());
+    EXPECT_EQ(result.uncovered, line.size());
+  }
+}
+
+TEST_F(PointMesh, KeepsAllSamplesOfAPlaceWithinTheBound) {
+  // Three samples at a place, in the plane's every part: inside, at the hull's corners and on its
+  // sides. Heights differ by up to `apart`.
+  for (const double apart : {0.0, 0.4, 0.9}) {
+    SCOPED_TRACE(apart);
+    Random random(11);
+    Cloud cloud = lattice(40, 40, 0, 0, 1, everywhere);
+    for (const stream::Point3& p : uniform(1500, 12, 39)) cloud.push_back(p);
+    const std::size_t places = cloud.size();
+    for (std::size_t i = 0; i < places; ++i) {
+      for (int k = 0; k < 2; ++k) {
+        cloud.push_back({cloud[i][0], cloud[i][1], cloud[i][2] + random(0, apart)});
+      }
+    }
+    const stream::Store store = build(cloud);
+    std::vector<double> x, y, z;
+    for (const stream::Point3& p : cloud) {
+      x.push_back(p[0]);
+      y.push_back(p[1]);
+      z.push_back(p[2]);
+    }
+    for (const auto quality :
+         {tri::TinQuality::kGreedy, tri::TinQuality::kRemoval, tri::TinQuality::kFitted}) {
+      for (const std::size_t window : {400U, 1U << 20}) {
+        SCOPED_TRACE(window);
+        auto wanted = options(1.0, window);
+        wanted.quality = quality;
+        const auto result = bounded_point_mesh(store, wanted, common(2));
+        EXPECT_EQ(result.samples, cloud.size());
+        EXPECT_EQ(result.uncovered, 0U);
+        EXPECT_EQ(result.duplicates, 2 * places);
+        const tools::TriangleMesh mesh = tools::read_mesh_file(wanted.path)->mesh;
+        const tri::TinErrors errors = tri::measure_surface(x, y, z, mesh.positions, mesh.triangles);
+        EXPECT_EQ(errors.covered, cloud.size());
+        EXPECT_LE(errors.largest, 1.0 + 1e-9);
+        EXPECT_NEAR(errors.largest, result.max_error, 1e-9);
+        EXPECT_LT(result.vertices, places);
+      }
+    }
+  }
+}
+
+TEST_F(PointMesh, RefusesSamplesOfAPlaceThatAreFartherApartThanTheBound) {
+  Cloud cloud = uniform(3000, 13);
+  for (const std::size_t i : {5U, 2000U}) cloud.push_back(cloud[i]);
+  cloud.push_back({cloud[7][0], cloud[7][1], cloud[7][2] + 12.5});
+  const stream::Store store = build(cloud);
+  for (const std::size_t window : {400U, 1U << 20}) {
+    try {
+      bounded_point_mesh(store, options(1.0, window), common(2));
+      FAIL();
+    } catch (const stream::Error& error) {
+      EXPECT_NE(error.parts().cause.find("3 places have several samples, whose heights differ by "
+                                         "up to 12.5 m"),
+                std::string::npos)
+          << error.what();
+      EXPECT_NE(error.parts().remedy.find("--duplicates"), std::string::npos);
+    }
+    EXPECT_LE(bounded_point_mesh(store, options(12.5, window), common()).max_error, 12.5);
   }
 }
 
@@ -142,7 +205,9 @@ TEST_F(PointMesh, TakesOneHeightPerPlaceAsAsked) {
     for (const stream::Point3& p : places) cloud.push_back({p[0], p[1], p[2] + up});
   }
   const stream::Store store = build(cloud);
-  EXPECT_THROW(bounded_point_mesh(store, options(1.0, 500), common()), stream::Error);
+  auto none = options(1.0, 500);
+  none.duplicates = tri::PointDuplicates::kError;
+  EXPECT_THROW(bounded_point_mesh(store, none, common()), stream::Error);
   const std::vector<std::pair<tri::PointDuplicates, double>> rules{
       {tri::PointDuplicates::kMin, 0.0},
       {tri::PointDuplicates::kMax, 0.5},

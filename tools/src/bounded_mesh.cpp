@@ -39,8 +39,8 @@ double aim_within(double bound, const stream::MeshRounding& rounding, const std:
   if (!(aim >= 0.0)) {
     throw stream::Error({.file = path,
                          .where = {},
-                         .cause = "its format rounds heights by up to " + number_text(moved[2]) +
-                                  ", too much for this --max-error",
+                         .cause = "its format rounds heights by up to " +
+                                  readable_number(moved[2]) + ", too much for this --max-error",
                          .remedy = "write PLY, which is exact"});
   }
   return aim;
@@ -55,8 +55,9 @@ tri::TinQuality parse_quality(const std::string& text) {
 }
 
 tri::PointDuplicates parse_duplicates(const std::string& text) {
-  constexpr std::array<std::pair<std::string_view, tri::PointDuplicates>, 5> kChoices{
-      {{"min", tri::PointDuplicates::kMin},
+  constexpr std::array<std::pair<std::string_view, tri::PointDuplicates>, 6> kChoices{
+      {{"all", tri::PointDuplicates::kAll},
+       {"min", tri::PointDuplicates::kMin},
        {"max", tri::PointDuplicates::kMax},
        {"mean", tri::PointDuplicates::kMean},
        {"first", tri::PointDuplicates::kFirst},

@@ -33,7 +33,7 @@ tri::TinQuality parse_quality(const std::string& text);
 /// by what they are rounded by, and a little with the places. Throws: stream::Error if the file's
 /// format rounds too coarsely for that.
 double aim_within(double bound, const stream::MeshRounding& rounding, const std::string& path);
-/// "min", "max", "mean", "first", "error". Throws: UsageError.
+/// "all", "min", "max", "mean", "first", "error". Throws: UsageError.
 tri::PointDuplicates parse_duplicates(const std::string& text);
 
 /// Irregular samples meshed at once, at most.
@@ -43,7 +43,8 @@ struct BoundedMeshOptions {
   double max_error = 0.0;        ///< metres
   std::uint64_t max_points = 0;  ///< 0: no limit; else max_error is not used
   tri::TinQuality quality = tri::TinQuality::kRemoval;
-  tri::PointDuplicates duplicates = tri::PointDuplicates::kError;
+  /// kAll: an error where samples of one place differ by more than max_error.
+  tri::PointDuplicates duplicates = tri::PointDuplicates::kAll;
   Fill fill = Fill::none;
   std::optional<Region> region;
   std::string path;                ///< of the mesh
@@ -51,15 +52,16 @@ struct BoundedMeshOptions {
   std::size_t window_points = kWindowPoints;
 };
 
-/// What was measured on the mesh as a reader of the file gets it back, at every sample of the
-/// region at full resolution that has data.
+/// What was measured on the mesh as a reader of the file gets it back, at every sample at full
+/// resolution that has data and lies on a triangle.
 struct BoundedMeshResult {
   std::uint64_t vertices = 0, triangles = 0;
   double max_error = 0.0, rms_error = 0.0;  ///< metres
-  std::uint64_t samples = 0;                ///< with data
-  std::uint64_t duplicates = 0;             ///< samples at the place of another
-  double reading_seconds = 0.0;             ///< of all threads together, decoding included
-  double meshing_seconds = 0.0;             ///< likewise, the check included
+  std::uint64_t samples = 0;                ///< with data, in the region if there is one
+  std::uint64_t uncovered = 0;   ///< of these, such as lie on no triangle: they have no error
+  std::uint64_t duplicates = 0;  ///< samples at the place of another
+  double reading_seconds = 0.0;  ///< of all threads together, decoding included
+  double meshing_seconds = 0.0;  ///< likewise, the check included
 };
 
 /// The mesh of a raster store, window by window: windows depend on the data and the bound alone,

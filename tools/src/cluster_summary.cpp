@@ -2,7 +2,6 @@
 #include "cluster_summary.hpp"
 
 #include <algorithm>
-#include <cstdio>
 #include <optional>
 #include <string>
 
@@ -11,11 +10,7 @@
 namespace terrace::tools {
 namespace {
 
-std::string rounded(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.6g", value);
-  return text;
-}
+std::string rounded(double value) { return readable_number(value, 6); }
 
 }  // namespace
 
@@ -63,8 +58,8 @@ Summary cluster_summary(const ClusterOutcome& outcome, std::uint64_t points, std
     text += "\n";
   }
   if (gap) {
-    text += "lower bound " + rounded(*outcome.lower_bound) + ": at most " + rounded(100 * *gap) +
-            " % above the optimum\n";
+    text += "lower bound " + rounded(*outcome.lower_bound) + ": at most " +
+            readable_bound(100 * *gap) + " % above the optimum\n";
   }
   return summary;
 }

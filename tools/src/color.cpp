@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <vector>
+#include <span>
 
 #include "portable_math.hpp"
 
@@ -84,19 +84,14 @@ Rgb cluster_colour(std::int64_t cluster) {
   return colour;
 }
 
-HeightTint HeightTint::of(std::span<const double> heights) {
-  constexpr std::size_t kSample = 100000;
-  const std::size_t stride = heights.size() / kSample + 1;
-  std::vector<double> sample;
-  for (std::size_t i = 0; i < heights.size(); i += stride) {
-    if (std::isfinite(heights[i])) sample.push_back(heights[i]);
-  }
-  if (sample.empty()) return {};
-  std::sort(sample.begin(), sample.end());
+HeightTint HeightTint::of(std::vector<double> heights) {
+  std::erase_if(heights, [](double height) { return !std::isfinite(height); });
+  if (heights.empty()) return {};
+  std::sort(heights.begin(), heights.end());
   HeightTint tint;
-  const std::size_t outer = sample.size() / 200;
-  tint.low = sample[outer];
-  tint.high = sample[sample.size() - 1 - outer];
+  const std::size_t outer = heights.size() / 200;
+  tint.low = heights[outer];
+  tint.high = heights[heights.size() - 1 - outer];
   // A shore only where the sea is a good part of what is seen: beaches and polders lie below 0 too.
   tint.shore = tint.low < 0 && tint.high > 0 && -tint.low > 0.05 * tint.high;
   return tint;

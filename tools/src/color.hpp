@@ -2,7 +2,7 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
+#include <vector>
 
 #include "scene.hpp"
 
@@ -21,14 +21,15 @@ Rgb category_colour(std::int64_t category);
 /// numbers, points without a cluster, are light grey.
 Rgb cluster_colour(std::int64_t cluster);
 
-/// The range of heights that the tints span: without the outermost 0.5 % on either side, and with
-/// a shore at 0 where there is land and sea.
+/// The range of heights that the tints span: without the outermost 0.5 % of what is shown on either
+/// side, and with a shore at 0 where there is land and sea.
 struct HeightTint {
   double low = 0.0, high = 1.0;
   bool shore = false;
 
-  /// Heights that are not finite are ignored. O(n log n) of a sample of at most 100,000.
-  static HeightTint of(std::span<const double> heights);
+  /// Of heights that stand for equal parts of what is shown. Those that are not finite are ignored.
+  /// O(n log n).
+  static HeightTint of(std::vector<double> heights);
   [[nodiscard]] Rgb colour(double height) const;
 };
 

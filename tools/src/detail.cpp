@@ -29,7 +29,11 @@ Detail Detail::parse(const stream::Store& store, const std::string& level,
                      const std::string& region, const std::vector<std::string>& focuses,
                      const RegionConversion& conversion) {
   Detail detail;
-  detail.level = checked(parse_level(level), store);
+  if (!level.empty()) {
+    detail.level = checked(parse_level(level), store);
+  } else if (!focuses.empty()) {
+    detail.level = store.top();
+  }
   if (!region.empty()) detail.region = conversion(Region::parse(region));
   for (const std::string& text : focuses) {
     Focus focus = parse_focus(text);

@@ -22,7 +22,8 @@ struct FinerRegion {
 /// Which detail is wanted where: `level` everywhere (or inside `region` only), finer inside the
 /// focuses. All regions are in the store's CRS.
 struct Detail {
-  /// The levels as asked for (nothing: the top), checked against the store.
+  /// The levels as asked for, checked against the store. An empty level is the top if there are
+  /// focuses, else level 0.
   /// Throws: UsageError for a level above the store's top.
   /// conversion: of regions that are given in another CRS.
   static Detail parse(const stream::Store& store, const std::string& level,

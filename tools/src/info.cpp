@@ -63,7 +63,9 @@ std::string text_of(const stream::Crs& crs) {
 std::string text_of(const stream::Box3& box) {
   if (box.empty()) return "none";
   const auto corner = [](const stream::Point3& p) {
-    return number_text(p[0]) + ' ' + number_text(p[1]) + ' ' + number_text(p[2]);
+    // A nanodegree, or a millimetre of what is projected.
+    return readable_number(p[0], 10) + ' ' + readable_number(p[1], 10) + ' ' +
+           readable_number(p[2], 10);
   };
   return corner(box.min) + "  to  " + corner(box.max);
 }

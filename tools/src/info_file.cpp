@@ -131,8 +131,8 @@ Summary info_of_file(const std::string& path, const CommonOptions& common) {
   if (info.grid) {
     text += "raster:    " + std::to_string(info.columns) + " x " + std::to_string(info.rows) +
             " cells of " + text_of(z) + '\n';
-    text +=
-        "cell:      " + number_text(info.world.xy[0]) + ' ' + number_text(info.world.xy[4]) + '\n';
+    text += "cell:      " + readable_number(info.world.xy[0], 10) + ' ' +
+            readable_number(info.world.xy[4], 10) + '\n';
     text += "nodata:    " + with_commas(contents.nodata) + " cells" +
             (info.nodata ? ", value " + number_text(*info.nodata) : std::string()) + '\n';
   }
@@ -142,9 +142,9 @@ Summary info_of_file(const std::string& path, const CommonOptions& common) {
   if (crs.heights != Heights::unknown) text += "vertical:  " + name_of(crs.heights) + '\n';
   text += "bounds:    " + text_of(contents.world) + '\n';
   if (contents.points > 0) {
-    text += "heights:   " + number_text(json["height"]["min"].get<double>()) + " to " +
-            number_text(json["height"]["max"].get<double>()) + ", mean " +
-            number_text(json["height"]["mean"].get<double>()) + '\n';
+    text += "heights:   " + readable_number(json["height"]["min"].get<double>(), 6) + " to " +
+            readable_number(json["height"]["max"].get<double>(), 6) + ", mean " +
+            readable_number(json["height"]["mean"].get<double>(), 6) + '\n';
   }
   text += "channels: ";
   for (const stream::Channel& channel : info.coordinates) text += ' ' + text_of(channel) + ',';

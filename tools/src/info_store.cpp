@@ -93,8 +93,8 @@ Summary info_of_store(const std::string& path, const CommonOptions& common) {
   text +=
       "vertical:  " + (schema.vertical.empty() ? std::string("unknown") : schema.vertical) + '\n';
   text += "bounds:    " + text_of(bounds) + '\n';
-  text += "heights:   " + number_text(bounds.min[2]) + " to " + number_text(bounds.max[2]) +
-          ", mean " + number_text(mean) + '\n';
+  text += "heights:   " + readable_number(bounds.min[2], 6) + " to " +
+          readable_number(bounds.max[2], 6) + ", mean " + readable_number(mean, 6) + '\n';
   text += "channels: ";
   for (const stream::Channel& c : schema.coordinates) text += ' ' + text_of(c) + ',';
   for (const stream::Channel& c : schema.attributes) text += ' ' + text_of(c) + ',';

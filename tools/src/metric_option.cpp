@@ -181,7 +181,7 @@ std::string MetricChoice::canonical() const {
 }
 
 cluster::Metric MetricChoice::on_ground(const stream::Point3& origin,
-                                        const stream::Point3& scale) const {
+                                        const cluster::LinearMap& map) const {
   switch (kind) {
     case Kind::euclidean:
       return cluster::Euclidean{};
@@ -193,20 +193,32 @@ cluster::Metric MetricChoice::on_ground(const stream::Point3& origin,
       break;
   }
   if (!has_boxes()) return regions.front().metric;
+  // Back from the ground to the CRS. Where heights do not count, all are taken for inside.
+  const bool flat = map[8] == 0.0;
+  const double area = map[0] * map[4] - map[1] * map[3];
+  const cluster::EllipticalField::Frame frame{{map[4] / area, -map[1] / area, 0,  //
+                                               -map[3] / area, map[0] / area, 0,  //
+                                               0, 0, flat ? 0.0 : 1.0 / map[8]},
+                                              origin};
   std::vector<cluster::EllipticalField::Region> field;
   for (const Region& region : regions) {
     cluster::Bounds box{{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}};
     if (region.box) {
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        // Where heights do not count all points lie at 0, inside.
-        if (scale[axis] == 0.0) continue;
-        box.min[axis] = scale[axis] * (region.box->min[axis] - origin[axis]);
-        box.max[axis] = scale[axis] * (region.box->max[axis] - origin[axis]);
+      for (std::size_t axis = 0; axis < (flat ? 2U : 3U); ++axis) {
+        const double low = region.box->min[axis], high = region.box->max[axis];
+        // Boxes are closed: rounding on the way to the ground and back must not move a point on
+        // their sides out of them.
+        constexpr double kRounding = 1e-14;
+        const auto slack = [&](double side) {
+          return std::isfinite(side) ? kRounding * (std::abs(side) + std::abs(origin[axis])) : 0.0;
+        };
+        box.min[axis] = low - slack(low);
+        box.max[axis] = high + slack(high);
       }
     }
     field.push_back({box, region.metric});
   }
-  return cluster::EllipticalField(std::move(field));
+  return cluster::EllipticalField(std::move(field), frame);
 }
 
 }  // namespace terrace::tools

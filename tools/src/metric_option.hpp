@@ -40,10 +40,11 @@ struct MetricChoice {
   /// True where boxes make the metric depend on the place.
   [[nodiscard]] bool has_boxes() const;
 
-  /// The metric between points ground = scale * (position - origin), component by component, where
-  /// positions are in the CRS. scale: positive.
+  /// The metric between points ground = map * (position - origin), where positions are in the CRS:
+  /// a region holds a point if its box holds the position. map: invertible, but that heights may
+  /// count for nothing; x and y are not mixed with them.
   [[nodiscard]] cluster::Metric on_ground(const stream::Point3& origin,
-                                          const stream::Point3& scale) const;
+                                          const cluster::LinearMap& map) const;
 };
 
 }  // namespace terrace::tools

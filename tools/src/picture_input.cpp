@@ -207,9 +207,8 @@ PictureInput from_store(const std::string& path, const PictureSelection& selecti
     put_on_ground(input, stored, Ground(stored));
     return input;
   }
-  const std::string level = !selection.level.empty()    ? selection.level
-                            : selection.focuses.empty() ? finest_level(store, selection.region)
-                                                        : std::string("top");
+  const bool chosen = !selection.level.empty() || !selection.focuses.empty();
+  const std::string level = chosen ? selection.level : finest_level(store, selection.region);
   const Detail detail = Detail::parse(store, level, selection.region, selection.focuses);
   // These positions are in the CRS already.
   Placement world;

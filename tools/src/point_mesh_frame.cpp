@@ -87,12 +87,17 @@ std::vector<tri::Point3> simplify(OuterSide& side, double from_height, double to
                    [](const Along& a, const Along& b) { return a.at < b.at; });
   std::vector<double> at{sign * side.from[axis]}, height{from_height}, group;
   std::vector<tri::Point3> places{{side.from[0], side.from[1], from_height}};
+  double apart = 0.0;  // the lowest and the highest of a place where all count, from their middle
   for (std::size_t i = 0; i < side.samples.size(); ++i) {
     const Along& along = side.samples[i];
     group.push_back(along.sample[2]);
     if (i + 1 < side.samples.size() && side.samples[i + 1].at == along.at) continue;
     at.push_back(along.at);
     height.push_back(merged_height(group, options.duplicates));
+    if (options.duplicates == tri::PointDuplicates::kAll) {
+      const double highest = *std::max_element(group.begin(), group.end());
+      apart = std::max(apart, highest - height.back());
+    }
     places.push_back({along.sample[0], along.sample[1], height.back()});
     group.clear();
   }
@@ -101,7 +106,7 @@ std::vector<tri::Point3> simplify(OuterSide& side, double from_height, double to
   std::vector<tri::Point3> chosen;
   if (options.max_error > 0.0) {
     // A little less, as others interpolate with other rounding.
-    const double bound = options.max_error * (1.0 - 0x1p-20);
+    const double bound = std::max(0.0, options.max_error - apart) * (1.0 - 0x1p-20);
     const std::vector<tri::LineVertex> line = tri::simplify_line(at, height, bound).vertices;
     for (std::size_t i = 1; i + 1 < line.size(); ++i) chosen.push_back(places[line[i].sample]);
     return chosen;

@@ -34,8 +34,32 @@ double merged_height(std::span<const double> heights, tri::PointDuplicates dupli
     double sum = 0.0;
     for (const double other : heights) sum += other - heights.front();
     height += sum / static_cast<double>(heights.size());
+  } else if (duplicates == tri::PointDuplicates::kAll) {
+    const auto [low, high] = std::minmax_element(heights.begin(), heights.end());
+    height = *low + (*high - *low) / 2.0;
   }
   return height;
+}
+
+void SharedPlaces::add(const MeshSamples& samples) {
+  std::vector<std::uint32_t> order(samples.size());
+  std::iota(order.begin(), order.end(), 0U);
+  const auto place = [&](std::uint32_t i) { return Point2{samples.x[i], samples.y[i]}; };
+  std::sort(order.begin(), order.end(),
+            [&](std::uint32_t a, std::uint32_t b) { return place(a) < place(b); });
+  for (std::size_t first = 0, end = 0; first < order.size(); first = end) {
+    double low = samples.z[order[first]], high = low;
+    for (end = first + 1; end < order.size() && place(order[end]) == place(order[first]); ++end) {
+      low = std::min(low, samples.z[order[end]]);
+      high = std::max(high, samples.z[order[end]]);
+    }
+    if (end - first == 1) continue;
+    if (places == 0 || high - low > range) {
+      range = high - low;
+      widest = place(order[first]);
+    }
+    ++places;
+  }
 }
 
 PointMeshSamples::PointMeshSamples(const stream::Store& store, const std::optional<Region>& region,

@@ -34,8 +34,19 @@ struct MeshSamples {
 };
 
 /// The height that stands for several samples at one place, as tri::point_tin() takes it. With
-/// kError that of the first. heights: in order, not empty.
+/// kError that of the first, with kAll the middle of the lowest and the highest. heights: in order,
+/// not empty.
 double merged_height(std::span<const double> heights, tri::PointDuplicates duplicates);
+
+/// What is known of places that several samples share.
+struct SharedPlaces {
+  std::uint64_t places = 0;
+  double range = 0.0;  ///< the largest difference of heights at one of them
+  Point2 widest{};     ///< where that is
+
+  /// Adds those of more samples, none of which shares a place with earlier ones. O(n log n).
+  void add(const MeshSamples& samples);
+};
 
 /// The samples of a region, dealt to the cells of the plane: on disk, beside the file that is made,
 /// as clusters may reach over many cells. What is kept goes with the object. Reading: by several

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <map>
 #include <memory>
-#include <numeric>
 #include <stdexcept>
 #include <utility>
 
@@ -17,20 +16,6 @@
 
 namespace terrace::tools {
 namespace {
-
-/// "X, Y" of the first place that several samples have; empty if there is none.
-std::string shared_place(const MeshSamples& samples) {
-  std::vector<std::uint32_t> order(samples.size());
-  std::iota(order.begin(), order.end(), 0U);
-  const auto place = [&](std::uint32_t i) { return Point2{samples.x[i], samples.y[i]}; };
-  std::sort(order.begin(), order.end(),
-            [&](std::uint32_t a, std::uint32_t b) { return place(a) < place(b); });
-  for (std::size_t i = 1; i < order.size(); ++i) {
-    const Point2 p = place(order[i]);
-    if (p == place(order[i - 1])) return number_text(p[0]) + ", " + number_text(p[1]);
-  }
-  return {};
-}
 
 /// Errors on what a reader gets back from a format that rounds.
 tri::TinErrors measure_rounded(const MeshSamples& samples, const PlaneBox& box,
@@ -67,7 +52,10 @@ std::size_t take_out_vertices(const std::vector<tri::Point3>& frame,
     if (own.empty()) continue;
     heights.clear();
     for (const std::size_t i : own) heights.push_back(samples.z[i]);
-    if (merged_height(heights, duplicates) != v[2]) continue;
+    const bool differ = duplicates == tri::PointDuplicates::kAll &&
+                        std::count(heights.begin(), heights.end(), v[2]) !=
+                            static_cast<std::ptrdiff_t>(heights.size());
+    if (differ || merged_height(heights, duplicates) != v[2]) continue;
     ++places;
     for (const std::size_t i : own) out[i] = 1;
   }
@@ -87,10 +75,6 @@ PointWindowTin mesh_samples(const MeshSamples& samples, const std::vector<tri::P
   const auto fail = [&](const std::string& cause, const std::string& remedy) {
     throw stream::Error({.file = source, .where = {}, .cause = cause, .remedy = remedy});
   };
-  const auto fail_duplicates = [&](const std::string& place) {
-    fail("several samples have one place, the first at " + place,
-         "say with --duplicates which of them counts");
-  };
   const bool refuse = options.tin.duplicates == tri::PointDuplicates::kError;
   MeshSamples left;
   const MeshSamples* taken = &samples;
@@ -98,19 +82,20 @@ PointWindowTin mesh_samples(const MeshSamples& samples, const std::vector<tri::P
   if (!frame.empty() && options.tin.max_error == 0.0) {
     left = samples;
     vertex_places = take_out_vertices(frame, options.tin.duplicates, left);
-    if (refuse && samples.size() - left.size() > vertex_places) {
-      fail_duplicates(shared_place(samples));
-    }
+    if (refuse && samples.size() - left.size() > vertex_places) throw SamplesShareAPlace{};
     taken = &left;
   }
   tri::PointTin tin;
   try {
     tin = tri::point_tin(taken->x, taken->y, taken->z, frame, options.tin);
   } catch (const std::invalid_argument& error) {
-    const std::string place = shared_place(samples);
-    if (place.empty() || !refuse) fail(error.what(), "look at the store's points");
-    fail_duplicates(place);
+    SharedPlaces shared;
+    if (refuse) shared.add(samples);
+    if (shared.places > 0) throw SamplesShareAPlace{};
+    fail(error.what(), "look at the store's points");
   }
+  const bool all = options.tin.duplicates == tri::PointDuplicates::kAll;
+  if (all && tin.duplicate_range > options.tin.max_error) throw SamplesShareAPlace{};
   // Those taken out have no error.
   tin.errors.rms *=
       std::sqrt(static_cast<double>(tin.errors.covered) /
@@ -125,14 +110,15 @@ PointWindowTin mesh_samples(const MeshSamples& samples, const std::vector<tri::P
   out.errors = tin.errors;
   const bool exact = rounding.largest() == stream::Point3{};
   if (!exact) {
-    if (tin.duplicates > 0) {
+    if (tin.duplicates > 0 && !all) {
       fail(
           "the format of the mesh rounds positions, so the error where several samples have one "
-          "place cannot be verified",
-          "write PLY, which is exact");
+          "place and not all of them count cannot be verified",
+          "write PLY, which is exact, or leave out --duplicates");
     }
     out.errors = measure_rounded(samples, box, out, rounding);
   }
+  out.uncovered = out.triangles.empty() ? samples.size() : out.errors.uncovered;
   const bool missed = exact && tin.errors.uncovered > 0 && !out.triangles.empty();
   if (missed || (options.tin.max_points == 0 && out.errors.largest > options.bound)) {
     fail(missed ? "the mesh leaves out samples"

@@ -36,12 +36,16 @@ struct PointWindowTin {
   std::vector<std::array<std::uint32_t, 3>> triangles;
   tri::TinErrors errors;  ///< of what a reader gets back
   std::size_t samples = 0, duplicates = 0;
+  std::size_t uncovered = 0;  ///< of the samples, those that lie on no triangle
   double reading_seconds = 0.0, meshing_seconds = 0.0;
 };
 
+/// Thrown where several samples have one place and must not, or differ by more than the bound.
+struct SamplesShareAPlace {};
+
 /// Meshes samples and measures what a reader of the file gets back. frame: as in tri::point_tin();
 /// box: what the frame's straight sides lie on, as far as it is finite.
-/// Throws: stream::Error where samples of one place must not be, and where the bound is missed.
+/// Throws: SamplesShareAPlace; stream::Error where the bound is missed.
 PointWindowTin mesh_samples(const MeshSamples& samples, const std::vector<tri::Point3>& frame,
                             const PlaneBox& box, const PointMeshOptions& options,
                             const stream::MeshRounding& rounding, const std::string& source);

@@ -96,6 +96,7 @@ BoundedMeshResult PointMesher::run_whole(const PointMeshOptions& options, MeshSp
   result.max_error = tin.errors.largest;
   result.rms_error = tin.errors.rms;
   result.samples = tin.samples;
+  result.uncovered = tin.uncovered;
   result.duplicates = tin.duplicates;
   for (const tri::Point3& p : tin.vertices) spool.add_vertex(p);
   for (const auto& triangle : tin.triangles) spool.add_triangle(triangle);
@@ -128,7 +129,7 @@ BoundedMeshResult PointMesher::run_windows(const PointMeshOptions& options, Mesh
                                            std::uint64_t most_vertices) const {
   BoundedMeshResult result;
   if (!samples_) {  // on one line: no surface
-    result.samples = scan_.samples;
+    result.samples = result.uncovered = scan_.samples;
     return result;
   }
   const PointMeshPlan plan = plan_for(options.tin.max_error);
@@ -160,6 +161,7 @@ BoundedMeshResult PointMesher::run_windows(const PointMeshOptions& options, Mesh
           const auto count = static_cast<double>(tin.errors.covered);
           squares += tin.errors.rms * tin.errors.rms * count;
           covered += count;
+          result.uncovered += tin.uncovered;
           result.duplicates += tin.duplicates;
           result.reading_seconds += tin.reading_seconds;
           result.meshing_seconds += tin.meshing_seconds;
@@ -186,21 +188,51 @@ double PointMesher::estimate(double max_error) const {
          static_cast<double>(cuts_.cells.size());
 }
 
+stream::Error PointMesher::shared_places_error() const {
+  SharedPlaces shared;
+  if (scan_.whole) {
+    shared.add(*scan_.whole);
+  } else {
+    for (std::uint32_t cell = 0; cell < cuts_.cells.size(); ++cell) {
+      check_interrupt();
+      MeshSamples samples;
+      samples_->read(cell, 1, {}, samples);
+      shared.add(samples);
+    }
+  }
+  const bool some = shared.places > 1;
+  return stream::Error(
+      {.file = store_.path().string(),
+       .where = {},
+       .cause = with_commas(shared.places) + (some ? " places have" : " place has") +
+                " several samples, whose heights differ by up to " +
+                readable_number(shared.range * metres_vertical()) + " m (at " +
+                number_text(shared.widest[0]) + ", " + number_text(shared.widest[1]) + ")",
+       .remedy = options_.duplicates == tri::PointDuplicates::kAll
+                     ? "say with --duplicates min, max, mean or first which of them counts, or ask "
+                       "for a larger --max-error"
+                     : "say with --duplicates which of them counts"});
+}
+
 BoundedMeshResult PointMesher::run(double max_error, MeshSpool& spool,
                                    std::uint64_t most_vertices) {
   BoundedMeshResult result;
-  if (!single()) {
-    result = run_windows(mesh_options(max_error), spool, most_vertices);
-  } else {
-    PointMeshOptions options;
-    if (options_.max_points > 0) {
-      options = mesh_options(bounds_.max[2] - bounds_.min[2]);
-      options.tin.max_error = 0.0;
-      options.tin.max_points = options_.max_points;
+  try {
+    if (!single()) {
+      result = run_windows(mesh_options(max_error), spool, most_vertices);
     } else {
-      options = mesh_options(max_error);
+      PointMeshOptions options;
+      if (options_.max_points > 0) {
+        options = mesh_options(bounds_.max[2] - bounds_.min[2]);
+        options.tin.max_error = 0.0;
+        options.tin.max_points = options_.max_points;
+      } else {
+        options = mesh_options(max_error);
+      }
+      result = run_whole(options, spool);
     }
-    result = run_whole(options, spool);
+  } catch (const SamplesShareAPlace&) {
+    throw shared_places_error();
   }
   result.reading_seconds += reading_seconds_;
   result.triangles = spool.triangles();

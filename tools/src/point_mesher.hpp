@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 
+#include <terrace/stream/error.hpp>
 #include <terrace/stream/mesh_writer.hpp>
 #include <terrace/stream/store.hpp>
 
@@ -40,6 +41,8 @@ class PointMesher {
 
  private:
   [[nodiscard]] PointMeshOptions mesh_options(double max_error) const;
+  /// Why samples at one place are refused: how many places, and how far apart.
+  [[nodiscard]] stream::Error shared_places_error() const;
   BoundedMeshResult run_whole(const PointMeshOptions& options, MeshSpool& spool) const;
   BoundedMeshResult run_windows(const PointMeshOptions& options, MeshSpool& spool,
                                 std::uint64_t most_vertices) const;

@@ -191,6 +191,7 @@ BoundedMeshResult RasterMesher::run(double max_error, MeshSpool& spool,
                        static_cast<double>(samples_seen) / static_cast<double>(whole_.size()));
         });
     result.vertices = spool.vertices();
+    result.uncovered = joiner.uncovered();
   } catch (const Enough&) {
     const double part = static_cast<double>(samples_seen) / static_cast<double>(whole_.size());
     result.vertices = std::max(

@@ -2,6 +2,7 @@
 #include "scene.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace terrace::tools {
@@ -38,6 +39,90 @@ bool mostly_steep(const TriangleMesh& mesh) {
     if (std::abs(n[2]) < 0.5 * area) steep += area;
   }
   return steep > 0.5 * all;
+}
+
+namespace {
+
+constexpr std::size_t kShownHeights = 100000;
+
+std::vector<double> heights_by_area(const TriangleMesh& mesh, const std::vector<double>& heights,
+                                    bool flat) {
+  std::vector<double> areas;
+  areas.reserve(mesh.triangles.size());
+  double whole = 0;
+  for (const auto& t : mesh.triangles) {
+    const stream::Point3 n = area_vector(mesh, t);
+    const double area = flat ? std::abs(n[2]) : std::hypot(n[0], n[1], n[2]);
+    areas.push_back(std::isfinite(area) ? area : 0.0);
+    whole += areas.back();
+  }
+  std::vector<double> shown;
+  if (!(whole > 0) || !std::isfinite(whole)) return shown;
+  const double each = whole / static_cast<double>(kShownHeights);
+  double before = 0;
+  for (std::size_t i = 0; i < areas.size(); ++i) {
+    const auto& t = mesh.triangles[i];
+    const double after = before + areas[i];
+    // Places that fill a triangle evenly (M. Roberts's sequence of two dimensions).
+    for (std::size_t k = shown.size(); (static_cast<double>(k) + 0.5) * each < after; ++k) {
+      double u = std::fmod(static_cast<double>(k) * 0.7548776662466927, 1.0);
+      double v = std::fmod(static_cast<double>(k) * 0.5698402909980532, 1.0);
+      if (u + v > 1) {
+        u = 1 - u;
+        v = 1 - v;
+      }
+      shown.push_back((1 - u - v) * heights[t[0]] + u * heights[t[1]] + v * heights[t[2]]);
+    }
+    before = after;
+  }
+  return shown;
+}
+
+/// By cells of the plane with points, about four in each where points are fewest.
+std::vector<double> heights_by_cells(const TriangleMesh& cloud,
+                                     const std::vector<double>& heights) {
+  constexpr double kMostCells = 64;  // on a side
+  std::array<std::size_t, 256> groups{};
+  for (const std::uint8_t left_out : cloud.left_out) ++groups[left_out];
+  const std::size_t coarsest =
+      *std::find_if(groups.rbegin(), groups.rend(), [](std::size_t count) { return count > 0; });
+  const double cells =
+      std::clamp(std::floor(std::sqrt(static_cast<double>(coarsest) / 4)), 1.0, kMostCells);
+  stream::Box3 box;
+  for (const stream::Point3& p : cloud.positions) box.include(p);
+  std::vector<std::vector<double>> members(static_cast<std::size_t>(cells * cells));
+  const auto cell = [&](double value, std::size_t axis) {
+    const double width = box.max[axis] - box.min[axis];
+    return width > 0 ? std::min(cells - 1, std::floor((value - box.min[axis]) / width * cells)) : 0;
+  };
+  for (std::size_t i = 0; i < heights.size(); ++i) {
+    const stream::Point3& p = cloud.positions[i];
+    members[static_cast<std::size_t>(cell(p[1], 1) * cells + cell(p[0], 0))].push_back(heights[i]);
+  }
+  const std::size_t of_each = kShownHeights / members.size();
+  std::vector<double> shown;
+  for (const std::vector<double>& some : members) {
+    for (std::size_t k = 0; k < of_each && !some.empty(); ++k) {
+      shown.push_back(some[k * some.size() / of_each]);
+    }
+  }
+  return shown;
+}
+
+}  // namespace
+
+std::vector<double> shown_heights(const TriangleMesh& mesh, const std::vector<double>& heights,
+                                  bool flat) {
+  std::vector<double> shown;
+  if (!mesh.triangles.empty()) {
+    shown = heights_by_area(mesh, heights, flat);
+  } else if (flat && !mesh.left_out.empty()) {
+    shown = heights_by_cells(mesh, heights);
+  }
+  if (!shown.empty()) return shown;
+  const std::size_t stride = heights.size() / kShownHeights + 1;
+  for (std::size_t i = 0; i < heights.size(); i += stride) shown.push_back(heights[i]);
+  return shown;
 }
 
 std::vector<std::array<float, 3>> vertex_normals(const TriangleMesh& mesh) {

@@ -141,24 +141,21 @@ void set_metric(const BuildRequest& request, const stream::SourceInfo& info, con
                 cluster::HierarchyOptions& options) {
   const MetricChoice& choice = request.metric;
   if (!choice.has_boxes()) {
-    options.metric = choice.on_ground({0, 0, 0}, {1, 1, 1});
+    options.metric = choice.on_ground({0, 0, 0}, cluster::kIdentityMap);
     return;
   }
+  // From the CRS by way of stored coordinates, which are columns and rows for a raster.
   const std::array<double, 6>& xy = info.world.xy;
   const stream::Channel& height = info.coordinates[2];
-  if (xy[1] != 0.0 || xy[3] != 0.0) {
-    throw stream::Error({.file = request.inputs.front(),
-                         .where = {},
-                         .cause = "is a rotated raster, and --metric " + choice.text +
-                                  " has boxes along the axes of the CRS",
-                         .remedy =
-                             "give the metric one region without a box, or convert the raster "
-                             "to points first"});
-  }
   options.metric_of = [&choice, &ground, xy, height](const cluster::Bounds& bounds) {
     const GroundMap map = ground.map({bounds.min, bounds.max});
+    const double area = xy[0] * xy[4] - xy[1] * xy[3];
+    const auto across = [&](double a, double b) { return (a * xy[4] - b * xy[3]) / area; };
+    const auto along = [&](double a, double b) { return (b * xy[0] - a * xy[1]) / area; };
     return choice.on_ground({xy[2], xy[5], height.offset},
-                            {map[0] / xy[0], map[4] / xy[4], map[8] / height.scale});
+                            {across(map[0], map[1]), along(map[0], map[1]), 0,  //
+                             across(map[3], map[4]), along(map[3], map[4]), 0,  //
+                             0, 0, map[8] / height.scale});
   };
 }
 

@@ -168,6 +168,33 @@ std::string readable_seconds(double seconds) {
   return text.data();
 }
 
+std::string readable_number(double value, int digits) {
+  const double size = std::fabs(value);
+  if (!(size < 1e15)) return printed("%.3g%s", value, "");
+  std::array<char, 64> text{};
+  if (size >= std::pow(10.0, digits) - 0.5) {
+    std::snprintf(text.data(), text.size(), "%.0f", value);
+  } else {
+    std::snprintf(text.data(), text.size(), "%.*g", digits, value);
+  }
+  const std::string plain = text.data();
+  // Not in coordinates.
+  const bool commas = digits < 10 && size >= 999.5 && plain.find_first_of(".e") == plain.npos;
+  if (!commas) return plain;
+  return (value < 0 ? "-" : "") + with_commas(static_cast<std::uint64_t>(std::llround(size)));
+}
+
+std::string readable_bound(double value) {
+  if (!(value > 0.0) || !std::isfinite(value)) return readable_number(value);
+  if (value >= 100.0) return readable_number(std::ceil(value));
+  // The least number of 3 digits that is not below the value.
+  const double unit = std::pow(10.0, std::floor(std::log10(value)) - 2.0);
+  const double shorter = std::round(value / unit);
+  // What differs by rounding errors alone is the same number.
+  const double kept = value <= shorter * unit * (1.0 + 1e-12) ? shorter : std::ceil(value / unit);
+  return readable_number(kept * unit);
+}
+
 std::string number_text(double value) {
   std::array<char, 40> text{};
   const auto [end, error] = std::to_chars(text.data(), text.data() + text.size(), value);

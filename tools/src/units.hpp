@@ -38,5 +38,10 @@ std::string readable_rate(double per_second);
 std::string readable_seconds(double seconds);
 /// The shortest text that reads back as the same double: "0.1", "1e+20", "nan".
 std::string number_text(double value);
+/// A number to read, of so many digits, but never without those before the point: "2.99", "1,834",
+/// "0.00012", "4345.68" (of 6), "nan". Of 10 digits, as coordinates have, no commas.
+std::string readable_number(double value, int digits = 3);
+/// The same of 3 digits, rounded up: what is within the value is within what is printed.
+std::string readable_bound(double value);
 
 }  // namespace terrace::tools

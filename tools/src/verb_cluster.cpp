@@ -135,7 +135,9 @@ class ClusterCommand final : public Command {
     cluster::FacilityPoints problem;
     problem.points = positions;
     problem.weights = weights;
-    problem.metric = metric.on_ground(ground.origin, ground.scale);
+    const stream::Point3& scale = ground.scale;
+    problem.metric =
+        metric.on_ground(ground.origin, {scale[0], 0, 0, 0, scale[1], 0, 0, 0, scale[2]});
     problem.channels = {channels.values, channels.weights};
     problem.facility_cost = facility_cost_;
     if (outlier_price_ > 0) problem.outlier_price = outlier_price_;

@@ -3,7 +3,6 @@
 // matching.
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <iostream>
 #include <string>
 #include <vector>
@@ -168,7 +167,8 @@ class MatchCommand final : public Command {
     if (odd) summary.json["left_over"] = alone - outcome.mate.begin();
     summary.json["lower_bound"] = nullptr;
     if (outcome.lower_bound) summary.json["lower_bound"] = *outcome.lower_bound;
-    summary.text = with_commas(pairs) + " pairs, total distance " + short_text(outcome.cost);
+    summary.text =
+        with_commas(pairs) + " pairs, total distance " + readable_number(outcome.cost, 6);
     summary.text += guarantee(outcome);
     if (odd) {
       summary.text += ", point " + std::to_string(alone - outcome.mate.begin()) + " left over";
@@ -192,7 +192,7 @@ class MatchCommand final : public Command {
                     {"levels", levels},
                     {"clusters", outcome.clusters}};
     summary.text = "a tree of " + with_commas(outcome.tree.rows.size()) + " pairs on " +
-                   std::to_string(levels) + " levels, total distance " + short_text(cost);
+                   std::to_string(levels) + " levels, total distance " + readable_number(cost, 6);
     finish(summary, watch);
     return summary;
   }
@@ -201,16 +201,8 @@ class MatchCommand final : public Command {
   static std::string guarantee(const MatchOutcome& outcome) {
     if (outcome.optimal) return " (the optimum)";
     if (!outcome.lower_bound || !(*outcome.lower_bound > 0.0)) return " (no bound)";
-    char share[64];
-    std::snprintf(share, sizeof share, " (at most %.2g %% above the optimum)",
-                  100.0 * std::max(0.0, outcome.cost / *outcome.lower_bound - 1.0));
-    return share;
-  }
-
-  static std::string short_text(double value) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.9g", value);
-    return text;
+    const double share = std::max(0.0, outcome.cost / *outcome.lower_bound - 1.0);
+    return " (at most " + readable_bound(100.0 * share) + " % above the optimum)";
   }
 
   void finish(Summary& summary, const Stopwatch& watch) const {

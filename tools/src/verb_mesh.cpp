@@ -31,7 +31,7 @@ class MeshCommand final : public Command {
     add_output(app, output_, "the file to write: .ply, .obj, .glb");
     app.add_option("--format", format_, "ply, ply-ascii, obj, glb; else by the file's ending");
     app.add_option("--level", level_, "detail outside the focuses: a number or top")
-        ->capture_default_str();
+        ->default_str("0; with --focus top");
     app.add_option("--region", region_,
                    "only triangles that reach inside: a box, minx,miny[,minz],maxx,maxy[,maxz], or "
                    "a GeoJSON file");
@@ -68,9 +68,10 @@ class MeshCommand final : public Command {
         ->capture_default_str()
         ->type_name("NAME");
     app.add_option("--duplicates", duplicates_,
-                   "which of several irregular samples at one x,y counts: min, max, mean, first, "
+                   "which of several irregular samples at one x,y counts: all (each is kept within "
+                   "--max-error, or refused where they differ by more), min, max, mean, first, "
                    "error (refuse them)")
-        ->capture_default_str()
+        ->default_str("all; with --max-points mean")
         ->type_name("NAME");
     app.add_option("--fill", fill_,
                    "what a raster's cells without data become in an error-bounded mesh: none "
@@ -88,8 +89,8 @@ class MeshCommand final : public Command {
  private:
   Summary bounded(const CommonOptions& common) const {
     const Stopwatch watch;
-    if (level_ != "0" || !focuses_.empty() || !smooth_.empty() || metric_ != "euclidean" ||
-        !overlay_.empty() || !save_overlay_.empty()) {
+    if ((!level_.empty() && level_ != "0") || !focuses_.empty() || !smooth_.empty() ||
+        metric_ != "euclidean" || !overlay_.empty() || !save_overlay_.empty()) {
       throw UsageError(
           "--max-error and --max-points are about all samples: without --level, --focus, --smooth, "
           "--overlay and --metric");
@@ -107,7 +108,13 @@ class MeshCommand final : public Command {
       if (options.max_points < 4) throw UsageError("--max-points: at least 4");
     }
     options.quality = parse_quality(quality_);
-    options.duplicates = parse_duplicates(duplicates_);
+    const std::string duplicates = !duplicates_.empty()  ? duplicates_
+                                   : max_points_.empty() ? "all"
+                                                         : "mean";
+    options.duplicates = parse_duplicates(duplicates);
+    if (options.duplicates == tri::PointDuplicates::kAll && !max_points_.empty()) {
+      throw UsageError("--duplicates all needs the bound of --max-error to keep all within");
+    }
     options.fill = parse_fill(fill_);
     options.path = output_;
     const stream::Store store = stream::Store::open(store_);
@@ -127,26 +134,49 @@ class MeshCommand final : public Command {
                     {"max_error", result.max_error},
                     {"rms_error", result.rms_error},
                     {"samples", result.samples},
+                    {"covered", result.samples - result.uncovered},
+                    {"uncovered", result.uncovered},
                     {"duplicates", result.duplicates},
                     {"seconds", watch.seconds()},
                     {"reading_seconds", result.reading_seconds},
                     {"meshing_seconds", result.meshing_seconds},
                     {"peak_rss_bytes", peak_rss_bytes()}};
-    summary.text = output_ + ": " + with_commas(result.vertices) + " vertices, " +
-                   with_commas(result.triangles) + " triangles, within " +
-                   number_text(result.max_error) + " m of all " + with_commas(result.samples) +
-                   " samples (RMS " + number_text(result.rms_error) + " m), in " +
-                   readable_seconds(watch.seconds()) + "\n";
+    const bool all = result.uncovered == 0;
+    summary.text =
+        output_ + ": " + with_commas(result.vertices) + " vertices, " +
+        with_commas(result.triangles) + " triangles, within " + readable_bound(result.max_error) +
+        " m of " + (all ? "all " : "") + with_commas(result.samples - result.uncovered) +
+        (all ? "" : " of " + with_commas(result.samples)) + " samples (RMS " +
+        readable_number(result.rms_error) + " m), in " + readable_seconds(watch.seconds()) + "\n";
+    if (!all) {
+      summary.text += with_commas(result.uncovered) +
+                      " samples lie on no triangle: " + why_uncovered(result, store.schema().grid) +
+                      "\n";
+    }
     if (result.duplicates > 0) {
-      summary.text += with_commas(result.duplicates) +
-                      " samples at the place of another: --duplicates " + duplicates_ + "\n";
+      summary.text +=
+          with_commas(result.duplicates) + " samples share the place of another: " +
+          (duplicates == "all" ? "the bound holds for each of them"
+                               : "the bound holds for the " + counting(duplicates) +
+                                     " of each place (--duplicates " + duplicates + ")") +
+          "\n";
     }
     return summary;
   }
 
+  static std::string why_uncovered(const BoundedMeshResult& result, bool grid) {
+    if (result.triangles == 0) return "nothing spans an area";
+    return grid ? "they are beside cells without data"
+                : "the file's format rounds the border of the mesh";
+  }
+
+  static std::string counting(const std::string& duplicates) {
+    return duplicates == "min" ? "lowest" : duplicates == "max" ? "highest" : duplicates;
+  }
+
   Summary multiresolution(const CommonOptions& common) const {
     const Stopwatch watch;
-    if (quality_ != "removal" || duplicates_ != "error" || fill_ != "none") {
+    if (quality_ != "removal" || !duplicates_.empty() || fill_ != "none") {
       throw UsageError("--quality, --duplicates and --fill belong to --max-error and --max-points");
     }
     MeshOptions options{{.smoothing = parse_smoothing(smooth_)}, MetricChoice::parse(metric_)};
@@ -189,9 +219,9 @@ class MeshCommand final : public Command {
     return summary;
   }
 
-  std::string store_, output_, format_, level_ = "0", region_, smooth_, metric_ = "euclidean";
+  std::string store_, output_, format_, level_, region_, smooth_, metric_ = "euclidean";
   std::string overlay_, save_overlay_;
-  std::string max_points_, quality_ = "removal", duplicates_ = "error", fill_ = "none";
+  std::string max_points_, quality_ = "removal", duplicates_, fill_ = "none";
   std::optional<double> max_error_;
   std::vector<std::string> focuses_;
   CrsOptions crs_;

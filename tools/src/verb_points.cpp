@@ -106,7 +106,7 @@ class PointsCommand final : public Command {
     add_output(app, output_, "the file to write: .xyz, .csv, .ply; - is standard output");
     app.add_option("--format", format_, "xyz, csv, ply, ply-ascii; else by the file's ending");
     app.add_option("--level", level_, "points of this level and above: a number or top")
-        ->capture_default_str();
+        ->default_str("0; with --focus top");
     app.add_option(
         "--region", region_,
         "only points inside: a box, minx,miny[,minz],maxx,maxy[,maxz], or a GeoJSON file");
@@ -152,7 +152,7 @@ class PointsCommand final : public Command {
   }
 
  private:
-  std::string store_, output_, format_, level_ = "0", region_, overlay_;
+  std::string store_, output_, format_, level_, region_, overlay_;
   std::vector<std::string> focuses_;
   CrsOptions crs_;
 };

@@ -86,7 +86,7 @@ class ProfileCommand final : public Command {
                     {"seconds", watch.seconds()},
                     {"peak_rss_bytes", peak_rss_bytes()}};
     summary.text = output_ + ": " + with_commas(outcome.points) + " places on " +
-                   number_text(std::round(outcome.metres * 10) / 10) + " metres in " +
+                   readable_number(outcome.metres, 6) + " m in " +
                    readable_seconds(watch.seconds()) + "\n";
     return summary;
   }

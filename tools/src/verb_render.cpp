@@ -139,7 +139,7 @@ class RenderCommand : public Command {
     summary.text = output_ + ": " + std::to_string(size.width) + " x " +
                    std::to_string(size.height) + " pixels, " + with_commas(mesh.positions.size()) +
                    " points, " + with_commas(mesh.triangles.size()) + " triangles";
-    if (factor != 1) summary.text += ", heights x " + number_text(factor);
+    if (factor != 1) summary.text += ", heights x " + readable_number(factor);
     summary.text += ", " + readable_seconds(watch.seconds()) + '\n';
     return summary;
   }
@@ -226,7 +226,8 @@ class RenderCommand : public Command {
     if (by == "level" && mesh.levels.empty()) lacks("levels");
     if ((by == "class" || by == "cluster") && mesh.classes.empty()) lacks(by);
     if (by == "slope" && mesh.triangles.empty()) lacks("triangles to have a slope");
-    const HeightTint tint = HeightTint::of(heights);
+    const HeightTint tint =
+        by == "height" ? HeightTint::of(shown_heights(mesh, heights, terrain)) : HeightTint{};
     const auto normals = by == "slope" ? vertex_normals(mesh) : std::vector<std::array<float, 3>>();
     for (std::size_t i = 0; i < colours.size(); ++i) {
       if (by == "height") colours[i] = tint.colour(heights[i]);

@@ -29,7 +29,7 @@ class SurfaceCommand final : public Command {
     add_output(app, output_, "the file to write: .ply, .obj, .glb; with --tetrahedra .vtk");
     app.add_option("--format", format_, "ply, ply-ascii, obj, glb; else by the file's ending");
     app.add_option("--level", level_, "detail outside the focuses: a number or top")
-        ->capture_default_str();
+        ->default_str("0; with --focus top");
     app.add_option(
         "--region", region_,
         "only points inside: a box, minx,miny[,minz],maxx,maxy[,maxz], or a GeoJSON file");
@@ -37,7 +37,8 @@ class SurfaceCommand final : public Command {
         ->allow_extra_args(false);
     app.add_option("--criterion", criterion_,
                    "what lies on the surface: gabriel; edge[:FACTOR], facets whose edges are short "
-                   "beside the others (0.5); or CGAL's advancing-front, alpha-wrap[:METRES]")
+                   "beside the others (0.5), which does not restore scans yet: pieces or the hull; "
+                   "or CGAL's advancing-front, alpha-wrap[:METRES]")
         ->capture_default_str()
         ->type_name("NAME");
     app.add_option(
@@ -101,8 +102,8 @@ class SurfaceCommand final : public Command {
     return summary;
   }
 
-  std::string store_, output_, format_, level_ = "0", region_, criterion_ = "gabriel",
-                                        metric_ = "euclidean";
+  std::string store_, output_, format_, level_, region_, criterion_ = "gabriel",
+                                                         metric_ = "euclidean";
   std::vector<std::string> focuses_;
   bool tetrahedra_ = false;
   CrsOptions crs_;

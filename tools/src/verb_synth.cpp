@@ -107,8 +107,8 @@ class SynthCommand : public Command {
                    std::to_string(dem_.size.height) + " cells, heights " +
                    number_text(std::round(result.minimum)) + " to " +
                    number_text(std::round(result.maximum)) + ", RMS step " +
-                   number_text(std::round(result.rms_step * 1000) / 1000) + ", " +
-                   readable_bytes(result.bytes) + ", " + readable_seconds(watch.seconds()) + '\n';
+                   readable_number(result.rms_step) + ", " + readable_bytes(result.bytes) + ", " +
+                   readable_seconds(watch.seconds()) + '\n';
     return summary;
   }
 

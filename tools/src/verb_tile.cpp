@@ -169,10 +169,10 @@ Summary TileCommand::run(const CommonOptions& common) {
   for (const ZoomSummary& zoom : result.zooms) {
     zooms.push_back({{"zoom", zoom.zoom}, {"tiles", zoom.tiles}, {"max_error", zoom.max_error}});
     summary.text += "zoom " + std::to_string(zoom.zoom) + ": " + with_commas(zoom.tiles) +
-                    " tiles, within " + number_text(zoom.max_error) + " m\n";
+                    " tiles, within " + readable_bound(zoom.max_error) + " m\n";
     if (zoom.max_error > max_error_of(options, zoom.zoom)) {
       common.say("zoom " + std::to_string(zoom.zoom) + ": " +
-                 number_text(max_error_of(options, zoom.zoom)) +
+                 readable_number(max_error_of(options, zoom.zoom)) +
                  " m was asked for, less than what the 15 bits of a tile's coordinates show here");
     }
   }

@@ -134,9 +134,17 @@ Summary VerifyCommand::tiles(const CommonOptions& common) const {
     summary.text += "zoom " + std::to_string(zoom.zoom) + ": " + with_commas(zoom.tiles) + " tiles";
     if (store) {
       line["samples"] = zoom.samples;
+      line["covered"] = zoom.samples - zoom.uncovered;
+      line["uncovered"] = zoom.uncovered;
       line["max_error"] = zoom.max_error;
-      summary.text += ", " + with_commas(zoom.samples) + " samples within " +
-                      number_text(zoom.max_error) + " m";
+      summary.text += ", within " + readable_bound(zoom.max_error) + " m of " +
+                      (zoom.uncovered == 0 ? "all " + with_commas(zoom.samples)
+                                           : with_commas(zoom.samples - zoom.uncovered) + " of " +
+                                                 with_commas(zoom.samples)) +
+                      " samples";
+      if (zoom.uncovered > 0) {
+        summary.text += " (" + with_commas(zoom.uncovered) + " lie on no triangle)";
+      }
     }
     summary.text += "\n";
     zooms.push_back(std::move(line));

@@ -29,7 +29,31 @@ std::uint32_t* WindowJoiner::shared(const WindowTin& tin, const tri::GridVertex&
   return nullptr;
 }
 
+void WindowJoiner::count_uncovered(const WindowTin& tin) {
+  const LatticeWindow &window = tin.window, &whole = plan_.whole();
+  for (const std::uint32_t at : tin.uncovered) {
+    const std::int64_t column = at % window.columns, row = at / window.columns;
+    const auto between = [](std::int64_t place, std::int64_t first, std::int64_t count,
+                            std::int64_t whole_first, std::int64_t whole_count) {
+      return (place == 0 && first > whole_first) ||
+             (place + 1 == count && first + count < whole_first + whole_count);
+    };
+    const unsigned windows =
+        (between(column, window.column, window.columns, whole.column, whole.columns) ? 2U : 1U) *
+        (between(row, window.row, window.rows, whole.row, whole.rows) ? 2U : 1U);
+    if (windows == 1) {
+      ++uncovered_;
+      continue;
+    }
+    const auto known = on_sides_.try_emplace({window.row + row, window.column + column}, 0U).first;
+    if (++known->second < windows) continue;
+    ++uncovered_;
+    on_sides_.erase(known);
+  }
+}
+
 void WindowJoiner::add(std::size_t i, WindowTin&& tin) {
+  count_uncovered(tin);
   const auto rows = static_cast<std::size_t>(tin.window.rows);
   if (i % plan_.across() == 0) {
     if (i > 0) above_ = std::exchange(below_, std::vector<std::uint32_t>(below_.size(), kNone));

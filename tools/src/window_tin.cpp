@@ -11,6 +11,7 @@
 
 #include "region_overlap.hpp"
 #include "summary.hpp"
+#include "units.hpp"
 
 namespace terrace::tools {
 namespace {
@@ -75,6 +76,15 @@ WindowMesher::WindowMesher(const stream::Store& store, WindowTinOptions options,
       placement_(placement_of(store.schema())),
       reader_(store, std::uint64_t{8} << 20) {}
 
+bool WindowMesher::in_region(const LatticeWindow& window, std::int64_t column, std::int64_t row,
+                             double height) const {
+  if (!options_.region) return true;
+  stream::Point3 p = world_point(placement_, {static_cast<double>(window.column + column),
+                                              static_cast<double>(window.row + row), 0.0});
+  p[2] = height;
+  return options_.region->contains(p);
+}
+
 template <class T>
 WindowMesher::Samples<T> WindowMesher::read(const LatticeWindow& window) {
   const stream::Schema& schema = store_.schema();
@@ -99,7 +109,9 @@ WindowMesher::Samples<T> WindowMesher::read(const LatticeWindow& window) {
       if ((c < 0 && !has_left) || (c == window.columns && !has_right)) continue;
       T& height = heights[static_cast<std::size_t>((r + 1) * wide.columns + c + 1)];
       const bool data = std::isfinite(height);
-      if (counts(c, r) && data) ++samples.with_data;
+      if (data && counts(c, r) && in_region(window, c, r, static_cast<double>(height))) {
+        ++samples.with_data;
+      }
       if (!data && options_.fill) {
         height = static_cast<T>(options_.fill(window.column + c, window.row + r));
       }
@@ -172,8 +184,8 @@ void WindowMesher::check(
   };
   if (tin.check.max_error > options_.bound) {
     if (exact) {
-      fail("the mesh misses its bound: " + std::to_string(tin.check.max_error) + " of " +
-               std::to_string(options_.bound),
+      fail("the mesh misses its bound: " + number_text(tin.check.max_error) + " of " +
+               number_text(options_.bound),
            "this is a fault of terrace, please report it");
     }
     fail("the numbers of the file's format are too coarse for this bound so far from its origin",
@@ -226,6 +238,13 @@ WindowTin WindowMesher::mesh_as(const LatticeWindow& window, tri::TinQuality qua
     check(out, [&](std::span<const tri::Point3> points, double tolerance) {
       return tri::check_grid_tin<T>(grid, points, out.triangles, tolerance);
     });
+    // Whatever lies in the region is on triangles that reach into it, which stay.
+    for (const std::uint32_t at : out.check.uncovered_at) {
+      if (in_region(window, at % window.columns, at / window.columns,
+                    static_cast<double>(samples.heights[at]))) {
+        out.uncovered.push_back(at);
+      }
+    }
     if (options_.region) keep_what_touches(out, *options_.region);
     order_by_use(out);
   }

@@ -37,8 +37,12 @@ struct WindowTin {
   std::vector<stream::Point3> positions;  ///< of the vertices, in the CRS
   std::vector<std::array<std::uint32_t, 3>> triangles;
   tri::GridTinCheck check;  ///< of what a reader gets back
-  /// With data before any was filled; those on the first row and column count in the window before.
+  /// With data before any was filled, in the region if there is one; those on the first row and
+  /// column count in the window before.
   std::uint64_t samples = 0;
+  /// Numbers in the window of such samples, those on the first row and column included, that lie on
+  /// no triangle of this window.
+  std::vector<std::uint32_t> uncovered;
   double reading_seconds = 0.0, meshing_seconds = 0.0;
 };
 
@@ -67,6 +71,9 @@ class WindowMesher {
   Samples<T> read(const LatticeWindow& window);
   template <class T>
   WindowTin mesh_as(const LatticeWindow& window, tri::TinQuality quality, bool checked);
+  /// Whether a sample of the window lies in the region, if there is one.
+  [[nodiscard]] bool in_region(const LatticeWindow& window, std::int64_t column, std::int64_t row,
+                               double height) const;
   [[nodiscard]] std::vector<stream::Point3> positions(const WindowTin& tin) const;
   void check(WindowTin& tin,
              const std::function<tri::GridTinCheck(std::span<const tri::Point3>, double tolerance)>&

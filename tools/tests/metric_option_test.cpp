@@ -14,7 +14,8 @@
 namespace terrace::tools {
 namespace {
 
-constexpr stream::Point3 kOrigin{0, 0, 0}, kOne{1, 1, 1};
+constexpr stream::Point3 kOrigin{0, 0, 0};
+constexpr cluster::LinearMap kOne = cluster::kIdentityMap;
 
 MetricChoice from_file(const std::string& json) {
   const tests::TemporaryFolder scratch;
@@ -49,11 +50,37 @@ TEST(MetricOption, BoxesAreInTheCrsAndSemiAxesOnTheGround) {
   // Two metres to a unit of x, about (100, 0, 0).
   const cluster::Metric metric =
       from_file(R"({"regions": [{"box": [110, -5, 120, 5], "semi_axes": [10, 1]}]})")
-          .on_ground({100, 0, 0}, {2, 1, 1});
+          .on_ground({100, 0, 0}, {2, 0, 0, 0, 1, 0, 0, 0, 1});
   // x = 115 lies at 30 on the ground.
   EXPECT_EQ(cluster::distance(metric, {30, 0, 0}, {40, 0, 0}), 1.0);
   EXPECT_EQ(cluster::distance(metric, {30, 0, 7}, {30, 1, 7}), 1.0);
   EXPECT_EQ(cluster::distance(metric, {50, 0, 0}, {40, 0, 0}), 10.0);
+}
+
+TEST(MetricOption, BoxesHoldWhatIsInThemInTheCrsUnderAnyMapToTheGround) {
+  // A projection far from its centre, and a turned one, about a far origin.
+  const MetricChoice choice = from_file(
+      R"({"regions": [{"box": [5000100, 2000200, 5000300, 2000600], "semi_axes": [10, 10, 10]}]})");
+  const stream::Point3 origin{5000000, 2000000, 0};
+  for (const cluster::LinearMap& map :
+       {cluster::LinearMap{1.125, 0.0625, 0, 0.0625, 0.875, 0, 0, 0, 1},
+        cluster::LinearMap{0.6, -0.8, 0, 0.8, 0.6, 0, 0, 0, 0.3048}}) {
+    const cluster::Metric metric = choice.on_ground(origin, map);
+    std::size_t inside = 0;
+    for (int i = 0; i <= 40; ++i) {
+      for (int k = 0; k <= 80; ++k) {
+        // Some lie on the sides and corners of the box, which is closed.
+        const double x = 10.0 * i, y = 10.0 * k;
+        const cluster::Point3 place{map[0] * x + map[1] * y, map[3] * x + map[4] * y, 0};
+        const bool in = x >= 100 && x <= 300 && y >= 200 && y <= 600;
+        inside += in ? 1 : 0;
+        EXPECT_NEAR(cluster::distance(metric, place, {place[0] + 20, place[1], 0}), in ? 2 : 20,
+                    1e-9)
+            << x << ' ' << y;
+      }
+    }
+    EXPECT_EQ(inside, 21U * 41U);
+  }
 }
 
 TEST(MetricOption, TheFirstRegionCountsAndRotationsTurn) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "check_samples.hpp"
@@ -55,12 +56,14 @@ class Checker {
       at = std::find(at, end, std::uint8_t{0});
       if (at == end) break;
       const auto i = static_cast<std::size_t>(at - flags_.data());
-      if (std::isfinite(heights_[i]) && inner(i % columns_, i / columns_)) ++check_.uncovered_inner;
+      if (!std::isfinite(heights_[i])) continue;
+      check_.uncovered_at.push_back(static_cast<std::uint32_t>(i));
+      if (inner(i % columns_, i / columns_)) ++check_.uncovered_inner;
     }
     check_.uncovered = check_.samples - check_.covered;
     if (check_.covered > 0)
       check_.rms_error = std::sqrt(squares / static_cast<double>(check_.covered));
-    return check_;
+    return std::move(check_);
   }
 
   void count_turned() { ++check_.turned; }

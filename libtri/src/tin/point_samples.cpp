@@ -157,11 +157,27 @@ Samples take_samples(std::span<const double> x, std::span<const double> y,
     if (end - begin > 1 && duplicates == PointDuplicates::kError)
       throw std::invalid_argument("point_tin: sample " + std::to_string(all[begin + 1].id) +
                                   " has the place of sample " + std::to_string(first.id));
-    first.z = merged_height(span_of(all).subspan(begin, end - begin), duplicates);
-    all[kept++] = first;
+    if (end - begin == 1) {
+      all[kept++] = first;
+      begin = end;
+      continue;
+    }
+    const std::span<Sample> group = span_of(all).subspan(begin, end - begin);
+    const auto [low, high] = std::minmax_element(
+        group.begin(), group.end(), [](const Sample& a, const Sample& b) { return a.z < b.z; });
+    const Sample lowest = *low, highest = *high;
+    samples.duplicates += group.size() - 1;
+    samples.duplicate_range = std::max(samples.duplicate_range, highest.z - lowest.z);
+    if (duplicates == PointDuplicates::kAll) {
+      // Once one of them is a vertex, the other cannot become one: its place is taken.
+      all[kept++] = lowest;
+      if (highest.z > lowest.z) all[kept++] = highest;
+    } else {
+      first.z = merged_height(group, duplicates);
+      all[kept++] = first;
+    }
     begin = end;
   }
-  samples.duplicates = count - kept;
   all.resize(kept);
   return samples;
 }

@@ -33,8 +33,11 @@ inline bool stuck(const Sample& sample) { return (sample.id & kStuck) != 0; }
 inline std::uint32_t number(const Sample& sample) { return sample.id & ~kStuck; }
 
 struct Samples {
-  Pool<Sample> all;  ///< along a curve: neighbours are near each other; every place once
+  /// Along a curve: neighbours are near each other. Every place once, or, with kAll, twice where
+  /// heights differ.
+  Pool<Sample> all;
   std::size_t duplicates = 0;
+  double duplicate_range = 0;  ///< the largest difference of heights at one place
 };
 
 /// Checks, sorts and merges; throws as point_tin() does.

@@ -197,6 +197,7 @@ PointTin point_tin(std::span<const double> x, std::span<const double> y, std::sp
   Samples samples = take_samples(x, y, z, options.duplicates);
   PointTin result;
   result.duplicates = samples.duplicates;
+  result.duplicate_range = samples.duplicate_range;
   result.errors.uncovered = samples.all.size();
   Maker maker(samples, frame, options);
   if (options.max_points == 0 ? maker.make(options.max_error, kUnlimited, options.quality)

@@ -41,7 +41,7 @@ std::string misfit(const BorderSide& a, const BorderSide& b) {
   for (std::size_t i = 0; i < a.size(); ++i) {
     most = std::max(most, std::abs(a[i].second - b[i].second));
   }
-  return most > kBorderSlack ? "heights that differ by up to " + number_text(most) + " m" : "";
+  return most > kBorderSlack ? "heights that differ by up to " + readable_number(most) + " m" : "";
 }
 
 DecodedTile unpack_tile(const std::vector<std::byte>& bytes, const std::string& name) {

@@ -128,10 +128,11 @@ Checked SetCheck::check(const TileAddress& tile, unsigned worker) const {
   }
   const double bound = bound_of(tile.zoom);
   if (heights.max_error > bound * (1.0 + 1e-9) + kHeightSlack) {
-    checked.faults.push_back({0, "the sample at " + number_text(heights.longitude) + ", " +
-                                     number_text(heights.latitude) + " is " +
-                                     number_text(heights.max_error) +
-                                     " m off the tile, more than " + number_text(bound) + " m"});
+    checked.faults.push_back({0, "the sample at " + readable_number(heights.longitude, 10) + ", " +
+                                     readable_number(heights.latitude, 10) + " is " +
+                                     readable_number(heights.max_error) +
+                                     " m off the tile, more than " + readable_number(bound) +
+                                     " m"});
   }
   return checked;
 }
@@ -192,6 +193,7 @@ void SetCheck::add(unsigned zoom, const TileHeights& heights) {
   ZoomCheck& sum = result.zooms[zoom];
   ++sum.tiles;
   sum.samples += heights.samples;
+  sum.uncovered += heights.uncovered;
   sum.max_error = std::max(sum.max_error, heights.max_error);
   ++result.tiles;
   result.samples += heights.samples;

@@ -23,9 +23,10 @@ struct TileCheckOptions {
 
 struct ZoomCheck {
   unsigned zoom = 0;
-  std::uint64_t tiles = 0;    ///< that are there
-  std::uint64_t samples = 0;  ///< measured; those on borders of tiles in each of them
-  double max_error = 0.0;     ///< metres; 0 if none was measured
+  std::uint64_t tiles = 0;      ///< that are there
+  std::uint64_t samples = 0;    ///< in its tiles; those on borders of tiles in each of them
+  std::uint64_t uncovered = 0;  ///< of these, such as lie on no triangle: they have no error
+  double max_error = 0.0;       ///< metres; 0 if none was measured
 };
 
 struct TileCheckResult {

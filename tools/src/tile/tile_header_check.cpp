@@ -46,9 +46,9 @@ std::vector<TileFault> check_tile_header(const TileAddress& address, const Decod
   for (const Point3& p : points) farthest = std::max(farthest, distance(p, sphere.centre));
   if (farthest > sphere.radius + kLengthSlack) {
     fault(kSphereAt, "the bounding sphere leaves out vertices by up to " +
-                         number_text(farthest - sphere.radius) + " m");
+                         readable_number(farthest - sphere.radius) + " m");
   } else if (sphere.radius > farthest * (1.0 + kShareSlack) + kLengthSlack) {
-    fault(kSphereAt + 24, "the bounding sphere is " + number_text(sphere.radius / farthest) +
+    fault(kSphereAt + 24, "the bounding sphere is " + readable_number(sphere.radius / farthest) +
                               " times as wide as its centre asks for");
   }
   if (distance(tile.header.centre, bounding_sphere(points).centre) >
@@ -68,11 +68,11 @@ std::vector<TileFault> check_tile_header(const TileAddress& address, const Decod
   const double needed = std::sqrt(dot(right, right));
   if (length < needed * (1.0 - 1e-9)) {
     fault(kHorizonAt, "the horizon occlusion point is hidden while a vertex is not: it is " +
-                          number_text(length) + " radii out, " + number_text(needed) +
+                          readable_number(length) + " radii out, " + readable_number(needed) +
                           " are needed");
   } else if (length > needed * (1.0 + kShareSlack)) {
-    fault(kHorizonAt, "the horizon occlusion point is " + number_text(length) + " radii out, " +
-                          number_text(needed) + " are needed");
+    fault(kHorizonAt, "the horizon occlusion point is " + readable_number(length) + " radii out, " +
+                          readable_number(needed) + " are needed");
   }
   return faults;
 }

@@ -98,9 +98,10 @@ void MeshCheck::triangles() {
   }
   constexpr std::int64_t kWhole = 2 * std::int64_t{kTileUnits} * kTileUnits;
   if (sum != kWhole) {
-    fault(triangles_at_, "the triangles have " +
-                             number_text(static_cast<double>(sum) / static_cast<double>(kWhole)) +
-                             " times the area of the tile");
+    fault(triangles_at_,
+          "the triangles have " +
+              readable_number(static_cast<double>(sum) / static_cast<double>(kWhole)) +
+              " times the area of the tile");
   }
 }
 

@@ -70,22 +70,31 @@ class EllipticalField {
     Bounds box;  ///< closed
     Elliptical metric;
   };
+  /// The coordinates that boxes are in, if they are not those of the points: map * point + offset.
+  struct Frame {
+    LinearMap map = kIdentityMap;
+    Point3 offset{};
+  };
   /// Throws: std::invalid_argument on an empty or not finite box (infinite sides are allowed),
   /// naming its index.
-  explicit EllipticalField(std::vector<Region> regions);
+  explicit EllipticalField(std::vector<Region> regions,
+                           const std::optional<Frame>& frame = std::nullopt);
 
   /// The map that holds at a position: the field as a function from position to symmetric matrix.
   [[nodiscard]] const LinearMap& operator()(const Point3& position) const;
   /// As Elliptical::least_scale() at that position; 1 outside all regions.
   [[nodiscard]] double least_scale(const Point3& position) const;
   /// The map that holds in all of `box`, if there is one: then distances within it are symmetric
-  /// and obey the triangle inequality, and a linear map of the points makes them Euclidean.
+  /// and obey the triangle inequality, and a linear map of the points makes them Euclidean. With a
+  /// frame it may be missed where a region's border passes close by.
   [[nodiscard]] std::optional<LinearMap> uniform_in(const Bounds& box) const;
   [[nodiscard]] const std::vector<Region>& regions() const { return regions_; }
 
  private:
+  [[nodiscard]] Point3 framed(const Point3& position) const;
   [[nodiscard]] const Region* find(const Point3& position) const;
   std::vector<Region> regions_;
+  std::optional<Frame> frame_;
 };
 
 /// A distance of the caller's own. It must be finite, not negative, and 0 from a point to itself.

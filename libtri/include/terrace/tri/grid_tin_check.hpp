@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 /// How far a mesh is from the samples of a raster window, found independently of what made it.
 
@@ -23,9 +24,10 @@ struct GridWindow {
 struct GridTinCheck {
   double max_error = 0;  ///< vertically, over the covered samples
   double rms_error = 0;
-  std::size_t samples = 0;    ///< with data
-  std::size_t covered = 0;    ///< of these, in a triangle
-  std::size_t uncovered = 0;  ///< of these, in none
+  std::size_t samples = 0;                  ///< with data
+  std::size_t covered = 0;                  ///< of these, in a triangle
+  std::size_t uncovered = 0;                ///< of these, in none
+  std::vector<std::uint32_t> uncovered_at;  ///< their numbers, row by row
   /// Of the uncovered ones, those whose 8 neighbours (as far as they are in the window) have data.
   std::size_t uncovered_inner = 0;
   std::size_t nodata_covered = 0;  ///< samples without data that are in a triangle
@@ -37,7 +39,7 @@ struct GridTinCheck {
 /// gets back, which may have been rounded. `tolerance`, in cells, is how far they may have moved:
 /// samples that are outside a triangle by no more count as covered by it, with its plane continued;
 /// samples without data count only if they are inside. O(samples + triangles + points), memory for
-/// one byte per sample.
+/// one byte per sample and four per uncovered one.
 ///
 /// Throws std::invalid_argument for `heights` of the wrong length, a corner that is not the number
 /// of a point, a point that is not finite or (column, row) more than 2^20 away from the window, and

@@ -21,12 +21,14 @@ namespace terrace::tri {
 
 using Point3 = std::array<double, 3>;
 
-/// The height that stands for several samples at one x,y. It alone is measured.
+/// Which of several samples at one x,y counts: one height stands for them and it alone is measured,
+/// unless all count.
 enum class PointDuplicates : std::uint8_t {
   kFirst,
   kMin,
   kMax,
   kMean,
+  kAll,    ///< the lowest and the highest are measured, so the surface is as close to all others
   kError,  ///< std::invalid_argument names the first that has the place of an earlier one
 };
 
@@ -70,12 +72,15 @@ struct PointTin {
   /// The sample that a vertex was taken from, in parallel to `vertices`.
   std::vector<std::uint32_t> sample;
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< vertices, counter-clockwise
-  /// Measured at every sample in the finished surface, after duplicates were merged.
+  /// Measured at every sample in the finished surface, after duplicates were merged; with kAll at
+  /// the lowest and the highest sample of a place.
   /// errors.largest <= max_error, unless max_points was reached or samples are `stuck`.
   TinErrors errors;
   std::size_t duplicates = 0;  ///< samples that share a place with an earlier one
+  double duplicate_range = 0;  ///< the largest difference of heights at one place
   /// Samples beyond max_error that cannot become vertices: they lie on the frame's sides, which are
-  /// kept, or their place on the lattice is taken or on a side.
+  /// kept, or their place on the lattice is taken or on a side, or the place has a vertex already
+  /// (kAll, where samples of one place differ by more than max_error).
   std::size_t stuck = 0;
   std::size_t inserted = 0;  ///< vertices of the greedy surface beside the frame's or the corners
   std::size_t removed = 0;   ///< of these, removed again
