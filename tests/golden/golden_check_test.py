@@ -5,14 +5,16 @@
 TERRACE=path/to/terrace golden_check_test.py
 """
 
+import contextlib
+import io
 import os
 import re
-import subprocess
-import sys
+import shutil
 import tempfile
 import unittest
 
-HERE = os.path.dirname(os.path.abspath(__file__))
+import golden_test
+
 LIST = '''# Kept as it is.
 $ inputs
 
@@ -24,6 +26,20 @@ $ terrace convert - --format csv -o - < twice.xyz
 
 
 class GoldenCheckTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        inputs = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(inputs.cleanup)
+        names = golden_test.make_inputs(inputs.name)
+
+        def copy(folder):
+            shutil.copytree(inputs.name, folder, dirs_exist_ok=True)
+            return names
+
+        make = golden_test.make_inputs
+        cls.addClassCleanup(setattr, golden_test, 'make_inputs', make)
+        golden_test.make_inputs = copy
+
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
@@ -39,10 +55,10 @@ class GoldenCheckTest(unittest.TestCase):
             return file.read()
 
     def check(self, *options):
-        result = subprocess.run([sys.executable, '-B', os.path.join(HERE, 'golden_test.py'), '--list',
-                                 self.list, *options], capture_output=True, text=True, timeout=100)
-        self.assertEqual(result.stderr, '')
-        return result.returncode, result.stdout
+        out = io.StringIO()
+        with contextlib.redirect_stdout(out):
+            code = golden_test.main(['--list', self.list, *options])
+        return code, out.getvalue()
 
     def differs(self, *words):
         code, out = self.check()
@@ -67,7 +83,7 @@ class GoldenCheckTest(unittest.TestCase):
         self.check('--update')
         text = self.read()
         self.write(re.sub(r'[0-9a-f]{64} some\.csv', '0' * 64 + ' some.csv', text))
-        self.differs('line 19: terrace points', '0' * 64 + ' some.csv', '--update', '1 of 4 commands')
+        self.differs(': terrace points', '0' * 64 + ' some.csv', '--update', '1 of 4 commands')
         self.write(text.replace('"points": ', '"points": 1'))
         self.differs('terrace build', '"points": 1')
         self.write(re.sub(r'  [0-9a-f]{64} -\n', '', text))
