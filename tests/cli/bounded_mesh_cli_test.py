@@ -11,10 +11,12 @@ import json
 import math
 import os
 import random
-import struct
 import subprocess
 import tempfile
 import unittest
+
+import small_tiff
+from small_tiff import utm
 
 TERRACE = os.environ.get('TERRACE', 'terrace')
 CELL, WEST, NORTH = 30.0, 500000.0, 5100000.0
@@ -26,34 +28,8 @@ def terrace(*args):
 
 
 def write_tiff(path, columns, rows, heights, nodata=True):
-    """A GeoTIFF of float32 in one strip, UTM zone 32."""
-    values = array.array('f', heights)
-    extra = b''
-    offset = 8 + len(values) * 4
-
-    def put(data):
-        nonlocal extra
-        at = offset + len(extra)
-        extra += data + b'\0' * (len(data) % 2)
-        return at
-
-    scale = put(struct.pack('<3d', CELL, CELL, 0))
-    tie = put(struct.pack('<6d', 0, 0, 0, WEST, NORTH, 0))
-    keys = (1, 1, 0, 3, 1024, 0, 1, 1, 1025, 0, 1, 1, 3072, 0, 1, 32632)
-    key_at = put(struct.pack(f'<{len(keys)}H', *keys))
-    mark = b'-9999\0'
-    mark_at = put(mark)
-    tags = [(256, 4, 1, columns), (257, 4, 1, rows), (258, 3, 1, 32), (259, 3, 1, 1),
-            (262, 3, 1, 1), (273, 4, 1, 8), (277, 3, 1, 1), (278, 4, 1, rows),
-            (279, 4, 1, len(values) * 4), (339, 3, 1, 3), (33550, 12, 3, scale),
-            (33922, 12, 6, tie), (34735, 3, len(keys), key_at)]
-    if nodata:
-        tags.append((42113, 2, len(mark), mark_at))
-    directory = struct.pack('<H', len(tags))
-    directory += b''.join(struct.pack('<HHII', *tag) for tag in tags) + struct.pack('<I', 0)
-    with open(path, 'wb') as file:
-        file.write(struct.pack('<2sHI', b'II', 42, offset + len(extra)))
-        file.write(values.tobytes() + extra + directory)
+    small_tiff.write_tiff(path, columns, rows, heights, (WEST, NORTH), CELL, utm(32),
+                          nodata='-9999' if nodata else None)
 
 
 def read_obj(path):

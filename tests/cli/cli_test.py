@@ -689,6 +689,23 @@ class RenderTest(CommandTest):
         self.assertLess(empty, 0.08 * 160 * 160)
         self.assertEqual(rows[199][-3:], background)
 
+    def test_heights_are_exaggerated_as_asked(self):
+        # A pyramid from the south, at eye level: half as high as wide when stretched twice.
+        with open(self.path('pyramid.obj'), 'w') as file:
+            file.write('v -20 -20 0\nv 20 -20 0\nv 20 20 0\nv -20 20 0\nv 0 0 10\n')
+            file.write('f 1 2 5\nf 2 3 5\nf 3 4 5\nf 4 1 5\n')
+        for factor in (0.5, 1, 2, 4):
+            out = self.path('a.png')
+            summary = self.json_of('render', self.path('pyramid.obj'), '-o', out, '--force', '--size',
+                                   '200x200', '--view', '180,0', '--exaggerate', factor)
+            self.assertEqual(summary['exaggeration'], factor)
+            _, _, rows = png_pixels(out)
+            background = rows[0][:3]
+            drawn = [[x for x in range(200) if row[3 * x:3 * x + 3] != background] for row in rows]
+            height = sum(1 for row in drawn if row)
+            width = max(max(row) for row in drawn if row) - min(min(row) for row in drawn if row) + 1
+            self.assertAlmostEqual(height / width, factor / 4, delta=0.04)
+
     def test_same_picture_for_any_threads(self):
         self.run_ok('synth', 'dem', '--size', '300x300', '-o', self.path('a.tif'))
         pictures = set()

@@ -344,6 +344,59 @@ class ClusterTest(unittest.TestCase):
             self.assertEqual(len(result.stderr.splitlines()), 1)
             self.assertFalse(os.path.exists(tree))
 
+    def even(self, count):
+        generator = random.Random(9)
+        path = self.path(f'even{count}.csv')
+        self.write(path, ['x', 'y', 'z'],
+                   [[generator.uniform(0, 100) for _ in range(3)] for _ in range(count)])
+        return path
+
+    def test_more_effort_finds_cheaper_clusters(self):
+        # Below 2500 points the search is full anyway.
+        source = self.even(3000)
+        standard, fine, full = (
+            self.clustered('--effort', effort, '--bound-iterations', 0, source=source)[0]['cost']
+            for effort in ('default', 'fine', 'full'))
+        self.assertLess(fine, standard)
+        self.assertLess(full, standard)
+
+    def test_the_best_of_several_restarts_counts(self):
+        source = self.even(400)
+        for method in ('k-means', 'k-median'):
+            costs = [self.clustered('--method', method, '-k', 12, '--restarts', restarts,
+                                    source=source)[0]['cost'] for restarts in (1, 2, 4, 8)]
+            self.assertEqual(costs, sorted(costs, reverse=True), method)
+            self.assertLess(costs[-1], costs[0], method)
+
+    def test_more_iterations_prove_a_higher_bound(self):
+        bounds = []
+        for iterations in (0, 2, 200):
+            summary, _ = self.clustered('--facility-cost', 0.1, '--bound-iterations', iterations)
+            bounds.append(summary['lower_bound'])
+        self.assertIsNone(bounds[0])
+        self.assertLess(bounds[1], bounds[2])
+        self.assertLessEqual(bounds[2], summary['cost'])
+
+    def test_heights_count_as_much_as_their_weight(self):
+        generator = random.Random(11)
+        points = [[generator.uniform(0, 100) for _ in range(3)] for _ in range(300)]
+        heights = [p[2] for p in points]
+        clouds = {'plain': points,
+                  'mixed': [[x, y, z] for (x, y, _), z in zip(points, reversed(heights))],
+                  'tall': [[x, y, 2 * z] for x, y, z in points],
+                  'flat': [[x, y, 0] for x, y, _ in points]}
+
+        def labels(name, *options):
+            source = self.path(f'{name}.csv')
+            self.write(source, ['x', 'y', 'z'], clouds[name])
+            _, rows = self.clustered('--method', 'k-means', '-k', 9, *options, source=source)
+            return [row['cluster'] for row in rows]
+
+        self.assertNotEqual(labels('plain'), labels('flat'))
+        self.assertEqual(labels('plain', '--z-weight', 0), labels('flat'))
+        self.assertEqual(labels('mixed', '--z-weight', 0), labels('flat'))
+        self.assertEqual(labels('plain', '--z-weight', 2), labels('tall'))
+
 
 if __name__ == '__main__':
     unittest.main()

@@ -10,10 +10,11 @@ import json
 import os
 import random
 import shutil
-import struct
 import subprocess
 import tempfile
 import unittest
+
+from small_tiff import write_tiff
 
 TERRACE = os.environ.get('TERRACE', 'terrace')
 ESRI_UTM = ('PROJCS["WGS_1984_UTM_Zone_32N",GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984",'
@@ -26,50 +27,6 @@ ESRI_UTM = ('PROJCS["WGS_1984_UTM_Zone_32N",GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1
 
 def terrace(*args):
     return subprocess.run([TERRACE, *map(str, args)], capture_output=True, text=True, timeout=120)
-
-
-def write_tiff(name, keys, corner=(500000, 5200000), cell=10.0, size=6, matrix=None):
-    """An uncompressed float32 GeoTIFF; keys: {number: integer, float or text}."""
-    pixels = struct.pack(f'<{size * size}f', *range(size * size))
-    shorts, doubles, text = [], [], ''
-    for key, value in sorted(keys.items()):
-        if isinstance(value, str):
-            shorts += [key, 34737, len(value) + 1, len(text)]
-            text += value + '|'
-        elif isinstance(value, float):
-            shorts += [key, 34736, 1, len(doubles)]
-            doubles.append(value)
-        else:
-            shorts += [key, 0, 1, value]
-    shorts = [1, 1, 0, len(keys)] + shorts
-    entries = [(256, 3, [size]), (257, 3, [size]), (258, 3, [32]), (259, 3, [1]), (262, 3, [1]),
-               (273, 4, [8]), (277, 3, [1]), (278, 3, [size]), (279, 4, [len(pixels)]),
-               (339, 3, [3]), (34735, 3, shorts)]
-    if matrix:
-        entries.append((34264, 12, matrix))
-    else:
-        entries += [(33550, 12, [cell, cell, 0.0]), (33922, 12, [0.0, 0.0, 0.0, *map(float, corner), 0.0])]
-    if doubles:
-        entries.append((34736, 12, doubles))
-    if text:
-        entries.append((34737, 2, [text.encode() + b'\0']))
-    forms = {2: ('s', 1), 3: ('H', 2), 4: ('I', 4), 12: ('d', 8)}
-    directory, extra = b'', b''
-    start = 8 + len(pixels)
-    behind = start + 2 + 12 * len(entries) + 4
-    for tag, kind, values in sorted(entries):
-        form, width = forms[kind]
-        data = values[0] if kind == 2 else struct.pack(f'<{len(values)}{form}', *values)
-        count = len(data) // width
-        if len(data) <= 4:
-            value = data.ljust(4, b'\0')
-        else:
-            value = struct.pack('<I', behind + len(extra))
-            extra += data + b'\0' * (len(data) % 2)
-        directory += struct.pack('<HHI', tag, kind, count) + value
-    with open(name, 'wb') as file:
-        file.write(struct.pack('<2sHI', b'II', 42, start) + pixels)
-        file.write(struct.pack('<H', len(entries)) + directory + struct.pack('<I', 0) + extra)
 
 
 class GeodesyTest(unittest.TestCase):
@@ -106,8 +63,9 @@ class GeodesyTest(unittest.TestCase):
         text = self.ok('points', *args, '-o', '-', '--format', 'xyz', '-q')
         return [tuple(map(float, line.split()[:3])) for line in text.splitlines()]
 
-    def raster(self, keys, name='dem.tif', **options):
-        write_tiff(self.path(name), keys, **options)
+    def raster(self, keys, name='dem.tif', corner=(500000, 5200000), cell=10.0, matrix=None):
+        """Six by six samples, 0 to 35."""
+        write_tiff(self.path(name), 6, 6, range(36), corner, cell, keys, matrix)
         return self.path(name)
 
     def cloud(self, places, name='points.xyz'):

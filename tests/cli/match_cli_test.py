@@ -216,6 +216,14 @@ class MatchTest(unittest.TestCase):
         self.assertEqual(len(result.stdout.splitlines()), 6)
         self.assertIn('the optimum', result.stderr)
 
+    def test_heights_count_as_much_as_their_weight(self):
+        points = self.points(10, 3)
+        for weight in (0, 0.5, 4):
+            weighed = [[x, y, weight * z] for x, y, z in points]
+            summary, rows = self.match('--z-weight', weight)
+            self.check(weighed, summary, rows)
+            self.assertAlmostEqual(summary['cost'], optimum(weighed), places=6)
+
 
 if __name__ == '__main__':
     unittest.main()

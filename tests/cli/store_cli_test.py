@@ -15,7 +15,7 @@ import subprocess
 import tempfile
 import unittest
 
-from tile_case import utm, write_tiff
+from small_tiff import utm, write_tiff
 
 TERRACE = os.environ.get('TERRACE', 'terrace')
 SIZE = 600
@@ -291,6 +291,120 @@ class StoreTest(unittest.TestCase):
         for verb in ('verify', 'info'):
             self.expect_error(1, verb, self.path('nothing'))
         self.expect_error(1, 'mesh', self.dem, '-o', self.path('none.ply'))
+
+
+class BuildOptionTest(unittest.TestCase):
+    """Options of build, by what they do to the points of the levels."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = folder.name
+
+    def path(self, name):
+        return os.path.join(self.folder, name)
+
+    def write(self, name, points):
+        with open(self.path(name), 'w') as file:
+            file.writelines(f'{x!r} {y!r} {z!r}\n' for x, y, z in points)
+        return self.path(name)
+
+    def build(self, *args, text=None):
+        store = self.path(f'{len(os.listdir(self.folder))}.terrace')
+        result = subprocess.run([TERRACE, 'build', '-o', store, *map(str, args)], timeout=120,
+                                capture_output=True, text=True, input=text)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return store
+
+    def points(self, store, level=0):
+        result = terrace('points', store, '--level', level, '-o', '-')
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return [tuple(map(float, line.split()[:3])) for line in result.stdout.splitlines()]
+
+    @staticmethod
+    def somewhere(seed, count):
+        generator = random.Random(seed)
+        return [tuple(generator.uniform(0, 100) for _ in range(3)) for _ in range(count)]
+
+    def test_more_effort_finds_cheaper_clusters(self):
+        cost = dict.fromkeys(('fast', 'default', 'fine', 'full'), 0.0)
+        # Two blocks of one town each; blocks below 2500 points are searched in full anyway.
+        towns = [self.somewhere(1, 3000), [(x + 1e6, y, z) for x, y, z in self.somewhere(2, 2700)]]
+        cloud = self.write('towns.xyz', towns[0] + towns[1])
+        for effort in cost:
+            store = self.build(cloud, '--effort', effort, '--block', 3000, '--facility-cost', 1)
+            chosen = self.points(store, 1)
+            for town in towns:
+                diagonal = math.dist([min(axis) for axis in zip(*town)],
+                                     [max(axis) for axis in zip(*town)])
+                near = [p for p in chosen if abs(p[0] - town[0][0]) < 1000]
+                cost[effort] += diagonal * len(near)
+                cost[effort] += sum(min(math.dist(p, q) for q in near) for p in town)
+        self.assertLess(cost['full'], cost['default'])
+        self.assertLess(cost['default'], cost['fast'])
+
+    def test_heights_count_as_much_as_their_weight(self):
+        points = self.somewhere(1, 700)
+        mixed = [(x, y, z) for (x, y, _), z in zip(points, reversed([p[2] for p in points]))]
+        tall = [(x, y, 2 * z) for x, y, z in points]
+
+        def chosen(cloud, *options):
+            store = self.build(self.write('cloud.xyz', cloud), '--block', 400, *options)
+            return sorted(p[:2] for p in self.points(store, 1))
+
+        plain = chosen(points)
+        self.assertNotEqual(chosen(mixed), plain)
+        flat = chosen(points, '--z-weight', 0)
+        self.assertNotEqual(flat, plain)
+        self.assertEqual(chosen(mixed, '--z-weight', 0), flat)
+        self.assertEqual(chosen(tall), chosen(points, '--z-weight', 2))
+
+    def test_the_band_that_was_asked_for_is_the_heights(self):
+        raster = self.path('bands.tif')
+        write_tiff(raster, 7, 5, [value for i in range(35) for value in (i, 1000 - i, 7)],
+                   kind='h', bands=3, keys=utm(32))
+        for options, height in (((), lambda i: i), (('--band', 1), lambda i: i),
+                                (('--band', 2), lambda i: 1000 - i), (('--band', 3), lambda i: 7)):
+            found = {(x, y): z for x, y, z in self.points(self.build(raster, *options))}
+            self.assertEqual(found, {(500015.0 + 30 * (i % 7), 5199985.0 - 30 * (i // 7)): height(i)
+                                     for i in range(35)})
+        result = terrace('build', raster, '-o', self.path('none'), '--band', 4)
+        self.assertEqual(result.returncode, 1, result.stderr)
+        self.assertIn('band', result.stderr)
+
+    def test_a_format_that_cannot_be_told_can_be_named(self):
+        points = self.somewhere(3, 40)
+        cloud = self.path('cloud.dat')
+        with open(cloud, 'w') as file:
+            file.write('# as surveyed\n' * 1000)
+            file.writelines(f'{x!r} {y!r} {z!r}\n' for x, y, z in points)
+        for verb in ('build', 'convert', 'cluster', 'match'):
+            out = self.path('out.terrace' if verb == 'build' else 'out.csv')
+            result = terrace(verb, cloud, '-o', out)
+            self.assertEqual(result.returncode, 1, result.stderr)
+            self.assertIn('format', result.stderr)
+            result = terrace(verb, cloud, '-o', out, '--input-format', 'ply')
+            self.assertEqual(result.returncode, 1, result.stderr)
+            self.assertFalse(os.path.exists(out))
+            result = terrace(verb, cloud, '-o', out, '--input-format', 'xyz')
+            self.assertEqual(result.returncode, 0, result.stderr)
+            if verb == 'build':
+                self.assertEqual(sorted(self.points(out)), sorted(points))
+            else:
+                with open(out) as file:
+                    self.assertEqual(sum(1 for _ in file), 1 + (20 if verb == 'match' else 40))
+                os.remove(out)
+
+    def test_standard_input_makes_the_store_of_the_file(self):
+        points = self.somewhere(4, 2000)
+        cloud = self.write('cloud.xyz', points)
+        with open(cloud) as file:
+            text = file.read()
+        piped, named = self.build('-', '--block', 300, text=text), self.build(cloud, '--block', 300)
+        self.assertEqual(sorted(self.points(piped)), sorted(points))
+        levels = [name for name in sorted(os.listdir(named)) if name != 'manifest.json']
+        self.assertGreaterEqual(len(levels), 4)
+        self.assertEqual(filecmp.cmpfiles(piped, named, levels, shallow=False)[1:], ([], []))
 
 
 if __name__ == '__main__':

@@ -6,20 +6,16 @@ import json
 import math
 import os
 import random
-import struct
 import subprocess
 import tempfile
 import unittest
 
+import small_tiff
 from quantized_mesh import A, B
+from small_tiff import GEOGRAPHIC, utm
 
 TERRACE = os.environ.get('TERRACE', 'terrace')
 NODATA = -9999.0
-GEOGRAPHIC = (1, 1, 0, 4, 1024, 0, 1, 2, 1025, 0, 1, 1, 2048, 0, 1, 4326, 2054, 0, 1, 9102)
-
-
-def utm(zone):
-    return (1, 1, 0, 3, 1024, 0, 1, 1, 1025, 0, 1, 1, 3072, 0, 1, 32600 + zone)
 
 
 def terrace(*args, **kwargs):
@@ -28,34 +24,8 @@ def terrace(*args, **kwargs):
 
 
 def write_tiff(path, columns, rows, heights, west, north, cell, keys, matrix=None):
-    """A GeoTIFF of float32 in one strip; keys: its GeoKeys, or nothing."""
-    values = array.array('f', heights)
-    extra = b''
-    offset = 8 + len(values) * 4
-
-    def put(data):
-        nonlocal extra
-        at = offset + len(extra)
-        extra += data + b'\0' * (len(data) % 2)
-        return at
-
-    tags = [(256, 4, 1, columns), (257, 4, 1, rows), (258, 3, 1, 32), (259, 3, 1, 1),
-            (262, 3, 1, 1), (273, 4, 1, 8), (277, 3, 1, 1), (278, 4, 1, rows),
-            (279, 4, 1, len(values) * 4), (339, 3, 1, 3)]
-    if matrix:
-        tags.append((34264, 12, 16, put(struct.pack('<16d', *matrix))))
-    else:
-        tags.append((33550, 12, 3, put(struct.pack('<3d', cell, cell, 0))))
-        tags.append((33922, 12, 6, put(struct.pack('<6d', 0, 0, 0, west, north, 0))))
-    if keys:
-        tags.append((34735, 3, len(keys), put(struct.pack(f'<{len(keys)}H', *keys))))
-    tags.append((42113, 2, 6, put(b'-9999\0')))
-    tags.sort()
-    directory = struct.pack('<H', len(tags))
-    directory += b''.join(struct.pack('<HHII', *tag) for tag in tags) + struct.pack('<I', 0)
-    with open(path, 'wb') as file:
-        file.write(struct.pack('<2sHI', b'II', 42, offset + len(extra)))
-        file.write(values.tobytes() + extra + directory)
+    small_tiff.write_tiff(path, columns, rows, heights, (west, north), cell, keys, matrix,
+                          nodata='-9999')
 
 
 def utm_to_degrees(x, y, zone):

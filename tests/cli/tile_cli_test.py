@@ -283,6 +283,36 @@ class TileTest(TileTestCase):
         self.assertEqual(self.verify('tiny', '--store', self.stores['degrees'], '--vertical',
                                      'ellipsoidal')['problems'], [])
 
+    def write_geoid(self, name, undulation):
+        """A grid in GeographicLib's format, five degrees apart; undulation(lat) in hundredths."""
+        with open(self.path(name), 'wb') as file:
+            file.write(b'P5\n# Description test\n# DateTime 2020-01-01 00:00:00\n'
+                       b'# MaxBilinearError 0.1\n# RMSBilinearError 0.1\n# MaxCubicError 0.1\n'
+                       b'# RMSCubicError 0.1\n# Offset -100\n# Scale 0.01\n72 37\n65535\n')
+            for row in range(37):
+                file.write(struct.pack('>H', 10000 + undulation(90 - 5 * row)) * 72)
+        return self.path(name)
+
+    def test_a_geoid_is_added_to_the_heights(self):
+        # Straight in latitude, so that every interpolation of the grid gives the same.
+        geoid = self.write_geoid('slope.pgm', lambda lat: 5000 + 40 * lat)
+        other = self.write_geoid('level.pgm', lambda lat: 5000)
+        for name, store in self.stores.items():
+            with self.subTest(name):
+                out = f'{name}-geoid'
+                result = terrace('tile', store, '-o', self.path(out), '--geoid', geoid, '--max-error', 2)
+                self.assertEqual(result.returncode, 0, result.stderr)
+                tiles = TileSet(self.path(out))
+                tiles.check()
+                samples = [(lon, lat, z + 50 + 0.4 * lat)
+                           for lon, lat, z in self.dems[name].samples()]
+                for zoom, (error, missed) in tiles.errors(samples).items():
+                    self.assertEqual(missed, 0)
+                    self.assertLessEqual(error, 2 * 2 ** (tiles.layer['maxzoom'] - zoom) * 1.000001)
+                self.assertTrue(self.verify(out, '--store', store, '--geoid', geoid)['ok'])
+                self.assertFalse(self.verify(out, '--store', store, '--geoid', other)['ok'])
+                self.assertFalse(self.verify(out, '--store', store, '--vertical', 'ignore')['ok'])
+
     def test_rotated_rasters(self):
         dem = Dem(70, 50, 0, 0, 1)
         angle, cell = math.radians(30), 900.0

@@ -5,14 +5,14 @@
 TERRACE=path/to/terrace tile_void_cli_test.py
 """
 
-import array
 import json
 import os
 import random
-import struct
 import subprocess
 import tempfile
 import unittest
+
+import small_tiff
 
 TERRACE = os.environ.get('TERRACE', 'terrace')
 NODATA = -9999.0
@@ -26,32 +26,9 @@ def terrace(*args):
 
 
 def write_tiff(path, heights):
-    """A GeoTIFF of float32 in one strip, WGS 84, samples on the corners of cells."""
-    values = array.array('f', heights)
-    extra = b''
-    offset = 8 + len(values) * 4
-
-    def put(data):
-        nonlocal extra
-        at = offset + len(extra)
-        extra += data + b'\0' * (len(data) % 2)
-        return at
-
-    scale = put(struct.pack('<3d', CELL, CELL, 0))
-    tie = put(struct.pack('<6d', 0, 0, 0, WEST, NORTH, 0))
-    keys = (1, 1, 0, 3, 1024, 0, 1, 2, 1025, 0, 1, 2, 2048, 0, 1, 4326)
-    key_at = put(struct.pack(f'<{len(keys)}H', *keys))
-    mark = b'-9999\0'
-    tags = [(256, 4, 1, COUNT), (257, 4, 1, COUNT), (258, 3, 1, 32), (259, 3, 1, 1),
-            (262, 3, 1, 1), (273, 4, 1, 8), (277, 3, 1, 1), (278, 4, 1, COUNT),
-            (279, 4, 1, len(values) * 4), (339, 3, 1, 3), (33550, 12, 3, scale),
-            (33922, 12, 6, tie), (34735, 3, len(keys), key_at),
-            (42113, 2, len(mark), put(mark))]
-    directory = struct.pack('<H', len(tags))
-    directory += b''.join(struct.pack('<HHII', *tag) for tag in tags) + struct.pack('<I', 0)
-    with open(path, 'wb') as file:
-        file.write(struct.pack('<2sHI', b'II', 42, offset + len(extra)))
-        file.write(values.tobytes() + extra + directory)
+    """WGS 84, samples on the corners of cells."""
+    keys = {1024: 2, 1025: 2, 2048: 4326}
+    small_tiff.write_tiff(path, COUNT, COUNT, heights, (WEST, NORTH), CELL, keys, nodata='-9999')
 
 
 def steep_with_voids(seed):

@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Small GeoTIFFs, written and read without a library: inputs whose bytes depend on nothing that is
+installed, and samples of outputs that do not depend on how they were compressed."""
+
+import array
+import struct
+import zlib
+
+# GeoKeys of WGS 84 in degrees, samples in the middle of cells.
+GEOGRAPHIC = {1024: 2, 1025: 1, 2048: 4326, 2054: 9102}
+
+# By array's type code: the bits of a sample and TIFF's number for the kind.
+KINDS = {'B': (8, 1), 'H': (16, 1), 'h': (16, 2), 'i': (32, 2), 'f': (32, 3), 'd': (64, 3)}
+# Bytes of a value, by TIFF's number for its type.
+WIDTHS = {1: 1, 2: 1, 3: 2, 4: 4, 5: 8, 12: 8}
+PLACES_OF_PIECES = (273, 279, 324, 325)
+
+
+def utm(zone):
+    """GeoKeys of a UTM zone of the northern half."""
+    return {1024: 1, 1025: 1, 3072: 32600 + zone}
+
+
+def write_tiff(path, columns, rows, samples, corner=(500000.0, 5200000.0), cell=30.0, keys=None,
+               matrix=None, kind='f', bands=1, nodata=None):
+    """A raster in one strip.
+
+    samples: by rows, bands beside each other. corner: the upper left one, cell: its side; or
+    matrix: the sixteen numbers of a transformation. keys: {GeoKey: integer, float or text}.
+    nodata: as text.
+    """
+    pixels = array.array(kind, samples).tobytes()
+    bits, form = KINDS[kind]
+    assert len(pixels) == columns * rows * bands * bits // 8
+    shorts, doubles, text = [], [], ''
+    for key, value in sorted((keys or {}).items()):
+        if isinstance(value, str):
+            shorts += [key, 34737, len(value) + 1, len(text)]
+            text += value + '|'
+        elif isinstance(value, float):
+            shorts += [key, 34736, 1, len(doubles)]
+            doubles.append(value)
+        else:
+            shorts += [key, 0, 1, value]
+    entries = [(256, 4, [columns]), (257, 4, [rows]), (258, 3, [bits] * bands), (259, 3, [1]),
+               (262, 3, [1]), (273, 4, [8]), (277, 3, [bands]), (278, 4, [rows]),
+               (279, 4, [len(pixels)]), (339, 3, [form] * bands)]
+    if matrix:
+        entries.append((34264, 12, matrix))
+    else:
+        entries.append((33550, 12, [cell, cell, 0.0]))
+        entries.append((33922, 12, [0.0, 0.0, 0.0, *map(float, corner), 0.0]))
+    if shorts:
+        entries.append((34735, 3, [1, 1, 0, len(keys)] + shorts))
+    if doubles:
+        entries.append((34736, 12, doubles))
+    if text:
+        entries.append((34737, 2, text))
+    if nodata is not None:
+        entries.append((42113, 2, nodata))
+    directory, extra = b'', b''
+    start = 8 + len(pixels) + len(pixels) % 2
+    behind = start + 2 + 12 * len(entries) + 4
+    for tag, number, values in sorted(entries):
+        if number == 2:
+            data = values.encode() + b'\0'
+        else:
+            data = struct.pack(f'<{len(values)}' + {3: 'H', 4: 'I', 12: 'd'}[number], *values)
+        count = len(data) // WIDTHS[number]
+        if len(data) <= 4:
+            value = data.ljust(4, b'\0')
+        else:
+            value = struct.pack('<I', behind + len(extra))
+            extra += data + b'\0' * (len(data) % 2)
+        directory += struct.pack('<HHI', tag, number, count) + value
+    with open(path, 'wb') as file:
+        file.write(struct.pack('<2sHI', b'II', 42, start) + pixels + b'\0' * (len(pixels) % 2))
+        file.write(struct.pack('<H', len(entries)) + directory + struct.pack('<I', 0) + extra)
+
+
+def read_directory(data):
+    """{tag: (type, the bytes of its values)} of the first directory of a little-endian TIFF."""
+    mark, magic, at = struct.unpack('<2sHI', data[:8])
+    assert (mark, magic) == (b'II', 42), 'no little-endian TIFF'
+    tags = {}
+    for i in range(struct.unpack_from('<H', data, at)[0]):
+        tag, number, count = struct.unpack_from('<HHI', data, at + 2 + 12 * i)
+        size, place = count * WIDTHS[number], at + 10 + 12 * i
+        if size > 4:
+            place = struct.unpack_from('<I', data, place)[0]
+        tags[tag] = (number, data[place:place + size])
+    return tags
+
+
+def tiff_content(path):
+    """What a GeoTIFF says: its tags but for the places and sizes of its pieces, then the bytes of
+    each strip or tile without their compression."""
+    with open(path, 'rb') as file:
+        data = file.read()
+    tags = read_directory(data)
+
+    def numbers(tag):
+        kind, values = tags[tag]
+        return struct.unpack(f'<{len(values) // WIDTHS[kind]}' + {3: 'H', 4: 'I'}[kind], values)
+
+    content = b''.join(struct.pack('<HHI', tag, kind, len(values)) + values
+                       for tag, (kind, values) in sorted(tags.items()) if tag not in PLACES_OF_PIECES)
+    places, sizes = (324, 325) if 324 in tags else (273, 279)
+    unpack = {1: bytes, 8: zlib.decompress, 32946: zlib.decompress}[numbers(259)[0]]
+    return content + b''.join(unpack(data[at:at + size])
+                              for at, size in zip(numbers(places), numbers(sizes)))
