@@ -3,9 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <stdexcept>
 #include <type_traits>
+
+#include "portable_math.hpp"
 
 namespace terrace::cluster {
 namespace {
@@ -16,23 +17,6 @@ struct Overloaded : Ts... {
 };
 template <class... Ts>
 Overloaded(Ts...) -> Overloaded<Ts...>;
-
-// Sine and cosine of an angle in degrees, exact at multiples of 90.
-std::array<double, 2> sine_cosine(double degrees) {
-  int quarter = 0;
-  const double rest = std::remquo(degrees, 90.0, &quarter) * (std::numbers::pi / 180.0);
-  const double s = std::sin(rest), c = std::cos(rest);
-  switch (quarter & 3) {
-    case 0:
-      return {s, c};
-    case 1:
-      return {c, -s};
-    case 2:
-      return {-s, -c};
-    default:
-      return {-c, s};
-  }
-}
 
 void check_semi_axis(double length, std::size_t axis) {
   if (length > 0.0 && std::isfinite(length) && std::isfinite(1.0 / length)) return;
@@ -47,7 +31,7 @@ LinearMap upright(double angle_degrees) {
         "the angle of an ellipse is not finite: give it in degrees, "
         "counter-clockwise from +x");
   }
-  const auto [s, c] = sine_cosine(angle_degrees);
+  const auto [s, c] = portable::sine_cosine(angle_degrees);
   return {c, s, 0, -s, c, 0, 0, 0, 1};
 }
 
@@ -71,9 +55,9 @@ double minkowski(double p, double x, double y, double z) {
   if (largest == 0.0 || std::isinf(p)) return largest;
   if (p == 1.0) return x + y + z;
   // Relative to the largest, so that powers neither overflow nor vanish.
+  using portable::power;
   return largest *
-         std::pow(std::pow(x / largest, p) + std::pow(y / largest, p) + std::pow(z / largest, p),
-                  1.0 / p);
+         power(power(x / largest, p) + power(y / largest, p) + power(z / largest, p), 1.0 / p);
 }
 
 bool separate(const Bounds& a, const Bounds& b) {

@@ -11,8 +11,6 @@
 namespace terrace::cluster {
 namespace {
 
-constexpr double kFloatTolerance = 1e-7;
-
 std::string message_of(const std::function<void()>& action) {
   try {
     action();
@@ -58,11 +56,25 @@ TEST(CompleteLinkage, IsThatOfTheTextbook) {
         ASSERT_EQ(laws::complete_fault(complete_linkage(points), d, 1e-14), "");
         if (name == "geometric spacing" && count > 100) continue;  // more than the range of float
         ASSERT_EQ(laws::complete_fault(complete_linkage(points, {.entry = MatrixEntry::float32}), d,
-                                       kFloatTolerance),
+                                       laws::kFloatTolerance),
                   "");
       }
     }
   }
+}
+
+/// The law by which runs on other devices are judged: which of several equal distances comes first
+/// may change the heights that follow.
+TEST(CompleteLinkage, EqualDistancesAllowRunsOfDifferentHeights) {
+  const laws::Distances d = laws::distances_of({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}});
+  const Dendrogram pairs{4, {{0, 1, 1, 2}, {2, 3, 1, 2}, {4, 5, 3, 4}}};
+  const Dendrogram middle{4, {{1, 2, 1, 2}, {0, 4, 2, 3}, {3, 5, 3, 4}}};
+  EXPECT_EQ(laws::complete_fault(pairs, d, 0.0), "");
+  EXPECT_EQ(laws::complete_fault(middle, d, 0.0), "");
+  const Dendrogram low{4, {{0, 1, 1, 2}, {2, 3, 1, 2}, {4, 5, 2, 4}}};
+  EXPECT_EQ(laws::complete_fault(low, d, 0.0), "row 2: wrong height");
+  const Dendrogram early{4, {{0, 1, 1, 2}, {2, 4, 2, 3}, {3, 5, 3, 4}}};
+  EXPECT_EQ(laws::complete_fault(early, d, 0.0), "row 1: others are nearer");
 }
 
 TEST(CompleteLinkage, HeightsAreThoseOfTheTextbook) {
@@ -95,7 +107,7 @@ TEST(CompleteLinkage, TakesAnyDistances) {
         }
         ASSERT_EQ(laws::complete_fault(
                       complete_linkage(count, lookup(d), {.entry = MatrixEntry::float32}), d,
-                      kFloatTolerance),
+                      laws::kFloatTolerance),
                   "");
       }
     }

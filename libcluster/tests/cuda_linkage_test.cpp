@@ -61,8 +61,10 @@ TEST(CudaLinkage, GivesTheDendrogramsOfTheCpu) {
     std::mt19937_64 random(count);
     const std::vector<Point3> points = inputs::cube(count, random);
     EXPECT_EQ(cuda_complete_linkage(points), complete_linkage(points));
-    EXPECT_EQ(heights_of(cuda_complete_linkage(points, {.entry = MatrixEntry::float32})),
-              heights_of(complete_linkage(points, {.entry = MatrixEntry::float32})));
+    // Roundings to float are equal now and then: several runs are valid.
+    EXPECT_EQ(laws::complete_fault(cuda_complete_linkage(points, {.entry = MatrixEntry::float32}),
+                                   laws::distances_of(points), laws::kFloatTolerance),
+              "");
     EXPECT_EQ(cuda_single_linkage(points), single_linkage(points));
   }
   for (const auto& [name, points] : laws::linkage_inputs(150, 6)) {

@@ -44,9 +44,10 @@ TEST(DeviceLinkage, GivesTheDendrogramsOfTheCpu) {
       LoopDevice loop(lanes, true, count);
       EXPECT_EQ(complete_on<double>(loop, points), complete_linkage(points));
       EXPECT_EQ(single_on(loop, points), single_linkage(points));
-      // Roundings to float are equal now and then; what counts here are the same heights.
-      EXPECT_EQ(heights_of(complete_on<float>(loop, points)),
-                heights_of(complete_linkage(points, {.entry = MatrixEntry::float32})));
+      // Roundings to float are equal now and then: several runs are valid.
+      EXPECT_EQ(laws::complete_fault(complete_on<float>(loop, points), laws::distances_of(points),
+                                     laws::kFloatTolerance),
+                "");
     }
   }
 }

@@ -83,28 +83,42 @@ inline std::vector<std::vector<std::uint32_t>> members_of(const Dendrogram& dend
   return members;
 }
 
+/// Of heights from a matrix of floats: an entry is rounded once.
+inline constexpr double kFloatTolerance = 1e-7;
+
 /// What is wrong with a dendrogram as a run of complete linkage: each row must merge two clusters
 /// than which none are nearer, at the distance of their farthest points, up to `tolerance`
-/// (relative). Empty if nothing is. O(n^3).
+/// (relative). Empty if nothing is. This is the whole law: where distances are equal several runs
+/// are valid, and not even their heights need be the same. O(n^2) unless many distances are equal.
 inline std::string complete_fault(const Dendrogram& dendrogram, Distances d, double tolerance) {
   if (std::string fault = dendrogram_fault(dendrogram); !fault.empty()) return fault;
   std::vector<std::size_t> place(dendrogram.points);  // of each cluster its row of d
   for (std::size_t i = 0; i < place.size(); ++i) place[i] = i;
   std::vector<std::size_t> active = place;
+  std::vector<std::size_t> nearest(place.size());  // of each active row the other nearest to it
+  const auto find_nearest = [&](std::size_t i) {
+    std::size_t best = i;
+    for (const std::size_t j : active) {
+      if (j != i && (best == i || d[i][j] < d[i][best])) best = j;
+    }
+    nearest[i] = best;
+  };
+  for (const std::size_t i : active) find_nearest(i);
   for (const Merge& merge : dendrogram.merges) {
     const std::string row = "row " + std::to_string(place.size() - dendrogram.points) + ": ";
     const std::size_t a = place[merge.a];
     const std::size_t b = place[merge.b];
     if (std::abs(merge.height - d[a][b]) > tolerance * d[a][b]) return row + "wrong height";
     for (const std::size_t i : active) {
-      for (const std::size_t j : active) {
-        if (i < j && d[i][j] * (1 + tolerance) < merge.height) {
-          return row + "others are nearer";
-        }
-      }
+      if (d[i][nearest[i]] * (1 + tolerance) < merge.height) return row + "others are nearer";
     }
-    for (const std::size_t k : active) d[a][k] = d[k][a] = std::max(d[a][k], d[b][k]);
     active.erase(std::find(active.begin(), active.end(), b));
+    for (const std::size_t k : active) {
+      if (k != a) d[a][k] = d[k][a] = std::max(d[a][k], d[b][k]);
+    }
+    for (const std::size_t k : active) {
+      if (k == a || nearest[k] == a || nearest[k] == b) find_nearest(k);
+    }
     place.push_back(a);
   }
   return {};

@@ -84,6 +84,33 @@ TEST(Metric, MinkowskiTakesAbsoluteValuesAndSums) {
   EXPECT_NEAR(distance(Minkowski{2.0}, origin, {3e300, 4e300, 0}), 5e300, 1e286);
 }
 
+/// The C library's pow gives other last bits for some of these.
+TEST(Metric, PowersHaveTheSameBitsOnEveryMachine) {
+  const auto of = [](double p) { return distance(Minkowski{p}, {0, 0, 0}, {1, 2.25, -0.3}); };
+  EXPECT_EQ(of(1.5), 0x1.5eea974e767f3p+1);
+  EXPECT_EQ(of(2.5), 0x1.2f4d903710bc5p+1);
+  EXPECT_EQ(of(4), 0x1.22ca8edaae2ffp+1);
+  EXPECT_EQ(of(0.75), 0x1.33262b366ab1bp+2);
+}
+
+TEST(Metric, PowersAgreeWithTheLibrary) {
+  std::mt19937_64 random(7);
+  for (int i = 0; i < 2000; ++i) {
+    const double p = 0.1 + 10 * inputs::uniform(random) * inputs::uniform(random);
+    Point3 v;
+    for (double& x : v) x = std::ldexp(inputs::uniform(random), -static_cast<int>(random() % 40));
+    const double largest = std::max({v[0], v[1], v[2]});
+    double sum = 0;
+    for (const double x : v) sum += std::pow(x / largest, p);
+    const double expected = largest * std::pow(sum, 1 / p);
+    ASSERT_NEAR(distance(Minkowski{p}, {}, v), expected, 1e-14 * expected) << p;
+  }
+  // Ratios below the smallest normal number, and a root that overflows.
+  EXPECT_DOUBLE_EQ(distance(Minkowski{0.01}, {}, {1, 1e-310, 0}),
+                   std::pow(1 + std::pow(1e-310, 0.01), 100));
+  EXPECT_EQ(distance(Minkowski{0.001}, {}, {1, 1, 1}), std::pow(3.0, 1000));
+}
+
 TEST(Metric, ADistanceInAFieldBelongsToTheRegionOfTheFacility) {
   const EllipticalField field({{{{0, 0, -1}, {10, 10, 1}}, Elliptical(10.0, 10.0, 0.0, 10.0)}});
   const Point3 inside{5, 5, 0}, outside{-5, 5, 0};

@@ -12,6 +12,7 @@
 #include "interpolation/blocks.hpp"
 #include "interpolation/check_heights.hpp"
 #include "interpolation/sampler.hpp"
+#include "portable_math.hpp"
 
 namespace terrace::tri {
 namespace {
@@ -101,6 +102,17 @@ std::vector<Gradient> gradients_at(const Delaunay2<Coord>& triangulation, const 
       Delaunay2Access::mesh(triangulation), queries, results, threads,
       [&](auto& sampler, const Point2& query) { return sampler.gradient(query, heights, from); });
   return results;
+}
+
+double slope_degrees(const Gradient& gradient) {
+  return portable::angle_degrees(portable::length(gradient.x, gradient.y), 1);
+}
+
+double aspect_degrees(const Gradient& gradient) {
+  if (gradient.x == 0 && gradient.y == 0) return std::numeric_limits<double>::quiet_NaN();
+  const double degrees = portable::angle_degrees(-gradient.x, -gradient.y);
+  // A tiny negative angle would round to 360.
+  return !(degrees < 0) ? degrees + 0.0 : degrees + 360 < 360 ? degrees + 360 : 0;
 }
 
 #define TERRACE_TRI_DEFINE(Coord)                                                            \

@@ -2,8 +2,10 @@
 #include "terrace/tri/interpolation.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <map>
+#include <numbers>
 #include <stdexcept>
 #include <string>
 
@@ -370,6 +372,20 @@ TEST(Interpolation, SlopeAndAspect) {
   EXPECT_LT(aspect_degrees({1e-300, -1}), 360);
   EXPECT_TRUE(std::isnan(aspect_degrees({0, -0.0})));
   EXPECT_TRUE(std::isnan(aspect_degrees({})));
+}
+
+/// The C library's atan and atan2 give other last bits for some of these.
+TEST(Interpolation, SlopeAndAspectHaveTheSameBitsOnEveryMachine) {
+  EXPECT_EQ(slope_degrees({0.1, 0.2}), 0x1.93571a47a1deep+3);
+  EXPECT_EQ(aspect_degrees({0.1, 0.2}), 0x1.9d214e634c3b8p+7);
+  EXPECT_EQ(aspect_degrees({-3.0, 0.7}), 0x1.9c893d24bba07p+6);
+  EXPECT_EQ(slope_degrees({-1.7, -1.1}), 0x1.fdbc1ea252cd6p+5);
+  for (double g = 1e-12; g < 1e12; g *= 1.07) {
+    const double x = g * 0.8, y = -g * g;
+    const double slope = std::atan(std::hypot(x, y)) * (180 / std::numbers::pi);
+    ASSERT_NEAR(slope_degrees({x, y}), slope, 1e-15 * slope) << g;
+    ASSERT_NEAR(aspect_degrees({-x, y}), std::atan2(x, -y) * (180 / std::numbers::pi), 1e-13) << g;
+  }
 }
 
 TEST(Interpolation, HeightsComeFromArraysFunctionsAndModels) {

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What questions to a store cost, on the store that TERRACE_BENCH_STORE names or else on one made
 // here of a fractal elevation model of 2049 x 2049 samples.
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <cstdlib>
 #include <fstream>
@@ -15,6 +17,7 @@
 
 #include "../pipeline/temporary_folder.hpp"
 #include "cli.hpp"
+#include "detail.hpp"
 #include "height_sampler.hpp"
 #include "place_file.hpp"
 #include "portable_math.hpp"
@@ -139,6 +142,63 @@ void sample_lines(benchmark::State& state) {
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(place_count()));
 }
 BENCHMARK(sample_lines)->Unit(benchmark::kMillisecond);
+
+/// A square anywhere within the bounds that covers this share of their area, in the store's CRS.
+terrace::tools::Region random_square(double share, std::uint64_t seed) {
+  const terrace::stream::Box3 all =
+      terrace::tools::world_box(terrace::tools::placement_of(store().schema()), store().bounds());
+  std::string text[2];
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    const double side = std::sqrt(share) * (all.max[axis] - all.min[axis]);
+    seed = terrace::tools::scramble(seed);
+    const double low = all.min[axis] +
+                       terrace::tools::unit_interval(seed) * (all.max[axis] - all.min[axis] - side);
+    text[0] += std::to_string(low) + ',';
+    text[1] += std::to_string(low + side) + (axis == 0 ? "," : "");
+  }
+  return terrace::tools::Region::parse(text[0] + text[1]);
+}
+
+/// What it takes to read all points inside a square: the argument is its share of the area in parts
+/// of ten thousand. The counters are means over the squares; `delivered` and `bytes` are per point
+/// inside. The root, of any size up to a block, is left out of clusters and bytes: whoever asks
+/// often keeps it.
+void region(benchmark::State& state) {
+  const Store& source = store();
+  const terrace::tools::Placement placement = terrace::tools::placement_of(source.schema());
+  const double share = static_cast<double>(state.range(0)) / 10000;
+  const std::uint64_t squares = small() ? 2 : share < 0.005 ? 200 : share < 0.05 ? 40 : 10;
+  std::uint64_t inside = 0, delivered = 0, clusters = 0, bytes = 0, reads = 0;
+  for (auto _ : state) {
+    for (std::uint64_t square = 1; square <= squares; ++square) {
+      terrace::tools::Detail detail;
+      detail.region = random_square(share, square);
+      terrace::tools::for_each_wanted(
+          source, detail,
+          [&](terrace::stream::ClusterId id, const terrace::stream::ClusterRecord& record,
+              const terrace::stream::ClusterPoints& points) {
+            if (id != source.root()) {
+              ++clusters;
+              bytes += record.bytes;
+              delivered += points.size();
+            }
+            for (const auto& p : points.positions) {
+              inside += detail.region->contains(terrace::tools::world_point(placement, p));
+            }
+          });
+      ++reads;
+    }
+  }
+  const double count = static_cast<double>(reads);
+  const double within = static_cast<double>(std::max<std::uint64_t>(1, inside));
+  state.counters["inside"] = static_cast<double>(inside) / count;
+  state.counters["clusters"] = static_cast<double>(clusters) / count;
+  state.counters["KB"] = static_cast<double>(bytes) / count / 1000;
+  state.counters["delivered"] = static_cast<double>(delivered) / within;
+  state.counters["bytes"] = static_cast<double>(bytes) / within;
+  state.SetItemsProcessed(static_cast<std::int64_t>(inside));
+}
+BENCHMARK(region)->Arg(1)->Arg(100)->Arg(1000)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Checks the rules of ARCHITECTURE.md: who may know whom, licences, lists of files.
+"""Checks the rules of ARCHITECTURE.md: who may know whom, licences, lists of files, portable sums.
 
 check_layout.py ROOT    prints one line per breach; exit status 1 if there is one.
 """
@@ -37,6 +37,23 @@ RESTRICTED = [
     (r'gtest/|gmock/', TESTS + ['tools']),
     (r'benchmark/', BENCHES),
 ]
+
+# Functions of the C library whose last bit differs from release to release and from processor to
+# processor. Where bytes depend on them the same input gives other bytes elsewhere, so sources use
+# the portable_math.hpp of their room instead (sqrt, fma, fmod, remquo, frexp and ldexp are exact).
+INEXACT = (r'(?:acosh?|asinh?|atan[2h]?|cbrt|cosh?|erfc?|exp(?:2|m1)?|hypot|[lt]gamma|'
+           r'log(?:10|1p|2)?|pow|sincos|sinh?|tanh?)')
+INEXACT_USE = re.compile(rf'\bstd::{INEXACT}[fl]?\b|(?<![\w.>:]){INEXACT}[fl]?\(')
+# The files that may, and why. GeographicLib, which tools alone use, is made of such functions too.
+CAMERA = 'the camera: which clusters a view asks for, never what a file holds'
+EARTH = 'places on the earth, by formulas of such functions: ARCHITECTURE.md says what depends on them'
+MAY_DIFFER = {
+    'libtri/src/view/columns.cpp': CAMERA,
+    'libtri/src/view/view.cpp': CAMERA,
+    'tools/src/projection.cpp': EARTH,
+    'tools/src/projection_cone.cpp': EARTH,
+    'tools/src/projection_oblique.cpp': EARTH,
+}
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 SOURCE_ENDINGS = ('.cpp', '.hpp', '.h', '.cu', '.cpp.in', '.py', '.sh')
@@ -116,6 +133,22 @@ def check_sources(root):
                         yield f'{path}:{number}: {breach}'
 
 
+def check_inexact(root):
+    """Functions of the C library that are not exact, where nobody allowed them."""
+    used = set()
+    for folder in [f'lib{library}/{part}' for library in LIBRARIES for part in ('include', 'src')] + ['tools/src']:
+        for path in files_below(root, folder):
+            for number, line in enumerate(read(root, path).split('\n'), 1):
+                found = INEXACT_USE.search(line.split('//')[0])
+                if found and path in MAY_DIFFER:
+                    used.add(path)
+                elif found:
+                    yield (f'{path}:{number}: {found.group(0).rstrip("(")} gives other last bits elsewhere; '
+                           'use portable_math.hpp, or say in MAY_DIFFER why no output depends on it')
+    for path in sorted(set(MAY_DIFFER) - used):
+        yield f'{path}: is in MAY_DIFFER and uses nothing of the kind'
+
+
 def check_meson(root):
     for library in LIBRARIES:
         room = f'lib{library}'
@@ -154,6 +187,7 @@ def check_rooms(root):
 def breaches(root):
     yield from check_rooms(root)
     yield from check_sources(root)
+    yield from check_inexact(root)
     yield from check_meson(root)
 
 

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "draw.hpp"
+#include "portable_math.hpp"
 
 namespace terrace::tools {
 namespace {
@@ -56,7 +57,7 @@ void draw_marks(const std::vector<stream::Point3>& positions, const Camera& came
       if (is_hidden(canvas, cx, cy, radius, depth + behind)) continue;
       for (auto y = static_cast<std::uint32_t>(y0); y < static_cast<std::uint32_t>(y1); ++y) {
         for (auto x = static_cast<std::uint32_t>(x0); x < static_cast<std::uint32_t>(x1); ++x) {
-          const double distance = std::hypot(x + 0.5 - cx, y + 0.5 - cy);
+          const double distance = portable_hypot(x + 0.5 - cx, y + 0.5 - cy);
           if (distance <= radius) canvas.colour(x, y) = distance <= core ? kCore : kRim;
         }
       }

@@ -6,6 +6,7 @@
 
 #include "draw.hpp"
 #include "matching_result.hpp"
+#include "portable_math.hpp"
 
 namespace terrace::tools {
 namespace {
@@ -99,7 +100,7 @@ double usual_distance(const std::vector<MatchingLine>& lines,
   std::vector<double> lengths;
   for (const MatchingLine& line : lines) {
     const auto &a = places[line.a], &b = places[line.b];
-    const double length = std::hypot(a[0] - b[0], a[1] - b[1]);
+    const double length = portable_hypot(a[0] - b[0], a[1] - b[1]);
     if (line.level == 1 && std::isfinite(length)) lengths.push_back(length);
   }
   double usual = 0.4 * std::sqrt(static_cast<double>(canvas.width()) * canvas.height() /

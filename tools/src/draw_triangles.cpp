@@ -44,7 +44,8 @@ void fill(const std::array<Corner, 3>& t, bool wire, std::uint32_t first_row,
 
   // Heights over the three edges turn barycentric coordinates into distances.
   const auto length = [](const Projected& p, const Projected& q) {
-    return std::hypot(q.x - p.x, q.y - p.y);
+    const float x = q.x - p.x, y = q.y - p.y;
+    return std::sqrt(x * x + y * y);
   };
   const float twice = std::abs(area);
   const std::array<float, 3> height{twice / length(b, c), twice / length(c, a),

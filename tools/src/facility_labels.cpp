@@ -132,14 +132,15 @@ std::vector<std::uint32_t> facility_labels(std::span<const stream::Point3> point
   }
   // All in one block: the root is the only cluster.
   std::vector<std::uint32_t> labels(points.size(), 0);
-  double nearest =
-      std::abs(std::log(static_cast<double>(std::max<std::size_t>(points.size(), 1)) / size));
+  // How many times as large as wanted, or as small.
+  const auto ratio = [size](double mean) { return std::max(mean / size, size / mean); };
+  double nearest = ratio(static_cast<double>(std::max<std::size_t>(points.size(), 1)));
   std::size_t levels = 0;
   for (std::size_t level = 0; level < sink.counts().size(); ++level) {
     const double mean =
         static_cast<double>(points.size()) / static_cast<double>(sink.counts()[level]);
-    if (std::abs(std::log(mean / size)) >= nearest) continue;
-    nearest = std::abs(std::log(mean / size));
+    if (ratio(mean) >= nearest) continue;
+    nearest = ratio(mean);
     levels = level + 1;
   }
   if (levels == 0) return labels;

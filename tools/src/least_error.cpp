@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "portable_math.hpp"
+
 namespace terrace::tools {
 namespace {
 
@@ -37,15 +39,16 @@ class Bracket {
     if (!few_.known) return std::min(range_, std::max(4.0 * many_.bound, 1e-4 * range_));
     if (!many_.known) {
       if (few_.bound < 1e-6 * range_) return 0.0;
-      const double by_power = few_.bound * std::pow(few_.vertices / wanted_, 1 / 1.5);
+      const double by_power =
+          few_.bound * portable_exp(portable_log(few_.vertices / wanted_) / 1.5);
       return std::clamp(by_power, few_.bound / 64.0, few_.bound / (in_a_row_ < 2 ? 1.05 : 4.0));
     }
     if (many_.bound <= 0.0) return few_.bound / 4.0;
-    const double width = std::log(few_.bound / many_.bound);
-    const double fall = std::log(many_.vertices / few_.vertices);
+    const double width = portable_log(few_.bound / many_.bound);
+    const double fall = portable_log(many_.vertices / few_.vertices);
     double part = 0.5;
-    if (in_a_row_ < 3 && fall > 0.0) part = std::log(many_.vertices / wanted_) / fall;
-    return inside(many_.bound * std::exp(width * part));
+    if (in_a_row_ < 3 && fall > 0.0) part = portable_log(many_.vertices / wanted_) / fall;
+    return inside(many_.bound * portable_exp(width * part));
   }
 
   /// The nearest bound strictly between those known.

@@ -13,6 +13,7 @@
 
 #include "crs_options.hpp"
 #include "error.hpp"
+#include "portable_math.hpp"
 #include "units.hpp"
 #include "world.hpp"
 
@@ -150,7 +151,7 @@ RasterGrid raster_grid(const stream::Store& store, const RasterRequest& request)
     if (!request.cell) {
       transform(from, to, steps);
       const auto length = [&](std::size_t i) {
-        return std::hypot(steps[i][0] - steps[0][0], steps[i][1] - steps[0][1]);
+        return portable_hypot(steps[i][0] - steps[0][0], steps[i][1] - steps[0][1]);
       };
       cell = std::sqrt(length(1) * length(2));
     }

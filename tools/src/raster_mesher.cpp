@@ -13,6 +13,7 @@
 #include "interrupt.hpp"
 #include "lattice_plan.hpp"
 #include "ordered_work.hpp"
+#include "portable_math.hpp"
 #include "progress.hpp"
 #include "units.hpp"
 #include "window_joiner.hpp"
@@ -99,8 +100,8 @@ WindowTinOptions RasterMesher::window_options(double max_error) const {
   out.tin.quality = options_.quality;
   const GroundMap ground = Ground(placement_).map(store_.bounds());
   const bool mirrored = ground[0] * ground[4] - ground[1] * ground[3] < 0.0;
-  out.tin.column_step = std::hypot(ground[0], ground[3]);
-  out.tin.row_step = (mirrored ? -1.0 : 1.0) * std::hypot(ground[1], ground[4]);
+  out.tin.column_step = portable_hypot(ground[0], ground[3]);
+  out.tin.row_step = (mirrored ? -1.0 : 1.0) * portable_hypot(ground[1], ground[4]);
   if (options_.fill == Fill::flat) {
     const double lowest = bounds_.min[2];
     out.fill = [lowest](std::int64_t, std::int64_t) { return lowest; };

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "portable_math.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::tools {
@@ -70,9 +71,9 @@ class Outline {
       return add_from(middle, b, place, depth + 1, result);
     }
     const Point2 place = moved(middle, start), end = moved(b, place);
-    const double length = std::hypot(end[0] - start[0], end[1] - start[1]);
+    const double length = portable_hypot(end[0] - start[0], end[1] - start[1]);
     const double off =
-        std::hypot(place[0] - 0.5 * (start[0] + end[0]), place[1] - 0.5 * (start[1] + end[1]));
+        portable_hypot(place[0] - 0.5 * (start[0] + end[0]), place[1] - 0.5 * (start[1] + end[1]));
     if (off <= 1e-6 * length) return end;
     if (depth == kMost) {
       // By now the pieces of a smooth curve are straight; a jump never is.

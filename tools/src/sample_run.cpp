@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <optional>
 #include <vector>
 
@@ -20,8 +19,6 @@ constexpr std::size_t kLines = 8192;
 constexpr std::uint64_t kBytesPerLine = 266;
 constexpr std::size_t kMostLines = std::size_t{1} << 21, kMostBytes = std::size_t{128} << 20;
 
-constexpr double kDegrees = 180 / std::numbers::pi;
-
 /// The numbers behind a line.
 class AnswerText {
  public:
@@ -35,7 +32,7 @@ class AnswerText {
     const double steepness = std::sqrt(gradient.x * gradient.x + gradient.y * gradient.y);
     gradient_.append(text, steepness);
     text += separator_;
-    slope_.append(text, std::atan(steepness) * kDegrees);
+    slope_.append(text, tri::slope_degrees(gradient));
     text += separator_;
     aspect_.append(text, tri::aspect_degrees(gradient));
   }

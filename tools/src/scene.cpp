@@ -34,7 +34,7 @@ bool mostly_steep(const TriangleMesh& mesh) {
   double steep = 0, all = 0;
   for (const auto& t : mesh.triangles) {
     const stream::Point3 n = area_vector(mesh, t);
-    const double area = std::hypot(n[0], n[1], n[2]);
+    const double area = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
     all += area;
     if (std::abs(n[2]) < 0.5 * area) steep += area;
   }

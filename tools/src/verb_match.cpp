@@ -16,6 +16,7 @@
 #include "match_run.hpp"
 #include "output.hpp"
 #include "point_table.hpp"
+#include "portable_math.hpp"
 #include "terrace/stream/atomic_file.hpp"
 #include "units.hpp"
 #include "verbs.hpp"
@@ -124,7 +125,7 @@ class MatchCommand final : public Command {
       // Who has no partner has a number above all.
       if (b <= a || b >= outcome.mate.size()) continue;
       const stream::Point3 &p = positions_[a], &q = positions_[b];
-      const double distance = std::hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]);
+      const double distance = portable_hypot(portable_hypot(p[0] - q[0], p[1] - q[1]), p[2] - q[2]);
       text += std::to_string(a) + ',' + std::to_string(b) + ',' + number_text(distance) + '\n';
       ++pairs;
     }

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include <CLI/CLI.hpp>
+#include <terrace/tri/interpolation.hpp>
 
 #include "camera.hpp"
 #include "color.hpp"
@@ -48,8 +49,9 @@ double rms_slope(const TriangleMesh& mesh) {
 
 /// Degrees of slope at a vertex with that normal.
 double slope_degrees(const std::array<float, 3>& normal) {
-  const double horizontal = std::hypot(normal[0], normal[1]);
-  return std::atan2(horizontal, std::abs(static_cast<double>(normal[2]))) * 180 / 3.14159265358979;
+  const double up = std::abs(static_cast<double>(normal[2]));
+  if (up == 0.0) return normal[0] == 0.0f && normal[1] == 0.0f ? 0.0 : 90.0;
+  return tri::slope_degrees({normal[0] / up, normal[1] / up});
 }
 
 class RenderCommand : public Command {

@@ -9,6 +9,7 @@
 
 #include <terrace/stream/error.hpp>
 
+#include "portable_math.hpp"
 #include "region_overlap.hpp"
 #include "summary.hpp"
 #include "units.hpp"
@@ -171,8 +172,8 @@ void WindowMesher::check(
     read.push_back(p);
   }
   const std::array<double, 6>& m = placement_.world.xy;
-  const double cell = std::min(std::hypot(m[0], m[3]), std::hypot(m[1], m[4]));
-  const double tolerance = std::min(1.0, 2.0 * std::hypot(moved[0], moved[1]) / cell);
+  const double cell = std::min(portable_hypot(m[0], m[3]), portable_hypot(m[1], m[4]));
+  const double tolerance = std::min(1.0, 2.0 * portable_hypot(moved[0], moved[1]) / cell);
   tin.check = measure(read, tolerance);
 
   const auto fail = [&](const std::string& cause, const std::string& remedy) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "facility/point_space.hpp"
 
+#include "portable_math.hpp"
+
 namespace terrace::cluster {
 namespace {
 
@@ -48,7 +50,7 @@ double rounding_of_frame(const FacilityPoints& problem, const SearchFrame& frame
   for (const double w : frame.weights) weight += w;
   double unit = 16.0 * std::numeric_limits<double>::epsilon();
   if (const auto* minkowski = std::get_if<Minkowski>(&problem.metric)) {
-    unit = std::pow(unit, std::min(1.0, minkowski->p));
+    unit = portable::power(unit, std::min(1.0, minkowski->p));
   }
   const Bounds box = bounds_of(problem.points);
   double stretch = 1.0;

@@ -8,6 +8,7 @@
 
 #include "facility/search_norms.hpp"
 #include "ground.hpp"
+#include "portable_math.hpp"
 #include "scaling.hpp"
 
 namespace terrace::cluster {
@@ -89,7 +90,7 @@ double whole_diagonal(const Metric& metric, const Point3& extent, double positio
     return length(PowerNorm{minkowski->p});
   }
   double longest = positions;
-  for (const double range : ranges) longest = std::hypot(longest, range);
+  for (const double range : ranges) longest = portable::length(longest, range);
   return longest;
 }
 

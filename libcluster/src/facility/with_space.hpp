@@ -10,6 +10,7 @@
 
 #include "facility/search_frame.hpp"
 #include "facility/search_space.hpp"
+#include "portable_math.hpp"
 
 namespace terrace::cluster {
 
@@ -43,7 +44,7 @@ auto with_space(const FacilityPoints& problem, SearchFrame& frame, std::span<con
                            function = metric.distance](std::uint32_t j, std::uint32_t i) {
             double d = function(points[j], points[i]);
             for (std::size_t c = 0; c < count && d >= 0.0; ++c) {
-              d = std::hypot(d, channels[j * count + c] - channels[i * count + c]);
+              d = portable::length(d, channels[j * count + c] - channels[i * count + c]);
             }
             return d;
           };

@@ -2,11 +2,11 @@
 #include "terrace/tri/metric2.hpp"
 
 #include <cmath>
-#include <numbers>
 #include <stdexcept>
 #include <utility>
 
 #include "delaunay2/double_kernel.hpp"
+#include "portable_math.hpp"
 
 namespace terrace::tri {
 namespace {
@@ -18,25 +18,14 @@ void check_semi_axis(double length, const char* name) {
                               ": it must be positive and finite, in the unit of the points");
 }
 
-/// (cosine, sine) of an angle in degrees, exact at multiples of 90.
+/// (cosine, sine) of an angle in degrees.
 std::array<double, 2> direction_of(double degrees) {
   if (!std::isfinite(degrees)) {
     throw std::invalid_argument(
         "the angle of an ellipse is not finite: give it in degrees, counter-clockwise from +x");
   }
-  int quarter = 0;
-  const double rest = std::remquo(degrees, 90.0, &quarter) * (std::numbers::pi / 180.0);
-  const double s = std::sin(rest), c = std::cos(rest);
-  switch (quarter & 3) {
-    case 0:
-      return {c, s};
-    case 1:
-      return {-s, c};
-    case 2:
-      return {-c, -s};
-    default:
-      return {s, -c};
-  }
+  const auto [s, c] = portable::sine_cosine(degrees);
+  return {c, s};
 }
 
 /// Whether the rows of the map are not parallel; exact.
@@ -84,10 +73,11 @@ LinearMap2 plane_map(const std::array<double, 9>& m) {
     return map;
   }
   // Gram-Schmidt on the images of both axes.
-  const double first = std::hypot(m[0], m[3], m[6]);
+  const double first = portable::length(portable::length(m[0], m[3]), m[6]);
   const double along = (m[0] / first) * m[1] + (m[3] / first) * m[4] + (m[6] / first) * m[7];
-  const double across = std::hypot(m[1] - along * (m[0] / first), m[4] - along * (m[3] / first),
-                                   m[7] - along * (m[6] / first));
+  const double across = portable::length(
+      portable::length(m[1] - along * (m[0] / first), m[4] - along * (m[3] / first)),
+      m[7] - along * (m[6] / first));
   const LinearMap2 map{first, along, 0.0, across};
   check_metric(map, "the map of space, restricted to the plane,");
   return map;

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "../portable_math.hpp"
 #include "check_samples.hpp"
 #include "check_window.hpp"
 #include "grid_make.hpp"
@@ -35,8 +36,9 @@ class Checker {
     if (window_.tolerance > 0) {
       const Point3* const corner[4] = {&a, &b, &c, &a};
       for (int i = 0; i < 3; ++i)
-        triangle.margin[i] = window_.tolerance * std::hypot((*corner[i + 1])[0] - (*corner[i])[0],
-                                                            (*corner[i + 1])[1] - (*corner[i])[1]);
+        triangle.margin[i] =
+            window_.tolerance * portable::length((*corner[i + 1])[0] - (*corner[i])[0],
+                                                 (*corner[i + 1])[1] - (*corner[i])[1]);
     }
     if (check_samples_(window_, triangle, sums_)) count_missing(a, b, c);
     return area;

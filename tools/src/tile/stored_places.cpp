@@ -9,6 +9,8 @@
 
 #include <terrace/stream/error.hpp>
 
+#include "portable_math.hpp"
+
 namespace terrace::tools {
 namespace {
 
@@ -52,7 +54,7 @@ StoredPlaces::StoredPlaces(const stream::Store& store, CoordinateSystem system)
   const double margin = degrees ? kMarginDegrees : kMarginMetres / crs_.metres_per_unit();
   const std::array<double, 6>& xy = placement_.world.xy;
   for (std::size_t axis = 0; axis < 2; ++axis) {
-    margin_[axis] = margin / std::hypot(xy[axis], xy[3 + axis]);
+    margin_[axis] = margin / portable_hypot(xy[axis], xy[3 + axis]);
   }
   if (degrees) {
     turn_ = 360.0 / crs_.definition().degrees_per_unit;

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <cmath>
 #include <cstdint>
 #include <limits>
-#include <numbers>
 #include <span>
 #include <vector>
 
@@ -86,18 +84,11 @@ std::vector<Gradient> gradients_at(const Delaunay2<Coord>& triangulation, const 
 
 /// The angle between the surface and the horizontal in degrees, 0 to 90. Heights and coordinates
 /// must have the same unit.
-inline double slope_degrees(const Gradient& gradient) {
-  return std::atan(std::hypot(gradient.x, gradient.y)) * (180 / std::numbers::pi);
-}
+[[nodiscard]] double slope_degrees(const Gradient& gradient);
 
 /// The direction in which the surface falls most, in degrees clockwise from north (+y): 90 is east
 /// (+x). 0 <= aspect < 360; NaN where it is level.
-inline double aspect_degrees(const Gradient& gradient) {
-  if (gradient.x == 0 && gradient.y == 0) return std::numeric_limits<double>::quiet_NaN();
-  const double degrees = std::atan2(-gradient.x, -gradient.y) * (180 / std::numbers::pi);
-  // A tiny negative angle would round to 360.
-  return !(degrees < 0) ? degrees + 0.0 : degrees + 360 < 360 ? degrees + 360 : 0;
-}
+[[nodiscard]] double aspect_degrees(const Gradient& gradient);
 
 #define TERRACE_TRI_DECLARE(Coord)                                                                \
   extern template void weights_at(const Delaunay2<Coord>&, const Point2&, Interpolation,          \

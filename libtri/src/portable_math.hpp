@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+
+/// Functions of the C library whose last bit differs from release to release and from processor to
+/// processor, made here of +, -, *, / and sqrt alone, which IEEE 754 fixes, so that triangles and
+/// numbers are the same everywhere. (remquo is exact.)
+
+namespace terrace::tri::portable {
+
+/// Sine and cosine of an angle in degrees, within 2e-16; exact at multiples of 90.
+inline std::array<double, 2> sine_cosine(double degrees) {
+  int quarter = 0;
+  const double x = std::remquo(degrees, 90.0, &quarter) * (std::numbers::pi / 180.0);
+  // Taylor's series; |x| <= pi / 4.
+  double s = 0.0, c = 0.0;
+  for (int k = 9; k >= 1; --k) {
+    s = (1.0 + s) * (-x * x / (2 * k * (2 * k + 1)));
+    c = (1.0 + c) * (-x * x / (2 * k * (2 * k - 1)));
+  }
+  s = x + x * s;
+  c = 1.0 + c;
+  switch (quarter & 3) {
+    case 0:
+      return {s, c};
+    case 1:
+      return {c, -s};
+    case 2:
+      return {-s, -c};
+    default:
+      return {-c, s};
+  }
+}
+
+/// sqrt(x^2 + y^2), where the squares would overflow or vanish as well.
+inline double length(double x, double y) {
+  const double squares = x * x + y * y;
+  if (squares > 1e-280 && squares < 1e300) return std::sqrt(squares);
+  const double largest = std::max(std::abs(x), std::abs(y));
+  if (largest == 0.0 || std::isinf(largest)) return largest;
+  x /= largest;
+  y /= largest;
+  return largest * std::sqrt(x * x + y * y);
+}
+
+/// The angle of the vector (x, y) from the x axis in degrees, -180 to 180, within 4e-16 of itself;
+/// exact at multiples of 45. As atan2(y, x): 0 or 180 with the sign of y if y is a zero.
+inline double angle_degrees(double y, double x) {
+  const double a = std::abs(x), b = std::abs(y);
+  if (std::isnan(a) || std::isnan(b)) return a + b;
+  // The tangent, at most 1: the nearest eighth, whose angle is known, and the angle from there.
+  double t = a == b ? 1.0 : std::min(a, b) / std::max(a, b);
+  if (b == 0.0) t = 0.0;
+  static constexpr std::array<double, 9> kEighths{0.0,
+                                                  7.125016348901798,
+                                                  14.036243467926479,
+                                                  20.556045219583464,
+                                                  26.56505117707799,
+                                                  32.005383208083494,
+                                                  36.86989764584402,
+                                                  41.18592516570965,
+                                                  45.0};
+  const int eighth = static_cast<int>(t * 8.0 + 0.5);
+  t = (t - eighth / 8.0) / (1.0 + t * (eighth / 8.0));
+  const double q = t * t;  // at most 1 / 256
+  double sum = 0.0;
+  for (const double c :
+       {1.0 / 17, 1.0 / 15, 1.0 / 13, 1.0 / 11, 1.0 / 9, 1.0 / 7, 1.0 / 5, 1.0 / 3})
+    sum = q * (c - sum);
+  double degrees =
+      kEighths[static_cast<std::size_t>(eighth)] + (t - t * sum) * (180.0 / std::numbers::pi);
+  if (b > a) degrees = 90.0 - degrees;
+  if (std::signbit(x)) degrees = 180.0 - degrees;
+  return std::copysign(degrees, y);
+}
+
+}  // namespace terrace::tri::portable
