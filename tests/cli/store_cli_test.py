@@ -141,8 +141,8 @@ class StoreTest(unittest.TestCase):
         for verb in (('tile', '--vertical', 'ignore'),
                      ('tile', '--vertical', 'ignore', '--fill', 'flat'),
                      ('points', '--format', 'csv'), ('mesh', '--format', 'ply'), ('mesh', '--format', 'ply', '--max-error', 5),
-                     ('raster',), ('contour', '--interval', 50, '--format', 'geojson')):
-            output = out + {'tile': '', 'raster': '.tif'}.get(verb[0], '.out')
+                     ('raster',), ('contour', '--interval', 50)):
+            output = out + {'tile': '', 'raster': '.tif', 'contour': '.geojson'}.get(verb[0], '.out')
             error = self.expect_error(1, *verb, store, '-o', output, '-q')
             self.assertIn('outside of the bounds of the store', error, verb)
             self.assertFalse(os.path.exists(output), verb)
