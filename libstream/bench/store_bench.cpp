@@ -36,6 +36,7 @@ const Input& input(bool grid) {
     if (of_grid) {
       made.schema.coordinates[2].type = ScalarType::i16;
       const int side = is_small() ? 256 : 2048;
+      made.schema.columns = made.schema.rows = static_cast<std::uint64_t>(side);
       const auto heights = testing::fractal_heights(side, 2.65, 1);
       for (int y = 0; y < side; y += 100) {
         for (int x = 0; x < side; x += 100) {

@@ -11,6 +11,7 @@
 #include "stand_in_hierarchy.hpp"
 #include "store_testing.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/stream/overlay.hpp"
 
 namespace terrace::stream {
 namespace {
@@ -141,6 +142,42 @@ TEST(Store, DecimalAttributesAreSmall) {
   const std::uint64_t without = testing::check_round_trip(
       testing::cloud_schema(), blocks, {.block_points = 900, .cluster_points = 60});
   EXPECT_LT(with, without + 6000 * 2);
+}
+
+/// data/stores/README.md: every version reads them, for ever.
+TEST(Store, GoldenStoresAreSound) {
+  const std::filesystem::path folder = std::filesystem::path(TERRACE_TEST_DATA) / "stores";
+  for (const auto& [name, points] : {std::pair<const char*, std::uint64_t>{"grid", 8530},
+                                     {"int64", 432},
+                                     {"uint64", 432},
+                                     {"cloud", 1200},
+                                     {"empty", 0}}) {
+    SCOPED_TRACE(name);
+    const Store store = Store::open(folder / name);
+    EXPECT_EQ(store.version(), 1);
+    EXPECT_EQ(store.points(), points);
+    EXPECT_TRUE(store.verify(testing::expect_no_problem));
+  }
+  const Store store = Store::open(folder / "grid");
+  EXPECT_EQ(Overlay::open(folder / "grid.overlay", store).values(), 918u);
+}
+
+/// The bytes of a store do not depend on the compiler or its optimisation: GCC at -O3 and the
+/// sanitizers' build, Clang at -O1, find the same checksums. They change with the format alone.
+TEST(Store, ChecksumsAreTheSameWithEveryCompiler) {
+  const TemporaryFolder folder;
+  const auto checksum = [&](const char* name, const Schema& schema, const auto& blocks) {
+    testing::write_store(folder.path() / name, schema, blocks,
+                         {.block_points = 900, .cluster_points = 60});
+    return Store::open(folder.path() / name).checksum();
+  };
+  EXPECT_EQ(
+      checksum("grid", testing::grid_schema(ScalarType::f32),
+               testing::grid_blocks(ScalarType::f32, testing::Relief::fractal, 96, 88, 30, 1)),
+      0x49323b27u);
+  EXPECT_EQ(checksum("cloud", testing::cloud_schema(),
+                     testing::cloud_blocks(testing::Numbers::mixed, 8000, 900, 4)),
+            0x032c2e1du);
 }
 
 }  // namespace

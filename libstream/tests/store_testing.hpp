@@ -41,6 +41,7 @@ inline Schema grid_schema(ScalarType type) {
   schema.coordinates = {
       channel("column", ScalarType::i32), channel("row", ScalarType::i32),
       Channel{.name = "height", .type = type, .scale = 0.5, .offset = 3, .unit = "metre"}};
+  schema.columns = schema.rows = std::uint64_t{1} << 31;
   schema.world.xy = {30, 0, 500000.25, 0, -30, 5e6};
   schema.crs = {.epsg = 32632,
                 .vertical_epsg = 5773,

@@ -11,9 +11,11 @@ import json
 import math
 import os
 import random
+import shutil
 import subprocess
 import tempfile
 import unittest
+import zlib
 
 from small_tiff import utm, write_tiff
 
@@ -123,6 +125,33 @@ class StoreTest(unittest.TestCase):
         verdict = json.loads(result.stdout)
         self.assertFalse(verdict['ok'])
         self.assertIn('level-0.0.clusters', verdict['problems'][0]['file'])
+
+    def test_a_store_that_lies_about_its_raster_is_read_by_no_verb(self):
+        """Points outside of the columns that the manifest tells, with checksums that are right."""
+        store = self.path('lies.terrace')
+        shutil.copytree(self.store, store)
+        manifest = os.path.join(store, 'manifest.json')
+        with open(manifest, encoding='utf-8') as file:
+            values = json.load(file)
+        values['columns'] = values['rows'] = 40
+        values['bounds']['max'][0] = values['bounds']['max'][1] = 39
+        values['checksum'] = '00000000'
+        text = json.dumps(values, indent=2) + '\n'
+        checksum = '%08x' % zlib.crc32(text.encode())
+        with open(manifest, 'w', encoding='utf-8') as file:
+            file.write(text.replace('"checksum": "00000000"', f'"checksum": "{checksum}"'))
+        out = self.path('lies')
+        for verb in (('tile', '--vertical', 'ignore'),
+                     ('tile', '--vertical', 'ignore', '--fill', 'flat'),
+                     ('points', '--format', 'csv'), ('mesh', '--format', 'ply'), ('mesh', '--format', 'ply', '--max-error', 5),
+                     ('raster',), ('contour', '--interval', 50)):
+            output = out + {'tile': '', 'raster': '.tif', 'contour': '.geojson'}.get(verb[0], '.out')
+            error = self.expect_error(1, *verb, store, '-o', output, '-q')
+            self.assertIn('outside of the bounds of the store', error, verb)
+            self.assertFalse(os.path.exists(output), verb)
+        result = terrace('verify', store)
+        self.assertEqual(result.returncode, 1, result.stderr)
+        self.assertIn('outside of the bounds of the store', result.stdout + result.stderr)
 
     def test_points_of_every_level_are_as_many_as_info_says(self):
         for level in json.loads(self.run_ok('info', self.store, '--json'))['levels']:

@@ -177,8 +177,12 @@ Entry BlockEncoder::enter(std::size_t cluster) {
   const std::uint32_t first = block_->first[cluster], last = block_->first[cluster + 1];
   members_ = block_->order.subspan(first, last - first);
   const auto n = static_cast<std::uint32_t>(members_.size());
-  if (n > kMostPoints) {
-    throw Error({.file = {}, .where = {}, .cause = "a cluster has too many points", .remedy = {}});
+  if (n > layout_->most_points()) {
+    throw Error({.file = {},
+                 .where = {},
+                 .cause = "a cluster has " + std::to_string(n) + " points, of this size a store " +
+                          "has at most " + std::to_string(layout_->most_points()) + " in one",
+                 .remedy = "make the blocks smaller"});
   }
   representative_ = UINT32_MAX;
   const std::uint32_t representative = block_->representatives[cluster];

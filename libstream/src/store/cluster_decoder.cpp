@@ -71,7 +71,7 @@ void ClusterDecoder::decode(const Layout& layout, const DecodingTables& tables, 
     out.representative_children.clear();
     return;
   }
-  if (n > kMostPoints) throw Damage("a cluster has too many points");
+  if (n > layout.most_points()) throw Damage("a cluster has too many points");
   SymbolDecoder coder(tables.tables, bytes);
   positions(coder, layout, tables.predictor, entry);
 

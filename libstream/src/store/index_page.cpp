@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <bit>
 #include <cassert>
+#include <limits>
 
 namespace terrace::stream::store {
 namespace {
@@ -100,11 +101,16 @@ IndexPage::IndexPage(Bytes bytes, std::uint32_t clusters)
     bits += std::uint64_t{column.width} * clusters_;
   }
   if (in.left() != (bits + 7) / 8) throw Damage("an index page has a wrong size");
+  if (bits % 8 != 0 && bytes_[size - 5] >> bits % 8 != 0) {
+    throw Damage("an index page ends with bits that are not zero");
+  }
   for (Column& column : columns_) column.start += static_cast<std::uint32_t>(in.offset() * 8);
   bytes_.resize(size + kSlack);
   for (std::uint32_t i = 0; i < clusters_; ++i) {
     const std::uint64_t cluster = value(kBytes, i);
-    if (cluster >= kMostBytes) throw Damage("an index entry is out of range");
+    if (cluster >= kMostBytes || offsets_[i] > UINT64_MAX - cluster) {
+      throw Damage("an index entry is out of range");
+    }
     offsets_[i + 1] = offsets_[i] + cluster;
   }
 }
@@ -126,8 +132,9 @@ Entry IndexPage::entry(std::uint32_t i) const {
   Entry entry;
   const std::uint64_t bytes = offsets_[i + 1] - offsets_[i], points = value(kPoints, i);
   std::uint64_t forms = value(kForms, i);
-  const std::uint64_t error = value(kError, i);
-  if (points > kMostPoints || error > 0x7ff0u * 2) {
+  const std::uint64_t error = value(kError, i), checksum = value(kChecksum, i);
+  if (points > kMostPoints || error > error_code(std::numeric_limits<double>::infinity()) ||
+      checksum > UINT16_MAX) {
     throw Damage("an index entry is out of range");
   }
   entry.bytes = static_cast<std::uint32_t>(bytes);
@@ -142,7 +149,7 @@ Entry IndexPage::entry(std::uint32_t i) const {
   if (forms != 0) throw Damage("an index entry has an unknown number form");
   entry.error = static_cast<std::uint16_t>(error);
   entry.descendants = value(kDescendants, i);
-  entry.checksum = static_cast<std::uint16_t>(value(kChecksum, i));
+  entry.checksum = static_cast<std::uint16_t>(checksum);
   return entry;
 }
 

@@ -11,6 +11,9 @@ namespace terrace::stream::store {
 
 /// Clusters in a page, the last of a level excepted. A page's ordinals follow by arithmetic.
 inline constexpr std::uint32_t kPageClusters = 128;
+/// More bytes than this no page has: twelve columns, each with its base, shift and width, of 64
+/// bits a cluster.
+inline constexpr std::uint64_t kMostPageBytes = 10 + 12 * (10 + 2 + 8 * kPageClusters) + 4;
 
 /// Appends the page of `entries` (1 to kPageClusters): packed columns, each a base, a shift and a
 /// width, then as many bits per cluster as the width says; and the CRC-32 of it all.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <vector>
@@ -12,8 +13,12 @@
 
 namespace terrace::stream::store {
 
-/// More points than this no cluster has; a guard against damaged counts.
-inline constexpr std::uint32_t kMostPoints = 1u << 24;
+/// More points than this no cluster has, nor more bytes when it is decoded (see Layout): a few
+/// bytes can stand for any number of points, so nothing else limits what a damaged count costs.
+inline constexpr std::uint32_t kMostPoints = 1u << 20;
+inline constexpr std::uint64_t kMostDecodedBytes = std::uint64_t{1} << 28;
+/// Fewer bytes than this no cluster has that has points.
+inline constexpr std::uint32_t kFewestClusterBytes = 4;
 /// More bytes than this no cluster has: every point at its raw size, and as much again.
 inline constexpr std::uint32_t kMostBytes = 1u << 31;
 
@@ -27,6 +32,11 @@ struct Layout {
   Layout(const Schema& schema, unsigned of_level)
       : grid(schema.grid), level(of_level), payload_size(schema.payload_size()) {
     for (const Channel& channel : schema.attributes) attributes.push_back(channel.type);
+  }
+  /// Of a cluster: coordinates, attributes and children of all its points fit kMostDecodedBytes.
+  [[nodiscard]] std::uint64_t most_points() const {
+    const std::uint64_t bytes = sizeof(Point3) + payload_size + sizeof(std::uint64_t) * level;
+    return std::min<std::uint64_t>(kMostPoints, kMostDecodedBytes / bytes);
   }
   [[nodiscard]] unsigned contexts() const {
     return context::kAttribute + context::kPerAttribute * static_cast<unsigned>(attributes.size());

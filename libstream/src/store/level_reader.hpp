@@ -70,9 +70,12 @@ class LevelReader {
   [[nodiscard]] std::shared_ptr<const IndexPage> page(std::uint64_t number) const;
   /// The entry and where its bytes begin. Throws: Error.
   [[nodiscard]] Entry entry(std::uint64_t ordinal, std::uint64_t& offset) const;
+  /// Of the i-th cluster of `page`, checked against the manifest. Throws: Damage.
+  [[nodiscard]] Entry entry(const IndexPage& page, std::uint32_t i) const;
   /// Throws: Error.
   void read(std::uint64_t ordinal, ReadSpace& space, ClusterPoints& out) const;
-  /// `bytes`: of the cluster, padded. Throws: Error.
+  /// `bytes`: of the cluster, padded. Its points lie in the entry's box and in the bounds of the
+  /// store, and what they head exists. Throws: Error.
   void decode(std::uint64_t ordinal, const Entry& entry, std::uint64_t offset, ByteView bytes,
               ClusterDecoder& decoder, ClusterPoints& out) const;
   /// Calls visit(first ordinal, IndexPage, bytes of its clusters, padded). Throws: Error.
@@ -103,11 +106,15 @@ class LevelReader {
   [[nodiscard]] std::shared_ptr<const IndexPage> read_page(std::uint64_t number) const;
   [[nodiscard]] std::shared_ptr<const DecodingTables> tables(std::uint64_t ordinal) const;
   void check_range(std::uint64_t ordinal, std::uint64_t offset, std::uint64_t size) const;
+  void check_points(const Entry& entry, const ClusterPoints& points) const;
 
   Layout layout_;
   std::uint64_t clusters_, pages_;
-  std::uint64_t most_points_;
+  std::uint64_t most_points_;  ///< of a cluster
   bool top_;
+  std::uint64_t store_points_;
+  Box3 bounds_;                                ///< of the store
+  std::vector<std::uint64_t> clusters_below_;  ///< of each level below
   InputFile data_, index_;
   Bytes tail_;
   std::vector<std::uint64_t> directory_;  ///< pages_ + 1 offsets in the index file

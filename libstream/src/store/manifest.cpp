@@ -8,6 +8,7 @@
 
 #include "bytes.hpp"
 #include "files.hpp"
+#include "layout.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::stream::store {
@@ -46,6 +47,19 @@ double number(const Json& json) {
   throw Damage("\"" + word + "\" is not a number");
 }
 
+/// The library's own conversions would round, wrap or cut what is no such integer.
+std::uint64_t count_of(const Json& json) {
+  if (!json.is_number_unsigned()) throw Damage("a count is not an integer from 0 up");
+  return json.get<std::uint64_t>();
+}
+
+int code_of(const Json& json) {
+  if (!json.is_number_integer()) throw Damage("an EPSG code is not an integer");
+  const auto value = json.get<std::int64_t>();
+  if (value < 0 || value > INT32_MAX) throw Damage("an EPSG code is out of range");
+  return static_cast<int>(value);
+}
+
 Json channel_json(const Channel& channel) {
   return {{"name", channel.name},
           {"type", std::string(name_of(channel.type))},
@@ -78,7 +92,7 @@ Json file_json(const FileEntry& file) {
 }
 
 FileEntry file_of(const Json& json) {
-  FileEntry file{json.at("file").get<std::string>(), json.at("bytes").get<std::uint64_t>(),
+  FileEntry file{json.at("file").get<std::string>(), count_of(json.at("bytes")),
                  from_hexadecimal(json.at("crc32").get<std::string>())};
   // A name, not a way out of the folder.
   if (file.name.empty() || file.name.find('/') != std::string::npos || file.name[0] == '.') {
@@ -99,8 +113,8 @@ Json crs_json(const Crs& crs) {
 
 Crs crs_of(const Json& json) {
   Crs crs;
-  crs.epsg = json.at("epsg").get<int>();
-  crs.vertical_epsg = json.at("vertical_epsg").get<int>();
+  crs.epsg = code_of(json.at("epsg"));
+  crs.vertical_epsg = code_of(json.at("vertical_epsg"));
   crs.name = json.at("name").get<std::string>();
   crs.geographic = json.at("geographic").get<bool>();
   crs.horizontal_unit = json.at("horizontal_unit").get<std::string>();
@@ -162,10 +176,10 @@ Manifest from_json(const Json& json) {
   if (kind != "grid" && kind != "cloud") throw Damage("the kind is unknown");
   m.schema.grid = kind == "grid";
   m.schema.format = json.at("source").get<std::string>();
-  m.points = json.at("points").get<std::uint64_t>();
-  m.schema.nodata = json.at("nodata").get<std::uint64_t>();
-  m.schema.columns = json.at("columns").get<std::uint64_t>();
-  m.schema.rows = json.at("rows").get<std::uint64_t>();
+  m.points = count_of(json.at("points"));
+  m.schema.nodata = count_of(json.at("nodata"));
+  m.schema.columns = count_of(json.at("columns"));
+  m.schema.rows = count_of(json.at("rows"));
   if (const Json& bounds = json.at("bounds"); !bounds.is_null()) {
     m.bounds = {point_of(bounds.at("min")), point_of(bounds.at("max"))};
   }
@@ -194,22 +208,35 @@ Manifest from_json(const Json& json) {
     if (!segments.is_array() || segments.size() != 1) {
       throw Damage("a level does not have one segment");
     }
+    if (count_of(level.at("level")) != m.levels.size()) {
+      throw Damage("the levels do not follow one another from 0 up");
+    }
     LevelEntry entry;
-    entry.points = level.at("points").get<std::uint64_t>();
-    entry.members = level.at("members").get<std::uint64_t>();
-    entry.clusters = level.at("clusters").get<std::uint64_t>();
+    entry.points = count_of(level.at("points"));
+    entry.members = count_of(level.at("members"));
+    entry.clusters = count_of(level.at("clusters"));
+    if (count_of(segments[0].at("clusters")) != entry.clusters) {
+      throw Damage("a level's segment does not have the level's clusters");
+    }
     entry.data = file_of(segments[0].at("data"));
     entry.index = file_of(segments[0].at("index"));
-    entry.directory_bytes = segments[0].at("directory_bytes").get<std::uint64_t>();
+    entry.directory_bytes = count_of(segments[0].at("directory_bytes"));
     m.levels.push_back(std::move(entry));
   }
   return m;
 }
 
-/// Counts that must agree with one another whatever the files hold.
+/// What must hold whatever the files hold. Readers and all who size arrays by a manifest rely on
+/// it: sums and products of its counts do not wrap, and no count is out of proportion to the files.
 void check_counts(const Manifest& m) {
   if (m.levels.empty() || m.levels.size() > 255) throw Damage("the number of levels is impossible");
   if (m.levels[0].points != m.points) throw Damage("the points of level 0 are not all points");
+  if (m.points > kMostStorePoints || m.schema.nodata > kMostStorePoints) {
+    throw Damage("the store is said to have more points than one can have");
+  }
+  if (m.points == 0 && (m.levels.size() > 1 || m.levels[0].data.bytes > 0)) {
+    throw Damage("a store without points has clusters");
+  }
   for (std::size_t l = 0; l < m.levels.size(); ++l) {
     const LevelEntry& level = m.levels[l];
     const bool top = l + 1 == m.levels.size();
@@ -220,6 +247,47 @@ void check_counts(const Manifest& m) {
     // Every cluster is headed by a point of the next level, but for the root.
     if (level.clusters != (top ? 1 : above)) {
       throw Damage("the clusters of level " + std::to_string(l) + " do not add up");
+    }
+    if (m.points > 0 && level.clusters > level.data.bytes / kFewestClusterBytes) {
+      throw Damage("level " + std::to_string(l) + " has more clusters than its file can hold");
+    }
+    if (level.points / kMostPoints > level.clusters) {
+      throw Damage("level " + std::to_string(l) + " has more points than its clusters can hold");
+    }
+  }
+}
+
+void check_places(const Manifest& m) {
+  for (const Channel& channel : m.schema.coordinates) {
+    if (!std::isfinite(channel.scale) || channel.scale == 0 || !std::isfinite(channel.offset)) {
+      throw Damage("a coordinate has an impossible scale or offset");
+    }
+  }
+  const auto& xy = m.schema.world.xy;
+  const double determinant = xy[0] * xy[4] - xy[1] * xy[3];
+  if (!std::isfinite(determinant) || determinant == 0 || !std::isfinite(xy[2]) ||
+      !std::isfinite(xy[5])) {
+    throw Damage("the world transform cannot be inverted");
+  }
+  if (m.bounds.empty() != (m.points == 0)) throw Damage("the bounds do not suit the points");
+  for (std::size_t axis = 0; axis < 3 && m.points > 0; ++axis) {
+    if (!std::isfinite(m.bounds.min[axis]) || !std::isfinite(m.bounds.max[axis])) {
+      throw Damage("the bounds are not finite");
+    }
+  }
+  if (!m.schema.grid) {
+    if (m.schema.columns != 0 || m.schema.rows != 0) throw Damage("a cloud has columns or rows");
+    return;
+  }
+  const std::array<std::uint64_t, 2> cells{m.schema.columns, m.schema.rows};
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    if (cells[axis] < 1 || cells[axis] > kMostColumns) {
+      throw Damage("the number of columns or rows is impossible");
+    }
+    const double low = m.bounds.min[axis], high = m.bounds.max[axis];
+    if (m.points > 0 && !(low >= 0 && high < static_cast<double>(cells[axis]) &&
+                          low == std::floor(low) && high == std::floor(high))) {
+      throw Damage("the bounds do not lie on the raster's columns and rows");
     }
   }
 }
@@ -280,6 +348,7 @@ Manifest parse_manifest(const std::string& text, const std::filesystem::path& fi
     }
     Manifest manifest = from_json(json);
     check_counts(manifest);
+    check_places(manifest);
     manifest.checksum = checksum;
     return manifest;
   } catch (const Json::exception& error) {
@@ -287,6 +356,13 @@ Manifest parse_manifest(const std::string& text, const std::filesystem::path& fi
   } catch (const Damage& error) {
     damaged(file, error.what());
   }
+}
+
+bool is_as_written(const std::string& text, const Manifest& manifest) {
+  Json json = to_json(manifest);
+  json["checksum"] = hexadecimal(manifest.checksum);
+  // Objects of this kind of JSON are equal only if their keys have the same order.
+  return Json::parse(text, nullptr, /*allow_exceptions=*/false) == json;
 }
 
 bool looks_like_store(const std::filesystem::path& folder) {

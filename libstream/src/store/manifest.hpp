@@ -14,6 +14,10 @@ inline constexpr int kVersion = 1;
 inline constexpr const char* kManifestName = "manifest.json";
 inline constexpr std::uint64_t kMostManifestBytes = 64u << 20;
 inline constexpr std::size_t kMostAttributes = 4096;
+/// So many points, cells without data, columns and rows are possible: sums and products of them,
+/// and of points with the bytes that a point takes anywhere, fit 64 bits.
+inline constexpr std::uint64_t kMostStorePoints = std::uint64_t{1} << 48;
+inline constexpr std::uint64_t kMostColumns = std::uint64_t{1} << 31;
 
 struct FileEntry {
   std::string name;
@@ -47,6 +51,10 @@ std::string to_text(const Manifest& manifest);
 /// Throws: Error, in the name of `file`, if the text is not a manifest of this version or earlier,
 /// or not the one that was written.
 Manifest parse_manifest(const std::string& text, const std::filesystem::path& file);
+
+/// Whether `text`, which parse_manifest() has made `manifest` of, has the keys of the format, all
+/// of them, no others and in the format's order.
+bool is_as_written(const std::string& text, const Manifest& manifest);
 
 /// Whether `folder` has a manifest whose format is that of a store, of whatever version.
 bool looks_like_store(const std::filesystem::path& folder);

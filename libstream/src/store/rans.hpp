@@ -180,9 +180,11 @@ class SymbolDecoder {
     }
     return short_raw(bits);
   }
-  /// The encoder's `last`. Throws: Damage unless both ends have met.
+  /// The encoder's `last`. Throws: Damage unless both ends have met, with zero bits between.
   std::uint32_t finish() const {
-    if (next_ != end_ - (used_bits_ + 7) / 8 || state_ < kLow || state_ >= 2 * kLow) {
+    const bool met = next_ == end_ - (used_bits_ + 7) / 8;
+    if (!met || (used_bits_ % 8 != 0 && (*next_ & (0xff >> used_bits_ % 8)) != 0) ||
+        state_ < kLow || state_ >= 2 * kLow) {
       throw Damage("a cluster's bytes do not end where its points do");
     }
     return state_ - kLow;

@@ -115,8 +115,17 @@ void Store::for_each(
     unsigned number,
     const std::function<void(ClusterId, const ClusterRecord&, const ClusterPoints&)>& visit) const {
   const LevelReader& level = impl_->level(number);
+  const std::uint64_t members = impl_->infos[number].members;
+  const auto miscounted = [&] {
+    return Error({.file = level.data().path().string(),
+                  .where = {},
+                  .cause = "the clusters do not have the " + std::to_string(members) +
+                           " members that the manifest tells",
+                  .remedy = "restore the file or build the store anew"});
+  };
   ClusterDecoder decoder;
   ClusterPoints points;
+  std::uint64_t visited = 0;
   level.for_each_page([&](std::uint64_t first, const IndexPage& page, ByteView bytes) {
     const std::uint64_t start = page.offset(0);
     std::uint64_t offset = start;
@@ -124,16 +133,19 @@ void Store::for_each(
       const std::uint64_t ordinal = first + i;
       Entry entry;
       try {
-        entry = page.entry(i);
+        entry = level.entry(page, i);
       } catch (const Damage& damage) {
         throw level.damaged(ordinal, damage.what());
       }
       level.decode(ordinal, entry, offset, bytes.subspan(kPadding + (offset - start), entry.bytes),
                    decoder, points);
+      visited += points.size();
+      if (visited > members) throw miscounted();
       visit(cluster_id(number, ordinal), record_of(entry, number, offset, level.top()), points);
       offset += entry.bytes;
     }
   });
+  if (visited != members) throw miscounted();
 }
 
 bool Store::verify(const std::function<void(const Problem&)>& report) const {

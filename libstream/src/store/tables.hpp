@@ -27,6 +27,12 @@ struct Tables {
   void write(Bytes& out) const;
   /// Throws: Damage.
   static Tables read(ByteView bytes, unsigned contexts);
+  /// More bytes than this no tables have.
+  static std::uint64_t most_bytes(unsigned contexts) {
+    constexpr std::uint64_t kVarint = 10;
+    return 8 + kVarint * kPatterns * kNeighbours +
+           std::uint64_t{contexts} * kVarint * (1 + 2 * kClasses);
+  }
 };
 
 /// Tables made ready for encoding.

@@ -158,6 +158,11 @@ struct Problem {
 };
 
 /// A store opened for reading. All const members may be called by several threads at once.
+///
+/// Whatever the files hold, what is read from an open store suits its manifest, so that callers can
+/// size arrays by it: points lie in bounds(), those of a raster on its columns and rows; children
+/// exist; a level that for_each() has gone through has as many members as levels() says, and no
+/// more are visited before it throws. The hierarchy as a whole is for verify() to check.
 class Store {
  public:
   /// Throws: Error if there is no store, a newer version, or a damaged manifest.

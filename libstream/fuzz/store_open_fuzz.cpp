@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+// A whole store: Store::open, all ways to read it, and verify. Its checksums are mended first, so
+// that what lies behind them is the target. The input is file after file: two bytes for the length
+// of the name, the name, four bytes for the number of bytes, the bytes.
+#include <cmath>
+#include <cstdlib>
+#include <string_view>
+
+#include "../tests/store_mending.hpp"
+#include "fuzz_points.hpp"
+#include "terrace/stream/store.hpp"
+
+namespace {
+
+using namespace terrace::stream;
+namespace fs = std::filesystem;
+
+/// One folder for the life of the process.
+class Folder {
+ public:
+  Folder() {
+    std::string name = (fs::temp_directory_path() / "terrace-fuzz-XXXXXX").string();
+    require(mkdtemp(name.data()) != nullptr, "a temporary folder");
+    path_ = name;
+  }
+  ~Folder() { fs::remove_all(path_); }
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+  [[nodiscard]] const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+testing::StoreFiles files_of(std::string_view input) {
+  testing::StoreFiles files;
+  const auto take = [&input](std::size_t size) {
+    const std::string_view part = input.substr(0, size);
+    input.remove_prefix(part.size());
+    return std::string(part);
+  };
+  const auto number = [&take](std::size_t bytes) {
+    std::uint32_t value = 0;
+    const std::string part = take(bytes);
+    std::memcpy(&value, part.data(), part.size());
+    return value;
+  };
+  while (!input.empty() && files.size() < 32) {
+    const std::string name = take(number(2) % 64);
+    const std::string bytes = take(number(4));
+    if (!name.empty() && name[0] != '.' && name.find_first_of(std::string("/\0", 2)) == name.npos) {
+      files[name] = bytes;
+    }
+  }
+  return files;
+}
+
+/// What Store promises of any store that opens.
+class Promises {
+ public:
+  explicit Promises(const Store& store) : store_(store) {}
+
+  void check_cluster(ClusterId id, const ClusterRecord& record, const ClusterPoints& points) {
+    const unsigned level = level_of(id);
+    require(points.size() == record.points, "as many members as the index says");
+    require(points.has_representative == (id != store_.root()), "a representative");
+    require(points.payload.size() == points.size() * store_.schema().payload_size(), "attributes");
+    require(points.children.size() == points.size() * level, "children");
+    for (const Point3& p : points.positions) check_point(p, record);
+    if (points.has_representative) check_point(points.representative, record);
+    for (std::size_t i = 0; i < points.children.size(); ++i) {
+      require(points.children[i] < store_.levels()[i % level].clusters, "children that exist");
+    }
+    for (std::size_t j = 0; j < points.representative_children.size(); ++j) {
+      require(points.representative_children[j] < store_.levels()[j].clusters,
+              "children that exist");
+    }
+  }
+
+ private:
+  void check_point(const Point3& p, const ClusterRecord& record) {
+    const Schema& schema = store_.schema();
+    require(record.summary.box.contains(p), "points in the cluster's box");
+    require(store_.bounds().contains(p), "points in the bounds");
+    if (!schema.grid) return;
+    require(p[0] == std::floor(p[0]) && p[1] == std::floor(p[1]), "whole columns and rows");
+    require(p[0] >= 0 && p[0] < static_cast<double>(schema.columns), "columns of the raster");
+    require(p[1] >= 0 && p[1] < static_cast<double>(schema.rows), "rows of the raster");
+  }
+
+  const Store& store_;
+};
+
+void read_all(const Store& store) {
+  Promises promises(store);
+  bool whole = true;
+  for (const LevelInfo& level : store.levels()) {
+    std::uint64_t members = 0;
+    try {
+      store.for_each(level.level,
+                     [&](ClusterId id, const ClusterRecord& record, const ClusterPoints& points) {
+                       promises.check_cluster(id, record, points);
+                       members += points.size();
+                       require(members <= level.members, "no more members than the manifest says");
+                     });
+      require(members == level.members, "as many members as the manifest says");
+    } catch (const Error&) {
+      whole = false;
+    }
+  }
+  // One by one, from behind, so that what can be read of a damaged store is read.
+  ClusterPoints points;
+  for (const LevelInfo& level : store.levels()) {
+    for (std::uint64_t i = std::min<std::uint64_t>(level.clusters, 300); i-- > 0;) {
+      const ClusterId id = cluster_id(level.level, level.clusters - 1 - i);
+      try {
+        const ClusterRecord record = store.record(id);
+        store.read(id, points);
+        promises.check_cluster(id, record, points);
+      } catch (const Error&) {
+        whole = false;
+      }
+    }
+  }
+  std::size_t problems = 0;
+  const bool good = store.verify([&problems](const Problem& problem) {
+    require(!problem.file.empty() && !problem.what.empty(), "a problem says where and what");
+    ++problems;
+  });
+  require(good == (problems == 0), "problems are told");
+  require(!good || whole, "what is sound can be read");
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static const Folder folder;
+  testing::StoreFiles files = files_of({reinterpret_cast<const char*>(data), size});
+  testing::mend(files);
+  testing::write_files(folder.path(), files);
+  try {
+    read_all(Store::open(folder.path()));
+  } catch (const Error& error) {
+    require(!error.parts().cause.empty(), "a cause");
+  }
+  for (const auto& [name, bytes] : files) fs::remove(folder.path() / name);
+  return 0;
+}

@@ -1,0 +1,416 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Reads stores and overlays. Written from FORMAT.md alone, and to stay so: where it and the library
+differ, one of the three is wrong.
+
+    decode_store.py STORE            every point: its cluster's level and ordinal, coordinates, attributes
+    decode_store.py STORE OVERLAY    every value of the overlay: level, ordinal, index, value
+"""
+import json
+import pathlib
+import struct
+import sys
+import zlib
+
+WORD = 1 << 64
+ESCAPE = 136
+STEPS = (0, 2, 4, 8, 15, 21, 29)  # the last class of steps 0 to 6
+
+
+def require(condition, what):
+    if not condition:
+        raise ValueError(what)
+
+
+def signed(value, bits=64):
+    value %= 1 << bits
+    return value - (1 << bits) if value >> (bits - 1) else value
+
+
+def unzigzag(value):
+    return (value >> 1) ^ -(value & 1)
+
+
+def clamp(value, low, high):
+    return max(low, min(high, value))
+
+
+def step_of(number_class):
+    return sum(number_class > last for last in STEPS)
+
+
+def crc16(data):
+    state = 0xFFFF
+    for byte in data:
+        state ^= byte << 8
+        for _ in range(8):
+            state = (state << 1 ^ (0x1021 if state & 0x8000 else 0)) & 0xFFFF
+    return state ^ 0xFFFF
+
+
+def real(form, k):
+    """The double that integer `k` stands for in a number form."""
+    if form < 20:
+        value = float(k) / 10 ** (form % 10)
+        return value if form < 10 else struct.unpack("<f", struct.pack("<f", value))[0]
+    bits, code = (32, "f") if form == 20 else (64, "d")
+    k = k if k >= 0 else k ^ ((1 << (bits - 1)) - 1)
+    return struct.unpack("<" + code, (k % (1 << bits)).to_bytes(bits // 8, "little"))[0]
+
+
+class Bytes:
+    """Numbers of a byte string whose last four bytes are the CRC-32 of the rest."""
+
+    def __init__(self, data, what):
+        require(len(data) >= 4 and zlib.crc32(data[:-4]) == struct.unpack("<I", data[-4:])[0], what)
+        self.data, self.at = data[:-4], 0
+
+    def take(self, count):
+        require(count <= len(self.data) - self.at, "too short")
+        self.at += count
+        return self.data[self.at - count:self.at]
+
+    def number(self, count):
+        return int.from_bytes(self.take(count), "little")
+
+    def varint(self):
+        value = shift = 0
+        while True:
+            byte = self.number(1)
+            value |= (byte & 127) << shift
+            shift += 7
+            if byte < 128:
+                return value
+
+    def signed_varint(self):
+        return unzigzag(self.varint())
+
+    def done(self):
+        require(self.at == len(self.data), "bytes left over")
+
+
+class Tables:
+    def __init__(self, data, contexts):
+        source = Bytes(data + struct.pack("<I", zlib.crc32(data)), "tables")
+        given = source.number(8)
+        self.coefficients = {}
+        for pattern in range(64):
+            neighbours = [bit for bit in range(6) if pattern >> bit & 1]
+            if given >> pattern & 1:
+                rest = [source.signed_varint() for _ in neighbours[1:]]
+                self.coefficients[pattern] = dict(zip(neighbours, [256 - sum(rest)] + rest))
+            elif pattern & 7 == 7:
+                self.coefficients[pattern] = {0: 256, 1: 256, 2: -256}
+            elif pattern:
+                self.coefficients[pattern] = {neighbours[0]: 256}
+        self.symbols = []  # per context: the (symbol, start, frequency) of every slot
+        for _ in range(contexts):
+            slots, symbol = [], 0
+            for _ in range(source.varint()):
+                symbol += source.varint()
+                frequency = source.varint()
+                slots += [(symbol, len(slots), frequency)] * frequency
+            missing = 2048 - len(slots)
+            require(symbol < ESCAPE and missing >= 0, "frequencies")
+            self.symbols.append(slots + [(ESCAPE, len(slots), missing)] * missing)
+        source.done()
+
+
+class Symbols:
+    """The two ends of a cluster's bytes."""
+
+    def __init__(self, data, tables):
+        self.data, self.tables = data, tables
+        self.state, self.front = struct.unpack_from("<I", data)[0], 4
+        self.bits, self.left = int.from_bytes(data[::-1], "big"), 8 * len(data)
+
+    def raw(self, count):
+        if count > 56:
+            upper = self.raw(count - 32)
+            return upper << 32 | self.raw(32)
+        self.left -= count
+        require(self.left >= 8 * self.front, "bits run out")
+        return self.bits >> self.left & ((1 << count) - 1)
+
+    def symbol(self, context):
+        symbol, start, frequency = self.tables.symbols[context][self.state % 2048]
+        self.state = frequency * (self.state // 2048) + self.state % 2048 - start
+        if self.state < 65536:
+            self.state = self.state * 65536 + struct.unpack_from("<H", self.data, self.front)[0]
+            self.front += 2
+        return self.raw(8) if symbol == ESCAPE else symbol
+
+    def number(self, context):
+        """A number and its class."""
+        c = self.symbol(context)
+        require(c < ESCAPE, "class")
+        if c < 16:
+            return c, c
+        e = 4 + (c - 16) // 2
+        return ((2 + c % 2) << (e - 1)) + self.raw(e - 1), c
+
+    def uniform(self, size):
+        b = size.bit_length() - 1
+        value, s = self.raw(b), (2 << b) - size
+        return value if value < s else 2 * value + self.raw(1) - s
+
+    def end(self):
+        require(65536 <= self.state < 131072, "rANS state")
+        rest = self.left - 8 * self.front
+        require(0 <= rest < 8 and self.bits >> 8 * self.front & ((1 << rest) - 1) == 0, "the two ends do not meet")
+        return self.state - 65536
+
+
+def magnitude(number_class):
+    c = number_class
+    base = c if c < 16 else (2 + c % 2) << (3 + (c - 16) // 2)
+    m = abs(unzigzag(base))
+    return (0, 2)[m] if m < 2 else 2 * (m.bit_length() - 1) + 2 + (m >> (m.bit_length() - 2) & 1)
+
+
+def rows(source, size):
+    """Cells (column, row) of the box, row by row, then their heights."""
+    cells, above = [], 0
+    begin = end = None
+    steps = [0, 0]
+    for row in range(size[1]):
+        count = source.number(1 + min(2, above))[0]
+        at = None
+        for run in range(count):
+            if run:
+                first = at + 1 + source.number(16)[0]
+                at = first + 1 + source.number(17)[0]
+            elif begin is None:
+                first = source.number(9)[0]
+                at = first + 1 + source.number(15)[0]
+            else:
+                steps[0] = unzigzag(source.number(6 + clamp(steps[0], -2, 2))[0])
+                steps[1] = unzigzag(source.number(12 + clamp(steps[1], -2, 2))[0])
+                first, at = begin + steps[0], end + steps[1]
+            if run == 0:
+                begin, end = first, at
+            require(0 <= first < at <= size[0], "runs")
+            cells += [(column, row) for column in range(first, at)]
+        above = count
+    return cells
+
+
+def heights(source, size, cells):
+    known, magnitudes, out = {}, {}, []
+    last = min(size - 1, (1 << 63) - 1) // 2
+    for column, row in cells:
+        if size == 1:
+            out.append(0)
+            continue
+        places = [(column - 1, row), (column, row - 1), (column - 1, row - 1), (column + 1, row - 1), (column - 2, row),
+                  (column, row - 2)]
+        there = [place in known for place in places]
+        pattern = sum(bit << k for k, bit in enumerate(there))
+        prediction = last
+        if pattern:
+            coefficients = source.tables.coefficients[pattern]
+            total = sum(factor * known[places[k]] for k, factor in coefficients.items())
+            prediction = signed(total + 128) >> 8
+        prediction = clamp(prediction, 0, size - 1)
+        factors = [factor * bit for factor, bit in zip((2, 2, 1, 1), there)]
+        weight = sum(factors)
+        total = sum(factor * magnitudes.get(place, 0) for factor, place in zip(factors, places))
+        step = min(30, total * (1024 // weight) >> 10) if weight else 31
+        value, c = source.number(84 + step + (0 if there[0] and there[1] else 32))
+        last = (prediction + unzigzag(value)) % WORD
+        known[column, row], magnitudes[column, row] = last, magnitude(c)
+        out.append(last)
+    return out
+
+
+def split(source, low, size, n, out):
+    if n == 0:
+        return
+    if n == 1:
+        out.append(tuple(a + (source.uniform(s) if s > 1 else 0) for a, s in zip(low, size)))
+        return
+    axis = max(range(3), key=lambda k: (size[k], -k))
+    if size[axis] == 1:
+        out += [tuple(low)] * n
+        return
+    if n < 32:
+        lower = source.symbol(30 + n - 2)
+    else:
+        lower = n // 2 + unzigzag(source.number(60 + min(23, n.bit_length() - 6))[0])
+    require(0 <= lower <= n, "split")
+    half = size[axis] - size[axis] // 2
+    for start, length, count in ((0, half, lower), (half, size[axis] // 2, n - lower)):
+        part_low, part_size = list(low), list(size)
+        part_low[axis] += start
+        part_size[axis] = length
+        split(source, part_low, part_size, count, out)
+
+
+def attribute(source, context, count, kind):
+    form = source.symbol(context) if kind.startswith("float") else None
+    values, value, c = [], 0, None
+    for _ in range(count):
+        difference, c = source.number(context + 1 if c is None else context + 2 + step_of(c))
+        value = signed(value + unzigzag(difference))
+        if form is not None:
+            values.append(real(form, value))
+        else:
+            bits = int(kind.lstrip("uint"))
+            values.append(value % (1 << bits) if kind.startswith("u") else signed(value, bits))
+    return values
+
+
+def ordinals(source, nearest, count):
+    values, value, c = [], 0, None
+    for _ in range(count):
+        step = 0 if c is None else step_of(c)
+        context = 24 if c is None else 25 + max(0, min(2, step - 4)) if nearest else 28 + (step == 7)
+        difference, c = source.number(context)
+        value = (value + unzigzag(difference)) % WORD
+        values.append(value)
+    return values
+
+
+class Cluster:
+    """`points` (three doubles), `attributes` (a column each), `children` (per level below, from the next), the place of
+    the representative (None in the root)."""
+
+    def __init__(self, data, entry, tables, schema, level, root):
+        require(crc16(data) == entry["checksum"], "cluster checksum")
+        source = Symbols(data, tables)
+        count = entry["points"]
+        form = source.symbol(0)
+        require(form < 4, "cluster form")
+        low, size = list(entry["low"]), [s or WORD for s in entry["size"]]
+        if form & 2:
+            for axis in range(3):
+                inside = [source.number(18 + 2 * axis + side)[0] for side in range(2)]
+                low[axis] += inside[0]
+                size[axis] -= sum(inside)
+                require(size[axis] > 0, "own box")
+        if form & 1:
+            places = []
+            split(source, (0, 0, 0), size, count, places)
+        else:
+            cells = rows(source, size)
+            places = [(c, r, h) for (c, r), h in zip(cells, heights(source, size[2], cells))]
+        require(len(places) == count, "number of points")
+        require(all(0 <= p[axis] < size[axis] for p in places for axis in range(3)), "a point outside of its box")
+        forms = (entry["forms"] // 484, entry["forms"] // 22 % 22, entry["forms"] % 22)
+        self.points = [tuple(real(f, signed(a + k)) for f, a, k in zip(forms, low, p)) for p in places]
+        self.attributes = [attribute(source, 148 + 10 * a, count, channel["type"]) for a, channel in enumerate(schema)]
+        self.children = [ordinals(source, below == level - 1, count) for below in reversed(range(level))]
+        upper = source.raw(16) if count >= 65536 else 0
+        place = upper << 16 | source.end()
+        require(place < count and (not root or place == 0), "representative")
+        self.representative = None if root else place
+
+    def members(self):
+        return [k for k in range(len(self.points)) if k != self.representative]
+
+
+class Level:
+    def __init__(self, folder, number, levels, schema):
+        segment, = levels[number]["segments"]
+        self.entries, files = [], {}
+        for part in ("data", "index"):
+            files[part] = (folder / segment[part]["file"]).read_bytes()
+            require(len(files[part]) == segment[part]["bytes"], "file size")
+            require("%08x" % zlib.crc32(files[part]) == segment[part]["crc32"], "file checksum")
+        index, data = files["index"], files["data"]
+        directory = Bytes(index[-segment["directory_bytes"]:], "directory checksum")
+        clusters = segment["clusters"]
+        pages = (clusters + 127) // 128
+        offsets = [directory.number(8) for _ in range(pages + 1)]
+        require(offsets[0] == 0 and offsets[-1] == len(index) - segment["directory_bytes"], "page offsets")
+        sets = []
+        for _ in range(directory.number(4)):
+            first = directory.varint()
+            sets.append((first, Tables(directory.take(directory.varint()), 148 + 10 * len(schema))))
+        directory.done()
+        for page in range(pages):
+            self.entries += self.page(index[offsets[page]:offsets[page + 1]], min(128, clusters - 128 * page))
+        self.clusters = []
+        for ordinal, entry in enumerate(self.entries):
+            tables = [each for first, each in sets if first <= ordinal]
+            body = data[entry["offset"]:entry["offset"] + entry["bytes"]]
+            root = number == len(levels) - 1
+            self.clusters.append(Cluster(body, entry, tables[-1], schema, number, root) if entry["points"] else None)
+
+    @staticmethod
+    def page(data, count):
+        source = Bytes(data, "page checksum")
+        offset = source.varint()
+        columns = []
+        for column in range(12):
+            base = source.signed_varint() if column in (3, 4, 5) else source.varint()
+            columns.append((base, source.number(1), source.number(1)))
+        bits = source.take((count * sum(width for _, width, _ in columns) + 7) // 8)
+        source.done()
+        bits, rows = int.from_bytes(bits, "little"), [[] for _ in range(count)]
+        for base, width, shift in columns:
+            for row in rows:
+                row.append((base + ((bits & ((1 << width) - 1)) << shift)) % WORD)
+                bits >>= width
+        require(bits == 0, "page padding")
+        entries = []
+        for row in rows:
+            entries.append({"offset": offset, "bytes": row[0], "points": row[1], "forms": row[2],
+                            "low": [signed(low) for low in row[3:6]], "size": row[6:9],
+                            "error": struct.unpack("<d", (row[9] << 47).to_bytes(8, "little"))[0],
+                            "descendants": row[10], "checksum": row[11]})
+            offset += row[0]
+        return entries
+
+
+class Store:
+    def __init__(self, folder):
+        folder = pathlib.Path(folder)
+        text = (folder / "manifest.json").read_bytes()
+        self.manifest = json.loads(text)
+        require(self.manifest["format"] == "terrace-store" and self.manifest["version"] == 1, "not a store of version 1")
+        self.checksum = self.manifest["checksum"]
+        require(text[-12:] == b"%s\"\n}\n" % self.checksum.encode(), "end of the manifest")
+        self.checksum = int(self.checksum, 16)
+        require(zlib.crc32(text[:-12] + b"00000000\"\n}\n") == self.checksum, "manifest checksum")
+        levels = self.manifest["levels"]
+        self.levels = [Level(folder, k, levels, self.manifest["attributes"]) for k in range(len(levels))]
+
+    def points(self):
+        """Of every point the level and the ordinal of the cluster that it is a member of, coordinates, attributes."""
+        for number, level in enumerate(self.levels):
+            for ordinal, cluster in enumerate(level.clusters):
+                for k in cluster.members() if cluster else ():
+                    yield (number, ordinal) + cluster.points[k] + tuple(column[k] for column in cluster.attributes)
+
+
+def overlay(path, store):
+    data = pathlib.Path(path).read_bytes()
+    require(data[:16] == b"terrace overlay\n", "not an overlay")
+    length = struct.unpack_from("<I", data, 40)[0]
+    header = Bytes(data[:44 + length + 4], "overlay header")
+    header.take(16)
+    require(header.number(4) == 1 and header.number(4) == store.checksum, "of another store or version")
+    pages, directory_at = header.number(8), header.number(8)
+    directory = Bytes(data[directory_at:], "overlay directory")
+    places = [(directory.number(8), directory.number(8), directory.number(4)) for _ in range(pages)] + [(0, directory_at, 0)]
+    directory.done()
+    for (first, begin, total), (_, end, _) in zip(places, places[1:]):
+        page = Bytes(data[begin:end], "overlay page")
+        ids, cluster = [], 0
+        for _ in range(page.number(4)):
+            cluster += page.varint()
+            index = -1
+            for _ in range(page.varint()):
+                index += page.varint() + (1 if index >= 0 else 1)
+                ids.append((cluster >> 56, cluster & ((1 << 56) - 1), index))
+        require(len(ids) == total and first == ids[0][0] << 56 | ids[0][1], "overlay page")
+        for place in ids:
+            yield place + struct.unpack("<d", page.take(8))
+        page.done()
+
+
+if __name__ == "__main__":
+    store = Store(sys.argv[1])
+    for row in overlay(sys.argv[2], store) if len(sys.argv) > 2 else store.points():
+        print(*(repr(value) for value in row))

@@ -1,0 +1,739 @@
+// SPDX-License-Identifier: Apache-2.0
+// FORMAT.md's statements one by one: stores that violate one of them, with good checksums, are
+// refused when they are opened or read, or reported by verify; never believed.
+#include <functional>
+#include <limits>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "../src/store/cluster_decoder.hpp"
+#include "../src/store/form.hpp"
+#include "store_inputs.hpp"
+#include "store_mending.hpp"
+#include "store_testing.hpp"
+#include "terrace/stream/error.hpp"
+#include "terrace/stream/store.hpp"
+
+namespace terrace::stream {
+namespace {
+
+using nlohmann::ordered_json;
+using store::Entry;
+using testing::OwnedBlock;
+using testing::StoreFiles;
+using testing::TemporaryFolder;
+
+constexpr std::uint64_t kColumns = 60, kRows = 50;
+
+Schema small_grid() {
+  Schema schema = testing::grid_schema(ScalarType::i16);
+  schema.columns = kColumns;
+  schema.rows = kRows;
+  return schema;
+}
+
+const testing::StandInHierarchy::Options kOptions{.block_points = 200, .cluster_points = 8};
+
+std::vector<testing::Block> small_blocks() {
+  return testing::grid_blocks(ScalarType::i16, testing::Relief::fractal, kColumns, kRows, 12, 1);
+}
+
+/// A raster's store with three levels, level 0 of three pages.
+const StoreFiles& grid_files() {
+  static const StoreFiles files = [] {
+    const TemporaryFolder folder;
+    testing::write_store(folder.path() / "s", small_grid(), small_blocks(), kOptions);
+    return testing::read_files(folder.path() / "s");
+  }();
+  return files;
+}
+
+const StoreFiles& cloud_files() {
+  static const StoreFiles files = [] {
+    const TemporaryFolder folder;
+    testing::write_store(folder.path() / "s", testing::cloud_schema(),
+                         testing::cloud_blocks(testing::Numbers::mixed, 3000, 200, 1), kOptions);
+    return testing::read_files(folder.path() / "s");
+  }();
+  return files;
+}
+
+std::string opening(const std::filesystem::path& path) {
+  try {
+    Store::open(path);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return {};
+}
+
+std::string problems_of(const Store& store) {
+  std::string problems;
+  store.verify([&](const Problem& problem) { problems += problem.what + "\n"; });
+  return problems;
+}
+
+/// The store opens, and reading all of it throws `expected`; verify says the same.
+void expect_unreadable(const StoreFiles& files, const std::string& expected) {
+  const TemporaryFolder folder;
+  testing::write_files(folder.path(), files);
+  const Store store = Store::open(folder.path());
+  std::string refused;
+  try {
+    testing::all_points(store);
+  } catch (const Error& error) {
+    refused = error.what();
+  }
+  EXPECT_NE(refused.find(expected), refused.npos) << refused << "\nexpected: " << expected;
+  const std::string problems = problems_of(store);
+  EXPECT_NE(problems.find(expected), problems.npos) << problems << "\nexpected: " << expected;
+}
+
+void expect_problem(const StoreFiles& files, const std::string& expected) {
+  const TemporaryFolder folder;
+  testing::write_files(folder.path(), files);
+  const std::string problems = problems_of(Store::open(folder.path()));
+  EXPECT_NE(problems.find(expected), problems.npos) << problems << "\nexpected: " << expected;
+}
+
+void expect_refused(const StoreFiles& files, const std::string& expected) {
+  const TemporaryFolder folder;
+  testing::write_files(folder.path(), files);
+  const std::string refused = opening(folder.path());
+  EXPECT_NE(refused.find(expected), refused.npos) << refused << "\nexpected: " << expected;
+}
+
+TEST(StoreInvariants, MendedCopiesAreTheSame) {
+  for (StoreFiles files : {grid_files(), cloud_files()}) {
+    const StoreFiles before = files;
+    testing::mend(files);
+    EXPECT_TRUE(files == before);
+    testing::edit_page(files, 0, 1, [](std::vector<Entry>&, std::uint64_t&) {});
+    EXPECT_TRUE(files == before);
+    const TemporaryFolder folder;
+    testing::write_files(folder.path(), files);
+    EXPECT_EQ(problems_of(Store::open(folder.path())), "");
+  }
+}
+
+struct ManifestCase {
+  const char* expected;
+  std::function<void(ordered_json&)> edit;
+};
+
+TEST(StoreInvariants, ManifestsWhoseCountsCannotBeAreRefused) {
+  const auto level = [](ordered_json& m, std::size_t l) -> ordered_json& { return m["levels"][l]; };
+  const std::vector<ManifestCase> cases{
+      {"the points of level 0", [](auto& m) { m["points"] = 1; }},
+      {"a count is not an integer", [](auto& m) { m["points"] = -1; }},
+      {"a count is not an integer", [](auto& m) { m["points"] = 2500.5; }},
+      {"a count is not an integer", [](auto& m) { m["nodata"] = 1e30; }},
+      {"more points than one can have", [](auto& m) { m["nodata"] = std::uint64_t{1} << 60; }},
+      {"the number of levels", [](auto& m) { m["levels"] = ordered_json::array(); }},
+      {"the levels do not follow", [&](auto& m) { level(m, 1)["level"] = 2; }},
+      {"the members of level 0", [&](auto& m) { level(m, 0)["members"] = 5; }},
+      {"the members of level 0", [&](auto& m) { level(m, 1)["points"] = 100000; }},
+      {"does not have the level's clusters", [&](auto& m) { level(m, 0)["clusters"] = 5; }},
+      {"the clusters of level 0",
+       [&](auto& m) {
+         level(m, 0)["clusters"] = 5;
+         level(m, 0)["segments"][0]["clusters"] = 5;
+       }},
+      {"does not have one segment",
+       [&](auto& m) { level(m, 0)["segments"].push_back(level(m, 0)["segments"][0]); }},
+      // As many clusters as only their number's wrapping makes possible.
+      {"more points than one can have",
+       [&](auto& m) {
+         const std::uint64_t many = std::numeric_limits<std::uint64_t>::max();
+         m["points"] = level(m, 0)["points"] = many;
+         level(m, 1)["points"] = level(m, 0)["clusters"] = many;
+         level(m, 0)["segments"][0]["clusters"] = many;
+         level(m, 0)["members"] = 0;
+       }},
+      {"more clusters than its file",
+       [&](auto& m) {
+         const std::uint64_t many = std::uint64_t{1} << 40;
+         m["points"] = level(m, 0)["points"] = 2 * many;
+         level(m, 1)["points"] = level(m, 0)["clusters"] = many;
+         level(m, 0)["segments"][0]["clusters"] = many;
+         level(m, 0)["members"] = many;
+       }},
+      {"more points than its clusters",
+       [&](auto& m) {
+         const std::uint64_t clusters = level(m, 0)["clusters"];
+         m["points"] = level(m, 0)["points"] = std::uint64_t{1} << 40;
+         level(m, 0)["members"] = (std::uint64_t{1} << 40) - clusters;
+       }},
+      {"a store without points has clusters",
+       [&](auto& m) {
+         m["points"] = 0;
+         m["bounds"] = nullptr;
+         for (auto& l : m["levels"]) l["points"] = l["members"] = 0;
+       }},
+      {"a file name is not allowed",
+       [&](auto& m) { level(m, 0)["segments"][0]["data"]["file"] = "../x"; }},
+      {"a file name is not allowed",
+       [&](auto& m) { level(m, 0)["segments"][0]["data"]["file"] = ".x"; }},
+      {"smaller than its directory",
+       [&](auto& m) { level(m, 0)["segments"][0]["directory_bytes"] = std::uint64_t{1} << 62; }},
+  };
+  for (const ManifestCase& c : cases) {
+    StoreFiles files = grid_files();
+    testing::edit_manifest(files, c.edit);
+    expect_refused(files, c.expected);
+  }
+}
+
+TEST(StoreInvariants, ManifestsWhosePlacesCannotBeAreRefused) {
+  const std::vector<ManifestCase> cases{
+      {"the bounds do not suit", [](auto& m) { m["bounds"] = nullptr; }},
+      {"the bounds do not suit", [](auto& m) { m["bounds"]["min"][2] = "nan"; }},
+      {"the bounds do not suit", [](auto& m) { m["bounds"]["min"][2] = 1e9; }},
+      {"the bounds are not finite", [](auto& m) { m["bounds"]["max"][2] = "inf"; }},
+      {"on the raster's columns", [](auto& m) { m["columns"] = 20; }},
+      {"on the raster's columns", [](auto& m) { m["rows"] = 49; }},
+      {"on the raster's columns", [](auto& m) { m["bounds"]["min"][0] = -1; }},
+      {"on the raster's columns", [](auto& m) { m["bounds"]["max"][1] = 48.5; }},
+      {"number of columns", [](auto& m) { m["columns"] = 0; }},
+      {"number of columns", [](auto& m) { m["rows"] = std::uint64_t{1} << 32; }},
+      {"a cloud has columns", [](auto& m) { m["kind"] = "cloud"; }},
+      {"scale or offset", [](auto& m) { m["coordinates"][2]["scale"] = 0; }},
+      {"scale or offset", [](auto& m) { m["coordinates"][2]["scale"] = "nan"; }},
+      {"scale or offset", [](auto& m) { m["coordinates"][0]["offset"] = "-inf"; }},
+      {"the world transform", [](auto& m) { m["world"][0] = 0; }},
+      {"the world transform", [](auto& m) { m["world"][5] = "nan"; }},
+      {"an EPSG code", [](auto& m) { m["crs"]["epsg"] = 1e300; }},
+      {"an EPSG code", [](auto& m) { m["crs"]["vertical_epsg"] = -5; }},
+      {"an unknown type", [](auto& m) { m["coordinates"][0]["type"] = "int3"; }},
+  };
+  for (const ManifestCase& c : cases) {
+    StoreFiles files = grid_files();
+    testing::edit_manifest(files, c.edit);
+    expect_refused(files, c.expected);
+  }
+}
+
+TEST(StoreInvariants, VerifyFindsManifestsThatAreNotAsWritten) {
+  const char* const order = "the keys of the format in their order";
+  const std::vector<ManifestCase> cases{
+      {order,
+       [](auto& m) {
+         ordered_json other{{"more", 1}};
+         other.update(m);
+         m = other;
+       }},
+      {order, [](auto& m) { m["levels"][0]["more"] = 1; }},
+      {order,
+       [](auto& m) {
+         ordered_json other{{"kind", m["kind"]}};
+         other.update(m);
+         m = other;
+       }},
+      {order, [](auto& m) { m["coordinates"][0]["type"] = "int"; }},  // of PLY: int32 here
+      {"the bounds are not those of the points", [](auto& m) { m["bounds"]["min"][2] = -1e6; }},
+      {"the mean height", [](auto& m) { m["mean_height"] = 0; }},
+      {"the mean height", [](auto& m) { m["mean_height"] = "nan"; }},
+  };
+  for (const ManifestCase& c : cases) {
+    StoreFiles files = grid_files();
+    testing::edit_manifest(files, c.edit);
+    expect_problem(files, c.expected);
+  }
+  // mend() writes these anew, so they are changed as text.
+  StoreFiles files = grid_files();
+  std::string& text = files["manifest.json"];
+  const std::size_t at = text.find("\"crc32\": \"") + 10;
+  std::transform(text.begin() + static_cast<std::ptrdiff_t>(at),
+                 text.begin() + static_cast<std::ptrdiff_t>(at + 8),
+                 text.begin() + static_cast<std::ptrdiff_t>(at),
+                 [](char c) { return static_cast<char>(std::toupper(c)); });
+  ASSERT_NE(text, grid_files().at("manifest.json"));
+  text.replace(text.size() - 12, 8, "00000000");
+  const std::string checksum = store::hexadecimal(testing::crc32_of(text, 0, text.size()));
+  text.replace(text.size() - 12, 8, checksum);
+  expect_problem(files, order);
+}
+
+/// A store whose manifest says fewer columns than its points have is not read, by whatever way.
+TEST(StoreInvariants, PointsOutsideOfTheRasterAreNotRead) {
+  for (const char* const side : {"columns", "rows"}) {
+    StoreFiles files = grid_files();
+    testing::edit_manifest(files, [&](ordered_json& m) {
+      m[side] = 20;
+      m["bounds"]["max"][side == std::string("columns") ? 0 : 1] = 19;
+    });
+    expect_unreadable(files, "a point lies outside of the bounds of the store");
+  }
+  StoreFiles files = cloud_files();
+  testing::edit_manifest(files, [](ordered_json& m) { m["bounds"]["max"][2] = 1; });
+  expect_unreadable(files, "a point lies outside of the bounds of the store");
+}
+
+TEST(StoreInvariants, LevelsWithOtherNumbersOfMembersAreNotRead) {
+  for (const int more : {-1, 1}) {
+    StoreFiles files = grid_files();
+    testing::edit_manifest(files, [&](ordered_json& m) {
+      ordered_json& level = m["levels"][0];
+      m["points"] = level["points"] = level["points"].get<int>() + more;
+      level["members"] = level["members"].get<int>() + more;
+    });
+    const TemporaryFolder folder;
+    testing::write_files(folder.path(), files);
+    const Store store = Store::open(folder.path());
+    std::uint64_t members = 0;
+    EXPECT_THROW(store.for_each(0, [&](ClusterId, const ClusterRecord&,
+                                       const ClusterPoints& points) { members += points.size(); }),
+                 Error);
+    EXPECT_LE(members, store.levels()[0].members);
+    EXPECT_NE(problems_of(store).find("members, not"), std::string::npos);
+  }
+}
+
+struct EntryCase {
+  const char* expected;
+  std::function<void(Entry&)> edit;
+  unsigned level = 0;
+};
+
+TEST(StoreInvariants, IndexEntriesThatCannotBeAreNotRead) {
+  constexpr store::NumberForm kCents = 2;
+  const std::vector<EntryCase> grid{
+      {"an index entry has no points", [](Entry& e) { e.points = 0; }},
+      {"more points than possible", [](Entry& e) { e.points = 3001; }},
+      {"an index entry is out of range", [](Entry& e) { e.points = (1u << 20) + 1; }},
+      {"an empty box", [](Entry& e) { e.size[1] = 0; }},
+      {"an impossible box", [](Entry& e) { e.low[2] = INT64_MAX; }},
+      {"an impossible box", [](Entry& e) { e.size[0] = UINT64_MAX; }},
+      {"columns or rows that are not integers", [](Entry& e) { e.forms[1] = kCents; }},
+      {"descendants", [](Entry& e) { e.descendants = e.points; }},
+      {"descendants", [](Entry& e) { e.descendants = e.points - 1u; }, 1},
+      {"descendants", [](Entry& e) { e.descendants = 3001; }, 1},
+      {"an unknown number form", [](Entry& e) { e.forms[0] = store::kNumberForms; }},
+      {"out of range", [](Entry& e) { e.error = 0xffe1; }},
+      {"cluster 0/3", [](Entry& e) { e.points += 1; }},
+      {"cluster 0/3", [](Entry& e) { e.points -= 1; }},
+      {"cluster 0/3", [](Entry& e) { e.size[0] -= 1, e.size[1] -= 1; }},
+  };
+  for (const EntryCase& c : grid) {
+    SCOPED_TRACE(c.expected);
+    StoreFiles files = grid_files();
+    testing::edit_page(files, c.level, 0,
+                       [&](auto& entries, std::uint64_t&) { c.edit(entries[3]); });
+    expect_unreadable(files, c.expected);
+  }
+  const auto bits = [](double value) { return store::ordered_bits(value); };
+  const std::vector<EntryCase> cloud{
+      {"an impossible box",
+       [&](Entry& e) {
+         e.forms[0] = store::kDoubleBits;
+         e.low[0] = bits(std::numeric_limits<double>::infinity());
+       }},
+      {"an impossible box",
+       [&](Entry& e) {
+         e.forms[0] = store::kDoubleBits;
+         e.low[0] = bits(1.0);
+         e.size[0] = static_cast<std::uint64_t>(INT64_MAX - bits(1.0));
+       }},
+      {"an impossible box",
+       [](Entry& e) {
+         e.forms[0] = store::kFloatBits;
+         e.low[0] = std::int64_t{1} << 40;
+       }},
+  };
+  for (const EntryCase& c : cloud) {
+    SCOPED_TRACE(c.expected);
+    StoreFiles files = cloud_files();
+    testing::edit_page(files, c.level, 0,
+                       [&](auto& entries, std::uint64_t&) { c.edit(entries[3]); });
+    expect_unreadable(files, c.expected);
+  }
+}
+
+TEST(StoreInvariants, PagesThatDoNotFollowOneAnotherAreFound) {
+  StoreFiles files = grid_files();
+  testing::edit_page(files, 0, 1, [](auto&, std::uint64_t& offset) { ++offset; });
+  expect_problem(files, "do not follow those of the page before");
+  files = grid_files();
+  testing::edit_page(files, 0, 1, [](auto&, std::uint64_t& offset) { offset = UINT64_MAX - 9; });
+  expect_unreadable(files, "an index entry is out of range");
+  files = grid_files();
+  testing::edit_page(files, 0, 1, [](auto&, std::uint64_t& offset) { offset = 1u << 30; });
+  expect_unreadable(files, "behind the end of the file");
+  files = grid_files();
+  files["level-0.0.clusters"] += "more";
+  testing::mend(files);
+  expect_problem(files, "the clusters do not end where the file does");
+}
+
+/// The bytes of level 0's index, and what can be done to them.
+TEST(StoreInvariants, DirectoriesThatCannotBeAreRefused) {
+  struct Case {
+    const char* expected;
+    std::function<void(testing::LevelBytes&)> edit;
+  };
+  const auto put = [](testing::LevelBytes& level, std::size_t at, std::uint64_t value,
+                      std::size_t n) {
+    std::memcpy(level.index.data() + level.directory() + at, &value, n);
+  };
+  const auto tables = [](const testing::LevelBytes& level) { return 8 * (level.pages() + 1); };
+  const std::vector<Case> cases{
+      {"do not follow one another", [&](auto& level) { put(level, 0, 1, 8); }},
+      {"do not follow one another", [&](auto& level) { put(level, 8, UINT64_MAX, 8); }},
+      {"do not follow one another",
+       [&](auto& level) { put(level, 16, level.page_offset(1) - 1, 8); }},
+      {"do not end where the directory begins",
+       [&](auto& level) {
+         put(level, 8 * level.pages(), level.page_offset(level.pages()) - 1, 8);
+       }},
+      {"the level has no tables",
+       [&](auto& level) {
+         put(level, tables(level), 0, 4);
+         level.index.resize(level.directory() + tables(level) + 8);
+       }},
+      {"the data end too early", [&](auto& level) { put(level, tables(level), 2, 4); }},
+      {"the tables do not follow one another",
+       [&](auto& level) { put(level, tables(level) + 4, 1, 1); }},
+      {"bytes follow the directory",
+       [&](auto& level) { level.index.insert(level.index.size() - 4, 1, '\0'); }},
+      {"too large for the level's clusters",
+       [&](auto& level) { level.index.insert(level.index.size() - 4, 4u << 20, '\0'); }},
+  };
+  for (const Case& c : cases) {
+    SCOPED_TRACE(c.expected);
+    StoreFiles files = grid_files();
+    auto manifest = ordered_json::parse(files["manifest.json"]);
+    bool first = true;
+    testing::for_each_level(files, manifest,
+                            [&](testing::LevelBytes& level, ordered_json& segment) {
+                              if (!std::exchange(first, false)) return;
+                              const std::size_t directory = level.directory();
+                              c.edit(level);
+                              segment["directory_bytes"] = level.index.size() - directory;
+                            });
+    files["manifest.json"] = manifest.dump(2) + "\n";
+    testing::mend(files);
+    expect_refused(files, c.expected);
+  }
+}
+
+/// A second set of tables, from cluster `first` on, is put behind that of level 0.
+StoreFiles with_second_tables(std::uint64_t first, bool damaged) {
+  StoreFiles files = grid_files();
+  auto manifest = ordered_json::parse(files["manifest.json"]);
+  bool done = false;
+  testing::for_each_level(files, manifest, [&](testing::LevelBytes& level, ordered_json& segment) {
+    if (std::exchange(done, true)) return;
+    const std::size_t directory = level.directory(), count_at = directory + 8 * (level.pages() + 1);
+    const std::uint32_t two = 2;
+    std::memcpy(level.index.data() + count_at, &two, 4);
+    // Behind the first's ordinal.
+    std::string set = level.index.substr(count_at + 5, level.index.size() - 4 - (count_at + 5));
+    if (damaged) set.back() = static_cast<char>(0x7f);
+    store::Bytes ordinal;
+    store::put_varint(ordinal, first);
+    level.index.insert(level.index.size() - 4, std::string(ordinal.begin(), ordinal.end()) + set);
+    segment["directory_bytes"] = level.index.size() - directory;
+  });
+  files["manifest.json"] = manifest.dump(2) + "\n";
+  testing::mend(files);
+  return files;
+}
+
+TEST(StoreInvariants, SecondTablesServeClustersOfTheirOwn) {
+  const TemporaryFolder folder;
+  testing::write_files(folder.path(), with_second_tables(100, false));
+  EXPECT_EQ(problems_of(Store::open(folder.path())), "");
+  expect_refused(with_second_tables(0, false), "the tables do not follow one another");
+  expect_refused(with_second_tables(1000, false), "clusters that do not exist");
+  expect_unreadable(with_second_tables(100, true), "table");
+}
+
+TEST(StoreInvariants, PagesWithBitsThatMeanNothingAreNotRead) {
+  bool tried = false;
+  for (const StoreFiles& sound : {grid_files(), cloud_files()}) {
+    auto manifest = ordered_json::parse(sound.at("manifest.json"));
+    for (std::size_t page = 0; page < 3; ++page) {
+      StoreFiles files = sound;
+      bool first = true, padded = false;
+      testing::for_each_level(files, manifest, [&](testing::LevelBytes& level, ordered_json&) {
+        if (!std::exchange(first, false)) return;
+        // The last bit of the last column's bytes.
+        char& last = level.index[level.page_offset(page + 1) - 5];
+        last = static_cast<char>(last | 0x80);
+        padded = level.clusters_of(page) % 8 != 0;  // 16 bits each: else there is no padding
+      });
+      if (files == sound || !padded) continue;
+      testing::mend(files);
+      const TemporaryFolder folder;
+      testing::write_files(folder.path(), files);
+      const std::string problems = problems_of(Store::open(folder.path()));
+      tried |= problems.find("bits that are not zero") != problems.npos;
+    }
+  }
+  EXPECT_TRUE(tried);
+}
+
+/// Tables in which every symbol has its bits, so that any cluster can be written.
+const store::Tables& even_tables(unsigned contexts) {
+  static store::Tables tables;
+  std::array<std::uint32_t, store::kSymbols> counts{};
+  for (unsigned s = 0; s < 40; ++s) counts[s] = 40;
+  tables.frequencies.assign(contexts, store::normalised(counts));
+  return tables;
+}
+
+/// What the decoder says of a cluster of `points` points in the box (0, 0, 0) to (7, 7, 7).
+std::string decoding(bool grid, std::uint32_t points, std::uint32_t last,
+                     const std::function<void(store::SymbolEncoder&)>& write,
+                     const std::function<void(store::Bytes&)>& change = {}) {
+  Schema schema;
+  schema.grid = grid;
+  const store::Layout layout(schema, 0);
+  const store::EncodingTables encoding(even_tables(layout.contexts()));
+  const store::DecodingTables decoding(even_tables(layout.contexts()));
+  store::SymbolEncoder encoder(encoding.tables);
+  encoder.start();
+  write(encoder);
+  store::Bytes bytes(store::kPadding);
+  encoder.finish(bytes, last);
+  if (change) change(bytes);
+  Entry entry;
+  entry.points = points;
+  entry.size = {8, 8, 8};
+  entry.bytes = static_cast<std::uint32_t>(bytes.size() - store::kPadding);
+  bytes.resize(bytes.size() + store::kPadding);
+  store::ClusterDecoder decoder;
+  ClusterPoints out;
+  try {
+    decoder.decode(layout, decoding, entry,
+                   store::ByteView(bytes).subspan(store::kPadding, entry.bytes), false, out);
+  } catch (const store::Damage& damage) {
+    return damage.what();
+  }
+  EXPECT_EQ(out.size() + 1, points);
+  return "read";
+}
+
+TEST(StoreInvariants, ClustersThatBreakTheirRulesAreNotRead) {
+  using store::SymbolEncoder;
+  namespace context = store::context;
+  const auto number = [](SymbolEncoder& coder, unsigned where, std::uint64_t value) {
+    store::code_number(coder, where, value);
+  };
+  const auto one_point = [&](SymbolEncoder& coder) {
+    coder.symbol(context::kForm, store::kSplitForm);
+    for (std::uint64_t axis = 0; axis < 3; ++axis) store::code_uniform(coder, axis, 8);
+  };
+  const auto own_box = [&](SymbolEncoder& coder, std::uint64_t below, std::uint64_t above) {
+    coder.symbol(context::kForm, store::kSplitForm | store::kOwnBoxForm);
+    for (unsigned side = 0; side < 6; ++side) {
+      number(coder, context::kInset + side, side == 0 ? below : side == 1 ? above : 7 * (side % 2));
+    }
+  };
+  const auto run = [&](SymbolEncoder& coder, std::uint64_t begin, std::uint64_t length) {
+    coder.symbol(context::kForm, 0);
+    number(coder, context::kRunCount, 1);
+    number(coder, context::kRunStart + 5, begin);
+    number(coder, context::kRunEnd + 5, length - 1);
+    for (unsigned row = 1; row < 8; ++row) number(coder, context::kRunCount + (row == 1), 0);
+  };
+  // What is right is read.
+  EXPECT_EQ(decoding(false, 1, 0, one_point), "read");
+  EXPECT_EQ(decoding(false, 1, 0, [&](auto& coder) { own_box(coder, 3, 4); }), "read");
+  const auto flat_run = [&](SymbolEncoder& coder) {
+    run(coder, 2, 1);
+    number(coder, context::kHeight + 63, 4);
+  };
+  EXPECT_EQ(decoding(true, 1, 0, flat_run), "read");
+
+  EXPECT_EQ(decoding(false, 1, 1, one_point),
+            "a cluster's representative is not one of its points");
+  EXPECT_EQ(decoding(false, 1, 0, [](auto& coder) { coder.symbol(context::kForm, 4); }),
+            "a cluster has an unknown form");
+  EXPECT_EQ(decoding(false, 1, 0, [&](auto& coder) { own_box(coder, 4, 4); }),
+            "a cluster's own box is not inside of its index entry's");
+  EXPECT_EQ(decoding(false, 1, 0, flat_run), "a cluster's box does not suit its form");
+  EXPECT_EQ(decoding(true, 1, 0, [&](auto& coder) { run(coder, 8, 1); }),
+            "a run lies outside of its cluster");
+  EXPECT_EQ(decoding(true, 1, 0, [&](auto& coder) { run(coder, 2, 2); }),
+            "a run lies outside of its cluster");
+  EXPECT_EQ(decoding(true, 2, 0, [&](auto& coder) { run(coder, 2, 1); }),
+            "a cluster has too few cells");
+  EXPECT_EQ(decoding(true, 1, 0,
+                     [&](auto& coder) {
+                       run(coder, 2, 1);
+                       number(coder, context::kHeight + 63, 10);
+                     }),
+            "a height lies outside of its cluster's box");
+  EXPECT_EQ(decoding(false, 2, 0,
+                     [](auto& coder) {
+                       coder.symbol(context::kForm, store::kSplitForm);
+                       coder.symbol(context::kSplit, 3);
+                     }),
+            "a part of a cluster has more points than the whole");
+  // Nine raw bits: seven behind them mean nothing.
+  const char* const ends = "a cluster's bytes do not end where its points do";
+  EXPECT_EQ(
+      decoding(false, 1, 0, one_point, [](store::Bytes& bytes) { bytes[bytes.size() - 2] ^= 1; }),
+      ends);
+  EXPECT_EQ(decoding(false, 1, 0, one_point,
+                     [](store::Bytes& bytes) { bytes.insert(bytes.end() - 2, 1, 0); }),
+            ends);
+  // 2^20 points at one place are a few bytes: more are too many.
+  const auto same_place = [&](SymbolEncoder& coder) {
+    coder.symbol(context::kForm, store::kSplitForm | store::kOwnBoxForm);
+    for (unsigned side = 0; side < 6; ++side) number(coder, context::kInset + side, 7 * (side % 2));
+    coder.raw(0, 16);
+  };
+  EXPECT_EQ(decoding(false, 1u << 20, 0, same_place), "read");
+  EXPECT_EQ(decoding(false, (1u << 20) + 1, 0, same_place), "a cluster has too many points");
+}
+
+/// Clusters that would take much memory are neither written nor read, however few bytes they are.
+TEST(StoreInvariants, ClustersOfManyBytesAreNotWritten) {
+  Schema schema = testing::cloud_schema();
+  for (int i = 0; i < 4096; ++i) {
+    schema.attributes.push_back(testing::channel(std::to_string(i)));
+  }
+  const std::uint64_t most = store::Layout(schema, 0).most_points();
+  EXPECT_LE(most * schema.payload_size(), std::uint64_t{1} << 28);
+  const TemporaryFolder folder;
+  StoreWriter writer(folder.path() / "s", schema);
+  const std::vector<Point3> positions(most + 1);
+  std::vector<std::uint32_t> order(most + 1);
+  for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
+  const std::vector<std::byte> payload(positions.size() * schema.payload_size());
+  const std::vector<std::uint32_t> first{0, static_cast<std::uint32_t>(most + 1)}, none{UINT32_MAX};
+  EXPECT_THROW(writer.finish({.level = 0,
+                              .positions = positions,
+                              .payload = payload,
+                              .children = {},
+                              .first = first,
+                              .order = order,
+                              .representatives = none,
+                              .summaries = {}}),
+               Error);
+}
+
+/// The store of small_blocks() written from its hierarchy after `edit`.
+StoreFiles rewritten(const std::function<void(std::vector<OwnedBlock>&)>& edit) {
+  std::vector<std::vector<Point3>> blocks;
+  for (const auto& block : small_blocks()) blocks.push_back(block.positions);
+  std::vector<OwnedBlock> recorded = testing::recorded_hierarchy(blocks, kOptions);
+  edit(recorded);
+  const TemporaryFolder folder;
+  StoreWriter writer(folder.path() / "s", small_grid());
+  for (const OwnedBlock& block : recorded) {
+    if (block.representatives[0] == UINT32_MAX) {
+      writer.finish(block.view());
+    } else {
+      writer.append(writer.encode(block.view()));
+    }
+  }
+  return testing::read_files(folder.path() / "s");
+}
+
+OwnedBlock& block_of(std::vector<OwnedBlock>& blocks, unsigned level) {
+  return *std::find_if(blocks.begin(), blocks.end(),
+                       [&](const OwnedBlock& block) { return block.level == level; });
+}
+
+TEST(StoreInvariants, VerifyFindsHierarchiesThatAreNone) {
+  EXPECT_TRUE(rewritten([](auto&) {}) == grid_files());
+  // A point of the first block of level 1 that represents no cluster there.
+  const auto plain_member = [](const OwnedBlock& block) {
+    std::uint32_t point = 0;
+    while (std::find(block.representatives.begin(), block.representatives.end(), point) !=
+           block.representatives.end()) {
+      ++point;
+    }
+    return point;
+  };
+  expect_problem(rewritten([&](auto& blocks) {
+                   OwnedBlock& block = block_of(blocks, 1);
+                   const std::uint32_t point = plain_member(block);
+                   block.children[point] = block.children[point + 1];
+                 }),
+                 "is headed a second time");
+  expect_problem(rewritten([&](auto& blocks) {
+                   OwnedBlock& block = block_of(blocks, 1);
+                   const std::uint32_t point = plain_member(block);
+                   block.children[point] = block.children[point + 1];
+                 }),
+                 "no point above heads it");
+  expect_unreadable(rewritten([&](auto& blocks) {
+                      OwnedBlock& block = block_of(blocks, 1);
+                      block.children[plain_member(block)] = 1000000;
+                    }),
+                    "heads a cluster that does not exist");
+  expect_problem(rewritten([&](auto& blocks) {
+                   OwnedBlock& block = block_of(blocks, 1);
+                   block.positions[plain_member(block)][2] += 1;
+                 }),
+                 "are not the points above that head its clusters");
+  // A representative that says otherwise than the point above what it heads.
+  expect_problem(rewritten([](auto& blocks) {
+                   OwnedBlock& block = block_of(blocks, 1);
+                   std::swap(block.children[block.representatives[0]],
+                             block.children[block.representatives[1]]);
+                 }),
+                 "are not the points above that head its clusters");
+  expect_problem(rewritten([](auto& blocks) { --block_of(blocks, 1).summaries[0].descendants; }),
+                 "the descendants do not add up");
+  expect_problem(rewritten([](auto& blocks) {
+                   OwnedBlock& block = block_of(blocks, 1);
+                   const Point3 at = block.positions[block.representatives[0]];
+                   block.summaries[0].box = {at, at};
+                 }),
+                 "a cluster below reaches out of its box");
+}
+
+/// Boxes of 32 columns from a multiple of 32 on look as if they had been grown to that: the box
+/// above must hold the very points all the same.
+TEST(StoreInvariants, VerifyFindsBoxesThatMissOnePoint) {
+  for (const int missed : {0, 1, 31}) {
+    const TemporaryFolder folder;
+    StoreWriter writer(folder.path() / "s", testing::grid_schema(ScalarType::i16));
+    std::vector<Point3> positions;
+    std::vector<std::uint32_t> order;
+    for (std::uint32_t i = 0; i < 64; ++i) {
+      positions.push_back({32.0 + i, 0, 0});
+      order.push_back(i);
+    }
+    const std::vector<std::uint32_t> first{0, 32, 64}, heads{31, 60}, all{0, 2}, none{UINT32_MAX};
+    const std::vector<ClusterSummary> summaries{{{positions[0], positions[31]}, 40, 32},
+                                                {{positions[32], positions[63]}, 40, 32}};
+    const std::vector<Point3> top{positions[31], positions[60]};
+    const std::vector<std::uint64_t> children{0, 1};
+    const auto low = static_cast<std::size_t>(missed);
+    const std::vector<ClusterSummary> root{{{positions[low], positions[63]}, 40, 64}};
+    writer.append(writer.encode({.level = 0,
+                                 .positions = positions,
+                                 .payload = {},
+                                 .children = {},
+                                 .first = first,
+                                 .order = order,
+                                 .representatives = heads,
+                                 .summaries = summaries}));
+    writer.finish({.level = 1,
+                   .positions = top,
+                   .payload = {},
+                   .children = children,
+                   .first = all,
+                   .order = std::span(order).first(2),
+                   .representatives = none,
+                   .summaries = root});
+    const std::string problems = problems_of(Store::open(folder.path() / "s"));
+    if (missed == 0) {
+      EXPECT_EQ(problems, "");
+    } else {
+      EXPECT_EQ(problems, "cluster 1/0: a cluster below reaches out of its box\n");
+    }
+  }
+}
+
+}  // namespace
+}  // namespace terrace::stream

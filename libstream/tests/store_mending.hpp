@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "../src/store/index_page.hpp"
+#include "../src/store/manifest.hpp"
+
+/// Stores as bytes in memory that anything can be done to: mend() makes all checksums right again,
+/// so that what lies behind them is reached. For tests and for the fuzzer.
+
+namespace terrace::stream::testing {
+
+/// By name within the store's folder.
+using StoreFiles = std::map<std::string, std::string>;
+
+inline StoreFiles read_files(const std::filesystem::path& folder) {
+  StoreFiles files;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    std::ifstream in(entry.path(), std::ios::binary);
+    files[entry.path().filename().string()] = {std::istreambuf_iterator<char>(in), {}};
+  }
+  return files;
+}
+
+/// Into an existing folder.
+inline void write_files(const std::filesystem::path& folder, const StoreFiles& files) {
+  for (const auto& [name, bytes] : files) {
+    std::ofstream(folder / name, std::ios::binary) << bytes;
+  }
+}
+
+inline std::uint32_t crc32_of(const std::string& bytes, std::size_t begin, std::size_t end) {
+  return store::crc32(0, bytes.data() + begin, end - begin);
+}
+
+/// Writes the CRC-32 of [begin, end - 4) behind it.
+inline void sign(std::string& bytes, std::size_t begin, std::size_t end) {
+  const std::uint32_t checksum = crc32_of(bytes, begin, end - 4);
+  std::memcpy(bytes.data() + end - 4, &checksum, 4);
+}
+
+/// One level's index and data as far as they can be found.
+struct LevelBytes {
+  std::string& data;
+  std::string& index;
+  std::size_t clusters = 0, directory_bytes = 0;
+
+  [[nodiscard]] std::size_t pages() const { return (clusters + 127) / 128; }
+  [[nodiscard]] std::size_t directory() const { return index.size() - directory_bytes; }
+  [[nodiscard]] std::size_t clusters_of(std::size_t page) const {
+    return std::min<std::size_t>(128, clusters - 128 * page);
+  }
+  [[nodiscard]] std::uint64_t page_offset(std::size_t page) const {
+    std::uint64_t offset = 0;
+    std::memcpy(&offset, index.data() + directory() + 8 * page, 8);
+    return offset;
+  }
+  /// Whether the directory has an offset for this page, and the page lies before the directory.
+  [[nodiscard]] bool has_page(std::size_t page) const {
+    return 8 * page + 20 <= directory_bytes && page_offset(page) <= page_offset(page + 1) &&
+           page_offset(page + 1) <= directory() && page_offset(page + 1) - page_offset(page) >= 4;
+  }
+  [[nodiscard]] store::Bytes page_bytes(std::size_t page) const {
+    const auto* const begin = reinterpret_cast<const std::uint8_t*>(index.data());
+    return {begin + page_offset(page), begin + page_offset(page + 1)};
+  }
+};
+
+/// The checksum column of a page is 16 bits wide in whatever the library writes: the last column.
+inline void mend_cluster_checksums(LevelBytes& level, std::size_t page) {
+  const std::size_t begin = level.page_offset(page), end = level.page_offset(page + 1);
+  const std::size_t count = level.clusters_of(page);
+  store::Bytes checksums;
+  try {
+    const store::IndexPage entries(level.page_bytes(page), static_cast<std::uint32_t>(count));
+    for (std::uint32_t i = 0; i < count; ++i) {
+      const std::uint64_t from = entries.offset(i), to = entries.offset(i + 1);
+      const bool there = from <= to && to <= level.data.size();
+      const auto* const bytes = reinterpret_cast<const std::uint8_t*>(level.data.data());
+      store::put(checksums, there ? store::crc16({bytes + from, to - from}) : std::uint16_t{0});
+    }
+    // Where the columns begin, and how many bits lie before the last one.
+    store::ByteReader in(
+        {reinterpret_cast<const std::uint8_t*>(level.index.data()) + begin, end - begin});
+    in.varint();
+    std::size_t bits = 0;
+    std::uint64_t base = 0;
+    std::uint16_t packed = 0;
+    for (unsigned column = 0; column < 12; ++column) {
+      bits += std::size_t{packed} % 256 * count;
+      base = in.varint();
+      packed = in.get<std::uint16_t>();
+    }
+    if (base != 0 || packed != 16) return;
+    std::string& index = level.index;
+    for (std::size_t b = 0; b < 16 * count; ++b) {
+      const std::size_t at = 8 * (begin + in.offset()) + bits + b;
+      const int bit = checksums[b / 8] >> b % 8 & 1;
+      index[at / 8] =
+          static_cast<char>((index[at / 8] & ~(1 << at % 8)) | (bit != 0 ? 1 << at % 8 : 0));
+    }
+  } catch (const store::Damage&) {
+    return;  // no page: nothing to mend
+  }
+  sign(level.index, begin, end);
+}
+
+/// The levels whose files are there. `manifest`: as JSON; what it says of a directory's size and of
+/// the clusters need not be true.
+inline void for_each_level(StoreFiles& files, nlohmann::ordered_json& manifest,
+                           const std::function<void(LevelBytes&, nlohmann::ordered_json&)>& use) {
+  if (!manifest.contains("levels") || !manifest["levels"].is_array()) return;
+  for (auto& level : manifest["levels"]) {
+    try {
+      auto& segment = level.at("segments").at(0);
+      const auto data = files.find(segment.at("data").at("file").get<std::string>());
+      const auto index = files.find(segment.at("index").at("file").get<std::string>());
+      if (data == files.end() || index == files.end() || data == index) continue;
+      LevelBytes bytes{data->second, index->second, level.at("clusters").get<std::size_t>(),
+                       segment.at("directory_bytes").get<std::size_t>()};
+      if (bytes.directory_bytes < 4 || bytes.directory_bytes > bytes.index.size()) continue;
+      use(bytes, segment);
+    } catch (const nlohmann::json::exception&) {
+      continue;  // not a level
+    }
+  }
+}
+
+/// Makes sizes and checksums right: of clusters, pages, directories, files and the manifest. Files
+/// that are too damaged to tell where something is keep what they have.
+inline void mend(StoreFiles& files) {
+  std::string& text = files[store::kManifestName];
+  auto manifest = nlohmann::ordered_json::parse(text, nullptr, /*allow_exceptions=*/false);
+  if (!manifest.is_object()) return;
+  for_each_level(files, manifest, [](LevelBytes& level, nlohmann::ordered_json& segment) {
+    for (std::size_t page = 0; page < level.pages() && level.has_page(page); ++page) {
+      sign(level.index, level.page_offset(page), level.page_offset(page + 1));
+      mend_cluster_checksums(level, page);
+    }
+    sign(level.index, level.directory(), level.index.size());
+    for (const auto& [name, bytes] :
+         {std::pair<const char*, const std::string&>{"data", level.data}, {"index", level.index}}) {
+      segment[name]["bytes"] = bytes.size();
+      segment[name]["crc32"] = store::hexadecimal(crc32_of(bytes, 0, bytes.size()));
+    }
+  });
+  manifest["checksum"] = "00000000";
+  text = manifest.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  constexpr std::size_t kDigitsFromEnd = 12;  // eight digits, a quote, newline, brace, newline
+  const std::string checksum = store::hexadecimal(crc32_of(text, 0, text.size()));
+  // Whoever put a key behind the checksum gets a manifest whose checksum is wrong.
+  text.replace(text.size() - kDigitsFromEnd, 8, checksum);
+}
+
+/// Calls edit(manifest) and mends.
+inline void edit_manifest(StoreFiles& files,
+                          const std::function<void(nlohmann::ordered_json&)>& edit) {
+  auto manifest = nlohmann::ordered_json::parse(files[store::kManifestName]);
+  edit(manifest);
+  files[store::kManifestName] = manifest.dump(2) + "\n";
+  mend(files);
+}
+
+/// Calls edit(entries, offset of the first in the data file) for a page of a level, writes what is
+/// left of it, moves what lies behind it, and mends.
+inline void edit_page(StoreFiles& files, unsigned level, std::size_t page,
+                      const std::function<void(std::vector<store::Entry>&, std::uint64_t&)>& edit) {
+  auto manifest = nlohmann::ordered_json::parse(files[store::kManifestName]);
+  unsigned number = 0;
+  for_each_level(files, manifest, [&](LevelBytes& bytes, nlohmann::ordered_json&) {
+    if (number++ != level) return;
+    const store::IndexPage old(bytes.page_bytes(page),
+                               static_cast<std::uint32_t>(bytes.clusters_of(page)));
+    std::vector<store::Entry> entries;
+    for (std::uint32_t i = 0; i < old.clusters(); ++i) entries.push_back(old.entry(i));
+    std::uint64_t offset = old.offset(0);
+    edit(entries, offset);
+    store::Bytes fresh;
+    store::write_page(entries, offset, fresh);
+    const std::size_t begin = bytes.page_offset(page), end = bytes.page_offset(page + 1);
+    for (std::size_t p = page + 1; p <= bytes.pages(); ++p) {
+      const std::uint64_t moved = bytes.page_offset(p) - (end - begin) + fresh.size();
+      std::memcpy(bytes.index.data() + bytes.directory() + 8 * p, &moved, 8);
+    }
+    bytes.index.replace(begin, end - begin, reinterpret_cast<const char*>(fresh.data()),
+                        fresh.size());
+  });
+  mend(files);
+}
+
+}  // namespace terrace::stream::testing
