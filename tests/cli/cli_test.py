@@ -324,7 +324,7 @@ class ErrorTest(CommandTest):
                 letter = self.bytes_of(out)
                 result = terrace(*command(1), option, out, '--force')
                 self.assert_one_line_error(result, 1)
-                self.assertIn('bears no mark of terrace', result.stderr)
+                self.assertIn('not written by terrace', result.stderr)
                 self.assertEqual(self.bytes_of(out), letter)
 
     @staticmethod

@@ -235,7 +235,7 @@ bool may_replace(const std::string& path, bool force) {
   if (!force) refuse("exists already", "name another output, or give --force to replace it");
   if (!fs::is_regular_file(status)) refuse("is not a regular file", "name another output");
   if (!written_by_terrace(path)) {
-    refuse("bears no mark of terrace, so --force does not replace it",
+    refuse("was not written by terrace, as far as its format tells, so --force does not replace it",
            "remove it yourself or name another output");
   }
   return true;
