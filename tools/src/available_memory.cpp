@@ -138,6 +138,4 @@ std::uint64_t available_memory_bytes() {
   return bytes;
 }
 
-std::uint64_t machine_memory_bytes() { return available_memory_bytes(); }
-
 }  // namespace terrace::tools

@@ -11,7 +11,6 @@ namespace terrace::tools {
 /// it, of version 1 or 2) or its limits RLIMIT_AS and RLIMIT_DATA say so. The only place that asks;
 /// the libraries are told.
 std::uint64_t available_memory_bytes();
-std::uint64_t machine_memory_bytes();
 
 /// The smallest memory limit of the cgroups that a process belongs to and of those above them;
 /// nullopt if there is none or they cannot be read. `proc`: the process's folder in /proc, of which

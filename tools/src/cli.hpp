@@ -32,7 +32,7 @@ struct CommonOptions {
   bool force = false;                         ///< --force
   ProgressMode progress = ProgressMode::automatic;
 
-  /// --memory, or else what the verb grants itself: `standard`; 0 means half the machine.
+  /// --memory, or else what the verb grants itself: `standard`; 0 means half of what there is.
   [[nodiscard]] std::uint64_t memory_or(std::uint64_t standard) const;
   /// A message to the user on standard error; not with -q.
   void say(const std::string& line) const;

@@ -32,7 +32,5 @@ class Stopwatch {
 
 /// Largest resident set of this process so far.
 std::uint64_t peak_rss_bytes();
-/// Physical memory of the machine.
-std::uint64_t machine_memory_bytes();
 
 }  // namespace terrace::tools

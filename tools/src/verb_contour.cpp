@@ -56,7 +56,7 @@ class ContourCommand final : public Command {
     if (!region_.empty()) request.region = crs_.regions(store)(Region::parse(region_));
     request.level = level.value_or(store.top());
     request.threads = common.threads;
-    request.memory_bytes = common.memory_or(machine_memory_bytes() / 2);
+    request.memory_bytes = common.memory_or(0);
     TextOutput output(output_, may_replace(output_, common.force));
     ProgressMeter meter(common.progress, "lines");
     const ContourOutcome outcome = write_contours(

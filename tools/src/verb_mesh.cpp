@@ -198,8 +198,7 @@ class MeshCommand final : public Command {
           &writer.emplace(save_overlay_, store, store.schema().coordinates[2].name,
                           may_replace(save_overlay_, common.force));
     }
-    TriangleMesh mesh =
-        mesh_of_store(store, detail, common.memory_or(machine_memory_bytes() / 2), options);
+    TriangleMesh mesh = mesh_of_store(store, detail, common.memory_or(0), options);
     places(mesh.positions);
     write_mesh(output_, format_, mesh, replace);
     if (writer) writer->finish();

@@ -72,7 +72,7 @@ class ProfileCommand final : public Command {
     }
     request.sampler.level = level.value_or(store.top());
     request.sampler.threads = common.threads;
-    request.sampler.memory_bytes = common.memory_or(machine_memory_bytes() / 2);
+    request.sampler.memory_bytes = common.memory_or(0);
     TextOutput output(output_, may_replace(output_, common.force));
     const ProfileOutcome outcome =
         write_profile(store, request, [&](std::string_view text) { output.write(text); });

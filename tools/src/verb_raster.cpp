@@ -64,7 +64,7 @@ class RasterCommand final : public Command {
     const stream::Store store = stream::Store::open(store_);
     request.sampler.level = level.value_or(store.top());
     request.sampler.threads = common.threads;
-    request.sampler.memory_bytes = common.memory_or(machine_memory_bytes() / 2);
+    request.sampler.memory_bytes = common.memory_or(0);
     if (!region_.empty()) request.region = crs_.regions(store)(Region::parse(region_));
     request.to = crs_.to(store);
     request.output = output_;

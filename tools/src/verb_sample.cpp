@@ -70,7 +70,7 @@ class SampleCommand final : public Command {
     const stream::Store store = stream::Store::open(store_);
     options.level = level.value_or(store.top());
     options.threads = common.threads;
-    options.memory_bytes = common.memory_or(machine_memory_bytes() / 2);
+    options.memory_bytes = common.memory_or(0);
     const PlaceConversions conversions = conversions_for(store);
     PlaceFile places(points_);
     TextOutput output(output_, may_replace(output_, common.force));

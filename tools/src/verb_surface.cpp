@@ -64,8 +64,7 @@ class SurfaceCommand final : public Command {
     const bool replace = may_replace(output_, common.force);
     SurfaceOutcome outcome;
     call_library(store_, criterion_, [&] {
-      outcome = surface_of_store(store, detail, options, tetrahedra_,
-                                 common.memory_or(machine_memory_bytes() / 2));
+      outcome = surface_of_store(store, detail, options, tetrahedra_, common.memory_or(0));
     });
     places(outcome.mesh.positions);
     if (tetrahedra_) {
