@@ -78,7 +78,8 @@ std::vector<double> heights_by_area(const TriangleMesh& mesh, const std::vector<
   return shown;
 }
 
-/// By cells of the plane with points, about four in each where points are fewest.
+/// By cells of space with points: of the surface that the points lie on, about four in each where
+/// they are fewest.
 std::vector<double> heights_by_cells(const TriangleMesh& cloud,
                                      const std::vector<double>& heights) {
   constexpr double kMostCells = 64;  // on a side
@@ -90,21 +91,25 @@ std::vector<double> heights_by_cells(const TriangleMesh& cloud,
       std::clamp(std::floor(std::sqrt(static_cast<double>(coarsest) / 4)), 1.0, kMostCells);
   stream::Box3 box;
   for (const stream::Point3& p : cloud.positions) box.include(p);
-  std::vector<std::vector<double>> members(static_cast<std::size_t>(cells * cells));
-  const auto cell = [&](double value, std::size_t axis) {
-    const double width = box.max[axis] - box.min[axis];
-    return width > 0 ? std::min(cells - 1, std::floor((value - box.min[axis]) / width * cells)) : 0;
-  };
-  for (std::size_t i = 0; i < heights.size(); ++i) {
-    const stream::Point3& p = cloud.positions[i];
-    members[static_cast<std::size_t>(cell(p[1], 1) * cells + cell(p[0], 0))].push_back(heights[i]);
+  double width = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    width = std::max(width, box.max[axis] - box.min[axis]);
   }
-  const std::size_t of_each = kShownHeights / members.size();
+  std::vector<std::vector<double>> members(static_cast<std::size_t>(cells * cells * cells));
+  for (std::size_t i = 0; i < heights.size(); ++i) {
+    double cell = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double place = cloud.positions[i][axis] - box.min[axis];
+      cell =
+          cell * cells + (width > 0 ? std::min(cells - 1, std::floor(place / width * cells)) : 0);
+    }
+    members[static_cast<std::size_t>(cell)].push_back(heights[i]);
+  }
+  std::erase_if(members, [](const std::vector<double>& some) { return some.empty(); });
+  const std::size_t of_each = std::max<std::size_t>(1, kShownHeights / members.size());
   std::vector<double> shown;
   for (const std::vector<double>& some : members) {
-    for (std::size_t k = 0; k < of_each && !some.empty(); ++k) {
-      shown.push_back(some[k * some.size() / of_each]);
-    }
+    for (std::size_t k = 0; k < of_each; ++k) shown.push_back(some[k * some.size() / of_each]);
   }
   return shown;
 }
@@ -116,7 +121,7 @@ std::vector<double> shown_heights(const TriangleMesh& mesh, const std::vector<do
   std::vector<double> shown;
   if (!mesh.triangles.empty()) {
     shown = heights_by_area(mesh, heights, flat);
-  } else if (flat && !mesh.left_out.empty()) {
+  } else if (!mesh.left_out.empty()) {
     shown = heights_by_cells(mesh, heights);
   }
   if (!shown.empty()) return shown;

@@ -34,10 +34,10 @@ bool is_height_field(const TriangleMesh& mesh);
 /// and the lower side of a body that was triangulated as if it were a terrain.
 bool mostly_steep(const TriangleMesh& mesh);
 
-/// What of `heights`, one per vertex, the surface shows: a sample of at most 100,000 that is even
+/// What of `heights`, one per vertex, the surface shows: a sample of about 100,000 that is even
 /// over its area (with `flat` as seen from above), so that parts with small triangles count no more
-/// than others of their size. Of a cloud: even over the parts of the plane that have points if
-/// `flat`, else over its points. O(triangles + points).
+/// than others of their size. Of a cloud out of a store: even over the parts of space that have
+/// points; of other clouds: over the points. O(triangles + points).
 std::vector<double> shown_heights(const TriangleMesh& mesh, const std::vector<double>& heights,
                                   bool flat);
 
