@@ -4,7 +4,6 @@
 
 #include <pthread.h>
 
-extern "C" int pthread_create(pthread_t*, const pthread_attr_t*, void* (*)(void*),
-                              void*) noexcept {
+extern "C" int pthread_create(pthread_t*, const pthread_attr_t*, void* (*)(void*), void*) noexcept {
   return EAGAIN;
 }

@@ -85,9 +85,7 @@ void add_common_options(CLI::App& app, CommonOptions& common) {
       ->type_name("SIZE");
   app.add_option_function<std::string>(
          "--seed",
-         [&common](const std::string& text) {
-           common.seed = value_of_option("--seed", text, parse_count);
-         },
+         [&common](const std::string& text) { common.seed = count_of_option("--seed", text); },
          "Same input, options and seed give the same bytes (default: 1)")
       ->group(group)
       ->type_name("N");
@@ -149,11 +147,12 @@ int run_verb(const Verb& verb, std::vector<std::string> arguments) {
   const Summary summary = command->run(common);
   try {
     if (common.json) {
-      // A file's name or text in it may be no UTF-8.
+      // A file's name or text in it may be no UTF-8, and what a terminal obeys is escaped with
+      // all that is not ASCII.
       constexpr auto kReplace = nlohmann::ordered_json::error_handler_t::replace;
-      print_result(summary.json.dump(-1, ' ', false, kReplace) + '\n');
+      print_result(summary.json.dump(-1, ' ', true, kReplace) + '\n');
     } else if (summary.text_is_result) {
-      print_result(summary.text);
+      print_result(printable(summary.text));
     } else if (!common.quiet) {
       print_lines(summary.text);
     }
@@ -243,6 +242,10 @@ CLI::Option* add_number(CLI::App& app, const std::string& name, std::optional<do
           },
           description)
       ->type_name("NUMBER");
+}
+
+std::uint64_t count_of_option(const std::string& name, const std::string& text) {
+  return value_of_option(name, text, parse_count);
 }
 
 void not_yet(CLI::App& app, std::initializer_list<const char*> names) {

@@ -88,6 +88,9 @@ CLI::Option* add_number(CLI::App& app, const std::string& name, double& value,
 CLI::Option* add_number(CLI::App& app, const std::string& name, std::optional<double>& value,
                         const std::string& description, const NumberRange& range = {});
 
+/// parse_count() for an option, which its UsageError names.
+std::uint64_t count_of_option(const std::string& name, const std::string& text);
+
 /// The option -o, --output: required, kept in `target`.
 CLI::Option* add_output(CLI::App& app, std::string& target, const std::string& description);
 

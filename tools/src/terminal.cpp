@@ -49,6 +49,7 @@ std::string printable(std::string_view text, bool keep_line_ends) {
   while (!text.empty()) {
     std::uint32_t code = 0;
     const std::size_t length = character_length(text, code);
+    if (length == 0) code = 0;
     if ((code == '\n' && keep_line_ends) || (length > 0 && !is_obeyed(code))) {
       out.append(text.substr(0, length));
     } else if (code == '\n' || code == '\t') {
@@ -80,7 +81,7 @@ void print_lines(std::string_view text) { std::fputs(printable(text).c_str(), st
 
 void print_result(std::string_view text) {
   stream::Sink output("-", false, stop_token());
-  output.write(printable(text));
+  output.write(text);
   output.commit();
 }
 

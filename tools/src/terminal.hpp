@@ -5,12 +5,12 @@
 #include <string_view>
 
 /// Text on its way to people. File names, names in files and comments may hold anything, and a
-/// terminal obeys control characters: all text goes through here.
+/// terminal obeys control characters: all messages and summaries go through here.
 
 namespace terrace::tools {
 
-/// With what a terminal would obey made visible as \xNN: control characters (of C0, DEL and C1),
-/// bytes that are no UTF-8, and marks that turn the direction of writing. Line ends stay.
+/// `text` with what a terminal would obey made visible as \xNN: control characters (of C0, DEL and
+/// C1), bytes that are no UTF-8, and marks that turn the direction of writing. Line ends stay.
 std::string printable(std::string_view text);
 /// The same for a part of a line: line ends become \n.
 std::string printable_line(std::string_view text);
@@ -19,8 +19,8 @@ std::string printable_line(std::string_view text);
 void print_message(std::string_view line);
 /// Lines, each ended by '\n', on standard error.
 void print_lines(std::string_view text);
-/// The same on standard output, all of it. Throws: stream::Error; ClosedPipe and Stopped among
-/// them.
+/// Text on standard output, as it is and all of it. Throws: stream::Error, ClosedPipe among them;
+/// stream::Stopped.
 void print_result(std::string_view text);
 
 /// Makes sure that descriptors 0 to 2 are open, so that no file that is opened later gets the

@@ -103,7 +103,7 @@ class MatchCommand final : public Command {
     if (!labels_.empty() && !tree_ && request.method != MatchMethod::automatic) {
       throw UsageError("--labels is for --method auto, or for --tree with any method");
     }
-    request.iterations = iterations_.empty() ? 0 : parse_count(iterations_);
+    request.iterations = iterations_.empty() ? 0 : count_of_option("--iterations", iterations_);
     if (!iterations_.empty() && request.iterations == 0) {
       throw UsageError("--iterations must be positive");
     }

@@ -101,7 +101,7 @@ class MeshCommand final : public Command {
     }
     options.max_error = max_error_.value_or(0.0);
     if (!max_points_.empty()) {
-      options.max_points = parse_count(max_points_);
+      options.max_points = count_of_option("--max-points", max_points_);
       if (options.max_points < 4) throw UsageError("--max-points: at least 4");
     }
     options.quality = parse_quality(quality_);

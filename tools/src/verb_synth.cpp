@@ -109,7 +109,7 @@ class SynthCommand : public Command {
 
   Summary make_cloud(const CommonOptions& common) {
     const Stopwatch watch;
-    const std::uint64_t points = points_.empty() ? 1000000 : parse_count(points_);
+    const std::uint64_t points = points_.empty() ? 1000000 : count_of_option("--points", points_);
     const std::unique_ptr<Cloud> cloud = kind_ == "surface"   ? make_surface(points, common.seed)
                                          : kind_ == "uniform" ? make_uniform(common.seed)
                                                               : make_clusters(points, common.seed);
