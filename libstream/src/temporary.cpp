@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdint>
 #include <cstdio>
 #include <set>
 #include <string_view>
@@ -21,8 +22,16 @@ namespace terrace::stream {
 namespace fs = std::filesystem;
 namespace {
 
+/// File systems take names of 255 bytes at most: a hash (64-bit FNV-1a) stands for a long one.
 std::string prefix_of(const fs::path& target) {
-  return std::string(".").append(target.filename().string()).append(".tmp-");
+  constexpr std::size_t kMostNamed = 200;
+  std::string name = target.filename().string();
+  if (name.size() > kMostNamed) {
+    std::uint64_t hash = 0xcbf29ce484222325;
+    for (const char c : name) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3;
+    name = "terrace-" + std::to_string(hash);
+  }
+  return std::string(".").append(name).append(".tmp-");
 }
 
 bool drop_ending(std::string& name, std::string_view ending) {

@@ -4,6 +4,7 @@
 
 #include "available_memory.hpp"
 #include "cli.hpp"
+#include "terminal.hpp"
 #include "units.hpp"
 
 // Apart from the command line, which needs all verbs: libraries of the tools speak by these.
@@ -16,11 +17,11 @@ std::uint64_t CommonOptions::memory_or(std::uint64_t standard) const {
 }
 
 void CommonOptions::say(const std::string& line) const {
-  if (!quiet) std::fprintf(stderr, "terrace: %s\n", line.c_str());
+  if (!quiet) print_message(line);
 }
 
 void CommonOptions::explain(const std::string& line) const {
-  if (verbose && !quiet) std::fprintf(stderr, "terrace: %s\n", line.c_str());
+  if (verbose && !quiet) print_message(line);
 }
 
 }  // namespace terrace::tools
