@@ -16,7 +16,7 @@ struct Mark {
   bool any_case = false;
 };
 
-struct Row {
+struct KnownFormat {
   ForeignFormat format;
   std::string_view endings;  ///< ".a .b"
   Mark first, second{};      ///< both, if there are two; of the first with text, it may be indented
@@ -30,7 +30,7 @@ constexpr std::string_view kVector =
     "convert its points, e.g. 'ogr2ogr -f CSV -lco GEOMETRY=AS_XYZ out.csv FILE', to text";
 
 // What tells more comes first.
-constexpr Row kRows[] = {
+constexpr KnownFormat kRows[] = {
     // Points.
     {{"COPC (a cloud-optimised LAZ file)", kPdal}, "", {0, "LASF"}, {377, "copc"}},
     {{"LAS", kPdal}, ".las", {0, "LASF"}},
@@ -148,7 +148,7 @@ const ForeignFormat* foreign_format_of_content(std::string_view head) {
   std::string_view text = head;
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
   text.remove_prefix(std::min(text.find_first_not_of(" \t\r\n"), text.size()));
-  for (const Row& row : kRows) {
+  for (const KnownFormat& row : kRows) {
     if (!shows(row.first, row.first.at == 0 ? text : head)) continue;
     if (!row.second.bytes.empty() && !shows(row.second, head)) continue;
     // The type of point of LAS has its highest bits set where points are compressed.
@@ -164,7 +164,7 @@ const ForeignFormat* foreign_format_of_content(std::string_view head) {
 
 const ForeignFormat* foreign_format_of_ending(std::string_view ending) {
   if (ending.empty()) return nullptr;
-  for (const Row& row : kRows) {
+  for (const KnownFormat& row : kRows) {
     if (has_word(row.endings, ending)) return &row.format;
   }
   return nullptr;

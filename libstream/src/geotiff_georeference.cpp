@@ -11,7 +11,7 @@
 namespace terrace::stream {
 namespace {
 
-constexpr char kRemedy[] = "set the georeferencing anew (gdal_edit.py -a_ullr)";
+constexpr char kSetAnew[] = "set the georeferencing anew (gdal_edit.py -a_ullr)";
 
 bool all_finite(const std::vector<double>& values) {
   return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
@@ -61,9 +61,9 @@ WorldTransform geotiff_transform(const GeoTiffHandle& handle, const GeoKeys& key
   // As GDAL does, scale and tie point go before a matrix if a file has both against the rules.
   if (scale.size() >= 2 && tie.size() >= 6) {
     if (!all_finite(scale) || !all_finite(tie)) {
-      handle.fail("ModelPixelScale", "is not finite", kRemedy);
+      handle.fail("ModelPixelScale", "is not finite", kSetAnew);
     }
-    if (scale[0] == 0 || scale[1] == 0) handle.fail("ModelPixelScale", "is zero", kRemedy);
+    if (scale[0] == 0 || scale[1] == 0) handle.fail("ModelPixelScale", "is zero", kSetAnew);
     if (scale[1] < 0) {
       comments.emplace_back("the pixel scale's negative y is read as positive, as by GDAL");
     }
@@ -74,7 +74,7 @@ WorldTransform geotiff_transform(const GeoTiffHandle& handle, const GeoKeys& key
     const WorldTransform world{{matrix[0], matrix[1], matrix[3], matrix[4], matrix[5], matrix[7]}};
     const double determinant = world.xy[0] * world.xy[4] - world.xy[1] * world.xy[3];
     if (!all_finite(matrix) || !std::isfinite(determinant) || determinant == 0) {
-      handle.fail("ModelTransformation", "does not map cells to distinct places", kRemedy);
+      handle.fail("ModelTransformation", "does not map cells to distinct places", kSetAnew);
     }
     return shifted(world, to_sample);
   }

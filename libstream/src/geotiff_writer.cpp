@@ -37,7 +37,7 @@ const std::array<TIFFFieldInfo, 7> kFields{{
 }};
 
 /// The shortest text that reads back as the same number.
-std::string printed(double value) {
+std::string shortest(double value) {
   if (std::isnan(value)) return "nan";
   std::array<char, 32> text{};
   const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
@@ -126,8 +126,8 @@ std::string metadata_of(const Channel& sample) {
     xml.append("  <Item name=\"").append(item_name).append("\" sample=\"0\" role=\"");
     xml.append(role).append("\">").append(value).append("</Item>\n");
   };
-  if (sample.offset != 0) item("OFFSET", "offset", printed(sample.offset));
-  if (sample.scale != 1) item("SCALE", "scale", printed(sample.scale));
+  if (sample.offset != 0) item("OFFSET", "offset", shortest(sample.offset));
+  if (sample.scale != 1) item("SCALE", "scale", shortest(sample.scale));
   if (!sample.unit.empty()) item("UNITTYPE", "unittype", escaped(sample.unit));
   return xml + "</GDALMetadata>\n";
 }
@@ -283,7 +283,7 @@ void GeoTiffWriter::Impl::set_fields() {
   const std::string metadata = metadata_of(options.sample);
   if (!metadata.empty()) check(TIFFSetField(tiff, kGdalMetadata, metadata.c_str()), "metadata");
   if (options.nodata) {
-    check(TIFFSetField(tiff, kGdalNodata, printed(*options.nodata).c_str()), "nodata");
+    check(TIFFSetField(tiff, kGdalNodata, shortest(*options.nodata).c_str()), "nodata");
   }
 }
 

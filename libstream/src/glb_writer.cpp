@@ -22,7 +22,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::size_t kPieceBytes = 64u << 10;
+constexpr std::size_t kGlbPieceBytes = 64u << 10;
 constexpr std::uint64_t kHeaderBytes = 12, kChunkHeaderBytes = 8;
 constexpr std::size_t kMaxStride = 252;  // of a vertex buffer, by the specification
 // Values of the specification: componentType, target, mode.
@@ -201,7 +201,7 @@ class GlbWriter final : public MeshWriter {
   }
 
   void flush_if_full() {
-    if (piece_.size() >= kPieceBytes) flush();
+    if (piece_.size() >= kGlbPieceBytes) flush();
   }
   void flush() {
     sink_->write(piece_);

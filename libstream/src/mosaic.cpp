@@ -14,10 +14,10 @@
 namespace terrace::stream {
 namespace {
 
-constexpr std::uint64_t kMostCells = 1u << 30;
+constexpr std::uint64_t kMostMosaicCells = 1u << 30;
 constexpr double kPhase = 1e-3;  // cells
 
-std::string printed(double value) {
+std::string all_digits(double value) {
   std::ostringstream out;
   out.precision(17);
   out << value;
@@ -63,15 +63,15 @@ Member placed(const RasterInfo& first, const RasterInfo& other) {
     const auto at = corner(c, r);
     if (!(std::abs(at[0] - origin[0] - c) <= kPhase && std::abs(at[1] - origin[1] - r) <= kPhase)) {
       differ(a, b,
-             "cells of " + printed(m[0]) + " x " + printed(m[4]) + " where the other has " +
-                 printed(first.world.xy[0]) + " x " + printed(first.world.xy[4]),
+             "cells of " + all_digits(m[0]) + " x " + all_digits(m[4]) + " where the other has " +
+                 all_digits(first.world.xy[0]) + " x " + all_digits(first.world.xy[4]),
              align);
     }
   }
   if (!(std::abs(origin[0] - column) <= kPhase && std::abs(origin[1] - row) <= kPhase)) {
     differ(a, b,
-           "its cells are shifted by " + printed(origin[0] - column) + ", " +
-               printed(origin[1] - row) + " of a cell",
+           "its cells are shifted by " + all_digits(origin[0] - column) + ", " +
+               all_digits(origin[1] - row) + " of a cell",
            align);
   }
   if (std::abs(column) >= 0x1p31 || std::abs(row) >= 0x1p31) {
@@ -95,9 +95,9 @@ void check_samples(const RasterInfo& first, const RasterInfo& other) {
   }
   if (first.sample.scale != other.sample.scale || first.sample.offset != other.sample.offset) {
     differ(a, b,
-           "scale and offset are " + printed(other.sample.scale) + ", " +
-               printed(other.sample.offset) + ", there " + printed(first.sample.scale) + ", " +
-               printed(first.sample.offset),
+           "scale and offset are " + all_digits(other.sample.scale) + ", " +
+               all_digits(other.sample.offset) + ", there " + all_digits(first.sample.scale) +
+               ", " + all_digits(first.sample.offset),
            "make them agree: gdal_translate -unscale");
   }
   if (first.sample.unit != other.sample.unit) {
@@ -214,7 +214,7 @@ class Mosaic final : public Raster {
     }
     info_.columns = static_cast<std::uint64_t>(right - left);
     info_.rows = static_cast<std::uint64_t>(bottom - top);
-    if (info_.columns >= kMostCells || info_.rows >= kMostCells) {
+    if (info_.columns >= kMostMosaicCells || info_.rows >= kMostMosaicCells) {
       throw Error({.file = members_.front().file,
                    .where = {},
                    .cause = "the mosaic of the " + std::to_string(members_.size()) + " files has " +

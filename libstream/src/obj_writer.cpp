@@ -9,7 +9,7 @@
 namespace terrace::stream {
 namespace {
 
-constexpr std::size_t kTextBytes = 64u << 10;
+constexpr std::size_t kObjTextBytes = 64u << 10;
 
 /// Wavefront OBJ: "v x y z" per vertex, "f a b c" per triangle, vertices counted from 1.
 class ObjWriter final : public MeshWriter {
@@ -58,7 +58,7 @@ class ObjWriter final : public MeshWriter {
  private:
   void end_line() {
     text_ += '\n';
-    if (text_.size() >= kTextBytes) flush();
+    if (text_.size() >= kObjTextBytes) flush();
   }
   void flush() {
     sink_.write(text_);

@@ -61,7 +61,7 @@ PlyEncoding parse_format(const std::vector<std::string_view>& words, const Heade
   if (words[1] == "ascii") return PlyEncoding::ascii;
   if (words[1] == "binary_little_endian") return PlyEncoding::little_endian;
   if (words[1] == "binary_big_endian") return PlyEncoding::big_endian;
-  reader.fail("unknown format " + quoted(words[1]),
+  reader.fail("unknown format " + in_quotes(words[1]),
               "known are ascii, binary_little_endian and binary_big_endian");
 }
 
@@ -72,7 +72,7 @@ PlyElement parse_element(const std::vector<std::string_view>& words, const Heade
   const char* const end = words[2].data() + words[2].size();
   const auto [rest, error] = std::from_chars(words[2].data(), end, element.count);
   if (error != std::errc{} || rest != end) {
-    reader.fail(quoted(words[2]) + " is no number of items", "correct the header");
+    reader.fail(in_quotes(words[2]) + " is no number of items", "correct the header");
   }
   return element;
 }
@@ -80,7 +80,7 @@ PlyElement parse_element(const std::vector<std::string_view>& words, const Heade
 PlyProperty parse_property(const std::vector<std::string_view>& words, const HeaderReader& reader) {
   const auto type_of = [&](std::string_view word) {
     const std::optional<ScalarType> type = scalar_type_of(word);
-    if (!type) reader.fail("unknown type " + quoted(word), "correct the header");
+    if (!type) reader.fail("unknown type " + in_quotes(word), "correct the header");
     return *type;
   };
   PlyProperty property;
@@ -115,7 +115,7 @@ void check_counts(const PlyHeader& header, const Input& input) {
       throw Error({.file = input.name(),
                    .where = "byte " + std::to_string(input.offset()),
                    .cause = "the header promises " + std::to_string(element.count) + " items of " +
-                            quoted(element.name) + " of at least " + std::to_string(least) +
+                            in_quotes(element.name) + " of at least " + std::to_string(least) +
                             " bytes, but only " + std::to_string(left) + " bytes are left",
                    .remedy = "the file is cut off or its header is wrong"});
     }
@@ -157,7 +157,7 @@ PlyHeader read_ply_header(Input& input) {
       PlyElement element = parse_element(words, reader);
       for (const PlyElement& other : header.elements) {
         if (other.name == element.name) {
-          reader.fail("a second element " + quoted(element.name), "correct the header");
+          reader.fail("a second element " + in_quotes(element.name), "correct the header");
         }
       }
       header.elements.push_back(std::move(element));
@@ -169,7 +169,7 @@ PlyHeader read_ply_header(Input& input) {
       PlyProperty property = parse_property(words, reader);
       for (const PlyProperty& other : properties) {
         if (other.name == property.name) {
-          reader.fail("a second property " + quoted(property.name), "correct the header");
+          reader.fail("a second property " + in_quotes(property.name), "correct the header");
         }
       }
       properties.push_back(std::move(property));
@@ -180,7 +180,7 @@ PlyHeader read_ply_header(Input& input) {
     } else if (words[0] == "end_header") {
       break;
     } else {
-      reader.fail("unknown keyword " + quoted(words[0]), "this is no PLY 1.0 header");
+      reader.fail("unknown keyword " + in_quotes(words[0]), "this is no PLY 1.0 header");
     }
     if (header.elements.size() > kMaxElements) {
       reader.fail("more than " + std::to_string(kMaxElements) + " elements",

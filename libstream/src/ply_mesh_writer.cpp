@@ -13,7 +13,7 @@
 namespace terrace::stream {
 namespace {
 
-constexpr std::size_t kPieceBytes = 64u << 10;
+constexpr std::size_t kMeshPieceBytes = 64u << 10;
 
 std::vector<Channel> float_channels(const std::vector<std::string>& names) {
   std::vector<Channel> channels;
@@ -88,7 +88,7 @@ class PlyMeshWriter final : public MeshWriter {
   }
   void end_row() {
     if (ascii_) piece_.back() = '\n';
-    if (piece_.size() >= kPieceBytes) flush();
+    if (piece_.size() >= kMeshPieceBytes) flush();
   }
   void flush() {
     sink_.write(piece_);

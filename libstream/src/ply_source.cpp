@@ -106,7 +106,7 @@ class PlySource final : public PointSource {
   }
   [[noreturn]] void fail_end(const std::string& element, std::uint64_t item) const {
     fail("byte " + std::to_string(input_.offset()),
-         "the file ends in item " + std::to_string(item) + " of element " + quoted(element),
+         "the file ends in item " + std::to_string(item) + " of element " + in_quotes(element),
          "the file is cut off or its header is wrong");
   }
 
@@ -120,7 +120,7 @@ class PlySource final : public PointSource {
         const std::size_t axis = std::string_view("xyz").find(property.name);
         if (property.name.size() == 1 && axis != std::string_view::npos) {
           if (size_of(property.type) == 8 && property.type != ScalarType::f64) {
-            fail("header", "the coordinate " + quoted(property.name) + " is a 64-bit integer",
+            fail("header", "the coordinate " + in_quotes(property.name) + " is a 64-bit integer",
                  "store it as double");
           }
           field.axis = static_cast<int>(axis);
@@ -182,8 +182,8 @@ class PlySource final : public PointSource {
     const std::int64_t length = to_integer(raw.data(), property.count_type);
     if (length < 0) {
       fail("byte " + std::to_string(input_.offset()),
-           "list " + quoted(property.name) + " in item " + std::to_string(item) + " of element " +
-               quoted(element) + " has the length " + std::to_string(length),
+           "list " + in_quotes(property.name) + " in item " + std::to_string(item) +
+               " of element " + in_quotes(element) + " has the length " + std::to_string(length),
            "the file is damaged");
     }
     const auto size = static_cast<std::uint64_t>(size_of(property.type));
@@ -244,7 +244,8 @@ class PlySource final : public PointSource {
         const std::int64_t length = to_integer(raw.data(), property.count_type);
         // Each item takes two bytes of the line but the last: a longer list cannot be there.
         if (length < 0 || static_cast<std::uint64_t>(length) > line.size()) {
-          fail_line("list " + quoted(property.name) + " has the length " + std::to_string(length));
+          fail_line("list " + in_quotes(property.name) + " has the length " +
+                    std::to_string(length));
         }
         for (std::int64_t n = 0; n < length; ++n) {
           read_word(line, property.type, property, raw.data());
@@ -268,9 +269,9 @@ class PlySource final : public PointSource {
     const char* const rest = parse_scalar(line.data(), end, type, raw);
     if (rest == nullptr) {
       const std::string_view word = line.substr(0, line.find_first_of(" \t"));
-      fail_line(word.empty() ? "the line ends before property " + quoted(property.name)
-                             : quoted(word) + " is no " + std::string(name_of(type)) +
-                                   " for property " + quoted(property.name));
+      fail_line(word.empty() ? "the line ends before property " + in_quotes(property.name)
+                             : in_quotes(word) + " is no " + std::string(name_of(type)) +
+                                   " for property " + in_quotes(property.name));
     }
     line = trim_left({rest, static_cast<std::size_t>(end - rest)});
   }

@@ -30,7 +30,7 @@ std::vector<std::string_view> split_fields(std::string_view line, char separator
   return fields;
 }
 
-std::string quoted(std::string_view text) {
+std::string in_quotes(std::string_view text) {
   constexpr std::size_t kMost = 40;
   std::string out = "'";
   for (const char c : text.substr(0, kMost)) {

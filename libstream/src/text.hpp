@@ -20,6 +20,6 @@ std::string_view trim(std::string_view line);
 /// The fields of a line, blanks around them removed. The separator ' ' stands for runs of blanks.
 std::vector<std::string_view> split_fields(std::string_view line, char separator);
 /// `text` made fit for an error message: in quotes, cut to 40 characters, nothing unprintable.
-std::string quoted(std::string_view text);
+std::string in_quotes(std::string_view text);
 
 }  // namespace terrace::stream

@@ -80,8 +80,8 @@ void find_axes(const std::vector<std::string_view>& names, TextLayout& layout,
       if (column) {
         throw Error({.file = file,
                      .where = where,
-                     .cause = "columns " + quoted(names[*column]) + " and " + quoted(names[i]) +
-                              " name the same coordinate",
+                     .cause = "columns " + in_quotes(names[*column]) + " and " +
+                              in_quotes(names[i]) + " name the same coordinate",
                      .remedy = "rename one of them"});
       }
       column = i;

@@ -152,7 +152,7 @@ class XyzSource final : public PointSource {
       double value = 0;
       const char* const end = field.data() + field.size();
       if (parse_real(field.data(), end, value) != end) {
-        fail(column + ", " + quoted(field) + ", is no number of a double's range",
+        fail(column + ", " + in_quotes(field) + ", is no number of a double's range",
              "leave the column out, or correct it");
       }
       const bool coordinate =

@@ -381,7 +381,7 @@ TEST(CrowdedLeaf, IsWithinTheBoundOfAllItsSamples) {
                                place(surface.bounds().south, box.south)};
     tools::TileSides sides(tile, plan, surface);
     std::vector<tri::Point3> frame;
-    for (const tools::SideVertex& vertex : sides.around(leaf)) {
+    for (const tools::TileSideVertex& vertex : sides.around(leaf)) {
       frame.push_back({static_cast<double>(vertex.u), static_cast<double>(vertex.v),
                        static_cast<double>(vertex.height) * plan.height_step});
     }

@@ -10,7 +10,7 @@
 namespace terrace::tools {
 namespace {
 
-constexpr std::array<std::pair<const char*, ClusterMethod>, 6> kMethods{
+constexpr std::array<std::pair<const char*, ClusterMethod>, 6> kClusterMethods{
     {{"facility", ClusterMethod::facility},
      {"primal-dual", ClusterMethod::primal_dual},
      {"k-means", ClusterMethod::k_means},
@@ -21,7 +21,7 @@ constexpr std::array<std::pair<const char*, ClusterMethod>, 6> kMethods{
 }  // namespace
 
 std::optional<ClusterMethod> cluster_method_of(const std::string& name) {
-  for (const auto& [text, method] : kMethods) {
+  for (const auto& [text, method] : kClusterMethods) {
     if (name == text) return method;
   }
   return std::nullopt;

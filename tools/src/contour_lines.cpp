@@ -11,7 +11,7 @@
 namespace terrace::tools {
 namespace {
 
-constexpr std::uint64_t kHorizontal = 0, kVertical = 1, kFalling = 2, kRising = 3;
+constexpr std::uint64_t kHorizontal = 0, kVerticalSide = 1, kFalling = 2, kRising = 3;
 
 }  // namespace
 
@@ -27,7 +27,7 @@ ContourLines::Crossing ContourLines::crossing(std::int64_t level, const Corner& 
                                               const Corner& b) const {
   const std::int64_t column = std::min(a.column, b.column), row = std::min(a.row, b.row);
   const std::uint64_t kind = a.row == b.row                             ? kHorizontal
-                             : a.column == b.column                     ? kVertical
+                             : a.column == b.column                     ? kVerticalSide
                              : (a.column < b.column) == (a.row < b.row) ? kFalling
                                                                         : kRising;
   return {level, static_cast<std::uint64_t>(row * columns_ + column) * 4 + kind};

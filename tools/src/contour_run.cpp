@@ -17,7 +17,7 @@ namespace terrace::tools {
 namespace {
 
 /// Of a point of a line at work (twice while it grows).
-constexpr std::uint64_t kBytesPerPoint = 48;
+constexpr std::uint64_t kContourBytesPerPoint = 48;
 constexpr double kMostLevels = 1e15;
 
 stream::Error failure(const stream::Store& store, const std::string& cause,
@@ -72,14 +72,15 @@ ContourOutcome write_contours(const stream::Store& store, const ContourRequest& 
       .store = store,
       .request = request,
       .emit = [&](ContourLine&& line) { text.add(std::move(line)); },
-      .limit = {.points = request.memory_bytes / 3 / kBytesPerPoint,
+      .limit = {.points = request.memory_bytes / 3 / kContourBytesPerPoint,
                 .exceeded =
                     [&] {
-                      throw failure(store,
-                                    "contour lines that are not at their ends have more than " +
-                                        with_commas(request.memory_bytes / 3 / kBytesPerPoint) +
-                                        " points, too many for --memory",
-                                    "raise --memory or --interval, or take a smaller --region");
+                      throw failure(
+                          store,
+                          "contour lines that are not at their ends have more than " +
+                              with_commas(request.memory_bytes / 3 / kContourBytesPerPoint) +
+                              " points, too many for --memory",
+                          "raise --memory or --interval, or take a smaller --region");
                     }},
       .progress =
           [&](double share) {

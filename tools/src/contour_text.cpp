@@ -20,7 +20,7 @@ namespace {
 /// Nine decimals of a degree are a tenth of a millimetre.
 constexpr int kDecimals = 9;
 /// Points turned into text at a time.
-constexpr std::size_t kPoints = std::size_t{1} << 17;
+constexpr std::size_t kContourPoints = std::size_t{1} << 17;
 
 }  // namespace
 
@@ -43,7 +43,7 @@ void ContourText::add(ContourLine&& line) {
   outcome_.points += line.points.size();
   points_ += line.points.size();
   lines_.push_back(std::move(line));
-  if (points_ >= kPoints) flush();
+  if (points_ >= kContourPoints) flush();
 }
 
 void ContourText::append(std::string& text, const ContourLine& line,

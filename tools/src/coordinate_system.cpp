@@ -34,7 +34,7 @@ Matrix inverse(const Matrix& m) {
   return result;
 }
 
-GeographicLib::Geocentric geocentric(const Ellipsoid& ellipsoid) {
+GeographicLib::Geocentric geocentric_of(const Ellipsoid& ellipsoid) {
   return {ellipsoid.semi_major, ellipsoid.flattening()};
 }
 
@@ -81,7 +81,7 @@ void check_numbers(const CrsDefinition& definition, const std::string& title) {
 /// From a datum's geocentric coordinates to those of WGS 84 and back, for places on the ellipsoid.
 struct CoordinateSystem::Shift {
   Shift(const Ellipsoid& ellipsoid, const DatumShift& s)
-      : own(geocentric(ellipsoid)), wgs84(GeographicLib::Geocentric::WGS84()) {
+      : own(geocentric_of(ellipsoid)), wgs84(GeographicLib::Geocentric::WGS84()) {
     constexpr double kArcSecond = kDegree / 3600;
     const double m = 1 + s[6] * 1e-6;
     const double rx = s[3] * kArcSecond * m, ry = s[4] * kArcSecond * m, rz = s[5] * kArcSecond * m;

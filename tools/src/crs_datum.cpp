@@ -13,7 +13,7 @@ namespace terrace::tools {
 namespace {
 
 /// ESRI's names and short ones, which the dataset does not have.
-constexpr std::array<std::pair<std::string_view, int>, 26> kNames{{
+constexpr std::array<std::pair<std::string_view, int>, 26> kDatumNames{{
     {"wgs84", 4326},
     {"wgs1984", 4326},
     {"worldgeodeticsystem1984", 4326},
@@ -54,7 +54,7 @@ std::string plain_datum(std::string_view name) {
 const EpsgGeographic* row_of_datum(const std::string& name) {
   const std::string plain = plain_datum(name);
   if (plain.empty()) return nullptr;
-  for (const auto& [known, code] : kNames) {
+  for (const auto& [known, code] : kDatumNames) {
     if (plain == known) return epsg_geographic(code);
   }
   for (const EpsgGeographic& row : epsg_tables().geographic) {

@@ -13,35 +13,35 @@ namespace terrace::tools {
 namespace {
 
 using P = ProjectionParameters;
-using Kind = ParameterName::Kind;
+using NameKind = ParameterName::Kind;
 using M = ProjectionMethod;
 
 constexpr ParameterName kNatural[] = {
-    {&P::latitude, Kind::angle, "Latitude of natural origin", 8801},
-    {&P::longitude, Kind::angle, "Longitude of natural origin", 8802},
-    {&P::scale, Kind::scale, "Scale factor at natural origin", 8805},
-    {&P::false_easting, Kind::length, "False easting", 8806},
-    {&P::false_northing, Kind::length, "False northing", 8807}};
+    {&P::latitude, NameKind::angle, "Latitude of natural origin", 8801},
+    {&P::longitude, NameKind::angle, "Longitude of natural origin", 8802},
+    {&P::scale, NameKind::scale, "Scale factor at natural origin", 8805},
+    {&P::false_easting, NameKind::length, "False easting", 8806},
+    {&P::false_northing, NameKind::length, "False northing", 8807}};
 constexpr ParameterName kUnscaled[] = {kNatural[0], kNatural[1], kNatural[3], kNatural[4]};
 constexpr ParameterName kTwoParallels[] = {
-    {&P::latitude, Kind::angle, "Latitude of false origin", 8821},
-    {&P::longitude, Kind::angle, "Longitude of false origin", 8822},
-    {&P::parallel1, Kind::angle, "Latitude of 1st standard parallel", 8823},
-    {&P::parallel2, Kind::angle, "Latitude of 2nd standard parallel", 8824},
-    {&P::false_easting, Kind::length, "Easting at false origin", 8826},
-    {&P::false_northing, Kind::length, "Northing at false origin", 8827}};
+    {&P::latitude, NameKind::angle, "Latitude of false origin", 8821},
+    {&P::longitude, NameKind::angle, "Longitude of false origin", 8822},
+    {&P::parallel1, NameKind::angle, "Latitude of 1st standard parallel", 8823},
+    {&P::parallel2, NameKind::angle, "Latitude of 2nd standard parallel", 8824},
+    {&P::false_easting, NameKind::length, "Easting at false origin", 8826},
+    {&P::false_northing, NameKind::length, "Northing at false origin", 8827}};
 constexpr ParameterName kPolarB[] = {
-    {&P::parallel1, Kind::angle, "Latitude of standard parallel", 8832},
-    {&P::longitude, Kind::angle, "Longitude of origin", 8833},
+    {&P::parallel1, NameKind::angle, "Latitude of standard parallel", 8832},
+    {&P::longitude, NameKind::angle, "Longitude of origin", 8833},
     kNatural[3],
     kNatural[4]};
 constexpr ParameterName kMercatorB[] = {kTwoParallels[2], kNatural[1], kNatural[3], kNatural[4]};
 constexpr ParameterName kHotineA[] = {
-    {&P::latitude, Kind::angle, "Latitude of projection centre", 8811},
-    {&P::longitude, Kind::angle, "Longitude of projection centre", 8812},
-    {&P::azimuth, Kind::angle, "Azimuth of initial line", 8813},
-    {&P::skew, Kind::angle, "Angle from Rectified to Skew Grid", 8814},
-    {&P::scale, Kind::scale, "Scale factor on initial line", 8815},
+    {&P::latitude, NameKind::angle, "Latitude of projection centre", 8811},
+    {&P::longitude, NameKind::angle, "Longitude of projection centre", 8812},
+    {&P::azimuth, NameKind::angle, "Azimuth of initial line", 8813},
+    {&P::skew, NameKind::angle, "Angle from Rectified to Skew Grid", 8814},
+    {&P::scale, NameKind::scale, "Scale factor on initial line", 8815},
     kNatural[3],
     kNatural[4]};
 constexpr ParameterName kHotineB[] = {
@@ -50,8 +50,8 @@ constexpr ParameterName kHotineB[] = {
     kHotineA[2],
     kHotineA[3],
     kHotineA[4],
-    {&P::false_easting, Kind::length, "Easting at projection centre", 8816},
-    {&P::false_northing, Kind::length, "Northing at projection centre", 8817}};
+    {&P::false_easting, NameKind::length, "Easting at projection centre", 8816},
+    {&P::false_northing, NameKind::length, "Northing at projection centre", 8817}};
 
 constexpr MethodName kMethods[] = {
     {M::transverse_mercator, "Transverse Mercator", 9807, kNatural},

@@ -16,16 +16,16 @@ struct Projected {
 constexpr float kEdge = 0.55F * Canvas::kOversampling;
 constexpr float kEdgeFade = 0.7F * Canvas::kOversampling;
 /// Triangles whose height is below this many samples get no edges: they would be all edge.
-constexpr float kSmallest = 3.0F * Canvas::kOversampling;
+constexpr float kSmallestTriangle = 3.0F * Canvas::kOversampling;
 constexpr std::array<float, 3> kEdgeColour{0.10F, 0.12F, 0.16F};
 
-struct Corner {
+struct ScreenCorner {
   Projected p;
   std::array<float, 3> colour;
 };
 
 /// Fills the samples of one triangle in rows [first_row, last_row).
-void fill(const std::array<Corner, 3>& t, bool wire, std::uint32_t first_row,
+void fill(const std::array<ScreenCorner, 3>& t, bool wire, std::uint32_t first_row,
           std::uint32_t last_row, Canvas& canvas) {
   const Projected &a = t[0].p, &b = t[1].p, &c = t[2].p;
   const float area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
@@ -52,7 +52,7 @@ void fill(const std::array<Corner, 3>& t, bool wire, std::uint32_t first_row,
                                     twice / length(a, b)};
   const float smallest = std::min({height[0], height[1], height[2]});
   const float edge_strength =
-      wire ? 0.85F * std::clamp(smallest / kSmallest - 0.35F, 0.0F, 1.0F) : 0.0F;
+      wire ? 0.85F * std::clamp(smallest / kSmallestTriangle - 0.35F, 0.0F, 1.0F) : 0.0F;
 
   const float scale = 1.0F / area;
   for (std::uint32_t y = y0; y < y1; ++y) {
@@ -111,7 +111,7 @@ void draw_triangles(const TriangleMesh& mesh, const std::vector<Rgb>& colours, c
           std::min({y0, y1, y2}) > static_cast<float>(last_row)) {
         continue;
       }
-      std::array<Corner, 3> corners{};
+      std::array<ScreenCorner, 3> corners{};
       for (std::size_t k = 0; k < 3; ++k) {
         corners[k] = {.p = vertices[t[k]], .colour = as_floats(colours[t[k]])};
       }
@@ -123,7 +123,7 @@ void draw_triangles(const TriangleMesh& mesh, const std::vector<Rgb>& colours, c
         const float shade = light.shade(
             unit({u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]}),
             camera.toward);
-        for (Corner& corner : corners) corner.p.shade = shade;
+        for (ScreenCorner& corner : corners) corner.p.shade = shade;
       }
       fill(corners, options.wire, first_row, last_row, canvas);
     }

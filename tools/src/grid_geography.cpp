@@ -28,9 +28,9 @@ constexpr std::array<Point2, 6> kChecks{
     {{0, 0}, {1, kInner}, {1 - kInner, 1}, {kInner, 1 - kInner}, {0.5, 0.5}, {0, 1}}};
 
 /// Coefficients of the polynomial in t through values at the nodes: row k gives those of t^k.
-using Matrix = std::array<std::array<double, kNodes>, kNodes>;
-Matrix monomials() {
-  Matrix matrix{};
+using NodeMatrix = std::array<std::array<double, kNodes>, kNodes>;
+NodeMatrix monomials() {
+  NodeMatrix matrix{};
   for (std::size_t i = 0; i < kNodes; ++i) {
     // The product of (t - node) over the others, divided by its value at node i.
     std::array<double, kNodes> product{1};
@@ -59,7 +59,7 @@ double value(const Quintic& c, double t) {
 struct Surface {
   std::array<Quintic, kNodes> coefficients{};
 
-  Surface(const std::array<double, kNodes * kNodes>& values, const Matrix& matrix) {
+  Surface(const std::array<double, kNodes * kNodes>& values, const NodeMatrix& matrix) {
     std::array<Quintic, kNodes> along{};
     for (std::size_t j = 0; j < kNodes; ++j) {
       for (std::size_t k = 0; k < kNodes; ++k) {
@@ -134,7 +134,7 @@ void GridGeography::exact(const Patch& patch, const Output& output) const {
 }
 
 bool GridGeography::interpolated(const Patch& patch, const Output& output) const {
-  static const Matrix matrix = monomials();
+  static const NodeMatrix matrix = monomials();
   const double width = static_cast<double>(patch.columns - 1);
   const double height = static_cast<double>(patch.rows - 1);
   const double left =

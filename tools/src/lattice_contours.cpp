@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::int64_t kBandRows = 256, kWindow = 512;
 /// Of a sample of a band (height, level).
-constexpr std::uint64_t kBytesPerSample = 16;
+constexpr std::uint64_t kContourBytesPerSample = 16;
 
 /// The samples around the region.
 LatticeWindow lattice_of(const stream::Store& store, const GroundSlope& ground,
@@ -50,8 +50,9 @@ void draw_lattice_contours(const ContourParts& parts) {
   const GroundSlope ground(store);
   const LatticeWindow lattice = lattice_of(store, ground, request.region);
   const std::int64_t band = std::clamp<std::int64_t>(
-      static_cast<std::int64_t>(request.memory_bytes / 4 / kBytesPerSample) / lattice.columns, 2,
-      kBandRows);
+      static_cast<std::int64_t>(request.memory_bytes / 4 / kContourBytesPerSample) /
+          lattice.columns,
+      2, kBandRows);
   const auto stored = [&](const Point2& p) {
     return Point2{p[0] + static_cast<double>(lattice.column),
                   p[1] + static_cast<double>(lattice.row)};

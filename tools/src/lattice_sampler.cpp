@@ -16,9 +16,9 @@ namespace terrace::tools {
 namespace {
 
 /// Places are answered tile by tile. A tile with few places is read in smaller pieces.
-constexpr std::int64_t kTile = 256, kPiece = 32;
+constexpr std::int64_t kTile = 256, kLatticePiece = 32;
 constexpr std::size_t kFew = 100;
-constexpr std::uint64_t kCacheBytes = std::uint64_t{4} << 20;
+constexpr std::uint64_t kLatticeCacheBytes = std::uint64_t{4} << 20;
 
 /// Natural neighbours of a place in the unit lattice lie within two samples of its square, so a
 /// block of the lattice that is a little larger than the tile has them all.
@@ -73,7 +73,7 @@ struct Worker {
   std::vector<T> heights{};
   std::optional<NaturalBlock> natural{};
 
-  explicit Worker(const stream::Store& store) : reader(store), pieces(store, kCacheBytes) {}
+  explicit Worker(const stream::Store& store) : reader(store), pieces(store, kLatticeCacheBytes) {}
 };
 
 /// T: what holds the heights exactly.
@@ -167,7 +167,7 @@ class LatticeSampler final : public HeightSampler {
     }
     if (numbers.size() >= kFew) return answer_window(worker, worker.reader, numbers, places, out);
     const auto piece = [&](std::uint32_t i) {
-      return std::pair(cell(places[i][1]) / kPiece, cell(places[i][0]) / kPiece);
+      return std::pair(cell(places[i][1]) / kLatticePiece, cell(places[i][0]) / kLatticePiece);
     };
     std::sort(numbers.begin(), numbers.end(),
               [&](std::uint32_t a, std::uint32_t b) { return piece(a) < piece(b); });

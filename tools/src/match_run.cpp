@@ -19,7 +19,7 @@ namespace {
 
 using matching::Point3;
 
-constexpr std::array<std::pair<const char*, MatchMethod>, 4> kMethods{
+constexpr std::array<std::pair<const char*, MatchMethod>, 4> kMatchMethods{
     {{"auto", MatchMethod::automatic},
      {"exact", MatchMethod::exact},
      {"monotone", MatchMethod::monotone},
@@ -92,7 +92,7 @@ MatchOutcome halve(const MatchRequest& request, std::span<const Point3> points,
 }  // namespace
 
 std::optional<MatchMethod> match_method_of(const std::string& name) {
-  for (const auto& [known, method] : kMethods) {
+  for (const auto& [known, method] : kMatchMethods) {
     if (name == known) return method;
   }
   return std::nullopt;

@@ -17,7 +17,7 @@ struct Named {
   tri::VertexId vertex = tri::kNoVertex;
 };
 
-stream::ClusterId stored(tri::ClusterId id) {
+stream::ClusterId stored_id(tri::ClusterId id) {
   return stream::cluster_id(tri::level_of(id), tri::ordinal_of(id));
 }
 
@@ -36,14 +36,14 @@ std::vector<Named> by_point(const tri::Multiresolution2<Coord>& model) {
 
 /// Calls change(vertex, value) for the vertices that the overlay has.
 template <class Change>
-void apply(stream::Overlay& overlay, const std::vector<Named>& vertices, Change&& change) {
+void apply_changes(stream::Overlay& overlay, const std::vector<Named>& vertices, Change&& change) {
   std::span<const stream::OverlayValue> values;
   std::size_t next = 0;
   for (std::size_t i = 0; i < vertices.size(); ++i) {
     const tri::PointId& point = vertices[i].point;
     if (i == 0 || point.cluster != vertices[i - 1].point.cluster) {
       check_interrupt();
-      values = overlay.find(stored(point.cluster));
+      values = overlay.find(stored_id(point.cluster));
       next = 0;
     }
     while (next < values.size() && values[next].index < point.index) ++next;
@@ -124,7 +124,7 @@ std::vector<double> changed_heights(const tri::Multiresolution2<Coord>& model,
     }
   }
   if (options.overlay != nullptr) {
-    apply(*options.overlay, vertices, [&](tri::VertexId vertex, double value) {
+    apply_changes(*options.overlay, vertices, [&](tri::VertexId vertex, double value) {
       heights[tri::slot(vertex)] = value;
       if (options.smoothing) before[tri::slot(vertex)] = (value - z.offset) / z.scale;
     });
@@ -139,7 +139,7 @@ std::vector<double> changed_heights(const tri::Multiresolution2<Coord>& model,
     for (const auto& [point, vertex] : vertices) {
       const double height = heights[tri::slot(vertex)];
       if (height == real(model.height(vertex))) continue;
-      options.save->add(stored(point.cluster), point.index, height);
+      options.save->add(stored_id(point.cluster), point.index, height);
     }
   }
   return heights;

@@ -14,10 +14,10 @@
 namespace terrace::tools {
 namespace {
 
-constexpr std::size_t kPiece = 65536;  // vertices or triangles at a time
+constexpr std::size_t kSpoolPiece = 65536;  // vertices or triangles at a time
 
 /// What the pieces would be called if they were ever published.
-std::filesystem::path name_of(const std::string& path) {
+std::filesystem::path spool_name(const std::string& path) {
   return path != "-" ? std::filesystem::path(path)
                      : std::filesystem::temp_directory_path() / "terrace-mesh";
 }
@@ -26,9 +26,9 @@ std::filesystem::path name_of(const std::string& path) {
 template <class T, class Take>
 void read_back(stream::AtomicFile& file, std::uint64_t count, const Take& take) {
   std::vector<T> piece;
-  for (std::uint64_t at = 0; at < count; at += kPiece) {
+  for (std::uint64_t at = 0; at < count; at += kSpoolPiece) {
     check_interrupt();
-    piece.resize(static_cast<std::size_t>(std::min<std::uint64_t>(kPiece, count - at)));
+    piece.resize(static_cast<std::size_t>(std::min<std::uint64_t>(kSpoolPiece, count - at)));
     const auto bytes = std::as_writable_bytes(std::span(piece));
     if (file.read_at(at * sizeof(T), bytes) != bytes.size()) {
       throw stream::Error({.file = file.target().string(),
@@ -43,7 +43,7 @@ void read_back(stream::AtomicFile& file, std::uint64_t count, const Take& take) 
 }  // namespace
 
 MeshSpool::MeshSpool(const std::string& path)
-    : vertex_file_(name_of(path), true), triangle_file_(name_of(path), true) {}
+    : vertex_file_(spool_name(path), true), triangle_file_(spool_name(path), true) {}
 
 void MeshSpool::add_vertex(const stream::Point3& position) {
   add_vertices(std::span(&position, 1));

@@ -17,7 +17,7 @@
 namespace terrace::tools {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 
 /// A member of the file that is being read, for messages.
 struct Place {
@@ -47,7 +47,7 @@ stream::Box3 box_of(const nlohmann::json& json, const Place& place) {
   const std::vector<double> v = numbers(json, "box", place);
   stream::Box3 box;
   if (v.size() == 4) {
-    box = {{v[0], v[1], -kInfinity}, {v[2], v[3], kInfinity}};
+    box = {{v[0], v[1], -kUnbounded}, {v[2], v[3], kUnbounded}};
   } else if (v.size() == 6) {
     box = {{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
   } else {
@@ -144,7 +144,8 @@ MetricChoice MetricChoice::parse(const std::string& text) {
     choice.kind = Kind::squared;
   } else if (name == "minkowski" && !rest.empty()) {
     choice.kind = Kind::minkowski;
-    choice.p = rest == "inf" ? kInfinity : parse_number(rest, "the exponent of --metric minkowski");
+    choice.p =
+        rest == "inf" ? kUnbounded : parse_number(rest, "the exponent of --metric minkowski");
     if (!(choice.p > 0.0)) throw UsageError("--metric minkowski:P needs a P above 0, or inf");
   } else if (name == "elliptical" && !rest.empty()) {
     choice.kind = Kind::elliptical;
@@ -202,7 +203,8 @@ cluster::Metric MetricChoice::on_ground(const stream::Point3& origin,
                                               origin};
   std::vector<cluster::EllipticalField::Region> field;
   for (const Region& region : regions) {
-    cluster::Bounds box{{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}};
+    cluster::Bounds box{{-kUnbounded, -kUnbounded, -kUnbounded},
+                        {kUnbounded, kUnbounded, kUnbounded}};
     if (region.box) {
       for (std::size_t axis = 0; axis < (flat ? 2U : 3U); ++axis) {
         const double low = region.box->min[axis], high = region.box->max[axis];

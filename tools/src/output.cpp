@@ -20,7 +20,7 @@ namespace terrace::tools {
 namespace {
 
 /// Longer lines are in no file of ours; neither are longer headers.
-constexpr std::size_t kLongestLine = 64u << 10;
+constexpr std::size_t kLongestMarkLine = 64u << 10;
 constexpr std::uint64_t kLongestHeader = 1u << 20;
 
 using Bytes = std::string;
@@ -58,7 +58,7 @@ std::optional<std::string_view> take_line(std::string_view& text) {
 }
 
 bool is_our_ply(std::ifstream& file) {
-  const Bytes bytes = read_at(file, 0, kLongestLine);
+  const Bytes bytes = read_at(file, 0, kLongestMarkLine);
   std::string_view text = bytes;
   const std::string mark = std::string("comment ") + kWriterMark;
   while (const auto line = take_line(text)) {
@@ -183,8 +183,8 @@ class Table {
 bool is_our_table(std::ifstream& file) {
   Table table;
   Bytes rest;  // a line that has no end yet
-  for (std::uint64_t at = 0;; at += kLongestLine) {
-    const Bytes piece = read_at(file, at, kLongestLine);
+  for (std::uint64_t at = 0;; at += kLongestMarkLine) {
+    const Bytes piece = read_at(file, at, kLongestMarkLine);
     // The last line has an end: what is cut short is not what we wrote.
     if (piece.empty()) return rest.empty() && table.has_rows();
     rest += piece;
@@ -193,7 +193,7 @@ bool is_our_table(std::ifstream& file) {
       if (!table.take(*line)) return false;
       if (table.ours()) return true;
     }
-    if (text.size() > kLongestLine) return false;
+    if (text.size() > kLongestMarkLine) return false;
     rest = Bytes(text);
   }
 }

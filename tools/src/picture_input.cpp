@@ -66,7 +66,7 @@ PictureInput from_mesh(MeshFile file) {
 }
 
 /// Bytes that a point of a cloud takes until it is drawn.
-constexpr std::uint64_t kBytesPerPoint = 100;
+constexpr std::uint64_t kPictureBytesPerPoint = 100;
 
 /// The number of the attribute with one of these names.
 std::optional<std::size_t> attribute(const stream::SourceInfo& info,
@@ -136,7 +136,7 @@ PictureInput from_source(const std::string& path, std::uint64_t most_cells,
       for (const stream::Point3& p : block.positions) grid->add(p);
     } else {
       append_cloud(info, block, input.mesh);
-      if (input.mesh.positions.size() > memory / kBytesPerPoint) {
+      if (input.mesh.positions.size() > memory / kPictureBytesPerPoint) {
         throw stream::Error(
             {.file = path,
              .where = {},

@@ -14,7 +14,7 @@
 namespace terrace::tools {
 namespace {
 
-constexpr std::size_t kLongestLine = std::size_t{1} << 20, kReadAtOnce = std::size_t{1} << 22;
+constexpr std::size_t kLongestPlaceLine = std::size_t{1} << 20, kReadAtOnce = std::size_t{1} << 22;
 
 /// Takes the cell at the beginning of `rest`, and the separator behind it. Separators within double
 /// quotes belong to the cell.
@@ -56,13 +56,13 @@ std::string lower(std::string_view text) {
   return result;
 }
 
-constexpr std::array<std::array<const char*, 2>, 7> kNames{{{"x", "y"},
-                                                            {"lon", "lat"},
-                                                            {"longitude", "latitude"},
-                                                            {"long", "lat"},
-                                                            {"lng", "lat"},
-                                                            {"easting", "northing"},
-                                                            {"east", "north"}}};
+constexpr std::array<std::array<const char*, 2>, 7> kPlaceNames{{{"x", "y"},
+                                                                 {"lon", "lat"},
+                                                                 {"longitude", "latitude"},
+                                                                 {"long", "lat"},
+                                                                 {"lng", "lat"},
+                                                                 {"easting", "northing"},
+                                                                 {"east", "north"}}};
 
 }  // namespace
 
@@ -84,7 +84,7 @@ PlaceLayout PlaceLayout::of(std::string_view first_line, const std::string& file
     names.push_back(lower(bare(cell)));
   }
   layout.header = !numbers;
-  for (const auto& [x, y] : kNames) {
+  for (const auto& [x, y] : kPlaceNames) {
     const auto at_x = std::find(names.begin(), names.end(), x);
     const auto at_y = std::find(names.begin(), names.end(), y);
     if (at_x == names.end() || at_y == names.end()) continue;
@@ -107,7 +107,7 @@ PlaceFile::PlaceFile(const std::string& path) : input_(path, stop_token(), kRead
 
 bool PlaceFile::next(PlaceBatch& batch, std::size_t most_bytes, std::size_t most_lines) {
   check_interrupt();
-  const std::size_t wanted = std::max(most_bytes, kLongestLine);
+  const std::size_t wanted = std::max(most_bytes, kLongestPlaceLine);
   const std::string_view window = input_.fill(wanted);
   const bool ended = window.size() < wanted;
   batch.begins.clear();

@@ -11,7 +11,7 @@ namespace terrace::tools {
 namespace {
 
 /// Share of the bound that sides are settled to: the rest is left to the triangles at them.
-constexpr double kSideShare = 0.9;
+constexpr double kPointSideShare = 0.9;
 /// How far samples that settle a side lie from it, in distances of neighbours.
 constexpr double kReach = 3.0;
 /// More samples than this around a knot are not looked at.
@@ -38,7 +38,7 @@ PointMeshSides::PointMeshSides(const PointMeshPlan& plan, PointMeshSamples& samp
     : plan_(plan),
       samples_(samples),
       duplicates_(duplicates),
-      side_error_(kSideShare * max_error),
+      side_error_(kPointSideShare * max_error),
       windows_at_(plan.knots.size()),
       known_(plan.sides.size()),
       heights_(plan.knots.size()) {

@@ -28,8 +28,8 @@ constexpr std::uint64_t kBytesPerPoint = 24 + 40 + 200;
 constexpr std::uint64_t kBytesPerSample = 80;
 /// Cells become one window where that has no more vertices than this, so that those on its sides,
 /// which cannot be removed, are few among them; and only so many.
-constexpr double kVerticesPerWindow = 10000.0;
-constexpr double kMostCells = 4.0;
+constexpr double kPointsPerMeshWindow = 10000.0;
+constexpr double kMostMeshCells = 4.0;
 /// What a thread needs to read, and what is there besides.
 constexpr std::uint64_t kBytesPerReader = std::uint64_t{12} << 20;
 constexpr std::uint64_t kBytesBeside = std::uint64_t{48} << 20;
@@ -107,8 +107,8 @@ BoundedMeshResult PointMesher::run_whole(const PointMeshOptions& options, MeshSp
 
 PointMeshPlan PointMesher::plan_for(double max_error) const {
   const PointMeshEstimate estimate(cuts_, *samples_, options_.duplicates);
-  std::vector<double> vertices(cuts_.cells.size(), kVerticesPerWindow);
-  if (estimate.per_cell(max_error) < kVerticesPerWindow / 2.0) {
+  std::vector<double> vertices(cuts_.cells.size(), kPointsPerMeshWindow);
+  if (estimate.per_cell(max_error) < kPointsPerMeshWindow / 2.0) {
     in_order(
         cuts_.cells.size(), cell_threads_,
         [&](unsigned, std::size_t i) {
@@ -120,8 +120,8 @@ PointMeshPlan PointMesher::plan_for(double max_error) const {
   return plan_point_mesh(cuts_, scan_.hull, [&](std::uint32_t first, std::uint32_t cells) {
     const auto from = vertices.begin() + first;
     return static_cast<double>(samples_->count(first, cells)) <=
-               kMostCells * static_cast<double>(options_.window_points) &&
-           std::accumulate(from, from + cells, 0.0) <= kVerticesPerWindow;
+               kMostMeshCells * static_cast<double>(options_.window_points) &&
+           std::accumulate(from, from + cells, 0.0) <= kPointsPerMeshWindow;
   });
 }
 

@@ -22,14 +22,14 @@ namespace {
 constexpr std::size_t kWindowPoints = 16384;
 /// Of windows with fewer places only what lies around these is loaded, in parts that are so many
 /// times smaller to each side.
-constexpr std::size_t kFew = 100;
+constexpr std::size_t kFewPlaces = 100;
 constexpr double kParts = 8;
-constexpr std::uint64_t kCacheBytes = std::uint64_t{4} << 20;
+constexpr std::uint64_t kCloudCacheBytes = std::uint64_t{4} << 20;
 /// What a thread may need: a window of usual size where points crowd.
 constexpr std::uint64_t kThreadBytes = std::uint64_t{32} << 20;
 
 /// What one thread works with.
-struct Worker {
+struct CloudWorker {
   PointWindow window;
   std::optional<NearestPoint> nearest{};
   std::vector<Point2> places{};
@@ -46,7 +46,7 @@ struct Worker {
     window.load(box);
   }
 
-  Worker(const stream::Store& store, unsigned level, std::uint64_t memory_bytes)
+  CloudWorker(const stream::Store& store, unsigned level, std::uint64_t memory_bytes)
       : window(store, level, memory_bytes) {}
 
  private:
@@ -122,9 +122,9 @@ class PointSampler final : public HeightSampler {
   void for_each_part(const Work& work) {
     parallel_for(
         parts_.size(), static_cast<unsigned>(workers_.size()), [&](unsigned thread, std::size_t i) {
-          std::unique_ptr<Worker>& worker = workers_[thread];
+          std::unique_ptr<CloudWorker>& worker = workers_[thread];
           if (worker == nullptr) {
-            worker = std::make_unique<Worker>(store_, options_.level, worker_bytes_);
+            worker = std::make_unique<CloudWorker>(store_, options_.level, worker_bytes_);
             worker->window.set_limit(too_long_);
           }
           const Part& part = parts_[i];
@@ -135,12 +135,12 @@ class PointSampler final : public HeightSampler {
   void answer(std::span<const Point2> places, std::span<SurfacePoint> out,
               tri::Interpolation method) {
     sort_by_window(places, [&](std::size_t i) { return inside(places[i]); });
-    for_each_part([&](Worker& worker, std::size_t window, Numbers numbers) {
+    for_each_part([&](CloudWorker& worker, std::size_t window, Numbers numbers) {
       if (method == tri::Interpolation::kNaturalNeighbour) {
         // Always the whole window: the last bits depend on it.
         worker.load(tree_, window, PointWindow::Reach::kCircles);
         answer_natural(worker, numbers, places, out);
-      } else if (numbers.size() >= kFew) {
+      } else if (numbers.size() >= kFewPlaces) {
         worker.load(tree_, window, PointWindow::Reach::kTriangles);
         for (const std::uint32_t i : numbers) out[i] = worker.window.at(places[i]);
       } else {
@@ -149,7 +149,7 @@ class PointSampler final : public HeightSampler {
     });
   }
 
-  static void answer_few(Worker& worker, const StoredBox& box, Numbers numbers,
+  static void answer_few(CloudWorker& worker, const StoredBox& box, Numbers numbers,
                          std::span<const Point2> places, std::span<SurfacePoint> out) {
     const auto part = [&](std::uint32_t i) {
       std::array<double, 2> at{};
@@ -176,7 +176,7 @@ class PointSampler final : public HeightSampler {
     }
   }
 
-  void answer_natural(Worker& worker, Numbers numbers, std::span<const Point2> places,
+  void answer_natural(CloudWorker& worker, Numbers numbers, std::span<const Point2> places,
                       std::span<SurfacePoint> out) const {
     const PointWindow& window = worker.window;
     const auto& triangulation = window.triangulation();
@@ -211,8 +211,8 @@ class PointSampler final : public HeightSampler {
       return std::isfinite(places[i][0]) && std::isfinite(places[i][1]) &&
              (!too_long_ || !std::isnan(answers[i].height));
     });
-    for_each_part([&](Worker& worker, std::size_t, Numbers numbers) {
-      if (!worker.nearest) worker.nearest.emplace(store_, options_.level, kCacheBytes);
+    for_each_part([&](CloudWorker& worker, std::size_t, Numbers numbers) {
+      if (!worker.nearest) worker.nearest.emplace(store_, options_.level, kCloudCacheBytes);
       for (const std::uint32_t i : numbers) nearest_[i] = (*worker.nearest)(places[i]);
     });
   }
@@ -221,7 +221,7 @@ class PointSampler final : public HeightSampler {
   SamplerOptions options_;
   WindowTree tree_;
   PointWindow::TooLong too_long_;
-  std::vector<std::unique_ptr<Worker>> workers_;
+  std::vector<std::unique_ptr<CloudWorker>> workers_;
   std::uint64_t worker_bytes_ = 0;
   std::vector<std::uint32_t> keys_, order_;
   std::vector<Part> parts_;

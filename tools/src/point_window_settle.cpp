@@ -9,7 +9,7 @@
 namespace terrace::tools {
 namespace {
 
-constexpr std::uint32_t kNone = 0xFFFFFFFF;
+constexpr std::uint32_t kNoTriangle = 0xFFFFFFFF;
 
 /// Whether a triangle, its corners counter-clockwise, meets a box; sometimes true where it does not
 /// by a rounding.
@@ -182,7 +182,8 @@ void PointWindow::gather_near(const StoredBox& wide) {
     if (!meets) continue;
     for (std::size_t at = group.begin; at < group.begin + group.count; ++at) {
       const Pending& p = pending_[at];
-      if (p.origin.cluster == kNone || !around.contains({p.place[0], p.place[1], 0})) continue;
+      if (p.origin.cluster == kNoTriangle || !around.contains({p.place[0], p.place[1], 0}))
+        continue;
       points_near_.emplace_back(p.place[0], at);
     }
   }
@@ -197,7 +198,7 @@ bool PointWindow::find_missing(const Suspect& suspect, bool is_near) {
   double depth = std::numeric_limits<double>::infinity();
   const auto look_at_point = [&](std::size_t at) {
     const Pending& p = pending_[at];
-    if (p.origin.cluster == kNone) return;  // taken
+    if (p.origin.cluster == kNoTriangle) return;  // taken
     const StoredBox box{p.place, p.place};
     const double d = cover.depth(box);
     if (point < pending_.size() && !(d < depth)) return;
@@ -223,17 +224,17 @@ bool PointWindow::find_missing(const Suspect& suspect, bool is_near) {
   }
   if (point < pending_.size()) {
     taken_.push_back(pending_[point]);
-    pending_[point].origin.cluster = kNone;
+    pending_[point].origin.cluster = kNoTriangle;
     return true;
   }
   // Else of the clusters that may hold some one of the highest level.
   const auto open = frontier_.open();
-  std::uint32_t best = kNone;
+  std::uint32_t best = kNoTriangle;
   const auto look_at = [&](std::uint32_t k) {
-    if (best != kNone && open[k].level < open[best].level) return;
+    if (best != kNoTriangle && open[k].level < open[best].level) return;
     if (!bounds.meets(open[k].box) || !cover.meets(open[k].box)) return;
     const double d = cover.depth(open[k].box);
-    if (best != kNone && open[k].level == open[best].level && !(d < depth)) return;
+    if (best != kNoTriangle && open[k].level == open[best].level && !(d < depth)) return;
     best = k;
     depth = d;
   };
@@ -242,7 +243,7 @@ bool PointWindow::find_missing(const Suspect& suspect, bool is_near) {
   } else {
     for (std::uint32_t k = 0; k < open.size(); ++k) look_at(k);
   }
-  if (best == kNone) return false;
+  if (best == kNoTriangle) return false;
   chosen_.push_back(best);
   return true;
 }

@@ -14,7 +14,7 @@
 namespace terrace::tools {
 namespace {
 
-constexpr std::size_t kMostCells = std::size_t{1} << 20;
+constexpr std::size_t kMostFilledCells = std::size_t{1} << 20;
 
 }  // namespace
 
@@ -24,7 +24,7 @@ RasterFill::RasterFill(const stream::Store& store) {
   const auto reduced = [&](std::uint64_t count) {
     return (static_cast<std::size_t>(count) + reduction - 1) / reduction;
   };
-  while (reduced(schema.columns) * reduced(schema.rows) > kMostCells) ++reduction;
+  while (reduced(schema.columns) * reduced(schema.rows) > kMostFilledCells) ++reduction;
   reduction_ = static_cast<double>(reduction);
 
   // The points of level 1 lie close enough for a surface that nothing measures.

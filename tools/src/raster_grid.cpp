@@ -20,7 +20,7 @@
 namespace terrace::tools {
 namespace {
 
-constexpr double kMostCells = 2147483647.0;
+constexpr double kMostGridCells = 2147483647.0;
 
 [[noreturn]] void outside(const stream::Store& store) {
   throw stream::Error({.file = store.path().string(),
@@ -72,7 +72,7 @@ stream::Box3 converted(const stream::Box3& box, const CoordinateSystem& from,
 }
 
 /// To two digits.
-double rounded(double value) {
+double rounded_cell(double value) {
   std::array<char, 32> digits{};
   const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), value,
                                  std::chars_format::scientific, 1);
@@ -87,11 +87,11 @@ double spacing_of(const stream::Store& store, const stream::Box3& area, unsigned
   if (store.schema().grid && level == 0) return std::sqrt(std::abs(m[0] * m[4] - m[1] * m[3]));
   const double size = (area.max[0] - area.min[0]) * (area.max[1] - area.min[1]);
   const std::uint64_t points = std::max<std::uint64_t>(store.levels()[level].points, 1);
-  return rounded(std::sqrt(size / static_cast<double>(points)));
+  return rounded_cell(std::sqrt(size / static_cast<double>(points)));
 }
 
 std::uint32_t count_of(double cells) {
-  if (!(cells <= kMostCells)) {
+  if (!(cells <= kMostGridCells)) {
     throw UsageError("--cell is too small: a side of the raster would have " +
                      number_text(std::ceil(cells)) + " cells");
   }

@@ -31,7 +31,7 @@ constexpr std::int64_t kSampleCells = 256;
 /// What a thread needs at worst: a window of kWindowCells with every sample a vertex, or one of
 /// kWidestCells with few, and the results that wait.
 constexpr std::uint64_t kBytesPerThread = std::uint64_t{112} << 20;
-constexpr std::uint64_t kBytesBeside = std::uint64_t{48} << 20;
+constexpr std::uint64_t kRasterBytesBeside = std::uint64_t{48} << 20;
 
 }  // namespace
 
@@ -67,7 +67,7 @@ bool RasterMesher::can_estimate() const {
 
 unsigned RasterMesher::threads_within_memory() const {
   const std::uint64_t memory = common_.memory_or(0);
-  const std::uint64_t beside = kBytesBeside + 8 * static_cast<std::uint64_t>(whole_.columns) +
+  const std::uint64_t beside = kRasterBytesBeside + 8 * static_cast<std::uint64_t>(whole_.columns) +
                                (options_.fill == Fill::interpolate ? std::uint64_t{32} << 20 : 0);
   if (memory < beside + kBytesPerThread) {
     throw stream::Error({.file = store_.path().string(),

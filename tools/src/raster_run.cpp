@@ -22,7 +22,7 @@
 namespace terrace::tools {
 namespace {
 
-constexpr std::int64_t kTile = 256;
+constexpr std::int64_t kRunTile = 256;
 /// Peak bytes per cell of the tiles at work: places twice, sorting, surface, heights.
 constexpr std::uint64_t kBytesPerCell = 130;
 
@@ -30,7 +30,7 @@ constexpr std::uint64_t kBytesPerCell = 130;
 constexpr std::int64_t kMostSide = 8;
 
 constexpr std::uint64_t bytes_of(std::int64_t side) {
-  return static_cast<std::uint64_t>(side * side * kTile * kTile) * kBytesPerCell;
+  return static_cast<std::uint64_t>(side * side * kRunTile * kRunTile) * kBytesPerCell;
 }
 
 /// A tile by its column and row among the tiles.
@@ -80,11 +80,11 @@ class RasterRun {
     options.world.xy = {grid_.step_x, 0, grid_.x, 0, grid_.step_y, grid_.y};
     options.crs = crs_;
     options.nodata = nodata_;
-    options.tile = kTile;
+    options.tile = kRunTile;
     options.replace = request_.replace;
     stream::GeoTiffWriter writer(request_.output, options);
-    const std::int64_t across = (grid_.columns + kTile - 1) / kTile;
-    const std::int64_t down = (grid_.rows + kTile - 1) / kTile;
+    const std::int64_t across = (grid_.columns + kRunTile - 1) / kRunTile;
+    const std::int64_t down = (grid_.rows + kRunTile - 1) / kRunTile;
     std::int64_t side = 1;
     while (side < kMostSide && bytes_of(2 * side) <= request_.sampler.memory_bytes / 2) side *= 2;
     std::vector<TilePlace> block;
@@ -124,10 +124,10 @@ class RasterRun {
   /// by rows in heights_.
   void sample(TilePlace corner, std::int64_t side) {
     const std::int64_t around = request_.value == RasterValue::height ? 0 : 1;
-    first_column_ = corner.column * kTile - around;
-    first_row_ = corner.row * kTile - around;
+    first_column_ = corner.column * kRunTile - around;
+    first_row_ = corner.row * kRunTile - around;
     const auto size = [&](std::int64_t first, std::int64_t all) {
-      return static_cast<std::size_t>(std::min(side * kTile + 2 * around, all + around - first));
+      return static_cast<std::size_t>(std::min(side * kRunTile + 2 * around, all + around - first));
     };
     width_ = size(first_column_, grid_.columns);
     const std::size_t height = size(first_row_, grid_.rows);
@@ -158,7 +158,7 @@ class RasterRun {
     tiles_.resize(block.size());
     counts_.assign(block.size(), 0);
     parallel_for(block.size(), request_.sampler.threads, [&](unsigned, std::size_t i) {
-      make_tile(i, block[i].column * kTile, block[i].row * kTile);
+      make_tile(i, block[i].column * kRunTile, block[i].row * kRunTile);
     });
     for (std::size_t i = 0; i < block.size(); ++i) {
       if (counts_[i] == 0) continue;
@@ -171,16 +171,16 @@ class RasterRun {
   void make_tile(std::size_t number, std::int64_t column, std::int64_t row) {
     std::vector<std::byte>& bytes = tiles_[number];
     const std::size_t size = shaded() ? 1 : sizeof(float);
-    bytes.resize(kTile * kTile * size);
-    const std::int64_t columns = std::min<std::int64_t>(kTile, grid_.columns - column);
-    const std::int64_t rows = std::min<std::int64_t>(kTile, grid_.rows - row);
+    bytes.resize(kRunTile * kRunTile * size);
+    const std::int64_t columns = std::min<std::int64_t>(kRunTile, grid_.columns - column);
+    const std::int64_t rows = std::min<std::int64_t>(kRunTile, grid_.rows - row);
     const double middle = static_cast<double>(column) + 0.5 * static_cast<double>(columns - 1);
-    for (std::int64_t j = 0; j < kTile; ++j) {
+    for (std::int64_t j = 0; j < kRunTile; ++j) {
       RasterShader::Scale scale;
       if (request_.value != RasterValue::height && j < rows) {
         scale = shader_.scale(middle, static_cast<double>(row + j));
       }
-      for (std::int64_t i = 0; i < kTile; ++i) {
+      for (std::int64_t i = 0; i < kRunTile; ++i) {
         double value = NAN;
         if (i < columns && j < rows) {
           const double* z = heights_.data() +
@@ -195,7 +195,7 @@ class RasterRun {
         } else {
           ++counts_[number];
         }
-        std::byte* at = bytes.data() + static_cast<std::size_t>(j * kTile + i) * size;
+        std::byte* at = bytes.data() + static_cast<std::size_t>(j * kRunTile + i) * size;
         if (shaded()) {
           *at = static_cast<std::byte>(static_cast<std::uint8_t>(value + 0.5));
         } else {

@@ -8,7 +8,7 @@
 namespace terrace::tools {
 namespace {
 
-using Triangle = std::array<Point2, 3>;
+using PlaneTriangle = std::array<Point2, 3>;
 
 bool in_box(const Point2& p, const Point2& a, const Point2& b) {
   return std::min(a[0], b[0]) <= p[0] && p[0] <= std::max(a[0], b[0]) &&
@@ -24,14 +24,14 @@ bool cross(const Point2& a, const Point2& b, const Point2& c, const Point2& d) {
          (cda == 0 && in_box(a, c, d)) || (cdb == 0 && in_box(b, c, d));
 }
 
-bool holds(const Triangle& triangle, const Point2& p) {
+bool holds(const PlaneTriangle& triangle, const Point2& p) {
   const int a = orientation(triangle[0], triangle[1], p);
   const int b = orientation(triangle[1], triangle[2], p);
   const int c = orientation(triangle[2], triangle[0], p);
   return (a >= 0 && b >= 0 && c >= 0) || (a <= 0 && b <= 0 && c <= 0);
 }
 
-bool touches(const Polygon& polygon, const Triangle& triangle) {
+bool touches(const Polygon& polygon, const PlaneTriangle& triangle) {
   if (tools::covers(polygon, triangle[0])) return true;
   for (const std::vector<Point2>& ring : polygon) {
     if (ring.empty()) continue;
@@ -53,9 +53,9 @@ bool touches(const Region& region, const std::array<stream::Point3, 3>& triangle
   for (const stream::Point3& corner : triangle) bounds.include(corner);
   const stream::Box3& box = region.box();
   if (!bounds.intersects(box)) return false;
-  const Triangle flat{{{triangle[0][0], triangle[0][1]},
-                       {triangle[1][0], triangle[1][1]},
-                       {triangle[2][0], triangle[2][1]}}};
+  const PlaneTriangle flat{{{triangle[0][0], triangle[0][1]},
+                            {triangle[1][0], triangle[1][1]},
+                            {triangle[2][0], triangle[2][1]}}};
   if (region.polygons().empty()) {
     return touches({{{box.min[0], box.min[1]},
                      {box.max[0], box.min[1]},

@@ -11,13 +11,13 @@
 namespace terrace::tools {
 namespace {
 
-constexpr std::size_t kWindowPoints = 16384;
+constexpr std::size_t kCrossingWindowPoints = 16384;
 /// Of a window's size. Boxes around slanting pieces hold more than these.
-constexpr double kPiece = 0.5;
+constexpr double kCrossingPiece = 0.5;
 /// Of the way: two crossings that rounding may tell apart are one.
 constexpr double kSame = 1e-12;
 
-Point2 between(const Point2& a, const Point2& b, double t) {
+Point2 point_between(const Point2& a, const Point2& b, double t) {
   return {a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])};
 }
 
@@ -41,7 +41,7 @@ std::array<double, 2> part_within(const StoredBox& box, const Point2& from, cons
 
 SurfaceCrossings::SurfaceCrossings(const stream::Store& store, const SamplerOptions& options)
     : store_(store),
-      tree_(store, options.level, kWindowPoints),
+      tree_(store, options.level, kCrossingWindowPoints),
       window_(store, options.level, options.memory_bytes / 2) {
   if (options.max_edge) too_long_ = longer_than(store, *options.max_edge);
 }
@@ -54,11 +54,11 @@ void SurfaceCrossings::operator()(const Point2& from, const Point2& to,
   const auto [first, last] = part_within(all, from, to);
   double latest = -1;
   for (double begin = first; begin <= last;) {
-    const StoredBox& box = tree_.box(tree_.window_of(between(from, to, begin)));
+    const StoredBox& box = tree_.box(tree_.window_of(point_between(from, to, begin)));
     double end = 1;
     for (std::size_t k = 0; k < 2; ++k) {
       const double size = box.max[k] - box.min[k], way = std::abs(to[k] - from[k]);
-      if (size > 0 && way > 0) end = std::min(end, begin + kPiece * size / way);
+      if (size > 0 && way > 0) end = std::min(end, begin + kCrossingPiece * size / way);
     }
     // Not so little that it comes to a stand.
     end = std::max(end, begin + 1e-9);
@@ -76,8 +76,8 @@ void SurfaceCrossings::operator()(const Point2& from, const Point2& to,
 void SurfaceCrossings::collect(const Point2& from, const Point2& to, double begin, double end,
                                bool is_last) {
   // With what rounding may take for one of this piece.
-  const Point2 a = between(from, to, std::max(0.0, begin - 1e-9));
-  const Point2 b = between(from, to, std::min(1.0, end + 1e-9));
+  const Point2 a = point_between(from, to, std::max(0.0, begin - 1e-9));
+  const Point2 b = point_between(from, to, std::min(1.0, end + 1e-9));
   StoredBox box;
   for (std::size_t k = 0; k < 2; ++k) {
     box.min[k] = std::min(a[k], b[k]);
@@ -107,8 +107,9 @@ void SurfaceCrossings::collect(const Point2& from, const Point2& to, double begi
       const double left = std::abs(off(c.place)), right = std::abs(off(d.place));
       const double share = left + right > 0 ? left / (left + right) : 0.5;
       const bool is_surface = !too_long_ || !too_long_(c.place, d.place);
-      add(between(c.place, d.place, share), is_surface ? c.height + share * (d.height - c.height)
-                                                       : std::numeric_limits<double>::quiet_NaN());
+      add(point_between(c.place, d.place, share), is_surface
+                                                      ? c.height + share * (d.height - c.height)
+                                                      : std::numeric_limits<double>::quiet_NaN());
     }
   }
   std::sort(found_.begin(), found_.end(), [](const Crossing& p, const Crossing& q) {

@@ -20,7 +20,7 @@ namespace {
 
 /// Peak bytes per point: tetrahedra and their vertices, the shape, positions in the CRS and on the
 /// ground, and the surface.
-constexpr std::uint64_t kBytesPerPoint = 300 + 60 + 48 + 2 * 60;
+constexpr std::uint64_t kSurfaceBytesPerPoint = 300 + 60 + 48 + 2 * 60;
 /// CGAL's own triangulation in place of ours.
 constexpr std::uint64_t kCgalBytesPerPoint = 1200;
 
@@ -39,7 +39,7 @@ void check_memory(const stream::Store& store, const Detail& detail,
       store, detail,
       [&](stream::ClusterId, const stream::ClusterRecord& record) { points += record.points; });
   const bool ours = options.method == tri::SurfaceMethod::kShape;
-  const std::uint64_t needed = points * (ours ? kBytesPerPoint : kCgalBytesPerPoint);
+  const std::uint64_t needed = points * (ours ? kSurfaceBytesPerPoint : kCgalBytesPerPoint);
   if (needed <= memory_bytes) return;
   throw stream::Error({.file = store.path().string(),
                        .where = {},

@@ -39,9 +39,9 @@ stream::Point3 random_direction(std::uint64_t seed, std::uint64_t n) {
   return v;
 }
 
-class Surface : public Cloud {
+class CloudSurface : public Cloud {
  public:
-  Surface(std::uint64_t points, std::uint64_t seed) : seed_(seed) {
+  CloudSurface(std::uint64_t points, std::uint64_t seed) : seed_(seed) {
     for (std::size_t i = 0; i < waves_.size(); ++i) {
       // From broad lobes to fine bumps, the finer the flatter.
       const double cycles = 1.0 + 0.8 * static_cast<double>(i * i) / 4;
@@ -166,7 +166,7 @@ class Clusters : public Cloud {
 }  // namespace
 
 std::unique_ptr<Cloud> make_surface(std::uint64_t points, std::uint64_t seed) {
-  return std::make_unique<Surface>(points, seed);
+  return std::make_unique<CloudSurface>(points, seed);
 }
 std::unique_ptr<Cloud> make_uniform(std::uint64_t seed) { return std::make_unique<Uniform>(seed); }
 std::unique_ptr<Cloud> make_clusters(std::uint64_t points, std::uint64_t seed) {

@@ -21,7 +21,7 @@
 namespace terrace::tools {
 namespace {
 
-constexpr std::uint32_t kTile = 256;
+constexpr std::uint32_t kSynthTile = 256;
 
 /// Sums over the steps between neighbouring cells, and the range of heights. Integer samples are
 /// summed as doubles all the same: squares below 2^53 are exact.
@@ -97,14 +97,14 @@ class Maker {
         rows_(static_cast<std::uint32_t>(options.size.height)),
         writer_(path, writer_options(options)) {
     // Each thread holds a piece as samples and some rows of lattices, about 48 bytes a column.
-    const std::uint64_t per_column = kTile * sizeof(Sample) + 48;
+    const std::uint64_t per_column = kSynthTile * sizeof(Sample) + 48;
     constexpr std::uint64_t kOverhead = 48u << 20;
     const std::uint64_t share =
         (std::max(options.memory_bytes, 2 * kOverhead) - kOverhead) / options.threads;
-    piece_columns_ = static_cast<std::uint32_t>(
-        std::clamp<std::uint64_t>(share / per_column / kTile * kTile, kTile, 1u << 16));
+    piece_columns_ = static_cast<std::uint32_t>(std::clamp<std::uint64_t>(
+        share / per_column / kSynthTile * kSynthTile, kSynthTile, 1u << 16));
     pieces_across_ = (columns_ + piece_columns_ - 1) / piece_columns_;
-    pieces_ = std::uint64_t{pieces_across_} * ((rows_ + kTile - 1) / kTile);
+    pieces_ = std::uint64_t{pieces_across_} * ((rows_ + kSynthTile - 1) / kSynthTile);
   }
 
   Statistics run() {
@@ -132,7 +132,7 @@ class Maker {
     tiff.compression = options.compression == "deflate" ? stream::GeoTiffCompression::deflate
                        : options.compression == "zstd"  ? stream::GeoTiffCompression::zstd
                                                         : stream::GeoTiffCompression::none;
-    tiff.tile = kTile;
+    tiff.tile = kSynthTile;
     tiff.replace = options.replace;
     return tiff;
   }
@@ -140,10 +140,10 @@ class Maker {
   [[nodiscard]] Piece piece(std::uint64_t number) const {
     Piece p{};
     p.first_column = static_cast<std::uint32_t>(number % pieces_across_) * piece_columns_;
-    p.first_row = static_cast<std::uint32_t>(number / pieces_across_) * kTile;
+    p.first_row = static_cast<std::uint32_t>(number / pieces_across_) * kSynthTile;
     p.columns = std::min(piece_columns_, columns_ - p.first_column);
-    p.rows = std::min(kTile, rows_ - p.first_row);
-    p.tiles = (p.columns + kTile - 1) / kTile;
+    p.rows = std::min(kSynthTile, rows_ - p.first_row);
+    p.tiles = (p.columns + kSynthTile - 1) / kSynthTile;
     return p;
   }
 
@@ -180,7 +180,7 @@ class Maker {
   }
 
   Statistics make(const Piece& p, std::vector<Sample>& tiles) const {
-    constexpr std::size_t kTileSize = std::size_t{kTile} * kTile;
+    constexpr std::size_t kTileSize = std::size_t{kSynthTile} * kSynthTile;
     tiles.assign(p.tiles * kTileSize, Sample{});
     std::vector<Sample> row(p.columns), above(p.columns);
     Fractal::Rows rows(fractal_, p.first_column, p.columns);
@@ -189,9 +189,9 @@ class Maker {
       to_samples(rows.row(p.first_row + y), base_, row.data());
       measure(row.data(), y == 0 ? nullptr : above.data(), p.columns, statistics);
       for (std::uint32_t t = 0; t < p.tiles; ++t) {
-        const std::uint32_t width = std::min(kTile, p.columns - t * kTile);
-        std::memcpy(tiles.data() + t * kTileSize + std::size_t{y} * kTile, row.data() + t * kTile,
-                    width * sizeof(Sample));
+        const std::uint32_t width = std::min(kSynthTile, p.columns - t * kSynthTile);
+        std::memcpy(tiles.data() + t * kTileSize + std::size_t{y} * kSynthTile,
+                    row.data() + t * kSynthTile, width * sizeof(Sample));
       }
       row.swap(above);
     }
@@ -199,10 +199,10 @@ class Maker {
   }
 
   void write(const Piece& p, const std::vector<Sample>& tiles) {
-    constexpr std::size_t kTileSize = std::size_t{kTile} * kTile;
+    constexpr std::size_t kTileSize = std::size_t{kSynthTile} * kSynthTile;
     const std::span<const Sample> all(tiles);
     for (std::uint32_t t = 0; t < p.tiles; ++t) {
-      writer_.write_tile(p.first_column / kTile + t, p.first_row / kTile,
+      writer_.write_tile(p.first_column / kSynthTile + t, p.first_row / kSynthTile,
                          std::as_bytes(all.subspan(t * kTileSize, kTileSize)));
     }
   }
@@ -213,7 +213,7 @@ class Maker {
   const std::function<void(std::uint64_t)>& progress_;
   std::uint32_t columns_, rows_;
   stream::GeoTiffWriter writer_;
-  std::uint32_t piece_columns_ = kTile, pieces_across_ = 1;
+  std::uint32_t piece_columns_ = kSynthTile, pieces_across_ = 1;
   std::uint64_t pieces_ = 0;
 
   std::mutex mutex_;

@@ -43,7 +43,7 @@ bool is_obeyed(std::uint32_t code) {
          (code >= 0x2028 && code <= 0x202E) || (code >= 0x2066 && code <= 0x2069);
 }
 
-std::string printable(std::string_view text, bool keep_line_ends) {
+std::string escaped_controls(std::string_view text, bool keep_line_ends) {
   std::string out;
   out.reserve(text.size());
   while (!text.empty()) {
@@ -68,9 +68,9 @@ std::string printable(std::string_view text, bool keep_line_ends) {
 
 }  // namespace
 
-std::string printable(std::string_view text) { return printable(text, true); }
+std::string printable(std::string_view text) { return escaped_controls(text, true); }
 
-std::string printable_line(std::string_view text) { return printable(text, false); }
+std::string printable_line(std::string_view text) { return escaped_controls(text, false); }
 
 void print_message(std::string_view line) {
   while (line.ends_with('\n')) line.remove_suffix(1);

@@ -26,9 +26,9 @@ namespace terrace::tools {
 namespace {
 
 /// What a thread needs: the samples of a leaf, their mesh and what is kept of the store.
-constexpr std::uint64_t kBytesPerThread = std::uint64_t{96} << 20;
+constexpr std::uint64_t kTileBytesPerThread = std::uint64_t{96} << 20;
 /// Fill and blocks of the store, and the lists of tiles.
-constexpr std::uint64_t kBytesBeside = std::uint64_t{80} << 20;
+constexpr std::uint64_t kTileBytesBeside = std::uint64_t{80} << 20;
 
 std::pair<unsigned, unsigned> parse_zooms(const std::string& text, unsigned native) {
   if (text.empty()) return {0, native};
@@ -100,7 +100,7 @@ class TileCommand final : public Command {
 };
 
 /// Of the store that the tiles depend on.
-std::string fingerprint_of(const stream::Store& store) {
+std::string store_fingerprint(const stream::Store& store) {
   const std::vector<std::byte> manifest = read_tile_file((store.path() / "manifest.json").string());
   return std::to_string(checksum_of(manifest));
 }
@@ -123,7 +123,7 @@ TileSetOptions TileCommand::options_for(const stream::Store& store, double spaci
   options.metadata = metadata_;
   options.resume = resume_;
   options.replace = common.force;
-  options.source_fingerprint = fingerprint_of(store);
+  options.source_fingerprint = store_fingerprint(store);
   options.source_options = fill_ + "\n" + water_ + "\n" + vertical_;
   if (!geoid_.empty()) options.source_options += "\n" + std::to_string(digest_of_file(geoid_));
   return options;
@@ -136,17 +136,17 @@ Summary TileCommand::run(const CommonOptions& common) {
   }
   const stream::Store store = stream::Store::open(store_);
   const std::uint64_t memory = common.memory_or(0);
-  if (memory < kBytesBeside + kBytesPerThread) {
+  if (memory < kTileBytesBeside + kTileBytesPerThread) {
     throw stream::Error(
         {.file = store_,
          .where = {},
-         .cause = "tiles need " + std::to_string((kBytesBeside + kBytesPerThread) >> 20) +
+         .cause = "tiles need " + std::to_string((kTileBytesBeside + kTileBytesPerThread) >> 20) +
                   "M of memory, --memory allows " + std::to_string(memory >> 20) + "M",
          .remedy = "allow more"});
   }
   const TileFolder folder(output_, common.force, resume_);
   const unsigned threads = static_cast<unsigned>(
-      std::min<std::uint64_t>(common.threads, (memory - kBytesBeside) / kBytesPerThread));
+      std::min<std::uint64_t>(common.threads, (memory - kTileBytesBeside) / kTileBytesPerThread));
 
   const std::unique_ptr<TileSource> source = open_tile_source(store,
                                                               {.vertical = vertical_,

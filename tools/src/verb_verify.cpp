@@ -21,9 +21,9 @@ namespace terrace::tools {
 namespace {
 
 /// What a thread needs: a tile, the samples of a part of it and what is kept of the store.
-constexpr std::uint64_t kBytesPerThread = std::uint64_t{96} << 20;
+constexpr std::uint64_t kVerifyBytesPerThread = std::uint64_t{96} << 20;
 /// Blocks of the raster, and the lists of tiles.
-constexpr std::uint64_t kBytesBeside = std::uint64_t{80} << 20;
+constexpr std::uint64_t kVerifyBytesBeside = std::uint64_t{80} << 20;
 
 /// The problems in the summary's two forms.
 void add_problem(const stream::Problem& problem, nlohmann::ordered_json& list, std::string& text) {
@@ -91,16 +91,17 @@ Summary VerifyCommand::tiles(const CommonOptions& common) const {
     throw UsageError("--max-error, --vertical and --geoid have a meaning with --store alone");
   }
   const std::uint64_t memory = common.memory_or(0);
-  if (memory < kBytesBeside + kBytesPerThread) {
+  if (memory < kVerifyBytesBeside + kVerifyBytesPerThread) {
     throw stream::Error(
         {.file = path_,
          .where = {},
-         .cause = "the check needs " + std::to_string((kBytesBeside + kBytesPerThread) >> 20) +
+         .cause = "the check needs " +
+                  std::to_string((kVerifyBytesBeside + kVerifyBytesPerThread) >> 20) +
                   "M of memory, --memory allows " + std::to_string(memory >> 20) + "M",
          .remedy = "allow more"});
   }
-  const auto threads = static_cast<unsigned>(
-      std::min<std::uint64_t>(common.threads, (memory - kBytesBeside) / kBytesPerThread));
+  const auto threads = static_cast<unsigned>(std::min<std::uint64_t>(
+      common.threads, (memory - kVerifyBytesBeside) / kVerifyBytesPerThread));
 
   std::optional<stream::Store> store;
   std::unique_ptr<TileSource> source;

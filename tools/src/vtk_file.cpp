@@ -21,7 +21,7 @@ void append(std::string& bytes, T value) {
   bytes.append(raw, sizeof raw);
 }
 
-constexpr std::size_t kPiece = 65536;
+constexpr std::size_t kVtkPiece = 65536;
 
 }  // namespace
 
@@ -33,7 +33,7 @@ void write_vtk(const std::string& path, std::span<const stream::Point3> position
                       "\nBINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS " +
                       std::to_string(positions.size()) + " double\n";
   const auto flush = [&](std::size_t done) {
-    if (done % kPiece != 0) return;
+    if (done % kVtkPiece != 0) return;
     check_interrupt();
     file.write(bytes);
     bytes.clear();

@@ -8,14 +8,14 @@
 namespace terrace::tools {
 namespace {
 
-constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+constexpr std::uint32_t kNoVertex = std::numeric_limits<std::uint32_t>::max();
 
 }  // namespace
 
 WindowJoiner::WindowJoiner(const LatticePlan& plan, MeshSpool& spool)
     : plan_(plan),
       spool_(spool),
-      above_(static_cast<std::size_t>(plan.whole().columns), kNone),
+      above_(static_cast<std::size_t>(plan.whole().columns), kNoVertex),
       below_(above_) {}
 
 std::uint32_t* WindowJoiner::shared(const WindowTin& tin, const tri::GridVertex& vertex) {
@@ -56,12 +56,12 @@ void WindowJoiner::add(std::size_t i, WindowTin&& tin) {
   count_uncovered(tin);
   const auto rows = static_cast<std::size_t>(tin.window.rows);
   if (i % plan_.across() == 0) {
-    if (i > 0) above_ = std::exchange(below_, std::vector<std::uint32_t>(below_.size(), kNone));
-    left_.assign(rows, kNone);
+    if (i > 0) above_ = std::exchange(below_, std::vector<std::uint32_t>(below_.size(), kNoVertex));
+    left_.assign(rows, kNoVertex);
   } else {
     left_ = std::move(right_);
   }
-  right_.assign(rows, kNone);
+  right_.assign(rows, kNoVertex);
 
   // Vertices that are there already make room for those behind them.
   std::vector<std::uint32_t> numbers;
@@ -70,7 +70,7 @@ void WindowJoiner::add(std::size_t i, WindowTin&& tin) {
   std::uint32_t fresh = 0;
   for (std::size_t k = 0; k < tin.vertices.size(); ++k) {
     std::uint32_t* const at_side = shared(tin, tin.vertices[k]);
-    if (at_side != nullptr && *at_side != kNone) {
+    if (at_side != nullptr && *at_side != kNoVertex) {
       numbers.push_back(*at_side);
       continue;
     }

@@ -7,10 +7,10 @@
 namespace terrace::tools {
 namespace {
 
-constexpr std::uint32_t kWindow = std::uint32_t{1} << 31;
+constexpr std::uint32_t kTreeWindow = std::uint32_t{1} << 31;
 constexpr std::uint64_t kMostCounted = std::uint64_t{1} << 18;
 /// Halvings of the store's area. More come only where points lie on each other.
-constexpr unsigned kDeepest = 48;
+constexpr unsigned kDeepestTree = 48;
 
 }  // namespace
 
@@ -40,9 +40,10 @@ std::uint32_t WindowTree::split(const StoredBox& box, std::span<Point2> sample, 
   node.axis = width >= height ? 0 : 1;
   const double low = box.min[node.axis], high = box.max[node.axis];
   node.middle = low + 0.5 * (high - low);
-  if (sample.size() <= most || depth == kDeepest || !(low < node.middle && node.middle < high)) {
+  if (sample.size() <= most || depth == kDeepestTree ||
+      !(low < node.middle && node.middle < high)) {
     boxes_.push_back(box);
-    return kWindow | static_cast<std::uint32_t>(boxes_.size() - 1);
+    return kTreeWindow | static_cast<std::uint32_t>(boxes_.size() - 1);
   }
   const auto cut = std::partition(sample.begin(), sample.end(),
                                   [&](const Point2& p) { return p[node.axis] < node.middle; });
@@ -59,11 +60,11 @@ std::uint32_t WindowTree::split(const StoredBox& box, std::span<Point2> sample, 
 
 std::size_t WindowTree::window_of(const Point2& place) const {
   std::uint32_t at = root_;
-  while ((at & kWindow) == 0) {
+  while ((at & kTreeWindow) == 0) {
     const Node& node = nodes_[at];
     at = place[node.axis] < node.middle ? node.below : node.above;
   }
-  return at & ~kWindow;
+  return at & ~kTreeWindow;
 }
 
 }  // namespace terrace::tools

@@ -281,14 +281,14 @@ TEST(TileSides, GoAroundTheirLeaf) {
     const std::uint32_t west = leaf_unit(leaf.x, leaf.depth), south = leaf_unit(leaf.y, leaf.depth);
     const std::uint32_t east = leaf_unit(leaf.x + 1, leaf.depth);
     const std::uint32_t north = leaf_unit(leaf.y + 1, leaf.depth);
-    const std::vector<SideVertex> ring = sides.around(leaf);
+    const std::vector<TileSideVertex> ring = sides.around(leaf);
     ASSERT_EQ(ring.front().u, west);
     ASSERT_EQ(ring.front().v, south);
     // Each step goes along one side, forward.
     unsigned turns = 0;
     for (std::size_t i = 0; i < ring.size(); ++i) {
-      const SideVertex& a = ring[i];
-      const SideVertex& b = ring[(i + 1) % ring.size()];
+      const TileSideVertex& a = ring[i];
+      const TileSideVertex& b = ring[(i + 1) % ring.size()];
       const bool forward = (a.v == south && b.v == south && a.u < b.u) ||
                            (a.u == east && b.u == east && a.v < b.v) ||
                            (a.v == north && b.v == north && a.u > b.u) ||

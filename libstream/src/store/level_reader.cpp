@@ -7,7 +7,7 @@
 namespace terrace::stream::store {
 namespace {
 
-constexpr const char* kRemedy = "restore the file or build the store anew";
+constexpr const char* kRestoreStore = "restore the file or build the store anew";
 /// About 1.5 KB each.
 constexpr std::uint64_t kCachedPages = 4096;
 /// About 100 KB each; one set is for about ten million points of level 0.
@@ -21,7 +21,7 @@ Error damaged_file(const InputFile& file, std::uint64_t offset, const std::strin
   return Error({.file = file.path().string(),
                 .where = "byte " + std::to_string(offset),
                 .cause = cause,
-                .remedy = kRemedy});
+                .remedy = kRestoreStore});
 }
 
 }  // namespace
@@ -189,7 +189,7 @@ Error LevelReader::damaged(std::uint64_t ordinal, const std::string& cause) cons
   return Error({.file = data_.path().string(),
                 .where = "cluster " + std::to_string(layout_.level) + "/" + std::to_string(ordinal),
                 .cause = cause,
-                .remedy = kRemedy});
+                .remedy = kRestoreStore});
 }
 
 void LevelReader::decode(std::uint64_t ordinal, const Entry& entry, std::uint64_t offset,

@@ -17,7 +17,7 @@ using namespace store;
 
 namespace {
 
-constexpr const char* kRemedy = "restore the file or make the overlay anew";
+constexpr const char* kRestoreOverlay = "restore the file or make the overlay anew";
 
 InputFile open_file(const std::filesystem::path& path) {
   std::error_code error;
@@ -52,7 +52,7 @@ struct Overlay::Impl {
     return Error({.file = file.path().string(),
                   .where = "byte " + std::to_string(offset),
                   .cause = cause,
-                  .remedy = kRemedy});
+                  .remedy = kRestoreOverlay});
   }
 
   void read_header(const Store& store);

@@ -10,7 +10,7 @@
 namespace terrace::tools {
 namespace {
 
-constexpr std::size_t kMostBytes = std::size_t{6} << 20;
+constexpr std::size_t kMostCensusBytes = std::size_t{6} << 20;
 constexpr std::size_t kMostSome = 12;
 
 bool meets(const StoredBox& box, const stream::Box3& other) {
@@ -70,7 +70,7 @@ const ClusterCensus::Node& ClusterCensus::node(stream::ClusterId id) {
     nodes_.splice(nodes_.begin(), nodes_, found->second);
     return nodes_.front();
   }
-  while (held_bytes_ > kMostBytes && !nodes_.empty()) {
+  while (held_bytes_ > kMostCensusBytes && !nodes_.empty()) {
     held_bytes_ -= nodes_.back().bytes();
     by_id_.erase(static_cast<std::uint64_t>(nodes_.back().id));
     nodes_.pop_back();

@@ -16,19 +16,19 @@
 namespace terrace::tools {
 namespace {
 
-constexpr std::uint64_t kMostPoints = std::uint64_t{1} << 23;
-constexpr std::uint64_t kMostCells = std::uint64_t{1} << 20;
+constexpr std::uint64_t kMostFillPoints = std::uint64_t{1} << 23;
+constexpr std::uint64_t kMostFillCells = std::uint64_t{1} << 20;
 
 }  // namespace
 
 PointFill::PointFill(const stream::Store& store) {
   Detail detail;
-  while (detail.level < store.top() && store.levels()[detail.level].points > kMostPoints) {
+  while (detail.level < store.top() && store.levels()[detail.level].points > kMostFillPoints) {
     ++detail.level;
   }
   // About a point to a cell, so that the surface fits to those at the border.
   const std::uint64_t points = store.levels()[detail.level].points;
-  const auto cells = static_cast<double>(std::clamp<std::uint64_t>(points, 1, kMostCells));
+  const auto cells = static_cast<double>(std::clamp<std::uint64_t>(points, 1, kMostFillCells));
   const stream::Box3& box = store.bounds();
   const double width = box.max[0] - box.min[0], height = box.max[1] - box.min[1];
   std::array<std::size_t, 2> size{1, 1};

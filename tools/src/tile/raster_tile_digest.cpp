@@ -13,10 +13,10 @@ namespace {
 
 /// A projected raster's places are looked at in so many steps along a box. Wider boxes than this
 /// (degrees) may hold places outside the raster that its projection tears apart.
-constexpr unsigned kSteps = 24;
+constexpr unsigned kDigestSteps = 24;
 constexpr double kSmooth = 1.0;
 /// Samples around a place: those it lies between, and what rounding moves.
-constexpr double kMargin = 2.0;
+constexpr double kDigestMargin = 2.0;
 
 void add_raster(const TiledRaster& raster, Digest& digest) {
   const stream::Schema& schema = raster.store.schema();
@@ -136,7 +136,7 @@ std::uint64_t digest_of(const TiledRaster& raster, const GeographicBox& box) {
                       box.north <= all.north;
   const bool smooth =
       geographic ? crs.degrees_per_unit == 1.0 : inside || box.east - box.west <= kSmooth;
-  const unsigned steps = straight ? 1 : kSteps;
+  const unsigned steps = straight ? 1 : kDigestSteps;
   std::vector<Point2> places;
   if (smooth) places = places_of(raster, box, steps);
   if (places.empty()) {
@@ -158,9 +158,9 @@ std::uint64_t digest_of(const TiledRaster& raster, const GeographicBox& box) {
     around.max[axis] += more;
   }
   if (geographic) {
-    add_in_all_turns(raster, around, kMargin, digest);
+    add_in_all_turns(raster, around, kDigestMargin, digest);
   } else {
-    add_window(raster, window_of(raster, around, kMargin), digest);
+    add_window(raster, window_of(raster, around, kDigestMargin), digest);
   }
   return digest.value();
 }

@@ -17,15 +17,15 @@ namespace {
 constexpr double kTolerance = 0.005;
 /// Cells along a part of a mask: smaller ones are placed one by one, larger ones are cut unless
 /// they are all the same.
-constexpr std::size_t kSmallest = 8, kLargest = 64;
+constexpr std::size_t kSmallestHeight = 8, kLargestHeight = 64;
 /// Samples that are read at once, unless a cell alone needs more.
-constexpr std::size_t kMostSamples = 65536;
+constexpr std::size_t kMostWaterSamples = 65536;
 
 /// Parameters at which a quadratic through values at 0, 1/2 and 1 is farthest from a cubic.
 constexpr double kWorst = 0.2113248654051871;
 
 /// A rectangle of cells.
-struct Part {
+struct WaterPart {
   std::size_t column, row, columns, rows;
 };
 
@@ -42,19 +42,19 @@ class WaterMask {
         columns_(columns),
         out_(out) {}
 
-  void fill(const Part& part);
+  void fill(const WaterPart& part);
   /// Cell by cell.
-  void fill_exactly(const Part& part);
+  void fill_exactly(const WaterPart& part);
 
  private:
   /// On the lattice; what has no place is none.
   void place(std::span<Point2> places) const;
   /// Whether all cells whose places lie between these are the same; sets them then.
-  bool is_uniform(const Part& part, std::span<const Point2> nodes);
+  bool is_uniform(const WaterPart& part, std::span<const Point2> nodes);
   /// The samples nearest to the places of a part, row by row.
-  void look(const Part& part, std::span<Point2> places);
-  void read(const Part& part, std::span<const Point2> places, std::size_t stride);
-  void set(const Part& part, bool wet) {
+  void look(const WaterPart& part, std::span<Point2> places);
+  void read(const WaterPart& part, std::span<const Point2> places, std::size_t stride);
+  void set(const WaterPart& part, bool wet) {
     for (std::size_t row = part.row; row < part.row + part.rows; ++row) {
       std::fill_n(out_.begin() + static_cast<std::ptrdiff_t>(row * columns_ + part.column),
                   part.columns, wet ? std::uint8_t{1} : std::uint8_t{0});
@@ -78,7 +78,7 @@ void WaterMask<View>::place(std::span<Point2> places) const {
 }
 
 template <class View>
-bool WaterMask<View>::is_uniform(const Part& part, std::span<const Point2> nodes) {
+bool WaterMask<View>::is_uniform(const WaterPart& part, std::span<const Point2> nodes) {
   Point2 low = nodes[0], high = nodes[0];
   for (const Point2& p : nodes) {
     low = {std::min(low[0], p[0]), std::min(low[1], p[1])};
@@ -118,7 +118,8 @@ bool WaterMask<View>::is_uniform(const Part& part, std::span<const Point2> nodes
 }
 
 template <class View>
-void WaterMask<View>::read(const Part& part, std::span<const Point2> places, std::size_t stride) {
+void WaterMask<View>::read(const WaterPart& part, std::span<const Point2> places,
+                           std::size_t stride) {
   LatticeWindow window;
   std::int64_t right = 0, bottom = 0;
   for (std::size_t j = 0; j < part.rows; ++j) {
@@ -134,7 +135,7 @@ void WaterMask<View>::read(const Part& part, std::span<const Point2> places, std
   }
   window.columns = right - window.column + 1;
   window.rows = bottom - window.row + 1;
-  if (window.size() > kMostSamples && (part.columns > 1 || part.rows > 1)) {
+  if (window.size() > kMostWaterSamples && (part.columns > 1 || part.rows > 1)) {
     if (part.rows > 1) {
       const std::size_t upper = part.rows / 2;
       read({part.column, part.row, part.columns, upper}, places, stride);
@@ -161,7 +162,7 @@ void WaterMask<View>::read(const Part& part, std::span<const Point2> places, std
 }
 
 template <class View>
-void WaterMask<View>::look(const Part& part, std::span<Point2> places) {
+void WaterMask<View>::look(const WaterPart& part, std::span<Point2> places) {
   const stream::Schema& schema = raster_.store.schema();
   const double right = static_cast<double>(schema.columns);
   const double bottom = static_cast<double>(schema.rows);
@@ -175,7 +176,7 @@ void WaterMask<View>::look(const Part& part, std::span<Point2> places) {
 }
 
 template <class View>
-void WaterMask<View>::fill_exactly(const Part& part) {
+void WaterMask<View>::fill_exactly(const WaterPart& part) {
   std::vector<Point2> places;
   places.reserve(part.columns * part.rows);
   for (std::size_t row = part.row; row < part.row + part.rows; ++row) {
@@ -188,8 +189,8 @@ void WaterMask<View>::fill_exactly(const Part& part) {
 }
 
 template <class View>
-void WaterMask<View>::fill(const Part& part) {
-  if (part.columns < kSmallest || part.rows < kSmallest) return fill_exactly(part);
+void WaterMask<View>::fill(const WaterPart& part) {
+  if (part.columns < kSmallestHeight || part.rows < kSmallestHeight) return fill_exactly(part);
   const std::size_t corner = part.row * columns_ + part.column;
   const std::size_t last = corner + (part.rows - 1) * columns_ + part.columns - 1;
   const double west = longitude_[corner], width = longitude_[last] - west;
@@ -218,7 +219,7 @@ void WaterMask<View>::fill(const Part& part) {
            std::abs(row.value(s, t) - places[9 + k][1]) <= kTolerance;
   }
   if (good && is_uniform(part, std::span(places).first(9))) return;
-  if (!good || part.columns > kLargest || part.rows > kLargest) {
+  if (!good || part.columns > kLargestHeight || part.rows > kLargestHeight) {
     const std::size_t left = part.columns / 2, upper = part.rows / 2;
     fill({part.column, part.row, left, upper});
     fill({part.column + left, part.row, part.columns - left, upper});

@@ -14,13 +14,13 @@
 namespace terrace::tools {
 namespace {
 
-constexpr double kFar = std::numeric_limits<double>::infinity();
+constexpr double kFarPlace = std::numeric_limits<double>::infinity();
 /// Metres and degrees that a place may be off after it was converted there and back, with a shift
 /// of datum in between: much more than it is.
 constexpr double kMarginMetres = 0.02;
 constexpr double kMarginDegrees = 2e-7;
 /// Steps across a box in which its image is looked at, and across a small one around its border.
-constexpr unsigned kSteps = 24;
+constexpr unsigned kPlaceSteps = 24;
 constexpr unsigned kSmallSteps = 8;
 /// What bulges between the places looked at goes with the square of the steps' length: twice that.
 constexpr double share_of(unsigned steps) { return 2.0 / (steps * steps); }
@@ -33,7 +33,7 @@ void include(StoredBox& box, const Point2& p) {
   }
 }
 
-StoredBox nothing() { return {{kFar, kFar}, {-kFar, -kFar}}; }
+StoredBox nothing() { return {{kFarPlace, kFarPlace}, {-kFarPlace, -kFarPlace}}; }
 
 Point2 between(const Point2& low, const Point2& high, unsigned i, unsigned j, unsigned steps) {
   return {low[0] + (high[0] - low[0]) * i / steps, low[1] + (high[1] - low[1]) * j / steps};
@@ -176,7 +176,7 @@ std::vector<StoredBox> StoredPlaces::windows(const GeographicBox& box) const {
   }
   // The outline of what is small says all: at a pole, too, it is a narrow wedge.
   const bool small = high[0] - low[0] < 2.0 && high[1] - low[1] < 2.0;
-  const unsigned steps = small ? kSmallSteps : kSteps;
+  const unsigned steps = small ? kSmallSteps : kPlaceSteps;
   std::vector<Point2> places;
   for (unsigned j = 0; j <= steps; ++j) {
     const unsigned skip = small && j != 0 && j != steps ? steps : 1;
@@ -187,7 +187,7 @@ std::vector<StoredBox> StoredPlaces::windows(const GeographicBox& box) const {
   for (const Point2& p : places) {
     if (std::isfinite(p[0]) && std::isfinite(p[1])) include(around, stored_place(placement_, p));
   }
-  add(around, small ? share_of(kSmallSteps) : 1.0 / kSteps);
+  add(around, small ? share_of(kSmallSteps) : 1.0 / kPlaceSteps);
   return windows;
 }
 

@@ -13,7 +13,7 @@ namespace terrace::tools {
 namespace {
 
 /// What a tile may unpack to.
-constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 28;
+constexpr std::uint64_t kMostBorderBytes = std::uint64_t{1} << 28;
 /// Metres by which neighbours' heights may differ.
 constexpr double kBorderSlack = 1e-3;
 
@@ -47,7 +47,7 @@ std::string misfit(const BorderSide& a, const BorderSide& b) {
 DecodedTile unpack_tile(const std::vector<std::byte>& bytes, const std::string& name) {
   if (!stream::is_gzip(bytes)) return decode_tile(bytes, name);
   try {
-    return decode_tile(stream::gunzip(bytes, kMostBytes, name), name);
+    return decode_tile(stream::gunzip(bytes, kMostBorderBytes, name), name);
   } catch (const stream::Error& packed) {
     // One plain tile of 65536 begins as gzip does.
     try {

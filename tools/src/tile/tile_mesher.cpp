@@ -21,13 +21,13 @@ namespace {
 
 /// A mesh in units of the tile and steps of height, put together from leaves.
 struct Pieces {
-  std::vector<SideVertex> vertices;
+  std::vector<TileSideVertex> vertices;
   std::vector<std::array<std::uint32_t, 3>> triangles;
   std::unordered_map<std::uint32_t, std::uint32_t> by_place;  ///< vertices on sides of leaves
   double max_error = 0.0;
   bool has_data = false;
 
-  std::uint32_t side_vertex(const SideVertex& vertex) {
+  std::uint32_t side_vertex(const TileSideVertex& vertex) {
     const std::uint32_t place = vertex.v << 16 | vertex.u;
     const auto [found, fresh] =
         by_place.try_emplace(place, static_cast<std::uint32_t>(vertices.size()));
@@ -37,9 +37,9 @@ struct Pieces {
 };
 
 /// The error of a leaf whose samples have heights in `range`, if none becomes a vertex.
-double flat_error(const std::vector<SideVertex>& frame, double step, const HeightRange& range) {
+double flat_error(const std::vector<TileSideVertex>& frame, double step, const HeightRange& range) {
   double low = std::numeric_limits<double>::infinity(), high = -low;
-  for (const SideVertex& vertex : frame) {
+  for (const TileSideVertex& vertex : frame) {
     const double height = static_cast<double>(vertex.height) * step;
     low = std::min(low, height);
     high = std::max(high, height);
@@ -101,8 +101,8 @@ tri::PointTin tin_of(const TileAddress& tile, const TileLeaf& leaf, TileSurface&
 }
 
 void mesh_leaf(const TileAddress& tile, const TileLeaf& leaf, const ZoomPlan& plan,
-               TileSurface& surface, tri::TinQuality quality, const std::vector<SideVertex>& frame,
-               Pieces& pieces) {
+               TileSurface& surface, tri::TinQuality quality,
+               const std::vector<TileSideVertex>& frame, Pieces& pieces) {
   const auto range = surface.range(box_of(tile, leaf));
   bool measured = false;
   if (range) {
@@ -117,7 +117,7 @@ void mesh_leaf(const TileAddress& tile, const TileLeaf& leaf, const ZoomPlan& pl
   }
   std::vector<tri::Point3> corners;
   corners.reserve(frame.size());
-  for (const SideVertex& vertex : frame) {
+  for (const TileSideVertex& vertex : frame) {
     corners.push_back({static_cast<double>(vertex.u), static_cast<double>(vertex.v),
                        static_cast<double>(vertex.height) * plan.height_step});
   }
@@ -150,7 +150,7 @@ void mesh_leaf(const TileAddress& tile, const TileLeaf& leaf, const ZoomPlan& pl
 /// is one step, and neighbours decode the heights that they share to the same value.
 void set_heights(const Pieces& pieces, double step, TileMesh& mesh) {
   std::int64_t lowest = pieces.vertices.front().height, highest = lowest;
-  for (const SideVertex& vertex : pieces.vertices) {
+  for (const TileSideVertex& vertex : pieces.vertices) {
     lowest = std::min(lowest, vertex.height);
     highest = std::max(highest, vertex.height);
   }
@@ -162,7 +162,7 @@ void set_heights(const Pieces& pieces, double step, TileMesh& mesh) {
   }
   mesh.lowest = static_cast<float>(static_cast<double>(lowest) * step);
   mesh.highest = static_cast<float>(static_cast<double>(lowest + kTileUnits) * step);
-  for (const SideVertex& vertex : pieces.vertices) {
+  for (const TileSideVertex& vertex : pieces.vertices) {
     mesh.u.push_back(static_cast<std::uint16_t>(vertex.u));
     mesh.v.push_back(static_cast<std::uint16_t>(vertex.v));
     mesh.height.push_back(static_cast<std::uint16_t>(vertex.height - lowest));

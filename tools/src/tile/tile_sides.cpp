@@ -14,7 +14,7 @@ namespace {
 /// A leaf has at least this many units each way.
 constexpr unsigned kDeepestLeaf = 8;
 /// Places at which a side of one leaf is looked at, at most.
-constexpr double kMostPlaces = 4096.0;
+constexpr double kMostSidePlaces = 4096.0;
 /// Share of the bound that sides are settled to. Samples so close to a side that no vertex fits
 /// between have what the side has.
 constexpr double kSideShare = 0.75;
@@ -24,7 +24,7 @@ double width_at(unsigned zoom, unsigned depth) {
   return std::ldexp(180.0, -static_cast<int>(zoom + depth));
 }
 
-bool meet(const GeographicBox& a, const GeographicBox& b) {
+bool boxes_meet(const GeographicBox& a, const GeographicBox& b) {
   return a.west <= b.east && b.west <= a.east && a.south <= b.north && b.south <= a.north;
 }
 
@@ -77,7 +77,7 @@ std::vector<TileLeaf> leaves_of(const TileAddress& tile, const ZoomPlan& plan,
       const double width = width_at(tile.zoom, leaf.depth);
       if (width > plan.longest_edge) return true;
       const GeographicBox box = box_of(tile, leaf);
-      return (width > plan.widest_leaf && meet(box, data)) || surface.crowded(box);
+      return (width > plan.widest_leaf && boxes_meet(box, data)) || surface.crowded(box);
     };
     if (leaf.depth == kDeepestLeaf || !wide()) {
       leaves.push_back(leaf);
@@ -142,19 +142,19 @@ bool TileSides::is_near_data(const Side& side, double reach) const {
     // The line of 180 degrees has two numbers, and tiles on both sides of it.
     if (std::abs(longitude) == 180.0) {
       const GeographicBox other{-longitude - reach, box.south, -longitude + reach, box.north};
-      if (meet(other, data_)) return true;
+      if (boxes_meet(other, data_)) return true;
     }
   }
-  return meet(box, data_);
+  return boxes_meet(box, data_);
 }
 
-std::vector<SideVertex> TileSides::settle(const Side& side) {
+std::vector<TileSideVertex> TileSides::settle(const Side& side) {
   if (is_cut(side)) {
     const Side first{side.along_parallel, side.depth + 1, 2 * side.line, 2 * side.k};
     Side second = first;
     ++second.k;
-    std::vector<SideVertex> all = vertices(first);
-    const std::vector<SideVertex>& rest = vertices(second);
+    std::vector<TileSideVertex> all = vertices(first);
+    const std::vector<TileSideVertex>& rest = vertices(second);
     all.insert(all.end(), rest.begin() + 1, rest.end());
     return all;
   }
@@ -166,7 +166,8 @@ std::vector<SideVertex> TileSides::settle(const Side& side) {
   const double length = width_at(tile_.zoom, side.depth);
   const double unit = tile_width(tile_.zoom) / kTileUnits;
   const bool near_data = is_near_data(side, 2.0 * (unit + surface_.spacing()));
-  const double wanted = near_data ? std::min(2.0 * length / surface_.spacing(), kMostPlaces) : 1.0;
+  const double wanted =
+      near_data ? std::min(2.0 * length / surface_.spacing(), kMostSidePlaces) : 1.0;
   const auto parts =
       static_cast<std::size_t>(std::clamp(std::ceil(wanted), 1.0, static_cast<double>(to - from)));
   std::vector<double> t, longitude, latitude, height;
@@ -193,7 +194,7 @@ std::vector<SideVertex> TileSides::settle(const Side& side) {
   }
   const tri::SimplifiedLine line = tri::simplify_line(t, height, kSideShare * plan_.max_error,
                                                       tri::TinLattice{0.0, plan_.height_step});
-  std::vector<SideVertex> vertices;
+  std::vector<TileSideVertex> vertices;
   for (const tri::LineVertex& vertex : line.vertices) {
     const auto at = static_cast<std::uint32_t>(vertex.t);
     vertices.push_back({side.along_parallel ? at : across, side.along_parallel ? across : at,
@@ -202,19 +203,19 @@ std::vector<SideVertex> TileSides::settle(const Side& side) {
   return vertices;
 }
 
-const std::vector<SideVertex>& TileSides::vertices(const Side& side) {
+const std::vector<TileSideVertex>& TileSides::vertices(const Side& side) {
   const auto key = std::make_tuple(side.along_parallel, side.depth, side.line, side.k);
   if (const auto found = known_.find(key); found != known_.end()) return found->second;
-  std::vector<SideVertex> settled = settle(side);
+  std::vector<TileSideVertex> settled = settle(side);
   return known_[key] = std::move(settled);
 }
 
-std::vector<SideVertex> TileSides::around(const TileLeaf& leaf) {
+std::vector<TileSideVertex> TileSides::around(const TileLeaf& leaf) {
   const auto side = [&](bool along_parallel, std::uint32_t line, std::uint32_t k) {
     return vertices({along_parallel, leaf.depth, line, k});
   };
-  std::vector<SideVertex> ring;
-  const auto add = [&](std::vector<SideVertex> part, bool backward) {
+  std::vector<TileSideVertex> ring;
+  const auto add = [&](std::vector<TileSideVertex> part, bool backward) {
     if (backward) std::reverse(part.begin(), part.end());
     ring.insert(ring.end(), part.begin(), part.end() - 1);
   };

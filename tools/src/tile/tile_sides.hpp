@@ -48,7 +48,7 @@ std::vector<TileLeaf> leaves_of(const TileAddress& tile, const ZoomPlan& plan,
                                 TileSurface& surface);
 
 /// A vertex on the side of a leaf: units of the tile, and multiples of the height step.
-struct SideVertex {
+struct TileSideVertex {
   std::uint32_t u = 0, v = 0;
   std::int64_t height = 0;
 };
@@ -61,7 +61,7 @@ class TileSides {
   TileSides(const TileAddress& tile, const ZoomPlan& plan, TileSurface& surface);
 
   /// Counter-clockwise from the south-west corner, each vertex once.
-  std::vector<SideVertex> around(const TileLeaf& leaf);
+  std::vector<TileSideVertex> around(const TileLeaf& leaf);
 
  private:
   /// A side: from place k to k + 1 of 2^depth along `line` of 2^depth.
@@ -70,8 +70,8 @@ class TileSides {
     unsigned depth = 0;
     std::uint32_t line = 0, k = 0;
   };
-  const std::vector<SideVertex>& vertices(const Side& side);
-  std::vector<SideVertex> settle(const Side& side);
+  const std::vector<TileSideVertex>& vertices(const Side& side);
+  std::vector<TileSideVertex> settle(const Side& side);
   /// Lowest and highest samples within a unit of a place on a side: of those within half a unit, if
   /// there are some.
   struct Samples {
@@ -101,7 +101,7 @@ class TileSides {
   TileSurface& surface_;
   GeographicBox data_;
   std::map<std::pair<double, double>, std::optional<Samples>> corners_;
-  std::map<std::tuple<bool, unsigned, std::uint32_t, std::uint32_t>, std::vector<SideVertex>>
+  std::map<std::tuple<bool, unsigned, std::uint32_t, std::uint32_t>, std::vector<TileSideVertex>>
       known_;
 };
 
