@@ -16,6 +16,7 @@
 #include <unistd.h>
 
 #include "file_size_signal.hpp"
+#include "temporary_name.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::stream {
@@ -98,7 +99,7 @@ struct AtomicFile::Impl {
   /// abandoned and unlink it, hence the look at the link count.
   void create() {
     const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
-    const std::string prefix = std::string(".").append(target.filename().string()).append(".tmp-");
+    const std::string prefix = temporary_prefix(target.filename().string());
     remove_abandoned(folder, prefix);
     const std::string name = prefix + std::to_string(::getpid());
     for (int attempt = 0;; ++attempt) {

@@ -154,6 +154,15 @@ TEST(AtomicFile, AFileSizeLimitIsAnErrorAndLeavesNothing) {
   EXPECT_EQ(entries(folder.path()), 0);
 }
 
+TEST(AtomicFile, AFileMayHaveTheLongestName) {
+  const TempFolder folder;
+  const std::filesystem::path path = folder.path() / std::string(255, 'f');
+  AtomicFile file(path);
+  file.write("whole");
+  file.commit();
+  EXPECT_EQ(std::filesystem::file_size(path), 5u);
+}
+
 TEST(AtomicFile, RefusesADevice) { EXPECT_THROW(AtomicFile("/dev/null", true), Error); }
 
 }  // namespace

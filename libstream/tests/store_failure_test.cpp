@@ -268,10 +268,23 @@ TEST(StoreWriting, KilledWritersLeaveNothingThatOpensAndAreCleanedUp) {
 
 TEST(StoreWriting, OtherNamesAreNotTouched) {
   const TemporaryFolder folder;
-  fs::create_directory(folder.path() / ".other.tmp-1");
-  fs::create_directory(folder.path() / ".s.tmp-1");
+  const auto name_of_a_dead_writer = [&](const char* store) {
+    const StoreWriter writer(folder.path() / store, testing::cloud_schema());
+    const std::string name = names_in(folder.path()).front();
+    return name.substr(0, name.rfind('-') + 1) + "1";
+  };
+  const std::string others = name_of_a_dead_writer("other"), ours = name_of_a_dead_writer("s");
+  fs::create_directory(folder.path() / others);
+  fs::create_directory(folder.path() / ours);
   write_small(folder.path() / "s", 10);
-  EXPECT_EQ(names_in(folder.path()), (std::vector<std::string>{".other.tmp-1", "s"}));
+  EXPECT_EQ(names_in(folder.path()), (std::vector<std::string>{others, "s"}));
+}
+
+TEST(StoreWriting, AStoreMayHaveTheLongestName) {
+  const TemporaryFolder folder;
+  const fs::path path = folder.path() / std::string(255, 's');
+  write_small(path, 10);
+  EXPECT_TRUE(Store::open(path).verify(testing::expect_no_problem));
 }
 
 /// Runs `write` in a process whose files may not grow beyond `limit`. True if it threw an Error.

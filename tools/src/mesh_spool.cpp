@@ -7,7 +7,6 @@
 #include <vector>
 
 #include <terrace/stream/error.hpp>
-#include <unistd.h>
 
 #include "interrupt.hpp"
 #include "output.hpp"
@@ -17,9 +16,10 @@ namespace {
 
 constexpr std::size_t kPiece = 65536;  // vertices or triangles at a time
 
-std::filesystem::path beside(const std::string& path, const char* ending) {
-  if (path != "-") return path + ending;
-  return std::filesystem::temp_directory_path() / ("terrace-" + std::to_string(getpid()) + ending);
+/// What the pieces would be called if they were ever published.
+std::filesystem::path name_of(const std::string& path) {
+  return path != "-" ? std::filesystem::path(path)
+                     : std::filesystem::temp_directory_path() / "terrace-mesh";
 }
 
 // Calls take(span of T) for the whole file, piece by piece.
@@ -43,8 +43,7 @@ void read_back(stream::AtomicFile& file, std::uint64_t count, const Take& take) 
 }  // namespace
 
 MeshSpool::MeshSpool(const std::string& path)
-    : vertex_file_(beside(path, ".vertices"), true),
-      triangle_file_(beside(path, ".triangles"), true) {}
+    : vertex_file_(name_of(path), true), triangle_file_(name_of(path), true) {}
 
 void MeshSpool::add_vertex(const stream::Point3& position) {
   add_vertices(std::span(&position, 1));

@@ -12,6 +12,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "../temporary_name.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::stream::store {
@@ -90,8 +91,7 @@ Staging::Staging(fs::path target) : target_(std::move(target)) {
                  .remedy = "give a folder that does not exist yet"});
   }
   parent_ = target_.has_parent_path() ? target_.parent_path() : fs::path(".");
-  std::string prefix(".");
-  prefix.append(target_.filename().string()).append(".tmp-");
+  const std::string prefix = temporary_prefix(target_.filename().string());
   std::error_code error;
   if (!fs::is_directory(parent_, error)) {
     throw Error({.file = target_.string(),

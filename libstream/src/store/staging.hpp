@@ -7,9 +7,9 @@
 
 namespace terrace::stream::store {
 
-/// The folder in which a store is written before it has its name: `.NAME.tmp-PID` beside it, with a
-/// locked file `.NAME.tmp-PID.lock` that tells living writers from dead ones. It is gone, whatever
-/// happens, unless published.
+/// The folder in which a store is written before it has its name: `.terrace-HASH.tmp-PID` beside
+/// it, with a locked file `.terrace-HASH.tmp-PID.lock` that tells living writers from dead ones. It
+/// is gone, whatever happens, unless published.
 class Staging {
  public:
   /// Removes what dead writers of the same store have left, then makes a folder.

@@ -12,10 +12,10 @@ namespace terrace::stream {
 
 /// A file that appears under its name whole and synced, or not at all.
 ///
-/// Bytes go to a temporary file beside the target, `.NAME.tmp-PID`, which is locked while its
-/// writer lives. `commit()` syncs it and renames it to the target; an object destroyed before that,
-/// by an exception say, removes it. What a writer that was killed has left behind is removed by the
-/// next one for the same target.
+/// Bytes go to a temporary file beside the target, `.terrace-HASH.tmp-PID`, which is locked
+/// while its writer lives. `commit()` syncs it and renames it to the target; an object destroyed
+/// before that, by an exception say, removes it. What a writer that was killed has left behind is
+/// removed by the next one for the same target.
 ///
 ///     AtomicFile file("out.ply");
 ///     file.write("ply\n");
