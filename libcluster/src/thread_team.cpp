@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "thread_team.hpp"
 
+#include <new>
 #include <system_error>
 #include <utility>
 
@@ -26,6 +27,8 @@ ThreadTeam::ThreadTeam(unsigned threads) {
     for (unsigned i = 1; i < threads; ++i) threads_.emplace_back([this, i] { run_thread(i); });
   } catch (const std::system_error&) {
     // Those there are do the same work.
+  } catch (const std::bad_alloc&) {
+    // Likewise. Not thrown: those that run would never be joined.
   }
 }
 

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <exception>
 #include <numeric>
 #include <random>
 #include <stdexcept>
@@ -14,6 +13,7 @@
 
 #include <unistd.h>
 
+#include "parallel.hpp"
 #include "terrace/matching/assignment.hpp"
 
 namespace terrace::matching {
@@ -131,28 +131,15 @@ void monte_carlo(std::uint32_t count, const Row& row, const HalvingOptions& opti
                  unsigned threads, Search& search) {
   std::vector<Matcher> matchers(threads, Matcher(count, row));
   std::vector<Trial> trials(threads);
-  std::vector<std::exception_ptr> failures(threads);
   while (search.goes_on()) {
     // A round of one iteration per thread; they are looked at in their order.
     const auto round = static_cast<unsigned>(std::min<std::uint64_t>(threads, search.left()));
     const std::uint64_t first = search.result.iterations;
-    const auto work = [&](unsigned t) {
-      try {
-        std::mt19937_64 random(seed_of_iteration(options.seed, first + t));
-        trials[t] = matchers[t].match(random_halves(count, random));
-      } catch (...) {
-        failures[t] = std::current_exception();
-      }
-    };
-    {
-      std::vector<std::jthread> others;
-      for (unsigned t = 1; t < round; ++t) others.emplace_back(work, t);
-      work(0);
-    }
-    for (unsigned t = 0; t < round; ++t) {
-      if (failures[t]) std::rethrow_exception(failures[t]);
-      search.take(std::move(trials[t]));
-    }
+    for_each_index(round, round, [&](std::size_t t) {
+      std::mt19937_64 random(seed_of_iteration(options.seed, first + t));
+      trials[t] = matchers[t].match(random_halves(count, random));
+    });
+    for (unsigned t = 0; t < round; ++t) search.take(std::move(trials[t]));
   }
 }
 

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <exception>
 #include <functional>
+#include <system_error>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -34,7 +35,11 @@ inline bool for_each_index(std::size_t count, unsigned threads,
   };
   {
     std::vector<std::jthread> others;
-    for (unsigned t = 1; t < threads && t < count; ++t) others.emplace_back(run, t);
+    try {
+      for (unsigned t = 1; t < threads && t < count; ++t) others.emplace_back(run, t);
+    } catch (const std::system_error&) {
+      // The system grants no more threads. Those there are do the same work.
+    }
     run(0);
   }
   std::pair<std::size_t, std::exception_ptr> first{count, nullptr};

@@ -2,12 +2,9 @@
 #include "canvas.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <exception>
-#include <mutex>
-#include <thread>
 
+#include "parallel.hpp"
 #include "portable_math.hpp"
 
 namespace terrace::tools {
@@ -49,27 +46,10 @@ std::vector<std::uint8_t> Canvas::resolve() const {
 void for_bands(std::uint32_t rows, unsigned threads,
                const std::function<void(std::uint32_t, std::uint32_t)>& work) {
   const std::uint32_t bands = std::clamp<std::uint32_t>(threads * 4, 1, std::max(rows / 16, 1u));
-  std::atomic<std::uint32_t> next{0};
-  std::exception_ptr failure;
-  std::mutex failure_mutex;
-  const auto run = [&] {
-    for (std::uint32_t band = next++; band < bands; band = next++) {
-      try {
-        work(static_cast<std::uint32_t>(std::uint64_t{rows} * band / bands),
-             static_cast<std::uint32_t>(std::uint64_t{rows} * (band + 1) / bands));
-      } catch (...) {
-        const std::lock_guard lock(failure_mutex);
-        failure = std::current_exception();
-        next = bands;
-      }
-    }
-  };
-  {
-    std::vector<std::jthread> helpers;
-    for (unsigned i = 1; i < std::min(threads, bands); ++i) helpers.emplace_back(run);
-    run();
-  }
-  if (failure) std::rethrow_exception(failure);
+  parallel_for(bands, threads, [&](unsigned, std::size_t band) {
+    work(static_cast<std::uint32_t>(std::uint64_t{rows} * band / bands),
+         static_cast<std::uint32_t>(std::uint64_t{rows} * (band + 1) / bands));
+  });
 }
 
 Light Light::for_terrain(const ViewDirection& view, double relief) {

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <exception>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -34,7 +35,11 @@ void parallel_for(std::size_t items, unsigned threads,
   {
     std::vector<std::jthread> helpers;
     const std::size_t wanted = std::min<std::size_t>(threads, items);
-    for (unsigned thread = 1; thread < wanted; ++thread) helpers.emplace_back(run, thread);
+    try {
+      for (unsigned thread = 1; thread < wanted; ++thread) helpers.emplace_back(run, thread);
+    } catch (const std::system_error&) {
+      // The system grants no more threads. Those there are do the same work.
+    }
     run(0);
   }
   if (failure) std::rethrow_exception(failure);

@@ -11,11 +11,11 @@
 #include <limits>
 #include <mutex>
 #include <optional>
-#include <thread>
 #include <vector>
 
 #include "error.hpp"
 #include "interrupt.hpp"
+#include "parallel.hpp"
 #include "terrace/stream/geotiff_writer.hpp"
 
 namespace terrace::tools {
@@ -108,13 +108,8 @@ class Maker {
   }
 
   Statistics run() {
-    {
-      std::vector<std::jthread> helpers;
-      const auto threads =
-          static_cast<unsigned>(std::min<std::uint64_t>(options_.threads, pieces_));
-      for (unsigned i = 1; i < threads; ++i) helpers.emplace_back([this] { work(); });
-      work();
-    }
+    const auto threads = static_cast<unsigned>(std::min<std::uint64_t>(options_.threads, pieces_));
+    parallel_for(threads, threads, [this](unsigned, std::size_t) { work(); });
     if (failure_) std::rethrow_exception(failure_);
     writer_.commit();
     return statistics_;

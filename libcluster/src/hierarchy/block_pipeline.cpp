@@ -2,6 +2,7 @@
 #include "hierarchy/block_pipeline.hpp"
 
 #include <algorithm>
+#include <new>
 #include <system_error>
 #include <utility>
 
@@ -20,6 +21,8 @@ BlockPipeline::BlockPipeline(unsigned threads, Stages stages)
     for (unsigned i = 1; i < threads; ++i) threads_.emplace_back([this, i] { run_thread(i); });
   } catch (const std::system_error&) {
     // The system grants no more threads. Those there are do the same work, only later.
+  } catch (const std::bad_alloc&) {
+    // Nor memory for one. Not thrown: those that run would never be joined.
   }
 }
 
@@ -95,11 +98,12 @@ void BlockPipeline::run_one(Lock& lock, unsigned thread) {
     failure = std::current_exception();
   }
   lock.lock();
-  if (failure) {
-    fail(std::move(failure));
-  } else {
+  try {
+    if (failure) std::rethrow_exception(failure);
     lanes_[block->level].ready.push_back(std::move(block));
     commit_ready(lock);
+  } catch (...) {
+    fail(std::current_exception());
   }
   --running_;
   progress_.notify_all();
@@ -147,6 +151,7 @@ void BlockPipeline::fail(std::exception_ptr failure) {
   if (failed_) return;  // the first one counts
   failed_ = true;
   failure_ = std::move(failure);
+  if (stages_.failed) stages_.failed();
 }
 
 }  // namespace terrace::cluster

@@ -32,6 +32,8 @@ class BlockPipeline {
     std::function<void(HierarchyBlock&, unsigned thread)> process;
     /// May submit further blocks of higher levels.
     std::function<void(HierarchyBlock&)> commit;
+    /// Called once, after the first failure; empty: nobody.
+    std::function<void()> failed{};
   };
 
   /// Starts threads - 1 threads, or as many as the system grants. thread is below `threads`.

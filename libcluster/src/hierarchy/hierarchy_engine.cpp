@@ -47,7 +47,7 @@ HierarchyEngine::HierarchyEngine(HierarchyOptions options, HierarchySink& sink,
       base_(levels_.front()),
       pipeline_(options_.threads,
                 {[this](HierarchyBlock& block, unsigned thread) { process(block, thread); },
-                 [this](HierarchyBlock& block) { commit(block); }}) {
+                 [this](HierarchyBlock& block) { commit(block); }, options_.on_failure}) {
   // No thread looks at the processors before the first block is submitted.
   processors_.reserve(options_.threads);
   for (unsigned i = 0; i < options_.threads; ++i) {
@@ -74,6 +74,7 @@ void HierarchyEngine::push(std::span<const Point3> positions, std::span<const st
   const std::size_t held = base_.open ? base_.open->size() : 0;
   const bool fits_a_block = positions.size() <= options_.block_size;
   ended_ = true;  // should anything below throw
+  if (positions.empty()) pipeline_.wait_for_room();
   if (fits_a_block && held + positions.size() > options_.block_size) submit(base_);
   while (!positions.empty()) {
     if (base_.open && base_.open->size() == options_.block_size) submit(base_);

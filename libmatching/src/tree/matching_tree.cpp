@@ -8,6 +8,7 @@
 #include <numeric>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 #include <thread>
 
 #include <unistd.h>
@@ -167,7 +168,11 @@ class Builder {
     };
     {
       std::vector<std::jthread> others;
-      for (unsigned t = 1; t < clusters; ++t) others.emplace_back(work, t);
+      try {
+        for (unsigned t = 1; t < clusters; ++t) others.emplace_back(work, t);
+      } catch (const std::system_error&) {
+        // The system grants no more threads. Those there are do the same work.
+      }
       work(0);
     }
     for (const std::exception_ptr& failure : failures) {

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <array>
 #include <exception>
+#include <system_error>
 #include <thread>
 
 #include "cavity_insert.hpp"
@@ -24,16 +25,20 @@ namespace {
 
 constexpr std::uint32_t kParts = 2;
 
-/// A thread that has this one's metric.
+/// A thread that has this one's metric; none if the system grants no more.
 template <class Kernel, class Work>
 std::thread in_thread(const Work& work) {
-  if constexpr (std::is_same_v<Kernel, EllipticalKernel>) {
-    return std::thread([work, &metric = EllipticalKernel::metric()] {
-      const EllipticalKernel::Scope scope(metric);
-      work();
-    });
-  } else {
-    return std::thread(work);
+  try {
+    if constexpr (std::is_same_v<Kernel, EllipticalKernel>) {
+      return std::thread([work, &metric = EllipticalKernel::metric()] {
+        const EllipticalKernel::Scope scope(metric);
+        work();
+      });
+    } else {
+      return std::thread(work);
+    }
+  } catch (const std::system_error&) {
+    return {};
   }
 }
 
@@ -137,12 +142,12 @@ class Round {
       Worker<Kernel> first(mesh_, curve_,
                            Part(ranges_[0], base, kParts, 0, blocks, mesh_.free_tetrahedron));
       Worker<Kernel> second(mesh_, curve_, Part(ranges_[1], base, kParts, 1, blocks, kNone));
-      if (threads > 1) {
-        std::thread other = in_thread<Kernel>([&] { second.run(lists[1]); });
-        first.run(lists[0]);
+      std::thread other;
+      if (threads > 1) other = in_thread<Kernel>([&] { second.run(lists[1]); });
+      first.run(lists[0]);
+      if (other.joinable()) {
         other.join();
       } else {
-        first.run(lists[0]);
         second.run(lists[1]);
       }
       for (const auto* worker : {&first, &second}) {

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <exception>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -34,7 +35,11 @@ void for_blocks(std::size_t count, std::size_t block, unsigned threads, Make mak
     }
   };
   std::vector<std::jthread> others;
-  for (std::size_t i = 1; i < used; ++i) others.emplace_back(run);
+  try {
+    for (std::size_t i = 1; i < used; ++i) others.emplace_back(run);
+  } catch (const std::system_error&) {
+    // The system grants no more threads. Those there are do the same work.
+  }
   run();
   others.clear();
   if (failure) std::rethrow_exception(failure);

@@ -117,6 +117,10 @@ struct HierarchyOptions {
   /// The ground map for a block with these bounds; empty: the identity. Called from any thread.
   std::function<GroundMap(const Bounds&)> ground;
   SimdPath simd = SimdPath::automatic;
+  /// Called once when the work has failed, from the thread where it did: for an owner who waits for
+  /// input meanwhile and would see the exception only in the next push(). Must not throw nor call
+  /// the builder.
+  std::function<void()> on_failure;
 };
 
 struct HierarchyResult {
@@ -144,6 +148,7 @@ class HierarchyBuilder {
   /// Appends points. A batch that fits into one block is never torn: if it does not fit into what
   /// is left of the present block, that block is closed first. (So tiles of a raster stay whole.) A
   /// larger batch is a plain stream: it fills the present block, and is cut wherever one is full.
+  /// An empty batch only tells of failures.
   /// Throws: std::invalid_argument on a coordinate that is not finite, naming its index in the
   /// batch, and on a payload of another size than payload_size bytes per point (the builder is
   /// unchanged); what the sink or `ground` threw, and std::invalid_argument on a ground map that is

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+// No exception of a worker ends the process. A program of its own, since it replaces operator new:
+// each allocation fails in turn, on whichever thread it is.
+#include <atomic>
+#include <cstdlib>
+#include <limits>
+#include <memory>
+#include <new>
+#include <span>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "terrace/cluster/hierarchy.hpp"
+#include "thread_team.hpp"
+
+namespace {
+
+std::atomic<std::int64_t> left{std::numeric_limits<std::int64_t>::max()};
+
+}  // namespace
+
+void* operator new(std::size_t size) {
+  void* memory = left.fetch_sub(1, std::memory_order_relaxed) > 0 ? std::malloc(size) : nullptr;
+  if (memory == nullptr) throw std::bad_alloc();
+  return memory;
+}
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+
+namespace terrace::cluster {
+namespace {
+
+/// Calls work() again and again, with the first allocation failing, the second, ... and all after
+/// it, about `times` times in all. Returns how often it threw std::bad_alloc.
+template <class Work>
+int fail_in_turn(int times, const Work& work) {
+  constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
+  work();  // what is made once
+  left = kNever;
+  work();
+  const std::int64_t all = kNever - left.exchange(kNever);
+  int thrown = 0;
+  for (std::int64_t at = 0; at < all; at += std::max<std::int64_t>(1, all / times)) {
+    left = at;
+    try {
+      work();
+      left = kNever;
+    } catch (const std::bad_alloc&) {
+      left = kNever;
+      ++thrown;
+    }
+  }
+  return thrown;
+}
+
+struct Nowhere final : HierarchySink {
+  std::unique_ptr<Prepared> prepare(const FinishedBlock&) override {
+    return std::make_unique<Prepared>();
+  }
+  void commit(unsigned, std::unique_ptr<Prepared>) override {}
+  void root(const FinishedBlock&) override {}
+};
+
+TEST(AllocationFailure, OfTheHierarchyComesOut) {
+  std::vector<Point3> points(3000);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const double x = static_cast<double>(i);
+    points[i] = {static_cast<double>(i * 7919 % 1009), static_cast<double>(i * 104729 % 997), x};
+  }
+  const auto build = [&] {
+    HierarchyOptions options;
+    options.block_size = 100;
+    options.threads = 4;
+    Nowhere sink;
+    HierarchyBuilder builder(options, sink);
+    for (std::size_t i = 0; i < points.size(); i += 50) {
+      builder.push(std::span(points).subspan(i, 50));
+    }
+    builder.finish();
+  };
+  EXPECT_GT(fail_in_turn(400, build), 100);
+}
+
+TEST(AllocationFailure, OfATeamComesOut) {
+  const auto run = [] {
+    ThreadTeam team(4);
+    for (int round = 0; round < 5; ++round) {
+      team.run(40, [](std::size_t i) {
+        std::vector<double>(i + 1).swap(*std::make_unique<std::vector<double>>());
+      });
+    }
+  };
+  EXPECT_GT(fail_in_turn(200, run), 50);
+}
+
+}  // namespace
+}  // namespace terrace::cluster
