@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "input.hpp"
+#include "peek.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::stream {

@@ -9,8 +9,8 @@
 #include <nlohmann/json.hpp>
 
 #include "bytes.hpp"
-#include "sink.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/stream/sink.hpp"
 #include "writers.hpp"
 
 /// glTF 2.0 (ISO/IEC 12113), section 4.4: GLB is a header of 12 bytes, a JSON chunk and a binary
@@ -46,7 +46,7 @@ std::string attribute_name(const std::string& name) {
 
 class GlbWriter final : public MeshWriter {
  public:
-  GlbWriter(const std::string& path, const MeshHeader& header, bool replace)
+  GlbWriter(const std::string& path, const MeshHeader& header, const WriterOptions& options)
       : header_(header), counts_(header), stride_(4 * (3 + header.attributes.size())) {
     const auto refuse = [&](std::string cause) {
       throw Error({.file = path,
@@ -74,7 +74,7 @@ class GlbWriter final : public MeshWriter {
                       .size() +
                   36;
     json_bytes_ += (4 - json_bytes_ % 4) % 4;
-    sink_.emplace(path, replace);
+    sink_.emplace(path, options.replace, options.stop);
     std::string text;
     append_little_endian(text, std::uint32_t{0x46546C67});  // "glTF"
     append_little_endian(text, std::uint32_t{2});
@@ -237,8 +237,8 @@ float glb_coordinate(double coordinate, double origin) {
 }
 
 std::unique_ptr<MeshWriter> open_glb_writer(const std::string& path, const MeshHeader& header,
-                                            bool replace) {
-  return std::make_unique<GlbWriter>(path, header, replace);
+                                            const WriterOptions& options) {
+  return std::make_unique<GlbWriter>(path, header, options);
 }
 
 }  // namespace terrace::stream

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "input.hpp"
+#include "terrace/stream/input.hpp"
 
 #include <algorithm>
 #include <cassert>
@@ -9,24 +9,20 @@
 #include <utility>
 
 #include <fcntl.h>
+#include <poll.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "peek.hpp"
+#include "stop_waiter.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::stream {
 namespace {
 
-constexpr std::size_t kBufferBytes = 256u << 10;
-
-/// A pipe whose first bytes have been looked at: it cannot be opened again without losing them.
-struct Head {
-  int fd = -1;
-  std::vector<char> bytes;
-};
-
-std::map<std::string, Head>& heads() {
-  thread_local std::map<std::string, Head> kept;
+/// Pipes whose first bytes have been looked at: they cannot be opened again without losing them.
+std::map<std::string, std::unique_ptr<Input>>& heads() {
+  thread_local std::map<std::string, std::unique_ptr<Input>> kept;
   return kept;
 }
 
@@ -36,56 +32,97 @@ std::string shown(const std::string& file) {
 
 int open_for_reading(const std::string& file) {
   if (file == kStandardStream) return STDIN_FILENO;
-  const int fd = open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  struct stat status {};
+  // To open a pipe without O_NONBLOCK is to wait for its writer where no stop ends the wait. poll()
+  // waits for it too.
+  const bool pipe = ::stat(file.c_str(), &status) == 0 && S_ISFIFO(status.st_mode);
+  const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | (pipe ? O_NONBLOCK : 0));
   if (fd < 0) throw system_error(file, "cannot open", errno, "check the name and its permissions");
   return fd;
 }
 
-/// Returns 0 at the end. Throws: Error with the name of the input.
-std::size_t read_some(int fd, char* to, std::size_t most, const std::string& name) {
-  for (;;) {
-    const ssize_t got = read(fd, to, most);
-    if (got >= 0) return static_cast<std::size_t>(got);
-    if (errno == EISDIR) {
-      throw Error({.file = name,
-                   .where = {},
-                   .cause = "is a folder, not a file",
-                   .remedy = "name the files in it"});
-    }
-    if (errno != EINTR) throw system_error(name, "cannot read", errno);
-  }
-}
-
 }  // namespace
 
-Input::Input(const std::string& file) : name_(shown(file)), buffer_(kBufferBytes) {
+/// An open file, closed with the object.
+class Input::Descriptor {
+ public:
+  Descriptor(const std::string& file, const std::stop_token& stop)
+      : fd_(open_for_reading(file)), owned_(file != kStandardStream) {
+    struct stat status {};
+    if (::fstat(fd_, &status) == 0 && S_ISREG(status.st_mode)) {
+      // Standard input that is a file may have been read before: what is left counts.
+      const off_t at = owned_ ? 0 : std::max<off_t>(0, ::lseek(fd_, 0, SEEK_CUR));
+      size_ = static_cast<std::uint64_t>(std::max<off_t>(0, status.st_size - at));
+      ::posix_fadvise(fd_, 0, 0, POSIX_FADV_SEQUENTIAL);
+      return;
+    }
+    try {
+      waiter_.emplace(stop);
+    } catch (...) {
+      if (owned_) ::close(fd_);
+      throw;
+    }
+  }
+  ~Descriptor() {
+    if (owned_) ::close(fd_);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+
+  /// Returns 0 at the end. Throws: Error with the name of the input, Stopped.
+  [[nodiscard]] std::size_t read(char* to, std::size_t most, const std::string& name) const {
+    for (;;) {
+      if (waiter_) waiter_->wait(fd_, POLLIN);
+      const ssize_t got = ::read(fd_, to, most);
+      if (got >= 0) return static_cast<std::size_t>(got);
+      if (errno == EISDIR) {
+        throw Error({.file = name,
+                     .where = {},
+                     .cause = "is a folder, not a file",
+                     .remedy = "name the files in it"});
+      }
+      if (errno == EBADF) {
+        throw Error({.file = name,
+                     .where = {},
+                     .cause = "is closed",
+                     .remedy = "name a file, or connect it to one"});
+      }
+      // EAGAIN: another reader of the same pipe was faster.
+      if (errno != EINTR && errno != EAGAIN) throw system_error(name, "cannot read", errno);
+    }
+  }
+  [[nodiscard]] bool skip(std::uint64_t count) const {
+    return ::lseek(fd_, static_cast<off_t>(count), SEEK_CUR) >= 0;
+  }
+  /// Of a regular file.
+  [[nodiscard]] std::optional<std::uint64_t> size() const { return size_; }
+
+ private:
+  int fd_;
+  bool owned_;
+  std::optional<std::uint64_t> size_;
+  std::optional<StopWaiter> waiter_;  ///< of all but regular files, which never keep one waiting
+};
+
+Input::Input(const std::string& file, const std::stop_token& stop, std::size_t at_once) {
   const auto kept = heads().find(file);
   if (kept != heads().end()) {
-    fd_ = kept->second.fd;
-    const std::vector<char>& bytes = kept->second.bytes;
-    buffer_.resize(std::max(buffer_.size(), bytes.size()));
-    std::copy(bytes.begin(), bytes.end(), buffer_.begin());
-    end_ = bytes.size();
+    *this = std::move(*kept->second);
     heads().erase(kept);
-  } else {
-    fd_ = open_for_reading(file);
+    buffer_.resize(std::max(buffer_.size(), at_once));
+    return;
   }
-  owned_ = fd_ != STDIN_FILENO;
-  struct stat status {};
-  if (fstat(fd_, &status) == 0 && S_ISREG(status.st_mode)) {
-    // Standard input that is a file may have been read before: what is left counts.
-    const off_t at = owned_ ? 0 : lseek(fd_, 0, SEEK_CUR) - static_cast<off_t>(end_);
-    size_ = static_cast<std::uint64_t>(std::max<off_t>(0, status.st_size - std::max<off_t>(0, at)));
-    posix_fadvise(fd_, 0, 0, POSIX_FADV_SEQUENTIAL);
-  }
+  name_ = shown(file);
+  descriptor_ = std::make_unique<Descriptor>(file, stop);
+  size_ = descriptor_->size();
+  buffer_.resize(at_once);
 }
 
-Input::~Input() {
-  if (owned_) close(fd_);
-}
+Input::~Input() = default;
+Input& Input::operator=(Input&&) noexcept = default;
 
 bool Input::read_more() {
-  const std::size_t got = read_some(fd_, buffer_.data() + end_, buffer_.size() - end_, name_);
+  const std::size_t got = descriptor_->read(buffer_.data() + end_, buffer_.size() - end_, name_);
   end_ += got;
   ended_ = got == 0;
   return !ended_;
@@ -117,9 +154,7 @@ bool Input::skip(std::uint64_t count) {
   if (count == 0) return true;
   if (size_) {
     if (count > *size_ - std::min(*size_, offset_)) return false;
-    if (lseek(fd_, static_cast<off_t>(count), SEEK_CUR) < 0) {
-      throw system_error(name_, "cannot seek", errno);
-    }
+    if (!descriptor_->skip(count)) throw system_error(name_, "cannot seek", errno);
     offset_ += count;
     return true;
   }
@@ -134,38 +169,24 @@ bool Input::skip(std::uint64_t count) {
 
 bool is_rereadable(const std::string& file) {
   struct stat status {};
-  return file != kStandardStream && stat(file.c_str(), &status) == 0 && S_ISREG(status.st_mode);
+  return file != kStandardStream && ::stat(file.c_str(), &status) == 0 && S_ISREG(status.st_mode);
 }
 
-std::vector<char> peek_head(const std::string& file, std::size_t most) {
-  const auto kept = heads().find(file);
-  if (kept != heads().end()) return kept->second.bytes;
-  Head head{open_for_reading(file), std::vector<char>(most)};
-  const bool keep = !is_rereadable(file);
-  std::size_t got = 0;
-  try {
-    while (got < most) {
-      const std::size_t step = read_some(head.fd, head.bytes.data() + got, most - got, shown(file));
-      if (step == 0) break;
-      got += step;
+std::vector<char> peek_head(const std::string& file, std::size_t most,
+                            const std::stop_token& stop) {
+  auto kept = heads().find(file);
+  if (kept == heads().end()) {
+    auto input = std::make_unique<Input>(file, stop, most);
+    if (is_rereadable(file)) {
+      const std::string_view head = input->fill(most).substr(0, most);
+      return {head.begin(), head.end()};
     }
-  } catch (...) {
-    if (head.fd != STDIN_FILENO) close(head.fd);
-    throw;
+    kept = heads().emplace(file, std::move(input)).first;
   }
-  head.bytes.resize(got);
-  if (!keep) {
-    close(head.fd);
-    return std::move(head.bytes);
-  }
-  return heads().emplace(file, std::move(head)).first->second.bytes;
+  const std::string_view head = kept->second->fill(most).substr(0, most);
+  return {head.begin(), head.end()};
 }
 
-void drop_heads() {
-  for (auto& [file, head] : heads()) {
-    if (head.fd != STDIN_FILENO) close(head.fd);
-  }
-  heads().clear();
-}
+void drop_heads() { heads().clear(); }
 
 }  // namespace terrace::stream

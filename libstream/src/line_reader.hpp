@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include "input.hpp"
+#include "terrace/stream/input.hpp"
 
 namespace terrace::stream {
 

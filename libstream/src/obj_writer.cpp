@@ -3,7 +3,7 @@
 #include <string>
 
 #include "number.hpp"
-#include "sink.hpp"
+#include "terrace/stream/sink.hpp"
 #include "writers.hpp"
 
 namespace terrace::stream {
@@ -14,8 +14,8 @@ constexpr std::size_t kTextBytes = 64u << 10;
 /// Wavefront OBJ: "v x y z" per vertex, "f a b c" per triangle, vertices counted from 1.
 class ObjWriter final : public MeshWriter {
  public:
-  ObjWriter(const std::string& path, const MeshHeader& header, bool replace)
-      : sink_(path, replace), counts_(header) {
+  ObjWriter(const std::string& path, const MeshHeader& header, const WriterOptions& options)
+      : sink_(path, options.replace, options.stop), counts_(header) {
     for (const std::string& comment : header.comments) {
       text_ += "# ";
       for (const char c : comment) text_ += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
@@ -73,8 +73,8 @@ class ObjWriter final : public MeshWriter {
 }  // namespace
 
 std::unique_ptr<MeshWriter> open_obj_writer(const std::string& path, const MeshHeader& header,
-                                            bool replace) {
-  return std::make_unique<ObjWriter>(path, header, replace);
+                                            const WriterOptions& options) {
+  return std::make_unique<ObjWriter>(path, header, options);
 }
 
 }  // namespace terrace::stream

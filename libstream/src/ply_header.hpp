@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "input.hpp"
+#include "terrace/stream/input.hpp"
 #include "terrace/stream/source.hpp"
 
 namespace terrace::stream {

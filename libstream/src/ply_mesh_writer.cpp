@@ -7,7 +7,7 @@
 #include "number.hpp"
 #include "output_columns.hpp"
 #include "ply_writer.hpp"
-#include "sink.hpp"
+#include "terrace/stream/sink.hpp"
 #include "writers.hpp"
 
 namespace terrace::stream {
@@ -26,8 +26,9 @@ std::vector<Channel> float_channels(const std::vector<std::string>& names) {
 
 class PlyMeshWriter final : public MeshWriter {
  public:
-  PlyMeshWriter(const std::string& path, const MeshHeader& header, bool replace, bool ascii)
-      : sink_(path, replace),
+  PlyMeshWriter(const std::string& path, const MeshHeader& header, const WriterOptions& options,
+                bool ascii)
+      : sink_(path, options.replace, options.stop),
         counts_(header),
         attributes_(header.attributes.size()),
         ascii_(ascii) {
@@ -104,13 +105,14 @@ class PlyMeshWriter final : public MeshWriter {
 }  // namespace
 
 std::unique_ptr<MeshWriter> open_ply_mesh_writer(const std::string& path, const MeshHeader& header,
-                                                 bool replace) {
-  return std::make_unique<PlyMeshWriter>(path, header, replace, /*ascii=*/false);
+                                                 const WriterOptions& options) {
+  return std::make_unique<PlyMeshWriter>(path, header, options, /*ascii=*/false);
 }
 
 std::unique_ptr<MeshWriter> open_ply_ascii_mesh_writer(const std::string& path,
-                                                       const MeshHeader& header, bool replace) {
-  return std::make_unique<PlyMeshWriter>(path, header, replace, /*ascii=*/true);
+                                                       const MeshHeader& header,
+                                                       const WriterOptions& options) {
+  return std::make_unique<PlyMeshWriter>(path, header, options, /*ascii=*/true);
 }
 
 }  // namespace terrace::stream

@@ -14,11 +14,11 @@
 
 #include "chain.hpp"
 #include "format_ply.hpp"
-#include "input.hpp"
 #include "line_reader.hpp"
 #include "ply_decode.hpp"
 #include "ply_header.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/stream/input.hpp"
 #include "text.hpp"
 
 namespace terrace::stream {
@@ -39,7 +39,7 @@ struct Field {
 class PlySource final : public PointSource {
  public:
   PlySource(const std::string& file, const SourceOptions& options)
-      : input_(file),
+      : input_(file, options.stop),
         lines_(input_),
         header_(read_ply_header(input_)),
         block_points_(options.block_points) {

@@ -7,7 +7,7 @@
 #include "bytes.hpp"
 #include "number.hpp"
 #include "output_columns.hpp"
-#include "sink.hpp"
+#include "terrace/stream/sink.hpp"
 #include "writers.hpp"
 
 namespace terrace::stream {
@@ -26,8 +26,9 @@ std::string count_field(std::uint64_t count) {
 
 class PlyWriter final : public PointWriter {
  public:
-  PlyWriter(const std::string& path, const PointHeader& header, bool replace, bool ascii)
-      : sink_(path, replace), columns_(header.attributes), ascii_(ascii) {
+  PlyWriter(const std::string& path, const PointHeader& header, const WriterOptions& options,
+            bool ascii)
+      : sink_(path, options.replace, options.stop), columns_(header.attributes), ascii_(ascii) {
     std::string text = ply_preamble(ascii, header.comments) + "element vertex ";
     count_at_ = text.size();
     text += count_field(0);
@@ -122,13 +123,14 @@ std::string ply_preamble(bool ascii, std::span<const std::string> comments) {
 }
 
 std::unique_ptr<PointWriter> open_ply_writer(const std::string& path, const PointHeader& header,
-                                             bool replace) {
-  return std::make_unique<PlyWriter>(path, header, replace, /*ascii=*/false);
+                                             const WriterOptions& options) {
+  return std::make_unique<PlyWriter>(path, header, options, /*ascii=*/false);
 }
 
 std::unique_ptr<PointWriter> open_ply_ascii_writer(const std::string& path,
-                                                   const PointHeader& header, bool replace) {
-  return std::make_unique<PlyWriter>(path, header, replace, /*ascii=*/true);
+                                                   const PointHeader& header,
+                                                   const WriterOptions& options) {
+  return std::make_unique<PlyWriter>(path, header, options, /*ascii=*/true);
 }
 
 }  // namespace terrace::stream

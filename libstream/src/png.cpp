@@ -10,8 +10,8 @@
 
 #include <png.h>
 
-#include "terrace/stream/atomic_file.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/stream/sink.hpp"
 
 namespace terrace::stream {
 namespace {
@@ -28,7 +28,7 @@ struct Image {
 /// libpng is C and leaves by longjmp: exceptions must not pass through it. A failed write is kept
 /// here and thrown when libpng has returned.
 struct Output {
-  AtomicFile* file;
+  Sink* file;
   std::exception_ptr error;
   char message[128];
 };
@@ -85,14 +85,15 @@ bool write_image(const Image& image, Output& output) {
   return true;
 }
 
-void write_file(const std::filesystem::path& path, const Image& image, bool replace) {
+void write_file(const std::filesystem::path& path, const Image& image, bool replace,
+                const std::stop_token& stop) {
   const auto refuse = [&](std::string cause) {
     throw Error({.file = path.string(), .where = {}, .cause = std::move(cause), .remedy = {}});
   };
   constexpr std::size_t kMost = std::numeric_limits<std::int32_t>::max();
   if (image.width == 0 || image.height == 0) refuse("a PNG image cannot be empty");
   if (image.width > kMost || image.height > kMost) refuse("a PNG side is at most 2147483647 long");
-  AtomicFile file(path, replace);
+  Sink file(path.string(), replace, stop);
   Output output{.file = &file, .error = nullptr, .message = ""};
   if (!write_image(image, output)) {
     if (output.error) std::rethrow_exception(output.error);
@@ -105,7 +106,8 @@ void write_file(const std::filesystem::path& path, const Image& image, bool repl
 }  // namespace
 
 void write_png(const std::filesystem::path& path, std::size_t width, std::size_t height,
-               int channels, std::span<const std::uint8_t> pixels, bool replace) {
+               int channels, std::span<const std::uint8_t> pixels, bool replace,
+               const std::stop_token& stop) {
   assert(channels >= 1 && channels <= 4);
   assert(pixels.size() == width * height * static_cast<std::size_t>(channels));
   constexpr int kColorTypes[] = {PNG_COLOR_TYPE_GRAY, PNG_COLOR_TYPE_GRAY_ALPHA, PNG_COLOR_TYPE_RGB,
@@ -118,11 +120,12 @@ void write_png(const std::filesystem::path& path, std::size_t width, std::size_t
               .bit_depth = 8,
               .color_type = kColorTypes[channels - 1],
               .swap = false},
-             replace);
+             replace, stop);
 }
 
 void write_png_grey16(const std::filesystem::path& path, std::size_t width, std::size_t height,
-                      std::span<const std::uint16_t> samples, bool replace) {
+                      std::span<const std::uint16_t> samples, bool replace,
+                      const std::stop_token& stop) {
   assert(samples.size() == width * height);
   write_file(path,
              {.pixels = reinterpret_cast<const unsigned char*>(samples.data()),
@@ -132,7 +135,7 @@ void write_png_grey16(const std::filesystem::path& path, std::size_t width, std:
               .bit_depth = 16,
               .color_type = PNG_COLOR_TYPE_GRAY,
               .swap = std::endian::native == std::endian::little},
-             replace);
+             replace, stop);
 }
 
 }  // namespace terrace::stream

@@ -4,6 +4,7 @@
 #include <deque>
 #include <exception>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <utility>
 
@@ -14,11 +15,13 @@ namespace {
 
 class ReadAhead final : public PointSource {
  public:
-  ReadAhead(std::unique_ptr<PointSource> source, std::size_t blocks)
+  ReadAhead(std::unique_ptr<PointSource> source, std::size_t blocks,
+            const std::stop_source& reading, const std::stop_token& stop)
       : source_(std::move(source)),
         most_(std::max<std::size_t>(blocks, 1)),
         info_(source_->info()),
-        thread_([this] { run(); }) {}
+        reading_(reading),
+        on_stop_(stop, Forward{reading}) {}
 
   ~ReadAhead() override {
     {
@@ -26,7 +29,8 @@ class ReadAhead final : public PointSource {
       stop_ = true;
     }
     room_.notify_one();
-    thread_.join();
+    reading_.request_stop();
+    if (thread_.joinable()) thread_.join();
   }
   ReadAhead(const ReadAhead&) = delete;
   ReadAhead& operator=(const ReadAhead&) = delete;
@@ -35,6 +39,12 @@ class ReadAhead final : public PointSource {
 
   bool next(PointBlock& block) override {
     block.clear();
+    if (!started_) start();
+    if (!thread_.joinable()) {
+      const bool more = source_->next(block);
+      progress_ = source_->progress();
+      return more;
+    }
     std::unique_lock lock(mutex_);
     news_.wait(lock, [this] { return !ready_.empty() || ended_; });
     if (ready_.empty()) {
@@ -63,6 +73,21 @@ class ReadAhead final : public PointSource {
     PointBlock block;
     Progress progress;
   };
+
+  /// To one stop goes what another was asked for.
+  struct Forward {
+    std::stop_source to;
+    void operator()() { to.request_stop(); }
+  };
+
+  void start() {
+    started_ = true;
+    try {
+      thread_ = std::thread([this] { run(); });
+    } catch (const std::system_error&) {
+      // The system grants no more threads: next() reads.
+    }
+  }
 
   void run() {
     try {
@@ -104,7 +129,10 @@ class ReadAhead final : public PointSource {
   const std::unique_ptr<PointSource> source_;  // the thread's alone once it runs
   const std::size_t most_;
   const SourceInfo info_;
+  std::stop_source reading_;
+  std::stop_callback<Forward> on_stop_;
   Progress progress_;  // the caller's alone
+  bool started_ = false;
 
   std::mutex mutex_;
   std::condition_variable news_, room_;
@@ -114,13 +142,15 @@ class ReadAhead final : public PointSource {
   std::exception_ptr error_;
   bool ended_ = false, stop_ = false;
 
-  std::thread thread_;  // last: it starts when all else is there
+  std::thread thread_;
 };
 
 }  // namespace
 
-std::unique_ptr<PointSource> read_ahead(std::unique_ptr<PointSource> source, std::size_t blocks) {
-  return std::make_unique<ReadAhead>(std::move(source), blocks);
+std::unique_ptr<PointSource> read_ahead(std::unique_ptr<PointSource> source, std::size_t blocks,
+                                        const std::stop_source& reading,
+                                        const std::stop_token& stop) {
+  return std::make_unique<ReadAhead>(std::move(source), blocks, reading, stop);
 }
 
 }  // namespace terrace::stream

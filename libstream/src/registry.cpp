@@ -9,8 +9,9 @@
 #include "format_geotiff.hpp"
 #include "format_ply.hpp"
 #include "format_xyz.hpp"
-#include "input.hpp"
+#include "peek.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/stream/input.hpp"
 #include "terrace/stream/source.hpp"
 
 namespace terrace::stream {
@@ -47,7 +48,7 @@ const Format& format_of(const std::string& file, const SourceOptions& options) {
                  .cause = "unknown input format '" + options.format + "'",
                  .remedy = "known are " + known_formats()});
   }
-  const std::vector<char> head = peek_head(file, kHeadBytes);
+  const std::vector<char> head = peek_head(file, kHeadBytes, options.stop);
   for (const Format& format : formats()) {
     if (format.recognise(std::as_bytes(std::span(head)))) return format;
   }
@@ -71,16 +72,9 @@ struct HeadScope {
   HeadScope& operator=(const HeadScope&) = delete;
 };
 
-}  // namespace
-
-std::span<const Format> formats() {
-  // The most telling content first: text is whatever looks like a table of numbers.
-  static const std::array<Format, 3> all{geotiff_format(), ply_format(), xyz_format()};
-  return all;
-}
-
-std::unique_ptr<PointSource> open_source(std::span<const std::string> files,
-                                         const SourceOptions& options) {
+/// What open_source() does but for reading ahead.
+std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
+                                       const SourceOptions& options) {
   assert(!files.empty() && options.block_points > 0);
   const HeadScope scope;
   const Format& format = format_of(files.front(), options);
@@ -92,8 +86,8 @@ std::unique_ptr<PointSource> open_source(std::span<const std::string> files,
                    .cause = "is " + other.name + ", but " + files.front() + " is " + format.name,
                    .remedy = "name files of one format"});
     }
-    if (file == kStandardStream && !format.streams) {
-      throw Error({.file = "standard input",
+    if (!format.streams && !is_rereadable(file)) {
+      throw Error({.file = file == kStandardStream ? "standard input" : file,
                    .where = {},
                    .cause = format.name + " cannot be read from a pipe",
                    .remedy = "name a file"});
@@ -106,6 +100,25 @@ std::unique_ptr<PointSource> open_source(std::span<const std::string> files,
                  .remedy = "it can be read only once"});
   }
   return format.open(files, options);
+}
+
+}  // namespace
+
+std::span<const Format> formats() {
+  // The most telling content first: text is whatever looks like a table of numbers.
+  static const std::array<Format, 3> all{geotiff_format(), ply_format(), xyz_format()};
+  return all;
+}
+
+std::unique_ptr<PointSource> open_source(std::span<const std::string> files,
+                                         const SourceOptions& options) {
+  if (options.blocks_ahead == 0) return open_here(files, options);
+  // The reading ends with the source too, not by the caller's stop alone.
+  std::stop_source reading;
+  SourceOptions inner = options;
+  inner.stop = reading.get_token();
+  const std::stop_callback on_stop(options.stop, [&reading] { reading.request_stop(); });
+  return read_ahead(open_here(files, inner), options.blocks_ahead, reading, options.stop);
 }
 
 }  // namespace terrace::stream

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <filesystem>
 
-#include "input.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/stream/input.hpp"
 
 namespace terrace::stream {
 namespace {
@@ -83,12 +83,12 @@ std::size_t choose_format(std::span<const WriterFormat> table, const std::string
 
 std::unique_ptr<PointWriter> open_point_writer(const std::string& path, const PointHeader& header,
                                                const WriterOptions& options) {
-  return kPointOpeners[choose_format(kPointFormats, path, options)](path, header, options.replace);
+  return kPointOpeners[choose_format(kPointFormats, path, options)](path, header, options);
 }
 
 std::unique_ptr<MeshWriter> open_mesh_writer(const std::string& path, const MeshHeader& header,
                                              const WriterOptions& options) {
-  return kMeshOpeners[choose_format(kMeshFormats, path, options)](path, header, options.replace);
+  return kMeshOpeners[choose_format(kMeshFormats, path, options)](path, header, options);
 }
 
 MeshRounding::MeshRounding(const std::string& path, const Box3& bounds,

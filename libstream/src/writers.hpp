@@ -28,22 +28,24 @@ std::size_t choose_format(std::span<const WriterFormat> table, const std::string
                           const WriterOptions& options);
 
 std::unique_ptr<PointWriter> open_xyz_writer(const std::string& path, const PointHeader& header,
-                                             bool replace);
+                                             const WriterOptions& options);
 std::unique_ptr<PointWriter> open_csv_writer(const std::string& path, const PointHeader& header,
-                                             bool replace);
+                                             const WriterOptions& options);
 std::unique_ptr<PointWriter> open_ply_writer(const std::string& path, const PointHeader& header,
-                                             bool replace);
+                                             const WriterOptions& options);
 std::unique_ptr<PointWriter> open_ply_ascii_writer(const std::string& path,
-                                                   const PointHeader& header, bool replace);
+                                                   const PointHeader& header,
+                                                   const WriterOptions& options);
 
 std::unique_ptr<MeshWriter> open_ply_mesh_writer(const std::string& path, const MeshHeader& header,
-                                                 bool replace);
+                                                 const WriterOptions& options);
 std::unique_ptr<MeshWriter> open_ply_ascii_mesh_writer(const std::string& path,
-                                                       const MeshHeader& header, bool replace);
+                                                       const MeshHeader& header,
+                                                       const WriterOptions& options);
 std::unique_ptr<MeshWriter> open_obj_writer(const std::string& path, const MeshHeader& header,
-                                            bool replace);
+                                            const WriterOptions& options);
 std::unique_ptr<MeshWriter> open_glb_writer(const std::string& path, const MeshHeader& header,
-                                            bool replace);
+                                            const WriterOptions& options);
 
 /// The local origin of a GLB file whose vertices lie in `bounds`.
 Point3 glb_origin(const Box3& bounds);

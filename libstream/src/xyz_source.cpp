@@ -12,10 +12,10 @@
 
 #include "chain.hpp"
 #include "format_xyz.hpp"
-#include "input.hpp"
 #include "line_reader.hpp"
 #include "number.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/stream/input.hpp"
 #include "text.hpp"
 #include "xyz_layout.hpp"
 
@@ -58,7 +58,7 @@ ParseRow row_parser(char separator) {
 class XyzSource final : public PointSource {
  public:
   XyzSource(const std::string& file, const SourceOptions& options)
-      : input_(file), lines_(input_), block_points_(options.block_points) {
+      : input_(file, options.stop), lines_(input_), block_points_(options.block_points) {
     constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
     if (input_.fill(kByteOrderMark.size()).starts_with(kByteOrderMark)) {
       input_.consume(kByteOrderMark.size());

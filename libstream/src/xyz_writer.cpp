@@ -4,7 +4,7 @@
 
 #include "number.hpp"
 #include "output_columns.hpp"
-#include "sink.hpp"
+#include "terrace/stream/sink.hpp"
 #include "writers.hpp"
 
 namespace terrace::stream {
@@ -25,8 +25,11 @@ std::string csv_field(const std::string& name) {
 
 class XyzWriter final : public PointWriter {
  public:
-  XyzWriter(const std::string& path, const PointHeader& header, bool replace, char separator)
-      : sink_(path, replace), columns_(header.attributes), separator_(separator) {}
+  XyzWriter(const std::string& path, const PointHeader& header, const WriterOptions& options,
+            char separator)
+      : sink_(path, options.replace, options.stop),
+        columns_(header.attributes),
+        separator_(separator) {}
 
   void write_header() {
     text_ = "x,y,z";
@@ -76,13 +79,13 @@ class XyzWriter final : public PointWriter {
 }  // namespace
 
 std::unique_ptr<PointWriter> open_xyz_writer(const std::string& path, const PointHeader& header,
-                                             bool replace) {
-  return std::make_unique<XyzWriter>(path, header, replace, ' ');
+                                             const WriterOptions& options) {
+  return std::make_unique<XyzWriter>(path, header, options, ' ');
 }
 
 std::unique_ptr<PointWriter> open_csv_writer(const std::string& path, const PointHeader& header,
-                                             bool replace) {
-  auto writer = std::make_unique<XyzWriter>(path, header, replace, ',');
+                                             const WriterOptions& options) {
+  auto writer = std::make_unique<XyzWriter>(path, header, options, ',');
   writer->write_header();
   return writer;
 }

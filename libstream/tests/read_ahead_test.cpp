@@ -1,11 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <array>
 #include <atomic>
+#include <condition_variable>
 #include <memory>
+#include <mutex>
+#include <stop_token>
 #include <string>
+#include <thread>
 #include <utility>
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
+#include "temp_folder.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/source.hpp"
 
@@ -77,6 +86,84 @@ TEST(ReadAhead, ReadsNoFurtherThanAskedAndStopsAtOnce) {
     ASSERT_TRUE(source->next(block));
   }
   EXPECT_LE(made, 1 + 4 + 1);
+}
+
+/// A block, then a wait that a stop alone ends.
+class Waiting final : public PointSource {
+ public:
+  explicit Waiting(std::stop_token stop) : stop_(std::move(stop)) {}
+  [[nodiscard]] const SourceInfo& info() const override { return info_; }
+  bool next(PointBlock& block) override {
+    block.clear();
+    if (!delivered_) {
+      delivered_ = true;
+      block.positions.push_back({1, 2, 3});
+      return true;
+    }
+    std::mutex mutex;
+    std::unique_lock lock(mutex);
+    std::condition_variable_any().wait(lock, stop_, [] { return false; });
+    throw Stopped();
+  }
+  [[nodiscard]] Progress progress() const override { return {}; }
+
+ private:
+  std::stop_token stop_;
+  SourceInfo info_;
+  bool delivered_ = false;
+};
+
+TEST(ReadAhead, ItsEndAndTheCallersStopEndTheReading) {
+  PointBlock block;
+  {
+    const std::stop_source reading;
+    const auto source = read_ahead(std::make_unique<Waiting>(reading.get_token()), 4, reading);
+    ASSERT_TRUE(source->next(block));
+    // The thread waits, or is about to: the destructor ends it.
+  }
+  std::stop_source caller;
+  const std::stop_source reading;
+  const auto source =
+      read_ahead(std::make_unique<Waiting>(reading.get_token()), 4, reading, caller.get_token());
+  ASSERT_TRUE(source->next(block));
+  caller.request_stop();
+  EXPECT_THROW(source->next(block), Stopped);
+}
+
+/// A pipe with a name, in a folder that goes with it.
+class NamedPipe {
+ public:
+  NamedPipe() : path_((folder_.path() / "pipe").string()) { ::mkfifo(path_.c_str(), 0600); }
+  [[nodiscard]] const std::string& path() const { return path_; }
+
+ private:
+  TempFolder folder_;
+  std::string path_;
+};
+
+TEST(ReadAhead, AStopEndsOpeningAPipeWithoutAWriter) {
+  const NamedPipe pipe;
+  const std::array<std::string, 1> files{pipe.path()};
+  std::stop_source stop;
+  std::jthread stopper([&stop] { stop.request_stop(); });
+  EXPECT_THROW((void)open_source(files, {.stop = stop.get_token()}), Stopped);
+}
+
+TEST(ReadAhead, ASourceEndsWhileItsPipeIdles) {
+  const NamedPipe pipe;
+  const std::array<std::string, 1> files{pipe.path()};
+  // For reading too, so that it opens at once and has a reader.
+  const int writer = ::open(pipe.path().c_str(), O_RDWR | O_CLOEXEC);
+  std::string lines;
+  while (lines.size() < 8192) lines += "1 2 3\n";
+  ASSERT_EQ(::write(writer, lines.data(), lines.size()), static_cast<ssize_t>(lines.size()));
+  {
+    const auto source = open_source(files, {.block_points = 100, .blocks_ahead = 1000});
+    PointBlock block;
+    ASSERT_TRUE(source->next(block));
+    EXPECT_EQ(block.size(), 100u);
+  }
+  ::close(writer);
 }
 
 }  // namespace

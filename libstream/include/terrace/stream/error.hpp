@@ -25,6 +25,18 @@ class Error : public std::runtime_error {
   Parts parts_;
 };
 
+/// Thrown where reading or writing ends because the caller's stop token asked for it.
+class Stopped : public std::runtime_error {
+ public:
+  Stopped() : std::runtime_error("stopped") {}
+};
+
+/// Thrown by a write to standard output whose reader has gone (EPIPE).
+class ClosedPipe : public Error {
+ public:
+  ClosedPipe();
+};
+
 /// An Error for a failed system call: the cause ends with the text of `error_number` (errno).
 Error system_error(std::string file, const std::string& action, int error_number,
                    std::string remedy = {});

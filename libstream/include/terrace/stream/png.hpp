@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <span>
+#include <stop_token>
 
 namespace terrace::stream {
 
@@ -12,12 +13,15 @@ namespace terrace::stream {
 ///
 /// channels: 1 grey, 2 grey and alpha, 3 RGB, 4 RGBA; pixels: width * height * channels values.
 /// The file appears whole and synced, or not at all; an existing one only goes with `replace`.
+/// "-" is standard output; `stop` ends a wait for its reader.
 /// Throws: Error if the image is empty or larger than 2^31 - 1 on a side, or cannot be written.
 void write_png(const std::filesystem::path& path, std::size_t width, std::size_t height,
-               int channels, std::span<const std::uint8_t> pixels, bool replace = false);
+               int channels, std::span<const std::uint8_t> pixels, bool replace = false,
+               const std::stop_token& stop = {});
 
 /// The same for one channel of 16 bits: `samples` are width * height values.
 void write_png_grey16(const std::filesystem::path& path, std::size_t width, std::size_t height,
-                      std::span<const std::uint16_t> samples, bool replace = false);
+                      std::span<const std::uint16_t> samples, bool replace = false,
+                      const std::stop_token& stop = {});
 
 }  // namespace terrace::stream

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -44,7 +45,8 @@ struct WriterOptions {
   /// by blanks), "csv" (with a header line), "ply" (binary, little-endian), "ply-ascii".
   /// Meshes: "ply", "ply-ascii", "obj", "glb".
   std::string format{};
-  bool replace = false;  ///< an existing file is replaced instead of refused
+  bool replace = false;    ///< an existing file is replaced instead of refused
+  std::stop_token stop{};  ///< ends a wait for the reader of standard output, with Stopped
 };
 
 /// A writer for `path`; "-" is standard output, for "xyz" (also if no format is named) and "csv".

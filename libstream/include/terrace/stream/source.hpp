@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <stop_token>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -128,7 +129,7 @@ class PointSource {
   [[nodiscard]] virtual const SourceInfo& info() const = 0;
   /// Fills `block` (cleared first; its capacity is reused). False at the end, the block then empty.
   /// A block never has more than SourceOptions::block_points points.
-  /// Throws: Error on bad data, naming file, place, cause and remedy.
+  /// Throws: Error on bad data, naming file, place, cause and remedy; Stopped.
   virtual bool next(PointBlock& block) = 0;
   [[nodiscard]] virtual Progress progress() const = 0;
 };
@@ -142,19 +143,29 @@ struct SourceOptions {
   double cell_aspect = 0.0;  ///< ground height/width of a raster's cell, so that tiles are
                              ///< square on the ground; 0: as the transform says
   std::optional<Crs> crs{};  ///< replaces what the file says
+  /// Ends whatever waits for a pipe, in opening the source and in next(), with Stopped.
+  std::stop_token stop{};
+  /// Above 0: blocks are read on a thread of their own, at most so many ahead, from the first
+  /// next() on (see read_ahead()). The source's destructor waits for no pipe.
+  std::size_t blocks_ahead = 0;
 };
 
 /// Opens one file, or several as one source: rasters form a mosaic (same CRS, cell size and phase;
 /// where they overlap the last named valid sample wins), other formats follow one another and must
 /// agree in channels and CRS. "-" is standard input (formats that stream only).
-/// Throws: Error.
+/// Throws: Error, Stopped.
 std::unique_ptr<PointSource> open_source(std::span<const std::string> files,
                                          const SourceOptions& options = {});
 
 /// The same stream, read on a thread of its own, at most `blocks` blocks ahead. An Error thrown
-/// there is thrown by the `next` that would have delivered the block.
-std::unique_ptr<PointSource> read_ahead(std::unique_ptr<PointSource> source,
-                                        std::size_t blocks = 8);
+/// there is thrown by the `next` that would have delivered the block. The thread starts with the
+/// first `next`; where none can be had the caller's reads.
+/// reading: the stop of `source`, asked for by `stop` and when the object goes, so that its
+/// destructor waits for no pipe.
+std::unique_ptr<PointSource> read_ahead(
+    std::unique_ptr<PointSource> source, std::size_t blocks = 8,
+    const std::stop_source& reading = std::stop_source(std::nostopstate),
+    const std::stop_token& stop = {});
 
 /// A format in the registry. `recognise` sees the first bytes of a file, up to 4096.
 struct Format {

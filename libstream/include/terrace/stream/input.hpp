@@ -3,7 +3,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -15,10 +17,15 @@ inline constexpr std::string_view kStandardStream = "-";
 
 /// The bytes of a file, a pipe or standard input ("-") from first to last, through a window that
 /// moves forward. Holds the window, never the file.
+///
+/// Whatever waits for a pipe (its first writer, more bytes) ends with Stopped as soon as `stop` is
+/// asked for, by whichever thread.
 class Input {
  public:
-  /// Throws: Error if the file cannot be opened or is a folder.
-  explicit Input(const std::string& file);
+  /// at_once: bytes that are asked for at a time. Does not wait for the first writer of a pipe.
+  /// Throws: Error if the file cannot be opened.
+  explicit Input(const std::string& file, const std::stop_token& stop = {},
+                 std::size_t at_once = std::size_t{256} << 10);
   ~Input();
   Input(const Input&) = delete;
   Input& operator=(const Input&) = delete;
@@ -26,11 +33,12 @@ class Input {
   /// The unread bytes that are in memory. Valid until the next fill() or skip().
   [[nodiscard]] std::string_view window() const { return {buffer_.data() + begin_, end_ - begin_}; }
   /// Reads until the window has `wanted` bytes or the input ends; returns the window. The window
-  /// grows to what is asked, so callers bound it.
+  /// grows to what is asked, so callers bound it. Throws: Error, Stopped.
   std::string_view fill(std::size_t wanted);
   /// Moves past the first `count` bytes of the window.
   void consume(std::size_t count);
   /// Moves past `count` bytes wherever they are; false if the input ends before.
+  /// Throws: Error, Stopped.
   bool skip(std::uint64_t count);
 
   /// Bytes consumed so far.
@@ -41,27 +49,19 @@ class Input {
   [[nodiscard]] const std::string& name() const { return name_; }
 
  private:
+  class Descriptor;
+
+  Input& operator=(Input&&) noexcept;
   /// One read into the free end of the buffer; false at the end of the input.
   bool read_more();
 
   std::string name_;
-  int fd_ = -1;
-  bool owned_ = false;
+  std::unique_ptr<Descriptor> descriptor_;
   bool ended_ = false;
   std::optional<std::uint64_t> size_;
   std::uint64_t offset_ = 0;
   std::vector<char> buffer_;
   std::size_t begin_ = 0, end_ = 0;
 };
-
-/// True for a file that can be opened again from its start; false for pipes and standard input.
-bool is_rereadable(const std::string& file);
-
-/// The first bytes of a file, at most `most`. What is read from a pipe is kept for the next Input
-/// of that name on this thread, or until drop_heads(). Throws: Error if the file cannot be opened
-/// or read.
-std::vector<char> peek_head(const std::string& file, std::size_t most);
-/// Forgets what peek_head() has kept and nobody has taken.
-void drop_heads();
 
 }  // namespace terrace::stream

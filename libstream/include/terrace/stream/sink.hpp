@@ -3,8 +3,10 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
+#include <stop_token>
 #include <string>
 #include <string_view>
 
@@ -12,12 +14,21 @@
 
 namespace terrace::stream {
 
+class StopWaiter;
+
 /// Where a writer's bytes go: to a file that appears when it is complete, or, for "-", to standard
 /// output.
 class Sink {
  public:
-  Sink(const std::string& path, bool replace);
+  /// replace: of an existing file. stop: ends a wait for the reader of standard output.
+  /// Throws: as AtomicFile.
+  Sink(const std::string& path, bool replace, const std::stop_token& stop = {});
+  ~Sink();
+  Sink(const Sink&) = delete;
+  Sink& operator=(const Sink&) = delete;
 
+  /// Throws: Error if it cannot be written; of standard output ClosedPipe and Stopped too, here or
+  /// in commit().
   void write(std::string_view text);
   void write(std::span<const std::byte> bytes) {
     write(std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
@@ -32,8 +43,9 @@ class Sink {
  private:
   void flush();
 
-  std::optional<AtomicFile> file_;  ///< nothing: standard output
-  std::string pending_;             ///< for standard output
+  std::optional<AtomicFile> file_;      ///< nothing: standard output
+  std::string pending_;                 ///< for standard output
+  std::unique_ptr<StopWaiter> waiter_;  ///< where standard output may keep one waiting
   std::uint64_t size_ = 0;
 };
 
