@@ -2,19 +2,20 @@
 #include "cli.hpp"
 
 #include <algorithm>
-#include <cstdio>
+#include <cmath>
 #include <exception>
-#include <iostream>
+#include <filesystem>
 #include <new>
+#include <stdexcept>
 #include <thread>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 #include <terrace/cluster/cuda_linkage.hpp>
-#include <unistd.h>
 
 #include "error.hpp"
 #include "interrupt.hpp"
+#include "terminal.hpp"
 #include "terrace/stream/error.hpp"
 #include "units.hpp"
 #include "version.hpp"
@@ -26,22 +27,6 @@ constexpr int kDone = 0;
 constexpr int kFailed = 1;
 constexpr int kWrongUsage = 2;
 constexpr int kInterrupted = 130;
-
-/// `text` on standard output, all of it. Throws: ClosedPipe, stream::Error.
-void print_result(const std::string& text) {
-  const bool written = std::fwrite(text.data(), 1, text.size(), stdout) == text.size();
-  if (written && std::fflush(stdout) == 0) return;
-  const int error = errno;
-  if (error == EPIPE) throw ClosedPipe();
-  throw stream::system_error("standard output", "cannot write", error);
-}
-
-/// The one line an error is. Multi-line messages of libraries are joined.
-void print_error(std::string text) {
-  while (!text.empty() && text.back() == '\n') text.pop_back();
-  std::replace(text.begin(), text.end(), '\n', ' ');
-  std::fprintf(stderr, "terrace: %s\n", text.c_str());
-}
 
 std::string general_help() {
   std::string text =
@@ -73,17 +58,35 @@ const Verb& find_verb(const std::string& name) {
   throw UsageError("there is no verb '" + name + "'; `terrace --help` lists them");
 }
 
-void add_common_options(CLI::App& app, CommonOptions& common, std::string& memory,
-                        std::string& seed) {
+/// parse(text), with the option's name before what it throws.
+template <class Parse>
+std::uint64_t value_of_option(const std::string& name, const std::string& text,
+                              const Parse& parse) {
+  try {
+    return parse(text);
+  } catch (const UsageError& error) {
+    throw UsageError(name + ": " + error.what());
+  }
+}
+
+void add_common_options(CLI::App& app, CommonOptions& common) {
   const std::string group = "Common options";
   app.add_option("--threads", common.threads, "Threads; never changes results (default: all cores)")
       ->check(CLI::Range(1U, 4096U))
       ->group(group)
       ->type_name("N");
-  app.add_option("--memory", memory, "Most memory to use: 256M, 2G; never changes results")
+  app.add_option_function<std::string>(
+         "--memory",
+         [&common](const std::string& text) {
+           common.memory_bytes = value_of_option("--memory", text, parse_memory);
+         },
+         "Most memory to use: 256M, 2G; never changes results")
       ->group(group)
       ->type_name("SIZE");
-  app.add_option("--seed", seed, "Same input, options and seed give the same bytes (default: 1)")
+  app.add_option_function<std::string>(
+         "--seed",
+         [&common](const std::string& text) { common.seed = count_of_option("--seed", text); },
+         "Same input, options and seed give the same bytes (default: 1)")
       ->group(group)
       ->type_name("N");
   app.add_flag("--json", common.json, "Print the summary as one JSON object on standard output")
@@ -105,6 +108,13 @@ void add_common_options(CLI::App& app, CommonOptions& common, std::string& memor
   app.add_flag("-v,--verbose", common.verbose, "Explain what is done")->group(group);
 }
 
+/// True if -o or what stands in its place is '-'.
+bool writes_to_stdout(const CLI::App& app) {
+  const CLI::Option* output = app.get_option_no_throw("--output");
+  if (output == nullptr) return false;
+  return (output->count() > 0 ? output->as<std::string>() : output->get_default_str()) == "-";
+}
+
 /// Runs one verb with its arguments, those after the verb's name.
 int run_verb(const Verb& verb, std::vector<std::string> arguments) {
   CLI::App app{verb.brief.empty() ? "" : "terrace " + verb.name + ": " + verb.brief + ".",
@@ -114,10 +124,9 @@ int run_verb(const Verb& verb, std::vector<std::string> arguments) {
 
   CommonOptions common;
   common.threads = std::max(1U, std::thread::hardware_concurrency());
-  std::string memory, seed;
   const std::unique_ptr<Command> command = verb.create();
   command->define(app);
-  add_common_options(app, common, memory, seed);
+  add_common_options(app, common);
 
   try {
     std::reverse(arguments.begin(), arguments.end());  // as CLI11 takes them
@@ -128,19 +137,27 @@ int run_verb(const Verb& verb, std::vector<std::string> arguments) {
   } catch (const CLI::ParseError& error) {
     throw UsageError(std::string(error.what()) + "; `terrace " + verb.name + " --help` tells more");
   }
-  if (!memory.empty()) common.memory_bytes = parse_memory(memory);
-  if (!seed.empty()) common.seed = parse_count(seed);
+  if (common.json && writes_to_stdout(app)) {
+    throw UsageError("--json and the output both want standard output; give -o FILE");
+  }
   if (common.quiet && common.progress == ProgressMode::automatic) {
     common.progress = ProgressMode::none;
   }
 
   const Summary summary = command->run(common);
-  if (common.json) {
-    print_result(summary.json.dump() + '\n');
-  } else if (summary.text_is_result) {
-    print_result(summary.text);
-  } else if (!common.quiet) {
-    std::fputs(summary.text.c_str(), stderr);
+  try {
+    if (common.json) {
+      // A file's name or text in it may be no UTF-8, and what a terminal obeys is escaped with
+      // all that is not ASCII.
+      constexpr auto kReplace = nlohmann::ordered_json::error_handler_t::replace;
+      print_result(summary.json.dump(-1, ' ', true, kReplace) + '\n');
+    } else if (summary.text_is_result) {
+      print_result(printable(summary.text));
+    } else if (!common.quiet) {
+      print_lines(summary.text);
+    }
+  } catch (const stream::ClosedPipe&) {
+    // Nobody wants to read the summary; what it would have said still is the exit code.
   }
   return summary.exit_code;
 }
@@ -165,7 +182,71 @@ int dispatch(const std::vector<std::string>& arguments) {
   return run_verb(find_verb(first), {arguments.begin() + 1, arguments.end()});
 }
 
+/// What went wrong, for people: texts of the standard library say little to them.
+std::string message_of(const std::exception& error) {
+  if (dynamic_cast<const std::bad_alloc*>(&error) != nullptr) {
+    return "out of memory; give a smaller --memory or a smaller input";
+  }
+  if (const auto* file = dynamic_cast<const std::filesystem::filesystem_error*>(&error)) {
+    return file->path1().string() + ": " + file->code().message();
+  }
+  const std::string text = error.what();
+  // "vector::reserve", "cannot create std::vector larger than max_size()": a size beyond all
+  // memory.
+  if (dynamic_cast<const std::length_error*>(&error) != nullptr &&
+      (text.find("::") != std::string::npos || text.find("max_size") != std::string::npos)) {
+    return "what is asked for does not fit into any memory; ask for less";
+  }
+  if (dynamic_cast<const std::invalid_argument*>(&error) != nullptr) {
+    return text + "; check the values of the options (`terrace VERB --help`)";
+  }
+  return text;
+}
+
+/// Throws: UsageError naming the option.
+double number_of_option(const std::string& name, const std::string& text,
+                        const NumberRange& range) {
+  const double value = parse_number(text, name);
+  if (value < range.least || (range.above_least && value == range.least) || value > range.most) {
+    std::string wanted = range.above_least        ? "above " + number_text(range.least)
+                         : std::isinf(range.most) ? "at least " + number_text(range.least)
+                                                  : "from " + number_text(range.least) + " to " +
+                                                        number_text(range.most);
+    throw UsageError(name + " must be " + wanted + ", not " + text);
+  }
+  return value;
+}
+
 }  // namespace
+
+CLI::Option* add_number(CLI::App& app, const std::string& name, double& value,
+                        const std::string& description, const NumberRange& range) {
+  return app
+      .add_option_function<std::string>(
+          name,
+          [name, range, &value](const std::string& text) {
+            value = number_of_option(name, text, range);
+          },
+          description)
+      ->default_str(number_text(value))
+      ->type_name("NUMBER");
+}
+
+CLI::Option* add_number(CLI::App& app, const std::string& name, std::optional<double>& value,
+                        const std::string& description, const NumberRange& range) {
+  return app
+      .add_option_function<std::string>(
+          name,
+          [name, range, &value](const std::string& text) {
+            value = number_of_option(name, text, range);
+          },
+          description)
+      ->type_name("NUMBER");
+}
+
+std::uint64_t count_of_option(const std::string& name, const std::string& text) {
+  return value_of_option(name, text, parse_count);
+}
 
 void not_yet(CLI::App& app, std::initializer_list<const char*> names) {
   for (const char* name : names) {
@@ -188,25 +269,21 @@ int run_command_line(int argc, const char* const* argv) {
   install_signal_handlers();
   try {
     return dispatch({argv + std::min(argc, 1), argv + argc});
-  } catch (const ClosedPipe&) {
+  } catch (const stream::ClosedPipe&) {
     return kDone;
   } catch (const UsageError& error) {
-    print_error(error.what());
+    print_message(error.what());
     return kWrongUsage;
   } catch (const Interrupted& error) {
-    print_error(error.what());
+    print_message(error.what());
     return kInterrupted;
-  } catch (const std::bad_alloc&) {
-    print_error("out of memory; give a smaller --memory or a smaller input");
-    return kFailed;
   } catch (const std::exception& error) {
-    // A read or write that a signal cut short, or whose other end has gone, is not a fault.
+    // A wait that Ctrl-C ended, or a read or write that the signal cut short, is not a fault.
     if (interrupted()) {
-      print_error("interrupted; run the same command again to start anew");
+      print_message("interrupted; run the same command again to start anew");
       return kInterrupted;
     }
-    if (stdout_closed()) return kDone;
-    print_error(error.what());
+    print_message(message_of(error));
     return kFailed;
   }
 }

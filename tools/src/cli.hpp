@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <initializer_list>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -67,6 +68,28 @@ std::span<const Verb> verbs();
 
 /// Options of the contract that do not work yet: refused with exit 2, hidden from the help.
 void not_yet(CLI::App& app, std::initializer_list<const char*> names);
+
+/// The numbers that an option takes: finite, and not outside these.
+struct NumberRange {
+  double least = -std::numeric_limits<double>::infinity();
+  double most = std::numeric_limits<double>::infinity();
+  bool above_least = false;  ///< the least itself is outside
+};
+inline constexpr NumberRange kAboveZero{.least = 0.0, .above_least = true};
+inline constexpr NumberRange kNotNegative{.least = 0.0};
+/// Of factors of lengths and costs: with these what they multiply stays a number.
+inline constexpr NumberRange kFactor{.least = 1e-12, .most = 1e12};
+inline constexpr NumberRange kFactorOrZero{.least = 0.0, .most = 1e12};
+
+/// The one way in which an option takes a real number. `value` is its default, shown in the help.
+CLI::Option* add_number(CLI::App& app, const std::string& name, double& value,
+                        const std::string& description, const NumberRange& range = {});
+/// Without a default.
+CLI::Option* add_number(CLI::App& app, const std::string& name, std::optional<double>& value,
+                        const std::string& description, const NumberRange& range = {});
+
+/// parse_count() for an option, which its UsageError names.
+std::uint64_t count_of_option(const std::string& name, const std::string& text);
 
 /// The option -o, --output: required, kept in `target`.
 CLI::Option* add_output(CLI::App& app, std::string& target, const std::string& description);

@@ -2,7 +2,6 @@
 #include "cluster_output.hpp"
 
 #include <algorithm>
-#include <cstdio>
 #include <span>
 #include <utility>
 #include <vector>
@@ -10,8 +9,8 @@
 #include "error.hpp"
 #include "interrupt.hpp"
 #include "output.hpp"
-#include "terrace/stream/atomic_file.hpp"
 #include "terrace/stream/point_writer.hpp"
+#include "terrace/stream/sink.hpp"
 
 namespace terrace::tools {
 
@@ -21,12 +20,7 @@ void write_labels(const std::string& path, const ClusterOutcome& outcome, bool r
     text += label == cluster::kOutlier ? "-1" : std::to_string(label);
     text += '\n';
   }
-  if (path == "-") {
-    std::fwrite(text.data(), 1, text.size(), stdout);
-    if (std::fflush(stdout) != 0) throw ClosedPipe();
-    return;
-  }
-  stream::AtomicFile file(path, replace);
+  stream::Sink file(path, replace, stop_token());
   file.write(text);
   file.commit();
 }
@@ -41,7 +35,7 @@ void write_clustered(const std::string& path, const std::string& format, PointTa
   attributes.push_back({.name = "representative", .type = stream::ScalarType::i32});
   const auto writer = stream::open_point_writer(
       path, {.attributes = std::move(attributes), .comments = {kWriterMark}},
-      {.format = format, .replace = replace});
+      {.format = format, .replace = replace, .stop = stop_token()});
   const std::size_t own = table.attributes.size();
   constexpr std::size_t kBlock = 65536;
   stream::PointBlock block;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <cstdio>
-
 #include "cli.hpp"
+#include "terminal.hpp"
 #include "units.hpp"
 
 // Apart from the command line, which needs all verbs: libraries of the tools speak by these.
@@ -13,11 +12,11 @@ std::uint64_t CommonOptions::memory_or(std::uint64_t standard) const {
 }
 
 void CommonOptions::say(const std::string& line) const {
-  if (!quiet) std::fprintf(stderr, "terrace: %s\n", line.c_str());
+  if (!quiet) print_message(line);
 }
 
 void CommonOptions::explain(const std::string& line) const {
-  if (verbose && !quiet) std::fprintf(stderr, "terrace: %s\n", line.c_str());
+  if (verbose && !quiet) print_message(line);
 }
 
 }  // namespace terrace::tools

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "dendrogram_file.hpp"
 
-#include <iostream>
 #include <string_view>
 
 #include "csv_rows.hpp"
 #include "error.hpp"
-#include "terrace/stream/atomic_file.hpp"
+#include "interrupt.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/stream/sink.hpp"
 #include "units.hpp"
 
 namespace terrace::tools {
@@ -29,13 +29,7 @@ bool parse_row(std::string_view text, cluster::Merge& merge) {
 
 void write_dendrogram(const std::string& path, const cluster::Dendrogram& dendrogram,
                       bool replace) {
-  if (path == "-") {
-    std::cout << kHeader << '\n';
-    for (const cluster::Merge& merge : dendrogram.merges) std::cout << row_text(merge);
-    if (!std::cout.flush()) throw ClosedPipe();
-    return;
-  }
-  stream::AtomicFile file(path, replace);
+  stream::Sink file(path, replace, stop_token());
   file.write(std::string(kHeader) + '\n');
   for (const cluster::Merge& merge : dendrogram.merges) file.write(row_text(merge));
   file.commit();

@@ -13,10 +13,4 @@ class UsageError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// The reader of our standard output has gone. Ends the command quietly.
-class ClosedPipe : public std::runtime_error {
- public:
-  ClosedPipe() : std::runtime_error("closed pipe") {}
-};
-
 }  // namespace terrace::tools

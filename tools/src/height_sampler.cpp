@@ -13,13 +13,6 @@ tri::Interpolation parse_interpolation(const std::string& text) {
   throw UsageError("'" + text + "' is no --method; write linear, natural or nearest");
 }
 
-std::optional<double> parse_max_edge(const std::string& text) {
-  if (text.empty()) return std::nullopt;
-  const double metres = parse_number(text, "--max-edge");
-  if (!(metres > 0)) throw UsageError("--max-edge must be above 0");
-  return metres;
-}
-
 std::unique_ptr<HeightSampler> make_sampler(const stream::Store& store,
                                             const SamplerOptions& options) {
   if (options.level > store.top()) {

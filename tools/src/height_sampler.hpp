@@ -18,9 +18,6 @@ namespace terrace::tools {
 /// "linear", "natural", "nearest". Throws: UsageError.
 tri::Interpolation parse_interpolation(const std::string& text);
 
-/// Of --max-edge; nothing for an empty text. Throws: UsageError unless it is above 0.
-std::optional<double> parse_max_edge(const std::string& text);
-
 struct SamplerOptions {
   tri::Interpolation method = tri::Interpolation::kLinear;
   unsigned level = 0;  ///< the points of this level and above

@@ -9,6 +9,7 @@
 #include "info.hpp"
 #include "interrupt.hpp"
 #include "source_crs.hpp"
+#include "terminal.hpp"
 #include "terrace/stream/error.hpp"
 #include "units.hpp"
 
@@ -76,9 +77,8 @@ std::uint64_t bytes_of(const std::vector<std::string>& files) {
 
 Summary info_of_file(const std::string& path, const CommonOptions& common) {
   const std::array<std::string, 1> files{path};
-  std::unique_ptr<stream::PointSource> source = stream::open_source(files);
-  // Standard input is read by this thread, which Ctrl-C reaches.
-  if (path != "-") source = stream::read_ahead(std::move(source));
+  const std::unique_ptr<stream::PointSource> source =
+      stream::open_source(files, {.stop = stop_token(), .blocks_ahead = 8});
   const Contents contents = stream_through(*source, common);
   const stream::SourceInfo& info = source->info();
   SourceCrs crs;
@@ -137,8 +137,8 @@ Summary info_of_file(const std::string& path, const CommonOptions& common) {
             (info.nodata ? ", value " + number_text(*info.nodata) : std::string()) + '\n';
   }
   text += "points:    " + with_commas(contents.points) + '\n';
-  text += "crs:       " + text_of(crs.crs) + '\n';
-  if (!crs.note.empty()) text += "note:      " + crs.note + '\n';
+  text += "crs:       " + printable_line(text_of(crs.crs)) + '\n';
+  if (!crs.note.empty()) text += "note:      " + printable_line(crs.note) + '\n';
   if (crs.heights != Heights::unknown) text += "vertical:  " + name_of(crs.heights) + '\n';
   text += "bounds:    " + text_of(contents.world) + '\n';
   if (contents.points > 0) {
@@ -147,10 +147,13 @@ Summary info_of_file(const std::string& path, const CommonOptions& common) {
             number_text(json["height"]["mean"].get<double>()) + '\n';
   }
   text += "channels: ";
-  for (const stream::Channel& channel : info.coordinates) text += ' ' + text_of(channel) + ',';
-  for (const stream::Channel& channel : info.attributes) text += ' ' + text_of(channel) + ',';
+  for (const stream::Channel& channel : info.coordinates)
+    text += ' ' + printable_line(text_of(channel)) + ',';
+  for (const stream::Channel& channel : info.attributes)
+    text += ' ' + printable_line(text_of(channel)) + ',';
   text.back() = '\n';
-  for (const std::string& comment : info.comments) text += "comment:   " + comment + '\n';
+  for (const std::string& comment : info.comments)
+    text += "comment:   " + printable_line(comment) + '\n';
   return summary;
 }
 

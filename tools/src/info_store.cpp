@@ -4,6 +4,7 @@
 
 #include "info.hpp"
 #include "interrupt.hpp"
+#include "terminal.hpp"
 #include "terrace/stream/store.hpp"
 #include "units.hpp"
 
@@ -89,18 +90,19 @@ Summary info_of_store(const std::string& path, const CommonOptions& common) {
   }
   text +=
       "points:    " + with_commas(store.points()) + ", nodata " + with_commas(schema.nodata) + '\n';
-  text += "crs:       " + text_of(schema.crs) + '\n';
+  text += "crs:       " + printable_line(text_of(schema.crs)) + '\n';
   text +=
       "vertical:  " + (schema.vertical.empty() ? std::string("unknown") : schema.vertical) + '\n';
   text += "bounds:    " + text_of(bounds) + '\n';
   text += "heights:   " + number_text(bounds.min[2]) + " to " + number_text(bounds.max[2]) +
           ", mean " + number_text(mean) + '\n';
   text += "channels: ";
-  for (const stream::Channel& c : schema.coordinates) text += ' ' + text_of(c) + ',';
-  for (const stream::Channel& c : schema.attributes) text += ' ' + text_of(c) + ',';
+  for (const stream::Channel& c : schema.coordinates)
+    text += ' ' + printable_line(text_of(c)) + ',';
+  for (const stream::Channel& c : schema.attributes) text += ' ' + printable_line(text_of(c)) + ',';
   text.back() = '\n';
   for (const auto& [name, value] : schema.parameters)
-    text += "parameter: " + name + ' ' + value + '\n';
+    text += "parameter: " + printable_line(name + ' ' + value) + '\n';
   text += "level          points    clusters        bytes   cluster sizes: 5 %  median   95 %\n";
   for (const stream::LevelInfo& level : store.levels()) {
     const Sizes sizes = sizes_of(store, level);

@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <stdexcept>
+#include <stop_token>
 #include <string>
 
 namespace terrace::tools {
@@ -13,9 +14,8 @@ class Interrupted : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// From here on SIGINT and SIGTERM only set a flag and close standard input, so that nobody waits
-/// for it (the second one ends the process at once), and a closed pipe is an error of the write
-/// instead of a signal.
+/// From here on SIGINT and SIGTERM only ask to stop (the second one ends the process at once), and
+/// a closed pipe is an error of the write instead of a signal.
 void install_signal_handlers();
 
 /// True once the user has asked to stop. Cheap; may be called from any thread.
@@ -24,13 +24,13 @@ void install_signal_handlers();
 /// Throws Interrupted if the user has asked to stop. Loops call it once per block.
 void check_interrupt();
 
+/// The same request for what waits: reading and writing pipes ends with stream::Stopped.
+[[nodiscard]] std::stop_token stop_token();
+
 /// Calls `work` on a thread of its own and returns when it is done; what it throws comes out. If
 /// the user asks to stop and the work does not end by itself within a second (it calls
 /// check_interrupt() now and then, or it does not), the process ends here with a message and exit
 /// code 130. So `work` must not be writing anything.
 void run_interruptible(const std::function<void()>& work);
-
-/// True if standard output is a pipe that nobody reads any more.
-[[nodiscard]] bool stdout_closed() noexcept;
 
 }  // namespace terrace::tools

@@ -1,4 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli.hpp"
+#include "terminal.hpp"
 
-int main(int argc, char** argv) { return terrace::tools::run_command_line(argc, argv); }
+int main(int argc, char** argv) {
+  terrace::tools::secure_standard_descriptors();
+  return terrace::tools::run_command_line(argc, argv);
+}

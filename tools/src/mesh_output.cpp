@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "interrupt.hpp"
 #include "output.hpp"
 #include "terrace/stream/mesh_writer.hpp"
 
@@ -22,8 +23,8 @@ void write_mesh(const std::string& path, const std::string& format, const Triang
   if (!mesh.levels.empty()) header.attributes = {"level"};
   header.comments = {kWriterMark};
   if (!bounds.empty()) header.bounds = bounds;
-  const auto writer =
-      stream::open_mesh_writer(path, header, {.format = format, .replace = replace});
+  const auto writer = stream::open_mesh_writer(
+      path, header, {.format = format, .replace = replace, .stop = stop_token()});
   std::vector<float> levels;
   const std::span vertices(mesh.positions);
   for (std::size_t at = 0; at < vertices.size(); at += kPiece) {

@@ -120,7 +120,8 @@ void append_cloud(const stream::SourceInfo& info, const stream::PointBlock& bloc
 PictureInput from_source(const std::string& path, std::uint64_t most_cells,
                          const CommonOptions& common) {
   const std::array<std::string, 1> files{path};
-  const std::unique_ptr<stream::PointSource> source = stream::open_source(files);
+  const std::unique_ptr<stream::PointSource> source =
+      stream::open_source(files, {.stop = stop_token()});
   const stream::SourceInfo& info = source->info();
   const std::uint64_t memory = common.memory_or(0);
 

@@ -3,10 +3,8 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <charconv>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <optional>
 
@@ -105,53 +103,32 @@ std::string_view PlaceBatch::line(std::size_t i) const {
   return line;
 }
 
-PlaceFile::PlaceFile(const std::string& path)
-    : name_(path == "-" ? "standard input" : path),
-      file_(path == "-" ? stdin : std::fopen(path.c_str(), "rb")) {
-  if (file_ == nullptr) throw stream::system_error(name_, "cannot open", errno);
-}
-
-void PlaceFile::read_more(std::size_t most_bytes) {
-  buffer_.erase(0, at_);
-  at_ = 0;
-  while (!ended_ && buffer_.size() < most_bytes) {
-    const std::size_t had = buffer_.size(), wanted = std::min(most_bytes - had, kReadAtOnce);
-    buffer_.resize(had + wanted);
-    errno = 0;
-    const std::size_t taken = std::fread(buffer_.data() + had, 1, wanted, file_.get());
-    buffer_.resize(had + taken);
-    if (taken == wanted) continue;
-    const int error = errno;
-    check_interrupt();
-    if (std::ferror(file_.get()) != 0) throw stream::system_error(name_, "cannot read", error);
-    ended_ = true;
-  }
-}
+PlaceFile::PlaceFile(const std::string& path) : input_(path, stop_token(), kReadAtOnce) {}
 
 bool PlaceFile::next(PlaceBatch& batch, std::size_t most_bytes, std::size_t most_lines) {
   check_interrupt();
-  read_more(std::max(most_bytes, kLongestLine));
+  const std::size_t wanted = std::max(most_bytes, kLongestLine);
+  const std::string_view window = input_.fill(wanted);
+  const bool ended = window.size() < wanted;
   batch.begins.clear();
   batch.first_line = line_;
   std::size_t end = 0;
-  while (end < buffer_.size() && batch.begins.size() < most_lines) {
-    const void* found = std::memchr(buffer_.data() + end, '\n', buffer_.size() - end);
-    if (found == nullptr && !ended_) break;
+  while (end < window.size() && batch.begins.size() < most_lines) {
+    const std::size_t found = window.find('\n', end);
+    if (found == std::string_view::npos && !ended) break;
     batch.begins.push_back(end);
-    end = found == nullptr
-              ? buffer_.size()
-              : static_cast<std::size_t>(static_cast<const char*>(found) - buffer_.data()) + 1;
+    end = found == std::string_view::npos ? window.size() : found + 1;
   }
   if (batch.begins.empty()) {
-    if (buffer_.empty()) return false;
-    throw stream::Error({.file = name_,
+    if (window.empty()) return false;
+    throw stream::Error({.file = name(),
                          .where = "line " + std::to_string(line_),
                          .cause = "is longer than any line of a table",
                          .remedy = "give a text file with one place a line"});
   }
-  batch.text.assign(buffer_, 0, end);
+  batch.text.assign(window.substr(0, end));
   batch.begins.push_back(end);
-  at_ = end;
+  input_.consume(end);
   line_ += batch.size();
   return true;
 }

@@ -3,12 +3,12 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <cstdio>
-#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include <terrace/stream/input.hpp>
 
 #include "region.hpp"
 
@@ -48,23 +48,11 @@ class PlaceFile {
   /// Throws: stream::Error on a line longer than a mebibyte, Interrupted.
   bool next(PlaceBatch& batch, std::size_t most_bytes, std::size_t most_lines);
   /// As messages call it.
-  [[nodiscard]] const std::string& name() const { return name_; }
+  [[nodiscard]] const std::string& name() const { return input_.name(); }
 
  private:
-  struct Close {
-    void operator()(std::FILE* file) const {
-      if (file != stdin) std::fclose(file);
-    }
-  };
-
-  void read_more(std::size_t most_bytes);
-
-  std::string name_;
-  std::unique_ptr<std::FILE, Close> file_;
-  std::string buffer_;
-  std::size_t at_ = 0;  ///< what has been delivered of it
+  stream::Input input_;
   std::uint64_t line_ = 1;
-  bool ended_ = false;
 };
 
 /// Whether a line is kept without an answer: it is empty, or a comment (#).

@@ -44,7 +44,7 @@ PointTable read_point_table(const std::string& file, const std::string& format,
                             std::uint64_t memory_bytes, const CommonOptions& common) {
   const std::array<std::string, 1> files{file};
   const std::unique_ptr<stream::PointSource> source =
-      stream::open_source(files, {.format = format});
+      stream::open_source(files, {.format = format, .stop = stop_token()});
   PointTable table;
   table.info = source->info();
   table.attributes.resize(table.info.attributes.size());

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <memory>
+#include <stop_token>
 #include <utility>
 
 #include <terrace/cluster/hierarchy.hpp>
@@ -174,6 +175,11 @@ BuildOutcome build_store(const BuildRequest& request, const BuildProgress& progr
   source_options.memory_bytes = kSourceMemory;
   source_options.band = request.band;
   source_options.crs = request.crs;
+  source_options.blocks_ahead = kBlocksAhead;
+  std::stop_source reading;
+  const auto stop_reading = [&reading] { reading.request_stop(); };
+  const std::stop_callback on_interrupt(stop_token(), stop_reading);
+  source_options.stop = reading.get_token();
   auto source = stream::open_source(request.inputs, source_options);
   const stream::SourceInfo& info = source->info();
   const SourceCrs crs = crs_of_source(info, request.datum_shift);
@@ -189,7 +195,6 @@ BuildOutcome build_store(const BuildRequest& request, const BuildProgress& progr
     source_options.cell_aspect = cell_aspect(ground, info);
     source = stream::open_source(request.inputs, source_options);
   }
-  source = stream::read_ahead(std::move(source), kBlocksAhead);
 
   const stream::Schema schema = schema_of(source->info(), crs, request);
   stream::StoreWriter writer(request.store, schema, request.replace);
@@ -205,12 +210,24 @@ BuildOutcome build_store(const BuildRequest& request, const BuildProgress& progr
     return ground.map({bounds.min, bounds.max});
   };
   set_metric(request, source->info(), ground, options);
+  // A full disk is told at once, even if the input's producer idles.
+  options.on_failure = stop_reading;
   cluster::HierarchyBuilder builder(options, sink);
 
   stream::PointBlock block;
   std::vector<std::byte> payload;
   stream::Progress so_far;
-  while (source->next(block)) {
+  // What ended the reading is told by whoever asked for it.
+  const auto next = [&] {
+    try {
+      return source->next(block);
+    } catch (const stream::Stopped&) {
+      check_interrupt();
+      builder.push({});
+      throw;
+    }
+  };
+  while (next()) {
     pack(block, options.payload_size, payload);
     builder.push(block.positions, payload);
     so_far = source->progress();

@@ -16,6 +16,7 @@
 
 #include "coordinate_system.hpp"
 #include "error.hpp"
+#include "interrupt.hpp"
 #include "store_build.hpp"
 #include "units.hpp"
 #include "verbs.hpp"
@@ -69,16 +70,13 @@ class BuildCommand final : public Command {
         ->check(CLI::IsMember({"ellipsoidal", "orthometric"}));
     app.add_option("--band", request_.band, "of rasters, from 1")->check(CLI::PositiveNumber);
     app.add_option("--block", block_, "most points clustered together")->capture_default_str();
-    app.add_option("--facility-cost", request_.facility_cost,
-                   "times the diagonal of a block: larger makes larger clusters")
-        ->check(CLI::PositiveNumber)
-        ->capture_default_str();
+    add_number(app, "--facility-cost", request_.facility_cost,
+               "times the diagonal of a block: larger makes larger clusters", kFactor);
     app.add_option("--effort", effort_, "how long to search for good clusters")
         ->check(CLI::IsMember({"fast", "default", "fine", "full"}))
         ->capture_default_str();
-    app.add_option("--z-weight", request_.z_weight, "how much heights count in a distance")
-        ->check(CLI::NonNegativeNumber)
-        ->capture_default_str();
+    add_number(app, "--z-weight", request_.z_weight, "how much heights count in a distance",
+               kFactorOrZero);
     app.add_option(
            "--metric", metric_,
            "euclidean, squared, minkowski:P or elliptical:FILE (JSON: boxes with semi-axes)")
@@ -147,7 +145,8 @@ class BuildCommand final : public Command {
     if (std::find(request_.inputs.begin(), request_.inputs.end(), "-") != request_.inputs.end()) {
       throw UsageError("--dry-run reads its input before the build does: name files, not -");
     }
-    const auto source = stream::open_source(request_.inputs, {.format = request_.input_format});
+    const auto source = stream::open_source(
+        request_.inputs, {.format = request_.input_format, .stop = stop_token()});
     const stream::SourceInfo& info = source->info();
     const std::filesystem::path target = request_.store;
     const TrialFolder folder(target.parent_path());

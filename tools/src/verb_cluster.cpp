@@ -2,6 +2,7 @@
 // cluster: clusters one file of points in memory, by any method of libcluster.
 #include <algorithm>
 #include <limits>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -54,16 +55,13 @@ class ClusterCommand final : public Command {
     app.add_option("-k", request_.k, "Number of clusters")
         ->check(CLI::PositiveNumber)
         ->type_name("K");
-    app.add_option("--height", height_, "single, complete: cut the tree at this distance")
-        ->check(CLI::NonNegativeNumber)
+    add_number(app, "--height", request_.height, "single, complete: cut the tree at this distance",
+               kNotNegative)
         ->type_name("H");
-    app.add_option("--facility-cost", facility_cost_,
-                   "Times the diagonal of the points: larger makes fewer clusters")
-        ->check(CLI::PositiveNumber)
-        ->capture_default_str();
-    app.add_option("--outlier-price", outlier_price_,
-                   "facility: leave a point out if that costs less; times the diagonal")
-        ->check(CLI::PositiveNumber)
+    add_number(app, "--facility-cost", facility_cost_,
+               "Times the diagonal of the points: larger makes fewer clusters", kFactor);
+    add_number(app, "--outlier-price", outlier_price_,
+               "facility: leave a point out if that costs less; times the diagonal", kFactor)
         ->type_name("PRICE");
     app.add_option("--strategy", request_.strategy,
                    "facility: automatic, fast, full-scan, quadtree, octree, kd-tree or facilities")
@@ -97,9 +95,7 @@ class ClusterCommand final : public Command {
         ->allow_extra_args(false)
         ->type_name("NAME:WEIGHT");
     app.add_option("--weight", weight_, "The column of the points' weights")->type_name("NAME");
-    app.add_option("--z-weight", z_weight_, "How much heights count in a distance")
-        ->check(CLI::NonNegativeNumber)
-        ->capture_default_str();
+    add_number(app, "--z-weight", z_weight_, "How much heights count in a distance", kFactorOrZero);
     app.add_flag("--single-precision", request_.single_precision,
                  "complete: a matrix of half the size");
     app.add_option("--device", device_, "single, complete: cpu or cuda")
@@ -138,7 +134,7 @@ class ClusterCommand final : public Command {
     problem.metric = metric.on_ground(ground.origin, ground.scale);
     problem.channels = {channels.values, channels.weights};
     problem.facility_cost = facility_cost_;
-    if (outlier_price_ > 0) problem.outlier_price = outlier_price_;
+    if (outlier_price_) problem.outlier_price = *outlier_price_;
 
     ClusterOutcome outcome;
     {
@@ -179,7 +175,6 @@ class ClusterCommand final : public Command {
     request_.cuda = device_ == "cuda";
     request_.seed = common.seed;
     request_.threads = common.threads;
-    if (height_ >= 0) request_.height = height_;
     const bool tree = *method == ClusterMethod::single || *method == ClusterMethod::complete;
     const bool flat = !output_.empty() || !labels_.empty();
     if (!flat && dendrogram_.empty()) {
@@ -204,7 +199,7 @@ class ClusterCommand final : public Command {
                        "k-means, k-median, single and complete");
     }
     if (*method != ClusterMethod::facility &&
-        (outlier_price_ > 0 || request_.strategy != "automatic" || !request_.iterations.empty() ||
+        (outlier_price_ || request_.strategy != "automatic" || !request_.iterations.empty() ||
          request_.batch != 1)) {
       throw UsageError(
           "--outlier-price, --strategy, --iterations and --batch are for --method "
@@ -219,7 +214,8 @@ class ClusterCommand final : public Command {
   std::string method_ = "facility", effort_ = "default", metric_ = "euclidean", weight_;
   std::string device_ = "cpu";
   std::vector<std::string> channels_;
-  double height_ = -1, facility_cost_ = 1.0, outlier_price_ = 0, z_weight_ = 1.0;
+  double facility_cost_ = 1.0, z_weight_ = 1.0;
+  std::optional<double> outlier_price_;
 };
 
 }  // namespace

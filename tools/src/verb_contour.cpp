@@ -4,13 +4,13 @@
 #include <string>
 
 #include <CLI/CLI.hpp>
+#include <terrace/stream/sink.hpp>
 #include <terrace/stream/store.hpp>
 
 #include "contour_run.hpp"
 #include "crs_options.hpp"
-#include "error.hpp"
+#include "interrupt.hpp"
 #include "output.hpp"
-#include "text_output.hpp"
 #include "units.hpp"
 #include "verbs.hpp"
 
@@ -24,17 +24,19 @@ class ContourCommand final : public Command {
     add_output(
         app, output_,
         "GeoJSON: lines in longitude and latitude, elev is the height; - is standard output");
-    app.add_option("--interval", interval_,
-                   "height from line to line, in the store's vertical unit: lines at its multiples")
+    add_number(app, "--interval", interval_,
+               "height from line to line, in the store's vertical unit: lines at its multiples",
+               kAboveZero)
         ->required()
         ->type_name("HEIGHT");
     app.add_option("--region", region_,
                    "only what is inside: minx,miny,maxx,maxy or a GeoJSON file");
     app.add_option("--level", level_, "only points of this level and above: a number or top")
         ->capture_default_str();
-    app.add_option("--max-edge", max_edge_,
-                   "of points: triangles with a longer side, on the ground, are no data (default: "
-                   "none is too long)")
+    add_number(app, "--max-edge", max_edge_,
+               "of points: triangles with a longer side, on the ground, are no data (default: "
+               "none is too long)",
+               kAboveZero)
         ->type_name("METRES");
     crs_.define_region(app);
   }
@@ -42,27 +44,20 @@ class ContourCommand final : public Command {
   Summary run(const CommonOptions& common) override {
     const Stopwatch watch;
     ContourRequest request;
-    request.interval = parse_number(interval_, "--interval");
-    if (!(request.interval > 0)) throw UsageError("--interval must be above 0");
+    request.interval = *interval_;  // required
     const std::optional<unsigned> level = parse_level(level_);
-    if (!max_edge_.empty()) {
-      request.max_edge = parse_number(max_edge_, "--max-edge");
-      if (!(*request.max_edge > 0)) throw UsageError("--max-edge must be above 0");
-    }
-    if (common.json && output_ == "-") {
-      throw UsageError("--json and the lines cannot both go to standard output; give -o FILE");
-    }
+    request.max_edge = max_edge_;
     const stream::Store store = stream::Store::open(store_);
     if (!region_.empty()) request.region = crs_.regions(store)(Region::parse(region_));
     request.level = level.value_or(store.top());
     request.threads = common.threads;
     request.memory_bytes = common.memory_or(machine_memory_bytes() / 2);
-    TextOutput output(output_, may_replace(output_, common.force));
+    stream::Sink output(output_, may_replace(output_, common.force), stop_token());
     ProgressMeter meter(common.progress, "lines");
     const ContourOutcome outcome = write_contours(
         store, request, [&](std::string_view text) { output.write(text); },
         [&](std::uint64_t lines, double share) { meter.update(lines, share); });
-    output.finish();
+    output.commit();
 
     Summary summary;
     summary.json = {{"lines", outcome.lines},
@@ -77,7 +72,8 @@ class ContourCommand final : public Command {
   }
 
  private:
-  std::string store_, output_, interval_, region_, level_ = "0", max_edge_;
+  std::string store_, output_, region_, level_ = "0";
+  std::optional<double> interval_, max_edge_;
   CrsOptions crs_;
 };
 

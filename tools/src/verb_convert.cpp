@@ -6,7 +6,6 @@
 
 #include <CLI/CLI.hpp>
 
-#include "error.hpp"
 #include "interrupt.hpp"
 #include "output.hpp"
 #include "terrace/stream/point_writer.hpp"
@@ -32,20 +31,14 @@ class ConvertCommand : public Command {
 
   Summary run(const CommonOptions& common) override {
     const Stopwatch watch;
-    if (output_ == "-" && common.json) {
-      throw UsageError("--json and '-o -' both want standard output");
-    }
     const bool replace = may_replace(output_, common.force);
     const std::array<std::string, 1> files{input_};
-    stream::SourceOptions options;
-    options.format = input_format_;
-    std::unique_ptr<stream::PointSource> source = stream::open_source(files, options);
-    // Standard input is read by this thread, which Ctrl-C reaches.
-    if (input_ != "-") source = stream::read_ahead(std::move(source));
+    const std::unique_ptr<stream::PointSource> source = stream::open_source(
+        files, {.format = input_format_, .stop = stop_token(), .blocks_ahead = 8});
     const stream::SourceInfo& info = source->info();
     const auto writer = stream::open_point_writer(
         output_, {.attributes = info.attributes, .comments = {kWriterMark}},
-        {.format = format_, .replace = replace});
+        {.format = format_, .replace = replace, .stop = stop_token()});
     {
       ProgressMeter meter(common.progress, "points");
       stream::PointBlock block;

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <iostream>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,7 +17,7 @@
 #include "match_run.hpp"
 #include "output.hpp"
 #include "point_table.hpp"
-#include "terrace/stream/atomic_file.hpp"
+#include "terrace/stream/sink.hpp"
 #include "units.hpp"
 #include "verbs.hpp"
 
@@ -45,12 +45,10 @@ class MatchCommand final : public Command {
     app.add_option("--iterations", iterations_,
                    "monotone, monte-carlo: at most so many (default: as many as points)")
         ->type_name("N");
-    app.add_option("--seconds", seconds_, "monotone, monte-carlo: begin no iteration after")
-        ->check(CLI::PositiveNumber)
+    add_number(app, "--seconds", seconds_, "monotone, monte-carlo: begin no iteration after",
+               kAboveZero)
         ->type_name("S");
-    app.add_option("--z-weight", z_weight_, "How much heights count in a distance")
-        ->check(CLI::NonNegativeNumber)
-        ->capture_default_str();
+    add_number(app, "--z-weight", z_weight_, "How much heights count in a distance", kFactorOrZero);
     app.add_flag(
         "--tree", tree_,
         "Match the pairs again, and so on: the binary tree. Row k is node n + k of n points "
@@ -99,19 +97,17 @@ class MatchCommand final : public Command {
     request.method = *match_method_of(method_);
     const bool halving =
         request.method == MatchMethod::monotone || request.method == MatchMethod::monte_carlo;
-    if (!halving && (!iterations_.empty() || seconds_ > 0)) {
+    if (!halving && (!iterations_.empty() || seconds_)) {
       throw UsageError("--iterations and --seconds are for --method monotone and monte-carlo");
     }
     if (!labels_.empty() && !tree_ && request.method != MatchMethod::automatic) {
       throw UsageError("--labels is for --method auto, or for --tree with any method");
     }
-    if (output_ == "-" && common.json)
-      throw UsageError("--json and '-o -' both want standard output");
-    request.iterations = iterations_.empty() ? 0 : parse_count(iterations_);
+    request.iterations = iterations_.empty() ? 0 : count_of_option("--iterations", iterations_);
     if (!iterations_.empty() && request.iterations == 0) {
       throw UsageError("--iterations must be positive");
     }
-    request.seconds = seconds_;
+    request.seconds = seconds_.value_or(0.0);
     request.seed = common.seed;
     request.threads = common.threads;
     request.memory_bytes = common.memory_or(0);
@@ -143,12 +139,7 @@ class MatchCommand final : public Command {
   }
 
   void write(const std::string& text, bool replace) const {
-    if (output_ == "-") {
-      std::cout << text;
-      if (!std::cout.flush()) throw ClosedPipe();
-      return;
-    }
-    stream::AtomicFile file(output_, replace);
+    stream::Sink file(output_, replace, stop_token());
     file.write(text);
     file.commit();
   }
@@ -223,7 +214,8 @@ class MatchCommand final : public Command {
   std::vector<stream::Point3> positions_;
   std::string input_, output_, input_format_, method_ = "auto", iterations_, labels_;
   bool tree_ = false;
-  double seconds_ = 0, z_weight_ = 1;
+  std::optional<double> seconds_;
+  double z_weight_ = 1;
 };
 
 }  // namespace

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <cmath>
 #include <memory>
 #include <optional>
 #include <string>
@@ -14,6 +13,7 @@
 #include "detail.hpp"
 #include "error.hpp"
 #include "height_overlay.hpp"
+#include "interrupt.hpp"
 #include "mesh_output.hpp"
 #include "output.hpp"
 #include "smooth_option.hpp"
@@ -55,9 +55,10 @@ class MeshCommand final : public Command {
            "ellipses inside the regions")
         ->capture_default_str()
         ->type_name("NAME");
-    app.add_option("--max-error", max_error_,
-                   "the fewest triangles that are vertically within this many metres of every "
-                   "sample, checked on the values written")
+    add_number(app, "--max-error", max_error_,
+               "the fewest triangles that are vertically within this many metres of every "
+               "sample, checked on the values written",
+               kNotNegative)
         ->type_name("METRES");
     app.add_option("--max-points", max_points_,
                    "the mesh of at most this many points with the smallest error")
@@ -98,12 +99,9 @@ class MeshCommand final : public Command {
     if (max_error_ && !max_points_.empty()) {
       throw UsageError("either --max-error or --max-points, not both");
     }
-    if (max_error_ && !(*max_error_ >= 0.0 && std::isfinite(*max_error_))) {
-      throw UsageError("--max-error: a number of metres that is not negative");
-    }
     options.max_error = max_error_.value_or(0.0);
     if (!max_points_.empty()) {
-      options.max_points = parse_count(max_points_);
+      options.max_points = count_of_option("--max-points", max_points_);
       if (options.max_points < 4) throw UsageError("--max-points: at least 4");
     }
     options.quality = parse_quality(quality_);
@@ -117,7 +115,8 @@ class MeshCommand final : public Command {
           "--to-crs: between other coordinates the triangles would be other surfaces, and the "
           "bound would not hold; write the mesh in the store's CRS");
     }
-    options.writer = {.format = format_, .replace = may_replace(output_, common.force)};
+    options.writer = {
+        .format = format_, .replace = may_replace(output_, common.force), .stop = stop_token()};
     const BoundedMeshResult result = store.schema().grid
                                          ? bounded_raster_mesh(store, options, common)
                                          : bounded_point_mesh(store, options, common);

@@ -128,7 +128,7 @@ class PointsCommand final : public Command {
     if (!overlay_.empty()) overlay.emplace(open_height_overlay(overlay_, store));
     const auto writer = stream::open_point_writer(
         output_, {.attributes = store.schema().attributes, .comments = {kWriterMark}},
-        {.format = format_, .replace = may_replace(output_, common.force)});
+        {.format = format_, .replace = may_replace(output_, common.force), .stop = stop_token()});
     PointOutput output(store, detail, crs_.places(store), overlay ? &*overlay : nullptr, *writer);
     for_each_wanted(store, detail,
                     [&output](stream::ClusterId id, const stream::ClusterRecord&,

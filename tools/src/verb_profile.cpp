@@ -5,14 +5,14 @@
 #include <string>
 
 #include <CLI/CLI.hpp>
+#include <terrace/stream/sink.hpp>
 #include <terrace/stream/store.hpp>
 
 #include "coordinate_system.hpp"
 #include "crs_options.hpp"
-#include "error.hpp"
+#include "interrupt.hpp"
 #include "output.hpp"
 #include "profile_run.hpp"
-#include "text_output.hpp"
 #include "units.hpp"
 #include "verbs.hpp"
 
@@ -35,17 +35,18 @@ class ProfileCommand final : public Command {
         "--towgs84", shift_,
         "dx,dy,dz[,rx,ry,rz,ds] to WGS 84 from the datum of --line-crs, or of the store, "
         "if it is another");
-    app.add_option("--step", step_,
-                   "metres from row to row (default: a row wherever the line crosses the lattice "
-                   "or a diagonal of it, or an edge of the triangulated points)")
+    add_number(app, "--step", step_,
+               "metres from row to row (default: a row wherever the line crosses the lattice "
+               "or a diagonal of it, or an edge of the triangulated points)",
+               kAboveZero)
         ->type_name("METRES");
     app.add_option("--method", method_, "linear, natural or nearest")
         ->capture_default_str()
         ->type_name("NAME");
-    app.add_option(
-           "--max-edge", max_edge_,
-           "of irregular points and coarser levels: triangles with a longer side (metres on "
-           "the ground) are no data, as over water and in shadows (default: none)")
+    add_number(app, "--max-edge", max_edge_,
+               "of irregular points and coarser levels: triangles with a longer side (metres on "
+               "the ground) are no data, as over water and in shadows (default: none)",
+               kAboveZero)
         ->type_name("METRES");
     app.add_option("--level", level_, "only points of this level and above: a number or top")
         ->capture_default_str();
@@ -53,17 +54,11 @@ class ProfileCommand final : public Command {
 
   Summary run(const CommonOptions& common) override {
     const Stopwatch watch;
-    if (common.json && output_ == "-") {
-      throw UsageError("--json and the rows cannot both go to standard output; give -o FILE");
-    }
     ProfileRequest request;
     request.sampler.method = parse_interpolation(method_);
-    request.sampler.max_edge = parse_max_edge(max_edge_);
+    request.sampler.max_edge = max_edge_;
     const std::optional<unsigned> level = parse_level(level_);
-    if (!step_.empty()) {
-      request.step = parse_number(step_, "--step");
-      if (!(*request.step > 0)) throw UsageError("--step must be above 0");
-    }
+    request.step = step_;
     request.line = parse_line(line_);
     const stream::Store store = stream::Store::open(store_);
     if (!line_crs_.empty()) {
@@ -73,10 +68,10 @@ class ProfileCommand final : public Command {
     request.sampler.level = level.value_or(store.top());
     request.sampler.threads = common.threads;
     request.sampler.memory_bytes = common.memory_or(machine_memory_bytes() / 2);
-    TextOutput output(output_, may_replace(output_, common.force));
+    stream::Sink output(output_, may_replace(output_, common.force), stop_token());
     const ProfileOutcome outcome =
         write_profile(store, request, [&](std::string_view text) { output.write(text); });
-    output.finish();
+    output.commit();
     if (outcome.answered == 0) common.say("the line does not meet the store's data");
 
     Summary summary;
@@ -92,8 +87,8 @@ class ProfileCommand final : public Command {
   }
 
  private:
-  std::string store_, output_, line_, line_crs_, shift_, step_, method_ = "linear", level_ = "0",
-                                                                max_edge_;
+  std::string store_, output_, line_, line_crs_, shift_, method_ = "linear", level_ = "0";
+  std::optional<double> step_, max_edge_;
 };
 
 }  // namespace

@@ -27,10 +27,11 @@ class RasterCommand final : public Command {
                    "hillshade, 1 to 255")
         ->capture_default_str()
         ->type_name("NAME");
-    app.add_option("--cell", cell_,
-                   "width and height of a cell in units of the output's CRS (default: the "
-                   "raster's own cells; of points and of coarser levels, about as many cells as "
-                   "there are points)")
+    add_number(app, "--cell", cell_,
+               "width and height of a cell in units of the output's CRS (default: the "
+               "raster's own cells; of points and of coarser levels, about as many cells as "
+               "there are points)",
+               kAboveZero)
         ->type_name("SIZE");
     app.add_option("--region", region_,
                    "only what is inside: minx,miny,maxx,maxy or a GeoJSON file");
@@ -39,9 +40,10 @@ class RasterCommand final : public Command {
         ->type_name("NAME");
     app.add_option("--level", level_, "only points of this level and above: a number or top")
         ->capture_default_str();
-    app.add_option("--max-edge", max_edge_,
-                   "of points: triangles with a longer side, on the ground, are no data (default: "
-                   "none is too long)")
+    add_number(app, "--max-edge", max_edge_,
+               "of points: triangles with a longer side, on the ground, are no data (default: "
+               "none is too long)",
+               kAboveZero)
         ->type_name("METRES");
     crs_.define(app);
   }
@@ -52,14 +54,8 @@ class RasterCommand final : public Command {
     request.value = parse_raster_value(value_);
     request.sampler.method = parse_interpolation(method_);
     const std::optional<unsigned> level = parse_level(level_);
-    if (!max_edge_.empty()) {
-      request.sampler.max_edge = parse_number(max_edge_, "--max-edge");
-      if (!(*request.sampler.max_edge > 0)) throw UsageError("--max-edge must be above 0");
-    }
-    if (!cell_.empty()) {
-      request.cell = parse_number(cell_, "--cell");
-      if (!(*request.cell > 0)) throw UsageError("--cell must be above 0");
-    }
+    request.sampler.max_edge = max_edge_;
+    request.cell = cell_;
     if (output_ == "-") throw UsageError("a GeoTIFF cannot go to standard output; name a file");
     const stream::Store store = stream::Store::open(store_);
     request.sampler.level = level.value_or(store.top());
@@ -89,8 +85,8 @@ class RasterCommand final : public Command {
   }
 
  private:
-  std::string store_, output_, value_ = "height", cell_, region_, method_ = "linear", level_ = "0",
-                               max_edge_;
+  std::string store_, output_, value_ = "height", region_, method_ = "linear", level_ = "0";
+  std::optional<double> cell_, max_edge_;
   CrsOptions crs_;
 };
 

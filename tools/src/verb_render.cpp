@@ -71,9 +71,8 @@ class RenderCommand : public Command {
     app.add_option("--view", view_, "top, or where the viewer stands: AZIMUTH,ELEVATION in degrees")
         ->capture_default_str()
         ->type_name("VIEW");
-    app.add_option("--exaggerate", exaggerate_,
-                   "Multiply heights (default: as much as the relief needs to be seen)")
-        ->check(CLI::PositiveNumber)
+    add_number(app, "--exaggerate", exaggerate_,
+               "Multiply heights (default: as much as the relief needs to be seen)", kFactor)
         ->type_name("FACTOR");
     define_picture_input(app, selection_);
     app.add_option("--points", points_file_,
@@ -126,7 +125,7 @@ class RenderCommand : public Command {
       draw_triangles(mesh, colours, camera, light, options, canvas);
     }
     check_interrupt();
-    stream::write_png(output_, size.width, size.height, 3, canvas.resolve(), replace);
+    stream::write_png(output_, size.width, size.height, 3, canvas.resolve(), replace, stop_token());
 
     Summary summary;
     summary.json["width"] = size.width;
@@ -150,7 +149,7 @@ class RenderCommand : public Command {
     Canvas canvas(static_cast<std::uint32_t>(size.width), static_cast<std::uint32_t>(size.height));
     draw_dendrogram(tree, canvas);
     check_interrupt();
-    stream::write_png(output_, size.width, size.height, 3, canvas.resolve(), replace);
+    stream::write_png(output_, size.width, size.height, 3, canvas.resolve(), replace, stop_token());
     Summary summary;
     summary.json = {{"width", size.width},        {"height", size.height},
                     {"points", tree.points},      {"merges", tree.merges.size()},
@@ -176,8 +175,8 @@ class RenderCommand : public Command {
     MatchingPicture picture = read_matching_picture(input_, points_file_, common);
     if (!picture.assumption.empty()) common.explain(points_file_ + ": " + picture.assumption);
     picture.keep_levels(selection_.level);
-    if (exaggerate_ > 0) {
-      for (stream::Point3& p : picture.positions) p[2] *= exaggerate_;
+    if (exaggerate_) {
+      for (stream::Point3& p : picture.positions) p[2] *= *exaggerate_;
     }
     check_interrupt();
     Canvas canvas(static_cast<std::uint32_t>(size.width), static_cast<std::uint32_t>(size.height));
@@ -185,7 +184,7 @@ class RenderCommand : public Command {
     fit(camera, picture.positions, canvas);
     draw_matching(picture, camera, {.threads = common.threads}, canvas);
     check_interrupt();
-    stream::write_png(output_, size.width, size.height, 3, canvas.resolve(), replace);
+    stream::write_png(output_, size.width, size.height, 3, canvas.resolve(), replace, stop_token());
 
     const MatchingResult& result = picture.result;
     Summary summary;
@@ -245,20 +244,20 @@ class RenderCommand : public Command {
     const double slope = terrain ? rms_slope(mesh) : 0;
     const double wanted = slope > 0 ? std::clamp(kPleasant / slope, 1.0, 25.0) : 1.0;
     double factor = 1;
-    if (exaggerate_ > 0) {
-      factor = exaggerate_;
+    if (exaggerate_) {
+      factor = *exaggerate_;
     } else if (std::abs(view.elevation) < 89) {
       // Seen from the side the shape itself is stretched, but not as far as the light.
       factor = std::round(10 * std::sqrt(wanted)) / 10;
     }
-    relief_ = exaggerate_ > 0 ? 1.0 : std::max(1.0, wanted / factor);
+    relief_ = exaggerate_ ? 1.0 : std::max(1.0, wanted / factor);
     for (stream::Point3& p : mesh.positions) p[2] *= factor;
     return factor;
   }
 
   std::string input_, output_, points_file_, size_ = "1600x1200", color_, view_ = "top";
   bool wire_ = false;
-  double exaggerate_ = 0;
+  std::optional<double> exaggerate_;
   double relief_ = 1;
   PictureSelection selection_;
 };

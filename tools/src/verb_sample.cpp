@@ -7,14 +7,14 @@
 #include <string_view>
 
 #include <CLI/CLI.hpp>
+#include <terrace/stream/sink.hpp>
 #include <terrace/stream/store.hpp>
 
 #include "coordinate_system.hpp"
 #include "crs_options.hpp"
-#include "error.hpp"
+#include "interrupt.hpp"
 #include "output.hpp"
 #include "sample_run.hpp"
-#include "text_output.hpp"
 #include "units.hpp"
 #include "verbs.hpp"
 
@@ -41,10 +41,10 @@ class SampleCommand final : public Command {
                    "nearest: the nearest point")
         ->capture_default_str()
         ->type_name("NAME");
-    app.add_option(
-           "--max-edge", max_edge_,
-           "of irregular points and coarser levels: triangles with a longer side (metres on "
-           "the ground) are no data, as over water and in shadows (default: none)")
+    add_number(app, "--max-edge", max_edge_,
+               "of irregular points and coarser levels: triangles with a longer side (metres on "
+               "the ground) are no data, as over water and in shadows (default: none)",
+               kAboveZero)
         ->type_name("METRES");
     app.add_option("--level", level_, "only points of this level and above: a number or top")
         ->capture_default_str();
@@ -60,12 +60,9 @@ class SampleCommand final : public Command {
 
   Summary run(const CommonOptions& common) override {
     const Stopwatch watch;
-    if (common.json && output_ == "-") {
-      throw UsageError("--json and the lines cannot both go to standard output; give -o FILE");
-    }
     SamplerOptions options;
     options.method = parse_interpolation(method_);
-    options.max_edge = parse_max_edge(max_edge_);
+    options.max_edge = max_edge_;
     const std::optional<unsigned> level = parse_level(level_);
     const stream::Store store = stream::Store::open(store_);
     options.level = level.value_or(store.top());
@@ -73,12 +70,12 @@ class SampleCommand final : public Command {
     options.memory_bytes = common.memory_or(machine_memory_bytes() / 2);
     const PlaceConversions conversions = conversions_for(store);
     PlaceFile places(points_);
-    TextOutput output(output_, may_replace(output_, common.force));
+    stream::Sink output(output_, may_replace(output_, common.force), stop_token());
     ProgressMeter meter(common.progress, "points");
     const SampleCounts counts = answer_places(
         store, options, places, conversions, [&](std::string_view text) { output.write(text); },
         [&](const SampleCounts& sum) { meter.update(sum.points, 0); });
-    output.finish();
+    output.commit();
     if (counts.points > 0 && counts.answered == 0) {
       common.say(
           "no point has a height: are their coordinates in the CRS of the store? --points-crs "
@@ -121,7 +118,8 @@ class SampleCommand final : public Command {
   }
 
   std::string store_, points_ = "-", output_ = "-", method_ = "linear", level_ = "0", points_crs_,
-                      to_crs_, shift_, max_edge_;
+                      to_crs_, shift_;
+  std::optional<double> max_edge_;
 };
 
 }  // namespace

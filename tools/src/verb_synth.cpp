@@ -38,16 +38,11 @@ class SynthCommand : public Command {
                        ->type_name("WxH");
     points_option_ =
         app.add_option("--points", points_, "Number of points (default: 1M)")->type_name("N");
-    app.add_option("--cell", dem_.cell, "dem: side of a cell, in units of the CRS")
-        ->capture_default_str()
-        ->check(CLI::PositiveNumber);
-    app.add_option("--hurst", dem_.hurst, "dem: smoothness, between 0 and 1")
-        ->capture_default_str()
-        ->check(CLI::Range(0.01, 0.99));
-    app.add_option("--roughness", dem_.roughness,
-                   "dem: RMS difference of neighbouring cells in metres, at any size")
-        ->capture_default_str()
-        ->check(CLI::NonNegativeNumber);
+    add_number(app, "--cell", dem_.cell, "dem: side of a cell, in units of the CRS", kAboveZero);
+    add_number(app, "--hurst", dem_.hurst, "dem: smoothness, between 0 and 1",
+               {.least = 0.01, .most = 0.99});
+    add_number(app, "--roughness", dem_.roughness,
+               "dem: RMS difference of neighbouring cells in metres, at any size", kNotNegative);
     app.add_option("--type", type_, "dem: int16 or float32")
         ->capture_default_str()
         ->check(CLI::IsMember({"int16", "float32"}));
@@ -114,14 +109,14 @@ class SynthCommand : public Command {
 
   Summary make_cloud(const CommonOptions& common) {
     const Stopwatch watch;
-    const std::uint64_t points = points_.empty() ? 1000000 : parse_count(points_);
+    const std::uint64_t points = points_.empty() ? 1000000 : count_of_option("--points", points_);
     const std::unique_ptr<Cloud> cloud = kind_ == "surface"   ? make_surface(points, common.seed)
                                          : kind_ == "uniform" ? make_uniform(common.seed)
                                                               : make_clusters(points, common.seed);
     const DeliveryOrder order(shuffle_, points, common.seed, common.memory_or(kStreamingMemory));
-    const auto writer =
-        stream::open_point_writer(output_, {.attributes = {}, .comments = {kWriterMark}},
-                                  {.format = {}, .replace = may_replace(output_, common.force)});
+    const auto writer = stream::open_point_writer(
+        output_, {.attributes = {}, .comments = {kWriterMark}},
+        {.format = {}, .replace = may_replace(output_, common.force), .stop = stop_token()});
     {
       ProgressMeter meter(common.progress, "points");
       stream::PointBlock block;

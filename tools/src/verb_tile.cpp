@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
 #include <charconv>
-#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -59,9 +58,10 @@ class TileCommand final : public Command {
     add_output(app, output_, "the folder to write");
     app.add_option("--format", format_, "quantized-mesh")->capture_default_str();
     app.add_option("--zoom", zoom_, "FIRST-LAST; else from 0 to where tiles show every sample");
-    app.add_option("--max-error", max_error_,
-                   "metres within which the deepest zoom is of every sample, twice as much at each "
-                   "zoom above; else what globes expect: 77067 / 2^zoom")
+    add_number(app, "--max-error", max_error_,
+               "metres within which the deepest zoom is of every sample, twice as much at each "
+               "zoom above; else what globes expect: 77067 / 2^zoom",
+               kAboveZero)
         ->type_name("METRES");
     app.add_option("--quality", quality_, "greedy, removal (fewer triangles) or fitted")
         ->capture_default_str();
@@ -134,9 +134,6 @@ Summary TileCommand::run(const CommonOptions& common) {
   const Stopwatch watch;
   if (format_ != "quantized-mesh") {
     throw UsageError("--format '" + format_ + "': quantized-mesh is the one that works");
-  }
-  if (max_error_ && !(*max_error_ > 0.0 && std::isfinite(*max_error_))) {
-    throw UsageError("--max-error: a number of metres above 0");
   }
   const stream::Store store = stream::Store::open(store_);
   const std::uint64_t memory = common.memory_or(0);

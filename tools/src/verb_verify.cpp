@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -38,10 +37,10 @@ class VerifyCommand final : public Command {
     app.add_option("PATH", path_, "the store, or the folder of tiles, to check")->required();
     app.add_option("--store", store_,
                    "where the tiles' samples come from: heights are checked against all of them");
-    app.add_option(
-           "--max-error", max_error_,
-           "metres that the deepest zoom may be off, twice as much at each zoom above; else "
-           "what layer.json states")
+    add_number(app, "--max-error", max_error_,
+               "metres that the deepest zoom may be off, twice as much at each zoom above; else "
+               "what layer.json states",
+               kAboveZero)
         ->type_name("METRES");
     app.add_option("--vertical", vertical_,
                    "ellipsoidal: the store's heights are above the ellipsoid; ignore: take them as "
@@ -88,9 +87,6 @@ Summary VerifyCommand::store() const {
 
 Summary VerifyCommand::tiles(const CommonOptions& common) const {
   const Stopwatch watch;
-  if (max_error_ && !(*max_error_ > 0.0 && std::isfinite(*max_error_))) {
-    throw UsageError("--max-error: a number of metres above 0");
-  }
   if (store_.empty() && (max_error_ || !vertical_.empty() || !geoid_.empty())) {
     throw UsageError("--max-error, --vertical and --geoid have a meaning with --store alone");
   }

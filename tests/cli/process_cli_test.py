@@ -1,0 +1,518 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The command as a process among others: pipes, closed descriptors, signals, full disks, names that
+a terminal would obey, and what is not to be had.
+
+TERRACE=path/to/terrace process_cli_test.py [CLASS...]
+"""
+
+import fcntl
+import json
+import os
+import re
+import resource
+import shutil
+import signal
+import struct
+import subprocess
+import sys
+import tempfile
+import termios
+import threading
+import time
+import unittest
+
+TERRACE = os.environ.get('TERRACE', 'terrace')
+# A library that makes each start of a thread fail; preloaded.
+NO_THREADS = os.environ.get('NO_THREADS')
+
+
+def terrace(*args, **kwargs):
+    """Runs the command; output is text unless text=False."""
+    kwargs.setdefault('text', True)
+    kwargs.setdefault('stdout', subprocess.PIPE)
+    kwargs.setdefault('stderr', subprocess.PIPE)
+    return subprocess.run([TERRACE, *args], timeout=120, **kwargs)
+
+
+def wait_until(condition):
+    """Returns what the condition gives once it is true; waits for a minute at most."""
+    end = time.monotonic() + 60
+    while time.monotonic() < end:
+        value = condition()
+        if value:
+            return value
+        time.sleep(0.005)
+    raise TimeoutError('waited in vain')
+
+
+def catches_signals(process):
+    """True once SIGTERM has a handler."""
+    with open(f'/proc/{process.pid}/status') as status:
+        caught = int(re.search(r'SigCgt:\s*(\w+)', status.read()).group(1), 16)
+    return caught >> (signal.SIGTERM - 1) & 1
+
+
+def unread_bytes(descriptor):
+    return struct.unpack('i', fcntl.ioctl(descriptor, termios.FIONREAD, b'\0' * 4))[0]
+
+
+class ProcessTest(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.mkdtemp(prefix='terrace-process-')
+        self.addCleanup(shutil.rmtree, self.folder)
+
+    def path(self, name):
+        return os.path.join(self.folder, name)
+
+    def run_ok(self, *args, **kwargs):
+        result = terrace(*args, **kwargs)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return result
+
+    def start(self, *args, **kwargs):
+        """A process that the test ends if it does not end itself."""
+        kwargs.setdefault('stdout', subprocess.PIPE)
+        kwargs.setdefault('stderr', subprocess.PIPE)
+        process = subprocess.Popen([TERRACE, *args], **kwargs)
+
+        def clean():
+            process.kill()
+            process.wait()
+            for stream in (process.stdin, process.stdout, process.stderr):
+                if stream:
+                    try:
+                        stream.close()
+                    except BrokenPipeError:
+                        pass
+        self.addCleanup(clean)
+        return process
+
+    def end_of(self, process):
+        """Exit code and messages, without closing what the process reads from."""
+        try:
+            code = process.wait(timeout=60)
+        except subprocess.TimeoutExpired:
+            self.fail(f'{process.args} does not end')
+        return code, process.stderr.read().decode()
+
+    def points(self, count):
+        return ''.join(f'{i * 7919 % 10007} {i * 104729 % 9973} {i % 97}\n' for i in range(count))
+
+    def points_file(self, name='points.xyz', count=300):
+        with open(self.path(name), 'w') as file:
+            file.write(self.points(count))
+        return self.path(name)
+
+    def store(self):
+        if not os.path.exists(self.path('store')):
+            self.run_ok('build', self.points_file(), '-o', self.path('store'))
+        return self.path('store')
+
+
+class ClosedPipeTest(ProcessTest):
+    def run_without_reader(self, *args):
+        read_end, write_end = os.pipe()
+        os.close(read_end)
+        try:
+            return terrace(*args, stdout=write_end)
+        finally:
+            os.close(write_end)
+
+    def test_a_failure_stays_a_failure(self):
+        store = self.store()
+        for args in (['info', self.path('none')], ['info', self.path('none'), '--json'],
+                     ['points', store, '-o', self.path('missing/x.xyz')],
+                     ['convert', self.path('none.xyz'), '-o', '-'],
+                     ['sample', self.path('none')], ['verify', self.path('none')]):
+            with self.subTest(args=args):
+                result = self.run_without_reader(*args)
+                self.assertEqual(result.returncode, 1, result.stderr)
+                self.assertEqual(result.stderr.count('\n'), 1, result.stderr)
+
+    def test_a_fault_that_was_found_stays_one(self):
+        store = self.store()
+        level = os.path.join(store, sorted(n for n in os.listdir(store) if 'manifest' not in n)[0])
+        data = bytearray(open(level, 'rb').read())
+        data[len(data) // 2] ^= 1
+        open(level, 'wb').write(data)
+        self.assertEqual(self.run_without_reader('verify', store, '--json').returncode, 1)
+
+    def test_output_that_nobody_reads_ends_quietly(self):
+        points, store = self.points_file(), self.store()
+        places = self.path('places.csv')
+        open(places, 'w').write('x,y\n5,5\n')
+        for args in (['--version'], ['info', points], ['info', points, '--json'],
+                     ['convert', points, '-o', '-'], ['points', store, '-o', '-'],
+                     ['mesh', store, '-o', '-'], ['sample', store, '--points', places],
+                     ['match', points, '-o', '-'], ['cluster', points, '--labels', '-'],
+                     ['render', store, '-o', '-', '--size', '64x64'],
+                     ['cluster', points, '--method', 'single', '--dendrogram', '-']):
+            with self.subTest(args=args):
+                result = self.run_without_reader(*args)
+                self.assertEqual((result.returncode, result.stderr), (0, ''))
+
+    def test_standard_output_on_a_full_disk_is_a_failure(self):
+        points, store = self.points_file(), self.store()
+        for args in (['--version'], ['info', points], ['info', points, '--json'],
+                     ['convert', points, '-o', '-'], ['points', store, '-o', '-'],
+                     ['match', points, '-o', '-'], ['cluster', points, '--labels', '-'],
+                     ['render', store, '-o', '-', '--size', '64x64'],
+                     ['cluster', points, '--method', 'single', '--dendrogram', '-']):
+            with self.subTest(args=args), open('/dev/full', 'w') as full:
+                result = terrace(*args, stdout=full)
+                self.assertEqual(result.returncode, 1)
+                self.assertIn('standard output: cannot write: No space left', result.stderr)
+
+    def test_a_picture_goes_to_standard_output(self):
+        result = self.run_ok('render', self.store(), '-o', '-', '--size', '64x64', text=False,
+                             cwd=self.folder)
+        self.assertTrue(result.stdout.startswith(b'\x89PNG'))
+        self.assertNotIn('-', os.listdir(self.folder))
+
+
+class ClosedDescriptorTest(ProcessTest):
+    def test_no_file_gets_the_number_of_a_standard_stream(self):
+        fifo = self.path('fifo')
+        os.mkfifo(fifo)
+        for closed in ((0,), (1,), (2,), (0, 1), (1, 2), (0, 1, 2)):
+            with self.subTest(closed=closed):
+                def close(which=closed):
+                    for descriptor in which:
+                        os.close(descriptor)
+                process = self.start('convert', fifo, '-o', self.path('out.ply'), '--force',
+                                     '--progress', 'json', stdout=None, stderr=None,
+                                     preexec_fn=close)
+                with open(fifo, 'w') as producer:
+                    producer.write(self.points(3000))
+                    producer.flush()
+                    # The output is open from here on.
+                    wait_until(lambda: any('.tmp-' in name for name in os.listdir(self.folder)))
+                    for descriptor in closed:
+                        self.assertEqual(os.readlink(f'/proc/{process.pid}/fd/{descriptor}'),
+                                         '/dev/null')
+                self.assertEqual(process.wait(timeout=60), 0)
+
+    def test_to_use_a_closed_stream_is_a_failure(self):
+        points, store = self.points_file(), self.store()
+        for args in (['info', points], ['info', points, '--json'], ['--version'],
+                     ['convert', points, '-o', '-'], ['points', store, '-o', '-'],
+                     ['render', store, '-o', '-', '--size', '64x64'],
+                     ['match', points, '-o', '-']):
+            with self.subTest(args=args):
+                result = terrace(*args, stdout=None, preexec_fn=lambda: os.close(1))
+                self.assertEqual((result.returncode, result.stderr.split(';')[0]),
+                                 (1, 'terrace: standard output: is closed'))
+        for args in (['info', '-'], ['convert', '-', '-o', self.path('x.xyz')], ['sample', store]):
+            with self.subTest(args=args):
+                result = terrace(*args, preexec_fn=lambda: os.close(0))
+                self.assertEqual((result.returncode, result.stderr.split(';')[0]),
+                                 (1, 'terrace: standard input: is closed'))
+
+
+class WaitTest(ProcessTest):
+    """What waits for another program ends at once by a signal, and by a failure elsewhere."""
+
+    def readers(self, source):
+        store = self.store()
+        return (['info', source], ['convert', source, '-o', self.path('out.ply')],
+                ['build', source, '-o', self.path('built')],
+                ['cluster', source, '-o', self.path('out.csv')],
+                ['match', source, '-o', self.path('out.csv')],
+                ['render', source, '-o', self.path('out.png')],
+                ['sample', store, '--points', source])
+
+    def assert_interrupted(self, process):
+        code, error = self.end_of(process)
+        self.assertEqual(code, 130, error)
+        self.assertEqual(error.count('\n'), 1, error)
+        self.assertIn('again', error)
+        self.assertFalse([n for n in os.listdir(self.folder) if n.startswith(('out', 'built', '.'))])
+
+    def test_a_signal_ends_the_wait_for_an_idle_producer(self):
+        for args in self.readers('-'):
+            for stop in (signal.SIGINT, signal.SIGTERM):
+                with self.subTest(args=args, signal=stop):
+                    process = self.start(*args, stdin=subprocess.PIPE)
+                    wait_until(lambda: catches_signals(process))
+                    process.stdin.write(self.points(3000).encode())
+                    process.stdin.flush()
+                    wait_until(lambda: unread_bytes(process.stdin) == 0)
+                    process.send_signal(stop)
+                    self.assert_interrupted(process)
+
+    def test_a_signal_ends_the_wait_for_a_writer(self):
+        fifo = self.path('fifo')
+        os.mkfifo(fifo)
+        for args in self.readers(fifo):
+            if args[0] == 'render':
+                continue  # a pipe is drawn by its content; see the test with data
+            with self.subTest(args=args):
+                process = self.start(*args)
+                wait_until(lambda: catches_signals(process))
+                process.send_signal(signal.SIGTERM)
+                self.assert_interrupted(process)
+
+    def test_a_signal_ends_the_wait_for_the_reader_of_standard_output(self):
+        for args in (['synth', 'uniform', '--points', '1M', '-o', '-'],
+                     ['convert', self.points_file(count=100000), '-o', '-']):
+            with self.subTest(args=args):
+                process = self.start(*args)
+                # Full: the process waits for room.
+                wait_until(lambda: unread_bytes(process.stdout) >= 60000)
+                process.send_signal(signal.SIGTERM)
+                self.assert_interrupted(process)
+
+    def test_a_named_pipe_is_read_from_its_first_writer_to_its_last(self):
+        fifo = self.path('fifo')
+        os.mkfifo(fifo)
+        process = self.start('convert', fifo, '-o', self.path('out.xyz'))
+        wait_until(lambda: catches_signals(process))
+        with open(fifo, 'w') as producer:
+            producer.write('1 2 3\n')
+            producer.flush()
+            wait_until(lambda: unread_bytes(producer) == 0)
+            producer.write('4 5 6\n')
+        code, error = self.end_of(process)
+        self.assertEqual(code, 0, error)
+        self.assertEqual(open(self.path('out.xyz')).read(), '1 2 3\n4 5 6\n')
+
+    def test_a_pipe_without_blocking_is_waited_for(self):
+        read_end, write_end = os.pipe()
+        os.set_blocking(read_end, False)
+        process = self.start('convert', '-', '-o', self.path('out.xyz'), stdin=read_end)
+        os.close(read_end)
+        wait_until(lambda: catches_signals(process))
+        with open(write_end, 'w') as producer:
+            producer.write('1 2 3\n')
+        code, error = self.end_of(process)
+        self.assertEqual(code, 0, error)
+
+    def test_a_full_disk_is_told_while_the_producer_idles(self):
+        def small_files():
+            resource.setrlimit(resource.RLIMIT_FSIZE, (40000, 40000))
+        for args in (['convert', '-', '-o', self.path('out.ply')],
+                     ['build', '-', '-o', self.path('built'), '--block', '1000', '--threads', '2']):
+            with self.subTest(args=args):
+                process = self.start(*args, stdin=subprocess.PIPE, preexec_fn=small_files)
+
+                def feed():
+                    try:
+                        process.stdin.write(self.points(150000).encode())
+                        process.stdin.flush()
+                    except BrokenPipeError:
+                        pass
+                feeder = threading.Thread(target=feed)
+                feeder.start()
+                code, error = self.end_of(process)
+                feeder.join()
+                self.assertEqual(code, 1, error)
+                self.assertIn('File too large', error)
+                self.assertFalse([n for n in os.listdir(self.folder)
+                                  if n.startswith(('out', 'built', '.'))])
+
+    def test_a_raster_in_a_pipe_is_refused_by_name(self):
+        raster, fifo = self.path('dem.tif'), self.path('fifo')
+        self.run_ok('synth', 'dem', '--size', '64x64', '-o', raster)
+        os.mkfifo(fifo)
+        process = self.start('info', fifo)
+        with open(fifo, 'wb') as producer:
+            try:
+                producer.write(open(raster, 'rb').read())
+                producer.flush()
+            except BrokenPipeError:
+                pass  # its first bytes told
+            code, error = self.end_of(process)
+        self.assertEqual(code, 1)
+        self.assertIn(f'{fifo}: geotiff cannot be read from a pipe', error)
+
+
+class OptionTest(ProcessTest):
+    """Every option of every verb, as its help has it."""
+
+    def commands(self):
+        """Each verb with arguments that work, but for its output."""
+        points, store, dem = self.points_file(), self.store(), self.path('dem.tif')
+        self.run_ok('synth', 'dem', '--size', '64x64', '-o', dem)
+        self.run_ok('build', dem, '-o', self.path('raster'))
+        places = self.path('places.csv')
+        open(places, 'w').write('x,y\n5,5\n')
+        out = lambda name: ['-o', self.path(name)]
+        return {'build': ['build', points, *out('built')], 'info': ['info', points],
+                'verify': ['verify', store], 'points': ['points', store, *out('out.xyz')],
+                'mesh': ['mesh', store, *out('out.ply')],
+                'surface': ['surface', store, *out('out.ply')],
+                'tile': ['tile', self.path('raster'), *out('tiles'), '--vertical', 'ignore'],
+                'sample': ['sample', store, '--points', places, *out('out.csv')],
+                'raster': ['raster', store, *out('out.tif')],
+                'profile': ['profile', store, '--line', '1,1,90,90', *out('out.csv')],
+                'contour': ['contour', store, '--interval', '10', *out('out.json')],
+                'cluster': ['cluster', points, *out('out.csv')],
+                'match': ['match', points, *out('out.csv')],
+                'render': ['render', store, *out('out.png'), '--size', '64x64'],
+                'synth dem': ['synth', 'dem', '--size', '64x64', *out('out.tif')],
+                'synth uniform': ['synth', 'uniform', '--points', '10', *out('out.xyz')],
+                'convert': ['convert', points, *out('out.ply')]}
+
+    def options_of(self, verb):
+        for line in self.run_ok(verb, '--help').stdout.splitlines():
+            found = re.match(r'  (?:-\w,)?(--?[\w-]+) \S', line)
+            if found:
+                yield found.group(1)
+
+    def test_every_verb_is_tried(self):
+        listed = re.findall(r'^  (\w+) +\S', self.run_ok('--help').stdout.split('Verbs:')[1], re.M)
+        tried = {name.split()[0] for name in self.commands()}
+        self.assertEqual(set(listed) - {'terrace'}, tried)
+
+    def test_no_number_is_nan_or_infinite(self):
+        numeric = set()
+        for name, command in self.commands().items():
+            for option in self.options_of(command[0]):
+                # What does not take a word takes numbers, or names of its own.
+                word = terrace(*command, f'{option}=bogus' if option[1] == '-' else option + 'bogus')
+                if word.returncode != 2:
+                    for out in ('out', 'built', 'tiles'):
+                        for made in os.listdir(self.folder):
+                            if made.startswith(out):
+                                (shutil.rmtree if os.path.isdir(self.path(made)) else os.remove)(
+                                    self.path(made))
+                    continue
+                numeric.add(option)
+                for value in ('nan', 'inf', '-inf'):
+                    with self.subTest(name=name, option=option, value=value):
+                        given = f'{option}={value}' if option[1] == '-' else option + value
+                        result = terrace(*command, given)
+                        self.assertEqual(result.returncode, 2, result.stderr)
+                        if not option.endswith(('crs', 'weight', 'iterations')):
+                            self.assertIn(option.lstrip('-'), result.stderr)
+        self.assertLessEqual({'--facility-cost', '--z-weight', '--outlier-price', '--height',
+                              '--max-error', '--cell', '--step', '--interval', '--exaggerate',
+                              '--max-edge', '--seconds', '--hurst', '--roughness', '--threads',
+                              '--memory', '--seed', '-k', '--band', '--block'}, numeric)
+
+    def test_json_is_refused_where_the_output_wants_standard_output(self):
+        for name, command in self.commands().items():
+            if '-o' not in command:
+                continue
+            with self.subTest(name=name):
+                at = command.index('-o')
+                there = [*command[:at + 1], '-', *command[at + 2:], '--json']
+                result = terrace(*there)
+                self.assertEqual((result.returncode, result.stdout), (2, ''))
+                self.assertEqual(result.stderr.count('\n'), 1, result.stderr)
+        # Without -o its lines go there.
+        self.assertEqual(terrace('sample', self.store(), '--json').returncode, 2)
+        for option in ('--labels', '--dendrogram'):
+            result = terrace('cluster', self.points_file(), '--method', 'single', '-k', '3', option,
+                             '-', '--json')
+            self.assertEqual((result.returncode, result.stdout), (2, ''))
+
+
+class NameTest(ProcessTest):
+    ESCAPE = '\x1b[31m'
+
+    def assert_plain(self, text):
+        self.assertNotRegex(text, '[\x00-\x09\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]')
+
+    def test_control_characters_of_names_are_shown_not_sent(self):
+        name = f'a{self.ESCAPE}\r\u009b2J\u202e.xyz'
+        points = self.points_file(name)
+        for args in (['info', points], ['info', points + 'x'], ['cluster', points, '-o', 'x.csv', '-v'],
+                     ['convert', points, '-o', self.path('b' + name)], ['points', points, '-o', 'x'],
+                     ['info', points, '--no-such' + self.ESCAPE], ['info', points, '--memory', self.ESCAPE],
+                     ['build', points, '-o', self.path('s' + self.ESCAPE), '--crs', self.ESCAPE],
+                     [self.ESCAPE]):
+            with self.subTest(args=args):
+                result = terrace(*args, cwd=self.folder)
+                self.assert_plain(result.stdout)
+                self.assert_plain(result.stderr)
+                if result.stderr:
+                    self.assertIn('\\x', result.stderr)
+
+    def test_a_line_end_in_a_name_makes_no_line_of_its_own(self):
+        result = terrace('info', self.path('none\nterrace: all is well'))
+        self.assertEqual(result.returncode, 1)
+        self.assertEqual(result.stderr.count('\n'), 1, result.stderr)
+
+    def test_foreign_text_is_shown_not_sent(self):
+        hostile = self.path('hostile.ply')
+        with open(hostile, 'w') as file:
+            file.write(f'ply\nformat ascii 1.0\ncomment {self.ESCAPE}red\x07\u009b\n'
+                       'element vertex 3\nproperty double x\nproperty double y\nproperty double z\n'
+                       f'property float co{self.ESCAPE}l\nend_header\n0 0 0 1\n1 0 0 2\n0 1 0 3\n')
+        wkt = self.path('crs.prj')
+        with open(wkt, 'w') as file:
+            file.write(f'LOCAL_CS["{self.ESCAPE}",UNIT["metre",1]]')
+        store = self.path('hostile-store')
+        for args in (['info', hostile], ['build', hostile, '-o', store], ['info', store],
+                     ['cluster', hostile, '-o', self.path('o.ply'), '--weight', 'none'],
+                     ['build', hostile, '-o', self.path('p'), '--crs', wkt]):
+            with self.subTest(args=args):
+                result = terrace(*args)
+                self.assert_plain(result.stdout)
+                self.assert_plain(result.stderr)
+        self.assertIn(self.ESCAPE, ' '.join(
+            json.loads(self.run_ok('info', hostile, '--json').stdout)['comments']))
+
+    def test_names_that_are_no_utf_8(self):
+        name = os.fsencode(self.folder) + b'/caf\xe9.xyz'
+        with open(name, 'w') as file:
+            file.write('1 2 3\n')
+        self.assertIn('"points":1', self.run_ok('info', name, '--json').stdout)
+        result = terrace('info', name + b'x')
+        self.assertEqual(result.returncode, 1)
+        self.assertIn('caf\\xe9', result.stderr)
+
+    def test_names_of_255_bytes_can_be_written(self):
+        store = self.store()
+        for ending, args in (('.tif', ['synth', 'dem', '--size', '64x64']),
+                             ('.xyz', ['synth', 'uniform', '--points', '10']),
+                             ('.ply', ['mesh', store]), ('.obj', ['mesh', store, '--max-error', '50',
+                                                                 '--duplicates', 'mean']),
+                             ('.png', ['render', store, '--size', '64x64']),
+                             ('', ['build', self.points_file()])):
+            for length in (240, 241, 255):
+                with self.subTest(ending=ending, length=length):
+                    out = self.path('n' * (length - len(ending)) + ending)
+                    self.run_ok(*args, '-o', out)
+                    self.assertTrue(os.path.exists(out))
+        self.assertFalse([n for n in os.listdir(self.folder) if n.startswith('.')])
+
+
+@unittest.skipUnless(NO_THREADS, 'NO_THREADS names no library to preload')
+class NoThreadTest(ProcessTest):
+    """Where the system grants no threads the one there is does the work."""
+
+    def test_results_are_the_same(self):
+        points, dem, raster = self.points_file(count=4000), self.path('dem.tif'), self.path('raster')
+        self.run_ok('synth', 'dem', '--size', '600x600', '-o', dem)
+        self.run_ok('build', dem, '-o', raster)
+        scan, store = self.path('scan.ply'), self.path('scan')
+        self.run_ok('synth', 'surface', '--points', '30000', '-o', scan)
+        self.run_ok('build', scan, '-o', store)
+        commands = {'d.tif': ['synth', 'dem', '--size', '600x600'],
+                    'p.ply': ['synth', 'surface', '--points', '10000'], 's': ['build', points],
+                    'c.csv': ['cluster', points], 'k.csv': ['cluster', points, '--method', 'k-means', '-k', '9'],
+                    'l.csv': ['cluster', self.points_file('few.xyz', 2000), '--method', 'complete', '-k', '9'],
+                    'm.csv': ['match', points], 't.csv': ['match', points, '--tree'],
+                    'h.csv': ['match', self.path('few.xyz'), '--method', 'monte-carlo', '--iterations', '9'],
+                    'a.ply': ['mesh', raster, '--max-error', '5'],
+                    'f.ply': ['surface', store], 'e.tif': ['raster', raster, '--cell', '50'],
+                    'r.png': ['render', dem, '--size', '300x300'],
+                    'v.json': ['contour', raster, '--interval', '50'],
+                    'x.ply': ['convert', points]}
+        for name, command in commands.items():
+            with self.subTest(command=command):
+                contents = []
+                for kind, more in (('with', {}), ('without', {'LD_PRELOAD': NO_THREADS})):
+                    out = self.path(kind + name)
+                    self.run_ok(*command, '-o', out, '--threads', '4', env={**os.environ, **more})
+                    files = ([out] if os.path.isfile(out) else
+                             sorted(os.path.join(out, n) for n in os.listdir(out)))
+                    contents.append([open(file, 'rb').read() for file in files])
+                self.assertEqual(contents[0], contents[1])
+
+
+if __name__ == '__main__':
+    unittest.main(argv=[sys.argv[0], '-v', *sys.argv[1:]])
