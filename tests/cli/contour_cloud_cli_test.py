@@ -102,7 +102,8 @@ class CloudTestCase(unittest.TestCase):
         cloud, store = cls.path(name + '.xyz'), cls.path(name + '.terrace')
         with open(cloud, 'w') as file:
             file.writelines(f'{x!r} {y!r} {z!r}\n' for x, y, z in points)
-        cls.run_ok('build', cloud, '-o', store, '--block', 200, *options)
+        # Small clusters and blocks: several levels.
+        cls.run_ok('build', cloud, '-o', store, '--block', 200, '--facility-cost', 1, *options)
         return store
 
     @staticmethod

@@ -110,6 +110,7 @@ inline std::filesystem::path cloud_store(const std::filesystem::path& folder,
   request.inputs = {(folder / "cloud.xyz").string()};
   request.store = folder / "cloud.store";
   request.block_points = 100;
+  request.facility_cost = 1.0;
   tools::build_store(request);
   return request.store;
 }
@@ -141,6 +142,7 @@ inline std::filesystem::path raster_store(const std::filesystem::path& folder) {
   request.inputs = {(folder / "dem.tif").string()};
   request.store = folder / "dem.store";
   request.block_points = 300;
+  request.facility_cost = 1.0;
   tools::build_store(request);
   return request.store;
 }

@@ -72,6 +72,7 @@ class Mesh : public testing::Test {
     request.inputs = {(folder_->path() / "dem.tif").string()};
     request.store = folder_->path() / "dem.store";
     request.block_points = 2000;  // more levels
+    request.facility_cost = 1.0;
     tools::build_store(request);
     store_ = new stream::Store(stream::Store::open(request.store));
     ASSERT_GE(store_->top(), 2u);

@@ -42,6 +42,7 @@ stream::Store store_of(const std::filesystem::path& input, std::size_t block_poi
   request.inputs = {input.string()};
   request.store = input.string() + ".store";
   request.block_points = block_points;  // few: more clusters, more levels
+  request.facility_cost = 1.0;
   tools::build_store(request);
   return stream::Store::open(request.store);
 }

@@ -162,6 +162,7 @@ class PointMesh : public testing::Test {
     request.inputs = {name + ".ply"};
     request.store = name + ".store";
     request.block_points = 500;  // more levels
+    request.facility_cost = 1.0;
     tools::build_store(request);
     return stream::Store::open(request.store);
   }

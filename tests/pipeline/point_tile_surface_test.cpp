@@ -132,6 +132,7 @@ struct CloudStore {
     request.inputs = {file.string()};
     request.store = folder / "cloud.store";
     request.block_points = 300;  // few: more levels
+    request.facility_cost = 1.0;
     request.crs = tools::CoordinateSystem::parse(cloud.crs).crs();
     tools::build_store(request);
     return stream::Store::open(request.store);

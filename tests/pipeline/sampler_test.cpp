@@ -67,6 +67,7 @@ class Sampler : public testing::TestWithParam<Raster> {
     request.inputs = {file.string()};
     request.store = folder_.path() / "dem.store";
     request.block_points = 1000;
+    request.facility_cost = 1.0;
     tools::build_store(request);
     std::vector<std::array<std::int32_t, 2>> points;
     std::vector<double> at;

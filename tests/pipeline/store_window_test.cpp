@@ -37,6 +37,7 @@ std::filesystem::path build(const std::filesystem::path& input, const std::strin
   request.inputs = {input.string()};
   request.store = input.parent_path() / name;
   request.block_points = block_points;  // few: more levels
+  request.facility_cost = 1.0;
   tools::build_store(request);
   return request.store;
 }
