@@ -41,7 +41,7 @@ class BuildCommand final : public Command {
                    "the CRS's datum to WGS 84");
     app.add_option("--vertical", request_.vertical, "what heights refer to")
         ->check(CLI::IsMember({"ellipsoidal", "orthometric"}));
-    app.add_option("--band", request_.band, "of rasters, from 1")->check(CLI::PositiveNumber);
+    app.add_option("--band", request_.band, "of rasters, from 1")->check(CLI::Range(1, 65535));
     app.add_option("--block", block_, "most points clustered together")->capture_default_str();
     add_number(app, "--facility-cost", request_.facility_cost,
                "times the diagonal of a block: larger makes larger clusters", kFactor);

@@ -53,7 +53,7 @@ class ClusterCommand final : public Command {
         ->capture_default_str()
         ->type_name("NAME");
     app.add_option("-k", request_.k, "Number of clusters")
-        ->check(CLI::PositiveNumber)
+        ->check(CLI::Range(1U, 4294967295U))
         ->type_name("K");
     add_number(app, "--height", request_.height, "single, complete: cut the tree at this distance",
                kNotNegative)
@@ -76,11 +76,11 @@ class ClusterCommand final : public Command {
         ->check(CLI::IsMember({"fast", "default", "fine", "full"}))
         ->capture_default_str();
     app.add_option("--batch", request_.batch, "facility: candidates judged at once")
-        ->check(CLI::PositiveNumber)
+        ->check(CLI::Range(1U, 4294967295U))
         ->capture_default_str();
     app.add_option("--restarts", request_.restarts,
                    "k-means, k-median: runs, the best of which counts")
-        ->check(CLI::PositiveNumber)
+        ->check(CLI::Range(1U, 4294967295U))
         ->capture_default_str();
     app.add_option("--bound-iterations", request_.bound_iterations,
                    "Steps towards a lower bound of the cost; 0: none (default: some seconds)")
