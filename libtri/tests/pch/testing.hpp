@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Compiled once for all tests; each test includes what it uses all the same.
-#pragma once
-
 #include <algorithm>
 #include <array>
 #include <cmath>
