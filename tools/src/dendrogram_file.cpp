@@ -29,7 +29,8 @@ bool parse_row(std::string_view text, cluster::Merge& merge) {
 void write_dendrogram(const std::string& path, const cluster::Dendrogram& dendrogram,
                       bool replace) {
   stream::Sink file(path, replace, stop_token());
-  file.write(std::string(kDendrogramHead) + '\n');
+  file.write(kDendrogramHead);
+  file.write("\n");
   for (const cluster::Merge& merge : dendrogram.merges) file.write(row_text(merge));
   file.commit();
 }
