@@ -67,7 +67,7 @@ class RasterSource final : public PointSource {
 
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
   [[nodiscard]] Progress progress() const override { return progress_; }
-  [[nodiscard]] std::uint64_t reading_bytes() const { return reading_bytes_; }
+  [[nodiscard]] std::uint64_t reading_bytes() const override { return reading_bytes_; }
 
   bool next(PointBlock& block) override {
     block.clear();
@@ -205,11 +205,6 @@ class RasterSource final : public PointSource {
 std::unique_ptr<PointSource> points_of(std::unique_ptr<Raster> raster,
                                        const SourceOptions& options) {
   return std::make_unique<RasterSource>(std::move(raster), options);
-}
-
-std::uint64_t reading_bytes(const PointSource& source) {
-  const auto* const raster = dynamic_cast<const RasterSource*>(&source);
-  return raster == nullptr ? 0 : raster->reading_bytes();
 }
 
 }  // namespace terrace::stream

@@ -36,6 +36,7 @@ class ReadAhead final : public PointSource {
   ReadAhead& operator=(const ReadAhead&) = delete;
 
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
+  [[nodiscard]] std::uint64_t reading_bytes() const override { return source_->reading_bytes(); }
 
   bool next(PointBlock& block) override {
     block.clear();

@@ -299,9 +299,11 @@ class BoundedMeshTest(unittest.TestCase):
         inside = set()
         for row in range(self.ROWS):
             for column in range(self.COLUMNS):
-                turns = [(bx - ax) * (row - ay) - (column - ax) * (by - ay) > 0
+                # Exact, and regions are closed: ten samples lie on a side.
+                turns = [(bx - ax) * (row - ay) - (column - ax) * (by - ay)
                          for (ax, ay), (bx, by) in zip(triangle, triangle[1:] + triangle[:1])]
-                if len(set(turns)) == 1 and raster.valid(column, row):
+                within = min(turns) >= 0 or max(turns) <= 0
+                if within and raster.valid(column, row):
                     inside.add(row * self.COLUMNS + column)
         self.assertEqual(summary['samples'], len(inside))
         self.assertEqual(summary['covered'], sum(raster.covered[i] for i in inside))
@@ -452,8 +454,8 @@ class BoundedMeshTest(unittest.TestCase):
     def test_wrong_usage(self):
         mesh = ('mesh', self.store, '-o', self.path('none.obj'))
         for text, *options in (('not both', '--max-error', 1, '--max-points', 10),
-                               ('not negative', '--max-error', -1),
-                               ('not negative', '--max-error', 'nan'),
+                               ('at least 0', '--max-error', -1),
+                               ('not a number', '--max-error', 'nan'),
                                ('at least 4', '--max-points', 3),
                                ('--level', '--max-error', 1, '--level', 1),
                                ('greedy', '--max-error', 1, '--quality', 'best'),

@@ -668,7 +668,8 @@ class RenderTest(CommandTest):
                 x, y = noise.uniform(0, 100), noise.uniform(0, 100)
                 file.write(f'{x!r} {y!r} {x!r}\n')
         store = self.path('cloud.store')
-        self.run_ok('build', self.path('cloud.xyz'), '-o', store, '--block', 1000, '--z-weight', 0)
+        self.run_ok('build', self.path('cloud.xyz'), '-o', store, '--block', 1000, '--z-weight', 0,
+                    '--facility-cost', 1)
         pictures = []
         for options in ([], ['--focus', '90,0,100,100:0']):
             self.run_ok('render', store, '-o', self.path('a.png'), '--size', '100x100', '--color',

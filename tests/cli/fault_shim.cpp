@@ -8,6 +8,8 @@
 //                  pause: sends itself SIGSTOP before the step, and goes on when continued
 //   FAULT_LOG      a file that gets the name of each step, one per line
 //   FAULT_NO_EXCHANGE  no renameat2(), as on some network disks (EINVAL)
+// Each name of a function is defined here, not one mapped to the other.
+#undef _FILE_OFFSET_BITS
 #include <cerrno>
 #include <csignal>
 #include <cstdarg>

@@ -226,7 +226,7 @@ class StoreMemoryTest(MemoryCase):
         super().setUpClass()
         cls.dem, cls.store = cls.path('dem.tif'), cls.path('dem.store')
         for args in (('synth', 'dem', '--size', '1500x1500', '-o', cls.dem),
-                     ('build', cls.dem, '-o', cls.store)):
+                     ('build', cls.dem, '-o', cls.store, '--facility-cost', 1)):
             code, _, err, _ = run(*args)
             assert code == 0, err
 

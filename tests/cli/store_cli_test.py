@@ -258,9 +258,9 @@ class StoreTest(unittest.TestCase):
             with self.subTest(name):
                 dem, regions = self.path(f'{name}.tif'), self.path(f'{name}.json')
                 if matrix:
-                    write_tiff(dem, columns, rows, heights, 0, 0, cell, keys, matrix)
+                    write_tiff(dem, columns, rows, heights, keys=keys, matrix=matrix)
                 else:
-                    write_tiff(dem, columns, rows, heights, west, north, cell, keys)
+                    write_tiff(dem, columns, rows, heights, (west, north), cell, keys)
                 m = matrix or [cell, 0, 0, west, 0, -cell, 0, north]
 
                 def place(column, row):

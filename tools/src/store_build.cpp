@@ -194,7 +194,7 @@ BuildOutcome build_store(const BuildRequest& request, const BuildProgress& progr
   BuildOutcome outcome;
   if (!crs.note.empty()) outcome.notes.push_back(crs.note);
   if (!ground.assumption().empty()) outcome.notes.push_back(ground.assumption());
-  const std::uint64_t source_bytes = std::max(kSourceMemory, stream::reading_bytes(*source));
+  const std::uint64_t source_bytes = std::max(kSourceMemory, source->reading_bytes());
   const std::size_t payload_bytes = payload_size(info);
   const unsigned threads = threads_within_memory(request, payload_bytes, source_bytes);
   if (info.grid) {

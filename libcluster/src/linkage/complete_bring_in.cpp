@@ -82,6 +82,8 @@ void CompleteRounds<T>::list_others(std::uint32_t k, std::vector<std::uint32_t>&
 }
 
 template void CompleteRounds<float>::bring_in(std::uint32_t, Columns&);
+template void CompleteRounds<float>::list_others(std::uint32_t, std::vector<std::uint32_t>&) const;
 template void CompleteRounds<double>::bring_in(std::uint32_t, Columns&);
+template void CompleteRounds<double>::list_others(std::uint32_t, std::vector<std::uint32_t>&) const;
 
 }  // namespace terrace::cluster

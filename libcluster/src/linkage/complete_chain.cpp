@@ -86,6 +86,10 @@ void CompleteRounds<T>::merge_into(std::uint32_t a, std::uint32_t b) {
 }
 
 template void CompleteRounds<float>::chain();
+template CompleteRounds<float>::Nearest CompleteRounds<float>::nearest_of(std::uint32_t, Nearest);
+template void CompleteRounds<float>::merge_into(std::uint32_t, std::uint32_t);
 template void CompleteRounds<double>::chain();
+template CompleteRounds<double>::Nearest CompleteRounds<double>::nearest_of(std::uint32_t, Nearest);
+template void CompleteRounds<double>::merge_into(std::uint32_t, std::uint32_t);
 
 }  // namespace terrace::cluster

@@ -101,8 +101,4 @@ std::unique_ptr<Raster> open_mosaic(const std::vector<std::string>& files,
 std::unique_ptr<PointSource> points_of(std::unique_ptr<Raster> raster,
                                        const SourceOptions& options = {});
 
-/// What a source that points_of() made takes at least, in bytes: its window and what its raster
-/// holds. 0 for other sources. Memory beyond it keeps more files of a mosaic open.
-std::uint64_t reading_bytes(const PointSource& source);
-
 }  // namespace terrace::stream

@@ -132,6 +132,9 @@ class PointSource {
   /// Throws: Error on bad data, naming file, place, cause and remedy; Stopped.
   virtual bool next(PointBlock& block) = 0;
   [[nodiscard]] virtual Progress progress() const = 0;
+  /// What reading takes at least, in bytes: of a raster the window and what its file holds, which
+  /// its layout decides. 0 where nothing but the blocks counts.
+  [[nodiscard]] virtual std::uint64_t reading_bytes() const { return 0; }
 };
 
 /// What a caller may ask of any source.
