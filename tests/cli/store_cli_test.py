@@ -249,7 +249,7 @@ class StoreTest(unittest.TestCase):
         heights = [noise.uniform(0, 100) for _ in range(columns * rows)]
         # Lambert's equal-area projection of Europe, 3,000 km off its centre: what is true to scale
         # in x and y is 3 % longer along one diagonal than along the other.
-        laea = (1, 1, 0, 3, 1024, 0, 1, 1, 1025, 0, 1, 1, 3072, 0, 1, 3035)
+        laea = {1024: 1, 1025: 1, 3072: 3035}
         turned = [0.6 * cell, 0.8 * cell, 0, 6.5e6, 0.8 * cell, -0.6 * cell, 0, 2.2e6,
                   0, 0, 0, 0, 0, 0, 0, 1]
         for name, keys, west, north, matrix in (('utm', utm(32), 0, 5.2e6, None),
