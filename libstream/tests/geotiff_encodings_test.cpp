@@ -224,7 +224,7 @@ TEST(GeoTiffEncodings, ALargeStripIsNotHeldDecoded) {
               std::filesystem::file_size(path) + (std::uint64_t{1} << 20));
     std::vector<std::int16_t> window(100 * 20);
     std::vector<std::uint8_t> valid(window.size());
-    for (const std::uint64_t row : {0, 700, 710, 1480, 3}) {
+    for (const std::uint64_t row : {0u, 700u, 710u, 1480u, 3u}) {
       raster->read_over({.column = 1900, .row = row, .columns = 100, .rows = 20},
                         {.samples = reinterpret_cast<std::byte*>(window.data()),
                          .valid = valid.data(),

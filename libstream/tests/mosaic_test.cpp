@@ -149,7 +149,7 @@ class CountedRaster final : public Raster {
 };
 
 TEST(Mosaic, KeepsOpenWhatFitsIntoItsMemory) {
-  for (const std::size_t room : {0, 1, 2, 5, 40}) {
+  for (const std::size_t room : {0u, 1u, 2u, 5u, 40u}) {
     SCOPED_TRACE(room);
     std::size_t open = 0, most = 0;
     const RasterOpener opener = [&](const std::string& name) {

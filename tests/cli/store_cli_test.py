@@ -302,7 +302,8 @@ class StoreTest(unittest.TestCase):
                     if where == 'in':
                         self.assertLess(share, 0.7, side)
                     else:
-                        self.assertGreater(share, 0.85, side)
+                        # About 1; a box that is shifted gives about a half on one side.
+                        self.assertGreater(share, 0.75, side)
                 # What is in blocks that do not meet the box stays as it is.
                 far = 225 * cell
                 apart = [{p for p in points
