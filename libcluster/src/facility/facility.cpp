@@ -8,7 +8,7 @@
 namespace terrace::cluster {
 namespace {
 
-constexpr std::size_t kMost = 0xfffffffe;
+constexpr std::size_t kMostEntries = 0xfffffffe;
 
 [[noreturn]] void fail(const std::string& what) { throw std::invalid_argument(what); }
 
@@ -16,8 +16,8 @@ bool is_cost(double value) { return value >= 0.0 && std::isfinite(value); }
 
 void check_count(std::size_t count, const char* what) {
   if (count == 0) fail(std::string("facility location without ") + what);
-  if (count > kMost) {
-    fail(std::to_string(count) + " " + what + ": at most " + std::to_string(kMost) +
+  if (count > kMostEntries) {
+    fail(std::to_string(count) + " " + what + ": at most " + std::to_string(kMostEntries) +
          " are possible; cluster them in blocks (hierarchy.hpp)");
   }
 }

@@ -14,6 +14,9 @@ constexpr std::size_t kRowsPerBlock = 32;
 constexpr std::size_t kThreadsFrom = 512;  ///< clusters; below, threads cost more than they save
 constexpr std::size_t kChainBelow = 8;     ///< a round that merges less than 1/8 is followed by it
 
+constexpr std::uint32_t kPairsPerCheck = 256;
+constexpr std::size_t kPrefetch = 8;
+
 }  // namespace
 
 template <class T>
@@ -221,6 +224,150 @@ void CompleteRounds<T>::shrink() {
                   });
   clusters_.swap(next);
   end_minima();
+}
+
+/// shrunk() makes the row of the new cluster k of those of its parts. What it needs from rows of
+/// others is brought in here, into the row of the first part. That only reads entries with a second
+/// part, and only writes entries of two first parts, so all clusters may do it at once.
+template <class T>
+void CompleteRounds<T>::bring_in(std::uint32_t k, Columns& columns) {
+  std::vector<std::uint32_t>& others = columns.others;
+  list_others(k, others);
+  const std::uint32_t a = first_[k];
+  const auto for_entries = [&](std::uint32_t other, auto action) {
+    const std::uint32_t c = first_[other];
+    if (second_[other] != c) action(entry(a, second_[other]));
+    if (second_[k] == a) return;
+    action(entry(second_[k], c));
+    if (second_[other] != c) action(entry(second_[k], second_[other]));
+  };
+  // Each is in another row, far from the last.
+  for (std::size_t i = 0; i < others.size(); ++i) {
+    if (i + kPrefetch < others.size()) {
+      for_entries(others[i + kPrefetch], [](const T& from) { __builtin_prefetch(&from); });
+    }
+    const std::uint32_t c = first_[others[i]];
+    T& to = clusters_[a].row[offset(a, c)];
+    for_entries(others[i], [&to](const T& from) { to = std::max(to, from); });
+  }
+}
+
+/// New clusters whose entry belongs to the row of k, with an entry of their parts that is neither
+/// in the row of the first part of k nor, in a column of that row, in the row of the second.
+template <class T>
+void CompleteRounds<T>::list_others(std::uint32_t k, std::vector<std::uint32_t>& others) const {
+  others.clear();
+  const std::uint32_t m = size();
+  const std::uint32_t a = first_[k];
+  const std::uint32_t b = second_[k];
+  const std::uint32_t length = clusters_[a].length;
+  if (b != a) {
+    // Clusters in the row of a that are not in the row of b. Offsets count from a.
+    const std::uint32_t begin = b - a;
+    const std::uint32_t end = begin + clusters_[b].length;
+    const auto list = [&](std::uint32_t from, std::uint32_t to) {
+      for (std::uint32_t step = from; step <= to; ++step) {
+        const std::uint32_t j = a + step < m ? a + step : a + step - m;
+        const std::uint32_t other = new_cluster_[j];
+        if (j != b && holds(a, first_[other])) others.push_back(other);
+      }
+    };
+    if (end < m) {
+      list(1, std::min(length, begin));
+      list(end + 1, length);
+    } else {
+      list(end - m + 1, std::min(length, begin));
+    }
+  }
+  // Pairs of which one is in the row of a and the other is not.
+  for (std::size_t p = 0; p < pair_first_.size(); p += kPairsPerCheck) {
+    const std::size_t count = std::min<std::size_t>(kPairsPerCheck, pair_first_.size() - p);
+    if (kernels_.straddling(pair_first_.data() + p, pair_second_.data() + p, count, a, length, m) ==
+        0) {
+      continue;
+    }
+    for (std::size_t q = p; q < p + count; ++q) {
+      if (pair_first_[q] != a && holds(a, pair_first_[q]) && !holds(a, pair_second_[q])) {
+        others.push_back(new_cluster_[pair_first_[q]]);
+      }
+    }
+  }
+}
+
+/// Merges until three quarters of the clusters are left, and lists those. Entries of clusters that
+/// are gone are infinite. O(m^2): a cluster joins the chain once for itself and at most twice for
+/// each merge.
+template <class T>
+void CompleteRounds<T>::chain() {
+  const std::uint32_t m = size();
+  const std::uint32_t enough = std::max(1u, m - m / 4);
+  std::vector<bool> gone(m, false);
+  std::vector<std::uint32_t> chain;
+  std::uint32_t start = 0;
+  for (std::uint32_t left = m; left > enough;) {
+    if (chain.empty()) {
+      while (gone[start]) ++start;
+      chain.push_back(start);
+    }
+    const std::uint32_t c = chain.back();
+    // Of equally near ones the last on the chain: it would never end otherwise.
+    Nearest best{std::numeric_limits<T>::infinity(), kNone};
+    if (chain.size() > 1) best = {entry(c, chain[chain.size() - 2]), chain[chain.size() - 2]};
+    best = nearest_of(c, best);
+    if (chain.size() == 1 || best.cluster != chain[chain.size() - 2]) {
+      chain.push_back(best.cluster);
+      continue;
+    }
+    chain.resize(chain.size() - 2);
+    const std::uint32_t a = std::min(c, best.cluster);
+    const std::uint32_t b = std::max(c, best.cluster);
+    links_.push_back({clusters_[a].name, clusters_[b].name, static_cast<double>(best.distance)});
+    merge_into(a, b);
+    gone[b] = true;
+    --left;
+  }
+  first_.clear();
+  for (std::uint32_t c = 0; c < m; ++c) {
+    firsts_before_[c] = static_cast<std::uint32_t>(first_.size());
+    if (!gone[c]) first_.push_back(c);
+  }
+  firsts_before_[m] = static_cast<std::uint32_t>(first_.size());
+  second_ = first_;
+}
+
+/// The nearest to c, or `best` if none is nearer than that.
+template <class T>
+typename CompleteRounds<T>::Nearest CompleteRounds<T>::nearest_of(std::uint32_t c, Nearest best) {
+  const Pieces own = pieces(c);
+  for (const Piece& piece : {own.after, own.wrapped}) {
+    for (std::uint32_t j = piece.begin; j < piece.end; ++j) {
+      const T distance = piece.values[j - piece.begin];
+      if (distance < best.distance) best = {distance, j};
+    }
+  }
+  // All others have c in their rows.
+  const auto look = [&](std::uint32_t begin, std::uint32_t end) {
+    for (std::uint32_t j = begin; j < end; ++j) {
+      const T distance = clusters_[j].row[offset(j, c)];
+      if (distance < best.distance) best = {distance, j};
+    }
+  };
+  look(own.wrapped.end, c);
+  look(own.after.end, size());
+  return best;
+}
+
+template <class T>
+void CompleteRounds<T>::merge_into(std::uint32_t a, std::uint32_t b) {
+  constexpr T kMerged = std::numeric_limits<T>::infinity();
+  for (std::uint32_t c = 0; c < size(); ++c) {
+    if (c == a || c == b) continue;
+    T& from = entry(b, c);
+    T& to = entry(a, c);
+    to = std::max(to, from);
+    from = kMerged;
+  }
+  entry(a, b) = kMerged;
 }
 
 template class CompleteRounds<float>;
