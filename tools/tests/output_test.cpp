@@ -201,7 +201,9 @@ TEST_F(MayReplace, ForceLeavesWhatMerelyHasTheWord) {
   }
   write(std::string(200000, '1'));
   expect_foreign("one long line");
-  write(std::string(200000, '\xFF') + "terrace");
+  std::string binary(200000, '\xFF');
+  binary += "terrace";
+  write(binary);
   expect_foreign("the word at the end");
 }
 
