@@ -226,6 +226,9 @@ void CompleteRounds<T>::shrink() {
   end_minima();
 }
 
+// Entries of merged clusters that are in the rows of others: with near clusters in near rows they
+// are few, but each is a row apart from the next.
+
 /// shrunk() makes the row of the new cluster k of those of its parts. What it needs from rows of
 /// others is brought in here, into the row of the first part. That only reads entries with a second
 /// part, and only writes entries of two first parts, so all clusters may do it at once.
@@ -293,6 +296,10 @@ void CompleteRounds<T>::list_others(std::uint32_t k, std::vector<std::uint32_t>&
     }
   }
 }
+
+// The nearest-neighbour chain: from any cluster to its nearest, on to the nearest of that, until
+// two are each other's nearest and merge. Each step looks at m distances, half of them one per row,
+// so it serves only where rounds would merge too few clusters.
 
 /// Merges until three quarters of the clusters are left, and lists those. Entries of clusters that
 /// are gone are infinite. O(m^2): a cluster joins the chain once for itself and at most twice for
