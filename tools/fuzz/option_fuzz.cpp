@@ -57,9 +57,6 @@ bool parse(std::string_view name, const std::string& value) {
     require(parse_line(file.name()).size() >= 2, "a line has two places");
   } else if (name == "criterion") {
     static_cast<void>(parse_criterion(value));
-  } else if (name == "max-edge") {
-    const auto edge = parse_max_edge(value);
-    require(!edge || *edge > 0, "a length");
   } else if (name == "tile") {
     const auto tile = parse_tile_path(value);
     if (!tile) return false;
