@@ -6,8 +6,6 @@
 #include <cmath>
 #include <utility>
 
-#include <CLI/CLI.hpp>
-
 #include "region_crs.hpp"
 #include "terrace/stream/error.hpp"
 #include "units.hpp"
@@ -74,20 +72,6 @@ void PlaceConversion::operator()(std::span<stream::Point3> points) const {
       p[1] = places[i][1];
     }
   }
-}
-
-void CrsOptions::define(CLI::App& app) {
-  define_region(app);
-  app.add_option("--to-crs", to_, "the CRS of what is written; heights stay as they are");
-}
-
-void CrsOptions::define_region(CLI::App& app) {
-  app.add_option("--region-crs", region_,
-                 "the CRS of regions and focuses (EPSG:n or a WKT file; x,y is lon,lat), if it is "
-                 "not the store's");
-  app.add_option("--towgs84", shift_,
-                 "dx,dy,dz[,rx,ry,rz,ds] to WGS 84 from the datum of such a CRS, or of the store, "
-                 "if it is another");
 }
 
 RegionConversion CrsOptions::regions(const stream::Store& store) const {

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <CLI/CLI.hpp>
+
+#include "crs_options.hpp"
+
+namespace terrace::tools {
+
+void CrsOptions::define(CLI::App& app) {
+  define_region(app);
+  app.add_option("--to-crs", to_, "the CRS of what is written; heights stay as they are");
+}
+
+void CrsOptions::define_region(CLI::App& app) {
+  app.add_option("--region-crs", region_,
+                 "the CRS of regions and focuses (EPSG:n or a WKT file; x,y is lon,lat), if it is "
+                 "not the store's");
+  app.add_option("--towgs84", shift_,
+                 "dx,dy,dz[,rx,ry,rz,ds] to WGS 84 from the datum of such a CRS, or of the store, "
+                 "if it is another");
+}
+
+}  // namespace terrace::tools
