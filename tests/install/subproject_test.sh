@@ -52,7 +52,7 @@ CODE
 
 # Unoptimised: what is tested is the building, not the result. All are configured and all users are
 # compiled; linked and run are those of the two quick libraries (CI builds each library alone).
-meson setup "$folder/build" "$folder" --buildtype=plain >"$folder/log" 2>&1 || { cat "$folder/log"; exit 1; }
+meson setup "$folder/build" "$folder" --buildtype=plain -Dunity=on -Dunity_size=30 >"$folder/log" 2>&1 || { cat "$folder/log"; exit 1; }
 ninja -C "$folder/build" use_cluster use_matching use_stream.p/use_stream.cpp.o use_tri.p/use_tri.cpp.o \
   >"$folder/log" 2>&1 || { tail -n 50 "$folder/log"; exit 1; }
 if grep -o 'subprojects/[^ ]*_tests' "$folder/build/build.ninja"; then
