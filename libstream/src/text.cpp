@@ -31,13 +31,13 @@ std::vector<std::string_view> split_fields(std::string_view line, char separator
 }
 
 std::string in_quotes(std::string_view text) {
-  constexpr std::size_t kMost = 40;
+  constexpr std::size_t kMostShown = 40;
   std::string out = "'";
-  for (const char c : text.substr(0, kMost)) {
+  for (const char c : text.substr(0, kMostShown)) {
     const bool control = static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
     out += control ? '?' : c;
   }
-  out += text.size() > kMost ? "...'" : "'";
+  out += text.size() > kMostShown ? "...'" : "'";
   return out;
 }
 

@@ -11,7 +11,7 @@ namespace terrace::tools {
 
 void check_geo_keys(const stream::Crs& crs, const CrsDefinition& definition) {
   using P = ProjectionParameters;
-  using Kind = KeyOfParameter::Kind;
+  using KeyKind = KeyOfParameter::Kind;
   const GeoKeyValues keys(crs);
   const std::string code = "EPSG:" + std::to_string(definition.epsg);
   const auto contradict = [&code](const std::string& what) {
@@ -45,8 +45,8 @@ void check_geo_keys(const stream::Crs& crs, const CrsDefinition& definition) {
       return false;
     }();
     if (!value || !known) continue;
-    const double given = *value * (parameter.kind == Kind::angle                 ? angle
-                                   : parameter.kind == Kind::length && unit != 0 ? unit
+    const double given = *value * (parameter.kind == KeyKind::angle                 ? angle
+                                   : parameter.kind == KeyKind::length && unit != 0 ? unit
                                                                                  : 1.0);
     const ProjectionParameters& p = definition.parameters;
     const auto means = [given](double meant) {

@@ -43,8 +43,8 @@ void HeightPatches::build() {
 
 // Halves at the median along the longer side of what the middles span; boxes come from below.
 void HeightPatches::split(std::uint32_t node, std::uint32_t first, std::uint32_t last) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  std::array<double, 4> box{kInfinity, kInfinity, -kInfinity, -kInfinity};
+  const double infinity = std::numeric_limits<double>::infinity();
+  std::array<double, 4> box{infinity, infinity, -infinity, -infinity};
   const auto add = [&box](double x, double y) {
     box = {std::min(box[0], x), std::min(box[1], y), std::max(box[2], x), std::max(box[3], y)};
   };

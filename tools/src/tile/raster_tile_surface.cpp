@@ -76,7 +76,7 @@ template <class Visit>
 void RasterTileSurface::visit_places(std::span<const double> longitude,
                                      std::span<const double> latitude, const Visit& visit) {
   constexpr std::int64_t kBlock = 128;          // places are taken block by block of the lattice
-  constexpr std::int64_t kMostSamples = 32768;  // of a window that is read for a run of them
+  constexpr std::int64_t kMostInWindow = 32768;  // of a window that is read for a run of them
   std::vector<Point2> places(longitude.size());
   for (std::size_t i = 0; i < places.size(); ++i) {
     // One of the two numbers that the line of 180 degrees has: tiles on both sides ask for it.
@@ -116,7 +116,7 @@ void RasterTileSurface::visit_places(std::span<const double> longitude,
       const std::int64_t nr0 = first ? row : std::min(r0, row);
       const std::int64_t nc1 = first ? column + 1 : std::max(c1, column + 1);
       const std::int64_t nr1 = first ? row + 1 : std::max(r1, row + 1);
-      if (!first && (nc1 - nc0 + 1) * (nr1 - nr0 + 1) > kMostSamples) break;
+      if (!first && (nc1 - nc0 + 1) * (nr1 - nr0 + 1) > kMostInWindow) break;
       c0 = nc0;
       r0 = nr0;
       c1 = nc1;
