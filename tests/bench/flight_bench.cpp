@@ -23,10 +23,10 @@
 #include <sys/resource.h>
 
 #include "../pipeline/temporary_folder.hpp"
-#include "cli.hpp"
+#include "build/store_build.hpp"
+#include "cli/cli.hpp"
 #include "flight_path.hpp"
 #include "flight_viewer.hpp"
-#include "store_build.hpp"
 
 namespace {
 
@@ -41,7 +41,7 @@ constexpr double kBudget = 0.010;
 
 Store open_store(const std::filesystem::path& folder) {
   const char* given = std::getenv("TERRACE_BENCH_STORE");
-  terrace::tools::BuildRequest request;
+  terrace::terrain::BuildRequest request;
   request.store = given ? std::filesystem::path(given) : folder / "dem.store";
   if (std::filesystem::exists(request.store)) return Store::open(request.store);
   const std::string dem = (folder / "dem.tif").string();
@@ -53,7 +53,7 @@ Store open_store(const std::filesystem::path& folder) {
   request.inputs = {dem};
   request.block_points = small() ? 1000 : 10000;
   request.threads = std::max(1u, std::thread::hardware_concurrency());
-  terrace::tools::build_store(request);
+  terrace::terrain::build_store(request);
   return Store::open(request.store);
 }
 

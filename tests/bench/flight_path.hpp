@@ -10,7 +10,7 @@
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/view.hpp>
 
-#include "world.hpp"
+#include "earth/world.hpp"
 
 namespace terrace::tests {
 
@@ -23,14 +23,14 @@ class Flight {
   /// active: points that are to be in the model.
   Flight(const stream::Store& store, Kind kind, std::size_t active)
       : kind_(kind), points_(static_cast<double>(active)) {
-    const auto placement = tools::placement_of(store.schema());
-    const stream::Box3 box = tools::world_box(placement, store.bounds());
+    const auto placement = terrain::placement_of(store.schema());
+    const stream::Box3 box = terrain::world_box(placement, store.bounds());
     middle_ = {(box.min[0] + box.max[0]) / 2, (box.min[1] + box.max[1]) / 2, box.max[2]};
     const double side = std::min(box.max[0] - box.min[0], box.max[1] - box.min[1]);
     cell_ = std::sqrt((box.max[0] - box.min[0]) * (box.max[1] - box.min[1]) /
                       static_cast<double>(store.points()));
     radius_ = 0.22 * side;
-    const double ground = tools::world_point(placement, {0, 0, store.mean_height()})[2];
+    const double ground = terrain::world_point(placement, {0, 0, store.mean_height()})[2];
     // As much is seen over small stores as over large ones, in proportion.
     const double seen = std::sqrt(points_) * cell_;
     above_ = 0.3 * seen;

@@ -17,8 +17,8 @@
 #include <terrace/tri/view_control.hpp>
 #include <terrace/tri/view_meter.hpp>
 
-#include "store_source.hpp"
-#include "world.hpp"
+#include "earth/world.hpp"
+#include "terrace/terrain/store_source.hpp"
 
 /// What stands between a store and the view control: who reads, and when.
 
@@ -35,7 +35,7 @@ inline double now() {
 class GroundSource final : public tri::ClusterSource {
  public:
   explicit GroundSource(const stream::Store& store)
-      : inner_(store), placement_(tools::placement_of(store.schema())) {}
+      : inner_(store), placement_(terrain::placement_of(store.schema())) {}
 
   [[nodiscard]] unsigned top() const override { return inner_.top(); }
   [[nodiscard]] std::uint64_t cluster_count(unsigned level) const override {
@@ -43,15 +43,15 @@ class GroundSource final : public tri::ClusterSource {
   }
   tri::ClusterRecord record(tri::ClusterId id) override {
     tri::ClusterRecord record = inner_.record(id);
-    const stream::Box3 box = tools::world_box(placement_, {record.box.min, record.box.max});
+    const stream::Box3 box = terrain::world_box(placement_, {record.box.min, record.box.max});
     record.box = {box.min, box.max};
     return record;
   }
   tri::ClusterMembers read(tri::ClusterId id) override { return inner_.read(id); }
 
  private:
-  tools::StoreSource inner_;
-  tools::Placement placement_;
+  terrain::StoreSource inner_;
+  terrain::Placement placement_;
 };
 
 /// The view control, fed from a store.

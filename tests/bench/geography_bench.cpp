@@ -8,14 +8,14 @@
 
 #include <benchmark/benchmark.h>
 
-#include "coordinate_system.hpp"
-#include "grid_geography.hpp"
+#include "earth/crs/coordinate_system.hpp"
+#include "earth/grid_geography.hpp"
 
 namespace {
 
-using terrace::tools::CoordinateSystem;
-using terrace::tools::GridGeography;
-using terrace::tools::Point2;
+using terrace::terrain::CoordinateSystem;
+using terrace::terrain::GridGeography;
+using terrace::terrain::Point2;
 
 struct Grid {
   const char* crs;

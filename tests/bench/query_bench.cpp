@@ -16,15 +16,15 @@
 #include <terrace/stream/store.hpp>
 
 #include "../pipeline/temporary_folder.hpp"
-#include "cli.hpp"
-#include "detail.hpp"
-#include "height_sampler.hpp"
-#include "place_file.hpp"
-#include "portable_math.hpp"
-#include "sample_run.hpp"
-#include "store_build.hpp"
-#include "store_window.hpp"
-#include "world.hpp"
+#include "build/store_build.hpp"
+#include "cli/cli.hpp"
+#include "earth/portable_math.hpp"
+#include "earth/world.hpp"
+#include "sample/height_sampler.hpp"
+#include "sample/place_file.hpp"
+#include "sample/sample_run.hpp"
+#include "surface/detail.hpp"
+#include "surface/store_window.hpp"
 
 namespace {
 
@@ -41,11 +41,11 @@ const Store& store() {
         "terrace", "synth", "dem", "--size", small() ? "257x257" : "2049x2049", "-o", dem.c_str()};
     if (terrace::tools::run_command_line(static_cast<int>(synth.size()), synth.data()) != 0)
       std::exit(1);
-    terrace::tools::BuildRequest request;
+    terrace::terrain::BuildRequest request;
     request.inputs = {dem};
     request.store = folder.path() / "dem.store";
     request.threads = 2;
-    terrace::tools::build_store(request);
+    terrace::terrain::build_store(request);
     return Store::open(request.store);
   }();
   return opened;
@@ -59,7 +59,7 @@ void windows(benchmark::State& state) {
   const auto rows = static_cast<std::int64_t>(source.schema().rows);
   std::vector<float> heights(static_cast<std::size_t>(side * side));
   for (auto _ : state) {
-    terrace::tools::StoreWindow reader(source);
+    terrace::terrain::StoreWindow reader(source);
     for (std::int64_t row = 0; row < rows; row += side) {
       for (std::int64_t column = 0; column < columns; column += side) {
         reader.heights({column, row, side, side}, std::span(heights));
@@ -76,7 +76,7 @@ void same_window(benchmark::State& state) {
   const Store& source = store();
   const auto side = state.range(0);
   std::vector<float> heights(static_cast<std::size_t>(side * side));
-  terrace::tools::StoreWindow reader(source, std::uint64_t{16} << 20);
+  terrace::terrain::StoreWindow reader(source, std::uint64_t{16} << 20);
   for (auto _ : state) {
     reader.heights({10, 10, side, side}, std::span(heights));
     benchmark::DoNotOptimize(heights.data());
@@ -88,16 +88,16 @@ BENCHMARK(same_window)->Arg(64)->Arg(256)->Unit(benchmark::kMillisecond);
 std::size_t place_count() { return small() ? 2000 : 1000000; }
 
 /// Columns and rows in random order anywhere on the lattice.
-std::vector<terrace::tools::Point2> random_places() {
+std::vector<terrace::terrain::Point2> random_places() {
   const auto columns = static_cast<double>(store().schema().columns - 1);
   const auto rows = static_cast<double>(store().schema().rows - 1);
-  std::vector<terrace::tools::Point2> places(place_count());
+  std::vector<terrace::terrain::Point2> places(place_count());
   std::uint64_t seed = 1;
   const auto next = [&seed] {
-    seed = terrace::tools::scramble(seed);
-    return terrace::tools::unit_interval(seed);
+    seed = terrace::terrain::scramble(seed);
+    return terrace::terrain::unit_interval(seed);
   };
-  for (terrace::tools::Point2& place : places) place = {next() * columns, next() * rows};
+  for (terrace::terrain::Point2& place : places) place = {next() * columns, next() * rows};
   return places;
 }
 
@@ -106,13 +106,13 @@ void sample(benchmark::State& state) {
   const std::array<const char*, 3> methods{"linear", "natural", "nearest"};
   const char* const method = methods[static_cast<std::size_t>(state.range(0))];
   state.SetLabel(method);
-  terrace::tools::SamplerOptions options;
-  options.method = terrace::tools::parse_interpolation(method);
+  terrace::terrain::SamplerOptions options;
+  options.method = terrace::terrain::parse_interpolation(method);
   const Store& source = store();
   const auto places = random_places();
-  std::vector<terrace::tools::SurfacePoint> surface(places.size());
+  std::vector<terrace::terrain::SurfacePoint> surface(places.size());
   for (auto _ : state) {
-    terrace::tools::make_sampler(source, options)->sample(places, surface);
+    terrace::terrain::make_sampler(source, options)->sample(places, surface);
     benchmark::DoNotOptimize(surface.data());
   }
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(places.size()));
@@ -124,19 +124,19 @@ void sample_lines(benchmark::State& state) {
   const Store& source = store();
   static const terrace::tests::TemporaryFolder folder;
   const std::string name = (folder.path() / "places.csv").string();
-  const terrace::tools::Placement placement = terrace::tools::placement_of(source.schema());
+  const terrace::terrain::Placement placement = terrace::terrain::placement_of(source.schema());
   std::ofstream file(name);
   file.precision(12);
   for (const auto& [column, row] : random_places()) {
-    const terrace::stream::Point3 p = terrace::tools::world_point(placement, {column, row, 0});
+    const terrace::stream::Point3 p = terrace::terrain::world_point(placement, {column, row, 0});
     file << p[0] << ',' << p[1] << '\n';
   }
   file.close();
   std::size_t bytes = 0;
   for (auto _ : state) {
-    terrace::tools::PlaceFile places(name);
-    terrace::tools::answer_places(source, {}, places, {},
-                                  [&bytes](std::string_view text) { bytes += text.size(); }, {});
+    terrace::terrain::PlaceFile places(name);
+    terrace::terrain::answer_places(source, {}, places, {},
+                                    [&bytes](std::string_view text) { bytes += text.size(); }, {});
   }
   benchmark::DoNotOptimize(bytes);
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(place_count()));
@@ -144,19 +144,19 @@ void sample_lines(benchmark::State& state) {
 BENCHMARK(sample_lines)->Unit(benchmark::kMillisecond);
 
 /// A square anywhere within the bounds that covers this share of their area, in the store's CRS.
-terrace::tools::Region random_square(double share, std::uint64_t seed) {
-  const terrace::stream::Box3 all =
-      terrace::tools::world_box(terrace::tools::placement_of(store().schema()), store().bounds());
+terrace::terrain::Region random_square(double share, std::uint64_t seed) {
+  const terrace::stream::Box3 all = terrace::terrain::world_box(
+      terrace::terrain::placement_of(store().schema()), store().bounds());
   std::string text[2];
   for (std::size_t axis = 0; axis < 2; ++axis) {
     const double side = std::sqrt(share) * (all.max[axis] - all.min[axis]);
-    seed = terrace::tools::scramble(seed);
-    const double low = all.min[axis] +
-                       terrace::tools::unit_interval(seed) * (all.max[axis] - all.min[axis] - side);
+    seed = terrace::terrain::scramble(seed);
+    const double low = all.min[axis] + terrace::terrain::unit_interval(seed) *
+                                           (all.max[axis] - all.min[axis] - side);
     text[0] += std::to_string(low) + ',';
     text[1] += std::to_string(low + side) + (axis == 0 ? "," : "");
   }
-  return terrace::tools::Region::parse(text[0] + text[1]);
+  return terrace::terrain::Region::parse(text[0] + text[1]);
 }
 
 /// What it takes to read all points inside a square: the argument is its share of the area in parts
@@ -165,15 +165,15 @@ terrace::tools::Region random_square(double share, std::uint64_t seed) {
 /// often keeps it.
 void region(benchmark::State& state) {
   const Store& source = store();
-  const terrace::tools::Placement placement = terrace::tools::placement_of(source.schema());
+  const terrace::terrain::Placement placement = terrace::terrain::placement_of(source.schema());
   const double share = static_cast<double>(state.range(0)) / 10000;
   const std::uint64_t squares = small() ? 2 : share < 0.005 ? 200 : share < 0.05 ? 40 : 10;
   std::uint64_t inside = 0, delivered = 0, clusters = 0, bytes = 0, reads = 0;
   for (auto _ : state) {
     for (std::uint64_t square = 1; square <= squares; ++square) {
-      terrace::tools::Detail detail;
+      terrace::terrain::Detail detail;
       detail.region = random_square(share, square);
-      terrace::tools::for_each_wanted(
+      terrace::terrain::for_each_wanted(
           source, detail,
           [&](terrace::stream::ClusterId id, const terrace::stream::ClusterRecord& record,
               const terrace::stream::ClusterPoints& points) {
@@ -183,7 +183,7 @@ void region(benchmark::State& state) {
               delivered += points.size();
             }
             for (const auto& p : points.positions) {
-              inside += detail.region->contains(terrace::tools::world_point(placement, p));
+              inside += detail.region->contains(terrace::terrain::world_point(placement, p));
             }
           });
       ++reads;

@@ -20,9 +20,9 @@
 #include <terrace/tri/multiresolution.hpp>
 
 #include "../pipeline/temporary_folder.hpp"
-#include "cli.hpp"
-#include "store_build.hpp"
-#include "store_source.hpp"
+#include "build/store_build.hpp"
+#include "cli/cli.hpp"
+#include "terrace/terrain/store_source.hpp"
 
 namespace {
 
@@ -41,11 +41,11 @@ const Store& store() {
         "terrace", "synth", "dem", "--size", small() ? "256x256" : "4096x4096", "-o", dem.c_str()};
     if (terrace::tools::run_command_line(static_cast<int>(synth.size()), synth.data()) != 0)
       std::exit(1);
-    terrace::tools::BuildRequest request;
+    terrace::terrain::BuildRequest request;
     request.inputs = {dem};
     request.store = folder.path() / "dem.store";
     request.threads = 2;
-    terrace::tools::build_store(request);
+    terrace::terrain::build_store(request);
     return Store::open(request.store);
   }();
   return opened;
@@ -222,7 +222,7 @@ BENCHMARK(collapse_cgal_one_by_one)->Unit(benchmark::kMillisecond);
 
 /// The whole model, reading included: expand 500 clusters of level 0 and collapse them again.
 void model_expand_and_collapse(benchmark::State& state) {
-  terrace::tools::StoreSource source(store());
+  terrace::terrain::StoreSource source(store());
   if (store().top() == 0) return state.SkipWithError("the store has one level");
   terrace::tri::Multiresolution2<std::int32_t> model(source, {.level = 1, .focuses = {}});
   const std::uint64_t clusters = store().levels()[0].clusters;

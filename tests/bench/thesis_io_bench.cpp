@@ -18,8 +18,8 @@
 #include <terrace/cluster/hierarchy.hpp>
 #include <terrace/stream/source.hpp>
 
-#include "ground.hpp"
-#include "world.hpp"
+#include "earth/ground.hpp"
+#include "earth/world.hpp"
 
 namespace {
 
@@ -42,7 +42,7 @@ int measure(const std::string& file, std::size_t block_points, double facility_c
   source_options.block_points = block_points;
   const std::array files{file};
   const auto source = terrace::stream::open_source(files, source_options);
-  const terrace::tools::Ground ground(terrace::tools::placement_of(source->info()));
+  const terrace::terrain::Ground ground(terrace::terrain::placement_of(source->info()));
 
   NullSink sink;
   terrace::cluster::HierarchyOptions options;

@@ -21,7 +21,7 @@
 #include <terrace/stream/store.hpp>
 #include <unistd.h>
 
-#include "store_build.hpp"
+#include "build/store_build.hpp"
 #include "temporary_folder.hpp"
 
 namespace terrace {
@@ -71,12 +71,12 @@ class Build : public testing::Test {
   [[nodiscard]] fs::path dem() const { return folder_.path() / "dem.tif"; }
 
   tests::TemporaryFolder folder_;
-  tools::BuildRequest request_;
+  terrain::BuildRequest request_;
   std::uint64_t valid_ = 0;
 };
 
 TEST_F(Build, KeepsEveryValidCellOnceAndCountsTheOthers) {
-  const tools::BuildOutcome outcome = tools::build_store(request_);
+  const terrain::BuildOutcome outcome = terrain::build_store(request_);
   EXPECT_EQ(outcome.points, valid_);
   EXPECT_EQ(outcome.points + outcome.nodata, std::uint64_t{kSize} * kSize);
   const stream::Store store = stream::Store::open(request_.store);
@@ -94,28 +94,28 @@ TEST_F(Build, KeepsEveryValidCellOnceAndCountsTheOthers) {
 }
 
 TEST_F(Build, GivesTheSameBytesForAnyNumberOfThreads) {
-  tools::build_store(request_);
+  terrain::build_store(request_);
   const auto one = files_of(request_.store);
   for (const unsigned threads : {2u, 3u, 8u}) {
     SCOPED_TRACE(threads);
     request_.store = folder_.path() / std::to_string(threads);
     request_.threads = threads;
-    tools::build_store(request_);
+    terrain::build_store(request_);
     EXPECT_TRUE(files_of(request_.store) == one);
   }
 }
 
 TEST_F(Build, RefusesAnOutputThatExistsAndKeepsIt) {
-  tools::build_store(request_);
+  terrain::build_store(request_);
   const auto before = files_of(request_.store);
-  EXPECT_THROW(tools::build_store(request_), stream::Error);
+  EXPECT_THROW(terrain::build_store(request_), stream::Error);
   EXPECT_TRUE(files_of(request_.store) == before);
 }
 
 TEST_F(Build, SaysWhatMemoryItNeeds) {
   request_.memory_bytes = std::uint64_t{8} << 20;
   try {
-    tools::build_store(request_);
+    terrain::build_store(request_);
     FAIL() << "8 MiB were enough";
   } catch (const stream::Error& error) {
     EXPECT_NE(std::string(error.what()).find("need"), std::string::npos) << error.what();
@@ -131,7 +131,7 @@ TEST_F(Build, LeavesNothingWhenTheDiskIsFull) {
       const rlimit size{limit, limit};
       setrlimit(RLIMIT_FSIZE, &size);
       try {
-        tools::build_store(request_);
+        terrain::build_store(request_);
         _exit(2);
       } catch (const stream::Error&) {
         _exit(0);
@@ -156,7 +156,7 @@ TEST_F(Build, LeavesNothingOnADiskThatIsFull) {
   }
   request_.store = disk / "a.store";
   try {
-    tools::build_store(request_);
+    terrain::build_store(request_);
     ADD_FAILURE() << "the store fits into 128 KiB";
   } catch (const stream::Error& error) {
     EXPECT_NE(std::string(error.what()).find("No space left"), std::string::npos) << error.what();
@@ -174,7 +174,7 @@ TEST_F(Build, RefusesARasterOfNodataOnly) {
   stream::GeoTiffWriter writer(dem(), options);
   writer.write_rows(std::vector<std::byte>(400));
   writer.commit();
-  EXPECT_THROW(tools::build_store(request_), stream::Error);
+  EXPECT_THROW(terrain::build_store(request_), stream::Error);
   EXPECT_FALSE(fs::exists(request_.store));
 }
 

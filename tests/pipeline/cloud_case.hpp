@@ -18,9 +18,9 @@
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/delaunay2.hpp>
 
-#include "region.hpp"
-#include "store_build.hpp"
-#include "store_window.hpp"
+#include "base/region.hpp"
+#include "build/store_build.hpp"
+#include "surface/store_window.hpp"
 
 /// Clouds of many kinds in small stores of many clusters, and the triangulation of all their
 /// points.
@@ -28,8 +28,8 @@
 namespace terrace::tests {
 
 using Points = std::vector<stream::Point3>;
-using Triangle = std::array<tools::Point2, 3>;
-using tools::Point2;
+using Triangle = std::array<terrain::Point2, 3>;
+using terrain::Point2;
 
 class Random {
  public:
@@ -106,12 +106,12 @@ inline std::filesystem::path cloud_store(const std::filesystem::path& folder,
   out.precision(17);
   for (const stream::Point3& p : points) out << p[0] << ' ' << p[1] << ' ' << p[2] << '\n';
   out.close();
-  tools::BuildRequest request;
+  terrain::BuildRequest request;
   request.inputs = {(folder / "cloud.xyz").string()};
   request.store = folder / "cloud.store";
   request.block_points = 100;
   request.facility_cost = 1.0;
-  tools::build_store(request);
+  terrain::build_store(request);
   return request.store;
 }
 
@@ -138,12 +138,12 @@ inline std::filesystem::path raster_store(const std::filesystem::path& folder) {
   stream::GeoTiffWriter writer(folder / "dem.tif", options);
   writer.write_rows(std::as_bytes(std::span(samples)));
   writer.commit();
-  tools::BuildRequest request;
+  terrain::BuildRequest request;
   request.inputs = {(folder / "dem.tif").string()};
   request.store = folder / "dem.store";
   request.block_points = 300;
   request.facility_cost = 1.0;
-  tools::build_store(request);
+  terrain::build_store(request);
   return request.store;
 }
 
@@ -155,8 +155,8 @@ struct Whole {
 
   Whole(const stream::Store& store, unsigned level) {
     constexpr double kAll = std::numeric_limits<double>::infinity();
-    tools::StoreWindow reader(store);
-    tools::WindowPoints points;
+    terrain::StoreWindow reader(store);
+    terrain::WindowPoints points;
     reader.points({{-kAll, -kAll}, {kAll, kAll}}, points, level);
     const stream::Channel& z = store.schema().coordinates[2];
     for (const stream::Point3& p : points.positions) {

@@ -19,9 +19,9 @@
 #include <terrace/stream/geotiff_writer.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "detail.hpp"
-#include "store_build.hpp"
-#include "store_mesh.hpp"
+#include "build/store_build.hpp"
+#include "mesh/store_mesh.hpp"
+#include "surface/detail.hpp"
 #include "temporary_folder.hpp"
 
 namespace terrace {
@@ -32,13 +32,13 @@ constexpr std::uint32_t kSize = 500;
 constexpr double kCell = 30, kLeft = 500000, kTop = 5200000;
 
 /// Twice the area of a triangle seen from above; positive when counter-clockwise.
-double doubled_area(const tools::TriangleMesh& mesh, const std::array<std::uint32_t, 3>& t) {
+double doubled_area(const terrain::TriangleMesh& mesh, const std::array<std::uint32_t, 3>& t) {
   const auto &a = mesh.positions[t[0]], &b = mesh.positions[t[1]], &c = mesh.positions[t[2]];
   return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
 }
 
 /// Every edge lies in one triangle (the border) or in two, and all turn counter-clockwise.
-void expect_sound(const tools::TriangleMesh& mesh) {
+void expect_sound(const terrain::TriangleMesh& mesh) {
   std::map<std::pair<std::uint32_t, std::uint32_t>, int> edges;
   for (const auto& t : mesh.triangles) {
     ASSERT_GT(doubled_area(mesh, t), 0.0);
@@ -68,12 +68,12 @@ class Mesh : public testing::Test {
     stream::GeoTiffWriter writer(folder_->path() / "dem.tif", options);
     writer.write_rows(std::as_bytes(std::span(samples)));
     writer.commit();
-    tools::BuildRequest request;
+    terrain::BuildRequest request;
     request.inputs = {(folder_->path() / "dem.tif").string()};
     request.store = folder_->path() / "dem.store";
     request.block_points = 2000;  // more levels
     request.facility_cost = 1.0;
-    tools::build_store(request);
+    terrain::build_store(request);
     store_ = new stream::Store(stream::Store::open(request.store));
     ASSERT_GE(store_->top(), 2u);
   }
@@ -91,8 +91,8 @@ stream::Store* Mesh::store_ = nullptr;
 TEST_F(Mesh, OfALevelHasThePointsOfThatLevelAndAbove) {
   for (unsigned level = 0; level <= store_->top(); ++level) {
     SCOPED_TRACE(level);
-    const tools::TriangleMesh mesh =
-        mesh_of_store(*store_, tools::Detail::parse(*store_, std::to_string(level), "", {}), kMuch);
+    const terrain::TriangleMesh mesh = mesh_of_store(
+        *store_, terrain::Detail::parse(*store_, std::to_string(level), "", {}), kMuch);
     EXPECT_EQ(mesh.positions.size(), store_->levels()[level].points);
     expect_sound(mesh);
     for (const std::uint8_t l : mesh.levels) EXPECT_GE(l, level);
@@ -100,8 +100,8 @@ TEST_F(Mesh, OfALevelHasThePointsOfThatLevelAndAbove) {
 }
 
 TEST_F(Mesh, OfLevelZeroIsTheGrid) {
-  const tools::TriangleMesh mesh =
-      mesh_of_store(*store_, tools::Detail::parse(*store_, "0", "", {}), kMuch);
+  const terrain::TriangleMesh mesh =
+      mesh_of_store(*store_, terrain::Detail::parse(*store_, "0", "", {}), kMuch);
   EXPECT_EQ(mesh.positions.size(), std::size_t{kSize} * kSize);
   EXPECT_EQ(mesh.triangles.size(), std::size_t{2} * (kSize - 1) * (kSize - 1));
   double area = 0;
@@ -112,8 +112,8 @@ TEST_F(Mesh, OfLevelZeroIsTheGrid) {
 TEST_F(Mesh, HoldsEveryPointInsideAFocusAndFewOutside) {
   // Columns 200 to 260, rows 100 to 160, borders on samples.
   const std::string box = "506000,5195200,507800,5197000";
-  const tools::TriangleMesh mesh =
-      mesh_of_store(*store_, tools::Detail::parse(*store_, "top", "", {box + ":0"}), kMuch);
+  const terrain::TriangleMesh mesh =
+      mesh_of_store(*store_, terrain::Detail::parse(*store_, "top", "", {box + ":0"}), kMuch);
   expect_sound(mesh);
   std::set<std::pair<double, double>> inside;
   for (const auto& p : mesh.positions) {
@@ -127,8 +127,8 @@ TEST_F(Mesh, HoldsEveryPointInsideAFocusAndFewOutside) {
 
 TEST_F(Mesh, OfARegionIsThePartOfTheWholeThatReachesIn) {
   const std::string box = "505003,5190001,507004,5192002";
-  const tools::TriangleMesh part =
-      mesh_of_store(*store_, tools::Detail::parse(*store_, "0", box, {}), kMuch);
+  const terrain::TriangleMesh part =
+      mesh_of_store(*store_, terrain::Detail::parse(*store_, "0", box, {}), kMuch);
   expect_sound(part);
   // At full resolution the region's triangles are grid triangles.
   double inside = 0;
@@ -145,7 +145,7 @@ TEST_F(Mesh, OfARegionIsThePartOfTheWholeThatReachesIn) {
 
 TEST_F(Mesh, SaysWhatMemoryItNeeds) {
   try {
-    mesh_of_store(*store_, tools::Detail::parse(*store_, "0", "", {}), std::uint64_t{1} << 20);
+    mesh_of_store(*store_, terrain::Detail::parse(*store_, "0", "", {}), std::uint64_t{1} << 20);
     FAIL() << "one MiB was enough";
   } catch (const stream::Error& error) {
     EXPECT_NE(std::string(error.what()).find("needs"), std::string::npos) << error.what();
@@ -153,10 +153,10 @@ TEST_F(Mesh, SaysWhatMemoryItNeeds) {
 }
 
 TEST_F(Mesh, PointsOfTheSameDetailAreItsVertices) {
-  const tools::Detail detail =
-      tools::Detail::parse(*store_, "1", "", {"506000,5195200,507800,5197000:0"});
-  const tools::TriangleMesh mesh = mesh_of_store(*store_, detail, kMuch);
-  const tools::TriangleMesh cloud = points_of_store(*store_, detail);
+  const terrain::Detail detail =
+      terrain::Detail::parse(*store_, "1", "", {"506000,5195200,507800,5197000:0"});
+  const terrain::TriangleMesh mesh = mesh_of_store(*store_, detail, kMuch);
+  const terrain::TriangleMesh cloud = points_of_store(*store_, detail);
   std::vector<stream::Point3> a = mesh.positions, b = cloud.positions;
   std::sort(a.begin(), a.end());
   std::sort(b.begin(), b.end());

@@ -24,26 +24,26 @@
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/delaunay2.hpp>
 
-#include "contour_parts.hpp"
-#include "error.hpp"
-#include "store_build.hpp"
-#include "store_window.hpp"
+#include "base/error.hpp"
+#include "build/store_build.hpp"
+#include "contour/contour_parts.hpp"
+#include "surface/store_window.hpp"
 #include "temporary_folder.hpp"
 
 namespace terrace {
 namespace {
 
-using tools::Point2;
+using terrain::Point2;
 using Segment = std::tuple<std::int64_t, Point2, Point2>;
 using Triangle = std::array<stream::Point3, 3>;
 
 stream::Store store_of(const std::filesystem::path& input, std::size_t block_points) {
-  tools::BuildRequest request;
+  terrain::BuildRequest request;
   request.inputs = {input.string()};
   request.store = input.string() + ".store";
   request.block_points = block_points;  // few: more clusters, more levels
   request.facility_cost = 1.0;
-  tools::build_store(request);
+  terrain::build_store(request);
   return stream::Store::open(request.store);
 }
 
@@ -75,9 +75,9 @@ std::vector<stream::Point3> lake_shore(std::uint64_t seed, bool whole) {
 /// The whole triangulation.
 std::vector<Triangle> triangles_of(const stream::Store& store, unsigned level) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  tools::WindowPoints points;
-  tools::StoreWindow(store).points({{-kInfinity, -kInfinity}, {kInfinity, kInfinity}}, points,
-                                   level);
+  terrain::WindowPoints points;
+  terrain::StoreWindow(store).points({{-kInfinity, -kInfinity}, {kInfinity, kInfinity}}, points,
+                                     level);
   std::vector<Point2> places;
   for (const stream::Point3& p : points.positions) places.push_back({p[0], p[1]});
   tri::Delaunay2<double> whole;
@@ -133,14 +133,14 @@ std::multiset<Segment> segments_of(const std::vector<Triangle>& triangles, doubl
   return segments;
 }
 
-std::vector<tools::ContourLine> lines_of(const stream::Store& store,
-                                         const tools::ContourRequest& request,
-                                         std::uint64_t points_per_part) {
-  std::vector<tools::ContourLine> lines;
-  tools::draw_point_contours(
+std::vector<terrain::ContourLine> lines_of(const stream::Store& store,
+                                           const terrain::ContourRequest& request,
+                                           std::uint64_t points_per_part) {
+  std::vector<terrain::ContourLine> lines;
+  terrain::draw_point_contours(
       {.store = store,
        .request = request,
-       .emit = [&](const tools::ContourLine& line) { lines.push_back(line); },
+       .emit = [&](const terrain::ContourLine& line) { lines.push_back(line); },
        .limit = {},
        .progress = [](double) {},
        .points_per_part = points_per_part});
@@ -148,7 +148,7 @@ std::vector<tools::ContourLine> lines_of(const stream::Store& store,
 }
 
 /// The lines are those of the whole, in the same order for any number of threads and memory.
-void expect_contours(const stream::Store& store, tools::ContourRequest request,
+void expect_contours(const stream::Store& store, terrain::ContourRequest request,
                      const std::vector<Triangle>& triangles) {
   const auto wanted = [&](const Triangle& t) {
     for (std::size_t i = 0; request.max_edge && i < 3; ++i) {
@@ -164,9 +164,9 @@ void expect_contours(const stream::Store& store, tools::ContourRequest request,
     SCOPED_TRACE("parts of " + std::to_string(most));
     request.threads = 1;
     request.memory_bytes = std::uint64_t{1} << 30;
-    const std::vector<tools::ContourLine> lines = lines_of(store, request, most);
+    const std::vector<terrain::ContourLine> lines = lines_of(store, request, most);
     std::multiset<Segment> segments;
-    for (const tools::ContourLine& line : lines) {
+    for (const terrain::ContourLine& line : lines) {
       if (line.closed) {
         EXPECT_EQ(line.points.front(), line.points.back());
       }
@@ -178,7 +178,7 @@ void expect_contours(const stream::Store& store, tools::ContourRequest request,
     EXPECT_TRUE(segments == expected);
     request.threads = 3;
     request.memory_bytes = std::uint64_t{64} << 20;
-    const std::vector<tools::ContourLine> again = lines_of(store, request, most);
+    const std::vector<terrain::ContourLine> again = lines_of(store, request, most);
     ASSERT_EQ(again.size(), lines.size());
     for (std::size_t i = 0; i < lines.size(); ++i) EXPECT_EQ(again[i].points, lines[i].points);
   }
@@ -207,7 +207,7 @@ TEST(PointContours, EndAtTrianglesWithALongerSideThanAllowed) {
     expect_contours(store, {.interval = 3, .max_edge = most}, triangles);
   }
   expect_contours(store,
-                  {.interval = 3, .max_edge = 20, .region = tools::Region::parse("0,0,200,400")},
+                  {.interval = 3, .max_edge = 20, .region = terrain::Region::parse("0,0,200,400")},
                   triangles);
 }
 
@@ -237,7 +237,7 @@ TEST(PointContours, OfARegionAreThoseOfTheTrianglesWhoseMiddlesLieInside) {
     }
     const std::string text = std::to_string(x) + ',' + std::to_string(y) + ',' +
                              std::to_string(x + size) + ',' + std::to_string(y + size);
-    const tools::Region region = tools::Region::parse(text);
+    const terrain::Region region = terrain::Region::parse(text);
     for (const Triangle& t : triangles) {
       strange += i % 2 == 0 && region.contains({(t[0][0] + t[1][0] + t[2][0]) / 3,
                                                 (t[0][1] + t[1][1] + t[2][1]) / 3, 0})
@@ -247,11 +247,11 @@ TEST(PointContours, OfARegionAreThoseOfTheTrianglesWhoseMiddlesLieInside) {
     expect_contours(store, {.interval = 0.5, .region = region}, triangles);
   }
   EXPECT_GE(strange, 6u);
-  const tools::Region polygon = tools::Region::of_polygons(
+  const terrain::Region polygon = terrain::Region::of_polygons(
       {{{{-200, 10}, {400, 60}, {90, 480}}, {{0, 200}, {60, 200}, {30, 260}}}}, -1e9, 1e9);
   expect_contours(store, {.interval = 2, .region = polygon}, triangles);
   EXPECT_THROW(
-      lines_of(store, {.interval = 1, .region = tools::Region::parse("2000,0,2001,5")}, 100),
+      lines_of(store, {.interval = 1, .region = terrain::Region::parse("2000,0,2001,5")}, 100),
       stream::Error);
 }
 
@@ -311,11 +311,11 @@ TEST(PointContours, TooManyLevelsForMemoryAreToldInsteadOfTried) {
   const tests::TemporaryFolder folder;
   const stream::Store store =
       cloud(folder.path(), std::vector<stream::Point3>{{0, 0, 0}, {1, 0, 10}, {0, 1, 10}});
-  tools::ContourRequest request{.interval = 1e-9};
-  EXPECT_THROW(tools::draw_point_contours(
+  terrain::ContourRequest request{.interval = 1e-9};
+  EXPECT_THROW(terrain::draw_point_contours(
                    {.store = store,
                     .request = request,
-                    .emit = [](const tools::ContourLine&) {},
+                    .emit = [](const terrain::ContourLine&) {},
                     .limit = {.points = 10000,
                               .exceeded =
                                   [] {

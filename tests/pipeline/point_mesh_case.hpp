@@ -20,18 +20,18 @@
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/point_tin.hpp>
 
-#include "bounded_mesh.hpp"
-#include "mesh_file.hpp"
-#include "region.hpp"
-#include "store_build.hpp"
-#include "streaming_hull.hpp"
+#include "base/region.hpp"
+#include "build/store_build.hpp"
+#include "mesh/bounded/bounded_mesh.hpp"
+#include "mesh/bounded/streaming_hull.hpp"
+#include "mesh/mesh_file.hpp"
 #include "temporary_folder.hpp"
 
 /// Clouds, and what any mesh of them must be.
 
 namespace terrace::tests {
 
-using tools::Point2;
+using terrain::Point2;
 using Cloud = std::vector<stream::Point3>;
 
 class Random {
@@ -88,7 +88,7 @@ inline bool everywhere(int, int) { return true; }
 
 /// Checks that a mesh is one piece over the hull of samples with a place of their own each, and
 /// tells their errors.
-inline tri::TinErrors check_surface(const Cloud& cloud, const tools::TriangleMesh& mesh) {
+inline tri::TinErrors check_surface(const Cloud& cloud, const terrain::TriangleMesh& mesh) {
   // Every sample, by other code.
   std::vector<double> x, y, z;
   std::vector<Point2> places;
@@ -112,7 +112,7 @@ inline tri::TinErrors check_surface(const Cloud& cloud, const tools::TriangleMes
   const Point2 origin = places.front();
   double area = 0;
   for (const auto& t : mesh.triangles) {
-    EXPECT_GT(tools::orientation(place(t[0]), place(t[1]), place(t[2])), 0);
+    EXPECT_GT(terrain::orientation(place(t[0]), place(t[1]), place(t[2])), 0);
     for (std::size_t k = 0; k < 3; ++k) {
       used.insert(t[k]);
       const auto [edge, fresh] = edges.emplace(t[k], t[(k + 1) % 3]);
@@ -122,7 +122,7 @@ inline tri::TinErrors check_surface(const Cloud& cloud, const tools::TriangleMes
     }
   }
   EXPECT_EQ(used.size(), mesh.positions.size());
-  const std::vector<Point2> hull = tools::convex_hull(places);
+  const std::vector<Point2> hull = terrain::convex_hull(places);
   double hull_area = 0;
   std::set<Point2> corners;
   for (std::size_t i = 0; i < hull.size(); ++i) {
@@ -158,17 +158,17 @@ class PointMesh : public testing::Test {
     block.positions = cloud;
     writer->append(block);
     writer->finish();
-    tools::BuildRequest request;
+    terrain::BuildRequest request;
     request.inputs = {name + ".ply"};
     request.store = name + ".store";
     request.block_points = 500;  // more levels
     request.facility_cost = 1.0;
-    tools::build_store(request);
+    terrain::build_store(request);
     return stream::Store::open(request.store);
   }
 
-  tools::BoundedMeshOptions options(double max_error, std::size_t window_points) {
-    tools::BoundedMeshOptions out;
+  terrain::BoundedMeshOptions options(double max_error, std::size_t window_points) {
+    terrain::BoundedMeshOptions out;
     out.max_error = max_error;
     out.window_points = window_points;
     out.path = (folder_.path() / "mesh.ply").string();
@@ -176,11 +176,10 @@ class PointMesh : public testing::Test {
     return out;
   }
 
-  static tools::CommonOptions common(unsigned threads = 1, std::uint64_t memory = 1U << 30) {
-    tools::CommonOptions out;
+  static terrain::Context common(unsigned threads = 1, std::uint64_t memory = 1U << 30) {
+    terrain::Context out;
     out.threads = threads;
     out.memory_bytes = memory;
-    out.progress = tools::ProgressMode::none;
     return out;
   }
 
@@ -190,21 +189,21 @@ class PointMesh : public testing::Test {
   }
 
   /// Meshes and checks all that must hold whatever the points are, each with a place of its own.
-  tools::BoundedMeshResult mesh_and_check(const Cloud& cloud,
-                                          const tools::BoundedMeshOptions& options) {
+  terrain::BoundedMeshResult mesh_and_check(const Cloud& cloud,
+                                            const terrain::BoundedMeshOptions& options) {
     return mesh_and_check(build(cloud), cloud, options);
   }
-  tools::BoundedMeshResult mesh_and_check(const stream::Store& store, const Cloud& cloud,
-                                          const tools::BoundedMeshOptions& options);
+  terrain::BoundedMeshResult mesh_and_check(const stream::Store& store, const Cloud& cloud,
+                                            const terrain::BoundedMeshOptions& options);
 
   TemporaryFolder folder_;
   int clouds_ = 0;
 };
 
-inline tools::BoundedMeshResult PointMesh::mesh_and_check(
-    const stream::Store& store, const Cloud& cloud, const tools::BoundedMeshOptions& options) {
-  const tools::BoundedMeshResult result = bounded_point_mesh(store, options, common());
-  const tools::TriangleMesh mesh = tools::read_mesh_file(options.path)->mesh;
+inline terrain::BoundedMeshResult PointMesh::mesh_and_check(
+    const stream::Store& store, const Cloud& cloud, const terrain::BoundedMeshOptions& options) {
+  const terrain::BoundedMeshResult result = bounded_point_mesh(store, options, common());
+  const terrain::TriangleMesh mesh = terrain::read_mesh_file(options.path)->mesh;
   EXPECT_EQ(result.vertices, mesh.positions.size());
   EXPECT_EQ(result.triangles, mesh.triangles.size());
   EXPECT_EQ(result.samples, cloud.size());

@@ -22,15 +22,15 @@
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/point_tin.hpp>
 
-#include "bounded_mesh.hpp"
-#include "mesh_file.hpp"
+#include "base/region.hpp"
+#include "mesh/bounded/bounded_mesh.hpp"
+#include "mesh/mesh_file.hpp"
 #include "point_mesh_case.hpp"
-#include "region.hpp"
 
 namespace terrace::tests {
 namespace {
 
-using tools::Point2;
+using terrain::Point2;
 
 TEST_F(PointMesh, IsOnePieceWithinTheBoundWhateverThePoints) {
   const auto diamond = [](int c, int r) {
@@ -165,7 +165,7 @@ TEST_F(PointMesh, KeepsAllSamplesOfAPlaceWithinTheBound) {
         EXPECT_EQ(result.samples, cloud.size());
         EXPECT_EQ(result.uncovered, 0U);
         EXPECT_EQ(result.duplicates, 2 * places);
-        const tools::TriangleMesh mesh = tools::read_mesh_file(wanted.path)->mesh;
+        const terrain::TriangleMesh mesh = terrain::read_mesh_file(wanted.path)->mesh;
         const tri::TinErrors errors = tri::measure_surface(x, y, z, mesh.positions, mesh.triangles);
         EXPECT_EQ(errors.covered, cloud.size());
         EXPECT_LE(errors.largest, 1.0 + 1e-9);
@@ -219,7 +219,7 @@ TEST_F(PointMesh, TakesOneHeightPerPlaceAsAsked) {
     EXPECT_EQ(result.samples, cloud.size());
     EXPECT_EQ(result.duplicates, 2 * places.size());
     EXPECT_LE(result.max_error, 1e-12);
-    const tools::TriangleMesh mesh = tools::read_mesh_file(wanted.path)->mesh;
+    const terrain::TriangleMesh mesh = terrain::read_mesh_file(wanted.path)->mesh;
     std::vector<double> x, y, z;
     for (const stream::Point3& p : places) {
       x.push_back(p[0]);
@@ -244,7 +244,7 @@ TEST_F(PointMesh, OfARegionIsTheMeshOfItsSamples) {
   const Cloud cloud = uniform(9000, 8);
   const stream::Store store = build(cloud);
   auto wanted = options(0.8, 900);
-  wanted.region = tools::Region::parse("10.5,20,80,71");
+  wanted.region = terrain::Region::parse("10.5,20,80,71");
   Cloud inside;
   std::copy_if(cloud.begin(), cloud.end(), std::back_inserter(inside),
                [&](const stream::Point3& p) { return wanted.region->contains(p); });
@@ -305,7 +305,7 @@ TEST_F(PointMesh, OfALaserScan) {
     const auto result = bounded_point_mesh(store, wanted, common(2));
     EXPECT_EQ(result.samples, scan.size());
     EXPECT_EQ(result.duplicates, scan.size() - cloud.size());
-    const auto errors = check_surface(cloud, tools::read_mesh_file(wanted.path)->mesh);
+    const auto errors = check_surface(cloud, terrain::read_mesh_file(wanted.path)->mesh);
     EXPECT_LE(errors.largest, max_error * (1 + 1e-9));
     EXPECT_NEAR(errors.largest, result.max_error, 1e-9);
     auto whole = wanted;

@@ -16,18 +16,18 @@
 #include <terrace/tri/delaunay2.hpp>
 #include <terrace/tri/interpolation.hpp>
 
+#include "base/error.hpp"
 #include "cloud_case.hpp"
-#include "error.hpp"
-#include "height_sampler.hpp"
+#include "sample/height_sampler.hpp"
 #include "temporary_folder.hpp"
 
 namespace terrace {
 namespace {
 
+using terrain::Point2;
+using terrain::SurfacePoint;
 using tests::Random;
 using tests::Whole;
-using tools::Point2;
-using tools::SurfacePoint;
 using tri::Interpolation;
 
 bool same_bits(double a, double b) {
@@ -69,13 +69,13 @@ std::vector<Point2> places_of(const stream::Store& store, const Whole& whole, st
 }
 
 /// Answers, and that neither threads, memory nor what else is asked changes a bit.
-std::vector<SurfacePoint> sampled(const stream::Store& store, tools::SamplerOptions options,
+std::vector<SurfacePoint> sampled(const stream::Store& store, terrain::SamplerOptions options,
                                   const std::vector<Point2>& places) {
   std::vector<SurfacePoint> out(places.size()), again(1);
-  tools::make_sampler(store, options)->sample(places, out);
+  terrain::make_sampler(store, options)->sample(places, out);
   options.threads = 3;
   options.memory_bytes = std::uint64_t{100} << 20;
-  const auto other = tools::make_sampler(store, options);
+  const auto other = terrain::make_sampler(store, options);
   Random random(23);
   std::vector<std::size_t> order(places.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -195,8 +195,8 @@ TEST(PointSampler, GivesNothingInTrianglesWithLongSides) {
 TEST(PointSampler, RefusesALimitOfEdgesForRasters) {
   const tests::TemporaryFolder folder;
   const stream::Store store = stream::Store::open(tests::raster_store(folder.path()));
-  EXPECT_THROW(tools::make_sampler(store, {.max_edge = 5.0}), tools::UsageError);
-  EXPECT_THROW(tools::make_sampler(store, {.level = store.top() + 1}), tools::UsageError);
+  EXPECT_THROW(terrain::make_sampler(store, {.max_edge = 5.0}), terrain::UsageError);
+  EXPECT_THROW(terrain::make_sampler(store, {.level = store.top() + 1}), terrain::UsageError);
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "point_spacing.hpp"
+#include "base/point_spacing.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -11,6 +11,8 @@
 #include <gtest/gtest.h>
 
 namespace terrace::tools {
+
+using namespace terrain;
 namespace {
 
 using Points = std::vector<stream::Point3>;

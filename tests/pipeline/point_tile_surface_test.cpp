@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What tiles ask of a store of irregular points, against all of its points.
-#include "tile/point_tile_surface.hpp"
+#include "tile/make/point_tile_surface.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -19,22 +19,22 @@
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/delaunay2.hpp>
 
-#include "crs_options.hpp"
-#include "store_build.hpp"
+#include "build/store_build.hpp"
+#include "earth/store_crs.hpp"
+#include "surface/cluster_census.hpp"
 #include "temporary_folder.hpp"
-#include "tile/cloud_spacing.hpp"
-#include "tile/cluster_census.hpp"
-#include "tile/crowded_leaf.hpp"
-#include "tile/sample_parts.hpp"
-#include "tile/tile_candidates.hpp"
-#include "tile/tile_mesher.hpp"
+#include "tile/make/cloud_spacing.hpp"
+#include "tile/make/crowded_leaf.hpp"
+#include "tile/make/sample_parts.hpp"
+#include "tile/make/tile_mesher.hpp"
+#include "tile/set/tile_candidates.hpp"
 
 namespace terrace {
 namespace {
 
-using tools::GeographicBox;
-using tools::Point2;
-using tools::StoredBox;
+using terrain::GeographicBox;
+using terrain::Point2;
+using terrain::StoredBox;
 
 class Random {
  public:
@@ -96,12 +96,12 @@ std::vector<CloudCase> cases() {
 struct CloudStore {
   tests::TemporaryFolder folder;
   stream::Store store;
-  tools::CoordinateSystem crs;
+  terrain::CoordinateSystem crs;
   std::vector<stream::Point3> firsts;  ///< of points at one x, y the one that counts
   std::vector<Point2> globe;           ///< of these
 
   explicit CloudStore(const CloudCase& cloud)
-      : store(build(cloud, folder.path())), crs(tools::system_of(store)) {
+      : store(build(cloud, folder.path())), crs(terrain::system_of(store)) {
     std::set<Point2> seen;
     for (unsigned level = store.top() + 1; level-- > 0;) {
       store.for_each(level, [&](stream::ClusterId, const stream::ClusterRecord&,
@@ -113,11 +113,11 @@ struct CloudStore {
     }
     for (const stream::Point3& p : firsts) globe.push_back({p[0], p[1]});
     crs.to_geographic(globe);
-    for (Point2& p : globe) p[0] = tools::wrapped_longitude(p[0]);
+    for (Point2& p : globe) p[0] = terrain::wrapped_longitude(p[0]);
   }
 
-  [[nodiscard]] tools::TiledCloud tiled() const {
-    return {store, crs, tools::EllipsoidalHeights(store.schema(), "ellipsoidal", "", 0),
+  [[nodiscard]] terrain::TiledCloud tiled() const {
+    return {store, crs, terrain::EllipsoidalHeights(store.schema(), "ellipsoidal", "", 0),
             std::uint64_t{256} << 20};
   }
 
@@ -128,13 +128,13 @@ struct CloudStore {
     out.precision(17);
     for (const stream::Point3& p : cloud.points) out << p[0] << ' ' << p[1] << ' ' << p[2] << '\n';
     out.close();
-    tools::BuildRequest request;
+    terrain::BuildRequest request;
     request.inputs = {file.string()};
     request.store = folder / "cloud.store";
     request.block_points = 300;  // few: more levels
     request.facility_cost = 1.0;
-    request.crs = tools::CoordinateSystem::parse(cloud.crs).crs();
-    tools::build_store(request);
+    request.crs = terrain::CoordinateSystem::parse(cloud.crs).crs();
+    terrain::build_store(request);
     return stream::Store::open(request.store);
   }
 };
@@ -158,8 +158,8 @@ TEST(PointTileSurface, HasTheSamplesOfABoxAndTheirRange) {
   for (const CloudCase& cloud : cases()) {
     SCOPED_TRACE(cloud.name);
     const CloudStore all(cloud);
-    const tools::TiledCloud tiled = all.tiled();
-    tools::PointTileSurface surface(tiled);
+    const terrain::TiledCloud tiled = all.tiled();
+    terrain::PointTileSurface surface(tiled);
     for (const Point2& p : all.globe)
       ASSERT_TRUE(inside(surface.bounds(), p)) << p[0] << " " << p[1];
     EXPECT_GT(surface.spacing(), 0.0);
@@ -177,7 +177,7 @@ TEST(PointTileSurface, HasTheSamplesOfABoxAndTheirRange) {
         low = std::min(low, all.firsts[k][2]);
         high = std::max(high, all.firsts[k][2]);
       }
-      tools::SurfaceSamples found;
+      terrain::SurfaceSamples found;
       surface.samples(box, found);
       std::set<std::tuple<double, double, double>> got;
       for (std::size_t k = 0; k < found.size(); ++k) {
@@ -197,7 +197,7 @@ TEST(PointTileSurface, HasTheSamplesOfABoxAndTheirRange) {
       // In parts it is the same, each sample once.
       got.clear();
       std::size_t count = 0;
-      tools::for_each_part(box, surface, [&](const tools::SurfaceSamples& part) {
+      terrain::for_each_part(box, surface, [&](const terrain::SurfaceSamples& part) {
         count += part.size();
         for (std::size_t k = 0; k < part.size(); ++k) {
           got.insert({part.longitude[k], part.latitude[k], part.height[k]});
@@ -215,8 +215,8 @@ TEST(PointTileSurface, IsThatOfAllPointsWhateverWasAskedBefore) {
     if (cloud.name == "one" || cloud.name == "line") continue;
     SCOPED_TRACE(cloud.name);
     const CloudStore all(cloud);
-    const tools::TiledCloud tiled = all.tiled();
-    tools::PointTileSurface surface(tiled), other(tiled);
+    const terrain::TiledCloud tiled = all.tiled();
+    terrain::PointTileSurface surface(tiled), other(tiled);
     tri::Delaunay2<double> whole;
     std::map<Point2, double> height;
     std::vector<tri::Point2> places;
@@ -274,7 +274,7 @@ TEST(PointTileSurface, IsThatOfAllPointsWhateverWasAskedBefore) {
 
 TEST(ClusterCensus, CountsWhatTheClustersHave) {
   const CloudStore all(cases().front());
-  tools::ClusterCensus census(all.store);
+  terrain::ClusterCensus census(all.store);
   const stream::Box3& bounds = all.store.bounds();
   // The index grows boxes a little.
   EXPECT_NEAR(census.count({{bounds.min[0], bounds.min[1]}, {bounds.max[0], bounds.max[1]}}, 1e9),
@@ -331,7 +331,7 @@ TEST(CloudSpacing, IsThatOfALatticeOfTheSameDensity) {
   }
   const auto spacing = [](const CloudCase& cloud) {
     const CloudStore all(cloud);
-    return tools::cloud_spacing(all.store, tools::StoredPlaces(all.store, all.crs));
+    return terrain::cloud_spacing(all.store, terrain::StoredPlaces(all.store, all.crs));
   };
   EXPECT_NEAR(spacing(lattice), 1e-4, 0.15e-4);
   EXPECT_NEAR(spacing(far), 1e-4 * std::sqrt(0.695), 0.25e-4);
@@ -342,12 +342,12 @@ TEST(TileCandidates, AreAllThatMayHaveSamples) {
   for (const CloudCase& cloud : cases()) {
     SCOPED_TRACE(cloud.name);
     const CloudStore all(cloud);
-    const tools::TiledCloud tiled = all.tiled();
-    tools::PointTileSurface surface(tiled);
+    const terrain::TiledCloud tiled = all.tiled();
+    terrain::PointTileSurface surface(tiled);
     for (const unsigned zoom : {0U, 1U, 4U, 9U}) {
-      const auto tiles = tools::tiles_with_samples(surface, zoom);
+      const auto tiles = terrain::tiles_with_samples(surface, zoom);
       std::set<std::pair<std::uint32_t, std::uint32_t>> found;
-      for (const tools::TileAddress& tile : tiles) found.insert({tile.y, tile.x});
+      for (const terrain::TileAddress& tile : tiles) found.insert({tile.y, tile.x});
       EXPECT_EQ(found.size(), tiles.size());
       const double width = 180.0 / std::exp2(zoom);
       for (const Point2& p : all.globe) {
@@ -365,33 +365,33 @@ TEST(TileCandidates, AreAllThatMayHaveSamples) {
 
 TEST(CrowdedLeaf, IsWithinTheBoundOfAllItsSamples) {
   const CloudStore all(cases().front());
-  const tools::TiledCloud tiled = all.tiled();
-  tools::PointTileSurface surface(tiled);
+  const terrain::TiledCloud tiled = all.tiled();
+  terrain::PointTileSurface surface(tiled);
   // All of the cloud in a few units of a leaf.
   for (const unsigned zoom : {6U, 8U, 10U}) {
     SCOPED_TRACE(zoom);
-    const tools::TileRange range = tools::tiles_in(surface.bounds(), zoom);
-    const tools::TileAddress tile{zoom, range.x0, range.y0};
-    const tools::ZoomPlan plan = tools::plan_zoom(zoom, 40, 2000, surface);
-    const double unit = tools::tile_width(zoom) / tools::kTileUnits;
+    const terrain::TileRange range = terrain::tiles_in(surface.bounds(), zoom);
+    const terrain::TileAddress tile{zoom, range.x0, range.y0};
+    const terrain::ZoomPlan plan = terrain::plan_zoom(zoom, 40, 2000, surface);
+    const double unit = terrain::tile_width(zoom) / terrain::kTileUnits;
     const auto place = [&](double degrees, double from) {
       return static_cast<std::uint32_t>((degrees - from) / unit) / 128;
     };
     const GeographicBox box = box_of(tile);
-    const tools::TileLeaf leaf{8, place(surface.bounds().west, box.west),
-                               place(surface.bounds().south, box.south)};
-    tools::TileSides sides(tile, plan, surface);
+    const terrain::TileLeaf leaf{8, place(surface.bounds().west, box.west),
+                                 place(surface.bounds().south, box.south)};
+    terrain::TileSides sides(tile, plan, surface);
     std::vector<tri::Point3> frame;
-    for (const tools::TileSideVertex& vertex : sides.around(leaf)) {
+    for (const terrain::TileSideVertex& vertex : sides.around(leaf)) {
       frame.push_back({static_cast<double>(vertex.u), static_cast<double>(vertex.v),
                        static_cast<double>(vertex.height) * plan.height_step});
     }
     tri::PointTinOptions options;
     options.lattice = tri::TinLattice{0.0, plan.height_step};
-    tools::SurfaceSamples samples;
+    terrain::SurfaceSamples samples;
     surface.samples(box_of(tile, leaf), samples);
     ASSERT_GT(samples.size(), 50U);
-    const tools::LeafPlaces units(tile, leaf);
+    const terrain::LeafPlaces units(tile, leaf);
     std::vector<double> u, v;
     for (std::size_t i = 0; i < samples.size(); ++i) {
       u.push_back(units.u(samples.longitude[i]));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Windows of the triangulation of a store's points against the triangulation of all of them.
-#include "point_window.hpp"
+#include "surface/point_window.hpp"
 
 #include <algorithm>
 #include <array>
@@ -24,6 +24,10 @@
 namespace terrace {
 namespace {
 
+using terrain::Point2;
+using terrain::PointWindow;
+using terrain::StoredBox;
+using terrain::SurfacePoint;
 using tests::cloud_store;
 using tests::Points;
 using tests::points_of;
@@ -31,10 +35,6 @@ using tests::Random;
 using tests::raster_store;
 using tests::Triangle;
 using tests::Whole;
-using tools::Point2;
-using tools::PointWindow;
-using tools::StoredBox;
-using tools::SurfacePoint;
 /// Whether no line separates them, in long double.
 bool meets(const Triangle& t, const StoredBox& box) {
   using Number = long double;

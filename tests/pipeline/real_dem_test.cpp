@@ -16,7 +16,7 @@
 #include <terrace/stream/source.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "store_build.hpp"
+#include "build/store_build.hpp"
 #include "temporary_folder.hpp"
 
 namespace terrace {
@@ -65,12 +65,12 @@ std::vector<char> samples_by_gdal(const fs::path& raster, const fs::path& raw) {
 
 void expect_every_sample(const fs::path& raster, const fs::path& scratch) {
   SCOPED_TRACE(raster.string());
-  tools::BuildRequest request;
+  terrain::BuildRequest request;
   request.inputs = {raster.string()};
   request.store = scratch / "dem.store";
   request.replace = true;
   request.threads = 2;
-  const tools::BuildOutcome outcome = tools::build_store(request);
+  const terrain::BuildOutcome outcome = terrain::build_store(request);
 
   const stream::Store store = stream::Store::open(request.store);
   EXPECT_TRUE(store.verify([](const stream::Problem& problem) {

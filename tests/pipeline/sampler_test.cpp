@@ -15,15 +15,15 @@
 #include <terrace/tri/delaunay2.hpp>
 #include <terrace/tri/interpolation.hpp>
 
-#include "error.hpp"
-#include "height_sampler.hpp"
-#include "store_build.hpp"
+#include "base/error.hpp"
+#include "build/store_build.hpp"
+#include "sample/height_sampler.hpp"
 #include "temporary_folder.hpp"
 
 namespace terrace {
 namespace {
 
-using tools::Point2;
+using terrain::Point2;
 using tri::Interpolation;
 
 struct Raster {
@@ -63,12 +63,12 @@ class Sampler : public testing::TestWithParam<Raster> {
     writer.write_rows(raster.doubles ? std::as_bytes(std::span(doubles))
                                      : std::as_bytes(std::span(floats)));
     writer.commit();
-    tools::BuildRequest request;
+    terrain::BuildRequest request;
     request.inputs = {file.string()};
     request.store = folder_.path() / "dem.store";
     request.block_points = 1000;
     request.facility_cost = 1.0;
-    tools::build_store(request);
+    terrain::build_store(request);
     std::vector<std::array<std::int32_t, 2>> points;
     std::vector<double> at;
     for (std::size_t i = 0; i < heights_.size(); ++i) {
@@ -98,12 +98,12 @@ class Sampler : public testing::TestWithParam<Raster> {
   }
 
   /// Answers and that they depend on neither threads nor on what else is asked.
-  [[nodiscard]] std::vector<tools::SurfacePoint> sampled(Interpolation method,
-                                                         const std::vector<Point2>& places) const {
+  [[nodiscard]] std::vector<terrain::SurfacePoint> sampled(
+      Interpolation method, const std::vector<Point2>& places) const {
     const stream::Store store = stream::Store::open(folder_.path() / "dem.store");
-    std::vector<tools::SurfacePoint> out(places.size()), again(places.size());
-    tools::make_sampler(store, {.method = method})->sample(places, out);
-    const auto many = tools::make_sampler(store, {.method = method, .threads = 3});
+    std::vector<terrain::SurfacePoint> out(places.size()), again(places.size());
+    terrain::make_sampler(store, {.method = method})->sample(places, out);
+    const auto many = terrain::make_sampler(store, {.method = method, .threads = 3});
     for (std::size_t begin = 0; begin < places.size(); begin += 90) {
       const std::size_t size = std::min<std::size_t>(90, places.size() - begin);
       many->sample(std::span(places).subspan(begin, size), std::span(again).subspan(begin, size));
@@ -225,7 +225,8 @@ TEST_P(Sampler, PlacesThatAreNoNumbersHaveNoHeight) {
   const std::vector<Point2> queries{{NAN, 3}, {3, INFINITY}, {-INFINITY, NAN}, {1e300, 1e300}};
   for (const Interpolation method :
        {Interpolation::kLinear, Interpolation::kNearest, Interpolation::kNaturalNeighbour}) {
-    for (const tools::SurfacePoint& p : sampled(method, queries)) EXPECT_TRUE(std::isnan(p.height));
+    for (const terrain::SurfacePoint& p : sampled(method, queries))
+      EXPECT_TRUE(std::isnan(p.height));
     EXPECT_TRUE(sampled(method, {}).empty());
   }
 }

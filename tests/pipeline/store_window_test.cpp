@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Windows of a store against the whole store decoded, on a raster with holes and on a cloud; with
 // caches of any size, on several threads, and of a damaged store.
-#include "store_window.hpp"
+#include "surface/store_window.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -22,7 +22,7 @@
 #include <terrace/stream/geotiff_writer.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "store_build.hpp"
+#include "build/store_build.hpp"
 #include "temporary_folder.hpp"
 
 namespace terrace {
@@ -33,12 +33,12 @@ constexpr std::int16_t kNodata = -32768;
 
 std::filesystem::path build(const std::filesystem::path& input, const std::string& name,
                             std::size_t block_points) {
-  tools::BuildRequest request;
+  terrain::BuildRequest request;
   request.inputs = {input.string()};
   request.store = input.parent_path() / name;
   request.block_points = block_points;  // few: more levels
   request.facility_cost = 1.0;
-  tools::build_store(request);
+  terrain::build_store(request);
   return request.store;
 }
 
@@ -101,7 +101,7 @@ struct Whole {
   }
 
   [[nodiscard]] std::vector<double> heights(const stream::Store& store,
-                                            const tools::LatticeWindow& window,
+                                            const terrain::LatticeWindow& window,
                                             unsigned level) const {
     std::vector<double> grid(window.size(), std::numeric_limits<double>::quiet_NaN());
     const stream::Channel& channel = store.schema().coordinates[2];
@@ -126,8 +126,8 @@ bool same_bits(const std::vector<T>& a, const std::vector<double>& b) {
   });
 }
 
-tools::LatticeWindow random_window(std::mt19937_64& random) {
-  tools::LatticeWindow window;
+terrain::LatticeWindow random_window(std::mt19937_64& random) {
+  terrain::LatticeWindow window;
   window.column = static_cast<std::int64_t>(random() % (kColumns + 60)) - 40;
   window.row = static_cast<std::int64_t>(random() % (kRows + 60)) - 40;
   window.columns = 1 + static_cast<std::int64_t>(random() % 130);
@@ -148,10 +148,10 @@ TEST(StoreWindow, GivesTheSamplesOfARasterAndNaNForItsHoles) {
     for (const std::uint64_t cache :
          {std::uint64_t{0}, std::uint64_t{50000}, std::uint64_t{1} << 26}) {
       SCOPED_TRACE(cache);
-      tools::StoreWindow reader(store, cache);
+      terrain::StoreWindow reader(store, cache);
       EXPECT_EQ(reader.float_is_exact(), scale == 1.0);
       for (int i = 0; i < 40; ++i) {
-        const tools::LatticeWindow window = random_window(random);
+        const terrain::LatticeWindow window = random_window(random);
         const unsigned level = i % 3 == 0 ? static_cast<unsigned>(random() % (store.top() + 1)) : 0;
         std::vector<double> heights(window.size());
         reader.heights(window, std::span(heights), level);
@@ -170,10 +170,10 @@ TEST(StoreWindow, GivesTheSamplesOfARasterAndNaNForItsHoles) {
 TEST(StoreWindow, OutsideTheRasterThereIsNothing) {
   const tests::TemporaryFolder folder;
   const stream::Store store = stream::Store::open(raster_store(folder.path(), 1.0));
-  tools::StoreWindow reader(store);
-  for (const tools::LatticeWindow window :
-       {tools::LatticeWindow{-500, 0, 20, 20}, tools::LatticeWindow{kColumns, kRows, 7, 3},
-        tools::LatticeWindow{0, 0, 0, 0}}) {
+  terrain::StoreWindow reader(store);
+  for (const terrain::LatticeWindow window :
+       {terrain::LatticeWindow{-500, 0, 20, 20}, terrain::LatticeWindow{kColumns, kRows, 7, 3},
+        terrain::LatticeWindow{0, 0, 0, 0}}) {
     std::vector<double> heights(window.size(), 1.0);
     reader.heights(window, std::span(heights));
     for (const double height : heights) EXPECT_TRUE(std::isnan(height));
@@ -190,10 +190,10 @@ TEST(StoreWindow, GivesThePointsInABoxHigherLevelsFirst) {
   std::mt19937_64 random(seed);
   const auto unit = [&] { return static_cast<double>(random() >> 11) * 0x1p-53; };
   for (const std::uint64_t cache : {std::uint64_t{0}, std::uint64_t{1} << 26}) {
-    tools::StoreWindow reader(store, cache);
-    tools::WindowPoints points;
+    terrain::StoreWindow reader(store, cache);
+    terrain::WindowPoints points;
     for (int i = 0; i < 60; ++i) {
-      tools::StoredBox box;
+      terrain::StoredBox box;
       // Half of the boxes have a corner on a point: they are closed.
       const stream::Point3& corner = whole.positions[random() % whole.positions.size()];
       box.min = {i % 2 == 0 ? corner[0] : unit() * 1000 - 300,
@@ -222,13 +222,13 @@ TEST(StoreWindow, GivesThePointsInABoxHigherLevelsFirst) {
 TEST(StoreWindow, ReadersOfOneStoreDoNotDisturbEachOther) {
   const tests::TemporaryFolder folder;
   const stream::Store store = stream::Store::open(raster_store(folder.path(), 1.0));
-  const tools::LatticeWindow all{0, 0, kColumns, kRows};
+  const terrain::LatticeWindow all{0, 0, kColumns, kRows};
   const std::vector<double> expected = Whole(store).heights(store, all, 0);
   std::array<std::vector<double>, 4> results;
   std::vector<std::thread> threads;
   for (std::vector<double>& result : results) {
     threads.emplace_back([&] {
-      tools::StoreWindow reader(store, 100000);
+      terrain::StoreWindow reader(store, 100000);
       for (int round = 0; round < 5; ++round) {
         result.assign(all.size(), 0.0);
         reader.heights(all, std::span(result));
@@ -253,7 +253,7 @@ TEST(StoreWindow, DamageComesThroughAndTheRestIsStillRead) {
     file.put(static_cast<char>(byte ^ 16));
   }
   const stream::Store store = stream::Store::open(path);
-  tools::StoreWindow reader(store);
+  terrain::StoreWindow reader(store);
   std::vector<double> all(std::size_t{kColumns} * kRows);
   for (int round = 0; round < 2; ++round) {
     EXPECT_THROW(reader.heights({0, 0, kColumns, kRows}, std::span(all)), stream::Error);
@@ -262,7 +262,7 @@ TEST(StoreWindow, DamageComesThroughAndTheRestIsStillRead) {
   constexpr std::int64_t kSide = 40;
   for (std::int64_t row = 0; row < kRows; row += kSide) {
     for (std::int64_t column = 0; column < kColumns; column += kSide) {
-      const tools::LatticeWindow window{column, row, kSide, kSide};
+      const terrain::LatticeWindow window{column, row, kSide, kSide};
       std::vector<double> heights(window.size());
       try {
         reader.heights(window, std::span(heights));

@@ -14,9 +14,9 @@
 #include <terrace/stream/geotiff_writer.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "coordinate_system.hpp"
-#include "ground.hpp"
-#include "store_build.hpp"
+#include "build/store_build.hpp"
+#include "earth/crs/coordinate_system.hpp"
+#include "earth/ground.hpp"
 #include "temporary_folder.hpp"
 
 namespace terrace {
@@ -49,7 +49,7 @@ Shape cluster(const Twin& twin, const std::filesystem::path& folder) {
   options.rows = twin.rows;
   options.sample.type = stream::ScalarType::f32;
   options.world.xy = {cell_x / twin.unit_x, 0, twin.x0, 0, -cell_y / twin.unit_y, twin.y0};
-  options.crs = tools::CoordinateSystem::parse(twin.crs).crs();
+  options.crs = terrain::CoordinateSystem::parse(twin.crs).crs();
   options.replace = true;
   std::vector<float> samples;
   for (std::uint32_t row = 0; row < twin.rows; ++row) {
@@ -61,13 +61,13 @@ Shape cluster(const Twin& twin, const std::filesystem::path& folder) {
   writer.write_rows(std::as_bytes(std::span(samples)));
   writer.commit();
 
-  tools::BuildRequest request;
+  terrain::BuildRequest request;
   request.inputs = {(folder / "dem.tif").string()};
   request.store = folder / "dem.store";
   request.replace = true;
   request.crs = options.crs;
   if (twin.unit_z != 1.0) request.crs->vertical_unit = "US survey foot";
-  tools::build_store(request);
+  terrain::build_store(request);
 
   const stream::Store store = stream::Store::open(request.store);
   Shape shape;
@@ -104,7 +104,7 @@ TEST_F(Twins, MetresMakeClustersAsWideAsDeep) {
 
 TEST_F(Twins, DegreesClusterLikeMetres) {
   // At 60 degrees north a degree of longitude is half as long as one of latitude.
-  const tools::MetresPerDegree degree = tools::metres_per_degree(60.0);
+  const terrain::MetresPerDegree degree = terrain::metres_per_degree(60.0);
   expect_like_metres(cluster({300, 300, degree.longitude, degree.latitude, 1, 10.0,
                               60.0 + kExtent / 2 / degree.latitude, "EPSG:4326"},
                              folder_.path()));

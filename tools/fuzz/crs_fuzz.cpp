@@ -7,12 +7,14 @@
 #include <cmath>
 #include <vector>
 
-#include "coordinate_system.hpp"
-#include "error.hpp"
+#include "base/error.hpp"
+#include "earth/crs/coordinate_system.hpp"
 #include "fuzz_target.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::tools {
+
+using namespace terrain;
 namespace {
 
 stream::Crs crs_of_keys(std::string_view text) {

@@ -10,12 +10,14 @@
 #include <terrace/stream/overlay.hpp>
 #include <terrace/stream/store.hpp>
 
+#include "build/store_build.hpp"
 #include "fuzz_target.hpp"
-#include "height_overlay.hpp"
-#include "store_build.hpp"
+#include "mesh/height_overlay.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::tools {
+
+using namespace terrain;
 namespace {
 
 /// 40 points in clusters, made anew in every run: what the store's bytes are does not matter.

@@ -2,11 +2,13 @@
 // Mesh files, PLY and OBJ: refused, or triangles of vertices that are there, with as many of each
 // property as there are vertices.
 #include "fuzz_target.hpp"
-#include "mesh_file.hpp"
-#include "obj_mesh.hpp"
+#include "mesh/mesh_file.hpp"
+#include "mesh/obj_mesh.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::tools {
+
+using namespace terrain;
 
 bool accepts(const std::uint8_t* data, std::size_t size) {
   const std::string_view text = text_of(data, size);

@@ -3,21 +3,23 @@
 #include <algorithm>
 #include <cmath>
 
-#include "bounded_mesh.hpp"
-#include "camera.hpp"
-#include "error.hpp"
+#include "base/error.hpp"
+#include "base/region.hpp"
+#include "base/units.hpp"
+#include "cli/smooth_option.hpp"
 #include "fuzz_target.hpp"
-#include "height_sampler.hpp"
-#include "profile_run.hpp"
-#include "raster_run.hpp"
-#include "region.hpp"
-#include "smooth_option.hpp"
-#include "surface_run.hpp"
+#include "mesh/bounded/bounded_mesh.hpp"
+#include "picture/camera.hpp"
+#include "sample/height_sampler.hpp"
+#include "sample/profile_run.hpp"
+#include "sample/raster_run.hpp"
+#include "scan/surface_run.hpp"
 #include "terrace/stream/error.hpp"
-#include "tile/tile_address.hpp"
-#include "units.hpp"
+#include "tile/format/tile_address.hpp"
 
 namespace terrace::tools {
+
+using namespace terrain;
 namespace {
 
 bool parse(std::string_view name, const std::string& value) {

@@ -5,13 +5,15 @@
 
 #include <nlohmann/json.hpp>
 
-#include "error.hpp"
+#include "base/error.hpp"
+#include "base/region.hpp"
+#include "build/metric_option.hpp"
 #include "fuzz_target.hpp"
-#include "metric_option.hpp"
-#include "region.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::tools {
+
+using namespace terrain;
 namespace {
 
 void use(const Region& region) {

@@ -4,14 +4,16 @@
 #include <charconv>
 #include <cmath>
 
-#include "dendrogram_file.hpp"
 #include "fuzz_target.hpp"
-#include "label_file.hpp"
-#include "matching_result.hpp"
-#include "place_file.hpp"
+#include "sample/place_file.hpp"
+#include "tables/dendrogram_file.hpp"
+#include "tables/label_file.hpp"
+#include "tables/matching_result.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::tools {
+
+using namespace terrain;
 namespace {
 
 /// As `sample` goes through a table; true if there was a place in it.

@@ -8,13 +8,15 @@
 
 #include "fuzz_target.hpp"
 #include "terrace/stream/error.hpp"
-#include "tile/quantized_mesh.hpp"
-#include "tile/tile_journal.hpp"
-#include "tile/tile_layer.hpp"
-#include "tile/tile_mesh_check.hpp"
+#include "tile/format/quantized_mesh.hpp"
+#include "tile/format/tile_layer.hpp"
+#include "tile/set/tile_journal.hpp"
+#include "tile/verify/tile_mesh_check.hpp"
 #include "version.hpp"
 
 namespace terrace::tools {
+
+using namespace terrain;
 namespace {
 
 bool read_tile(std::string_view text) {

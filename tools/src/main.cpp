@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cli.hpp"
-#include "terminal.hpp"
+#include "base/terminal.hpp"
+#include "cli/cli.hpp"
 
 int main(int argc, char** argv) {
   terrace::tools::secure_standard_descriptors();

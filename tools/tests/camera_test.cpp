@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "src/camera.hpp"
+#include "picture/camera.hpp"
 
 #include <gtest/gtest.h>
 
-#include "src/error.hpp"
+#include "base/error.hpp"
 
 namespace terrace::tools {
+
+using namespace terrain;
 namespace {
 
 TEST(ParseView, TakesTopAndTwoAngles) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "src/dendrogram_file.hpp"
+#include "tables/dendrogram_file.hpp"
 
 #include <cmath>
 #include <filesystem>
@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "../../tests/pipeline/temporary_folder.hpp"
-#include "src/draw.hpp"
+#include "picture/draw.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::tools {

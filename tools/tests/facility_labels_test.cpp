@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "facility_labels.hpp"
+#include "tables/facility_labels.hpp"
 
 #include <algorithm>
 #include <random>

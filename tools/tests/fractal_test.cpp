@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "src/fractal.hpp"
+#include "synth/fractal.hpp"
 
 #include <algorithm>
 #include <bit>

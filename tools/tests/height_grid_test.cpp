@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "src/height_grid.hpp"
+#include "picture/height_grid.hpp"
 
 #include <set>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "src/matching_result.hpp"
+#include "tables/matching_result.hpp"
 
 #include <filesystem>
 #include <fstream>
@@ -8,11 +8,13 @@
 #include <gtest/gtest.h>
 
 #include "../../tests/pipeline/temporary_folder.hpp"
-#include "src/draw.hpp"
-#include "src/error.hpp"
+#include "base/error.hpp"
+#include "picture/draw.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::tools {
+
+using namespace terrain;
 namespace {
 
 constexpr const char* kPairs = "a,b,distance\n";

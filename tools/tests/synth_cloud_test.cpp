@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "src/synth_cloud.hpp"
+#include "synth/synth_cloud.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -8,10 +8,12 @@
 
 #include <gtest/gtest.h>
 
-#include "src/error.hpp"
+#include "base/error.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::tools {
+
+using namespace terrain;
 namespace {
 
 constexpr std::uint64_t kMemory = 1 << 20;

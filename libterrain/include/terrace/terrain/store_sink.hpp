@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include <terrace/cluster/hierarchy.hpp>
+#include <terrace/stream/store.hpp>
+
+namespace terrace::terrain {
+
+/// Hands the finished blocks of libcluster's hierarchy builder to libstream's store writer: encoded
+/// on the thread that clustered them, appended in order. The two libraries do not know each other.
+class StoreSink final : public cluster::HierarchySink {
+ public:
+  /// The writer must outlive the sink. publish: false for a trial.
+  explicit StoreSink(stream::StoreWriter& writer, bool publish = true)
+      : writer_(writer), publish_(publish) {}
+
+  std::unique_ptr<Prepared> prepare(const cluster::FinishedBlock& block) override;
+  void commit(unsigned level, std::unique_ptr<Prepared> prepared) override;
+  /// Finishes the store: it stands under its name when this returns, unless it is a trial.
+  void root(const cluster::FinishedBlock& block) override;
+
+  /// Bytes of the finished store; 0 before root().
+  [[nodiscard]] std::uint64_t store_bytes() const { return store_bytes_; }
+
+ private:
+  stream::StoreWriter& writer_;
+  bool publish_;
+  std::uint64_t store_bytes_ = 0;
+};
+
+}  // namespace terrace::terrain

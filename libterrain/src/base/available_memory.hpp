@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+
+namespace terrace::terrain {
+
+/// Bytes that this process may use: the machine's memory, or less where its cgroup (or one above
+/// it, of version 1 or 2) or its limits RLIMIT_AS and RLIMIT_DATA say so. The only place that asks;
+/// the libraries are told.
+std::uint64_t available_memory_bytes();
+
+/// The smallest memory limit of the cgroups that a process belongs to and of those above them;
+/// nullopt if there is none or they cannot be read. `proc`: the process's folder in /proc, of which
+/// the files cgroup and mountinfo are read.
+std::optional<std::uint64_t> cgroup_memory_limit(const std::filesystem::path& proc);
+
+}  // namespace terrace::terrain

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "terrace/terrain/context.hpp"
+
+#include <algorithm>
+
+#include "base/available_memory.hpp"
+
+namespace terrace::terrain {
+
+std::uint64_t Context::memory_or(std::uint64_t standard) const {
+  if (memory_bytes) return *memory_bytes;
+  const std::uint64_t available = available_memory_bytes();
+  return standard != 0 ? std::min(standard, available) : available / 2;
+}
+
+void Context::say(const std::string& line) const {
+  if (note) note(line);
+}
+
+}  // namespace terrace::terrain

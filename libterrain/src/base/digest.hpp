@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <bit>
+#include <cstdint>
+#include <string_view>
+
+#include "earth/portable_math.hpp"
+
+namespace terrace::terrain {
+
+/// Puts numbers and texts together into one number of 64 bits that tells whether they are the same,
+/// in the same order. No protection against those who want two to look alike.
+class Digest {
+ public:
+  constexpr void add(std::uint64_t number) { value_ = scramble(value_ ^ number); }
+  constexpr void add(double number) { add(std::bit_cast<std::uint64_t>(number)); }
+  constexpr void add(std::string_view text) {
+    add(std::uint64_t{text.size()});
+    for (const char c : text) add(std::uint64_t{static_cast<unsigned char>(c)});
+  }
+  [[nodiscard]] constexpr std::uint64_t value() const { return value_; }
+
+ private:
+  std::uint64_t value_ = 0;
+};
+
+}  // namespace terrace::terrain

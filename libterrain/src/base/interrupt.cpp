@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "base/interrupt.hpp"
+
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstdlib>
+#include <future>
+#include <system_error>
+#include <thread>
+#include <utility>
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include "base/terminal.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+constexpr const char* kStopped = "interrupted; run the same command again to start anew";
+
+volatile std::sig_atomic_t stop_requested = 0;
+/// A pipe: the signal handler writes, a thread reads and does what a handler may not.
+std::array<int, 2> wake_pipe{-1, -1};
+
+extern "C" void on_stop_signal(int signal) {
+  // A second Ctrl-C means it: the default action ends the process.
+  if (stop_requested != 0) {
+    std::signal(signal, SIG_DFL);
+    ::raise(signal);
+  }
+  stop_requested = 1;
+  const int error = errno;
+  const char byte = 0;
+  [[maybe_unused]] const ssize_t written = ::write(wake_pipe[1], &byte, 1);
+  errno = error;
+}
+
+/// Passes the signal on to `stop`. Without a thread only loops that look at the flag end.
+void watch_for_signals(const std::stop_source& stop) {
+  if (wake_pipe[0] < 0) return;
+  // Signals shall cut short what the other threads wait in, not this one.
+  sigset_t all, before;
+  sigfillset(&all);
+  pthread_sigmask(SIG_SETMASK, &all, &before);
+  try {
+    std::thread([stop]() mutable {
+      char byte = 0;
+      while (::read(wake_pipe[0], &byte, 1) < 0 && errno == EINTR) {
+      }
+      stop.request_stop();
+    }).detach();
+  } catch (const std::system_error&) {
+  }
+  pthread_sigmask(SIG_SETMASK, &before, nullptr);
+}
+
+}  // namespace
+
+void install_signal_handlers() {
+  if (::pipe(wake_pipe.data()) == 0) {
+    for (const int end : wake_pipe) ::fcntl(end, F_SETFD, FD_CLOEXEC);
+  }
+  struct sigaction action {};
+  action.sa_handler = on_stop_signal;
+  sigemptyset(&action.sa_mask);
+  // No SA_RESTART: a read that waits for a terminal or a pipe must come back.
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+  std::signal(SIGPIPE, SIG_IGN);
+  // Beyond a file size limit, writes shall fail with an error that can be told to the user.
+  std::signal(SIGXFSZ, SIG_IGN);
+}
+
+bool interrupted() noexcept { return stop_requested != 0; }
+
+void check_interrupt() {
+  if (interrupted()) throw Interrupted(kStopped);
+}
+
+std::stop_token stop_token() {
+  // Never destroyed: the thread that asks it to stop outlives main().
+  static std::stop_source& source = *[] {
+    auto* made = new std::stop_source;
+    watch_for_signals(*made);
+    return made;
+  }();
+  return source.get_token();
+}
+
+void run_interruptible(const std::function<void()>& work) {
+  std::packaged_task<void()> task(work);
+  std::future<void> done = task.get_future();
+  std::thread worker;
+  try {
+    worker = std::thread(std::move(task));
+  } catch (const std::system_error&) {
+    return work();  // the system grants no thread: Ctrl-C ends what looks for it
+  }
+  using namespace std::chrono_literals;
+  while (done.wait_for(50ms) != std::future_status::ready) {
+    if (!interrupted() || done.wait_for(1s) == std::future_status::ready) continue;
+    print_message(kStopped);
+    // Not exit(): the worker would go on beneath the destructors.
+    std::_Exit(130);
+  }
+  worker.join();
+  done.get();
+}
+
+}  // namespace terrace::terrain

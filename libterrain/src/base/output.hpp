@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace terrace::terrain {
+
+/// The comment that marks files of formats with comments.
+inline constexpr const char* kWriterMark = "written by terrace";
+/// How files begin that have no room for comments.
+inline constexpr std::string_view kContourHead =
+    R"({"type":"FeatureCollection","generator":"terrace contour","features":[)";
+inline constexpr std::string_view kPairsHead = "a,b,distance";
+inline constexpr std::string_view kTreeHead = "a,b,distance,size,level";
+inline constexpr std::string_view kDendrogramHead = "a,b,height,size";
+inline constexpr std::string_view kProfileHead = "distance,x,y,height";
+
+/// True if the regular file at `path` is empty or terrace wrote it, which its format says at the
+/// place that the format has for that: a comment of the header (PLY, OBJ, VTK), the generator (GLB,
+/// GeoJSON), the tag Software (TIFF, PNG), the first bytes (overlays), the names of the columns
+/// (CSV). Tables of numbers without such names, and points as CSV, have no place for a mark: they
+/// count as ours if every number and separator in them stands exactly as terrace writes it.
+bool written_by_terrace(const std::string& path);
+
+/// Whether the output `path` may be written, to be asked before the work begins. Returns the
+/// writers' `replace`: true if a file is there, or where a link leads, and --force says to replace
+/// it. Throws: stream::Error if something is there and `force` is false, or if it is no file of
+/// ours.
+bool may_replace(const std::string& path, bool force);
+
+}  // namespace terrace::terrain

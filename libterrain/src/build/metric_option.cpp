@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "build/metric_option.hpp"
+
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "base/error.hpp"
+#include "base/units.hpp"
+#include "earth/portable_math.hpp"
+#include "terrace/stream/error.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+constexpr double kUnbounded = std::numeric_limits<double>::infinity();
+
+/// A member of the file that is being read, for messages.
+struct Place {
+  const std::string& file;
+  std::size_t region;
+
+  [[noreturn]] void fail(const std::string& cause) const {
+    throw stream::Error({.file = file,
+                         .where = "region " + std::to_string(region),
+                         .cause = cause,
+                         .remedy = "a region is {\"box\": [minx, miny, maxx, maxy], \"semi_axes\": "
+                                   "[a, b], \"angle\": degrees}"});
+  }
+};
+
+std::vector<double> numbers(const nlohmann::json& json, const char* name, const Place& place) {
+  if (!json.is_array()) place.fail(std::string("\"") + name + "\" is no list of numbers");
+  std::vector<double> values;
+  for (const nlohmann::json& value : json) {
+    if (!value.is_number()) place.fail(std::string("\"") + name + "\" holds what is no number");
+    values.push_back(value.get<double>());
+  }
+  return values;
+}
+
+stream::Box3 box_of(const nlohmann::json& json, const Place& place) {
+  const std::vector<double> v = numbers(json, "box", place);
+  stream::Box3 box;
+  if (v.size() == 4) {
+    box = {{v[0], v[1], -kUnbounded}, {v[2], v[3], kUnbounded}};
+  } else if (v.size() == 6) {
+    box = {{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
+  } else {
+    place.fail("\"box\" has " + std::to_string(v.size()) + " numbers, not 4 or 6");
+  }
+  if (box.empty()) place.fail("\"box\" is empty: a minimum exceeds its maximum");
+  return box;
+}
+
+cluster::LinearMap axes_of(const nlohmann::json& region, const Place& place) {
+  if (region.contains("rotation")) {
+    if (region.contains("angle")) place.fail("has both \"angle\" and \"rotation\"");
+    const nlohmann::json& rows = region["rotation"];
+    if (!rows.is_array() || rows.size() != 3) place.fail("\"rotation\" is no list of three rows");
+    cluster::LinearMap axes{};
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::vector<double> row = numbers(rows[i], "rotation", place);
+      if (row.size() != 3) place.fail("a row of \"rotation\" has not three numbers");
+      for (std::size_t k = 0; k < 3; ++k) axes[3 * i + k] = row[k];
+    }
+    return axes;
+  }
+  double angle = 0.0;
+  if (region.contains("angle")) {
+    if (!region["angle"].is_number()) place.fail("\"angle\" is no number of degrees");
+    angle = region["angle"].get<double>();
+  }
+  // Not the library's own constructor by angle: its sine may differ in the last bit between
+  // machines.
+  const double s = portable_sin_degrees(angle), c = portable_cos_degrees(angle);
+  return {c, s, 0, -s, c, 0, 0, 0, 1};
+}
+
+MetricChoice::Region region_of(const nlohmann::json& json, const Place& place) {
+  if (!json.is_object()) place.fail("is no object");
+  for (const auto& [name, value] : json.items()) {
+    if (name != "box" && name != "semi_axes" && name != "angle" && name != "rotation") {
+      place.fail("\"" + name + "\" is no member of a region");
+    }
+  }
+  if (!json.contains("semi_axes")) place.fail("has no \"semi_axes\"");
+  const std::vector<double> lengths = numbers(json["semi_axes"], "semi_axes", place);
+  if (lengths.size() != 2 && lengths.size() != 3) {
+    place.fail("\"semi_axes\" has " + std::to_string(lengths.size()) + " numbers, not 2 or 3");
+  }
+  std::optional<stream::Box3> box;
+  if (json.contains("box")) box = box_of(json["box"], place);
+  for (const double length : lengths) {
+    // Distances are divided by it.
+    if (length > 0 && std::isinf(1.0 / length)) place.fail("\"semi_axes\" are too small");
+  }
+  try {
+    return {box,
+            cluster::Elliptical({lengths[0], lengths[1], lengths.size() > 2 ? lengths[2] : 1.0},
+                                axes_of(json, place))};
+  } catch (const std::invalid_argument& error) {
+    place.fail(error.what());
+  }
+}
+
+std::vector<MetricChoice::Region> read_regions(const std::string& file) {
+  std::ifstream stream(file);
+  if (!stream) {
+    throw stream::Error({.file = file,
+                         .where = {},
+                         .cause = "cannot be read",
+                         .remedy = "--metric elliptical:FILE names a JSON file of regions"});
+  }
+  const nlohmann::json json = nlohmann::json::parse(stream, nullptr, /* allow_exceptions= */ false);
+  if (!json.is_object() || !json.contains("regions") || !json["regions"].is_array() ||
+      json["regions"].empty()) {
+    throw stream::Error({.file = file,
+                         .where = {},
+                         .cause = "is no JSON object with a list \"regions\"",
+                         .remedy = "see 'terrace cluster --help'"});
+  }
+  std::vector<MetricChoice::Region> regions;
+  for (const nlohmann::json& region : json["regions"]) {
+    regions.push_back(region_of(region, {file, regions.size()}));
+  }
+  return regions;
+}
+
+}  // namespace
+
+MetricChoice MetricChoice::parse(const std::string& text) {
+  MetricChoice choice;
+  choice.text = text;
+  const std::size_t colon = text.find(':');
+  const std::string name = text.substr(0, colon);
+  const std::string rest = colon == std::string::npos ? "" : text.substr(colon + 1);
+  if (text == "euclidean") return choice;
+  if (text == "squared") {
+    choice.kind = Kind::squared;
+  } else if (name == "minkowski" && !rest.empty()) {
+    choice.kind = Kind::minkowski;
+    choice.p =
+        rest == "inf" ? kUnbounded : parse_number(rest, "the exponent of --metric minkowski");
+    if (!(choice.p > 0.0)) throw UsageError("--metric minkowski:P needs a P above 0, or inf");
+  } else if (name == "elliptical" && !rest.empty()) {
+    choice.kind = Kind::elliptical;
+    choice.regions = read_regions(rest);
+  } else {
+    throw UsageError("--metric " + text +
+                     ": the metrics are euclidean, squared, minkowski:P and elliptical:FILE");
+  }
+  return choice;
+}
+
+bool MetricChoice::has_boxes() const {
+  // What stands behind a region without a box counts nowhere.
+  return kind == Kind::elliptical && regions.front().box.has_value();
+}
+
+std::string MetricChoice::canonical() const {
+  if (kind != Kind::elliptical) return text;
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const Region& region : regions) {
+    nlohmann::ordered_json json = nlohmann::ordered_json::object();
+    if (region.box) {
+      const stream::Box3& box = *region.box;
+      // Boxes in the plane have no bounds in z, for which JSON has no number.
+      json["box"] = std::isfinite(box.min[2])
+                        ? std::vector<double>{box.min[0], box.min[1], box.min[2],
+                                              box.max[0], box.max[1], box.max[2]}
+                        : std::vector<double>{box.min[0], box.min[1], box.max[0], box.max[1]};
+    }
+    json["map"] = region.metric.map();
+    list.push_back(std::move(json));
+  }
+  return "elliptical:" + list.dump();
+}
+
+cluster::Metric MetricChoice::on_ground(const stream::Point3& origin,
+                                        const cluster::LinearMap& map) const {
+  switch (kind) {
+    case Kind::euclidean:
+      return cluster::Euclidean{};
+    case Kind::squared:
+      return cluster::SquaredEuclidean{};
+    case Kind::minkowski:
+      return cluster::Minkowski{p};
+    case Kind::elliptical:
+      break;
+  }
+  if (!has_boxes()) return regions.front().metric;
+  // Back from the ground to the CRS. Where heights do not count, all are taken for inside.
+  const bool flat = map[8] == 0.0;
+  const double area = map[0] * map[4] - map[1] * map[3];
+  const cluster::EllipticalField::Frame frame{{map[4] / area, -map[1] / area, 0,  //
+                                               -map[3] / area, map[0] / area, 0,  //
+                                               0, 0, flat ? 0.0 : 1.0 / map[8]},
+                                              origin};
+  std::vector<cluster::EllipticalField::Region> field;
+  for (const Region& region : regions) {
+    cluster::Bounds box{{-kUnbounded, -kUnbounded, -kUnbounded},
+                        {kUnbounded, kUnbounded, kUnbounded}};
+    if (region.box) {
+      for (std::size_t axis = 0; axis < (flat ? 2U : 3U); ++axis) {
+        const double low = region.box->min[axis], high = region.box->max[axis];
+        // Boxes are closed: rounding on the way to the ground and back must not move a point on
+        // their sides out of them.
+        constexpr double kRounding = 1e-14;
+        const auto slack = [&](double side) {
+          return std::isfinite(side) ? kRounding * (std::abs(side) + std::abs(origin[axis])) : 0.0;
+        };
+        box.min[axis] = low - slack(low);
+        box.max[axis] = high + slack(high);
+      }
+    }
+    field.push_back({box, region.metric});
+  }
+  return cluster::EllipticalField(std::move(field), frame);
+}
+
+}  // namespace terrace::terrain

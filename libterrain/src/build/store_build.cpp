@@ -1,0 +1,268 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "build/store_build.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <stop_token>
+#include <utility>
+
+#include <terrace/cluster/hierarchy.hpp>
+#include <terrace/stream/error.hpp>
+#include <terrace/stream/raster.hpp>
+#include <terrace/stream/store.hpp>
+
+#include "base/interrupt.hpp"
+#include "base/units.hpp"
+#include "earth/ground.hpp"
+#include "earth/source_crs.hpp"
+#include "earth/world.hpp"
+#include "terrace/terrain/store_sink.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+constexpr std::array<std::pair<const char*, cluster::Effort>, 4> kEfforts{
+    {{"fast", cluster::Effort::fast},
+     {"default", cluster::Effort::standard},
+     {"fine", cluster::Effort::fine},
+     {"full", cluster::Effort::full}}};
+
+stream::Schema schema_of(const stream::SourceInfo& info, const SourceCrs& crs,
+                         const BuildRequest& request) {
+  stream::Schema schema;
+  schema.grid = info.grid;
+  schema.coordinates = info.coordinates;
+  schema.attributes = info.attributes;
+  schema.world = info.world;
+  schema.crs = crs.crs;
+  schema.vertical = request.vertical.empty() ? name_of(crs.heights) : request.vertical;
+  if (schema.vertical != name_of(crs.heights)) {
+    // What was said of the heights goes before what the file says of them.
+    schema.crs.vertical_epsg = 0;
+    if (crs.system) {
+      CrsDefinition definition = crs.system->definition();
+      definition.heights = Heights::unknown;
+      definition.vertical_name.clear();
+      schema.crs.wkt = wkt_of(definition);
+    }
+  }
+  schema.columns = info.columns;
+  schema.rows = info.rows;
+  schema.format = info.format;
+  schema.parameters = {{"block", std::to_string(request.block_points)},
+                       {"facility_cost", number_text(request.facility_cost)},
+                       {"effort", name_of(request.effort)},
+                       {"z_weight", number_text(request.z_weight)},
+                       {"seed", std::to_string(request.seed)}};
+  if (request.metric.kind != MetricChoice::Kind::euclidean) {
+    schema.parameters.emplace_back("metric", request.metric.canonical());
+  }
+  return schema;
+}
+
+/// Attribute values of each point side by side, in the order of the schema.
+void pack(const stream::PointBlock& block, std::size_t payload_size,
+          std::vector<std::byte>& payload) {
+  payload.resize(block.size() * payload_size);
+  std::size_t at = 0;
+  for (const stream::Column& column : block.attributes) {
+    const std::size_t size = stream::size_of(column.type);
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      std::memcpy(payload.data() + i * payload_size + at, column.bytes.data() + i * size, size);
+    }
+    at += size;
+  }
+}
+
+/// What a source takes, unless it says that it needs more. What --memory leaves over goes to the
+/// source as well, which keeps more files of a mosaic open by it.
+constexpr std::uint64_t kSourceMemory = std::uint64_t{64} << 20;
+constexpr std::size_t kBlocksAhead = 4;
+
+/// Bytes at the peak with so many threads, beside the source's: a generous estimate; a benchmark
+/// prints the true peak.
+std::uint64_t memory_beside_source(const BuildRequest& request, std::size_t payload_size,
+                                   std::uint64_t threads) {
+  const std::uint64_t point = sizeof(stream::Point3) + payload_size;
+  // Blocks read ahead, being clustered or waiting their turn, one forming per level, with what is
+  // worked out per point beside them; and those that the store writer holds back to train its
+  // tables.
+  const std::uint64_t blocks =
+      (8 * threads + 8 + kBlocksAhead) * request.block_points * (point + 64) +
+      64 * request.block_points * (point + 16);
+  return (std::uint64_t{32} << 20) + blocks;
+}
+
+/// As many threads as were asked for and fit into --memory: their number changes no result.
+/// Throws: stream::Error if not even one does.
+unsigned threads_within_memory(const BuildRequest& request, std::size_t payload_size,
+                               std::uint64_t source_bytes) {
+  const auto needed = [&](unsigned threads) {
+    return source_bytes + memory_beside_source(request, payload_size, threads);
+  };
+  for (unsigned threads = request.threads; threads > 0; --threads) {
+    if (needed(threads) <= request.memory_bytes) return threads;
+  }
+  const auto in_mebibytes = [](std::uint64_t bytes) {
+    return std::to_string((bytes >> 20) + 1) + "M";
+  };
+  throw stream::Error({.file = request.store.string(),
+                       .where = {},
+                       .cause = "--memory " + std::to_string(request.memory_bytes >> 20) +
+                                "M is not enough: the build needs " + in_mebibytes(needed(1)) +
+                                ", " + in_mebibytes(source_bytes) + " of it to read the input",
+                       .remedy = "raise --memory, lower --block, or rewrite large strips and tiles "
+                                 "as small tiles: gdal_translate -co TILED=YES"});
+}
+
+std::size_t payload_size(const stream::SourceInfo& info) {
+  std::size_t bytes = 0;
+  for (const stream::Channel& channel : info.attributes) bytes += stream::size_of(channel.type);
+  return bytes;
+}
+
+/// Height of a cell over its width on the ground, in the middle of the raster.
+double cell_aspect(const Ground& ground, const stream::SourceInfo& info) {
+  stream::Box3 raster;
+  raster.include(stream::Point3{0, 0, 0});
+  raster.include(
+      stream::Point3{static_cast<double>(info.columns), static_cast<double>(info.rows), 0});
+  const GroundMap map = ground.map(raster);
+  const auto length = [&map](std::size_t axis) {
+    return std::sqrt(map[axis] * map[axis] + map[3 + axis] * map[3 + axis]);
+  };
+  return length(1) / length(0);
+}
+
+/// Regions are boxes in the CRS; the ground's frame may differ from block to block.
+void set_metric(const BuildRequest& request, const stream::SourceInfo& info, const Ground& ground,
+                cluster::HierarchyOptions& options) {
+  const MetricChoice& choice = request.metric;
+  if (!choice.has_boxes()) {
+    options.metric = choice.on_ground({0, 0, 0}, cluster::kIdentityMap);
+    return;
+  }
+  // From the CRS by way of stored coordinates, which are columns and rows for a raster.
+  const std::array<double, 6>& xy = info.world.xy;
+  const stream::Channel& height = info.coordinates[2];
+  options.metric_of = [&choice, &ground, xy, height](const cluster::Bounds& bounds) {
+    const GroundMap map = ground.map({bounds.min, bounds.max});
+    const double area = xy[0] * xy[4] - xy[1] * xy[3];
+    const auto across = [&](double a, double b) { return (a * xy[4] - b * xy[3]) / area; };
+    const auto along = [&](double a, double b) { return (b * xy[0] - a * xy[1]) / area; };
+    return choice.on_ground({xy[2], xy[5], height.offset},
+                            {across(map[0], map[1]), along(map[0], map[1]), 0,  //
+                             across(map[3], map[4]), along(map[3], map[4]), 0,  //
+                             0, 0, map[8] / height.scale});
+  };
+}
+
+}  // namespace
+
+std::optional<cluster::Effort> effort_of(const std::string& name) {
+  for (const auto& [text, effort] : kEfforts) {
+    if (name == text) return effort;
+  }
+  return std::nullopt;
+}
+
+std::string name_of(cluster::Effort effort) {
+  return kEfforts[static_cast<std::size_t>(effort)].first;
+}
+
+BuildOutcome build_store(const BuildRequest& request, const BuildProgress& progress) {
+  stream::SourceOptions source_options;
+  source_options.format = request.input_format;
+  source_options.block_points = request.block_points;
+  source_options.memory_bytes = std::max(kSourceMemory, request.memory_bytes);
+  source_options.band = request.band;
+  source_options.crs = request.crs;
+  source_options.blocks_ahead = kBlocksAhead;
+  std::stop_source reading;
+  const auto stop_reading = [&reading] { reading.request_stop(); };
+  const std::stop_callback on_interrupt(stop_token(), stop_reading);
+  source_options.stop = reading.get_token();
+  auto source = stream::open_source(request.inputs, source_options);
+  const stream::SourceInfo& info = source->info();
+  const SourceCrs crs = crs_of_source(info, request.datum_shift);
+  Placement placement = placement_of(info);
+  placement.crs = crs.crs;
+  const Ground ground(placement, request.z_weight);
+  BuildOutcome outcome;
+  if (!crs.note.empty()) outcome.notes.push_back(crs.note);
+  if (!ground.assumption().empty()) outcome.notes.push_back(ground.assumption());
+  const std::uint64_t source_bytes = std::max(kSourceMemory, source->reading_bytes());
+  const std::size_t payload_bytes = payload_size(info);
+  const unsigned threads = threads_within_memory(request, payload_bytes, source_bytes);
+  if (info.grid) {
+    // Tiles are to be square on the ground: only now is it known what a cell measures there.
+    source_options.cell_aspect = cell_aspect(ground, info);
+    source_options.memory_bytes =
+        request.memory_bytes - memory_beside_source(request, payload_bytes, threads);
+    source = stream::open_source(request.inputs, source_options);
+  }
+
+  const stream::Schema schema = schema_of(source->info(), crs, request);
+  stream::StoreWriter writer(request.store, schema, request.replace);
+  StoreSink sink(writer, request.most_points == 0);
+  cluster::HierarchyOptions options;
+  options.block_size = request.block_points;
+  options.block.facility_cost = request.facility_cost;
+  options.block.effort = request.effort;
+  options.block.seed = request.seed;
+  options.payload_size = schema.payload_size();
+  options.threads = threads;
+  options.ground = [&ground](const cluster::Bounds& bounds) {
+    return ground.map({bounds.min, bounds.max});
+  };
+  set_metric(request, source->info(), ground, options);
+  // A full disk is told at once, even if the input's producer idles.
+  options.on_failure = stop_reading;
+  cluster::HierarchyBuilder builder(options, sink);
+
+  stream::PointBlock block;
+  std::vector<std::byte> payload;
+  stream::Progress so_far;
+  // What ended the reading is told by whoever asked for it.
+  const auto next = [&] {
+    try {
+      return source->next(block);
+    } catch (const stream::Stopped&) {
+      check_interrupt();
+      builder.push({});
+      throw;
+    }
+  };
+  while (next()) {
+    pack(block, options.payload_size, payload);
+    builder.push(block.positions, payload);
+    so_far = source->progress();
+    check_interrupt();
+    if (progress) progress(so_far);
+    if (request.most_points != 0 && so_far.points >= request.most_points) break;
+  }
+  so_far = source->progress();
+  if (so_far.points == 0) {
+    throw stream::Error({.file = request.inputs.front(),
+                         .where = {},
+                         .cause = "there is not one point with data in it" +
+                                  (so_far.nodata == 0 ? std::string()
+                                                      : " (" + std::to_string(so_far.nodata) +
+                                                            " cells, all nodata)"),
+                         .remedy = "check the file and its nodata value"});
+  }
+  writer.schema().nodata = so_far.nodata;
+  const cluster::HierarchyResult result = builder.finish();
+  outcome.points = result.points;
+  outcome.nodata = so_far.nodata;
+  outcome.store_bytes = sink.store_bytes();
+  outcome.top = result.top;
+  outcome.level_points = result.level_points;
+  outcome.level_clusters = result.level_clusters;
+  return outcome;
+}
+
+}  // namespace terrace::terrain

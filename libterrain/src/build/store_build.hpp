@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <terrace/cluster/block.hpp>
+#include <terrace/stream/source.hpp>
+
+#include "build/metric_option.hpp"
+
+namespace terrace::terrain {
+
+/// What `terrace build` was asked to do.
+struct BuildRequest {
+  std::vector<std::string> inputs;
+  std::filesystem::path store;
+  bool replace = false;
+  std::string input_format;        ///< empty: told by content
+  std::optional<stream::Crs> crs;  ///< replaces the source's
+  /// To WGS 84, for a CRS of another datum (see DatumShift).
+  std::optional<std::array<double, 7>> datum_shift;
+  std::string vertical;  ///< "ellipsoidal", "orthometric" or empty
+  std::size_t block_points = 10000;
+  /// Times the diagonal of a block. At 3 clusters hold about 160 points: docs/FIGURES.md.
+  double facility_cost = 3.0;
+  cluster::Effort effort = cluster::Effort::standard;
+  double z_weight = 1.0;
+  MetricChoice metric;  ///< on the ground
+  int band = 1;
+  std::uint64_t seed = 1;
+  unsigned threads = 1;
+  std::uint64_t memory_bytes = std::uint64_t{256} << 20;
+  /// A trial run that stops after about this many points and leaves no store; 0: read everything.
+  std::uint64_t most_points = 0;
+};
+
+struct BuildOutcome {
+  std::uint64_t points = 0;
+  std::uint64_t nodata = 0;
+  std::uint64_t store_bytes = 0;
+  unsigned top = 0;
+  std::vector<std::uint64_t> level_points, level_clusters;
+  std::vector<std::string> notes;  ///< what the user should know: unknown CRS and the like
+};
+
+/// Called after every block from the building thread; what it throws ends the build.
+using BuildProgress = std::function<void(const stream::Progress&)>;
+
+/// Streams the inputs once into a store: reads ahead on a thread of its own, clusters and encodes
+/// blocks on `threads` threads, appends in order. Same input, options and seed: same bytes.
+/// Throws: stream::Error; Interrupted on Ctrl-C. No store stands then.
+BuildOutcome build_store(const BuildRequest& request, const BuildProgress& progress = {});
+
+/// "fast", "default", "fine", "full" and back.
+std::optional<cluster::Effort> effort_of(const std::string& name);
+std::string name_of(cluster::Effort effort);
+
+}  // namespace terrace::terrain

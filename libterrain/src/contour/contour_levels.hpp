@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+namespace terrace::terrain {
+
+/// The multiples of an interval, and where they cross triangles: a level crosses an edge if one end
+/// lies above it and the other does not. So a corner at a level counts as below it, a plateau has a
+/// line around its upper side only, and a triangle that a level crosses has one segment of it.
+class ContourLevels {
+ public:
+  /// interval: above 0. Heights must be within 2^50 intervals.
+  explicit ContourLevels(double interval) : interval_(interval) {}
+
+  [[nodiscard]] double height(std::int64_t level) const {
+    return static_cast<double>(level) * interval_;
+  }
+
+  /// The lowest level that is not below a height: those below this one lie under the height.
+  [[nodiscard]] std::int64_t at_or_above(double height) const {
+    auto level = static_cast<std::int64_t>(std::ceil(height / interval_));
+    // The quotient is rounded; level * interval, as it is written, decides.
+    while (this->height(level) < height) ++level;
+    while (this->height(level - 1) >= height) --level;
+    return level;
+  }
+
+  /// Calls segment(level, apex, right, left) for every level that crosses the triangle a, b, c,
+  /// given counter-clockwise: a segment from the edge apex-right to the edge apex-left has higher
+  /// ground on its left. A Corner has a `level`, at_or_above() its height.
+  template <class Corner, class Segment>
+  static void cross(const Corner& a, const Corner& b, const Corner& c, const Segment& segment) {
+    const std::array<const Corner*, 3> corner{&a, &b, &c};
+    const auto [low, high] = std::minmax({a.level, b.level, c.level});
+    for (std::int64_t level = low; level < high; ++level) {
+      // The one that is alone on its side of the level.
+      const std::array<bool, 3> above{a.level > level, b.level > level, c.level > level};
+      const std::size_t alone = above[1] == above[2] ? 0 : above[0] == above[2] ? 1 : 2;
+      const Corner& next = *corner[(alone + 1) % 3];
+      const Corner& previous = *corner[(alone + 2) % 3];
+      if (above[alone]) {
+        segment(level, *corner[alone], next, previous);
+      } else {
+        segment(level, *corner[alone], previous, next);
+      }
+    }
+  }
+
+  /// How far from `from` to `to` the level lies, 0 to 1; the edge must be crossed.
+  [[nodiscard]] double share(std::int64_t level, double from, double to) const {
+    return (height(level) - from) / (to - from);
+  }
+
+ private:
+  double interval_;
+};
+
+}  // namespace terrace::terrain

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "base/region.hpp"
+#include "contour/contour_levels.hpp"
+#include "contour/line_joiner.hpp"
+
+namespace terrace::terrain {
+
+/// Contour lines of the triangulated lattice (lattice_surface.hpp), in columns and rows, exactly
+/// (see ContourLevels). In a frame of columns to the right and rows upwards higher ground is on the
+/// left of a line. Lines end at the border of the window and at samples without data.
+///
+/// The lattice comes in bands of rows from the first on; lines go on from band to band. Memory: the
+/// lines that are not at their ends.
+class ContourLines {
+ public:
+  /// columns: of the lattice. emit: takes every line once it is whole, in an order that depends on
+  /// the lattice alone. Lines that shrink to a point are left out.
+  ContourLines(std::int64_t columns, double interval, std::function<void(ContourLine&&)> emit,
+               OpenLineLimit limit = {});
+
+  /// The next band: `rows` rows of heights (NaN: no data), of which the first is the last of the
+  /// band before. wanted: whether the square right of and below (column, row) of the lattice
+  /// counts; may be empty: all do.
+  void add(std::span<const double> heights, std::int64_t rows,
+           const std::function<bool(std::int64_t column, std::int64_t row)>& wanted = {});
+  /// Emits what is still open: nothing follows.
+  void finish();
+
+  /// Points of lines that are not whole yet.
+  [[nodiscard]] std::uint64_t open_points() const { return joiner_.open_points(); }
+  /// Edges crossed by levels so far, each counted once per triangle at it.
+  [[nodiscard]] std::uint64_t segments() const { return joiner_.segments(); }
+
+ private:
+  /// A level on an edge.
+  struct Crossing {
+    std::int64_t level = 0;
+    std::uint64_t edge = 0;
+    friend bool operator==(const Crossing&, const Crossing&) = default;
+  };
+  struct Hash {
+    std::size_t operator()(const Crossing& c) const;
+  };
+  struct Corner {
+    std::int64_t column = 0, row = 0;
+    double height = 0;
+    std::int64_t level = 0;  ///< ContourLevels::at_or_above
+  };
+
+  [[nodiscard]] Crossing crossing(std::int64_t level, const Corner& a, const Corner& b) const;
+  [[nodiscard]] Point2 place(std::int64_t level, const Corner& a, const Corner& b) const;
+  void triangle(const Corner& a, const Corner& b, const Corner& c);
+  void emit_whole(std::int64_t last_row, bool all);
+
+  std::int64_t columns_;
+  ContourLevels contour_levels_;
+  LineJoiner<Crossing, Hash> joiner_;
+  std::int64_t row_ = 0;  ///< of the next band's first row
+  std::vector<std::int64_t> levels_;
+};
+
+}  // namespace terrace::terrain

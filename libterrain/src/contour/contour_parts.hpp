@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <functional>
+
+#include <terrace/stream/store.hpp>
+
+#include "base/region.hpp"
+#include "contour/contour_run.hpp"
+#include "contour/line_joiner.hpp"
+#include "earth/ground_slope.hpp"
+#include "surface/store_window.hpp"
+
+/// What write_contours() is made of.
+
+namespace terrace::terrain {
+
+/// What the lines are drawn of, and where they go.
+struct ContourParts {
+  const stream::Store& store;
+  const ContourRequest& request;
+  std::function<void(ContourLine&&)> emit;  ///< as ContourText::add() wants them
+  OpenLineLimit limit;
+  std::function<void(double share)> progress;
+  /// The parts in which points are triangulated; the order of the lines depends on it.
+  std::uint64_t points_per_part = std::uint64_t{1} << 16;
+};
+
+/// Of a raster at level 0.
+void draw_lattice_contours(const ContourParts& parts);
+/// Of points, or of a raster at a level above 0.
+void draw_point_contours(const ContourParts& parts);
+
+[[noreturn]] void throw_region_outside(const stream::Store& store);
+/// The box in stored coordinates around a region's box.
+StoredBox box_around(const Region& region, const GroundSlope& ground);
+/// Whether a place of the CRS lies in the region, whatever its height.
+bool holds_place(const Region& region, const Point2& world);
+
+}  // namespace terrace::terrain

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "contour/contour_run.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include <terrace/stream/error.hpp>
+
+#include "base/error.hpp"
+#include "base/units.hpp"
+#include "contour/contour_parts.hpp"
+#include "contour/contour_text.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+/// Of a point of a line at work (twice while it grows).
+constexpr std::uint64_t kContourBytesPerPoint = 48;
+constexpr double kMostLevels = 1e15;
+
+stream::Error failure(const stream::Store& store, const std::string& cause,
+                      const std::string& remedy) {
+  return stream::Error(
+      {.file = store.path().string(), .where = {}, .cause = cause, .remedy = remedy});
+}
+
+}  // namespace
+
+void throw_region_outside(const stream::Store& store) {
+  throw failure(store, "the region does not meet the store",
+                "`terrace info` tells its bounds; --region-crs says in which CRS the region is");
+}
+
+StoredBox box_around(const Region& region, const GroundSlope& ground) {
+  const stream::Box3& world = region.box();
+  StoredBox box;
+  for (unsigned corner = 0; corner < 4; ++corner) {
+    const Point2 p = ground.stored(
+        {(corner & 1 ? world.max : world.min)[0], (corner & 2 ? world.max : world.min)[1]});
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      box.min[axis] = corner == 0 ? p[axis] : std::min(box.min[axis], p[axis]);
+      box.max[axis] = corner == 0 ? p[axis] : std::max(box.max[axis], p[axis]);
+    }
+  }
+  return box;
+}
+
+bool holds_place(const Region& region, const Point2& world) {
+  const double low = region.box().min[2];
+  return region.contains({world[0], world[1], low > -1e300 ? low : 0});
+}
+
+ContourOutcome write_contours(const stream::Store& store, const ContourRequest& request,
+                              const std::function<void(std::string_view)>& write,
+                              const std::function<void(std::uint64_t, double)>& progress) {
+  if (request.level > store.top()) {
+    throw UsageError("the store has no level " + std::to_string(request.level) +
+                     ": its top is level " + std::to_string(store.top()));
+  }
+  const stream::Channel& z = store.schema().coordinates[2];
+  for (const double raw : {store.bounds().min[2], store.bounds().max[2]}) {
+    if (store.points() > 0 &&
+        std::abs((raw * z.scale + z.offset) / request.interval) > kMostLevels) {
+      throw failure(store, "heights have too many levels of " + number_text(request.interval),
+                    "give a larger --interval");
+    }
+  }
+  ContourText text(store, request.interval, request.threads, write);
+  ContourParts parts{
+      .store = store,
+      .request = request,
+      .emit = [&](ContourLine&& line) { text.add(std::move(line)); },
+      .limit = {.points = request.memory_bytes / 3 / kContourBytesPerPoint,
+                .exceeded =
+                    [&] {
+                      throw failure(
+                          store,
+                          "contour lines that are not at their ends have more than " +
+                              with_commas(request.memory_bytes / 3 / kContourBytesPerPoint) +
+                              " points, too many for --memory",
+                          "raise --memory or --interval, or take a smaller --region");
+                    }},
+      .progress =
+          [&](double share) {
+            if (progress) progress(text.outcome().lines, share);
+          },
+  };
+  if (store.schema().grid && request.level == 0) {
+    draw_lattice_contours(parts);
+  } else {
+    draw_point_contours(parts);
+  }
+  text.finish();
+  return text.outcome();
+}
+
+}  // namespace terrace::terrain

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string_view>
+
+#include <terrace/stream/store.hpp>
+
+#include "base/region.hpp"
+
+namespace terrace::terrain {
+
+struct ContourRequest {
+  double interval = 0;  ///< in the store's vertical unit, above 0
+  unsigned level = 0;   ///< the points of this level and above
+  /// Triangles with a longer side, in metres on the ground, are left out.
+  std::optional<double> max_edge{};
+  std::optional<Region> region{};  ///< in the store's CRS
+  unsigned threads = 1;
+  std::uint64_t memory_bytes = std::uint64_t{1} << 30;
+};
+
+struct ContourOutcome {
+  std::uint64_t lines = 0, closed = 0, points = 0;
+};
+
+/// The contour lines of the linear surface as GeoJSON (RFC 7946): one LineString in longitude and
+/// latitude per line, with its height as `elev`, higher ground on its right. See ContourLevels for
+/// what is exact.
+///
+/// Of a raster at level 0 the surface is that of lattice_surface.hpp; else the Delaunay
+/// triangulation of the points of the level and above (see PointWindow), which spans the points'
+/// convex hull, holes and all, where max_edge does not say otherwise. With a region, the lines of
+/// those squares of samples, or of those triangles, whose middles lie inside; they end there.
+///
+/// Lines and their order depend on neither threads nor memory. Memory: a band of rows, or a part of
+/// about 65,536 points per thread, and the lines that go on beyond. Throws: stream::Error if the
+/// store has no CRS, does not meet the region, is damaged, or if the lines at work do not fit;
+/// UsageError for a level that the store has not, and for max_edge with a raster at level 0.
+ContourOutcome write_contours(
+    const stream::Store& store, const ContourRequest& request,
+    const std::function<void(std::string_view)>& write,
+    const std::function<void(std::uint64_t lines, double share)>& progress);
+
+}  // namespace terrace::terrain

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "contour/contour_text.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include <terrace/stream/error.hpp>
+
+#include "base/output.hpp"
+#include "base/parallel.hpp"
+#include "base/units.hpp"
+#include "earth/store_crs.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+/// Nine decimals of a degree are a tenth of a millimetre.
+constexpr int kDecimals = 9;
+/// Points turned into text at a time.
+constexpr std::size_t kContourPoints = std::size_t{1} << 17;
+
+}  // namespace
+
+ContourText::ContourText(const stream::Store& store, double interval, unsigned threads,
+                         std::function<void(std::string_view)> write)
+    : file_(store.path().string()),
+      system_(system_of(store)),
+      ground_(store),
+      interval_(interval),
+      threads_(std::max(1U, threads)),
+      write_(std::move(write)),
+      degrees_(kDecimals) {
+  const std::array<double, 6>& m = store.schema().world.xy;
+  reverse_ = m[0] * m[4] - m[1] * m[3] > 0;
+}
+
+void ContourText::add(ContourLine&& line) {
+  ++outcome_.lines;
+  outcome_.closed += line.closed ? 1 : 0;
+  outcome_.points += line.points.size();
+  points_ += line.points.size();
+  lines_.push_back(std::move(line));
+  if (points_ >= kContourPoints) flush();
+}
+
+void ContourText::append(std::string& text, const ContourLine& line,
+                         std::vector<Point2>& places) const {
+  places.clear();
+  for (const Point2& p : line.points) places.push_back(ground_.world(p));
+  if (reverse_) std::reverse(places.begin(), places.end());
+  system_.to_geographic(places);
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    if (std::isfinite(places[i][0]) && std::isfinite(places[i][1])) continue;
+    const Point2 at = ground_.world(line.points[reverse_ ? places.size() - 1 - i : i]);
+    throw stream::Error({.file = file_,
+                         .where = {},
+                         .cause = number_text(at[0]) + ',' + number_text(at[1]) +
+                                  " has no longitude and latitude in " + system_.title(),
+                         .remedy = "say with `terrace build --crs` which CRS it is, or leave the "
+                                   "place out with --region"});
+  }
+  text += "{\"type\":\"Feature\",\"properties\":{\"elev\":" +
+          number_text(static_cast<double>(line.level) * interval_) +
+          "},\"geometry\":{\"type\":\"LineString\",\"coordinates\":[";
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    text += i == 0 ? "[" : ",[";
+    degrees_.append(text, places[i][0]);
+    text += ',';
+    degrees_.append(text, places[i][1]);
+    text += ']';
+  }
+  text += "]}}";
+}
+
+void ContourText::flush() {
+  // Pieces of about equally many points.
+  const std::size_t pieces = 4 * std::size_t{threads_};
+  std::vector<std::size_t> begin{0};
+  std::size_t points = 0;
+  for (std::size_t i = 0; i < lines_.size(); ++i) {
+    points += lines_[i].points.size();
+    if (points * pieces >= points_ * begin.size()) begin.push_back(i + 1);
+  }
+  std::vector<std::string> texts(begin.size() - 1);
+  parallel_for(texts.size(), threads_, [&](unsigned, std::size_t piece) {
+    std::vector<Point2> places;
+    for (std::size_t i = begin[piece]; i < begin[piece + 1]; ++i) {
+      texts[piece] += i == 0 && first_ ? "\n" : ",\n";
+      append(texts[piece], lines_[i], places);
+    }
+  });
+  if (first_) write_(kContourHead);
+  for (const std::string& text : texts) write_(text);
+  first_ = false;
+  lines_.clear();
+  points_ = 0;
+}
+
+void ContourText::finish() {
+  flush();
+  write_("\n]}\n");
+}
+
+}  // namespace terrace::terrain

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <terrace/stream/store.hpp>
+
+#include "base/region.hpp"
+#include "contour/contour_run.hpp"
+#include "contour/line_joiner.hpp"
+#include "earth/crs/coordinate_system.hpp"
+#include "earth/ground_slope.hpp"
+#include "sample/fixed_text.hpp"
+
+namespace terrace::terrain {
+
+/// Contour lines of a store as a GeoJSON FeatureCollection (RFC 7946), higher ground on the right.
+class ContourText {
+ public:
+  /// write: takes the text in large pieces. Throws: stream::Error if the store has no CRS; add()
+  /// and finish() also for a place without longitude and latitude.
+  ContourText(const stream::Store& store, double interval, unsigned threads,
+              std::function<void(std::string_view)> write);
+
+  /// line: in stored coordinates, higher ground on the left where the second one grows upwards.
+  void add(ContourLine&& line);
+  void finish();
+  [[nodiscard]] const ContourOutcome& outcome() const { return outcome_; }
+
+ private:
+  void append(std::string& text, const ContourLine& line, std::vector<Point2>& places) const;
+  void flush();
+
+  std::string file_;
+  CoordinateSystem system_;
+  GroundSlope ground_;
+  bool reverse_;  ///< higher ground is on the left in the CRS
+  double interval_;
+  unsigned threads_;
+  std::function<void(std::string_view)> write_;
+  FixedText degrees_;
+  ContourOutcome outcome_;
+  std::vector<ContourLine> lines_;  ///< not written yet
+  std::size_t points_ = 0;          ///< of these
+  bool first_ = true;
+};
+
+}  // namespace terrace::terrain

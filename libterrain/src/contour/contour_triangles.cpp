@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "contour/contour_triangles.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <tuple>
+#include <utility>
+
+#include "earth/portable_math.hpp"
+
+namespace terrace::terrain {
+
+ContourTriangles::ContourTriangles(double interval, std::function<void(ContourLine&&)> emit,
+                                   OpenLineLimit limit)
+    : levels_(interval), joiner_(std::move(emit), std::move(limit)) {}
+
+std::size_t ContourTriangles::Hash::operator()(const Crossing& c) const {
+  std::uint64_t hash = static_cast<std::uint64_t>(c.level);
+  // Adding 0 makes 0 of -0, which is equal to it.
+  for (const double v : {c.a[0], c.a[1], c.b[0], c.b[1]}) {
+    hash = scramble(hash) ^ std::bit_cast<std::uint64_t>(v + 0.0);
+  }
+  return scramble(hash);
+}
+
+void ContourTriangles::join(std::span<const Triangle> triangles) {
+  const auto crossing = [&](std::int64_t level, const Corner& p, const Corner& q) {
+    // Always from the same end, so that both triangles at an edge find the same place.
+    const Corner &a = p.place < q.place ? p : q, &b = p.place < q.place ? q : p;
+    const double t = levels_.share(level, a.height, b.height);
+    // An end at the level is met exactly, from whatever side.
+    const Point2 place = t == 1 ? b.place
+                                : Point2{a.place[0] + t * (b.place[0] - a.place[0]),
+                                         a.place[1] + t * (b.place[1] - a.place[1])};
+    return std::pair(Crossing{level, a.place, b.place, std::min(a.part, b.part)}, place);
+  };
+  for (const Triangle& t : triangles) {
+    ContourLevels::cross(
+        t[0], t[1], t[2],
+        [&](std::int64_t level, const Corner& apex, const Corner& right, const Corner& left) {
+          const auto [from, from_place] = crossing(level, apex, right);
+          const auto [to, to_place] = crossing(level, apex, left);
+          joiner_.add(from, from_place, to, to_place);
+        });
+  }
+}
+
+void ContourTriangles::add(std::span<const Triangle> triangles) {
+  join(triangles);
+  joiner_.emit_whole([&](const Crossing& c) { return c.last > part_; });
+  ++part_;
+}
+
+void ContourTriangles::finish(std::span<const Triangle> triangles) {
+  join(triangles);
+  joiner_.emit_whole([](const Crossing&) { return false; });
+}
+
+void ContourTriangles::sort(std::span<Triangle> triangles) {
+  for (Triangle& t : triangles) {
+    const auto smallest = std::min_element(
+        t.begin(), t.end(), [](const Corner& a, const Corner& b) { return a.place < b.place; });
+    std::rotate(t.begin(), smallest, t.end());
+  }
+  std::sort(triangles.begin(), triangles.end(), [](const Triangle& s, const Triangle& t) {
+    return std::tie(s[0].place, s[1].place, s[2].place) <
+           std::tie(t[0].place, t[1].place, t[2].place);
+  });
+}
+
+}  // namespace terrace::terrain

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+
+#include "base/region.hpp"
+#include "contour/contour_levels.hpp"
+#include "contour/line_joiner.hpp"
+
+namespace terrace::terrain {
+
+/// Contour lines of a triangulation, in the coordinates of its vertices, exactly (see
+/// ContourLevels). Higher ground is on the left of a line where the second coordinate grows
+/// upwards. Lines end at hull edges and at triangles that are left out.
+///
+/// The triangles come in parts: part 0, 1, ... in this order, each triangle in the first part that
+/// has one of its vertices, or at the end if no part has. So what lies at an edge is known when the
+/// first part of one of its ends is. Memory: the lines that are not at their ends.
+class ContourTriangles {
+ public:
+  /// Of vertices that are in no part.
+  static constexpr std::uint32_t kNoPart = 0xFFFFFFFFu;
+
+  struct Corner {
+    Point2 place{};
+    double height = 0;
+    std::int64_t level = 0;  ///< ContourLevels::at_or_above
+    std::uint32_t part = kNoPart;
+  };
+  using Triangle = std::array<Corner, 3>;  ///< counter-clockwise
+
+  /// emit: takes every line once it is whole, in an order that depends on that of the triangles
+  /// alone. Lines that shrink to a point are left out.
+  ContourTriangles(double interval, std::function<void(ContourLine&&)> emit,
+                   OpenLineLimit limit = {});
+
+  /// The triangles of the next part; those that no level crosses may be left out.
+  void add(std::span<const Triangle> triangles);
+  /// Those of no part; nothing follows.
+  void finish(std::span<const Triangle> triangles = {});
+
+  /// The order in which the triangles of a part are to be added: such that it depends on their
+  /// places alone. Each triangle is turned so that its smallest corner comes first.
+  static void sort(std::span<Triangle> triangles);
+
+  /// Points of lines that are not whole yet.
+  [[nodiscard]] std::uint64_t open_points() const { return joiner_.open_points(); }
+  /// Edges crossed by levels so far, each counted once per triangle at it.
+  [[nodiscard]] std::uint64_t segments() const { return joiner_.segments(); }
+
+ private:
+  /// A level on the edge from a to b, a < b.
+  struct Crossing {
+    std::int64_t level = 0;
+    Point2 a{}, b{};
+    std::uint32_t last = kNoPart;  ///< part in which a triangle at the edge may come
+    friend bool operator==(const Crossing& p, const Crossing& q) {
+      return p.level == q.level && p.a == q.a && p.b == q.b;
+    }
+  };
+  struct Hash {
+    std::size_t operator()(const Crossing& c) const;
+  };
+
+  void join(std::span<const Triangle> triangles);
+
+  ContourLevels levels_;
+  LineJoiner<Crossing, Hash> joiner_;
+  std::uint32_t part_ = 0;  ///< the next one
+};
+
+}  // namespace terrace::terrain

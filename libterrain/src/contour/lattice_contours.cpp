@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "base/error.hpp"
+#include "base/parallel.hpp"
+#include "contour/contour_lines.hpp"
+#include "contour/contour_parts.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+constexpr std::int64_t kBandRows = 256, kWindow = 512;
+/// Of a sample of a band (height, level).
+constexpr std::uint64_t kContourBytesPerSample = 16;
+
+/// The samples around the region.
+LatticeWindow lattice_of(const stream::Store& store, const GroundSlope& ground,
+                         const std::optional<Region>& region) {
+  StoredBox box{{0, 0},
+                {static_cast<double>(store.schema().columns) - 1,
+                 static_cast<double>(store.schema().rows) - 1}};
+  if (region) {
+    const StoredBox wanted = box_around(*region, ground);
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      box.min[axis] = std::max(box.min[axis], std::floor(wanted.min[axis]));
+      box.max[axis] = std::min(box.max[axis], std::ceil(wanted.max[axis]));
+    }
+  }
+  if (!(box.min[0] <= box.max[0] && box.min[1] <= box.max[1])) throw_region_outside(store);
+  const auto whole = [](double value) { return static_cast<std::int64_t>(value); };
+  return {whole(box.min[0]), whole(box.min[1]), whole(box.max[0] - box.min[0]) + 1,
+          whole(box.max[1] - box.min[1]) + 1};
+}
+
+}  // namespace
+
+void draw_lattice_contours(const ContourParts& parts) {
+  const stream::Store& store = parts.store;
+  const ContourRequest& request = parts.request;
+  if (request.max_edge) {
+    throw UsageError(
+        "--max-edge is for irregular points and coarser levels: the samples of a raster say "
+        "themselves where there is no data");
+  }
+  const GroundSlope ground(store);
+  const LatticeWindow lattice = lattice_of(store, ground, request.region);
+  const std::int64_t band = std::clamp<std::int64_t>(
+      static_cast<std::int64_t>(request.memory_bytes / 4 / kContourBytesPerSample) /
+          lattice.columns,
+      2, kBandRows);
+  const auto stored = [&](const Point2& p) {
+    return Point2{p[0] + static_cast<double>(lattice.column),
+                  p[1] + static_cast<double>(lattice.row)};
+  };
+  ContourLines lines(
+      lattice.columns, request.interval,
+      [&](ContourLine&& line) {
+        for (Point2& p : line.points) p = stored(p);
+        parts.emit(std::move(line));
+      },
+      parts.limit);
+  std::function<bool(std::int64_t, std::int64_t)> wanted;
+  if (request.region) {
+    wanted = [&](std::int64_t column, std::int64_t row) {
+      return holds_place(*request.region, ground.world(stored({static_cast<double>(column) + 0.5,
+                                                               static_cast<double>(row) + 0.5})));
+    };
+  }
+
+  const auto windows = static_cast<std::size_t>((lattice.columns + kWindow - 1) / kWindow);
+  std::vector<std::unique_ptr<StoreWindow>> readers(std::max(1U, request.threads));
+  std::vector<double> heights;
+  for (std::int64_t row = 0; row + 1 < lattice.rows; row += band) {
+    const std::int64_t rows = std::min(band + 1, lattice.rows - row);
+    heights.resize(static_cast<std::size_t>(lattice.columns * rows));
+    parallel_for(windows, request.threads, [&](unsigned thread, std::size_t i) {
+      if (readers[thread] == nullptr) {
+        readers[thread] = std::make_unique<StoreWindow>(store);
+      }
+      const std::int64_t column = static_cast<std::int64_t>(i) * kWindow;
+      const LatticeWindow window{lattice.column + column, lattice.row + row,
+                                 std::min(kWindow, lattice.columns - column), rows};
+      std::vector<double> part(window.size());
+      readers[thread]->heights(window, std::span(part));
+      for (std::int64_t r = 0; r < rows; ++r) {
+        std::copy_n(part.begin() + r * window.columns, window.columns,
+                    heights.begin() + r * lattice.columns + column);
+      }
+    });
+    lines.add(heights, rows, wanted);
+    parts.progress(static_cast<double>(row) / static_cast<double>(lattice.rows));
+  }
+  lines.finish();
+}
+
+}  // namespace terrace::terrain

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "earth/geoid_heights.hpp"
+
+#include <cassert>
+#include <cmath>
+#include <filesystem>
+#include <system_error>
+
+#include <GeographicLib/Geoid.hpp>
+
+#include "base/error.hpp"
+#include "earth/ground.hpp"
+#include "earth/world.hpp"
+#include "terrace/stream/error.hpp"
+
+namespace terrace::terrain {
+
+GeoidGrid::GeoidGrid(const std::string& file, std::uint64_t memory_bytes) {
+  const auto fail = [&file](const std::string& cause, const std::string& remedy) {
+    throw stream::Error({.file = file, .where = {}, .cause = cause, .remedy = remedy});
+  };
+  const std::filesystem::path path(file);
+  const char* const fetch = "give a grid of GeographicLib's, like egm2008-5.pgm";
+  if (path.extension() != ".pgm") fail("is not named like a geoid grid (.pgm)", fetch);
+  std::error_code error;
+  const std::uintmax_t bytes = std::filesystem::file_size(path, error);
+  if (error) fail("cannot be read: " + error.message(), fetch);
+  if (bytes > memory_bytes) {
+    fail("takes " + std::to_string((bytes >> 20) + 1) + "M of memory, " +
+             std::to_string(memory_bytes >> 20) + "M are left of --memory",
+         "raise --memory or take a coarser grid");
+  }
+  try {
+    const std::filesystem::path folder =
+        path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
+    constexpr bool kCubic = true, kForThreads = true;
+    geoid_ = std::make_unique<const GeographicLib::Geoid>(path.stem().string(), folder.string(),
+                                                          kCubic, kForThreads);
+  } catch (const std::exception& damage) {
+    fail(std::string("is no geoid grid: ") + damage.what(), fetch);
+  }
+}
+
+GeoidGrid::~GeoidGrid() = default;
+GeoidGrid::GeoidGrid(GeoidGrid&&) noexcept = default;
+GeoidGrid& GeoidGrid::operator=(GeoidGrid&&) noexcept = default;
+
+double GeoidGrid::undulation(const Point2& place) const { return (*geoid_)(place[1], place[0]); }
+
+EllipsoidalHeights::EllipsoidalHeights(const stream::Schema& schema, const std::string& vertical,
+                                       const std::string& geoid, std::uint64_t memory_bytes) {
+  const bool said = vertical == "ellipsoidal" || vertical == "ignore";
+  if (!vertical.empty() && !said) {
+    throw UsageError("--vertical is ellipsoidal or ignore, not '" + vertical + "'");
+  }
+  if (said && !geoid.empty()) {
+    throw UsageError("--vertical " + vertical +
+                     " takes heights as they are, --geoid converts them: give one of the two");
+  }
+  const std::string& recorded = schema.vertical;
+  if (recorded == "ellipsoidal" && !geoid.empty()) {
+    throw UsageError(
+        "the store's heights are ellipsoidal already: leave --geoid out, or build the "
+        "store with --vertical orthometric if they are not");
+  }
+  if (recorded != "ellipsoidal" && !said && geoid.empty()) {
+    throw UsageError(
+        (recorded.empty() ? std::string("the store does not say what its heights refer to")
+                          : "the store's heights are " + recorded) +
+        ", and globes want heights above the ellipsoid: give --geoid FILE (a GeographicLib geoid "
+        "grid), or --vertical ellipsoidal if they are that, or --vertical ignore");
+  }
+  // One unit in all verbs, whatever had to be assumed.
+  const Ground ground(placement_of(schema));
+  metres_per_unit_ = ground.metres_vertical();
+  if (!metres_in_unit(schema.coordinates[2].unit) && !metres_in_unit(schema.crs.vertical_unit)) {
+    note_ = ground.assumption().empty() ? "the unit of heights is unknown and taken as metres"
+                                        : ground.assumption();
+  }
+  if (!geoid.empty()) geoid_.emplace(geoid, memory_bytes);
+  const auto add = [this](const std::string& what) { note_ += (note_.empty() ? "" : "; ") + what; };
+  if (vertical == "ignore" && recorded != "ellipsoidal") {
+    add("heights are taken as ellipsoidal though they are " +
+        (recorded.empty() ? std::string("of unknown reference") : recorded) +
+        ": they may be off by up to about 100 m");
+  }
+  if (recorded.empty() && geoid_) add("heights of unknown reference are taken as orthometric");
+}
+
+double EllipsoidalHeights::convert(const Point2& place, double height) const {
+  const double metres = height * metres_per_unit_;
+  return geoid_ ? metres + geoid_->undulation(place) : metres;
+}
+
+void EllipsoidalHeights::convert(std::span<const Point2> places, std::span<double> heights) const {
+  assert(places.size() == heights.size());
+  for (std::size_t i = 0; i < heights.size(); ++i) heights[i] = convert(places[i], heights[i]);
+}
+
+}  // namespace terrace::terrain

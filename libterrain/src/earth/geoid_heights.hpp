@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "earth/crs/coordinate_system.hpp"
+#include "terrace/stream/store.hpp"
+
+namespace GeographicLib {
+class Geoid;
+}
+
+namespace terrace::terrain {
+
+/// Metres above the ellipsoid that no geoid leaves.
+inline constexpr double kLowestGeoid = -110.0, kHighestGeoid = 90.0;
+
+/// How far a geoid lies above the ellipsoid, from a grid in GeographicLib's format (egm96-5.pgm,
+/// egm2008-2_5.pgm, ...), interpolated by its cubic of 12 samples. The whole grid is held in
+/// memory. Const members may be called by several threads at once.
+class GeoidGrid {
+ public:
+  /// file: with its folder and ending. Throws: stream::Error if it cannot be read, is damaged, or
+  /// would take more than `memory_bytes`.
+  GeoidGrid(const std::string& file, std::uint64_t memory_bytes);
+  ~GeoidGrid();
+  GeoidGrid(GeoidGrid&&) noexcept;
+  GeoidGrid& operator=(GeoidGrid&&) noexcept;
+
+  /// Metres at longitude, latitude in degrees; NaN for a place that is none.
+  [[nodiscard]] double undulation(const Point2& place) const;
+
+ private:
+  std::unique_ptr<const GeographicLib::Geoid> geoid_;
+};
+
+/// Heights of a store as heights above the ellipsoid in metres, which globes want.
+class EllipsoidalHeights {
+ public:
+  /// vertical: of `--vertical`, "ellipsoidal" (the heights are that, whatever the store says),
+  /// "ignore" (they are to be taken as if they were) or empty. geoid: the file of `--geoid` or
+  /// empty. Throws: UsageError if the store's heights are orthometric or unknown and neither was
+  /// said, or if the options contradict the store or one another; stream::Error as GeoidGrid.
+  EllipsoidalHeights(const stream::Schema& schema, const std::string& vertical,
+                     const std::string& geoid, std::uint64_t memory_bytes);
+
+  /// heights in the store's vertical unit at places in WGS 84 degrees, to metres above the
+  /// ellipsoid, in place. Sizes are equal.
+  void convert(std::span<const Point2> places, std::span<double> heights) const;
+  [[nodiscard]] double convert(const Point2& place, double height) const;
+
+  /// Metres in a unit of the store's heights.
+  [[nodiscard]] double metres_per_unit() const { return metres_per_unit_; }
+  /// Whether a geoid is added: heights then depend on the place.
+  [[nodiscard]] bool has_geoid() const { return geoid_.has_value(); }
+  /// What the user should know: an unknown unit, heights that were not converted. May be empty.
+  [[nodiscard]] const std::string& note() const { return note_; }
+
+ private:
+  double metres_per_unit_ = 1.0;
+  std::optional<GeoidGrid> geoid_;
+  std::string note_;
+};
+
+}  // namespace terrace::terrain

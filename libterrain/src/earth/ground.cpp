@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "earth/ground.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include <GeographicLib/Constants.hpp>
+
+#include "earth/portable_math.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+struct UnitName {
+  std::string_view name;
+  double metres;
+};
+
+// The spellings of GeoTIFF citations, WKT and EPSG.
+constexpr double kSurveyFoot = 1200.0 / 3937.0;
+constexpr std::array<UnitName, 14> kUnits{{
+    {"metre", 1.0},
+    {"meter", 1.0},
+    {"metres", 1.0},
+    {"meters", 1.0},
+    {"m", 1.0},
+    {"kilometre", 1000.0},
+    {"km", 1000.0},
+    {"foot", 0.3048},
+    {"feet", 0.3048},
+    {"ft", 0.3048},
+    {"international foot", 0.3048},
+    {"US survey foot", kSurveyFoot},
+    {"Foot_US", kSurveyFoot},
+    {"US foot", kSurveyFoot},
+}};
+
+bool same_text(std::string_view a, std::string_view b) {
+  const auto lower = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; };
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [&](char x, char y) { return lower(x) == lower(y); });
+}
+
+}  // namespace
+
+MetresPerDegree metres_per_degree(double latitude) {
+  // Radii of the parallel and the meridian: Snyder, Map Projections - A Working Manual (1987),
+  // USGS Professional Paper 1395, equations 4-19 to 4-21.
+  const double a = GeographicLib::Constants::WGS84_a();
+  const double f = GeographicLib::Constants::WGS84_f();
+  const double e2 = f * (2.0 - f);
+  const double phi = std::clamp(latitude, -90.0, 90.0);
+  const double sine = portable_sin_degrees(phi);
+  const double w2 = 1.0 - e2 * sine * sine;
+  const double w = std::sqrt(w2);
+  return {.longitude = kDegree * a * portable_cos_degrees(phi) / w,
+          .latitude = kDegree * a * (1.0 - e2) / (w2 * w)};
+}
+
+std::optional<double> metres_in_unit(std::string_view unit) {
+  for (const UnitName& known : kUnits) {
+    if (same_text(unit, known.name)) return known.metres;
+  }
+  return std::nullopt;
+}
+
+Ground::Ground(Placement placement, double z_weight) : placement_(std::move(placement)) {
+  const stream::Crs& crs = placement_.crs;
+  const auto assume = [this](const std::string& what) {
+    assumption_ += (assumption_.empty() ? "" : "; ") + what;
+  };
+
+  const bool degrees =
+      same_text(crs.horizontal_unit, "degree") ||
+      (crs.horizontal_unit.empty() && same_text(placement_.coordinates[0].unit, "degree"));
+  std::optional<CrsDefinition> known;
+  try {
+    known = definition_of(crs);
+  } catch (const CrsError&) {
+    // Its unit counts all the same; whoever needs places says what is wrong with it.
+  }
+  if (crs.geographic || degrees) {
+    kind_ = Kind::geographic;
+    if (known && !known->method) degrees_ = known->degrees_per_unit;
+  } else if (crs.epsg == 3857 || crs.epsg == 3785 || crs.epsg == 900913) {
+    kind_ = Kind::web_mercator;
+  } else if (known && known->method) {
+    kind_ = Kind::projected;
+    system_.emplace(*known);
+    metres_horizontal_ = known->metres_per_unit;
+  } else if (const auto metres = metres_in_unit(crs.horizontal_unit)) {
+    metres_horizontal_ = *metres;
+  } else if (const auto stored = metres_in_unit(placement_.coordinates[0].unit)) {
+    metres_horizontal_ = *stored;
+  } else {
+    assume("the horizontal unit is unknown and taken as metres");
+  }
+
+  // The heights' own unit if it is named, else that of a CRS in feet, else metres.
+  if (const auto channel = metres_in_unit(placement_.coordinates[2].unit)) {
+    metres_vertical_ = *channel;
+  } else if (const auto vertical = metres_in_unit(crs.vertical_unit)) {
+    metres_vertical_ = *vertical;
+  } else if (kind_ != Kind::geographic && metres_horizontal_ < 1.0) {
+    metres_vertical_ = metres_horizontal_;
+    assume("the unit of heights is unknown and taken as that of x and y");
+  }
+  metres_vertical_ *= z_weight;
+}
+
+/// East, the mixed term and north of the symmetric map from a step in x, y to metres: the square
+/// root of the metric that the ellipsoid has in the plane.
+std::array<double, 3> Ground::projected_scale(const stream::Point3& centre) const {
+  const double unit = metres_horizontal_;
+  // A step of a hundred metres tells the slopes to nine digits.
+  const double step = 100.0 / unit;
+  std::array<Point2, 5> places{{{centre[0], centre[1]},
+                                {centre[0] - step, centre[1]},
+                                {centre[0] + step, centre[1]},
+                                {centre[0], centre[1] - step},
+                                {centre[0], centre[1] + step}}};
+  system_->to_own_geographic(places);
+  const MetresPerDegree metres = metres_per_degree(places[0][1]);
+  const auto slope = [&](std::size_t from, std::size_t to) -> Point2 {
+    const double turn = std::remainder(places[to][0] - places[from][0], 360.0);
+    return {turn * metres.longitude / (2 * step),
+            (places[to][1] - places[from][1]) * metres.latitude / (2 * step)};
+  };
+  const Point2 x = slope(1, 2), y = slope(3, 4);
+  const double xx = x[0] * x[0] + x[1] * x[1], yy = y[0] * y[0] + y[1] * y[1];
+  const double xy = x[0] * y[0] + x[1] * y[1];
+  const double root = std::sqrt(std::max(0.0, xx * yy - xy * xy));
+  const double sum = std::sqrt(xx + yy + 2 * root);
+  // Projections call the C library's functions: rounded to five digits, their last bits do not
+  // reach what is clustered.
+  const auto rounded = [&](double value) { return std::round(value / unit * 0x1p16) * 0x1p-16; };
+  const std::array<double, 3> scale{rounded((xx + root) / sum), rounded(xy / sum),
+                                    rounded((yy + root) / sum)};
+  // Outside of the projection, and where longitudes are lost at a pole.
+  const bool usable = scale[0] > 0.01 && scale[2] > 0.01 && scale[0] < 100 && scale[2] < 100 &&
+                      std::abs(scale[1]) < 0.5 * std::min(scale[0], scale[2]);
+  if (!usable) return {unit, 0, unit};
+  return {scale[0] * unit, scale[1] * unit, scale[2] * unit};
+}
+
+GroundMap Ground::map(const stream::Box3& stored) const {
+  double east = metres_horizontal_, north = metres_horizontal_, mixed = 0;
+  if (kind_ != Kind::linear && !stored.empty()) {
+    const stream::Point3 centre =
+        world_point(placement_, {0.5 * (stored.min[0] + stored.max[0]),
+                                 0.5 * (stored.min[1] + stored.max[1]), stored.min[2]});
+    if (kind_ == Kind::geographic) {
+      const MetresPerDegree metres = metres_per_degree(centre[1] * degrees_);
+      east = metres.longitude * degrees_;
+      north = metres.latitude * degrees_;
+    } else if (kind_ == Kind::projected) {
+      const std::array<double, 3> scale = projected_scale(centre);
+      east = scale[0];
+      mixed = scale[1];
+      north = scale[2];
+    } else {
+      // y = a ln tan(pi/4 + phi/2), so cos(phi) = 1 / cosh(y/a). One metre of the map is
+      // rho cos(phi)/a metres northward on the ground, N cos(phi)/a eastward.
+      const double a = GeographicLib::Constants::WGS84_a();
+      const double growth = portable_exp(-std::abs(centre[1]) / a);
+      const double cosine = 2.0 * growth / (1.0 + growth * growth);
+      const double f = GeographicLib::Constants::WGS84_f();
+      const double e2 = f * (2.0 - f);
+      const double w2 = 1.0 - e2 * (1.0 - cosine * cosine);
+      const double w = std::sqrt(w2);
+      east = cosine / w;
+      north = cosine * (1.0 - e2) / (w2 * w);
+    }
+  }
+  const std::array<double, 6>& xy = placement_.world.xy;
+  const double height = metres_vertical_ * placement_.coordinates[2].scale;
+  if (mixed == 0) {
+    return {east * xy[0], east * xy[1], 0, north * xy[3], north * xy[4], 0, 0, 0, height};
+  }
+  return {east * xy[0] + mixed * xy[3],
+          east * xy[1] + mixed * xy[4],
+          0,
+          mixed * xy[0] + north * xy[3],
+          mixed * xy[1] + north * xy[4],
+          0,
+          0,
+          0,
+          height};
+}
+
+stream::Point3 apply(const GroundMap& map, const stream::Point3& v) {
+  return {map[0] * v[0] + map[1] * v[1] + map[2] * v[2],
+          map[3] * v[0] + map[4] * v[1] + map[5] * v[2],
+          map[6] * v[0] + map[7] * v[1] + map[8] * v[2]};
+}
+
+}  // namespace terrace::terrain

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "earth/crs/coordinate_system.hpp"
+#include "earth/world.hpp"
+#include "terrace/stream/point.hpp"
+
+/// Ground distances. Points are stored as they came, in degrees, feet, or columns and rows; what is
+/// near or far is measured in metres on the ground.
+
+namespace terrace::terrain {
+
+/// A linear map, row-major: ground = map * stored, in metres (east, north, up weighed).
+using GroundMap = std::array<double, 9>;
+
+struct MetresPerDegree {
+  double longitude = 0.0, latitude = 0.0;
+};
+/// On the WGS 84 ellipsoid at `latitude` (degrees, clamped to [-90, 90]): the radii of the parallel
+/// and of the meridian's curvature, times pi/180. Within 1e-14 relative. The same bits on every
+/// machine, unlike what calls the C library's sin and cos.
+MetresPerDegree metres_per_degree(double latitude);
+
+/// Metres in one "metre", "foot", "US survey foot" (and their usual spellings, EPSG names, and
+/// "kilometre"); nothing for a unit that is not known.
+std::optional<double> metres_in_unit(std::string_view unit);
+
+/// Local ground maps for a source or a store.
+class Ground {
+ public:
+  /// z_weight: what heights are multiplied by besides, `--z-weight`.
+  explicit Ground(Placement placement, double z_weight = 1.0);
+
+  /// The map near the centre of `stored`, a box in stored coordinates: the local scale of the
+  /// projection, on the axes of the CRS (its east and north, not the meridian's). Without a known
+  /// CRS it is the same everywhere.
+  [[nodiscard]] GroundMap map(const stream::Box3& stored) const;
+
+  [[nodiscard]] bool same_everywhere() const { return kind_ == Kind::linear; }
+  /// Whether the map is a projection's scale, which changes little over a hundredth of an area.
+  [[nodiscard]] bool projected() const { return kind_ == Kind::projected; }
+
+  /// What had to be assumed because the source does not say; empty if nothing.
+  [[nodiscard]] const std::string& assumption() const { return assumption_; }
+  /// Of a unit of heights, weighed.
+  [[nodiscard]] double metres_vertical() const { return metres_vertical_; }
+
+ private:
+  enum class Kind : std::uint8_t { linear, geographic, web_mercator, projected };
+
+  [[nodiscard]] std::array<double, 3> projected_scale(const stream::Point3& centre) const;
+
+  Placement placement_;
+  Kind kind_ = Kind::linear;
+  std::optional<CoordinateSystem> system_;  ///< of projected ones
+  double degrees_ = 1.0;                    ///< of a unit of x, y
+  double metres_horizontal_ = 1.0;          ///< of a unit of x, y
+  double metres_vertical_ = 1.0;            ///< of a unit of z, weighed
+  std::string assumption_;
+};
+
+/// map * v.
+stream::Point3 apply(const GroundMap& map, const stream::Point3& v);
+
+}  // namespace terrace::terrain

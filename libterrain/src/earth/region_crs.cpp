@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "earth/region_crs.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "earth/portable_math.hpp"
+#include "terrace/stream/error.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+[[noreturn]] void fail(const CoordinateSystem& to, const std::string& cause) {
+  throw stream::Error({.file = {},
+                       .where = "region",
+                       .cause = cause + " " + to.title(),
+                       .remedy = "give a smaller region, or one in the store's CRS"});
+}
+
+class Outline {
+ public:
+  Outline(const CoordinateSystem& from, const CoordinateSystem& to)
+      : from_(from),
+        to_(to),
+        turn_(to.is_geographic() ? 360.0 / to.definition().degrees_per_unit : 0.0) {}
+
+  std::vector<Point2> ring(const std::vector<Point2>& corners) const {
+    std::vector<Point2> result;
+    const Point2 first = moved(corners[0]);
+    Point2 start = first;
+    for (std::size_t i = 0; i < corners.size(); ++i) {
+      const Point2 &a = corners[i], &b = corners[(i + 1) % corners.size()];
+      result.push_back(start);
+      // An edge is cut a few times in any case: one that is straight in its middle may bend.
+      start = add_from(a, b, start, 0, result);
+    }
+    // Once round a pole: the outline comes back a full turn from where it began.
+    if (turn_ != 0 && std::abs(start[0] - first[0]) > 0.5 * turn_) {
+      fail(to_, "the region holds a pole, and its outline is no polygon in");
+    }
+    return result;
+  }
+
+ private:
+  [[nodiscard]] Point2 moved(Point2 place) const {
+    transform(from_, to_, {&place, 1});
+    if (!std::isfinite(place[0]) || !std::isfinite(place[1])) {
+      fail(to_, "the region's outline reaches places that there are none of in");
+    }
+    return place;
+  }
+  /// Longitudes go on beyond the antimeridian instead of jumping back.
+  [[nodiscard]] Point2 moved(const Point2& corner, const Point2& near) const {
+    Point2 place = moved(corner);
+    if (turn_ != 0) place[0] += turn_ * std::round((near[0] - place[0]) / turn_);
+    return place;
+  }
+
+  /// The curve from a, whose place is `start`, to b; without its ends. Returns the place of b.
+  Point2 add_from(const Point2& a, const Point2& b, const Point2& start, int depth,
+                  std::vector<Point2>& result) const {
+    constexpr int kLeast = 4, kMost = 14;
+    const Point2 middle{0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])};
+    if (depth < kLeast) {
+      const Point2 place = add_from(a, middle, start, depth + 1, result);
+      result.push_back(place);
+      return add_from(middle, b, place, depth + 1, result);
+    }
+    const Point2 place = moved(middle, start), end = moved(b, place);
+    const double length = portable_hypot(end[0] - start[0], end[1] - start[1]);
+    const double off =
+        portable_hypot(place[0] - 0.5 * (start[0] + end[0]), place[1] - 0.5 * (start[1] + end[1]));
+    if (off <= 1e-6 * length) return end;
+    if (depth == kMost) {
+      // By now the pieces of a smooth curve are straight; a jump never is.
+      if (off > 0.1 * length) fail(to_, "the region's outline is torn in");
+      return end;
+    }
+    const Point2 half = add_from(a, middle, start, depth + 1, result);
+    result.push_back(half);
+    return add_from(middle, b, half, depth + 1, result);
+  }
+
+  const CoordinateSystem& from_;
+  const CoordinateSystem& to_;
+  double turn_;  ///< of a geographic system, in its unit; else 0
+};
+
+std::vector<Polygon> outlines(const Region& region) {
+  if (!region.polygons().empty()) return region.polygons();
+  const stream::Box3& box = region.box();
+  return {{{{box.min[0], box.min[1]},
+            {box.max[0], box.min[1]},
+            {box.max[0], box.max[1]},
+            {box.min[0], box.max[1]}}}};
+}
+
+}  // namespace
+
+Region region_in(const Region& region, const CoordinateSystem& from, const CoordinateSystem& to,
+                 const stream::Box3& bounds) {
+  std::vector<Polygon> polygons = outlines(region);
+  if (!from.same_places(to)) {
+    const Outline outline(from, to);
+    for (Polygon& polygon : polygons) {
+      for (std::vector<Point2>& ring : polygon) ring = outline.ring(ring);
+    }
+  }
+  if (to.is_geographic()) {
+    const double turn = 360.0 / to.definition().degrees_per_unit;
+    std::vector<Polygon> there;
+    for (const Polygon& polygon : polygons) {
+      for (const double shift : {-turn, 0.0, turn}) {
+        Polygon copy = polygon;
+        stream::Box3 box;
+        for (std::vector<Point2>& ring : copy) {
+          for (Point2& p : ring) {
+            p[0] += shift;
+            box.include(stream::Point3{p[0], p[1], 0});
+          }
+        }
+        const bool meets = box.min[0] <= bounds.max[0] && box.max[0] >= bounds.min[0];
+        if (shift == 0 || meets) there.push_back(std::move(copy));
+      }
+    }
+    polygons = std::move(there);
+  }
+  return Region::of_polygons(std::move(polygons), region.box().min[2], region.box().max[2]);
+}
+
+}  // namespace terrace::terrain

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "earth/source_crs.hpp"
+
+#include <filesystem>
+#include <system_error>
+
+#include "base/error.hpp"
+#include "earth/ground.hpp"
+#include "terrace/stream/error.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+[[noreturn]] void fail(const std::string& file, const std::string& cause,
+                       const std::string& remedy) {
+  throw stream::Error({.file = file, .where = {}, .cause = cause, .remedy = remedy});
+}
+
+/// NAME.prj beside NAME.tif; empty if there is none.
+std::string sidecar_of(const std::string& file) {
+  if (file == "-") return {};
+  for (const char* ending : {".prj", ".PRJ"}) {
+    const std::filesystem::path path = std::filesystem::path(file).replace_extension(ending);
+    std::error_code ignored;
+    if (path != file && std::filesystem::is_regular_file(path, ignored)) return path.string();
+  }
+  return {};
+}
+
+CoordinateSystem read_sidecar(const std::string& file) {
+  try {
+    return CoordinateSystem::parse(file);
+  } catch (const UsageError& error) {
+    fail(file, error.what(), "correct or remove it, or name the system: --crs EPSG:n");
+  }
+}
+
+/// What the .prj files say, which must be one thing.
+std::optional<CoordinateSystem> system_of_sidecars(const stream::SourceInfo& info,
+                                                   std::string& name) {
+  std::optional<CoordinateSystem> system;
+  for (const std::string& file : info.files) {
+    const std::string sidecar = sidecar_of(file);
+    if (sidecar.empty()) continue;
+    const CoordinateSystem other = read_sidecar(sidecar);
+    if (system && !system->same_places(other)) {
+      fail(sidecar, "its CRS is not that of " + name,
+           "convert one of the files, or name the CRS of all: --crs EPSG:n");
+    }
+    if (!system) {
+      system = other;
+      name = sidecar;
+    }
+  }
+  return system;
+}
+
+}  // namespace
+
+SourceCrs crs_of_source(const stream::SourceInfo& info, const std::optional<DatumShift>& shift) {
+  SourceCrs found;
+  found.crs = info.crs;
+  found.crs.geo_keys.clear();
+  const std::string file = info.files.empty() ? std::string() : info.files.front();
+  std::optional<CrsDefinition> definition;
+  try {
+    definition = definition_of(info.crs);
+    if (definition) found.system.emplace(*definition);
+  } catch (const ContradictoryCrs& error) {
+    fail(file, error.what(), error.remedy());
+  } catch (const CrsError& error) {
+    // Without a unit not even a distance is known.
+    if (!info.crs.geographic && !metres_in_unit(info.crs.horizontal_unit)) {
+      fail(file, error.what(), error.remedy());
+    }
+    found.note = std::string(error.what()) + ": what needs places on the earth will not work (" +
+                 error.remedy() + ")";
+    return found;
+  }
+  std::string sidecar;
+  if (!found.system) {
+    found.system = system_of_sidecars(info, sidecar);
+  } else if (!info.crs.geo_keys.empty()) {
+    // A file that tells its own CRS needs no other; one beside it must not say anything else.
+    const std::optional<CoordinateSystem> other = system_of_sidecars(info, sidecar);
+    if (other && !other->same_places(*found.system)) {
+      fail(file,
+           "its CRS is " + found.system->title() + ", that of " + sidecar + " is " + other->title(),
+           "remove the wrong one, or say which is meant: --crs EPSG:n");
+    }
+  }
+  if (!found.system) {
+    if (info.crs.vertical_epsg != 0) {
+      CrsDefinition heights;
+      try {
+        set_vertical_epsg(heights, info.crs.vertical_epsg);
+        found.heights = heights.heights;
+      } catch (const CrsError& error) {
+        found.note = std::string(error.what()) + " (" + error.remedy() + ")";
+      }
+    }
+    return found;
+  }
+  if (shift) {
+    CrsDefinition shifted = found.system->definition();
+    if (shifted.uncertainty >= 0) {
+      fail(file, "its CRS " + found.system->title() + " counts as WGS 84 and takes no shift",
+           "leave --towgs84 out");
+    }
+    shifted.shift = shift;
+    found.system.emplace(shifted);
+  }
+  const std::string vertical_unit = found.crs.vertical_unit;
+  found.crs = found.system->crs();
+  if (!vertical_unit.empty()) found.crs.vertical_unit = vertical_unit;
+  found.heights = found.system->heights();
+  return found;
+}
+
+}  // namespace terrace::terrain

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include <terrace/stream/atomic_file.hpp>
+#include <terrace/stream/mesh_writer.hpp>
+#include <terrace/stream/point.hpp>
+
+namespace terrace::terrain {
+
+/// Keeps a mesh that comes in pieces on disk, beside the file that it will become, until its counts
+/// are known and it can be written. What is kept goes with the object.
+class MeshSpool {
+ public:
+  /// path: of the mesh file; "-" keeps the pieces in the folder for temporary files.
+  explicit MeshSpool(const std::string& path);
+
+  [[nodiscard]] std::uint64_t vertices() const { return vertices_; }
+  [[nodiscard]] std::uint64_t triangles() const { return triangles_; }
+
+  /// All throw stream::Error if the disk is full or the like. Vertices must be fewer than 2^32.
+  void add_vertex(const stream::Point3& position);
+  void add_vertices(std::span<const stream::Point3> positions);
+  void add_triangle(const stream::TriangleIndices& triangle);
+  void add_triangles(std::span<const stream::TriangleIndices> triangles);
+
+  /// Writes the file. bounds: what the writer is told, see stream::MeshHeader.
+  void write(const std::string& path, const stream::WriterOptions& options,
+             const stream::Box3& bounds);
+
+ private:
+  stream::AtomicFile vertex_file_, triangle_file_;
+  std::uint64_t vertices_ = 0, triangles_ = 0;
+};
+
+}  // namespace terrace::terrain

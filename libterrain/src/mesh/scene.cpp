@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "mesh/scene.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "earth/portable_math.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+stream::Point3 difference(const stream::Point3& a, const stream::Point3& b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+
+/// Twice the area along the normal of the triangle.
+stream::Point3 area_vector(const TriangleMesh& mesh, const std::array<std::uint32_t, 3>& t) {
+  const stream::Point3 u = difference(mesh.positions[t[1]], mesh.positions[t[0]]);
+  const stream::Point3 v = difference(mesh.positions[t[2]], mesh.positions[t[0]]);
+  return {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
+}
+
+}  // namespace
+
+bool is_height_field(const TriangleMesh& mesh) {
+  double up = 0, down = 0;
+  for (const auto& t : mesh.triangles) {
+    const double z = area_vector(mesh, t)[2];
+    (z > 0 ? up : down) += std::abs(z);
+  }
+  return std::max(up, down) > 0 && std::min(up, down) < 0.001 * std::max(up, down);
+}
+
+bool mostly_steep(const TriangleMesh& mesh) {
+  double steep = 0, all = 0;
+  for (const auto& t : mesh.triangles) {
+    const stream::Point3 n = area_vector(mesh, t);
+    const double area = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    all += area;
+    if (std::abs(n[2]) < 0.5 * area) steep += area;
+  }
+  return steep > 0.5 * all;
+}
+
+namespace {
+
+constexpr std::size_t kShownHeights = 100000;
+
+std::vector<double> heights_by_area(const TriangleMesh& mesh, const std::vector<double>& heights,
+                                    bool flat) {
+  std::vector<double> areas;
+  areas.reserve(mesh.triangles.size());
+  double whole = 0;
+  for (const auto& t : mesh.triangles) {
+    const stream::Point3 n = area_vector(mesh, t);
+    const double area = flat ? std::abs(n[2]) : portable_hypot(portable_hypot(n[0], n[1]), n[2]);
+    areas.push_back(std::isfinite(area) ? area : 0.0);
+    whole += areas.back();
+  }
+  std::vector<double> shown;
+  if (!(whole > 0) || !std::isfinite(whole)) return shown;
+  const double each = whole / static_cast<double>(kShownHeights);
+  double before = 0;
+  for (std::size_t i = 0; i < areas.size(); ++i) {
+    const auto& t = mesh.triangles[i];
+    const double after = before + areas[i];
+    // Places that fill a triangle evenly (M. Roberts's sequence of two dimensions).
+    for (std::size_t k = shown.size(); (static_cast<double>(k) + 0.5) * each < after; ++k) {
+      double u = std::fmod(static_cast<double>(k) * 0.7548776662466927, 1.0);
+      double v = std::fmod(static_cast<double>(k) * 0.5698402909980532, 1.0);
+      if (u + v > 1) {
+        u = 1 - u;
+        v = 1 - v;
+      }
+      shown.push_back((1 - u - v) * heights[t[0]] + u * heights[t[1]] + v * heights[t[2]]);
+    }
+    before = after;
+  }
+  return shown;
+}
+
+/// By cells of space with points: of the surface that the points lie on, about four in each where
+/// they are fewest.
+std::vector<double> heights_by_cells(const TriangleMesh& cloud,
+                                     const std::vector<double>& heights) {
+  constexpr double kMostCells = 64;  // on a side
+  std::array<std::size_t, 256> groups{};
+  for (const std::uint8_t left_out : cloud.left_out) ++groups[left_out];
+  const std::size_t coarsest =
+      *std::find_if(groups.rbegin(), groups.rend(), [](std::size_t count) { return count > 0; });
+  const double cells =
+      std::clamp(std::floor(std::sqrt(static_cast<double>(coarsest) / 4)), 1.0, kMostCells);
+  stream::Box3 box;
+  for (const stream::Point3& p : cloud.positions) box.include(p);
+  double width = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    width = std::max(width, box.max[axis] - box.min[axis]);
+  }
+  std::vector<std::vector<double>> members(static_cast<std::size_t>(cells * cells * cells));
+  for (std::size_t i = 0; i < heights.size(); ++i) {
+    double cell = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double place = cloud.positions[i][axis] - box.min[axis];
+      cell =
+          cell * cells + (width > 0 ? std::min(cells - 1, std::floor(place / width * cells)) : 0);
+    }
+    members[static_cast<std::size_t>(cell)].push_back(heights[i]);
+  }
+  std::erase_if(members, [](const std::vector<double>& some) { return some.empty(); });
+  const std::size_t of_each = std::max<std::size_t>(1, kShownHeights / members.size());
+  std::vector<double> shown;
+  for (const std::vector<double>& some : members) {
+    for (std::size_t k = 0; k < of_each; ++k) shown.push_back(some[k * some.size() / of_each]);
+  }
+  return shown;
+}
+
+}  // namespace
+
+std::vector<double> shown_heights(const TriangleMesh& mesh, const std::vector<double>& heights,
+                                  bool flat) {
+  std::vector<double> shown;
+  if (!mesh.triangles.empty()) {
+    shown = heights_by_area(mesh, heights, flat);
+  } else if (!mesh.left_out.empty()) {
+    shown = heights_by_cells(mesh, heights);
+  }
+  if (!shown.empty()) return shown;
+  const std::size_t stride = heights.size() / kShownHeights + 1;
+  for (std::size_t i = 0; i < heights.size(); i += stride) shown.push_back(heights[i]);
+  return shown;
+}
+
+std::vector<std::array<float, 3>> vertex_normals(const TriangleMesh& mesh) {
+  std::vector<stream::Point3> sums(mesh.positions.size(), stream::Point3{});
+  double up = 0;
+  for (const auto& t : mesh.triangles) {
+    const stream::Point3 n = area_vector(mesh, t);
+    up += n[2];
+    for (const std::uint32_t v : t) {
+      for (std::size_t axis = 0; axis < 3; ++axis) sums[v][axis] += n[axis];
+    }
+  }
+  const double sign = up < 0 && is_height_field(mesh) ? -1 : 1;
+  std::vector<std::array<float, 3>> normals(sums.size());
+  for (std::size_t v = 0; v < sums.size(); ++v) {
+    const double length =
+        std::sqrt(sums[v][0] * sums[v][0] + sums[v][1] * sums[v][1] + sums[v][2] * sums[v][2]);
+    if (length > 0) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        normals[v][axis] = static_cast<float>(sign * sums[v][axis] / length);
+      }
+    } else {
+      normals[v] = {0, 0, 1};
+    }
+  }
+  return normals;
+}
+
+}  // namespace terrace::terrain

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "terrace/stream/point.hpp"
+
+namespace terrace::terrain {
+
+using Rgb = std::array<std::uint8_t, 3>;
+
+/// Vertices with what is known of them, and triangles between them: none for a cloud of points.
+/// The optional columns are empty or as long as `positions`.
+struct TriangleMesh {
+  std::vector<stream::Point3> positions;
+  std::vector<std::array<std::uint32_t, 3>> triangles;  ///< either orientation
+  std::vector<std::uint8_t> levels;                     ///< of a store
+  std::vector<std::int32_t> classes;                    ///< class or cluster
+  std::vector<std::uint32_t> representatives;  ///< of the clusters: vertex numbers, any length
+  std::vector<Rgb> colours;
+  std::vector<std::array<float, 3>> normals;  ///< unit length
+  /// Of a cloud that is coarse somewhere: the levels that are left out around a point, 0 for none.
+  std::vector<std::uint8_t> left_out;
+};
+
+/// True if the mesh is seen from above without overlap: nearly all triangles, seen along z, turn
+/// the same way. A cloud of points is none.
+bool is_height_field(const TriangleMesh& mesh);
+
+/// Whether more than half of the surface is steeper than 60 degrees: triangles between the upper
+/// and the lower side of a body that was triangulated as if it were a terrain.
+bool mostly_steep(const TriangleMesh& mesh);
+
+/// What of `heights`, one per vertex, the surface shows: a sample of about 100,000 that is even
+/// over its area (with `flat` as seen from above), so that parts with small triangles count no more
+/// than others of their size. Of a cloud out of a store: even over the parts of space that have
+/// points; of other clouds: over the points. O(triangles + points).
+std::vector<double> shown_heights(const TriangleMesh& mesh, const std::vector<double>& heights,
+                                  bool flat);
+
+/// Unit normals at the vertices: those of the triangles around, weighed by area. For a height field
+/// they point up.
+std::vector<std::array<float, 3>> vertex_normals(const TriangleMesh& mesh);
+
+}  // namespace terrace::terrain

@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "mesh/store_mesh.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include <terrace/stream/error.hpp>
+#include <terrace/tri/metric_triangles.hpp>
+#include <terrace/tri/multiresolution.hpp>
+
+#include "base/error.hpp"
+#include "base/interrupt.hpp"
+#include "base/region_overlap.hpp"
+#include "earth/ground.hpp"
+#include "earth/world.hpp"
+#include "terrace/terrain/store_source.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+/// Peak bytes per vertex: the triangulation and its bulk build, the model's bookkeeping, and the
+/// mesh that comes out (vertex, level, two triangles).
+constexpr std::uint64_t kBytesPerVertex = 66 + 20 + 32 + 24 + 4 + 1 + 2 * 12;
+
+/// The box in stored coordinates around a box in the CRS. Heights are left free where `world` is.
+tri::Box3 stored_box(const Placement& placement, const stream::Box3& world) {
+  stream::Box3 stored;
+  for (unsigned corner = 0; corner < 4; ++corner) {
+    const Point2 place = stored_place(placement, {(corner & 1 ? world.max : world.min)[0],
+                                                  (corner & 2 ? world.max : world.min)[1]});
+    stored.include(stream::Point3{place[0], place[1], 0});
+  }
+  const stream::Channel& z = placement.coordinates[2];
+  double low = (world.min[2] - z.offset) / z.scale, high = (world.max[2] - z.offset) / z.scale;
+  if (low > high) std::swap(low, high);
+  // The division rounds: one part in 2^40 outward, so that no point at the border is lost.
+  const auto outward = [](double value, double sign) {
+    return value + sign * (std::abs(value) * 0x1p-40 + 0x1p-40);
+  };
+  return {{outward(stored.min[0], -1), outward(stored.min[1], -1), outward(low, -1)},
+          {outward(stored.max[0], 1), outward(stored.max[1], 1), outward(high, 1)}};
+}
+
+tri::Detail in_stored_coordinates(const Detail& detail, const Placement& placement) {
+  tri::Detail stored;
+  if (detail.region) {
+    stored.focuses.push_back({stored_box(placement, detail.region->box()), detail.level});
+  } else {
+    stored.level = detail.level;
+  }
+  for (const FinerRegion& focus : detail.focuses) {
+    stored.focuses.push_back({stored_box(placement, focus.region.box()), focus.level});
+  }
+  return stored;
+}
+
+/// The triangles of a field of metrics.
+constexpr std::uint64_t kBytesToFlip = 120;
+
+/// Counts what `detail` wants from the index alone and refuses what cannot fit.
+void check_memory(const stream::Store& store, const Detail& detail, std::uint64_t memory_bytes,
+                  std::uint64_t more_per_vertex) {
+  std::uint64_t points = 0;
+  if (!detail.region && detail.focuses.empty()) {
+    points = store.levels()[detail.level].points;
+  } else {
+    for_each_wanted_record(
+        store, detail,
+        [&](stream::ClusterId, const stream::ClusterRecord& record) { points += record.points; });
+  }
+  constexpr std::uint64_t kMostVertices = (std::uint64_t{1} << 29) - 2;
+  const std::uint64_t needed =
+      points * (kBytesPerVertex + more_per_vertex) + (std::uint64_t{32} << 20);
+  if (needed <= memory_bytes && points <= kMostVertices) return;
+  throw stream::Error({.file = store.path().string(),
+                       .where = {},
+                       .cause = "a mesh of " + std::to_string(points) + " points needs " +
+                                std::to_string((needed >> 20) + 1) +
+                                "M of memory, --memory allows " +
+                                std::to_string(memory_bytes >> 20) + "M",
+                       .remedy = "take a coarser --level or a smaller --region"});
+}
+
+/// The metric in the coordinates of the triangulation.
+tri::MetricField2 field_of(const MetricChoice& metric, const stream::Store& store,
+                           const Placement& placement) {
+  const std::array<double, 6>& m = placement.world.xy;
+  const Ground ground(placement);
+  std::vector<tri::MetricField2::Region> regions;
+  for (const MetricChoice::Region& region : metric.regions) {
+    if (region.box && (m[1] != 0.0 || m[3] != 0.0)) {
+      throw UsageError("--metric: the boxes of regions need a raster that is not rotated");
+    }
+    constexpr double kEverywhere = std::numeric_limits<double>::infinity();
+    tri::Box3 box{{-kEverywhere, -kEverywhere, -kEverywhere},
+                  {kEverywhere, kEverywhere, kEverywhere}};
+    stream::Box3 around = store.bounds();
+    if (region.box) {
+      const tri::Box3 stored = stored_box(placement, *region.box);
+      for (std::size_t axis = 0; axis < 2; ++axis) {
+        box.min[axis] = around.min[axis] = stored.min[axis];
+        box.max[axis] = around.max[axis] = stored.max[axis];
+      }
+    }
+    // From stored coordinates to the ground, then by the ellipse to the unit circle.
+    const GroundMap on_ground = ground.map(around);
+    const cluster::LinearMap& ellipse = region.metric.map();
+    std::array<double, 9> map{};
+    for (std::size_t row = 0; row < 3; ++row) {
+      for (std::size_t column = 0; column < 3; ++column) {
+        for (std::size_t k = 0; k < 3; ++k) {
+          map[3 * row + column] += ellipse[3 * row + k] * on_ground[3 * k + column];
+        }
+      }
+    }
+    regions.push_back({box, tri::plane_map(map)});
+  }
+  return tri::MetricField2(std::move(regions));
+}
+
+/// `heights`: by slot in real units; empty: the model's.
+template <class Coord>
+TriangleMesh mesh_of_model(const tri::Multiresolution2<Coord>& model, const Placement& placement,
+                           const std::optional<Region>& region, const std::vector<double>& heights,
+                           const std::optional<tri::MetricField2>& field) {
+  const auto& triangulation = model.triangulation();
+  const auto position = [&](tri::VertexId v) {
+    const auto p = triangulation.point(v);
+    stream::Point3 place = world_point(
+        placement, {static_cast<double>(p[0]), static_cast<double>(p[1]), model.height(v)});
+    if (!heights.empty()) place[2] = heights[tri::slot(v)];
+    return place;
+  };
+  const std::array<double, 6>& m = placement.world.xy;
+  const bool mirrored = m[0] * m[4] - m[1] * m[3] < 0;
+
+  TriangleMesh mesh;
+  constexpr auto kUnused = std::numeric_limits<std::uint32_t>::max();
+  std::vector<std::uint32_t> number(triangulation.vertex_slots(), kUnused);
+  const auto number_of = [&](tri::VertexId v) {
+    std::uint32_t& n = number[tri::slot(v)];
+    if (n == kUnused) {
+      n = static_cast<std::uint32_t>(mesh.positions.size());
+      mesh.positions.push_back(position(v));
+      mesh.levels.push_back(static_cast<std::uint8_t>(model.level(v)));
+    }
+    return n;
+  };
+  if (!region) {
+    mesh.positions.reserve(triangulation.vertex_count());
+    mesh.levels.reserve(triangulation.vertex_count());
+    mesh.triangles.reserve(triangulation.triangle_count());
+    // Points without a triangle (fewer than three, or all on one line) are written all the same.
+    for (const tri::VertexId v : triangulation.all_vertices()) number_of(v);
+  }
+  const auto add = [&](std::array<tri::VertexId, 3> corners) {
+    if (mirrored) std::swap(corners[1], corners[2]);
+    if (region &&
+        !touches(*region, {position(corners[0]), position(corners[1]), position(corners[2])})) {
+      return;
+    }
+    mesh.triangles.push_back({number_of(corners[0]), number_of(corners[1]), number_of(corners[2])});
+  };
+  if (field) {
+    for (const auto& corners : tri::metric_triangles(triangulation, *field)) add(corners);
+  } else {
+    for (const tri::TriangleId t : triangulation.all_triangles()) add(triangulation.vertices(t));
+  }
+  return mesh;
+}
+
+template <class Coord>
+TriangleMesh mesh_of(const stream::Store& store, const Detail& detail, const MeshOptions& options) {
+  StoreSource source(store);
+  const Placement placement = placement_of(store.schema());
+  std::optional<tri::MetricField2> field;
+  if (options.metric.kind == MetricChoice::Kind::elliptical) {
+    field = field_of(options.metric, store, placement);
+  }
+  const tri::Multiresolution2<Coord> model(source, in_stored_coordinates(detail, placement),
+                                           {.deltas = false});
+  check_interrupt();
+  std::vector<double> heights;
+  if (options.heights.any()) {
+    heights = changed_heights(model, placement, detail.region, options.heights);
+  }
+  return mesh_of_model(model, placement, detail.region, heights, field);
+}
+
+}  // namespace
+
+TriangleMesh mesh_of_store(const stream::Store& store, const Detail& detail,
+                           std::uint64_t memory_bytes, const MeshOptions& options) {
+  const MetricChoice::Kind kind = options.metric.kind;
+  if (kind != MetricChoice::Kind::euclidean && kind != MetricChoice::Kind::elliptical) {
+    throw UsageError("a mesh has the metric euclidean or elliptical:FILE, not " +
+                     options.metric.text);
+  }
+  check_memory(store, detail, memory_bytes,
+               options.heights.bytes_per_vertex() +
+                   (kind == MetricChoice::Kind::elliptical ? kBytesToFlip : 0));
+  return store.schema().grid ? mesh_of<std::int32_t>(store, detail, options)
+                             : mesh_of<double>(store, detail, options);
+}
+
+TriangleMesh points_of_store(const stream::Store& store, const Detail& detail) {
+  const Placement placement = placement_of(store.schema());
+  const bool coarse = detail.level > 0;
+  TriangleMesh cloud;
+  for_each_wanted(
+      store, detail,
+      [&](stream::ClusterId id, const stream::ClusterRecord&, const stream::ClusterPoints& points) {
+        check_interrupt();
+        const unsigned level = stream::level_of(id);
+        for (std::size_t i = 0; i < points.size(); ++i) {
+          const stream::Point3 place = world_point(placement, points.positions[i]);
+          if (detail.region && !detail.region->contains(place)) continue;
+          cloud.positions.push_back(place);
+          cloud.levels.push_back(static_cast<std::uint8_t>(level));
+          if (!coarse) continue;
+          unsigned left_out = level;
+          for (; left_out > 0; --left_out) {
+            const unsigned below = left_out - 1;
+            const stream::ClusterId headed =
+                stream::cluster_id(below, points.children[i * level + below]);
+            if (!detail.wants(below, world_box(placement, store.record(headed).summary.box))) break;
+          }
+          cloud.left_out.push_back(static_cast<std::uint8_t>(left_out));
+        }
+      });
+  return cloud;
+}
+
+unsigned level_within(const stream::Store& store, std::uint64_t most_points) {
+  for (const stream::LevelInfo& level : store.levels()) {
+    if (level.points <= most_points) return level.level;
+  }
+  return store.top();
+}
+
+}  // namespace terrace::terrain

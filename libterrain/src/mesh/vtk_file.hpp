@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "terrace/stream/point.hpp"
+
+namespace terrace::terrain {
+
+/// Writes tetrahedra as a legacy VTK file, binary, an unstructured grid with a "level" per point.
+/// The file appears whole. levels: as many as positions. Throws: stream::Error.
+void write_vtk(const std::string& path, std::span<const stream::Point3> positions,
+               std::span<const std::uint8_t> levels,
+               std::span<const std::array<std::uint32_t, 4>> tetrahedra, bool replace);
+
+}  // namespace terrace::terrain

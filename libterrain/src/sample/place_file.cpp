@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "sample/place_file.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "base/interrupt.hpp"
+#include "terrace/stream/error.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+constexpr std::size_t kLongestPlaceLine = std::size_t{1} << 20, kReadAtOnce = std::size_t{1} << 22;
+
+/// Takes the cell at the beginning of `rest`, and the separator behind it. Separators within double
+/// quotes belong to the cell.
+std::string_view take_text(std::string_view& rest, char separator) {
+  bool quoted = false;
+  std::size_t end = 0;
+  while (end < rest.size() && (quoted || rest[end] != separator)) {
+    if (rest[end] == '"') quoted = !quoted;
+    ++end;
+  }
+  const std::string_view cell = rest.substr(0, end);
+  rest.remove_prefix(std::min(end + 1, rest.size()));
+  return cell;
+}
+
+std::string_view bare(std::string_view cell) {
+  const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
+  for (;;) {
+    while (!cell.empty() && blank(cell.front())) cell.remove_prefix(1);
+    while (!cell.empty() && blank(cell.back())) cell.remove_suffix(1);
+    if (cell.size() < 2 || cell.front() != '"' || cell.back() != '"') return cell;
+    cell = cell.substr(1, cell.size() - 2);
+  }
+}
+
+std::optional<double> number_in(std::string_view cell) {
+  cell = bare(cell);
+  if (cell.empty()) return std::numeric_limits<double>::quiet_NaN();
+  if (cell.front() == '+') cell.remove_prefix(1);
+  double value = 0;
+  const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
+  if (error != std::errc{} || end != cell.data() + cell.size()) return std::nullopt;
+  return value;
+}
+
+std::string lower(std::string_view text) {
+  std::string result(text);
+  for (char& c : result) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c;
+  return result;
+}
+
+constexpr std::array<std::array<const char*, 2>, 7> kPlaceNames{{{"x", "y"},
+                                                                 {"lon", "lat"},
+                                                                 {"longitude", "latitude"},
+                                                                 {"long", "lat"},
+                                                                 {"lng", "lat"},
+                                                                 {"easting", "northing"},
+                                                                 {"east", "north"}}};
+
+}  // namespace
+
+PlaceLayout PlaceLayout::of(std::string_view first_line, const std::string& file) {
+  PlaceLayout layout;
+  if (const std::size_t at = first_line.find_first_of(",;\t"); at != std::string_view::npos) {
+    layout.separator = first_line[at];
+  } else {
+    throw stream::Error({.file = file,
+                         .where = {},
+                         .cause = "the first line has one column only",
+                         .remedy = "give x and y with a comma, a semicolon or a tab between them"});
+  }
+  std::vector<std::string> names;
+  bool numbers = true;
+  for (std::string_view rest = first_line; !rest.empty();) {
+    const std::string_view cell = take_text(rest, layout.separator);
+    if (names.size() < 2) numbers = numbers && number_in(cell).has_value();
+    names.push_back(lower(bare(cell)));
+  }
+  layout.header = !numbers;
+  for (const auto& [x, y] : kPlaceNames) {
+    const auto at_x = std::find(names.begin(), names.end(), x);
+    const auto at_y = std::find(names.begin(), names.end(), y);
+    if (at_x == names.end() || at_y == names.end()) continue;
+    layout.header = true;
+    layout.x = static_cast<std::size_t>(at_x - names.begin());
+    layout.y = static_cast<std::size_t>(at_y - names.begin());
+    break;
+  }
+  return layout;
+}
+
+std::string_view PlaceBatch::line(std::size_t i) const {
+  std::string_view line(text.data() + begins[i], begins[i + 1] - begins[i]);
+  if (line.ends_with('\n')) line.remove_suffix(1);
+  if (line.ends_with('\r')) line.remove_suffix(1);
+  return line;
+}
+
+PlaceFile::PlaceFile(const std::string& path) : input_(path, stop_token(), kReadAtOnce) {}
+
+bool PlaceFile::next(PlaceBatch& batch, std::size_t most_bytes, std::size_t most_lines) {
+  check_interrupt();
+  const std::size_t wanted = std::max(most_bytes, kLongestPlaceLine);
+  const std::string_view window = input_.fill(wanted);
+  const bool ended = window.size() < wanted;
+  batch.begins.clear();
+  batch.first_line = line_;
+  std::size_t end = 0;
+  while (end < window.size() && batch.begins.size() < most_lines) {
+    const std::size_t found = window.find('\n', end);
+    if (found == std::string_view::npos && !ended) break;
+    batch.begins.push_back(end);
+    end = found == std::string_view::npos ? window.size() : found + 1;
+  }
+  if (batch.begins.empty()) {
+    if (window.empty()) return false;
+    throw stream::Error({.file = name(),
+                         .where = "line " + std::to_string(line_),
+                         .cause = "is longer than any line of a table",
+                         .remedy = "give a text file with one place a line"});
+  }
+  batch.text.assign(window.substr(0, end));
+  batch.begins.push_back(end);
+  input_.consume(end);
+  line_ += batch.size();
+  return true;
+}
+
+bool is_no_place(std::string_view line) { return line.empty() || line.front() == '#'; }
+
+Point2 place_of(std::string_view line, const PlaceLayout& layout, const std::string& file,
+                std::uint64_t line_number) {
+  Point2 place{};
+  const std::size_t last = std::max(layout.x, layout.y);
+  std::size_t cells = 0;
+  std::string_view rest = line;
+  for (std::size_t column = 0; column <= last && !rest.empty(); ++column) {
+    const std::string_view cell = take_text(rest, layout.separator);
+    if (column != layout.x && column != layout.y) continue;
+    const std::optional<double> value = number_in(cell);
+    if (!value) {
+      throw stream::Error({.file = file,
+                           .where = "line " + std::to_string(line_number),
+                           .cause = "'" + std::string(cell.substr(0, 40)) + "' is no coordinate",
+                           .remedy = "coordinates are plain numbers, in column " +
+                                     std::to_string(layout.x + 1) + " and column " +
+                                     std::to_string(layout.y + 1)});
+    }
+    place[column == layout.x ? 0 : 1] = *value;
+    ++cells;
+  }
+  // A line that ends with the separator has an empty cell behind it.
+  if (cells == 1 && !line.empty() && line.back() == layout.separator) {
+    place[last == layout.x ? 0 : 1] = std::numeric_limits<double>::quiet_NaN();
+    ++cells;
+  }
+  if (cells < 2) {
+    throw stream::Error({.file = file,
+                         .where = "line " + std::to_string(line_number),
+                         .cause = "has fewer columns than the first line",
+                         .remedy = "give x and y in every line"});
+  }
+  return place;
+}
+
+void append_with_place(std::string& text, std::string_view line, const PlaceLayout& layout,
+                       std::string_view x, std::string_view y) {
+  for (std::size_t column = 0;; ++column) {
+    const std::string_view before = line;
+    const std::string_view cell = take_text(line, layout.separator);
+    text += column == layout.x ? x : column == layout.y ? y : cell;
+    if (cell.size() == before.size()) return;
+    text += layout.separator;
+  }
+}
+
+}  // namespace terrace::terrain

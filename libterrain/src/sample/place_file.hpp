@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <terrace/stream/input.hpp>
+
+#include "base/region.hpp"
+
+/// Tables of places as text, one a line: read in batches, each line kept as it is so that answers
+/// can be written behind it.
+
+namespace terrace::terrain {
+
+/// Where x and y stand in a line. Told by the first line: names in it say where (x and y, lon and
+/// lat, longitude and latitude, easting and northing, in any case and order); without names that
+/// are known the first two columns.
+struct PlaceLayout {
+  char separator = ',';  ///< or ';' or a tab: the first of these in the first line
+  std::size_t x = 0, y = 1;
+  bool header = false;  ///< the first line has names
+
+  /// Throws: stream::Error for a line with fewer than two columns. file: named in the error.
+  static PlaceLayout of(std::string_view first_line, const std::string& file);
+};
+
+/// Lines without their ends, "\n" or "\r\n".
+struct PlaceBatch {
+  std::string text;
+  std::vector<std::size_t> begins;  ///< of the lines in text; one more: the end
+  std::uint64_t first_line = 1;     ///< number of the first in the file
+
+  [[nodiscard]] std::size_t size() const { return begins.empty() ? 0 : begins.size() - 1; }
+  [[nodiscard]] std::string_view line(std::size_t i) const;
+};
+
+class PlaceFile {
+ public:
+  /// path: "-" is standard input. Throws: stream::Error if the file cannot be read.
+  explicit PlaceFile(const std::string& path);
+
+  /// The next whole lines, at most `most_lines` and about `most_bytes` of them; false at the end.
+  /// Throws: stream::Error on a line longer than a mebibyte, Interrupted.
+  bool next(PlaceBatch& batch, std::size_t most_bytes, std::size_t most_lines);
+  /// As messages call it.
+  [[nodiscard]] const std::string& name() const { return input_.name(); }
+
+ private:
+  stream::Input input_;
+  std::uint64_t line_ = 1;
+};
+
+/// Whether a line is kept without an answer: it is empty, or a comment (#).
+bool is_no_place(std::string_view line);
+
+/// The place in a line; NaN where a coordinate is empty or "nan".
+/// Throws: stream::Error naming file and line if there is no number where one should be.
+Point2 place_of(std::string_view line, const PlaceLayout& layout, const std::string& file,
+                std::uint64_t line_number);
+
+/// Appends the line to `text`, in the columns of its place x and y instead.
+void append_with_place(std::string& text, std::string_view line, const PlaceLayout& layout,
+                       std::string_view x, std::string_view y);
+
+}  // namespace terrace::terrain

@@ -1,0 +1,262 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "sample/profile_run.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <memory>
+#include <optional>
+
+#include <nlohmann/json.hpp>
+#include <terrace/stream/error.hpp>
+
+#include "base/error.hpp"
+#include "base/interrupt.hpp"
+#include "base/output.hpp"
+#include "base/units.hpp"
+#include "earth/ground.hpp"
+#include "earth/ground_slope.hpp"
+#include "earth/line_distance.hpp"
+#include "sample/fixed_text.hpp"
+#include "sample/surface_crossings.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+constexpr std::size_t kRowsAtOnce = 65536;
+
+void collect_line(const nlohmann::json& object, std::vector<std::vector<Point2>>& lines) {
+  const std::string type = object.value("type", "");
+  if (type == "Feature") return collect_line(object.at("geometry"), lines);
+  if (type == "FeatureCollection") {
+    for (const nlohmann::json& feature : object.at("features")) collect_line(feature, lines);
+  } else if (type == "LineString") {
+    lines.emplace_back();
+    for (const nlohmann::json& p : object.at("coordinates")) {
+      lines.back().push_back({p.at(0).get<double>(), p.at(1).get<double>()});
+    }
+  }
+}
+
+Point2 between(const Point2& a, const Point2& b, double t) {
+  return {a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])};
+}
+
+class ProfileRun {
+ public:
+  ProfileRun(const stream::Store& store, const ProfileRequest& request,
+             const std::function<void(std::string_view)>& write)
+      : request_(request),
+        write_(write),
+        ground_(store),
+        distance_(LineDistance::of(store)),
+        sampler_(make_sampler(store, request.sampler)),
+        heights_(FixedText::for_numbers_up_to(largest(store))) {
+    if (!request.step && (!store.schema().grid || request.sampler.level > 0)) {
+      crossings_.emplace(store, request.sampler);
+    }
+  }
+
+  ProfileOutcome run() {
+    write_(std::string(kProfileHead) + '\n');
+    add(request_.line.front(), 0);
+    for (std::size_t leg = 0; leg + 1 < request_.line.size(); ++leg) {
+      const Point2 &a = request_.line[leg], &b = request_.line[leg + 1];
+      if (request_.step) {
+        walk(a, b);
+      } else if (crossings_) {
+        cross_triangles(a, b);
+      } else {
+        cross(a, b);
+      }
+    }
+    // The end of the line, unless a step has met it.
+    if (request_.step && outcome_.metres > last_) add(request_.line.back(), outcome_.metres);
+    flush();
+    return outcome_;
+  }
+
+ private:
+  static double largest(const stream::Store& store) {
+    const stream::Channel& z = store.schema().coordinates[2];
+    const auto height = [&](double raw) { return std::abs(raw * z.scale + z.offset); };
+    return std::max(height(store.bounds().min[2]), height(store.bounds().max[2]));
+  }
+
+  /// Every so many metres of the leg.
+  void walk(const Point2& a, const Point2& b) {
+    const double step = *request_.step;
+    // So short that neither the line's bend nor the map's changing scale shows.
+    const double pieces = std::clamp(distance_.pieces(a, b, std::min(1000.0, step / 4)), 16.0, 1e9);
+    Point2 from = a;
+    for (double i = 1; i <= pieces; ++i) {
+      const Point2 to = i == pieces ? b : between(a, b, i / pieces);
+      const double length = distance_.between(from, to);
+      for (double next = next_step_ * step; next <= outcome_.metres + length;
+           next = ++next_step_ * step) {
+        if (!(length > 0)) break;
+        add(between(from, to, (next - outcome_.metres) / length), next);
+      }
+      outcome_.metres += length;
+      from = to;
+    }
+  }
+
+  /// At each crossing with the lattice.
+  void cross(const Point2& a, const Point2& b) {
+    const Point2 from = ground_.stored(a), to = ground_.stored(b);
+    // Columns, rows, and the diagonals, on which column plus row is whole.
+    const std::array<double, 3> begin{from[0], from[1], from[0] + from[1]};
+    const std::array<double, 3> end{to[0], to[1], to[0] + to[1]};
+    std::array<double, 3> next{}, at{};
+    constexpr double kNever = std::numeric_limits<double>::infinity();
+    const auto t_of = [&](std::size_t k) {
+      const double t = (next[k] - begin[k]) / (end[k] - begin[k]);
+      return t < 1 ? t : kNever;
+    };
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (begin[k] == end[k]) {
+        at[k] = kNever;
+        continue;
+      }
+      next[k] = begin[k] < end[k] ? std::floor(begin[k]) + 1 : std::ceil(begin[k]) - 1;
+      at[k] = t_of(k);
+    }
+    Point2 last = a;
+    double last_t = 0;
+    while (true) {
+      const double t = *std::min_element(at.begin(), at.end());
+      if (t == kNever) break;
+      Point2 stored = between(from, to, t);
+      for (std::size_t k = 0; k < 3; ++k) {
+        if (at[k] > t) continue;
+        if (k < 2) stored[k] = next[k];
+        next[k] += begin[k] < end[k] ? 1 : -1;
+        at[k] = t_of(k);
+      }
+      // Where lines of the lattice meet, rounding may tell them apart: one row is enough.
+      if (t - last_t <= 1e-12 && last_t > 0) continue;
+      const Point2 here = between(a, b, t);
+      outcome_.metres += distance_.along(last, here);
+      add(here, outcome_.metres, stored);
+      last = here;
+      last_t = t;
+    }
+    outcome_.metres += distance_.along(last, b);
+    add(b, outcome_.metres);
+  }
+
+  /// At each crossing with an edge of the triangulation.
+  void cross_triangles(const Point2& a, const Point2& b) {
+    Point2 last = a;
+    (*crossings_)(ground_.stored(a), ground_.stored(b), [&](const auto& crossing) {
+      const Point2 here = between(a, b, crossing.t);
+      outcome_.metres += distance_.along(last, here);
+      add(here, outcome_.metres, crossing.place, crossing.height);
+      last = here;
+    });
+    outcome_.metres += distance_.along(last, b);
+    add(b, outcome_.metres);
+  }
+
+  void add(const Point2& place, double metres) { add(place, metres, ground_.stored(place)); }
+  /// known: the linear surface's height there, where it was met anyhow.
+  void add(const Point2& place, double metres, const Point2& stored, double known = NAN) {
+    places_.push_back(place);
+    metres_.push_back(metres);
+    stored_.push_back(stored);
+    known_.push_back(known);
+    last_ = metres;
+    if (places_.size() >= kRowsAtOnce) flush();
+  }
+
+  void flush() {
+    check_interrupt();
+    surface_.assign(stored_.size(), {});
+    const tri::Interpolation method = request_.sampler.method;
+    if (method == tri::Interpolation::kLinear) {
+      for (std::size_t i = 0; i < stored_.size(); ++i) {
+        if (!std::isnan(known_[i])) stored_[i] = {NAN, NAN};  // need not be asked
+      }
+    }
+    sampler_->sample(stored_, surface_);
+    for (std::size_t i = 0; i < stored_.size(); ++i) {
+      // On an edge, where rounding may lead outside.
+      const bool missed = std::isnan(surface_[i].height);
+      if (missed && method != tri::Interpolation::kNearest) surface_[i].height = known_[i];
+    }
+    std::string text;
+    for (std::size_t i = 0; i < places_.size(); ++i) {
+      metres_text_.append(text, metres_[i]);
+      text += ',';
+      text += number_text(places_[i][0]);
+      text += ',';
+      text += number_text(places_[i][1]);
+      text += ',';
+      heights_.append(text, surface_[i].height);
+      text += '\n';
+      outcome_.answered += std::isnan(surface_[i].height) ? 0 : 1;
+    }
+    outcome_.points += places_.size();
+    write_(text);
+    places_.clear();
+    metres_.clear();
+    stored_.clear();
+    known_.clear();
+  }
+
+  const ProfileRequest& request_;
+  const std::function<void(std::string_view)>& write_;
+  GroundSlope ground_;
+  LineDistance distance_;
+  std::unique_ptr<HeightSampler> sampler_;
+  FixedText heights_, metres_text_{4};
+  ProfileOutcome outcome_;
+  double next_step_ = 1, last_ = 0;
+  std::vector<Point2> places_, stored_;
+  std::vector<double> metres_, known_;
+  std::optional<SurfaceCrossings> crossings_;
+  std::vector<SurfacePoint> surface_;
+};
+
+}  // namespace
+
+std::vector<Point2> parse_line(const std::string& text) {
+  const auto bad = [&](const std::string& cause) {
+    return stream::Error({.file = text,
+                          .where = {},
+                          .cause = cause,
+                          .remedy = "give x1,y1,x2,y2,... or a GeoJSON file with one LineString"});
+  };
+  std::vector<Point2> line;
+  if (text.find(',') != std::string::npos &&
+      text.find_first_not_of("0123456789+-.,eE ") == std::string::npos) {
+    const std::vector<double> v = parse_numbers(text, "--line");
+    if (v.size() < 4 || v.size() % 2 != 0) {
+      throw UsageError("--line has " + std::to_string(v.size()) +
+                       " numbers; write x1,y1,x2,y2 and more pairs if wanted");
+    }
+    for (std::size_t i = 0; i < v.size(); i += 2) line.push_back({v[i], v[i + 1]});
+    return line;
+  }
+  std::ifstream file(text);
+  if (!file) throw bad("neither places nor a file that can be read");
+  std::vector<std::vector<Point2>> lines;
+  try {
+    collect_line(nlohmann::json::parse(file), lines);
+  } catch (const nlohmann::json::exception& error) {
+    throw bad(std::string("is no GeoJSON (") + error.what() + ")");
+  }
+  if (lines.size() != 1) throw bad("holds " + std::to_string(lines.size()) + " lines");
+  if (lines.front().size() < 2) throw bad("the line has fewer than two places");
+  return lines.front();
+}
+
+ProfileOutcome write_profile(const stream::Store& store, const ProfileRequest& request,
+                             const std::function<void(std::string_view)>& write) {
+  return ProfileRun(store, request, write).run();
+}
+
+}  // namespace terrace::terrain

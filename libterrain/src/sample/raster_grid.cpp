@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "sample/raster_grid.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <terrace/stream/error.hpp>
+
+#include "base/error.hpp"
+#include "base/units.hpp"
+#include "earth/portable_math.hpp"
+#include "earth/store_crs.hpp"
+#include "earth/world.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+constexpr double kMostGridCells = 2147483647.0;
+
+[[noreturn]] void outside(const stream::Store& store) {
+  throw stream::Error({.file = store.path().string(),
+                       .where = {},
+                       .cause = "the region does not meet the store",
+                       .remedy = "`terrace info` tells its bounds; --region-crs says in which CRS "
+                                 "the region is"});
+}
+
+/// The store's area in its CRS: of a raster with half a cell around the samples.
+stream::Box3 area_of(const stream::Store& store) {
+  stream::Box3 stored = store.bounds();
+  if (store.schema().grid) {
+    const auto last = [](std::uint64_t n) { return static_cast<double>(n) - 0.5; };
+    stored.min = {-0.5, -0.5, 0};
+    stored.max = {last(store.schema().columns), last(store.schema().rows), 0};
+  }
+  stored.min[2] = stored.max[2] = 0;
+  return world_box(placement_of(store.schema()), stored);
+}
+
+/// The box of the output's CRS around one of the store's CRS.
+stream::Box3 converted(const stream::Box3& box, const CoordinateSystem& from,
+                       const CoordinateSystem& to, const stream::Store& store) {
+  // The outline bends: so many points on each side.
+  constexpr int kPoints = 256;
+  std::vector<Point2> outline;
+  for (int i = 0; i <= kPoints; ++i) {
+    const double t = static_cast<double>(i) / kPoints;
+    const double x = box.min[0] + t * (box.max[0] - box.min[0]);
+    const double y = box.min[1] + t * (box.max[1] - box.min[1]);
+    for (const Point2 p : {Point2{x, box.min[1]}, Point2{x, box.max[1]}, Point2{box.min[0], y},
+                           Point2{box.max[0], y}}) {
+      outline.push_back(p);
+    }
+  }
+  transform(from, to, outline);
+  stream::Box3 result;
+  for (const Point2& p : outline) {
+    if (std::isfinite(p[0]) && std::isfinite(p[1])) result.include(stream::Point3{p[0], p[1], 0});
+  }
+  if (result.empty()) {
+    throw stream::Error({.file = store.path().string(),
+                         .where = {},
+                         .cause = "the region has no place in " + to.title(),
+                         .remedy = "take another --to-crs or a smaller --region"});
+  }
+  return result;
+}
+
+/// To two digits.
+double rounded_cell(double value) {
+  std::array<char, 32> digits{};
+  const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), value,
+                                 std::chars_format::scientific, 1);
+  double result = 0;
+  std::from_chars(digits.data(), end.ptr, result);
+  return result;
+}
+
+/// The distance between neighbouring points in units of the store's CRS.
+double spacing_of(const stream::Store& store, const stream::Box3& area, unsigned level) {
+  const std::array<double, 6>& m = store.schema().world.xy;
+  if (store.schema().grid && level == 0) return std::sqrt(std::abs(m[0] * m[4] - m[1] * m[3]));
+  const double size = (area.max[0] - area.min[0]) * (area.max[1] - area.min[1]);
+  const std::uint64_t points = std::max<std::uint64_t>(store.levels()[level].points, 1);
+  return rounded_cell(std::sqrt(size / static_cast<double>(points)));
+}
+
+std::uint32_t count_of(double cells) {
+  if (!(cells <= kMostGridCells)) {
+    throw UsageError("--cell is too small: a side of the raster would have " +
+                     number_text(std::ceil(cells)) + " cells");
+  }
+  return static_cast<std::uint32_t>(std::max(1.0, cells));
+}
+
+}  // namespace
+
+RasterGrid raster_grid(const stream::Store& store, const RasterRequest& request) {
+  const unsigned level = request.sampler.level;
+  if (level > store.top()) {
+    throw UsageError("the store has no level " + std::to_string(level) + ": its top is level " +
+                     std::to_string(store.top()));
+  }
+  const stream::Box3 area = area_of(store);
+  stream::Box3 box = area;
+  if (request.region) {
+    const stream::Box3& wanted = request.region->box();
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      box.min[axis] = std::max(box.min[axis], wanted.min[axis]);
+      box.max[axis] = std::min(box.max[axis], wanted.max[axis]);
+    }
+  }
+  if (store.points() == 0 || !(box.min[0] <= box.max[0] && box.min[1] <= box.max[1])) {
+    outside(store);
+  }
+  const std::array<double, 6>& m = store.schema().world.xy;
+  const bool straight = m[1] == 0 && m[3] == 0;
+  RasterGrid grid;
+  if (!request.cell && !request.to && store.schema().grid && straight && level == 0) {
+    // The lattice itself: the samples within the box.
+    std::array<double, 2> first{}, last{};
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      const double step = m[4 * axis], origin = axis == 0 ? m[2] : m[5];
+      const double size =
+          static_cast<double>(axis == 0 ? store.schema().columns : store.schema().rows);
+      double a = (box.min[axis] - origin) / step, b = (box.max[axis] - origin) / step;
+      if (a > b) std::swap(a, b);
+      first[axis] = std::max(0.0, std::ceil(a - 1e-6));
+      last[axis] = std::min(size - 1, std::floor(b + 1e-6));
+      if (first[axis] > last[axis]) outside(store);
+    }
+    grid.step_x = m[0];
+    grid.step_y = m[4];
+    grid.x = m[2] + m[0] * first[0];
+    grid.y = m[5] + m[4] * first[1];
+    grid.columns = count_of(last[0] - first[0] + 1);
+    grid.rows = count_of(last[1] - first[1] + 1);
+    return grid;
+  }
+  double cell = request.cell.value_or(spacing_of(store, area, level));
+  if (request.to) {
+    const CoordinateSystem &from = request.to->store, &to = request.to->named;
+    const Point2 centre{0.5 * (box.min[0] + box.max[0]), 0.5 * (box.min[1] + box.max[1])};
+    std::vector<Point2> steps{centre, {centre[0] + cell, centre[1]}, {centre[0], centre[1] + cell}};
+    box = converted(box, from, to, store);
+    if (!request.cell) {
+      transform(from, to, steps);
+      const auto length = [&](std::size_t i) {
+        return portable_hypot(steps[i][0] - steps[0][0], steps[i][1] - steps[0][1]);
+      };
+      cell = std::sqrt(length(1) * length(2));
+    }
+  }
+  if (!(cell > 0) || !std::isfinite(cell)) {
+    throw UsageError("the points do not tell a cell size: give --cell");
+  }
+  grid.step_x = cell;
+  grid.step_y = -cell;
+  grid.x = box.min[0] + 0.5 * cell;
+  grid.y = box.max[1] - 0.5 * cell;
+  grid.columns = count_of(std::ceil((box.max[0] - box.min[0]) / cell - 1e-6));
+  grid.rows = count_of(std::ceil((box.max[1] - box.min[1]) / cell - 1e-6));
+  return grid;
+}
+
+}  // namespace terrace::terrain

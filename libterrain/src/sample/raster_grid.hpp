@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+
+#include <terrace/stream/store.hpp>
+
+#include "sample/raster_run.hpp"
+
+namespace terrace::terrain {
+
+/// Cells of a raster to be written: the centre of (0, 0), and steps per column and row.
+struct RasterGrid {
+  double x = 0, y = 0, step_x = 1, step_y = -1;
+  std::uint32_t columns = 0, rows = 0;
+};
+
+/// As write_raster() has it, with its errors.
+RasterGrid raster_grid(const stream::Store& store, const RasterRequest& request);
+
+}  // namespace terrace::terrain

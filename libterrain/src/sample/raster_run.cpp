@@ -1,0 +1,243 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "sample/raster_run.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <terrace/stream/geotiff_writer.hpp>
+
+#include "base/error.hpp"
+#include "base/parallel.hpp"
+#include "earth/ground_slope.hpp"
+#include "earth/store_crs.hpp"
+#include "sample/raster_grid.hpp"
+#include "sample/raster_shader.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+constexpr std::int64_t kRunTile = 256;
+/// Peak bytes per cell of the tiles at work: places twice, sorting, surface, heights.
+constexpr std::uint64_t kBytesPerCell = 130;
+
+/// Most tiles along a side of what is sampled at a time.
+constexpr std::int64_t kMostSide = 8;
+
+constexpr std::uint64_t bytes_of(std::int64_t side) {
+  return static_cast<std::uint64_t>(side * side * kRunTile * kRunTile) * kBytesPerCell;
+}
+
+/// A tile by its column and row among the tiles.
+struct TilePlace {
+  std::int64_t column = 0, row = 0;
+};
+
+constexpr std::int64_t power_of_two(std::int64_t at_least) {
+  std::int64_t power = 1;
+  while (power < at_least) power *= 2;
+  return power;
+}
+
+/// Calls visit(corner) for the squares of `side` tiles in the square of `size` at `corner` that
+/// begin before `end`, quarter by quarter: so tiles come in the same order for any side, and those
+/// of near places near each other. Both sizes are powers of two.
+template <class Visit>
+void for_each_square(TilePlace corner, std::int64_t size, std::int64_t side, TilePlace end,
+                     const Visit& visit) {
+  if (corner.column >= end.column || corner.row >= end.row) return;
+  if (size <= side) return visit(corner);
+  const std::int64_t half = size / 2;
+  for (const auto& [column, row] : {std::pair{0, 0}, {1, 0}, {0, 1}, {1, 1}}) {
+    for_each_square({corner.column + column * half, corner.row + row * half}, half, side, end,
+                    visit);
+  }
+}
+
+class RasterRun {
+ public:
+  RasterRun(const stream::Store& store, const RasterRequest& request)
+      : request_(request),
+        grid_(raster_grid(store, request)),
+        crs_(request.to ? request.to->named.crs() : store.schema().crs),
+        ground_(store),
+        sampler_(make_sampler(store, request.sampler)),
+        shader_(grid_, store.schema(), crs_, request.value),
+        nodata_(nodata(store, request.value)) {}
+
+  RasterOutcome run(const stream::Channel& heights,
+                    const std::function<void(std::uint64_t, double)>& progress) {
+    stream::GeoTiffOptions options;
+    options.columns = grid_.columns;
+    options.rows = grid_.rows;
+    options.sample.type = shaded() ? stream::ScalarType::u8 : stream::ScalarType::f32;
+    if (request_.value == RasterValue::height) options.sample.unit = heights.unit;
+    options.world.xy = {grid_.step_x, 0, grid_.x, 0, grid_.step_y, grid_.y};
+    options.crs = crs_;
+    options.nodata = nodata_;
+    options.tile = kRunTile;
+    options.replace = request_.replace;
+    stream::GeoTiffWriter writer(request_.output, options);
+    const std::int64_t across = (grid_.columns + kRunTile - 1) / kRunTile;
+    const std::int64_t down = (grid_.rows + kRunTile - 1) / kRunTile;
+    std::int64_t side = 1;
+    while (side < kMostSide && bytes_of(2 * side) <= request_.sampler.memory_bytes / 2) side *= 2;
+    std::vector<TilePlace> block;
+    double done = 0;
+    for_each_square({0, 0}, power_of_two(std::max(across, down)), side, {across, down},
+                    [&](TilePlace corner) {
+                      block.clear();
+                      for_each_square(corner, side, 1, {across, down},
+                                      [&](TilePlace tile) { block.push_back(tile); });
+                      sample(corner, side);
+                      make_tiles(block, writer);
+                      done += static_cast<double>(block.size());
+                      const double all = static_cast<double>(across) * static_cast<double>(down);
+                      if (progress) progress(outcome_.cells_with_data, done / all);
+                    });
+    writer.commit();
+    outcome_.columns = grid_.columns;
+    outcome_.rows = grid_.rows;
+    if (request_.value != RasterValue::height) outcome_.assumption = shader_.assumption();
+    return outcome_;
+  }
+
+ private:
+  [[nodiscard]] bool shaded() const { return request_.value == RasterValue::hillshade; }
+
+  static double nodata(const stream::Store& store, RasterValue value) {
+    if (value == RasterValue::hillshade) return 0;
+    const stream::Channel& z = store.schema().coordinates[2];
+    const auto height = [&](double raw) { return raw * z.scale + z.offset; };
+    const double lowest = std::min(height(store.bounds().min[2]), height(store.bounds().max[2]));
+    return value == RasterValue::height && lowest <= -9999
+               ? static_cast<double>(-std::numeric_limits<float>::max())
+               : -9999;
+  }
+
+  /// The surface at the cells of a square of tiles and, if slopes are made of it, one cell around,
+  /// by rows in heights_.
+  void sample(TilePlace corner, std::int64_t side) {
+    const std::int64_t around = request_.value == RasterValue::height ? 0 : 1;
+    first_column_ = corner.column * kRunTile - around;
+    first_row_ = corner.row * kRunTile - around;
+    const auto size = [&](std::int64_t first, std::int64_t all) {
+      return static_cast<std::size_t>(std::min(side * kRunTile + 2 * around, all + around - first));
+    };
+    width_ = size(first_column_, grid_.columns);
+    const std::size_t height = size(first_row_, grid_.rows);
+    places_.resize(width_ * height);
+    surface_.resize(places_.size());
+    heights_.resize(places_.size());
+    parallel_for(height, request_.sampler.threads, [&](unsigned, std::size_t j) {
+      const std::span<Point2> line(places_.data() + j * width_, width_);
+      const auto cell = [](std::int64_t first, std::size_t i) {
+        return static_cast<double>(first + static_cast<std::int64_t>(i));
+      };
+      const double y = grid_.y + grid_.step_y * cell(first_row_, j);
+      for (std::size_t i = 0; i < width_; ++i) {
+        line[i] = {grid_.x + grid_.step_x * cell(first_column_, i), y};
+      }
+      if (request_.to) transform(request_.to->named, request_.to->store, line);
+      for (Point2& p : line) {
+        const bool wanted = !request_.region || request_.region->polygons().empty() ||
+                            request_.region->contains({p[0], p[1], 0});
+        p = wanted ? ground_.stored(p) : Point2{NAN, NAN};
+      }
+    });
+    sampler_->sample(places_, surface_);
+    for (std::size_t i = 0; i < surface_.size(); ++i) heights_[i] = surface_[i].height;
+  }
+
+  void make_tiles(std::span<const TilePlace> block, stream::GeoTiffWriter& writer) {
+    tiles_.resize(block.size());
+    counts_.assign(block.size(), 0);
+    parallel_for(block.size(), request_.sampler.threads, [&](unsigned, std::size_t i) {
+      make_tile(i, block[i].column * kRunTile, block[i].row * kRunTile);
+    });
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      if (counts_[i] == 0) continue;
+      outcome_.cells_with_data += counts_[i];
+      writer.write_tile(static_cast<std::uint32_t>(block[i].column),
+                        static_cast<std::uint32_t>(block[i].row), tiles_[i]);
+    }
+  }
+
+  void make_tile(std::size_t number, std::int64_t column, std::int64_t row) {
+    std::vector<std::byte>& bytes = tiles_[number];
+    const std::size_t size = shaded() ? 1 : sizeof(float);
+    bytes.resize(kRunTile * kRunTile * size);
+    const std::int64_t columns = std::min<std::int64_t>(kRunTile, grid_.columns - column);
+    const std::int64_t rows = std::min<std::int64_t>(kRunTile, grid_.rows - row);
+    const double middle = static_cast<double>(column) + 0.5 * static_cast<double>(columns - 1);
+    for (std::int64_t j = 0; j < kRunTile; ++j) {
+      RasterShader::Scale scale;
+      if (request_.value != RasterValue::height && j < rows) {
+        scale = shader_.scale(middle, static_cast<double>(row + j));
+      }
+      for (std::int64_t i = 0; i < kRunTile; ++i) {
+        double value = NAN;
+        if (i < columns && j < rows) {
+          const double* z = heights_.data() +
+                            static_cast<std::size_t>(row - first_row_ + j) * width_ +
+                            static_cast<std::size_t>(column - first_column_ + i);
+          value = request_.value == RasterValue::height
+                      ? *z
+                      : shader_(z, static_cast<std::ptrdiff_t>(width_), scale);
+        }
+        if (std::isnan(value)) {
+          value = nodata_;
+        } else {
+          ++counts_[number];
+        }
+        std::byte* at = bytes.data() + static_cast<std::size_t>(j * kRunTile + i) * size;
+        if (shaded()) {
+          *at = static_cast<std::byte>(static_cast<std::uint8_t>(value + 0.5));
+        } else {
+          const auto number32 = static_cast<float>(value);
+          std::memcpy(at, &number32, sizeof number32);
+        }
+      }
+    }
+  }
+
+  const RasterRequest& request_;
+  RasterGrid grid_;
+  stream::Crs crs_;
+  GroundSlope ground_;
+  std::unique_ptr<HeightSampler> sampler_;
+  RasterShader shader_;
+  double nodata_;
+  RasterOutcome outcome_;
+
+  // The tiles at work.
+  std::int64_t first_column_ = 0, first_row_ = 0;  ///< of heights_
+  std::size_t width_ = 0;
+  std::vector<Point2> places_;
+  std::vector<SurfacePoint> surface_;
+  std::vector<double> heights_;
+  std::vector<std::vector<std::byte>> tiles_;
+  std::vector<std::uint64_t> counts_;
+};
+
+}  // namespace
+
+RasterValue parse_raster_value(const std::string& text) {
+  if (text == "height") return RasterValue::height;
+  if (text == "slope") return RasterValue::slope;
+  if (text == "aspect") return RasterValue::aspect;
+  if (text == "hillshade") return RasterValue::hillshade;
+  throw UsageError("'" + text + "' is no --value; write height, slope, aspect or hillshade");
+}
+
+RasterOutcome write_raster(const stream::Store& store, const RasterRequest& request,
+                           const std::function<void(std::uint64_t, double)>& progress) {
+  return RasterRun(store, request).run(store.schema().coordinates[2], progress);
+}
+
+}  // namespace terrace::terrain

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include <terrace/stream/store.hpp>
+
+#include "base/region.hpp"
+#include "earth/store_crs.hpp"
+#include "sample/height_sampler.hpp"
+
+namespace terrace::terrain {
+
+enum class RasterValue : std::uint8_t { height, slope, aspect, hillshade };
+/// Throws: UsageError.
+RasterValue parse_raster_value(const std::string& text);
+
+/// What `terrace raster` was asked to write.
+struct RasterRequest {
+  RasterValue value = RasterValue::height;
+  SamplerOptions sampler;
+  std::optional<double> cell;    ///< width and height in units of the output's CRS
+  std::optional<Region> region;  ///< in the store's CRS
+  std::optional<SystemPair> to;  ///< the output's CRS if it is not the store's
+  std::string output;
+  bool replace = false;
+};
+
+struct RasterOutcome {
+  std::uint64_t columns = 0, rows = 0, cells_with_data = 0;
+  std::string assumption;  ///< of units; empty if none
+};
+
+/// Writes a tiled GeoTIFF, PixelIsArea: the value of a cell is that of the surface in its centre.
+///
+/// The grid: without a cell size, at level 0 and in the store's CRS it is a raster's own lattice
+/// (rotated ones have none); else cells of that size from the upper left corner of the region, or
+/// of the store's area, on. Without a cell size they have about the area that a point of the level
+/// has on average, the size rounded to two digits. The grid never reaches beyond the store's area;
+/// cells whose centres lie outside the region's polygons are nodata.
+///
+/// Slope, aspect and hillshade come from the 3 x 3 heights around a cell of this grid by Horn's
+/// formula (B. K. P. Horn, "Hill shading and the reflectance map", doi:10.1109/PROC.1981.11918),
+/// with the ground's metres per cell and heights in metres; nodata where one of the nine is. Slope
+/// in degrees; aspect in degrees clockwise from north, downhill, nodata where it is level;
+/// hillshade 1 to 255 (0: nodata) under a light from 315 degrees, 45 degrees high.
+///
+/// Tiles come in the order of a quadtree, so that a store of points is triangulated little more
+/// than once. Memory: some tiles at a time within options.memory_bytes. Throws: stream::Error if
+/// the region does not meet the store; UsageError for a grid of more than 2^31 columns or rows.
+RasterOutcome write_raster(const stream::Store& store, const RasterRequest& request,
+                           const std::function<void(std::uint64_t cells, double share)>& progress);
+
+}  // namespace terrace::terrain

@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "sample/sample_run.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <vector>
+
+#include "base/parallel.hpp"
+#include "earth/ground_slope.hpp"
+#include "sample/fixed_text.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+/// Lines handled by a thread at a time.
+constexpr std::size_t kLines = 8192;
+/// Peak bytes per line besides its text: places, sorting, surface, answer.
+constexpr std::uint64_t kBytesPerLine = 266;
+constexpr std::size_t kMostLines = std::size_t{1} << 21, kMostBytes = std::size_t{128} << 20;
+
+/// The numbers behind a line.
+class AnswerText {
+ public:
+  AnswerText(const stream::Store& store, char separator)
+      : separator_(separator), height_(FixedText::for_numbers_up_to(largest(store))) {}
+
+  void append(std::string& text, double height, const tri::Gradient& gradient) const {
+    text += separator_;
+    height_.append(text, height);
+    text += separator_;
+    const double steepness = std::sqrt(gradient.x * gradient.x + gradient.y * gradient.y);
+    gradient_.append(text, steepness);
+    text += separator_;
+    slope_.append(text, tri::slope_degrees(gradient));
+    text += separator_;
+    aspect_.append(text, tri::aspect_degrees(gradient));
+  }
+
+ private:
+  static double largest(const stream::Store& store) {
+    const stream::Channel& channel = store.schema().coordinates[2];
+    const auto height = [&](double raw) { return std::abs(raw * channel.scale + channel.offset); };
+    return std::max(height(store.bounds().min[2]), height(store.bounds().max[2]));
+  }
+
+  char separator_;
+  FixedText height_, gradient_{8}, slope_{6}, aspect_{4};
+};
+
+class Answers {
+ public:
+  Answers(const stream::Store& store, const SamplerOptions& options, const PlaceFile& file)
+      : store_(store),
+        options_(options),
+        file_(file),
+        sampler_(make_sampler(store, options)),
+        ground_(store) {}
+
+  SampleCounts answer(const PlaceBatch& batch, const PlaceConversions& conversions,
+                      const std::function<void(std::string_view)>& write) {
+    find_layout(batch);
+    const std::size_t lines = batch.size(), pieces = (lines + kLines - 1) / kLines;
+    const auto end_of = [&](std::size_t piece) { return std::min((piece + 1) * kLines, lines); };
+    places_.assign(lines, Point2{NAN, NAN});
+    surface_.assign(lines, SurfacePoint{});
+    if (conversions.to_written) written_.resize(lines);
+    if (layout_) {
+      parallel_for(pieces, options_.threads, [&](unsigned, std::size_t piece) {
+        for (std::size_t i = piece * kLines; i < end_of(piece); ++i) {
+          if (!is_place(batch, i)) continue;
+          places_[i] = place_of(batch.line(i), *layout_, file_.name(), batch.first_line + i);
+        }
+        const std::span<Point2> here(places_.data() + piece * kLines,
+                                     end_of(piece) - piece * kLines);
+        if (conversions.to_written) {
+          const std::span<Point2> there(written_.data() + piece * kLines, here.size());
+          std::copy(here.begin(), here.end(), there.begin());
+          conversions.to_written(there);
+        }
+        if (conversions.to_store) conversions.to_store(here);
+        for (Point2& p : here) p = ground_.stored(p);
+      });
+      sampler_->sample(places_, surface_);
+    }
+    texts_.resize(pieces);
+    counts_.assign(pieces, {});
+    const AnswerText numbers(store_, layout_ ? layout_->separator : ',');
+    parallel_for(pieces, options_.threads, [&](unsigned, std::size_t piece) {
+      std::string& text = texts_[piece];
+      text.clear();
+      for (std::size_t i = piece * kLines; i < end_of(piece); ++i) {
+        append_line(text, batch, i, conversions);
+        if (is_header(batch, i)) {
+          for (const char* name : {"height", "gradient", "slope", "aspect"}) {
+            (text += layout_->separator) += name;
+          }
+        } else if (is_place(batch, i)) {
+          ++counts_[piece].points;
+          if (!std::isnan(surface_[i].height)) ++counts_[piece].answered;
+          numbers.append(text, surface_[i].height, ground_.on_ground(places_[i], surface_[i]));
+        }
+        text += '\n';
+      }
+    });
+    SampleCounts sum;
+    for (std::size_t piece = 0; piece < pieces; ++piece) {
+      write(texts_[piece]);
+      sum.points += counts_[piece].points;
+      sum.answered += counts_[piece].answered;
+    }
+    return sum;
+  }
+
+ private:
+  /// The line as it was, but for the place.
+  void append_line(std::string& text, const PlaceBatch& batch, std::size_t i,
+                   const PlaceConversions& conversions) const {
+    const std::string_view line = batch.line(i);
+    if (!conversions.to_written || !layout_ || is_no_place(line)) {
+      text += line;
+    } else if (is_header(batch, i)) {
+      const bool degrees = conversions.writes_degrees;
+      append_with_place(text, line, *layout_, degrees ? "longitude" : "x",
+                        degrees ? "latitude" : "y");
+    } else {
+      // A hundredth of a millimetre, or a tenth.
+      const FixedText number(conversions.writes_degrees ? 10 : 4);
+      std::string x, y;
+      number.append(x, written_[i][0]);
+      number.append(y, written_[i][1]);
+      append_with_place(text, line, *layout_, x, y);
+    }
+  }
+  /// The first line that is no comment says how all are to be read.
+  void find_layout(const PlaceBatch& batch) {
+    for (std::size_t i = 0; !layout_ && i < batch.size(); ++i) {
+      if (is_no_place(batch.line(i))) continue;
+      layout_ = PlaceLayout::of(batch.line(i), file_.name());
+      if (layout_->header) header_line_ = batch.first_line + i;
+    }
+  }
+  [[nodiscard]] bool is_header(const PlaceBatch& batch, std::size_t i) const {
+    return batch.first_line + i == header_line_;
+  }
+  [[nodiscard]] bool is_place(const PlaceBatch& batch, std::size_t i) const {
+    return !is_header(batch, i) && !is_no_place(batch.line(i));
+  }
+
+  const stream::Store& store_;
+  SamplerOptions options_;
+  const PlaceFile& file_;
+  std::unique_ptr<HeightSampler> sampler_;
+  GroundSlope ground_;
+  std::optional<PlaceLayout> layout_;
+  std::uint64_t header_line_ = 0;  ///< none
+  std::vector<Point2> places_, written_;
+  std::vector<SurfacePoint> surface_;
+  std::vector<std::string> texts_;
+  std::vector<SampleCounts> counts_;
+};
+
+}  // namespace
+
+SampleCounts answer_places(const stream::Store& store, const SamplerOptions& options,
+                           PlaceFile& places, const PlaceConversions& conversions,
+                           const std::function<void(std::string_view)>& write,
+                           const std::function<void(const SampleCounts&)>& progress) {
+  Answers answers(store, options, places);
+  const auto lines = static_cast<std::size_t>(
+      std::clamp<std::uint64_t>(options.memory_bytes / 3 / kBytesPerLine, 1000, kMostLines));
+  const auto bytes = static_cast<std::size_t>(
+      std::clamp<std::uint64_t>(options.memory_bytes / 16, std::uint64_t{1} << 20, kMostBytes));
+  PlaceBatch batch;
+  SampleCounts sum;
+  while (places.next(batch, bytes, lines)) {
+    const SampleCounts counts = answers.answer(batch, conversions, write);
+    sum.points += counts.points;
+    sum.answered += counts.answered;
+    if (progress) progress(sum);
+  }
+  return sum;
+}
+
+}  // namespace terrace::terrain

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "surface/cluster_frontier.hpp"
+
+#include "base/interrupt.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+/// Windows side by side share clusters of level 0 at their borders.
+constexpr std::uint64_t kCacheBytes = std::uint64_t{2} << 20;
+
+}  // namespace
+
+ClusterFrontier::ClusterFrontier(const stream::Store& store, unsigned level)
+    : reader_(store, kCacheBytes), root_(store.root()), level_(level) {}
+
+void ClusterFrontier::begin(const Take& take) {
+  check_interrupt();
+  entries_.clear();
+  open_.clear();
+  const StoreWindow::Node& root = reader_.node(root_);
+  take(root);
+  add_below(root);
+}
+
+bool ClusterFrontier::settle(Open& open) const {
+  while (true) {
+    open.box = entries_[open.entry].box;
+    if (open.box.min != open.box.max) return true;
+    if (open.level == level_) return false;
+    --open.level;
+    --open.entry;
+  }
+}
+
+void ClusterFrontier::add_below(const StoreWindow::Node& node) {
+  const unsigned at = stream::level_of(node.id);
+  if (at <= level_) return;
+  for (std::size_t i = 0; i < node.positions.size(); ++i) {
+    for (unsigned below = level_; below < at; ++below) {
+      entries_.push_back({node.boxes[i * at + below], node.children[i * at + below]});
+    }
+    Open next{
+        {}, static_cast<std::uint32_t>(entries_.size() - 1), static_cast<std::uint8_t>(at - 1)};
+    if (settle(next)) open_.push_back(next);
+  }
+}
+
+void ClusterFrontier::read_one(std::size_t at, const Take& take) {
+  const Open open = open_[at];
+  const StoreWindow::Node& node =
+      reader_.node(stream::cluster_id(open.level, entries_[open.entry].ordinal));
+  take(node);
+  add_below(node);
+  Open next{{}, open.entry - 1, static_cast<std::uint8_t>(open.level - 1)};
+  if (open.level > level_ && settle(next)) {
+    open_[at] = next;
+  } else {
+    open_[at] = open_.back();
+    open_.pop_back();
+  }
+}
+
+void ClusterFrontier::read_meeting(const StoredBox& box, const Take& take) {
+  check_interrupt();
+  for (std::size_t at = 0; at < open_.size();) {
+    if (open_[at].box.meets(box)) {
+      read_one(at, take);  // and what has come to this place is next
+    } else {
+      ++at;
+    }
+  }
+}
+
+void ClusterFrontier::read(std::span<const std::uint32_t> chosen, const Take& take) {
+  check_interrupt();
+  // From behind: what moves into a gap was not chosen.
+  for (std::size_t k = chosen.size(); k-- > 0;) read_one(chosen[k], take);
+}
+
+}  // namespace terrace::terrain

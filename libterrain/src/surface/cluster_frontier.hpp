@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include <terrace/stream/store.hpp>
+
+#include "surface/store_window.hpp"
+
+namespace terrace::terrain {
+
+/// The way down into a store's clusters, step by step: which have been read, and the boxes of all
+/// that have not. Whatever a box of open() does not meet holds no point that is still missing.
+class ClusterFrontier {
+ public:
+  /// A cluster that was not read; its box holds all points below it too.
+  struct Open {
+    StoredBox box;
+    std::uint32_t entry = 0;  ///< for ClusterFrontier
+    std::uint8_t level = 0;
+  };
+  /// Takes the members of a cluster.
+  using Take = std::function<void(const StoreWindow::Node& node)>;
+
+  /// level: the points of this level and above. The store must outlive this.
+  ClusterFrontier(const stream::Store& store, unsigned level);
+
+  /// Forgets what was read and reads the root.
+  void begin(const Take& take);
+  [[nodiscard]] std::span<const Open> open() const { return open_; }
+  /// Reads what meets the box, and what meets it below that.
+  void read_meeting(const StoredBox& box, const Take& take);
+  /// Reads some of open() without what is below. `chosen`: places in open(), ascending, all
+  /// different. open() is then another.
+  void read(std::span<const std::uint32_t> chosen, const Take& take);
+
+  [[nodiscard]] std::size_t memory_bytes() const {
+    return entries_.capacity() * sizeof(Entry) + open_.capacity() * sizeof(Open);
+  }
+
+ private:
+  /// A cluster that a point heads. Those of one point stand in a row, the lowest level first.
+  struct Entry {
+    StoredBox box;
+    std::uint64_t ordinal = 0;
+  };
+
+  void read_one(std::size_t at, const Take& take);
+  void add_below(const StoreWindow::Node& node);
+  /// Takes empty boxes off: all that is below has the x,y of the head. False: nothing is left.
+  bool settle(Open& open) const;
+
+  StoreWindow reader_;
+  stream::ClusterId root_;
+  unsigned level_;
+  std::vector<Entry> entries_;
+  std::vector<Open> open_;
+};
+
+}  // namespace terrace::terrain

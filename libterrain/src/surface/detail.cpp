@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "surface/detail.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <utility>
+
+#include "base/error.hpp"
+#include "earth/world.hpp"
+
+namespace terrace::terrain {
+
+namespace {
+
+unsigned checked(std::optional<unsigned> level, const stream::Store& store) {
+  const unsigned top = store.top();
+  if (level && *level > top) {
+    throw UsageError("the store has no level " + std::to_string(*level) + ": its top is level " +
+                     std::to_string(top));
+  }
+  return level.value_or(top);
+}
+
+}  // namespace
+
+Detail Detail::parse(const stream::Store& store, const std::string& level,
+                     const std::string& region, const std::vector<std::string>& focuses,
+                     const RegionConversion& conversion) {
+  Detail detail;
+  if (!level.empty()) {
+    detail.level = checked(parse_level(level), store);
+  } else if (!focuses.empty()) {
+    detail.level = store.top();
+  }
+  if (!region.empty()) detail.region = conversion(Region::parse(region));
+  for (const std::string& text : focuses) {
+    Focus focus = parse_focus(text);
+    detail.focuses.push_back({conversion(std::move(focus.region)), checked(focus.level, store)});
+  }
+  return detail;
+}
+
+unsigned Detail::finest() const {
+  unsigned finest = level;
+  for (const FinerRegion& focus : focuses) finest = std::min(finest, focus.level);
+  return finest;
+}
+
+bool Detail::wants(unsigned cluster_level, const stream::Box3& world_box) const {
+  if (cluster_level >= level && (!region || region->box().intersects(world_box))) return true;
+  return std::any_of(focuses.begin(), focuses.end(), [&](const FinerRegion& focus) {
+    return cluster_level >= focus.level && focus.region.box().intersects(world_box);
+  });
+}
+
+namespace {
+
+/// Walks down the levels and remembers which clusters the points on its way head.
+class Descent {
+ public:
+  using Visit = std::function<void(stream::ClusterId, const stream::ClusterRecord&,
+                                   const stream::ClusterPoints&)>;
+
+  Descent(const stream::Store& store, const Detail& detail, const Visit& visit)
+      : store_(store),
+        detail_(detail),
+        visit_(visit),
+        placement_(placement_of(store.schema())),
+        finest_(detail.finest()),
+        heads_(store.top()) {}
+
+  /// The root and the wanted clusters down to `lowest`.
+  void run(unsigned lowest) {
+    stream::ClusterPoints points;
+    store_.read(store_.root(), points);
+    deliver(store_.root(), store_.record(store_.root()), points);
+    for (unsigned level = store_.top(); level-- > lowest;) {
+      if (whole(level)) {
+        store_.for_each(level, [this](stream::ClusterId id, const stream::ClusterRecord& record,
+                                      const stream::ClusterPoints& p) { deliver(id, record, p); });
+        continue;
+      }
+      for_each_head(level, [&](stream::ClusterId id, const stream::ClusterRecord& record) {
+        store_.read(id, points);
+        deliver(id, record, points);
+      });
+    }
+  }
+
+  /// A level that is wanted everywhere needs no list of its clusters.
+  [[nodiscard]] bool whole(unsigned level) const {
+    return level >= detail_.level && !detail_.region;
+  }
+
+  /// The wanted clusters among those that points met so far head on `level`, in order.
+  template <class Found>
+  void for_each_head(unsigned level, const Found& found) {
+    std::vector<std::uint64_t> ordinals = std::exchange(heads_[level], {});
+    std::sort(ordinals.begin(), ordinals.end());
+    for (const std::uint64_t ordinal : ordinals) {
+      const stream::ClusterId id = stream::cluster_id(level, ordinal);
+      const stream::ClusterRecord record = store_.record(id);
+      if (detail_.wants(level, world_box(placement_, record.summary.box))) found(id, record);
+    }
+  }
+
+ private:
+  void deliver(stream::ClusterId id, const stream::ClusterRecord& record,
+               const stream::ClusterPoints& points) {
+    visit_(id, record, points);
+    const unsigned level = stream::level_of(id);
+    const stream::Box3 box = world_box(placement_, record.summary.box);
+    for (unsigned below = finest_; below < level; ++below) {
+      // What lies below this cluster lies in its box.
+      if (whole(below) || !detail_.wants(below, box)) continue;
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        heads_[below].push_back(points.children[i * level + below]);
+      }
+    }
+  }
+
+  const stream::Store& store_;
+  const Detail& detail_;
+  const Visit& visit_;
+  Placement placement_;
+  unsigned finest_;
+  std::vector<std::vector<std::uint64_t>> heads_;  // per level, ordinals met in higher levels
+};
+
+}  // namespace
+
+void for_each_wanted(const stream::Store& store, const Detail& detail,
+                     const std::function<void(stream::ClusterId, const stream::ClusterRecord&,
+                                              const stream::ClusterPoints&)>& visit) {
+  Descent(store, detail, visit).run(detail.finest());
+}
+
+void for_each_wanted_record(
+    const stream::Store& store, const Detail& detail,
+    const std::function<void(stream::ClusterId, const stream::ClusterRecord&)>& visit) {
+  const Descent::Visit all = [&visit](stream::ClusterId id, const stream::ClusterRecord& record,
+                                      const stream::ClusterPoints&) { visit(id, record); };
+  Descent descent(store, detail, all);
+  const unsigned finest = detail.finest();
+  if (finest == store.top()) return descent.run(finest);
+  // The finest level's clusters need not be read to be counted.
+  descent.run(finest + 1);
+  if (descent.whole(finest)) {
+    for (std::uint64_t c = 0; c < store.levels()[finest].clusters; ++c) {
+      const stream::ClusterId id = stream::cluster_id(finest, c);
+      visit(id, store.record(id));
+    }
+  } else {
+    descent.for_each_head(finest, visit);
+  }
+}
+
+}  // namespace terrace::terrain

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <terrace/stream/store.hpp>
+
+#include "base/region.hpp"
+#include "earth/store_crs.hpp"
+
+namespace terrace::terrain {
+
+/// All points of `level` and above inside `region`.
+struct FinerRegion {
+  Region region;
+  unsigned level = 0;
+};
+
+/// Which detail is wanted where: `level` everywhere (or inside `region` only), finer inside the
+/// focuses. All regions are in the store's CRS.
+struct Detail {
+  /// The levels as asked for, checked against the store. An empty level is the top if there are
+  /// focuses, else level 0.
+  /// Throws: UsageError for a level above the store's top.
+  /// conversion: of regions that are given in another CRS.
+  static Detail parse(const stream::Store& store, const std::string& level,
+                      const std::string& region, const std::vector<std::string>& focuses,
+                      const RegionConversion& conversion = {});
+
+  unsigned level = 0;
+  std::optional<Region> region;
+  std::vector<FinerRegion> focuses;
+
+  /// The finest level wanted anywhere.
+  [[nodiscard]] unsigned finest() const;
+  /// Whether a cluster of `cluster_level` whose descendants lie in `world_box` must be expanded.
+  [[nodiscard]] bool wants(unsigned cluster_level, const stream::Box3& world_box) const;
+};
+
+/// Visits every cluster that `detail` wants, the root first, then level by level downward; within a
+/// level in order of ordinals. A wanted cluster's parent is always wanted as well.
+/// Memory: the ordinals of the wanted clusters of two levels where only a part is wanted; constant
+/// where a whole level is.
+/// Throws: stream::Error on a damaged store.
+void for_each_wanted(const stream::Store& store, const Detail& detail,
+                     const std::function<void(stream::ClusterId, const stream::ClusterRecord&,
+                                              const stream::ClusterPoints&)>& visit);
+
+/// The same for the index entries alone: what lies in clusters of level 0 is not read.
+void for_each_wanted_record(
+    const stream::Store& store, const Detail& detail,
+    const std::function<void(stream::ClusterId, const stream::ClusterRecord&)>& visit);
+
+}  // namespace terrace::terrain

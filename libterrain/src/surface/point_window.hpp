@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <utility>
+#include <vector>
+
+#include <terrace/stream/store.hpp>
+#include <terrace/tri/delaunay2.hpp>
+#include <terrace/tri/heights.hpp>
+
+#include "base/region.hpp"
+#include "surface/circle_cover.hpp"
+#include "surface/cluster_frontier.hpp"
+#include "surface/lattice_surface.hpp"
+#include "surface/store_window.hpp"
+
+namespace terrace::terrain {
+
+/// The Delaunay triangulation in x,y of all points of a level and above, part by part: exactly the
+/// triangles that the whole has. tri::Delaunay2 breaks ties by the points alone, so a triangle
+/// belongs to the whole if and only if it belongs to the triangulation of some of the points, among
+/// them all those in its closed circumcircle.
+///
+/// Coordinates are stored ones: x and y, or column and row of a raster's coarser levels.
+///
+/// Points at equal x,y are one vertex. The first of them in the order of StoreWindow::points()
+/// (higher levels first, within a level by id) gives its height, whatever the window.
+///
+/// One object per thread; any number of them share a Store.
+class PointWindow {
+ public:
+  /// What shall be known besides the triangles that meet the box.
+  enum class Reach : std::uint8_t {
+    kTriangles,
+    /// Also all triangles whose closed circumcircles meet the box, and their neighbours: the
+    /// natural neighbours and, within the hull, the nearest vertex of any place in the box.
+    kCircles,
+  };
+
+  /// memory_bytes: what one window may take; 0: as much as there is. The store must outlive this.
+  PointWindow(const stream::Store& store, unsigned level, std::uint64_t memory_bytes);
+  PointWindow(const PointWindow&) = delete;
+  PointWindow& operator=(const PointWindow&) = delete;
+
+  /// Afterwards every triangle of the whole triangulation that meets the box, which is closed, is
+  /// in triangulation() and certain. There are others around, certain or not.
+  ///
+  /// Reads the clusters that meet the box and triangulates their points in the box in bulk; then,
+  /// while a triangle that meets the box has a circumcircle, or a hull edge that the box sees from
+  /// outside has a half-plane, in which a point may be missing, adds one: of what was read, or else
+  /// of the clusters whose boxes it meets, coarse levels first. So no width is guessed, and voids
+  /// and hulls cost a few clusters of coarse levels more. About 0.5 us per point, several times
+  /// that for windows that see much of the hull.
+  ///
+  /// Throws: stream::Error on a damaged store, or where memory_bytes do not suffice, saying what
+  /// would be needed; Interrupted. After that it can only be loaded again or destroyed.
+  void load(const StoredBox& box, Reach reach = Reach::kTriangles);
+
+  /// As it was loaded last. Vertices have no other order or number than this one gives them.
+  [[nodiscard]] const tri::Delaunay2<double>& triangulation() const { return triangulation_; }
+  /// Whether it is a triangle of the whole. Requires a living triangle.
+  [[nodiscard]] bool is_certain(tri::TriangleId triangle) const {
+    return states_[tri::slot(triangle)] == kCertain;
+  }
+  /// In the store's vertical unit (scale and offset of the channel applied).
+  [[nodiscard]] double height(tri::VertexId vertex) const { return heights_[tri::slot(vertex)]; }
+  /// By slot of vertex, as libtri wants them.
+  [[nodiscard]] const std::vector<double>& heights() const { return heights_; }
+
+  /// A point of the surface.
+  struct Corner {
+    Point2 place;
+    double height = 0;
+  };
+  [[nodiscard]] Corner corner(tri::VertexId vertex) const;
+  /// Counter-clockwise.
+  [[nodiscard]] std::array<Corner, 3> corners_with_heights(tri::TriangleId triangle) const;
+
+  /// Whether an edge between two places is so long that triangles with it are no surface.
+  using TooLong = std::function<bool(const Point2&, const Point2&)>;
+  void set_limit(TooLong too_long) { too_long_ = std::move(too_long); }
+
+  /// The linear surface at a place of the box. On an edge and on a vertex the height comes from the
+  /// points there alone and the gradient is the mean of the triangles that meet there. NaN outside
+  /// the hull. While all points are on one line, or there is only one, the hull is the segment
+  /// between the outermost; there are heights but no gradients. With a limit, triangles beyond it
+  /// are left out; shorter edges and vertices that have no other have heights but no gradients.
+  /// The same bits whatever the window.
+  [[nodiscard]] SurfacePoint at(const Point2& place) const;
+
+  /// Whether a place lies inside an edge, exactly.
+  [[nodiscard]] bool is_on_edge(const Point2& place) const;
+
+ private:
+  using Triangulation = tri::Delaunay2<double>;
+  /// Where a vertex comes from: the sequence of its cluster in read_, and its place in that.
+  struct Origin {
+    std::uint32_t cluster = 0xFFFFFFFF, index = 0;
+  };
+  /// A point that was read; taken for inserting where its cluster is no number.
+  struct Pending {
+    Triangulation::Point place{};
+    double height = 0;
+    Origin origin;
+  };
+  /// Some of one cluster that lie together: pending_[begin] and the next ones; or, without any of
+  /// its own, those of the groups from the next one on up to `next`.
+  struct Group {
+    StoredBox box;
+    std::size_t begin = 0, count = 0, next = 0;
+  };
+  /// A triangle, or its hull edge, that needs all points in its cover.
+  struct Suspect {
+    static constexpr std::uint8_t kNone = 3;
+    CircleCover cover;
+    tri::TriangleId triangle = tri::kNoTriangle;
+    std::uint8_t edge = kNone;
+  };
+  enum State : std::uint8_t { kUnknown, kSuspect, kCertain };
+
+  void clear();
+  void take(const StoreWindow::Node& node);
+  void add_groups(std::size_t begin, std::size_t count);
+  void take_inner();
+  void move_pending(Group& group, std::size_t at);
+  void insert_taken();
+  [[nodiscard]] bool stands_before(const Origin& a, const Origin& b) const;
+  void check_memory(std::size_t more) const;
+
+  void examine_all();
+  void examine_changes();
+  void examine(tri::TriangleId triangle);
+  void consider(tri::TriangleId triangle, const CircleCover& cover);
+  void find_suspect_hull();
+  /// False: nothing is missing.
+  bool add_missing();
+  bool read_missing();
+  void gather_near(const StoredBox& wide);
+  bool find_missing(const Suspect& suspect, bool is_near);
+  [[nodiscard]] CircleCover circle(tri::TriangleId triangle) const;
+
+  void make_hints();
+  [[nodiscard]] std::size_t hint_cell(const Point2& place) const;
+  [[nodiscard]] SurfacePoint at_edge(tri::TriangleId triangle, std::size_t edge,
+                                     const Point2& place) const;
+  [[nodiscard]] SurfacePoint at_vertex(tri::VertexId vertex, tri::TriangleId triangle) const;
+  [[nodiscard]] bool is_surface(tri::TriangleId triangle) const;
+  [[nodiscard]] std::array<Point2, 3> corners(tri::TriangleId triangle) const;
+
+  const stream::Store& store_;
+  std::uint64_t memory_bytes_;
+  double scale_, offset_;  ///< of heights
+  TooLong too_long_;
+  ClusterFrontier frontier_;
+  StoredBox box_{}, inner_{};  ///< loaded; where all points are inserted
+  Reach reach_ = Reach::kTriangles;
+  Triangulation triangulation_;
+  std::vector<double> heights_;             ///< by slot of vertex
+  std::vector<Origin> origins_;             ///< by slot of vertex
+  std::vector<std::uint8_t> states_;        ///< by slot of triangle
+  std::vector<std::uint8_t> hull_certain_;  ///< by slot of triangle, a bit for each edge
+  std::vector<stream::ClusterId> read_;     ///< in their order
+  std::vector<Pending> pending_, taken_;
+  std::vector<Group> groups_;
+  std::vector<Triangulation::Point> places_;  ///< of taken_
+  std::vector<Triangulation::Insertion> inserted_;
+  std::vector<Suspect> suspects_;  ///< hull edges behind the first suspect_triangles_
+  std::size_t suspect_triangles_ = 0;
+  std::vector<tri::TriangleId> hull_;  ///< triangles that have or had a hull edge
+  std::vector<std::uint32_t> open_near_, chosen_;
+  std::vector<std::pair<double, std::size_t>> points_near_;  ///< x and place in pending_
+  Triangulation::Changes changes_;
+  // A vertex near each cell of a grid over the box.
+  std::vector<tri::VertexId> hints_;
+  std::uint32_t hint_columns_ = 1, hint_rows_ = 1;
+  std::array<double, 2> hint_scale_{};
+};
+
+}  // namespace terrace::terrain

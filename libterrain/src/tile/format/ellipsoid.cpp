@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tile/format/ellipsoid.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+
+#include "base/vector.hpp"
+#include "earth/portable_math.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+stream::Point3 scaled(const stream::Point3& p) {
+  return {p[0] / kEquatorialRadius, p[1] / kEquatorialRadius, p[2] / kPolarRadius};
+}
+
+// Where no point on the line will do, this many radii out.
+constexpr double kNeverHidden = 1e6;
+
+// How far out along `direction` the point must lie for one point, in radii.
+double magnitude(const stream::Point3& direction, const stream::Point3& point) {
+  const stream::Point3 p = scaled(point);
+  const double square = dot(p, p);
+  // A point below the ellipsoid is taken as lying on it: it is hidden earlier.
+  const double length = std::sqrt(std::max(1.0, square));
+  const double cos_alpha = std::min(1.0, dot(direction, p) / std::sqrt(square));
+  const double sin_alpha = std::sqrt(std::max(0.0, 1.0 - cos_alpha * cos_alpha));
+  const double cos_beta = 1.0 / length;
+  const double sin_beta = std::sqrt(std::max(0.0, length * length - 1.0)) / length;
+  const double denominator = cos_alpha * cos_beta - sin_alpha * sin_beta;
+  return denominator > 1.0 / kNeverHidden ? 1.0 / denominator : kNeverHidden;
+}
+
+}  // namespace
+
+stream::Point3 geocentric(double longitude, double latitude, double height) {
+  constexpr double kSquareRatio =
+      (kPolarRadius * kPolarRadius) / (kEquatorialRadius * kEquatorialRadius);
+  const double sine = portable_sin_degrees(latitude), cosine = portable_cos_degrees(latitude);
+  const double n = kEquatorialRadius / std::sqrt(1.0 - (1.0 - kSquareRatio) * sine * sine);
+  const double from_axis = (n + height) * cosine;
+  return {from_axis * portable_cos_degrees(longitude), from_axis * portable_sin_degrees(longitude),
+          (kSquareRatio * n + height) * sine};
+}
+
+LocalFrame local_frame(double longitude, double latitude) {
+  const double sin_lon = portable_sin_degrees(longitude), cos_lon = portable_cos_degrees(longitude);
+  const double sin_lat = portable_sin_degrees(latitude), cos_lat = portable_cos_degrees(latitude);
+  return {.east = {-sin_lon, cos_lon, 0.0},
+          .north = {-sin_lat * cos_lon, -sin_lat * sin_lon, cos_lat},
+          .up = {cos_lat * cos_lon, cos_lat * sin_lon, sin_lat}};
+}
+
+Sphere bounding_sphere(std::span<const stream::Point3> points) {
+  assert(!points.empty());
+  stream::Box3 box;
+  for (const stream::Point3& p : points) box.include(p);
+  Sphere sphere;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    sphere.centre[axis] = box.min[axis] + (box.max[axis] - box.min[axis]) / 2.0;
+  }
+  double square = 0.0;
+  for (const stream::Point3& p : points) {
+    const stream::Point3 d{p[0] - sphere.centre[0], p[1] - sphere.centre[1],
+                           p[2] - sphere.centre[2]};
+    square = std::max(square, dot(d, d));
+  }
+  // The root may have been rounded down.
+  sphere.radius = std::sqrt(square) * (1.0 + 1e-12);
+  return sphere;
+}
+
+stream::Point3 horizon_occlusion_point(const stream::Point3& towards,
+                                       std::span<const stream::Point3> points) {
+  const stream::Point3 direction = unit(scaled(towards));
+  double farthest = 1.0;
+  for (const stream::Point3& p : points) farthest = std::max(farthest, magnitude(direction, p));
+  return {direction[0] * farthest, direction[1] * farthest, direction[2] * farthest};
+}
+
+}  // namespace terrace::terrain

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+/// What the writer and the reader of tiles must agree on.
+
+namespace terrace::terrain {
+
+enum class TileExtension : std::uint8_t { oct_normals = 1, water_mask = 2, metadata = 4 };
+
+/// With more vertices, indices have 32 bits.
+inline constexpr std::size_t kMostShortVertices = 65536;
+/// Cells of a water mask that is not uniform.
+inline constexpr std::size_t kWaterCells = std::size_t{256} * 256;
+
+}  // namespace terrace::terrain

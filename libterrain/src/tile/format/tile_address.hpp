@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <compare>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+/// Tiles of the geographic TMS scheme (EPSG:4326): two tiles at zoom 0, columns counted from the
+/// west, rows from the south, four children to a tile.
+
+namespace terrace::terrain {
+
+/// The deepest zoom: a tile is then 2 cm wide.
+inline constexpr unsigned kDeepestZoom = 30;
+
+struct TileAddress {
+  unsigned zoom = 0;
+  std::uint32_t x = 0, y = 0;
+
+  friend auto operator<=>(const TileAddress&, const TileAddress&) = default;
+};
+
+/// "9/543/380.terrain", the path under the folder of a tile set.
+std::string tile_path(const TileAddress& tile);
+/// The address of such a path; nothing if it is none (leading zeros, too large, another ending).
+std::optional<TileAddress> parse_tile_path(const std::string& path);
+
+inline constexpr std::uint32_t tile_columns(unsigned zoom) { return std::uint32_t{2} << zoom; }
+inline constexpr std::uint32_t tile_rows(unsigned zoom) { return std::uint32_t{1} << zoom; }
+
+/// Degrees; closed. Borders of neighbouring tiles are the same numbers.
+struct GeographicBox {
+  double west = 0.0, south = 0.0, east = 0.0, north = 0.0;
+
+  friend bool operator==(const GeographicBox&, const GeographicBox&) = default;
+};
+GeographicBox box_of(const TileAddress& tile);
+
+/// Columns and rows of tiles, closed. Empty if x1 < x0 or y1 < y0.
+struct TileRange {
+  std::uint32_t x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+
+  friend bool operator==(const TileRange&, const TileRange&) = default;
+};
+/// The tiles of a zoom whose inside meets `box`; a box without width or height gets those that it
+/// touches.
+TileRange tiles_in(const GeographicBox& box, unsigned zoom);
+
+/// The error in metres that a web globe expects of a tile, 77,067.34 / 2^zoom: a quarter of the
+/// width at the equator of one of 65 samples of a tile at that zoom.
+double expected_error(unsigned zoom);
+
+}  // namespace terrace::terrain

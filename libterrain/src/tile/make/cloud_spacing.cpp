@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tile/make/cloud_spacing.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "base/point_spacing.hpp"
+#include "earth/portable_math.hpp"
+#include "surface/cluster_census.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+constexpr std::uint64_t kSeeds = 32;
+constexpr double kMostPoints = 3000;
+constexpr unsigned kRank = 8;
+
+/// A point, and a box around points near it.
+struct Seed {
+  stream::Point3 at;
+  StoredBox box;
+};
+
+/// Of clusters of level 0, evenly over the store; of a store of one block, of its points.
+std::vector<Seed> some_seeds(const stream::Store& store, const StoredPlaces& places) {
+  std::vector<Seed> seeds;
+  stream::ClusterPoints points;
+  if (store.top() == 0) store.read(store.root(), points);
+  const std::uint64_t all = store.top() == 0 ? points.size() : store.levels()[0].clusters;
+  const std::uint64_t count = std::min(all, kSeeds);
+  for (std::uint64_t i = 0; i < count; ++i) {
+    const std::uint64_t number = i * (all / count) + all / count / 2;
+    if (store.top() == 0) {
+      seeds.push_back({points.positions[number], places.stored_bounds()});
+      continue;
+    }
+    const stream::ClusterId id = stream::cluster_id(0, number);
+    store.read(id, points);
+    const stream::Box3 box = store.record(id).summary.box;
+    seeds.push_back({points.representative, {{box.min[0], box.min[1]}, {box.max[0], box.max[1]}}});
+  }
+  return seeds;
+}
+
+StoredBox grown(StoredBox box) {
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    const double more = 0.5 * (box.max[axis] - box.min[axis]);
+    box.min[axis] -= more;
+    box.max[axis] += more;
+  }
+  return box;
+}
+
+/// The seed's box, or a smaller one around the seed that has not too many points near it.
+StoredBox box_of(const Seed& seed, ClusterCensus& census) {
+  constexpr unsigned kHalvings = 60;
+  StoredBox box = seed.box;
+  for (unsigned i = 0; i < kHalvings && census.count(grown(box), kMostPoints) > kMostPoints; ++i) {
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      const double quarter = 0.25 * (box.max[axis] - box.min[axis]);
+      box.min[axis] = seed.at[axis] - quarter;
+      box.max[axis] = seed.at[axis] + quarter;
+    }
+  }
+  return box;
+}
+
+/// Of different places of a store, in degrees of latitude.
+std::vector<stream::Point3> on_the_ground(const WindowPoints& points, const StoredPlaces& places,
+                                          std::vector<Point2>& stored) {
+  stored.clear();
+  for (const stream::Point3& p : points.positions) stored.push_back({p[0], p[1]});
+  std::sort(stored.begin(), stored.end());
+  stored.erase(std::unique(stored.begin(), stored.end()), stored.end());
+  std::vector<Point2> on_globe = stored;
+  places.to_geographic(on_globe);
+  std::vector<stream::Point3> ground;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < on_globe.size(); ++i) {
+    const Point2& p = on_globe[i];
+    if (!std::isfinite(p[0]) || !std::isfinite(p[1])) continue;
+    // In one turn, so that neighbours across the line of 180 degrees are that.
+    const double east = wrapped_longitude(p[0] - on_globe.front()[0]);
+    ground.push_back({east * portable_cos_degrees(p[1]), p[1], 0.0});
+    stored[kept++] = stored[i];
+  }
+  stored.resize(kept);
+  return ground;
+}
+
+}  // namespace
+
+double cloud_spacing(const stream::Store& store, const StoredPlaces& places) {
+  StoreWindow reader(store);
+  ClusterCensus census(store);
+  std::vector<float> distances;
+  WindowPoints points;
+  std::vector<Point2> stored;
+  for (const Seed& seed : some_seeds(store, places)) {
+    const StoredBox box = box_of(seed, census), around = grown(box);
+    if (census.count(around, kMostPoints) > kMostPoints) continue;
+    points.clear();
+    reader.points(around, points);
+    const std::vector<stream::Point3> ground = on_the_ground(points, places, stored);
+    if (ground.size() < 2) continue;
+    const auto rank = static_cast<unsigned>(std::min<std::size_t>(kRank, ground.size() - 1));
+    const std::vector<float> found = neighbour_distances(ground, rank, 1);
+    // So many points lie in a circle of the distance.
+    const auto share = static_cast<float>(std::sqrt(kPi / rank));
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      if (found[i] > 0.0F && box.contains({stored[i][0], stored[i][1], 0.0})) {
+        distances.push_back(found[i] * share);
+      }
+    }
+  }
+  if (distances.empty()) return 180.0 / 64.0;
+  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::nth_element(distances.begin(), middle, distances.end());
+  return static_cast<double>(*middle);
+}
+
+}  // namespace terrace::terrain

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <algorithm>
+#include <span>
+
+#include <terrace/tri/point_tin.hpp>
+
+#include "tile/format/quantized_mesh.hpp"
+#include "tile/format/tile_address.hpp"
+#include "tile/make/tile_sides.hpp"
+#include "tile/make/tile_surface.hpp"
+
+namespace terrace::terrain {
+
+/// Degrees to units of a tile, of the samples of a leaf. Rounding must not take a sample on a side
+/// out of both leaves.
+class LeafPlaces {
+ public:
+  LeafPlaces(const TileAddress& tile, const TileLeaf& leaf)
+      : whole_(box_of(tile)),
+        units_(kTileUnits / (whole_.east - whole_.west)),
+        west_(leaf_unit(leaf.x, leaf.depth)),
+        south_(leaf_unit(leaf.y, leaf.depth)),
+        east_(leaf_unit(leaf.x + 1, leaf.depth)),
+        north_(leaf_unit(leaf.y + 1, leaf.depth)) {}
+
+  [[nodiscard]] double u(double longitude) const {
+    return std::clamp((longitude - whole_.west) * units_, west_, east_);
+  }
+  [[nodiscard]] double v(double latitude) const {
+    return std::clamp((latitude - whole_.south) * units_, south_, north_);
+  }
+  [[nodiscard]] double west() const { return west_; }
+  [[nodiscard]] double south() const { return south_; }
+  [[nodiscard]] double width() const { return east_ - west_; }
+  [[nodiscard]] double height() const { return north_ - south_; }
+
+ private:
+  GeographicBox whole_;
+  double units_, west_, south_, east_, north_;
+};
+
+/// Meshes a leaf that cannot be cut further and has too many samples to be taken at once: by the
+/// lowest and the highest of each quarter of a unit, then by those, too, that are beyond the bound
+/// when all are measured, part after part, and so on some rounds. The errors of what it returns are
+/// those of all samples; PointTin::sample and the counts of vertices have no meaning. Memory: of a
+/// part, and of 2^19 samples.
+tri::PointTin mesh_crowded_leaf(const TileAddress& tile, const TileLeaf& leaf,
+                                std::span<const tri::Point3> frame,
+                                const tri::PointTinOptions& options, TileSurface& surface);
+
+}  // namespace terrace::terrain

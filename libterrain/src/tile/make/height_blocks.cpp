@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tile/make/height_blocks.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "base/digest.hpp"
+#include "base/interrupt.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+constexpr std::int64_t kMostBlocks = std::int64_t{1} << 20;
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+// Outward, where a float cannot hold the height.
+float rounded_down(double height) {
+  const auto near = static_cast<float>(height);
+  return static_cast<double>(near) > height ? std::nextafter(near, -kInfinity) : near;
+}
+float rounded_up(double height) {
+  const auto near = static_cast<float>(height);
+  return static_cast<double>(near) < height ? std::nextafter(near, kInfinity) : near;
+}
+
+std::uint64_t sample_digest(std::uint64_t place, double height) {
+  Digest digest;
+  digest.add(place);
+  digest.add(height);
+  return digest.value();
+}
+
+}  // namespace
+
+HeightBlocks::HeightBlocks(const stream::Store& store)
+    : columns_(static_cast<std::int64_t>(store.schema().columns)),
+      rows_(static_cast<std::int64_t>(store.schema().rows)) {
+  const auto count = [this](std::int64_t samples) { return (samples + side_ - 1) / side_; };
+  while (count(columns_) * count(rows_) > kMostBlocks) side_ *= 2;
+  across_ = count(columns_);
+  down_ = count(rows_);
+  const auto blocks = static_cast<std::size_t>(across_ * down_);
+  blocks_.assign(blocks, {kInfinity, -kInfinity});
+  digests_.assign(blocks, 0);
+  samples_.assign(blocks, 0);
+  const stream::Channel& channel = store.schema().coordinates[2];
+  for (unsigned level = 0; level <= store.top(); ++level) {
+    store.for_each(level, [&](stream::ClusterId, const stream::ClusterRecord&,
+                              const stream::ClusterPoints& cluster) {
+      check_interrupt();
+      for (const stream::Point3& p : cluster.positions) {
+        const auto column = static_cast<std::int64_t>(p[0]), row = static_cast<std::int64_t>(p[1]);
+        const auto at = static_cast<std::size_t>(row / side_ * across_ + column / side_);
+        Block& block = blocks_[at];
+        const double height = p[2] * channel.scale + channel.offset;
+        block.low = std::min(block.low, rounded_down(height));
+        block.high = std::max(block.high, rounded_up(height));
+        // A sum: samples come in the order of their clusters.
+        digests_[at] += sample_digest(static_cast<std::uint64_t>(row * columns_ + column), height);
+        ++samples_[at];
+      }
+    });
+  }
+}
+
+HeightBlocks::Blocks HeightBlocks::blocks_of(const LatticeWindow& window) const {
+  const std::int64_t right = std::min(window.column + window.columns, columns_);
+  const std::int64_t bottom = std::min(window.row + window.rows, rows_);
+  return {std::max<std::int64_t>(window.column, 0) / side_,
+          std::max<std::int64_t>(window.row, 0) / side_, (right + side_ - 1) / side_,
+          (bottom + side_ - 1) / side_};
+}
+
+std::uint64_t HeightBlocks::digest(const LatticeWindow& window) const {
+  const Blocks part = blocks_of(window);
+  Digest digest;
+  for (const std::int64_t side : {part.x0, part.y0, part.x1, part.y1}) {
+    digest.add(static_cast<std::uint64_t>(side));
+  }
+  for (std::int64_t y = part.y0; y < part.y1; ++y) {
+    for (std::int64_t x = part.x0; x < part.x1; ++x) {
+      digest.add(digests_[static_cast<std::size_t>(y * across_ + x)]);
+    }
+  }
+  return digest.value();
+}
+
+bool HeightBlocks::is_complete(const LatticeWindow& window) const {
+  const Blocks part = blocks_of(window);
+  for (std::int64_t y = part.y0; y < part.y1; ++y) {
+    for (std::int64_t x = part.x0; x < part.x1; ++x) {
+      if (!is_complete(x, y)) return false;
+    }
+  }
+  return true;
+}
+
+std::optional<HeightBlocks::Range> HeightBlocks::range(const LatticeWindow& window) const {
+  const Blocks part = blocks_of(window);
+  Block all{kInfinity, -kInfinity};
+  for (std::int64_t y = part.y0; y < part.y1; ++y) {
+    for (std::int64_t x = part.x0; x < part.x1; ++x) {
+      all.low = std::min(all.low, at(x, y).low);
+      all.high = std::max(all.high, at(x, y).high);
+    }
+  }
+  if (all.low > all.high) return std::nullopt;
+  return Range{all.low, all.high};
+}
+
+std::optional<LatticeWindow> HeightBlocks::some_block_within(const LatticeWindow& window) const {
+  const auto up = [this](std::int64_t from) {
+    return (std::max<std::int64_t>(from, 0) + side_ - 1) / side_;
+  };
+  const std::int64_t right = window.column + window.columns, bottom = window.row + window.rows;
+  const std::int64_t x0 = up(window.column), y0 = up(window.row);
+  // From the middle on: those are the least likely to lie at the border.
+  const std::int64_t x1 = std::min((right - x0 * side_) / side_ + x0, across_);
+  const std::int64_t y1 = std::min((bottom - y0 * side_) / side_ + y0, down_);
+  const std::int64_t width = x1 - x0, height = y1 - y0;
+  for (std::int64_t i = 0; i < height; ++i) {
+    const std::int64_t y = y0 + (i + height / 2) % height;
+    for (std::int64_t j = 0; j < width; ++j) {
+      const std::int64_t x = x0 + (j + width / 2) % width;
+      if (at(x, y).low > at(x, y).high) continue;
+      return rectangle(x, y);
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace terrace::terrain

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include <terrace/stream/store.hpp>
+
+#include "surface/store_window.hpp"
+
+namespace terrace::terrain {
+
+/// Lowest and highest samples of the square blocks of a raster, so that what cannot matter need not
+/// be read, and a digest of each, so that what has not changed need not be made again.
+class HeightBlocks {
+ public:
+  /// Reads the store once. Memory: 20 bytes per block, at most 20 MiB. Throws: stream::Error.
+  explicit HeightBlocks(const stream::Store& store);
+
+  struct Range {
+    double low = 0.0, high = 0.0;  ///< in the vertical unit of the store
+  };
+  /// Over the blocks that meet the window; nothing if no sample in them has data.
+  [[nodiscard]] std::optional<Range> range(const LatticeWindow& window) const;
+
+  /// A block that has data and lies in the window, if there is one: its lattice rectangle.
+  [[nodiscard]] std::optional<LatticeWindow> some_block_within(const LatticeWindow& window) const;
+
+  /// A number of the samples of all blocks that meet the window, and of their places: of two
+  /// rasters of equal size, whatever the clusters of their stores, it is the same if these are.
+  [[nodiscard]] std::uint64_t digest(const LatticeWindow& window) const;
+
+  /// Whether every block that meets the window has all its samples.
+  [[nodiscard]] bool is_complete(const LatticeWindow& window) const;
+  /// Calls visit(lattice rectangle) for each block that meets the window and lacks a sample.
+  template <class Visit>
+  void for_each_incomplete(const LatticeWindow& window, const Visit& visit) const {
+    const Blocks part = blocks_of(window);
+    for (std::int64_t y = part.y0; y < part.y1; ++y) {
+      for (std::int64_t x = part.x0; x < part.x1; ++x) {
+        if (!is_complete(x, y)) visit(rectangle(x, y));
+      }
+    }
+  }
+
+ private:
+  struct Block {
+    float low, high;
+  };
+  struct Blocks {
+    std::int64_t x0, y0, x1, y1;  // half open
+  };
+  /// Those that meet a window.
+  [[nodiscard]] Blocks blocks_of(const LatticeWindow& window) const;
+  [[nodiscard]] bool is_complete(std::int64_t x, std::int64_t y) const {
+    return samples_[static_cast<std::size_t>(y * across_ + x)] == rectangle(x, y).size();
+  }
+  [[nodiscard]] LatticeWindow rectangle(std::int64_t x, std::int64_t y) const {
+    return {x * side_, y * side_, std::min(side_, columns_ - x * side_),
+            std::min(side_, rows_ - y * side_)};
+  }
+  [[nodiscard]] const Block& at(std::int64_t x, std::int64_t y) const {
+    return blocks_[static_cast<std::size_t>(y * across_ + x)];
+  }
+
+  std::int64_t side_ = 16;  ///< samples
+  std::int64_t columns_ = 0, rows_ = 0, across_ = 0, down_ = 0;
+  std::vector<Block> blocks_;
+  std::vector<std::uint64_t> digests_;  ///< of blocks, sums over their samples
+  std::vector<std::uint32_t> samples_;  ///< how many of a block have data
+};
+
+}  // namespace terrace::terrain

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <terrace/stream/store.hpp>
+
+#include "earth/crs/coordinate_system.hpp"
+#include "earth/geoid_heights.hpp"
+#include "surface/cluster_census.hpp"
+#include "surface/point_fill.hpp"
+#include "surface/point_window.hpp"
+#include "surface/store_window.hpp"
+#include "tile/make/stored_places.hpp"
+#include "tile/make/tile_surface.hpp"
+
+namespace terrace::terrain {
+
+/// What all threads know of a store of irregular points that is tiled.
+struct TiledCloud {
+  const stream::Store& store;
+  StoredPlaces places;
+  EllipsoidalHeights vertical;
+  PointFill fill;
+  double spacing = 0.0;
+  /// Heights beyond the points' hull: nothing takes those around, else this height in metres.
+  std::optional<double> flat_fill{};
+  /// Where the surface has this height (in the store's unit) is water.
+  std::optional<double> water_height{};
+  /// Of a thread, for the triangles of a part.
+  std::uint64_t window_bytes = 0;
+
+  /// Reads a level of the store, and a few clusters. Throws: stream::Error if no place of it can be
+  /// told on the globe.
+  TiledCloud(const stream::Store& tiled, CoordinateSystem system, EllipsoidalHeights heights,
+             std::uint64_t window_bytes);
+};
+
+/// The surface of a store of irregular points: linear in the triangles of the Delaunay
+/// triangulation of all of them by stored x, y, filled beyond their hull. Of points at one x, y the
+/// first in the order of StoreWindow::points() counts, and the others are no samples.
+class PointTileSurface final : public TileSurface {
+ public:
+  explicit PointTileSurface(const TiledCloud& cloud);
+
+  [[nodiscard]] GeographicBox bounds() const override { return cloud_.places.bounds(); }
+  [[nodiscard]] double spacing() const override { return cloud_.spacing; }
+  void expect(const GeographicBox& box) override;
+  [[nodiscard]] double widest_part() const override { return 360.0; }
+  bool crowded(const GeographicBox& box) override;
+  [[nodiscard]] bool sides_take_samples() const override { return true; }
+  void samples(const GeographicBox& box, SurfaceSamples& out) override;
+  std::optional<HeightRange> range(const GeographicBox& box) override;
+  void heights(std::span<const double> longitude, std::span<const double> latitude,
+               std::span<double> out) override;
+  void water(std::span<const double> longitude, std::span<const double> latitude,
+             std::span<std::uint8_t> out) override;
+  /// Of the whole store: a point changes the triangles around it, and the fill, far away.
+  std::uint64_t digest(const GeographicBox& box) override;
+
+ private:
+  /// Of the store's places, kept for the box asked for last.
+  const std::vector<StoredBox>& windows(const GeographicBox& box);
+  /// In the store's vertical unit, by the stored places; NaN beyond the hull.
+  void surface_heights(std::span<const Point2> stored, std::span<double> out);
+  void part_heights(std::span<const Point2> stored, std::span<std::uint32_t> part,
+                    std::span<double> out);
+  bool holds(const StoredBox& box) const;
+  /// Leaves the first of points at one x, y, in their order.
+  void drop_duplicates();
+
+  const TiledCloud& cloud_;
+  StoreWindow reader_;
+  ClusterCensus census_;
+  PointWindow window_;
+  std::optional<StoredBox> held_, expected_;  ///< what the window holds, and is to hold
+  std::optional<GeographicBox> asked_;
+  std::vector<StoredBox> windows_;
+  WindowPoints points_;
+  std::vector<std::uint32_t> slots_;
+};
+
+}  // namespace terrace::terrain

@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tile/make/raster_tile_digest.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "base/digest.hpp"
+#include "tile/make/tiled_raster.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+/// A projected raster's places are looked at in so many steps along a box. Wider boxes than this
+/// (degrees) may hold places outside the raster that its projection tears apart.
+constexpr unsigned kDigestSteps = 24;
+constexpr double kSmooth = 1.0;
+/// Samples around a place: those it lies between, and what rounding moves.
+constexpr double kDigestMargin = 2.0;
+
+void add_raster(const TiledRaster& raster, Digest& digest) {
+  const stream::Schema& schema = raster.store.schema();
+  digest.add(schema.columns);
+  digest.add(schema.rows);
+  for (const double number : schema.world.xy) digest.add(number);
+  const stream::Channel& height = schema.coordinates[2];
+  digest.add(std::uint64_t{static_cast<std::uint8_t>(height.type)});
+  digest.add(height.scale);
+  digest.add(height.offset);
+  const stream::Crs crs = raster.crs.crs();
+  digest.add(static_cast<std::uint64_t>(crs.epsg));
+  digest.add(crs.wkt);
+  digest.add(raster.vertical.metres_per_unit());
+  digest.add(std::uint64_t{raster.vertical.has_geoid()});
+  for (const std::optional<double>& option : {raster.flat_fill, raster.water_height}) {
+    digest.add(std::uint64_t{option.has_value()});
+    digest.add(option.value_or(0.0));
+  }
+}
+
+/// Of the samples of a window, and of the fill where it is asked.
+void add_window(const TiledRaster& raster, const LatticeWindow& window, Digest& digest) {
+  digest.add(raster.blocks.digest(window));
+  if (raster.flat_fill) return;
+  raster.blocks.for_each_incomplete(
+      window, [&](const LatticeWindow& block) { digest.add(raster.fill.digest(block)); });
+  // What hangs over the raster's borders.
+  const stream::Schema& schema = raster.store.schema();
+  const auto columns = static_cast<std::int64_t>(schema.columns);
+  const auto rows = static_cast<std::int64_t>(schema.rows);
+  const std::int64_t right = window.column + window.columns - columns;
+  const std::int64_t bottom = window.row + window.rows - rows;
+  for (const LatticeWindow& strip :
+       {LatticeWindow{window.column, window.row, -window.column, window.rows},
+        LatticeWindow{columns, window.row, right, window.rows},
+        LatticeWindow{window.column, window.row, window.columns, -window.row},
+        LatticeWindow{window.column, rows, window.columns, bottom}}) {
+    if (strip.columns > 0 && strip.rows > 0) digest.add(raster.fill.digest(strip));
+  }
+}
+
+/// The lattice around places of it, two samples over its borders at most: what lies beyond is asked
+/// there. Some part of the raster is always in it.
+LatticeWindow window_of(const TiledRaster& raster, const stream::Box3& around, double margin) {
+  const stream::Schema& schema = raster.store.schema();
+  LatticeWindow window;
+  const auto span = [&](std::size_t axis, std::uint64_t count, std::int64_t& first,
+                        std::int64_t& size) {
+    const double last = static_cast<double>(count - 1);
+    const double low = std::clamp(std::floor(around.min[axis] - margin), -2.0, last);
+    const double high = std::clamp(std::ceil(around.max[axis] + margin), 0.0, last + 2.0);
+    first = static_cast<std::int64_t>(low);
+    size = static_cast<std::int64_t>(high - low) + 1;
+  };
+  span(0, schema.columns, window.column, window.columns);
+  span(1, schema.rows, window.row, window.rows);
+  return window;
+}
+
+void add_everything(const TiledRaster& raster, Digest& digest) {
+  const stream::Schema& schema = raster.store.schema();
+  const auto columns = static_cast<std::int64_t>(schema.columns);
+  const auto rows = static_cast<std::int64_t>(schema.rows);
+  add_window(raster, {-2, -2, columns + 4, rows + 4}, digest);
+}
+
+/// Places of the box in the raster's CRS, in `steps` each way; empty if some has no place there.
+std::vector<Point2> places_of(const TiledRaster& raster, const GeographicBox& box, unsigned steps) {
+  std::vector<Point2> places;
+  for (unsigned j = 0; j <= steps; ++j) {
+    for (unsigned i = 0; i <= steps; ++i) {
+      double longitude = box.west + (box.east - box.west) * i / steps;
+      // A raster in degrees may be in any turn; projections take the first.
+      if (!raster.crs.is_geographic()) longitude = std::remainder(longitude, 360.0);
+      const double latitude = box.south + (box.north - box.south) * j / steps;
+      places.push_back({longitude, std::clamp(latitude, -90.0, 90.0)});
+    }
+  }
+  raster.crs.from_geographic(places);
+  const bool good = std::all_of(places.begin(), places.end(), [](const Point2& p) {
+    return std::isfinite(p[0]) && std::isfinite(p[1]);
+  });
+  return good ? places : std::vector<Point2>{};
+}
+
+/// In degrees a place is asked in the turn that is nearest to the raster's own longitudes.
+void add_in_all_turns(const TiledRaster& raster, const stream::Box3& box, double margin,
+                      Digest& digest) {
+  const double width = raster.last_longitude - raster.first_longitude;
+  const double beside = std::max(0.0, 360.0 - width) / 2.0 + 1e-6;
+  for (int turn = -2; turn <= 2; ++turn) {
+    const double west = std::max(box.min[0] + 360.0 * turn, raster.first_longitude - beside);
+    const double east = std::min(box.max[0] + 360.0 * turn, raster.last_longitude + beside);
+    if (west > east) continue;
+    stream::Box3 around;
+    for (const double x : {west, east}) {
+      for (const double y : {box.min[1], box.max[1]}) {
+        const Point2 place = stored_place(raster.placement, {x, y});
+        around.include(stream::Point3{place[0], place[1], 0.0});
+      }
+    }
+    add_window(raster, window_of(raster, around, margin), digest);
+  }
+}
+
+}  // namespace
+
+std::uint64_t digest_of(const TiledRaster& raster, const GeographicBox& box) {
+  Digest digest;
+  add_raster(raster, digest);
+  const CrsDefinition& crs = raster.crs.definition();
+  const bool geographic = raster.crs.is_geographic();
+  const bool straight = geographic && !crs.shift;
+  const GeographicBox& all = raster.bounds;
+  const bool inside = box.west >= all.west && box.east <= all.east && box.south >= all.south &&
+                      box.north <= all.north;
+  const bool smooth =
+      geographic ? crs.degrees_per_unit == 1.0 : inside || box.east - box.west <= kSmooth;
+  const unsigned steps = straight ? 1 : kDigestSteps;
+  std::vector<Point2> places;
+  if (smooth) places = places_of(raster, box, steps);
+  if (places.empty()) {
+    add_everything(raster, digest);
+    return digest.value();
+  }
+  if (!geographic) {
+    for (Point2& p : places) p = stored_place(raster.placement, p);
+  }
+  stream::Box3 around;
+  for (const Point2& p : places) around.include(stream::Point3{p[0], p[1], 0.0});
+  // What bulges between the places looked at.
+  const auto bulge = [&](std::size_t axis) {
+    return straight ? 0.0 : (around.max[axis] - around.min[axis]) / steps;
+  };
+  for (const std::size_t axis : {std::size_t{0}, std::size_t{1}}) {
+    const double more = bulge(axis);
+    around.min[axis] -= more;
+    around.max[axis] += more;
+  }
+  if (geographic) {
+    add_in_all_turns(raster, around, kDigestMargin, digest);
+  } else {
+    add_window(raster, window_of(raster, around, kDigestMargin), digest);
+  }
+  return digest.value();
+}
+
+}  // namespace terrace::terrain

@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tile/make/raster_tile_surface.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <optional>
+#include <utility>
+
+namespace terrace::terrain {
+
+RasterTileSurface::RasterTileSurface(const TiledRaster& raster)
+    : raster_(raster), reader_(raster.store, std::uint64_t{24} << 20) {}
+
+RasterTileSurface::View RasterTileSurface::view(const LatticeWindow& window) {
+  const std::int64_t column = window.column - held_.column, row = window.row - held_.row;
+  const bool holds = column >= 0 && row >= 0 && column + window.columns <= held_.columns &&
+                     row + window.rows <= held_.rows;
+  if (holds) return {heights_.data() + row * held_.columns + column, held_.columns};
+  held_ = {};  // if reading fails nothing is held
+  heights_.resize(window.size());
+  reader_.heights(window, heights_);
+  held_ = window;
+  return {heights_.data(), held_.columns};
+}
+
+void RasterTileSurface::expect(const GeographicBox& box) {
+  LatticeWindow window = window_around(raster_, box);
+  if (window.size() == 0) return;
+  // What lies around places on the box's sides, outside the raster too.
+  window = {window.column - 2, window.row - 2, window.columns + 4, window.rows + 4};
+  view(window);
+}
+
+std::optional<HeightRange> RasterTileSurface::range(const GeographicBox& box) {
+  const LatticeWindow window = window_around(raster_, box);
+  if (window.size() == 0) return std::nullopt;
+  const auto range = raster_.blocks.range(window);
+  if (!range) return std::nullopt;
+  HeightRange out;
+  const double low = range->low * raster_.vertical.metres_per_unit();
+  const double high = range->high * raster_.vertical.metres_per_unit();
+  out.low = std::min(low, high);
+  out.high = std::max(low, high);
+  if (raster_.flat_fill) {
+    out.low = std::min(out.low, *raster_.flat_fill);
+    out.high = std::max(out.high, *raster_.flat_fill);
+  }
+  if (raster_.vertical.has_geoid()) {
+    out.low += kLowestGeoid;
+    out.high += kHighestGeoid;
+  }
+  // A block of the lattice all of whose corners are inside.
+  if (const auto block = raster_.blocks.some_block_within(window)) {
+    std::array<Point2, 4> corners;
+    for (unsigned k = 0; k < 4; ++k) {
+      corners[k] =
+          world_place(raster_.placement,
+                      static_cast<double>(block->column + ((k & 1) != 0 ? block->columns - 1 : 0)),
+                      static_cast<double>(block->row + ((k & 2) != 0 ? block->rows - 1 : 0)));
+    }
+    raster_.crs.to_geographic(corners);
+    const double margin = raster_.crs.is_geographic() ? 0.0 : raster_.spacing;
+    out.certain = std::all_of(corners.begin(), corners.end(), [&](const Point2& p) {
+      const double longitude = wrapped(p[0]);
+      return longitude >= box.west + margin && longitude <= box.east - margin &&
+             p[1] >= box.south + margin && p[1] <= box.north - margin;
+    });
+  }
+  return out;
+}
+
+template <class Visit>
+void RasterTileSurface::visit_places(std::span<const double> longitude,
+                                     std::span<const double> latitude, const Visit& visit) {
+  constexpr std::int64_t kBlock = 128;           // places are taken block by block of the lattice
+  constexpr std::int64_t kMostInWindow = 32768;  // of a window that is read for a run of them
+  std::vector<Point2> places(longitude.size());
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    // One of the two numbers that the line of 180 degrees has: tiles on both sides ask for it.
+    const double turned = wrapped(longitude[i]);
+    places[i] = {turned == 180.0 ? -180.0 : turned, std::clamp(latitude[i], -90.0, 90.0)};
+  }
+  find_on_lattice(raster_, places);
+  const stream::Schema& schema = raster_.store.schema();
+  const double last_column = static_cast<double>(schema.columns - 1);
+  const double last_row = static_cast<double>(schema.rows - 1);
+  for (Point2& p : places) {
+    // What has no place, or one far off, is asked at the raster's border: it is filled there.
+    if (!std::isfinite(p[0]) || !std::isfinite(p[1])) p = {-1.0, -1.0};
+    p = {std::clamp(p[0], -1.0, last_column + 1.0), std::clamp(p[1], -1.0, last_row + 1.0)};
+  }
+  std::vector<std::uint32_t> order(places.size());
+  std::iota(order.begin(), order.end(), 0U);
+  const auto block = [&](std::uint32_t i) {
+    return std::pair{static_cast<std::int64_t>(std::floor(places[i][1])) / kBlock,
+                     static_cast<std::int64_t>(std::floor(places[i][0])) / kBlock};
+  };
+  const auto before = [&](std::uint32_t a, std::uint32_t b) { return block(a) < block(b); };
+  // Sides come in order already.
+  if (!std::is_sorted(order.begin(), order.end(), before)) {
+    std::stable_sort(order.begin(), order.end(), before);
+  }
+
+  for (std::size_t from = 0; from < order.size();) {
+    std::int64_t c0 = 0, r0 = 0, c1 = 0, r1 = 0;
+    std::size_t to = from;
+    for (; to < order.size(); ++to) {
+      const Point2& p = places[order[to]];
+      const auto column = static_cast<std::int64_t>(std::floor(p[0]));
+      const auto row = static_cast<std::int64_t>(std::floor(p[1]));
+      const bool first = to == from;
+      const std::int64_t nc0 = first ? column : std::min(c0, column);
+      const std::int64_t nr0 = first ? row : std::min(r0, row);
+      const std::int64_t nc1 = first ? column + 1 : std::max(c1, column + 1);
+      const std::int64_t nr1 = first ? row + 1 : std::max(r1, row + 1);
+      if (!first && (nc1 - nc0 + 1) * (nr1 - nr0 + 1) > kMostInWindow) break;
+      c0 = nc0;
+      r0 = nr0;
+      c1 = nc1;
+      r1 = nr1;
+    }
+    const LatticeWindow window{c0, r0, c1 - c0 + 1, r1 - r0 + 1};
+    const View view = this->view(window);
+    for (; from < to; ++from) {
+      const Point2& p = places[order[from]];
+      const auto column = static_cast<std::int64_t>(std::floor(p[0])) - window.column;
+      const auto row = static_cast<std::int64_t>(std::floor(p[1])) - window.row;
+      visit(order[from], p, view.first + row * view.stride + column, view.stride);
+    }
+  }
+}
+
+void RasterTileSurface::heights(std::span<const double> longitude, std::span<const double> latitude,
+                                std::span<double> out) {
+  visit_places(longitude, latitude,
+               [&](std::size_t i, const Point2& p, const double* at, std::int64_t stride) {
+                 const double fx = p[0] - std::floor(p[0]), fy = p[1] - std::floor(p[1]);
+                 // A sample that has no weight need not be there.
+                 const auto weighed = [](double weight, double height) {
+                   return weight > 0.0 ? weight * height : 0.0;
+                 };
+                 const double height =
+                     weighed((1.0 - fy) * (1.0 - fx), at[0]) + weighed((1.0 - fy) * fx, at[1]) +
+                     weighed(fy * (1.0 - fx), at[stride]) + weighed(fy * fx, at[stride + 1]);
+                 const Point2 place{longitude[i], latitude[i]};
+                 if (!std::isnan(height)) {
+                   out[i] = raster_.vertical.convert(place, height);
+                   return;
+                 }
+                 // Samples that are not there are filled one by one: the surface goes through those
+                 // that are, up to the last.
+                 out[i] = 0.0;
+                 for (unsigned k = 0; k < 4; ++k) {
+                   const unsigned right = k & 1, down = k >> 1;
+                   const double weight = (right != 0 ? fx : 1.0 - fx) * (down != 0 ? fy : 1.0 - fy);
+                   if (weight > 0.0) {
+                     const double sample = at[down * stride + right];
+                     const Point2 corner{std::floor(p[0]) + right, std::floor(p[1]) + down};
+                     out[i] += weight * corner_height(place, sample, corner);
+                   }
+                 }
+               });
+}
+
+double RasterTileSurface::corner_height(const Point2& place, double sample,
+                                        const Point2& corner) const {
+  if (!std::isnan(sample)) return raster_.vertical.convert(place, sample);
+  if (raster_.flat_fill) return *raster_.flat_fill;
+  return raster_.vertical.convert(place, raster_.fill.height(corner[0], corner[1]));
+}
+
+}  // namespace terrace::terrain

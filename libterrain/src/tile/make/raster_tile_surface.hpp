@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "surface/store_window.hpp"
+#include "tile/make/height_cache.hpp"
+#include "tile/make/raster_tile_digest.hpp"
+#include "tile/make/tile_surface.hpp"
+#include "tile/make/tiled_raster.hpp"
+
+namespace terrace::terrain {
+
+/// The surface of a raster store: bilinear between four samples with data, filled elsewhere.
+/// Memory: 36 MiB, and of the largest box that was asked for 8 bytes per sample, or 24 where
+/// samples() are.
+class RasterTileSurface final : public TileSurface {
+ public:
+  explicit RasterTileSurface(const TiledRaster& raster);
+
+  [[nodiscard]] GeographicBox bounds() const override { return raster_.bounds; }
+  [[nodiscard]] double spacing() const override { return raster_.spacing; }
+  void expect(const GeographicBox& box) override;
+  void samples(const GeographicBox& box, SurfaceSamples& out) override;
+  bool rows(const GeographicBox& box, SurfaceRows& out) override;
+  bool grid(const GeographicBox& box, SurfaceGrid& out) override;
+  std::optional<HeightRange> range(const GeographicBox& box) override;
+  void heights(std::span<const double> longitude, std::span<const double> latitude,
+               std::span<double> out) override;
+  void water(std::span<const double> longitude, std::span<const double> latitude,
+             std::span<std::uint8_t> out) override;
+  std::uint64_t digest(const GeographicBox& box) override { return digest_of(raster_, box); }
+
+ private:
+  /// Calls visit(i, place on the lattice, the sample north-west of it, distance to the next row)
+  /// for each place, in an order that reads little. The sample's right neighbour follows it.
+  template <class Visit>
+  void visit_places(std::span<const double> longitude, std::span<const double> latitude,
+                    const Visit& visit);
+  /// Metres above the ellipsoid at a place, of a sample of the lattice or, if it is NaN, of what
+  /// fills it.
+  [[nodiscard]] double corner_height(const Point2& place, double sample,
+                                     const Point2& corner) const;
+  /// The heights of a window: of the one that is held, or read into it.
+  struct View {
+    const double* first = nullptr;
+    std::int64_t stride = 0;
+  };
+  View view(const LatticeWindow& window);
+
+  const TiledRaster& raster_;
+  HeightCache reader_;
+  LatticeWindow held_{};
+  std::vector<double> heights_;  ///< of the held window
+  SurfaceGrid grid_;
+};
+
+}  // namespace terrace::terrain

@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tile/make/stored_places.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include <terrace/stream/error.hpp>
+
+#include "earth/portable_math.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+constexpr double kFarPlace = std::numeric_limits<double>::infinity();
+/// Metres and degrees that a place may be off after it was converted there and back, with a shift
+/// of datum in between: much more than it is.
+constexpr double kMarginMetres = 0.02;
+constexpr double kMarginDegrees = 2e-7;
+/// Steps across a box in which its image is looked at, and across a small one around its border.
+constexpr unsigned kPlaceSteps = 24;
+constexpr unsigned kSmallSteps = 8;
+/// What bulges between the places looked at goes with the square of the steps' length: twice that.
+constexpr double share_of(unsigned steps) { return 2.0 / (steps * steps); }
+constexpr unsigned kBoundsSteps = 64;
+
+void include(StoredBox& box, const Point2& p) {
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    box.min[axis] = std::min(box.min[axis], p[axis]);
+    box.max[axis] = std::max(box.max[axis], p[axis]);
+  }
+}
+
+StoredBox nothing() { return {{kFarPlace, kFarPlace}, {-kFarPlace, -kFarPlace}}; }
+
+Point2 between(const Point2& low, const Point2& high, unsigned i, unsigned j, unsigned steps) {
+  return {low[0] + (high[0] - low[0]) * i / steps, low[1] + (high[1] - low[1]) * j / steps};
+}
+
+}  // namespace
+
+double wrapped_longitude(double longitude) {
+  if (longitude >= -180.0 && longitude <= 180.0) return longitude;
+  return longitude - 360.0 * std::floor((longitude + 180.0) / 360.0);
+}
+
+StoredPlaces::StoredPlaces(const stream::Store& store, CoordinateSystem system)
+    : crs_(std::move(system)), placement_(placement_of(store.schema())) {
+  const stream::Box3& box = store.bounds();
+  stored_ = {{box.min[0], box.min[1]}, {box.max[0], box.max[1]}};
+  const bool degrees = crs_.is_geographic();
+  const double margin = degrees ? kMarginDegrees : kMarginMetres / crs_.metres_per_unit();
+  const std::array<double, 6>& xy = placement_.world.xy;
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    margin_[axis] = margin / portable_hypot(xy[axis], xy[3 + axis]);
+  }
+  if (degrees) {
+    turn_ = 360.0 / crs_.definition().degrees_per_unit;
+    StoredBox all = nothing();
+    for (unsigned k = 0; k < 4; ++k) {
+      include(all, world(between(stored_.min, stored_.max, k & 1, k >> 1, 1)));
+    }
+    first_longitude_ = all.min[0];
+    last_longitude_ = all.max[0];
+  }
+  find_bounds(store.path().string());
+}
+
+Point2 StoredPlaces::world(const Point2& stored) const {
+  const stream::Point3 p = world_point(placement_, {stored[0], stored[1], 0.0});
+  return {p[0], p[1]};
+}
+
+void StoredPlaces::find_bounds(const std::string& file) {
+  std::vector<Point2> places;
+  for (unsigned j = 0; j <= kBoundsSteps; ++j) {
+    for (unsigned i = 0; i <= kBoundsSteps; ++i) {
+      places.push_back(between(stored_.min, stored_.max, i, j, kBoundsSteps));
+    }
+  }
+  to_geographic(places);
+  StoredBox all = nothing();
+  Point2 step{};
+  bool crosses = false;
+  for (unsigned j = 0; j <= kBoundsSteps; ++j) {
+    for (unsigned i = 0; i <= kBoundsSteps; ++i) {
+      const Point2& p = places[j * (kBoundsSteps + 1) + i];
+      if (!std::isfinite(p[0]) || !std::isfinite(p[1])) continue;
+      include(all, p);
+      const auto step_to = [&](const Point2& next) {
+        if (!std::isfinite(next[0])) return;
+        const double wide = std::abs(next[0] - p[0]);
+        // Between neighbours more than half of the globe: the line of 180 degrees lies between.
+        if (wide > 180.0) {
+          crosses = true;
+          return;
+        }
+        step = {std::max(step[0], wide), std::max(step[1], std::abs(next[1] - p[1]))};
+      };
+      if (i < kBoundsSteps) step_to(places[j * (kBoundsSteps + 1) + i + 1]);
+      if (j < kBoundsSteps) step_to(places[(j + 1) * (kBoundsSteps + 1) + i]);
+    }
+  }
+  if (!(all.min[0] <= all.max[0])) {
+    throw stream::Error({.file = file,
+                         .where = {},
+                         .cause = "its places cannot be told on the globe by " + crs_.title(),
+                         .remedy = "build the store anew with the right --crs"});
+  }
+  // Between the places looked at, the border of a projected box may bulge by part of a step.
+  if (!crs_.is_geographic()) {
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      const double bulge = std::min(0.5 * step[axis], 1.0) + kMarginDegrees;
+      all.min[axis] -= bulge;
+      all.max[axis] += bulge;
+    }
+    // A pole inside has all longitudes around it.
+    for (const double pole : {-90.0, 90.0}) {
+      const Point2 at = stored_place(placement_, crs_.from_geographic(Point2{0.0, pole}));
+      bool inside = true;
+      for (std::size_t axis = 0; axis < 2; ++axis) {
+        inside = inside && at[axis] >= stored_.min[axis] - margin_[axis] &&
+                 at[axis] <= stored_.max[axis] + margin_[axis];
+      }
+      if (!inside) continue;
+      (pole < 0.0 ? all.min[1] : all.max[1]) = pole;
+      crosses = true;
+    }
+  }
+  if (crosses) {
+    all.min[0] = -180.0;
+    all.max[0] = 180.0;
+  }
+  bounds_ = {std::max(-180.0, all.min[0]), std::max(-90.0, all.min[1]), std::min(180.0, all.max[0]),
+             std::min(90.0, all.max[1])};
+}
+
+double StoredPlaces::in_turn(double longitude) const {
+  const double first = first_longitude_, last = last_longitude_;
+  const double after = longitude - turn_ * std::floor((longitude - first) / turn_);
+  return after > last && after - last > first + turn_ - after ? after - turn_ : after;
+}
+
+std::vector<StoredBox> StoredPlaces::windows(const GeographicBox& box) const {
+  // Only where the points are: far from them a projection may have no places.
+  const Point2 low{std::max(box.west, bounds_.west), std::max(box.south, bounds_.south)};
+  const Point2 high{std::min(box.east, bounds_.east), std::min(box.north, bounds_.north)};
+  std::vector<StoredBox> windows;
+  if (!(low[0] <= high[0] && low[1] <= high[1])) return windows;
+  const auto add = [&](StoredBox around, double share) {
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      // What bulges between the places looked at.
+      const double margin = margin_[axis] + share * (around.max[axis] - around.min[axis]);
+      around.min[axis] = std::max(around.min[axis] - margin, stored_.min[axis]);
+      around.max[axis] = std::min(around.max[axis] + margin, stored_.max[axis]);
+      if (!(around.min[axis] <= around.max[axis])) return;
+    }
+    windows.push_back(around);
+  };
+  if (crs_.is_geographic()) {
+    for (int turn = -2; turn <= 2; ++turn) {
+      std::array<Point2, 4> places;
+      for (unsigned k = 0; k < 4; ++k) {
+        places[k] = between(low, high, k & 1, k >> 1, 1);
+      }
+      crs_.from_geographic(places);
+      StoredBox around = nothing();
+      for (const Point2& p : places) {
+        include(around, stored_place(placement_, {p[0] + turn_ * turn, p[1]}));
+      }
+      add(around, 0.0);
+    }
+    return windows;
+  }
+  // The outline of what is small says all: at a pole, too, it is a narrow wedge.
+  const bool small = high[0] - low[0] < 2.0 && high[1] - low[1] < 2.0;
+  const unsigned steps = small ? kSmallSteps : kPlaceSteps;
+  std::vector<Point2> places;
+  for (unsigned j = 0; j <= steps; ++j) {
+    const unsigned skip = small && j != 0 && j != steps ? steps : 1;
+    for (unsigned i = 0; i <= steps; i += skip) places.push_back(between(low, high, i, j, steps));
+  }
+  crs_.from_geographic(places);
+  StoredBox around = nothing();
+  for (const Point2& p : places) {
+    if (std::isfinite(p[0]) && std::isfinite(p[1])) include(around, stored_place(placement_, p));
+  }
+  add(around, small ? share_of(kSmallSteps) : 1.0 / kPlaceSteps);
+  return windows;
+}
+
+void StoredPlaces::to_geographic(std::span<Point2> places) const {
+  for (Point2& p : places) p = world(p);
+  crs_.to_geographic(places);
+  for (Point2& p : places) p[0] = wrapped_longitude(p[0]);
+}
+
+void StoredPlaces::to_stored(std::span<Point2> places) const {
+  for (Point2& p : places) {
+    // One of the two numbers that the line of 180 degrees has: tiles on both sides ask for it.
+    const double turned = wrapped_longitude(p[0]);
+    p = {turned == 180.0 ? -180.0 : turned, std::clamp(p[1], -90.0, 90.0)};
+  }
+  crs_.from_geographic(places);
+  for (Point2& p : places) {
+    if (crs_.is_geographic()) p[0] = in_turn(p[0]);
+    p = stored_place(placement_, p);
+    if (!std::isfinite(p[0]) || !std::isfinite(p[1])) {
+      p = {stored_.min[0] - 1.0, stored_.min[1] - 1.0};
+    }
+  }
+}
+
+}  // namespace terrace::terrain

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include <terrace/stream/store.hpp>
+
+#include "earth/crs/coordinate_system.hpp"
+#include "earth/world.hpp"
+#include "surface/store_window.hpp"
+#include "tile/format/tile_address.hpp"
+
+namespace terrace::terrain {
+
+/// Longitudes in [-180, 180], whatever turn they were in.
+double wrapped_longitude(double longitude);
+
+/// Where a store of points lies on the globe. Const members may be called by several threads at
+/// once.
+class StoredPlaces {
+ public:
+  /// Throws: stream::Error if no place of the store can be told on the globe.
+  StoredPlaces(const stream::Store& store, CoordinateSystem system);
+
+  /// Around all points of the store, a little larger where it is projected.
+  [[nodiscard]] const GeographicBox& bounds() const { return bounds_; }
+  /// Of all points, in stored coordinates.
+  [[nodiscard]] const StoredBox& stored_bounds() const { return stored_; }
+
+  /// The boxes of stored coordinates outside of which no point of a geographic box lies: none if it
+  /// does not meet bounds(). Two, apart from each other, where a store in degrees goes around the
+  /// globe.
+  [[nodiscard]] std::vector<StoredBox> windows(const GeographicBox& box) const;
+
+  /// Stored x, y to longitude in [-180, 180] and latitude, in place; NaN: on no place.
+  void to_geographic(std::span<Point2> places) const;
+  /// Longitude and latitude to stored x, y, in place. Both numbers of the line of 180 degrees give
+  /// the same; what has no place there goes to a corner outside stored_bounds().
+  void to_stored(std::span<Point2> places) const;
+
+ private:
+  void find_bounds(const std::string& file);
+  [[nodiscard]] Point2 world(const Point2& stored) const;
+  [[nodiscard]] double in_turn(double longitude) const;
+
+  CoordinateSystem crs_;
+  Placement placement_;
+  StoredBox stored_;
+  GeographicBox bounds_;
+  /// Of a store in degrees: its own longitudes, and the unit's number all around the globe.
+  double first_longitude_ = 0.0, last_longitude_ = 0.0, turn_ = 360.0;
+  Point2 margin_{};  ///< stored: what converting there and back may be off, and more
+};
+
+}  // namespace terrace::terrain

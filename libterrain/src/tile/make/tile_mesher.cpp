@@ -1,0 +1,268 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tile/make/tile_mesher.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <span>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "base/vector.hpp"
+#include "earth/ground.hpp"
+#include "tile/format/ellipsoid.hpp"
+#include "tile/format/quantized_mesh_layout.hpp"
+#include "tile/make/crowded_leaf.hpp"
+#include "tile/make/sample_parts.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+/// A mesh in units of the tile and steps of height, put together from leaves.
+struct Pieces {
+  std::vector<TileSideVertex> vertices;
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  std::unordered_map<std::uint32_t, std::uint32_t> by_place;  ///< vertices on sides of leaves
+  double max_error = 0.0;
+  bool has_data = false;
+
+  std::uint32_t side_vertex(const TileSideVertex& vertex) {
+    const std::uint32_t place = vertex.v << 16 | vertex.u;
+    const auto [found, fresh] =
+        by_place.try_emplace(place, static_cast<std::uint32_t>(vertices.size()));
+    if (fresh) vertices.push_back(vertex);
+    return found->second;
+  }
+};
+
+/// The error of a leaf whose samples have heights in `range`, if none becomes a vertex.
+double flat_error(const std::vector<TileSideVertex>& frame, double step, const HeightRange& range) {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const TileSideVertex& vertex : frame) {
+    const double height = static_cast<double>(vertex.height) * step;
+    low = std::min(low, height);
+    high = std::max(high, height);
+  }
+  return std::max(range.high - low, high - range.low);
+}
+
+/// Degrees along one axis to units of the tile; rounding takes no sample out of the leaf.
+struct LeafUnits {
+  double from = 0.0, units = 0.0;
+  double low = 0.0, high = 0.0;  ///< the leaf's sides
+
+  [[nodiscard]] double at(double degrees) const {
+    return std::clamp((degrees - from) * units, low, high);
+  }
+  void convert(std::vector<double>& degrees) const {
+    for (double& place : degrees) place = at(place);
+  }
+  /// Of places without a height too: those may lie outside, and nothing holds them back.
+  void convert(std::vector<double>& degrees, std::span<const double> heights) const {
+    for (std::size_t i = 0; i < degrees.size(); ++i) {
+      degrees[i] = std::isnan(heights[i]) ? (degrees[i] - from) * units : at(degrees[i]);
+    }
+  }
+};
+
+tri::PointTin tin_of(const TileAddress& tile, const TileLeaf& leaf, TileSurface& surface,
+                     bool measured, std::span<const tri::Point3> frame,
+                     const tri::PointTinOptions& options) {
+  const GeographicBox whole = box_of(tile);
+  const double units = kTileUnits / (whole.east - whole.west);
+  const auto units_along = [&](double from, std::uint32_t part) {
+    return LeafUnits{from, units, static_cast<double>(leaf_unit(part, leaf.depth)),
+                     static_cast<double>(leaf_unit(part + 1, leaf.depth))};
+  };
+  const LeafUnits across = units_along(whole.west, leaf.x);
+  const LeafUnits down = units_along(whole.south, leaf.y);
+  if (!measured) return tri::point_tin(tri::SampleRows{}, frame, options);
+  if (is_to_be_cut(box_of(tile, leaf), surface)) {
+    return mesh_crowded_leaf(tile, leaf, frame, options, surface);
+  }
+  if (SurfaceRows rows; surface.rows(box_of(tile, leaf), rows)) {
+    across.convert(rows.longitude);
+    down.convert(rows.latitude);
+    return tri::point_tin(tri::SampleRows{rows.longitude, rows.latitude, rows.height}, frame,
+                          options);
+  }
+  if (SurfaceGrid grid; surface.grid(box_of(tile, leaf), grid)) {
+    across.convert(grid.longitude, grid.height);
+    down.convert(grid.latitude, grid.height);
+    return tri::point_tin(tri::SampleGrid{grid.columns, grid.longitude, grid.latitude, grid.height},
+                          frame, options);
+  }
+  SurfaceSamples samples;
+  surface.samples(box_of(tile, leaf), samples);
+  across.convert(samples.longitude);
+  down.convert(samples.latitude);
+  return tri::point_tin(samples.longitude, samples.latitude, samples.height, frame, options);
+}
+
+void mesh_leaf(const TileAddress& tile, const TileLeaf& leaf, const ZoomPlan& plan,
+               TileSurface& surface, tri::TinQuality quality,
+               const std::vector<TileSideVertex>& frame, Pieces& pieces) {
+  const auto range = surface.range(box_of(tile, leaf));
+  bool measured = false;
+  if (range) {
+    const double error = flat_error(frame, plan.height_step, *range);
+    if (error <= plan.max_error && (range->certain || pieces.has_data)) {
+      // Whatever the triangles: nothing needs to be read.
+      pieces.max_error = std::max(pieces.max_error, error);
+      pieces.has_data = true;
+    } else {
+      measured = true;
+    }
+  }
+  std::vector<tri::Point3> corners;
+  corners.reserve(frame.size());
+  for (const TileSideVertex& vertex : frame) {
+    corners.push_back({static_cast<double>(vertex.u), static_cast<double>(vertex.v),
+                       static_cast<double>(vertex.height) * plan.height_step});
+  }
+  tri::PointTinOptions options;
+  options.max_error = plan.max_error;
+  options.quality = quality;
+  options.lattice = tri::TinLattice{0.0, plan.height_step};
+  const tri::PointTin tin = tin_of(tile, leaf, surface, measured, corners, options);
+  if (measured) pieces.max_error = std::max(pieces.max_error, tin.errors.largest);
+  if (tin.errors.covered > 0) pieces.has_data = true;
+
+  std::vector<std::uint32_t> number;
+  number.reserve(tin.vertices.size());
+  for (std::size_t i = 0; i < tin.vertices.size(); ++i) {
+    if (i < frame.size()) {
+      number.push_back(pieces.side_vertex(frame[i]));
+    } else {
+      const tri::Point3& p = tin.vertices[i];
+      number.push_back(static_cast<std::uint32_t>(pieces.vertices.size()));
+      pieces.vertices.push_back({static_cast<std::uint32_t>(p[0]), static_cast<std::uint32_t>(p[1]),
+                                 std::llround(p[2] / plan.height_step)});
+    }
+  }
+  for (const auto& t : tin.triangles) {
+    pieces.triangles.push_back({number[t[0]], number[t[1]], number[t[2]]});
+  }
+}
+
+/// Heights as 15-bit numbers above the lowest. The highest is always as far above: then a number
+/// is one step, and neighbours decode the heights that they share to the same value.
+void set_heights(const Pieces& pieces, double step, TileMesh& mesh) {
+  std::int64_t lowest = pieces.vertices.front().height, highest = lowest;
+  for (const TileSideVertex& vertex : pieces.vertices) {
+    lowest = std::min(lowest, vertex.height);
+    highest = std::max(highest, vertex.height);
+  }
+  // As floats both ends must be exact.
+  constexpr std::int64_t kExactAsFloat = std::int64_t{1} << 24;
+  if (highest - lowest > kTileUnits || lowest < -kExactAsFloat ||
+      lowest + kTileUnits > kExactAsFloat) {
+    throw HeightsTooFar();
+  }
+  mesh.lowest = static_cast<float>(static_cast<double>(lowest) * step);
+  mesh.highest = static_cast<float>(static_cast<double>(lowest + kTileUnits) * step);
+  for (const TileSideVertex& vertex : pieces.vertices) {
+    mesh.u.push_back(static_cast<std::uint16_t>(vertex.u));
+    mesh.v.push_back(static_cast<std::uint16_t>(vertex.v));
+    mesh.height.push_back(static_cast<std::uint16_t>(vertex.height - lowest));
+  }
+}
+
+TileHeader header_of(const TileAddress& tile, const TileMesh& mesh) {
+  std::vector<stream::Point3> points;
+  points.reserve(mesh.size());
+  double low = mesh.metres(0), high = low;
+  for (std::size_t i = 0; i < mesh.size(); ++i) {
+    const double height = mesh.metres(i);
+    low = std::min(low, height);
+    high = std::max(high, height);
+    points.push_back(
+        geocentric(longitude_at(tile, mesh.u[i]), latitude_at(tile, mesh.v[i]), height));
+  }
+  TileHeader header;
+  const double middle = kTileUnits / 2.0;
+  header.centre =
+      geocentric(longitude_at(tile, middle), latitude_at(tile, middle), low + (high - low) / 2.0);
+  header.sphere = bounding_sphere(points);
+  header.horizon_occlusion = horizon_occlusion_point(header.sphere.centre, points);
+  return header;
+}
+
+/// The source's own normals, from its slope over about a 256th of the tile, but not less than a
+/// sample.
+void set_normals(const TileAddress& tile, TileSurface& surface, TileMesh& mesh) {
+  const GeographicBox box = box_of(tile);
+  const double reach = std::max(surface.spacing(), (box.east - box.west) / 256.0);
+  std::vector<double> longitude, latitude;
+  for (std::size_t i = 0; i < mesh.size(); ++i) {
+    const double lon = longitude_at(tile, mesh.u[i]), lat = latitude_at(tile, mesh.v[i]);
+    longitude.insert(longitude.end(), {lon - reach, lon + reach, lon, lon});
+    latitude.insert(latitude.end(), {lat, lat, lat - reach, lat + reach});
+  }
+  std::vector<double> heights(longitude.size());
+  surface.heights(longitude, latitude, heights);
+  for (std::size_t i = 0; i < mesh.size(); ++i) {
+    const double lon = longitude[4 * i + 2], lat = latitude[4 * i];
+    const MetresPerDegree metres = metres_per_degree(lat);
+    // At the poles all meridians meet.
+    const double east = metres.longitude < 1.0 ? 0.0
+                                               : (heights[4 * i + 1] - heights[4 * i]) /
+                                                     (2.0 * reach * metres.longitude);
+    const double north =
+        (heights[4 * i + 3] - heights[4 * i + 2]) / (2.0 * reach * metres.latitude);
+    const LocalFrame frame = local_frame(lon, lat);
+    stream::Point3 normal;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      normal[axis] = frame.up[axis] - east * frame.east[axis] - north * frame.north[axis];
+    }
+    normal = unit(normal);
+    mesh.normals.push_back({static_cast<float>(normal[0]), static_cast<float>(normal[1]),
+                            static_cast<float>(normal[2])});
+  }
+}
+
+void set_water(const TileAddress& tile, TileSurface& surface, TileMesh& mesh) {
+  constexpr unsigned kSide = 256;
+  std::vector<double> longitude, latitude;
+  for (unsigned row = 0; row < kSide; ++row) {
+    for (unsigned column = 0; column < kSide; ++column) {
+      longitude.push_back(longitude_at(tile, kTileUnits * (column + 0.5) / kSide));
+      latitude.push_back(latitude_at(tile, kTileUnits * (1.0 - (row + 0.5) / kSide)));
+    }
+  }
+  mesh.water.resize(longitude.size());
+  surface.water(longitude, latitude, mesh.water);
+  for (std::uint8_t& cell : mesh.water) cell = cell != 0 ? 255 : 0;
+  const std::uint8_t first = mesh.water.front();
+  if (std::all_of(mesh.water.begin(), mesh.water.end(),
+                  [first](std::uint8_t cell) { return cell == first; })) {
+    mesh.water.assign(1, first);
+  }
+}
+
+}  // namespace
+
+MadeTile make_tile(const TileAddress& tile, const ZoomPlan& plan, TileSurface& surface,
+                   const TileMeshOptions& options) {
+  Pieces pieces;
+  TileSides sides(tile, plan, surface);
+  for (const TileLeaf& leaf : leaves_of(tile, plan, surface)) {
+    const auto range = surface.range(box_of(tile, leaf));
+    // Where heights differ less than the bound, nothing but the sides is read as a rule.
+    if (range && range->high - range->low > plan.max_error) surface.expect(box_of(tile, leaf));
+    mesh_leaf(tile, leaf, plan, surface, options.quality, sides.around(leaf), pieces);
+  }
+  MadeTile made;
+  made.max_error = pieces.max_error;
+  made.has_data = pieces.has_data;
+  set_heights(pieces, plan.height_step, made.mesh);
+  made.mesh.triangles = std::move(pieces.triangles);
+  order_vertices(made.mesh);
+  made.header = header_of(tile, made.mesh);
+  if (options.normals) set_normals(tile, surface, made.mesh);
+  if (options.water) set_water(tile, surface, made.mesh);
+  return made;
+}
+
+}  // namespace terrace::terrain

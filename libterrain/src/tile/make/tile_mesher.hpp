@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <stdexcept>
+
+#include <terrace/tri/point_tin.hpp>
+
+#include "tile/format/quantized_mesh.hpp"
+#include "tile/format/tile_address.hpp"
+#include "tile/make/tile_sides.hpp"
+#include "tile/make/tile_surface.hpp"
+
+namespace terrace::terrain {
+
+struct TileMeshOptions {
+  tri::TinQuality quality = tri::TinQuality::kRemoval;
+  bool normals = false;
+  bool water = false;
+};
+
+/// A tile's mesh and header, and how far it is from the samples.
+struct MadeTile {
+  TileMesh mesh;
+  TileHeader header;
+  double max_error = 0.0;  ///< metres, of what a client decodes; never too small
+  bool has_data = false;   ///< whether a sample lies in the tile
+};
+
+/// The heights of a tile do not fit into its zoom's steps: take larger ones.
+class HeightsTooFar : public std::runtime_error {
+ public:
+  HeightsTooFar() : std::runtime_error("the heights of a tile need larger steps") {}
+};
+
+/// Meshes a tile: within plan.max_error of every sample, positions and heights rounded as a client
+/// decodes them. Where the rounding itself is coarser than the bound, max_error says what was
+/// reached. Depends on the arguments alone; what lies on the tile's borders depends on the plan and
+/// the surface there. Memory: of the samples of one leaf, whatever the tile holds.
+/// Throws: HeightsTooFar; stream::Error on a damaged store.
+MadeTile make_tile(const TileAddress& tile, const ZoomPlan& plan, TileSurface& surface,
+                   const TileMeshOptions& options);
+
+}  // namespace terrace::terrain

@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tile/make/tile_sides.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "earth/portable_math.hpp"
+#include "tile/format/ellipsoid.hpp"
+#include "tile/format/quantized_mesh.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+/// A leaf has at least this many units each way.
+constexpr unsigned kDeepestLeaf = 8;
+/// Places at which a side of one leaf is looked at, at most.
+constexpr double kMostSidePlaces = 4096.0;
+/// Share of the bound that sides are settled to. Samples so close to a side that no vertex fits
+/// between have what the side has.
+constexpr double kSideShare = 0.75;
+
+/// Of a tile's part at a depth; exact.
+double width_at(unsigned zoom, unsigned depth) {
+  return std::ldexp(180.0, -static_cast<int>(zoom + depth));
+}
+
+bool boxes_meet(const GeographicBox& a, const GeographicBox& b) {
+  return a.west <= b.east && b.west <= a.east && a.south <= b.north && b.south <= a.north;
+}
+
+}  // namespace
+
+ZoomPlan plan_zoom(unsigned zoom, double max_error, double range, const TileSurface& surface) {
+  ZoomPlan plan;
+  plan.zoom = zoom;
+  plan.max_error = max_error;
+  // All heights of a tile must fit into 32767 steps, and be exact as floats. A step is never below
+  // half a millimetre.
+  plan.height_step = 0x1p-11;
+  while (plan.height_step * (kTileUnits - 2) < range) plan.height_step *= 2.0;
+  // A chord of angle a lies R a^2 / 8 below its arc at most: half of the error that the client
+  // expects of the zoom.
+  plan.longest_edge = std::sqrt(8.0 * 0.5 * expected_error(zoom) / kEquatorialRadius) / kDegree;
+  plan.widest_leaf = surface.widest_part();
+  return plan;
+}
+
+std::uint32_t leaf_unit(std::uint32_t k, unsigned depth) {
+  return (std::uint32_t{kTileUnits} * k + (1U << depth) / 2) >> depth;
+}
+
+double tile_width(unsigned zoom) { return std::ldexp(180.0, -static_cast<int>(zoom)); }
+
+double longitude_at(const TileAddress& tile, double units) {
+  return -180.0 + tile_width(tile.zoom) * (tile.x + units / kTileUnits);
+}
+
+double latitude_at(const TileAddress& tile, double units) {
+  return -90.0 + tile_width(tile.zoom) * (tile.y + units / kTileUnits);
+}
+
+GeographicBox box_of(const TileAddress& tile, const TileLeaf& leaf) {
+  return {longitude_at(tile, leaf_unit(leaf.x, leaf.depth)),
+          latitude_at(tile, leaf_unit(leaf.y, leaf.depth)),
+          longitude_at(tile, leaf_unit(leaf.x + 1, leaf.depth)),
+          latitude_at(tile, leaf_unit(leaf.y + 1, leaf.depth))};
+}
+
+std::vector<TileLeaf> leaves_of(const TileAddress& tile, const ZoomPlan& plan,
+                                TileSurface& surface) {
+  const GeographicBox data = surface.bounds();
+  std::vector<TileLeaf> leaves, open{{}};
+  while (!open.empty()) {
+    const TileLeaf leaf = open.back();
+    open.pop_back();
+    const auto wide = [&] {
+      const double width = width_at(tile.zoom, leaf.depth);
+      if (width > plan.longest_edge) return true;
+      const GeographicBox box = box_of(tile, leaf);
+      return (width > plan.widest_leaf && boxes_meet(box, data)) || surface.crowded(box);
+    };
+    if (leaf.depth == kDeepestLeaf || !wide()) {
+      leaves.push_back(leaf);
+      continue;
+    }
+    for (unsigned quarter = 4; quarter-- > 0;) {
+      open.push_back({leaf.depth + 1, 2 * leaf.x + (quarter & 1), 2 * leaf.y + (quarter >> 1)});
+    }
+  }
+  return leaves;
+}
+
+TileSides::TileSides(const TileAddress& tile, const ZoomPlan& plan, TileSurface& surface)
+    : tile_(tile), plan_(plan), surface_(surface), data_(surface.bounds()) {}
+
+bool TileSides::is_cut(const Side& side) const {
+  if (side.depth == kDeepestLeaf) return false;
+  // A leaf beside the side lies within its length on either side of it, and is cut if this is: so
+  // the side is cut wherever a leaf of its length is.
+  const double width = width_at(tile_.zoom, side.depth);
+  if (width > plan_.longest_edge) return true;
+  // A little more than the length: units are rounded.
+  if (width > plan_.widest_leaf && is_near_data(side, 1.01 * width)) return true;
+  return is_crowded(side);
+}
+
+bool TileSides::is_crowded(const Side& side) const {
+  const std::uint32_t parts = 1U << side.depth;
+  const std::uint32_t columns = tile_columns(tile_.zoom), rows = tile_rows(tile_.zoom);
+  for (const bool before : {true, false}) {
+    // By the numbers that the leaf's own tile has.
+    TileAddress tile = tile_;
+    TileLeaf leaf{side.depth, side.k, side.k};
+    std::uint32_t& across = side.along_parallel ? leaf.y : leaf.x;
+    std::uint32_t& place = side.along_parallel ? tile.y : tile.x;
+    if (before && side.line == 0) {
+      if (side.along_parallel && place == 0) continue;
+      place = place == 0 ? columns - 1 : place - 1;
+      across = parts - 1;
+    } else if (!before && side.line == parts) {
+      if (side.along_parallel && place == rows - 1) continue;
+      place = !side.along_parallel && place == columns - 1 ? 0 : place + 1;
+      across = 0;
+    } else {
+      across = before ? side.line - 1 : side.line;
+    }
+    if (surface_.crowded(box_of(tile, leaf))) return true;
+  }
+  return false;
+}
+
+bool TileSides::is_near_data(const Side& side, double reach) const {
+  const double from = leaf_unit(side.k, side.depth), to = leaf_unit(side.k + 1, side.depth);
+  const double line = leaf_unit(side.line, side.depth);
+  GeographicBox box;
+  if (side.along_parallel) {
+    const double latitude = latitude_at(tile_, line);
+    box = {longitude_at(tile_, from), latitude - reach, longitude_at(tile_, to), latitude + reach};
+  } else {
+    const double longitude = longitude_at(tile_, line);
+    box = {longitude - reach, latitude_at(tile_, from), longitude + reach, latitude_at(tile_, to)};
+    // The line of 180 degrees has two numbers, and tiles on both sides of it.
+    if (std::abs(longitude) == 180.0) {
+      const GeographicBox other{-longitude - reach, box.south, -longitude + reach, box.north};
+      if (boxes_meet(other, data_)) return true;
+    }
+  }
+  return boxes_meet(box, data_);
+}
+
+std::vector<TileSideVertex> TileSides::settle(const Side& side) {
+  if (is_cut(side)) {
+    const Side first{side.along_parallel, side.depth + 1, 2 * side.line, 2 * side.k};
+    Side second = first;
+    ++second.k;
+    std::vector<TileSideVertex> all = vertices(first);
+    const std::vector<TileSideVertex>& rest = vertices(second);
+    all.insert(all.end(), rest.begin() + 1, rest.end());
+    return all;
+  }
+  const std::uint32_t from = leaf_unit(side.k, side.depth);
+  const std::uint32_t to = leaf_unit(side.k + 1, side.depth);
+  const std::uint32_t across = leaf_unit(side.line, side.depth);
+
+  // Two places per sample, at equal distances; away from all samples the ends will do.
+  const double length = width_at(tile_.zoom, side.depth);
+  const double unit = tile_width(tile_.zoom) / kTileUnits;
+  const bool near_data = is_near_data(side, 2.0 * (unit + surface_.spacing()));
+  const double wanted =
+      near_data ? std::min(2.0 * length / surface_.spacing(), kMostSidePlaces) : 1.0;
+  const auto parts =
+      static_cast<std::size_t>(std::clamp(std::ceil(wanted), 1.0, static_cast<double>(to - from)));
+  std::vector<double> t, longitude, latitude, height;
+  for (std::size_t i = 0; i <= parts; ++i) {
+    const double at =
+        from + static_cast<double>(to - from) * static_cast<double>(i) / static_cast<double>(parts);
+    t.push_back(at);
+    longitude.push_back(longitude_at(tile_, side.along_parallel ? at : across));
+    latitude.push_back(latitude_at(tile_, side.along_parallel ? across : at));
+  }
+  SamplesAt samples;
+  if (near_data) samples = add_samples(side, t, longitude, latitude);
+  for (const std::size_t end : {std::size_t{0}, t.size() - 1}) {
+    if (const auto corner = samples_at_corner(longitude[end], latitude[end])) {
+      samples[t[end]] = *corner;
+    }
+  }
+  height.resize(t.size());
+  surface_.heights(longitude, latitude, height);
+  for (const auto& [at, between] : samples) {
+    const auto place = std::lower_bound(t.begin(), t.end(), at) - t.begin();
+    // In the middle, so that none is farther off than it must be.
+    height[static_cast<std::size_t>(place)] = between.low + 0.5 * (between.high - between.low);
+  }
+  const tri::SimplifiedLine line = tri::simplify_line(t, height, kSideShare * plan_.max_error,
+                                                      tri::TinLattice{0.0, plan_.height_step});
+  std::vector<TileSideVertex> vertices;
+  for (const tri::LineVertex& vertex : line.vertices) {
+    const auto at = static_cast<std::uint32_t>(vertex.t);
+    vertices.push_back({side.along_parallel ? at : across, side.along_parallel ? across : at,
+                        std::llround(vertex.height / plan_.height_step)});
+  }
+  return vertices;
+}
+
+const std::vector<TileSideVertex>& TileSides::vertices(const Side& side) {
+  const auto key = std::make_tuple(side.along_parallel, side.depth, side.line, side.k);
+  if (const auto found = known_.find(key); found != known_.end()) return found->second;
+  std::vector<TileSideVertex> settled = settle(side);
+  return known_[key] = std::move(settled);
+}
+
+std::vector<TileSideVertex> TileSides::around(const TileLeaf& leaf) {
+  const auto side = [&](bool along_parallel, std::uint32_t line, std::uint32_t k) {
+    return vertices({along_parallel, leaf.depth, line, k});
+  };
+  std::vector<TileSideVertex> ring;
+  const auto add = [&](std::vector<TileSideVertex> part, bool backward) {
+    if (backward) std::reverse(part.begin(), part.end());
+    ring.insert(ring.end(), part.begin(), part.end() - 1);
+  };
+  add(side(true, leaf.y, leaf.x), false);
+  add(side(false, leaf.x + 1, leaf.y), false);
+  add(side(true, leaf.y + 1, leaf.x), true);
+  add(side(false, leaf.x, leaf.y), true);
+  return ring;
+}
+
+}  // namespace terrace::terrain

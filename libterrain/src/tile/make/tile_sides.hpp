@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include <terrace/tri/point_tin.hpp>
+
+#include "tile/format/tile_address.hpp"
+#include "tile/make/tile_surface.hpp"
+
+namespace terrace::terrain {
+
+/// What all tiles of a zoom have in context.
+struct ZoomPlan {
+  unsigned zoom = 0;
+  double max_error = 0.0;     ///< metres
+  double height_step = 0.0;   ///< a power of two: heights of vertices are multiples of it
+  double longest_edge = 0.0;  ///< degrees: longer ones would cut off too much of the Earth's curve
+  double widest_leaf = 0.0;   ///< degrees: wider parts of a tile with samples are cut in four
+};
+/// surface: for the distance of its samples. range: of heights within any tile of the zoom.
+ZoomPlan plan_zoom(unsigned zoom, double max_error, double range, const TileSurface& surface);
+
+/// A square part of a tile, 1 / 2^depth of it wide. Place x, y counts such parts from the tile's
+/// south-west corner.
+struct TileLeaf {
+  unsigned depth = 0;
+  std::uint32_t x = 0, y = 0;
+};
+/// Units of the tile's lattice at k / 2^depth of its width.
+std::uint32_t leaf_unit(std::uint32_t k, unsigned depth);
+/// Degrees; exact.
+double tile_width(unsigned zoom);
+/// The meridian and the parallel at `units` of a tile's lattice. On a border they are the same
+/// numbers for both tiles.
+double longitude_at(const TileAddress& tile, double units);
+double latitude_at(const TileAddress& tile, double units);
+GeographicBox box_of(const TileAddress& tile, const TileLeaf& leaf);
+
+/// The parts that a tile is meshed in, so that no edge is too long and no part has too many
+/// samples. The smallest may have.
+std::vector<TileLeaf> leaves_of(const TileAddress& tile, const ZoomPlan& plan,
+                                TileSurface& surface);
+
+/// A vertex on the side of a leaf: units of the tile, and multiples of the height step.
+struct TileSideVertex {
+  std::uint32_t u = 0, v = 0;
+  std::int64_t height = 0;
+};
+
+/// Finds the vertices on the sides of a tile's leaves. They depend on the zoom's plan and on the
+/// surface along the side alone, not on the tile or leaf that asks: what neighbours share is equal,
+/// and leaves of different size fit together, because a side is cut wherever a leaf beside it is.
+class TileSides {
+ public:
+  TileSides(const TileAddress& tile, const ZoomPlan& plan, TileSurface& surface);
+
+  /// Counter-clockwise from the south-west corner, each vertex once.
+  std::vector<TileSideVertex> around(const TileLeaf& leaf);
+
+ private:
+  /// A side: from place k to k + 1 of 2^depth along `line` of 2^depth.
+  struct Side {
+    bool along_parallel = false;  ///< from west to east; else from south to north
+    unsigned depth = 0;
+    std::uint32_t line = 0, k = 0;
+  };
+  const std::vector<TileSideVertex>& vertices(const Side& side);
+  std::vector<TileSideVertex> settle(const Side& side);
+  /// Lowest and highest samples within a unit of a place on a side: of those within half a unit, if
+  /// there are some.
+  struct Samples {
+    double low = 0.0, high = 0.0;
+    bool any = false, on = false;
+
+    void add(double height, double units);
+  };
+  using SamplesAt = std::map<double, Samples>;
+  /// Adds to the places at which a side is looked at those of samples that lie on it, and returns
+  /// their heights if the surface wants sides to go through them.
+  SamplesAt add_samples(const Side& side, std::vector<double>& t, std::vector<double>& longitude,
+                        std::vector<double>& latitude);
+  /// Samples in a box around places on a side or at its end, the same for all tiles there; nothing
+  /// if they may be too many.
+  std::optional<SurfaceSamples> samples_near(const GeographicBox& box);
+  /// Of samples at the end of a side: the same for all sides and tiles that meet there.
+  std::optional<Samples> samples_at_corner(double longitude, double latitude);
+  [[nodiscard]] bool is_cut(const Side& side) const;
+  /// Whether a leaf beside a side has too many samples; the same for both tiles.
+  [[nodiscard]] bool is_crowded(const Side& side) const;
+  /// Whether there may be samples within `reach` (degrees) of a side; the same for both tiles.
+  [[nodiscard]] bool is_near_data(const Side& side, double reach) const;
+
+  TileAddress tile_;
+  const ZoomPlan& plan_;
+  TileSurface& surface_;
+  GeographicBox data_;
+  std::map<std::pair<double, double>, std::optional<Samples>> corners_;
+  std::map<std::tuple<bool, unsigned, std::uint32_t, std::uint32_t>, std::vector<TileSideVertex>>
+      known_;
+};
+
+}  // namespace terrace::terrain

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include <terrace/stream/store.hpp>
+
+#include "earth/crs/coordinate_system.hpp"
+#include "earth/geoid_heights.hpp"
+#include "earth/grid_geography.hpp"
+#include "earth/world.hpp"
+#include "surface/raster_fill.hpp"
+#include "surface/store_window.hpp"
+#include "tile/format/tile_address.hpp"
+#include "tile/make/height_blocks.hpp"
+
+namespace terrace::terrain {
+
+/// What all threads know of a raster store that is tiled.
+struct TiledRaster {
+  const stream::Store& store;
+  CoordinateSystem crs;
+  Placement placement;
+  GridGeography geography;
+  EllipsoidalHeights vertical;
+  /// Heights where there is no data: nothing takes those around, else this height in metres.
+  std::optional<double> flat_fill{};
+  /// A sample of this height (in the store's unit) is water; without, one that has no data is.
+  std::optional<double> water_height{};
+
+  RasterFill fill;
+  HeightBlocks blocks;
+  GeographicBox bounds{};
+  double spacing = 0.0;
+  /// Of a raster in degrees: the longitudes that it gives its samples, which may go beyond 180.
+  double first_longitude = 0.0, last_longitude = 0.0;
+  /// Columns run along meridians, rows along parallels, at equal distances.
+  bool upright = false;
+
+  /// Reads the store twice. Throws: stream::Error if no place of it can be told on the globe.
+  TiledRaster(const stream::Store& tiled, CoordinateSystem system, EllipsoidalHeights heights);
+};
+
+/// A place of the lattice, between samples too, in the raster's CRS.
+Point2 world_place(const Placement& placement, double column, double row);
+/// Longitudes in [-180, 180], whatever turn they were in.
+double wrapped(double longitude);
+/// Places on the globe to those of the raster's lattice, in place.
+void find_on_lattice(const TiledRaster& raster, std::span<Point2> places);
+/// Of the raster, with all samples in the box; empty if there is none.
+LatticeWindow window_around(const TiledRaster& raster, const GeographicBox& box);
+
+}  // namespace terrace::terrain

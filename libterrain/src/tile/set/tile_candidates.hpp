@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <vector>
+
+#include "tile/format/tile_address.hpp"
+#include "tile/make/tile_surface.hpp"
+
+namespace terrace::terrain {
+
+/// The tiles of a zoom that may have samples, sorted by row, then column. Found from zoom 0 down,
+/// so that it costs by these tiles, however far apart the samples lie.
+std::vector<TileAddress> tiles_with_samples(TileSurface& surface, unsigned zoom);
+
+}  // namespace terrace::terrain

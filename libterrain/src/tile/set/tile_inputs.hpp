@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "tile/format/tile_address.hpp"
+#include "tile/make/tile_mesher.hpp"
+#include "tile/make/tile_sides.hpp"
+#include "tile/make/tile_surface.hpp"
+
+namespace terrace::terrain {
+
+/// What the bytes of a tile depend on besides its zoom's plan and the surface.
+struct TileInputs {
+  TileMeshOptions mesh;
+  bool gzip = false;
+  std::string source_options;  ///< of the command line, that the surface depends on
+  std::string metadata;        ///< of this tile
+};
+
+/// All places at which make_tile() may ask a surface about: the tile and what lies around it. May
+/// reach beyond 180 degrees and the poles.
+GeographicBox reach_of(const TileAddress& tile, const TileSurface& surface);
+
+/// A number of all that a tile's bytes, or that it has no data, depend on: if it is the same as of
+/// an earlier tile, that one need not be made again.
+std::uint64_t digest_of(const TileAddress& tile, const ZoomPlan& plan, const TileInputs& inputs,
+                        TileSurface& surface);
+
+/// A number of the bytes of a file. Throws: stream::Error if it cannot be read.
+std::uint64_t digest_of_file(const std::string& path);
+
+}  // namespace terrace::terrain

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <fstream>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tile/format/tile_address.hpp"
+
+namespace terrace::terrain {
+
+/// What is known of a finished tile.
+struct FinishedTile {
+  std::uint64_t bytes = 0;  ///< of its file; 0: there is no such tile, because it has no data
+  std::uint64_t checksum = 0;
+  std::uint64_t inputs = 0;  ///< TileInputs::digest: of all that its bytes depend on
+  double max_error = 0.0;    ///< metres
+
+  friend bool operator==(const FinishedTile&, const FinishedTile&) = default;
+};
+
+/// A checksum of 64 bits: FNV-1a.
+std::uint64_t checksum_of(std::span<const std::byte> bytes);
+
+/// The file in the folder of a tile set that says which tiles are finished and what they were made
+/// from. It is there while the set is made, so that an interrupted run can go on, and stays, so
+/// that a later run makes only what changed. One line per tile; of several lines of a tile the last
+/// counts. A line that is cut short, as a crash leaves it, ends what is believed; what is believed
+/// is checked against the tile's file anyhow.
+class TileJournal {
+ public:
+  static constexpr const char* kName = ".terrace-tiles";
+  using Record = std::pair<TileAddress, FinishedTile>;
+
+  /// Reads the journal in the folder, if there is one that this version wrote, and goes on with it;
+  /// else begins a new one. Memory: 48 bytes per tile. Throws: stream::Error.
+  explicit TileJournal(const std::string& folder);
+
+  /// What an earlier run has finished; nullptr if not this tile.
+  [[nodiscard]] const FinishedTile* find(const TileAddress& tile) const;
+  /// Of a tile that is not known as such yet.
+  void add(const TileAddress& tile, const FinishedTile& finished);
+  /// Replaces all lines by these, sorted by address, if they say anything else. Nothing is added
+  /// after that. Throws: stream::Error.
+  void finish(std::vector<Record> records);
+
+ private:
+  std::string path_;
+  std::vector<Record> earlier_;  ///< sorted by address
+  bool tidy_ = true;             ///< the file holds these, in this order
+  std::ofstream file_;
+};
+
+/// The records of a finished set, sorted by address; none where there is no journal that this
+/// version can read.
+std::vector<TileJournal::Record> read_tile_records(const std::string& folder);
+
+}  // namespace terrace::terrain

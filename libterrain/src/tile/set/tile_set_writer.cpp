@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tile/set/tile_set_writer.hpp"
+
+#include <algorithm>
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+#include <terrace/stream/error.hpp>
+#include <terrace/stream/gzip.hpp>
+
+#include "base/interrupt.hpp"
+#include "base/ordered_work.hpp"
+#include "base/progress_report.hpp"
+#include "tile/set/tile_candidates.hpp"
+#include "tile/set/tile_file.hpp"
+#include "tile/set/tile_inputs.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Tiles that may have data, sorted by row, then column. The two of zoom 0 always count.
+std::vector<TileAddress> candidates(unsigned zoom, TileSurface& surface) {
+  if (zoom == 0) return {{0, 0, 0}, {0, 1, 0}};
+  return tiles_with_samples(surface, zoom);
+}
+
+/// The largest difference of heights within a tile, as far as it is known without reading.
+double widest_range(const std::vector<TileAddress>& tiles, TileSurface& surface) {
+  double widest = 0.0;
+  for (const TileAddress& tile : tiles) {
+    if (const auto range = surface.range(box_of(tile))) {
+      widest = std::max(widest, range->high - range->low);
+    }
+  }
+  return widest;
+}
+
+/// The tiles of the next zoom below a tile, as its metadata tells them.
+std::string children_json(const TileAddress& tile, const std::set<TileAddress>& deeper) {
+  std::vector<TileAddress> there;
+  for (std::uint32_t y = 2 * tile.y; y <= 2 * tile.y + 1; ++y) {
+    for (std::uint32_t x = 2 * tile.x; x <= 2 * tile.x + 1; ++x) {
+      if (deeper.contains({tile.zoom + 1, x, y})) there.push_back({tile.zoom + 1, x, y});
+    }
+  }
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const TileRange& range : ranges_of(there)) {
+    list.push_back(
+        {{"startX", range.x0}, {"startY", range.y0}, {"endX", range.x1}, {"endY", range.y1}});
+  }
+  return nlohmann::ordered_json{{"available", {list}}}.dump();
+}
+
+}  // namespace
+
+void TileSetWriter::begin_change() {
+  std::call_once(changed_, [this] {
+    std::error_code error;
+    fs::remove(layer_path_, error);
+    if (error) throw stream::system_error(layer_path_, "cannot be removed", error.value());
+    // Not to be there again after a power cut that tiles have survived.
+    sync_names(options_.folder);
+  });
+}
+
+TileSetWriter::Written TileSetWriter::write_tile(const TileAddress& tile, const ZoomPlan& plan,
+                                                 TileSurface& surface) {
+  check_interrupt();
+  TileInputs inputs{options_.mesh, options_.gzip, options_.source_options, {}};
+  if (options_.metadata) inputs.metadata = children_json(tile, deeper_);
+  const std::uint64_t digest = digest_of(tile, plan, inputs, surface);
+  const std::string path = options_.folder + "/" + tile_path(tile);
+  std::vector<std::byte> before;
+  if (const FinishedTile* earlier = journal_.find(tile);
+      earlier != nullptr && earlier->inputs == digest) {
+    if (earlier->bytes == 0) return {false, true, *earlier};
+    before = read_tile_file(path);
+    if (before.size() == earlier->bytes && checksum_of(before) == earlier->checksum) {
+      return {false, true, *earlier};
+    }
+  }
+  MadeTile made = make_tile(tile, plan, surface, options_.mesh);
+  if (!made.has_data && tile.zoom > 0) return {true, true, {.inputs = digest}};
+  made.mesh.metadata = std::move(inputs.metadata);
+  std::vector<std::byte> bytes = encode_tile(made.mesh, made.header);
+  if (options_.gzip) bytes = stream::gzip(bytes);
+  if (before.empty()) before = read_tile_file(path);
+  const Written written{
+      true, bytes == before, {bytes.size(), checksum_of(bytes), digest, made.max_error}};
+  if (!written.kept) {
+    begin_change();
+    write_tile_file(path, bytes);
+  }
+  return written;
+}
+
+void TileSetWriter::write_tiles(const ZoomPlan& plan, const std::vector<TileAddress>& tiles) {
+  std::vector<TileAddress> there;
+  std::vector<TileJournal::Record> records;
+  ZoomSummary summary{.zoom = plan.zoom};
+  TileSetResult added;
+  ProgressReport report(context_, "tiles");
+  in_order(
+      tiles.size(), static_cast<unsigned>(surfaces_.size()),
+      [&](unsigned worker, std::size_t i) {
+        return write_tile(tiles[i], plan, *surfaces_[worker]);
+      },
+      [&](std::size_t i, const Written& written) {
+        report.update(result.tiles + i,
+                      static_cast<double>(i + 1) / static_cast<double>(tiles.size()));
+        if (written.made) journal_.add(tiles[i], written.finished);
+        records.emplace_back(tiles[i], written.finished);
+        if (written.finished.bytes == 0) return;
+        there.push_back(tiles[i]);
+        added.bytes += written.finished.bytes;
+        added.made += written.made ? 1 : 0;
+        added.kept += written.kept ? 1 : 0;
+        summary.max_error = std::max(summary.max_error, written.finished.max_error);
+      });
+  summary.tiles = there.size();
+  result.tiles += there.size();
+  result.bytes += added.bytes;
+  result.made += added.made;
+  result.kept += added.kept;
+  result.zooms.insert(result.zooms.begin(), summary);
+  records_.insert(records_.end(), records.begin(), records.end());
+  deeper_ = {there.begin(), there.end()};
+  present[plan.zoom] = std::move(there);
+}
+
+void TileSetWriter::write_zoom(unsigned zoom) {
+  TileSurface& surface = *surfaces_.front();
+  const std::vector<TileAddress> tiles = candidates(zoom, surface);
+  // A quarter more, for what is filled beside the samples.
+  double range = 1.25 * widest_range(tiles, surface);
+  for (;;) {
+    try {
+      write_tiles(plan_zoom(zoom, max_error_of(options_, zoom), range, surface), tiles);
+      return;
+    } catch (const HeightsTooFar&) {
+      if (range > 1e7) {
+        throw stream::Error({.file = options_.folder,
+                             .where = "zoom " + std::to_string(zoom),
+                             .cause = "heights beyond 10,000 km have no place on a globe",
+                             .remedy = "look at the unit and the nodata value of the source"});
+      }
+      range = std::max(1.0, 2.0 * range);
+    }
+  }
+}
+
+void TileSetWriter::remove_others() {
+  std::vector<fs::path> gone, torn;
+  for (const auto& entry : fs::recursive_directory_iterator(options_.folder)) {
+    if (!entry.is_regular_file()) continue;
+    const std::string name = entry.path().lexically_relative(options_.folder).generic_string();
+    if (is_torn_tile(name)) torn.push_back(entry.path());
+    const auto tile = parse_tile_path(name);
+    if (!tile) continue;
+    const auto by_row = [](const TileAddress& a, const TileAddress& b) {
+      return a.y != b.y ? a.y < b.y : a.x < b.x;
+    };
+    if (tile->zoom >= present.size() ||
+        !std::binary_search(present[tile->zoom].begin(), present[tile->zoom].end(), *tile,
+                            by_row)) {
+      gone.push_back(entry.path());
+    }
+  }
+  if (!gone.empty()) begin_change();
+  const auto remove = [](const fs::path& path) {
+    fs::remove(path);
+    // Fails on folders that are not empty, as it should.
+    std::error_code ignored;
+    if (fs::remove(path.parent_path(), ignored)) {
+      fs::remove(path.parent_path().parent_path(), ignored);
+    }
+  };
+  std::ranges::for_each(gone, remove);
+  std::ranges::for_each(torn, remove);
+  result.removed = gone.size();
+}
+
+void TileSetWriter::finish() {
+  remove_others();
+  sync_files(options_.folder);
+  journal_.finish(std::move(records_));
+}
+
+}  // namespace terrace::terrain

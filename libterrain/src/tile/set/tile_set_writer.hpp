@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "terrace/terrain/context.hpp"
+#include "tile/set/tile_journal.hpp"
+#include "tile/set/tile_set.hpp"
+
+namespace terrace::terrain {
+
+/// Writes the tiles of one folder, zoom by zoom. What is there, whole and made from the same is
+/// kept; before anything changes, `layer.json` goes: until the set is whole again it is none.
+class TileSetWriter {
+ public:
+  TileSetWriter(const std::vector<std::unique_ptr<TileSurface>>& surfaces,
+                const TileSetOptions& options, const Context& context,
+                const std::string& layer_path)
+      : surfaces_(surfaces),
+        options_(options),
+        context_(context),
+        layer_path_(layer_path),
+        journal_(options.folder) {
+    present.resize(options.last_zoom + 1);
+  }
+
+  /// The deepest first: its tiles are named in the metadata of those above.
+  void write_zoom(unsigned zoom);
+  /// After all zooms: removes tiles of an earlier set that this one does not have and what killed
+  /// runs were writing, and has the journal say what is there.
+  void finish();
+
+  TileSetResult result;
+  std::vector<std::vector<TileAddress>> present;  ///< per zoom, sorted by row, then column
+
+ private:
+  /// What became of a tile.
+  struct Written {
+    bool made = false;  ///< else it was known already
+    bool kept = false;  ///< its file was not touched
+    FinishedTile finished;
+  };
+  void write_tiles(const ZoomPlan& plan, const std::vector<TileAddress>& tiles);
+  Written write_tile(const TileAddress& tile, const ZoomPlan& plan, TileSurface& surface);
+  void remove_others();
+  void begin_change();
+
+  const std::vector<std::unique_ptr<TileSurface>>& surfaces_;
+  const TileSetOptions& options_;
+  const Context& context_;
+  const std::string& layer_path_;
+  TileJournal journal_;
+  std::vector<TileJournal::Record> records_;
+  std::set<TileAddress> deeper_;
+  std::once_flag changed_;
+};
+
+}  // namespace terrace::terrain

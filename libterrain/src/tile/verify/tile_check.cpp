@@ -1,0 +1,255 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tile/verify/tile_check.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <map>
+#include <span>
+#include <string_view>
+#include <utility>
+
+#include <terrace/stream/error.hpp>
+
+#include "base/interrupt.hpp"
+#include "base/ordered_work.hpp"
+#include "base/progress_report.hpp"
+#include "base/units.hpp"
+#include "tile/format/tile_layer.hpp"
+#include "tile/set/tile_candidates.hpp"
+#include "tile/set/tile_file.hpp"
+#include "tile/set/tile_journal.hpp"
+#include "tile/verify/tile_borders.hpp"
+#include "tile/verify/tile_height_check.hpp"
+#include "tile/verify/tile_inventory.hpp"
+#include "tile/verify/tile_mesh_check.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+/// Metres by which rounding may exceed a bound: samples are placed on the globe to a hundredth of a
+/// millimetre.
+constexpr double kHeightSlack = 1e-4;
+
+/// A tile that was looked at.
+struct Checked {
+  bool decoded = false;
+  std::vector<TileFault> faults;
+  TileBorders borders;
+  TileHeights heights;
+};
+
+/// The number in "byte 17" of a message.
+std::uint64_t byte_of(std::string_view where) {
+  std::uint64_t byte = 0;
+  if (where.starts_with("byte "))
+    std::from_chars(where.data() + 5, where.data() + where.size(), byte);
+  return byte;
+}
+
+class SetCheck {
+ public:
+  SetCheck(const TileCheckOptions& options, TileLayer layer, unsigned threads,
+           const std::vector<std::unique_ptr<TileSurface>>& surfaces, const Context& context)
+      : options_(options),
+        layer_(std::move(layer)),
+        threads_(threads),
+        surfaces_(surfaces),
+        context_(context),
+        records_(read_tile_records(options.folder)) {}
+
+  /// Of all zooms together, so that the few large tiles of the upper ones share the threads.
+  void tiles(const std::vector<TileAddress>& tiles);
+  /// tiles: of one zoom.
+  void absent(unsigned zoom, const std::vector<TileAddress>& tiles);
+
+  TileCheckResult result;
+
+ private:
+  [[nodiscard]] std::string path_of(const TileAddress& tile) const {
+    return options_.folder + "/" + tile_path(tile);
+  }
+  [[nodiscard]] double bound_of(unsigned zoom) const;
+  [[nodiscard]] bool is_as_written(const TileAddress& tile, std::span<const std::byte> bytes) const;
+  [[nodiscard]] Checked check(const TileAddress& tile, unsigned worker) const;
+  void compare(const TileAddress& tile, const char* side, const BorderSide& own,
+               const TileAddress& neighbour, const BorderSide& other);
+  void add(unsigned zoom, const TileHeights& heights);
+
+  const TileCheckOptions& options_;
+  TileLayer layer_;
+  unsigned threads_;
+  const std::vector<std::unique_ptr<TileSurface>>& surfaces_;
+  const Context& context_;
+  std::vector<TileJournal::Record> records_;  ///< what was written, where that is known
+};
+
+double SetCheck::bound_of(unsigned zoom) const {
+  if (options_.max_error) {
+    return std::ldexp(*options_.max_error, static_cast<int>(layer_.last_zoom - zoom));
+  }
+  return zoom < layer_.max_errors.size() ? layer_.max_errors[zoom] : expected_error(zoom);
+}
+
+bool SetCheck::is_as_written(const TileAddress& tile, std::span<const std::byte> bytes) const {
+  const auto record = std::lower_bound(
+      records_.begin(), records_.end(), tile,
+      [](const TileJournal::Record& a, const TileAddress& b) { return a.first < b; });
+  if (record == records_.end() || record->first != tile) return true;
+  return record->second.bytes == bytes.size() && record->second.checksum == checksum_of(bytes);
+}
+
+Checked SetCheck::check(const TileAddress& tile, unsigned worker) const {
+  check_interrupt();
+  Checked checked;
+  DecodedTile decoded;
+  try {
+    const std::string path = path_of(tile);
+    const std::vector<std::byte> bytes = read_tile_file(path);
+    if (!is_as_written(tile, bytes)) {
+      checked.faults.push_back({0, "not the bytes that were written: its checksum is another one"});
+    }
+    decoded = unpack_tile(bytes, path);
+  } catch (const stream::Error& error) {
+    checked.faults.push_back({byte_of(error.parts().where), error.parts().cause});
+    return checked;
+  }
+  checked.decoded = true;
+  for (TileFault& fault : check_tile_mesh(tile, decoded, layer_.extensions)) {
+    checked.faults.push_back(std::move(fault));
+  }
+  checked.borders = borders_of(decoded.mesh);
+  if (surfaces_.empty()) return checked;
+  checked.heights = measure_tile(tile, decoded.mesh, *surfaces_[worker]);
+  const TileHeights& heights = checked.heights;
+  if (heights.uncovered > 0) {
+    checked.faults.push_back(
+        {0, with_commas(heights.uncovered) + " samples of the store lie over no triangle"});
+  }
+  const double bound = bound_of(tile.zoom);
+  if (heights.max_error > bound * (1.0 + 1e-9) + kHeightSlack) {
+    checked.faults.push_back({0, "the sample at " + readable_number(heights.longitude, 10) + ", " +
+                                     readable_number(heights.latitude, 10) + " is " +
+                                     readable_number(heights.max_error) +
+                                     " m off the tile, more than " + readable_number(bound) +
+                                     " m"});
+  }
+  return checked;
+}
+
+void SetCheck::compare(const TileAddress& tile, const char* side, const BorderSide& own,
+                       const TileAddress& neighbour, const BorderSide& other) {
+  const std::string what = misfit(own, other);
+  if (what.empty()) return;
+  result.problems.push_back(
+      {path_of(tile), 0,
+       std::string("its ") + side + " side and that of " + tile_path(neighbour) + " have " + what});
+}
+
+void SetCheck::tiles(const std::vector<TileAddress>& tiles) {
+  // Northern sides of the row below and of this row, by column, the eastern side of the tile before
+  // this one, and the western one of the row's first tile, which is beside the last.
+  std::map<std::uint32_t, BorderSide> below, row;
+  BorderSide before, first;
+  std::optional<TileAddress> last;
+  ProgressReport report(context_, "tiles");
+  in_order(
+      tiles.size(), threads_,
+      [&](unsigned worker, std::size_t i) { return check(tiles[i], worker); },
+      [&](std::size_t i, Checked&& checked) {
+        const TileAddress& tile = tiles[i];
+        for (TileFault& fault : checked.faults) {
+          result.problems.push_back({path_of(tile), fault.offset, std::move(fault.what)});
+        }
+        if (!last || last->zoom != tile.zoom || last->y != tile.y) {
+          const bool next = last && last->zoom == tile.zoom && last->y + 1 == tile.y;
+          below = next ? std::move(row) : std::map<std::uint32_t, BorderSide>{};
+          row.clear();
+          before.clear();
+          first.clear();
+        }
+        if (checked.decoded) {
+          if (!before.empty() && last && last->x + 1 == tile.x) {
+            compare(tile, "western", checked.borders.west, *last, before);
+          }
+          if (const auto under = below.find(tile.x); under != below.end()) {
+            compare(tile, "southern", checked.borders.south, {tile.zoom, tile.x, tile.y - 1},
+                    under->second);
+          }
+          if (!first.empty() && tile.x + 1 == tile_columns(tile.zoom)) {
+            compare(tile, "eastern", checked.borders.east, {tile.zoom, 0, tile.y}, first);
+          }
+          if (tile.x == 0) first = std::move(checked.borders.west);
+          row[tile.x] = std::move(checked.borders.north);
+        }
+        before = std::move(checked.borders.east);
+        last = tile;
+        add(tile.zoom, checked.heights);
+        report.update(i + 1, static_cast<double>(i + 1) / static_cast<double>(tiles.size()));
+      });
+}
+
+void SetCheck::add(unsigned zoom, const TileHeights& heights) {
+  ZoomCheck& sum = result.zooms[zoom];
+  ++sum.tiles;
+  sum.samples += heights.samples;
+  sum.uncovered += heights.uncovered;
+  sum.max_error = std::max(sum.max_error, heights.max_error);
+  ++result.tiles;
+  result.samples += heights.samples;
+}
+
+void SetCheck::absent(unsigned zoom, const std::vector<TileAddress>& tiles) {
+  TileSurface& surface = *surfaces_.front();
+  auto at = tiles.begin();
+  for (const TileAddress& tile : tiles_with_samples(surface, zoom)) {
+    while (at != tiles.end() && (at->y < tile.y || (at->y == tile.y && at->x < tile.x))) ++at;
+    if (at != tiles.end() && *at == tile) continue;
+    const std::uint64_t samples = count_samples(tile, surface);
+    if (samples > 0) {
+      result.problems.push_back(
+          {path_of(tile), 0, "no tile where the store has " + with_commas(samples) + " samples"});
+    }
+  }
+}
+
+}  // namespace
+
+bool is_tile_folder(const std::string& folder) {
+  return std::filesystem::exists(folder + "/layer.json") ||
+         std::filesystem::exists(folder + "/" + TileJournal::kName);
+}
+
+TileCheckResult check_tile_set(const TileCheckOptions& options, unsigned threads,
+                               const std::vector<std::unique_ptr<TileSurface>>& surfaces,
+                               const Context& context) {
+  const std::string layer_path = options.folder + "/layer.json";
+  if (!std::filesystem::exists(layer_path)) {
+    throw stream::Error({.file = options.folder,
+                         .where = {},
+                         .cause = "holds a tile set that was begun and not finished",
+                         .remedy = "finish it first: terrace tile with --resume"});
+  }
+  TileLayer layer = read_layer(layer_path);
+  TileInventory inventory = take_inventory(options.folder, layer);
+  const unsigned first = layer.first_zoom;
+  SetCheck check(options, std::move(layer), threads, surfaces, context);
+  check.result.problems = std::move(inventory.problems);
+  check.result.torn = inventory.torn;
+  std::vector<TileAddress> all;
+  for (unsigned zoom = 0; zoom < inventory.tiles.size(); ++zoom) {
+    check.result.zooms.push_back({.zoom = zoom});
+    all.insert(all.end(), inventory.tiles[zoom].begin(), inventory.tiles[zoom].end());
+  }
+  check.tiles(all);
+  if (!surfaces.empty()) {
+    for (unsigned zoom = first; zoom < inventory.tiles.size(); ++zoom) {
+      check.absent(zoom, inventory.tiles[zoom]);
+    }
+  }
+  check.result.zooms.erase(check.result.zooms.begin(), check.result.zooms.begin() + first);
+  return std::move(check.result);
+}
+
+}  // namespace terrace::terrain

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <terrace/stream/store.hpp>
+
+#include "terrace/terrain/context.hpp"
+#include "tile/make/tile_surface.hpp"
+
+namespace terrace::terrain {
+
+struct TileCheckOptions {
+  std::string folder;
+  /// The bound at the deepest zoom, metres, twice as much at each zoom above; without, what
+  /// layer.json states, or else what globes expect of each zoom.
+  std::optional<double> max_error;
+};
+
+struct ZoomCheck {
+  unsigned zoom = 0;
+  std::uint64_t tiles = 0;      ///< that are there
+  std::uint64_t samples = 0;    ///< in its tiles; those on borders of tiles in each of them
+  std::uint64_t uncovered = 0;  ///< of these, such as lie on no triangle: they have no error
+  double max_error = 0.0;       ///< metres; 0 if none was measured
+};
+
+struct TileCheckResult {
+  std::vector<stream::Problem> problems;  ///< of layer.json, then by zoom, row, column
+  std::uint64_t tiles = 0, samples = 0;
+  std::uint64_t torn = 0;  ///< files that a killed run was writing: harmless
+  std::vector<ZoomCheck> zooms;
+};
+
+/// Whether `folder` is one of tiles, whole or begun.
+bool is_tile_folder(const std::string& folder);
+
+/// Decodes and checks every tile of a set: layer.json against the files, each tile by itself
+/// (check_tile_mesh), its bytes against the checksum in the journal where there is one, the sides
+/// that neighbours share, across the line of 180 degrees too, and the heights against every sample
+/// of `surfaces` if there are any (all of the same samples, one per thread). Depends on the files
+/// alone, not on the number of threads. Memory: of one row of tiles' borders, and of a tile and a
+/// part of its samples per thread. Throws: stream::Error if layer.json cannot be read or the store
+/// is damaged; Interrupted.
+TileCheckResult check_tile_set(const TileCheckOptions& options, unsigned threads,
+                               const std::vector<std::unique_ptr<TileSurface>>& surfaces,
+                               const Context& context);
+
+}  // namespace terrace::terrain

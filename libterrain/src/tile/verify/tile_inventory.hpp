@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <terrace/stream/store.hpp>
+
+#include "tile/format/tile_address.hpp"
+#include "tile/format/tile_layer.hpp"
+
+namespace terrace::terrain {
+
+/// What of a tile set lies in its folder.
+struct TileInventory {
+  /// Per zoom the tiles that are there, sorted by row, then column.
+  std::vector<std::vector<TileAddress>> tiles;
+  std::vector<stream::Problem> problems;
+  /// Files that a killed run was writing: beside the set, not in it.
+  std::uint64_t torn = 0;
+};
+
+/// Compares layer.json with the files: each tile that it names is there, each that is there is
+/// named once. Throws: stream::Error if the folder cannot be read.
+TileInventory take_inventory(const std::string& folder, const TileLayer& layer);
+
+}  // namespace terrace::terrain

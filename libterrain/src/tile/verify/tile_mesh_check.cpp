@@ -1,0 +1,257 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tile/verify/tile_mesh_check.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "base/units.hpp"
+#include "base/vector.hpp"
+#include "tile/format/quantized_mesh_layout.hpp"
+#include "tile/make/tile_sides.hpp"
+#include "tile/verify/tile_header_check.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+using stream::Point3;
+
+/// Of a normal's upward part: a normal has 2 x 8 bits.
+constexpr double kNormalSlack = 0.02;
+
+class MeshCheck {
+ public:
+  MeshCheck(const TileAddress& address, const DecodedTile& tile)
+      : address_(address), tile_(tile), mesh_(tile.mesh) {
+    const std::size_t n = mesh_.size();
+    index_size_ = n > kMostShortVertices ? 4 : 2;
+    triangles_at_ = kVerticesAt + 4 + 6 * n;
+    if (index_size_ == 4) triangles_at_ = (triangles_at_ + 3) / 4 * 4;
+    edges_at_ = triangles_at_ + 4 + 3 * index_size_ * mesh_.triangles.size();
+    extensions_at_ = edges_at_ + 16 +
+                     index_size_ * (tile.edges.west.size() + tile.edges.south.size() +
+                                    tile.edges.east.size() + tile.edges.north.size());
+  }
+
+  void triangles();
+  void cover();
+  void vertices();
+  void edges();
+  void normals();
+  void extensions(const std::vector<std::string>& wanted);
+
+  std::vector<TileFault> faults;
+
+ private:
+  static constexpr std::uint64_t kVerticesAt = 88;
+
+  void fault(std::uint64_t offset, std::string what) {
+    faults.push_back({offset, std::move(what)});
+  }
+  [[nodiscard]] std::uint64_t triangle_at(std::size_t t) const {
+    return triangles_at_ + 4 + 3 * index_size_ * t;
+  }
+  [[nodiscard]] std::int64_t twice_area(std::size_t t) const {
+    const auto& [a, b, c] = mesh_.triangles[t];
+    const auto u = [this](std::uint32_t v) { return std::int64_t{mesh_.u[v]}; };
+    const auto v = [this](std::uint32_t w) { return std::int64_t{mesh_.v[w]}; };
+    return (u(b) - u(a)) * (v(c) - v(a)) - (u(c) - u(a)) * (v(b) - v(a));
+  }
+  [[nodiscard]] bool on_border(std::uint32_t a, std::uint32_t b) const {
+    const auto same = [&](const std::vector<std::uint16_t>& c) {
+      return c[a] == c[b] && (c[a] == 0 || c[a] == kTileUnits);
+    };
+    return same(mesh_.u) || same(mesh_.v);
+  }
+
+  const TileAddress& address_;
+  const DecodedTile& tile_;
+  const TileMesh& mesh_;
+  std::uint64_t index_size_ = 0, triangles_at_ = 0, edges_at_ = 0, extensions_at_ = 0;
+};
+
+/// "triangle 5 ..." or "7 triangles ..., first triangle 5".
+std::string counted(std::uint64_t count, const std::string& kind, std::uint64_t first,
+                    const std::string& what) {
+  if (count == 1) return kind + " " + std::to_string(first) + " " + what;
+  return kind + " " + std::to_string(first) + " and " + with_commas(count - 1) + " more " + what;
+}
+
+void MeshCheck::triangles() {
+  std::uint64_t turned = 0, empty = 0, first_turned = 0, first_empty = 0;
+  std::int64_t sum = 0;
+  for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
+    const std::int64_t area = twice_area(t);
+    sum += area;
+    if (area < 0 && turned++ == 0) first_turned = t;
+    if (area == 0 && empty++ == 0) first_empty = t;
+  }
+  if (turned > 0) {
+    fault(triangle_at(first_turned),
+          counted(turned, "triangle", first_turned, "not counter-clockwise as seen from above"));
+  }
+  if (empty > 0) {
+    fault(triangle_at(first_empty), counted(empty, "triangle", first_empty, "without area"));
+  }
+  constexpr std::int64_t kWhole = 2 * std::int64_t{kTileUnits} * kTileUnits;
+  if (sum != kWhole) {
+    fault(triangles_at_,
+          "the triangles have " +
+              readable_number(static_cast<double>(sum) / static_cast<double>(kWhole)) +
+              " times the area of the tile");
+  }
+}
+
+void MeshCheck::cover() {
+  // Directed edges: each at most once, and its opposite beside it unless on a border. With whole
+  // area and no turned triangle that is a cover without overlap.
+  struct Edge {
+    std::uint32_t low, high;
+    bool forward;
+    std::uint32_t triangle;
+  };
+  std::vector<Edge> edges;
+  edges.reserve(3 * mesh_.triangles.size());
+  for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
+    for (unsigned k = 0; k < 3; ++k) {
+      const std::uint32_t a = mesh_.triangles[t][k], b = mesh_.triangles[t][(k + 1) % 3];
+      edges.push_back({std::min(a, b), std::max(a, b), a < b, t});
+    }
+  }
+  std::sort(edges.begin(), edges.end(), [](const Edge& a, const Edge& b) {
+    if (a.low != b.low) return a.low < b.low;
+    if (a.high != b.high) return a.high < b.high;
+    return a.triangle < b.triangle;
+  });
+  std::uint64_t open = 0, crowded = 0;
+  std::uint32_t first_open = 0, first_crowded = 0;
+  for (std::size_t i = 0; i < edges.size();) {
+    std::size_t end = i, forward = 0;
+    for (; end < edges.size() && edges[end].low == edges[i].low && edges[end].high == edges[i].high;
+         ++end) {
+      forward += edges[end].forward ? 1 : 0;
+    }
+    const std::size_t count = end - i;
+    const bool border = on_border(edges[i].low, edges[i].high);
+    if (count == 1 && !border) {
+      first_open = open++ == 0 ? edges[i].triangle : std::min(first_open, edges[i].triangle);
+    } else if (count > 2 || (count == 2 && (border || forward != 1))) {
+      first_crowded =
+          crowded++ == 0 ? edges[i].triangle : std::min(first_crowded, edges[i].triangle);
+    }
+    i = end;
+  }
+  if (open > 0) {
+    fault(triangle_at(first_open), with_commas(open) +
+                                       " edges inside the tile have one triangle only, the first "
+                                       "at triangle " +
+                                       std::to_string(first_open));
+  }
+  if (crowded > 0) {
+    fault(triangle_at(first_crowded), with_commas(crowded) +
+                                          " edges have two triangles on one side, the first at "
+                                          "triangle " +
+                                          std::to_string(first_crowded));
+  }
+}
+
+void MeshCheck::vertices() {
+  std::vector<bool> used(mesh_.size());
+  for (const auto& t : mesh_.triangles) {
+    for (const std::uint32_t vertex : t) used[vertex] = true;
+  }
+  const auto unused = static_cast<std::uint64_t>(std::count(used.begin(), used.end(), false));
+  if (unused > 0) {
+    const auto first =
+        static_cast<std::uint64_t>(std::find(used.begin(), used.end(), false) - used.begin());
+    fault(kVerticesAt + 4 + 2 * first, counted(unused, "vertex", first, "in no triangle"));
+  }
+  for (unsigned corner = 0; corner < 4; ++corner) {
+    const std::uint16_t u = (corner & 1) != 0 ? kTileUnits : 0;
+    const std::uint16_t v = (corner & 2) != 0 ? kTileUnits : 0;
+    bool there = false;
+    for (std::size_t i = 0; i < mesh_.size() && !there; ++i) {
+      there = mesh_.u[i] == u && mesh_.v[i] == v;
+    }
+    if (!there) {
+      fault(kVerticesAt, std::string("no vertex in the ") + (v == 0 ? "south-" : "north-") +
+                             (u == 0 ? "west" : "east") + " corner");
+    }
+  }
+}
+
+void MeshCheck::edges() {
+  const TileEdges expected = edges_of(mesh_);
+  std::uint64_t at = edges_at_;
+  const auto compare = [&](const char* name, std::vector<std::uint32_t> list,
+                           std::vector<std::uint32_t> right) {
+    if (list != right) {
+      const std::uint64_t size = list.size();
+      std::sort(list.begin(), list.end());
+      std::sort(right.begin(), right.end());
+      fault(at, std::string("the list of vertices on the ") + name + " side " +
+                    (list == right ? "is not sorted along it"
+                                   : "has " + with_commas(size) + " entries that are not its " +
+                                         with_commas(right.size()) + " vertices"));
+    }
+    at += 4 + index_size_ * list.size();
+  };
+  compare("west", tile_.edges.west, expected.west);
+  compare("south", tile_.edges.south, expected.south);
+  compare("east", tile_.edges.east, expected.east);
+  compare("north", tile_.edges.north, expected.north);
+}
+
+void MeshCheck::normals() {
+  std::uint64_t downward = 0, first = 0;
+  for (std::size_t i = 0; i < mesh_.normals.size(); ++i) {
+    const auto& n = mesh_.normals[i];
+    const Point3 normal{static_cast<double>(n[0]), static_cast<double>(n[1]),
+                        static_cast<double>(n[2])};
+    const Point3 up =
+        local_frame(longitude_at(address_, mesh_.u[i]), latitude_at(address_, mesh_.v[i])).up;
+    // Written so that NaN is a fault.
+    const bool good = std::abs(dot(normal, normal) - 1.0) < 1e-3 && dot(normal, up) > -kNormalSlack;
+    if (!good && downward++ == 0) first = i;
+  }
+  if (downward > 0) {
+    fault(extensions_at_, counted(downward, "vertex", first, "with a normal that points downward"));
+  }
+}
+
+void MeshCheck::extensions(const std::vector<std::string>& wanted) {
+  const auto compare = [&](const char* name, bool there) {
+    const bool promised = std::find(wanted.begin(), wanted.end(), name) != wanted.end();
+    if (promised == there) return;
+    fault(extensions_at_,
+          std::string("the extension ") + name +
+              (there ? " is not among those of layer.json" : " of layer.json is not there"));
+  };
+  compare("octvertexnormals", !mesh_.normals.empty());
+  compare("watermask", !mesh_.water.empty());
+  compare("metadata", !mesh_.metadata.empty());
+  if (!mesh_.metadata.empty() && !nlohmann::json::accept(mesh_.metadata)) {
+    fault(extensions_at_, "the metadata is no JSON");
+  }
+}
+
+}  // namespace
+
+std::vector<TileFault> check_tile_mesh(const TileAddress& address, const DecodedTile& tile,
+                                       const std::vector<std::string>& extensions) {
+  MeshCheck check(address, tile);
+  if (tile.mesh.size() == 0) return {{88, "no vertex"}};
+  check.faults = check_tile_header(address, tile);
+  check.vertices();
+  check.triangles();
+  check.cover();
+  check.edges();
+  check.normals();
+  check.extensions(extensions);
+  return std::move(check.faults);
+}
+
+}  // namespace terrace::terrain

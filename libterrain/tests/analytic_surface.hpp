@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "base/digest.hpp"
+#include "tile/make/tile_surface.hpp"
+
+namespace terrace::terrain {
+
+using namespace terrain;
+
+/// Samples of a function on a lattice of longitudes and latitudes, for tests.
+class AnalyticSurface final : public TileSurface {
+ public:
+  using Height = std::function<double(double longitude, double latitude)>;
+
+  AnalyticSurface(double west, double south, double step, int columns, int rows, Height height)
+      : west_(west),
+        south_(south),
+        step_(step),
+        columns_(columns),
+        rows_(rows),
+        height_(std::move(height)) {
+    for (int row = 0; row < rows_; ++row) {
+      for (int column = 0; column < columns_; ++column) {
+        samples_.push_back(height_(longitude(column), latitude(row)));
+      }
+    }
+  }
+
+  [[nodiscard]] GeographicBox bounds() const override {
+    return {west_, south_, longitude(columns_ - 1), latitude(rows_ - 1)};
+  }
+  [[nodiscard]] double spacing() const override { return step_; }
+  void expect(const GeographicBox& /*box*/) override {}
+
+  void samples(const GeographicBox& box, SurfaceSamples& out) override {
+    out.clear();
+    visit(box, [&](int column, int row, double height) {
+      out.longitude.push_back(longitude(column));
+      out.latitude.push_back(latitude(row));
+      out.height.push_back(height);
+    });
+  }
+
+  bool rows(const GeographicBox& box, SurfaceRows& out) override {
+    out = {};
+    if (!in_rows) return false;
+    int row_before = -1;
+    visit(box, [&](int column, int row, double height) {
+      if (row != row_before) out.latitude.push_back(latitude(row));
+      row_before = row;
+      if (out.latitude.size() == 1) out.longitude.push_back(longitude(column));
+      out.height.push_back(height);
+    });
+    return true;
+  }
+
+  std::optional<HeightRange> range(const GeographicBox& box) override {
+    constexpr double kFar = std::numeric_limits<double>::infinity();
+    HeightRange range{kFar, -kFar, true};
+    visit(box, [&](int, int, double height) {
+      range.low = std::min(range.low, height);
+      range.high = std::max(range.high, height);
+    });
+    if (range.low > range.high) return std::nullopt;
+    return range;
+  }
+
+  void heights(std::span<const double> longitude, std::span<const double> latitude,
+               std::span<double> out) override {
+    for (std::size_t i = 0; i < out.size(); ++i) out[i] = height_(longitude[i], latitude[i]);
+  }
+
+  void water(std::span<const double> longitude, std::span<const double> latitude,
+             std::span<std::uint8_t> out) override {
+    for (std::size_t i = 0; i < out.size(); ++i) {
+      out[i] = height_(longitude[i], latitude[i]) <= 0.0 ? 1 : 0;
+    }
+  }
+
+  /// Of all samples: the function between them is known by nothing else.
+  std::uint64_t digest(const GeographicBox& /*box*/) override {
+    Digest digest;
+    for (const double height : samples_) digest.add(height);
+    for (const double number : {west_, south_, step_}) digest.add(number);
+    digest.add(static_cast<std::uint64_t>(columns_));
+    return digest.value();
+  }
+
+  bool in_rows = true;  ///< whether it says so
+
+ private:
+  [[nodiscard]] double longitude(int column) const { return west_ + step_ * column; }
+  [[nodiscard]] double latitude(int row) const { return south_ + step_ * row; }
+
+  template <class Visit>
+  void visit(const GeographicBox& box, const Visit& visit) const {
+    const auto first = [&](double from, double start, int count) {
+      return static_cast<int>(
+          std::clamp(std::floor((from - start) / step_), 0.0, static_cast<double>(count)));
+    };
+    const int c0 = first(box.west, west_, columns_), r0 = first(box.south, south_, rows_);
+    for (int row = r0; row < rows_ && latitude(row) <= box.north; ++row) {
+      if (latitude(row) < box.south) continue;
+      for (int column = c0; column < columns_ && longitude(column) <= box.east; ++column) {
+        if (longitude(column) < box.west) continue;
+        visit(column, row, samples_[static_cast<std::size_t>(row * columns_ + column)]);
+      }
+    }
+  }
+
+  double west_, south_, step_;
+  int columns_, rows_;
+  Height height_;
+  std::vector<double> samples_;
+};
+
+}  // namespace terrace::terrain

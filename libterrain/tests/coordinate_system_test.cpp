@@ -1,0 +1,481 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "earth/crs/coordinate_system.hpp"
+
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <limits>
+#include <random>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "base/error.hpp"
+#include "earth/crs/epsg_table.hpp"
+#include "terrace/stream/error.hpp"
+
+namespace terrace::terrain {
+
+using namespace terrain;
+namespace {
+
+TEST(CoordinateSystem, KnowsWhatTheCodesMeasureIn) {
+  for (const char* code : {"EPSG:4326", "epsg:4258", "EPSG:4269", "EPSG:4979"}) {
+    EXPECT_TRUE(CoordinateSystem::parse(code).is_geographic()) << code;
+    EXPECT_EQ(CoordinateSystem::parse(code).crs().horizontal_unit, "degree");
+  }
+  for (const char* code : {"EPSG:32632", "EPSG:25833", "EPSG:3857", "EPSG:2056"}) {
+    EXPECT_FALSE(CoordinateSystem::parse(code).is_geographic()) << code;
+    EXPECT_EQ(CoordinateSystem::parse(code).crs().horizontal_unit, "metre") << code;
+  }
+  EXPECT_EQ(CoordinateSystem::parse("EPSG:2263").crs().horizontal_unit, "US survey foot");
+  EXPECT_EQ(CoordinateSystem::parse("EPSG:2222").crs().horizontal_unit, "foot");
+  EXPECT_EQ(CoordinateSystem::parse("EPSG:32632").crs().epsg, 32632);
+  EXPECT_EQ(CoordinateSystem::parse("EPSG:900913").crs().epsg, 3857);
+}
+
+TEST(CoordinateSystem, RefusesOtherText) {
+  for (const char* text : {"", "32632", "EPSG:", "EPSG:x", "EPSG:12", "EPSG:99999", "EPSG:4326 ",
+                           "EPSG:4326+", "EPSG:4326+4326", "EPSG:5703", "no/such/file.prj",
+                           "PROJCS[\"x\"", "GEOGCS[\"x\"]", "LOCAL_CS[\"x\",UNIT[\"metre\",1]]",
+                           "[]", "GEOGCS[[[[", "(((((((((((((((((((((((((((((((((((((((((("}) {
+    EXPECT_THROW(CoordinateSystem::parse(text), UsageError) << text;
+  }
+  try {
+    CoordinateSystem::parse("EPSG:5514");
+    FAIL() << "a method that is not there";
+  } catch (const UsageError& error) {
+    EXPECT_NE(std::string(error.what()).find("EPSG:5514"), std::string::npos);
+    EXPECT_NE(std::string(error.what()).find("PRJ"), std::string::npos) << "no remedy";
+  }
+}
+
+TEST(CoordinateSystem, HeightsOfTheCodes) {
+  const auto heights = [](const char* text) { return CoordinateSystem::parse(text).heights(); };
+  EXPECT_EQ(heights("EPSG:32632"), Heights::unknown);
+  EXPECT_EQ(heights("EPSG:4979"), Heights::ellipsoidal);
+  EXPECT_EQ(heights("EPSG:32632+5773"), Heights::orthometric);
+  EXPECT_EQ(heights("EPSG:4326+5030"), Heights::ellipsoidal);
+  EXPECT_EQ(heights("EPSG:5555"), Heights::orthometric);  // compound: UTM 32 and DHHN92
+  EXPECT_EQ(CoordinateSystem::parse("EPSG:5555").crs().epsg, 25832);
+  EXPECT_EQ(CoordinateSystem::parse("EPSG:5555").crs().vertical_epsg, 5783);
+  EXPECT_EQ(CoordinateSystem::parse("EPSG:4326+6360").crs().vertical_unit, "US survey foot");
+  for (const int code : {5703, 5773, 3855, 5782, 5783, 5705}) {
+    EXPECT_NE(epsg_vertical(code), nullptr) << code;
+  }
+}
+
+// Guidance Note 7-2 (2019), the examples of sections 3.1 to 3.5 that have an EPSG code.
+TEST(CoordinateSystem, ExamplesOfTheGuidanceNote) {
+  struct Example {
+    const char* crs;
+    Point2 degrees, plane;
+    double tolerance;
+  };
+  const double minute = 1.0 / 60, second = 1.0 / 3600;
+  const Example examples[] = {
+      {"EPSG:3035", {5, 50}, {3962799.45, 2999718.85}, 0.01},
+      {"EPSG:28992", {6, 53}, {196105.283, 557057.739}, 0.001},
+      {"EPSG:27700", {0.5, 50.5}, {577274.99, 69740.50}, 0.01},
+      {"EPSG:5041", {44, 73}, {3320416.75, 632668.43}, 0.01},
+      {"EPSG:3857",
+       {-(100 + 20 * minute), 24 + 22 * minute + 54.433 * second},
+       {-11169055.58, 2800000.00},
+       0.01},
+  };
+  for (const Example& example : examples) {
+    SCOPED_TRACE(example.crs);
+    const CoordinateSystem system = CoordinateSystem::parse(example.crs);
+    Point2 place = example.degrees;
+    system.from_own_geographic({&place, 1});
+    EXPECT_NEAR(place[0], example.plane[0], example.tolerance);
+    EXPECT_NEAR(place[1], example.plane[1], example.tolerance);
+    system.to_own_geographic({&place, 1});
+    EXPECT_NEAR(place[0], example.degrees[0], 1e-10);
+    EXPECT_NEAR(place[1], example.degrees[1], 1e-10);
+  }
+}
+
+TEST(CoordinateSystem, WktOfEveryRowReadsBack) {
+  std::size_t rows = 0;
+  for (const EpsgProjected& row : epsg_tables().projected) {
+    CrsDefinition definition = definition_of_epsg(row.code);
+    const CoordinateSystem whole(definition);
+    EXPECT_TRUE(CoordinateSystem(definition_of_wkt(wkt_of(definition))).same_places(whole))
+        << row.code;
+    // Without the code all must come from the parameters.
+    definition.epsg = 0;
+    const CrsDefinition read = definition_of_wkt(wkt_of(definition));
+    EXPECT_TRUE(CoordinateSystem(read).same_places(whole)) << row.code << '\n'
+                                                           << wkt_of(definition);
+    EXPECT_EQ(read.uncertainty, definition.uncertainty) << row.code;
+    ++rows;
+  }
+  EXPECT_GT(rows, 4000u);
+  for (const EpsgGeographic& row : epsg_tables().geographic) {
+    const CrsDefinition definition = definition_of_epsg(row.code);
+    const CrsDefinition read = definition_of_wkt(wkt_of(definition));
+    EXPECT_TRUE(CoordinateSystem(read).same_places(CoordinateSystem(definition))) << row.code;
+    EXPECT_EQ(read.heights, definition.heights) << row.code;
+  }
+}
+
+TEST(CoordinateSystem, WktOfOtherDialects) {
+  const auto same = [](const std::string& wkt, const char* code) {
+    const CoordinateSystem read = CoordinateSystem::parse(wkt),
+                           known = CoordinateSystem::parse(code);
+    EXPECT_TRUE(read.same_places(known)) << wkt;
+    EXPECT_TRUE(read.reaches_wgs84() == known.reaches_wgs84()) << wkt;
+  };
+  const std::string wgs84 =
+      R"(GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984",SPHEROID["WGS_1984",6378137.0,298.257223563]],)"
+      R"(PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]])";
+  const std::string nad83 =
+      R"(GEOGCS["GCS_North_American_1983",DATUM["D_North_American_1983",SPHEROID["GRS_1980",)"
+      R"(6378137.0,298.257222101]],PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]])";
+  same(wgs84, "EPSG:4326");
+  // ESRI's.
+  same("PROJCS[\"WGS_1984_UTM_Zone_32N\"," + wgs84 +
+           R"(,PROJECTION["Transverse_Mercator"],PARAMETER["False_Easting",500000.0],)"
+           R"(PARAMETER["False_Northing",0.0],PARAMETER["Central_Meridian",9.0],)"
+           R"(PARAMETER["Scale_Factor",0.9996],PARAMETER["Latitude_Of_Origin",0.0],)"
+           R"(UNIT["Meter",1.0]])",
+       "EPSG:32632");
+  same("PROJCS[\"WGS_1984_Web_Mercator_Auxiliary_Sphere\"," + wgs84 +
+           R"(,PROJECTION["Mercator_Auxiliary_Sphere"],PARAMETER["False_Easting",0.0],)"
+           R"(PARAMETER["False_Northing",0.0],PARAMETER["Central_Meridian",0.0],)"
+           R"(PARAMETER["Standard_Parallel_1",0.0],PARAMETER["Auxiliary_Sphere_Type",0.0],)"
+           R"(UNIT["Meter",1.0]])",
+       "EPSG:3857");
+  same("PROJCS[\"NAD_1983_StatePlane_New_York_Long_Island_FIPS_3104_Feet\"," + nad83 +
+           R"(,PROJECTION["Lambert_Conformal_Conic"],PARAMETER["False_Easting",984250.0],)"
+           R"(PARAMETER["False_Northing",0.0],PARAMETER["Central_Meridian",-74.0],)"
+           R"(PARAMETER["Standard_Parallel_1",40.66666666666666],)"
+           R"(PARAMETER["Standard_Parallel_2",41.03333333333333],)"
+           R"(PARAMETER["Latitude_Of_Origin",40.16666666666666],)"
+           R"(UNIT["Foot_US",0.3048006096012192]])",
+       "EPSG:2263");
+  same("PROJCS[\"WGS_1984_Antarctic_Polar_Stereographic\"," + wgs84 +
+           R"(,PROJECTION["Stereographic_South_Pole"],PARAMETER["False_Easting",0.0],)"
+           R"(PARAMETER["False_Northing",0.0],PARAMETER["Central_Meridian",0.0],)"
+           R"(PARAMETER["Standard_Parallel_1",-71.0],UNIT["Meter",1.0]])",
+       "EPSG:3031");
+  // GDAL's.
+  same("PROJCS[\"WGS 84 / Pseudo-Mercator\"," + wgs84 +
+           R"(,PROJECTION["Mercator_1SP"],PARAMETER["central_meridian",0],)"
+           R"(PARAMETER["scale_factor",1],PARAMETER["false_easting",0],)"
+           R"(PARAMETER["false_northing",0],UNIT["metre",1],AXIS["X",EAST],AXIS["Y",NORTH],)"
+           R"(EXTENSION["PROJ4","+proj=merc +a=6378137 +b=6378137 +nadgrids=@null"],)"
+           R"(AUTHORITY["EPSG","3857"]])",
+       "EPSG:3857");
+  same("PROJCS[\"NSIDC\"," + wgs84 +
+           R"(,PROJECTION["Polar_Stereographic"],PARAMETER["latitude_of_origin",70],)"
+           R"(PARAMETER["central_meridian",-45],PARAMETER["false_easting",0],)"
+           R"(PARAMETER["false_northing",0],UNIT["metre",1],AXIS["Easting",SOUTH],)"
+           R"(AXIS["Northing",SOUTH]])",
+       "EPSG:3413");
+}
+
+TEST(CoordinateSystem, WktThatContradictsItselfIsRefused) {
+  const std::string good = CoordinateSystem::parse("EPSG:32632").crs().wkt;
+  EXPECT_NO_THROW(definition_of_wkt(good));
+  const auto broken = [&good](const std::string& from, const std::string& to) {
+    std::string text = good;
+    text.replace(text.find(from), from.size(), to);
+    return text;
+  };
+  EXPECT_THROW(definition_of_wkt(broken("0.9996", "0.9999")), ContradictoryCrs);
+  EXPECT_THROW(definition_of_wkt(broken("origin\",9,", "origin\",15,")), ContradictoryCrs);
+  EXPECT_THROW(definition_of_wkt(broken("298.257223563", "297")), ContradictoryCrs);
+  EXPECT_THROW(definition_of_wkt(broken("AXIS[\"(E)\",east", "AXIS[\"(W)\",west")), CrsError);
+  EXPECT_THROW(definition_of_wkt(broken("Scale factor at", "Something of")), CrsError);
+  EXPECT_THROW(definition_of_wkt(broken("0.9996", "nan")), CrsError);
+}
+
+TEST(CoordinateSystem, AnotherDatumNeedsAShift) {
+  const CoordinateSystem bare = CoordinateSystem::parse("EPSG:27700");
+  EXPECT_FALSE(bare.reaches_wgs84());
+  EXPECT_THROW(static_cast<void>(bare.to_geographic(Point2{400000, 100000})), stream::Error);
+  // Ordnance Survey's seven parameters; its own example of the accuracy is some metres.
+  const DatumShift shift{446.448, -125.157, 542.060, 0.1502, 0.2470, 0.8421, -20.4894};
+  const CoordinateSystem shifted = CoordinateSystem::parse("EPSG:27700", shift);
+  // PROJ 9.1.1: cs2cs with +towgs84, 2D.
+  const Point2 place = shifted.to_geographic(Point2{530000, 180000});
+  EXPECT_NEAR(place[0], -0.1285, 1e-3);
+  EXPECT_NEAR(place[1], 51.5037, 1e-3);
+  const Point2 back = shifted.from_geographic(place);
+  EXPECT_NEAR(back[0], 530000, 0.01);  // heights between the ellipsoids are left out
+  EXPECT_NEAR(back[1], 180000, 0.01);
+  // As a store keeps it.
+  const auto again = CoordinateSystem::of(shifted.crs(), "store");
+  ASSERT_TRUE(again && again->reaches_wgs84());
+  EXPECT_NEAR(again->to_geographic(Point2{530000, 180000})[0], place[0], 1e-12);
+  // Between systems of one datum no shift is needed.
+  Point2 own{400000, 100000};
+  transform(bare, CoordinateSystem::parse("EPSG:4277"), {&own, 1});
+  EXPECT_NEAR(own[0], -2, 1e-12);
+  // A shift for what counts as WGS 84 is not one.
+  EXPECT_TRUE(CoordinateSystem::parse("EPSG:25832", shift)
+                  .same_places(CoordinateSystem::parse("EPSG:25832")));
+}
+
+TEST(CoordinateSystem, TellsWhatItTakesForWgs84) {
+  EXPECT_EQ(CoordinateSystem::parse("EPSG:25832").uncertainty(), 1);
+  EXPECT_GE(CoordinateSystem::parse("EPSG:5070").uncertainty(), 1);
+  EXPECT_LT(CoordinateSystem::parse("EPSG:23032").definition().uncertainty, 0);
+  EXPECT_LT(CoordinateSystem::parse("EPSG:21781").definition().uncertainty, 0);
+}
+
+TEST(CoordinateSystem, PolesAndPlacesThatAreNone) {
+  const auto forward = [](const char* crs, Point2 place) {
+    return CoordinateSystem::parse(crs).from_geographic(place);
+  };
+  for (const char* crs : {"EPSG:3857", "EPSG:3395"}) {
+    EXPECT_TRUE(std::isnan(forward("EPSG:3857", {0, 90})[0])) << crs;
+  }
+  EXPECT_TRUE(std::isnan(forward("EPSG:32632", {9, 90.5})[0]));
+  EXPECT_TRUE(std::isnan(forward("EPSG:32632", {NAN, 0})[0]));
+  EXPECT_NEAR(forward("EPSG:3413", {123, 90})[0], 0, 1e-6);
+  EXPECT_NEAR(forward("EPSG:32661", {0, 90})[1], 2000000, 1e-6);
+  EXPECT_TRUE(std::isnan(forward("EPSG:3413", {0, -90})[0]));
+  // Across the antimeridian longitudes are the same place by any count.
+  const Point2 east = forward("EPSG:32660", {181, 10}), west = forward("EPSG:32660", {-179, 10});
+  EXPECT_NEAR(east[0], west[0], 1e-8);
+  EXPECT_LT(CoordinateSystem::parse("EPSG:32660").to_geographic(east)[0], -178.99);
+  const Point2 outside = CoordinateSystem::parse("EPSG:3035").to_geographic(Point2{3e7, 0});
+  EXPECT_TRUE(std::isnan(outside[0]));
+}
+
+std::vector<std::vector<double>> numbers_of(const std::string& name) {
+  const char* const data = std::getenv("TERRACE_DATA");
+  std::vector<std::vector<double>> rows;
+  if (data == nullptr) return rows;
+  std::ifstream file(std::string(data) + "/geodesy/" + name);
+  std::string line;
+  while (std::getline(file, line)) {
+    std::istringstream words(line);
+    if (line.starts_with('#')) continue;
+    std::vector<double> row;
+    for (double value = 0; words >> value;) row.push_back(value);
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+// GeographicLib's exact projection (elliptic functions): metres without false origin.
+TEST(CoordinateSystem, ExactTransverseMercator) {
+  const auto rows = numbers_of("utm_tm_exact_2000.tsv");
+  if (rows.empty()) GTEST_SKIP() << "TERRACE_DATA is not set";
+  ASSERT_EQ(rows.size(), 2000u);
+  double worst = 0;
+  for (const auto& row : rows) {
+    const int zone = static_cast<int>(row[0]);
+    const CoordinateSystem utm(definition_of_epsg((row[1] < 0 ? 32700 : 32600) + zone));
+    const Point2 plane = utm.from_geographic(Point2{row[2], row[1]});
+    const double north = row[1] < 0 ? 1e7 : 0;
+    worst =
+        std::max({worst, std::abs(plane[0] - 5e5 - row[3]), std::abs(plane[1] - north - row[4])});
+  }
+  EXPECT_LT(worst, 1e-8);
+}
+
+stream::Crs keys(std::vector<stream::GeoKey> list) {
+  stream::Crs crs;
+  crs.name = "own grid";
+  crs.geo_keys = std::move(list);
+  for (const stream::GeoKey& key : crs.geo_keys) {
+    if (key.key == 3072 && key.values[0] < 32767) crs.epsg = static_cast<int>(key.values[0]);
+    if (key.key == 1024) crs.geographic = key.values[0] == 2;
+  }
+  if (crs.epsg == 0 && crs.geographic) crs.epsg = 4326;
+  return crs;
+}
+
+TEST(GeoKeys, UserDefinedProjections) {
+  const auto same = [](std::vector<stream::GeoKey> list, const char* code) {
+    const auto system = CoordinateSystem::of(keys(std::move(list)), "file");
+    ASSERT_TRUE(system);
+    EXPECT_TRUE(system->same_places(CoordinateSystem::parse(code))) << code;
+  };
+  same({{1024, {1}, ""},
+        {2048, {4326}, ""},
+        {3072, {32767}, ""},
+        {3074, {32767}, ""},
+        {3075, {1}, ""},
+        {3076, {9001}, ""},
+        {3080, {9}, ""},
+        {3081, {0}, ""},
+        {3082, {500000}, ""},
+        {3083, {0}, ""},
+        {3092, {0.9996}, ""}},
+       "EPSG:32632");
+  same({{1024, {1}, ""},
+        {2048, {4258}, ""},
+        {3072, {32767}, ""},
+        {3075, {10}, ""},
+        {3076, {9001}, ""},
+        {3082, {4321000}, ""},
+        {3083, {3210000}, ""},
+        {3088, {10}, ""},
+        {3089, {52}, ""}},
+       "EPSG:3035");
+  same({{1024, {1}, ""},
+        {2048, {4269}, ""},
+        {3072, {32767}, ""},
+        {3075, {11}, ""},
+        {3076, {9001}, ""},
+        {3078, {29.5}, ""},
+        {3079, {45.5}, ""},
+        {3080, {-96}, ""},
+        {3081, {23}, ""},
+        {3082, {0}, ""},
+        {3083, {0}, ""}},
+       "EPSG:5070");
+  same({{1024, {1}, ""},
+        {2048, {4326}, ""},
+        {3072, {32767}, ""},
+        {3075, {15}, ""},
+        {3076, {9001}, ""},
+        {3081, {-71}, ""},
+        {3092, {1}, ""},
+        {3095, {0}, ""}},
+       "EPSG:3031");
+  same({{1024, {1}, ""},
+        {2048, {4326}, ""},
+        {3072, {32767}, ""},
+        {3074, {16032}, ""},
+        {3076, {9001}, ""}},
+       "EPSG:32632");
+  // The false easting is in feet as the unit is.
+  same({{1024, {1}, ""},
+        {2048, {4269}, ""},
+        {3072, {32767}, ""},
+        {3075, {8}, ""},
+        {3076, {9003}, ""},
+        {3078, {41 + 2.0 / 60}, ""},
+        {3079, {40 + 40.0 / 60}, ""},
+        {3084, {-74}, ""},
+        {3085, {40 + 10.0 / 60}, ""},
+        {3086, {984250}, ""},
+        {3087, {0}, ""}},
+       "EPSG:2263");
+}
+
+TEST(GeoKeys, ContradictionsAreRefusedAndNamed) {
+  const std::vector<std::vector<stream::GeoKey>> lists{
+      {{1024, {1}, ""}, {3072, {32632}, ""}, {3076, {9002}, ""}},
+      {{1024, {1}, ""}, {2048, {4269}, ""}, {3072, {32632}, ""}},
+      {{1024, {1}, ""}, {3072, {32632}, ""}, {3092, {0.9999}, ""}},
+      {{1024, {1}, ""}, {3072, {32632}, ""}, {3080, {15}, ""}},
+      {{1024, {2}, ""}, {3072, {32632}, ""}},
+  };
+  for (const auto& list : lists) {
+    try {
+      CoordinateSystem::of(keys(list), "dem.tif");
+      ADD_FAILURE() << "accepted";
+    } catch (const stream::Error& error) {
+      const std::string what = error.what();
+      EXPECT_NE(what.find("contradict"), std::string::npos) << what;
+      EXPECT_NE(what.find("dem.tif"), std::string::npos) << what;
+      EXPECT_NE(what.find("--crs"), std::string::npos) << what;
+    }
+  }
+  EXPECT_TRUE(CoordinateSystem::of(keys({{1024, {1}, ""},
+                                         {2048, {4326}, ""},
+                                         {3072, {32632}, ""},
+                                         {3076, {9001}, ""},
+                                         {3092, {0.9996}, ""}}),
+                                   "dem.tif"));
+}
+
+TEST(GeoKeys, ACodeIsAWholeNumberOf16Bits) {
+  for (const double code : {4326.5, -4326.0, 1e300}) {
+    stream::Crs crs;
+    crs.geo_keys = {{1024, {2}, ""}, {2048, {code}, ""}};
+    try {
+      CoordinateSystem::of(crs, "dem.tif");
+      ADD_FAILURE() << code << " is accepted";
+    } catch (const stream::Error& error) {
+      EXPECT_NE(std::string(error.what()).find("GeoKey 2048"), std::string::npos) << error.what();
+    }
+  }
+}
+
+TEST(GeoKeys, ImpossibleNumbersAreRefused) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<std::vector<stream::GeoKey>> lists{
+      {{1024, {2}, ""}, {2048, {32767}, ""}, {2057, {-1}, ""}, {2059, {300}, ""}},
+      {{1024, {2}, ""}, {2048, {32767}, ""}, {2057, {6.4e6}, ""}, {2059, {1}, ""}},
+      {{1024, {2}, ""}, {2048, {32767}, ""}, {2056, {7004}, ""}, {2062, {1, 2, nan}, ""}},
+      {{1024, {2}, ""},
+       {2048, {32767}, ""},
+       {2057, {-1}, ""},
+       {2059, {300}, ""},
+       {2062, {1, 2, 3}, ""}},
+  };
+  for (const auto& list : lists) {
+    stream::Crs crs;
+    crs.geo_keys = list;
+    EXPECT_THROW(CoordinateSystem::of(crs, "dem.tif"), stream::Error);
+  }
+}
+
+/// What a store keeps of such a system used to be refused when it was read: it contradicted the
+/// code that the name had given it.
+TEST(Wkt, ANameDoesNotMakeADatumOfAnotherEllipsoid) {
+  stream::Crs crs;
+  crs.wkt =
+      "GEOGCS[\"WGS 84\",DATUM[\"WGS_1984\",SPHEROID[\"Bessel\",6377397.155,299.1528128]],"
+      "UNIT[\"degree\",0.0174532925199433]]";
+  const auto system = CoordinateSystem::of(crs, "dem.tif");
+  ASSERT_TRUE(system);
+  EXPECT_EQ(system->definition().epsg, 0);
+  EXPECT_FALSE(system->reaches_wgs84());
+  const auto kept = CoordinateSystem::of(system->crs(), "dem.store");
+  ASSERT_TRUE(kept);
+  EXPECT_EQ(kept->definition().ellipsoid, system->definition().ellipsoid);
+}
+
+TEST(Wkt, UnitsWithoutASizeAreRefused) {
+  for (const char* const unit : {"0", "-1"}) {
+    stream::Crs crs;
+    crs.wkt = std::string("GEOGCS[\"x\",DATUM[\"y\",SPHEROID[\"z\",6378137,298]],UNIT[\"u\",") +
+              unit + "]]";
+    EXPECT_THROW(CoordinateSystem::of(crs, "dem.tif"), stream::Error) << unit;
+  }
+}
+
+TEST(GeoKeys, WhatIsMissingIsNamed) {
+  const std::vector<std::vector<stream::GeoKey>> lists{
+      {{1024, {1}, ""}, {3072, {32767}, ""}, {3075, {1}, ""}, {3076, {9001}, ""}},  // no datum
+      {{1024, {1}, ""}, {2048, {4326}, ""}, {3072, {32767}, ""}, {3075, {1}, ""}},  // no unit
+      {{1024, {1}, ""}, {2048, {4326}, ""}, {3072, {32767}, ""}, {3076, {9001}, ""}},
+      {{1024, {1}, ""},
+       {2048, {4326}, ""},
+       {3072, {32767}, ""},
+       {3075, {22}, ""},
+       {3076, {9001}, ""}},
+      {{1024, {1}, ""},
+       {2048, {4326}, ""},
+       {3072, {32767}, ""},
+       {3075, {1}, ""},
+       {3076, {9001}, ""},
+       {3092, {NAN}, ""}},
+  };
+  for (const auto& list : lists) EXPECT_THROW(CoordinateSystem::of(keys(list), "f"), stream::Error);
+  EXPECT_FALSE(CoordinateSystem::of(stream::Crs{}, "f"));
+}
+
+TEST(DatumShift, ThreeOrSevenNumbers) {
+  EXPECT_EQ(parse_datum_shift("1,2,3"), (DatumShift{1, 2, 3}));
+  EXPECT_EQ(parse_datum_shift("1,2,3,4,5,6,7"), (DatumShift{1, 2, 3, 4, 5, 6, 7}));
+  for (const char* text : {"", "1", "1,2", "1,2,3,4", "a,b,c", "1,2,3,4,5,6,7,8"}) {
+    EXPECT_THROW(parse_datum_shift(text), UsageError) << text;
+  }
+}
+
+}  // namespace
+}  // namespace terrace::terrain

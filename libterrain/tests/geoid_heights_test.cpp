@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "earth/geoid_heights.hpp"
+
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "base/error.hpp"
+#include "temporary_folder.hpp"
+#include "terrace/stream/error.hpp"
+
+namespace terrace::terrain {
+
+using namespace terrain;
+namespace {
+
+constexpr std::uint64_t kMemory = std::uint64_t{1} << 30;
+
+class GeoidTest : public testing::Test {
+ protected:
+  /// A grid of GeographicLib's format, 5 degrees apart, of height 20 sin(latitude) + 50: smooth, so
+  /// that the interpolation's error is small.
+  std::string write_grid(const std::string& name) const {
+    constexpr int kWidth = 72, kHeight = 37;
+    const std::string file = (folder_ / name).string();
+    std::ofstream out(file, std::ios::binary);
+    out << "P5\n# Geoid file in PGM format for the GeographicLib::Geoid class\n"
+        << "# Description test\n# DateTime 2020-01-01 00:00:00\n# MaxBilinearError 0.1\n"
+        << "# RMSBilinearError 0.1\n# MaxCubicError 0.1\n# RMSCubicError 0.1\n"
+        << "# Offset -100\n# Scale 0.003\n"
+        << kWidth << ' ' << kHeight << "\n65535\n";
+    for (int row = 0; row < kHeight; ++row) {
+      const double height = undulation(90.0 - 5.0 * row);
+      const auto raw = static_cast<unsigned>(std::lround((height + 100) / 0.003));
+      for (int column = 0; column < kWidth; ++column) {
+        out.put(static_cast<char>(raw >> 8));
+        out.put(static_cast<char>(raw & 255));
+      }
+    }
+    return file;
+  }
+  static double undulation(double latitude) {
+    return 50 + 20 * std::sin(latitude * 3.14159265358979 / 180);
+  }
+
+  tests::TemporaryFolder scratch_;
+  const std::filesystem::path& folder_ = scratch_.path();
+};
+
+TEST_F(GeoidTest, InterpolatesTheGrid) {
+  const GeoidGrid geoid(write_grid("test.pgm"), kMemory);
+  for (double latitude = -80; latitude <= 80; latitude += 3.7) {
+    for (double longitude = -180; longitude < 360; longitude += 31) {
+      EXPECT_NEAR(geoid.undulation({longitude, latitude}), undulation(latitude), 0.01);
+    }
+  }
+  EXPECT_TRUE(std::isnan(geoid.undulation({NAN, 10})));
+}
+
+TEST_F(GeoidTest, RefusesWhatIsNoGrid) {
+  const std::string file = write_grid("good.pgm");
+  EXPECT_THROW(GeoidGrid((folder_ / "none.pgm").string(), kMemory), stream::Error);
+  EXPECT_THROW(GeoidGrid((folder_ / "good.tif").string(), kMemory), stream::Error);
+  EXPECT_THROW(GeoidGrid(file, 100), stream::Error);
+  std::filesystem::resize_file(file, 2000);
+  EXPECT_THROW(GeoidGrid(file, kMemory), stream::Error);
+  std::ofstream(folder_ / "text.pgm") << "hello";
+  EXPECT_THROW(GeoidGrid((folder_ / "text.pgm").string(), kMemory), stream::Error);
+}
+
+stream::Schema schema_with(const std::string& vertical, const std::string& unit) {
+  stream::Schema schema;
+  schema.vertical = vertical;
+  schema.coordinates[2].unit = unit;
+  return schema;
+}
+
+TEST_F(GeoidTest, HeightsBecomeEllipsoidalMetres) {
+  const std::string file = write_grid("test.pgm");
+  const EllipsoidalHeights plain(schema_with("ellipsoidal", "metre"), "", "", kMemory);
+  EXPECT_EQ(plain.convert({8, 47}, 500), 500);
+  EXPECT_EQ(plain.note(), "");
+  const EllipsoidalHeights feet(schema_with("orthometric", "foot"), "", file, kMemory);
+  EXPECT_NEAR(feet.convert({8, 45}, 1000), 304.8 + undulation(45), 0.01);
+  EXPECT_TRUE(feet.has_geoid());
+  const EllipsoidalHeights ignored(schema_with("orthometric", "metre"), "ignore", "", kMemory);
+  EXPECT_EQ(ignored.convert({8, 47}, 500), 500);
+  EXPECT_NE(ignored.note(), "");
+  const EllipsoidalHeights said(schema_with("", "metre"), "ellipsoidal", "", kMemory);
+  EXPECT_EQ(said.convert({8, 47}, 500), 500);
+  const EllipsoidalHeights unknown(schema_with("", ""), "", file, kMemory);
+  EXPECT_NE(unknown.note().find("unit"), std::string::npos);
+  EXPECT_NE(unknown.note().find("orthometric"), std::string::npos);
+}
+
+TEST_F(GeoidTest, WhatWasNotSaidOrContradictsIsRefused) {
+  const std::string file = write_grid("test.pgm");
+  const auto refused = [](const stream::Schema& schema, const char* vertical,
+                          const std::string& geoid) {
+    EXPECT_THROW(EllipsoidalHeights(schema, vertical, geoid, kMemory), UsageError);
+  };
+  refused(schema_with("orthometric", "metre"), "", "");
+  refused(schema_with("", "metre"), "", "");
+  refused(schema_with("ellipsoidal", "metre"), "", file);
+  refused(schema_with("orthometric", "metre"), "ignore", file);
+  refused(schema_with("orthometric", "metre"), "sea", "");
+}
+
+TEST(EllipsoidalHeightsTest, AnUnknownUnitIsThatOfTheGroundAsInOtherVerbs) {
+  stream::Schema schema;
+  schema.vertical = "ellipsoidal";
+  schema.crs.horizontal_unit = "foot";
+  const EllipsoidalHeights feet(schema, {}, {}, kMemory);
+  EXPECT_EQ(feet.metres_per_unit(), 0.3048);
+  EXPECT_NE(feet.note().find("that of x and y"), std::string::npos) << feet.note();
+  schema.crs.horizontal_unit = "metre";
+  EXPECT_EQ(EllipsoidalHeights(schema, {}, {}, kMemory).metres_per_unit(), 1.0);
+  schema.coordinates[2].unit = "foot";
+  EXPECT_EQ(EllipsoidalHeights(schema, {}, {}, kMemory).metres_per_unit(), 0.3048);
+}
+
+}  // namespace
+}  // namespace terrace::terrain

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "base/ordered_work.hpp"
+
+#include <atomic>
+#include <latch>
+#include <memory>
+#include <stdexcept>
+
+#include <gtest/gtest.h>
+
+namespace terrace::terrain {
+
+using namespace terrain;
+namespace {
+
+TEST(OrderedWork, CommitsEachResultOnceInOrder) {
+  for (const unsigned threads : {1U, 2U, 7U}) {
+    for (const std::size_t count : {0U, 1U, 2U, 500U}) {
+      SCOPED_TRACE(testing::Message() << threads << " threads, " << count);
+      std::atomic<unsigned> made = 0;
+      std::vector<std::size_t> committed;
+      in_order(
+          count, threads,
+          [&](unsigned worker, std::size_t i) {
+            EXPECT_LT(worker, threads);
+            ++made;
+            if (i % 3 == 0) std::this_thread::yield();
+            return std::make_unique<std::size_t>(i * i);  // need not be copyable
+          },
+          [&](std::size_t i, const std::unique_ptr<std::size_t>& result) {
+            EXPECT_EQ(*result, i * i);
+            committed.push_back(i);
+          });
+      EXPECT_EQ(made, count);
+      ASSERT_EQ(committed.size(), count);
+      for (std::size_t i = 0; i < count; ++i) EXPECT_EQ(committed[i], i);
+    }
+  }
+}
+
+TEST(OrderedWork, OneCommitAtATimeAndNoMoreThreadsThanAsked) {
+  std::atomic<int> committing = 0, working = 0, most = 0;
+  std::vector<std::atomic<unsigned>> made(3);
+  std::latch all_at_work(3);
+  const auto enter = [&] {
+    const int now = ++working;
+    for (int seen = most; now > seen && !most.compare_exchange_weak(seen, now);) {
+    }
+  };
+  in_order(
+      300, 3,
+      [&](unsigned worker, std::size_t i) {
+        enter();
+        ++made[worker];
+        if (i < 3) all_at_work.arrive_and_wait();
+        if (i % 7 == 0) std::this_thread::yield();
+        --working;
+        return i;
+      },
+      [&](std::size_t i, std::size_t) {
+        enter();
+        EXPECT_EQ(++committing, 1);
+        if (i % 11 == 0) std::this_thread::yield();
+        --committing;
+        --working;
+      });
+  EXPECT_LE(most, 3);
+  for (const std::atomic<unsigned>& own : made) EXPECT_GT(own, 0U);
+}
+
+TEST(OrderedWork, TheFirstErrorComesOut) {
+  for (const unsigned threads : {1U, 4U}) {
+    std::size_t last = 0;
+    const auto run = [&] {
+      in_order(
+          1000, threads,
+          [](unsigned, std::size_t i) {
+            if (i >= 40) throw std::runtime_error("at " + std::to_string(i));
+            return i;
+          },
+          [&](std::size_t i, std::size_t) { last = i; });
+    };
+    try {
+      run();
+      FAIL();
+    } catch (const std::runtime_error& error) {
+      EXPECT_STREQ(error.what(), "at 40");
+    }
+    EXPECT_EQ(last, 39U);
+  }
+}
+
+TEST(OrderedWork, AnErrorOfACommitEndsTheWork) {
+  std::atomic<unsigned> made = 0;
+  EXPECT_THROW(in_order(
+                   1000, 4,
+                   [&](unsigned, std::size_t i) {
+                     ++made;
+                     return i;
+                   },
+                   [](std::size_t i, std::size_t) {
+                     if (i == 10) throw std::runtime_error("full");
+                   }),
+               std::runtime_error);
+  EXPECT_LT(made, 1000U);
+}
+
+}  // namespace
+}  // namespace terrace::terrain

@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "base/output.hpp"
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "temporary_folder.hpp"
+#include "terrace/stream/error.hpp"
+#include "terrace/stream/geotiff_writer.hpp"
+#include "terrace/stream/mesh_writer.hpp"
+#include "terrace/stream/png.hpp"
+#include "terrace/stream/point_writer.hpp"
+
+namespace terrace::terrain {
+
+using namespace terrain;
+namespace {
+
+namespace fs = std::filesystem;
+
+class MayReplace : public ::testing::Test {
+ protected:
+  void write(const std::string& text) const { std::ofstream(path_, std::ios::binary) << text; }
+  [[nodiscard]] std::string text() const {
+    std::ifstream file(path_, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+  void expect_ours(const std::string& what) const {
+    EXPECT_NO_THROW(EXPECT_TRUE(may_replace(path_, true))) << what;
+  }
+  void expect_foreign(const std::string& what) const {
+    EXPECT_THROW(may_replace(path_, true), stream::Error) << what;
+  }
+  /// What is in the file is ours, and no more with the mark spelt otherwise, wherever else the word
+  /// may be.
+  void expect_ours_by_mark(const std::string& mark, const std::string& what) const {
+    expect_ours(what);
+    std::string bytes = text();
+    const std::size_t at = bytes.find(mark);
+    ASSERT_NE(at, std::string::npos) << what;
+    bytes[at + mark.size() - 1] ^= 1;
+    write(bytes + " terrace, written by terrace\n# written by terrace\n");
+    expect_foreign(what);
+  }
+  void write_points(const std::string& format,
+                    std::vector<std::string> comments = {kWriterMark}) const {
+    const auto writer = stream::open_point_writer(
+        path_,
+        {.attributes = {{.name = "small", .type = stream::ScalarType::f32},
+                        {.name = "large", .type = stream::ScalarType::u64}},
+         .comments = std::move(comments)},
+        {.format = format, .replace = true});
+    const std::vector<float> small{0.1F, 16777217000.0F, std::numeric_limits<float>::denorm_min(),
+                                   -0.0F, std::numeric_limits<float>::max()};
+    const std::vector<std::uint64_t> large{0, 9007199254740993, ~std::uint64_t{0}, 7, 10};
+    stream::PointBlock block;
+    block.positions = {{0, -0.0, 1e300}, {0.1, 1.0 / 3, 1e21}, {1e-7, 123456789, 1e15}, {}, {}};
+    block.attributes.resize(2);
+    block.attributes[0].type = stream::ScalarType::f32;
+    const auto bytes = std::as_bytes(std::span(small)), more = std::as_bytes(std::span(large));
+    block.attributes[0].bytes.assign(bytes.begin(), bytes.end());
+    block.attributes[1].type = stream::ScalarType::u64;
+    block.attributes[1].bytes.assign(more.begin(), more.end());
+    writer->append(block);
+    writer->finish();
+  }
+  void write_mesh(const std::string& format) const {
+    const auto writer = stream::open_mesh_writer(
+        path_,
+        {.vertices = 3, .triangles = 1, .attributes = {}, .comments = {kWriterMark}, .bounds = {}},
+        {.format = format, .replace = true});
+    writer->add_vertices(std::vector<stream::Point3>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {});
+    writer->add_triangles(std::vector<stream::TriangleIndices>{{0, 1, 2}});
+    writer->finish();
+  }
+
+  tests::TemporaryFolder scratch_;
+  std::string path_ = scratch_.path() / "output";
+};
+
+TEST_F(MayReplace, NothingIsThere) { EXPECT_FALSE(may_replace(path_, false)); }
+
+TEST_F(MayReplace, RefusesAnExistingFileWithoutForce) {
+  write("1 2 3\n");
+  EXPECT_THROW(may_replace(path_, false), stream::Error);
+  EXPECT_TRUE(may_replace(path_, true));
+}
+
+TEST_F(MayReplace, ForceGoesByTheMarkOfEachFormat) {
+  for (const char* format : {"ply", "ply-ascii"}) {
+    write_points(format);
+    expect_ours_by_mark("comment written by terrace", format);
+  }
+  for (const auto& [format, mark] :
+       {std::pair{"ply", "comment written by terrace"}, std::pair{"obj", "# written by terrace"},
+        std::pair{"glb", "\"generator\":\"terrace\""}}) {
+    write_mesh(format);
+    expect_ours_by_mark(mark, format);
+  }
+  const std::array<std::uint8_t, 3> pixel{1, 2, 3};
+  stream::write_png(path_, 1, 1, 3, pixel, true);
+  expect_ours_by_mark(std::string("Software\0terrace", 16), "png");
+  stream::GeoTiffOptions tiff;
+  tiff.columns = tiff.rows = 16;
+  tiff.sample = {.name = "height", .type = stream::ScalarType::i16};
+  tiff.replace = true;
+  {
+    stream::GeoTiffWriter writer(path_, tiff);
+    writer.write_rows(std::vector<std::byte>(512));
+    writer.commit();
+  }
+  expect_ours_by_mark("terrace", "tiff");
+}
+
+/// BigTIFF keeps eight bytes in the entry itself; other writers may turn the bytes of numbers.
+TEST_F(MayReplace, TiffOfAllKindsIsReadToItsTag) {
+  const auto tiff = [](bool big_endian, bool big_tiff, std::uint64_t tag, const std::string& name) {
+    std::string bytes = big_endian ? "MM" : "II";
+    const auto put = [&](std::uint64_t number, std::size_t size) {
+      for (std::size_t i = 0; i < size; ++i) {
+        bytes += static_cast<char>(number >> 8 * (big_endian ? size - 1 - i : i));
+      }
+    };
+    const std::size_t word = big_tiff ? 8 : 4;
+    put(big_tiff ? 43 : 42, 2);
+    if (big_tiff) put(8, 2), put(0, 2);
+    put(big_tiff ? 16 : 8, word);  // of the directory
+    put(2, big_tiff ? 8 : 2);
+    for (const std::uint64_t entry : {std::uint64_t{256}, tag}) {
+      put(entry, 2);
+      put(entry == 256 ? 3 : 2, 2);
+      put(entry == 256 ? 1 : name.size(), word);
+      if (entry == 256) {
+        put(16, word);
+      } else if (big_tiff) {
+        bytes += name;
+      } else {
+        put(8 + 2 + 24 + 4, word);
+      }
+    }
+    put(0, word);
+    if (!big_tiff) bytes += name;
+    return bytes;
+  };
+  const std::string ours("terrace\0", 8), other("terrain\0", 8);
+  for (const bool big_endian : {false, true}) {
+    for (const bool big_tiff : {false, true}) {
+      const std::string bytes = tiff(big_endian, big_tiff, 305, ours);
+      write(bytes);
+      expect_ours("TIFF");
+      write(tiff(big_endian, big_tiff, 305, other));
+      expect_foreign("of another program");
+      write(tiff(big_endian, big_tiff, 270, ours));
+      expect_foreign("in its description");
+      for (std::size_t size = 1; size < bytes.size(); ++size) {
+        write(bytes.substr(0, size));
+        if (size < bytes.size() - (big_tiff ? 8 : 0)) expect_foreign(std::to_string(size));
+      }
+    }
+  }
+}
+
+TEST_F(MayReplace, ForceTakesTablesThatStandAsWeWriteThem) {
+  for (const char* format : {"xyz", "csv"}) {
+    write_points(format);
+    expect_ours(format);
+    write(text().substr(0, text().size() - 1));
+    expect_foreign("cut short");
+  }
+  for (const char* ours :
+       {"", "0\n-1\n12\n", "a,b,distance\n0,1,2.5\n", "a,b,distance,size,level\n",
+        "a,b,height,size\n", "distance,x,y,height\n0,1.50,2,\n", "x,y,z\n", "nan inf -inf\n",
+        "# places\nname;x;y;height;gradient;slope;aspect\nhere;1;2;;;;\n"}) {
+    write(ours);
+    expect_ours(ours);
+  }
+}
+
+TEST_F(MayReplace, ForceLeavesWhatMerelyHasTheWord) {
+  for (const char* foreign :
+       {"terrace\n", "The terrace is 3 m wide.\n", "ply\nformat ascii 1.0\ncomment terrace\n",
+        "ply\nformat ascii 1.0\nend_header\ncomment written by terrace\n",
+        "ply\nformat ascii 1.0\ncomment not written by terrace\nend_header\n",
+        "# a mesh of the terrace\nv 1 2 3\n", "v 1 2 3\n# written by terrace\n",
+        "{\"type\":\"FeatureCollection\",\"name\":\"terrace\",\"generator\":\"terrace contour\"}\n",
+        "# vtk DataFile Version 3.0\nthe terrace, written by hand\n", "#!/bin/sh\nterrace info\n",
+        "\x7F"
+        "ELF terrace",
+        "\x89PNG\r\n\x1a\n terrace", "glTF terrace", "II*", "MM", "Dear diary,\ntoday 1 2 3\n",
+        // Tables of other programs.
+        "x,y,z\n1.50,2,3\n", "x,y,z\n1,2\n", "1.0 2.0 3.0\n", "1 2 3\r\n", "1  2 3\n", "1\t2\t3\n",
+        "1,2,3\n", "+1 2 3\n", "01 2 3\n", "1 2 3\n1 2\n", "1 2 3\n\n", "1e5 2 3\n", "x,y\n1,2\n",
+        "# points\n1 2 3\n", "\n", "height,gradient,slope\n"}) {
+    write(foreign);
+    expect_foreign(foreign);
+  }
+  write(std::string(200000, '1'));
+  expect_foreign("one long line");
+  std::string binary(200000, '\xFF');
+  binary += "terrace";
+  write(binary);
+  expect_foreign("the word at the end");
+}
+
+TEST_F(MayReplace, ALinkIsWhatItLeadsTo) {
+  const std::string link = scratch_.path() / "link";
+  fs::create_symlink("output", link);
+  EXPECT_FALSE(may_replace(link, false)) << "nothing stands there yet";
+  write("a letter\n");
+  EXPECT_THROW(may_replace(link, true), stream::Error);
+  write("");
+  EXPECT_THROW(may_replace(link, false), stream::Error);
+  EXPECT_TRUE(may_replace(link, true));
+  fs::remove(link);
+  fs::create_symlink("link", link);
+  EXPECT_THROW(may_replace(link, true), stream::Error) << "in a circle";
+}
+
+TEST_F(MayReplace, NeverAFolder) {
+  EXPECT_THROW(may_replace(scratch_.path(), true), stream::Error);
+}
+
+}  // namespace
+}  // namespace terrace::terrain

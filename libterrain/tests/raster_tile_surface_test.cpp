@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tile/make/raster_tile_surface.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <limits>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <terrace/stream/geotiff_writer.hpp>
+#include <terrace/stream/store.hpp>
+
+#include "build/store_build.hpp"
+#include "earth/portable_math.hpp"
+#include "temporary_folder.hpp"
+#include "tile/make/height_cache.hpp"
+
+namespace terrace::terrain {
+
+using namespace terrain;
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::int64_t kColumns = 700, kRows = 290;
+constexpr double kNodata = -9999.0;
+
+class RasterOfDegrees : public ::testing::Test {
+ protected:
+  double random() {
+    seed_ = scramble(seed_);
+    return unit_interval(seed_);
+  }
+
+  template <class T>
+  stream::Store make(stream::ScalarType type, const std::array<double, 6>& world, int epsg) {
+    std::vector<T> heights;
+    for (std::int64_t i = 0; i < kColumns * kRows; ++i) {
+      heights.push_back(static_cast<T>(random() < 0.1 ? kNodata : 3000 * random()));
+    }
+    stream::GeoTiffOptions tiff;
+    tiff.columns = kColumns;
+    tiff.rows = kRows;
+    tiff.sample.name = "height";
+    tiff.sample.type = type;
+    tiff.world.xy = world;
+    tiff.nodata = kNodata;
+    tiff.replace = true;
+    tiff.crs.epsg = epsg;
+    tiff.crs.geographic = epsg == 4326;
+    stream::GeoTiffWriter writer(folder_ / "dem.tif", tiff);
+    writer.write_rows(std::as_bytes(std::span(heights)));
+    writer.commit();
+    BuildRequest request;
+    request.inputs = {(folder_ / "dem.tif").string()};
+    request.store = folder_ / "dem.terrace";
+    request.replace = true;
+    build_store(request);
+    return stream::Store::open(folder_ / "dem.terrace");
+  }
+
+  std::uint64_t seed_ = 23;
+  tests::TemporaryFolder scratch_;
+  const fs::path& folder_ = scratch_.path();
+};
+
+using Heights = std::map<std::pair<double, double>, double>;
+
+Heights sampled(TileSurface& surface, const GeographicBox& box) {
+  SurfaceSamples samples;
+  surface.samples(box, samples);
+  Heights heights;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    heights[{samples.longitude[i], samples.latitude[i]}] = samples.height[i];
+  }
+  EXPECT_EQ(heights.size(), samples.size());
+  return heights;
+}
+
+Heights in_rows(const SurfaceRows& rows) {
+  EXPECT_TRUE(std::is_sorted(rows.longitude.begin(), rows.longitude.end()));
+  EXPECT_TRUE(std::is_sorted(rows.latitude.begin(), rows.latitude.end()));
+  EXPECT_EQ(rows.height.size(), rows.longitude.size() * rows.latitude.size());
+  Heights heights;
+  for (std::size_t i = 0; i < rows.height.size(); ++i) {
+    if (std::isnan(rows.height[i])) continue;
+    heights[{rows.longitude[i % rows.longitude.size()], rows.latitude[i / rows.longitude.size()]}] =
+        rows.height[i];
+  }
+  return heights;
+}
+
+TEST_F(RasterOfDegrees, RowsAreTheSamples) {
+  const std::array<std::array<double, 6>, 5> worlds{{{0.01, 0, 10, 0, -0.01, 47},
+                                                     {0.01, 0, 10, 0, 0.01, 44},
+                                                     {-0.01, 0, 17, 0, -0.01, 47},
+                                                     {0.01, 0, 176, 0, -0.01, -20},
+                                                     {0.5, 0, 5, 0, -0.5, 72}}};
+  for (const auto& world : worlds) {
+    const stream::Store store = make<float>(stream::ScalarType::f32, world, 4326);
+    TiledRaster raster(store, CoordinateSystem::of(store.schema().crs, "test").value(),
+                       {store.schema(), "ignore", "", 1 << 20});
+    for (const bool flat : {false, true}) {
+      if (flat) raster.flat_fill = 12.0;
+      RasterTileSurface surface(raster), other(raster);
+      std::size_t samples = 0;
+      int in_a_row = 0;
+      const GeographicBox all = surface.bounds();
+      for (int round = 0; round < 60; ++round) {
+        const double west = all.west + (all.east - all.west) * random();
+        const double south = all.south + (all.north - all.south) * random();
+        const double size = std::abs(world[0]) * (2 + 150 * random() * random());
+        const GeographicBox box{west - 0.5 * size, south - 0.5 * size, west + size, south + size};
+        SCOPED_TRACE(testing::Message() << "from " << world[2] << " by " << world[0] << ", round "
+                                        << round << ": " << box.west << "," << box.south);
+        SurfaceRows rows;
+        if (!surface.rows(box, rows)) continue;
+        ++in_a_row;
+        const Heights expected = sampled(other, box);
+        EXPECT_EQ(in_rows(rows), expected);
+        samples += expected.size();
+      }
+      EXPECT_GT(in_a_row, 40);
+      EXPECT_GT(samples, 100u);
+    }
+  }
+}
+
+TEST_F(RasterOfDegrees, ProjectedOrTurnedRastersHaveNoRows) {
+  for (const auto& [world, epsg] :
+       {std::pair{std::array<double, 6>{30, 0, 400000, 0, -30, 5200000}, 32632},
+        std::pair{std::array<double, 6>{0.01, 0.001, 10, -0.001, 0.01, 44}, 4326}}) {
+    const stream::Store store = make<float>(stream::ScalarType::f32, world, epsg);
+    const TiledRaster raster(store, CoordinateSystem::of(store.schema().crs, "test").value(),
+                             {store.schema(), "ignore", "", 1 << 20});
+    RasterTileSurface surface(raster);
+    SurfaceRows rows;
+    EXPECT_FALSE(surface.rows(surface.bounds(), rows));
+  }
+}
+
+TEST_F(RasterOfDegrees, CachedHeightsAreThoseOfTheStore) {
+  const auto check = [&](const stream::Store& store) {
+    // None, a few of the nine squares, all.
+    for (const std::uint64_t bytes :
+         {std::uint64_t{0}, std::uint64_t{1} << 20, std::uint64_t{1} << 30}) {
+      HeightCache cache(store, bytes);
+      StoreWindow plain(store);
+      for (int round = 0; round < 60; ++round) {
+        const LatticeWindow window{static_cast<std::int64_t>(random() * 800) - 50,
+                                   static_cast<std::int64_t>(random() * 400) - 50,
+                                   1 + static_cast<std::int64_t>(random() * 500),
+                                   1 + static_cast<std::int64_t>(random() * random() * 300)};
+        SCOPED_TRACE(testing::Message()
+                     << bytes << " bytes, round " << round << ": " << window.column << ","
+                     << window.row << " " << window.columns << " x " << window.rows);
+        std::vector<double> cached(window.size()), read(window.size());
+        cache.heights(window, cached);
+        plain.heights(window, std::span<double>(read));
+        for (std::size_t i = 0; i < read.size(); ++i) {
+          ASSERT_TRUE(cached[i] == read[i] || (std::isnan(cached[i]) && std::isnan(read[i]))) << i;
+        }
+      }
+    }
+  };
+  check(make<float>(stream::ScalarType::f32, {0.01, 0, 10, 0, -0.01, 47}, 4326));
+  check(make<double>(stream::ScalarType::f64, {0.01, 0, 10, 0, -0.01, 47}, 4326));
+}
+
+}  // namespace
+}  // namespace terrace::terrain

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "earth/region_crs.hpp"
+
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "base/error.hpp"
+#include "terrace/stream/error.hpp"
+
+namespace terrace::terrain {
+
+using namespace terrain;
+namespace {
+
+const stream::Box3 kEverywhere{{-1e8, -1e8, -1e8}, {1e8, 1e8, 1e8}};
+
+// Oracle: the point itself, converted back into the region's system.
+TEST(RegionCrs, HoldsWhatTheBoxHolds) {
+  struct Case {
+    const char *from, *to;
+    const char* box;
+  };
+  const Case cases[] = {
+      {"EPSG:4326", "EPSG:32632", "8,46,12,48"},
+      {"EPSG:4326", "EPSG:3035", "-10,35,30,70"},
+      {"EPSG:4326", "EPSG:3413", "-180,60,180,90"},
+      {"EPSG:32632", "EPSG:4326", "200000,5000000,800000,6000000"},
+      {"EPSG:3857", "EPSG:32633", "1500000,6000000,1800000,6300000"},
+      {"EPSG:4326", "EPSG:32660", "179,-5,181,10"},
+      {"EPSG:32660", "EPSG:4326", "600000,0,900000,1000000"},
+  };
+  for (const Case& test : cases) {
+    SCOPED_TRACE(std::string(test.from) + " to " + test.to);
+    const CoordinateSystem from = CoordinateSystem::parse(test.from);
+    const CoordinateSystem to = CoordinateSystem::parse(test.to);
+    const Region box = Region::parse(test.box);
+    const stream::Box3 world =
+        to.is_geographic() ? stream::Box3{{-180, -90, 0}, {180, 90, 0}} : kEverywhere;
+    const Region region = region_in(box, from, to, world);
+    std::mt19937_64 random(7);
+    const auto unit = [&random] { return static_cast<double>(random() >> 11) * 0x1p-53; };
+    for (int i = 0; i < 2000; ++i) {
+      // Half again as large as the box, in its own system; nothing closer than a thousandth of its
+      // size to the border, where the polygon may differ.
+      const double width = box.box().max[0] - box.box().min[0];
+      const double height = box.box().max[1] - box.box().min[1];
+      const double u = 1.4 * unit() - 0.2, v = 1.4 * unit() - 0.2;
+      if (std::min({std::abs(u), std::abs(1 - u), std::abs(v), std::abs(1 - v)}) < 1e-3) continue;
+      Point2 place{box.box().min[0] + u * width, box.box().min[1] + v * height};
+      if (from.is_geographic() && (std::abs(place[1]) > 89.9 || width == 360)) {
+        if (u < 0 || u > 1 || std::abs(place[1]) > 89.9) continue;
+      }
+      const bool inside = u > 0 && u < 1 && v > 0 && v < 1;
+      transform(from, to, {&place, 1});
+      EXPECT_EQ(region.contains({place[0], place[1], 0}), inside) << u << ' ' << v;
+    }
+  }
+}
+
+TEST(RegionCrs, KeepsHeights) {
+  const Region box = Region::parse("8,46,100,9,47,200");
+  const Region region = region_in(box, CoordinateSystem::parse("EPSG:4326"),
+                                  CoordinateSystem::parse("EPSG:32632"), kEverywhere);
+  EXPECT_EQ(region.box().min[2], 100);
+  EXPECT_EQ(region.box().max[2], 200);
+}
+
+TEST(RegionCrs, RefusesWhatTheSystemDoesNotShow) {
+  const CoordinateSystem degrees, mercator = CoordinateSystem::parse("EPSG:3857");
+  EXPECT_THROW(region_in(Region::parse("0,0,10,90"), degrees, mercator, kEverywhere),
+               stream::Error);
+  EXPECT_THROW(region_in(Region::parse("0,0,10,95"), degrees, mercator, kEverywhere),
+               stream::Error);
+  // Cut in two by the projection: one side of the antimeridian lies at the left, one at the right.
+  EXPECT_THROW(region_in(Region::parse("170,0,190,10"), degrees, mercator, kEverywhere),
+               stream::Error);
+  EXPECT_THROW(region_in(Region::parse("-1000000,-1000000,900000,900000"),
+                         CoordinateSystem::parse("EPSG:3413"), degrees, kEverywhere),
+               stream::Error);
+  EXPECT_THROW(region_in(Region::parse("0,0,1,1"), degrees, CoordinateSystem::parse("EPSG:27700"),
+                         kEverywhere),
+               stream::Error);
+}
+
+}  // namespace
+}  // namespace terrace::terrain

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "mesh/scene.hpp"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+namespace terrace::terrain {
+
+using namespace terrain;
+namespace {
+
+TriangleMesh tetrahedron() {
+  TriangleMesh mesh;
+  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  mesh.triangles = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
+  return mesh;
+}
+
+TEST(HeightField, IsSeenFromAboveWithoutOverlap) {
+  TriangleMesh flat;
+  flat.positions = {{0, 0, 3}, {1, 0, 1}, {0, 1, 7}, {1, 1, -2}};
+  flat.triangles = {{0, 1, 2}, {1, 3, 2}};
+  EXPECT_TRUE(is_height_field(flat));
+  flat.triangles[1] = {1, 2, 3};  // turned over
+  EXPECT_FALSE(is_height_field(flat));
+  EXPECT_FALSE(is_height_field(tetrahedron()));
+  EXPECT_FALSE(is_height_field(TriangleMesh{}));
+}
+
+TEST(VertexNormals, AreUnitAndOutward) {
+  const TriangleMesh mesh = tetrahedron();
+  const auto normals = vertex_normals(mesh);
+  ASSERT_EQ(normals.size(), 4u);
+  for (std::size_t v = 0; v < 4; ++v) {
+    double length = 0, outward = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      length += normals[v][axis] * normals[v][axis];
+      outward += normals[v][axis] * (mesh.positions[v][axis] - 0.25);
+    }
+    EXPECT_NEAR(length, 1, 1e-6);
+    EXPECT_GT(outward, 0);
+  }
+}
+
+TEST(VertexNormals, OfTerrainPointUpWhateverTheOrientation) {
+  TriangleMesh mesh;
+  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {9, 9, 9}};
+  for (const std::array<std::uint32_t, 3> t : {std::array<std::uint32_t, 3>{0, 1, 2}, {0, 2, 1}}) {
+    mesh.triangles = {t};
+    EXPECT_EQ(vertex_normals(mesh)[0][2], 1);
+    EXPECT_EQ(vertex_normals(mesh)[3][2], 1);  // a vertex without triangles
+  }
+}
+
+}  // namespace
+}  // namespace terrace::terrain

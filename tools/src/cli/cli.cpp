@@ -1,0 +1,294 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/cli.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <filesystem>
+#include <new>
+#include <stdexcept>
+#include <thread>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <terrace/cluster/cuda_linkage.hpp>
+
+#include "base/error.hpp"
+#include "base/interrupt.hpp"
+#include "base/terminal.hpp"
+#include "base/units.hpp"
+#include "terrace/stream/error.hpp"
+#include "version.hpp"
+
+namespace terrace::tools {
+
+using namespace terrain;
+namespace {
+
+constexpr int kDone = 0;
+constexpr int kFailed = 1;
+constexpr int kWrongUsage = 2;
+constexpr int kInterrupted = 130;
+
+std::string general_help() {
+  std::string text =
+      "terrace turns point sets too large for memory into a store, and serves from it any part at "
+      "any\nresolution.\n\nUsage: terrace VERB [OPTIONS]\n\nVerbs:\n";
+  for (const Verb& verb : verbs()) {
+    if (verb.create == nullptr) continue;
+    text += "  " + verb.name + std::string(10 - std::min<std::size_t>(verb.name.size(), 9), ' ') +
+            verb.brief + '\n';
+  }
+  return text +
+         "\n`terrace VERB --help` tells more; `terrace --version` names version, build and parts.\n"
+         "\nExample:\n  terrace synth dem --size 1024x1024 -o dem.tif\n";
+}
+
+std::string version_text() {
+  const cluster::CudaStatus cuda = cluster::cuda_available();
+  return std::string("terrace ") + kVersion + "\nbuild: " + kBuild +
+         "\nparts: linkage on a GPU: " + (cuda.available ? cuda.device : cuda.reason) + "\n";
+}
+
+const Verb& find_verb(const std::string& name) {
+  for (const Verb& verb : verbs()) {
+    if (verb.name == name) {
+      if (verb.create == nullptr) throw UsageError("'" + name + "' is not available yet");
+      return verb;
+    }
+  }
+  throw UsageError("there is no verb '" + name + "'; `terrace --help` lists them");
+}
+
+/// parse(text), with the option's name before what it throws.
+template <class Parse>
+std::uint64_t value_of_option(const std::string& name, const std::string& text,
+                              const Parse& parse) {
+  try {
+    return parse(text);
+  } catch (const UsageError& error) {
+    throw UsageError(name + ": " + error.what());
+  }
+}
+
+void add_common_options(CLI::App& app, CommonOptions& common) {
+  const std::string group = "Common options";
+  app.add_option("--threads", common.threads, "Threads; never changes results (default: all cores)")
+      ->check(CLI::Range(1U, 4096U))
+      ->group(group)
+      ->type_name("N");
+  app.add_option_function<std::string>(
+         "--memory",
+         [&common](const std::string& text) {
+           common.memory_bytes = value_of_option("--memory", text, parse_memory);
+         },
+         "Most memory to use: 256M, 2G; never changes results")
+      ->group(group)
+      ->type_name("SIZE");
+  app.add_option_function<std::string>(
+         "--seed",
+         [&common](const std::string& text) { common.seed = count_of_option("--seed", text); },
+         "Same input, options and seed give the same bytes (default: 1)")
+      ->group(group)
+      ->type_name("N");
+  app.add_flag("--json", common.json, "Print the summary as one JSON object on standard output")
+      ->group(group);
+  app.add_flag("--force", common.force,
+               "Replace an existing output if its format's own mark says that terrace wrote it")
+      ->group(group);
+  app.add_option_function<std::string>(
+         "--progress",
+         [&common](const std::string& mode) {
+           common.progress = mode == "json"   ? ProgressMode::json
+                             : mode == "none" ? ProgressMode::none
+                                              : ProgressMode::automatic;
+         },
+         "Progress on standard error: auto (on a terminal), json (JSON lines) or none")
+      ->check(CLI::IsMember({"auto", "json", "none"}))
+      ->group(group)
+      ->type_name("MODE");
+  app.add_flag("-q,--quiet", common.quiet, "Print nothing but errors")->group(group);
+  app.add_flag("-v,--verbose", common.verbose, "Explain what is done")->group(group);
+}
+
+/// True if -o or what stands in its place is '-'.
+bool writes_to_stdout(const CLI::App& app) {
+  const CLI::Option* output = app.get_option_no_throw("--output");
+  if (output == nullptr) return false;
+  return (output->count() > 0 ? output->as<std::string>() : output->get_default_str()) == "-";
+}
+
+/// Runs one verb with its arguments, those after the verb's name.
+int run_verb(const Verb& verb, std::vector<std::string> arguments) {
+  CLI::App app{verb.brief.empty() ? "" : "terrace " + verb.name + ": " + verb.brief + ".",
+               "terrace " + verb.name};
+  app.set_help_flag("-h,--help", "Print this help")->group("Common options");
+  app.footer("Example:\n  " + verb.example);
+
+  CommonOptions common;
+  common.threads = std::max(1U, std::thread::hardware_concurrency());
+  const std::unique_ptr<Command> command = verb.create();
+  command->define(app);
+  add_common_options(app, common);
+
+  try {
+    std::reverse(arguments.begin(), arguments.end());  // as CLI11 takes them
+    app.parse(std::move(arguments));
+  } catch (const CLI::CallForHelp&) {
+    print_result(app.help());
+    return kDone;
+  } catch (const CLI::ParseError& error) {
+    throw UsageError(std::string(error.what()) + "; `terrace " + verb.name + " --help` tells more");
+  }
+  if (common.json && writes_to_stdout(app)) {
+    throw UsageError("--json and the output both want standard output; give -o FILE");
+  }
+  if (common.quiet && common.progress == ProgressMode::automatic) {
+    common.progress = ProgressMode::none;
+  }
+
+  const Summary summary = command->run(common);
+  try {
+    if (common.json) {
+      // A file's name or text in it may be no UTF-8, and what a terminal obeys is escaped with
+      // all that is not ASCII.
+      constexpr auto kReplace = nlohmann::ordered_json::error_handler_t::replace;
+      print_result(summary.json.dump(-1, ' ', true, kReplace) + '\n');
+    } else if (summary.text_is_result) {
+      print_result(printable(summary.text));
+    } else if (!common.quiet) {
+      print_lines(summary.text);
+    }
+  } catch (const stream::ClosedPipe&) {
+    // Nobody wants to read the summary; what it would have said still is the exit code.
+  }
+  return summary.exit_code;
+}
+
+int dispatch(const std::vector<std::string>& arguments) {
+  if (arguments.empty()) {
+    throw UsageError("no verb given; `terrace --help` lists them");
+  }
+  const std::string& first = arguments.front();
+  if (first == "--help" || first == "-h" || (first == "help" && arguments.size() == 1)) {
+    print_result(general_help());
+    return kDone;
+  }
+  if (first == "--version") {
+    print_result(version_text());
+    return kDone;
+  }
+  if (first == "help") return run_verb(find_verb(arguments[1]), {"--help"});
+  if (first.size() > 1 && first.front() == '-') {
+    throw UsageError("the verb comes first, then '" + first + "'; `terrace --help` lists verbs");
+  }
+  return run_verb(find_verb(first), {arguments.begin() + 1, arguments.end()});
+}
+
+/// What went wrong, for people: texts of the standard library say little to them.
+std::string message_of(const std::exception& error) {
+  if (dynamic_cast<const std::bad_alloc*>(&error) != nullptr) {
+    return "out of memory; give a smaller --memory or a smaller input";
+  }
+  if (const auto* file = dynamic_cast<const std::filesystem::filesystem_error*>(&error)) {
+    return file->path1().string() + ": " + file->code().message();
+  }
+  const std::string text = error.what();
+  // "vector::reserve", "cannot create std::vector larger than max_size()": a size beyond all
+  // memory.
+  if (dynamic_cast<const std::length_error*>(&error) != nullptr &&
+      (text.find("::") != std::string::npos || text.find("max_size") != std::string::npos)) {
+    return "what is asked for does not fit into any memory; ask for less";
+  }
+  if (dynamic_cast<const std::invalid_argument*>(&error) != nullptr) {
+    return text + "; check the values of the options (`terrace VERB --help`)";
+  }
+  return text;
+}
+
+/// Throws: UsageError naming the option.
+double number_of_option(const std::string& name, const std::string& text,
+                        const NumberRange& range) {
+  const double value = parse_number(text, name);
+  if (value < range.least || (range.above_least && value == range.least) || value > range.most) {
+    std::string wanted = range.above_least        ? "above " + number_text(range.least)
+                         : std::isinf(range.most) ? "at least " + number_text(range.least)
+                                                  : "from " + number_text(range.least) + " to " +
+                                                        number_text(range.most);
+    throw UsageError(name + " must be " + wanted + ", not " + text);
+  }
+  return value;
+}
+
+}  // namespace
+
+CLI::Option* add_number(CLI::App& app, const std::string& name, double& value,
+                        const std::string& description, const NumberRange& range) {
+  return app
+      .add_option_function<std::string>(
+          name,
+          [name, range, &value](const std::string& text) {
+            value = number_of_option(name, text, range);
+          },
+          description)
+      ->default_str(number_text(value))
+      ->type_name("NUMBER");
+}
+
+CLI::Option* add_number(CLI::App& app, const std::string& name, std::optional<double>& value,
+                        const std::string& description, const NumberRange& range) {
+  return app
+      .add_option_function<std::string>(
+          name,
+          [name, range, &value](const std::string& text) {
+            value = number_of_option(name, text, range);
+          },
+          description)
+      ->type_name("NUMBER");
+}
+
+std::uint64_t count_of_option(const std::string& name, const std::string& text) {
+  return value_of_option(name, text, parse_count);
+}
+
+void not_yet(CLI::App& app, std::initializer_list<const char*> names) {
+  for (const char* name : names) {
+    app.add_option_function<std::vector<std::string>>(
+           name,
+           [name](const std::vector<std::string>&) {
+             throw UsageError(std::string("'") + name + "' is not available yet");
+           })
+        ->expected(0, 1)
+        ->trigger_on_parse()
+        ->group("");
+  }
+}
+
+CLI::Option* add_output(CLI::App& app, std::string& target, const std::string& description) {
+  return app.add_option("-o,--output", target, description)->required()->type_name("FILE");
+}
+
+int run_command_line(int argc, const char* const* argv) {
+  install_signal_handlers();
+  try {
+    return dispatch({argv + std::min(argc, 1), argv + argc});
+  } catch (const stream::ClosedPipe&) {
+    return kDone;
+  } catch (const UsageError& error) {
+    print_message(error.what());
+    return kWrongUsage;
+  } catch (const Interrupted& error) {
+    print_message(error.what());
+    return kInterrupted;
+  } catch (const std::exception& error) {
+    // A wait that Ctrl-C ended, or a read or write that the signal cut short, is not a fault.
+    if (interrupted()) {
+      print_message("interrupted; run the same command again to start anew");
+      return kInterrupted;
+    }
+    print_message(message_of(error));
+    return kFailed;
+  }
+}
+
+}  // namespace terrace::tools

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <memory>
+#include <optional>
+
+#include "base/interrupt.hpp"
+#include "base/terminal.hpp"
+#include "cli/cli.hpp"
+
+// Apart from the command line, which needs all verbs: libraries of the tools speak by these.
+namespace terrace::tools {
+
+using namespace terrain;
+
+std::uint64_t CommonOptions::memory_or(std::uint64_t standard) const {
+  return terrain::Context{.memory_bytes = memory_bytes}.memory_or(standard);
+}
+
+void CommonOptions::say(const std::string& line) const {
+  if (!quiet) print_message(line);
+}
+
+void CommonOptions::explain(const std::string& line) const {
+  if (verbose && !quiet) print_message(line);
+}
+
+terrain::Context CommonOptions::context() const {
+  const auto show = [mode = progress, meter = std::make_shared<std::optional<ProgressMeter>>()](
+                        const terrain::Progress& now) {
+    if (now.ended) {
+      meter->reset();
+    } else {
+      if (!*meter) meter->emplace(mode, std::string(now.what));
+      (*meter)->update(now.count, now.fraction);
+    }
+  };
+  return {.threads = threads,
+          .memory_bytes = memory_bytes,
+          .stop = stop_token(),
+          .progress = show,
+          .note = [this](const std::string& line) { say(line); }};
+}
+
+}  // namespace terrace::tools

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "picture/color.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <span>
+
+#include "earth/portable_math.hpp"
+
+namespace terrace::tools {
+
+using namespace terrain;
+namespace {
+
+struct Stop {
+  double place;
+  Rgb colour;
+};
+
+Rgb ramp(std::span<const Stop> stops, double place) {
+  if (!(place > stops.front().place)) return stops.front().colour;
+  for (std::size_t i = 1; i < stops.size(); ++i) {
+    if (place > stops[i].place) continue;
+    const double t = (place - stops[i - 1].place) / (stops[i].place - stops[i - 1].place);
+    Rgb mixed{};
+    for (std::size_t c = 0; c < 3; ++c) {
+      mixed[c] = static_cast<std::uint8_t>(
+          std::lround((1 - t) * stops[i - 1].colour[c] + t * stops[i].colour[c]));
+    }
+    return mixed;
+  }
+  return stops.back().colour;
+}
+
+}  // namespace
+
+Rgb land_colour(double share) {
+  static constexpr std::array<Stop, 7> kLand{{{0.00, {96, 145, 92}},
+                                              {0.18, {150, 178, 110}},
+                                              {0.36, {212, 201, 140}},
+                                              {0.54, {196, 160, 105}},
+                                              {0.70, {160, 122, 92}},
+                                              {0.85, {178, 166, 158}},
+                                              {1.00, {250, 250, 250}}}};
+  return ramp(kLand, share);
+}
+
+Rgb sea_colour(double share) {
+  static constexpr std::array<Stop, 4> kSea{
+      {{0.0, {20, 42, 92}}, {0.5, {44, 92, 150}}, {0.85, {104, 160, 202}}, {1.0, {168, 208, 228}}}};
+  return ramp(kSea, share);
+}
+
+Rgb slope_colour(double degrees) {
+  static constexpr std::array<Stop, 4> kSlope{
+      {{0, {250, 250, 245}}, {15, {250, 215, 110}}, {35, {205, 70, 45}}, {60, {75, 15, 30}}}};
+  return ramp(kSlope, degrees);
+}
+
+Rgb category_colour(std::int64_t category) {
+  // P. Green-Armytage's idea of many distinct colours, in twelve of middle lightness.
+  static constexpr std::array<Rgb, 12> kCategories{{{68, 119, 170},
+                                                    {238, 153, 51},
+                                                    {51, 153, 85},
+                                                    {204, 68, 85},
+                                                    {136, 102, 187},
+                                                    {153, 119, 68},
+                                                    {221, 136, 187},
+                                                    {119, 119, 119},
+                                                    {170, 170, 51},
+                                                    {85, 187, 204},
+                                                    {34, 85, 51},
+                                                    {136, 34, 51}}};
+  const auto count = static_cast<std::int64_t>(kCategories.size());
+  return kCategories[static_cast<std::size_t>(((category % count) + count) % count)];
+}
+
+Rgb cluster_colour(std::int64_t cluster) {
+  if (cluster < 0) return {200, 200, 200};
+  const std::uint64_t scattered = scramble(static_cast<std::uint64_t>(cluster));
+  Rgb colour = category_colour(static_cast<std::int64_t>(scattered >> 8));
+  // In five shades, so that two clusters side by side are rarely alike.
+  const double shade = 0.7 + 0.12 * static_cast<double>(scattered % 5);
+  for (std::uint8_t& c : colour) c = static_cast<std::uint8_t>(std::min(255.0, shade * c));
+  return colour;
+}
+
+HeightTint HeightTint::of(std::vector<double> heights) {
+  std::erase_if(heights, [](double height) { return !std::isfinite(height); });
+  if (heights.empty()) return {};
+  std::sort(heights.begin(), heights.end());
+  HeightTint tint;
+  const std::size_t outer = heights.size() / 200;
+  tint.low = heights[outer];
+  tint.high = heights[heights.size() - 1 - outer];
+  // A shore only where the sea is a good part of what is seen: beaches and polders lie below 0 too.
+  tint.shore = tint.low < 0 && tint.high > 0 && -tint.low > 0.05 * tint.high;
+  return tint;
+}
+
+Rgb HeightTint::colour(double height) const {
+  if (shore && height < 0) return sea_colour((height - low) / -low);
+  const double bottom = shore ? 0 : low;
+  return high > bottom ? land_colour((height - bottom) / (high - bottom)) : land_colour(0.3);
+}
+
+}  // namespace terrace::tools

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "mesh/scene.hpp"
+
+namespace terrace::tools {
+
+using namespace terrain;
+
+/// Hypsometric tint: deep to high land as green, straw, brown, grey, white. share: 0 lowest, 1
+/// highest; clamped.
+Rgb land_colour(double share);
+/// Sea floor: dark to light blue. share: 0 deepest, 1 at the surface.
+Rgb sea_colour(double share);
+/// Slope: white, yellow, red, dark red at 0, 15, 35 and 60 degrees and above.
+Rgb slope_colour(double degrees);
+/// Colours that differ well for small numbers: levels, classes, clusters.
+Rgb category_colour(std::int64_t category);
+/// The same for clusters, whose numbers say nothing of who lies beside whom: scattered. Negative
+/// numbers, points without a cluster, are light grey.
+Rgb cluster_colour(std::int64_t cluster);
+
+/// The range of heights that the tints span: without the outermost 0.5 % of what is shown on either
+/// side, and with a shore at 0 where there is land and sea.
+struct HeightTint {
+  double low = 0.0, high = 1.0;
+  bool shore = false;
+
+  /// Of heights that stand for equal parts of what is shown. Those that are not finite are ignored.
+  /// O(n log n).
+  static HeightTint of(std::vector<double> heights);
+  [[nodiscard]] Rgb colour(double height) const;
+};
+
+}  // namespace terrace::tools

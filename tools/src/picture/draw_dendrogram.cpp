@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <vector>
+
+#include <terrace/cluster/dendrogram.hpp>
+
+#include "picture/color.hpp"
+#include "picture/draw.hpp"
+
+namespace terrace::tools {
+namespace {
+
+using cluster::Dendrogram;
+using cluster::Merge;
+
+/// The points in the order of the tree's leaves, from a stack: trees may be as deep as they are
+/// wide.
+std::vector<double> leaf_places(const Dendrogram& tree) {
+  std::vector<double> place(tree.points, 0.0);
+  const auto points = static_cast<std::uint32_t>(tree.points);
+  std::vector<std::uint32_t> stack{
+      static_cast<std::uint32_t>(tree.points + tree.merges.size() - 1)};
+  double next = 0.5;
+  while (!stack.empty()) {
+    const std::uint32_t node = stack.back();
+    stack.pop_back();
+    if (node < points) {
+      place[node] = next;
+      next += 1.0;
+      continue;
+    }
+    const Merge& merge = tree.merges[node - points];
+    stack.push_back(merge.b);
+    stack.push_back(merge.a);
+  }
+  return place;
+}
+
+/// Colour number of each merge: one per subtree that lies below the threshold, -1 above.
+std::vector<std::int64_t> groups_below(const Dendrogram& tree, double threshold) {
+  std::vector<std::int64_t> group(tree.merges.size(), -1);
+  std::int64_t next = 0;
+  const auto points = static_cast<std::uint32_t>(tree.points);
+  for (std::size_t r = tree.merges.size(); r > 0; --r) {
+    const Merge& merge = tree.merges[r - 1];
+    if (merge.height < threshold && group[r - 1] < 0) group[r - 1] = next++;
+    for (const std::uint32_t child : {merge.a, merge.b}) {
+      if (child >= points && group[r - 1] >= 0) group[child - points] = group[r - 1];
+    }
+  }
+  return group;
+}
+
+void fill(double x0, double y0, double x1, double y1, const Rgb& rgb, Canvas& canvas) {
+  const auto left = static_cast<std::uint32_t>(std::clamp(x0, 0.0, canvas.width() - 1.0));
+  const auto right = static_cast<std::uint32_t>(std::clamp(x1, 0.0, canvas.width() - 1.0));
+  const auto top = static_cast<std::uint32_t>(std::clamp(y0, 0.0, canvas.height() - 1.0));
+  const auto bottom = static_cast<std::uint32_t>(std::clamp(y1, 0.0, canvas.height() - 1.0));
+  for (std::uint32_t y = top; y <= bottom; ++y) {
+    for (std::uint32_t x = left; x <= right; ++x) {
+      canvas.colour(x, y) = {static_cast<float>(rgb[0]) / 255.0F,
+                             static_cast<float>(rgb[1]) / 255.0F,
+                             static_cast<float>(rgb[2]) / 255.0F};
+      canvas.depth(x, y) = 0.0F;
+    }
+  }
+}
+
+}  // namespace
+
+void draw_dendrogram(const Dendrogram& tree, Canvas& canvas) {
+  if (tree.merges.empty()) return;
+  const double margin = 0.03 * std::min(canvas.width(), canvas.height());
+  const double wide = canvas.width() - 2 * margin, high = canvas.height() - 2 * margin;
+  const double top = tree.merges.back().height;
+  // Of equal points all merges lie at 0.
+  const double scale = top > 0 ? high / top : 0.0;
+  const double step = wide / static_cast<double>(tree.points);
+  // Two samples make a pixel; crowded lines are one sample wide.
+  const double half = step >= 8 ? 1.0 : 0.5;
+  const auto row = [&](double height) { return canvas.height() - margin - scale * height; };
+
+  const std::vector<double> leaf = leaf_places(tree);
+  // The share of the height below which SciPy colours its clusters too.
+  const std::vector<std::int64_t> group = groups_below(tree, 0.7 * top);
+  std::vector<double> middle(tree.merges.size());
+  const auto points = static_cast<std::uint32_t>(tree.points);
+  for (std::size_t r = 0; r < tree.merges.size(); ++r) {
+    const Merge& merge = tree.merges[r];
+    const Rgb colour = group[r] < 0 ? Rgb{60, 60, 65} : category_colour(group[r]);
+    const auto place = [&](std::uint32_t node) {
+      return node < points ? margin + step * leaf[node] : middle[node - points];
+    };
+    const auto height = [&](std::uint32_t node) {
+      return node < points ? 0.0 : tree.merges[node - points].height;
+    };
+    const double a = place(merge.a), b = place(merge.b), y = row(merge.height);
+    middle[r] = 0.5 * (a + b);
+    fill(a - half, y, a + half, row(height(merge.a)), colour, canvas);
+    fill(b - half, y, b + half, row(height(merge.b)), colour, canvas);
+    fill(std::min(a, b) - half, y - half, std::max(a, b) + half, y + half, colour, canvas);
+  }
+}
+
+}  // namespace terrace::tools

@@ -1,0 +1,237 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <numbers>
+#include <vector>
+
+#include "base/parallel.hpp"
+#include "base/point_spacing.hpp"
+#include "base/vector.hpp"
+#include "picture/draw.hpp"
+
+namespace terrace::tools {
+
+using namespace terrain;
+namespace {
+
+struct Splat {
+  float x, y, depth, radius;
+};
+
+/// What the samples show, beside the canvas: radii of the discs, 0 where there is none.
+using Radii = std::vector<float>;
+
+/// A surface steeper than this, from sample to sample, is taken for two surfaces.
+float jump(float radius, const Camera& camera) {
+  return 4 * (radius + 1) / static_cast<float>(camera.scale);
+}
+
+/// Samples that the cloud covers, as if it had no gaps: cells of a grid coarse enough that a cell
+/// of the cloud holds several points are counted.
+double covered_area(const std::vector<Splat>& splats, const Canvas& canvas) {
+  double area = 1;
+  for (std::uint32_t cell = 2; cell <= 256; cell *= 2) {
+    const std::size_t columns = canvas.width() / cell + 1;
+    std::vector<std::uint8_t> taken(columns * (canvas.height() / cell + 1), 0);
+    std::size_t count = 0, points = 0;
+    for (const Splat& s : splats) {
+      if (!(s.x >= 0 && s.y >= 0 && s.x < static_cast<float>(canvas.width()) &&
+            s.y < static_cast<float>(canvas.height()))) {
+        continue;
+      }
+      std::uint8_t& mark = taken[static_cast<std::size_t>(s.y) / cell * columns +
+                                 static_cast<std::size_t>(s.x) / cell];
+      count += mark == 0 ? 1 : 0;
+      mark = 1;
+      ++points;
+    }
+    area = std::max(static_cast<double>(count) * cell * cell, 1.0);
+    if (points >= 6 * count) break;
+  }
+  return area;
+}
+
+/// Where a cloud is coarse in parts, discs as large as the part needs: by the distances to a few
+/// neighbours among the points that are as coarse, but not much above what is usual among them.
+void set_radii(const TriangleMesh& cloud, const Camera& camera, const Canvas& canvas,
+               const DrawOptions& options, std::vector<Splat>& splats) {
+  constexpr unsigned kRank = 8;
+  // Points of one side: for scattered ones the same cover as below, for representatives, which keep
+  // apart, less.
+  const double scattered = 1.34 * std::sqrt(std::numbers::pi / kRank);
+  const double apart = 0.8 * std::sqrt(std::numbers::pi / kRank);
+  // What covers a tenth of the picture tells nothing of a shape.
+  const double most = std::max(1.0, 0.1 * std::min(canvas.width(), canvas.height()));
+  std::array<std::vector<std::uint32_t>, 256> groups;
+  for (std::size_t i = 0; i < splats.size(); ++i) {
+    groups[cloud.left_out[i]].push_back(static_cast<std::uint32_t>(i));
+  }
+  std::vector<stream::Point3> positions;
+  for (std::size_t coarse = 0; coarse < groups.size(); ++coarse) {
+    const std::vector<std::uint32_t>& group = groups[coarse];
+    if (group.size() < 2) continue;
+    const double per_distance = coarse > 0 ? apart : scattered;
+    positions.clear();
+    for (const std::uint32_t i : group) positions.push_back(cloud.positions[i]);
+    const std::vector<float> distances = neighbour_distances(positions, kRank, options.threads);
+    std::vector<float> sorted = distances;
+    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+    std::nth_element(sorted.begin(), middle, sorted.end());
+    for (std::size_t k = 0; k < group.size(); ++k) {
+      const double distance = std::min(distances[k], 1.5F * *middle);
+      splats[group[k]].radius =
+          static_cast<float>(std::clamp(per_distance * distance * camera.scale, 1.0, most));
+    }
+  }
+}
+
+/// Averages depths over a square somewhat larger than the disc, only over neighbours whose depth is
+/// no jump away: normals of discs would else be those of the discs. Rows, then columns.
+void smooth_depths(Canvas& canvas, const Radii& radii, const Camera& camera, unsigned threads) {
+  const auto width = static_cast<int>(canvas.width()), height = static_cast<int>(canvas.height());
+  std::vector<float> other(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  const auto at = [width](int x, int y) {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+           static_cast<std::size_t>(x);
+  };
+  const auto pass = [&](bool along_rows, auto&& get, auto&& set) {
+    for_bands(canvas.height(), threads, [&](std::uint32_t first, std::uint32_t last) {
+      for (int y = static_cast<int>(first); y < static_cast<int>(last); ++y) {
+        for (int x = 0; x < width; ++x) {
+          const float centre = get(x, y);
+          float sum = 0, weight = 0;
+          if (std::isfinite(centre)) {
+            const float disc = radii[at(x, y)], step = jump(disc, camera);
+            const int radius = std::max(1, static_cast<int>(std::lround(1.2F * disc)));
+            for (int k = -radius; k <= radius; ++k) {
+              const int nx = along_rows ? x + k : x, ny = along_rows ? y : y + k;
+              if (nx < 0 || ny < 0 || nx >= width || ny >= height) continue;
+              const float d = get(nx, ny);
+              const float jump_share = (d - centre) / step;
+              if (!(std::abs(jump_share) < 1)) continue;
+              const float near = 1 - jump_share * jump_share;
+              const float w = static_cast<float>(radius + 1 - std::abs(k)) * near * near;
+              sum += w * d;
+              weight += w;
+            }
+          }
+          set(x, y, weight > 0 ? sum / weight : centre);
+        }
+      }
+    });
+  };
+  const auto canvas_depth = [&](int x, int y) -> float& {
+    return canvas.depth(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y));
+  };
+  pass(true, canvas_depth, [&](int x, int y, float d) { other[at(x, y)] = d; });
+  pass(
+      false, [&](int x, int y) { return other[at(x, y)]; },
+      [&](int x, int y, float d) { canvas_depth(x, y) = d; });
+}
+
+/// The slope of the depths at a sample along one axis, from the side without a jump.
+float slope(float before, float here, float after, float step) {
+  const float back = here - before, ahead = after - here;
+  const bool back_good = std::abs(back) <= step, ahead_good = std::abs(ahead) <= step;
+  if (back_good && ahead_good) return 0.5F * (back + ahead);
+  if (back_good) return back;
+  if (ahead_good) return ahead;
+  return 0;
+}
+
+/// Lights every sample by the normal that its depth and its neighbours' tell.
+void light_by_depth(const Camera& camera, const Light& light, const Radii& radii, unsigned threads,
+                    Canvas& canvas) {
+  for_bands(canvas.height(), threads, [&](std::uint32_t first, std::uint32_t last) {
+    for (std::uint32_t y = first; y < last; ++y) {
+      for (std::uint32_t x = 0; x < canvas.width(); ++x) {
+        const float here = canvas.depth(x, y);
+        if (!std::isfinite(here)) continue;
+        const float step = jump(radii[std::size_t{y} * canvas.width() + x], camera);
+        const float left = canvas.depth(x == 0 ? x : x - 1, y);
+        const float right = canvas.depth(std::min(x + 1, canvas.width() - 1), y);
+        const float above = canvas.depth(x, y == 0 ? y : y - 1);
+        const float below = canvas.depth(x, std::min(y + 1, canvas.height() - 1));
+        // Metres of depth per metre along right and up.
+        const double along = slope(left, here, right, step) * camera.scale;
+        const double upward = -slope(above, here, below, step) * camera.scale;
+        stream::Point3 normal{};
+        for (std::size_t i = 0; i < 3; ++i) {
+          normal[i] = camera.toward[i] - along * camera.right[i] - upward * camera.up[i];
+        }
+        const float shade = light.shade(unit(normal), camera.toward);
+        for (float& c : canvas.colour(x, y)) {
+          c = shade <= 1 ? c * shade : c + (1 - c) * std::min(shade - 1, 1.0F);
+        }
+      }
+    }
+  });
+}
+
+}  // namespace
+
+void draw_points(const TriangleMesh& cloud, const std::vector<Rgb>& colours, const Camera& camera,
+                 const Light& light, const DrawOptions& options, Canvas& canvas) {
+  std::vector<Splat> splats(cloud.positions.size());
+  for (std::size_t i = 0; i < splats.size(); ++i) {
+    const auto [x, y, depth] = camera.project(cloud.positions[i]);
+    splats[i] = {static_cast<float>(x), static_cast<float>(y), static_cast<float>(depth), 0};
+  }
+  if (splats.empty()) return;
+  // Discs of radius r cover all but exp(-points * pi * r^2 / area) of an area over which so many
+  // points are scattered evenly. Of a closed body half of the points lie behind the other half, so
+  // that this leaves half a percent there, and nothing of a terrain.
+  constexpr double kCover = 1.9;
+  const double per_point = covered_area(splats, canvas) / static_cast<double>(splats.size());
+  const auto usual = static_cast<float>(std::clamp(kCover * std::sqrt(per_point), 1.0, 60.0));
+  const bool own_normals = cloud.normals.size() == cloud.positions.size();
+  for (Splat& splat : splats) splat.radius = usual;
+  if (cloud.left_out.size() == splats.size()) set_radii(cloud, camera, canvas, options, splats);
+
+  Radii radii(std::size_t{canvas.width()} * canvas.height(), 0.0F);
+  for_bands(canvas.height(), options.threads, [&](std::uint32_t first, std::uint32_t last) {
+    for (std::size_t i = 0; i < splats.size(); ++i) {
+      const Splat& s = splats[i];
+      const float radius = s.radius;
+      const float y0 = std::max(std::ceil(s.y - radius - 0.5F), static_cast<float>(first));
+      const float y1 = std::min(std::floor(s.y + radius - 0.5F) + 1, static_cast<float>(last));
+      const float x0 = std::max(std::ceil(s.x - radius - 0.5F), 0.0F);
+      const float x1 =
+          std::min(std::floor(s.x + radius - 0.5F) + 1, static_cast<float>(canvas.width()));
+      if (!(y0 < y1 && x0 < x1)) continue;
+      float shade = 1;
+      if (own_normals) {
+        const auto& n = cloud.normals[i];
+        shade = light.shade({n[0], n[1], n[2]}, camera.toward);
+      }
+      const std::array<float, 3> colour{static_cast<float>(colours[i][0]) / 255.0F * shade,
+                                        static_cast<float>(colours[i][1]) / 255.0F * shade,
+                                        static_cast<float>(colours[i][2]) / 255.0F * shade};
+      for (auto y = static_cast<std::uint32_t>(y0); y < static_cast<std::uint32_t>(y1); ++y) {
+        for (auto x = static_cast<std::uint32_t>(x0); x < static_cast<std::uint32_t>(x1); ++x) {
+          const float dx = static_cast<float>(x) + 0.5F - s.x;
+          const float dy = static_cast<float>(y) + 0.5F - s.y;
+          const float square = (dx * dx + dy * dy) / (radius * radius);
+          if (square > 1) continue;
+          // Discs are a little vaulted, so that overlapping ones meet halfway between their
+          // centres.
+          const float depth = s.depth - square * radius * 0.1F / static_cast<float>(camera.scale);
+          if (!(depth > canvas.depth(x, y))) continue;
+          canvas.depth(x, y) = depth;
+          canvas.colour(x, y) = colour;
+          radii[std::size_t{y} * canvas.width() + x] = radius;
+        }
+      }
+    }
+  });
+  if (own_normals) return;
+  // Twice: the second pass takes away what the edges of the first one's squares leave.
+  smooth_depths(canvas, radii, camera, options.threads);
+  smooth_depths(canvas, radii, camera, options.threads);
+  light_by_depth(camera, light, radii, options.threads, canvas);
+}
+
+}  // namespace terrace::tools

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <terrace/stream/store.hpp>
+#include <terrace/tri/reconstruct.hpp>
+
+#include "build/metric_option.hpp"
+#include "mesh/scene.hpp"
+#include "surface/detail.hpp"
+
+namespace terrace::tools {
+
+using namespace terrain;
+
+/// What --criterion says: edge, edge:FACTOR, gabriel, advancing-front, alpha-wrap or
+/// alpha-wrap:ALPHA (metres). Throws: UsageError.
+tri::SurfaceOptions parse_criterion(const std::string& text);
+
+/// The one elliptical metric of a surface, between positions in metres; none where it is Euclidean.
+/// Throws: UsageError for another kind of metric, one with boxes, or with a method of CGAL's.
+std::optional<tri::LinearMap3> surface_metric(const MetricChoice& metric,
+                                              const tri::SurfaceOptions& options);
+
+/// A surface, or the tetrahedra inside it. Positions are in the store's CRS.
+struct SurfaceOutcome {
+  TriangleMesh mesh;
+  std::vector<std::array<std::uint32_t, 4>> tetrahedra;  ///< where asked for, in place of triangles
+  tri::SurfaceMeasures measures;                         ///< of the surface, in metres
+};
+
+/// The surface of the points that `detail` wants, restored in metres on the ground: of points in
+/// degrees about the middle of their box. Throws: UsageError where the method has no tetrahedra,
+/// stream::Error on a damaged store, and where the points do not fit into memory_bytes, saying what
+/// they need.
+SurfaceOutcome surface_of_store(const stream::Store& store, const Detail& detail,
+                                const tri::SurfaceOptions& options, bool tetrahedra,
+                                std::uint64_t memory_bytes);
+
+}  // namespace terrace::tools

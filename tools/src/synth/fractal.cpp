@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "synth/fractal.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include "earth/portable_math.hpp"
+
+namespace terrace::tools {
+
+using namespace terrain;
+namespace {
+
+/// The noise of a lattice point is the sum of two 16-bit numbers about 0, in units of 2^-16: a
+/// triangular density on (-1, 1) of variance 1/6 (to 1e-9).
+constexpr double kNoiseVariance = 1.0 / 6.0;
+/// Rounding to whole numbers adds 1/12 to the variance of each of two neighbours.
+constexpr double kRoundingStepVariance = 2.0 / 12.0;
+
+/// Adds the noise of lattice points first, first + 1, ... of one lattice row. 32-bit arithmetic, so
+/// that the compiler makes vectors of it; the mixing is C. Wellons' `lowbias32`, with the upper key
+/// put in between, so that rows are not shifted copies of one another.
+void add_noise(std::uint64_t key, std::int64_t first, float amplitude, float* values,
+               std::size_t count) {
+  const auto low = static_cast<std::uint32_t>(key);
+  const auto high = static_cast<std::uint32_t>(key >> 32);
+  const auto start = static_cast<std::uint32_t>(first);
+  const float scale = amplitude * 0x1p-16F;
+  for (std::size_t i = 0; i < count; ++i) {
+    std::uint32_t x = (start + static_cast<std::uint32_t>(i)) ^ low;
+    x ^= x >> 16;
+    x *= 0x7FEB352Du;
+    x ^= x >> 15;
+    x += high;
+    x *= 0x846CA68Bu;
+    x ^= x >> 16;
+    const auto sum = static_cast<std::int32_t>((x & 0xFFFFu) + (x >> 16)) - 0xFFFF;
+    values[i] += scale * static_cast<float>(sum);
+  }
+}
+
+/// One step of cubic B-spline subdivision: coefficient n of the finer lattice is
+/// (c[m-1] + 6 c[m] + c[m+1]) / 8 for n = 2m and (c[m] + c[m+1]) / 2 for n = 2m + 1.
+/// coarse[0] has lattice column coarse_first <= floor(first / 2) - 1.
+void double_columns(const float* coarse, std::int64_t coarse_first, std::int64_t first, float* fine,
+                    std::size_t count) {
+  std::size_t n = 0;
+  std::int64_t m = (first >> 1) - coarse_first;
+  if ((first & 1) != 0 && count > 0) {
+    fine[n++] = 0.5F * (coarse[m] + coarse[m + 1]);
+    ++m;
+  }
+  const float* c = coarse + m;
+  const std::size_t pairs = (count - n) / 2;
+  float* out = fine + n;
+  for (std::size_t p = 0; p < pairs; ++p) {
+    const float left = c[p];
+    const float right = c[p + 1];
+    out[2 * p] = 0.125F * (c[static_cast<std::ptrdiff_t>(p) - 1] + right) + 0.75F * left;
+    out[2 * p + 1] = 0.5F * (left + right);
+  }
+  n += 2 * pairs;
+  if (n < count) {
+    c += pairs;
+    fine[n] = 0.125F * (c[-1] + c[1]) + 0.75F * c[0];
+  }
+}
+
+/// The kernel of spacing 2^octave as sampled on the cells: what `octave` subdivisions make of a
+/// single 1.
+std::vector<double> kernel(unsigned octave) {
+  std::vector<double> fine{1.0};
+  for (unsigned step = 0; step < octave; ++step) {
+    std::vector<double> coarse = std::move(fine);
+    fine.assign(2 * coarse.size() + 3, 0.0);
+    for (std::size_t i = 0; i < coarse.size(); ++i) {
+      constexpr std::array<double, 5> kMask{0.125, 0.5, 0.75, 0.5, 0.125};
+      for (std::size_t k = 0; k < 5; ++k) fine[2 * i + k] += coarse[i] * kMask[k];
+    }
+  }
+  return fine;
+}
+
+/// Variance of a lattice's field, averaged over all cells, and of its steps, for noise of variance
+/// 1. The field is separable: both follow from the autocorrelation of the kernel at lags 0 and 1.
+struct Variances {
+  double field = 0.0, step = 0.0;
+};
+
+Variances variances(unsigned octave) {
+  const std::vector<double> k = kernel(octave);
+  double lag0 = 0, lag1 = 0;
+  for (std::size_t i = 0; i < k.size(); ++i) {
+    lag0 += k[i] * k[i];
+    if (i + 1 < k.size()) lag1 += k[i] * k[i + 1];
+  }
+  const double spacing = static_cast<double>(1u << octave);
+  lag0 /= spacing;
+  lag1 /= spacing;
+  return {.field = lag0 * lag0, .step = 2.0 * (lag0 - lag1) * lag0};
+}
+
+}  // namespace
+
+Fractal::Fractal(const FractalOptions& options) : seed_(options.seed) {
+  assert(options.hurst > 0 && options.hurst < 1 && options.roughness >= 0);
+  // The step's variance is the sum of the lattices'; the amplitudes' common factor follows.
+  const double growth = portable_exp2(options.hurst);
+  std::array<double, kOctaves> weight{};
+  double step = 0, field = 0, largest = 0;
+  for (unsigned octave = 0; octave < kOctaves; ++octave) {
+    weight[octave] = octave == 0 ? 1.0 : weight[octave - 1] * growth;
+    const Variances v = variances(octave);
+    step += weight[octave] * weight[octave] * kNoiseVariance * v.step;
+    field += weight[octave] * weight[octave] * kNoiseVariance * v.field;
+    largest += weight[octave];
+  }
+  double wanted = options.roughness * options.roughness;
+  if (options.rounded && options.roughness >= 1.0) wanted -= kRoundingStepVariance;
+  const double factor = std::sqrt(wanted / step);
+  for (unsigned octave = 0; octave < kOctaves; ++octave) {
+    amplitude_[octave] = static_cast<float>(weight[octave] * factor);
+  }
+  roughness_ = std::sqrt(wanted);
+  deviation_ = factor * std::sqrt(field);
+  bound_ = factor * largest;
+}
+
+void Fractal::scale(double factor) {
+  for (float& amplitude : amplitude_) amplitude = static_cast<float>(amplitude * factor);
+  roughness_ *= factor;
+  deviation_ *= factor;
+  bound_ *= factor;
+}
+
+Fractal::Rows::Rows(const Fractal& fractal, std::uint32_t first_column, std::uint32_t width)
+    : fractal_(&fractal) {
+  assert(width > 0);
+  std::int64_t first = first_column;
+  std::int64_t last = first + width - 1;
+  for (Lattice& lattice : lattices_) {
+    lattice.first = first;
+    lattice.width = static_cast<std::size_t>(last - first + 1);
+    lattice.row_of.fill(INT64_MIN);
+    for (std::vector<float>& values : lattice.values) values.resize(lattice.width);
+    first = (first >> 1) - 1;
+    last = (last >> 1) + 1;
+    lattice.blend.resize(static_cast<std::size_t>(last - first + 1));
+  }
+}
+
+std::span<const float> Fractal::Rows::row(std::uint32_t row) {
+  return {lattice_row(0, row), lattices_[0].width};
+}
+
+const float* Fractal::Rows::lattice_row(unsigned octave, std::int64_t row) {
+  Lattice& lattice = lattices_[octave];
+  const auto slot = static_cast<std::size_t>(row & 3);
+  std::vector<float>& values = lattice.values[slot];
+  if (lattice.row_of[slot] == row) return values.data();
+
+  if (octave + 1 < kOctaves) {
+    const std::int64_t m = row >> 1;
+    float* const blend = lattice.blend.data();
+    const std::size_t width = lattice.blend.size();
+    if ((row & 1) == 0) {
+      const float* const above = lattice_row(octave + 1, m - 1);
+      const float* const middle = lattice_row(octave + 1, m);
+      const float* const below = lattice_row(octave + 1, m + 1);
+      for (std::size_t i = 0; i < width; ++i) {
+        blend[i] = 0.125F * (above[i] + below[i]) + 0.75F * middle[i];
+      }
+    } else {
+      const float* const middle = lattice_row(octave + 1, m);
+      const float* const below = lattice_row(octave + 1, m + 1);
+      for (std::size_t i = 0; i < width; ++i) blend[i] = 0.5F * (middle[i] + below[i]);
+    }
+    double_columns(blend, lattices_[octave + 1].first, lattice.first, values.data(), lattice.width);
+  } else {
+    std::fill(values.begin(), values.end(), 0.0F);
+  }
+  const std::uint64_t key = scramble(scramble(fractal_->seed_ + (std::uint64_t{octave} << 56)) ^
+                                     static_cast<std::uint64_t>(row));
+  add_noise(key, lattice.first, fractal_->amplitude_[octave], values.data(), lattice.width);
+  lattice.row_of[slot] = row;
+  return values.data();
+}
+
+}  // namespace terrace::tools

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include <terrace/cluster/lower_bound.hpp>
+#include <terrace/cluster/point_matrix.hpp>
+#include <terrace/cluster/point_search.hpp>
+#include <terrace/cluster/primal_dual.hpp>
+
+#include "base/units.hpp"
+#include "tables/cluster_methods.hpp"
+
+namespace terrace::tools {
+
+using namespace terrain;
+
+using cluster::FacilityPoints;
+using cluster::FacilitySolution;
+
+namespace {
+
+constexpr std::array<std::pair<const char*, cluster::GainStrategy>, 7> kStrategies{
+    {{"automatic", cluster::GainStrategy::automatic},
+     {"fast", cluster::GainStrategy::fast},
+     {"full-scan", cluster::GainStrategy::full_scan},
+     {"quadtree", cluster::GainStrategy::quadtree},
+     {"octree", cluster::GainStrategy::octree},
+     {"kd-tree", cluster::GainStrategy::kd_tree},
+     {"facilities", cluster::GainStrategy::facilities}}};
+
+/// Steps towards the lower bound: as many as were asked for, else what takes seconds, as a step
+/// looks at some clusters' worth of points around each point.
+std::uint32_t bound_steps(const ClusterRequest& request, double points, double clusters) {
+  if (request.bound_iterations) return *request.bound_iterations;
+  const double distances = 4.0 * points * points / clusters;
+  return static_cast<std::uint32_t>(std::clamp(3e9 / distances, 15.0, 300.0));
+}
+
+double bound_of(const ClusterRequest& request, const FacilityPoints& problem,
+                const FacilitySolution& solution, const ClusterProgress& progress) {
+  const std::uint32_t steps = bound_steps(request, static_cast<double>(problem.points.size()),
+                                          static_cast<double>(solution.facilities.size()));
+  if (steps == 0) return 0.0;
+  cluster::LowerBoundOptions options;
+  options.iterations = steps;
+  options.threads = request.threads;
+  options.progress = [&](std::uint32_t done, std::uint32_t total) {
+    progress(static_cast<double>(done) / static_cast<double>(total));
+    return true;
+  };
+  return cluster::lower_bound(problem, solution, options).lower_bound;
+}
+
+cluster::SearchLength length_of(cluster::Effort effort) {
+  switch (effort) {
+    case cluster::Effort::fast:
+    case cluster::Effort::standard:
+      return cluster::SearchLength::tenth;
+    case cluster::Effort::fine:
+      return cluster::SearchLength::log10_full;
+    case cluster::Effort::full:
+      break;
+  }
+  return cluster::SearchLength::log2_full;
+}
+
+}  // namespace
+
+ClusterOutcome cluster_by_facilities(const ClusterRequest& request, const FacilityPoints& problem,
+                                     const ClusterProgress& progress) {
+  cluster::PointSearchOptions options;
+  for (const auto& [name, strategy] : kStrategies) {
+    if (request.strategy == name) options.strategy = strategy;
+  }
+  options.length = length_of(request.effort);
+  if (request.iterations == "tenth") {
+    options.length = cluster::SearchLength::tenth;
+  } else if (request.iterations == "log10") {
+    options.length = cluster::SearchLength::log10_full;
+  } else if (request.iterations == "log2") {
+    options.length = cluster::SearchLength::log2_full;
+  } else if (!request.iterations.empty()) {
+    options.iterations = parse_count(request.iterations);
+  }
+  options.seed = request.seed;
+  options.threads = request.threads;
+  options.batch = request.batch;
+  options.assign_nearest = true;
+  options.progress = [&](std::size_t done, std::size_t total) {
+    progress(static_cast<double>(done) / static_cast<double>(std::max<std::size_t>(total, 1)));
+    return true;
+  };
+  // The production path, unless something asks for what it does not do.
+  constexpr std::size_t kFastPoints = std::size_t{1} << 24;
+  if (request.strategy == "automatic" && request.iterations.empty() && request.batch == 1 &&
+      problem.channels.size() == 0 && std::isinf(problem.outlier_price) &&
+      problem.points.size() < kFastPoints && mapped(problem)) {
+    options.strategy = cluster::GainStrategy::fast;
+  }
+  FacilitySolution solution = cluster::search_points(problem, options);
+  progress(1.0);
+  solution.lower_bound = bound_of(request, problem, solution, progress);
+  ClusterOutcome outcome;
+  take(outcome, std::move(solution));
+  return outcome;
+}
+
+ClusterOutcome cluster_by_growth(const ClusterRequest& request, const FacilityPoints& problem,
+                                 const ClusterProgress& progress) {
+  // Beside the matrix the growth keeps the clients sorted by facility, half as much again.
+  const cluster::PointMatrix matrix = cluster::point_matrix(problem, request.memory_bytes / 3 * 2);
+  cluster::PrimalDual grown = cluster::greedy_stars(matrix.view());
+  FacilitySolution& solution = grown.solution;
+  solution.lower_bound =
+      std::max(solution.lower_bound, bound_of(request, problem, solution, progress));
+  ClusterOutcome outcome;
+  take(outcome, std::move(solution));
+  return outcome;
+}
+
+}  // namespace terrace::tools

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tables/csv_rows.hpp"
+
+#include <array>
+#include <filesystem>
+#include <utility>
+
+#include "terrace/stream/error.hpp"
+
+namespace terrace::tools {
+namespace {
+
+/// What is no text may be one line of gigabytes.
+constexpr std::size_t kLongestLine = 1000;
+
+}  // namespace
+
+std::optional<CsvRows> CsvRows::open(const std::string& path, std::string_view header) {
+  if (!std::filesystem::is_regular_file(path)) return std::nullopt;
+  CsvRows rows(path, std::ifstream(path));
+  // One byte more, for a carriage return.
+  std::array<char, 100> first{};
+  rows.stream_.getline(first.data(), static_cast<std::streamsize>(header.size() + 2));
+  const auto taken = static_cast<std::size_t>(rows.stream_.gcount());
+  if (!rows.stream_ || taken == 0) return std::nullopt;
+  rows.number_ = 1;
+  std::string_view line(first.data(), rows.stream_.eof() ? taken : taken - 1);
+  if (line.ends_with('\r')) line.remove_suffix(1);
+  return line == header ? std::optional(std::move(rows)) : std::nullopt;
+}
+
+bool CsvRows::read_line() {
+  line_.resize(kLongestLine);
+  stream_.getline(line_.data(), static_cast<std::streamsize>(line_.size()));
+  const auto taken = static_cast<std::size_t>(stream_.gcount());
+  if (stream_.fail()) {
+    if (stream_.eof() || stream_.bad()) return false;
+    ++number_;
+    throw stream::Error({.file = path_,
+                         .where = where(),
+                         .cause = "is longer than any row",
+                         .remedy = "rows are a few numbers with commas"});
+  }
+  ++number_;
+  // The line's end is counted too, where there is one.
+  line_.resize(stream_.eof() ? taken : taken - 1);
+  if (line_.ends_with('\r')) line_.pop_back();
+  return true;
+}
+
+bool CsvRows::next(std::string_view& line) {
+  while (read_line()) {
+    if (line_.empty()) continue;
+    line = line_;
+    return true;
+  }
+  return false;
+}
+
+}  // namespace terrace::tools

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tables/dendrogram_file.hpp"
+
+#include <string_view>
+
+#include "base/error.hpp"
+#include "base/interrupt.hpp"
+#include "base/output.hpp"
+#include "base/units.hpp"
+#include "tables/csv_rows.hpp"
+#include "terrace/stream/error.hpp"
+#include "terrace/stream/sink.hpp"
+
+namespace terrace::tools {
+
+using namespace terrain;
+namespace {
+
+std::string row_text(const cluster::Merge& merge) {
+  return std::to_string(merge.a) + ',' + std::to_string(merge.b) + ',' + number_text(merge.height) +
+         ',' + std::to_string(merge.size) + '\n';
+}
+
+bool parse_row(std::string_view text, cluster::Merge& merge) {
+  return take_cell(text, merge.a) && take_cell(text, merge.b) && take_cell(text, merge.height) &&
+         take_cell(text, merge.size, true);
+}
+
+}  // namespace
+
+void write_dendrogram(const std::string& path, const cluster::Dendrogram& dendrogram,
+                      bool replace) {
+  stream::Sink file(path, replace, stop_token());
+  file.write(kDendrogramHead);
+  file.write("\n");
+  for (const cluster::Merge& merge : dendrogram.merges) file.write(row_text(merge));
+  file.commit();
+}
+
+std::optional<cluster::Dendrogram> read_dendrogram(const std::string& path) {
+  std::optional<CsvRows> rows = CsvRows::open(path, kDendrogramHead);
+  if (!rows) return std::nullopt;
+  cluster::Dendrogram dendrogram;
+  const auto fail = [&](const std::string& where, const std::string& cause) {
+    throw stream::Error({.file = path,
+                         .where = where,
+                         .cause = cause,
+                         .remedy = "rows are a,b,height,size as 'terrace cluster --dendrogram' "
+                                   "and SciPy's linkage() give them"});
+  };
+  for (std::string_view line; rows->next(line);) {
+    cluster::Merge merge{};
+    if (!parse_row(line, merge)) fail(rows->where(), "is no row of a dendrogram");
+    dendrogram.merges.push_back(merge);
+    if (dendrogram.merges.size() >= cluster::kMostDendrogramPoints) {
+      fail(rows->where(), "is one row too many");
+    }
+  }
+  dendrogram.points = dendrogram.merges.size() + 1;
+  const std::string fault = cluster::dendrogram_fault(dendrogram);
+  if (!fault.empty()) fail("", "is no dendrogram: " + fault);
+  return dendrogram;
+}
+
+}  // namespace terrace::tools

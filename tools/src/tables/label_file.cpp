@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tables/label_file.hpp"
+
+#include <charconv>
+#include <fstream>
+
+#include "base/interrupt.hpp"
+#include "base/units.hpp"
+#include "terrace/stream/error.hpp"
+
+namespace terrace::tools {
+
+using namespace terrain;
+namespace {
+
+constexpr std::uint32_t kNoCluster = 0xFFFFFFFFu;
+
+}  // namespace
+
+std::vector<std::uint32_t> read_labels(const std::string& path, std::size_t points) {
+  std::ifstream file(path);
+  if (!file) {
+    throw stream::Error({.file = path,
+                         .where = {},
+                         .cause = "cannot be opened",
+                         .remedy = "name a file with one cluster number per line"});
+  }
+  std::vector<std::uint32_t> labels;
+  std::string line;
+  while (std::getline(file, line)) {
+    if (labels.size() % 65536 == 0) check_interrupt();
+    if (!line.empty() && line.back() == '\r') line.pop_back();
+    const std::string where = "line " + std::to_string(labels.size() + 1);
+    std::uint32_t label = kNoCluster;
+    const auto [end, error] = std::from_chars(line.data(), line.data() + line.size(), label);
+    const bool number = error == std::errc() && end == line.data() + line.size();
+    if ((!number || label == kNoCluster) && line != "-1") {
+      throw stream::Error({.file = path,
+                           .where = where,
+                           .cause = "'" + line.substr(0, 40) + "' is no cluster number",
+                           .remedy = "write one whole number from 0 to 4294967294 per line, or -1 "
+                                     "for a point in no cluster"});
+    }
+    labels.push_back(label);
+    if (labels.size() > points) {
+      throw stream::Error({.file = path,
+                           .where = where,
+                           .cause = "has more lines than the " + with_commas(points) + " points",
+                           .remedy = "give the labels of these points, in the order of the input"});
+    }
+  }
+  if (file.bad()) {
+    throw stream::Error({.file = path,
+                         .where = "line " + std::to_string(labels.size() + 1),
+                         .cause = "cannot be read",
+                         .remedy = "check the disk"});
+  }
+  if (labels.size() < points) {
+    throw stream::Error({.file = path,
+                         .where = {},
+                         .cause = "has " + with_commas(labels.size()) + " labels for " +
+                                  with_commas(points) + " points",
+                         .remedy = "give the labels of these points, in the order of the input"});
+  }
+  return labels;
+}
+
+}  // namespace terrace::tools

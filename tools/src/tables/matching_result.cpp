@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tables/matching_result.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "base/error.hpp"
+#include "base/output.hpp"
+#include "base/units.hpp"
+#include "tables/csv_rows.hpp"
+#include "tables/point_table.hpp"
+#include "terrace/stream/error.hpp"
+
+namespace terrace::tools {
+
+using namespace terrain;
+namespace {
+
+/// Of a row as it stands in the file.
+struct Row {
+  std::uint32_t a = 0, b = 0;
+  double distance = 0;
+  std::uint32_t size = 2, level = 1;
+};
+
+bool parse(std::string_view text, bool tree, Row& row) {
+  return take_cell(text, row.a) && take_cell(text, row.b) && take_cell(text, row.distance, !tree) &&
+         (!tree || (take_cell(text, row.size) && take_cell(text, row.level, true)));
+}
+
+/// Checks rows one by one; what is wrong with one, else nothing.
+class Checker {
+ public:
+  Checker(std::size_t points, bool tree)
+      : points_(points), tree_(tree), taken_(tree ? 2 * points : points, false) {
+    if (tree) nodes_.assign(2 * points, {1, 0});
+  }
+
+  std::string fault(const Row& row, std::size_t rows_before) {
+    const std::size_t nodes = tree_ ? points_ + rows_before : points_;
+    for (const std::uint32_t node : {row.a, row.b}) {
+      if (node < nodes) continue;
+      if (tree_ && node >= points_ && node < 2 * points_ - 1) {
+        return "names node " + std::to_string(node) + " before the row that makes it";
+      }
+      return "names " + std::string(tree_ ? "node " : "point ") + std::to_string(node) +
+             ", but there are " + with_commas(points_) + " points";
+    }
+    if (row.a == row.b) return "joins " + std::to_string(row.a) + " with itself";
+    for (const std::uint32_t node : {row.a, row.b}) {
+      if (taken_[node])
+        return "joins " + std::to_string(node) + ", which an earlier row has joined";
+    }
+    if (!(row.distance >= 0 && std::isfinite(row.distance))) {
+      return "has the distance " + number_text(row.distance);
+    }
+    taken_[row.a] = taken_[row.b] = true;
+    if (!tree_) return {};
+    const Node &a = nodes_[row.a], &b = nodes_[row.b];
+    if (row.size != a.size + b.size) {
+      return "says that its node has " + std::to_string(row.size) + " points below; it has " +
+             std::to_string(a.size + b.size);
+    }
+    if (row.level <= std::max(a.level, b.level)) {
+      return "is of level " + std::to_string(row.level) + ", no higher than what it joins";
+    }
+    nodes_[nodes] = {row.size, row.level};
+    return {};
+  }
+
+ private:
+  struct Node {
+    std::uint32_t size, level;
+  };
+  std::size_t points_;
+  bool tree_;
+  std::vector<bool> taken_;
+  std::vector<Node> nodes_;
+};
+
+}  // namespace
+
+bool is_matching_result(const std::string& path) {
+  return CsvRows::open(path, kPairsHead) || CsvRows::open(path, kTreeHead);
+}
+
+MatchingResult read_matching_result(const std::string& path, std::size_t points) {
+  const auto fail = [&](const std::string& where, const std::string& cause) {
+    throw stream::Error({.file = path,
+                         .where = where,
+                         .cause = cause,
+                         .remedy = "give the result of 'terrace match' as it was written, and with "
+                                   "--points the file that it was made from"});
+  };
+  std::optional<CsvRows> rows = CsvRows::open(path, kPairsHead);
+  MatchingResult result{.points = points, .tree = !rows, .lines = {}};
+  if (result.tree) rows = CsvRows::open(path, kTreeHead);
+  if (!rows) fail("", "is no result of 'terrace match'");
+  // Nodes of a tree are numbered in 32 bits.
+  if (points > std::numeric_limits<std::uint32_t>::max() / 2) fail("", "is of too many points");
+  const std::size_t most = result.tree ? points - std::min<std::size_t>(points, 1) : points / 2;
+  Checker checker(points, result.tree);
+  for (std::string_view line; rows->next(line);) {
+    Row row;
+    if (!parse(line, result.tree, row)) {
+      fail(rows->where(), "is no row " + std::string(result.tree ? kTreeHead : kPairsHead));
+    }
+    if (result.lines.size() == most) {
+      fail(rows->where(), "is one row too many for " + with_commas(points) + " points");
+    }
+    const std::string fault = checker.fault(row, result.lines.size());
+    if (!fault.empty()) fail(rows->where(), fault);
+    result.lines.push_back({row.a, row.b, row.level});
+    result.top = std::max(result.top, row.level);
+  }
+  if (result.tree && result.lines.size() < most) {
+    fail("", "has " + with_commas(result.lines.size()) + " rows; a tree of " + with_commas(points) +
+                 " points has " + with_commas(most));
+  }
+  return result;
+}
+
+void MatchingPicture::keep_levels(const std::string& level) {
+  if (level.empty() || level == "top") return;
+  std::uint32_t highest = 0;
+  std::string_view text = level;
+  if (!take_cell(text, highest, true) || highest > result.top) {
+    throw UsageError("'--level " + level + "': the lines are of the levels 1 to " +
+                     std::to_string(result.top) + " (0: the points alone)");
+  }
+  std::erase_if(result.lines, [&](const MatchingLine& line) { return line.level > highest; });
+}
+
+MatchingPicture read_matching_picture(const std::string& path, const std::string& points_file,
+                                      const CommonOptions& common) {
+  const PointTable table = read_point_table(points_file, "", common.memory_or(0), common);
+  const GroundFrame ground = GroundFrame::of(table, 1.0);
+  MatchingPicture picture{.result = read_matching_result(path, table.size()),
+                          .positions = {},
+                          .assumption = ground.assumption};
+  std::vector<stream::Point3>& positions = picture.positions;
+  positions.reserve(picture.result.tree ? 2 * table.size() : table.size());
+  for (const stream::Point3& p : table.positions) {
+    positions.push_back(ground(p));
+    for (const double x : positions.back()) {
+      if (std::isfinite(x)) continue;
+      throw stream::Error({.file = points_file,
+                           .where = "point " + std::to_string(positions.size() - 1),
+                           .cause = "has a coordinate that is not finite",
+                           .remedy = "match and draw the points without it"});
+    }
+  }
+  if (!picture.result.tree) return picture;
+  std::vector<std::uint32_t> sizes(table.size(), 1);
+  sizes.reserve(2 * table.size());
+  for (const MatchingLine& line : picture.result.lines) {
+    const stream::Point3 &a = positions[line.a], &b = positions[line.b];
+    const std::uint32_t size = sizes[line.a] + sizes[line.b];
+    const double share = static_cast<double>(sizes[line.b]) / size;
+    const stream::Point3 middle{(1 - share) * a[0] + share * b[0],
+                                (1 - share) * a[1] + share * b[1],
+                                (1 - share) * a[2] + share * b[2]};
+    positions.push_back(middle);
+    sizes.push_back(size);
+  }
+  return picture;
+}
+
+}  // namespace terrace::tools

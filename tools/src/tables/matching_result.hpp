@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "cli/cli.hpp"
+#include "terrace/stream/point.hpp"
+
+namespace terrace::tools {
+
+/// A line of what `match` found: between two nodes, which are points (0 to n - 1) or what an
+/// earlier row joined (row r is node n + r). A pair is a row of level 1.
+struct MatchingLine {
+  std::uint32_t a = 0, b = 0;
+  std::uint32_t level = 1;
+};
+
+/// What `match` writes: pairs (rows a,b,distance) or a tree (rows a,b,distance,size,level).
+struct MatchingResult {
+  std::size_t points = 0;
+  bool tree = false;
+  std::vector<MatchingLine> lines;  ///< children before parents
+  std::uint32_t top = 0;            ///< the highest level; 0 without lines
+};
+
+/// Whether a file begins as one that `match` writes.
+bool is_matching_result(const std::string& path);
+
+/// Reads such a file about so many points. Throws: stream::Error, naming the line, if a row is no
+/// row, names a node that there is not (yet) or that another row has taken, or contradicts itself;
+/// and if the rows are not those of so many points. 12 bytes a row.
+MatchingResult read_matching_result(const std::string& path, std::size_t points);
+
+/// Such a result with the places of its nodes, ready to be drawn.
+struct MatchingPicture {
+  MatchingResult result;
+  /// Metres on the ground about the middle: the points, then the nodes of a tree's rows, each at
+  /// the mean of all points below it.
+  std::vector<stream::Point3> positions;
+  std::string assumption;  ///< of units, empty if none
+
+  /// Leaves out the lines above a level. Throws: UsageError if there is no such level.
+  void keep_levels(const std::string& level);
+};
+
+/// Reads the result and its points' file. Throws: stream::Error, Interrupted.
+MatchingPicture read_matching_picture(const std::string& path, const std::string& points_file,
+                                      const CommonOptions& common);
+
+}  // namespace terrace::tools

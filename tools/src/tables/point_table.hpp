@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "cli/cli.hpp"
+#include "earth/ground.hpp"
+#include "terrace/stream/source.hpp"
+
+namespace terrace::tools {
+
+using namespace terrain;
+
+/// A whole file of points in memory, in the order in which it is read (for files that are no
+/// rasters the order of the file).
+struct PointTable {
+  stream::SourceInfo info;
+  std::vector<stream::Point3> positions;   ///< in the coordinates of the CRS
+  std::vector<stream::Column> attributes;  ///< one per info.attributes
+  std::uint64_t nodata = 0;                ///< cells without data, left out
+
+  [[nodiscard]] std::size_t size() const { return positions.size(); }
+  /// The attribute of that name as doubles, scale and offset applied.
+  /// Throws: UsageError naming the columns that there are.
+  [[nodiscard]] std::vector<double> column(const std::string& name) const;
+  /// Drops the attribute of that name, if there is one.
+  void drop(const std::string& name);
+};
+
+/// What reading the source takes, which is not left for anything else. Throws: stream::Error if it
+/// is more than memory_bytes, saying what it needs.
+std::uint64_t reading_within_memory(const stream::PointSource& source, std::uint64_t memory_bytes);
+
+/// Throws: stream::Error on bad data, on no points, and if the points take more than memory_bytes;
+/// Interrupted.
+PointTable read_point_table(const std::string& file, const std::string& format,
+                            std::uint64_t memory_bytes, const CommonOptions& common);
+
+/// Metres on the ground for the points of a table: ground = scale * (position - origin).
+struct GroundFrame {
+  stream::Point3 origin{}, scale{1, 1, 1};
+  std::string assumption;  ///< what had to be assumed of units; empty if nothing
+
+  /// About the middle of the table's points, with heights weighed besides.
+  static GroundFrame of(const PointTable& table, double z_weight);
+  [[nodiscard]] stream::Point3 operator()(const stream::Point3& position) const {
+    return {scale[0] * (position[0] - origin[0]), scale[1] * (position[1] - origin[1]),
+            scale[2] * (position[2] - origin[2])};
+  }
+};
+
+}  // namespace terrace::tools

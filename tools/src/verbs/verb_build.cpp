@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <terrace/stream/error.hpp>
+
+#include "base/error.hpp"
+#include "base/interrupt.hpp"
+#include "base/units.hpp"
+#include "build/store_build.hpp"
+#include "earth/crs/coordinate_system.hpp"
+#include "verbs/verbs.hpp"
+
+namespace terrace::tools {
+
+using namespace terrain;
+namespace {
+
+/// The trial run behind --dry-run reads this many points and scales up.
+constexpr std::uint64_t kTrialPoints = 1'000'000;
+
+class BuildCommand final : public Command {
+ public:
+  void define(CLI::App& app) override {
+    app.add_option("INPUT", request_.inputs,
+                   "rasters (several form a mosaic) or point files; - is standard input")
+        ->required();
+    add_output(app, output_, "the store to write");
+    app.add_option("--input-format", request_.input_format, "instead of telling it by content");
+    app.add_option(
+        "--crs", crs_,
+        "EPSG:n, EPSG:n+m with the heights' system, or a file with WKT (.prj): in place of "
+        "what the source says");
+    app.add_option("--towgs84", shift_,
+                   "dx,dy,dz[,rx,ry,rz,ds]: metres, arc-seconds and ppm (position vector) from "
+                   "the CRS's datum to WGS 84");
+    app.add_option("--vertical", request_.vertical, "what heights refer to")
+        ->check(CLI::IsMember({"ellipsoidal", "orthometric"}));
+    app.add_option("--band", request_.band, "of rasters, from 1")->check(CLI::Range(1, 65535));
+    app.add_option("--block", block_, "most points clustered together")->capture_default_str();
+    add_number(app, "--facility-cost", request_.facility_cost,
+               "times the diagonal of a block: larger makes larger clusters", kFactor);
+    app.add_option("--effort", effort_, "how long to search for good clusters")
+        ->check(CLI::IsMember({"fast", "default", "fine", "full"}))
+        ->capture_default_str();
+    add_number(app, "--z-weight", request_.z_weight, "how much heights count in a distance",
+               kFactorOrZero);
+    app.add_option(
+           "--metric", metric_,
+           "euclidean, squared, minkowski:P or elliptical:FILE (JSON: boxes with semi-axes)")
+        ->capture_default_str()
+        ->type_name("METRIC");
+    app.add_flag("--dry-run", dry_run_, "only tell points, disk and time, from a trial");
+    not_yet(app, {"--order", "--resume", "--append"});
+  }
+
+  Summary run(const CommonOptions& common) override {
+    request_.store = output_;
+    request_.replace = common.force;
+    request_.effort = *effort_of(effort_);
+    if (!crs_.empty()) request_.crs = CoordinateSystem::parse(crs_).crs();
+    if (!shift_.empty()) request_.datum_shift = parse_datum_shift(shift_);
+    if (block_ < 2 || block_ > 1'000'000) {
+      throw UsageError("--block must be between 2 and 1000000, not " + std::to_string(block_));
+    }
+    request_.block_points = block_;
+    request_.metric = MetricChoice::parse(metric_);
+    request_.seed = common.seed;
+    request_.threads = common.threads;
+    request_.memory_bytes = common.memory_or(kStreamingMemory);
+    if (output_ == "-") throw UsageError("a store is a folder: it cannot go to standard output");
+    std::error_code ignored;
+    if (!common.force && std::filesystem::exists(request_.store, ignored)) {
+      throw stream::Error({.file = output_,
+                           .where = {},
+                           .cause = "exists already",
+                           .remedy = "name another output, or give --force to replace it"});
+    }
+    return dry_run_ ? estimate() : build(common);
+  }
+
+ private:
+  Summary build(const CommonOptions& common) {
+    const Stopwatch watch;
+    BuildOutcome outcome;
+    {
+      ProgressMeter meter(common.progress, "points");
+      outcome = build_store(request_, [&meter](const stream::Progress& progress) {
+        meter.update(progress.points, progress.fraction);
+      });
+    }
+    for (const std::string& note : outcome.notes) common.say(note);
+    const double seconds = watch.seconds();
+    const double rate = static_cast<double>(outcome.points) / seconds;
+    Summary summary;
+    summary.json = {{"points", outcome.points},
+                    {"nodata", outcome.nodata},
+                    {"seconds", seconds},
+                    {"points_per_second", rate},
+                    {"peak_rss_bytes", peak_rss_bytes()},
+                    {"store_bytes", outcome.store_bytes},
+                    {"levels", outcome.top + 1}};
+    summary.text = with_commas(outcome.points) + " points (" + with_commas(outcome.nodata) +
+                   " cells without data left out) in " + readable_seconds(seconds) + ", " +
+                   readable_rate(rate) + "\n" + output_ + ": " + std::to_string(outcome.top + 1) +
+                   " levels, " + readable_bytes(outcome.store_bytes) + ", peak memory " +
+                   readable_bytes(peak_rss_bytes()) + "\n";
+    return summary;
+  }
+
+  /// Builds a store of the first points, weighs it and does not keep it.
+  Summary estimate() {
+    if (std::find(request_.inputs.begin(), request_.inputs.end(), "-") != request_.inputs.end()) {
+      throw UsageError("--dry-run reads its input before the build does: name files, not -");
+    }
+    const auto source = stream::open_source(
+        request_.inputs, {.format = request_.input_format, .stop = stop_token()});
+    const stream::SourceInfo& info = source->info();
+    request_.most_points = kTrialPoints;
+    const Stopwatch watch;
+    const BuildOutcome trial = build_store(request_);
+    const double seconds = watch.seconds();
+
+    // A raster's number of valid cells is not known before it is read: the trial's share is taken.
+    const double valid =
+        static_cast<double>(trial.points) /
+        static_cast<double>(std::max<std::uint64_t>(1, trial.points + trial.nodata));
+    double points =
+        info.points ? static_cast<double>(*info.points) * (info.grid ? valid : 1.0) : -1.0;
+    const bool whole = trial.points < kTrialPoints;
+    if (whole) points = static_cast<double>(trial.points);
+    const double scale = points / static_cast<double>(trial.points);
+    Summary summary;
+    if (points < 0) {
+      summary.json = {{"points", nullptr}, {"store_bytes", nullptr}, {"seconds", nullptr}};
+      summary.text =
+          "the number of points is not known before the end of the input; a million take " +
+          readable_seconds(seconds) + " and " + readable_bytes(trial.store_bytes) + "\n";
+    } else {
+      const auto bytes = static_cast<std::uint64_t>(static_cast<double>(trial.store_bytes) * scale);
+      summary.json = {{"points", static_cast<std::uint64_t>(points)},
+                      {"store_bytes", bytes},
+                      {"seconds", seconds * scale}};
+      summary.text = "about " + with_commas(static_cast<std::uint64_t>(points)) + " points, " +
+                     readable_bytes(bytes) + " of disk, " + readable_seconds(seconds * scale) +
+                     "; nothing was written\n";
+    }
+    return summary;
+  }
+
+  BuildRequest request_;
+  std::string output_, crs_, shift_, effort_ = "default", metric_ = "euclidean";
+  std::uint64_t block_ = 10000;
+  bool dry_run_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_build() { return std::make_unique<BuildCommand>(); }
+
+}  // namespace terrace::tools

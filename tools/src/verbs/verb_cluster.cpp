@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// cluster: clusters one file of points in memory, by any method of libcluster.
+#include <algorithm>
+#include <limits>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "base/error.hpp"
+#include "base/interrupt.hpp"
+#include "base/output.hpp"
+#include "base/units.hpp"
+#include "build/metric_option.hpp"
+#include "build/store_build.hpp"
+#include "cli/library_call.hpp"
+#include "tables/cluster_channels.hpp"
+#include "tables/cluster_output.hpp"
+#include "tables/cluster_run.hpp"
+#include "tables/cluster_summary.hpp"
+#include "tables/dendrogram_file.hpp"
+#include "tables/point_table.hpp"
+#include "terrace/stream/error.hpp"
+#include "verbs/verbs.hpp"
+
+namespace terrace::tools {
+
+using namespace terrain;
+namespace {
+
+class ClusterCommand final : public Command {
+ public:
+  void define(CLI::App& app) override {
+    app.add_option("input", input_, "File of points (or cells); - is standard input")
+        ->required()
+        ->type_name("FILE");
+    app.add_option(
+           "-o,--output", output_,
+           "The points with columns 'cluster' and 'representative' (the number of the point "
+           "that stands for the cluster; -1: outlier); - is standard output")
+        ->type_name("FILE");
+    app.add_option("--labels", labels_, "One cluster number per line, in the order of the input")
+        ->type_name("FILE");
+    app.add_option("--dendrogram", dendrogram_,
+                   "single, complete: the whole tree as rows a,b,height,size (SciPy's)")
+        ->type_name("FILE.csv");
+    app.add_option("--format", format_, "Of the output: xyz, csv, ply, ply-ascii (else its ending)")
+        ->type_name("NAME");
+    app.add_option("--input-format", input_format_, "Of the input (else its content, its ending)")
+        ->type_name("NAME");
+    app.add_option("--method", method_,
+                   "facility, primal-dual, k-means, k-median, single or complete")
+        ->capture_default_str()
+        ->type_name("NAME");
+    app.add_option("-k", request_.k, "Number of clusters")
+        ->check(CLI::Range(1U, 4294967295U))
+        ->type_name("K");
+    add_number(app, "--height", request_.height, "single, complete: cut the tree at this distance",
+               kNotNegative)
+        ->type_name("H");
+    add_number(app, "--facility-cost", facility_cost_,
+               "Times the diagonal of the points: larger makes fewer clusters", kFactor);
+    add_number(app, "--outlier-price", outlier_price_,
+               "facility: leave a point out if that costs less; times the diagonal", kFactor)
+        ->type_name("PRICE");
+    app.add_option("--strategy", request_.strategy,
+                   "facility: automatic, fast, full-scan, quadtree, octree, kd-tree or facilities")
+        ->check(CLI::IsMember(
+            {"automatic", "fast", "full-scan", "quadtree", "octree", "kd-tree", "facilities"}))
+        ->capture_default_str()
+        ->type_name("NAME");
+    app.add_option("--iterations", request_.iterations,
+                   "facility: tenth, log10, log2 (times N), or a number of candidates")
+        ->type_name("N");
+    app.add_option("--effort", effort_, "facility: how long to search")
+        ->check(CLI::IsMember({"fast", "default", "fine", "full"}))
+        ->capture_default_str();
+    app.add_option("--batch", request_.batch, "facility: candidates judged at once")
+        ->check(CLI::Range(1U, 4294967295U))
+        ->capture_default_str();
+    app.add_option("--restarts", request_.restarts,
+                   "k-means, k-median: runs, the best of which counts")
+        ->check(CLI::Range(1U, 4294967295U))
+        ->capture_default_str();
+    app.add_option("--bound-iterations", request_.bound_iterations,
+                   "Steps towards a lower bound of the cost; 0: none (default: some seconds)")
+        ->type_name("N");
+    app.add_option(
+           "--metric", metric_,
+           "euclidean, squared, minkowski:P or elliptical:FILE (JSON: boxes with semi-axes)")
+        ->capture_default_str()
+        ->type_name("METRIC");
+    app.add_option("--channel", channels_,
+                   "A column that counts in distances too, and how many metres its unit is worth")
+        ->allow_extra_args(false)
+        ->type_name("NAME:WEIGHT");
+    app.add_option("--weight", weight_, "The column of the points' weights")->type_name("NAME");
+    add_number(app, "--z-weight", z_weight_, "How much heights count in a distance", kFactorOrZero);
+    app.add_flag("--single-precision", request_.single_precision,
+                 "complete: a matrix of half the size");
+    app.add_option("--device", device_, "single, complete: cpu or cuda")
+        ->check(CLI::IsMember({"cpu", "cuda"}))
+        ->capture_default_str();
+  }
+
+  Summary run(const CommonOptions& common) override {
+    const Stopwatch watch;
+    check_usage(common);
+    const MetricChoice metric = MetricChoice::parse(metric_);
+    const bool replace_points = output_.empty() ? false : may_replace(output_, common.force);
+    const bool replace_labels = labels_.empty() ? false : may_replace(labels_, common.force);
+    const bool replace_tree = dendrogram_.empty() ? false : may_replace(dendrogram_, common.force);
+
+    request_.memory_bytes = common.memory_or(0);
+    PointTable table = read_point_table(input_, input_format_, request_.memory_bytes, common);
+    if (table.size() > std::numeric_limits<std::int32_t>::max()) {
+      throw stream::Error(
+          {.file = input_,
+           .where = {},
+           .cause = "has " + with_commas(table.size()) + " points",
+           .remedy = "at most 2,147,483,647 are clustered in memory; build a store"});
+    }
+    const GroundFrame ground = GroundFrame::of(table, z_weight_);
+    if (!ground.assumption.empty()) common.explain(input_ + ": " + ground.assumption);
+    std::vector<cluster::Point3> positions(table.size());
+    std::transform(table.positions.begin(), table.positions.end(), positions.begin(), ground);
+    const std::vector<double> weights =
+        weight_.empty() ? std::vector<double>() : table.column(weight_);
+    const ChannelTable channels = read_channels(table, channels_);
+
+    cluster::FacilityPoints problem;
+    problem.points = positions;
+    problem.weights = weights;
+    const stream::Point3& scale = ground.scale;
+    problem.metric =
+        metric.on_ground(ground.origin, {scale[0], 0, 0, 0, scale[1], 0, 0, 0, scale[2]});
+    problem.channels = {channels.values, channels.weights};
+    problem.facility_cost = facility_cost_;
+    if (outlier_price_) problem.outlier_price = *outlier_price_;
+
+    ClusterOutcome outcome;
+    {
+      ProgressMeter meter(common.progress, "points");
+      call_library(input_, method_, [&] {
+        outcome = run_clustering(request_, problem, [&](double fraction) {
+          check_interrupt();
+          meter.update(static_cast<std::uint64_t>(fraction * static_cast<double>(table.size())),
+                       fraction);
+        });
+      });
+    }
+    for (const std::string& note : outcome.notes) common.say(note);
+
+    if (!labels_.empty()) write_labels(labels_, outcome, replace_labels);
+    if (!dendrogram_.empty()) write_dendrogram(dendrogram_, *outcome.dendrogram, replace_tree);
+    const std::size_t outliers = static_cast<std::size_t>(
+        std::count(outcome.labels.begin(), outcome.labels.end(), cluster::kOutlier));
+    const std::uint64_t points = table.size();
+    if (!output_.empty())
+      write_clustered(output_, format_, std::move(table), outcome, replace_points);
+    Summary summary = cluster_summary(outcome, points, outliers, watch.seconds());
+    // Costs are a result; they stay out of the way of another one on standard output.
+    summary.text_is_result = output_ != "-" && labels_ != "-" && dendrogram_ != "-";
+    return summary;
+  }
+
+ private:
+  void check_usage(const CommonOptions& common) {
+    const auto method = cluster_method_of(method_);
+    if (!method) {
+      throw UsageError("--method " + method_ +
+                       ": the methods are facility, primal-dual, k-means, k-median, single and "
+                       "complete");
+    }
+    request_.method = *method;
+    request_.effort = *effort_of(effort_);
+    request_.cuda = device_ == "cuda";
+    request_.seed = common.seed;
+    request_.threads = common.threads;
+    const bool tree = *method == ClusterMethod::single || *method == ClusterMethod::complete;
+    const bool flat = !output_.empty() || !labels_.empty();
+    if (!flat && dendrogram_.empty()) {
+      throw UsageError(
+          "there is nothing to write: name -o FILE, --labels FILE or --dendrogram FILE");
+    }
+    if (!tree && (!dendrogram_.empty() || request_.height || request_.cuda)) {
+      throw UsageError(
+          "--dendrogram, --height and --device are for the methods single and complete");
+    }
+    if (tree && flat && request_.k == 0 && !request_.height) {
+      throw UsageError("--method " + method_ +
+                       " gives a tree: say where to cut it, with -k K or "
+                       "--height H");
+    }
+    if (request_.k != 0 && request_.height) throw UsageError("give either -k or --height");
+    const bool counts = *method == ClusterMethod::k_means || *method == ClusterMethod::k_median;
+    if (counts && request_.k == 0) throw UsageError("--method " + method_ + " needs -k K");
+    if (!counts && !tree && request_.k != 0) {
+      throw UsageError("--method " + method_ +
+                       " finds the number of clusters itself, by --facility-cost; -k is for "
+                       "k-means, k-median, single and complete");
+    }
+    if (*method != ClusterMethod::facility &&
+        (outlier_price_ || request_.strategy != "automatic" || !request_.iterations.empty() ||
+         request_.batch != 1)) {
+      throw UsageError(
+          "--outlier-price, --strategy, --iterations and --batch are for --method "
+          "facility");
+    }
+    const int on_output = (output_ == "-") + (labels_ == "-") + (dendrogram_ == "-") + common.json;
+    if (on_output > 1) throw UsageError("only one thing can go to standard output");
+  }
+
+  ClusterRequest request_;
+  std::string input_, output_, labels_, dendrogram_, format_, input_format_;
+  std::string method_ = "facility", effort_ = "default", metric_ = "euclidean", weight_;
+  std::string device_ = "cpu";
+  std::vector<std::string> channels_;
+  double facility_cost_ = 1.0, z_weight_ = 1.0;
+  std::optional<double> outlier_price_;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_cluster() { return std::make_unique<ClusterCommand>(); }
+
+}  // namespace terrace::tools

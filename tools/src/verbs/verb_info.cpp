@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// info: what a store or a file holds.
+#include <filesystem>
+
+#include <CLI/CLI.hpp>
+#include <terrace/stream/store.hpp>
+
+#include "verbs/info.hpp"
+#include "verbs/verbs.hpp"
+
+namespace terrace::tools {
+namespace {
+
+class InfoCommand : public Command {
+ public:
+  void define(CLI::App& app) override {
+    app.add_option("input", input_, "Store, or file of points or cells; - is standard input")
+        ->required()
+        ->type_name("STORE|FILE");
+  }
+
+  Summary run(const CommonOptions& common) override {
+    const bool store = std::filesystem::is_directory(input_) || stream::Store::recover(input_);
+    return store ? info_of_store(input_, common) : info_of_file(input_, common);
+  }
+
+ private:
+  std::string input_;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_info() { return std::make_unique<InfoCommand>(); }
+
+}  // namespace terrace::tools

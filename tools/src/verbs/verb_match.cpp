@@ -1,0 +1,221 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// match: pairs the points of one file at the least total distance, or makes the tree of repeated
+// matching.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "base/error.hpp"
+#include "base/interrupt.hpp"
+#include "base/output.hpp"
+#include "base/units.hpp"
+#include "cli/library_call.hpp"
+#include "earth/portable_math.hpp"
+#include "tables/label_file.hpp"
+#include "tables/match_run.hpp"
+#include "tables/point_table.hpp"
+#include "terrace/stream/sink.hpp"
+#include "verbs/verbs.hpp"
+
+namespace terrace::tools {
+
+using namespace terrain;
+namespace {
+
+class MatchCommand final : public Command {
+ public:
+  void define(CLI::App& app) override {
+    app.add_option("input", input_, "File of points (or cells); - is standard input")
+        ->required()
+        ->type_name("FILE");
+    add_output(app, output_,
+               "The pairs, rows a,b,distance: numbers of points in the order of the input, from 0, "
+               "and metres; with --tree rows a,b,distance,size,level; - is standard output");
+    app.add_option("--input-format", input_format_, "Of the input (else its content, its ending)")
+        ->type_name("NAME");
+    app.add_option("--method", method_,
+                   "auto: the optimum up to half a million points, beyond it clusters first, then "
+                   "windows, with a proven bound; exact: the optimum; monotone: repeated halving, "
+                   "near it; monte-carlo: random halving, as the thesis has it")
+        ->check(CLI::IsMember({"auto", "exact", "monotone", "monte-carlo"}))
+        ->capture_default_str()
+        ->type_name("NAME");
+    app.add_option("--iterations", iterations_,
+                   "monotone, monte-carlo: at most so many (default: as many as points)")
+        ->type_name("N");
+    add_number(app, "--seconds", seconds_, "monotone, monte-carlo: begin no iteration after",
+               kAboveZero)
+        ->type_name("S");
+    add_number(app, "--z-weight", z_weight_, "How much heights count in a distance", kFactorOrZero);
+    app.add_flag(
+        "--tree", tree_,
+        "Match the pairs again, and so on: the binary tree. Row k is node n + k of n points "
+        "and joins the nodes a and b; size: points below");
+    app.add_option("--labels", labels_,
+                   "One cluster number per line, in the order of the input: match within clusters "
+                   "first")
+        ->type_name("FILE");
+  }
+
+  Summary run(const CommonOptions& common) override {
+    const Stopwatch watch;
+    MatchRequest request = request_of(common);
+    const bool replace = may_replace(output_, common.force);
+    const PointTable table = read_point_table(input_, input_format_, common.memory_or(0), common);
+    const GroundFrame ground = GroundFrame::of(table, z_weight_);
+    if (!ground.assumption.empty()) common.explain(input_ + ": " + ground.assumption);
+    std::vector<std::uint32_t> labels;
+    if (!labels_.empty()) labels = read_labels(labels_, table.size());
+    request.labels = labels;
+    positions_.resize(table.size());
+    std::transform(table.positions.begin(), table.positions.end(), positions_.begin(), ground);
+
+    ProgressMeter meter(common.progress, tree_ ? "pairs" : "steps");
+    const MatchProgress progress = [&](std::uint64_t done, std::uint64_t total) {
+      check_interrupt();
+      meter.update(done, static_cast<double>(done) / static_cast<double>(total));
+    };
+    if (tree_) {
+      TreeOutcome outcome;
+      call_library(input_, method_,
+                   [&] { outcome = run_matching_tree(request, positions_, progress); });
+      write(rows_of(outcome), replace);
+      return summary_of(outcome, watch);
+    }
+    MatchOutcome outcome;
+    call_library(input_, method_, [&] { outcome = run_matching(request, positions_, progress); });
+    std::size_t pairs = 0;
+    write(rows_of(outcome, pairs), replace);
+    return summary_of(outcome, pairs, watch);
+  }
+
+ private:
+  [[nodiscard]] MatchRequest request_of(const CommonOptions& common) const {
+    MatchRequest request;
+    request.method = *match_method_of(method_);
+    const bool halving =
+        request.method == MatchMethod::monotone || request.method == MatchMethod::monte_carlo;
+    if (!halving && (!iterations_.empty() || seconds_)) {
+      throw UsageError("--iterations and --seconds are for --method monotone and monte-carlo");
+    }
+    if (!labels_.empty() && !tree_ && request.method != MatchMethod::automatic) {
+      throw UsageError("--labels is for --method auto, or for --tree with any method");
+    }
+    request.iterations = iterations_.empty() ? 0 : count_of_option("--iterations", iterations_);
+    if (!iterations_.empty() && request.iterations == 0) {
+      throw UsageError("--iterations must be positive");
+    }
+    request.seconds = seconds_.value_or(0.0);
+    request.seed = common.seed;
+    request.threads = common.threads;
+    request.memory_bytes = common.memory_or(0);
+    return request;
+  }
+
+  std::string rows_of(const MatchOutcome& outcome, std::size_t& pairs) const {
+    std::string text = std::string(kPairsHead) + '\n';
+    for (std::uint32_t a = 0; a < outcome.mate.size(); ++a) {
+      const std::uint32_t b = outcome.mate[a];
+      // Who has no partner has a number above all.
+      if (b <= a || b >= outcome.mate.size()) continue;
+      const stream::Point3 &p = positions_[a], &q = positions_[b];
+      const double distance = portable_hypot(portable_hypot(p[0] - q[0], p[1] - q[1]), p[2] - q[2]);
+      text += std::to_string(a) + ',' + std::to_string(b) + ',' + number_text(distance) + '\n';
+      ++pairs;
+    }
+    return text;
+  }
+
+  static std::string rows_of(const TreeOutcome& outcome) {
+    std::string text = std::string(kTreeHead) + '\n';
+    for (const matching::MatchingTreeRow& row : outcome.tree.rows) {
+      text += std::to_string(row.a) + ',' + std::to_string(row.b) + ',' +
+              number_text(row.distance) + ',' + std::to_string(row.size) + ',' +
+              std::to_string(row.level) + '\n';
+    }
+    return text;
+  }
+
+  void write(const std::string& text, bool replace) const {
+    stream::Sink file(output_, replace, stop_token());
+    file.write(text);
+    file.commit();
+  }
+
+  [[nodiscard]] Summary summary_of(const MatchOutcome& outcome, std::size_t pairs,
+                                   const Stopwatch& watch) const {
+    Summary summary;
+    const auto alone = std::find(outcome.mate.begin(), outcome.mate.end(), matching::kNobody);
+    const bool odd = alone != outcome.mate.end();
+    summary.json = {{"pairs", pairs},
+                    {"cost", outcome.cost},
+                    {"iterations", outcome.iterations},
+                    {"unmatched", odd ? 1 : 0},
+                    {"optimal", outcome.optimal},
+                    {"clusters", outcome.clusters}};
+    summary.json["left_over"] = nullptr;
+    if (odd) summary.json["left_over"] = alone - outcome.mate.begin();
+    summary.json["lower_bound"] = nullptr;
+    if (outcome.lower_bound) summary.json["lower_bound"] = *outcome.lower_bound;
+    summary.text =
+        with_commas(pairs) + " pairs, total distance " + readable_number(outcome.cost, 6);
+    summary.text += guarantee(outcome);
+    if (odd) {
+      summary.text += ", point " + std::to_string(alone - outcome.mate.begin()) + " left over";
+    }
+    finish(summary, watch);
+    return summary;
+  }
+
+  [[nodiscard]] Summary summary_of(const TreeOutcome& outcome, const Stopwatch& watch) const {
+    double cost = 0.0;
+    std::uint32_t levels = 0;
+    for (const matching::MatchingTreeRow& row : outcome.tree.rows) {
+      cost += row.distance;
+      levels = std::max(levels, row.level);
+    }
+    Summary summary;
+    summary.json = {{"pairs", outcome.tree.rows.size()},
+                    {"cost", cost},
+                    {"iterations", levels},
+                    {"unmatched", 0},
+                    {"levels", levels},
+                    {"clusters", outcome.clusters}};
+    summary.text = "a tree of " + with_commas(outcome.tree.rows.size()) + " pairs on " +
+                   std::to_string(levels) + " levels, total distance " + readable_number(cost, 6);
+    finish(summary, watch);
+    return summary;
+  }
+
+  /// What is known of the matching, for the user.
+  static std::string guarantee(const MatchOutcome& outcome) {
+    if (outcome.optimal) return " (the optimum)";
+    if (!outcome.lower_bound || !(*outcome.lower_bound > 0.0)) return " (no bound)";
+    const double share = std::max(0.0, outcome.cost / *outcome.lower_bound - 1.0);
+    return " (at most " + readable_bound(100.0 * share) + " % above the optimum)";
+  }
+
+  void finish(Summary& summary, const Stopwatch& watch) const {
+    summary.json["seconds"] = watch.seconds();
+    summary.json["peak_rss_bytes"] = peak_rss_bytes();
+    summary.text += ", " + readable_seconds(watch.seconds()) + '\n';
+    summary.text_is_result = output_ != "-";
+  }
+
+  std::vector<stream::Point3> positions_;
+  std::string input_, output_, input_format_, method_ = "auto", iterations_, labels_;
+  bool tree_ = false;
+  std::optional<double> seconds_;
+  double z_weight_ = 1;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_match() { return std::make_unique<MatchCommand>(); }
+
+}  // namespace terrace::tools

@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <terrace/stream/overlay.hpp>
+#include <terrace/stream/store.hpp>
+
+#include "base/error.hpp"
+#include "base/interrupt.hpp"
+#include "base/output.hpp"
+#include "base/units.hpp"
+#include "cli/crs_options.hpp"
+#include "cli/smooth_option.hpp"
+#include "mesh/bounded/bounded_mesh.hpp"
+#include "mesh/height_overlay.hpp"
+#include "mesh/mesh_output.hpp"
+#include "mesh/store_mesh.hpp"
+#include "surface/detail.hpp"
+#include "verbs/verbs.hpp"
+
+namespace terrace::tools {
+
+using namespace terrain;
+namespace {
+
+class MeshCommand final : public Command {
+ public:
+  void define(CLI::App& app) override {
+    app.add_option("STORE", store_, "where the points come from")->required();
+    add_output(app, output_, "the file to write: .ply, .obj, .glb");
+    app.add_option("--format", format_, "ply, ply-ascii, obj, glb; else by the file's ending");
+    app.add_option("--level", level_, "detail outside the focuses: a number or top")
+        ->default_str("0; with --focus top");
+    app.add_option("--region", region_,
+                   "only triangles that reach inside: a box, minx,miny[,minz],maxx,maxy[,maxz], or "
+                   "a GeoJSON file");
+    app.add_option("--focus", focuses_, "BOX:L, all points of level L inside the box; repeatable")
+        ->allow_extra_args(false);
+    app.add_option(
+           "--smooth", smooth_,
+           "laplacian, taubin (keeps what is wide) or bilateral (keeps steps), :STEPS behind "
+           "if wanted (10); with --region only inside it")
+        ->type_name("METHOD");
+    app.add_option("--overlay", overlay_,
+                   "a file of --save-overlay: its heights in place of the store's")
+        ->type_name("FILE");
+    app.add_option("--save-overlay", save_overlay_,
+                   "with --smooth: write the heights that changed to this file beside the store, "
+                   "which stays as it is")
+        ->type_name("FILE");
+    app.add_option(
+           "--metric", metric_,
+           "euclidean, or elliptical:FILE (JSON regions as for cluster): triangles follow the "
+           "ellipses inside the regions")
+        ->capture_default_str()
+        ->type_name("NAME");
+    add_number(app, "--max-error", max_error_,
+               "the fewest triangles that are vertically within this many metres of every "
+               "sample, checked on the values written",
+               kNotNegative)
+        ->type_name("METRES");
+    app.add_option("--max-points", max_points_,
+                   "the mesh of at most this many points with the smallest error")
+        ->type_name("N");
+    app.add_option("--quality", quality_,
+                   "of an error-bounded mesh: greedy (Delaunay), removal (fewer triangles), fitted "
+                   "(fewer again; heights leave the samples)")
+        ->capture_default_str()
+        ->type_name("NAME");
+    app.add_option("--duplicates", duplicates_,
+                   "which of several irregular samples at one x,y counts: all (each is kept within "
+                   "--max-error, or refused where they differ by more), min, max, mean, first, "
+                   "error (refuse them)")
+        ->default_str("all; with --max-points mean")
+        ->type_name("NAME");
+    app.add_option("--fill", fill_,
+                   "what a raster's cells without data become in an error-bounded mesh: none "
+                   "(holes), flat (at the lowest height), interpolate")
+        ->capture_default_str()
+        ->type_name("NAME");
+    not_yet(app, {"--base"});
+    crs_.define(app);
+  }
+
+  Summary run(const CommonOptions& common) override {
+    return max_error_ || !max_points_.empty() ? bounded(common) : multiresolution(common);
+  }
+
+ private:
+  Summary bounded(const CommonOptions& common) const {
+    const Stopwatch watch;
+    if ((!level_.empty() && level_ != "0") || !focuses_.empty() || !smooth_.empty() ||
+        metric_ != "euclidean" || !overlay_.empty() || !save_overlay_.empty()) {
+      throw UsageError(
+          "--max-error and --max-points are about all samples: without --level, --focus, --smooth, "
+          "--overlay and --metric");
+    }
+    BoundedMeshOptions options;
+    if (max_error_ && !max_points_.empty()) {
+      throw UsageError("either --max-error or --max-points, not both");
+    }
+    options.max_error = max_error_.value_or(0.0);
+    if (!max_points_.empty()) {
+      options.max_points = count_of_option("--max-points", max_points_);
+      if (options.max_points < 4) throw UsageError("--max-points: at least 4");
+    }
+    options.quality = parse_quality(quality_);
+    const std::string duplicates = !duplicates_.empty()  ? duplicates_
+                                   : max_points_.empty() ? "all"
+                                                         : "mean";
+    options.duplicates = parse_duplicates(duplicates);
+    if (options.duplicates == tri::PointDuplicates::kAll && !max_points_.empty()) {
+      throw UsageError("--duplicates all needs the bound of --max-error to keep all within");
+    }
+    options.fill = parse_fill(fill_);
+    options.path = output_;
+    const stream::Store store = stream::Store::open(store_);
+    if (!region_.empty()) options.region = crs_.regions(store)(Region::parse(region_));
+    if (crs_.places(store).has_effect()) {
+      throw UsageError(
+          "--to-crs: between other coordinates the triangles would be other surfaces, and the "
+          "bound would not hold; write the mesh in the store's CRS");
+    }
+    options.writer = {
+        .format = format_, .replace = may_replace(output_, common.force), .stop = stop_token()};
+    const BoundedMeshResult result = store.schema().grid
+                                         ? bounded_raster_mesh(store, options, common.context())
+                                         : bounded_point_mesh(store, options, common.context());
+    Summary summary;
+    summary.json = {{"vertices", result.vertices},
+                    {"triangles", result.triangles},
+                    {"max_error", result.max_error},
+                    {"rms_error", result.rms_error},
+                    {"samples", result.samples},
+                    {"covered", result.samples - result.uncovered},
+                    {"uncovered", result.uncovered},
+                    {"duplicates", result.duplicates},
+                    {"seconds", watch.seconds()},
+                    {"reading_seconds", result.reading_seconds},
+                    {"meshing_seconds", result.meshing_seconds},
+                    {"peak_rss_bytes", peak_rss_bytes()}};
+    const bool all = result.uncovered == 0;
+    summary.text =
+        output_ + ": " + with_commas(result.vertices) + " vertices, " +
+        with_commas(result.triangles) + " triangles, within " + readable_bound(result.max_error) +
+        " m of " + (all ? "all " : "") + with_commas(result.samples - result.uncovered) +
+        (all ? "" : " of " + with_commas(result.samples)) + " samples (RMS " +
+        readable_number(result.rms_error) + " m), in " + readable_seconds(watch.seconds()) + "\n";
+    if (!all) {
+      summary.text += with_commas(result.uncovered) +
+                      " samples lie on no triangle: " + why_uncovered(result, store.schema().grid) +
+                      "\n";
+    }
+    if (result.duplicates > 0) {
+      summary.text +=
+          with_commas(result.duplicates) + " samples share the place of another: " +
+          (duplicates == "all" ? "the bound holds for each of them"
+                               : "the bound holds for the " + counting(duplicates) +
+                                     " of each place (--duplicates " + duplicates + ")") +
+          "\n";
+    }
+    return summary;
+  }
+
+  static std::string why_uncovered(const BoundedMeshResult& result, bool grid) {
+    if (result.triangles == 0) return "nothing spans an area";
+    return grid ? "they are beside cells without data"
+                : "the file's format rounds the border of the mesh";
+  }
+
+  static std::string counting(const std::string& duplicates) {
+    return duplicates == "min" ? "lowest" : duplicates == "max" ? "highest" : duplicates;
+  }
+
+  Summary multiresolution(const CommonOptions& common) const {
+    const Stopwatch watch;
+    if (quality_ != "removal" || !duplicates_.empty() || fill_ != "none") {
+      throw UsageError("--quality, --duplicates and --fill belong to --max-error and --max-points");
+    }
+    MeshOptions options{{.smoothing = parse_smoothing(smooth_)}, MetricChoice::parse(metric_)};
+    const bool save = !save_overlay_.empty();
+    if (save && smooth_.empty()) throw UsageError("--save-overlay needs --smooth");
+    if (save && save_overlay_ == output_) {
+      throw UsageError("--save-overlay and --output are the same file");
+    }
+    const stream::Store store = stream::Store::open(store_);
+    const Detail detail = Detail::parse(store, level_, region_, focuses_, crs_.regions(store));
+    const PlaceConversion places = crs_.places(store);
+    const bool replace = may_replace(output_, common.force);
+    std::optional<stream::Overlay> overlay;
+    if (!overlay_.empty())
+      options.heights.overlay = &overlay.emplace(open_height_overlay(overlay_, store));
+    std::optional<stream::OverlayWriter> writer;
+    if (save) {
+      options.heights.save =
+          &writer.emplace(save_overlay_, store, store.schema().coordinates[2].name,
+                          may_replace(save_overlay_, common.force));
+    }
+    TriangleMesh mesh = mesh_of_store(store, detail, common.memory_or(0), options);
+    places(mesh.positions);
+    write_mesh(output_, format_, mesh, replace);
+    if (writer) writer->finish();
+
+    Summary summary;
+    summary.json = {{"vertices", mesh.positions.size()},
+                    {"triangles", mesh.triangles.size()},
+                    {"seconds", watch.seconds()},
+                    {"peak_rss_bytes", peak_rss_bytes()}};
+    summary.text = output_ + ": " + with_commas(mesh.positions.size()) + " vertices, " +
+                   with_commas(mesh.triangles.size()) + " triangles in " +
+                   readable_seconds(watch.seconds()) + "\n";
+    if (writer) {
+      summary.json["overlay_values"] = writer->values();
+      summary.text += save_overlay_ + ": " + with_commas(writer->values()) + " changed heights\n";
+    }
+    return summary;
+  }
+
+  std::string store_, output_, format_, level_, region_, smooth_, metric_ = "euclidean";
+  std::string overlay_, save_overlay_;
+  std::string max_points_, quality_ = "removal", duplicates_, fill_ = "none";
+  std::optional<double> max_error_;
+  std::vector<std::string> focuses_;
+  CrsOptions crs_;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_mesh() { return std::make_unique<MeshCommand>(); }
+
+}  // namespace terrace::tools

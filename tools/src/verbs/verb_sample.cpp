@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include <CLI/CLI.hpp>
+#include <terrace/stream/sink.hpp>
+#include <terrace/stream/store.hpp>
+
+#include "base/interrupt.hpp"
+#include "base/output.hpp"
+#include "base/units.hpp"
+#include "cli/crs_options.hpp"
+#include "earth/crs/coordinate_system.hpp"
+#include "sample/sample_run.hpp"
+#include "verbs/verbs.hpp"
+
+namespace terrace::tools {
+
+using namespace terrain;
+namespace {
+
+class SampleCommand final : public Command {
+ public:
+  void define(CLI::App& app) override {
+    app.add_option("STORE", store_, "where the heights come from")->required();
+    app.add_option("--points", points_,
+                   "CSV of places, one a line; columns by name (x,y; lon,lat; longitude,latitude; "
+                   "easting,northing) or else the first two; - is standard input")
+        ->capture_default_str()
+        ->type_name("FILE");
+    app.add_option("-o,--output", output_,
+                   "the lines again, with height, gradient (rise per run), slope and aspect "
+                   "(degrees; aspect clockwise from north, downhill) behind; empty where there is "
+                   "no data")
+        ->capture_default_str()
+        ->type_name("FILE");
+    app.add_option("--method", method_,
+                   "linear: on the triangulated points; natural: natural neighbours, smooth; "
+                   "nearest: the nearest point")
+        ->capture_default_str()
+        ->type_name("NAME");
+    add_number(app, "--max-edge", max_edge_,
+               "of irregular points and coarser levels: triangles with a longer side (metres on "
+               "the ground) are no data, as over water and in shadows (default: none)",
+               kAboveZero)
+        ->type_name("METRES");
+    app.add_option("--level", level_, "only points of this level and above: a number or top")
+        ->capture_default_str();
+    app.add_option("--points-crs", points_crs_,
+                   "the CRS of the places (EPSG:n or a WKT file; x,y is lon,lat), if it is not the "
+                   "store's");
+    app.add_option("--to-crs", to_crs_, "the CRS of the places in what is written");
+    app.add_option(
+        "--towgs84", shift_,
+        "dx,dy,dz[,rx,ry,rz,ds] to WGS 84 from the datum of such a CRS, or of the store, "
+        "if it is another");
+  }
+
+  Summary run(const CommonOptions& common) override {
+    const Stopwatch watch;
+    SamplerOptions options;
+    options.method = parse_interpolation(method_);
+    options.max_edge = max_edge_;
+    const std::optional<unsigned> level = parse_level(level_);
+    const stream::Store store = stream::Store::open(store_);
+    options.level = level.value_or(store.top());
+    options.threads = common.threads;
+    options.memory_bytes = common.memory_or(0);
+    const PlaceConversions conversions = conversions_for(store);
+    PlaceFile places(points_);
+    stream::Sink output(output_, may_replace(output_, common.force), stop_token());
+    ProgressMeter meter(common.progress, "points");
+    const SampleCounts counts = answer_places(
+        store, options, places, conversions, [&](std::string_view text) { output.write(text); },
+        [&](const SampleCounts& sum) { meter.update(sum.points, 0); });
+    output.commit();
+    if (counts.points > 0 && counts.answered == 0) {
+      common.say(
+          "no point has a height: are their coordinates in the CRS of the store? --points-crs "
+          "says otherwise");
+    }
+
+    Summary summary;
+    summary.json = {{"points", counts.points},
+                    {"answered", counts.answered},
+                    {"seconds", watch.seconds()},
+                    {"points_per_second", static_cast<double>(counts.points) / watch.seconds()},
+                    {"peak_rss_bytes", peak_rss_bytes()}};
+    summary.text = with_commas(counts.points) + " points, " +
+                   with_commas(counts.points - counts.answered) + " of them without a height, in " +
+                   readable_seconds(watch.seconds()) + ", " +
+                   readable_rate(static_cast<double>(counts.points) / watch.seconds()) + "\n";
+    return summary;
+  }
+
+ private:
+  [[nodiscard]] PlaceConversions conversions_for(const stream::Store& store) const {
+    PlaceConversions conversions;
+    std::optional<CoordinateSystem> from;
+    if (!points_crs_.empty()) {
+      const SystemPair systems = systems_of(store, points_crs_, shift_);
+      conversions.to_store = [systems](std::span<Point2> here) {
+        transform(systems.named, systems.store, here);
+      };
+      from = systems.named;
+    }
+    if (!to_crs_.empty()) {
+      const SystemPair systems = systems_of(store, to_crs_, shift_);
+      if (!from) from = systems.store;
+      conversions.to_written = [from = *from, to = systems.named](std::span<Point2> here) {
+        transform(from, to, here);
+      };
+      conversions.writes_degrees = systems.named.is_geographic();
+    }
+    return conversions;
+  }
+
+  std::string store_, points_ = "-", output_ = "-", method_ = "linear", level_ = "0", points_crs_,
+                      to_crs_, shift_;
+  std::optional<double> max_edge_;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_sample() { return std::make_unique<SampleCommand>(); }
+
+}  // namespace terrace::tools

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <terrace/stream/error.hpp>
+#include <terrace/stream/store.hpp>
+
+#include "base/error.hpp"
+#include "base/units.hpp"
+#include "tile/make/tile_source.hpp"
+#include "tile/verify/tile_check.hpp"
+#include "verbs/verbs.hpp"
+
+namespace terrace::tools {
+
+using namespace terrain;
+namespace {
+
+/// What a thread needs: a tile, the samples of a part of it and what is kept of the store.
+constexpr std::uint64_t kVerifyBytesPerThread = std::uint64_t{96} << 20;
+/// Blocks of the raster, and the lists of tiles.
+constexpr std::uint64_t kVerifyBytesBeside = std::uint64_t{80} << 20;
+
+/// The problems in the summary's two forms.
+void add_problem(const stream::Problem& problem, nlohmann::ordered_json& list, std::string& text) {
+  list.push_back({{"file", problem.file}, {"offset", problem.offset}, {"what", problem.what}});
+  text += problem.file + ": byte " + std::to_string(problem.offset) + ": " + problem.what + "\n";
+}
+
+class VerifyCommand final : public Command {
+ public:
+  void define(CLI::App& app) override {
+    app.add_option("PATH", path_, "the store, or the folder of tiles, to check")->required();
+    app.add_option("--store", store_,
+                   "where the tiles' samples come from: heights are checked against all of them");
+    add_number(app, "--max-error", max_error_,
+               "metres that the deepest zoom may be off, twice as much at each zoom above; else "
+               "what layer.json states",
+               kAboveZero)
+        ->type_name("METRES");
+    app.add_option("--vertical", vertical_,
+                   "ellipsoidal: the store's heights are above the ellipsoid; ignore: take them as "
+                   "if");
+    app.add_option("--geoid", geoid_, "the geoid grid that the tiles were made with")
+        ->type_name("FILE");
+  }
+
+  Summary run(const CommonOptions& common) override {
+    if (is_tile_folder(path_)) return tiles(common);
+    if (!store_.empty() || max_error_ || !vertical_.empty() || !geoid_.empty()) {
+      throw UsageError("--store, --max-error, --vertical and --geoid are for tile sets, and " +
+                       path_ + " is none");
+    }
+    return store();
+  }
+
+ private:
+  [[nodiscard]] Summary store() const;
+  [[nodiscard]] Summary tiles(const CommonOptions& common) const;
+
+  std::string path_, store_, vertical_, geoid_;
+  std::optional<double> max_error_;
+};
+
+Summary VerifyCommand::store() const {
+  const Stopwatch watch;
+  const stream::Store store = stream::Store::open(path_);
+  Summary summary;
+  nlohmann::ordered_json problems = nlohmann::ordered_json::array();
+  const bool ok = store.verify(
+      [&](const stream::Problem& problem) { add_problem(problem, problems, summary.text); });
+  std::uint64_t clusters = 0;
+  for (const stream::LevelInfo& level : store.levels()) clusters += level.clusters;
+  summary.json = {
+      {"ok", ok}, {"problems", problems}, {"clusters", clusters}, {"points", store.points()}};
+  summary.text += std::string(ok ? "sound: " : "damaged: ") + with_commas(store.points()) +
+                  " points in " + with_commas(clusters) + " clusters, " +
+                  readable_bytes(store.bytes()) + ", checked in " +
+                  readable_seconds(watch.seconds()) + "\n";
+  summary.exit_code = ok ? 0 : 1;
+  return summary;
+}
+
+Summary VerifyCommand::tiles(const CommonOptions& common) const {
+  const Stopwatch watch;
+  if (store_.empty() && (max_error_ || !vertical_.empty() || !geoid_.empty())) {
+    throw UsageError("--max-error, --vertical and --geoid have a meaning with --store alone");
+  }
+  const Context context = common.context();
+  const std::uint64_t memory = context.memory_or(0);
+  if (memory < kVerifyBytesBeside + kVerifyBytesPerThread) {
+    throw stream::Error(
+        {.file = path_,
+         .where = {},
+         .cause = "the check needs " +
+                  std::to_string((kVerifyBytesBeside + kVerifyBytesPerThread) >> 20) +
+                  "M of memory, --memory allows " + std::to_string(memory >> 20) + "M",
+         .remedy = "allow more"});
+  }
+  const auto threads = static_cast<unsigned>(std::min<std::uint64_t>(
+      common.threads, (memory - kVerifyBytesBeside) / kVerifyBytesPerThread));
+
+  std::optional<stream::Store> store;
+  std::unique_ptr<TileSource> source;
+  if (!store_.empty()) {
+    store.emplace(stream::Store::open(store_));
+    source = open_tile_source(*store,
+                              {.vertical = vertical_,
+                               .geoid = geoid_,
+                               .fill = {"interpolate"},
+                               .water = {},
+                               .memory_bytes = memory,
+                               .threads = threads},
+                              context);
+  }
+  const std::vector<std::unique_ptr<TileSurface>> none;
+  const TileCheckResult result = check_tile_set({.folder = path_, .max_error = max_error_}, threads,
+                                                source ? source->surfaces() : none, context);
+
+  Summary summary;
+  nlohmann::ordered_json problems = nlohmann::ordered_json::array();
+  for (const stream::Problem& problem : result.problems) {
+    add_problem(problem, problems, summary.text);
+  }
+  nlohmann::ordered_json zooms = nlohmann::ordered_json::array();
+  for (const ZoomCheck& zoom : result.zooms) {
+    nlohmann::ordered_json line{{"zoom", zoom.zoom}, {"tiles", zoom.tiles}};
+    summary.text += "zoom " + std::to_string(zoom.zoom) + ": " + with_commas(zoom.tiles) + " tiles";
+    if (store) {
+      line["samples"] = zoom.samples;
+      line["covered"] = zoom.samples - zoom.uncovered;
+      line["uncovered"] = zoom.uncovered;
+      line["max_error"] = zoom.max_error;
+      summary.text += ", within " + readable_bound(zoom.max_error) + " m of " +
+                      (zoom.uncovered == 0 ? "all " + with_commas(zoom.samples)
+                                           : with_commas(zoom.samples - zoom.uncovered) + " of " +
+                                                 with_commas(zoom.samples)) +
+                      " samples";
+      if (zoom.uncovered > 0) {
+        summary.text += " (" + with_commas(zoom.uncovered) + " lie on no triangle)";
+      }
+    }
+    summary.text += "\n";
+    zooms.push_back(std::move(line));
+  }
+  const bool ok = result.problems.empty();
+  if (result.torn > 0) {
+    summary.text += with_commas(result.torn) + (result.torn == 1 ? " file" : " files") +
+                    " left over from a run that was killed, no part of the set: the next "
+                    "`terrace tile` into the folder removes them\n";
+  }
+  summary.json = {{"ok", ok},
+                  {"problems", problems},
+                  {"tiles", result.tiles},
+                  {"samples", result.samples},
+                  {"left_over", result.torn},
+                  {"zooms", zooms}};
+  summary.text += std::string(ok ? "sound: " : "damaged: ") + with_commas(result.tiles) +
+                  " tiles, checked in " + readable_seconds(watch.seconds()) + "\n";
+  summary.exit_code = ok ? 0 : 1;
+  return summary;
+}
+
+}  // namespace
+
+std::unique_ptr<Command> make_verify() { return std::make_unique<VerifyCommand>(); }
+
+}  // namespace terrace::tools
