@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "build/metric_option.hpp"
+#include "terrace/terrain/metric_choice.hpp"
 
 #include <filesystem>
 #include <fstream>

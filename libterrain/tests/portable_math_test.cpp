@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "earth/portable_math.hpp"
+#include "base/portable_math.hpp"
 
 #include <cmath>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The bytes of a store are a function of input and options: not of the compiler or its
 // optimisation.
-#include "build/store_build.hpp"
+#include "terrace/terrain/build.hpp"
 
 #include <cstdlib>
 #include <filesystem>

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "earth/portable_math.hpp"
+#include "base/portable_math.hpp"
 
 namespace terrace::terrain {
 

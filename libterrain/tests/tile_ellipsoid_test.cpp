@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "base/vector.hpp"
-#include "earth/portable_math.hpp"
+#include "base/portable_math.hpp"
 #include "tile/format/ellipsoid.hpp"
 
 namespace terrace::terrain {

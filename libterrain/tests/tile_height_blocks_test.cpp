@@ -11,8 +11,8 @@
 #include <terrace/stream/geotiff_writer.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "build/store_build.hpp"
-#include "earth/portable_math.hpp"
+#include "terrace/terrain/build.hpp"
+#include "base/portable_math.hpp"
 #include "temporary_folder.hpp"
 #include "tile/make/height_blocks.hpp"
 

@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <terrace/stream/error.hpp>
 
-#include "earth/portable_math.hpp"
+#include "base/portable_math.hpp"
 #include "temporary_folder.hpp"
 
 namespace terrace::terrain {

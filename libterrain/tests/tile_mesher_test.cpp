@@ -12,7 +12,7 @@
 #include <terrace/tri/point_tin.hpp>
 
 #include "analytic_surface.hpp"
-#include "earth/portable_math.hpp"
+#include "base/portable_math.hpp"
 #include "tile/verify/tile_height_check.hpp"
 #include "tile/verify/tile_mesh_check.hpp"
 

@@ -7,7 +7,7 @@
 #include <terrace/stream/error.hpp>
 
 #include "base/vector.hpp"
-#include "earth/portable_math.hpp"
+#include "base/portable_math.hpp"
 #include "tile/format/quantized_mesh.hpp"
 
 namespace terrace::terrain {

@@ -16,9 +16,9 @@
 #include <terrace/stream/store.hpp>
 
 #include "../pipeline/temporary_folder.hpp"
-#include "build/store_build.hpp"
+#include "terrace/terrain/build.hpp"
 #include "cli/cli.hpp"
-#include "earth/portable_math.hpp"
+#include "base/portable_math.hpp"
 #include "earth/world.hpp"
 #include "sample/height_sampler.hpp"
 #include "sample/place_file.hpp"
@@ -44,8 +44,7 @@ const Store& store() {
     terrace::terrain::BuildRequest request;
     request.inputs = {dem};
     request.store = folder.path() / "dem.store";
-    request.threads = 2;
-    terrace::terrain::build_store(request);
+    terrace::terrain::build_store(request, {.threads = 2});
     return Store::open(request.store);
   }();
   return opened;

@@ -20,7 +20,7 @@
 #include <terrace/tri/multiresolution.hpp>
 
 #include "../pipeline/temporary_folder.hpp"
-#include "build/store_build.hpp"
+#include "terrace/terrain/build.hpp"
 #include "cli/cli.hpp"
 #include "terrace/terrain/store_source.hpp"
 
@@ -44,8 +44,7 @@ const Store& store() {
     terrace::terrain::BuildRequest request;
     request.inputs = {dem};
     request.store = folder.path() / "dem.store";
-    request.threads = 2;
-    terrace::terrain::build_store(request);
+    terrace::terrain::build_store(request, {.threads = 2});
     return Store::open(request.store);
   }();
   return opened;

@@ -1,58 +1,22 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A program outside the workspace that knows the four libraries by pkg-config alone: it clusters a
+// A program outside the workspace that knows the five libraries by pkg-config alone: it clusters a
 // small terrain into a store, reads it back, triangulates the top level and solves an assignment.
 // Usage: consumer FOLDER, where the store is to be made.
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
-#include <memory>
-#include <utility>
 #include <vector>
 
 #include <terrace/cluster/hierarchy.hpp>
 #include <terrace/matching/assignment.hpp>
 #include <terrace/stream/store.hpp>
+#include <terrace/terrain/store_sink.hpp>
 #include <terrace/tri/delaunay2.hpp>
 
 using namespace terrace;
 
 namespace {
-
-// Calls use with the block in the store's words.
-template <class Use>
-auto with_stored(const cluster::FinishedBlock& b, Use use) {
-  std::vector<stream::ClusterSummary> summaries;
-  for (const cluster::Summary& s : b.summaries) {
-    summaries.push_back({{s.box.min, s.box.max}, s.error, s.descendants});
-  }
-  return use(stream::ClusteredBlock{b.level, b.positions, b.payload, b.children, b.first, b.order,
-                                    b.representatives, summaries});
-}
-
-class StoreSink : public cluster::HierarchySink {
- public:
-  explicit StoreSink(stream::StoreWriter& writer) : writer_(writer) {}
-
-  std::unique_ptr<Prepared> prepare(const cluster::FinishedBlock& block) override {
-    auto encoded = std::make_unique<Encoded>();
-    encoded->block = with_stored(block, [&](const auto& b) { return writer_.encode(b); });
-    return encoded;
-  }
-  void commit(unsigned, std::unique_ptr<Prepared> prepared) override {
-    writer_.append(std::move(static_cast<Encoded&>(*prepared).block));
-  }
-  void root(const cluster::FinishedBlock& block) override {
-    with_stored(block, [&](const auto& b) { return writer_.finish(b); });
-  }
-
- private:
-  struct Encoded : Prepared {
-    stream::StoreWriter::EncodedPtr block;
-  };
-
-  stream::StoreWriter& writer_;
-};
 
 int fail(const char* what) {
   std::fprintf(stderr, "consumer: %s\n", what);
@@ -68,7 +32,7 @@ int main(int argc, char** argv) {
   stream::Schema schema;
   schema.coordinates = {stream::Channel{"x"}, stream::Channel{"y"}, stream::Channel{"z"}};
   stream::StoreWriter writer(path, schema);
-  StoreSink sink(writer);
+  terrain::StoreSink sink(writer);
   cluster::HierarchyOptions options;
   options.block_size = 400;
   options.threads = 2;

@@ -17,7 +17,7 @@ OPTIONS
 cat >"$folder/meson.build" <<'BUILD'
 project('stranger', 'cpp', default_options : ['cpp_std=c++20'])
 BUILD
-for library in stream cluster matching tri; do
+for library in stream cluster matching tri terrain; do
   mkdir "$folder/subprojects/terrace-$library"
   (cd "$source/lib$library" && tar -c --exclude './build*' .) | tar -x -C "$folder/subprojects/terrace-$library"
   cat >>"$folder/meson.build" <<BUILD
@@ -50,10 +50,15 @@ int main() {
 }
 CODE
 
+cat >"$folder/use_terrain.cpp" <<'CODE'
+#include <terrace/terrain/context.hpp>
+int main() { return terrace::terrain::Context{.memory_bytes = 3}.memory_or(7) == 3 ? 0 : 1; }
+CODE
+
 # Unoptimised: what is tested is the building, not the result. All are configured and all users are
 # compiled; linked and run are those of the two quick libraries (CI builds each library alone).
 meson setup "$folder/build" "$folder" --buildtype=plain -Dunity=on -Dunity_size=30 >"$folder/log" 2>&1 || { cat "$folder/log"; exit 1; }
-ninja -C "$folder/build" use_cluster use_matching use_stream.p/use_stream.cpp.o use_tri.p/use_tri.cpp.o \
+ninja -C "$folder/build" use_cluster use_matching use_stream.p/use_stream.cpp.o use_tri.p/use_tri.cpp.o use_terrain.p/use_terrain.cpp.o \
   >"$folder/log" 2>&1 || { tail -n 50 "$folder/log"; exit 1; }
 if grep -o 'subprojects/[^ ]*_tests' "$folder/build/build.ninja"; then
   echo 'a subproject would build its tests'

@@ -9,31 +9,37 @@ import os
 import re
 import sys
 
-LIBRARIES = ['stream', 'cluster', 'matching', 'tri']
+LIBRARIES = ['stream', 'cluster', 'matching', 'tri', 'terrain']
+# Who may use whom among them; the others know no sibling.
+SIBLINGS = {'terrain': ['stream', 'cluster', 'tri']}
+# The rooms of libterrain, in ranks: a room knows those of lower rank only.
+TERRAIN_ROOMS = {'base': 0, 'earth': 1, 'build': 2, 'surface': 2, 'sample': 3, 'contour': 3, 'mesh': 3, 'tile': 3}
 LICENCES = {
     'libstream': 'Apache-2.0',
     'libcluster': 'Apache-2.0',
     'libmatching': 'Apache-2.0',
     'libtri': 'GPL-3.0-or-later',
+    'libterrain': 'GPL-3.0-or-later',
     'tools': 'GPL-3.0-or-later',
     'tests': 'GPL-3.0-or-later',
 }
 
 # What may be included where: a pattern of the name, and the folders that may name it. Public headers
 # are stricter still, see check_public_header().
-TESTS = ['tests', 'libstream/tests', 'libcluster/tests', 'libmatching/tests', 'libtri/tests']
-BENCHES = ['tests/bench', 'libstream/bench', 'libcluster/bench', 'libmatching/bench', 'libtri/bench']
+TESTS = ['tests', 'libstream/tests', 'libcluster/tests', 'libmatching/tests', 'libtri/tests', 'libterrain/tests']
+BENCHES = ['tests/bench', 'libstream/bench', 'libcluster/bench', 'libmatching/bench', 'libtri/bench',
+           'libterrain/bench']
 IN_TRI = ['libtri/src', 'libtri/tests', 'libtri/bench', 'libtri/fuzz', 'tests/bench']
 IN_STREAM = ['libstream/src', 'libstream/tests', 'libstream/bench', 'libstream/fuzz']
 RESTRICTED = [
     (r'CGAL/|boost/|gmp(xx)?\.h|mpfr\.h', IN_TRI),
-    (r'GeographicLib/', ['tools']),
+    (r'GeographicLib/', ['libterrain/src', 'libterrain/tests', 'tools']),
     (r'tiff(io|io\.hxx|conf|vers)?\.h|png\.h|zlib\.h|zstd\.h|libdeflate\.h', IN_STREAM),
     (r'lemon/', ['libmatching/src', 'libmatching/tests', 'libmatching/bench']),
     (r'cuda_runtime|cuda\.h|cuda_(device|rounds)',
      ['libcluster/src', 'libcluster/tests', 'libcluster/bench']),
     (r'CLI/', ['tools']),
-    (r'nlohmann/', ['tools', 'tests'] + IN_STREAM),
+    (r'nlohmann/', ['libterrain/src', 'libterrain/tests', 'tools', 'tests'] + IN_STREAM),
     (r'gtest/|gmock/', TESTS + ['tools']),
     (r'benchmark/', BENCHES),
 ]
@@ -44,16 +50,16 @@ RESTRICTED = [
 INEXACT = (r'(?:acosh?|asinh?|atan[2h]?|cbrt|cosh?|erfc?|exp(?:2|m1)?|hypot|[lt]gamma|'
            r'log(?:10|1p|2)?|pow|sincos|sinh?|tanh?)')
 INEXACT_USE = re.compile(rf'\bstd::{INEXACT}[fl]?\b|(?<![\w.>:]){INEXACT}[fl]?\(')
-# The files that may, and why. GeographicLib, which tools alone use, is made of such functions too.
+# The files that may, and why. GeographicLib, which libterrain and tools alone use, is made of such functions too.
 CAMERA = 'the camera: which clusters a view asks for, never what a file holds'
 EARTH = 'places on the earth, by formulas of such functions: ARCHITECTURE.md says what depends on them'
 MAY_DIFFER = {
     'libtri/src/view/columns.cpp': CAMERA,
     'libtri/src/view/view.cpp': CAMERA,
-    'tools/src/projection.cpp': EARTH,
-    'tools/src/projection_cone.cpp': EARTH,
-    'tools/src/projection_oblique.cpp': EARTH,
-    'tools/src/units.cpp': 'summaries for people, rounded; files have all digits',
+    'libterrain/src/earth/crs/projection.cpp': EARTH,
+    'libterrain/src/earth/crs/projection_cone.cpp': EARTH,
+    'libterrain/src/earth/crs/projection_oblique.cpp': EARTH,
+    'libterrain/src/base/units.cpp': 'summaries for people, rounded; files have all digits',
 }
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
@@ -96,18 +102,23 @@ def check_include(path, bracket, name):
     library = library_of(path)
     if library:
         for other in LIBRARIES:
-            if other != library and name.startswith(f'terrace/{other}/'):
+            if other not in [library] + SIBLINGS.get(library, []) and name.startswith(f'terrace/{other}/'):
                 yield f'includes its sibling\'s <{name}>'
         if bracket == '"':
             target = os.path.normpath(os.path.join(os.path.dirname(path), name))
             if target.startswith('..') or not below(target, f'lib{library}'):
                 if '..' in name.split('/'):
                     yield f'includes "{name}", a file outside its library'
+    here = re.match(r'libterrain/src/([a-z]+)/', path)
+    room = name.split('/')[0]
+    if here and room in TERRAIN_ROOMS and room != here.group(1) and \
+            TERRAIN_ROOMS[room] >= TERRAIN_ROOMS.get(here.group(1), -1):
+        yield f'includes "{name}", whose room is not below its own'
     for pattern, folders in RESTRICTED:
         if re.match(pattern, name) and not any(below(path, folder) for folder in folders):
             yield f'includes <{name}>, which only {", ".join(folders)} may'
     if library and below(path, f'lib{library}/include'):
-        own = name.startswith(f'terrace/{library}/')
+        own = name.startswith(tuple(f'terrace/{known}/' for known in [library] + SIBLINGS.get(library, [])))
         if not own and not (bracket == '<' and re.fullmatch(r'[a-z_0-9]+', name)):
             yield f'is a public header and includes <{name}>; it may use the standard library only'
 
@@ -157,8 +168,8 @@ def check_meson(root):
             if os.path.basename(path) != 'meson.build':
                 continue
             for name in re.findall(r"(?:dependency|subproject)\(\s*'([^']+)'", read(root, path)):
-                sibling = name.startswith('terrace') and name != f'terrace-{library}'
-                if sibling or name == 'GeographicLib' or (name in ('gmp', 'mpfr') and library != 'tri'):
+                sibling = name.startswith('terrace-') and name[8:] not in [library] + SIBLINGS.get(library, [])
+                if sibling or (name == 'geographiclib' and library != 'terrain') or (name in ('gmp', 'mpfr') and library != 'tri'):
                     yield f'{path}: depends on {name}'
         for folder, ending, list_path, cut in LISTED:
             folder = folder.format(library)

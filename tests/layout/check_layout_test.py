@@ -58,6 +58,9 @@ class CheckLayout(unittest.TestCase):
         gpl = '// SPDX-License-Identifier: GPL-3.0-or-later\n'
         cases = [
             ('libcluster/src/b.cpp', apache + '#include "terrace/stream/a.hpp"\n', 'sibling'),
+            ('libterrain/src/base/b.cpp', gpl + '#include <terrace/matching/a.hpp>\n', 'sibling'),
+            ('libterrain/src/base/b.cpp', gpl + '#include "earth/ground.hpp"\n', 'room is not below'),
+            ('libterrain/src/mesh/b.cpp', gpl + '#include "tile/set.hpp"\n', 'room is not below'),
             ('libtri/tests/b.cpp', gpl + '#  include <terrace/stream/a.hpp>\n', 'sibling'),
             ('libtri/src/b.cpp', gpl + '#include "../../tools/src/units.hpp"\n', 'outside its library'),
             ('libtri/include/terrace/tri/a.hpp', gpl + '#include <CGAL/Gmpq.h>\n', 'which only'),

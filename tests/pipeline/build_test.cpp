@@ -21,7 +21,7 @@
 #include <terrace/stream/store.hpp>
 #include <unistd.h>
 
-#include "build/store_build.hpp"
+#include "terrace/terrain/build.hpp"
 #include "temporary_folder.hpp"
 
 namespace terrace {
@@ -99,8 +99,7 @@ TEST_F(Build, GivesTheSameBytesForAnyNumberOfThreads) {
   for (const unsigned threads : {2u, 3u, 8u}) {
     SCOPED_TRACE(threads);
     request_.store = folder_.path() / std::to_string(threads);
-    request_.threads = threads;
-    terrain::build_store(request_);
+    terrain::build_store(request_, {.threads = threads});
     EXPECT_TRUE(files_of(request_.store) == one);
   }
 }
@@ -113,9 +112,9 @@ TEST_F(Build, RefusesAnOutputThatExistsAndKeepsIt) {
 }
 
 TEST_F(Build, SaysWhatMemoryItNeeds) {
-  request_.memory_bytes = std::uint64_t{8} << 20;
+  const terrain::Context little{.memory_bytes = std::uint64_t{8} << 20};
   try {
-    terrain::build_store(request_);
+    terrain::build_store(request_, little);
     FAIL() << "8 MiB were enough";
   } catch (const stream::Error& error) {
     EXPECT_NE(std::string(error.what()).find("need"), std::string::npos) << error.what();

@@ -19,7 +19,7 @@
 #include <terrace/tri/delaunay2.hpp>
 
 #include "base/region.hpp"
-#include "build/store_build.hpp"
+#include "terrace/terrain/build.hpp"
 #include "surface/store_window.hpp"
 
 /// Clouds of many kinds in small stores of many clusters, and the triangulation of all their

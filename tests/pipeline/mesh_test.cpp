@@ -19,7 +19,7 @@
 #include <terrace/stream/geotiff_writer.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "build/store_build.hpp"
+#include "terrace/terrain/build.hpp"
 #include "mesh/store_mesh.hpp"
 #include "surface/detail.hpp"
 #include "temporary_folder.hpp"

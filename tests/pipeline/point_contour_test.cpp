@@ -25,7 +25,7 @@
 #include <terrace/tri/delaunay2.hpp>
 
 #include "base/error.hpp"
-#include "build/store_build.hpp"
+#include "terrace/terrain/build.hpp"
 #include "contour/contour_parts.hpp"
 #include "surface/store_window.hpp"
 #include "temporary_folder.hpp"

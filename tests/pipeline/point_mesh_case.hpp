@@ -21,7 +21,7 @@
 #include <terrace/tri/point_tin.hpp>
 
 #include "base/region.hpp"
-#include "build/store_build.hpp"
+#include "terrace/terrain/build.hpp"
 #include "mesh/bounded/bounded_mesh.hpp"
 #include "mesh/bounded/streaming_hull.hpp"
 #include "mesh/mesh_file.hpp"

@@ -19,7 +19,7 @@
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/delaunay2.hpp>
 
-#include "build/store_build.hpp"
+#include "terrace/terrain/build.hpp"
 #include "earth/store_crs.hpp"
 #include "surface/cluster_census.hpp"
 #include "temporary_folder.hpp"

@@ -16,7 +16,7 @@
 #include <terrace/stream/source.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "build/store_build.hpp"
+#include "terrace/terrain/build.hpp"
 #include "temporary_folder.hpp"
 
 namespace terrace {
@@ -69,8 +69,7 @@ void expect_every_sample(const fs::path& raster, const fs::path& scratch) {
   request.inputs = {raster.string()};
   request.store = scratch / "dem.store";
   request.replace = true;
-  request.threads = 2;
-  const terrain::BuildOutcome outcome = terrain::build_store(request);
+  const terrain::BuildOutcome outcome = terrain::build_store(request, {.threads = 2});
 
   const stream::Store store = stream::Store::open(request.store);
   EXPECT_TRUE(store.verify([](const stream::Problem& problem) {

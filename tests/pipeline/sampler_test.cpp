@@ -16,7 +16,7 @@
 #include <terrace/tri/interpolation.hpp>
 
 #include "base/error.hpp"
-#include "build/store_build.hpp"
+#include "terrace/terrain/build.hpp"
 #include "sample/height_sampler.hpp"
 #include "temporary_folder.hpp"
 

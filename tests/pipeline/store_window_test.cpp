@@ -22,7 +22,7 @@
 #include <terrace/stream/geotiff_writer.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "build/store_build.hpp"
+#include "terrace/terrain/build.hpp"
 #include "temporary_folder.hpp"
 
 namespace terrace {

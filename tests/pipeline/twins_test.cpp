@@ -14,7 +14,7 @@
 #include <terrace/stream/geotiff_writer.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "build/store_build.hpp"
+#include "terrace/terrain/build.hpp"
 #include "earth/crs/coordinate_system.hpp"
 #include "earth/ground.hpp"
 #include "temporary_folder.hpp"

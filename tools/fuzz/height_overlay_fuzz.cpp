@@ -10,7 +10,7 @@
 #include <terrace/stream/overlay.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "build/store_build.hpp"
+#include "terrace/terrain/build.hpp"
 #include "fuzz_target.hpp"
 #include "mesh/height_overlay.hpp"
 #include "terrace/stream/error.hpp"

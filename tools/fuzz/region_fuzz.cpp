@@ -7,7 +7,7 @@
 
 #include "base/error.hpp"
 #include "base/region.hpp"
-#include "build/metric_option.hpp"
+#include "terrace/terrain/metric_choice.hpp"
 #include "fuzz_target.hpp"
 #include "terrace/stream/error.hpp"
 

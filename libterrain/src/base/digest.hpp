@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include "earth/portable_math.hpp"
+#include "base/portable_math.hpp"
 
 namespace terrace::terrain {
 

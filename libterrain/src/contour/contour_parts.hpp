@@ -9,7 +9,7 @@
 #include "base/region.hpp"
 #include "contour/contour_run.hpp"
 #include "contour/line_joiner.hpp"
-#include "earth/ground_slope.hpp"
+#include "surface/ground_slope.hpp"
 #include "surface/store_window.hpp"
 
 /// What write_contours() is made of.

@@ -13,8 +13,8 @@
 #include "contour/contour_run.hpp"
 #include "contour/line_joiner.hpp"
 #include "earth/crs/coordinate_system.hpp"
-#include "earth/ground_slope.hpp"
-#include "sample/fixed_text.hpp"
+#include "surface/ground_slope.hpp"
+#include "base/fixed_text.hpp"
 
 namespace terrace::terrain {
 

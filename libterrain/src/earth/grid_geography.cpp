@@ -7,7 +7,7 @@
 #include <cmath>
 #include <vector>
 
-#include "earth/portable_math.hpp"
+#include "base/portable_math.hpp"
 
 namespace terrace::terrain {
 namespace {

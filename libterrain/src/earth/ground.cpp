@@ -8,7 +8,7 @@
 
 #include <GeographicLib/Constants.hpp>
 
-#include "earth/portable_math.hpp"
+#include "base/portable_math.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "earth/ground.hpp"
-#include "earth/portable_math.hpp"
+#include "base/portable_math.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "earth/portable_math.hpp"
+#include "base/portable_math.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::terrain {

@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-#include "earth/portable_math.hpp"
+#include "base/portable_math.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "build/metric_option.hpp"
+#include "terrace/terrain/metric_choice.hpp"
 #include "mesh/mesh_heights.hpp"
 #include "mesh/scene.hpp"
 #include "surface/detail.hpp"

@@ -10,7 +10,7 @@
 #include <terrace/tri/interpolation.hpp>
 
 #include "base/parallel.hpp"
-#include "earth/ground_slope.hpp"
+#include "surface/ground_slope.hpp"
 #include "sample/height_sampler.hpp"
 #include "sample/nearest_point.hpp"
 #include "surface/point_window.hpp"

@@ -17,9 +17,9 @@
 #include "base/output.hpp"
 #include "base/units.hpp"
 #include "earth/ground.hpp"
-#include "earth/ground_slope.hpp"
+#include "surface/ground_slope.hpp"
 #include "earth/line_distance.hpp"
-#include "sample/fixed_text.hpp"
+#include "base/fixed_text.hpp"
 #include "sample/surface_crossings.hpp"
 
 namespace terrace::terrain {

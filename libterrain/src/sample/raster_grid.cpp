@@ -13,7 +13,7 @@
 
 #include "base/error.hpp"
 #include "base/units.hpp"
-#include "earth/portable_math.hpp"
+#include "base/portable_math.hpp"
 #include "earth/store_crs.hpp"
 #include "earth/world.hpp"
 

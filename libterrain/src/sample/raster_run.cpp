@@ -14,7 +14,7 @@
 
 #include "base/error.hpp"
 #include "base/parallel.hpp"
-#include "earth/ground_slope.hpp"
+#include "surface/ground_slope.hpp"
 #include "earth/store_crs.hpp"
 #include "sample/raster_grid.hpp"
 #include "sample/raster_shader.hpp"

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "base/parallel.hpp"
-#include "earth/ground_slope.hpp"
-#include "sample/fixed_text.hpp"
+#include "surface/ground_slope.hpp"
+#include "base/fixed_text.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "earth/ground_slope.hpp"
+#include "surface/ground_slope.hpp"
 
 namespace terrace::terrain {
 namespace {

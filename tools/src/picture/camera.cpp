@@ -7,7 +7,7 @@
 #include "base/error.hpp"
 #include "base/units.hpp"
 #include "base/vector.hpp"
-#include "earth/portable_math.hpp"
+#include "base/portable_math.hpp"
 
 namespace terrace::tools {
 

@@ -6,7 +6,7 @@
 
 #include "base/parallel.hpp"
 #include "base/vector.hpp"
-#include "earth/portable_math.hpp"
+#include "base/portable_math.hpp"
 
 namespace terrace::tools {
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <span>
 
-#include "earth/portable_math.hpp"
+#include "base/portable_math.hpp"
 
 namespace terrace::tools {
 

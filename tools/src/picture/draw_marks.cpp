@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "base/parallel.hpp"
-#include "earth/portable_math.hpp"
+#include "base/portable_math.hpp"
 #include "picture/draw.hpp"
 
 namespace terrace::tools {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "base/parallel.hpp"
-#include "earth/portable_math.hpp"
+#include "base/portable_math.hpp"
 #include "picture/draw.hpp"
 #include "tables/matching_result.hpp"
 

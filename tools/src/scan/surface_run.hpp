@@ -10,7 +10,7 @@
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/reconstruct.hpp>
 
-#include "build/metric_option.hpp"
+#include "terrace/terrain/metric_choice.hpp"
 #include "mesh/scene.hpp"
 #include "surface/detail.hpp"
 

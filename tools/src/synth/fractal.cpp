@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <utility>
 
-#include "earth/portable_math.hpp"
+#include "base/portable_math.hpp"
 
 namespace terrace::tools {
 

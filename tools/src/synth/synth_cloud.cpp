@@ -9,7 +9,7 @@
 
 #include "base/error.hpp"
 #include "base/units.hpp"
-#include "earth/portable_math.hpp"
+#include "base/portable_math.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::tools {

@@ -14,7 +14,7 @@
 #include "base/error.hpp"
 #include "base/interrupt.hpp"
 #include "base/units.hpp"
-#include "build/store_build.hpp"
+#include "terrace/terrain/build.hpp"
 #include "earth/crs/coordinate_system.hpp"
 #include "verbs/verbs.hpp"
 
@@ -73,8 +73,6 @@ class BuildCommand final : public Command {
     request_.block_points = block_;
     request_.metric = MetricChoice::parse(metric_);
     request_.seed = common.seed;
-    request_.threads = common.threads;
-    request_.memory_bytes = common.memory_or(kStreamingMemory);
     if (output_ == "-") throw UsageError("a store is a folder: it cannot go to standard output");
     std::error_code ignored;
     if (!common.force && std::filesystem::exists(request_.store, ignored)) {
@@ -83,19 +81,13 @@ class BuildCommand final : public Command {
                            .cause = "exists already",
                            .remedy = "name another output, or give --force to replace it"});
     }
-    return dry_run_ ? estimate() : build(common);
+    return dry_run_ ? estimate(common) : build(common);
   }
 
  private:
   Summary build(const CommonOptions& common) {
     const Stopwatch watch;
-    BuildOutcome outcome;
-    {
-      ProgressMeter meter(common.progress, "points");
-      outcome = build_store(request_, [&meter](const stream::Progress& progress) {
-        meter.update(progress.points, progress.fraction);
-      });
-    }
+    const BuildOutcome outcome = build_store(request_, common.context());
     for (const std::string& note : outcome.notes) common.say(note);
     const double seconds = watch.seconds();
     const double rate = static_cast<double>(outcome.points) / seconds;
@@ -116,7 +108,7 @@ class BuildCommand final : public Command {
   }
 
   /// Builds a store of the first points, weighs it and does not keep it.
-  Summary estimate() {
+  Summary estimate(const CommonOptions& common) {
     if (std::find(request_.inputs.begin(), request_.inputs.end(), "-") != request_.inputs.end()) {
       throw UsageError("--dry-run reads its input before the build does: name files, not -");
     }
@@ -125,7 +117,9 @@ class BuildCommand final : public Command {
     const stream::SourceInfo& info = source->info();
     request_.most_points = kTrialPoints;
     const Stopwatch watch;
-    const BuildOutcome trial = build_store(request_);
+    Context context = common.context();
+    context.progress = nullptr;
+    const BuildOutcome trial = build_store(request_, context);
     const double seconds = watch.seconds();
 
     // A raster's number of valid cells is not known before it is read: the trial's share is taken.

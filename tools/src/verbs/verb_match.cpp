@@ -15,7 +15,7 @@
 #include "base/output.hpp"
 #include "base/units.hpp"
 #include "cli/library_call.hpp"
-#include "earth/portable_math.hpp"
+#include "base/portable_math.hpp"
 #include "tables/label_file.hpp"
 #include "tables/match_run.hpp"
 #include "tables/point_table.hpp"

@@ -10,7 +10,7 @@
 #include "base/error.hpp"
 #include "base/output.hpp"
 #include "base/units.hpp"
-#include "build/metric_option.hpp"
+#include "terrace/terrain/metric_choice.hpp"
 #include "cli/crs_options.hpp"
 #include "cli/library_call.hpp"
 #include "mesh/mesh_output.hpp"

@@ -22,7 +22,7 @@ struct Progress {
 /// changes it; whoever starts two jobs at once gives each its own.
 struct Context {
   unsigned threads = 1;                       ///< at most; results do not depend on it
-  std::optional<std::uint64_t> memory_bytes;  ///< at most, if given
+  std::optional<std::uint64_t> memory_bytes{};  ///< at most, if given
   std::stop_token stop{};                     ///< ends the work with stream::Stopped
   /// Called now and then, by one thread at a time; what it throws ends the work.
   std::function<void(const Progress&)> progress{};

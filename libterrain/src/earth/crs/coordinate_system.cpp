@@ -7,7 +7,7 @@
 #include <GeographicLib/Geocentric.hpp>
 
 #include "earth/crs/projection_batch.hpp"
-#include "earth/portable_math.hpp"
+#include "base/portable_math.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::terrain {

@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "earth/crs/crs_wkt_parts.hpp"
-#include "earth/portable_math.hpp"
+#include "base/portable_math.hpp"
 
 namespace terrace::terrain {
 namespace {

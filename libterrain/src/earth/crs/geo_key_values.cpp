@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "earth/crs/crs_definition.hpp"
-#include "earth/portable_math.hpp"
+#include "base/portable_math.hpp"
 
 namespace terrace::terrain {
 namespace {

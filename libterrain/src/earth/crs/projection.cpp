@@ -11,7 +11,7 @@
 #include <GeographicLib/TransverseMercator.hpp>
 
 #include "earth/crs/projection_batch.hpp"
-#include "earth/portable_math.hpp"
+#include "base/portable_math.hpp"
 
 namespace terrace::terrain {
 namespace {

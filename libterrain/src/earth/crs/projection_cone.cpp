@@ -5,7 +5,7 @@
 #include <GeographicLib/LambertConformalConic.hpp>
 
 #include "earth/crs/projection_batch.hpp"
-#include "earth/portable_math.hpp"
+#include "base/portable_math.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -14,7 +14,7 @@
 #include "base/progress_report.hpp"
 #include "base/units.hpp"
 #include "earth/ground.hpp"
-#include "earth/portable_math.hpp"
+#include "base/portable_math.hpp"
 #include "mesh/bounded/lattice_plan.hpp"
 #include "mesh/bounded/window_joiner.hpp"
 

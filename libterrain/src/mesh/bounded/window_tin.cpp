@@ -12,7 +12,7 @@
 #include "base/region_overlap.hpp"
 #include "base/stopwatch.hpp"
 #include "base/units.hpp"
-#include "earth/portable_math.hpp"
+#include "base/portable_math.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "base/vector.hpp"
-#include "earth/portable_math.hpp"
+#include "base/portable_math.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <utility>
 
-#include "earth/portable_math.hpp"
+#include "base/portable_math.hpp"
 #include "tile/format/ellipsoid.hpp"
 
 namespace terrace::terrain {

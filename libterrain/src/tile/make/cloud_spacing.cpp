@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "base/point_spacing.hpp"
-#include "earth/portable_math.hpp"
+#include "base/portable_math.hpp"
 #include "surface/cluster_census.hpp"
 
 namespace terrace::terrain {

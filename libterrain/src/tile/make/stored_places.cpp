@@ -9,7 +9,7 @@
 
 #include <terrace/stream/error.hpp>
 
-#include "earth/portable_math.hpp"
+#include "base/portable_math.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "earth/portable_math.hpp"
+#include "base/portable_math.hpp"
 #include "tile/format/ellipsoid.hpp"
 #include "tile/format/quantized_mesh.hpp"
 

@@ -8,7 +8,7 @@
 
 #include "base/units.hpp"
 #include "base/vector.hpp"
-#include "earth/portable_math.hpp"
+#include "base/portable_math.hpp"
 #include "tile/format/ellipsoid.hpp"
 #include "tile/make/tile_sides.hpp"
 

@@ -6,12 +6,11 @@
 #include <vector>
 
 #include <terrace/cluster/metric.hpp>
-
-#include "terrace/stream/point.hpp"
+#include <terrace/stream/point.hpp>
 
 namespace terrace::terrain {
 
-/// What --metric names. Semi-axes are in ground units (metres), boxes in the coordinates of the
+/// The metric that points are clustered by. Semi-axes are in ground units (metres), boxes in the coordinates of the
 /// CRS.
 struct MetricChoice {
   struct Region {

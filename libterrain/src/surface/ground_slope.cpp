@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "earth/ground_slope.hpp"
+#include "surface/ground_slope.hpp"
 
 #include <algorithm>
 #include <array>

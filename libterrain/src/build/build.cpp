@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "build/store_build.hpp"
+#include "terrace/terrain/build.hpp"
 
 #include <algorithm>
 #include <array>
@@ -14,7 +14,7 @@
 #include <terrace/stream/raster.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "base/interrupt.hpp"
+#include "base/progress_report.hpp"
 #include "base/units.hpp"
 #include "earth/ground.hpp"
 #include "earth/source_crs.hpp"
@@ -81,6 +81,8 @@ void pack(const stream::PointBlock& block, std::size_t payload_size,
 /// source as well, which keeps more files of a mosaic open by it.
 constexpr std::uint64_t kSourceMemory = std::uint64_t{64} << 20;
 constexpr std::size_t kBlocksAhead = 4;
+/// Of a build, unless its context says otherwise.
+constexpr std::uint64_t kMemory = std::uint64_t{256} << 20;
 
 /// Bytes at the peak with so many threads, beside the source's: a generous estimate; a benchmark
 /// prints the true peak.
@@ -98,20 +100,21 @@ std::uint64_t memory_beside_source(const BuildRequest& request, std::size_t payl
 
 /// As many threads as were asked for and fit into --memory: their number changes no result.
 /// Throws: stream::Error if not even one does.
-unsigned threads_within_memory(const BuildRequest& request, std::size_t payload_size,
+unsigned threads_within_memory(const BuildRequest& request, const Context& context,
+                               std::uint64_t memory_bytes, std::size_t payload_size,
                                std::uint64_t source_bytes) {
   const auto needed = [&](unsigned threads) {
     return source_bytes + memory_beside_source(request, payload_size, threads);
   };
-  for (unsigned threads = request.threads; threads > 0; --threads) {
-    if (needed(threads) <= request.memory_bytes) return threads;
+  for (unsigned threads = std::max(1U, context.threads); threads > 0; --threads) {
+    if (needed(threads) <= memory_bytes) return threads;
   }
   const auto in_mebibytes = [](std::uint64_t bytes) {
     return std::to_string((bytes >> 20) + 1) + "M";
   };
   throw stream::Error({.file = request.store.string(),
                        .where = {},
-                       .cause = "--memory " + std::to_string(request.memory_bytes >> 20) +
+                       .cause = "--memory " + std::to_string(memory_bytes >> 20) +
                                 "M is not enough: the build needs " + in_mebibytes(needed(1)) +
                                 ", " + in_mebibytes(source_bytes) + " of it to read the input",
                        .remedy = "raise --memory, lower --block, or rewrite large strips and tiles "
@@ -173,17 +176,18 @@ std::string name_of(cluster::Effort effort) {
   return kEfforts[static_cast<std::size_t>(effort)].first;
 }
 
-BuildOutcome build_store(const BuildRequest& request, const BuildProgress& progress) {
+BuildOutcome build_store(const BuildRequest& request, const Context& context) {
+  const std::uint64_t memory_bytes = context.memory_or(kMemory);
   stream::SourceOptions source_options;
   source_options.format = request.input_format;
   source_options.block_points = request.block_points;
-  source_options.memory_bytes = std::max(kSourceMemory, request.memory_bytes);
+  source_options.memory_bytes = std::max(kSourceMemory, memory_bytes);
   source_options.band = request.band;
   source_options.crs = request.crs;
   source_options.blocks_ahead = kBlocksAhead;
   std::stop_source reading;
   const auto stop_reading = [&reading] { reading.request_stop(); };
-  const std::stop_callback on_interrupt(stop_token(), stop_reading);
+  const std::stop_callback on_stop(context.stop, stop_reading);
   source_options.stop = reading.get_token();
   auto source = stream::open_source(request.inputs, source_options);
   const stream::SourceInfo& info = source->info();
@@ -196,12 +200,13 @@ BuildOutcome build_store(const BuildRequest& request, const BuildProgress& progr
   if (!ground.assumption().empty()) outcome.notes.push_back(ground.assumption());
   const std::uint64_t source_bytes = std::max(kSourceMemory, source->reading_bytes());
   const std::size_t payload_bytes = payload_size(info);
-  const unsigned threads = threads_within_memory(request, payload_bytes, source_bytes);
+  const unsigned threads = 
+      threads_within_memory(request, context, memory_bytes, payload_bytes, source_bytes);
   if (info.grid) {
     // Tiles are to be square on the ground: only now is it known what a cell measures there.
     source_options.cell_aspect = cell_aspect(ground, info);
     source_options.memory_bytes =
-        request.memory_bytes - memory_beside_source(request, payload_bytes, threads);
+        memory_bytes - memory_beside_source(request, payload_bytes, threads);
     source = stream::open_source(request.inputs, source_options);
   }
 
@@ -226,22 +231,22 @@ BuildOutcome build_store(const BuildRequest& request, const BuildProgress& progr
   stream::PointBlock block;
   std::vector<std::byte> payload;
   stream::Progress so_far;
-  // What ended the reading is told by whoever asked for it.
+  // The reading ends for two reasons: the context's, or a failure that push() tells.
   const auto next = [&] {
     try {
       return source->next(block);
     } catch (const stream::Stopped&) {
-      check_interrupt();
-      builder.push({});
+      if (!context.stop.stop_requested()) builder.push({});
       throw;
     }
   };
+  const ProgressReport report(context, "points");
   while (next()) {
     pack(block, options.payload_size, payload);
     builder.push(block.positions, payload);
     so_far = source->progress();
-    check_interrupt();
-    if (progress) progress(so_far);
+    if (context.stop.stop_requested()) throw stream::Stopped();
+    report.update(so_far.points, so_far.fraction);
     if (request.most_points != 0 && so_far.points >= request.most_points) break;
   }
   so_far = source->progress();

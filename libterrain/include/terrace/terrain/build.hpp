@@ -4,7 +4,6 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,11 +11,12 @@
 #include <terrace/cluster/block.hpp>
 #include <terrace/stream/source.hpp>
 
-#include "build/metric_option.hpp"
+#include "terrace/terrain/context.hpp"
+#include "terrace/terrain/metric_choice.hpp"
 
 namespace terrace::terrain {
 
-/// What `terrace build` was asked to do.
+/// What is to be built, and how.
 struct BuildRequest {
   std::vector<std::string> inputs;
   std::filesystem::path store;
@@ -34,8 +34,6 @@ struct BuildRequest {
   MetricChoice metric;  ///< on the ground
   int band = 1;
   std::uint64_t seed = 1;
-  unsigned threads = 1;
-  std::uint64_t memory_bytes = std::uint64_t{256} << 20;
   /// A trial run that stops after about this many points and leaves no store; 0: read everything.
   std::uint64_t most_points = 0;
 };
@@ -49,13 +47,12 @@ struct BuildOutcome {
   std::vector<std::string> notes;  ///< what the user should know: unknown CRS and the like
 };
 
-/// Called after every block from the building thread; what it throws ends the build.
-using BuildProgress = std::function<void(const stream::Progress&)>;
-
 /// Streams the inputs once into a store: reads ahead on a thread of its own, clusters and encodes
-/// blocks on `threads` threads, appends in order. Same input, options and seed: same bytes.
-/// Throws: stream::Error; Interrupted on Ctrl-C. No store stands then.
-BuildOutcome build_store(const BuildRequest& request, const BuildProgress& progress = {});
+/// blocks on the context's threads, appends in order. Same input, options and seed: same bytes.
+/// Takes 256 MiB of memory unless the context gives another bound; reports "points".
+/// Throws: stream::Error; stream::Stopped if the context asks to stop. No store stands then, and one
+/// that was to be replaced still does.
+BuildOutcome build_store(const BuildRequest& request, const Context& context = {});
 
 /// "fast", "default", "fine", "full" and back.
 std::optional<cluster::Effort> effort_of(const std::string& name);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "build/metric_option.hpp"
+#include "terrace/terrain/metric_choice.hpp"
 
 #include <cmath>
 #include <fstream>
@@ -11,7 +11,7 @@
 
 #include "base/error.hpp"
 #include "base/units.hpp"
-#include "earth/portable_math.hpp"
+#include "base/portable_math.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::terrain {
