@@ -9,7 +9,6 @@
 #include <fstream>
 #include <iterator>
 #include <limits>
-#include <random>
 #include <set>
 #include <string>
 #include <utility>
@@ -22,6 +21,7 @@
 
 #include "bounded_mesh.hpp"
 #include "mesh_file.hpp"
+#include "random.hpp"
 #include "region.hpp"
 #include "store_build.hpp"
 #include "streaming_hull.hpp"
@@ -33,17 +33,6 @@ namespace terrace::tests {
 
 using tools::Point2;
 using Cloud = std::vector<stream::Point3>;
-
-class Random {
- public:
-  explicit Random(std::uint64_t seed) : engine_(seed) {}
-  double operator()(double low, double high) {
-    return low + (high - low) * static_cast<double>(engine_() >> 11) * 0x1p-53;
-  }
-
- private:
-  std::mt19937_64 engine_;
-};
 
 inline double relief(double x, double y) { return 40 * std::sin(x / 9) * std::cos(y / 7) + x / 3; }
 

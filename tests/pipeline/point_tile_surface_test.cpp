@@ -8,7 +8,6 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
-#include <random>
 #include <set>
 #include <string>
 #include <tuple>
@@ -20,6 +19,7 @@
 #include <terrace/tri/delaunay2.hpp>
 
 #include "crs_options.hpp"
+#include "random.hpp"
 #include "store_build.hpp"
 #include "temporary_folder.hpp"
 #include "tile/cloud_spacing.hpp"
@@ -32,20 +32,10 @@
 namespace terrace {
 namespace {
 
+using tests::Random;
 using tools::GeographicBox;
 using tools::Point2;
 using tools::StoredBox;
-
-class Random {
- public:
-  explicit Random(std::uint64_t seed) : engine_(seed) {}
-  double operator()(double low, double high) {
-    return low + (high - low) * (static_cast<double>(engine_() >> 11) * 0x1p-53);
-  }
-
- private:
-  std::mt19937_64 engine_;
-};
 
 /// A cloud as it lies in its CRS.
 struct CloudCase {

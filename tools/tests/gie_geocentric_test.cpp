@@ -18,7 +18,7 @@
 #include "src/coordinate_system.hpp"
 #include "src/tile/ellipsoid.hpp"
 
-namespace terrace::tools::tests {
+namespace terrace::tools::gie {
 namespace {
 
 using stream::Point3;
@@ -166,4 +166,4 @@ TEST(GeocentricData, ShiftsBySevenParameters) {
 }
 
 }  // namespace
-}  // namespace terrace::tools::tests
+}  // namespace terrace::tools::gie

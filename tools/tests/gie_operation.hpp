@@ -7,7 +7,7 @@
 
 #include "src/coordinate_system.hpp"
 
-namespace terrace::tools::tests {
+namespace terrace::tools::gie {
 
 /// An operation of PROJ as systems of ours: steps from longitude and latitude to a plane and back.
 class GieRun {
@@ -30,4 +30,4 @@ class GieRun {
   std::vector<Step> steps_;
 };
 
-}  // namespace terrace::tools::tests
+}  // namespace terrace::tools::gie

@@ -24,9 +24,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::int64_t kColumns = 210, kRows = 160;
-constexpr float kNodata = -9999.0F;
-
 /// A raster somewhere on the globe.
 struct Frame {
   const char* name;
@@ -36,6 +33,9 @@ struct Frame {
 
 class RasterDigest : public ::testing::TestWithParam<Frame> {
  protected:
+  static constexpr std::int64_t kColumns = 210, kRows = 160;
+  static constexpr float kNodata = -9999.0F;
+
   void SetUp() override {
     for (std::int64_t i = 0; i < kColumns * kRows; ++i) {
       const double column = static_cast<double>(i % kColumns),

@@ -26,11 +26,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::int64_t kColumns = 700, kRows = 290;
-constexpr double kNodata = -9999.0;
-
 class RasterOfDegrees : public ::testing::Test {
  protected:
+  static constexpr std::int64_t kColumns = 700, kRows = 290;
+  static constexpr double kNodata = -9999.0;
+
   double random() {
     seed_ = scramble(seed_);
     return unit_interval(seed_);

@@ -21,11 +21,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::int64_t kColumns = 150, kRows = 90, kSide = 16;
-constexpr float kNodata = -9999.0F;
-
 class HeightBlocksOfAStore : public ::testing::Test {
  protected:
+  static constexpr std::int64_t kColumns = 150, kRows = 90, kSide = 16;
+  static constexpr float kNodata = -9999.0F;
+
   void SetUp() override {
     for (std::int64_t row = 0; row < kRows; ++row) {
       for (std::int64_t column = 0; column < kColumns; ++column) {
