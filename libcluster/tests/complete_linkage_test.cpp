@@ -2,7 +2,6 @@
 #include "terrace/cluster/complete_linkage.hpp"
 
 #include <limits>
-#include <stdexcept>
 
 #include <gtest/gtest.h>
 
@@ -11,14 +10,7 @@
 namespace terrace::cluster {
 namespace {
 
-std::string message_of(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "no exception";
-}
+using laws::message_of;
 
 /// A symmetric matrix; `levels` different values if not 0, so that most are equal.
 laws::Distances random_distances(std::size_t count, unsigned levels, std::mt19937_64& random) {

@@ -12,11 +12,7 @@
 namespace terrace::cluster {
 namespace {
 
-std::vector<double> heights_of(const Dendrogram& dendrogram) {
-  std::vector<double> heights;
-  for (const Merge& merge : dendrogram.merges) heights.push_back(merge.height);
-  return heights;
-}
+using laws::heights_of;
 
 TEST(CudaLinkage, SaysWhyItCannotRun) {
   const CudaStatus status = cuda_available();

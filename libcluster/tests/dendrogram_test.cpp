@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "terrace/cluster/dendrogram.hpp"
 
-#include <limits>
 #include <stdexcept>
 
 #include <gtest/gtest.h>
@@ -11,8 +10,9 @@
 namespace terrace::cluster {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+using inputs::kInfinity;
+using inputs::kNaN;
+using laws::message_of;
 using Labels = std::vector<std::uint32_t>;
 
 /// A random tree over the points; coarse heights, so that many are equal.
@@ -43,15 +43,6 @@ Labels components(std::size_t count, const std::vector<Link>& links, double heig
     l = number[l];
   }
   return label;
-}
-
-std::string message_of(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "no exception";
 }
 
 TEST(Dendrogram, FollowsSciPyConvention) {

@@ -13,6 +13,8 @@
 namespace terrace::cluster {
 namespace {
 
+using laws::heights_of;
+
 template <class Entry>
 Dendrogram complete_on(LoopDevice& loop, std::span<const Point3> points) {
   return device::dendrogram_of(LinkagePoints(points), [&](std::span<const Point3> ordered) {
@@ -24,12 +26,6 @@ Dendrogram single_on(LoopDevice& loop, std::span<const Point3> points) {
   return device::dendrogram_of(LinkagePoints(points), [&](std::span<const Point3> ordered) {
     return device::single_rounds(loop, ordered);
   });
-}
-
-std::vector<double> heights_of(const Dendrogram& dendrogram) {
-  std::vector<double> heights;
-  for (const Merge& merge : dendrogram.merges) heights.push_back(merge.height);
-  return heights;
 }
 
 TEST(DeviceLinkage, GivesTheDendrogramsOfTheCpu) {

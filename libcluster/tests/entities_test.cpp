@@ -16,7 +16,7 @@
 namespace terrace::cluster {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using inputs::kInfinity;
 
 Point3 random_point(std::mt19937_64& random, double scale) {
   // A grid now and then, so that ties and equal corners happen.

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -16,9 +15,8 @@
 namespace terrace::cluster {
 namespace {
 
+using inputs::kInfinity;
 using laws::OwnedProblem;
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 std::vector<Metric> linear_metrics() {
   const double s = std::sqrt(0.5);

@@ -15,6 +15,7 @@
 #include <gtest/gtest.h>
 
 #include "hierarchy_laws.hpp"
+#include "inputs.hpp"
 #include "recording_sink.hpp"
 #include "waiting_threads.hpp"
 
@@ -22,6 +23,9 @@
 
 namespace terrace::cluster {
 namespace {
+
+using inputs::kInfinity;
+using inputs::kNaN;
 
 /// Runs of ten consecutive points; the first of each is the facility.
 void runs_of_ten(std::span<const Point3> points, std::span<const double>, const BlockOptions&,
@@ -288,8 +292,6 @@ TEST(HierarchyEngine, ErrorHoldsWhereMapsDiffer) {
 }
 
 TEST(HierarchyEngine, BadInputLeavesTheBuilderAsItWas) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   const std::vector<Point3> points = line(330);
   for (const double bad : {kInfinity, -kInfinity, kNaN}) {
     for (const std::size_t where : {0u, 1u, 5u, 128u, 229u}) {
@@ -376,8 +378,8 @@ TEST(HierarchyEngine, ExceptionsComeOutOnce) {
     for (const int visit : {0, 1, 20, 55}) {
       for (const unsigned threads : {1u, 2u, 3u, 8u}) {
         if (where == Where::root && visit > 0) continue;
-        SCOPED_TRACE(::testing::Message() << "place " << static_cast<int>(where) << ", visit "
-                                          << visit << ", threads " << threads);
+        SCOPED_TRACE(testing::Message() << "place " << static_cast<int>(where) << ", visit "
+                                        << visit << ", threads " << threads);
         Trap trap{where, visit, {}};
         TrappedSink sink(trap);
         HierarchyOptions options = small_blocks(threads);
@@ -420,7 +422,7 @@ class LingeringSink : public RecordingSink {
     ++inside;
     const bool first = std::this_thread::get_id() != caller && !lingers.exchange(true);
     while (!failed) std::this_thread::yield();
-    if (first) testing::wait_until_others_wait([this] { return come_out.load(); });
+    if (first) wait_until_others_wait([this] { return come_out.load(); });
     --inside;
     return RecordingSink::prepare(block);
   }
@@ -450,8 +452,6 @@ TEST(HierarchyEngine, FinishOnlyOnce) {
 }
 
 TEST(HierarchyEngine, UselessGroundMapsAreRefused) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   const std::vector<GroundMap> maps = {{1, 0, 0, 0, kNaN, 0, 0, 0, 1},
                                        {1, 0, 0, 0, 1, 0, 0, kInfinity, 1},
                                        {0, 0, 0, 0, 0, 0, 0, 0, 0},
@@ -497,7 +497,7 @@ class SlowStartSink : public RecordingSink {
  public:
   std::unique_ptr<Prepared> prepare(const FinishedBlock& block) override {
     if (block.level == 0) {
-      if (block.block == 0) testing::wait_until_others_wait();
+      if (block.block == 0) wait_until_others_wait();
       const int waiting = ++waiting_;
       int most = most_waiting;
       while (most < waiting && !most_waiting.compare_exchange_weak(most, waiting)) {

@@ -137,12 +137,12 @@ inline void check_hierarchy(const RecordingSink& sink, const HierarchyResult& re
   };
 
   for (unsigned level = 0; level < result.top; ++level) {
-    SCOPED_TRACE(::testing::Message() << "level " << level);
+    SCOPED_TRACE(testing::Message() << "level " << level);
     std::vector<Expanded> clusters;
     heads.emplace_back();
     std::uint64_t number = 0;
     for (const RecordedBlock& block : sink.levels[level]) {
-      SCOPED_TRACE(::testing::Message() << "block " << block.block);
+      SCOPED_TRACE(testing::Message() << "block " << block.block);
       ASSERT_NO_FATAL_FAILURE(check_partition(block, block_size));
       const std::uint64_t base = number;
       for (std::size_t i = 0; i < block.positions.size(); ++i) {

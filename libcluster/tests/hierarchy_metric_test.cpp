@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <limits>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -21,7 +20,7 @@
 namespace terrace::cluster {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using inputs::kInfinity;
 
 HierarchyResult build(const std::vector<Point3>& points, HierarchyOptions options,
                       RecordingSink& sink) {

@@ -200,7 +200,7 @@ TEST(Hierarchy, AnyLinearMapAndLargeOffsets) {
       {1, 0, 0, 0, 1, 0, 0, 0, 0},                     // heights do not count
   };
   for (const GroundMap& map : maps) {
-    SCOPED_TRACE(::testing::PrintToString(map));
+    SCOPED_TRACE(testing::PrintToString(map));
     HierarchyOptions options;
     options.block_size = 90;
     options.ground = [&](const Bounds&) { return map; };

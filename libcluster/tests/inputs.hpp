@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <random>
 #include <string>
 #include <vector>
@@ -13,6 +14,9 @@
 /// Point sets for tests and benchmarks.
 
 namespace terrace::cluster::inputs {
+
+inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
+inline constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// Uniform in [0, 1).
 inline double uniform(std::mt19937_64& random) {

@@ -8,12 +8,13 @@
 
 #include <gtest/gtest.h>
 
+#include "inputs.hpp"
 #include "matrix_laws.hpp"
 
 namespace terrace::cluster {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using inputs::kInfinity;
 
 TEST(KMedian, FindsTheOptimumOfSmallProblems) {
   double share = 0.0;

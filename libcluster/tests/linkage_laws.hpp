@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,22 @@ void shuffle(std::vector<T>& items, std::mt19937_64& random) {
 
 inline bool contains(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
+}
+
+/// The words of the std::invalid_argument that `action` throws.
+inline std::string message_of(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return "no exception";
+}
+
+inline std::vector<double> heights_of(const Dendrogram& dendrogram) {
+  std::vector<double> heights;
+  for (const Merge& merge : dendrogram.merges) heights.push_back(merge.height);
+  return heights;
 }
 
 using Distances = std::vector<std::vector<double>>;  // square, symmetric

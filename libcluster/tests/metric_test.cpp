@@ -2,7 +2,6 @@
 #include "terrace/cluster/metric.hpp"
 
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <stdexcept>
 
@@ -14,8 +13,8 @@
 namespace terrace::cluster {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+using inputs::kInfinity;
+using inputs::kNaN;
 
 double unit(std::mt19937_64& random) { return static_cast<double>(random() >> 11) * 0x1p-53; }
 

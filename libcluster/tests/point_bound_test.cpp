@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
 #include <gtest/gtest.h>
@@ -13,7 +12,7 @@
 namespace terrace::cluster {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using inputs::kInfinity;
 
 struct Case {
   std::vector<Point3> points;

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -16,9 +15,9 @@
 namespace terrace::cluster {
 namespace {
 
+using inputs::kInfinity;
 using laws::OwnedProblem;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr GainStrategy kSearches[] = {GainStrategy::full_scan, GainStrategy::quadtree,
                                       GainStrategy::octree, GainStrategy::kd_tree,
                                       GainStrategy::facilities};

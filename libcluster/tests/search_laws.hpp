@@ -131,7 +131,7 @@ inline double optimum(const OwnedProblem& p) {
 }
 
 inline std::vector<Metric> metrics() {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  using inputs::kInfinity;
   const double s = std::sqrt(0.5);
   const auto taxi_in_x = [](const Point3& a, const Point3& b) {
     return 2 * std::abs(a[0] - b[0]) + std::abs(a[1] - b[1]) + std::abs(a[2] - b[2]);

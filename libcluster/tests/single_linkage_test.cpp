@@ -11,11 +11,7 @@
 namespace terrace::cluster {
 namespace {
 
-std::vector<double> heights_of(const Dendrogram& dendrogram) {
-  std::vector<double> heights;
-  for (const Merge& merge : dendrogram.merges) heights.push_back(merge.height);
-  return heights;
-}
+using laws::heights_of;
 
 /// Lengths of the minimum spanning tree, ascending. O(n^2), after Prim.
 std::vector<double> prim(const std::vector<Point3>& points) {

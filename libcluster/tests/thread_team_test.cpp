@@ -27,7 +27,7 @@ TEST(ThreadTeam, EveryPieceIsDoneOnce) {
 TEST(ThreadTeam, ThreadsThatSleptWakeUp) {
   ThreadTeam team(4);
   for (int round = 0; round < 3; ++round) {
-    testing::wait_until_others_wait();
+    wait_until_others_wait();
     // Two pieces that wait for each other need two threads.
     std::atomic<int> met = 0;
     team.run(2, [&](std::size_t) {

@@ -11,7 +11,7 @@
 
 #include <unistd.h>
 
-namespace terrace::cluster::testing {
+namespace terrace::cluster {
 
 /// Returns when every other thread of the process waits for something, or `enough` says so: what
 /// comes next finds them asleep, whatever the machine's load.
@@ -35,4 +35,4 @@ inline void wait_until_others_wait(const std::function<bool()>& enough = [] { re
   }
 }
 
-}  // namespace terrace::cluster::testing
+}  // namespace terrace::cluster

@@ -7,6 +7,8 @@
 #include <limits>
 #include <numeric>
 #include <random>
+#include <stdexcept>
+#include <string>
 #include <vector>
 
 namespace terrace::matching {
@@ -33,6 +35,16 @@ double brute_force(const std::vector<Number>& costs, std::size_t rows, std::size
 /// In [0, 1).
 inline double uniform(std::mt19937_64& random) {
   return static_cast<double>(random() >> 11) * 0x1p-53;
+}
+
+/// The words of the std::invalid_argument that `call` throws.
+inline std::string message_of(const auto& call) {
+  try {
+    call();
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return "no error";
 }
 
 }  // namespace terrace::matching

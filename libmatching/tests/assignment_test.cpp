@@ -17,15 +17,6 @@
 namespace terrace::matching {
 namespace {
 
-std::string message_of(const auto& call) {
-  try {
-    call();
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "no error";
-}
-
 template <class Cost>
 class AssignTyped : public testing::Test {};
 using CostTypes = testing::Types<double, float, std::int32_t>;

@@ -123,7 +123,7 @@ TEST(Matching, AcceptsNoVertices) {
   EXPECT_TRUE(min_weight_perfect_matching(0, std::span<const WeightedEdge>{}).mate.empty());
 }
 
-std::string message_of(std::size_t n, const std::vector<WeightedEdge>& edges) {
+std::string matching_message(std::size_t n, const std::vector<WeightedEdge>& edges) {
   try {
     min_weight_perfect_matching(n, edges);
   } catch (const std::invalid_argument& error) {
@@ -133,15 +133,16 @@ std::string message_of(std::size_t n, const std::vector<WeightedEdge>& edges) {
 }
 
 TEST(Matching, NamesWhatIsWrong) {
-  EXPECT_NE(message_of(3, {{0, 1, 1}}).find("odd"), std::string::npos);
-  EXPECT_NE(message_of(2, {{0, 1, 1}, {1, 1, 1}}).find("edge 1 joins 1 and 1"), std::string::npos);
-  EXPECT_NE(message_of(std::size_t{1} << 40, {}).find("GB"), std::string::npos);
-  EXPECT_NE(message_of(2, {{0, 2, 1}}).find("edge 0"), std::string::npos);
-  EXPECT_NE(message_of(2, {{0, 1, std::nan("")}}).find("edge 0"), std::string::npos);
-  EXPECT_NE(message_of(2, {{0, 1, INFINITY}}).find("edge 0"), std::string::npos);
-  EXPECT_NE(message_of(2, {}).find("vertex 0 stays alone"), std::string::npos);
+  EXPECT_NE(matching_message(3, {{0, 1, 1}}).find("odd"), std::string::npos);
+  EXPECT_NE(matching_message(2, {{0, 1, 1}, {1, 1, 1}}).find("edge 1 joins 1 and 1"),
+            std::string::npos);
+  EXPECT_NE(matching_message(std::size_t{1} << 40, {}).find("GB"), std::string::npos);
+  EXPECT_NE(matching_message(2, {{0, 2, 1}}).find("edge 0"), std::string::npos);
+  EXPECT_NE(matching_message(2, {{0, 1, std::nan("")}}).find("edge 0"), std::string::npos);
+  EXPECT_NE(matching_message(2, {{0, 1, INFINITY}}).find("edge 0"), std::string::npos);
+  EXPECT_NE(matching_message(2, {}).find("vertex 0 stays alone"), std::string::npos);
   // A star: without its middle the three rays are odd components.
-  const std::string star = message_of(4, {{0, 3, 1}, {1, 3, 1}, {2, 3, 1}});
+  const std::string star = matching_message(4, {{0, 3, 1}, {1, 3, 1}, {2, 3, 1}});
   EXPECT_NE(star.find("removing the 1 vertices {3} leaves 2 components"), std::string::npos)
       << star;
   const std::vector<IntegerEdge> heavy{{0, 1, std::numeric_limits<std::int64_t>::max()}};

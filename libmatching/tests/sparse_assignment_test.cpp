@@ -15,15 +15,6 @@
 namespace terrace::matching {
 namespace {
 
-std::string message_of(const auto& call) {
-  try {
-    call();
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "no error";
-}
-
 // What a matrix has in place of a pair that may not be chosen.
 constexpr double kAbsent = 1e6;
 

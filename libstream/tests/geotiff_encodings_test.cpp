@@ -174,7 +174,7 @@ TEST(GeoTiffEncodings, EveryTypeAndCodecReadsBack) {
           spec.separate = random() % 2 == 0;
         }
         round_trip(spec, seed);
-        if (testing::Test::HasFatalFailure()) return;
+        if (::testing::Test::HasFatalFailure()) return;
       }
     }
   }

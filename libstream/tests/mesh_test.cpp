@@ -64,7 +64,7 @@ T at(const std::string& bytes, std::size_t offset) {
   return value;
 }
 
-class MeshFile : public testing::Test {
+class MeshFile : public ::testing::Test {
  protected:
   std::string path(const std::string& name) { return (folder_.path() / name).string(); }
 

@@ -6,8 +6,6 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
-#include <fstream>
-#include <iterator>
 #include <limits>
 #include <map>
 #include <random>
@@ -28,17 +26,11 @@ namespace terrace::stream {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::bytes_of;
+using testing::contains;
 using testing::TemporaryFolder;
+using testing::write_bytes;
 using Values = std::map<std::pair<ClusterId, std::uint32_t>, double>;
-
-std::string bytes_of(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
-void write_bytes(const fs::path& file, const std::string& bytes) {
-  std::ofstream(file, std::ios::binary) << bytes;
-}
 
 Store make_store(const fs::path& path, int side, std::uint64_t seed) {
   testing::write_store(
@@ -70,7 +62,7 @@ std::uint64_t write(const fs::path& path, const Store& store, const Values& valu
   return writer.finish();
 }
 
-Values read_all(Overlay& overlay) {
+Values values_of(Overlay& overlay) {
   Values values;
   ClusterId last{};
   overlay.for_each([&](ClusterId cluster, std::span<const OverlayValue> of_cluster) {
@@ -102,10 +94,6 @@ std::string refusal(const fs::path& path, const Store& store) {
   return {};
 }
 
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
-
 TEST(StoreOverlay, ComesBack) {
   const TemporaryFolder folder;
   const Store store = make_store(folder.path() / "s", 110, 1);
@@ -120,7 +108,7 @@ TEST(StoreOverlay, ComesBack) {
     EXPECT_EQ(overlay.path(), path);
     EXPECT_EQ(overlay.channel(), "height");
     EXPECT_EQ(overlay.values(), values.size());
-    EXPECT_EQ(read_all(overlay), values);
+    EXPECT_EQ(values_of(overlay), values);
     // Cluster by cluster, those without values too, first upward, then any.
     std::vector<ClusterId> clusters;
     for (unsigned level = 0; level <= store.top(); ++level) {
@@ -185,7 +173,7 @@ TEST(StoreOverlay, TheWriterRefusesWhatDoesNotBelongAndGoesOn) {
   EXPECT_FALSE(fs::exists(path));
   writer.finish();
   Overlay overlay = Overlay::open(path, store);
-  EXPECT_EQ(read_all(overlay), (Values{{{one, 1}, 10}, {{one, 2}, 12}, {{store.root(), 0}, -3}}));
+  EXPECT_EQ(values_of(overlay), (Values{{{one, 1}, 10}, {{one, 2}, 12}, {{store.root(), 0}, -3}}));
   EXPECT_THROW(OverlayWriter(folder.path() / "p", store, std::string(65536, 'n')),
                std::invalid_argument);
 }

@@ -50,7 +50,7 @@ class PlyText {
 
 const std::vector<std::string> kEncodings{"ascii", "binary_little_endian", "binary_big_endian"};
 
-class Ply : public testing::Test {
+class Ply : public ::testing::Test {
  protected:
   AllPoints read(std::string_view text, const SourceOptions& options = {}) {
     return read_file(write_text(folder_.path() / "points.ply", text), options);

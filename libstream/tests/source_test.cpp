@@ -20,7 +20,7 @@ const char* const kPly =
     "ply\nformat ascii 1.0\nelement vertex 1\nproperty double x\nproperty double y\n"
     "property double z\nend_header\n7 8 9\n";
 
-class Source : public testing::Test {
+class Source : public ::testing::Test {
  protected:
   std::string put(const std::string& name, std::string_view text) {
     return write_text(folder_.path() / name, text);
@@ -165,7 +165,7 @@ TEST_F(Source, ReadsStandardInputAndPipes) {
     ASSERT_EQ(pipe(ends), 0);
     std::thread writer([&] {
       for (std::string_view left = text; !left.empty();) {
-        const ssize_t n = write(ends[1], left.data(), std::min<std::size_t>(left.size(), 777));
+        const ssize_t n = ::write(ends[1], left.data(), std::min<std::size_t>(left.size(), 777));
         if (n <= 0) break;
         left.remove_prefix(static_cast<std::size_t>(n));
       }
@@ -228,7 +228,7 @@ TEST_F(Source, PromisesInAPipeAreNotBelieved) {
       std::string(48, '\0');
   int ends[2];
   ASSERT_EQ(pipe(ends), 0);
-  ASSERT_EQ(write(ends[1], text.data(), text.size()), static_cast<ssize_t>(text.size()));
+  ASSERT_EQ(::write(ends[1], text.data(), text.size()), static_cast<ssize_t>(text.size()));
   close(ends[1]);
   const Redirected input(STDIN_FILENO, ends[0]);
   close(ends[0]);

@@ -3,7 +3,6 @@
 // removed.
 #include <csignal>
 #include <fstream>
-#include <iterator>
 #include <random>
 #include <string>
 #include <thread>
@@ -15,6 +14,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "point_files.hpp"
 #include "stand_in_hierarchy.hpp"
 #include "store_inputs.hpp"
 #include "store_testing.hpp"
@@ -26,17 +26,11 @@ namespace terrace::stream {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::bytes_of;
+using testing::contains;
 using testing::StandInHierarchy;
 using testing::TemporaryFolder;
-
-std::string bytes_of(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
-void write_bytes(const fs::path& file, const std::string& bytes) {
-  std::ofstream(file, std::ios::binary) << bytes;
-}
+using testing::write_bytes;
 
 /// One byte in place: rewriting whole files would wait for the disk each time.
 void overwrite(const fs::path& file, std::size_t at, char byte) {
@@ -71,21 +65,6 @@ void write_small(const fs::path& path, std::uint64_t seed, bool replace = false)
     hierarchy.push(block.positions);
   }
   hierarchy.finish();
-}
-
-/// The words of the Error that `action` throws; empty if it throws none.
-template <class Action>
-std::string error_of(Action&& action) {
-  try {
-    action();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return {};
-}
-
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
 }
 
 TEST(StoreDamage, EveryFlippedBitIsFound) {

@@ -12,7 +12,7 @@
 namespace terrace::stream {
 namespace {
 
-class Xyz : public testing::Test {
+class Xyz : public ::testing::Test {
  protected:
   AllPoints read(std::string_view text, const SourceOptions& options = {.format = "xyz"}) {
     return read_file(write_text(folder_.path() / "points.xyz", text), options);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Builds a store of a raster or a point file, shows its coarsest mesh, expands what lies in one place
-// to all its points, and collapses it again.
-// Usage: expand_region INPUT STORE
+// Builds a store of a raster or a point file, shows its coarsest mesh, expands what lies in one
+// place to all its points, and collapses it again. Usage: expand_region INPUT STORE
 #include <cstdio>
 
 #include <terrace/stream/store.hpp>
@@ -23,7 +22,9 @@ int main(int argc, char** argv) {
 
   // Stored coordinates: columns and rows of a raster.
   const auto& [low, high] = store.bounds();
-  const auto at = [&](int axis, double part) { return low[axis] + part * (high[axis] - low[axis]); };
+  const auto at = [&](int axis, double part) {
+    return low[axis] + part * (high[axis] - low[axis]);
+  };
   const tri::Box3 middle = tri::box2(at(0, 0.45), at(1, 0.45), at(0, 0.55), at(1, 0.55));
   const auto& finer = model.refine(middle, 0).changes;
   std::printf("the middle: %zu triangles more, %zu less\n", finer.added_triangles.size(),

@@ -125,4 +125,8 @@ class AnalyticSurface final : public TileSurface {
   std::vector<double> samples_;
 };
 
+inline double hills(double lon, double lat) {
+  return 900 + 400 * std::sin(lon * 12) * std::cos(lat * 15) + 15 * std::sin(lon * 310 + lat * 270);
+}
+
 }  // namespace terrace::terrain

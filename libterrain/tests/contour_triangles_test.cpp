@@ -25,7 +25,7 @@ namespace {
 
 using Triangle = ContourTriangles::Triangle;
 using Segment = std::tuple<std::int64_t, Point2, Point2>;
-using Edge = std::pair<Point2, Point2>;
+using PlaneEdge = std::pair<Point2, Point2>;
 
 struct Surface {
   std::vector<Triangle> triangles;
@@ -98,7 +98,7 @@ std::multiset<Segment> segments_of(const std::vector<Triangle>& triangles, doubl
   return segments;
 }
 
-struct Drawn {
+struct DrawnParts {
   std::vector<ContourLine> lines;
   std::uint64_t most_open = 0, left_open = 0;
 };
@@ -126,13 +126,13 @@ struct Parts {
   }
 };
 
-Drawn draw(std::vector<Triangle> triangles, const Parts& parts, double interval) {
+DrawnParts draw(std::vector<Triangle> triangles, const Parts& parts, double interval) {
   std::vector<std::vector<Triangle>> by_part(parts.count());
   for (Triangle& t : triangles) {
     for (ContourTriangles::Corner& corner : t) corner.part = parts.part_of(corner.place);
     by_part[std::min({t[0].part, t[1].part, t[2].part})].push_back(t);
   }
-  Drawn drawn;
+  DrawnParts drawn;
   ContourTriangles contours(interval,
                             [&](const ContourLine& line) { drawn.lines.push_back(line); });
   for (std::vector<Triangle>& part : by_part) {
@@ -164,7 +164,7 @@ TEST(ContourTriangles, AreTheSegmentsOfAllTrianglesAndEndAtTheHullOnly) {
     const auto expected = segments_of(surface.triangles, interval);
     ASSERT_FALSE(expected.empty());
     // The hull's crossings are where lines end.
-    std::map<Edge, int> edges;
+    std::map<PlaneEdge, int> edges;
     for (const Triangle& t : surface.triangles) {
       for (std::size_t i = 0; i < 3; ++i) {
         ++edges[std::minmax(t[i].place, t[(i + 1) % 3].place)];
@@ -184,7 +184,7 @@ TEST(ContourTriangles, AreTheSegmentsOfAllTrianglesAndEndAtTheHullOnly) {
     }
     for (const std::uint32_t along : {1U, 3U, 9U}) {
       SCOPED_TRACE(std::to_string(along) + " parts along a side");
-      const Drawn drawn = draw(surface.triangles, Parts(surface.points, along), interval);
+      const DrawnParts drawn = draw(surface.triangles, Parts(surface.points, along), interval);
       EXPECT_EQ(drawn.left_open, 0u);
       EXPECT_TRUE(segments_of(drawn.lines) == expected);
       std::uint64_t open = 0;
@@ -210,7 +210,7 @@ TEST(ContourTriangles, EndWhereTrianglesAreLeftOut) {
     Surface surface = random_surface(seed, 0, 900, 2);
     std::mt19937_64 random(seed);
     std::erase_if(surface.triangles, [&](const Triangle&) { return random() % 10 == 0; });
-    const Drawn drawn = draw(surface.triangles, Parts(surface.points, 5), 2);
+    const DrawnParts drawn = draw(surface.triangles, Parts(surface.points, 5), 2);
     EXPECT_TRUE(segments_of(drawn.lines) == segments_of(surface.triangles, 2));
     EXPECT_EQ(drawn.left_open, 0u);
   }
@@ -218,7 +218,7 @@ TEST(ContourTriangles, EndWhereTrianglesAreLeftOut) {
 
 TEST(ContourTriangles, LinesLeaveAsSoonAsTheyAreWhole) {
   const Surface surface = random_surface(7, 0, 4000, 1);
-  const Drawn drawn = draw(surface.triangles, Parts(surface.points, 8), 1);
+  const DrawnParts drawn = draw(surface.triangles, Parts(surface.points, 8), 1);
   std::uint64_t points = 0;
   for (const ContourLine& line : drawn.lines) points += line.points.size();
   EXPECT_LT(drawn.most_open, points / 2);
@@ -234,7 +234,7 @@ TEST(ContourTriangles, TheOrderIsThatOfThePlaces) {
   for (std::size_t i = shuffled.size(); i > 1; --i)
     std::swap(shuffled[i - 1], shuffled[random() % i]);
   const Parts parts(surface.points, 4);
-  const Drawn one = draw(surface.triangles, parts, 4), other = draw(shuffled, parts, 4);
+  const DrawnParts one = draw(surface.triangles, parts, 4), other = draw(shuffled, parts, 4);
   ASSERT_FALSE(one.lines.empty());
   ASSERT_EQ(one.lines.size(), other.lines.size());
   for (std::size_t i = 0; i < one.lines.size(); ++i) {

@@ -249,7 +249,7 @@ TEST(CoordinateSystem, PolesAndPlacesThatAreNone) {
   EXPECT_TRUE(std::isnan(outside[0]));
 }
 
-std::vector<std::vector<double>> numbers_of(const std::string& name) {
+std::vector<std::vector<double>> rows_of(const std::string& name) {
   const char* const data = std::getenv("TERRACE_DATA");
   std::vector<std::vector<double>> rows;
   if (data == nullptr) return rows;
@@ -267,7 +267,7 @@ std::vector<std::vector<double>> numbers_of(const std::string& name) {
 
 // GeographicLib's exact projection (elliptic functions): metres without false origin.
 TEST(CoordinateSystem, ExactTransverseMercator) {
-  const auto rows = numbers_of("utm_tm_exact_2000.tsv");
+  const auto rows = rows_of("utm_tm_exact_2000.tsv");
   if (rows.empty()) GTEST_SKIP() << "TERRACE_DATA is not set";
   ASSERT_EQ(rows.size(), 2000u);
   double worst = 0;

@@ -8,7 +8,7 @@
 #include <sstream>
 #include <stdexcept>
 
-namespace terrace::terrain::tests {
+namespace terrace::terrain::gie {
 namespace {
 
 /// "0.1 mm", "1e-15m", "50 nm", "3e8" (metres).
@@ -156,4 +156,4 @@ std::optional<std::vector<GieOperation>> read_gie(const std::string& path) {
   return reader.take();
 }
 
-}  // namespace terrace::terrain::tests
+}  // namespace terrace::terrain::gie

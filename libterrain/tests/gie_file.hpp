@@ -8,7 +8,7 @@
 /// The files in which PROJ keeps what its operations must give (.gie): operations, each with places
 /// to convert and what is expected of them.
 
-namespace terrace::terrain::tests {
+namespace terrace::terrain::gie {
 
 /// One conversion of an operation, in the units of the file: degrees and metres.
 struct GieCase {
@@ -36,4 +36,4 @@ std::optional<std::vector<GieOperation>> read_gie(const std::string& path);
 /// if it is none.
 std::optional<double> gie_number(const std::string& text);
 
-}  // namespace terrace::terrain::tests
+}  // namespace terrace::terrain::gie

@@ -18,7 +18,7 @@
 #include "gie_parameters.hpp"
 #include "tile/format/ellipsoid.hpp"
 
-namespace terrace::terrain::tests {
+namespace terrace::terrain::gie {
 namespace {
 
 using stream::Point3;
@@ -166,4 +166,4 @@ TEST(GeocentricData, ShiftsBySevenParameters) {
 }
 
 }  // namespace
-}  // namespace terrace::terrain::tests
+}  // namespace terrace::terrain::gie

@@ -14,7 +14,7 @@
 
 #include "gie_parameters.hpp"
 
-namespace terrace::terrain::tests {
+namespace terrace::terrain::gie {
 namespace {
 
 const std::set<std::string, std::less<>> kKnown{
@@ -177,4 +177,4 @@ double GieRun::distance(const Point2& a, const Point2& b, bool of_input) const {
   return metres;
 }
 
-}  // namespace terrace::terrain::tests
+}  // namespace terrace::terrain::gie

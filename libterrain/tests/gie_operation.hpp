@@ -7,7 +7,7 @@
 
 #include "earth/crs/coordinate_system.hpp"
 
-namespace terrace::terrain::tests {
+namespace terrace::terrain::gie {
 
 /// An operation of PROJ as systems of ours: steps from longitude and latitude to a plane and back.
 class GieRun {
@@ -30,4 +30,4 @@ class GieRun {
   std::vector<Step> steps_;
 };
 
-}  // namespace terrace::terrain::tests
+}  // namespace terrace::terrain::gie

@@ -7,7 +7,7 @@
 
 #include "gie_file.hpp"
 
-namespace terrace::terrain::tests {
+namespace terrace::terrain::gie {
 namespace {
 
 // As PROJ has them.
@@ -130,4 +130,4 @@ double gie_metres_per_unit(const GieParameters& p) {
   throw Unknown{"units=" + unit};
 }
 
-}  // namespace terrace::terrain::tests
+}  // namespace terrace::terrain::gie

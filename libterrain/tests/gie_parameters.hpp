@@ -10,7 +10,7 @@
 
 /// The words of PROJ's operations.
 
-namespace terrace::terrain::tests {
+namespace terrace::terrain::gie {
 
 /// Thrown for what is not ours, which it names shortly.
 struct Unknown {
@@ -47,4 +47,4 @@ void read_gie_ellipsoid(const GieParameters& p, CrsDefinition& definition);
 /// Metres in the unit of the plane. Throws: Unknown.
 double gie_metres_per_unit(const GieParameters& p);
 
-}  // namespace terrace::terrain::tests
+}  // namespace terrace::terrain::gie

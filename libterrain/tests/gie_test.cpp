@@ -12,7 +12,7 @@
 #include "gie_file.hpp"
 #include "gie_operation.hpp"
 
-namespace terrace::terrain::tests {
+namespace terrace::terrain::gie {
 namespace {
 
 struct Tally {
@@ -107,4 +107,4 @@ INSTANTIATE_TEST_SUITE_P(
                       std::pair{"4D-API_cs2cs-style.gie", 10}, std::pair{"ellipsoid.gie", 10}));
 
 }  // namespace
-}  // namespace terrace::terrain::tests
+}  // namespace terrace::terrain::gie

@@ -16,14 +16,14 @@ namespace terrace::terrain {
 using namespace terrain;
 namespace {
 
-struct Case {
+struct PlacedGrid {
   const char* crs;
   stream::WorldTransform world;
 };
 
 /// The largest difference from exact places, degrees; longitudes weighed with the cosine of the
 /// latitude near poles only in that turns of 360 do not count.
-double worst_of(const Case& test, std::int64_t column, std::int64_t row, std::size_t columns,
+double worst_of(const PlacedGrid& test, std::int64_t column, std::int64_t row, std::size_t columns,
                 std::size_t rows) {
   const CoordinateSystem system = CoordinateSystem::parse(test.crs);
   const GridGeography grid(system, test.world);
@@ -48,7 +48,7 @@ double worst_of(const Case& test, std::int64_t column, std::int64_t row, std::si
 }
 
 TEST(GridGeography, StaysWithinItsTolerance) {
-  const Case cases[] = {
+  const PlacedGrid cases[] = {
       {"EPSG:32632", {{30, 0, 400000, 0, -30, 5200000}}},
       {"EPSG:32632", {{24, -18, 400000, -18, -24, 5200000}}},   // rotated
       {"EPSG:32632", {{1000, 0, -500000, 0, -1000, 9000000}}},  // coarse, far off
@@ -64,7 +64,7 @@ TEST(GridGeography, StaysWithinItsTolerance) {
       {"EPSG:4326", {{1e-3, 0, 179.9, 0, -1e-3, 47}}},
       {"EPSG:6931", {{1e5, 0, -2e7, 0, -1e5, 2e7}}},  // reaches beyond the earth
   };
-  for (const Case& test : cases) {
+  for (const PlacedGrid& test : cases) {
     SCOPED_TRACE(std::string(test.crs) + " " + std::to_string(test.world.xy[0]));
     EXPECT_LE(worst_of(test, 0, 0, 500, 300), GridGeography::kTolerance);
     EXPECT_LE(worst_of(test, -7, 1001, 131, 65), GridGeography::kTolerance);

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "terrace/terrain/metric_choice.hpp"
-
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -10,6 +8,7 @@
 #include "base/error.hpp"
 #include "temporary_folder.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/terrain/metric_choice.hpp"
 
 namespace terrace::terrain {
 

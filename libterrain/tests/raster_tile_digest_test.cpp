@@ -14,9 +14,9 @@
 #include <terrace/stream/geotiff_writer.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "terrace/terrain/build.hpp"
 #include "base/portable_math.hpp"
 #include "temporary_folder.hpp"
+#include "terrace/terrain/build.hpp"
 #include "tile/make/raster_tile_surface.hpp"
 
 namespace terrace::terrain {
@@ -25,9 +25,6 @@ using namespace terrain;
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr std::int64_t kColumns = 210, kRows = 160;
-constexpr float kNodata = -9999.0F;
 
 /// A raster somewhere on the globe.
 struct Frame {
@@ -38,6 +35,9 @@ struct Frame {
 
 class RasterDigest : public ::testing::TestWithParam<Frame> {
  protected:
+  static constexpr std::int64_t kColumns = 210, kRows = 160;
+  static constexpr float kNodata = -9999.0F;
+
   void SetUp() override {
     for (std::int64_t i = 0; i < kColumns * kRows; ++i) {
       const double column = static_cast<double>(i % kColumns),

@@ -16,9 +16,9 @@
 #include <terrace/stream/geotiff_writer.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "terrace/terrain/build.hpp"
 #include "base/portable_math.hpp"
 #include "temporary_folder.hpp"
+#include "terrace/terrain/build.hpp"
 #include "tile/make/height_cache.hpp"
 
 namespace terrace::terrain {
@@ -28,11 +28,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::int64_t kColumns = 700, kRows = 290;
-constexpr double kNodata = -9999.0;
-
 class RasterOfDegrees : public ::testing::Test {
  protected:
+  static constexpr std::int64_t kColumns = 700, kRows = 290;
+  static constexpr double kNodata = -9999.0;
+
   double random() {
     seed_ = scramble(seed_);
     return unit_interval(seed_);

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The bytes of a store are a function of input and options: not of the compiler or its
 // optimisation.
-#include "terrace/terrain/build.hpp"
-
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -10,6 +8,8 @@
 
 #include <gtest/gtest.h>
 #include <terrace/stream/store.hpp>
+
+#include "terrace/terrain/build.hpp"
 
 namespace terrace::terrain {
 

@@ -5,8 +5,8 @@
 #include <GeographicLib/Geocentric.hpp>
 #include <gtest/gtest.h>
 
-#include "base/vector.hpp"
 #include "base/portable_math.hpp"
+#include "base/vector.hpp"
 #include "tile/format/ellipsoid.hpp"
 
 namespace terrace::terrain {

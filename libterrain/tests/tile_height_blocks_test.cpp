@@ -11,9 +11,9 @@
 #include <terrace/stream/geotiff_writer.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "terrace/terrain/build.hpp"
 #include "base/portable_math.hpp"
 #include "temporary_folder.hpp"
+#include "terrace/terrain/build.hpp"
 #include "tile/make/height_blocks.hpp"
 
 namespace terrace::terrain {
@@ -23,11 +23,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::int64_t kColumns = 150, kRows = 90, kSide = 16;
-constexpr float kNodata = -9999.0F;
-
 class HeightBlocksOfAStore : public ::testing::Test {
  protected:
+  static constexpr std::int64_t kColumns = 150, kRows = 90, kSide = 16;
+  static constexpr float kNodata = -9999.0F;
+
   void SetUp() override {
     for (std::int64_t row = 0; row < kRows; ++row) {
       for (std::int64_t column = 0; column < kColumns; ++column) {

@@ -20,10 +20,6 @@ namespace terrace::terrain {
 using namespace terrain;
 namespace {
 
-double hills(double lon, double lat) {
-  return 900 + 400 * std::sin(lon * 12) * std::cos(lat * 15) + 15 * std::sin(lon * 310 + lat * 270);
-}
-
 /// Notes the box around all that it is asked.
 class Spy final : public TileSurface {
  public:

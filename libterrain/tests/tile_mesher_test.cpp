@@ -21,10 +21,6 @@ namespace terrace::terrain {
 using namespace terrain;
 namespace {
 
-double hills(double lon, double lat) {
-  return 900 + 400 * std::sin(lon * 12) * std::cos(lat * 15) + 15 * std::sin(lon * 310 + lat * 270);
-}
-
 /// Some 40,000 samples, well inside a tile of zoom 6 and across borders of deeper ones.
 AnalyticSurface alps() { return {10.13, 45.91, 0.0031, 200, 200, hills}; }
 

@@ -6,8 +6,8 @@
 #include <gtest/gtest.h>
 #include <terrace/stream/error.hpp>
 
-#include "base/vector.hpp"
 #include "base/portable_math.hpp"
+#include "base/vector.hpp"
 #include "tile/format/quantized_mesh.hpp"
 
 namespace terrace::terrain {

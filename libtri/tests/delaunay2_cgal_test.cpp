@@ -19,8 +19,8 @@
 namespace terrace::tri {
 namespace {
 
-using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-using Oracle = CGAL::Delaunay_triangulation_2<Kernel>;
+using Kernel2 = CGAL::Exact_predicates_inexact_constructions_kernel;
+using Oracle2 = CGAL::Delaunay_triangulation_2<Kernel2>;
 using Triangle = std::array<std::array<double, 2>, 3>;
 
 Triangle rotated(Triangle t) {
@@ -28,7 +28,7 @@ Triangle rotated(Triangle t) {
   return t;
 }
 
-std::vector<Triangle> triangles_of(const Oracle& oracle) {
+std::vector<Triangle> triangles_of(const Oracle2& oracle) {
   std::vector<Triangle> result;
   for (const auto& face : oracle.finite_face_handles()) {
     Triangle t;
@@ -63,10 +63,10 @@ void expect_equal_to_cgal(const std::vector<std::array<Coord, 2>>& points) {
   Delaunay2<Coord> triangulation;
   triangulation.build(points);
   EXPECT_EQ(find_fault(triangulation), "");
-  std::vector<Kernel::Point_2> theirs;
+  std::vector<Kernel2::Point_2> theirs;
   for (const auto& p : points)
     theirs.emplace_back(static_cast<double>(p[0]), static_cast<double>(p[1]));
-  const Oracle oracle(theirs.begin(), theirs.end());
+  const Oracle2 oracle(theirs.begin(), theirs.end());
   EXPECT_EQ(triangulation.vertex_count(), oracle.number_of_vertices());
   EXPECT_TRUE(triangles_of(triangulation) == triangles_of(oracle));
 }

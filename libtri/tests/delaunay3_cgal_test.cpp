@@ -29,7 +29,7 @@ TYPED_TEST(Delaunay3CgalTest, SameTetrahedra) {
       Delaunay3<TypeParam> triangulation;
       triangulation.build(points);
       const auto theirs = to_cgal(points);
-      expect_equal_to_cgal(triangulation, Oracle(theirs.begin(), theirs.end()));
+      expect_equal_to_cgal(triangulation, Oracle3(theirs.begin(), theirs.end()));
     }
   }
 }
@@ -50,7 +50,7 @@ TYPED_TEST(Delaunay3CgalTest, SameTetrahedraAfterRemoval) {
       std::vector<std::array<TypeParam, 3>> left;
       for (const VertexId v : triangulation.all_vertices()) left.push_back(triangulation.point(v));
       const auto theirs = to_cgal(left);
-      expect_equal_to_cgal(triangulation, Oracle(theirs.begin(), theirs.end()));
+      expect_equal_to_cgal(triangulation, Oracle3(theirs.begin(), theirs.end()));
     }
   }
 }
@@ -76,13 +76,13 @@ TEST(Delaunay3Cgal, SameTetrahedraWhenPointsLeaveTheLattice) {
       between.push_back(triangulation.insert(p).vertex);
     }
     const auto theirs = to_cgal(points);
-    expect_equal_to_cgal(triangulation, Oracle(theirs.begin(), theirs.end()));
+    expect_equal_to_cgal(triangulation, Oracle3(theirs.begin(), theirs.end()));
     std::sort(between.begin(), between.end());
     between.erase(std::unique(between.begin(), between.end()), between.end());
     triangulation.remove(std::span<const VertexId>(between));
     points.resize(300);
     const auto fewer = to_cgal(points);
-    expect_equal_to_cgal(triangulation, Oracle(fewer.begin(), fewer.end()));
+    expect_equal_to_cgal(triangulation, Oracle3(fewer.begin(), fewer.end()));
   }
 }
 

@@ -55,7 +55,7 @@ void expect_same_as_cgal(const std::vector<std::array<Coord, 3>>& points) {
   Delaunay3<Coord> triangulation;
   triangulation.build(points, 2);
   const auto theirs = to_cgal(points);
-  expect_equal_to_cgal(triangulation, Oracle(theirs.begin(), theirs.end()));
+  expect_equal_to_cgal(triangulation, Oracle3(theirs.begin(), theirs.end()));
 }
 
 TEST_F(Delaunay3DataTest, ScansHaveTheTetrahedraOfCgal) {

@@ -17,15 +17,15 @@
 
 namespace terrace::tri {
 
-using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-using Oracle = CGAL::Delaunay_triangulation_3<Kernel>;
-using Corners = std::array<std::array<double, 3>, 4>;
+using Kernel3 = CGAL::Exact_predicates_inexact_constructions_kernel;
+using Oracle3 = CGAL::Delaunay_triangulation_3<Kernel3>;
+using Corners3 = std::array<std::array<double, 3>, 4>;
 
-inline std::vector<Corners> tetrahedra_of(const Oracle& oracle) {
-  std::vector<Corners> result;
+inline std::vector<Corners3> tetrahedra_of(const Oracle3& oracle) {
+  std::vector<Corners3> result;
   if (oracle.dimension() < 3) return result;
   for (const auto& cell : oracle.finite_cell_handles()) {
-    Corners corners;
+    Corners3 corners;
     for (int i = 0; i < 4; ++i) {
       const auto& p = cell->vertex(i)->point();
       corners[static_cast<std::size_t>(i)] = {p.x(), p.y(), p.z()};
@@ -38,10 +38,10 @@ inline std::vector<Corners> tetrahedra_of(const Oracle& oracle) {
 }
 
 template <class Coord>
-std::vector<Corners> tetrahedra_of(const Delaunay3<Coord>& triangulation) {
-  std::vector<Corners> result;
+std::vector<Corners3> tetrahedra_of(const Delaunay3<Coord>& triangulation) {
+  std::vector<Corners3> result;
   for (const TetrahedronId id : triangulation.all_tetrahedra()) {
-    Corners corners;
+    Corners3 corners;
     const auto vertices = triangulation.vertices(id);
     for (std::size_t i = 0; i < 4; ++i) {
       const auto p = triangulation.point(vertices[i]);
@@ -56,8 +56,8 @@ std::vector<Corners> tetrahedra_of(const Delaunay3<Coord>& triangulation) {
 }
 
 template <class Coord>
-std::vector<Kernel::Point_3> to_cgal(const std::vector<std::array<Coord, 3>>& points) {
-  std::vector<Kernel::Point_3> result;
+std::vector<Kernel3::Point_3> to_cgal(const std::vector<std::array<Coord, 3>>& points) {
+  std::vector<Kernel3::Point_3> result;
   for (const auto& p : points)
     result.emplace_back(static_cast<double>(p[0]), static_cast<double>(p[1]),
                         static_cast<double>(p[2]));
@@ -65,7 +65,7 @@ std::vector<Kernel::Point_3> to_cgal(const std::vector<std::array<Coord, 3>>& po
 }
 
 template <class Coord>
-void expect_equal_to_cgal(const Delaunay3<Coord>& triangulation, const Oracle& oracle) {
+void expect_equal_to_cgal(const Delaunay3<Coord>& triangulation, const Oracle3& oracle) {
   EXPECT_EQ(find_fault(triangulation), "");
   EXPECT_EQ(triangulation.vertex_count(), oracle.number_of_vertices());
   const auto ours = tetrahedra_of(triangulation);

@@ -17,10 +17,11 @@ namespace terrace::tri::test {
 namespace {
 
 using Exact = CGAL::Exact_predicates_exact_constructions_kernel;
-using Vertex = CGAL::Triangulation_vertex_base_with_info_2<std::size_t, Exact>;
-using Oracle = CGAL::Delaunay_triangulation_2<Exact, CGAL::Triangulation_data_structure_2<Vertex>>;
+using MappedVertex2 = CGAL::Triangulation_vertex_base_with_info_2<std::size_t, Exact>;
+using MappedOracle2 =
+    CGAL::Delaunay_triangulation_2<Exact, CGAL::Triangulation_data_structure_2<MappedVertex2>>;
 
-std::vector<Corners> mapped_triangles(const std::vector<Plane>& points, const LinearMap2& m) {
+std::vector<Corners> mapped_triangles(const std::vector<PlanePoint>& points, const LinearMap2& m) {
   std::vector<std::pair<Exact::Point_2, std::size_t>> mapped;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Exact::FT x(points[i][0]), y(points[i][1]);
@@ -28,7 +29,7 @@ std::vector<Corners> mapped_triangles(const std::vector<Plane>& points, const Li
                                        Exact::FT(m[2]) * x + Exact::FT(m[3]) * y),
                         i);
   }
-  const Oracle oracle(mapped.begin(), mapped.end());
+  const MappedOracle2 oracle(mapped.begin(), mapped.end());
   std::vector<Corners> result;
   for (const auto& face : oracle.finite_face_handles()) {
     Corners t;
@@ -74,7 +75,7 @@ TEST(EllipticalKernel, SignsAreExact) {
     // From plain to impossible for doubles, as for DoubleKernel.
     const double scale = std::ldexp(1.0, static_cast<int>(random() % 500) - 250);
     const double offset = round % 3 == 0 ? 0 : std::ldexp(scale, static_cast<int>(random() % 50));
-    std::array<Plane, 4> p;
+    std::array<PlanePoint, 4> p;
     for (auto& point : p) {
       for (double& c : point) {
         c = offset + scale * static_cast<double>(random() % 16);
@@ -93,7 +94,7 @@ TEST(EllipticalKernel, SignsAreExact) {
     ASSERT_EQ(EllipticalKernel::in_circle(p[0], p[1], p[2], p[3]),
               in_ellipse(map, p[0], p[1], p[2], p[3]));
     using Q = CGAL::Exact_rational;
-    const auto squared = [&](const Plane& a) -> Q {
+    const auto squared = [&](const PlanePoint& a) -> Q {
       return square(map, Q(a[0]) - Q(p[0][0]), Q(a[1]) - Q(p[0][1]));
     };
     ASSERT_EQ(EllipticalKernel::compare_distance(p[0], p[1], p[2]),

@@ -89,7 +89,7 @@ TEST(EllipticalDelaunay2, RandomOperationsEqualRebuild) {
             triangulation.remove(std::span<const VertexId>(alive));
         }
         ASSERT_EQ(find_fault(triangulation), "") << "step " << step;
-        std::vector<Plane> left;
+        std::vector<PlanePoint> left;
         for (const VertexId v : triangulation.all_vertices())
           left.push_back(triangulation.point(v));
         std::shuffle(left.begin(), left.end(), random);
@@ -104,14 +104,14 @@ TEST(EllipticalDelaunay2, RandomOperationsEqualRebuild) {
 TEST(EllipticalDelaunay2, PointsThatWouldFallTogetherWhenMappedStayApart) {
   // So flat an ellipse, so far out, that neighbours along it have the same mapped doubles.
   const LinearMap2 map = ellipse_map(1e12, 1, 45);
-  std::vector<Plane> points;
+  std::vector<PlanePoint> points;
   for (int i = 0; i < 30; ++i) {
     const double at = 1e9 + i * 0x1p-20;
     points.push_back({at, at});
     points.push_back({at, at + 3 + i % 2});
   }
-  const auto mapped = [&](const Plane& p) {
-    return Plane{map[0] * p[0] + map[1] * p[1], map[2] * p[0] + map[3] * p[1]};
+  const auto mapped = [&](const PlanePoint& p) {
+    return PlanePoint{map[0] * p[0] + map[1] * p[1], map[2] * p[0] + map[3] * p[1]};
   };
   ASSERT_EQ(mapped(points[0]), mapped(points[2]));
   EllipticalDelaunay2 triangulation(map);
@@ -133,12 +133,12 @@ TEST(EllipticalDelaunay2, NearestIsNearestInTheMetric) {
     SCOPED_TRACE(name(kind));
     EllipticalDelaunay2 triangulation(map);
     triangulation.build(make_points<double>(kind, 100, 8));
-    for (const Plane& q : make_points<double>(kind, 60, 9)) {
+    for (const PlanePoint& q : make_points<double>(kind, 60, 9)) {
       using Q = CGAL::Exact_rational;
       VertexId best = kNoVertex;
       Q least;
       for (const VertexId v : triangulation.all_vertices()) {
-        const Plane p = triangulation.point(v);
+        const PlanePoint p = triangulation.point(v);
         const Q d = square(map, Q(p[0]) - Q(q[0]), Q(p[1]) - Q(q[1]));
         if (best == kNoVertex || d < least || (d == least && p < triangulation.point(best))) {
           best = v;
@@ -164,7 +164,7 @@ TEST(EllipticalDelaunay2, RefusesBadInputAndStaysUnchanged) {
   EXPECT_THROW(static_cast<void>(ellipse_map(1, 1, std::array{1.0, 1.0})), std::invalid_argument);
   EllipticalDelaunay2 triangulation({1, 0, 0, 2});
   try {
-    triangulation.build(std::vector<Plane>{{0, 0}, {1, 0}, {0, kNan}});
+    triangulation.build(std::vector<PlanePoint>{{0, 0}, {1, 0}, {0, kNan}});
     FAIL();
   } catch (const std::invalid_argument& error) {
     EXPECT_NE(std::string(error.what()).find("point 2"), std::string::npos) << error.what();
@@ -194,7 +194,7 @@ TEST(Metric2, MapsMeasureEllipses) {
   EXPECT_EQ(plane_map({turned[0], turned[1], 0, turned[2], turned[3], 0, 0, 0, 9}), turned);
   const std::array<double, 9> m{2, 0.5, 0.25, 0.5, 1, -0.5, 0.25, -0.5, 3};
   const LinearMap2 flat = plane_map(m);
-  for (const Plane& v : {Plane{1, 0}, Plane{0, 1}, Plane{-2, 3}}) {
+  for (const PlanePoint& v : {PlanePoint{1, 0}, PlanePoint{0, 1}, PlanePoint{-2, 3}}) {
     EXPECT_NEAR(
         std::hypot(flat[0] * v[0] + flat[1] * v[1], flat[2] * v[0] + flat[3] * v[1]),
         std::hypot(m[0] * v[0] + m[1] * v[1], m[3] * v[0] + m[4] * v[1], m[6] * v[0] + m[7] * v[1]),

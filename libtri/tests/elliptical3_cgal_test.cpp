@@ -17,8 +17,9 @@ namespace terrace::tri::test {
 namespace {
 
 using Exact = CGAL::Exact_predicates_exact_constructions_kernel;
-using Vertex = CGAL::Triangulation_vertex_base_with_info_3<std::size_t, Exact>;
-using Oracle = CGAL::Delaunay_triangulation_3<Exact, CGAL::Triangulation_data_structure_3<Vertex>>;
+using MappedVertex3 = CGAL::Triangulation_vertex_base_with_info_3<std::size_t, Exact>;
+using MappedOracle3 =
+    CGAL::Delaunay_triangulation_3<Exact, CGAL::Triangulation_data_structure_3<MappedVertex3>>;
 
 std::vector<Corners3> mapped_tetrahedra(const std::vector<Space>& points, const LinearMap3& m) {
   std::vector<std::pair<Exact::Point_3, std::size_t>> mapped;
@@ -29,7 +30,7 @@ std::vector<Corners3> mapped_tetrahedra(const std::vector<Space>& points, const 
     };
     mapped.emplace_back(Exact::Point_3(row(0), row(3), row(6)), i);
   }
-  const Oracle oracle(mapped.begin(), mapped.end());
+  const MappedOracle3 oracle(mapped.begin(), mapped.end());
   std::vector<Corners3> result;
   if (oracle.dimension() < 3) return result;
   for (const auto& cell : oracle.finite_cell_handles()) {

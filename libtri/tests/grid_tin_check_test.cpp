@@ -16,8 +16,6 @@ namespace {
 using namespace terrace::tri;
 using Triangles = std::vector<std::array<std::uint32_t, 3>>;
 
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-
 const std::vector<Point3> kSquare{{0, 0, 0}, {3, 0, 0}, {3, 3, 0}, {0, 3, 0}};
 const Triangles kHalves{{0, 1, 2}, {0, 2, 3}};
 
@@ -41,7 +39,7 @@ TEST(GridTinCheck, CountsWhatIsNotCovered) {
   EXPECT_EQ(check.uncovered, 6U);
   EXPECT_EQ(check.uncovered_inner, 6U);
   EXPECT_EQ(check.max_error, 1);
-  heights[12] = kNone;  // column 0, row 3: its 3 neighbours are not inner then
+  heights[12] = kNoHeight;  // column 0, row 3: its 3 neighbours are not inner then
   check = check_grid_tin<double>({4, 4, heights}, kSquare, Triangles{{0, 1, 2}});
   EXPECT_EQ(check.samples, 15U);
   EXPECT_EQ(check.uncovered, 5U);
@@ -75,9 +73,9 @@ TEST(GridTinCheck, CornersOffTheLattice) {
   EXPECT_EQ(check.covered, 16U);
   EXPECT_LE(check.max_error, 1e-12);
   // Data that is missing is covered only if it is really inside.
-  heights[0] = kNone;
+  heights[0] = kNoHeight;
   EXPECT_EQ(check_grid_tin<double>({4, 4, heights}, moved, kHalves, 0.002).nodata_covered, 0U);
-  heights[5] = kNone;
+  heights[5] = kNoHeight;
   EXPECT_EQ(check_grid_tin<double>({4, 4, heights}, moved, kHalves, 0.002).nodata_covered, 1U);
 }
 
@@ -180,8 +178,8 @@ TEST(GridTinCheck, MisuseIsRefused) {
   EXPECT_THROW(check_grid_tin<double>(window, kSquare, Triangles{{0, 1, 4}}),
                std::invalid_argument);
   EXPECT_THROW(check_grid_tin<double>(window, kSquare, kHalves, 2), std::invalid_argument);
-  EXPECT_THROW(check_grid_tin<double>(window, kSquare, kHalves, kNone), std::invalid_argument);
-  for (const double bad : {kNone, 1e30, std::numeric_limits<double>::infinity()}) {
+  EXPECT_THROW(check_grid_tin<double>(window, kSquare, kHalves, kNoHeight), std::invalid_argument);
+  for (const double bad : {kNoHeight, 1e30, std::numeric_limits<double>::infinity()}) {
     std::vector<Point3> points = kSquare;
     points[2][1] = bad;
     EXPECT_THROW(check_grid_tin<double>(window, points, kHalves), std::invalid_argument);

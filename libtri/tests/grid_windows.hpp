@@ -14,6 +14,9 @@
 
 namespace terrace::tri {
 
+/// A sample that is not there.
+inline constexpr double kNoHeight = std::numeric_limits<double>::quiet_NaN();
+
 enum class Relief {
   kFlat,
   kRamp,

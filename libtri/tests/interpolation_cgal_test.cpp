@@ -12,19 +12,19 @@
 namespace terrace::tri {
 namespace {
 
-using Kernel = CGAL::Exact_predicates_exact_constructions_kernel;
-using Oracle = CGAL::Delaunay_triangulation_2<Kernel>;
+using Exact = CGAL::Exact_predicates_exact_constructions_kernel;
+using ExactOracle = CGAL::Delaunay_triangulation_2<Exact>;
 using Weights = std::map<Point2, double>;
 
-Point2 to_point(const Kernel::Point_2& p) {
+Point2 to_point(const Exact::Point_2& p) {
   return {CGAL::to_double(p.x()), CGAL::to_double(p.y())};
 }
 
 /// Empty outside the hull.
-Weights weights_of(const Oracle& oracle, const Point2& query) {
-  std::vector<std::pair<Kernel::Point_2, Kernel::FT>> found;
+Weights weights_of(const ExactOracle& oracle, const Point2& query) {
+  std::vector<std::pair<Exact::Point_2, Exact::FT>> found;
   const auto result = CGAL::natural_neighbor_coordinates_2(
-      oracle, Kernel::Point_2(query[0], query[1]), std::back_inserter(found));
+      oracle, Exact::Point_2(query[0], query[1]), std::back_inserter(found));
   Weights weights;
   if (!result.third) return weights;
   for (const auto& [point, weight] : found)
@@ -46,9 +46,9 @@ TYPED_TEST(InterpolationCgalTest, SameNaturalNeighbourCoordinates) {
       Delaunay2<TypeParam> triangulation;
       triangulation.build(points);
       if (triangulation.triangle_count() == 0) continue;
-      Oracle oracle;
+      ExactOracle oracle;
       for (const auto& p : points)
-        oracle.insert(Kernel::Point_2(static_cast<double>(p[0]), static_cast<double>(p[1])));
+        oracle.insert(Exact::Point_2(static_cast<double>(p[0]), static_cast<double>(p[1])));
       std::vector<VertexWeight> ours;
       for (const Point2& query : make_queries(triangulation, 70, count)) {
         SCOPED_TRACE(std::to_string(query[0]) + ", " + std::to_string(query[1]));

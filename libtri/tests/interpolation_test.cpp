@@ -19,8 +19,8 @@ namespace terrace::tri {
 namespace {
 
 using planar::DoubleKernel;
-constexpr Interpolation kMethods[] = {Interpolation::kNearest, Interpolation::kLinear,
-                                      Interpolation::kNaturalNeighbour};
+constexpr Interpolation kInterpolations[] = {Interpolation::kNearest, Interpolation::kLinear,
+                                             Interpolation::kNaturalNeighbour};
 const double kNan = std::numeric_limits<double>::quiet_NaN();
 
 template <class Coord>
@@ -223,7 +223,7 @@ TYPED_TEST(InterpolationTest, ManyQueriesEqualSingleOnesForAnyThreads) {
   std::vector<Point2> queries = make_queries(triangulation, 20'000, 6);
   for (std::size_t i = 0; i < 500; ++i) queries.push_back(queries[random() % 1000]);
   std::vector<VertexWeight> weights;
-  for (const Interpolation method : kMethods) {
+  for (const Interpolation method : kInterpolations) {
     const auto one = heights_at(triangulation, heights, queries, method, 1);
     const auto four = heights_at(triangulation, heights, queries, method, 4);
     ASSERT_EQ(one.size(), queries.size());
@@ -398,7 +398,7 @@ TEST(Interpolation, HeightsComeFromArraysFunctionsAndModels) {
   for (std::size_t i = 0; i < array.size(); ++i) array[i] = static_cast<double>(i);
   const Model model;
   const std::vector<Point2> queries{{0.25, 0.5}, {2, 2}, {-1, 0}};
-  for (const Interpolation method : kMethods) {
+  for (const Interpolation method : kInterpolations) {
     const auto expected = heights_at(triangulation, array, queries, method);
     EXPECT_EQ(std::isnan(expected[2]), method != Interpolation::kNearest);
     const auto other = heights_at(triangulation, model, queries, method);
@@ -433,7 +433,7 @@ TEST(Interpolation, RefusesBadData) {
   EXPECT_THROW(weights_at(triangulation, {kNan, 0}, Interpolation::kNearest, weights),
                std::invalid_argument);
   const Delaunay2<double> empty;
-  for (const Interpolation method : kMethods) {
+  for (const Interpolation method : kInterpolations) {
     weights_at(empty, {1, 2}, method, weights);
     EXPECT_TRUE(weights.empty());
     const std::vector<Point2> queries{{1, 2}};

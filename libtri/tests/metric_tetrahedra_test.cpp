@@ -82,7 +82,7 @@ Rational volume(const std::vector<Corners3>& tetrahedra) {
 }
 
 using Facet = std::array<Space, 3>;
-using Edge = std::array<Space, 2>;
+using SpaceEdge = std::array<Space, 2>;
 /// The corners in ascending order, and whether that took an odd number of swaps.
 std::pair<Facet, bool> directed(Facet facet) {
   bool odd = false;
@@ -205,7 +205,7 @@ class Check {
   const std::vector<Corners3>& after_;
   const MetricField3& field_;
   std::map<Facet, std::map<bool, std::pair<std::size_t, std::size_t>>> facets_;
-  std::map<Edge, std::vector<std::size_t>> edges_;
+  std::map<SpaceEdge, std::vector<std::size_t>> edges_;
   std::map<LinearMap3, spatial::EllipticalMetric> metrics_;
 };
 

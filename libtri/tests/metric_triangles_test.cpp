@@ -20,7 +20,7 @@ namespace {
 /// Three boxes of different ellipses over the extent of the points, two of them overlapping.
 template <class Coord>
 MetricField2 three_regions(const std::vector<std::array<Coord, 2>>& points) {
-  Plane low{}, high{};
+  PlanePoint low{}, high{};
   for (std::size_t k = 0; k < 2; ++k) {
     low[k] = high[k] = static_cast<double>(points[0][k]);
     for (const auto& p : points) {
@@ -50,20 +50,20 @@ std::vector<Corners> corners_of_all(const Triangulation& triangulation,
   return result;
 }
 
-using Edge = std::pair<Plane, Plane>;
+using PlaneEdge = std::pair<PlanePoint, PlanePoint>;
 /// The corner to the left of each directed edge.
-std::map<Edge, Plane> apices(const std::vector<Corners>& triangles) {
-  std::map<Edge, Plane> result;
+std::map<PlaneEdge, PlanePoint> apices(const std::vector<Corners>& triangles) {
+  std::map<PlaneEdge, PlanePoint> result;
   for (const Corners& t : triangles) {
     for (std::size_t i = 0; i < 3; ++i) {
-      EXPECT_TRUE(result.emplace(Edge{t[(i + 1) % 3], t[(i + 2) % 3]}, t[i]).second)
+      EXPECT_TRUE(result.emplace(PlaneEdge{t[(i + 1) % 3], t[(i + 2) % 3]}, t[i]).second)
           << "an edge has two triangles on one side";
     }
   }
   return result;
 }
-std::set<Edge> border(const std::map<Edge, Plane>& edges) {
-  std::set<Edge> result;
+std::set<PlaneEdge> border(const std::map<PlaneEdge, PlanePoint>& edges) {
+  std::set<PlaneEdge> result;
   for (const auto& [edge, apex] : edges)
     if (!edges.contains({edge.second, edge.first})) result.insert(edge);
   return result;
@@ -75,7 +75,7 @@ std::size_t check(const std::vector<Corners>& before, const std::vector<Corners>
   // A triangulation of the same: positive areas, every edge matched, the same border; so it covers
   // what is within the border once. And it has the same corners.
   EXPECT_EQ(before.size(), after.size());
-  std::set<Plane> corners_before, corners_after;
+  std::set<PlanePoint> corners_before, corners_after;
   for (const Corners& t : before) corners_before.insert(t.begin(), t.end());
   for (const Corners& t : after) {
     corners_after.insert(t.begin(), t.end());
@@ -172,12 +172,12 @@ TYPED_TEST(MetricTriangles, OfOneMetricAreThoseOfTheEllipticalTriangulation) {
       const auto points = make_points<TypeParam>(kind, 300, 44);
       Delaunay2<TypeParam> triangulation;
       triangulation.build(points);
-      std::vector<Plane> doubles;
+      std::vector<PlanePoint> doubles;
       for (const auto& p : points)
         doubles.push_back({static_cast<double>(p[0]), static_cast<double>(p[1])});
       EllipticalDelaunay2 elliptical(maps[m]);
       elliptical.build(doubles);
-      const MetricField2 everywhere([&](const Plane&) { return maps[m]; });
+      const MetricField2 everywhere([&](const PlanePoint&) { return maps[m]; });
       ASSERT_TRUE(corners_of_all(triangulation, metric_triangles(triangulation, everywhere)) ==
                   triangles_of(elliptical));
       // And back.
@@ -193,7 +193,7 @@ TEST(MetricTriangles2, StartFromAnEllipticalTriangulationToo) {
   EllipticalDelaunay2 triangulation(ellipse_map(3, 1, 80));
   triangulation.build(points);
   const MetricField2 field(
-      [&](const Plane& p) { return p[0] < 60 ? triangulation.map() : ellipse_map(1, 6, 10); });
+      [&](const PlanePoint& p) { return p[0] < 60 ? triangulation.map() : ellipse_map(1, 6, 10); });
   EXPECT_GT(check(triangles_of(triangulation),
                   corners_of_all(triangulation, metric_triangles(triangulation, field)), field,
                   triangulation.map()),
@@ -246,11 +246,11 @@ TEST(MetricField2, RefusesWhatIsNoField) {
   refuses({{box, kIdentityMap2}, {box2(1, 0, 0, 1), kIdentityMap2}}, "region 1");
   refuses({{box2(0, kNan, 1, 1), kIdentityMap2}}, "region 0");
   refuses({{box, {1, 1, 1, 1}}}, "region 0");
-  EXPECT_THROW(MetricField2(std::function<LinearMap2(const Plane&)>()), std::invalid_argument);
+  EXPECT_THROW(MetricField2(std::function<LinearMap2(const PlanePoint&)>()), std::invalid_argument);
 
   Delaunay2<double> triangulation;
-  triangulation.build(std::vector<Plane>{{0, 0}, {1, 0}, {0, 1}, {1, 1}});
-  const MetricField2 bad([&](const Plane& p) {
+  triangulation.build(std::vector<PlanePoint>{{0, 0}, {1, 0}, {0, 1}, {1, 1}});
+  const MetricField2 bad([&](const PlanePoint& p) {
     return p[0] > 0 ? LinearMap2{1, 0, 0, kNan} : kIdentityMap2;
   });
   EXPECT_THROW(static_cast<void>(metric_triangles(triangulation, bad)), std::invalid_argument);

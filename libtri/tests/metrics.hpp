@@ -16,8 +16,8 @@
 
 namespace terrace::tri::test {
 
-using Plane = std::array<double, 2>;
-using Corners = std::array<Plane, 3>;
+using PlanePoint = std::array<double, 2>;
+using Corners = std::array<PlanePoint, 3>;
 
 /// Maps that keep the lexicographic order, so that mapped ties are broken alike; every metric has
 /// one such map.
@@ -36,11 +36,11 @@ inline CGAL::Exact_rational square(const LinearMap2& m, const CGAL::Exact_ration
 }
 
 /// 1 where p lies inside the ellipse through the counter-clockwise a, b, c, 0 on it, -1 outside.
-inline int in_ellipse(const LinearMap2& m, const Plane& a, const Plane& b, const Plane& c,
-                      const Plane& p) {
+inline int in_ellipse(const LinearMap2& m, const PlanePoint& a, const PlanePoint& b,
+                      const PlanePoint& c, const PlanePoint& p) {
   using Q = CGAL::Exact_rational;
   Q row[3][3];
-  const Plane* corner[3] = {&a, &b, &c};
+  const PlanePoint* corner[3] = {&a, &b, &c};
   for (int i = 0; i < 3; ++i) {
     row[i][0] = Q((*corner[i])[0]) - Q(p[0]);
     row[i][1] = Q((*corner[i])[1]) - Q(p[1]);

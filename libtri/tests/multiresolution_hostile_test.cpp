@@ -13,7 +13,7 @@
 namespace terrace::tri::test {
 namespace {
 
-using Model = MultiresolutionModel<StandIn<std::int32_t>>;
+using StandInModel = MultiresolutionModel<StandIn<std::int32_t>>;
 
 MemorySource good_source(std::uint64_t seed) {
   std::mt19937_64 random(seed);
@@ -32,7 +32,7 @@ TEST(MultiresolutionFailure, LeavesTheModelUnchanged) {
         SCOPED_TRACE(testing::Message() << "seed " << seed);
         MemorySource source = good_source(seed);
         const WholeTree tree(source);
-        Model model(source, before);
+        StandInModel model(source, before);
         Consumer<StandIn<std::int32_t>> consumer(model);
         std::size_t failures = 0;
         for (std::size_t lives = 0;; lives += 1 + lives / 2) {
@@ -62,7 +62,7 @@ TEST(MultiresolutionFailure, LeavesNothingWhenTheModelCannotBegin) {
   for (std::size_t lives = 0; lives < 30; ++lives) {
     MemorySource source = good_source(3);
     source.lives = lives;
-    EXPECT_THROW(Model(source, {0, {}}), SourceFailure);
+    EXPECT_THROW(StandInModel(source, {0, {}}), SourceFailure);
   }
 }
 
@@ -79,7 +79,7 @@ void expect_refused(const std::function<void(MemorySource&, ClusterId)>& spoil, 
     while (source.levels[level][ordinal].positions.size() < 2) ++ordinal;
     const ClusterId id = cluster_id(level, ordinal);
     const MemorySource good = source;
-    Model model(source);
+    StandInModel model(source);
     spoil(source, id);
     try {
       model.set_level(0);
@@ -159,13 +159,13 @@ TEST(MultiresolutionHostile, CoordinatesThatTheTriangulationCannotTake) {
 TEST(MultiresolutionHostile, RootThatIsBad) {
   MemorySource source = good_source(2);
   source.root().children.pop_back();
-  EXPECT_THROW(Model{source}, HierarchyError);
+  EXPECT_THROW(StandInModel{source}, HierarchyError);
   source = good_source(2);
   source.root().children[2] = source.root().children[5];
-  EXPECT_THROW(Model{source}, HierarchyError);
+  EXPECT_THROW(StandInModel{source}, HierarchyError);
   source = good_source(2);
   source.root().positions[0][0] = -3;
-  EXPECT_THROW(Model{source}, HierarchyError);
+  EXPECT_THROW(StandInModel{source}, HierarchyError);
 }
 
 TEST(MultiresolutionHostile, BoxesThatAreNotNumbersIntersectNothing) {
@@ -173,14 +173,14 @@ TEST(MultiresolutionHostile, BoxesThatAreNotNumbersIntersectNothing) {
   for (auto& level : source.levels) {
     for (auto& cluster : level) cluster.record.box.min[0] = std::nan("");
   }
-  Model model(source);
+  StandInModel model(source);
   model.set_region(box2(-1e9, -1e9, 1e9, 1e9), 0);
   EXPECT_EQ(model.expanded_count(), 0u);
 }
 
 TEST(MultiresolutionMisuse, ClustersThatAreNotThere) {
   MemorySource source = good_source(1);
-  Model model(source);
+  StandInModel model(source);
   const ClusterId hidden = cluster_id(0, 0), unknown = cluster_id(2, 1000), root = cluster_id(3, 0);
   for (const ClusterId id : {hidden, unknown, root}) {
     EXPECT_FALSE(model.can_expand(id));

@@ -42,7 +42,7 @@ std::vector<Case> cases(std::uint64_t seeds) {
   return result;
 }
 
-#define TRACE(c)                                                       \
+#define TRACE_CASE(c)                                                  \
   SCOPED_TRACE(testing::Message() << "seed " << (c).seed << ", shape " \
                                   << static_cast<int>((c).shape))
 
@@ -95,7 +95,7 @@ std::vector<ClusterId> expandable(const MultiresolutionModel<T>& model, MemorySo
 // expanded set says, and a consumer of deltas sees just that.
 TYPED_TEST(Multiresolution, EveryStepDoesWhatItSays) {
   for (Case& c : cases(40)) {
-    TRACE(c);
+    TRACE_CASE(c);
     const WholeTree tree(c.source);
     const Detail start = random_detail(c);
     MultiresolutionModel<TypeParam> model(c.source, start);
@@ -160,7 +160,7 @@ TYPED_TEST(Multiresolution, EveryStepDoesWhatItSays) {
 
 TYPED_TEST(Multiresolution, CollapseIsTheInverseOfExpand) {
   for (Case& c : cases(15)) {
-    TRACE(c);
+    TRACE_CASE(c);
     MultiresolutionModel<TypeParam> model(c.source, random_detail(c));
     for (const ClusterId id : expandable(model, c.source)) {
       const std::uint64_t before = model.triangulation().hash();
@@ -180,7 +180,7 @@ TYPED_TEST(Multiresolution, CollapseIsTheInverseOfExpand) {
 // expanded meanwhile, nor whether points came in bulk.
 TYPED_TEST(Multiresolution, OrderLeavesNoTrace) {
   for (Case& c : cases(15)) {
-    TRACE(c);
+    TRACE_CASE(c);
     const WholeTree tree(c.source);
     const Detail goal = random_detail(c);
     MultiresolutionModel<TypeParam> at_once(c.source, goal);
@@ -203,7 +203,7 @@ TYPED_TEST(Multiresolution, OrderLeavesNoTrace) {
 
 TYPED_TEST(Multiresolution, LevelZeroIsAllPointsAndTheTopIsTheRoot) {
   for (Case& c : cases(3)) {
-    TRACE(c);
+    TRACE_CASE(c);
     const WholeTree tree(c.source);
     MultiresolutionModel<TypeParam> model(c.source);
     ASSERT_EQ(model.point_count(), c.source.root().positions.size());
@@ -223,7 +223,7 @@ TYPED_TEST(Multiresolution, LevelZeroIsAllPointsAndTheTopIsTheRoot) {
 
 TYPED_TEST(Multiresolution, HeadsAreWhereTheirClustersSay) {
   for (Case& c : cases(3)) {
-    TRACE(c);
+    TRACE_CASE(c);
     MultiresolutionModel<TypeParam> model(c.source, {0, {}});
     std::vector<ClusterId> heads;
     for (const ClusterId id : model.expanded()) {
@@ -249,7 +249,7 @@ TYPED_TEST(Multiresolution, DoingItAgainChangesNothing) {
 
 TYPED_TEST(Multiresolution, WithoutDeltasTheModelIsTheSame) {
   for (Case& c : cases(2)) {
-    TRACE(c);
+    TRACE_CASE(c);
     const WholeTree tree(c.source);
     MultiresolutionModel<TypeParam> model(c.source, {}, {.deltas = false});
     const Detail detail = random_detail(c);

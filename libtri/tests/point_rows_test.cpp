@@ -14,6 +14,7 @@
 #include <gtest/gtest.h>
 
 #include "delaunay2/double_kernel.hpp"
+#include "point_tin_oracle.hpp"
 #include "terrace/tri/point_tin.hpp"
 #include "tin/point_rows_places.hpp"
 
@@ -21,11 +22,12 @@ namespace terrace::tri {
 namespace {
 
 using planar::DoubleKernel;
+using point_tin_oracle::check_delaunay;
+using point_tin_oracle::kQualities;
+using point_tin_oracle::rough;
 using tin::rows::RowPath;
 
 constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
-constexpr TinQuality kQualities[] = {TinQuality::kGreedy, TinQuality::kRemoval,
-                                     TinQuality::kFitted};
 
 double unit(std::mt19937_64& random) { return static_cast<double>(random() >> 11) * 0x1p-53; }
 
@@ -53,11 +55,6 @@ struct Shape {
   double extent;  ///< of the frame
   double first;   ///< place of the first column and row, in steps from the frame's side
 };
-
-double rough(double u, double v) {
-  return 40 * std::sin(5 * u + 2 * v) + 25 * std::sin(11 * v - 3 * u) + 6 * std::sin(31 * u * v) +
-         2 * std::sin(97 * u + 41 * v);
-}
 
 /// `gaps`: the share of samples that are not there.
 Grid make_grid(const Shape& shape, double gaps, std::uint64_t seed) {
@@ -106,7 +103,7 @@ PointTinOptions options_of(double error, TinQuality quality, double step = 0x1p-
 }
 
 /// Triangles counter-clockwise, every edge once in each direction, but for those of the frame.
-void check_mesh(const PointTin& tin, const std::vector<Point3>& frame) {
+void check_framed_mesh(const PointTin& tin, const std::vector<Point3>& frame) {
   ASSERT_EQ(tin.sample.size(), tin.vertices.size());
   const auto place = [&](std::uint32_t v) {
     return std::array<double, 2>{tin.vertices[v][0], tin.vertices[v][1]};
@@ -169,18 +166,6 @@ void check_lattice(const Places& places, const std::vector<double>& heights, con
   }
 }
 
-void check_delaunay(const PointTin& tin) {
-  const auto place = [&](std::uint32_t v) {
-    return std::array<double, 2>{tin.vertices[v][0], tin.vertices[v][1]};
-  };
-  for (const auto& t : tin.triangles) {
-    for (std::uint32_t v = 0; v < tin.vertices.size(); ++v) {
-      if (v == t[0] || v == t[1] || v == t[2]) continue;
-      ASSERT_LE(DoubleKernel::in_circle(place(t[0]), place(t[1]), place(t[2]), place(v)), 0);
-    }
-  }
-}
-
 TEST(PointRows, KeepTheErrorOnALattice) {
   const Shape shapes[] = {{60, 45, 32767, 0},  {33, 80, 32767, -4.3}, {64, 64, 300, 0.5},
                           {70, 70, 40, 0},     {7, 5, 32767, -0.4},   {120, 3, 1000, 0.2},
@@ -197,7 +182,7 @@ TEST(PointRows, KeepTheErrorOnALattice) {
           const std::vector<Point3> frame = make_frame(shape.extent, 5, 4);
           const PointTinOptions options = options_of(error, quality);
           const PointTin tin = point_tin(grid.rows(), frame, options);
-          check_mesh(tin, frame);
+          check_framed_mesh(tin, frame);
           check_errors(Places(grid), grid.z, tin, error);
           if (quality != TinQuality::kFitted)
             check_lattice(Places(grid), grid.z, tin, *options.lattice);
@@ -255,7 +240,7 @@ TEST(PointRows, TurnedAndBentGridsKeepTheError) {
           const PointTinOptions options = options_of(error, quality);
           const PointTin tin =
               point_tin(SampleGrid{shape.columns, places.x, places.y, grid.z}, frame, options);
-          check_mesh(tin, frame);
+          check_framed_mesh(tin, frame);
           check_errors(places, grid.z, tin, error);
           if (quality != TinQuality::kFitted) check_lattice(places, grid.z, tin, *options.lattice);
           if (quality == TinQuality::kGreedy && tin.vertices.size() < 800) check_delaunay(tin);
@@ -335,7 +320,7 @@ TEST(PointRows, LatticeTooCoarseForTheError) {
   const std::vector<Point3> frame = make_frame(20, 1, 10);
   for (const TinQuality quality : {TinQuality::kGreedy, TinQuality::kRemoval}) {
     const PointTin tin = point_tin(grid.rows(), frame, options_of(1.0, quality));
-    check_mesh(tin, frame);
+    check_framed_mesh(tin, frame);
     check_errors(Places(grid), grid.z, tin, 1.0);
     EXPECT_GT(tin.stuck, 1000u);
     EXPECT_GT(tin.vertices.size(), 300u);
@@ -346,7 +331,7 @@ TEST(PointRows, ErrorZero) {
   const Grid grid = make_grid({20, 20, 1000, 0}, 0.1, 11);
   const std::vector<Point3> frame = make_frame(1000, 2, 12);
   const PointTin tin = point_tin(grid.rows(), frame, options_of(0.0, TinQuality::kRemoval));
-  check_mesh(tin, frame);
+  check_framed_mesh(tin, frame);
   check_errors(Places(grid), grid.z, tin, 0.0);
   // All inside are vertices: their heights are rounded.
   EXPECT_GT(tin.vertices.size(), 250u);
@@ -365,7 +350,7 @@ TEST(PointRows, SamplesOnTheFrameAndAHairOutside) {
   // Beyond the bound outside, on a side, inside.
   grid.z[4] = grid.z[9] = grid.z[22] = grid.z[12] = 300;
   const PointTin tin = point_tin(grid.rows(), frame, options_of(0.5, TinQuality::kGreedy));
-  check_mesh(tin, frame);
+  check_framed_mesh(tin, frame);
   check_errors(Places(grid), grid.z, tin, 0.5);
   EXPECT_EQ(tin.stuck, 1u);
   EXPECT_EQ(tin.errors.largest_at, 22u);
@@ -381,7 +366,7 @@ TEST(PointRows, FewSamples) {
   grid.y = {4};
   grid.z = {100};
   const PointTin one = point_tin(grid.rows(), frame, options);
-  check_mesh(one, frame);
+  check_framed_mesh(one, frame);
   EXPECT_EQ(one.triangles.size(), 4u);
   EXPECT_EQ(one.errors.covered, 1u);
   grid.z = {kMissing};
@@ -391,7 +376,7 @@ TEST(PointRows, FewSamples) {
   grid.x = {2, 4, 6, 8};
   grid.z = {0, 50, kMissing, 7};
   const PointTin row = point_tin(grid.rows(), frame, options);
-  check_mesh(row, frame);
+  check_framed_mesh(row, frame);
   check_errors(Places(grid), grid.z, row, 0.5);
   EXPECT_EQ(row.errors.covered, 3u);
 }
@@ -403,13 +388,13 @@ TEST(PointRows, IrregularPlacesAndFrames) {
   const std::vector<Point3> frame = make_frame(1000, 2, 14);
   const PointTinOptions options = options_of(1.0, TinQuality::kRemoval);
   const PointTin uneven = point_tin(grid.rows(), frame, options);
-  check_mesh(uneven, frame);
+  check_framed_mesh(uneven, frame);
   check_errors(Places(grid), grid.z, uneven, 1.0);
   check_lattice(Places(grid), grid.z, uneven, *options.lattice);
   const std::vector<Point3> triangle{{0, 0, 1}, {1000, 0, 2}, {0, 1000, 3}};
   const Grid even = make_grid({40, 40, 1000, 0}, 0.0, 13);
   const PointTin part = point_tin(even.rows(), triangle, options);
-  check_mesh(part, triangle);
+  check_framed_mesh(part, triangle);
   check_errors(Places(even), even.z, part, 1.0);
   EXPECT_GT(part.errors.uncovered, 0u);
   PointTinOptions few = options;

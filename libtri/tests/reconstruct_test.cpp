@@ -16,8 +16,8 @@
 namespace terrace::tri {
 namespace {
 
-constexpr SurfaceMethod kMethods[] = {SurfaceMethod::kShape, SurfaceMethod::kAdvancingFront,
-                                      SurfaceMethod::kAlphaWrap};
+constexpr SurfaceMethod kSurfaceMethods[] = {SurfaceMethod::kShape, SurfaceMethod::kAdvancingFront,
+                                             SurfaceMethod::kAlphaWrap};
 
 /// On a Fibonacci spiral, in random order.
 std::vector<Point3> sphere(std::size_t count) {
@@ -40,7 +40,7 @@ SurfaceOptions with(SurfaceMethod method) {
 
 TEST(ReconstructTest, EveryMethodGivesASphere) {
   const std::vector<Point3> points = sphere(1500);
-  for (const SurfaceMethod method : kMethods) {
+  for (const SurfaceMethod method : kSurfaceMethods) {
     SCOPED_TRACE("method " + std::to_string(static_cast<int>(method)));
     const ReconstructedSurface found = reconstruct_surface(points, with(method));
     const SurfaceMeasures measured = measure(found.surface);
@@ -95,7 +95,7 @@ TEST(ReconstructTest, CoarseRoundingJoinsPoints) {
 }
 
 TEST(ReconstructTest, DegeneratePoints) {
-  for (const SurfaceMethod method : kMethods) {
+  for (const SurfaceMethod method : kSurfaceMethods) {
     for (const unsigned bits : {0u, 24u}) {
       SurfaceOptions options = with(method);
       options.quantise_bits = bits;
@@ -159,7 +159,7 @@ TEST(ReconstructTest, BadInputIsNamed) {
   names("radius_ratio_bound", [](auto& options) { options.radius_ratio_bound = 0; });
   names("edge lengths", [](auto& options) { options.shape.edge_factor = 0; });
   points[7][1] = nan;
-  for (const SurfaceMethod method : kMethods)
+  for (const SurfaceMethod method : kSurfaceMethods)
     names("point 7", [&](auto& options) { options.method = method; });
 }
 

@@ -7,14 +7,13 @@
 
 #include <gtest/gtest.h>
 
+#include "grid_windows.hpp"
 #include "terrace/tri/grid_tin.hpp"
 
 namespace {
 
 using namespace terrace::tri;
 using Line = std::vector<double>;
-
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 std::vector<std::uint32_t> settle(const Line& line, const Line& beside, const Line& other,
                                   double bound) {
@@ -26,7 +25,8 @@ TEST(SettleSide, EndsOnlyWhereStraight) {
   EXPECT_EQ(settle({5}, {}, {}, 0), (std::vector<std::uint32_t>{0}));
   EXPECT_EQ(settle({5, 9}, {}, {}, 0), (std::vector<std::uint32_t>{0, 1}));
   EXPECT_TRUE(settle({}, {}, {}, 0).empty());
-  EXPECT_EQ(settle({kNone, kNone, kNone, kNone}, {}, {}, 0), (std::vector<std::uint32_t>{0, 3}));
+  EXPECT_EQ(settle({kNoHeight, kNoHeight, kNoHeight, kNoHeight}, {}, {}, 0),
+            (std::vector<std::uint32_t>{0, 3}));
 }
 
 TEST(SettleSide, GreatestErrorFirst) {
@@ -36,14 +36,14 @@ TEST(SettleSide, GreatestErrorFirst) {
 }
 
 TEST(SettleSide, DataEndsAtVertices) {
-  EXPECT_EQ(settle({0, 0, 0, kNone, kNone, kNone, 0, 0, 0, 0}, {}, {}, 1),
+  EXPECT_EQ(settle({0, 0, 0, kNoHeight, kNoHeight, kNoHeight, 0, 0, 0, 0}, {}, {}, 1),
             (std::vector<std::uint32_t>{0, 2, 3, 5, 6, 9}));
 }
 
 TEST(SettleSide, MissingDataBesideMakesVertices) {
   const Line line(7, 1.0);
   Line beside = line;
-  beside[3] = kNone;
+  beside[3] = kNoHeight;
   const std::vector<std::uint32_t> expected{0, 2, 3, 4, 6};
   EXPECT_EQ(settle(line, beside, {}, 1), expected);
   EXPECT_EQ(settle(line, {}, beside, 1), expected);
@@ -60,7 +60,7 @@ TEST(SettleSide, WithinTheBound) {
     double z = 0;
     for (std::size_t i = 0; i < count; ++i) {
       z += static_cast<double>(random() % 21) - 10;
-      line.push_back(gaps && random() % 10 == 0 ? kNone : z);
+      line.push_back(gaps && random() % 10 == 0 ? kNoHeight : z);
     }
     const double bound = static_cast<double>(random() % 30);
     const auto vertices = settle(line, {}, {}, bound);
@@ -84,7 +84,7 @@ TEST(SettleSide, MisuseIsRefused) {
   EXPECT_THROW(settle({1, 2, 3}, {1, 2}, {}, 1), std::invalid_argument);
   EXPECT_THROW(settle({1, 2, 3}, {}, {1, 2, 3, 4}, 1), std::invalid_argument);
   EXPECT_THROW(settle({1, 2, 3}, {}, {}, -1), std::invalid_argument);
-  EXPECT_THROW(settle({1, 2, 3}, {}, {}, kNone), std::invalid_argument);
+  EXPECT_THROW(settle({1, 2, 3}, {}, {}, kNoHeight), std::invalid_argument);
   EXPECT_THROW(settle({1, 1e151}, {}, {}, 1), std::invalid_argument);
 }
 

@@ -14,7 +14,8 @@
 namespace terrace::tri {
 namespace {
 
-constexpr Smoothing kMethods[] = {Smoothing::kLaplacian, Smoothing::kTaubin, Smoothing::kBilateral};
+constexpr Smoothing kSmoothings[] = {Smoothing::kLaplacian, Smoothing::kTaubin,
+                                     Smoothing::kBilateral};
 
 SmoothingOptions options_of(Smoothing method, unsigned iterations = 10) {
   SmoothingOptions options;
@@ -64,7 +65,7 @@ TYPED_TEST(SmoothingTest, ConstantsAndPlanesStay) {
     triangulation.build(make_points<TypeParam>(kind, 400, 1));
     double extent = 0;
     heights_from(triangulation, [&](double x, double) { return extent = std::max(extent, x); });
-    for (const Smoothing method : kMethods) {
+    for (const Smoothing method : kSmoothings) {
       SCOPED_TRACE(name(kind) + " method " + std::to_string(static_cast<int>(method)));
       const auto constant = heights_from(triangulation, [](double, double) { return 0.3; });
       const auto same = smooth(triangulation, constant, all(triangulation), options_of(method));
@@ -103,7 +104,7 @@ TYPED_TEST(SmoothingTest, WhatMovesIsInsideTheRegionOffItsBorderAndOffTheHull) {
           std::all_of(around.begin(), around.end(), in_region))
         expected.push_back(v);
     }
-    for (const Smoothing method : kMethods) {
+    for (const Smoothing method : kSmoothings) {
       std::vector<VertexId> moved;
       for (const auto& change : smooth(triangulation, heights, region, options_of(method)))
         moved.push_back(change.vertex);

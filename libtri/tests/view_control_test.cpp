@@ -15,9 +15,9 @@ namespace {
 
 template <class T>
 class ViewControlOf : public testing::Test {};
-using Triangulations =
+using ViewTriangulations =
     testing::Types<StandIn<std::int32_t>, Delaunay2<std::int32_t>, Delaunay2<double>>;
-TYPED_TEST_SUITE(ViewControlOf, Triangulations);
+TYPED_TEST_SUITE(ViewControlOf, ViewTriangulations);
 
 #define TRACE(w)                                                       \
   SCOPED_TRACE(testing::Message() << "seed " << (w).seed << ", shape " \

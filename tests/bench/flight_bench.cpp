@@ -23,10 +23,10 @@
 #include <sys/resource.h>
 
 #include "../pipeline/temporary_folder.hpp"
-#include "terrace/terrain/build.hpp"
 #include "cli/cli.hpp"
 #include "flight_path.hpp"
 #include "flight_viewer.hpp"
+#include "terrace/terrain/build.hpp"
 
 namespace {
 
@@ -52,8 +52,8 @@ Store open_store(const std::filesystem::path& folder) {
   }
   request.inputs = {dem};
   request.block_points = small() ? 1000 : 10000;
-  terrace::terrain::build_store(
-      request, {.threads = std::max(1u, std::thread::hardware_concurrency())});
+  terrace::terrain::build_store(request,
+                                {.threads = std::max(1u, std::thread::hardware_concurrency())});
   return Store::open(request.store);
 }
 

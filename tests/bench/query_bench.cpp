@@ -16,15 +16,15 @@
 #include <terrace/stream/store.hpp>
 
 #include "../pipeline/temporary_folder.hpp"
-#include "terrace/terrain/build.hpp"
-#include "cli/cli.hpp"
 #include "base/portable_math.hpp"
+#include "cli/cli.hpp"
 #include "earth/world.hpp"
 #include "sample/height_sampler.hpp"
 #include "sample/place_file.hpp"
 #include "sample/sample_run.hpp"
 #include "surface/detail.hpp"
 #include "surface/store_window.hpp"
+#include "terrace/terrain/build.hpp"
 
 namespace {
 

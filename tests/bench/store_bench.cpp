@@ -20,8 +20,8 @@
 #include <terrace/tri/multiresolution.hpp>
 
 #include "../pipeline/temporary_folder.hpp"
-#include "terrace/terrain/build.hpp"
 #include "cli/cli.hpp"
+#include "terrace/terrain/build.hpp"
 #include "terrace/terrain/store_source.hpp"
 
 namespace {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // From a file to a store: the same bytes whatever the number of threads, within the memory granted,
 // and nothing left behind where the work fails.
+#include "terrace/terrain/build.hpp"
+
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>
@@ -21,7 +23,6 @@
 #include <terrace/stream/store.hpp>
 #include <unistd.h>
 
-#include "terrace/terrain/build.hpp"
 #include "temporary_folder.hpp"
 
 namespace terrace {

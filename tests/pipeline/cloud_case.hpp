@@ -3,13 +3,13 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <limits>
 #include <map>
-#include <random>
 #include <span>
 #include <string>
 #include <vector>
@@ -19,8 +19,9 @@
 #include <terrace/tri/delaunay2.hpp>
 
 #include "base/region.hpp"
-#include "terrace/terrain/build.hpp"
+#include "random.hpp"
 #include "surface/store_window.hpp"
+#include "terrace/terrain/build.hpp"
 
 /// Clouds of many kinds in small stores of many clusters, and the triangulation of all their
 /// points.
@@ -31,15 +32,10 @@ using Points = std::vector<stream::Point3>;
 using Triangle = std::array<terrain::Point2, 3>;
 using terrain::Point2;
 
-class Random {
- public:
-  explicit Random(std::uint64_t seed) : engine_(seed) {}
-  double unit() { return static_cast<double>(engine_() >> 11) * 0x1p-53; }
-  std::uint64_t below(std::uint64_t n) { return engine_() % n; }
-
- private:
-  std::mt19937_64 engine_;
-};
+inline bool same_bits(double a, double b) {
+  return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b) ||
+         (std::isnan(a) && std::isnan(b));
+}
 
 inline Points points_of(const std::string& kind) {
   Random random(7);

@@ -19,10 +19,10 @@
 #include <terrace/stream/geotiff_writer.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "terrace/terrain/build.hpp"
 #include "mesh/store_mesh.hpp"
 #include "surface/detail.hpp"
 #include "temporary_folder.hpp"
+#include "terrace/terrain/build.hpp"
 
 namespace terrace {
 namespace {

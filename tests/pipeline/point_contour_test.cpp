@@ -25,17 +25,17 @@
 #include <terrace/tri/delaunay2.hpp>
 
 #include "base/error.hpp"
-#include "terrace/terrain/build.hpp"
 #include "contour/contour_parts.hpp"
 #include "surface/store_window.hpp"
 #include "temporary_folder.hpp"
+#include "terrace/terrain/build.hpp"
 
 namespace terrace {
 namespace {
 
 using terrain::Point2;
 using Segment = std::tuple<std::int64_t, Point2, Point2>;
-using Triangle = std::array<stream::Point3, 3>;
+using Corners = std::array<stream::Point3, 3>;
 
 stream::Store store_of(const std::filesystem::path& input, std::size_t block_points) {
   terrain::BuildRequest request;
@@ -73,7 +73,7 @@ std::vector<stream::Point3> lake_shore(std::uint64_t seed, bool whole) {
 }
 
 /// The whole triangulation.
-std::vector<Triangle> triangles_of(const stream::Store& store, unsigned level) {
+std::vector<Corners> triangles_of(const stream::Store& store, unsigned level) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   terrain::WindowPoints points;
   terrain::StoreWindow(store).points({{-kInfinity, -kInfinity}, {kInfinity, kInfinity}}, points,
@@ -88,9 +88,9 @@ std::vector<Triangle> triangles_of(const stream::Store& store, unsigned level) {
   for (std::size_t i = places.size(); i-- > 0;) {
     heights[tri::slot(vertices[i])] = points.positions[i][2] * z.scale + z.offset;
   }
-  std::vector<Triangle> triangles;
+  std::vector<Corners> triangles;
   for (const tri::TriangleId id : whole.all_triangles()) {
-    Triangle triangle{};
+    Corners triangle{};
     for (std::size_t i = 0; i < 3; ++i) {
       const tri::VertexId vertex = whole.vertices(id)[i];
       const Point2 p = whole.point(vertex);
@@ -102,10 +102,10 @@ std::vector<Triangle> triangles_of(const stream::Store& store, unsigned level) {
 }
 
 /// Each triangle by itself, higher ground on the left by the gradient. Equal ends are left out.
-std::multiset<Segment> segments_of(const std::vector<Triangle>& triangles, double interval,
-                                   const std::function<bool(const Triangle&)>& wanted) {
+std::multiset<Segment> segments_of(const std::vector<Corners>& triangles, double interval,
+                                   const std::function<bool(const Corners&)>& wanted) {
   std::multiset<Segment> segments;
-  for (const Triangle& t : triangles) {
+  for (const Corners& t : triangles) {
     if (!wanted(t)) continue;
     const auto [lowest, highest] = std::minmax({t[0][2], t[1][2], t[2][2]});
     for (auto level = static_cast<std::int64_t>(std::floor(lowest / interval)) - 1;
@@ -149,8 +149,8 @@ std::vector<terrain::ContourLine> lines_of(const stream::Store& store,
 
 /// The lines are those of the whole, in the same order for any number of threads and memory.
 void expect_contours(const stream::Store& store, terrain::ContourRequest request,
-                     const std::vector<Triangle>& triangles) {
-  const auto wanted = [&](const Triangle& t) {
+                     const std::vector<Corners>& triangles) {
+  const auto wanted = [&](const Corners& t) {
     for (std::size_t i = 0; request.max_edge && i < 3; ++i) {
       const stream::Point3 &a = t[i], &b = t[(i + 1) % 3];
       if (std::hypot(a[0] - b[0], a[1] - b[1]) > *request.max_edge) return false;
@@ -191,7 +191,7 @@ TEST(PointContours, AreThoseOfTheWholeTriangulationAtAnyLevel) {
     const stream::Store store = cloud(folder.path(), lake_shore(seed, seed % 2 == 0));
     for (unsigned level = 0; level <= std::min(2U, store.top()); ++level) {
       SCOPED_TRACE("level " + std::to_string(level));
-      const std::vector<Triangle> triangles = triangles_of(store, level);
+      const std::vector<Corners> triangles = triangles_of(store, level);
       ASSERT_FALSE(triangles.empty());
       expect_contours(store, {.interval = seed % 2 == 0 ? 2.0 : 3.3, .level = level}, triangles);
     }
@@ -201,7 +201,7 @@ TEST(PointContours, AreThoseOfTheWholeTriangulationAtAnyLevel) {
 TEST(PointContours, EndAtTrianglesWithALongerSideThanAllowed) {
   const tests::TemporaryFolder folder;
   const stream::Store store = cloud(folder.path(), lake_shore(6, false));
-  const std::vector<Triangle> triangles = triangles_of(store, 0);
+  const std::vector<Corners> triangles = triangles_of(store, 0);
   for (const double most : {0.5, 12.0, 40.0, 1e6}) {
     SCOPED_TRACE(most);
     expect_contours(store, {.interval = 3, .max_edge = most}, triangles);
@@ -214,7 +214,7 @@ TEST(PointContours, EndAtTrianglesWithALongerSideThanAllowed) {
 TEST(PointContours, OfARegionAreThoseOfTheTrianglesWhoseMiddlesLieInside) {
   const tests::TemporaryFolder folder;
   const stream::Store store = cloud(folder.path(), lake_shore(9, false));
-  const std::vector<Triangle> triangles = triangles_of(store, 0);
+  const std::vector<Corners> triangles = triangles_of(store, 0);
   std::mt19937_64 random(10);
   const auto unit = [&] { return static_cast<double>(random() >> 11) * 0x1p-53; };
   std::size_t strange = 0;
@@ -223,14 +223,14 @@ TEST(PointContours, OfARegionAreThoseOfTheTrianglesWhoseMiddlesLieInside) {
     // Every second one about the middle of a large triangle, far from its corners.
     double x = unit() * 900 - 300, y = unit() * 450, size = 20 + 150 * unit();
     if (i % 2 == 0) {
-      const auto area = [](const Triangle& t) {
+      const auto area = [](const Corners& t) {
         return (t[1][0] - t[0][0]) * (t[2][1] - t[0][1]) -
                (t[1][1] - t[0][1]) * (t[2][0] - t[0][0]);
       };
-      std::vector<Triangle> large = triangles;
+      std::vector<Corners> large = triangles;
       std::partial_sort(large.begin(), large.begin() + 40, large.end(),
-                        [&](const Triangle& s, const Triangle& t) { return area(s) > area(t); });
-      const Triangle& t = large[random() % 40];
+                        [&](const Corners& s, const Corners& t) { return area(s) > area(t); });
+      const Corners& t = large[random() % 40];
       size = 0.01;
       x = (t[0][0] + t[1][0] + t[2][0]) / 3 - size / 2;
       y = (t[0][1] + t[1][1] + t[2][1]) / 3 - size / 2;
@@ -238,7 +238,7 @@ TEST(PointContours, OfARegionAreThoseOfTheTrianglesWhoseMiddlesLieInside) {
     const std::string text = std::to_string(x) + ',' + std::to_string(y) + ',' +
                              std::to_string(x + size) + ',' + std::to_string(y + size);
     const terrain::Region region = terrain::Region::parse(text);
-    for (const Triangle& t : triangles) {
+    for (const Corners& t : triangles) {
       strange += i % 2 == 0 && region.contains({(t[0][0] + t[1][0] + t[2][0]) / 3,
                                                 (t[0][1] + t[1][1] + t[2][1]) / 3, 0})
                      ? 1
@@ -280,7 +280,7 @@ TEST(PointContours, OfACoarserLevelOfARasterAreThoseOfItsSamples) {
   writer.commit();
   const stream::Store store = store_of(file, 200);
   ASSERT_GE(store.top(), 1u);
-  const std::vector<Triangle> triangles = triangles_of(store, 1);
+  const std::vector<Corners> triangles = triangles_of(store, 1);
   expect_contours(store, {.interval = 7, .level = 1}, triangles);
 }
 

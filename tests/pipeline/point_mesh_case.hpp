@@ -9,7 +9,6 @@
 #include <fstream>
 #include <iterator>
 #include <limits>
-#include <random>
 #include <set>
 #include <string>
 #include <utility>
@@ -21,11 +20,12 @@
 #include <terrace/tri/point_tin.hpp>
 
 #include "base/region.hpp"
-#include "terrace/terrain/build.hpp"
 #include "mesh/bounded/bounded_mesh.hpp"
 #include "mesh/bounded/streaming_hull.hpp"
 #include "mesh/mesh_file.hpp"
+#include "random.hpp"
 #include "temporary_folder.hpp"
+#include "terrace/terrain/build.hpp"
 
 /// Clouds, and what any mesh of them must be.
 
@@ -33,17 +33,6 @@ namespace terrace::tests {
 
 using terrain::Point2;
 using Cloud = std::vector<stream::Point3>;
-
-class Random {
- public:
-  explicit Random(std::uint64_t seed) : engine_(seed) {}
-  double operator()(double low, double high) {
-    return low + (high - low) * static_cast<double>(engine_() >> 11) * 0x1p-53;
-  }
-
- private:
-  std::mt19937_64 engine_;
-};
 
 inline double relief(double x, double y) { return 40 * std::sin(x / 9) * std::cos(y / 7) + x / 3; }
 

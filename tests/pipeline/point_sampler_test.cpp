@@ -2,7 +2,6 @@
 // Heights between the points of stores against libtri's on the triangulation of all points.
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <numeric>
@@ -27,13 +26,9 @@ namespace {
 using terrain::Point2;
 using terrain::SurfacePoint;
 using tests::Random;
+using tests::same_bits;
 using tests::Whole;
 using tri::Interpolation;
-
-bool same_bits(double a, double b) {
-  return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b) ||
-         (std::isnan(a) && std::isnan(b));
-}
 
 bool same_bits(const SurfacePoint& a, const SurfacePoint& b) {
   return same_bits(a.height, b.height) && same_bits(a.per_column, b.per_column) &&
@@ -93,7 +88,7 @@ std::vector<SurfacePoint> sampled(const stream::Store& store, terrain::SamplerOp
   return out;
 }
 
-void check(const stream::Store& store, unsigned level, std::size_t count) {
+void check_heights(const stream::Store& store, unsigned level, std::size_t count) {
   const Whole whole(store, level);
   const auto& triangulation = whole.triangulation;
   const std::vector<Point2> places = places_of(store, whole, count);
@@ -135,8 +130,8 @@ TEST_P(CloudHeights, AreThoseOfTheWholeTriangulation) {
   const tests::TemporaryFolder folder;
   const stream::Store store =
       stream::Store::open(tests::cloud_store(folder.path(), tests::points_of(GetParam())));
-  check(store, 0, 700);
-  check(store, store.top(), 150);
+  check_heights(store, 0, 700);
+  check_heights(store, store.top(), 150);
 }
 
 INSTANTIATE_TEST_SUITE_P(PointSampler, CloudHeights,
@@ -152,7 +147,7 @@ INSTANTIATE_TEST_SUITE_P(PointSampler, CloudHeights,
 TEST(PointSampler, AnswersTheCoarserLevelsOfRasters) {
   const tests::TemporaryFolder folder;
   const stream::Store store = stream::Store::open(tests::raster_store(folder.path()));
-  for (unsigned level = 1; level <= store.top(); ++level) check(store, level, 400);
+  for (unsigned level = 1; level <= store.top(); ++level) check_heights(store, level, 400);
 }
 
 TEST(PointSampler, GivesNothingInTrianglesWithLongSides) {

@@ -8,7 +8,6 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
-#include <random>
 #include <set>
 #include <string>
 #include <tuple>
@@ -19,10 +18,10 @@
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/delaunay2.hpp>
 
-#include "terrace/terrain/build.hpp"
 #include "earth/store_crs.hpp"
-#include "surface/cluster_census.hpp"
+#include "random.hpp"
 #include "temporary_folder.hpp"
+#include "terrace/terrain/build.hpp"
 #include "tile/make/cloud_spacing.hpp"
 #include "tile/make/crowded_leaf.hpp"
 #include "tile/make/sample_parts.hpp"
@@ -35,17 +34,7 @@ namespace {
 using terrain::GeographicBox;
 using terrain::Point2;
 using terrain::StoredBox;
-
-class Random {
- public:
-  explicit Random(std::uint64_t seed) : engine_(seed) {}
-  double operator()(double low, double high) {
-    return low + (high - low) * (static_cast<double>(engine_() >> 11) * 0x1p-53);
-  }
-
- private:
-  std::mt19937_64 engine_;
-};
+using tests::Random;
 
 /// A cloud as it lies in its CRS.
 struct CloudCase {

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -33,6 +32,7 @@ using tests::Points;
 using tests::points_of;
 using tests::Random;
 using tests::raster_store;
+using tests::same_bits;
 using tests::Triangle;
 using tests::Whole;
 /// Whether no line separates them, in long double.
@@ -57,11 +57,6 @@ bool meets(const Triangle& t, const StoredBox& box) {
   return true;
 }
 
-bool same_bits(double a, double b) {
-  return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b) ||
-         (std::isnan(a) && std::isnan(b));
-}
-
 StoredBox random_box(const stream::Box3& bounds, Random& random, std::uint64_t i) {
   StoredBox box;
   for (std::size_t k = 0; k < 2; ++k) {
@@ -75,7 +70,7 @@ StoredBox random_box(const stream::Box3& bounds, Random& random, std::uint64_t i
   return box;
 }
 
-void check(const stream::Store& store, unsigned level, int boxes) {
+void check_windows(const stream::Store& store, unsigned level, int boxes) {
   const Whole whole(store, level);
   PointWindow window(store, level, 0), other(store, level, 0);
   Random random(level + 3);
@@ -141,8 +136,8 @@ TEST_P(Clouds, WindowsHaveTheTrianglesOfTheWhole) {
   const tests::TemporaryFolder folder;
   const stream::Store store =
       stream::Store::open(cloud_store(folder.path(), points_of(GetParam())));
-  check(store, 0, 40);
-  for (unsigned level = 1; level <= store.top(); ++level) check(store, level, 12);
+  check_windows(store, 0, 40);
+  for (unsigned level = 1; level <= store.top(); ++level) check_windows(store, level, 12);
 }
 
 INSTANTIATE_TEST_SUITE_P(PointWindow, Clouds,
@@ -159,7 +154,7 @@ TEST(PointWindow, TakesTheCoarserLevelsOfRasters) {
   const tests::TemporaryFolder folder;
   const stream::Store store = stream::Store::open(raster_store(folder.path()));
   ASSERT_GE(store.top(), 2U);
-  for (unsigned level = 0; level <= store.top(); ++level) check(store, level, 20);
+  for (unsigned level = 0; level <= store.top(); ++level) check_windows(store, level, 20);
 }
 
 TEST(PointWindow, ReadsLittleMoreThanItNeeds) {

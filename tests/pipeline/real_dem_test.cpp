@@ -16,8 +16,8 @@
 #include <terrace/stream/source.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "terrace/terrain/build.hpp"
 #include "temporary_folder.hpp"
+#include "terrace/terrain/build.hpp"
 
 namespace terrace {
 namespace {

@@ -16,9 +16,9 @@
 #include <terrace/tri/interpolation.hpp>
 
 #include "base/error.hpp"
-#include "terrace/terrain/build.hpp"
 #include "sample/height_sampler.hpp"
 #include "temporary_folder.hpp"
+#include "terrace/terrain/build.hpp"
 
 namespace terrace {
 namespace {

@@ -22,8 +22,8 @@
 #include <terrace/stream/geotiff_writer.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "terrace/terrain/build.hpp"
 #include "temporary_folder.hpp"
+#include "terrace/terrain/build.hpp"
 
 namespace terrace {
 namespace {
@@ -84,11 +84,11 @@ std::filesystem::path cloud_store(const std::filesystem::path& folder) {
 }
 
 /// Every point with its level, by Store::for_each alone.
-struct Whole {
+struct EveryPoint {
   std::vector<stream::Point3> positions;
   std::vector<unsigned> levels;
 
-  explicit Whole(const stream::Store& store) {
+  explicit EveryPoint(const stream::Store& store) {
     for (unsigned level = 0; level <= store.top(); ++level) {
       store.for_each(level, [&](stream::ClusterId, const stream::ClusterRecord&,
                                 const stream::ClusterPoints& points) {
@@ -141,7 +141,7 @@ TEST(StoreWindow, GivesTheSamplesOfARasterAndNaNForItsHoles) {
     const tests::TemporaryFolder folder;
     const stream::Store store = stream::Store::open(raster_store(folder.path(), scale));
     ASSERT_GE(store.top(), 2u);
-    const Whole whole(store);
+    const EveryPoint whole(store);
     const std::uint64_t seed = 71;
     SCOPED_TRACE(seed);
     std::mt19937_64 random(seed);
@@ -184,7 +184,7 @@ TEST(StoreWindow, GivesThePointsInABoxHigherLevelsFirst) {
   const tests::TemporaryFolder folder;
   const stream::Store store = stream::Store::open(cloud_store(folder.path()));
   ASSERT_GE(store.top(), 2u);
-  const Whole whole(store);
+  const EveryPoint whole(store);
   const std::uint64_t seed = 72;
   SCOPED_TRACE(seed);
   std::mt19937_64 random(seed);
@@ -223,7 +223,7 @@ TEST(StoreWindow, ReadersOfOneStoreDoNotDisturbEachOther) {
   const tests::TemporaryFolder folder;
   const stream::Store store = stream::Store::open(raster_store(folder.path(), 1.0));
   const terrain::LatticeWindow all{0, 0, kColumns, kRows};
-  const std::vector<double> expected = Whole(store).heights(store, all, 0);
+  const std::vector<double> expected = EveryPoint(store).heights(store, all, 0);
   std::array<std::vector<double>, 4> results;
   std::vector<std::thread> threads;
   for (std::vector<double>& result : results) {
@@ -242,7 +242,7 @@ TEST(StoreWindow, ReadersOfOneStoreDoNotDisturbEachOther) {
 TEST(StoreWindow, DamageComesThroughAndTheRestIsStillRead) {
   const tests::TemporaryFolder folder;
   const auto path = raster_store(folder.path(), 1.0);
-  const Whole whole(stream::Store::open(path));
+  const EveryPoint whole(stream::Store::open(path));
   {
     std::fstream file(path / "level-0.0.clusters", std::ios::in | std::ios::out | std::ios::binary);
     file.seekg(0, std::ios::end);

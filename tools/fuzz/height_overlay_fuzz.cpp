@@ -10,10 +10,10 @@
 #include <terrace/stream/overlay.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "terrace/terrain/build.hpp"
 #include "fuzz_target.hpp"
 #include "mesh/height_overlay.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/terrain/build.hpp"
 
 namespace terrace::tools {
 

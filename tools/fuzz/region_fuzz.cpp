@@ -7,9 +7,9 @@
 
 #include "base/error.hpp"
 #include "base/region.hpp"
-#include "terrace/terrain/metric_choice.hpp"
 #include "fuzz_target.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/terrain/metric_choice.hpp"
 
 namespace terrace::tools {
 

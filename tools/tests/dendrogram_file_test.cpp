@@ -22,13 +22,13 @@ class DendrogramFile : public ::testing::Test {
   std::string path_ = scratch_.path() / "dendrogram.csv";
 };
 
-const cluster::Dendrogram kTree{4, {{0, 1, 0.1, 2}, {2, 3, 1.0 / 3.0, 2}, {4, 5, 1e20, 4}}};
+const cluster::Dendrogram kDendrogram{4, {{0, 1, 0.1, 2}, {2, 3, 1.0 / 3.0, 2}, {4, 5, 1e20, 4}}};
 
 TEST_F(DendrogramFile, ComesBackToTheBit) {
-  write_dendrogram(path_, kTree, true);
+  write_dendrogram(path_, kDendrogram, true);
   const auto back = read_dendrogram(path_);
   ASSERT_TRUE(back);
-  EXPECT_EQ(*back, kTree);
+  EXPECT_EQ(*back, kDendrogram);
 }
 
 TEST_F(DendrogramFile, OtherFilesAreNone) {

@@ -16,7 +16,7 @@ namespace terrace::tools {
 using namespace terrain;
 namespace {
 
-constexpr std::uint64_t kMemory = 1 << 20;
+constexpr std::uint64_t kOrderMemory = 1 << 20;
 
 TEST(Permutation, IsOneOfEverySize) {
   for (std::uint64_t size = 1; size < 300; ++size) {
@@ -42,7 +42,7 @@ TEST(Permutation, LeavesLittleInOrder) {
 
 TEST(DeliveryOrder, KeepsPiecesTogether) {
   constexpr std::uint64_t kSize = 5000;
-  const DeliveryOrder order("pieces:20-60", kSize, 3, kMemory);
+  const DeliveryOrder order("pieces:20-60", kSize, 3, kOrderMemory);
   std::vector<std::uint64_t> seen;
   std::size_t breaks = 0;
   for (std::uint64_t n = 0; n < kSize; ++n) {
@@ -58,9 +58,9 @@ TEST(DeliveryOrder, KeepsPiecesTogether) {
 TEST(DeliveryOrder, RefusesWhatItCannotDo) {
   for (const char* text :
        {"some", "pieces", "pieces:5", "pieces:0-5", "pieces:7-5", "pieces:a-b"}) {
-    EXPECT_THROW(DeliveryOrder(text, 10, 1, kMemory), UsageError) << text;
+    EXPECT_THROW(DeliveryOrder(text, 10, 1, kOrderMemory), UsageError) << text;
   }
-  EXPECT_THROW(DeliveryOrder("pieces:1-1", 1000000, 1, kMemory), stream::Error);
+  EXPECT_THROW(DeliveryOrder("pieces:1-1", 1000000, 1, kOrderMemory), stream::Error);
 }
 
 TEST(Clouds, LieInTheirPlace) {

@@ -200,7 +200,7 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   if (!ground.assumption().empty()) outcome.notes.push_back(ground.assumption());
   const std::uint64_t source_bytes = std::max(kSourceMemory, source->reading_bytes());
   const std::size_t payload_bytes = payload_size(info);
-  const unsigned threads = 
+  const unsigned threads =
       threads_within_memory(request, context, memory_bytes, payload_bytes, source_bytes);
   if (info.grid) {
     // Tiles are to be square on the ground: only now is it known what a cell measures there.

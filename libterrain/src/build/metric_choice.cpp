@@ -10,8 +10,8 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.hpp"
-#include "base/units.hpp"
 #include "base/portable_math.hpp"
+#include "base/units.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::terrain {

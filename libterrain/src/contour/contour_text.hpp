@@ -9,12 +9,12 @@
 
 #include <terrace/stream/store.hpp>
 
+#include "base/fixed_text.hpp"
 #include "base/region.hpp"
 #include "contour/contour_run.hpp"
 #include "contour/line_joiner.hpp"
 #include "earth/crs/coordinate_system.hpp"
 #include "surface/ground_slope.hpp"
-#include "base/fixed_text.hpp"
 
 namespace terrace::terrain {
 

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <utility>
 
-#include "earth/ground.hpp"
 #include "base/portable_math.hpp"
+#include "earth/ground.hpp"
 
 namespace terrace::terrain {
 namespace {

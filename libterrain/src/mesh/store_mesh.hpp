@@ -3,11 +3,11 @@
 
 #include <cstdint>
 
-#include "terrace/terrain/metric_choice.hpp"
 #include "mesh/mesh_heights.hpp"
 #include "mesh/scene.hpp"
 #include "surface/detail.hpp"
 #include "terrace/stream/store.hpp"
+#include "terrace/terrain/metric_choice.hpp"
 
 namespace terrace::terrain {
 

@@ -10,9 +10,9 @@
 #include <terrace/tri/interpolation.hpp>
 
 #include "base/parallel.hpp"
-#include "surface/ground_slope.hpp"
 #include "sample/height_sampler.hpp"
 #include "sample/nearest_point.hpp"
+#include "surface/ground_slope.hpp"
 #include "surface/point_window.hpp"
 #include "surface/window_tree.hpp"
 

@@ -13,14 +13,14 @@
 #include <terrace/stream/error.hpp>
 
 #include "base/error.hpp"
+#include "base/fixed_text.hpp"
 #include "base/interrupt.hpp"
 #include "base/output.hpp"
 #include "base/units.hpp"
 #include "earth/ground.hpp"
-#include "surface/ground_slope.hpp"
 #include "earth/line_distance.hpp"
-#include "base/fixed_text.hpp"
 #include "sample/surface_crossings.hpp"
+#include "surface/ground_slope.hpp"
 
 namespace terrace::terrain {
 namespace {

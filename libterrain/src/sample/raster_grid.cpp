@@ -12,8 +12,8 @@
 #include <terrace/stream/error.hpp>
 
 #include "base/error.hpp"
-#include "base/units.hpp"
 #include "base/portable_math.hpp"
+#include "base/units.hpp"
 #include "earth/store_crs.hpp"
 #include "earth/world.hpp"
 

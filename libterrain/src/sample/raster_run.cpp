@@ -14,10 +14,10 @@
 
 #include "base/error.hpp"
 #include "base/parallel.hpp"
-#include "surface/ground_slope.hpp"
 #include "earth/store_crs.hpp"
 #include "sample/raster_grid.hpp"
 #include "sample/raster_shader.hpp"
+#include "surface/ground_slope.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -6,9 +6,9 @@
 #include <optional>
 #include <vector>
 
+#include "base/fixed_text.hpp"
 #include "base/parallel.hpp"
 #include "surface/ground_slope.hpp"
-#include "base/fixed_text.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "base/error.hpp"
+#include "base/portable_math.hpp"
 #include "base/units.hpp"
 #include "base/vector.hpp"
-#include "base/portable_math.hpp"
 
 namespace terrace::tools {
 

@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "base/parallel.hpp"
-#include "base/vector.hpp"
 #include "base/portable_math.hpp"
+#include "base/vector.hpp"
 
 namespace terrace::tools {
 

@@ -10,9 +10,9 @@
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/reconstruct.hpp>
 
-#include "terrace/terrain/metric_choice.hpp"
 #include "mesh/scene.hpp"
 #include "surface/detail.hpp"
+#include "terrace/terrain/metric_choice.hpp"
 
 namespace terrace::tools {
 

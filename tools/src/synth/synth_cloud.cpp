@@ -8,8 +8,8 @@
 #include <cmath>
 
 #include "base/error.hpp"
-#include "base/units.hpp"
 #include "base/portable_math.hpp"
+#include "base/units.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::tools {

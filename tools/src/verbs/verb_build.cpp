@@ -14,8 +14,8 @@
 #include "base/error.hpp"
 #include "base/interrupt.hpp"
 #include "base/units.hpp"
-#include "terrace/terrain/build.hpp"
 #include "earth/crs/coordinate_system.hpp"
+#include "terrace/terrain/build.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {

@@ -13,8 +13,6 @@
 #include "base/interrupt.hpp"
 #include "base/output.hpp"
 #include "base/units.hpp"
-#include "terrace/terrain/metric_choice.hpp"
-#include "terrace/terrain/build.hpp"
 #include "cli/library_call.hpp"
 #include "tables/cluster_channels.hpp"
 #include "tables/cluster_output.hpp"
@@ -23,6 +21,8 @@
 #include "tables/dendrogram_file.hpp"
 #include "tables/point_table.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/terrain/build.hpp"
+#include "terrace/terrain/metric_choice.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {

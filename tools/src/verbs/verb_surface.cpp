@@ -10,13 +10,13 @@
 #include "base/error.hpp"
 #include "base/output.hpp"
 #include "base/units.hpp"
-#include "terrace/terrain/metric_choice.hpp"
 #include "cli/crs_options.hpp"
 #include "cli/library_call.hpp"
 #include "mesh/mesh_output.hpp"
 #include "mesh/vtk_file.hpp"
 #include "scan/surface_run.hpp"
 #include "surface/detail.hpp"
+#include "terrace/terrain/metric_choice.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {

@@ -50,8 +50,8 @@ struct BuildOutcome {
 /// Streams the inputs once into a store: reads ahead on a thread of its own, clusters and encodes
 /// blocks on the context's threads, appends in order. Same input, options and seed: same bytes.
 /// Takes 256 MiB of memory unless the context gives another bound; reports "points".
-/// Throws: stream::Error; stream::Stopped if the context asks to stop. No store stands then, and one
-/// that was to be replaced still does.
+/// Throws: stream::Error; stream::Stopped if the context asks to stop. No store stands then, and
+/// one that was to be replaced still does.
 BuildOutcome build_store(const BuildRequest& request, const Context& context = {});
 
 /// "fast", "default", "fine", "full" and back.

@@ -21,9 +21,9 @@ struct Progress {
 /// How a job runs: passed to everything in this library that takes long. A job reads it and never
 /// changes it; whoever starts two jobs at once gives each its own.
 struct Context {
-  unsigned threads = 1;                       ///< at most; results do not depend on it
+  unsigned threads = 1;                         ///< at most; results do not depend on it
   std::optional<std::uint64_t> memory_bytes{};  ///< at most, if given
-  std::stop_token stop{};                     ///< ends the work with stream::Stopped
+  std::stop_token stop{};                       ///< ends the work with stream::Stopped
   /// Called now and then, by one thread at a time; what it throws ends the work.
   std::function<void(const Progress&)> progress{};
   /// What the user should know of the result: an assumption that was made, and the like.

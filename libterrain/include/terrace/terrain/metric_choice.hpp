@@ -10,8 +10,8 @@
 
 namespace terrace::terrain {
 
-/// The metric that points are clustered by. Semi-axes are in ground units (metres), boxes in the coordinates of the
-/// CRS.
+/// The metric that points are clustered by. Semi-axes are in ground units (metres), boxes in the
+/// coordinates of the CRS.
 struct MetricChoice {
   struct Region {
     std::optional<stream::Box3> box;  ///< none: everywhere

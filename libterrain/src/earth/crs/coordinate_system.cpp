@@ -6,8 +6,8 @@
 
 #include <GeographicLib/Geocentric.hpp>
 
-#include "earth/crs/projection_batch.hpp"
 #include "base/portable_math.hpp"
+#include "earth/crs/projection_batch.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::terrain {

@@ -4,8 +4,8 @@
 #include <string>
 #include <string_view>
 
-#include "earth/crs/crs_wkt_parts.hpp"
 #include "base/portable_math.hpp"
+#include "earth/crs/crs_wkt_parts.hpp"
 
 namespace terrace::terrain {
 namespace {

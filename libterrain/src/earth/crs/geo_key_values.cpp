@@ -3,8 +3,8 @@
 
 #include <cmath>
 
-#include "earth/crs/crs_definition.hpp"
 #include "base/portable_math.hpp"
+#include "earth/crs/crs_definition.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -10,8 +10,8 @@
 #include <GeographicLib/PolarStereographic.hpp>
 #include <GeographicLib/TransverseMercator.hpp>
 
-#include "earth/crs/projection_batch.hpp"
 #include "base/portable_math.hpp"
+#include "earth/crs/projection_batch.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -4,8 +4,8 @@
 
 #include <GeographicLib/LambertConformalConic.hpp>
 
-#include "earth/crs/projection_batch.hpp"
 #include "base/portable_math.hpp"
+#include "earth/crs/projection_batch.hpp"
 
 namespace terrace::terrain {
 namespace {

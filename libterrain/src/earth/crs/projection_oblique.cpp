@@ -5,8 +5,8 @@
 
 #include <GeographicLib/Ellipsoid.hpp>
 
-#include "earth/crs/projection_batch.hpp"
 #include "base/portable_math.hpp"
+#include "earth/crs/projection_batch.hpp"
 
 // Formulas of IOGP Publication 373-7-2 (2019), "Guidance Note 7-2", under their method codes, and
 // of Snyder (1987). What they write with the powers and logarithms of sines is GeographicLib's

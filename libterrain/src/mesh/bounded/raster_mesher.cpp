@@ -11,10 +11,10 @@
 #include "base/error.hpp"
 #include "base/interrupt.hpp"
 #include "base/ordered_work.hpp"
+#include "base/portable_math.hpp"
 #include "base/progress_report.hpp"
 #include "base/units.hpp"
 #include "earth/ground.hpp"
-#include "base/portable_math.hpp"
 #include "mesh/bounded/lattice_plan.hpp"
 #include "mesh/bounded/window_joiner.hpp"
 

@@ -9,10 +9,10 @@
 
 #include <terrace/stream/error.hpp>
 
+#include "base/portable_math.hpp"
 #include "base/region_overlap.hpp"
 #include "base/stopwatch.hpp"
 #include "base/units.hpp"
-#include "base/portable_math.hpp"
 
 namespace terrace::terrain {
 namespace {

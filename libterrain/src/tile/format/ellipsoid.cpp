@@ -5,8 +5,8 @@
 #include <cassert>
 #include <cmath>
 
-#include "base/vector.hpp"
 #include "base/portable_math.hpp"
+#include "base/vector.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -6,9 +6,9 @@
 #include <string>
 #include <utility>
 
+#include "base/portable_math.hpp"
 #include "base/units.hpp"
 #include "base/vector.hpp"
-#include "base/portable_math.hpp"
 #include "tile/format/ellipsoid.hpp"
 #include "tile/make/tile_sides.hpp"
 
