@@ -18,20 +18,21 @@ namespace terrace::terrain {
 
 /// What is to be built, and how.
 struct BuildRequest {
-  std::vector<std::string> inputs;
-  std::filesystem::path store;
+  std::vector<std::string>
+      inputs{};  ///< rasters (several form a mosaic) or point files; - is standard input
+  std::filesystem::path store{};  ///< a folder that is made
   bool replace = false;
-  std::string input_format;        ///< empty: told by content
-  std::optional<stream::Crs> crs;  ///< replaces the source's
+  std::string input_format{};        ///< empty: told by content
+  std::optional<stream::Crs> crs{};  ///< replaces the source's
   /// To WGS 84, for a CRS of another datum (see DatumShift).
-  std::optional<std::array<double, 7>> datum_shift;
-  std::string vertical;  ///< "ellipsoidal", "orthometric" or empty
+  std::optional<std::array<double, 7>> datum_shift{};
+  std::string vertical{};  ///< "ellipsoidal", "orthometric" or empty
   std::size_t block_points = 10000;
   /// Times the diagonal of a block. At 3 clusters hold about 160 points: docs/FIGURES.md.
   double facility_cost = 3.0;
   cluster::Effort effort = cluster::Effort::standard;
   double z_weight = 1.0;
-  MetricChoice metric;  ///< on the ground
+  MetricChoice metric{};  ///< on the ground
   int band = 1;
   std::uint64_t seed = 1;
   /// A trial run that stops after about this many points and leaves no store; 0: read everything.
