@@ -21,7 +21,8 @@ for library in stream cluster matching tri terrain; do
   mkdir "$folder/subprojects/terrace-$library"
   (cd "$source/lib$library" && tar -c --exclude './build*' .) | tar -x -C "$folder/subprojects/terrace-$library"
   cat >>"$folder/meson.build" <<BUILD
-executable('use_$library', 'use_$library.cpp', dependencies : dependency('terrace-$library'))
+executable('use_$library', 'use_$library.cpp', override_options : 'unity=off',
+  dependencies : dependency('terrace-$library'))
 BUILD
 done
 cat >"$folder/use_stream.cpp" <<'CODE'
