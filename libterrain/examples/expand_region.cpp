@@ -21,9 +21,9 @@ int main(int argc, char** argv) {
   std::printf("top: %zu of %llu points\n", model.point_count(), 1ULL * store.points());
 
   // Stored coordinates: columns and rows of a raster.
-  const auto& [low, high] = store.bounds();
-  const auto at = [&](int axis, double part) {
-    return low[axis] + part * (high[axis] - low[axis]);
+  const stream::Box3& box = store.bounds();
+  const auto at = [&box](std::size_t axis, double part) {
+    return box.min[axis] + part * (box.max[axis] - box.min[axis]);
   };
   const tri::Box3 middle = tri::box2(at(0, 0.45), at(1, 0.45), at(0, 0.55), at(1, 0.55));
   const auto& finer = model.refine(middle, 0).changes;
