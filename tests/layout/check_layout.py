@@ -33,7 +33,7 @@ IN_TRI = ['libtri/src', 'libtri/tests', 'libtri/bench', 'libtri/fuzz', 'tests/be
 IN_STREAM = ['libstream/src', 'libstream/tests', 'libstream/bench', 'libstream/fuzz']
 RESTRICTED = [
     (r'CGAL/|boost/|gmp(xx)?\.h|mpfr\.h', IN_TRI),
-    (r'GeographicLib/', ['libterrain/src', 'libterrain/tests', 'tools']),
+    (r'GeographicLib/', ['libterrain/src/earth', 'libterrain/tests']),
     (r'tiff(io|io\.hxx|conf|vers)?\.h|png\.h|zlib\.h|zstd\.h|libdeflate\.h', IN_STREAM),
     (r'lemon/', ['libmatching/src', 'libmatching/tests', 'libmatching/bench']),
     (r'cuda_runtime|cuda\.h|cuda_(device|rounds)',
@@ -50,7 +50,7 @@ RESTRICTED = [
 INEXACT = (r'(?:acosh?|asinh?|atan[2h]?|cbrt|cosh?|erfc?|exp(?:2|m1)?|hypot|[lt]gamma|'
            r'log(?:10|1p|2)?|pow|sincos|sinh?|tanh?)')
 INEXACT_USE = re.compile(rf'\bstd::{INEXACT}[fl]?\b|(?<![\w.>:]){INEXACT}[fl]?\(')
-# The files that may, and why. GeographicLib, which libterrain and tools alone use, is made of such functions too.
+# The files that may, and why. GeographicLib, which libterrain alone uses, is made of such functions too.
 CAMERA = 'the camera: which clusters a view asks for, never what a file holds'
 EARTH = 'places on the earth, by formulas of such functions: ARCHITECTURE.md says what depends on them'
 MAY_DIFFER = {
