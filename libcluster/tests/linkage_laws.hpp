@@ -100,7 +100,7 @@ inline std::vector<std::vector<std::uint32_t>> members_of(const Dendrogram& dend
   return members;
 }
 
-/// Of heights from a matrix of floats: an entry is rounded once.
+/// Relative tolerance of heights computed from a float matrix, whose entries are rounded once.
 inline constexpr double kFloatTolerance = 1e-7;
 
 /// What is wrong with a dendrogram as a run of complete linkage: each row must merge two clusters

@@ -75,7 +75,7 @@ inline double full_diagonal(const OwnedProblem& p) {
   return full_distance(box, 0, 1);
 }
 
-/// Of a client of weight 1; infinite without outliers, whatever the diagonal.
+/// Price of leaving out a client of weight 1; infinite if outliers are not allowed.
 inline double outlier_price(const OwnedProblem& p) {
   return std::isinf(p.outlier_price) ? p.outlier_price : p.outlier_price * full_diagonal(p);
 }

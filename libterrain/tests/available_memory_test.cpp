@@ -82,8 +82,8 @@ TEST_F(CgroupMemory, OfAContainerIsFoundWhereTheMountShowsIt) {
 
 TEST(AvailableMemory, KeepsWithinTheLimitsOfTheProcess) {
 #ifdef __has_feature
-#if __has_feature(thread_sanitizer)
-  GTEST_SKIP() << "ThreadSanitizer's own memory exceeds the limits that are set here";
+#if __has_feature(thread_sanitizer) || __has_feature(address_sanitizer)
+  GTEST_SKIP() << "the sanitizer's own memory exceeds the limits that are set here";
 #endif
 #endif
   for (const auto resource : {RLIMIT_AS, RLIMIT_DATA}) {

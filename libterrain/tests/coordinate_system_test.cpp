@@ -13,9 +13,9 @@
 
 #include <gtest/gtest.h>
 
-#include "base/error.hpp"
 #include "earth/crs/epsg_table.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
 

@@ -9,9 +9,9 @@
 
 #include <gtest/gtest.h>
 
-#include "base/error.hpp"
 #include "temporary_folder.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
 

@@ -5,9 +5,9 @@
 
 #include <gtest/gtest.h>
 
-#include "base/error.hpp"
 #include "temporary_folder.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/terrain/error.hpp"
 #include "terrace/terrain/metric_choice.hpp"
 
 namespace terrace::terrain {

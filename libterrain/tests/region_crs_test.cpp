@@ -5,8 +5,8 @@
 
 #include <gtest/gtest.h>
 
-#include "base/error.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
 

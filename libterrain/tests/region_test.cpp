@@ -8,10 +8,10 @@
 
 #include <gtest/gtest.h>
 
-#include "base/error.hpp"
 #include "base/portable_math.hpp"
 #include "temporary_folder.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
 

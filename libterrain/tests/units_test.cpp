@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "base/error.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
 

@@ -87,7 +87,7 @@ std::vector<Space> hard_points(int round, std::size_t count, std::mt19937_64& ra
   return points;
 }
 
-/// Of whole numbers, some of them with powers of two far apart; invertible.
+/// An invertible matrix of small integers, scaled by powers of two far apart in every fifth round.
 LinearMap3 hard_map(int round, std::mt19937_64& random) {
   while (true) {
     LinearMap3 map;

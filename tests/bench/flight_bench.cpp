@@ -22,7 +22,7 @@
 
 #include <sys/resource.h>
 
-#include "../pipeline/temporary_folder.hpp"
+#include "../../libterrain/tests/temporary_folder.hpp"
 #include "cli/cli.hpp"
 #include "flight_path.hpp"
 #include "flight_viewer.hpp"

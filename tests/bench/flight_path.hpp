@@ -56,7 +56,7 @@ class Flight {
     view.pixel_error = 2.0 / scale;
     return view;
   }
-  /// Of what is seen, in metres; in perspective where the middle of the picture meets the ground.
+  /// Width of the visible ground in metres; in perspective, at the centre of the picture.
   [[nodiscard]] double width() const {
     if (kind_ == Kind::map) return kAspect * map_height();
     return 2.0 * (2.0 * above_) * std::tan(kFov / 2 * std::numbers::pi / 180.0) * kAspect;

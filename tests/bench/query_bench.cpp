@@ -15,7 +15,7 @@
 #include <benchmark/benchmark.h>
 #include <terrace/stream/store.hpp>
 
-#include "../pipeline/temporary_folder.hpp"
+#include "../../libterrain/tests/temporary_folder.hpp"
 #include "base/portable_math.hpp"
 #include "cli/cli.hpp"
 #include "earth/world.hpp"

@@ -19,7 +19,7 @@
 #include <terrace/tri/delaunay2.hpp>
 #include <terrace/tri/multiresolution.hpp>
 
-#include "../pipeline/temporary_folder.hpp"
+#include "../../libterrain/tests/temporary_folder.hpp"
 #include "cli/cli.hpp"
 #include "terrace/terrain/build.hpp"
 #include "terrace/terrain/store_source.hpp"

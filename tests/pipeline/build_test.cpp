@@ -23,7 +23,7 @@
 #include <terrace/stream/store.hpp>
 #include <unistd.h>
 
-#include "temporary_folder.hpp"
+#include "../../libterrain/tests/temporary_folder.hpp"
 
 namespace terrace {
 namespace {

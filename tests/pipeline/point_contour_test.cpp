@@ -24,11 +24,11 @@
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/delaunay2.hpp>
 
-#include "base/error.hpp"
+#include "../../libterrain/tests/temporary_folder.hpp"
 #include "contour/contour_parts.hpp"
 #include "surface/store_window.hpp"
-#include "temporary_folder.hpp"
 #include "terrace/terrain/build.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace {
 namespace {

@@ -19,12 +19,12 @@
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/point_tin.hpp>
 
+#include "../../libterrain/tests/temporary_folder.hpp"
 #include "base/region.hpp"
 #include "mesh/bounded/bounded_mesh.hpp"
 #include "mesh/bounded/streaming_hull.hpp"
 #include "mesh/mesh_file.hpp"
 #include "random.hpp"
-#include "temporary_folder.hpp"
 #include "terrace/terrain/build.hpp"
 
 /// Clouds, and what any mesh of them must be.

@@ -15,10 +15,10 @@
 #include <terrace/tri/delaunay2.hpp>
 #include <terrace/tri/interpolation.hpp>
 
-#include "base/error.hpp"
+#include "../../libterrain/tests/temporary_folder.hpp"
 #include "cloud_case.hpp"
 #include "sample/height_sampler.hpp"
-#include "temporary_folder.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace {
 namespace {

@@ -18,9 +18,9 @@
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/delaunay2.hpp>
 
+#include "../../libterrain/tests/temporary_folder.hpp"
 #include "earth/store_crs.hpp"
 #include "random.hpp"
-#include "temporary_folder.hpp"
 #include "terrace/terrain/build.hpp"
 #include "tile/make/cloud_spacing.hpp"
 #include "tile/make/crowded_leaf.hpp"

@@ -17,8 +17,8 @@
 #include <terrace/tri/delaunay2.hpp>
 #include <terrace/tri/interpolation.hpp>
 
+#include "../../libterrain/tests/temporary_folder.hpp"
 #include "cloud_case.hpp"
-#include "temporary_folder.hpp"
 
 namespace terrace {
 namespace {

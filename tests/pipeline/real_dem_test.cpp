@@ -16,7 +16,7 @@
 #include <terrace/stream/source.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "temporary_folder.hpp"
+#include "../../libterrain/tests/temporary_folder.hpp"
 #include "terrace/terrain/build.hpp"
 
 namespace terrace {

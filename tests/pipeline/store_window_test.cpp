@@ -22,7 +22,7 @@
 #include <terrace/stream/geotiff_writer.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "temporary_folder.hpp"
+#include "../../libterrain/tests/temporary_folder.hpp"
 #include "terrace/terrain/build.hpp"
 
 namespace terrace {

@@ -14,9 +14,9 @@
 #include <terrace/stream/geotiff_writer.hpp>
 #include <terrace/stream/store.hpp>
 
+#include "../../libterrain/tests/temporary_folder.hpp"
 #include "earth/crs/coordinate_system.hpp"
 #include "earth/ground.hpp"
-#include "temporary_folder.hpp"
 #include "terrace/terrain/build.hpp"
 
 namespace terrace {

@@ -7,10 +7,10 @@
 #include <cmath>
 #include <vector>
 
-#include "base/error.hpp"
 #include "earth/crs/coordinate_system.hpp"
 #include "fuzz_target.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::tools {
 

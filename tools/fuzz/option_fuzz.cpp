@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/error.hpp"
 #include "base/region.hpp"
 #include "base/units.hpp"
 #include "cli/smooth_option.hpp"
@@ -15,6 +14,7 @@
 #include "sample/raster_run.hpp"
 #include "scan/surface_run.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/terrain/error.hpp"
 #include "tile/format/tile_address.hpp"
 
 namespace terrace::tools {

@@ -5,10 +5,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include "base/error.hpp"
 #include "base/region.hpp"
 #include "fuzz_target.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/terrain/error.hpp"
 #include "terrace/terrain/metric_choice.hpp"
 
 namespace terrace::tools {

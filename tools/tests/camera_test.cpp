@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "base/error.hpp"
 #include "base/vector.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::tools {
 

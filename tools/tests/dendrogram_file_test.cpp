@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "../../tests/pipeline/temporary_folder.hpp"
+#include "../../libterrain/tests/temporary_folder.hpp"
 #include "picture/draw.hpp"
 #include "terrace/stream/error.hpp"
 

@@ -7,10 +7,10 @@
 
 #include <gtest/gtest.h>
 
-#include "../../tests/pipeline/temporary_folder.hpp"
-#include "base/error.hpp"
+#include "../../libterrain/tests/temporary_folder.hpp"
 #include "picture/draw.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::tools {
 

@@ -9,9 +9,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "base/error.hpp"
 #include "base/units.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "base/error.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
 namespace {

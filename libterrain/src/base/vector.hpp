@@ -10,7 +10,7 @@ inline double dot(const std::array<double, 3>& a, const std::array<double, 3>& b
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/// Of length 1; upward for the zero vector.
+/// Unit vector in the direction of v; +z for the zero vector.
 inline std::array<double, 3> unit(const std::array<double, 3>& v) {
   const double length = std::sqrt(dot(v, v));
   if (!(length > 0)) return {0, 0, 1};

@@ -196,8 +196,6 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   placement.crs = crs.crs;
   const Ground ground(placement, request.z_weight);
   BuildOutcome outcome;
-  if (!crs.note.empty()) outcome.notes.push_back(crs.note);
-  if (!ground.assumption().empty()) outcome.notes.push_back(ground.assumption());
   const std::uint64_t source_bytes = std::max(kSourceMemory, source->reading_bytes());
   const std::size_t payload_bytes = payload_size(info);
   const unsigned threads =
@@ -267,6 +265,8 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   outcome.top = result.top;
   outcome.level_points = result.level_points;
   outcome.level_clusters = result.level_clusters;
+  if (!crs.note.empty()) context.say(crs.note);
+  if (!ground.assumption().empty()) context.say(ground.assumption());
   return outcome;
 }
 

@@ -9,10 +9,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include "base/error.hpp"
 #include "base/portable_math.hpp"
 #include "base/units.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
 namespace {

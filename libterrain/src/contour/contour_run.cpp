@@ -8,10 +8,10 @@
 
 #include <terrace/stream/error.hpp>
 
-#include "base/error.hpp"
 #include "base/units.hpp"
 #include "contour/contour_parts.hpp"
 #include "contour/contour_text.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
 namespace {

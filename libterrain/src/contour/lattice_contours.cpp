@@ -6,10 +6,10 @@
 #include <utility>
 #include <vector>
 
-#include "base/error.hpp"
 #include "base/parallel.hpp"
 #include "contour/contour_lines.hpp"
 #include "contour/contour_parts.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -8,10 +8,10 @@
 
 #include <GeographicLib/Geoid.hpp>
 
-#include "base/error.hpp"
 #include "earth/ground.hpp"
 #include "earth/world.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
 

@@ -4,9 +4,9 @@
 #include <filesystem>
 #include <system_error>
 
-#include "base/error.hpp"
 #include "earth/ground.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -12,11 +12,11 @@
 #include <terrace/tri/metric_triangles.hpp>
 #include <terrace/tri/multiresolution.hpp>
 
-#include "base/error.hpp"
 #include "base/interrupt.hpp"
 #include "base/region_overlap.hpp"
 #include "earth/ground.hpp"
 #include "earth/world.hpp"
+#include "terrace/terrain/error.hpp"
 #include "terrace/terrain/store_source.hpp"
 
 namespace terrace::terrain {

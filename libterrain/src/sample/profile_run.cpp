@@ -12,7 +12,6 @@
 #include <nlohmann/json.hpp>
 #include <terrace/stream/error.hpp>
 
-#include "base/error.hpp"
 #include "base/fixed_text.hpp"
 #include "base/interrupt.hpp"
 #include "base/output.hpp"
@@ -21,6 +20,7 @@
 #include "earth/line_distance.hpp"
 #include "sample/surface_crossings.hpp"
 #include "surface/ground_slope.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -11,11 +11,11 @@
 
 #include <terrace/stream/error.hpp>
 
-#include "base/error.hpp"
 #include "base/portable_math.hpp"
 #include "base/units.hpp"
 #include "earth/store_crs.hpp"
 #include "earth/world.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -12,12 +12,12 @@
 
 #include <terrace/stream/geotiff_writer.hpp>
 
-#include "base/error.hpp"
 #include "base/parallel.hpp"
 #include "earth/store_crs.hpp"
 #include "sample/raster_grid.hpp"
 #include "sample/raster_shader.hpp"
 #include "surface/ground_slope.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -7,8 +7,8 @@
 #include <string>
 #include <utility>
 
-#include "base/error.hpp"
 #include "earth/world.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
 

@@ -13,11 +13,11 @@
 #include <CLI/CLI.hpp>
 #include <terrace/cluster/cuda_linkage.hpp>
 
-#include "base/error.hpp"
 #include "base/interrupt.hpp"
 #include "base/terminal.hpp"
 #include "base/units.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/terrain/error.hpp"
 #include "version.hpp"
 
 namespace terrace::tools {

@@ -45,7 +45,7 @@ struct CommonOptions {
   [[nodiscard]] terrain::Context context() const;
 };
 
-/// The memory that `build` and `synth` grant themselves.
+/// The memory that `synth` takes unless --memory says otherwise.
 inline constexpr std::uint64_t kStreamingMemory = std::uint64_t{256} << 20;
 
 /// A verb. Life: constructed, define(), options parsed into its members, run().

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/smooth_option.hpp"
 
-#include "base/error.hpp"
 #include "base/units.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::tools {
 

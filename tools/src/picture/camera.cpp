@@ -4,10 +4,10 @@
 #include <cmath>
 #include <vector>
 
-#include "base/error.hpp"
 #include "base/portable_math.hpp"
 #include "base/units.hpp"
 #include "base/vector.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::tools {
 

@@ -10,7 +10,6 @@
 
 #include <CLI/CLI.hpp>
 
-#include "base/error.hpp"
 #include "base/interrupt.hpp"
 #include "earth/ground.hpp"
 #include "mesh/mesh_file.hpp"
@@ -21,6 +20,7 @@
 #include "tables/column_value.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/source.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::tools {
 

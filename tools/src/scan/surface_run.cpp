@@ -9,11 +9,11 @@
 #include <terrace/stream/error.hpp>
 #include <terrace/tri/shape.hpp>
 
-#include "base/error.hpp"
 #include "base/units.hpp"
 #include "earth/ground.hpp"
 #include "earth/world.hpp"
 #include "mesh/store_mesh.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::tools {
 

@@ -7,10 +7,10 @@
 #include <charconv>
 #include <cmath>
 
-#include "base/error.hpp"
 #include "base/portable_math.hpp"
 #include "base/units.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::tools {
 

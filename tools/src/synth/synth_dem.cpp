@@ -13,10 +13,10 @@
 #include <optional>
 #include <vector>
 
-#include "base/error.hpp"
 #include "base/interrupt.hpp"
 #include "base/parallel.hpp"
 #include "terrace/stream/geotiff_writer.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::tools {
 

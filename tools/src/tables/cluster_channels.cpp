@@ -3,8 +3,8 @@
 
 #include <cstddef>
 
-#include "base/error.hpp"
 #include "base/units.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::tools {
 

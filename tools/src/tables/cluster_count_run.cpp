@@ -6,8 +6,8 @@
 #include <terrace/cluster/k_means.hpp>
 #include <terrace/cluster/k_median.hpp>
 
-#include "base/error.hpp"
 #include "tables/cluster_methods.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::tools {
 

@@ -5,8 +5,8 @@
 #include <terrace/cluster/cuda_linkage.hpp>
 #include <terrace/cluster/single_linkage.hpp>
 
-#include "base/error.hpp"
 #include "tables/cluster_methods.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::tools {
 

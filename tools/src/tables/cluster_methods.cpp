@@ -7,7 +7,7 @@
 #include <utility>
 #include <variant>
 
-#include "base/error.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::tools {
 

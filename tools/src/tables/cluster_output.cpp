@@ -6,11 +6,11 @@
 #include <utility>
 #include <vector>
 
-#include "base/error.hpp"
 #include "base/interrupt.hpp"
 #include "base/output.hpp"
 #include "terrace/stream/point_writer.hpp"
 #include "terrace/stream/sink.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::tools {
 

@@ -4,8 +4,8 @@
 #include <array>
 #include <utility>
 
-#include "base/error.hpp"
 #include "tables/cluster_methods.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::tools {
 

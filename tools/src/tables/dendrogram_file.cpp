@@ -3,13 +3,13 @@
 
 #include <string_view>
 
-#include "base/error.hpp"
 #include "base/interrupt.hpp"
 #include "base/output.hpp"
 #include "base/units.hpp"
 #include "tables/csv_rows.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/sink.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::tools {
 

@@ -5,12 +5,12 @@
 #include <cmath>
 #include <limits>
 
-#include "base/error.hpp"
 #include "base/output.hpp"
 #include "base/units.hpp"
 #include "tables/csv_rows.hpp"
 #include "tables/point_table.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::tools {
 

@@ -5,7 +5,6 @@
 #include <memory>
 #include <utility>
 
-#include "base/error.hpp"
 #include "base/interrupt.hpp"
 #include "base/units.hpp"
 #include "earth/world.hpp"
@@ -13,6 +12,7 @@
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/point_writer.hpp"
 #include "terrace/stream/raster.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::tools {
 

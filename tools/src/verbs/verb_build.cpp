@@ -11,11 +11,11 @@
 #include <CLI/CLI.hpp>
 #include <terrace/stream/error.hpp>
 
-#include "base/error.hpp"
 #include "base/interrupt.hpp"
 #include "base/units.hpp"
 #include "earth/crs/coordinate_system.hpp"
 #include "terrace/terrain/build.hpp"
+#include "terrace/terrain/error.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
@@ -88,7 +88,6 @@ class BuildCommand final : public Command {
   Summary build(const CommonOptions& common) {
     const Stopwatch watch;
     const BuildOutcome outcome = build_store(request_, common.context());
-    for (const std::string& note : outcome.notes) common.say(note);
     const double seconds = watch.seconds();
     const double rate = static_cast<double>(outcome.points) / seconds;
     Summary summary;
@@ -119,6 +118,7 @@ class BuildCommand final : public Command {
     const Stopwatch watch;
     Context context = common.context();
     context.progress = nullptr;
+    context.note = nullptr;
     const BuildOutcome trial = build_store(request_, context);
     const double seconds = watch.seconds();
 

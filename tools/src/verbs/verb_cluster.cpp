@@ -9,7 +9,6 @@
 
 #include <CLI/CLI.hpp>
 
-#include "base/error.hpp"
 #include "base/interrupt.hpp"
 #include "base/output.hpp"
 #include "base/units.hpp"
@@ -22,6 +21,7 @@
 #include "tables/point_table.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/build.hpp"
+#include "terrace/terrain/error.hpp"
 #include "terrace/terrain/metric_choice.hpp"
 #include "verbs/verbs.hpp"
 

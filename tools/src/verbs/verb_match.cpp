@@ -10,7 +10,6 @@
 
 #include <CLI/CLI.hpp>
 
-#include "base/error.hpp"
 #include "base/interrupt.hpp"
 #include "base/output.hpp"
 #include "base/portable_math.hpp"
@@ -20,6 +19,7 @@
 #include "tables/match_run.hpp"
 #include "tables/point_table.hpp"
 #include "terrace/stream/sink.hpp"
+#include "terrace/terrain/error.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {

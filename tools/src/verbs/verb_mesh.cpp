@@ -8,7 +8,6 @@
 #include <terrace/stream/overlay.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "base/error.hpp"
 #include "base/interrupt.hpp"
 #include "base/output.hpp"
 #include "base/units.hpp"
@@ -19,6 +18,7 @@
 #include "mesh/mesh_output.hpp"
 #include "mesh/store_mesh.hpp"
 #include "surface/detail.hpp"
+#include "terrace/terrain/error.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {

@@ -7,11 +7,11 @@
 #include <CLI/CLI.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "base/error.hpp"
 #include "base/output.hpp"
 #include "base/units.hpp"
 #include "cli/crs_options.hpp"
 #include "sample/raster_run.hpp"
+#include "terrace/terrain/error.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {

@@ -10,7 +10,6 @@
 #include <CLI/CLI.hpp>
 #include <terrace/tri/interpolation.hpp>
 
-#include "base/error.hpp"
 #include "base/interrupt.hpp"
 #include "base/output.hpp"
 #include "base/units.hpp"
@@ -25,6 +24,7 @@
 #include "tables/matching_result.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/png.hpp"
+#include "terrace/terrain/error.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {

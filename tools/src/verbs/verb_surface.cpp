@@ -7,7 +7,6 @@
 #include <CLI/CLI.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "base/error.hpp"
 #include "base/output.hpp"
 #include "base/units.hpp"
 #include "cli/crs_options.hpp"
@@ -16,6 +15,7 @@
 #include "mesh/vtk_file.hpp"
 #include "scan/surface_run.hpp"
 #include "surface/detail.hpp"
+#include "terrace/terrain/error.hpp"
 #include "terrace/terrain/metric_choice.hpp"
 #include "verbs/verbs.hpp"
 

@@ -8,7 +8,6 @@
 
 #include <CLI/CLI.hpp>
 
-#include "base/error.hpp"
 #include "base/interrupt.hpp"
 #include "base/output.hpp"
 #include "base/parallel.hpp"
@@ -18,6 +17,7 @@
 #include "synth/synth_cloud.hpp"
 #include "synth/synth_dem.hpp"
 #include "terrace/stream/point_writer.hpp"
+#include "terrace/terrain/error.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {

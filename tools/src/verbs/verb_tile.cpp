@@ -12,9 +12,9 @@
 #include <terrace/stream/error.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "base/error.hpp"
 #include "base/units.hpp"
 #include "mesh/bounded/bounded_mesh.hpp"
+#include "terrace/terrain/error.hpp"
 #include "tile/make/tile_source.hpp"
 #include "tile/set/tile_file.hpp"
 #include "tile/set/tile_inputs.hpp"

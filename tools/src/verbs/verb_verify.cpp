@@ -11,8 +11,8 @@
 #include <terrace/stream/error.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "base/error.hpp"
 #include "base/units.hpp"
+#include "terrace/terrain/error.hpp"
 #include "tile/make/tile_source.hpp"
 #include "tile/verify/tile_check.hpp"
 #include "verbs/verbs.hpp"

@@ -18,9 +18,9 @@ namespace terrace::terrain {
 
 /// What is to be built, and how.
 struct BuildRequest {
-  std::vector<std::string>
-      inputs{};  ///< rasters (several form a mosaic) or point files; - is standard input
-  std::filesystem::path store{};  ///< a folder that is made
+  /// Rasters (several form a mosaic) or point files; "-" is standard input.
+  std::vector<std::string> inputs{};
+  std::filesystem::path store{};  ///< the folder to create
   bool replace = false;
   std::string input_format{};        ///< empty: told by content
   std::optional<stream::Crs> crs{};  ///< replaces the source's
@@ -45,12 +45,12 @@ struct BuildOutcome {
   std::uint64_t store_bytes = 0;
   unsigned top = 0;
   std::vector<std::uint64_t> level_points, level_clusters;
-  std::vector<std::string> notes;  ///< what the user should know: unknown CRS and the like
 };
 
 /// Streams the inputs once into a store: reads ahead on a thread of its own, clusters and encodes
 /// blocks on the context's threads, appends in order. Same input, options and seed: same bytes.
-/// Takes 256 MiB of memory unless the context gives another bound; reports "points".
+/// Takes 256 MiB of memory unless the context gives another bound; reports "points", and
+/// at the end notes an unknown CRS and the like.
 /// Throws: stream::Error; stream::Stopped if the context asks to stop. No store stands then, and
 /// one that was to be replaced still does.
 BuildOutcome build_store(const BuildRequest& request, const Context& context = {});

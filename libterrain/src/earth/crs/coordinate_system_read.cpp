@@ -8,7 +8,6 @@
 #include <string_view>
 #include <system_error>
 
-#include "base/error.hpp"
 #include "base/units.hpp"
 #include "earth/crs/coordinate_system.hpp"
 #include "earth/crs/crs_geo_keys.hpp"
@@ -16,6 +15,7 @@
 #include "earth/crs/wkt.hpp"
 #include "earth/ground.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
 namespace {

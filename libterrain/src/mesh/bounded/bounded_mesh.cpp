@@ -7,8 +7,8 @@
 
 #include <terrace/stream/error.hpp>
 
-#include "base/error.hpp"
 #include "base/units.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -5,12 +5,12 @@
 
 #include <terrace/stream/error.hpp>
 
-#include "base/error.hpp"
 #include "mesh/bounded/bounded_mesh.hpp"
 #include "mesh/bounded/keep_memory.hpp"
 #include "mesh/bounded/least_error.hpp"
 #include "mesh/bounded/mesh_spool.hpp"
 #include "mesh/bounded/point_mesher.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
 

@@ -10,7 +10,6 @@
 
 #include <terrace/stream/error.hpp>
 
-#include "base/error.hpp"
 #include "base/interrupt.hpp"
 #include "base/ordered_work.hpp"
 #include "base/progress_report.hpp"
@@ -18,6 +17,7 @@
 #include "mesh/bounded/point_mesh_estimate.hpp"
 #include "mesh/bounded/point_mesh_joiner.hpp"
 #include "mesh/bounded/point_mesh_sides.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
 namespace {

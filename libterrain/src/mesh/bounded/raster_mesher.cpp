@@ -8,7 +8,6 @@
 
 #include <terrace/stream/error.hpp>
 
-#include "base/error.hpp"
 #include "base/interrupt.hpp"
 #include "base/ordered_work.hpp"
 #include "base/portable_math.hpp"
@@ -17,6 +16,7 @@
 #include "earth/ground.hpp"
 #include "mesh/bounded/lattice_plan.hpp"
 #include "mesh/bounded/window_joiner.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -5,10 +5,10 @@
 #include <optional>
 #include <utility>
 
-#include "base/error.hpp"
 #include "base/units.hpp"
 #include "earth/geoid_heights.hpp"
 #include "earth/store_crs.hpp"
+#include "terrace/terrain/error.hpp"
 #include "tile/make/point_tile_surface.hpp"
 #include "tile/make/raster_tile_surface.hpp"
 

@@ -10,8 +10,8 @@
 #include <terrace/stream/atomic_file.hpp>
 #include <terrace/stream/error.hpp>
 
-#include "base/error.hpp"
 #include "base/units.hpp"
+#include "terrace/terrain/error.hpp"
 #include "tile/set/tile_file.hpp"
 #include "tile/set/tile_journal.hpp"
 #include "tile/set/tile_set_writer.hpp"

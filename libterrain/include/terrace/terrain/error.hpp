@@ -6,8 +6,8 @@
 
 namespace terrace::terrain {
 
-/// Wrong usage of the command: an option or value that makes no sense. Ends the command with exit
-/// code 2. (What is wrong with data is a stream::Error and ends it with 1.)
+/// An option or value that makes no sense, whatever the data is. (What is wrong with data is a
+/// stream::Error.)
 class UsageError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
