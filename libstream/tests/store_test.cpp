@@ -47,6 +47,30 @@ TEST(Store, OnePointComesBack) {
   EXPECT_TRUE(store.verify(testing::expect_no_problem));
 }
 
+TEST(Store, ReadingEndsOnceItIsAskedToStop) {
+  const TemporaryFolder folder;
+  StoreWriter writer(folder.path() / "s", testing::cloud_schema());
+  StandInHierarchy hierarchy(writer, {});
+  hierarchy.push(std::vector<Point3>{{1, 2, 3}, {4, 5, 6}});
+  hierarchy.finish();
+  const Store store = Store::open(folder.path() / "s");
+  std::stop_source stop, other;
+  const Store stopped = store.with_stop(stop.get_token());
+  const Store goes_on = stopped.with_stop(other.get_token());
+  const auto points = testing::all_points(store);
+  EXPECT_EQ(testing::all_points(stopped), points);
+  stop.request_stop();
+  ClusterPoints cluster;
+  EXPECT_THROW(stopped.read(stopped.root(), cluster), Stopped);
+  EXPECT_THROW(static_cast<void>(stopped.record(stopped.root())), Stopped);
+  EXPECT_THROW(testing::all_points(stopped), Stopped);
+  EXPECT_THROW(stopped.verify(testing::expect_no_problem), Stopped);
+  for (const Store* unstopped : {&store, &goes_on}) {
+    EXPECT_EQ(testing::all_points(*unstopped), points);
+    EXPECT_TRUE(unstopped->verify(testing::expect_no_problem));
+  }
+}
+
 /// Rasters of every sample type, smooth and rough, come back bit for bit.
 TEST(Store, GridsComeBackBitForBit) {
   for (const ScalarType type : testing::kAllTypes) {

@@ -11,7 +11,9 @@
 #include <map>
 #include <set>
 #include <span>
+#include <stop_token>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -103,6 +105,36 @@ TEST_F(Build, GivesTheSameBytesForAnyNumberOfThreads) {
     terrain::build_store(request_, {.threads = threads});
     EXPECT_TRUE(files_of(request_.store) == one);
   }
+}
+
+TEST_F(Build, OneOfTwoAtOnceIsGivenUpAndTheOtherGoesOn) {
+  terrain::build_store(request_);
+  const auto expected = files_of(request_.store);
+  std::stop_source stop;
+  bool given_up = false;
+  std::thread other([&] {
+    terrain::BuildRequest request = request_;
+    request.store = folder_.path() / "given_up";
+    try {
+      terrain::build_store(request, {.threads = 2,
+                                     .stop = stop.get_token(),
+                                     .progress = [&](const terrain::Progress& progress) {
+                                       if (progress.count > 0) stop.request_stop();
+                                     }});
+    } catch (const stream::Stopped&) {
+      given_up = true;
+    }
+  });
+  request_.store = folder_.path() / "finished";
+  terrain::build_store(request_, {.threads = 2});
+  other.join();
+  EXPECT_TRUE(given_up);
+  EXPECT_TRUE(files_of(request_.store) == expected);
+  std::set<std::string> left;
+  for (const auto& entry : fs::directory_iterator(folder_.path())) {
+    left.insert(entry.path().filename().string());
+  }
+  EXPECT_EQ(left, (std::set<std::string>{"a.store", "dem.tif", "finished"}));
 }
 
 TEST_F(Build, RefusesAnOutputThatExistsAndKeepsIt) {

@@ -334,7 +334,7 @@ TEST(TileCandidates, AreAllThatMayHaveSamples) {
     const terrain::TiledCloud tiled = all.tiled();
     terrain::PointTileSurface surface(tiled);
     for (const unsigned zoom : {0U, 1U, 4U, 9U}) {
-      const auto tiles = terrain::tiles_with_samples(surface, zoom);
+      const auto tiles = terrain::tiles_with_samples(surface, zoom, {});
       std::set<std::pair<std::uint32_t, std::uint32_t>> found;
       for (const terrain::TileAddress& tile : tiles) found.insert({tile.y, tile.x});
       EXPECT_EQ(found.size(), tiles.size());

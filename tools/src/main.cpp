@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "base/terminal.hpp"
 #include "cli/cli.hpp"
+#include "cli/terminal.hpp"
 
 int main(int argc, char** argv) {
   terrace::tools::secure_standard_descriptors();

@@ -48,10 +48,17 @@ struct Store::Impl {
   }
 };
 
-Store::Store(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
-Store::Store(Store&&) noexcept = default;
-Store& Store::operator=(Store&&) noexcept = default;
-Store::~Store() = default;
+Store::Store(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+Store Store::with_stop(std::stop_token stop) const {
+  Store other = *this;
+  other.stop_ = std::move(stop);
+  return other;
+}
+
+void Store::check_stop() const {
+  if (stop_.stop_requested()) throw Stopped();
+}
 
 Store Store::open(const std::filesystem::path& path) {
   const auto manifest_path = path / kManifestName;
@@ -62,7 +69,7 @@ Store Store::open(const std::filesystem::path& path) {
                  .cause = "there is no store here",
                  .remedy = "name a folder that terrace build has written"});
   }
-  auto impl = std::make_unique<Impl>();
+  auto impl = std::make_shared<Impl>();
   impl->path = path;
   const std::string text = read_whole(manifest_path, kMostManifestBytes);
   impl->manifest = parse_manifest(text, manifest_path);
@@ -98,6 +105,7 @@ double Store::mean_height() const { return impl_->manifest.mean_height; }
 ClusterId Store::root() const { return cluster_id(top(), 0); }
 
 ClusterRecord Store::record(ClusterId id) const {
+  check_stop();
   const LevelReader& level = impl_->level(level_of(id));
   std::uint64_t offset = 0;
   const Entry entry = level.entry(ordinal_of(id), offset);
@@ -105,6 +113,7 @@ ClusterRecord Store::record(ClusterId id) const {
 }
 
 void Store::read(ClusterId id, ClusterPoints& out) const {
+  check_stop();
   const LevelReader& level = impl_->level(level_of(id));
   auto space = impl_->borrow();
   level.read(ordinal_of(id), *space, out);
@@ -130,6 +139,7 @@ void Store::for_each(
     const std::uint64_t start = page.offset(0);
     std::uint64_t offset = start;
     for (std::uint32_t i = 0; i < page.clusters(); ++i) {
+      check_stop();
       const std::uint64_t ordinal = first + i;
       Entry entry;
       try {
@@ -149,7 +159,7 @@ void Store::for_each(
 }
 
 bool Store::verify(const std::function<void(const Problem&)>& report) const {
-  return verify_store(*this, impl_->manifest, impl_->levels, report);
+  return verify_store(*this, impl_->manifest, impl_->levels, stop_, report);
 }
 
 }  // namespace terrace::stream

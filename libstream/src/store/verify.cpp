@@ -43,9 +43,9 @@ bool holds(const Box3& outer, const Box3& inner) {
 class Verification {
  public:
   Verification(const Store& store, const Manifest& manifest,
-               const std::vector<std::unique_ptr<LevelReader>>& levels,
+               const std::vector<std::unique_ptr<LevelReader>>& levels, const std::stop_token& stop,
                const std::function<void(const Problem&)>& report)
-      : store_(store), manifest_(manifest), levels_(levels), report_(report) {}
+      : store_(store), manifest_(manifest), levels_(levels), stop_(stop), report_(report) {}
 
   bool run() {
     check_manifest();
@@ -73,6 +73,10 @@ class Verification {
             "cluster " + std::to_string(level) + "/" + std::to_string(ordinal) + ": " + what);
   }
 
+  void check_stop() const {
+    if (stop_.stop_requested()) throw Stopped();
+  }
+
   void check_manifest() {
     const auto path = store_.path() / kManifestName;
     try {
@@ -89,6 +93,7 @@ class Verification {
       Bytes bytes(1u << 20);
       std::uint32_t checksum = 0;
       for (std::uint64_t offset = 0; offset < file.size(); offset += bytes.size()) {
+        check_stop();
         bytes.resize(std::min<std::uint64_t>(bytes.size(), file.size() - offset));
         file.read(offset, bytes);
         checksum = crc32(checksum, bytes.data(), bytes.size());
@@ -122,6 +127,7 @@ class Verification {
   }
 
   void check_page(unsigned l, std::uint64_t number, std::uint64_t& data_end) {
+    check_stop();
     const LevelReader& level = *levels_[l];
     const auto page = level.page(number);
     if (page->offset(0) != data_end) {
@@ -250,6 +256,7 @@ class Verification {
   const Store& store_;
   const Manifest& manifest_;
   const std::vector<std::unique_ptr<LevelReader>>& levels_;
+  const std::stop_token& stop_;
   const std::function<void(const Problem&)>& report_;
   std::vector<LevelSums> sums_;
   ReadSpace space_;
@@ -264,8 +271,8 @@ class Verification {
 
 bool verify_store(const Store& store, const Manifest& manifest,
                   const std::vector<std::unique_ptr<LevelReader>>& levels,
-                  const std::function<void(const Problem&)>& report) {
-  return Verification(store, manifest, levels, report).run();
+                  const std::stop_token& stop, const std::function<void(const Problem&)>& report) {
+  return Verification(store, manifest, levels, stop, report).run();
 }
 
 }  // namespace terrace::stream::store

@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <memory>
+#include <stop_token>
 #include <vector>
 
 #include "level_reader.hpp"
@@ -14,6 +15,6 @@ namespace terrace::stream::store {
 /// Memory: two bits per cluster and some buffers.
 bool verify_store(const Store& store, const Manifest& manifest,
                   const std::vector<std::unique_ptr<LevelReader>>& levels,
-                  const std::function<void(const Problem&)>& report);
+                  const std::stop_token& stop, const std::function<void(const Problem&)>& report);
 
 }  // namespace terrace::stream::store

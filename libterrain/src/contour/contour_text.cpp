@@ -9,7 +9,7 @@
 
 #include <terrace/stream/error.hpp>
 
-#include "base/output.hpp"
+#include "base/file_marks.hpp"
 #include "base/parallel.hpp"
 #include "base/units.hpp"
 #include "earth/store_crs.hpp"

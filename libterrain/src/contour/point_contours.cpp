@@ -9,7 +9,6 @@
 #include <utility>
 #include <vector>
 
-#include "base/interrupt.hpp"
 #include "base/ordered_work.hpp"
 #include "contour/contour_parts.hpp"
 #include "contour/contour_triangles.hpp"
@@ -85,7 +84,6 @@ class PointContours {
           return crossed(*window, static_cast<std::uint32_t>(i));
         },
         [&](std::size_t i, const Crossed& triangles) {
-          check_interrupt();
           lines.add(triangles.own);
           // Several parts meet such a one.
           const auto middle =

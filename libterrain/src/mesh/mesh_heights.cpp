@@ -6,8 +6,6 @@
 #include <cstddef>
 #include <span>
 
-#include "base/interrupt.hpp"
-
 namespace terrace::terrain {
 namespace {
 
@@ -42,7 +40,6 @@ void apply_changes(stream::Overlay& overlay, const std::vector<Named>& vertices,
   for (std::size_t i = 0; i < vertices.size(); ++i) {
     const tri::PointId& point = vertices[i].point;
     if (i == 0 || point.cluster != vertices[i - 1].point.cluster) {
-      check_interrupt();
       values = overlay.find(stored_id(point.cluster));
       next = 0;
     }

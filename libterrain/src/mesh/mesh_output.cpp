@@ -6,14 +6,13 @@
 #include <span>
 #include <vector>
 
-#include "base/interrupt.hpp"
-#include "base/output.hpp"
+#include "base/file_marks.hpp"
 #include "terrace/stream/mesh_writer.hpp"
 
 namespace terrace::terrain {
 
-void write_mesh(const std::string& path, const std::string& format, const TriangleMesh& mesh,
-                bool replace) {
+void write_mesh(const std::string& path, const TriangleMesh& mesh,
+                const stream::WriterOptions& options) {
   constexpr std::size_t kPiece = 65536;
   stream::Box3 bounds;
   for (const stream::Point3& p : mesh.positions) bounds.include(p);
@@ -23,8 +22,7 @@ void write_mesh(const std::string& path, const std::string& format, const Triang
   if (!mesh.levels.empty()) header.attributes = {"level"};
   header.comments = {kWriterMark};
   if (!bounds.empty()) header.bounds = bounds;
-  const auto writer = stream::open_mesh_writer(
-      path, header, {.format = format, .replace = replace, .stop = stop_token()});
+  const auto writer = stream::open_mesh_writer(path, header, options);
   std::vector<float> levels;
   const std::span vertices(mesh.positions);
   for (std::size_t at = 0; at < vertices.size(); at += kPiece) {

@@ -3,13 +3,14 @@
 
 #include <string>
 
+#include <terrace/stream/point_writer.hpp>
+
 #include "mesh/scene.hpp"
 
 namespace terrace::terrain {
 
-/// Writes a mesh as the format says (empty: as the file's ending says), with its levels where it
-/// has any. Throws: stream::Error.
-void write_mesh(const std::string& path, const std::string& format, const TriangleMesh& mesh,
-                bool replace);
+/// Writes a mesh, with its levels where it has any. Throws: stream::Error, stream::Stopped.
+void write_mesh(const std::string& path, const TriangleMesh& mesh,
+                const stream::WriterOptions& options);
 
 }  // namespace terrace::terrain

@@ -12,7 +12,6 @@
 #include <terrace/tri/metric_triangles.hpp>
 #include <terrace/tri/multiresolution.hpp>
 
-#include "base/interrupt.hpp"
 #include "base/region_overlap.hpp"
 #include "earth/ground.hpp"
 #include "earth/world.hpp"
@@ -183,7 +182,6 @@ TriangleMesh mesh_of(const stream::Store& store, const Detail& detail, const Mes
   }
   const tri::Multiresolution2<Coord> model(source, in_stored_coordinates(detail, placement),
                                            {.deltas = false});
-  check_interrupt();
   std::vector<double> heights;
   if (options.heights.any()) {
     heights = changed_heights(model, placement, detail.region, options.heights);
@@ -214,7 +212,6 @@ TriangleMesh points_of_store(const stream::Store& store, const Detail& detail) {
   for_each_wanted(
       store, detail,
       [&](stream::ClusterId id, const stream::ClusterRecord&, const stream::ClusterPoints& points) {
-        check_interrupt();
         const unsigned level = stream::level_of(id);
         for (std::size_t i = 0; i < points.size(); ++i) {
           const stream::Point3 place = world_point(placement, points.positions[i]);

@@ -5,8 +5,7 @@
 #include <bit>
 #include <cstring>
 
-#include "base/interrupt.hpp"
-#include "base/output.hpp"
+#include "base/file_marks.hpp"
 #include "terrace/stream/atomic_file.hpp"
 
 namespace terrace::terrain {
@@ -27,14 +26,15 @@ constexpr std::size_t kVtkPiece = 65536;
 
 void write_vtk(const std::string& path, std::span<const stream::Point3> positions,
                std::span<const std::uint8_t> levels,
-               std::span<const std::array<std::uint32_t, 4>> tetrahedra, bool replace) {
-  stream::AtomicFile file(path, replace);
+               std::span<const std::array<std::uint32_t, 4>> tetrahedra,
+               const stream::WriterOptions& options) {
+  stream::AtomicFile file(path, options.replace);
   std::string bytes = "# vtk DataFile Version 3.0\n" + std::string(kWriterMark) +
                       "\nBINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS " +
                       std::to_string(positions.size()) + " double\n";
   const auto flush = [&](std::size_t done) {
     if (done % kVtkPiece != 0) return;
-    check_interrupt();
+    if (options.stop.stop_requested()) throw stream::Stopped();
     file.write(bytes);
     bytes.clear();
   };

@@ -7,13 +7,15 @@
 #include <string>
 
 #include "terrace/stream/point.hpp"
+#include "terrace/stream/point_writer.hpp"
 
 namespace terrace::terrain {
 
 /// Writes tetrahedra as a legacy VTK file, binary, an unstructured grid with a "level" per point.
-/// The file appears whole. levels: as many as positions. Throws: stream::Error.
+/// The file appears whole. levels: as many as positions. Throws: stream::Error, stream::Stopped.
 void write_vtk(const std::string& path, std::span<const stream::Point3> positions,
                std::span<const std::uint8_t> levels,
-               std::span<const std::array<std::uint32_t, 4>> tetrahedra, bool replace);
+               std::span<const std::array<std::uint32_t, 4>> tetrahedra,
+               const stream::WriterOptions& options);
 
 }  // namespace terrace::terrain

@@ -59,7 +59,7 @@ class HeightSampler {
 
   /// places: stored coordinates (column and row, or x and y); those that are not finite have no
   /// height. out: as many, in their order; heights in the store's vertical unit, gradients per unit
-  /// of stored coordinates. Throws: stream::Error on damage; Interrupted.
+  /// of stored coordinates. Throws: stream::Error on damage; stream::Stopped.
   virtual void sample(std::span<const Point2> places, std::span<SurfacePoint> out) = 0;
 };
 

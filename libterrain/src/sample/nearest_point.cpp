@@ -7,8 +7,6 @@
 
 #include <terrace/tri/delaunay2.hpp>
 
-#include "base/interrupt.hpp"
-
 namespace terrace::terrain {
 namespace {
 
@@ -53,7 +51,6 @@ void NearestPoint::look_into(const StoreWindow::Node& node, const Point2& place)
 }
 
 Point2 NearestPoint::operator()(const Point2& place) {
-  check_interrupt();
   branches_.clear();
   nearest_.clear();
   // The last answer is no farther than it is; it will be found again if there is nothing nearer.

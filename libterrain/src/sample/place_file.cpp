@@ -7,8 +7,8 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <utility>
 
-#include "base/interrupt.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::terrain {
@@ -103,10 +103,10 @@ std::string_view PlaceBatch::line(std::size_t i) const {
   return line;
 }
 
-PlaceFile::PlaceFile(const std::string& path) : input_(path, stop_token(), kReadAtOnce) {}
+PlaceFile::PlaceFile(const std::string& path, std::stop_token stop)
+    : input_(path, std::move(stop), kReadAtOnce) {}
 
 bool PlaceFile::next(PlaceBatch& batch, std::size_t most_bytes, std::size_t most_lines) {
-  check_interrupt();
   const std::size_t wanted = std::max(most_bytes, kLongestPlaceLine);
   const std::string_view window = input_.fill(wanted);
   const bool ended = window.size() < wanted;

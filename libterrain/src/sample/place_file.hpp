@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <stop_token>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -41,11 +42,12 @@ struct PlaceBatch {
 
 class PlaceFile {
  public:
-  /// path: "-" is standard input. Throws: stream::Error if the file cannot be read.
-  explicit PlaceFile(const std::string& path);
+  /// path: "-" is standard input. stop: ends a wait for more of it.
+  /// Throws: stream::Error if the file cannot be read.
+  explicit PlaceFile(const std::string& path, std::stop_token stop = {});
 
   /// The next whole lines, at most `most_lines` and about `most_bytes` of them; false at the end.
-  /// Throws: stream::Error on a line longer than a mebibyte, Interrupted.
+  /// Throws: stream::Error on a line longer than a mebibyte, stream::Stopped.
   bool next(PlaceBatch& batch, std::size_t most_bytes, std::size_t most_lines);
   /// As messages call it.
   [[nodiscard]] const std::string& name() const { return input_.name(); }

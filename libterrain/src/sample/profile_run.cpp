@@ -12,9 +12,8 @@
 #include <nlohmann/json.hpp>
 #include <terrace/stream/error.hpp>
 
+#include "base/file_marks.hpp"
 #include "base/fixed_text.hpp"
-#include "base/interrupt.hpp"
-#include "base/output.hpp"
 #include "base/units.hpp"
 #include "earth/ground.hpp"
 #include "earth/line_distance.hpp"
@@ -173,7 +172,6 @@ class ProfileRun {
   }
 
   void flush() {
-    check_interrupt();
     surface_.assign(stored_.size(), {});
     const tri::Interpolation method = request_.sampler.method;
     if (method == tri::Interpolation::kLinear) {

@@ -40,7 +40,7 @@ struct ProfileOutcome {
 ///
 /// Distances are geodesics (line_distance.hpp) summed over pieces so short that the line's bend
 /// does not show; without a CRS they are the map's. Memory: some thousand rows at a time.
-/// Throws: stream::Error on a damaged store, Interrupted, UsageError as make_sampler().
+/// Throws: stream::Error on a damaged store, stream::Stopped, UsageError as make_sampler().
 ProfileOutcome write_profile(const stream::Store& store, const ProfileRequest& request,
                              const std::function<void(std::string_view)>& write);
 

@@ -33,7 +33,7 @@ struct PlaceConversions {
 /// are called x and y, or longitude and latitude.
 ///
 /// write: what takes the lines, in order, many at a time.
-/// Throws: stream::Error on bad lines and a damaged store, Interrupted, what `write` throws.
+/// Throws: stream::Error on bad lines and a damaged store, stream::Stopped, what `write` throws.
 SampleCounts answer_places(const stream::Store& store, const SamplerOptions& options,
                            PlaceFile& places, const PlaceConversions& conversions,
                            const std::function<void(std::string_view)>& write,

@@ -28,7 +28,7 @@ class SurfaceCrossings {
   /// Calls visit for each crossing between `from` and `to` (stored), in their order, a vertex once;
   /// those closer than 1e-12 of the way are one. Which sides of the line the ends of an edge lie on
   /// is decided exactly, so none is missed. Windows of the store are read one after another along
-  /// the line. Throws: stream::Error, Interrupted.
+  /// the line. Throws: stream::Error, stream::Stopped.
   void operator()(const Point2& from, const Point2& to,
                   const std::function<void(const Crossing&)>& visit);
 

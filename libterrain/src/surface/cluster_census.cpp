@@ -5,8 +5,6 @@
 #include <limits>
 #include <utility>
 
-#include "base/interrupt.hpp"
-
 namespace terrace::terrain {
 namespace {
 
@@ -86,7 +84,6 @@ const ClusterCensus::Node& ClusterCensus::node(stream::ClusterId id) {
 
 template <class Take, class Opens>
 void ClusterCensus::walk(const StoredBox& box, const Take& take, const Opens& opens) {
-  check_interrupt();
   open_.assign(1, root_.id);
   while (!open_.empty()) {
     const Node& at = node(open_.back());

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "surface/cluster_frontier.hpp"
 
-#include "base/interrupt.hpp"
-
 namespace terrace::terrain {
 namespace {
 
@@ -15,7 +13,6 @@ ClusterFrontier::ClusterFrontier(const stream::Store& store, unsigned level)
     : reader_(store, kCacheBytes), root_(store.root()), level_(level) {}
 
 void ClusterFrontier::begin(const Take& take) {
-  check_interrupt();
   entries_.clear();
   open_.clear();
   const StoreWindow::Node& root = reader_.node(root_);
@@ -62,7 +59,6 @@ void ClusterFrontier::read_one(std::size_t at, const Take& take) {
 }
 
 void ClusterFrontier::read_meeting(const StoredBox& box, const Take& take) {
-  check_interrupt();
   for (std::size_t at = 0; at < open_.size();) {
     if (open_[at].box.meets(box)) {
       read_one(at, take);  // and what has come to this place is next
@@ -73,7 +69,6 @@ void ClusterFrontier::read_meeting(const StoredBox& box, const Take& take) {
 }
 
 void ClusterFrontier::read(std::span<const std::uint32_t> chosen, const Take& take) {
-  check_interrupt();
   // From behind: what moves into a gap was not chosen.
   for (std::size_t k = chosen.size(); k-- > 0;) read_one(chosen[k], take);
 }

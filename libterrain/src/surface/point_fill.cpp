@@ -10,7 +10,6 @@
 
 #include <terrace/stream/error.hpp>
 
-#include "base/interrupt.hpp"
 #include "surface/detail.hpp"
 
 namespace terrace::terrain {
@@ -48,7 +47,6 @@ PointFill::PointFill(const stream::Store& store) {
   for_each_wanted(
       store, detail,
       [&](stream::ClusterId, const stream::ClusterRecord&, const stream::ClusterPoints& cluster) {
-        check_interrupt();
         for (const stream::Point3& p : cluster.positions) {
           if (!std::isfinite(p[2])) continue;
           std::array<std::size_t, 2> at;

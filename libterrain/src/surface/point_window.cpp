@@ -10,8 +10,6 @@
 
 #include <terrace/stream/error.hpp>
 
-#include "base/interrupt.hpp"
-
 namespace terrace::terrain {
 namespace {
 
@@ -185,7 +183,6 @@ void PointWindow::load(const StoredBox& box, Reach reach) {
     triangulation_.start_journal();
     examine_all();
     while (add_missing()) {
-      check_interrupt();
       insert_taken();
       examine_changes();
     }

@@ -57,7 +57,7 @@ class PointWindow {
   /// that for windows that see much of the hull.
   ///
   /// Throws: stream::Error on a damaged store, or where memory_bytes do not suffice, saying what
-  /// would be needed; Interrupted. After that it can only be loaded again or destroyed.
+  /// would be needed; stream::Stopped. After that it can only be loaded again or destroyed.
   void load(const StoredBox& box, Reach reach = Reach::kTriangles);
 
   /// As it was loaded last. Vertices have no other order or number than this one gives them.

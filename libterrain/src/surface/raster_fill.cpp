@@ -8,7 +8,6 @@
 #include <terrace/stream/error.hpp>
 
 #include "base/digest.hpp"
-#include "base/interrupt.hpp"
 #include "surface/detail.hpp"
 
 namespace terrace::terrain {
@@ -36,7 +35,6 @@ RasterFill::RasterFill(const stream::Store& store) {
   for_each_wanted(
       store, detail,
       [&](stream::ClusterId, const stream::ClusterRecord&, const stream::ClusterPoints& points) {
-        check_interrupt();
         for (const stream::Point3& p : points.positions) {
           const auto column = static_cast<std::size_t>(p[0]) / reduction;
           const auto row = static_cast<std::size_t>(p[1]) / reduction;

@@ -7,8 +7,6 @@
 #include <limits>
 #include <utility>
 
-#include "base/interrupt.hpp"
-
 namespace terrace::terrain {
 namespace {
 
@@ -84,7 +82,6 @@ const StoreWindow::Node& StoreWindow::node(stream::ClusterId id) {
 
 template <class Visit>
 void StoreWindow::descend(const StoredBox& box, unsigned level, const Visit& visit) {
-  check_interrupt();
   for (std::vector<std::uint64_t>& ordinals : wanted_) ordinals.clear();
   const auto deliver = [&](const Node& node, unsigned at) {
     visit(node, at);

@@ -57,7 +57,8 @@ struct WindowPoints {
 /// point, and what is kept of earlier windows costs a tenth of that. The way down to the clusters
 /// is by their records: nothing else of the store is read.
 ///
-/// All functions throw stream::Error on a damaged store and Interrupted on Ctrl-C.
+/// All functions throw stream::Error on a damaged store and stream::Stopped if the store is to
+/// stop.
 class StoreWindow {
  public:
   /// cache_bytes: decoded clusters of level 0 to keep, those used last: for users that ask for near

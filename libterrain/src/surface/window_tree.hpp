@@ -20,7 +20,7 @@ namespace terrace::terrain {
 /// as come on one. O(n log n) of those; they are read once.
 class WindowTree {
  public:
-  /// Throws: stream::Error on a damaged store, Interrupted.
+  /// Throws: stream::Error on a damaged store, stream::Stopped.
   WindowTree(const stream::Store& store, unsigned level, std::size_t points);
 
   [[nodiscard]] std::size_t size() const { return boxes_.size(); }

@@ -13,9 +13,9 @@
 #include <CLI/CLI.hpp>
 #include <terrace/cluster/cuda_linkage.hpp>
 
-#include "base/interrupt.hpp"
-#include "base/terminal.hpp"
 #include "base/units.hpp"
+#include "cli/interrupt.hpp"
+#include "cli/terminal.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/error.hpp"
 #include "version.hpp"

@@ -2,9 +2,9 @@
 #include <memory>
 #include <optional>
 
-#include "base/interrupt.hpp"
-#include "base/terminal.hpp"
 #include "cli/cli.hpp"
+#include "cli/interrupt.hpp"
+#include "cli/terminal.hpp"
 
 // Apart from the command line, which needs all verbs: libraries of the tools speak by these.
 namespace terrace::tools {

@@ -4,7 +4,7 @@
 #include <new>
 #include <stdexcept>
 
-#include "base/interrupt.hpp"
+#include "cli/interrupt.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::tools {

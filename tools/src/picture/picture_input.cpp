@@ -10,7 +10,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "base/interrupt.hpp"
+#include "cli/interrupt.hpp"
 #include "earth/ground.hpp"
 #include "mesh/mesh_file.hpp"
 #include "mesh/store_mesh.hpp"
@@ -195,7 +195,7 @@ std::string finest_level(const stream::Store& store, const std::string& region) 
 
 PictureInput from_store(const std::string& path, const PictureSelection& selection,
                         std::uint64_t most_cells, const CommonOptions& common) {
-  const stream::Store store = stream::Store::open(path);
+  const stream::Store store = open_store(path);
   const bool whole = selection.focuses.empty() && selection.region.empty();
   const Placement stored = placement_of(store.schema());
   PictureInput input;

@@ -13,8 +13,8 @@
 #include <optional>
 #include <vector>
 
-#include "base/interrupt.hpp"
 #include "base/parallel.hpp"
+#include "cli/interrupt.hpp"
 #include "terrace/stream/geotiff_writer.hpp"
 #include "terrace/terrain/error.hpp"
 

@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "base/interrupt.hpp"
-#include "base/output.hpp"
+#include "cli/interrupt.hpp"
+#include "cli/output.hpp"
 #include "terrace/stream/point_writer.hpp"
 #include "terrace/stream/sink.hpp"
 #include "terrace/terrain/error.hpp"

@@ -3,9 +3,9 @@
 
 #include <string_view>
 
-#include "base/interrupt.hpp"
-#include "base/output.hpp"
 #include "base/units.hpp"
+#include "cli/interrupt.hpp"
+#include "cli/output.hpp"
 #include "tables/csv_rows.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/sink.hpp"

@@ -4,8 +4,8 @@
 #include <charconv>
 #include <fstream>
 
-#include "base/interrupt.hpp"
 #include "base/units.hpp"
+#include "cli/interrupt.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::tools {

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
-#include "base/output.hpp"
 #include "base/units.hpp"
+#include "cli/output.hpp"
 #include "tables/csv_rows.hpp"
 #include "tables/point_table.hpp"
 #include "terrace/stream/error.hpp"

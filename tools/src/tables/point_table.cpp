@@ -5,8 +5,8 @@
 #include <memory>
 #include <utility>
 
-#include "base/interrupt.hpp"
 #include "base/units.hpp"
+#include "cli/interrupt.hpp"
 #include "earth/world.hpp"
 #include "tables/column_value.hpp"
 #include "terrace/stream/error.hpp"

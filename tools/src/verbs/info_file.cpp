@@ -6,9 +6,9 @@
 #include <memory>
 #include <utility>
 
-#include "base/interrupt.hpp"
-#include "base/terminal.hpp"
 #include "base/units.hpp"
+#include "cli/interrupt.hpp"
+#include "cli/terminal.hpp"
 #include "earth/source_crs.hpp"
 #include "terrace/stream/error.hpp"
 #include "verbs/info.hpp"

@@ -2,9 +2,9 @@
 #include <algorithm>
 #include <array>
 
-#include "base/interrupt.hpp"
-#include "base/terminal.hpp"
 #include "base/units.hpp"
+#include "cli/interrupt.hpp"
+#include "cli/terminal.hpp"
 #include "terrace/stream/store.hpp"
 #include "verbs/info.hpp"
 
@@ -50,7 +50,7 @@ std::string padded(const std::string& text, std::size_t width) {
 
 Summary info_of_store(const std::string& path, const CommonOptions& common) {
   static_cast<void>(common);
-  const stream::Store store = stream::Store::open(path);
+  const stream::Store store = open_store(path);
   const stream::Schema& schema = store.schema();
   const Placement placement = placement_of(schema);
   const stream::Box3 bounds = world_box(placement, store.bounds());

@@ -11,8 +11,8 @@
 #include <CLI/CLI.hpp>
 #include <terrace/stream/error.hpp>
 
-#include "base/interrupt.hpp"
 #include "base/units.hpp"
+#include "cli/interrupt.hpp"
 #include "earth/crs/coordinate_system.hpp"
 #include "terrace/terrain/build.hpp"
 #include "terrace/terrain/error.hpp"

@@ -9,10 +9,10 @@
 
 #include <CLI/CLI.hpp>
 
-#include "base/interrupt.hpp"
-#include "base/output.hpp"
 #include "base/units.hpp"
+#include "cli/interrupt.hpp"
 #include "cli/library_call.hpp"
+#include "cli/output.hpp"
 #include "tables/cluster_channels.hpp"
 #include "tables/cluster_output.hpp"
 #include "tables/cluster_run.hpp"

@@ -7,10 +7,10 @@
 #include <terrace/stream/sink.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "base/interrupt.hpp"
-#include "base/output.hpp"
 #include "base/units.hpp"
 #include "cli/crs_options.hpp"
+#include "cli/interrupt.hpp"
+#include "cli/output.hpp"
 #include "contour/contour_run.hpp"
 #include "verbs/verbs.hpp"
 
@@ -49,7 +49,7 @@ class ContourCommand final : public Command {
     request.interval = *interval_;  // required
     const std::optional<unsigned> level = parse_level(level_);
     request.max_edge = max_edge_;
-    const stream::Store store = stream::Store::open(store_);
+    const stream::Store store = open_store(store_);
     if (!region_.empty()) request.region = crs_.regions(store)(Region::parse(region_));
     request.level = level.value_or(store.top());
     request.threads = common.threads;

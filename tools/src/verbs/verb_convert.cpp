@@ -6,9 +6,9 @@
 
 #include <CLI/CLI.hpp>
 
-#include "base/interrupt.hpp"
-#include "base/output.hpp"
 #include "base/units.hpp"
+#include "cli/interrupt.hpp"
+#include "cli/output.hpp"
 #include "tables/point_table.hpp"
 #include "terrace/stream/point_writer.hpp"
 #include "terrace/stream/source.hpp"

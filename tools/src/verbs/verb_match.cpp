@@ -10,11 +10,11 @@
 
 #include <CLI/CLI.hpp>
 
-#include "base/interrupt.hpp"
-#include "base/output.hpp"
 #include "base/portable_math.hpp"
 #include "base/units.hpp"
+#include "cli/interrupt.hpp"
 #include "cli/library_call.hpp"
+#include "cli/output.hpp"
 #include "tables/label_file.hpp"
 #include "tables/match_run.hpp"
 #include "tables/point_table.hpp"

@@ -8,10 +8,10 @@
 #include <terrace/stream/overlay.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "base/interrupt.hpp"
-#include "base/output.hpp"
 #include "base/units.hpp"
 #include "cli/crs_options.hpp"
+#include "cli/interrupt.hpp"
+#include "cli/output.hpp"
 #include "cli/smooth_option.hpp"
 #include "mesh/bounded/bounded_mesh.hpp"
 #include "mesh/height_overlay.hpp"
@@ -117,7 +117,7 @@ class MeshCommand final : public Command {
     }
     options.fill = parse_fill(fill_);
     options.path = output_;
-    const stream::Store store = stream::Store::open(store_);
+    const stream::Store store = open_store(store_);
     if (!region_.empty()) options.region = crs_.regions(store)(Region::parse(region_));
     if (crs_.places(store).has_effect()) {
       throw UsageError(
@@ -186,7 +186,7 @@ class MeshCommand final : public Command {
     if (save && save_overlay_ == output_) {
       throw UsageError("--save-overlay and --output are the same file");
     }
-    const stream::Store store = stream::Store::open(store_);
+    const stream::Store store = open_store(store_);
     const Detail detail = Detail::parse(store, level_, region_, focuses_, crs_.regions(store));
     const PlaceConversion places = crs_.places(store);
     const bool replace = may_replace(output_, common.force);
@@ -201,7 +201,7 @@ class MeshCommand final : public Command {
     }
     TriangleMesh mesh = mesh_of_store(store, detail, common.memory_or(0), options);
     places(mesh.positions);
-    write_mesh(output_, format_, mesh, replace);
+    write_mesh(output_, mesh, {.format = format_, .replace = replace, .stop = stop_token()});
     if (writer) writer->finish();
 
     Summary summary;

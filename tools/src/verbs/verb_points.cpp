@@ -12,10 +12,10 @@
 #include <terrace/stream/point_writer.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "base/interrupt.hpp"
-#include "base/output.hpp"
 #include "base/units.hpp"
 #include "cli/crs_options.hpp"
+#include "cli/interrupt.hpp"
+#include "cli/output.hpp"
 #include "earth/world.hpp"
 #include "mesh/height_overlay.hpp"
 #include "surface/detail.hpp"
@@ -124,7 +124,7 @@ class PointsCommand final : public Command {
 
   Summary run(const CommonOptions& common) override {
     const Stopwatch watch;
-    const stream::Store store = stream::Store::open(store_);
+    const stream::Store store = open_store(store_);
     const Detail detail = Detail::parse(store, level_, region_, focuses_, crs_.regions(store));
     std::optional<stream::Overlay> overlay;
     if (!overlay_.empty()) overlay.emplace(open_height_overlay(overlay_, store));

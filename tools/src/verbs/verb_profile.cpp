@@ -8,10 +8,10 @@
 #include <terrace/stream/sink.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "base/interrupt.hpp"
-#include "base/output.hpp"
 #include "base/units.hpp"
 #include "cli/crs_options.hpp"
+#include "cli/interrupt.hpp"
+#include "cli/output.hpp"
 #include "earth/crs/coordinate_system.hpp"
 #include "sample/profile_run.hpp"
 #include "verbs/verbs.hpp"
@@ -62,7 +62,7 @@ class ProfileCommand final : public Command {
     const std::optional<unsigned> level = parse_level(level_);
     request.step = step_;
     request.line = parse_line(line_);
-    const stream::Store store = stream::Store::open(store_);
+    const stream::Store store = open_store(store_);
     if (!line_crs_.empty()) {
       const SystemPair systems = systems_of(store, line_crs_, shift_);
       transform(systems.named, systems.store, request.line);

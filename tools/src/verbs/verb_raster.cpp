@@ -7,9 +7,10 @@
 #include <CLI/CLI.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "base/output.hpp"
 #include "base/units.hpp"
 #include "cli/crs_options.hpp"
+#include "cli/interrupt.hpp"
+#include "cli/output.hpp"
 #include "sample/raster_run.hpp"
 #include "terrace/terrain/error.hpp"
 #include "verbs/verbs.hpp"
@@ -59,7 +60,7 @@ class RasterCommand final : public Command {
     request.sampler.max_edge = max_edge_;
     request.cell = cell_;
     if (output_ == "-") throw UsageError("a GeoTIFF cannot go to standard output; name a file");
-    const stream::Store store = stream::Store::open(store_);
+    const stream::Store store = open_store(store_);
     request.sampler.level = level.value_or(store.top());
     request.sampler.threads = common.threads;
     request.sampler.memory_bytes = common.memory_or(0);

@@ -10,9 +10,9 @@
 #include <CLI/CLI.hpp>
 #include <terrace/tri/interpolation.hpp>
 
-#include "base/interrupt.hpp"
-#include "base/output.hpp"
 #include "base/units.hpp"
+#include "cli/interrupt.hpp"
+#include "cli/output.hpp"
 #include "earth/ground.hpp"
 #include "mesh/mesh_file.hpp"
 #include "picture/camera.hpp"

@@ -10,10 +10,10 @@
 #include <terrace/stream/sink.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "base/interrupt.hpp"
-#include "base/output.hpp"
 #include "base/units.hpp"
 #include "cli/crs_options.hpp"
+#include "cli/interrupt.hpp"
+#include "cli/output.hpp"
 #include "earth/crs/coordinate_system.hpp"
 #include "sample/sample_run.hpp"
 #include "verbs/verbs.hpp"
@@ -66,12 +66,12 @@ class SampleCommand final : public Command {
     options.method = parse_interpolation(method_);
     options.max_edge = max_edge_;
     const std::optional<unsigned> level = parse_level(level_);
-    const stream::Store store = stream::Store::open(store_);
+    const stream::Store store = open_store(store_);
     options.level = level.value_or(store.top());
     options.threads = common.threads;
     options.memory_bytes = common.memory_or(0);
     const PlaceConversions conversions = conversions_for(store);
-    PlaceFile places(points_);
+    PlaceFile places(points_, stop_token());
     stream::Sink output(output_, may_replace(output_, common.force), stop_token());
     ProgressMeter meter(common.progress, "points");
     const SampleCounts counts = answer_places(

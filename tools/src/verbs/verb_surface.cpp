@@ -7,10 +7,11 @@
 #include <CLI/CLI.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "base/output.hpp"
 #include "base/units.hpp"
 #include "cli/crs_options.hpp"
+#include "cli/interrupt.hpp"
 #include "cli/library_call.hpp"
+#include "cli/output.hpp"
 #include "mesh/mesh_output.hpp"
 #include "mesh/vtk_file.hpp"
 #include "scan/surface_run.hpp"
@@ -60,7 +61,7 @@ class SurfaceCommand final : public Command {
     options.metric = surface_metric(MetricChoice::parse(metric_), options);
     const bool vtk = output_.ends_with(".vtk");
     if (tetrahedra_ != vtk) throw UsageError("--tetrahedra and an output named .vtk go together");
-    const stream::Store store = stream::Store::open(store_);
+    const stream::Store store = open_store(store_);
     const Detail detail = Detail::parse(store, level_, region_, focuses_, crs_.regions(store));
     const PlaceConversion places = crs_.places(store);
     const bool replace = may_replace(output_, common.force);
@@ -69,10 +70,11 @@ class SurfaceCommand final : public Command {
       outcome = surface_of_store(store, detail, options, tetrahedra_, common.memory_or(0));
     });
     places(outcome.mesh.positions);
+    const stream::WriterOptions writer{.format = format_, .replace = replace, .stop = stop_token()};
     if (tetrahedra_) {
-      write_vtk(output_, outcome.mesh.positions, outcome.mesh.levels, outcome.tetrahedra, replace);
+      write_vtk(output_, outcome.mesh.positions, outcome.mesh.levels, outcome.tetrahedra, writer);
     } else {
-      write_mesh(output_, format_, outcome.mesh, replace);
+      write_mesh(output_, outcome.mesh, writer);
     }
     return summary_of(outcome, watch);
   }

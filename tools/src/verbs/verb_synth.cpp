@@ -8,10 +8,10 @@
 
 #include <CLI/CLI.hpp>
 
-#include "base/interrupt.hpp"
-#include "base/output.hpp"
 #include "base/parallel.hpp"
 #include "base/units.hpp"
+#include "cli/interrupt.hpp"
+#include "cli/output.hpp"
 #include "earth/crs/coordinate_system.hpp"
 #include "picture/canvas.hpp"
 #include "synth/synth_cloud.hpp"

@@ -13,6 +13,7 @@
 #include <terrace/stream/store.hpp>
 
 #include "base/units.hpp"
+#include "cli/interrupt.hpp"
 #include "mesh/bounded/bounded_mesh.hpp"
 #include "terrace/terrain/error.hpp"
 #include "tile/make/tile_source.hpp"
@@ -136,7 +137,7 @@ Summary TileCommand::run(const CommonOptions& common) {
   if (format_ != "quantized-mesh") {
     throw UsageError("--format '" + format_ + "': quantized-mesh is the one that works");
   }
-  const stream::Store store = stream::Store::open(store_);
+  const stream::Store store = open_store(store_);
   const Context context = common.context();
   const std::uint64_t memory = context.memory_or(0);
   if (memory < kTileBytesBeside + kTileBytesPerThread) {

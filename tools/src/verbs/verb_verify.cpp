@@ -12,6 +12,7 @@
 #include <terrace/stream/store.hpp>
 
 #include "base/units.hpp"
+#include "cli/interrupt.hpp"
 #include "terrace/terrain/error.hpp"
 #include "tile/make/tile_source.hpp"
 #include "tile/verify/tile_check.hpp"
@@ -70,7 +71,7 @@ class VerifyCommand final : public Command {
 
 Summary VerifyCommand::store() const {
   const Stopwatch watch;
-  const stream::Store store = stream::Store::open(path_);
+  const stream::Store store = open_store(path_);
   Summary summary;
   nlohmann::ordered_json problems = nlohmann::ordered_json::array();
   const bool ok = store.verify(
@@ -109,7 +110,7 @@ Summary VerifyCommand::tiles(const CommonOptions& common) const {
   std::optional<stream::Store> store;
   std::unique_ptr<TileSource> source;
   if (!store_.empty()) {
-    store.emplace(stream::Store::open(store_));
+    store.emplace(open_store(store_));
     source = open_tile_source(*store,
                               {.vertical = vertical_,
                                .geoid = geoid_,

@@ -9,6 +9,7 @@
 #include <limits>
 #include <memory>
 #include <span>
+#include <stop_token>
 #include <string>
 #include <utility>
 #include <vector>
@@ -163,6 +164,8 @@ struct Problem {
 /// size arrays by it: points lie in bounds(), those of a raster on its columns and rows; children
 /// exist; a level that for_each() has gone through has as many members as levels() says, and no
 /// more are visited before it throws. The hierarchy as a whole is for verify() to check.
+///
+/// Copies share the files and what was read of their indices; they are cheap.
 class Store {
  public:
   /// Throws: Error if there is no store, a newer version, or a damaged manifest.
@@ -170,9 +173,10 @@ class Store {
   /// A store that a writer moved aside to replace it gets its name back if the writer died then:
   /// true if so. open() does it by itself.
   static bool recover(const std::filesystem::path& path);
-  Store(Store&&) noexcept;
-  Store& operator=(Store&&) noexcept;
-  ~Store();
+
+  /// The same store for work that may be given up: once `stop` is asked, all that reads throws
+  /// Stopped. So whoever reads in loops needs no check of its own.
+  [[nodiscard]] Store with_stop(std::stop_token stop) const;
 
   [[nodiscard]] const Schema& schema() const;
   [[nodiscard]] int version() const;
@@ -202,8 +206,11 @@ class Store {
 
  private:
   struct Impl;
-  explicit Store(std::unique_ptr<Impl> impl);
-  std::unique_ptr<Impl> impl_;
+  explicit Store(std::shared_ptr<Impl> impl);
+  void check_stop() const;
+
+  std::shared_ptr<Impl> impl_;
+  std::stop_token stop_;
 };
 
 }  // namespace terrace::stream

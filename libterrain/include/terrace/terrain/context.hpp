@@ -34,6 +34,8 @@ struct Context {
   [[nodiscard]] std::uint64_t memory_or(std::uint64_t standard) const;
   /// Calls note, if there is one.
   void say(const std::string& line) const;
+  /// Throws: stream::Stopped if the job is to end.
+  void check_stop() const;
 };
 
 }  // namespace terrace::terrain

@@ -14,12 +14,13 @@
 
 namespace terrace::terrain {
 
-BoundedMeshResult bounded_point_mesh(const stream::Store& store, const BoundedMeshOptions& options,
+BoundedMeshResult bounded_point_mesh(const stream::Store& given, const BoundedMeshOptions& options,
                                      const Context& context) {
   if (options.fill != Fill::none) {
     throw UsageError("--fill is for rasters: irregular points have no cells without data");
   }
   keep_freed_memory();
+  const stream::Store store = given.with_stop(context.stop);
   PointMesher mesher(store, options, context);
   const double metres = mesher.metres_vertical();
   BoundedMeshResult result;

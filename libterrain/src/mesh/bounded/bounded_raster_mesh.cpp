@@ -42,9 +42,10 @@ BoundedMeshResult best_of_points(RasterMesher& mesher, const BoundedMeshOptions&
 
 }  // namespace
 
-BoundedMeshResult bounded_raster_mesh(const stream::Store& store, const BoundedMeshOptions& options,
+BoundedMeshResult bounded_raster_mesh(const stream::Store& given, const BoundedMeshOptions& options,
                                       const Context& context) {
   keep_freed_memory();
+  const stream::Store store = given.with_stop(context.stop);
   RasterMesher mesher(store, options, context);
   const double metres = mesher.metres_vertical();
   BoundedMeshResult result;

@@ -8,8 +8,7 @@
 
 #include <terrace/stream/error.hpp>
 
-#include "base/interrupt.hpp"
-#include "base/output.hpp"
+#include "base/file_marks.hpp"
 
 namespace terrace::terrain {
 namespace {
@@ -24,10 +23,11 @@ std::filesystem::path spool_name(const std::string& path) {
 
 // Calls take(span of T) for the whole file, piece by piece.
 template <class T, class Take>
-void read_back(stream::AtomicFile& file, std::uint64_t count, const Take& take) {
+void read_back(stream::AtomicFile& file, std::uint64_t count, const std::stop_token& stop,
+               const Take& take) {
   std::vector<T> piece;
   for (std::uint64_t at = 0; at < count; at += kSpoolPiece) {
-    check_interrupt();
+    if (stop.stop_requested()) throw stream::Stopped();
     piece.resize(static_cast<std::size_t>(std::min<std::uint64_t>(kSpoolPiece, count - at)));
     const auto bytes = std::as_writable_bytes(std::span(piece));
     if (file.read_at(at * sizeof(T), bytes) != bytes.size()) {
@@ -77,10 +77,10 @@ void MeshSpool::write(const std::string& path, const stream::WriterOptions& opti
   header.comments = {kWriterMark};
   if (!bounds.empty()) header.bounds = bounds;
   const auto writer = stream::open_mesh_writer(path, header, options);
-  read_back<stream::Point3>(vertex_file_, vertices_,
+  read_back<stream::Point3>(vertex_file_, vertices_, options.stop,
                             [&](std::span<const stream::Point3> p) { writer->add_vertices(p); });
   read_back<stream::TriangleIndices>(
-      triangle_file_, triangles_,
+      triangle_file_, triangles_, options.stop,
       [&](std::span<const stream::TriangleIndices> t) { writer->add_triangles(t); });
   writer->finish();
 }

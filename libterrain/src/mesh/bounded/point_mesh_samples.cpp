@@ -7,7 +7,6 @@
 
 #include <terrace/stream/error.hpp>
 
-#include "base/interrupt.hpp"
 #include "earth/world.hpp"
 #include "surface/detail.hpp"
 
@@ -77,7 +76,6 @@ PointMeshSamples::PointMeshSamples(const stream::Store& store, const std::option
   for_each_wanted(
       store, detail,
       [&](stream::ClusterId, const stream::ClusterRecord&, const stream::ClusterPoints& cluster) {
-        check_interrupt();
         for (const stream::Point3& stored : cluster.positions) {
           const stream::Point3 p = world_point(placement, stored);
           if (!region || region->contains(p)) deal(cuts.cell_of({p[0], p[1]}), p);

@@ -6,7 +6,6 @@
 
 #include <terrace/stream/error.hpp>
 
-#include "base/interrupt.hpp"
 #include "earth/world.hpp"
 #include "mesh/bounded/streaming_hull.hpp"
 #include "surface/detail.hpp"
@@ -60,7 +59,6 @@ PointMeshScan scan_point_mesh(const stream::Store& store, const std::optional<Re
   for_each_wanted(
       store, detail,
       [&](stream::ClusterId, const stream::ClusterRecord&, const stream::ClusterPoints& cluster) {
-        check_interrupt();
         for (const stream::Point3& stored : cluster.positions) {
           const stream::Point3 p = world_point(placement, stored);
           if (!region || region->contains(p)) add(p);

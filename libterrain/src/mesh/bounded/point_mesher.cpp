@@ -10,9 +10,9 @@
 
 #include <terrace/stream/error.hpp>
 
-#include "base/interrupt.hpp"
 #include "base/ordered_work.hpp"
 #include "base/progress_report.hpp"
+#include "base/stopwatch.hpp"
 #include "base/units.hpp"
 #include "mesh/bounded/point_mesh_estimate.hpp"
 #include "mesh/bounded/point_mesh_joiner.hpp"
@@ -112,7 +112,7 @@ PointMeshPlan PointMesher::plan_for(double max_error) const {
     in_order(
         cuts_.cells.size(), cell_threads_,
         [&](unsigned, std::size_t i) {
-          check_interrupt();
+          context_.check_stop();
           return estimate.in_cell(static_cast<std::uint32_t>(i), max_error);
         },
         [&](std::size_t i, double count) { vertices[i] = count; });
@@ -150,7 +150,7 @@ BoundedMeshResult PointMesher::run_windows(const PointMeshOptions& options, Mesh
     in_order(
         plan.windows.size(), threads_within_memory(each, most),
         [&](unsigned, std::size_t i) {
-          check_interrupt();
+          context_.check_stop();
           return mesher.mesh(i);
         },
         [&](std::size_t i, const PointWindowTin& tin) {
@@ -194,7 +194,7 @@ stream::Error PointMesher::shared_places_error() const {
     shared.add(*scan_.whole);
   } else {
     for (std::uint32_t cell = 0; cell < cuts_.cells.size(); ++cell) {
-      check_interrupt();
+      context_.check_stop();
       MeshSamples samples;
       samples_->read(cell, 1, {}, samples);
       shared.add(samples);

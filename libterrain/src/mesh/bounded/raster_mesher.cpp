@@ -8,7 +8,6 @@
 
 #include <terrace/stream/error.hpp>
 
-#include "base/interrupt.hpp"
 #include "base/ordered_work.hpp"
 #include "base/portable_math.hpp"
 #include "base/progress_report.hpp"
@@ -131,7 +130,6 @@ RasterMesher::Sample RasterMesher::sample(double max_error, tri::TinQuality qual
   in_order(
       windows.size(), threads_,
       [&](unsigned worker, std::size_t i) {
-        check_interrupt();
         return meshers[worker]->count(plan.window(windows[i]), quality);
       },
       [&](std::size_t i, const WindowCount& count) {
@@ -173,10 +171,7 @@ BoundedMeshResult RasterMesher::run(double max_error, MeshSpool& spool,
   try {
     in_order(
         plan.size(), threads_,
-        [&](unsigned worker, std::size_t i) {
-          check_interrupt();
-          return meshers[worker]->mesh(plan.window(i));
-        },
+        [&](unsigned worker, std::size_t i) { return meshers[worker]->mesh(plan.window(i)); },
         [&](std::size_t i, WindowTin&& tin) {
           result.max_error = std::max(result.max_error, tin.check.max_error);
           const auto count = static_cast<double>(tin.check.covered);

@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <terrace/stream/error.hpp>
 
-#include "base/output.hpp"
+#include "base/file_marks.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -6,7 +6,6 @@
 #include <limits>
 
 #include "base/digest.hpp"
-#include "base/interrupt.hpp"
 
 namespace terrace::terrain {
 namespace {
@@ -48,7 +47,6 @@ HeightBlocks::HeightBlocks(const stream::Store& store)
   for (unsigned level = 0; level <= store.top(); ++level) {
     store.for_each(level, [&](stream::ClusterId, const stream::ClusterRecord&,
                               const stream::ClusterPoints& cluster) {
-      check_interrupt();
       for (const stream::Point3& p : cluster.positions) {
         const auto column = static_cast<std::int64_t>(p[0]), row = static_cast<std::int64_t>(p[1]);
         const auto at = static_cast<std::size_t>(row / side_ * across_ + column / side_);

@@ -22,7 +22,7 @@ class HeightCache {
   HeightCache& operator=(const HeightCache&) = delete;
 
   /// As StoreWindow::heights() at full resolution. The window may be of any size: of what does not
-  /// fit, nothing is kept. Throws: stream::Error on a damaged store, Interrupted.
+  /// fit, nothing is kept. Throws: stream::Error on a damaged store, stream::Stopped.
   void heights(const LatticeWindow& window, std::span<double> out);
 
  private:

@@ -21,7 +21,7 @@ namespace terrace::terrain {
 
 /// What all threads know of a store of irregular points that is tiled.
 struct TiledCloud {
-  const stream::Store& store;
+  stream::Store store;
   StoredPlaces places;
   EllipsoidalHeights vertical;
   PointFill fill;

@@ -4,8 +4,6 @@
 #include <cstddef>
 #include <vector>
 
-#include "base/interrupt.hpp"
-
 namespace terrace::terrain {
 namespace {
 
@@ -62,7 +60,6 @@ void for_each_part(const GeographicBox& box, TileSurface& surface,
       for (const GeographicBox& quarter : quarters_of(part)) open.push_back(quarter);
       continue;
     }
-    check_interrupt();
     surface.samples(part, samples);
     drop_elsewhere(part, box, samples);
     if (samples.size() > 0) visit(samples);

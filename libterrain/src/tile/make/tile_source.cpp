@@ -58,9 +58,10 @@ std::optional<double> water_height(const stream::Store& store, const std::string
 
 }  // namespace
 
-std::unique_ptr<TileSource> open_tile_source(const stream::Store& store,
+std::unique_ptr<TileSource> open_tile_source(const stream::Store& given,
                                              const TileSourceOptions& options,
                                              const Context& context) {
+  const stream::Store store = given.with_stop(context.stop);
   EllipsoidalHeights heights(store.schema(), options.vertical, options.geoid,
                              options.memory_bytes / 4);
   if (!heights.note().empty()) context.say(heights.note());

@@ -19,7 +19,7 @@ namespace terrace::terrain {
 
 /// What all threads know of a raster store that is tiled.
 struct TiledRaster {
-  const stream::Store& store;
+  stream::Store store;
   CoordinateSystem crs;
   Placement placement;
   GridGeography geography;

@@ -4,14 +4,13 @@
 #include <algorithm>
 #include <utility>
 
-#include "base/interrupt.hpp"
-
 namespace terrace::terrain {
 
-std::vector<TileAddress> tiles_with_samples(TileSurface& surface, unsigned zoom) {
+std::vector<TileAddress> tiles_with_samples(TileSurface& surface, unsigned zoom,
+                                            const Context& context) {
   std::vector<TileAddress> found, open{{0, 0, 0}, {0, 1, 0}};
   while (!open.empty()) {
-    check_interrupt();
+    context.check_stop();
     const TileAddress tile = open.back();
     open.pop_back();
     // Borders belong to one tile here, so that what lies on them alone makes none.

@@ -61,7 +61,7 @@ unsigned native_zoom(double spacing);
 /// run before was interrupted or that samples changed elsewhere; one that is made again and comes
 /// out the same is not touched. So the folder is the same as if it had been empty before.
 /// `resume` without `replace` is refused for a finished set of other samples or options.
-/// Throws: stream::Error, Interrupted, UsageError for options that do not go together.
+/// Throws: stream::Error, stream::Stopped, UsageError for options that do not go together.
 TileSetResult write_tile_set(const std::vector<std::unique_ptr<TileSurface>>& surfaces,
                              const TileSetOptions& options, const Context& context);
 

@@ -10,7 +10,6 @@
 #include <terrace/stream/error.hpp>
 #include <terrace/stream/gzip.hpp>
 
-#include "base/interrupt.hpp"
 #include "base/ordered_work.hpp"
 #include "base/progress_report.hpp"
 #include "tile/set/tile_candidates.hpp"
@@ -23,9 +22,9 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Tiles that may have data, sorted by row, then column. The two of zoom 0 always count.
-std::vector<TileAddress> candidates(unsigned zoom, TileSurface& surface) {
+std::vector<TileAddress> candidates(unsigned zoom, TileSurface& surface, const Context& context) {
   if (zoom == 0) return {{0, 0, 0}, {0, 1, 0}};
-  return tiles_with_samples(surface, zoom);
+  return tiles_with_samples(surface, zoom, context);
 }
 
 /// The largest difference of heights within a tile, as far as it is known without reading.
@@ -69,7 +68,7 @@ void TileSetWriter::begin_change() {
 
 TileSetWriter::Written TileSetWriter::write_tile(const TileAddress& tile, const ZoomPlan& plan,
                                                  TileSurface& surface) {
-  check_interrupt();
+  context_.check_stop();
   TileInputs inputs{options_.mesh, options_.gzip, options_.source_options, {}};
   if (options_.metadata) inputs.metadata = children_json(tile, deeper_);
   const std::uint64_t digest = digest_of(tile, plan, inputs, surface);
@@ -134,7 +133,7 @@ void TileSetWriter::write_tiles(const ZoomPlan& plan, const std::vector<TileAddr
 
 void TileSetWriter::write_zoom(unsigned zoom) {
   TileSurface& surface = *surfaces_.front();
-  const std::vector<TileAddress> tiles = candidates(zoom, surface);
+  const std::vector<TileAddress> tiles = candidates(zoom, surface, context_);
   // A quarter more, for what is filled beside the samples.
   double range = 1.25 * widest_range(tiles, surface);
   for (;;) {

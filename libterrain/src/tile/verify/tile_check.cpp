@@ -12,7 +12,6 @@
 
 #include <terrace/stream/error.hpp>
 
-#include "base/interrupt.hpp"
 #include "base/ordered_work.hpp"
 #include "base/progress_report.hpp"
 #include "base/units.hpp"
@@ -101,7 +100,7 @@ bool SetCheck::is_as_written(const TileAddress& tile, std::span<const std::byte>
 }
 
 Checked SetCheck::check(const TileAddress& tile, unsigned worker) const {
-  check_interrupt();
+  context_.check_stop();
   Checked checked;
   DecodedTile decoded;
   try {
@@ -203,7 +202,7 @@ void SetCheck::add(unsigned zoom, const TileHeights& heights) {
 void SetCheck::absent(unsigned zoom, const std::vector<TileAddress>& tiles) {
   TileSurface& surface = *surfaces_.front();
   auto at = tiles.begin();
-  for (const TileAddress& tile : tiles_with_samples(surface, zoom)) {
+  for (const TileAddress& tile : tiles_with_samples(surface, zoom, context_)) {
     while (at != tiles.end() && (at->y < tile.y || (at->y == tile.y && at->x < tile.x))) ++at;
     if (at != tiles.end() && *at == tile) continue;
     const std::uint64_t samples = count_samples(tile, surface);
@@ -232,7 +231,7 @@ TileCheckResult check_tile_set(const TileCheckOptions& options, unsigned threads
                          .remedy = "finish it first: terrace tile with --resume"});
   }
   TileLayer layer = read_layer(layer_path);
-  TileInventory inventory = take_inventory(options.folder, layer);
+  TileInventory inventory = take_inventory(options.folder, layer, context);
   const unsigned first = layer.first_zoom;
   SetCheck check(options, std::move(layer), threads, surfaces, context);
   check.result.problems = std::move(inventory.problems);

@@ -45,7 +45,7 @@ bool is_tile_folder(const std::string& folder);
 /// of `surfaces` if there are any (all of the same samples, one per thread). Depends on the files
 /// alone, not on the number of threads. Memory: of one row of tiles' borders, and of a tile and a
 /// part of its samples per thread. Throws: stream::Error if layer.json cannot be read or the store
-/// is damaged; Interrupted.
+/// is damaged; stream::Stopped.
 TileCheckResult check_tile_set(const TileCheckOptions& options, unsigned threads,
                                const std::vector<std::unique_ptr<TileSurface>>& surfaces,
                                const Context& context);

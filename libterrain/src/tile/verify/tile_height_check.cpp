@@ -9,7 +9,6 @@
 
 #include <terrace/tri/point_tin.hpp>
 
-#include "base/interrupt.hpp"
 #include "tile/make/sample_parts.hpp"
 
 namespace terrace::terrain {
@@ -70,7 +69,6 @@ void Measurement::part(const GeographicBox& box, const std::vector<std::uint32_t
 }
 
 void Measurement::measure(const GeographicBox& box, const std::vector<std::uint32_t>& triangles) {
-  check_interrupt();
   surface_.samples(box, samples_);
   std::vector<double> u, v, height;
   std::vector<std::size_t> index;

@@ -9,7 +9,6 @@
 
 #include <terrace/stream/error.hpp>
 
-#include "base/interrupt.hpp"
 #include "base/units.hpp"
 #include "tile/set/tile_file.hpp"
 
@@ -27,8 +26,8 @@ bool by_row(const TileAddress& a, const TileAddress& b) {
 
 class Inventory {
  public:
-  Inventory(const std::string& folder, const TileLayer& layer)
-      : folder_(folder), layer_(layer), layer_path_(folder + "/layer.json") {}
+  Inventory(const std::string& folder, const TileLayer& layer, const Context& context)
+      : folder_(folder), layer_(layer), context_(context), layer_path_(folder + "/layer.json") {}
 
   void bounds();
   void files();
@@ -43,6 +42,7 @@ class Inventory {
 
   const std::string& folder_;
   const TileLayer& layer_;
+  const Context& context_;
   std::string layer_path_;
 };
 
@@ -66,7 +66,7 @@ void Inventory::files() {
   std::error_code error;
   fs::recursive_directory_iterator entry(folder_, error);
   for (; !error && entry != fs::recursive_directory_iterator(); entry.increment(error)) {
-    check_interrupt();
+    context_.check_stop();
     if (entry->is_directory()) continue;
     const std::string name = entry->path().lexically_relative(folder_).generic_string();
     if (const auto tile = parse_tile_path(name); tile && tile->zoom < result.tiles.size()) {
@@ -143,8 +143,9 @@ void Inventory::zoom(unsigned zoom) {
 
 }  // namespace
 
-TileInventory take_inventory(const std::string& folder, const TileLayer& layer) {
-  Inventory inventory(folder, layer);
+TileInventory take_inventory(const std::string& folder, const TileLayer& layer,
+                             const Context& context) {
+  Inventory inventory(folder, layer, context);
   inventory.bounds();
   inventory.files();
   for (unsigned zoom = 0; zoom < layer.available.size(); ++zoom) inventory.zoom(zoom);

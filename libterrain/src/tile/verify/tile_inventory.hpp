@@ -7,6 +7,7 @@
 
 #include <terrace/stream/store.hpp>
 
+#include "terrace/terrain/context.hpp"
 #include "tile/format/tile_address.hpp"
 #include "tile/format/tile_layer.hpp"
 
@@ -22,7 +23,9 @@ struct TileInventory {
 };
 
 /// Compares layer.json with the files: each tile that it names is there, each that is there is
-/// named once. Throws: stream::Error if the folder cannot be read.
-TileInventory take_inventory(const std::string& folder, const TileLayer& layer);
+/// named once. Throws: stream::Error if the folder cannot be read;
+/// stream::Stopped.
+TileInventory take_inventory(const std::string& folder, const TileLayer& layer,
+                             const Context& context);
 
 }  // namespace terrace::terrain

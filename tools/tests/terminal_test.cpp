@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "base/terminal.hpp"
+#include "cli/terminal.hpp"
 
 #include <string>
 
 #include <gtest/gtest.h>
 
-namespace terrace::terrain {
+namespace terrace::tools {
 
 using namespace terrain;
 namespace {
@@ -39,4 +39,4 @@ TEST(Terminal, BytesThatAreNoUtf8AreShown) {
 }
 
 }  // namespace
-}  // namespace terrace::terrain
+}  // namespace terrace::tools

@@ -4,17 +4,16 @@
 #include <string>
 #include <string_view>
 
-namespace terrace::terrain {
+#include "base/file_marks.hpp"
 
-/// The comment that marks files of formats with comments.
-inline constexpr const char* kWriterMark = "written by terrace";
-/// How files begin that have no room for comments.
-inline constexpr std::string_view kContourHead =
-    R"({"type":"FeatureCollection","generator":"terrace contour","features":[)";
+namespace terrace::tools {
+
+using namespace terrain;
+
+/// How tables of the command begin: formats without room for a comment.
 inline constexpr std::string_view kPairsHead = "a,b,distance";
 inline constexpr std::string_view kTreeHead = "a,b,distance,size,level";
 inline constexpr std::string_view kDendrogramHead = "a,b,height,size";
-inline constexpr std::string_view kProfileHead = "distance,x,y,height";
 
 /// True if the regular file at `path` is empty or terrace wrote it, which its format says at the
 /// place that the format has for that: a comment of the header (PLY, OBJ, VTK), the generator (GLB,
@@ -29,4 +28,4 @@ bool written_by_terrace(const std::string& path);
 /// ours.
 bool may_replace(const std::string& path, bool force);
 
-}  // namespace terrace::terrain
+}  // namespace terrace::tools

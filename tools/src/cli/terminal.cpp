@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "base/terminal.hpp"
+#include "cli/terminal.hpp"
 
 #include <array>
 #include <cerrno>
@@ -10,9 +10,9 @@
 #include <terrace/stream/sink.hpp>
 #include <unistd.h>
 
-#include "base/interrupt.hpp"
+#include "cli/interrupt.hpp"
 
-namespace terrace::terrain {
+namespace terrace::tools {
 namespace {
 
 unsigned char byte_at(std::string_view text, std::size_t i) {
@@ -98,4 +98,4 @@ void secure_standard_descriptors() noexcept {
   }
 }
 
-}  // namespace terrace::terrain
+}  // namespace terrace::tools

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "base/output.hpp"
+#include "cli/output.hpp"
 
 #include <array>
 #include <cstdint>
@@ -11,14 +11,14 @@
 
 #include <gtest/gtest.h>
 
-#include "temporary_folder.hpp"
+#include "../../libterrain/tests/temporary_folder.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/geotiff_writer.hpp"
 #include "terrace/stream/mesh_writer.hpp"
 #include "terrace/stream/png.hpp"
 #include "terrace/stream/point_writer.hpp"
 
-namespace terrace::terrain {
+namespace terrace::tools {
 
 using namespace terrain;
 namespace {
@@ -228,4 +228,4 @@ TEST_F(MayReplace, NeverAFolder) {
 }
 
 }  // namespace
-}  // namespace terrace::terrain
+}  // namespace terrace::tools

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "base/output.hpp"
+#include "cli/output.hpp"
 
 #include <algorithm>
 #include <array>
@@ -16,7 +16,7 @@
 #include "base/units.hpp"
 #include "terrace/stream/error.hpp"
 
-namespace terrace::terrain {
+namespace terrace::tools {
 namespace {
 
 /// Longer lines are in no file of ours; neither are longer headers.
@@ -241,4 +241,4 @@ bool may_replace(const std::string& path, bool force) {
   return true;
 }
 
-}  // namespace terrace::terrain
+}  // namespace terrace::tools

@@ -7,7 +7,7 @@
 /// Text on its way to people. File names, names in files and comments may hold anything, and a
 /// terminal obeys control characters: all messages and summaries go through here.
 
-namespace terrace::terrain {
+namespace terrace::tools {
 
 /// `text` with what a terminal would obey made visible as \xNN: control characters (of C0, DEL and
 /// C1), bytes that are no UTF-8, and marks that turn the direction of writing. Line ends stay.
@@ -28,4 +28,4 @@ void print_result(std::string_view text);
 /// written: to use it fails as before. To be called first of all.
 void secure_standard_descriptors() noexcept;
 
-}  // namespace terrace::terrain
+}  // namespace terrace::tools

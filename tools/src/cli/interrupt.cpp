@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "base/interrupt.hpp"
+#include "cli/interrupt.hpp"
 
 #include <array>
 #include <cerrno>
@@ -14,9 +14,9 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-#include "base/terminal.hpp"
+#include "cli/terminal.hpp"
 
-namespace terrace::terrain {
+namespace terrace::tools {
 namespace {
 
 constexpr const char* kStopped = "interrupted; run the same command again to start anew";
@@ -90,6 +90,10 @@ std::stop_token stop_token() {
   return source.get_token();
 }
 
+stream::Store open_store(const std::filesystem::path& path) {
+  return stream::Store::open(path).with_stop(stop_token());
+}
+
 void run_interruptible(const std::function<void()>& work) {
   std::packaged_task<void()> task(work);
   std::future<void> done = task.get_future();
@@ -110,4 +114,4 @@ void run_interruptible(const std::function<void()>& work) {
   done.get();
 }
 
-}  // namespace terrace::terrain
+}  // namespace terrace::tools

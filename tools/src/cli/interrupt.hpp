@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <filesystem>
 #include <functional>
 #include <stdexcept>
 #include <stop_token>
 #include <string>
 
-namespace terrace::terrain {
+#include <terrace/stream/store.hpp>
+
+namespace terrace::tools {
 
 /// Thrown where work stops because of Ctrl-C. what() says how to go on.
 class Interrupted : public std::runtime_error {
@@ -24,6 +27,9 @@ void install_signal_handlers();
 /// Throws Interrupted if the user has asked to stop. Loops call it once per block.
 void check_interrupt();
 
+/// A store whose reading ends by it, with stream::Stopped. Throws: as stream::Store::open.
+[[nodiscard]] stream::Store open_store(const std::filesystem::path& path);
+
 /// The same request for what waits: reading and writing pipes ends with stream::Stopped.
 [[nodiscard]] std::stop_token stop_token();
 
@@ -33,4 +39,4 @@ void check_interrupt();
 /// code 130. So `work` must not be writing anything.
 void run_interruptible(const std::function<void()>& work);
 
-}  // namespace terrace::terrain
+}  // namespace terrace::tools
