@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "base/region.hpp"
+#include "terrace/terrain/region.hpp"
 
 #include <cmath>
 #include <filesystem>
@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include "base/polygon.hpp"
 #include "base/portable_math.hpp"
 #include "temporary_folder.hpp"
 #include "terrace/stream/error.hpp"
@@ -129,16 +130,6 @@ TEST(Covers, AgreesWithHalfPlanesOfConvexPolygons) {
     inside += expected ? 1 : 0;
   }
   EXPECT_GT(inside, 300);
-}
-
-TEST(Focus, IsABoxAndALevel) {
-  const Focus focus = parse_focus("-1,-1,1,1:3");
-  EXPECT_EQ(focus.level, 3u);
-  EXPECT_EQ(focus.region.box().max[0], 1);
-  EXPECT_FALSE(parse_focus("0,0,1,1:top").level.has_value());
-  for (const char* text : {"0,0,1,1", "0,0,1,1:", "0,0,1,1:x", "0,0,1,1:-1", "0,0,1,1:999"}) {
-    EXPECT_THROW(parse_focus(text), UsageError) << text;
-  }
 }
 
 }  // namespace

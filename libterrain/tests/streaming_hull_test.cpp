@@ -9,6 +9,8 @@
 
 #include <gtest/gtest.h>
 
+#include "base/polygon.hpp"
+
 namespace terrace::terrain {
 
 using namespace terrain;

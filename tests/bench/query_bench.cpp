@@ -17,14 +17,15 @@
 
 #include "../../libterrain/tests/temporary_folder.hpp"
 #include "base/portable_math.hpp"
+#include "cli/choices.hpp"
 #include "cli/cli.hpp"
 #include "earth/world.hpp"
 #include "sample/height_sampler.hpp"
 #include "sample/place_file.hpp"
 #include "sample/sample_run.hpp"
-#include "surface/detail.hpp"
 #include "surface/store_window.hpp"
 #include "terrace/terrain/build.hpp"
+#include "terrace/terrain/detail.hpp"
 
 namespace {
 
@@ -106,7 +107,7 @@ void sample(benchmark::State& state) {
   const char* const method = methods[static_cast<std::size_t>(state.range(0))];
   state.SetLabel(method);
   terrace::terrain::SamplerOptions options;
-  options.method = terrace::terrain::parse_interpolation(method);
+  options.method = terrace::tools::parse_interpolation(method);
   const Store& source = store();
   const auto places = random_places();
   std::vector<terrace::terrain::SurfacePoint> surface(places.size());

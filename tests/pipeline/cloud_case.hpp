@@ -18,10 +18,10 @@
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/delaunay2.hpp>
 
-#include "base/region.hpp"
 #include "random.hpp"
 #include "surface/store_window.hpp"
 #include "terrace/terrain/build.hpp"
+#include "terrace/terrain/region.hpp"
 
 /// Clouds of many kinds in small stores of many clusters, and the triangulation of all their
 /// points.

@@ -20,8 +20,8 @@
 #include <terrace/stream/store.hpp>
 
 #include "../../libterrain/tests/temporary_folder.hpp"
+#include "cli/detail_options.hpp"
 #include "mesh/store_mesh.hpp"
-#include "surface/detail.hpp"
 #include "terrace/terrain/build.hpp"
 
 namespace terrace {
@@ -91,8 +91,8 @@ stream::Store* Mesh::store_ = nullptr;
 TEST_F(Mesh, OfALevelHasThePointsOfThatLevelAndAbove) {
   for (unsigned level = 0; level <= store_->top(); ++level) {
     SCOPED_TRACE(level);
-    const terrain::TriangleMesh mesh = mesh_of_store(
-        *store_, terrain::Detail::parse(*store_, std::to_string(level), "", {}), kMuch);
+    const terrain::TriangleMesh mesh =
+        mesh_of_store(*store_, tools::parse_detail(*store_, std::to_string(level), "", {}), kMuch);
     EXPECT_EQ(mesh.positions.size(), store_->levels()[level].points);
     expect_sound(mesh);
     for (const std::uint8_t l : mesh.levels) EXPECT_GE(l, level);
@@ -101,7 +101,7 @@ TEST_F(Mesh, OfALevelHasThePointsOfThatLevelAndAbove) {
 
 TEST_F(Mesh, OfLevelZeroIsTheGrid) {
   const terrain::TriangleMesh mesh =
-      mesh_of_store(*store_, terrain::Detail::parse(*store_, "0", "", {}), kMuch);
+      mesh_of_store(*store_, tools::parse_detail(*store_, "0", "", {}), kMuch);
   EXPECT_EQ(mesh.positions.size(), std::size_t{kSize} * kSize);
   EXPECT_EQ(mesh.triangles.size(), std::size_t{2} * (kSize - 1) * (kSize - 1));
   double area = 0;
@@ -113,7 +113,7 @@ TEST_F(Mesh, HoldsEveryPointInsideAFocusAndFewOutside) {
   // Columns 200 to 260, rows 100 to 160, borders on samples.
   const std::string box = "506000,5195200,507800,5197000";
   const terrain::TriangleMesh mesh =
-      mesh_of_store(*store_, terrain::Detail::parse(*store_, "top", "", {box + ":0"}), kMuch);
+      mesh_of_store(*store_, tools::parse_detail(*store_, "top", "", {box + ":0"}), kMuch);
   expect_sound(mesh);
   std::set<std::pair<double, double>> inside;
   for (const auto& p : mesh.positions) {
@@ -128,7 +128,7 @@ TEST_F(Mesh, HoldsEveryPointInsideAFocusAndFewOutside) {
 TEST_F(Mesh, OfARegionIsThePartOfTheWholeThatReachesIn) {
   const std::string box = "505003,5190001,507004,5192002";
   const terrain::TriangleMesh part =
-      mesh_of_store(*store_, terrain::Detail::parse(*store_, "0", box, {}), kMuch);
+      mesh_of_store(*store_, tools::parse_detail(*store_, "0", box, {}), kMuch);
   expect_sound(part);
   // At full resolution the region's triangles are grid triangles.
   double inside = 0;
@@ -145,7 +145,7 @@ TEST_F(Mesh, OfARegionIsThePartOfTheWholeThatReachesIn) {
 
 TEST_F(Mesh, SaysWhatMemoryItNeeds) {
   try {
-    mesh_of_store(*store_, terrain::Detail::parse(*store_, "0", "", {}), std::uint64_t{1} << 20);
+    mesh_of_store(*store_, tools::parse_detail(*store_, "0", "", {}), std::uint64_t{1} << 20);
     FAIL() << "one MiB was enough";
   } catch (const stream::Error& error) {
     EXPECT_NE(std::string(error.what()).find("needs"), std::string::npos) << error.what();
@@ -154,7 +154,7 @@ TEST_F(Mesh, SaysWhatMemoryItNeeds) {
 
 TEST_F(Mesh, PointsOfTheSameDetailAreItsVertices) {
   const terrain::Detail detail =
-      terrain::Detail::parse(*store_, "1", "", {"506000,5195200,507800,5197000:0"});
+      tools::parse_detail(*store_, "1", "", {"506000,5195200,507800,5197000:0"});
   const terrain::TriangleMesh mesh = mesh_of_store(*store_, detail, kMuch);
   const terrain::TriangleMesh cloud = points_of_store(*store_, detail);
   std::vector<stream::Point3> a = mesh.positions, b = cloud.positions;

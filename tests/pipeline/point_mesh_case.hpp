@@ -20,12 +20,13 @@
 #include <terrace/tri/point_tin.hpp>
 
 #include "../../libterrain/tests/temporary_folder.hpp"
-#include "base/region.hpp"
-#include "mesh/bounded/bounded_mesh.hpp"
+#include "base/polygon.hpp"
 #include "mesh/bounded/streaming_hull.hpp"
 #include "mesh/mesh_file.hpp"
 #include "random.hpp"
+#include "terrace/terrain/bounded_mesh.hpp"
 #include "terrace/terrain/build.hpp"
+#include "terrace/terrain/region.hpp"
 
 /// Clouds, and what any mesh of them must be.
 
@@ -191,7 +192,7 @@ class PointMesh : public testing::Test {
 
 inline terrain::BoundedMeshResult PointMesh::mesh_and_check(
     const stream::Store& store, const Cloud& cloud, const terrain::BoundedMeshOptions& options) {
-  const terrain::BoundedMeshResult result = bounded_point_mesh(store, options, common());
+  const terrain::BoundedMeshResult result = write_bounded_mesh(store, options, common());
   const terrain::TriangleMesh mesh = terrain::read_mesh_file(options.path)->mesh;
   EXPECT_EQ(result.vertices, mesh.positions.size());
   EXPECT_EQ(result.triangles, mesh.triangles.size());

@@ -22,10 +22,10 @@
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/point_tin.hpp>
 
-#include "base/region.hpp"
-#include "mesh/bounded/bounded_mesh.hpp"
 #include "mesh/mesh_file.hpp"
 #include "point_mesh_case.hpp"
+#include "terrace/terrain/bounded_mesh.hpp"
+#include "terrace/terrain/region.hpp"
 
 namespace terrace::tests {
 namespace {
@@ -113,12 +113,12 @@ TEST_F(PointMesh, DependsNeitherOnThreadsNorOnMemory) {
   std::set<std::string> different;
   for (const unsigned threads : {1U, 2U, 5U}) {
     for (const std::uint64_t memory : {100U << 20, 1U << 30}) {
-      bounded_point_mesh(store, options(1.0, 700), common(threads, memory));
+      write_bounded_mesh(store, options(1.0, 700), common(threads, memory));
       different.insert(bytes());
     }
   }
   EXPECT_EQ(different.size(), 1U);
-  EXPECT_THROW(bounded_point_mesh(store, options(1.0, 700), common(1, 8U << 20)), stream::Error);
+  EXPECT_THROW(write_bounded_mesh(store, options(1.0, 700), common(1, 8U << 20)), stream::Error);
 }
 
 TEST_F(PointMesh, OfPointsOnOneLineIsEmpty) {
@@ -126,7 +126,7 @@ TEST_F(PointMesh, OfPointsOnOneLineIsEmpty) {
   for (int i = 0; i < 1000; ++i) line.push_back({i * 3.0, i * 6.0 + 1, relief(i, 0)});
   const stream::Store store = build(line);
   for (const std::size_t window : {100U, 5000U}) {
-    const auto result = bounded_point_mesh(store, options(1.0, window), common());
+    const auto result = write_bounded_mesh(store, options(1.0, window), common());
     EXPECT_EQ(result.triangles, 0U);
     EXPECT_EQ(result.vertices, 0U);
     EXPECT_EQ(result.samples, line.size());
@@ -161,7 +161,7 @@ TEST_F(PointMesh, KeepsAllSamplesOfAPlaceWithinTheBound) {
         SCOPED_TRACE(window);
         auto wanted = options(1.0, window);
         wanted.quality = quality;
-        const auto result = bounded_point_mesh(store, wanted, common(2));
+        const auto result = write_bounded_mesh(store, wanted, common(2));
         EXPECT_EQ(result.samples, cloud.size());
         EXPECT_EQ(result.uncovered, 0U);
         EXPECT_EQ(result.duplicates, 2 * places);
@@ -183,7 +183,7 @@ TEST_F(PointMesh, RefusesSamplesOfAPlaceThatAreFartherApartThanTheBound) {
   const stream::Store store = build(cloud);
   for (const std::size_t window : {400U, 1U << 20}) {
     try {
-      bounded_point_mesh(store, options(1.0, window), common(2));
+      write_bounded_mesh(store, options(1.0, window), common(2));
       FAIL();
     } catch (const stream::Error& error) {
       EXPECT_NE(error.parts().cause.find("3 places have several samples, whose heights differ by "
@@ -192,7 +192,7 @@ TEST_F(PointMesh, RefusesSamplesOfAPlaceThatAreFartherApartThanTheBound) {
           << error.what();
       EXPECT_NE(error.parts().remedy.find("--duplicates"), std::string::npos);
     }
-    EXPECT_LE(bounded_point_mesh(store, options(12.5, window), common()).max_error, 12.5);
+    EXPECT_LE(write_bounded_mesh(store, options(12.5, window), common()).max_error, 12.5);
   }
 }
 
@@ -207,7 +207,7 @@ TEST_F(PointMesh, TakesOneHeightPerPlaceAsAsked) {
   const stream::Store store = build(cloud);
   auto none = options(1.0, 500);
   none.duplicates = tri::PointDuplicates::kError;
-  EXPECT_THROW(bounded_point_mesh(store, none, common()), stream::Error);
+  EXPECT_THROW(write_bounded_mesh(store, none, common()), stream::Error);
   const std::vector<std::pair<tri::PointDuplicates, double>> rules{
       {tri::PointDuplicates::kMin, 0.0},
       {tri::PointDuplicates::kMax, 0.5},
@@ -215,7 +215,7 @@ TEST_F(PointMesh, TakesOneHeightPerPlaceAsAsked) {
   for (const auto& [rule, up] : rules) {
     auto wanted = options(0.0, 500);
     wanted.duplicates = rule;
-    const auto result = bounded_point_mesh(store, wanted, common());
+    const auto result = write_bounded_mesh(store, wanted, common());
     EXPECT_EQ(result.samples, cloud.size());
     EXPECT_EQ(result.duplicates, 2 * places.size());
     EXPECT_LE(result.max_error, 1e-12);
@@ -235,7 +235,7 @@ TEST_F(PointMesh, TakesOneHeightPerPlaceAsAsked) {
   for (int i = 0; i < 2000; ++i) heap.push_back({50, 50, 1.0 * (i % 10)});
   auto wanted = options(1.0, 300);
   wanted.duplicates = tri::PointDuplicates::kMax;
-  const auto result = bounded_point_mesh(build(heap), wanted, common());
+  const auto result = write_bounded_mesh(build(heap), wanted, common());
   EXPECT_EQ(result.duplicates, 1999U);
   EXPECT_LE(result.max_error, 1.0);
 }
@@ -257,7 +257,7 @@ TEST_F(PointMesh, KeepsTheBoundOnRoundedNumbers) {
   const stream::Store store = build(cloud);
   auto wanted = options(0.5, 800);
   wanted.path = (folder_.path() / "mesh.glb").string();
-  const auto result = bounded_point_mesh(store, wanted, common());
+  const auto result = write_bounded_mesh(store, wanted, common());
   EXPECT_LE(result.max_error, 0.5);
   EXPECT_GT(result.max_error, 0.3);
   EXPECT_EQ(result.samples, cloud.size());
@@ -302,7 +302,7 @@ TEST_F(PointMesh, OfALaserScan) {
     SCOPED_TRACE(max_error);
     auto wanted = options(max_error, 15000);
     wanted.duplicates = tri::PointDuplicates::kMax;
-    const auto result = bounded_point_mesh(store, wanted, common(2));
+    const auto result = write_bounded_mesh(store, wanted, common(2));
     EXPECT_EQ(result.samples, scan.size());
     EXPECT_EQ(result.duplicates, scan.size() - cloud.size());
     const auto errors = check_surface(cloud, terrain::read_mesh_file(wanted.path)->mesh);
@@ -310,7 +310,7 @@ TEST_F(PointMesh, OfALaserScan) {
     EXPECT_NEAR(errors.largest, result.max_error, 1e-9);
     auto whole = wanted;
     whole.window_points = 1U << 20;
-    const auto one = bounded_point_mesh(store, whole, common());
+    const auto one = write_bounded_mesh(store, whole, common());
     EXPECT_LT(static_cast<double>(result.triangles), 1.03 * static_cast<double>(one.triangles));
   }
 }

@@ -3,18 +3,21 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/region.hpp"
 #include "base/units.hpp"
+#include "cli/choices.hpp"
+#include "cli/detail_options.hpp"
+#include "cli/line_option.hpp"
 #include "cli/smooth_option.hpp"
 #include "fuzz_target.hpp"
-#include "mesh/bounded/bounded_mesh.hpp"
 #include "picture/camera.hpp"
 #include "sample/height_sampler.hpp"
 #include "sample/profile_run.hpp"
 #include "sample/raster_run.hpp"
 #include "scan/surface_run.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/terrain/bounded_mesh.hpp"
 #include "terrace/terrain/error.hpp"
+#include "terrace/terrain/region.hpp"
 #include "tile/format/tile_address.hpp"
 
 namespace terrace::tools {

@@ -5,11 +5,12 @@
 
 #include <nlohmann/json.hpp>
 
-#include "base/region.hpp"
+#include "cli/detail_options.hpp"
 #include "fuzz_target.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/error.hpp"
 #include "terrace/terrain/metric_choice.hpp"
+#include "terrace/terrain/region.hpp"
 
 namespace terrace::tools {
 

@@ -1,58 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "base/region.hpp"
+#include "terrace/terrain/region.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <fstream>
 #include <limits>
 
 #include <nlohmann/json.hpp>
 
+#include "base/polygon.hpp"
 #include "base/units.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
 namespace {
-
-/// a + b as sum and rounding error, exactly (Knuth).
-void two_sum(double a, double b, double& sum, double& rest) {
-  sum = a + b;
-  const double part = sum - a;
-  rest = (a - (sum - part)) + (b - part);
-}
-
-/// The sign of a sum of products, exactly: each product is two doubles, and a sorted expansion of
-/// non-overlapping parts grows by one double after the other.
-class ExactSum {
- public:
-  void add_product(double a, double b) {
-    const double product = a * b;
-    add(std::fma(a, b, -product));
-    add(product);
-  }
-  [[nodiscard]] int sign() const {
-    for (std::size_t i = size_; i-- > 0;) {
-      if (parts_[i] != 0) return parts_[i] > 0 ? 1 : -1;
-    }
-    return 0;
-  }
-
- private:
-  void add(double value) {
-    for (std::size_t i = 0; i < size_; ++i) {
-      double sum = 0, rest = 0;
-      two_sum(value, parts_[i], sum, rest);
-      parts_[i] = rest;
-      value = sum;
-    }
-    parts_[size_++] = value;
-  }
-
-  std::array<double, 12> parts_{};
-  std::size_t size_ = 0;
-};
 
 [[noreturn]] void fail(const std::string& file, const std::string& cause) {
   throw stream::Error({.file = file,
@@ -140,43 +102,6 @@ bool looks_like_numbers(const std::string& text) {
 
 }  // namespace
 
-int orientation(const Point2& a, const Point2& b, const Point2& c) {
-  const double left = (b[0] - a[0]) * (c[1] - a[1]);
-  const double right = (b[1] - a[1]) * (c[0] - a[0]);
-  const double determinant = left - right;
-  const double bound =
-      (std::abs(left) + std::abs(right)) * 4 * std::numeric_limits<double>::epsilon();
-  if (determinant > bound) return 1;
-  if (-determinant > bound) return -1;
-  ExactSum sum;
-  sum.add_product(a[0], b[1]);
-  sum.add_product(-a[1], b[0]);
-  sum.add_product(b[0], c[1]);
-  sum.add_product(-b[1], c[0]);
-  sum.add_product(c[0], a[1]);
-  sum.add_product(-c[1], a[0]);
-  return sum.sign();
-}
-
-bool covers(const Polygon& polygon, const Point2& p) {
-  bool inside = false;
-  for (const std::vector<Point2>& ring : polygon) {
-    for (std::size_t i = 0; i < ring.size(); ++i) {
-      const Point2& a = ring[i];
-      const Point2& b = ring[i + 1 == ring.size() ? 0 : i + 1];
-      const bool in_height = std::min(a[1], b[1]) <= p[1] && p[1] <= std::max(a[1], b[1]);
-      if (!in_height) continue;
-      const int side = orientation(a, b, p);
-      if (side == 0 && std::min(a[0], b[0]) <= p[0] && p[0] <= std::max(a[0], b[0])) return true;
-      // A ray to the right meets the edge's half-open span of heights: crossings are counted once.
-      const bool upward = a[1] <= p[1] && p[1] < b[1];
-      const bool downward = b[1] <= p[1] && p[1] < a[1];
-      if ((upward && side > 0) || (downward && side < 0)) inside = !inside;
-    }
-  }
-  return inside;
-}
-
 Region Region::parse(const std::string& text) {
   Region region;
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -198,6 +123,12 @@ Region Region::parse(const std::string& text) {
   return of_polygons(read_geojson(text), -kInfinity, kInfinity);
 }
 
+Region Region::of_box(const stream::Box3& box) {
+  Region region;
+  region.box_ = box;
+  return region;
+}
+
 Region Region::of_polygons(std::vector<Polygon> polygons, double low, double high) {
   Region region;
   region.polygons_ = std::move(polygons);
@@ -217,25 +148,6 @@ bool Region::contains(const stream::Point3& p) const {
     if (covers(polygon, {p[0], p[1]})) return true;
   }
   return false;
-}
-
-std::optional<unsigned> parse_level(const std::string& text) {
-  if (text == "top") return std::nullopt;
-  unsigned level = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), level);
-  if (error != std::errc{} || end != text.data() + text.size() || level > 255) {
-    throw UsageError("'" + text + "' is not a level; write a number from 0 (full detail) or 'top'");
-  }
-  return level;
-}
-
-Focus parse_focus(const std::string& text) {
-  const std::size_t colon = text.rfind(':');
-  if (colon == std::string::npos) {
-    throw UsageError("the focus '" + text + "' names no level; write BOX:L");
-  }
-  return {.region = Region::parse(text.substr(0, colon)),
-          .level = parse_level(text.substr(colon + 1))};
 }
 
 }  // namespace terrace::terrain

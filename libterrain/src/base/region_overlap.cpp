@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <vector>
 
+#include "base/polygon.hpp"
+
 namespace terrace::terrain {
 namespace {
 

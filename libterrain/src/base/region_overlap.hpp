@@ -3,7 +3,7 @@
 
 #include <array>
 
-#include "base/region.hpp"
+#include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
 

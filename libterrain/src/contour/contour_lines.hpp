@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
-#include "base/region.hpp"
 #include "contour/contour_levels.hpp"
 #include "contour/line_joiner.hpp"
+#include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
 

@@ -6,11 +6,11 @@
 
 #include <terrace/stream/store.hpp>
 
-#include "base/region.hpp"
 #include "contour/contour_run.hpp"
 #include "contour/line_joiner.hpp"
 #include "surface/ground_slope.hpp"
 #include "surface/store_window.hpp"
+#include "terrace/terrain/region.hpp"
 
 /// What write_contours() is made of.
 

@@ -8,7 +8,7 @@
 
 #include <terrace/stream/store.hpp>
 
-#include "base/region.hpp"
+#include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
 

@@ -10,11 +10,11 @@
 #include <terrace/stream/store.hpp>
 
 #include "base/fixed_text.hpp"
-#include "base/region.hpp"
 #include "contour/contour_run.hpp"
 #include "contour/line_joiner.hpp"
 #include "earth/crs/coordinate_system.hpp"
 #include "surface/ground_slope.hpp"
+#include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
 

@@ -7,9 +7,9 @@
 #include <functional>
 #include <span>
 
-#include "base/region.hpp"
 #include "contour/contour_levels.hpp"
 #include "contour/line_joiner.hpp"
+#include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
 

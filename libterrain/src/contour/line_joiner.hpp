@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "base/region.hpp"
+#include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
 

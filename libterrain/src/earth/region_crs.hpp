@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "base/region.hpp"
 #include "earth/crs/coordinate_system.hpp"
+#include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
 

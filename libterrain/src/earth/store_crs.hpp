@@ -5,9 +5,9 @@
 #include <span>
 #include <string>
 
-#include "base/region.hpp"
 #include "earth/crs/coordinate_system.hpp"
 #include "terrace/stream/store.hpp"
+#include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
 

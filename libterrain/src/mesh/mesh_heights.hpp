@@ -9,8 +9,8 @@
 #include <terrace/tri/multiresolution.hpp>
 #include <terrace/tri/smoothing.hpp>
 
-#include "base/region.hpp"
 #include "earth/world.hpp"
+#include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
 

@@ -5,8 +5,8 @@
 
 #include "mesh/mesh_heights.hpp"
 #include "mesh/scene.hpp"
-#include "surface/detail.hpp"
 #include "terrace/stream/store.hpp"
+#include "terrace/terrain/detail.hpp"
 #include "terrace/terrain/metric_choice.hpp"
 
 namespace terrace::terrain {

@@ -10,13 +10,10 @@
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/interpolation.hpp>
 
-#include "base/region.hpp"
 #include "surface/lattice_surface.hpp"
+#include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
-
-/// "linear", "natural", "nearest". Throws: UsageError.
-tri::Interpolation parse_interpolation(const std::string& text);
 
 struct SamplerOptions {
   tri::Interpolation method = tri::Interpolation::kLinear;

@@ -8,8 +8,8 @@
 
 #include <terrace/stream/store.hpp>
 
-#include "base/region.hpp"
 #include "surface/store_window.hpp"
+#include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
 

@@ -11,7 +11,7 @@
 
 #include <terrace/stream/input.hpp>
 
-#include "base/region.hpp"
+#include "terrace/terrain/region.hpp"
 
 /// Tables of places as text, one a line: read in batches, each line kept as it is so that answers
 /// can be written behind it.

@@ -10,14 +10,10 @@
 
 #include <terrace/stream/store.hpp>
 
-#include "base/region.hpp"
 #include "sample/height_sampler.hpp"
+#include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
-
-/// "x1,y1,x2,y2[,...]", or a GeoJSON file with one LineString (plain, in a Feature, or in a
-/// FeatureCollection of one). At least two places. Throws: UsageError, stream::Error.
-std::vector<Point2> parse_line(const std::string& text);
 
 struct ProfileRequest {
   SamplerOptions sampler;

@@ -227,14 +227,6 @@ class RasterRun {
 
 }  // namespace
 
-RasterValue parse_raster_value(const std::string& text) {
-  if (text == "height") return RasterValue::height;
-  if (text == "slope") return RasterValue::slope;
-  if (text == "aspect") return RasterValue::aspect;
-  if (text == "hillshade") return RasterValue::hillshade;
-  throw UsageError("'" + text + "' is no --value; write height, slope, aspect or hillshade");
-}
-
 RasterOutcome write_raster(const stream::Store& store, const RasterRequest& request,
                            const std::function<void(std::uint64_t, double)>& progress) {
   return RasterRun(store, request).run(store.schema().coordinates[2], progress);

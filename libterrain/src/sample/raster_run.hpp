@@ -8,15 +8,13 @@
 
 #include <terrace/stream/store.hpp>
 
-#include "base/region.hpp"
 #include "earth/store_crs.hpp"
 #include "sample/height_sampler.hpp"
+#include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
 
 enum class RasterValue : std::uint8_t { height, slope, aspect, hillshade };
-/// Throws: UsageError.
-RasterValue parse_raster_value(const std::string& text);
 
 /// What `terrace raster` was asked to write.
 struct RasterRequest {

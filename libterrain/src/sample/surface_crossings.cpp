@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/polygon.hpp"
 #include "surface/ground_slope.hpp"
 
 namespace terrace::terrain {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "surface/detail.hpp"
+#include "terrace/terrain/detail.hpp"
 
 #include <algorithm>
 #include <cstddef>
@@ -11,36 +11,6 @@
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
-
-namespace {
-
-unsigned checked(std::optional<unsigned> level, const stream::Store& store) {
-  const unsigned top = store.top();
-  if (level && *level > top) {
-    throw UsageError("the store has no level " + std::to_string(*level) + ": its top is level " +
-                     std::to_string(top));
-  }
-  return level.value_or(top);
-}
-
-}  // namespace
-
-Detail Detail::parse(const stream::Store& store, const std::string& level,
-                     const std::string& region, const std::vector<std::string>& focuses,
-                     const RegionConversion& conversion) {
-  Detail detail;
-  if (!level.empty()) {
-    detail.level = checked(parse_level(level), store);
-  } else if (!focuses.empty()) {
-    detail.level = store.top();
-  }
-  if (!region.empty()) detail.region = conversion(Region::parse(region));
-  for (const std::string& text : focuses) {
-    Focus focus = parse_focus(text);
-    detail.focuses.push_back({conversion(std::move(focus.region)), checked(focus.level, store)});
-  }
-  return detail;
-}
 
 unsigned Detail::finest() const {
   unsigned finest = level;

@@ -7,9 +7,9 @@
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/interpolation.hpp>
 
-#include "base/region.hpp"
 #include "earth/ground.hpp"
 #include "surface/lattice_surface.hpp"
+#include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
 

@@ -10,7 +10,7 @@
 
 #include <terrace/stream/error.hpp>
 
-#include "surface/detail.hpp"
+#include "terrace/terrain/detail.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -12,11 +12,11 @@
 #include <terrace/tri/delaunay2.hpp>
 #include <terrace/tri/heights.hpp>
 
-#include "base/region.hpp"
 #include "surface/circle_cover.hpp"
 #include "surface/cluster_frontier.hpp"
 #include "surface/lattice_surface.hpp"
 #include "surface/store_window.hpp"
+#include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
 

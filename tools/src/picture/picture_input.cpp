@@ -10,16 +10,17 @@
 
 #include <CLI/CLI.hpp>
 
+#include "cli/detail_options.hpp"
 #include "cli/interrupt.hpp"
 #include "earth/ground.hpp"
 #include "mesh/mesh_file.hpp"
 #include "mesh/store_mesh.hpp"
 #include "picture/height_grid.hpp"
 #include "scan/surface_run.hpp"
-#include "surface/detail.hpp"
 #include "tables/column_value.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/source.hpp"
+#include "terrace/terrain/detail.hpp"
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::tools {
@@ -183,7 +184,7 @@ std::string finest_level(const stream::Store& store, const std::string& region) 
   constexpr std::uint64_t kMost = 4000000;
   if (region.empty()) return std::to_string(level_within(store, kMost));
   for (unsigned level = 0; level < store.top(); ++level) {
-    const Detail detail = Detail::parse(store, std::to_string(level), region, {});
+    const Detail detail = parse_detail(store, std::to_string(level), region, {});
     std::uint64_t points = 0;
     for_each_wanted_record(
         store, detail,
@@ -212,7 +213,7 @@ PictureInput from_store(const std::string& path, const PictureSelection& selecti
   }
   const bool chosen = !selection.level.empty() || !selection.focuses.empty();
   const std::string level = chosen ? selection.level : finest_level(store, selection.region);
-  const Detail detail = Detail::parse(store, level, selection.region, selection.focuses);
+  const Detail detail = parse_detail(store, level, selection.region, selection.focuses);
   // These positions are in the CRS already.
   Placement world;
   world.crs = stored.crs;

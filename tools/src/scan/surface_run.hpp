@@ -11,7 +11,7 @@
 #include <terrace/tri/reconstruct.hpp>
 
 #include "mesh/scene.hpp"
-#include "surface/detail.hpp"
+#include "terrace/terrain/detail.hpp"
 #include "terrace/terrain/metric_choice.hpp"
 
 namespace terrace::tools {

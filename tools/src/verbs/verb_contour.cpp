@@ -9,6 +9,7 @@
 
 #include "base/units.hpp"
 #include "cli/crs_options.hpp"
+#include "cli/detail_options.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/output.hpp"
 #include "contour/contour_run.hpp"

@@ -9,15 +9,18 @@
 #include <terrace/stream/store.hpp>
 
 #include "base/units.hpp"
+#include "cli/choices.hpp"
 #include "cli/crs_options.hpp"
+#include "cli/detail_options.hpp"
 #include "cli/interrupt.hpp"
+#include "cli/keep_memory.hpp"
 #include "cli/output.hpp"
 #include "cli/smooth_option.hpp"
-#include "mesh/bounded/bounded_mesh.hpp"
 #include "mesh/height_overlay.hpp"
 #include "mesh/mesh_output.hpp"
 #include "mesh/store_mesh.hpp"
-#include "surface/detail.hpp"
+#include "terrace/terrain/bounded_mesh.hpp"
+#include "terrace/terrain/detail.hpp"
 #include "terrace/terrain/error.hpp"
 #include "verbs/verbs.hpp"
 
@@ -126,9 +129,8 @@ class MeshCommand final : public Command {
     }
     options.writer = {
         .format = format_, .replace = may_replace(output_, common.force), .stop = stop_token()};
-    const BoundedMeshResult result = store.schema().grid
-                                         ? bounded_raster_mesh(store, options, common.context())
-                                         : bounded_point_mesh(store, options, common.context());
+    keep_freed_memory();
+    const BoundedMeshResult result = write_bounded_mesh(store, options, common.context());
     Summary summary;
     summary.json = {{"vertices", result.vertices},
                     {"triangles", result.triangles},
@@ -187,7 +189,7 @@ class MeshCommand final : public Command {
       throw UsageError("--save-overlay and --output are the same file");
     }
     const stream::Store store = open_store(store_);
-    const Detail detail = Detail::parse(store, level_, region_, focuses_, crs_.regions(store));
+    const Detail detail = parse_detail(store, level_, region_, focuses_, crs_.regions(store));
     const PlaceConversion places = crs_.places(store);
     const bool replace = may_replace(output_, common.force);
     std::optional<stream::Overlay> overlay;

@@ -14,11 +14,12 @@
 
 #include "base/units.hpp"
 #include "cli/crs_options.hpp"
+#include "cli/detail_options.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/output.hpp"
 #include "earth/world.hpp"
 #include "mesh/height_overlay.hpp"
-#include "surface/detail.hpp"
+#include "terrace/terrain/detail.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
@@ -125,7 +126,7 @@ class PointsCommand final : public Command {
   Summary run(const CommonOptions& common) override {
     const Stopwatch watch;
     const stream::Store store = open_store(store_);
-    const Detail detail = Detail::parse(store, level_, region_, focuses_, crs_.regions(store));
+    const Detail detail = parse_detail(store, level_, region_, focuses_, crs_.regions(store));
     std::optional<stream::Overlay> overlay;
     if (!overlay_.empty()) overlay.emplace(open_height_overlay(overlay_, store));
     const auto writer = stream::open_point_writer(

@@ -9,8 +9,11 @@
 #include <terrace/stream/store.hpp>
 
 #include "base/units.hpp"
+#include "cli/choices.hpp"
 #include "cli/crs_options.hpp"
+#include "cli/detail_options.hpp"
 #include "cli/interrupt.hpp"
+#include "cli/line_option.hpp"
 #include "cli/output.hpp"
 #include "earth/crs/coordinate_system.hpp"
 #include "sample/profile_run.hpp"

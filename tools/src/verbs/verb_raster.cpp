@@ -8,7 +8,9 @@
 #include <terrace/stream/store.hpp>
 
 #include "base/units.hpp"
+#include "cli/choices.hpp"
 #include "cli/crs_options.hpp"
+#include "cli/detail_options.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/output.hpp"
 #include "sample/raster_run.hpp"

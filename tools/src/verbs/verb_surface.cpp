@@ -9,13 +9,14 @@
 
 #include "base/units.hpp"
 #include "cli/crs_options.hpp"
+#include "cli/detail_options.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/library_call.hpp"
 #include "cli/output.hpp"
 #include "mesh/mesh_output.hpp"
 #include "mesh/vtk_file.hpp"
 #include "scan/surface_run.hpp"
-#include "surface/detail.hpp"
+#include "terrace/terrain/detail.hpp"
 #include "terrace/terrain/error.hpp"
 #include "terrace/terrain/metric_choice.hpp"
 #include "verbs/verbs.hpp"
@@ -62,7 +63,7 @@ class SurfaceCommand final : public Command {
     const bool vtk = output_.ends_with(".vtk");
     if (tetrahedra_ != vtk) throw UsageError("--tetrahedra and an output named .vtk go together");
     const stream::Store store = open_store(store_);
-    const Detail detail = Detail::parse(store, level_, region_, focuses_, crs_.regions(store));
+    const Detail detail = parse_detail(store, level_, region_, focuses_, crs_.regions(store));
     const PlaceConversion places = crs_.places(store);
     const bool replace = may_replace(output_, common.force);
     SurfaceOutcome outcome;

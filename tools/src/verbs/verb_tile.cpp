@@ -13,8 +13,9 @@
 #include <terrace/stream/store.hpp>
 
 #include "base/units.hpp"
+#include "cli/choices.hpp"
 #include "cli/interrupt.hpp"
-#include "mesh/bounded/bounded_mesh.hpp"
+#include "terrace/terrain/bounded_mesh.hpp"
 #include "terrace/terrain/error.hpp"
 #include "tile/make/tile_source.hpp"
 #include "tile/set/tile_file.hpp"

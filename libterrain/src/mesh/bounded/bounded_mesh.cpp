@@ -1,68 +1,66 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "mesh/bounded/bounded_mesh.hpp"
+#include "terrace/terrain/bounded_mesh.hpp"
 
-#include <array>
-#include <string_view>
-#include <utility>
+#include <optional>
+#include <string>
 
 #include <terrace/stream/error.hpp>
 
-#include "base/units.hpp"
+#include "mesh/bounded/least_error.hpp"
+#include "mesh/bounded/mesh_spool.hpp"
+#include "mesh/bounded/point_mesher.hpp"
+#include "mesh/bounded/raster_mesher.hpp"
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
 namespace {
 
-template <class T, std::size_t N>
-T choice(const std::string& text, const char* option,
-         const std::array<std::pair<std::string_view, T>, N>& choices) {
-  std::string names;
-  for (const auto& [name, value] : choices) {
-    if (name == text) return value;
-    names += (names.empty() ? "" : ", ") + std::string(name);
+/// By a RasterMesher or a PointMesher.
+template <class Mesher>
+BoundedMeshResult mesh_by(Mesher mesher, const BoundedMeshOptions& options) {
+  const double metres = mesher.metres_vertical();
+  BoundedMeshResult result;
+  std::optional<MeshSpool> spool;
+  const auto run = [&](double bound, std::uint64_t most) {
+    spool.reset();  // its files have the names of the next one's
+    spool.emplace(options.path);
+    result = mesher.run(bound, *spool, most);
+    return static_cast<double>(result.vertices);
+  };
+  if (options.max_points == 0 || mesher.limits_points()) {
+    run(options.max_error / metres, ~std::uint64_t{0});
+  } else {
+    LeastErrorSearch search;
+    search.most = options.max_points;
+    search.range = mesher.bounds().max[2] - mesher.bounds().min[2];
+    if (mesher.can_estimate()) {
+      search.estimate = [&](double bound) { return mesher.estimate(bound); };
+    }
+    search.run = [&](double bound) { return run(bound, options.max_points); };
+    if (!least_error(search)) {
+      throw stream::Error({.file = options.path,
+                           .where = {},
+                           .cause = "`max_points` " + std::to_string(options.max_points) +
+                                    " is too few even for a flat mesh of this region",
+                           .remedy = "allow more points"});
+    }
   }
-  throw UsageError(std::string(option) + " '" + text + "': one of " + names);
+  spool->write(options.path, options.writer, mesher.bounds());
+  result.max_error *= metres;
+  result.rms_error *= metres;
+  return result;
 }
 
 }  // namespace
 
-Fill parse_fill(const std::string& text) {
-  constexpr std::array<std::pair<std::string_view, Fill>, 3> kChoices{
-      {{"none", Fill::none}, {"flat", Fill::flat}, {"interpolate", Fill::interpolate}}};
-  return choice(text, "--fill", kChoices);
-}
-
-double aim_within(double bound, const stream::MeshRounding& rounding, const std::string& path) {
-  const stream::Point3& moved = rounding.largest();
-  if (moved == stream::Point3{}) return bound;
-  const double aim = bound * (15.0 / 16.0) - moved[2];
-  if (!(aim >= 0.0)) {
-    throw stream::Error({.file = path,
-                         .where = {},
-                         .cause = "its format rounds heights by up to " +
-                                  readable_number(moved[2]) + ", too much for this --max-error",
-                         .remedy = "write PLY, which is exact"});
+BoundedMeshResult write_bounded_mesh(const stream::Store& store, const BoundedMeshOptions& options,
+                                     const Context& context) {
+  const stream::Store source = store.with_stop(context.stop);
+  if (store.schema().grid) return mesh_by(RasterMesher(source, options, context), options);
+  if (options.fill != Fill::none) {
+    throw UsageError("`fill` is for rasters: irregular points have no cells without data");
   }
-  return aim;
-}
-
-tri::TinQuality parse_quality(const std::string& text) {
-  constexpr std::array<std::pair<std::string_view, tri::TinQuality>, 3> kChoices{
-      {{"greedy", tri::TinQuality::kGreedy},
-       {"removal", tri::TinQuality::kRemoval},
-       {"fitted", tri::TinQuality::kFitted}}};
-  return choice(text, "--quality", kChoices);
-}
-
-tri::PointDuplicates parse_duplicates(const std::string& text) {
-  constexpr std::array<std::pair<std::string_view, tri::PointDuplicates>, 6> kChoices{
-      {{"all", tri::PointDuplicates::kAll},
-       {"min", tri::PointDuplicates::kMin},
-       {"max", tri::PointDuplicates::kMax},
-       {"mean", tri::PointDuplicates::kMean},
-       {"first", tri::PointDuplicates::kFirst},
-       {"error", tri::PointDuplicates::kError}}};
-  return choice(text, "--duplicates", kChoices);
+  return mesh_by(PointMesher(source, options, context), options);
 }
 
 }  // namespace terrace::terrain

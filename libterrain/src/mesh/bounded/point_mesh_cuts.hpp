@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-#include "base/region.hpp"
+#include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
 

@@ -8,6 +8,7 @@
 #include <map>
 #include <utility>
 
+#include "base/polygon.hpp"
 #include "mesh/bounded/streaming_hull.hpp"
 
 namespace terrace::terrain {

@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "base/region.hpp"
 #include "mesh/bounded/point_mesh_cuts.hpp"
+#include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
 

@@ -8,7 +8,7 @@
 #include <terrace/stream/error.hpp>
 
 #include "earth/world.hpp"
-#include "surface/detail.hpp"
+#include "terrace/terrain/detail.hpp"
 
 namespace terrace::terrain {
 namespace {

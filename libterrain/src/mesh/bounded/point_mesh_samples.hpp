@@ -13,8 +13,8 @@
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/point_tin.hpp>
 
-#include "base/region.hpp"
 #include "mesh/bounded/point_mesh_cuts.hpp"
+#include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
 

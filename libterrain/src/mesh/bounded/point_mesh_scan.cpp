@@ -8,7 +8,7 @@
 
 #include "earth/world.hpp"
 #include "mesh/bounded/streaming_hull.hpp"
-#include "surface/detail.hpp"
+#include "terrace/terrain/detail.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -8,8 +8,8 @@
 
 #include <terrace/stream/store.hpp>
 
-#include "base/region.hpp"
 #include "mesh/bounded/point_mesh_samples.hpp"
+#include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
 

@@ -14,6 +14,7 @@
 #include "base/progress_report.hpp"
 #include "base/stopwatch.hpp"
 #include "base/units.hpp"
+#include "mesh/bounded/aim_within.hpp"
 #include "mesh/bounded/point_mesh_estimate.hpp"
 #include "mesh/bounded/point_mesh_joiner.hpp"
 #include "mesh/bounded/point_mesh_sides.hpp"

@@ -10,13 +10,13 @@
 
 #include "earth/ground.hpp"
 #include "earth/world.hpp"
-#include "mesh/bounded/bounded_mesh.hpp"
 #include "mesh/bounded/mesh_spool.hpp"
 #include "mesh/bounded/point_mesh_cuts.hpp"
 #include "mesh/bounded/point_mesh_plan.hpp"
 #include "mesh/bounded/point_mesh_samples.hpp"
 #include "mesh/bounded/point_mesh_scan.hpp"
 #include "mesh/bounded/point_mesh_window.hpp"
+#include "terrace/terrain/bounded_mesh.hpp"
 
 namespace terrace::terrain {
 
@@ -29,8 +29,8 @@ class PointMesher {
   /// Meshes into the spool. max_error in the vertical unit. Stops early once there are more than
   /// `most_vertices`, and tells about how many there would be.
   BoundedMeshResult run(double max_error, MeshSpool& spool, std::uint64_t most_vertices);
-  /// Whether the samples are few enough for one window, which can have a limit of vertices itself.
-  [[nodiscard]] bool single() const { return scan_.whole.has_value(); }
+  /// Whether run() keeps to options.max_points by itself: the samples fit into one window.
+  [[nodiscard]] bool limits_points() const { return single(); }
   /// About how many vertices a bound takes, in the vertical unit, quickly.
   [[nodiscard]] double estimate(double max_error) const;
   [[nodiscard]] bool can_estimate() const { return samples_.has_value(); }
@@ -40,6 +40,7 @@ class PointMesher {
   [[nodiscard]] const stream::Box3& bounds() const { return bounds_; }
 
  private:
+  [[nodiscard]] bool single() const { return scan_.whole.has_value(); }
   [[nodiscard]] PointMeshOptions mesh_options(double max_error) const;
   /// Why samples at one place are refused: how many places, and how far apart.
   [[nodiscard]] stream::Error shared_places_error() const;

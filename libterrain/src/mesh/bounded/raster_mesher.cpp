@@ -13,6 +13,7 @@
 #include "base/progress_report.hpp"
 #include "base/units.hpp"
 #include "earth/ground.hpp"
+#include "mesh/bounded/aim_within.hpp"
 #include "mesh/bounded/lattice_plan.hpp"
 #include "mesh/bounded/window_joiner.hpp"
 #include "terrace/terrain/error.hpp"

@@ -10,18 +10,18 @@
 #include <terrace/stream/store.hpp>
 
 #include "earth/world.hpp"
-#include "mesh/bounded/bounded_mesh.hpp"
 #include "mesh/bounded/mesh_spool.hpp"
 #include "mesh/bounded/window_tin.hpp"
 #include "surface/raster_fill.hpp"
 #include "surface/store_window.hpp"
+#include "terrace/terrain/bounded_mesh.hpp"
 
 namespace terrace::terrain {
 
 /// Meshes a raster store at one bound or another, window by window.
 class RasterMesher {
  public:
-  /// All must outlive it. Throws: stream::Error if --memory does not suffice, UsageError.
+  /// All must outlive it. Throws: stream::Error if the memory does not suffice, UsageError.
   RasterMesher(const stream::Store& store, const BoundedMeshOptions& options,
                const Context& context);
 
@@ -32,6 +32,8 @@ class RasterMesher {
   /// are a small part of all.
   [[nodiscard]] double estimate(double max_error) const;
   [[nodiscard]] bool can_estimate() const;
+  /// Whether run() keeps to options.max_points by itself.
+  [[nodiscard]] static bool limits_points() { return false; }
 
   [[nodiscard]] double metres_vertical() const;
   [[nodiscard]] const stream::Box3& bounds() const { return bounds_; }

@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 
+#include "base/polygon.hpp"
+
 namespace terrace::terrain {
 namespace {
 

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "base/region.hpp"
+#include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
 

@@ -11,10 +11,10 @@
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/grid_tin.hpp>
 
-#include "base/region.hpp"
 #include "earth/world.hpp"
 #include "surface/raster_fill.hpp"
 #include "surface/store_window.hpp"
+#include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "mesh/bounded/keep_memory.hpp"
+#include "cli/keep_memory.hpp"
 
 #include <cstdlib>
 #ifdef __GLIBC__
 #include <malloc.h>
 #endif
 
-namespace terrace::terrain {
+namespace terrace::tools {
 
 void keep_freed_memory() {
 #ifdef __GLIBC__
@@ -17,4 +17,4 @@ void keep_freed_memory() {
 #endif
 }
 
-}  // namespace terrace::terrain
+}  // namespace terrace::tools

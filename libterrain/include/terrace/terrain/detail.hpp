@@ -8,8 +8,7 @@
 
 #include <terrace/stream/store.hpp>
 
-#include "base/region.hpp"
-#include "earth/store_crs.hpp"
+#include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
 
@@ -22,14 +21,6 @@ struct FinerRegion {
 /// Which detail is wanted where: `level` everywhere (or inside `region` only), finer inside the
 /// focuses. All regions are in the store's CRS.
 struct Detail {
-  /// The levels as asked for, checked against the store. An empty level is the top if there are
-  /// focuses, else level 0.
-  /// Throws: UsageError for a level above the store's top.
-  /// conversion: of regions that are given in another CRS.
-  static Detail parse(const stream::Store& store, const std::string& level,
-                      const std::string& region, const std::vector<std::string>& focuses,
-                      const RegionConversion& conversion = {});
-
   unsigned level = 0;
   std::optional<Region> region;
   std::vector<FinerRegion> focuses;

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include <terrace/stream/mesh_writer.hpp>
+#include <terrace/stream/store.hpp>
+#include <terrace/tri/grid_tin.hpp>
+#include <terrace/tri/point_tin.hpp>
+
+#include "terrace/terrain/context.hpp"
+#include "terrace/terrain/region.hpp"
+
+/// Meshes whose vertical error is bounded, and measured at every sample.
+
+namespace terrace::terrain {
+
+/// What a raster's cells without data become.
+enum class Fill : std::uint8_t {
+  none,         ///< holes
+  flat,         ///< samples at the lowest height of the store
+  interpolate,  ///< samples between the heights around
+};
+
+struct BoundedMeshOptions {
+  double max_error = 0.0;        ///< metres
+  std::uint64_t max_points = 0;  ///< 0: no limit; else max_error is not used
+  tri::TinQuality quality = tri::TinQuality::kRemoval;
+  /// kAll: an error where samples of one place differ by more than max_error.
+  tri::PointDuplicates duplicates = tri::PointDuplicates::kAll;
+  Fill fill = Fill::none;
+  std::optional<Region> region{};  ///< in the store's CRS
+  std::string path{};              ///< of the mesh; "-" is standard output
+  stream::WriterOptions writer{};  ///< its format
+  /// Irregular samples meshed at once, at most; the mesh depends on it.
+  std::size_t window_points = std::size_t{1} << 18;
+};
+
+/// What was measured on the mesh as a reader of the file gets it back, at every sample at full
+/// resolution that has data and lies on a triangle.
+struct BoundedMeshResult {
+  std::uint64_t vertices = 0, triangles = 0;
+  double max_error = 0.0, rms_error = 0.0;  ///< metres
+  std::uint64_t samples = 0;                ///< with data, in the region if there is one
+  std::uint64_t uncovered = 0;   ///< of these, such as lie on no triangle: they have no error
+  std::uint64_t duplicates = 0;  ///< samples at the place of another
+  double reading_seconds = 0.0;  ///< of all threads together, decoding included
+  double meshing_seconds = 0.0;  ///< likewise, the check included
+};
+
+/// Writes the mesh of a store's samples at full resolution, with the fewest triangles within the
+/// bound or the smallest bound that so many points reach.
+///
+/// Works window by window: windows depend on the data and the bound alone, what lies on their sides
+/// on the samples there alone. A finished window is spooled beside `path` and forgotten. Of
+/// irregular points the mesh covers the convex hull; up to options.window_points they are meshed as
+/// a whole, above that after one pass that finds the hull and the windows. Reports "samples".
+/// Throws: stream::Error on a damaged store, if the memory does not suffice (says what it needs),
+/// or if the format's numbers are too coarse for the bound; UsageError; stream::Stopped. The file
+/// is whole or not there.
+BoundedMeshResult write_bounded_mesh(const stream::Store& store, const BoundedMeshOptions& options,
+                                     const Context& context = {});
+
+}  // namespace terrace::terrain

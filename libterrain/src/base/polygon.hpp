@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "terrace/terrain/region.hpp"
+
+namespace terrace::terrain {
+
+/// -1, 0 or 1: c lies right of, on, or left of the directed line a to b. Exact for all doubles
+/// whose products neither overflow nor underflow.
+/// Source: J. R. Shewchuk, Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric
+/// Predicates (1997), doi:10.1007/PL00009321; here one filter and the full expansion.
+int orientation(const Point2& a, const Point2& b, const Point2& c);
+
+/// True if `p` is inside (even-odd over all rings) or on a ring. Exact. O(vertices).
+bool covers(const Polygon& polygon, const Point2& p);
+
+}  // namespace terrace::terrain
