@@ -15,7 +15,6 @@
 #include <cstdlib>
 #include <exception>
 #include <filesystem>
-#include <memory>
 #include <string>
 #include <thread>
 #include <vector>
@@ -25,14 +24,19 @@
 #include "../../libterrain/tests/temporary_folder.hpp"
 #include "cli/cli.hpp"
 #include "flight_path.hpp"
-#include "flight_viewer.hpp"
 #include "terrace/terrain/build.hpp"
+#include "terrace/terrain/store_view.hpp"
 
 namespace {
 
 using terrace::stream::Store;
 using namespace terrace::tests;
 namespace tri = terrace::tri;
+using View = terrace::terrain::StoreView<std::int32_t>;
+
+double now() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
 bool small() { return std::getenv("TERRACE_BENCH_SMALL") != nullptr; }
 std::size_t active() { return small() ? 20'000 : 500'000; }
@@ -66,11 +70,11 @@ void warm(const Store& store) {
 }
 
 /// Frames until nothing is left to do; 0 if that takes more than 100,000.
-int settle(Viewer& viewer, const tri::View& view, double seconds) {
+int settle(View& viewer, View::Reader reader, const tri::View& view, double seconds) {
   for (int frame = 1; frame <= 100'000; ++frame) {
-    const Control::Step& step = viewer.frame(view, seconds);
-    if (step.settled && step.wanted.empty()) return frame;
-    if (viewer.waits()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    viewer.frame(view, seconds);
+    if (viewer.settled()) return frame;
+    if (reader == View::Reader::thread) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
   return 0;
 }
@@ -82,9 +86,9 @@ void tune(Flight& flight, const Store& store) {
     flight.scale = std::sqrt(low * high);
     tri::ViewOptions options;
     options.max_points = 2 * active();
-    OneThread viewer(store, options);
-    settle(viewer, flight.view(0.0), 1.0);
-    (viewer.control().model().point_count() > active() ? high : low) = flight.scale;
+    View viewer(store, options, View::Reader::in_frame);
+    settle(viewer, View::Reader::in_frame, flight.view(0.0), 1.0);
+    (viewer.model().point_count() > active() ? high : low) = flight.scale;
   }
   flight.scale = low;
 }
@@ -103,8 +107,8 @@ double quantile(const std::vector<double>& sorted, double q) {
 }
 
 /// At the end of the flight: the points of the expanded clusters, each once.
-std::string fault(const Viewer& viewer, const Store& store, int stop, double worst) {
-  const auto& model = viewer.control().model();
+std::string fault(const View& viewer, const Store& store, int stop, double worst) {
+  const auto& model = viewer.model();
   if (stop == 0) return "the view that stopped is never at its target";
   if (worst > 1.0) return "the view that stopped is settled and not at its target";
   std::uint64_t points = store.levels()[store.top()].members;
@@ -118,9 +122,10 @@ std::string fault(const Viewer& viewer, const Store& store, int stop, double wor
   return {};
 }
 
-std::string fly(const char* name, const Flight& flight, Viewer& viewer, const Store& store) {
-  settle(viewer, flight.view(0.0), kBudget);
-  const std::size_t loaded_before = viewer.loaded().size();
+std::string fly(const char* name, const Flight& flight, View& viewer, View::Reader reader,
+                const Store& store) {
+  settle(viewer, reader, flight.view(0.0), kBudget);
+  const View::Traffic before = viewer.traffic();
   std::vector<double> times;
   double points = 0.0, changed = 0.0, spent = cpu_seconds();
   int at_target = 0;
@@ -128,15 +133,15 @@ std::string fly(const char* name, const Flight& flight, Viewer& viewer, const St
   for (int i = 1; i <= frames(); ++i) {
     view = flight.view(i * 0.01 * flight.width());
     const double begin = now();
-    const Control::Step& step = viewer.frame(view, kBudget);
+    const View::Step& step = viewer.frame(view, kBudget);
     times.push_back(now() - begin);
     at_target += step.worst <= 1.0;
-    points += static_cast<double>(viewer.control().model().point_count());
+    points += static_cast<double>(viewer.model().point_count());
     changed += static_cast<double>(step.delta->changes.added_vertices.size() +
                                    step.delta->changes.removed_vertices.size());
     // A second thread has as long as a display leaves it.
     const double rest = kBudget - times.back();
-    if (viewer.waits() && rest > 0.0) {
+    if (reader == View::Reader::thread && rest > 0.0) {
       std::this_thread::sleep_for(std::chrono::duration<double>(rest));
     }
   }
@@ -145,30 +150,24 @@ std::string fly(const char* name, const Flight& flight, Viewer& viewer, const St
   double worst = 2.0;
   for (bool settled = false; !settled && stop < 10'000;) {
     const double begin = now();
-    const Control::Step& step = viewer.frame(view, kBudget);
+    const View::Step& step = viewer.frame(view, kBudget);
     ++stop;
-    settled = step.settled && step.wanted.empty();
+    settled = viewer.settled();
     worst = step.worst;
     const double rest = kBudget - (now() - begin);
-    if (viewer.waits() && !settled && rest > 0.0) {
+    if (reader == View::Reader::thread && !settled && rest > 0.0) {
       std::this_thread::sleep_for(std::chrono::duration<double>(rest));
     }
   }
-  std::uint64_t bytes = 0, decoded = 0;
-  const std::vector<tri::ClusterId>& loaded = viewer.loaded();
-  for (std::size_t i = loaded_before; i < loaded.size(); ++i) {
-    const auto record = store.record(
-        terrace::stream::cluster_id(tri::level_of(loaded[i]), tri::ordinal_of(loaded[i])));
-    bytes += record.bytes;
-    decoded += record.points;
-  }
+  const View::Traffic& after = viewer.traffic();
   std::sort(times.begin(), times.end());
   const double count = frames();
   std::printf("%-27s %6.2f %6.2f %6.2f %9.2f %9.1f %6d %9.0f %8.0f %9zu %10.2f %8.2f %7.2f\n", name,
               1e3 * quantile(times, 0.5), 1e3 * quantile(times, 0.99), 1e3 * times.back(),
               1e3 * spent / count, 100.0 * at_target / count, stop, points / count, changed / count,
-              loaded.size() - loaded_before, static_cast<double>(decoded) / 1e6,
-              static_cast<double>(bytes) / 1e6, view.pixel_error);
+              static_cast<std::size_t>(after.clusters - before.clusters),
+              static_cast<double>(after.points - before.points) / 1e6,
+              static_cast<double>(after.bytes - before.bytes) / 1e6, view.pixel_error);
   std::fflush(stdout);
   return fault(viewer, store, stop, worst);
 }
@@ -191,16 +190,11 @@ int run() {
   for (const Kind kind : {Kind::perspective, Kind::map}) {
     Flight flight(store, kind, active());
     tune(flight, store);
-    for (const bool threads : {false, true}) {
+    for (const View::Reader reader : {View::Reader::in_frame, View::Reader::thread}) {
       std::string name = kind == Kind::map ? "map" : "perspective";
-      name += threads ? ", reader thread" : ", one thread";
-      std::unique_ptr<Viewer> viewer;
-      if (threads) {
-        viewer = std::make_unique<ReaderThread>(store, tri::ViewOptions{});
-      } else {
-        viewer = std::make_unique<OneThread>(store, tri::ViewOptions{});
-      }
-      const std::string what = fly(name.c_str(), flight, *viewer, store);
+      name += reader == View::Reader::thread ? ", reader thread" : ", one thread";
+      View viewer(store, {}, reader);
+      const std::string what = fly(name.c_str(), flight, viewer, reader, store);
       if (what.empty()) continue;
       std::fprintf(stderr, "%s: %s\n", name.c_str(), what.c_str());
       status = 1;

@@ -2,15 +2,15 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <numbers>
 
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/view.hpp>
 
-#include "earth/world.hpp"
+#include "terrace/terrain/store_view.hpp"
 
 namespace terrace::tests {
 
@@ -23,18 +23,20 @@ class Flight {
   /// active: points that are to be in the model.
   Flight(const stream::Store& store, Kind kind, std::size_t active)
       : kind_(kind), points_(static_cast<double>(active)) {
-    const auto placement = terrain::placement_of(store.schema());
-    const stream::Box3 box = terrain::world_box(placement, store.bounds());
-    middle_ = {(box.min[0] + box.max[0]) / 2, (box.min[1] + box.max[1]) / 2, box.max[2]};
+    const terrain::StoreView<std::int32_t> view(store);
+    const stream::Box3& stored = store.bounds();
+    stream::Box3 box;
+    box.include(view.in_view_frame(stored.min));
+    box.include(view.in_view_frame(stored.max));
     const double side = std::min(box.max[0] - box.min[0], box.max[1] - box.min[1]);
     cell_ = std::sqrt((box.max[0] - box.min[0]) * (box.max[1] - box.min[1]) /
                       static_cast<double>(store.points()));
     radius_ = 0.22 * side;
-    const double ground = terrain::world_point(placement, {0, 0, store.mean_height()})[2];
+    const double ground = view.in_view_frame({0, 0, store.mean_height()})[2];
     // As much is seen over small stores as over large ones, in proportion.
     const double seen = std::sqrt(points_) * cell_;
     above_ = 0.3 * seen;
-    middle_[2] = kind == Kind::perspective ? ground + above_ : box.max[2] + 1.0;
+    height_ = kind == Kind::perspective ? ground + above_ : box.max[2] + 1.0;
   }
 
   /// More of it, more points: of the map the extent, in perspective the detail.
@@ -43,7 +45,7 @@ class Flight {
   [[nodiscard]] tri::View view(double way) const {
     const double angle = way / radius_, c = std::cos(angle), s = std::sin(angle);
     tri::Pose pose;
-    pose.position = {middle_[0] + radius_ * c, middle_[1] + radius_ * s, middle_[2]};
+    pose.position = {radius_ * c, radius_ * s, height_};
     tri::View view;
     if (kind_ == Kind::map) {
       view.camera = tri::orthographic_camera(pose, map_height(), kAspect, kPixels);
@@ -69,8 +71,7 @@ class Flight {
 
   Kind kind_;
   double points_;
-  std::array<double, 3> middle_{};
-  double cell_ = 0.0, radius_ = 0.0, above_ = 0.0;
+  double cell_ = 0.0, radius_ = 0.0, above_ = 0.0, height_ = 0.0;
 };
 
 }  // namespace terrace::tests

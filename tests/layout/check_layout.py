@@ -13,7 +13,8 @@ LIBRARIES = ['stream', 'cluster', 'matching', 'tri', 'terrain']
 # Who may use whom among them; the others know no sibling.
 SIBLINGS = {'terrain': ['stream', 'cluster', 'tri']}
 # The rooms of libterrain, in ranks: a room knows those of lower rank only.
-TERRAIN_ROOMS = {'base': 0, 'earth': 1, 'build': 2, 'surface': 2, 'sample': 3, 'contour': 3, 'mesh': 3, 'tile': 3}
+TERRAIN_ROOMS = {'base': 0, 'earth': 1, 'build': 2, 'surface': 2, 'view': 2, 'sample': 3, 'contour': 3,
+                 'mesh': 3, 'tile': 3}
 LICENCES = {
     'libstream': 'Apache-2.0',
     'libcluster': 'Apache-2.0',
@@ -161,6 +162,30 @@ def check_inexact(root):
         yield f'{path}: is in MAY_DIFFER and uses nothing of the kind'
 
 
+def strings_of(line):
+    """The string literals of a line, without those in a comment behind it."""
+    return re.findall(r'"(?:[^"\\]|\\.)*"', re.sub(r'("(?:[^"\\]|\\.)*")|//.*', lambda m: m.group(1) or '', line))
+
+
+def check_command(root):
+    """The libraries know neither the command's options nor the signals of a process."""
+    table = os.path.join('tools', 'src', 'cli', 'option_names.cpp')
+    known = set(re.findall(r'\{"([a-z_]+)", "--', read(root, table)) if os.path.isfile(os.path.join(root, table)) else [])
+    for folder in [f'lib{library}/{part}' for library in LIBRARIES for part in ('include', 'src')]:
+        for path in files_below(root, folder):
+            if not path.endswith(('.cpp', '.hpp', '.h', '.cu')):
+                continue
+            for number, line in enumerate(read(root, path).split('\n'), 1):
+                if re.search(r'\bsigaction\b|\bstd::signal\b', line):
+                    yield f'{path}:{number}: handles signals of the process, which only tools may'
+                for text in strings_of(line):
+                    if re.search(r'--[a-z]', text):
+                        yield f'{path}:{number}: names an option of the command; name the parameter, in backquotes'
+                    for name in re.findall(r'`([a-z_]+)`', text) if below(path, 'libterrain') else []:
+                        if name not in known:
+                            yield f'{path}:{number}: names the parameter `{name}`, which {table} does not know'
+
+
 def check_meson(root):
     for library in LIBRARIES:
         room = f'lib{library}'
@@ -200,6 +225,7 @@ def breaches(root):
     yield from check_rooms(root)
     yield from check_sources(root)
     yield from check_inexact(root)
+    yield from check_command(root)
     yield from check_meson(root)
 
 

@@ -104,6 +104,21 @@ class CheckLayout(unittest.TestCase):
         self.assertEqual(self.breaches(lambda root: write(root, 'libtri/tests/b.cpp', head + 'std::sin(x);\n')), [])
         self.assertEqual(len(self.breaches(lambda root: None, {'tools/src/main.cpp': 'a reason'})), 1)
 
+    def test_libraries_do_not_know_the_command(self):
+        terrain = '// SPDX-License-Identifier: ' + check_layout.LICENCES['libterrain'] + '\n'
+        table = '// SPDX-License-Identifier: GPL-3.0-or-later\n    {"level", "--level"},\n'
+        for text, word in [('const char* a = "give --level";\n', 'option'),
+                           ('const char* a = "give `levels`";\n', '`levels`'),
+                           ('struct sigaction action;\n', 'signals'),
+                           ('const char* a = "give `level`, a \\" b";  // or --level\n', None)]:
+            def change(root, text=text):
+                write(root, 'tools/src/cli/option_names.cpp', table)
+                write(root, 'libterrain/src/b.cpp', terrain + text)
+            found = self.breaches(change)
+            self.assertEqual(len(found), 0 if word is None else 1, found)
+            if word:
+                self.assertIn(word, found[0])
+
     def test_rooms_are_complete(self):
         found = self.breaches(lambda root: os.remove(os.path.join(root, 'libtri/LICENSE')))
         self.assertEqual(found, ['libtri/LICENSE: is missing'])

@@ -25,7 +25,7 @@ InputFile open_file(const std::filesystem::path& path) {
     throw Error({.file = path.string(),
                  .where = {},
                  .cause = "there is no overlay here",
-                 .remedy = "name a file that terrace mesh --save-overlay has written"});
+                 .remedy = "name an overlay that terrace has written"});
   }
   return {path, std::filesystem::file_size(path)};
 }

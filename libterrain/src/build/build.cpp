@@ -112,13 +112,14 @@ unsigned threads_within_memory(const BuildRequest& request, const Context& conte
   const auto in_mebibytes = [](std::uint64_t bytes) {
     return std::to_string((bytes >> 20) + 1) + "M";
   };
-  throw stream::Error({.file = request.store.string(),
-                       .where = {},
-                       .cause = "--memory " + std::to_string(memory_bytes >> 20) +
-                                "M is not enough: the build needs " + in_mebibytes(needed(1)) +
-                                ", " + in_mebibytes(source_bytes) + " of it to read the input",
-                       .remedy = "raise --memory, lower --block, or rewrite large strips and tiles "
-                                 "as small tiles: gdal_translate -co TILED=YES"});
+  throw stream::Error(
+      {.file = request.store.string(),
+       .where = {},
+       .cause = "`memory_bytes` " + std::to_string(memory_bytes >> 20) +
+                "M is not enough: the build needs " + in_mebibytes(needed(1)) + ", " +
+                in_mebibytes(source_bytes) + " of it to read the input",
+       .remedy = "raise `memory_bytes`, lower `block_points`, or rewrite large strips and tiles "
+                 "as small tiles: gdal_translate -co TILED=YES"});
 }
 
 std::size_t payload_size(const stream::SourceInfo& info) {

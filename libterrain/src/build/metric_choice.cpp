@@ -114,15 +114,17 @@ std::vector<MetricChoice::Region> read_regions(const std::string& file) {
     throw stream::Error({.file = file,
                          .where = {},
                          .cause = "cannot be read",
-                         .remedy = "--metric elliptical:FILE names a JSON file of regions"});
+                         .remedy = "`metric` elliptical:FILE names a JSON file of regions"});
   }
   const nlohmann::json json = nlohmann::json::parse(stream, nullptr, /* allow_exceptions= */ false);
   if (!json.is_object() || !json.contains("regions") || !json["regions"].is_array() ||
       json["regions"].empty()) {
-    throw stream::Error({.file = file,
-                         .where = {},
-                         .cause = "is no JSON object with a list \"regions\"",
-                         .remedy = "see 'terrace cluster --help'"});
+    throw stream::Error(
+        {.file = file,
+         .where = {},
+         .cause = "is no JSON object with a list \"regions\"",
+         .remedy = "write {\"regions\": [{\"box\": [minx, miny, maxx, maxy], \"semi_axes\": "
+                   "[a, b], \"angle\": degrees}]}"});
   }
   std::vector<MetricChoice::Region> regions;
   for (const nlohmann::json& region : json["regions"]) {
@@ -145,13 +147,13 @@ MetricChoice MetricChoice::parse(const std::string& text) {
   } else if (name == "minkowski" && !rest.empty()) {
     choice.kind = Kind::minkowski;
     choice.p =
-        rest == "inf" ? kUnbounded : parse_number(rest, "the exponent of --metric minkowski");
-    if (!(choice.p > 0.0)) throw UsageError("--metric minkowski:P needs a P above 0, or inf");
+        rest == "inf" ? kUnbounded : parse_number(rest, "the exponent of `metric` minkowski");
+    if (!(choice.p > 0.0)) throw UsageError("`metric` minkowski:P needs a P above 0, or inf");
   } else if (name == "elliptical" && !rest.empty()) {
     choice.kind = Kind::elliptical;
     choice.regions = read_regions(rest);
   } else {
-    throw UsageError("--metric " + text +
+    throw UsageError("`metric` " + text +
                      ": the metrics are euclidean, squared, minkowski:P and elliptical:FILE");
   }
   return choice;

@@ -30,7 +30,7 @@ stream::Error failure(const stream::Store& store, const std::string& cause,
 
 void throw_region_outside(const stream::Store& store) {
   throw failure(store, "the region does not meet the store",
-                "`terrace info` tells its bounds; --region-crs says in which CRS the region is");
+                "look at its bounds, and at the CRS in which the `region` is given");
 }
 
 StoredBox box_around(const Region& region, const GroundSlope& ground) {
@@ -64,7 +64,7 @@ ContourOutcome write_contours(const stream::Store& store, const ContourRequest& 
     if (store.points() > 0 &&
         std::abs((raw * z.scale + z.offset) / request.interval) > kMostLevels) {
       throw failure(store, "heights have too many levels of " + number_text(request.interval),
-                    "give a larger --interval");
+                    "give a larger `interval`");
     }
   }
   ContourText text(store, request.interval, request.threads, write);
@@ -79,8 +79,8 @@ ContourOutcome write_contours(const stream::Store& store, const ContourRequest& 
                           store,
                           "contour lines that are not at their ends have more than " +
                               with_commas(request.memory_bytes / 3 / kContourBytesPerPoint) +
-                              " points, too many for --memory",
-                          "raise --memory or --interval, or take a smaller --region");
+                              " points, too many for `memory_bytes`",
+                          "raise `memory_bytes` or `interval`, or take a smaller `region`");
                     }},
       .progress =
           [&](double share) {

@@ -59,8 +59,8 @@ void ContourText::append(std::string& text, const ContourLine& line,
                          .where = {},
                          .cause = number_text(at[0]) + ',' + number_text(at[1]) +
                                   " has no longitude and latitude in " + system_.title(),
-                         .remedy = "say with `terrace build --crs` which CRS it is, or leave the "
-                                   "place out with --region"});
+                         .remedy = "build the store with the right `crs`, or leave the "
+                                   "place out with `region`"});
   }
   text += "{\"type\":\"Feature\",\"properties\":{\"elev\":" +
           number_text(static_cast<double>(line.level) * interval_) +

@@ -44,7 +44,7 @@ void draw_lattice_contours(const ContourParts& parts) {
   const ContourRequest& request = parts.request;
   if (request.max_edge) {
     throw UsageError(
-        "--max-edge is for irregular points and coarser levels: the samples of a raster say "
+        "`max_edge` is for irregular points and coarser levels: the samples of a raster say "
         "themselves where there is no data");
   }
   const GroundSlope ground(store);

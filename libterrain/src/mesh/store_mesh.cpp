@@ -79,9 +79,9 @@ void check_memory(const stream::Store& store, const Detail& detail, std::uint64_
                        .where = {},
                        .cause = "a mesh of " + std::to_string(points) + " points needs " +
                                 std::to_string((needed >> 20) + 1) +
-                                "M of memory, --memory allows " +
+                                "M of memory, `memory_bytes` allows " +
                                 std::to_string(memory_bytes >> 20) + "M",
-                       .remedy = "take a coarser --level or a smaller --region"});
+                       .remedy = "take a coarser `level` or a smaller `region`"});
 }
 
 /// The metric in the coordinates of the triangulation.
@@ -92,7 +92,7 @@ tri::MetricField2 field_of(const MetricChoice& metric, const stream::Store& stor
   std::vector<tri::MetricField2::Region> regions;
   for (const MetricChoice::Region& region : metric.regions) {
     if (region.box && (m[1] != 0.0 || m[3] != 0.0)) {
-      throw UsageError("--metric: the boxes of regions need a raster that is not rotated");
+      throw UsageError("`metric`: the boxes of regions need a raster that is not rotated");
     }
     constexpr double kEverywhere = std::numeric_limits<double>::infinity();
     tri::Box3 box{{-kEverywhere, -kEverywhere, -kEverywhere},

@@ -26,8 +26,8 @@ constexpr double kMostGridCells = 2147483647.0;
   throw stream::Error({.file = store.path().string(),
                        .where = {},
                        .cause = "the region does not meet the store",
-                       .remedy = "`terrace info` tells its bounds; --region-crs says in which CRS "
-                                 "the region is"});
+                       .remedy = "look at its bounds, and at the CRS in which the `region` is "
+                                 "given"});
 }
 
 /// The store's area in its CRS: of a raster with half a cell around the samples.
@@ -66,7 +66,7 @@ stream::Box3 converted(const stream::Box3& box, const CoordinateSystem& from,
     throw stream::Error({.file = store.path().string(),
                          .where = {},
                          .cause = "the region has no place in " + to.title(),
-                         .remedy = "take another --to-crs or a smaller --region"});
+                         .remedy = "take another `to_crs` or a smaller `region`"});
   }
   return result;
 }
@@ -92,7 +92,7 @@ double spacing_of(const stream::Store& store, const stream::Box3& area, unsigned
 
 std::uint32_t count_of(double cells) {
   if (!(cells <= kMostGridCells)) {
-    throw UsageError("--cell is too small: a side of the raster would have " +
+    throw UsageError("`cell` is too small: a side of the raster would have " +
                      number_text(std::ceil(cells)) + " cells");
   }
   return static_cast<std::uint32_t>(std::max(1.0, cells));
@@ -157,7 +157,7 @@ RasterGrid raster_grid(const stream::Store& store, const RasterRequest& request)
     }
   }
   if (!(cell > 0) || !std::isfinite(cell)) {
-    throw UsageError("the points do not tell a cell size: give --cell");
+    throw UsageError("the points do not tell a cell size: give `cell`");
   }
   grid.step_x = cell;
   grid.step_y = -cell;

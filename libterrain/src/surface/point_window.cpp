@@ -50,12 +50,13 @@ void PointWindow::check_memory(std::size_t more) const {
   const std::uint64_t needed =
       read * kBytesRead + inserted * kBytesInserted + kBytesBefore + frontier_.memory_bytes();
   if (memory_bytes_ == 0 || needed <= memory_bytes_) return;
-  throw stream::Error({.file = store_.path().string(),
-                       .where = {},
-                       .cause = "a window of at least " + std::to_string(read) + " points needs " +
-                                std::to_string((needed >> 20) + 1) + "M of memory, " +
-                                std::to_string(memory_bytes_ >> 20) + "M are allowed for it",
-                       .remedy = "give more --memory, fewer --threads, or a coarser --level"});
+  throw stream::Error(
+      {.file = store_.path().string(),
+       .where = {},
+       .cause = "a window of at least " + std::to_string(read) + " points needs " +
+                std::to_string((needed >> 20) + 1) + "M of memory, " +
+                std::to_string(memory_bytes_ >> 20) + "M are allowed for it",
+       .remedy = "give more `memory_bytes`, fewer `threads`, or a coarser `level`"});
 }
 
 void PointWindow::take(const StoreWindow::Node& node) {

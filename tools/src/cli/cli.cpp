@@ -15,6 +15,7 @@
 
 #include "base/units.hpp"
 #include "cli/interrupt.hpp"
+#include "cli/option_names.hpp"
 #include "cli/terminal.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/error.hpp"
@@ -275,7 +276,7 @@ int run_command_line(int argc, const char* const* argv) {
   } catch (const stream::ClosedPipe&) {
     return kDone;
   } catch (const UsageError& error) {
-    print_message(error.what());
+    print_message(with_option_names(error.what()));
     return kWrongUsage;
   } catch (const Interrupted& error) {
     print_message(error.what());
@@ -286,7 +287,7 @@ int run_command_line(int argc, const char* const* argv) {
       print_message("interrupted; run the same command again to start anew");
       return kInterrupted;
     }
-    print_message(message_of(error));
+    print_message(with_option_names(message_of(error)));
     return kFailed;
   }
 }

@@ -4,6 +4,7 @@
 
 #include "cli/cli.hpp"
 #include "cli/interrupt.hpp"
+#include "cli/option_names.hpp"
 #include "cli/terminal.hpp"
 
 // Apart from the command line, which needs all verbs: libraries of the tools speak by these.
@@ -16,7 +17,7 @@ std::uint64_t CommonOptions::memory_or(std::uint64_t standard) const {
 }
 
 void CommonOptions::say(const std::string& line) const {
-  if (!quiet) print_message(line);
+  if (!quiet) print_message(with_option_names(line));
 }
 
 void CommonOptions::explain(const std::string& line) const {

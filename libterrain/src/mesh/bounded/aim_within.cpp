@@ -7,18 +7,18 @@
 
 namespace terrace::terrain {
 
-double aim_within(double bound, const stream::MeshRounding& rounding, const std::string& path) {
+Aim aim_within(double bound, const stream::MeshRounding& rounding, const std::string& path) {
   const stream::Point3& moved = rounding.largest();
-  if (moved == stream::Point3{}) return bound;
-  const double aim = bound * (15.0 / 16.0) - moved[2];
-  if (!(aim >= 0.0)) {
+  if (moved == stream::Point3{}) return {bound, bound};
+  const double sure = bound * (15.0 / 16.0) - moved[2];
+  if (!(sure >= 0.0)) {
     throw stream::Error({.file = path,
                          .where = {},
                          .cause = "its format rounds heights by up to " +
                                   readable_number(moved[2]) + ", too much for this `max_error`",
                          .remedy = "write PLY, which is exact"});
   }
-  return aim;
+  return {bound * (255.0 / 256.0) - moved[2], sure};
 }
 
 }  // namespace terrace::terrain

@@ -38,7 +38,7 @@ PointMeshScan scan_point_mesh(const stream::Store& store, const std::optional<Re
       throw stream::Error({.file = store.path().string(),
                            .where = {},
                            .cause = "a point has a coordinate that is not finite or above 1e100",
-                           .remedy = "leave it out of the store, or of the --region"});
+                           .remedy = "leave it out of the store, or of the `region`"});
     }
     if (scan.samples % scan.period == 0) {
       if (scan.some.size() == kMostPlaces) {

@@ -67,11 +67,11 @@ std::size_t take_out_vertices(const std::vector<tri::Point3>& frame,
   return places;
 }
 
-}  // namespace
-
-PointWindowTin mesh_samples(const MeshSamples& samples, const std::vector<tri::Point3>& frame,
-                            const PlaneBox& box, const PointMeshOptions& options,
-                            const stream::MeshRounding& rounding, const std::string& source) {
+/// As mesh_samples(), to options.tin.max_error. may_miss: then the result may be beyond the bound.
+PointWindowTin mesh_to_aim(const MeshSamples& samples, const std::vector<tri::Point3>& frame,
+                           const PlaneBox& box, const PointMeshOptions& options,
+                           const stream::MeshRounding& rounding, const std::string& source,
+                           bool may_miss) {
   const auto fail = [&](const std::string& cause, const std::string& remedy) {
     throw stream::Error({.file = source, .where = {}, .cause = cause, .remedy = remedy});
   };
@@ -114,19 +114,34 @@ PointWindowTin mesh_samples(const MeshSamples& samples, const std::vector<tri::P
       fail(
           "the format of the mesh rounds positions, so the error where several samples have one "
           "place and not all of them count cannot be verified",
-          "write PLY, which is exact, or leave out --duplicates");
+          "write PLY, which is exact, or leave out `duplicates`");
     }
     out.errors = measure_rounded(samples, box, out, rounding);
   }
   out.uncovered = out.triangles.empty() ? samples.size() : out.errors.uncovered;
   const bool missed = exact && tin.errors.uncovered > 0 && !out.triangles.empty();
-  if (missed || (options.tin.max_points == 0 && out.errors.largest > options.bound)) {
+  const bool beyond = options.tin.max_points == 0 && out.errors.largest > options.bound;
+  if (missed || (beyond && !may_miss)) {
     fail(missed ? "the mesh leaves out samples"
                 : "the mesh misses its bound: " + number_text(out.errors.largest) + " of " +
                       number_text(options.bound),
          exact ? "this is a fault of terrace, please report it" : "write PLY, which is exact");
   }
   return out;
+}
+
+}  // namespace
+
+PointWindowTin mesh_samples(const MeshSamples& samples, const std::vector<tri::Point3>& frame,
+                            const PlaneBox& box, const PointMeshOptions& options,
+                            const stream::MeshRounding& rounding, const std::string& source) {
+  if (options.first_aim > options.tin.max_error) {
+    PointMeshOptions first = options;
+    first.tin.max_error = options.first_aim;
+    PointWindowTin tin = mesh_to_aim(samples, frame, box, first, rounding, source, true);
+    if (!(tin.errors.largest > options.bound)) return tin;
+  }
+  return mesh_to_aim(samples, frame, box, options, rounding, source, false);
 }
 
 PointWindowMesher::PointWindowMesher(const PointMeshPlan& plan, PointMeshSamples& samples,

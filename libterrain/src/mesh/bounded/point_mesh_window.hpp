@@ -20,8 +20,11 @@ namespace terrace::terrain {
 
 /// How irregular samples are meshed. Heights in the store's vertical unit.
 struct PointMeshOptions {
-  double bound = 0.0;        ///< what readers of the file may see
-  tri::PointTinOptions tin;  ///< its max_error: what is meshed to, less where the file rounds
+  double bound = 0.0;  ///< what readers of the file may see
+  /// Its max_error: what is meshed to, less where the file rounds positions. first_aim: tried
+  /// before, inside windows; not less.
+  tri::PointTinOptions tin;
+  double first_aim = 0.0;
 };
 
 /// The mesh of one window.

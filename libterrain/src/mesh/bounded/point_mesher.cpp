@@ -70,7 +70,7 @@ unsigned PointMesher::threads_within_memory(std::uint64_t each, std::uint64_t po
                          .cause = "a mesh with a bound needs " +
                                   std::to_string(((beside + each) >> 20) + 1) + "M of memory for " +
                                   with_commas(points) +
-                                  " irregular points at a time, --memory allows " +
+                                  " irregular points at a time, `memory_bytes` allows " +
                                   std::to_string(memory >> 20) + "M",
                          .remedy = "allow more"});
   }
@@ -81,7 +81,9 @@ unsigned PointMesher::threads_within_memory(std::uint64_t each, std::uint64_t po
 PointMeshOptions PointMesher::mesh_options(double max_error) const {
   PointMeshOptions out;
   out.bound = max_error;
-  out.tin.max_error = aim_within(max_error, rounding_, options_.path);
+  const Aim aim = aim_within(max_error, rounding_, options_.path);
+  out.first_aim = aim.first;
+  out.tin.max_error = aim.sure;
   out.tin.duplicates = options_.duplicates;
   out.tin.quality = options_.quality;
   return out;
@@ -210,9 +212,9 @@ stream::Error PointMesher::shared_places_error() const {
                 readable_number(shared.range * metres_vertical()) + " m (at " +
                 number_text(shared.widest[0]) + ", " + number_text(shared.widest[1]) + ")",
        .remedy = options_.duplicates == tri::PointDuplicates::kAll
-                     ? "say with --duplicates min, max, mean or first which of them counts, or ask "
-                       "for a larger --max-error"
-                     : "say with --duplicates which of them counts"});
+                     ? "say with `duplicates` min, max, mean or first which of them counts, or ask "
+                       "for a larger `max_error`"
+                     : "say with `duplicates` which of them counts"});
 }
 
 BoundedMeshResult PointMesher::run(double max_error, MeshSpool& spool,
@@ -225,7 +227,7 @@ BoundedMeshResult PointMesher::run(double max_error, MeshSpool& spool,
       PointMeshOptions options;
       if (options_.max_points > 0) {
         options = mesh_options(bounds_.max[2] - bounds_.min[2]);
-        options.tin.max_error = 0.0;
+        options.first_aim = options.tin.max_error = 0.0;
         options.tin.max_points = options_.max_points;
       } else {
         options = mesh_options(max_error);

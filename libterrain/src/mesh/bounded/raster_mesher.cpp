@@ -45,7 +45,7 @@ RasterMesher::RasterMesher(const stream::Store& store, const BoundedMeshOptions&
       bounds_(world_box(placement_, store.bounds())),
       rounding_(options.path, bounds_, options.writer) {
   if (whole_.columns < 2 || whole_.rows < 2) {
-    throw UsageError(options.region ? "--region: nothing of it lies on the raster of the store"
+    throw UsageError(options.region ? "`region`: nothing of it lies on the raster of the store"
                                     : "the raster is one line of samples: it has no triangles");
   }
   threads_ = threads_within_memory();
@@ -74,8 +74,8 @@ unsigned RasterMesher::threads_within_memory() const {
                          .where = {},
                          .cause = "a mesh with a bound needs " +
                                   std::to_string(((beside + kBytesPerThread) >> 20) + 1) +
-                                  "M of memory, --memory allows " + std::to_string(memory >> 20) +
-                                  "M",
+                                  "M of memory, `memory_bytes` allows " +
+                                  std::to_string(memory >> 20) + "M",
                          .remedy = "allow more"});
   }
   return static_cast<unsigned>(
@@ -94,7 +94,9 @@ std::vector<std::unique_ptr<WindowMesher>> RasterMesher::meshers(double max_erro
 WindowTinOptions RasterMesher::window_options(double max_error) const {
   WindowTinOptions out;
   out.bound = max_error;
-  out.aim = aim_within(max_error, rounding_, options_.path);
+  const Aim aim = aim_within(max_error, rounding_, options_.path);
+  out.first_aim = aim.first;
+  out.aim = aim.sure;
   out.whole = whole_;
   out.region = options_.region;
   out.tin.quality = options_.quality;

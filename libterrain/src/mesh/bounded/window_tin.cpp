@@ -152,7 +152,7 @@ std::vector<stream::Point3> WindowMesher::positions(const WindowTin& tin) const 
   return positions;
 }
 
-void WindowMesher::check(
+void WindowMesher::measure_as_read(
     WindowTin& tin,
     const std::function<tri::GridTinCheck(std::span<const tri::Point3>, double)>& measure) const {
   const stream::Point3& moved = rounding_.largest();
@@ -175,7 +175,10 @@ void WindowMesher::check(
   const double cell = std::min(portable_hypot(m[0], m[3]), portable_hypot(m[1], m[4]));
   const double tolerance = std::min(1.0, 2.0 * portable_hypot(moved[0], moved[1]) / cell);
   tin.check = measure(read, tolerance);
+}
 
+void WindowMesher::require_sound(const WindowTin& tin) const {
+  const bool exact = rounding_.largest() == stream::Point3{};
   const auto fail = [&](const std::string& cause, const std::string& remedy) {
     throw stream::Error({.file = store_.path().string(),
                          .where = "window at column " + std::to_string(tin.window.column) +
@@ -190,12 +193,12 @@ void WindowMesher::check(
            "this is a fault of terrace, please report it");
     }
     fail("the numbers of the file's format are too coarse for this bound so far from its origin",
-         "write PLY, which is exact, or a smaller --region");
+         "write PLY, which is exact, or a smaller `region`");
   }
   if (tin.check.nodata_covered > 0 || tin.check.uncovered_inner > 0 || tin.check.turned > 0) {
     fail("the mesh covers cells without data, leaves out cells with data, or folds",
          exact ? "this is a fault of terrace, please report it"
-               : "write PLY, which is exact, or a smaller --region");
+               : "write PLY, which is exact, or a smaller `region`");
   }
 }
 
@@ -228,17 +231,25 @@ WindowTin WindowMesher::mesh_as(const LatticeWindow& window, tri::TinQuality qua
   const tri::GridWindow<T> grid{static_cast<std::uint32_t>(window.columns),
                                 static_cast<std::uint32_t>(window.rows), samples.heights};
   tri::GridTinOptions options = options_.tin;
-  options.max_error = options_.aim;
   options.quality = quality;
   options.measure = false;  // what was written is checked instead
-  tri::GridTin tin = tri::grid_tin<T>(grid, sides, options);
-  out.vertices = std::move(tin.vertices);
-  out.triangles = std::move(tin.triangles);
-  if (checked) {
+  const auto mesh_to = [&](double aim) {
+    options.max_error = aim;
+    tri::GridTin tin = tri::grid_tin<T>(grid, sides, options);
+    out.vertices = std::move(tin.vertices);
+    out.triangles = std::move(tin.triangles);
+    if (!checked) return;
     out.positions = positions(out);
-    check(out, [&](std::span<const tri::Point3> points, double tolerance) {
+    measure_as_read(out, [&](std::span<const tri::Point3> points, double tolerance) {
       return tri::check_grid_tin<T>(grid, points, out.triangles, tolerance);
     });
+  };
+  mesh_to(options_.first_aim);
+  if (checked) {
+    if (out.check.max_error > options_.bound && options_.aim < options_.first_aim) {
+      mesh_to(options_.aim);
+    }
+    require_sound(out);
     // Whatever lies in the region is on triangles that reach into it, which stay.
     for (const std::uint32_t at : out.check.uncovered_at) {
       if (in_region(window, at % window.columns, at / window.columns,

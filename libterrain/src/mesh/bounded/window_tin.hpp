@@ -21,7 +21,9 @@ namespace terrace::terrain {
 /// How the windows of a raster are meshed. Heights in the store's vertical unit.
 struct WindowTinOptions {
   double bound = 0.0;  ///< what readers of the file may see
-  double aim = 0.0;    ///< what is meshed to: less, where the file rounds positions
+  /// What is meshed to: less, where the file rounds positions. Sides have the second, which is
+  /// less; so has the inside of a window where the first misses the bound.
+  double first_aim = 0.0, aim = 0.0;
   tri::GridTinOptions tin;
   LatticeWindow whole;  ///< of which the windows are parts
   /// With a region the meshes have only the triangles that reach into it.
@@ -75,9 +77,11 @@ class WindowMesher {
   [[nodiscard]] bool in_region(const LatticeWindow& window, std::int64_t column, std::int64_t row,
                                double height) const;
   [[nodiscard]] std::vector<stream::Point3> positions(const WindowTin& tin) const;
-  void check(WindowTin& tin,
-             const std::function<tri::GridTinCheck(std::span<const tri::Point3>, double tolerance)>&
-                 measure) const;
+  void measure_as_read(WindowTin& tin,
+                       const std::function<tri::GridTinCheck(std::span<const tri::Point3>,
+                                                             double tolerance)>& measure) const;
+  /// Throws: stream::Error if a reader of the file would see more than the bound, or a hole.
+  void require_sound(const WindowTin& tin) const;
 
   const stream::Store& store_;
   WindowTinOptions options_;

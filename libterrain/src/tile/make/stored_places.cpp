@@ -107,7 +107,7 @@ void StoredPlaces::find_bounds(const std::string& file) {
     throw stream::Error({.file = file,
                          .where = {},
                          .cause = "its places cannot be told on the globe by " + crs_.title(),
-                         .remedy = "build the store anew with the right --crs"});
+                         .remedy = "build the store anew with the right `crs`"});
   }
   // Between the places looked at, the border of a projected box may bulge by part of a step.
   if (!crs_.is_geographic()) {

@@ -39,18 +39,18 @@ class SourceOf final : public TileSource {
 std::optional<double> flat_height(const stream::Store& store, const std::string& fill,
                                   double metres_per_unit) {
   if (fill == "interpolate") return std::nullopt;
-  if (fill.starts_with("flat:")) return parse_number(fill.substr(5), "--fill flat");
-  if (fill != "flat") throw UsageError("--fill '" + fill + "': interpolate, flat or flat:METRES");
+  if (fill.starts_with("flat:")) return parse_number(fill.substr(5), "`fill` flat");
+  if (fill != "flat") throw UsageError("`fill` '" + fill + "': interpolate, flat or flat:METRES");
   const stream::Channel& z = store.schema().coordinates[2];
   return (store.bounds().min[2] * z.scale + z.offset) * metres_per_unit;
 }
 
 std::optional<double> water_height(const stream::Store& store, const std::string& water) {
   if (water.empty()) return std::nullopt;
-  if (water != "nodata") return parse_number(water, "--water");
+  if (water != "nodata") return parse_number(water, "`water`");
   if (!store.schema().grid) {
     throw UsageError(
-        "--water nodata is for rasters: irregular points have no cells without data; give the "
+        "`water` nodata is for rasters: irregular points have no cells without data; give the "
         "height of the water");
   }
   return std::nullopt;

@@ -116,7 +116,7 @@ void find_bounds(TiledRaster& raster) {
     throw stream::Error({.file = raster.store.path().string(),
                          .where = {},
                          .cause = "its places cannot be told on the globe by " + raster.crs.title(),
-                         .remedy = "build the store anew with the right --crs"});
+                         .remedy = "build the store anew with the right `crs`"});
   }
   // Between the places looked at, the border of a projected raster may bulge by part of a step.
   const double share = raster.crs.is_geographic() ? 0.0 : 0.5;

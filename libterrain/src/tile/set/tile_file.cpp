@@ -88,7 +88,7 @@ void write_tile_file(const std::string& path, std::span<const std::byte> bytes) 
     const int cause = errno;
     ::unlink(temporary.c_str());
     throw stream::system_error(path, "cannot be written", cause,
-                               "make room and run again with --resume");
+                               "make room and run again with `resume`");
   }
 }
 

@@ -43,10 +43,11 @@ std::string fingerprint_of(const TileSetOptions& options) {
 /// A finished set is gone on with only to mend it.
 void refuse_another(const std::string& layer_path, const std::string& fingerprint) {
   if (!fs::exists(layer_path) || read_layer(layer_path).fingerprint == fingerprint) return;
-  throw stream::Error({.file = layer_path,
-                       .where = {},
-                       .cause = "finished, and made of another store or with other options",
-                       .remedy = "give --force to replace it: tiles that stay the same are kept"});
+  throw stream::Error(
+      {.file = layer_path,
+       .where = {},
+       .cause = "finished, and made of another store or with other options",
+       .remedy = "give `replace` to replace it: tiles that stay the same are kept"});
 }
 
 /// Whether there is anything in `folder` without a tile set, begun or finished.
@@ -108,11 +109,11 @@ TileFolder::TileFolder(const std::string& folder, bool force, bool resume)
     }
     if (!force && !resume) {
       refuse("holds a tile set already",
-             "give --force to replace it (what stays the same is kept), or name another folder");
+             "give `replace` to replace it (what stays the same is kept), or name another folder");
     }
   } else if (fs::exists(journal_path) && !force && !resume) {
     refuse("holds a tile set that was begun and not finished",
-           "give --resume to go on, or --force to replace it");
+           "give `resume` to go on, or `replace` to replace it");
   }
   stream::remove_abandoned(layer_path);
   stream::remove_abandoned(journal_path);
@@ -127,7 +128,7 @@ TileFolder::~TileFolder() {
 TileSetResult write_tile_set(const std::vector<std::unique_ptr<TileSurface>>& surfaces,
                              const TileSetOptions& options, const Context& context) {
   if (options.metadata && options.first_zoom > 0) {
-    throw UsageError("--metadata says in each tile which lie below it, from zoom 0 on: --zoom 0-" +
+    throw UsageError("`metadata` says in each tile which lie below it, from zoom 0 on: `zoom` 0-" +
                      std::to_string(options.last_zoom) + ", or go without");
   }
   const std::string layer_path = options.folder + "/" + kLayerName;

@@ -228,7 +228,7 @@ TileCheckResult check_tile_set(const TileCheckOptions& options, unsigned threads
     throw stream::Error({.file = options.folder,
                          .where = {},
                          .cause = "holds a tile set that was begun and not finished",
-                         .remedy = "finish it first: terrace tile with --resume"});
+                         .remedy = "finish it first: make the set again with `resume`"});
   }
   TileLayer layer = read_layer(layer_path);
   TileInventory inventory = take_inventory(options.folder, layer, context);

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include <terrace/stream/store.hpp>
+#include <terrace/tri/view_control.hpp>
+
+namespace terrace::terrain {
+
+/// A store under a camera: clusters expand where the camera comes near and collapse where it has
+/// been, frame by frame, under budgets of time and memory. (J. Skala, Algorithms for manipulating
+/// large geometric data, section 8.4; the control is tri::ViewControl, which this feeds.)
+///
+/// Cameras, regions and focuses are in the *view frame*: metres east, north and up, its origin
+/// above the middle of the store at height 0. It is flat: one linear map for the whole store, of
+/// the CRS's scale at the middle. The triangulation itself stays in stored coordinates;
+/// in_view_frame() tells where its vertices are.
+///
+/// Coord: std::int32_t for rasters, whose triangulation is exact on integers; double for any store.
+/// Members may be called by one thread at a time.
+template <class Coord>
+class StoreView {
+ public:
+  using Control = tri::ViewControl2<Coord>;
+  using Step = typename Control::Step;
+
+  /// Who reads and decodes what a frame lacks.
+  enum class Reader : std::uint8_t {
+    thread,   ///< a thread of its own; a frame takes what is there
+    in_frame  ///< the calling thread, within the frame's time
+  };
+
+  /// Throws: stream::Error if the root is damaged; std::invalid_argument for options out of range.
+  /// Requires a raster if Coord is std::int32_t.
+  explicit StoreView(const stream::Store& store, const tri::ViewOptions& options = {},
+                     Reader reader = Reader::thread);
+  ~StoreView();
+  StoreView(const StoreView&) = delete;
+  StoreView& operator=(const StoreView&) = delete;
+
+  /// Brings the model nearer to what `view` asks for, which takes about `seconds` at most. The
+  /// step tells which triangles came and went. Throws: stream::Error once a cluster could not be
+  /// read; stream::Stopped if the store is to stop.
+  const Step& frame(const tri::View& view, double seconds);
+  /// Whether another frame with the view of the last one would change nothing, now or later.
+  [[nodiscard]] bool settled() const;
+
+  [[nodiscard]] const Control& control() const;
+  [[nodiscard]] const typename Control::Model& model() const { return control().model(); }
+
+  /// Metres east, north and up of a point in stored coordinates.
+  [[nodiscard]] stream::Point3 in_view_frame(const stream::Point3& stored) const;
+  [[nodiscard]] stream::Point3 in_view_frame(tri::VertexId vertex) const;
+
+  /// What has been read so far.
+  struct Traffic {
+    std::uint64_t clusters = 0, points = 0;
+    std::uint64_t bytes = 0;  ///< as they are stored
+  };
+  [[nodiscard]] const Traffic& traffic() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+extern template class StoreView<std::int32_t>;
+extern template class StoreView<double>;
+
+}  // namespace terrace::terrain

@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "terrace/terrain/store_view.hpp"
+
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <set>
+#include <span>
+#include <stop_token>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <terrace/stream/error.hpp>
+#include <terrace/stream/geotiff_writer.hpp>
+
+#include "temporary_folder.hpp"
+#include "terrace/terrain/build.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+/// A raster of hills, 300 x 260 cells of about 30 m, in metres or in degrees.
+class StoreViews : public testing::Test {
+ protected:
+  static constexpr std::uint32_t kColumns = 300, kRows = 260;
+
+  stream::Store build(const std::string& name, const std::array<double, 6>& world, int epsg) {
+    stream::GeoTiffOptions options;
+    options.columns = kColumns;
+    options.rows = kRows;
+    options.sample.type = stream::ScalarType::i16;
+    options.world.xy = world;
+    options.crs.epsg = epsg;
+    options.crs.geographic = epsg == 4326;
+    std::vector<std::int16_t> samples;
+    for (std::uint32_t row = 0; row < kRows; ++row) {
+      for (std::uint32_t column = 0; column < kColumns; ++column) {
+        samples.push_back(static_cast<std::int16_t>(
+            300.0 + 150.0 * std::sin(column / 17.0) * std::cos(row / 23.0) + (column * row) % 7));
+      }
+    }
+    const std::string file = (folder_.path() / (name + ".tif")).string();
+    stream::GeoTiffWriter writer(file, options);
+    writer.write_rows(std::as_bytes(std::span(samples)));
+    writer.commit();
+    BuildRequest request{.inputs = {file}, .store = folder_.path() / name};
+    request.block_points = 1000;
+    build_store(request);
+    return stream::Store::open(request.store);
+  }
+  stream::Store in_metres() { return build("metres", {30, 0, 500000, 0, -30, 5200000}, 32632); }
+
+  tests::TemporaryFolder folder_;
+};
+
+tri::View looking_down(double east, double north, double pixel_error) {
+  tri::View view;
+  view.camera =
+      tri::perspective_camera({{east, north, 2500.0}, {0, 0.3, -1}, {0, 1, 0}}, 50.0, 1.5, 720.0);
+  view.pixel_error = pixel_error;
+  return view;
+}
+
+template <class Coord>
+bool settle(StoreView<Coord>& view, const tri::View& wish) {
+  for (int frame = 0; frame < 20000; ++frame) {
+    view.frame(wish, 0.01);
+    if (view.settled()) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  return false;
+}
+
+/// The points of the expanded clusters and of the root, each once.
+template <class Coord>
+std::uint64_t points_expected(const StoreView<Coord>& view, const stream::Store& store) {
+  std::uint64_t points = store.levels()[store.top()].members;
+  for (const tri::ClusterId id : view.model().expanded()) {
+    points += store.record(stream::cluster_id(tri::level_of(id), tri::ordinal_of(id))).points;
+  }
+  return points;
+}
+
+TEST_F(StoreViews, EndWithWhatTheViewAsksForWhoeverReads) {
+  const stream::Store store = in_metres();
+  using View = StoreView<std::int32_t>;
+  std::set<std::uint64_t> hashes;
+  for (const View::Reader reader : {View::Reader::thread, View::Reader::in_frame}) {
+    View view(store, {}, reader);
+    const std::size_t coarse = view.model().point_count();
+    ASSERT_TRUE(settle(view, looking_down(0, 0, 1.5)));
+    EXPECT_GT(view.model().point_count(), 2 * coarse);
+    EXPECT_LT(view.model().point_count(), store.points());
+    EXPECT_EQ(view.model().point_count(), points_expected(view, store));
+    EXPECT_EQ(view.model().triangulation().vertex_count(), view.model().point_count());
+    EXPECT_GT(view.traffic().clusters, 0u);
+    EXPECT_GE(view.traffic().points + coarse, view.model().point_count());
+    EXPECT_GT(view.traffic().bytes, 0u);
+    hashes.insert(view.model().triangulation().hash());
+    // Far away nothing is left but the root.
+    tri::View away;
+    away.ground_error = 1e9;
+    ASSERT_TRUE(settle(view, away));
+    EXPECT_EQ(view.model().point_count(), coarse);
+  }
+  EXPECT_EQ(hashes.size(), 1u);
+}
+
+TEST_F(StoreViews, TheTrianglesOfAllStepsAreThoseOfTheMesh) {
+  const stream::Store store = in_metres();
+  StoreView<double> view(store);
+  std::set<tri::TriangleId> drawn;
+  for (const auto t : view.model().triangulation().all_triangles()) drawn.insert(t);
+  for (int frame = 0; frame < 120; ++frame) {
+    const auto& step = view.frame(looking_down(-3000.0 + 50.0 * frame, -500.0, 2.0), 0.005);
+    for (const auto t : step.delta->changes.removed_triangles) EXPECT_EQ(drawn.erase(t), 1u);
+    for (const auto t : step.delta->changes.added_triangles) EXPECT_TRUE(drawn.insert(t).second);
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  std::set<tri::TriangleId> there;
+  for (const auto t : view.model().triangulation().all_triangles()) there.insert(t);
+  EXPECT_EQ(drawn, there);
+}
+
+TEST_F(StoreViews, AFrameOfMetresWhateverTheCrs) {
+  // At 46 degrees north 30 m are 0.00026999 degrees of latitude and 0.00038775 of longitude.
+  const stream::Store metres = in_metres();
+  const stream::Store degrees =
+      build("degrees", {0.00038775, 0, 8.0, 0, -0.00026999, 46.035}, 4326);
+  const StoreView<std::int32_t> one(metres), other(degrees);
+  EXPECT_NEAR(one.in_view_frame({0, 0, 300})[0], -0.5 * 299 * 30, 10.0);
+  EXPECT_NEAR(one.in_view_frame({0, 0, 300})[1], 0.5 * 259 * 30, 10.0);
+  EXPECT_NEAR(one.in_view_frame({0, 0, 300})[2], 300.0, 1e-9);
+  for (const stream::Point3& p :
+       {stream::Point3{0, 0, 0}, stream::Point3{299, 0, 100}, stream::Point3{150, 259, 450}}) {
+    const stream::Point3 a = one.in_view_frame(p), b = other.in_view_frame(p);
+    for (std::size_t axis = 0; axis < 3; ++axis) EXPECT_NEAR(a[axis], b[axis], 20.0) << axis;
+  }
+  StoreView<std::int32_t> flat(metres), geographic(degrees);
+  ASSERT_TRUE(settle(flat, looking_down(0, 0, 1.5)));
+  ASSERT_TRUE(settle(geographic, looking_down(0, 0, 1.5)));
+  EXPECT_NEAR(static_cast<double>(flat.model().point_count()),
+              static_cast<double>(geographic.model().point_count()),
+              0.1 * static_cast<double>(flat.model().point_count()));
+}
+
+TEST_F(StoreViews, FaultsOfReadingComeOutOfAFrame) {
+  const stream::Store store = in_metres();
+  std::stop_source stop;
+  for (const auto reader :
+       {StoreView<std::int32_t>::Reader::thread, StoreView<std::int32_t>::Reader::in_frame}) {
+    StoreView<std::int32_t> view(store.with_stop(stop.get_token()), {}, reader);
+    if (stop.stop_possible()) stop.request_stop();
+    EXPECT_THROW(settle(view, looking_down(0, 0, 1.5)), stream::Stopped);
+    stop = std::stop_source();
+  }
+}
+
+}  // namespace
+}  // namespace terrace::terrain

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/option_names.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <utility>
+
+namespace terrace::tools {
+namespace {
+
+/// Parameter and option. tests/layout checks that all parameters that libterrain names are here.
+constexpr std::array<std::pair<std::string_view, std::string_view>, 24> kOptions{{
+    {"block_points", "--block"},
+    {"cell", "--cell"},
+    {"crs", "--crs"},
+    {"duplicates", "--duplicates"},
+    {"facility_cost", "--facility-cost"},
+    {"fill", "--fill"},
+    {"geoid", "--geoid"},
+    {"interval", "--interval"},
+    {"level", "--level"},
+    {"max_edge", "--max-edge"},
+    {"max_error", "--max-error"},
+    {"max_points", "--max-points"},
+    {"memory_bytes", "--memory"},
+    {"metadata", "--metadata"},
+    {"metric", "--metric"},
+    {"region", "--region"},
+    {"replace", "--force"},
+    {"resume", "--resume"},
+    {"shift", "--towgs84"},
+    {"threads", "--threads"},
+    {"to_crs", "--to-crs"},
+    {"vertical", "--vertical"},
+    {"water", "--water"},
+    {"zoom", "--zoom"},
+}};
+
+}  // namespace
+
+std::string with_option_names(std::string_view message) {
+  std::string text;
+  for (std::size_t begin = message.find('`'); begin != std::string_view::npos;
+       begin = message.find('`')) {
+    text += message.substr(0, begin);
+    message.remove_prefix(begin + 1);
+    const std::string_view name = message.substr(0, message.find('`'));
+    const auto* const option = std::find_if(kOptions.begin(), kOptions.end(),
+                                            [&](const auto& row) { return row.first == name; });
+    if (option == kOptions.end() || name.size() == message.size()) {
+      text += '`';
+      continue;
+    }
+    text += option->second;
+    message.remove_prefix(name.size() + 1);
+  }
+  return text += message;
+}
+
+}  // namespace terrace::tools
