@@ -61,8 +61,9 @@ class SurfaceCommand final : public Command {
     const bool vtk = output_.ends_with(".vtk");
     if (tetrahedra_ != vtk) throw UsageError("--tetrahedra and an output named .vtk go together");
     const stream::Store store = stream::Store::open(store_);
-    const Detail detail = Detail::parse(store, level_, region_, focuses_, crs_.regions(store));
-    const PlaceConversion places = crs_.places(store);
+    const Detail detail =
+        Detail::parse(store, level_, region_, focuses_, crs_.regions(store, common));
+    const PlaceConversion places = crs_.places(store, common);
     const bool replace = may_replace(output_, common.force);
     SurfaceOutcome outcome;
     call_library(store_, criterion_, [&] {
