@@ -182,8 +182,9 @@ TEST(Epsg, EveryProjectedSystemWorksAndGeographicLibAgreesWithProj) {
   EXPECT_GT(all.places, 4 * codes.size());
   EXPECT_GT(all.compared, 4 * codes.size() / 2);
   EXPECT_LE(all.refused, kBeyondProj.size());
-  std::cout << codes.size() << " codes, " << all.refused << " of them beyond PROJ, " << all.places << " places, " << all.compared
-            << " of them by GeographicLib and PROJ: at most " << all.worst * 1e3 << " mm off\n";
+  std::cout << codes.size() << " codes, " << all.refused << " of them beyond PROJ, " << all.places
+            << " places, " << all.compared << " of them by GeographicLib and PROJ: at most "
+            << all.worst * 1e3 << " mm off\n";
 }
 
 }  // namespace
