@@ -26,11 +26,12 @@ namespace {
 // libtiff wants names that are not const, but never writes to them.
 char* name(const char* text) { return const_cast<char*>(text); }
 
-const std::array<TIFFFieldInfo, 7> kFields{{
+const std::array<TIFFFieldInfo, 8> kFields{{
     {kModelPixelScale, -1, -1, TIFF_DOUBLE, FIELD_CUSTOM, 1, 1, name("ModelPixelScale")},
     {kModelTiepoint, -1, -1, TIFF_DOUBLE, FIELD_CUSTOM, 1, 1, name("ModelTiepoint")},
     {kModelTransformation, -1, -1, TIFF_DOUBLE, FIELD_CUSTOM, 1, 1, name("ModelTransformation")},
     {kGeoKeyDirectory, -1, -1, TIFF_SHORT, FIELD_CUSTOM, 1, 1, name("GeoKeyDirectory")},
+    {kGeoDoubleParams, -1, -1, TIFF_DOUBLE, FIELD_CUSTOM, 1, 1, name("GeoDoubleParams")},
     {kGeoAsciiParams, -1, -1, TIFF_ASCII, FIELD_CUSTOM, 1, 0, name("GeoAsciiParams")},
     {kGdalMetadata, -1, -1, TIFF_ASCII, FIELD_CUSTOM, 1, 0, name("GDAL_METADATA")},
     {kGdalNodata, -1, -1, TIFF_ASCII, FIELD_CUSTOM, 1, 0, name("GDAL_NODATA")},
@@ -70,9 +71,29 @@ class KeyDirectory {
   void add(std::uint16_t key, std::uint16_t value) { entries_.push_back({key, 0, 1, value}); }
   void add(std::uint16_t key, const std::string& text) {
     const auto at = static_cast<std::uint16_t>(ascii_.size());
-    ascii_ += text.substr(0, 1024) + "|";
+    constexpr std::size_t kMost = 16384;
+    ascii_ += text.substr(0, kMost) + "|";
     const auto length = static_cast<std::uint16_t>(ascii_.size() - at);
     entries_.push_back({key, static_cast<std::uint16_t>(kGeoAsciiParams), length, at});
+  }
+  void add(std::uint16_t key, const std::vector<double>& values) {
+    const auto at = static_cast<std::uint16_t>(doubles_.size());
+    doubles_.insert(doubles_.end(), values.begin(), values.end());
+    entries_.push_back({key, static_cast<std::uint16_t>(kGeoDoubleParams),
+                        static_cast<std::uint16_t>(values.size()), at});
+  }
+  /// As it stands: what measures something is a double, what names something a short.
+  void add(const GeoKey& key) {
+    const bool measures = key.key == 2053 || key.key == 2055 ||
+                          (key.key >= 2057 && key.key <= 2062) ||
+                          (key.key >= 3077 && key.key <= 3096);
+    if (key.values.empty()) {
+      add(key.key, key.text);
+    } else if (measures) {
+      add(key.key, key.values);
+    } else {
+      add(key.key, static_cast<std::uint16_t>(key.values.front()));
+    }
   }
   [[nodiscard]] std::vector<std::uint16_t> shorts() const {
     std::vector<std::uint16_t> all{1, 1, 1, static_cast<std::uint16_t>(entries_.size())};
@@ -80,9 +101,11 @@ class KeyDirectory {
     return all;
   }
   [[nodiscard]] const std::string& ascii() const { return ascii_; }
+  [[nodiscard]] const std::vector<double>& doubles() const { return doubles_; }
 
  private:
   std::vector<std::array<std::uint16_t, 4>> entries_;
+  std::vector<double> doubles_;
   std::string ascii_;
 };
 
@@ -101,9 +124,18 @@ KeyDirectory keys_of(const GeoTiffOptions& options) {
   };
   const std::uint16_t epsg = code(crs.epsg), unit = unit_code(crs.horizontal_unit);
   KeyDirectory keys;
+  const std::span<const GeoKey> own =
+      epsg == 0 ? std::span(crs.geo_keys) : std::span<const GeoKey>();
   if (epsg != 0) keys.add(kGTModelType, crs.geographic ? kModelGeographic : kModelProjected);
+  for (const GeoKey& key : own) {
+    if (key.key == kGTModelType) keys.add(key);
+  }
   keys.add(kGTRasterType, options.pixel_is_point ? kPixelIsPoint : kPixelIsArea);
   if (!crs.name.empty()) keys.add(kGTCitation, crs.name);
+  for (const GeoKey& key : own) {
+    if (key.key > kGTCitation && key.key < kVerticalCrs) keys.add(key);
+  }
+  if (!own.empty() && !crs.geographic && unit != 0) keys.add(kLinearUnit, unit);
   if (epsg != 0 && crs.geographic) {
     keys.add(kGeodeticCrs, epsg);
     keys.add(kAngularUnit, unit != 0 ? unit : std::uint16_t{9102});
@@ -307,6 +339,11 @@ void GeoTiffWriter::Impl::set_georeference() {
   const std::vector<std::uint16_t> shorts = keys.shorts();
   check(TIFFSetField(tiff, kGeoKeyDirectory, static_cast<int>(shorts.size()), shorts.data()),
         "GeoKeys");
+  if (!keys.doubles().empty()) {
+    check(TIFFSetField(tiff, kGeoDoubleParams, static_cast<int>(keys.doubles().size()),
+                       keys.doubles().data()),
+          "GeoKeys");
+  }
   if (!keys.ascii().empty()) {
     check(TIFFSetField(tiff, kGeoAsciiParams, keys.ascii().c_str()), "GeoKeys");
   }

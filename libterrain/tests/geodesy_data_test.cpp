@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Published numbers that others agree on: geodesics and the grids of UTM and UPS.
+// Published numbers that others agree on: geodesics, geocentric places, the grids of UTM and UPS.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -18,6 +18,7 @@
 
 #include "earth/crs/coordinate_system.hpp"
 #include "earth/line_distance.hpp"
+#include "tile/format/ellipsoid.hpp"
 
 namespace terrace::terrain {
 
@@ -98,6 +99,22 @@ TEST(GeodesyData, UtmAndUpsOfGeotrans) {
   EXPECT_LT(worst, 0.501);
   std::cout << rows << " places in " << systems.size() << " grids, " << polar
             << " of them polar: within " << worst << " m of the middle of the square\n";
+}
+
+TEST(GeodesyData, TenThousandGeocentricPlaces) {
+  const std::string name = data_file("xyz_to_llh_10_000.txt");
+  if (name.empty()) GTEST_SKIP() << "TERRACE_DATA is not set";
+  std::ifstream file(name);
+  stream::Point3 xyz;
+  double longitude = 0, latitude = 0, height = 0, worst = 0;
+  std::size_t rows = 0;
+  while (file >> xyz[0] >> xyz[1] >> xyz[2] >> longitude >> latitude >> height) {
+    const stream::Point3 found = geocentric(longitude, latitude, height);
+    worst = std::max(worst, std::hypot(found[0] - xyz[0], found[1] - xyz[1], found[2] - xyz[2]));
+    ++rows;
+  }
+  EXPECT_EQ(rows, 10000u);
+  EXPECT_LT(worst, 1e-4);  // heights are written to a tenth of a millimetre
 }
 
 }  // namespace

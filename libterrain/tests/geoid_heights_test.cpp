@@ -110,6 +110,35 @@ TEST_F(GeoidTest, WhatWasNotSaidOrContradictsIsRefused) {
   refused(schema_with("orthometric", "metre"), "sea", "");
 }
 
+// The heights of EGM96 in its 15' grid, as cs2cs of PROJ 9.1.1 gives them.
+TEST(EllipsoidalHeightsTest, PROJsGridOfEgm96IsTheDefault) {
+  const EllipsoidalHeights sea(schema_with("", "metre"), "orthometric", "", kMemory);
+  EXPECT_TRUE(sea.has_geoid());
+  EXPECT_NEAR(sea.convert({8, 46}, 1000), 1051.852947, 1e-5);
+  EXPECT_NE(sea.note().find("EGM96"), std::string::npos) << sea.note();
+  const EllipsoidalHeights feet(schema_with("orthometric", "foot"), "orthometric", "", kMemory);
+  EXPECT_NEAR(feet.convert({8, 46}, 1000), 304.8 + 51.852947, 1e-5);
+  EXPECT_THROW(EllipsoidalHeights(schema_with("ellipsoidal", "metre"), "orthometric", "", kMemory),
+               UsageError);
+}
+
+TEST(EllipsoidalHeightsTest, TheStoresOwnVerticalSystemGoesBeforeTheDefault) {
+  stream::Schema schema = schema_with("orthometric", "metre");
+  schema.crs.vertical_epsg = 5773;
+  EXPECT_NEAR(EllipsoidalHeights(schema, "orthometric", "", kMemory).convert({8, 46}, 0), 51.852947,
+              1e-5);
+  // Debian has no grid of EGM2008; somebody else may.
+  schema.crs.vertical_epsg = 3855;
+  try {
+    const EllipsoidalHeights egm2008(schema, "orthometric", "", kMemory);
+    EXPECT_NE(egm2008.note().find("EGM2008"), std::string::npos);
+  } catch (const stream::Error& error) {
+    const std::string what = error.what();
+    EXPECT_NE(what.find("us_nga_egm08_25.tif"), std::string::npos) << what;
+    EXPECT_NE(what.find("--geoid"), std::string::npos) << what;
+  }
+}
+
 TEST(EllipsoidalHeightsTest, AnUnknownUnitIsThatOfTheGroundAsInOtherVerbs) {
   stream::Schema schema;
   schema.vertical = "ellipsoidal";

@@ -90,7 +90,10 @@ TEST(GridGeography, RandomGridsStayWithinTheTolerance) {
 }
 
 TEST(GridGeography, NeedsAWayToWgs84) {
-  EXPECT_THROW(GridGeography(CoordinateSystem::parse("EPSG:27700"), {}), stream::Error);
+  const char* const unknown =
+      R"(GEOGCS["own",DATUM["own datum",SPHEROID["own",6377000,300]],PRIMEM["Greenwich",0],)"
+      R"(UNIT["degree",0.0174532925199433]])";
+  EXPECT_THROW(GridGeography(CoordinateSystem::parse(unknown), {}), stream::Error);
 }
 
 TEST(GridGeography, EmptyWindow) {

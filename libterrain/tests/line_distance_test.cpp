@@ -62,8 +62,10 @@ TEST(LineDistance, TheMapsScaleIsTakenOut) {
 }
 
 TEST(LineDistance, AnotherDatumHasItsOwnEllipsoid) {
-  // ED50, without any shift.
-  const LineDistance own = distance_in("EPSG:4230");
+  // A datum that nobody knows, without any shift.
+  const LineDistance own =
+      distance_in(R"(GEOGCS["own",DATUM["own datum",SPHEROID["International 1924",6378388,297]],)"
+                  R"(PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]])");
   const GeographicLib::Ellipsoid international(6378388, 1 / 297.0);
   const double length = parallel(international, 45, 10);
   EXPECT_NEAR(own.along({0, 45}, {10, 45}), length, 1e-7 * length);

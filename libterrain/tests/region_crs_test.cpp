@@ -37,7 +37,7 @@ TEST(RegionCrs, HoldsWhatTheBoxHolds) {
     const Region box = Region::parse(test.box);
     const stream::Box3 world =
         to.is_geographic() ? stream::Box3{{-180, -90, 0}, {180, 90, 0}} : kEverywhere;
-    const Region region = region_in(box, from, to, world);
+    const Region region = region_in(box, Transformation(to, from), world);
     std::mt19937_64 random(7);
     const auto unit = [&random] { return static_cast<double>(random() >> 11) * 0x1p-53; };
     for (int i = 0; i < 2000; ++i) {
@@ -60,27 +60,30 @@ TEST(RegionCrs, HoldsWhatTheBoxHolds) {
 
 TEST(RegionCrs, KeepsHeights) {
   const Region box = Region::parse("8,46,100,9,47,200");
-  const Region region = region_in(box, CoordinateSystem::parse("EPSG:4326"),
-                                  CoordinateSystem::parse("EPSG:32632"), kEverywhere);
+  const Region region = region_in(
+      box,
+      Transformation(CoordinateSystem::parse("EPSG:32632"), CoordinateSystem::parse("EPSG:4326")),
+      kEverywhere);
   EXPECT_EQ(region.box().min[2], 100);
   EXPECT_EQ(region.box().max[2], 200);
 }
 
 TEST(RegionCrs, RefusesWhatTheSystemDoesNotShow) {
   const CoordinateSystem degrees, mercator = CoordinateSystem::parse("EPSG:3857");
-  EXPECT_THROW(region_in(Region::parse("0,0,10,90"), degrees, mercator, kEverywhere),
-               stream::Error);
-  EXPECT_THROW(region_in(Region::parse("0,0,10,95"), degrees, mercator, kEverywhere),
-               stream::Error);
+  EXPECT_THROW(
+      region_in(Region::parse("0,0,10,90"), Transformation(mercator, degrees), kEverywhere),
+      stream::Error);
+  EXPECT_THROW(
+      region_in(Region::parse("0,0,10,95"), Transformation(mercator, degrees), kEverywhere),
+      stream::Error);
   // Cut in two by the projection: one side of the antimeridian lies at the left, one at the right.
-  EXPECT_THROW(region_in(Region::parse("170,0,190,10"), degrees, mercator, kEverywhere),
-               stream::Error);
-  EXPECT_THROW(region_in(Region::parse("-1000000,-1000000,900000,900000"),
-                         CoordinateSystem::parse("EPSG:3413"), degrees, kEverywhere),
-               stream::Error);
-  EXPECT_THROW(region_in(Region::parse("0,0,1,1"), degrees, CoordinateSystem::parse("EPSG:27700"),
-                         kEverywhere),
-               stream::Error);
+  EXPECT_THROW(
+      region_in(Region::parse("170,0,190,10"), Transformation(mercator, degrees), kEverywhere),
+      stream::Error);
+  EXPECT_THROW(
+      region_in(Region::parse("-1000000,-1000000,900000,900000"),
+                Transformation(degrees, CoordinateSystem::parse("EPSG:3413")), kEverywhere),
+      stream::Error);
 }
 
 }  // namespace

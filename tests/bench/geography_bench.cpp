@@ -24,7 +24,8 @@ struct Grid {
 constexpr Grid kGrids[] = {{"EPSG:32632", {{30, 0, 400000, 0, -30, 5200000}}},
                            {"EPSG:3857", {{30, 0, 900000, 0, -30, 6000000}}},
                            {"EPSG:3035", {{25, 0, 4000000, 0, -25, 3000000}}},
-                           {"EPSG:3413", {{250, 0, 400000, 0, -250, -800000}}}};
+                           {"EPSG:3413", {{250, 0, 400000, 0, -250, -800000}}},
+                           {"EPSG:5514", {{10, 0, -742000, 0, -10, -1043000}}}};
 
 std::size_t side() { return std::getenv("TERRACE_BENCH_SMALL") != nullptr ? 128 : 1024; }
 
@@ -42,7 +43,7 @@ void windows(benchmark::State& state) {
   }
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(cells));
 }
-BENCHMARK(windows)->DenseRange(0, 3);
+BENCHMARK(windows)->DenseRange(0, 4);
 
 void places(benchmark::State& state) {
   const Grid& grid = kGrids[state.range(0)];
@@ -58,7 +59,7 @@ void places(benchmark::State& state) {
   }
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(list.size()));
 }
-BENCHMARK(places)->DenseRange(0, 3);
+BENCHMARK(places)->DenseRange(0, 4);
 
 }  // namespace
 

@@ -29,6 +29,14 @@ def terrace(*args):
     return subprocess.run([TERRACE, *map(str, args)], capture_output=True, text=True, timeout=120)
 
 
+# On a datum that nobody knows.
+OWN_DATUM = ('PROJCS["own grid",GEOGCS["own",DATUM["own datum",SPHEROID["Airy 1830",6377563.396,299.3249646]],'
+             'PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],'
+             'PARAMETER["latitude_of_origin",49],PARAMETER["central_meridian",-2],'
+             'PARAMETER["scale_factor",0.9996012717],PARAMETER["false_easting",400000],'
+             'PARAMETER["false_northing",-100000],UNIT["metre",1]]')
+
+
 class GeodesyTest(unittest.TestCase):
     def setUp(self):
         self.folder = tempfile.TemporaryDirectory()
@@ -145,24 +153,89 @@ class GeodesyTest(unittest.TestCase):
         error = self.refused(2, 'build', self.raster({1025: 1}), '-o', self.path('none'), '--crs',
                              'EPSG:32299')
         self.assertIn('EPSG:32299', error)
-        # Krovak: a method that is not there. Distances can be measured in its unit all the same.
-        krovak = self.raster({1024: 1, 1025: 1, 3072: 5514, 3076: 9001})
-        result = terrace('build', krovak, '-o', self.path('krovak'))
+        # A projection method that is not there. Distances can be measured in its unit all the same.
+        unknown = {1024: 1, 1025: 1, 2048: 4326, 3072: 32767, 3075: 22}
+        metres = self.raster({**unknown, 3076: 9001})
+        result = terrace('build', metres, '-o', self.path('unknown'))
         self.assertEqual(result.returncode, 0, result.stderr)
-        self.assertIn('EPSG:5514', result.stderr)
-        error = self.refused(1, 'points', self.path('krovak'), '-o', '-', '--to-crs', 'EPSG:4326')
-        self.assertIn('EPSG:5514', error)
-        unit_unknown = self.raster({1024: 1, 1025: 1, 3072: 5514})
-        error = self.refused(1, 'build', unit_unknown, '-o', self.path('none'))
-        self.assertIn('EPSG:5514', error)
+        self.assertIn('method 22', result.stderr)
+        error = self.refused(1, 'points', self.path('unknown'), '-o', '-', '--to-crs', 'EPSG:4326')
+        self.assertIn('no CRS', error)
+        error = self.refused(1, 'build', self.raster(unknown), '-o', self.path('none'))
+        self.assertIn('unit', error)
+
+    def test_national_grids_go_to_wgs84_by_one_operation_that_is_named(self):
+        for code, x, y in ((5514, -742000, -1043000), (27700, 530000, 180000), (28992, 155000, 463000),
+                           (2056, 2600000, 1200000), (31370, 150000, 170000)):
+            raster = self.raster({1024: 1, 1025: 1, 3072: code, 3076: 9001}, corner=(x, y))
+            store = self.build(raster)
+            self.assertEqual(self.info(store)['crs']['epsg'], code)
+            text = self.ok('info', store)
+            self.assertRegex(text, f'EPSG:{code} .*, to WGS 84 by ".*" within [12] m')
+            result = terrace('points', store, '-o', '-', '--to-crs', 'EPSG:4326', '--format', 'xyz')
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertRegex(result.stderr, f'EPSG:{code} .* to EPSG:4326 .* by ".*" within [12] m')
+
+    def test_rasters_keep_their_crs_for_gdal(self):
+        if not shutil.which('gdalsrsinfo'):
+            self.skipTest('gdalsrsinfo is not installed')
+        cloud = self.cloud([(i % 7 * 10.0, i // 7 * 10.0) for i in range(49)])
+        degrees = self.cloud([(10 + i % 7 * 0.001, 45 + i // 7 * 0.001) for i in range(49)], 'degrees.xyz')
+        with open(self.path('own.prj'), 'w', encoding='utf-8') as file:
+            file.write(ESRI_UTM.replace('9.0]', '10.25]'))
+        with open(self.path('own-degrees.prj'), 'w', encoding='utf-8') as file:
+            file.write('GEOGCS["own",DATUM["own datum",SPHEROID["own",6377000,300]],PRIMEM["Greenwich",0],'
+                       'UNIT["degree",0.0174532925199433]]')
+        for points, crs, expected in (
+                *((cloud, f'EPSG:{code}', f'EPSG:{code}') for code in (5514, 27700, 28992, 2056, 31370, 3035)),
+                (degrees, 'EPSG:4258', 'EPSG:4258'),
+                (cloud, self.path('own.prj'), '+proj=tmerc +lat_0=0 +lon_0=10.25 +k=0.9996 +x_0=500000'),
+                (cloud, 'ESRI:54030', '+proj=robin +lon_0=0'),
+                (degrees, self.path('own-degrees.prj'), '+proj=longlat +a=6377000 +rf=300')):
+            store, out = self.build(points, '--crs', crs), self.path('out.tif')
+            self.ok('raster', store, '-o', out, '--force')
+            wanted = 'epsg' if expected.startswith('EPSG') else 'proj4'
+            result = subprocess.run(['gdalsrsinfo', '-o', wanted, out], capture_output=True, text=True)
+            self.assertIn(expected, result.stdout, crs)
+            # And for ourselves.
+            again, name = self.build(out), self.path('again.tif')
+            self.ok('raster', again, '-o', name, '--force')
+            result = subprocess.run(['gdalsrsinfo', '-o', wanted, name], capture_output=True, text=True)
+            self.assertIn(expected, result.stdout, crs)
+
+    def test_the_command_line_takes_codes_names_and_files(self):
+        cloud = self.cloud([(500000 + 3 * i, 5200000 + i * i) for i in range(20)])
+        json_file = self.path('utm.json')
+        if shutil.which('projinfo'):
+            text = subprocess.run(['projinfo', 'EPSG:32632', '-o', 'PROJJSON', '-q'], capture_output=True,
+                                  text=True, check=True).stdout
+            with open(json_file, 'w', encoding='utf-8') as file:
+                file.write(text)
+            self.assertEqual(self.info(self.build(cloud, '--crs', json_file))['crs']['epsg'], 32632)
+        for crs in ('WGS 84 / UTM zone 32N', ESRI_UTM, 'urn:ogc:def:crs:EPSG::32632'):
+            self.assertEqual(self.info(self.build(cloud, '--crs', crs))['crs']['epsg'], 32632)
+        error = self.refused(2, 'build', cloud, '-o', self.path('none'), '--crs', 'UTM')
+        self.assertIn('EPSG:n', error)
+
+    def test_without_proj_db_the_remedy_is_told(self):
+        cloud = self.cloud([(1, 2), (3, 4)])
+        environment = {**os.environ, 'PROJ_DATA': self.folder.name, 'PROJ_LIB': self.folder.name}
+        result = subprocess.run([TERRACE, 'build', cloud, '--crs', 'EPSG:32632', '-o', self.path('none')],
+                                capture_output=True, text=True, env=environment)
+        if result.returncode == 0:
+            self.skipTest('PROJ finds its database all the same')
+        self.assertIn('proj.db', result.stderr)
+        self.assertIn('PROJ_DATA', result.stderr)
 
     def test_info_says_what_counts_as_wgs84(self):
         etrs = self.raster({1024: 1, 1025: 1, 3072: 25832, 3076: 9001, 4096: 5783})
         self.assertIn('counts as WGS 84 within 1 m', self.ok('info', etrs))
         self.assertEqual(self.info(etrs)['vertical'], 'orthometric')
         self.assertIn('counts as WGS 84 within 1 m', self.ok('info', self.build(etrs)))
-        british = self.raster({1024: 1, 1025: 1, 3072: 27700, 3076: 9001})
-        self.assertIn('without a shift', self.ok('info', british))
+        with open(self.path('own.prj'), 'w', encoding='utf-8') as file:
+            file.write(OWN_DATUM)
+        own = self.raster({1025: 1}, name='own.tif')
+        self.assertIn('without a way to WGS 84', self.ok('info', own))
         wrong = self.raster({1024: 1, 1025: 1, 3072: 32632, 3076: 9002})
         self.assertIn('contradict', self.ok('info', wrong))
 
@@ -180,10 +253,13 @@ class GeodesyTest(unittest.TestCase):
         random.seed(1)
         cloud = self.cloud([(random.uniform(2e5, 6e5), random.uniform(1e5, 9e5))
                             for _ in range(50)])
-        bare = self.build(cloud, '--crs', 'EPSG:27700')
-        error = self.refused(1, 'points', bare, '-o', '-', '--to-crs', 'EPSG:4326')
+        with open(self.path('own.prj'), 'w', encoding='utf-8') as file:
+            file.write(OWN_DATUM)
+        unknown = self.build(cloud, '--crs', self.path('own.prj'))
+        error = self.refused(1, 'points', unknown, '-o', '-', '--to-crs', 'EPSG:4326')
         self.assertIn('--towgs84', error)
-        self.assertIn('EPSG:27700', error)
+        self.assertIn('own grid', error)
+        bare = self.build(cloud, '--crs', 'EPSG:27700')
         shifted = self.build(cloud, '--crs', 'EPSG:27700', f'--towgs84={shift}')
         self.assertIn('BOUNDCRS', self.info(shifted)['crs']['wkt'])
         found = self.points(shifted, '--to-crs', 'EPSG:4326')
@@ -214,8 +290,10 @@ class GeodesyTest(unittest.TestCase):
             self.assertAlmostEqual(y, b, delta=1e-8)
 
     def query_with_shift(self, late):
-        store = self.build(self.raster({1024: 1, 1025: 1, 3072: 27700, 3076: 9001},
-                                       corner=(400000, 300000)))
+        with open(self.path('own.prj'), 'w', encoding='utf-8') as file:
+            file.write(OWN_DATUM)
+        raster = self.raster({1025: 1}, corner=(400000, 300000), name='plain.tif')
+        store = self.build(raster, '--crs', self.path('own.prj'))
         found = self.points(store, '--to-crs', 'EPSG:4326', late)
         with open(self.path('places.csv'), 'w', encoding='utf-8') as file:
             file.write('lon,lat\n' + ''.join(f'{x!r},{y!r}\n' for x, y, _ in found))
@@ -236,17 +314,18 @@ class GeodesyTest(unittest.TestCase):
         grid = ('raster', store, '--to-crs', 'EPSG:4326')
         self.assertIn('--towgs84', self.refused(1, *grid, '-o', late_raster))
         self.ok(*grid, late, '-o', late_raster)
-        early = self.build(self.raster({1024: 1, 1025: 1, 3072: 27700, 3076: 9001},
-                                       corner=(400000, 300000)), '--crs', 'EPSG:27700', late)
+        early = self.build(raster, '--crs', self.path('own.prj'), late)
         self.ok('raster', early, '--to-crs', 'EPSG:4326', '-o', early_raster)
         with open(late_raster, 'rb') as a, open(early_raster, 'rb') as b:
             self.assertEqual(a.read(), b.read())
 
     def test_contours_of_a_region_on_another_datum(self):
         store = self.build(self.raster({1024: 1, 1025: 1, 3072: 32632, 3076: 9001}))
-        # ED50, some hundred metres away.
+        # Some hundred metres away.
         shift = '-87,-98,-121'
-        region = ('--region', '9,46,9.0013,47.5', '--region-crs', 'EPSG:4230')
+        own = ('GEOGCS["own",DATUM["own datum",SPHEROID["International 1924",6378388,297]],'
+               'PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]]')
+        region = ('--region', '9,46,9.0013,47.5', '--region-crs', own)
         contour = ('contour', store, '--interval', '1', '-o', '-')
         self.assertIn('--towgs84', self.refused(1, *contour, *region))
         whole = json.loads(self.ok(*contour))['features']

@@ -9,7 +9,9 @@ import gzip
 import json
 import math
 import os
+import shutil
 import struct
+import subprocess
 import unittest
 
 from quantized_mesh import A, B, TileSet, box_of, dot
@@ -312,6 +314,27 @@ class TileTest(TileTestCase):
                 self.assertTrue(self.verify(out, '--store', store, '--geoid', geoid)['ok'])
                 self.assertFalse(self.verify(out, '--store', store, '--geoid', other)['ok'])
                 self.assertFalse(self.verify(out, '--store', store, '--vertical', 'ignore')['ok'])
+
+    def test_orthometric_heights_go_to_the_ellipsoid_by_egm96(self):
+        if not shutil.which('cs2cs'):
+            self.skipTest('cs2cs is not installed')
+        store, dem = self.stores['degrees'], list(self.dems['degrees'].samples())
+        result = terrace('tile', store, '-o', self.path('sea'), '--vertical', 'orthometric', '--max-error', 2)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn('EGM96', result.stderr)
+        answer = subprocess.run(['cs2cs', '-f', '%.6f', 'EPSG:4326+5773', '+to', 'EPSG:4979'],
+                                input='\n'.join(f'{lat!r} {lon!r} {z!r}' for lon, lat, z in dem),
+                                capture_output=True, text=True, check=True).stdout
+        samples = [(lon, lat, float(line.split()[2])) for (lon, lat, _), line in zip(dem, answer.splitlines())]
+        self.assertEqual(len(samples), len(dem))
+        self.assertGreater(samples[0][2] - dem[0][2], 30)
+        tiles = TileSet(self.path('sea'))
+        tiles.check()
+        for zoom, (error, missed) in tiles.errors(samples).items():
+            self.assertEqual(missed, 0)
+            self.assertLessEqual(error, 2 * 2 ** (tiles.layer['maxzoom'] - zoom) * 1.000001)
+        self.assertTrue(self.verify('sea', '--store', store, '--vertical', 'orthometric')['ok'])
+        self.assertFalse(self.verify('sea', '--store', store, '--vertical', 'ignore')['ok'])
 
     def test_rotated_rasters(self):
         dem = Dem(70, 50, 0, 0, 1)

@@ -34,7 +34,7 @@ IN_TRI = ['libtri/src', 'libtri/tests', 'libtri/bench', 'libtri/fuzz', 'tests/be
 IN_STREAM = ['libstream/src', 'libstream/tests', 'libstream/bench', 'libstream/fuzz']
 RESTRICTED = [
     (r'CGAL/|boost/|gmp(xx)?\.h|mpfr\.h', IN_TRI),
-    (r'GeographicLib/', ['libterrain/src/earth', 'libterrain/tests']),
+    (r'GeographicLib/|proj(_experimental)?\.h', ['libterrain/src/earth', 'libterrain/tests']),
     (r'tiff(io|io\.hxx|conf|vers)?\.h|png\.h|zlib\.h|zstd\.h|libdeflate\.h', IN_STREAM),
     (r'lemon/', ['libmatching/src', 'libmatching/tests', 'libmatching/bench']),
     (r'cuda_runtime|cuda\.h|cuda_(device|rounds)',
@@ -58,8 +58,6 @@ MAY_DIFFER = {
     'libtri/src/view/columns.cpp': CAMERA,
     'libtri/src/view/view.cpp': CAMERA,
     'libterrain/src/earth/crs/projection.cpp': EARTH,
-    'libterrain/src/earth/crs/projection_cone.cpp': EARTH,
-    'libterrain/src/earth/crs/projection_oblique.cpp': EARTH,
     'libterrain/src/base/units.cpp': 'summaries for people, rounded; files have all digits',
 }
 
@@ -194,7 +192,7 @@ def check_meson(root):
                 continue
             for name in re.findall(r"(?:dependency|subproject)\(\s*'([^']+)'", read(root, path)):
                 sibling = name.startswith('terrace-') and name[8:] not in [library] + SIBLINGS.get(library, [])
-                if sibling or (name == 'geographiclib' and library != 'terrain') or (name in ('gmp', 'mpfr') and library != 'tri'):
+                if sibling or (name in ('geographiclib', 'proj') and library != 'terrain') or (name in ('gmp', 'mpfr') and library != 'tri'):
                     yield f'{path}: depends on {name}'
         for folder, ending, list_path, cut in LISTED:
             folder = folder.format(library)

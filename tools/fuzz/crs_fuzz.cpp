@@ -49,7 +49,11 @@ void use(const CoordinateSystem& system) {
   std::vector<Point2> back = places;
   system.to_own_geographic(places);
   system.from_own_geographic(places);
-  if (system.reaches_wgs84()) system.to_geographic(back);
+  try {
+    if (system.reaches_wgs84()) system.to_geographic(back);
+  } catch (const stream::Error&) {
+    // PROJ cannot compute every shift that can be written.
+  }
   require(!system.title().empty(), "a title");
   // A store keeps its CRS as WKT.
   const stream::Crs kept = system.crs();

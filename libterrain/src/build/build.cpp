@@ -44,8 +44,8 @@ stream::Schema schema_of(const stream::SourceInfo& info, const SourceCrs& crs,
     schema.crs.vertical_epsg = 0;
     if (crs.system) {
       CrsDefinition definition = crs.system->definition();
-      definition.heights = Heights::unknown;
-      definition.vertical_name.clear();
+      forget_heights(definition);
+      schema.crs.epsg = definition.epsg();
       schema.crs.wkt = wkt_of(definition);
     }
   }

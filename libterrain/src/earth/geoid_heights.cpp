@@ -8,6 +8,7 @@
 
 #include <GeographicLib/Geoid.hpp>
 
+#include "earth/crs/proj_object.hpp"
 #include "earth/ground.hpp"
 #include "earth/world.hpp"
 #include "terrace/stream/error.hpp"
@@ -48,27 +49,32 @@ GeoidGrid& GeoidGrid::operator=(GeoidGrid&&) noexcept = default;
 double GeoidGrid::undulation(const Point2& place) const { return (*geoid_)(place[1], place[0]); }
 
 EllipsoidalHeights::EllipsoidalHeights(const stream::Schema& schema, const std::string& vertical,
-                                       const std::string& geoid, std::uint64_t memory_bytes) {
+                                       const std::string& geoid, std::uint64_t memory_bytes,
+                                       const std::optional<GeographicArea>& area) {
   const bool said = vertical == "ellipsoidal" || vertical == "ignore";
-  if (!vertical.empty() && !said) {
-    throw UsageError("--vertical is ellipsoidal or ignore, not '" + vertical + "'");
+  const bool orthometric = vertical == "orthometric";
+  if (!vertical.empty() && !said && !orthometric) {
+    throw UsageError("--vertical is ellipsoidal, orthometric or ignore, not '" + vertical + "'");
   }
   if (said && !geoid.empty()) {
     throw UsageError("--vertical " + vertical +
                      " takes heights as they are, --geoid converts them: give one of the two");
   }
   const std::string& recorded = schema.vertical;
-  if (recorded == "ellipsoidal" && !geoid.empty()) {
-    throw UsageError(
-        "the store's heights are ellipsoidal already: leave --geoid out, or build the "
-        "store with --vertical orthometric if they are not");
+  if (recorded == "ellipsoidal" && (!geoid.empty() || orthometric)) {
+    throw UsageError("the store's heights are ellipsoidal already: leave " +
+                     std::string(geoid.empty() ? "--vertical orthometric" : "--geoid") +
+                     " out, or build the store with --vertical orthometric if they are not");
   }
-  if (recorded != "ellipsoidal" && !said && geoid.empty()) {
-    throw UsageError(
-        (recorded.empty() ? std::string("the store does not say what its heights refer to")
+  if (recorded != "ellipsoidal" && vertical.empty() && geoid.empty()) {
+    throw UsageError((recorded.empty()
+                          ? std::string("the store does not say what its heights refer to")
                           : "the store's heights are " + recorded) +
-        ", and globes want heights above the ellipsoid: give --geoid FILE (a GeographicLib geoid "
-        "grid), or --vertical ellipsoidal if they are that, or --vertical ignore");
+                     ", and globes want heights above the ellipsoid: give --vertical orthometric "
+                     "(by the store's "
+                     "vertical CRS, or EGM96), --geoid FILE (a GeographicLib geoid grid), "
+                     "--vertical ellipsoidal "
+                     "if they are that, or --vertical ignore");
   }
   // One unit in all verbs, whatever had to be assumed.
   const Ground ground(placement_of(schema));
@@ -77,18 +83,67 @@ EllipsoidalHeights::EllipsoidalHeights(const stream::Schema& schema, const std::
     note_ = ground.assumption().empty() ? "the unit of heights is unknown and taken as metres"
                                         : ground.assumption();
   }
-  if (!geoid.empty()) geoid_.emplace(geoid, memory_bytes);
-  const auto add = [this](const std::string& what) { note_ += (note_.empty() ? "" : "; ") + what; };
-  if (vertical == "ignore" && recorded != "ellipsoidal") {
-    add("heights are taken as ellipsoidal though they are " +
-        (recorded.empty() ? std::string("of unknown reference") : recorded) +
-        ": they may be off by up to about 100 m");
+  if (!geoid.empty()) {
+    geoid_.emplace(geoid, memory_bytes);
+  } else if (orthometric) {
+    find_operation(schema, area);
   }
-  if (recorded.empty() && geoid_) add("heights of unknown reference are taken as orthometric");
+  if (vertical == "ignore" && recorded != "ellipsoidal") {
+    add_note("heights are taken as ellipsoidal though they are " +
+             (recorded.empty() ? std::string("of unknown reference") : recorded) +
+             ": they may be off by up to about 100 m");
+  }
+  if (recorded.empty() && geoid_) add_note("heights of unknown reference are taken as orthometric");
+}
+
+void EllipsoidalHeights::add_note(const std::string& what) {
+  note_ += (note_.empty() ? "" : "; ") + what;
+}
+
+void EllipsoidalHeights::find_operation(const stream::Schema& schema,
+                                        const std::optional<GeographicArea>& area) {
+  constexpr int kEgm96 = 5773;
+  std::string name, wkt;
+  OperationChoice choice;
+  try {
+    const std::optional<CrsDefinition> known = definition_of(schema.crs);
+    CrsDefinition heights;
+    if (known && known->heights == Heights::orthometric && !known->height_wkt.empty()) {
+      heights = *known;
+    } else {
+      set_vertical_epsg(heights, schema.crs.vertical_epsg != 0 ? schema.crs.vertical_epsg : kEgm96);
+      if (schema.crs.vertical_epsg == 0) add_note("heights are taken as above EGM96");
+    }
+    name = heights.vertical_name;
+    const ProjObject vertical = proj_crs_of_text(heights.height_wkt);
+    const ProjObject places = proj_crs_of_code("EPSG", "4326"),
+                     target = proj_crs_of_code("EPSG", "4979");
+    const ProjObject source(
+        proj_create_compound_crs(proj_context(), name.c_str(), places.get(), vertical.get()));
+    choice = choose_operation(source.get(), target.get(), area);
+    if (choice.found) operation_.emplace(choice.pipeline);
+  } catch (const CrsError& error) {
+    throw stream::Error(
+        {.file = {}, .where = "heights", .cause = error.what(), .remedy = error.remedy()});
+  }
+  if (!operation_) {
+    throw stream::Error(
+        {.file = {},
+         .where = "heights",
+         .cause = "no operation leads from " + name + " to the ellipsoid" +
+                  (choice.better.empty() ? "" : ": " + choice.better),
+         .remedy = choice.better.empty()
+                       ? "give --geoid FILE (a GeographicLib geoid grid)"
+                       : "install that grid where PROJ finds it, or give --geoid FILE (a "
+                         "GeographicLib geoid grid)"});
+  }
+  add_note(name + " to the ellipsoid by " + quoted_with_accuracy(choice.name, choice.accuracy) +
+           (choice.better.empty() ? "" : " (" + choice.better + ")"));
 }
 
 double EllipsoidalHeights::convert(const Point2& place, double height) const {
   const double metres = height * metres_per_unit_;
+  if (operation_) return metres + operation_->height(place);
   return geoid_ ? metres + geoid_->undulation(place) : metres;
 }
 

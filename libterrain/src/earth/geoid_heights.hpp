@@ -8,6 +8,7 @@
 #include <string>
 
 #include "earth/crs/coordinate_system.hpp"
+#include "earth/crs/proj_pipeline.hpp"
 #include "terrace/stream/store.hpp"
 
 namespace GeographicLib {
@@ -42,11 +43,15 @@ class GeoidGrid {
 class EllipsoidalHeights {
  public:
   /// vertical: of `--vertical`, "ellipsoidal" (the heights are that, whatever the store says),
-  /// "ignore" (they are to be taken as if they were) or empty. geoid: the file of `--geoid` or
-  /// empty. Throws: UsageError if the store's heights are orthometric or unknown and neither was
-  /// said, or if the options contradict the store or one another; stream::Error as GeoidGrid.
+  /// "ignore" (they are to be taken as if they were), "orthometric" (they are above the sea: PROJ
+  /// leads them from the store's vertical CRS to the ellipsoid, from EGM96 if there is none) or
+  /// empty. geoid: the file of `--geoid`, which goes before PROJ's, or empty. area: where the store
+  /// lies. Throws: UsageError if the store's heights are orthometric or unknown and neither was
+  /// said, or if the options contradict the store or one another; stream::Error as GeoidGrid, and
+  /// naming the grid that PROJ lacks.
   EllipsoidalHeights(const stream::Schema& schema, const std::string& vertical,
-                     const std::string& geoid, std::uint64_t memory_bytes);
+                     const std::string& geoid, std::uint64_t memory_bytes,
+                     const std::optional<GeographicArea>& area = std::nullopt);
 
   /// heights in the store's vertical unit at places in WGS 84 degrees, to metres above the
   /// ellipsoid, in place. Sizes are equal.
@@ -56,13 +61,17 @@ class EllipsoidalHeights {
   /// Metres in a unit of the store's heights.
   [[nodiscard]] double metres_per_unit() const { return metres_per_unit_; }
   /// Whether a geoid is added: heights then depend on the place.
-  [[nodiscard]] bool has_geoid() const { return geoid_.has_value(); }
+  [[nodiscard]] bool has_geoid() const { return geoid_ || operation_; }
   /// What the user should know: an unknown unit, heights that were not converted. May be empty.
   [[nodiscard]] const std::string& note() const { return note_; }
 
  private:
+  void find_operation(const stream::Schema& schema, const std::optional<GeographicArea>& area);
+  void add_note(const std::string& what);
+
   double metres_per_unit_ = 1.0;
   std::optional<GeoidGrid> geoid_;
+  std::optional<ProjPipeline> operation_;
   std::string note_;
 };
 

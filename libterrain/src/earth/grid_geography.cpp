@@ -96,8 +96,7 @@ struct GridGeography::Patch {
 
 GridGeography::GridGeography(const CoordinateSystem& system, const stream::WorldTransform& world)
     : system_(system), world_(world) {
-  const CrsDefinition& definition = system_.definition();
-  plain_ = system_.is_geographic() && !definition.shift;
+  plain_ = system_.is_geographic() && system_.counts_as_wgs84();
   static_cast<void>(system_.to_geographic(Point2{world.xy[2], world.xy[5]}));
 }
 

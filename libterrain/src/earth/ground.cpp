@@ -78,17 +78,17 @@ Ground::Ground(Placement placement, double z_weight) : placement_(std::move(plac
   std::optional<CrsDefinition> known;
   try {
     known = definition_of(crs);
+    if (known && !known->geographic) system_.emplace(*known);
   } catch (const CrsError&) {
     // Its unit counts all the same; whoever needs places says what is wrong with it.
   }
   if (crs.geographic || degrees) {
     kind_ = Kind::geographic;
-    if (known && !known->method) degrees_ = known->degrees_per_unit;
+    if (known && known->geographic) degrees_ = known->degrees_per_unit;
   } else if (crs.epsg == 3857 || crs.epsg == 3785 || crs.epsg == 900913) {
     kind_ = Kind::web_mercator;
-  } else if (known && known->method) {
+  } else if (system_) {
     kind_ = Kind::projected;
-    system_.emplace(*known);
     metres_horizontal_ = known->metres_per_unit;
   } else if (const auto metres = metres_in_unit(crs.horizontal_unit)) {
     metres_horizontal_ = *metres;

@@ -23,10 +23,10 @@ namespace {
 
 class Outline {
  public:
-  Outline(const CoordinateSystem& from, const CoordinateSystem& to)
-      : from_(from),
-        to_(to),
-        turn_(to.is_geographic() ? 360.0 / to.definition().degrees_per_unit : 0.0) {}
+  explicit Outline(const Transformation& change)
+      : change_(change),
+        to_(change.from()),
+        turn_(to_.is_geographic() ? 360.0 / to_.definition().degrees_per_unit : 0.0) {}
 
   std::vector<Point2> ring(const std::vector<Point2>& corners) const {
     std::vector<Point2> result;
@@ -47,7 +47,7 @@ class Outline {
 
  private:
   [[nodiscard]] Point2 moved(Point2 place) const {
-    transform(from_, to_, {&place, 1});
+    change_.reverse({&place, 1});
     if (!std::isfinite(place[0]) || !std::isfinite(place[1])) {
       fail(to_, "the region's outline reaches places that there are none of in");
     }
@@ -85,7 +85,7 @@ class Outline {
     return add_from(middle, b, half, depth + 1, result);
   }
 
-  const CoordinateSystem& from_;
+  const Transformation& change_;
   const CoordinateSystem& to_;
   double turn_;  ///< of a geographic system, in its unit; else 0
 };
@@ -101,11 +101,11 @@ std::vector<Polygon> outlines(const Region& region) {
 
 }  // namespace
 
-Region region_in(const Region& region, const CoordinateSystem& from, const CoordinateSystem& to,
-                 const stream::Box3& bounds) {
+Region region_in(const Region& region, const Transformation& change, const stream::Box3& bounds) {
+  const CoordinateSystem& to = change.from();
   std::vector<Polygon> polygons = outlines(region);
-  if (!from.same_places(to)) {
-    const Outline outline(from, to);
+  if (!change.identity()) {
+    const Outline outline(change);
     for (Polygon& polygon : polygons) {
       for (std::vector<Point2>& ring : polygon) ring = outline.ring(ring);
     }

@@ -6,12 +6,12 @@
 
 namespace terrace::terrain {
 
-/// A region given in `from` as one in `to`: its outline, a box's too, with so many corners between
-/// its own that it runs within a millionth of its length of the true curve. Heights stay as they
-/// are. In degrees, longitudes may go beyond 180 to cross the antimeridian (170 to 190); the part
-/// that is meant is moved by full turns to where `bounds`, a box in `to`, lies.
-/// Throws: stream::Error if the outline leaves the places that `to` shows, or is torn there.
-Region region_in(const Region& region, const CoordinateSystem& from, const CoordinateSystem& to,
-                 const stream::Box3& bounds);
+/// A region given in the CRS that `change` leads to as one in that it comes from: its outline, a
+/// box's too, with so many corners between its own that it runs within a millionth of its length of
+/// the true curve. Heights stay as they are. In degrees, longitudes may go beyond 180 to cross the
+/// antimeridian (170 to 190); the part that is meant is moved by full turns to where `bounds`, a
+/// box in the result's CRS, lies. Throws: stream::Error if the outline leaves the places that that
+/// CRS shows, or is torn there.
+Region region_in(const Region& region, const Transformation& change, const stream::Box3& bounds);
 
 }  // namespace terrace::terrain

@@ -103,7 +103,7 @@ SourceCrs crs_of_source(const stream::SourceInfo& info, const std::optional<Datu
   }
   if (shift) {
     CrsDefinition shifted = found.system->definition();
-    if (shifted.uncertainty >= 0) {
+    if (found.system->counts_as_wgs84()) {
       fail(file, "its CRS " + found.system->title() + " counts as WGS 84 and takes no shift",
            "leave --towgs84 out");
     }

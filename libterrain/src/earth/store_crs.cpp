@@ -22,50 +22,50 @@ CoordinateSystem system_of(const stream::Store& store) {
                          .cause = "has no CRS",
                          .remedy = "build it anew with --crs EPSG:n"});
   }
-  return *std::move(system);
+  return system->over(world_box(placement_of(store.schema()), store.bounds()));
 }
 
-SystemPair systems_of(const stream::Store& store, const std::string& named,
-                      const std::string& shift) {
+Transformation transformation_to(const stream::Store& store, const std::string& named,
+                                 const std::string& shift) {
   std::optional<DatumShift> values;
   if (!shift.empty()) values = parse_datum_shift(shift);
-  SystemPair pair{system_of(store), CoordinateSystem::parse(named, values)};
-  const bool used = pair.named.definition().uncertainty < 0;
-  if (values && !used && !pair.store.reaches_wgs84()) {
-    CrsDefinition shifted = pair.store.definition();
+  CoordinateSystem own = system_of(store);
+  const CoordinateSystem other = CoordinateSystem::parse(named, values);
+  if (values && !other.definition().shift && !own.counts_as_wgs84()) {
+    CrsDefinition shifted = own.definition();
     shifted.shift = values;
-    pair.store = CoordinateSystem(shifted);
+    own = CoordinateSystem(shifted);
   }
-  return pair;
+  return {own, other};
 }
 
-RegionConversion::RegionConversion(const stream::Store& store, const SystemPair& systems)
-    : systems_({systems.named, systems.store,
-                world_box(placement_of(store.schema()), store.bounds())}) {}
+RegionConversion::RegionConversion(const stream::Store& store, Transformation to_regions)
+    : to_regions_(std::move(to_regions)),
+      bounds_(world_box(placement_of(store.schema()), store.bounds())) {}
 
 Region RegionConversion::operator()(Region region) const {
-  if (!systems_) return region;
-  return region_in(region, systems_->from, systems_->to, systems_->bounds);
+  if (!to_regions_) return region;
+  return region_in(region, *to_regions_, bounds_);
 }
 
-PlaceConversion::PlaceConversion(const CoordinateSystem& from, const CoordinateSystem& to) {
-  if (!from.same_places(to)) systems_.emplace(Systems{from, to});
+PlaceConversion::PlaceConversion(Transformation change) {
+  if (!change.identity()) change_.emplace(std::move(change));
 }
 
 void PlaceConversion::operator()(std::span<stream::Point3> points) const {
-  if (!systems_) return;
+  if (!change_) return;
   std::array<Point2, 1024> places{};
   for (std::size_t first = 0; first < points.size(); first += places.size()) {
     const std::size_t count = std::min(places.size(), points.size() - first);
     for (std::size_t i = 0; i < count; ++i)
       places[i] = {points[first + i][0], points[first + i][1]};
-    transform(systems_->from, systems_->to, std::span(places).first(count));
+    change_->forward(std::span(places).first(count));
     for (std::size_t i = 0; i < count; ++i) {
       stream::Point3& p = points[first + i];
       if (!std::isfinite(places[i][0]) || !std::isfinite(places[i][1])) {
         throw stream::Error({.file = {},
                              .where = "point " + number_text(p[0]) + " " + number_text(p[1]),
-                             .cause = "has no place in " + systems_->to.title(),
+                             .cause = "has no place in " + change_->to().title(),
                              .remedy = "take another --to-crs or a smaller --region"});
       }
       p[0] = places[i][0];

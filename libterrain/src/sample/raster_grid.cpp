@@ -43,8 +43,8 @@ stream::Box3 area_of(const stream::Store& store) {
 }
 
 /// The box of the output's CRS around one of the store's CRS.
-stream::Box3 converted(const stream::Box3& box, const CoordinateSystem& from,
-                       const CoordinateSystem& to, const stream::Store& store) {
+stream::Box3 converted(const stream::Box3& box, const Transformation& change,
+                       const stream::Store& store) {
   // The outline bends: so many points on each side.
   constexpr int kPoints = 256;
   std::vector<Point2> outline;
@@ -57,7 +57,7 @@ stream::Box3 converted(const stream::Box3& box, const CoordinateSystem& from,
       outline.push_back(p);
     }
   }
-  transform(from, to, outline);
+  change.forward(outline);
   stream::Box3 result;
   for (const Point2& p : outline) {
     if (std::isfinite(p[0]) && std::isfinite(p[1])) result.include(stream::Point3{p[0], p[1], 0});
@@ -65,7 +65,7 @@ stream::Box3 converted(const stream::Box3& box, const CoordinateSystem& from,
   if (result.empty()) {
     throw stream::Error({.file = store.path().string(),
                          .where = {},
-                         .cause = "the region has no place in " + to.title(),
+                         .cause = "the region has no place in " + change.to().title(),
                          .remedy = "take another `to_crs` or a smaller `region`"});
   }
   return result;
@@ -144,12 +144,11 @@ RasterGrid raster_grid(const stream::Store& store, const RasterRequest& request)
   }
   double cell = request.cell.value_or(spacing_of(store, area, level));
   if (request.to) {
-    const CoordinateSystem &from = request.to->store, &to = request.to->named;
     const Point2 centre{0.5 * (box.min[0] + box.max[0]), 0.5 * (box.min[1] + box.max[1])};
     std::vector<Point2> steps{centre, {centre[0] + cell, centre[1]}, {centre[0], centre[1] + cell}};
-    box = converted(box, from, to, store);
+    box = converted(box, *request.to, store);
     if (!request.cell) {
-      transform(from, to, steps);
+      request.to->forward(steps);
       const auto length = [&](std::size_t i) {
         return portable_hypot(steps[i][0] - steps[0][0], steps[i][1] - steps[0][1]);
       };

@@ -59,12 +59,25 @@ void for_each_square(TilePlace corner, std::int64_t size, std::int64_t side, Til
   }
 }
 
+/// A CRS that is not known is written as the store has it.
+stream::Crs crs_with_keys(const stream::Store& store) {
+  const stream::Crs& recorded = store.schema().crs;
+  if (recorded.epsg != 0) return recorded;
+  try {
+    const std::optional<CrsDefinition> known = definition_of(recorded);
+    if (known) return CoordinateSystem(*known).crs_with_keys();
+  } catch (const CrsError&) {
+    // What needs places says what is wrong with it; heights do not.
+  }
+  return recorded;
+}
+
 class RasterRun {
  public:
   RasterRun(const stream::Store& store, const RasterRequest& request)
       : request_(request),
         grid_(raster_grid(store, request)),
-        crs_(request.to ? request.to->named.crs() : store.schema().crs),
+        crs_(request.to ? request.to->to().crs_with_keys() : crs_with_keys(store)),
         ground_(store),
         sampler_(make_sampler(store, request.sampler)),
         shader_(grid_, store.schema(), crs_, request.value),
@@ -143,7 +156,7 @@ class RasterRun {
       for (std::size_t i = 0; i < width_; ++i) {
         line[i] = {grid_.x + grid_.step_x * cell(first_column_, i), y};
       }
-      if (request_.to) transform(request_.to->named, request_.to->store, line);
+      if (request_.to) request_.to->reverse(line);
       for (Point2& p : line) {
         const bool wanted = !request_.region || request_.region->polygons().empty() ||
                             request_.region->contains({p[0], p[1], 0});

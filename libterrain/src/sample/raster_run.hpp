@@ -20,9 +20,9 @@ enum class RasterValue : std::uint8_t { height, slope, aspect, hillshade };
 struct RasterRequest {
   RasterValue value = RasterValue::height;
   SamplerOptions sampler;
-  std::optional<double> cell;    ///< width and height in units of the output's CRS
-  std::optional<Region> region;  ///< in the store's CRS
-  std::optional<SystemPair> to;  ///< the output's CRS if it is not the store's
+  std::optional<double> cell;        ///< width and height in units of the output's CRS
+  std::optional<Region> region;      ///< in the store's CRS
+  std::optional<Transformation> to;  ///< to the output's CRS if it is not the store's
   std::string output;
   bool replace = false;
 };

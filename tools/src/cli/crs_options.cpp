@@ -1,24 +1,38 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/crs_options.hpp"
 
+#include <utility>
+
 #include <CLI/CLI.hpp>
+
+#include "cli/cli.hpp"
 
 namespace terrace::tools {
 
-RegionConversion CrsOptions::regions(const stream::Store& store) const {
+Transformation CrsOptions::change(const stream::Store& store, const std::string& named,
+                                  const CommonOptions& common) const {
+  Transformation change = transformation_to(store, named, shift_);
+  if (!change.note().empty()) common.say(change.note());
+  return change;
+}
+
+RegionConversion CrsOptions::regions(const stream::Store& store,
+                                     const CommonOptions& common) const {
   if (region_.empty()) return {};
-  return RegionConversion(store, systems_of(store, region_, shift_));
+  return RegionConversion(store, change(store, region_, common));
 }
 
-PlaceConversion CrsOptions::places(const stream::Store& store) const {
+PlaceConversion CrsOptions::places(const stream::Store& store, const CommonOptions& common) const {
   if (to_.empty()) return {};
-  const SystemPair pair = systems_of(store, to_, shift_);
-  return PlaceConversion(pair.store, pair.named);
+  return PlaceConversion(change(store, to_, common));
 }
 
-std::optional<SystemPair> CrsOptions::to(const stream::Store& store) const {
-  if (!places(store).has_effect()) return std::nullopt;
-  return systems_of(store, to_, shift_);
+std::optional<Transformation> CrsOptions::to(const stream::Store& store,
+                                             const CommonOptions& common) const {
+  if (to_.empty()) return std::nullopt;
+  Transformation to = change(store, to_, common);
+  if (to.identity()) return std::nullopt;
+  return to;
 }
 
 void CrsOptions::define(CLI::App& app) {

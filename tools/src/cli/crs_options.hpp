@@ -12,6 +12,8 @@ class App;
 
 namespace terrace::tools {
 
+struct CommonOptions;
+
 using namespace terrain;
 
 /// The options --region-crs, --to-crs and --towgs84 of a verb on stores.
@@ -20,13 +22,18 @@ class CrsOptions {
   void define(CLI::App& app);
   /// Without --to-crs.
   void define_region(CLI::App& app);
-  /// Throws: as systems_of.
-  [[nodiscard]] RegionConversion regions(const stream::Store& store) const;
-  [[nodiscard]] PlaceConversion places(const stream::Store& store) const;
-  /// The store's CRS and that of --to-crs; nothing without it, or if they are the same.
-  [[nodiscard]] std::optional<SystemPair> to(const stream::Store& store) const;
+  /// Each says which operation it uses between datums. Throws: as transformation_to.
+  [[nodiscard]] RegionConversion regions(const stream::Store& store,
+                                         const CommonOptions& common) const;
+  [[nodiscard]] PlaceConversion places(const stream::Store& store,
+                                       const CommonOptions& common) const;
+  /// To --to-crs; nothing without it, or if it is the store's.
+  [[nodiscard]] std::optional<Transformation> to(const stream::Store& store,
+                                                 const CommonOptions& common) const;
 
  private:
+  [[nodiscard]] Transformation change(const stream::Store& store, const std::string& named,
+                                      const CommonOptions& common) const;
   std::string region_, to_, shift_;
 };
 

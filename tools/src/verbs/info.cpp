@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "base/units.hpp"
-#include "earth/crs/crs_definition.hpp"
+#include "earth/crs/coordinate_system.hpp"
 
 namespace terrace::tools {
 
@@ -45,17 +45,25 @@ nlohmann::ordered_json json_of(const stream::Channel& channel) {
   return json;
 }
 
-std::string text_of(const stream::Crs& crs) {
+std::string text_of(const stream::Crs& crs, const stream::Box3& bounds) {
   std::string text = crs.epsg != 0 ? "EPSG:" + std::to_string(crs.epsg) : "";
   if (!crs.name.empty()) text += text.empty() ? crs.name : " (" + crs.name + ")";
   if (text.empty()) text = crs.wkt.empty() ? "unknown" : crs.wkt.substr(0, 60) + "...";
   if (crs.vertical_epsg != 0) text += " + EPSG:" + std::to_string(crs.vertical_epsg);
   try {
     const std::optional<CrsDefinition> known = definition_of(crs);
-    if (!known || known->shift || known->uncertainty == 0) return text;
-    text += known->uncertainty < 0
-                ? ", datum " + known->datum + " without a shift to WGS 84"
-                : ", counts as WGS 84 within " + number_text(known->uncertainty) + " m";
+    if (!known) return text;
+    const CoordinateSystem system = CoordinateSystem(*known).over(bounds);
+    const DatumChange& change = system.to_wgs84();
+    if (!change.possible()) {
+      text += ", datum " + known->datum + " without a way to WGS 84";
+      if (!change.better().empty()) text += ": " + change.better();
+    } else if (!change.identity()) {
+      text += ", to WGS 84 by " + change.description();
+    } else if (change.accuracy().value_or(0) > 0) {
+      text += ", counts as WGS 84 within " + number_text(*change.accuracy()) + " m";
+      if (!change.better().empty()) text += " (" + change.better() + ")";
+    }
   } catch (const CrsError& error) {
     text += std::string(", ") + error.what();
   }

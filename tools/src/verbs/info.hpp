@@ -24,8 +24,9 @@ nlohmann::ordered_json json_of(const stream::Box3& box);
 nlohmann::ordered_json json_of(const stream::Crs& crs);
 /// {"name": ..., "type": ..., "scale": ..., "offset": ..., "unit": ...}
 nlohmann::ordered_json json_of(const stream::Channel& channel);
-/// "EPSG:32632 (WGS 84 / UTM zone 32N)" or "unknown".
-std::string text_of(const stream::Crs& crs);
+/// "EPSG:32632 (WGS 84 / UTM zone 32N)" or "unknown", with the operation that leads to WGS 84 where
+/// the data lie. bounds: in the CRS.
+std::string text_of(const stream::Crs& crs, const stream::Box3& bounds);
 /// "1.5 2 3 to 4 5 6" or "none".
 std::string text_of(const stream::Box3& box);
 /// "height int16 (metre)", with scale and offset where they are not 1 and 0.

@@ -139,7 +139,7 @@ Summary info_of_file(const std::string& path, const CommonOptions& common) {
             (info.nodata ? ", value " + number_text(*info.nodata) : std::string()) + '\n';
   }
   text += "points:    " + with_commas(contents.points) + '\n';
-  text += "crs:       " + printable_line(text_of(crs.crs)) + '\n';
+  text += "crs:       " + printable_line(text_of(crs.crs, contents.world)) + '\n';
   if (!crs.note.empty()) text += "note:      " + printable_line(crs.note) + '\n';
   if (crs.heights != Heights::unknown) text += "vertical:  " + name_of(crs.heights) + '\n';
   text += "bounds:    " + text_of(contents.world) + '\n';

@@ -92,7 +92,7 @@ Summary info_of_store(const std::string& path, const CommonOptions& common) {
   }
   text +=
       "points:    " + with_commas(store.points()) + ", nodata " + with_commas(schema.nodata) + '\n';
-  text += "crs:       " + printable_line(text_of(schema.crs)) + '\n';
+  text += "crs:       " + printable_line(text_of(schema.crs, bounds)) + '\n';
   text +=
       "vertical:  " + (schema.vertical.empty() ? std::string("unknown") : schema.vertical) + '\n';
   text += "bounds:    " + text_of(bounds) + '\n';

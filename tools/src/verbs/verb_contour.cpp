@@ -51,7 +51,8 @@ class ContourCommand final : public Command {
     const std::optional<unsigned> level = parse_level(level_);
     request.max_edge = max_edge_;
     const stream::Store store = open_store(store_);
-    if (!region_.empty()) request.region = crs_.regions(store)(Region::parse(region_));
+    if (!region_.empty()) request.region = crs_.regions(store, common)(Region::parse(region_));
+    if (const std::string note = system_of(store).wgs84_note(); !note.empty()) common.say(note);
     request.level = level.value_or(store.top());
     request.threads = common.threads;
     request.memory_bytes = common.memory_or(0);

@@ -121,8 +121,8 @@ class MeshCommand final : public Command {
     options.fill = parse_fill(fill_);
     options.path = output_;
     const stream::Store store = open_store(store_);
-    if (!region_.empty()) options.region = crs_.regions(store)(Region::parse(region_));
-    if (crs_.places(store).has_effect()) {
+    if (!region_.empty()) options.region = crs_.regions(store, common)(Region::parse(region_));
+    if (crs_.places(store, common).has_effect()) {
       throw UsageError(
           "--to-crs: between other coordinates the triangles would be other surfaces, and the "
           "bound would not hold; write the mesh in the store's CRS");
@@ -189,8 +189,9 @@ class MeshCommand final : public Command {
       throw UsageError("--save-overlay and --output are the same file");
     }
     const stream::Store store = open_store(store_);
-    const Detail detail = parse_detail(store, level_, region_, focuses_, crs_.regions(store));
-    const PlaceConversion places = crs_.places(store);
+    const Detail detail =
+        parse_detail(store, level_, region_, focuses_, crs_.regions(store, common));
+    const PlaceConversion places = crs_.places(store, common);
     const bool replace = may_replace(output_, common.force);
     std::optional<stream::Overlay> overlay;
     if (!overlay_.empty())

@@ -126,13 +126,15 @@ class PointsCommand final : public Command {
   Summary run(const CommonOptions& common) override {
     const Stopwatch watch;
     const stream::Store store = open_store(store_);
-    const Detail detail = parse_detail(store, level_, region_, focuses_, crs_.regions(store));
+    const Detail detail =
+        parse_detail(store, level_, region_, focuses_, crs_.regions(store, common));
     std::optional<stream::Overlay> overlay;
     if (!overlay_.empty()) overlay.emplace(open_height_overlay(overlay_, store));
     const auto writer = stream::open_point_writer(
         output_, {.attributes = store.schema().attributes, .comments = {kWriterMark}},
         {.format = format_, .replace = may_replace(output_, common.force), .stop = stop_token()});
-    PointOutput output(store, detail, crs_.places(store), overlay ? &*overlay : nullptr, *writer);
+    PointOutput output(store, detail, crs_.places(store, common), overlay ? &*overlay : nullptr,
+                       *writer);
     for_each_wanted(store, detail,
                     [&output](stream::ClusterId id, const stream::ClusterRecord&,
                               const stream::ClusterPoints& points) { output.add(id, points); });

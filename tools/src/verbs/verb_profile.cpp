@@ -67,8 +67,9 @@ class ProfileCommand final : public Command {
     request.line = parse_line(line_);
     const stream::Store store = open_store(store_);
     if (!line_crs_.empty()) {
-      const SystemPair systems = systems_of(store, line_crs_, shift_);
-      transform(systems.named, systems.store, request.line);
+      const Transformation change = transformation_to(store, line_crs_, shift_);
+      if (!change.note().empty()) common.say(change.note());
+      change.reverse(request.line);
     }
     request.sampler.level = level.value_or(store.top());
     request.sampler.threads = common.threads;

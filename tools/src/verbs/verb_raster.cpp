@@ -66,8 +66,8 @@ class RasterCommand final : public Command {
     request.sampler.level = level.value_or(store.top());
     request.sampler.threads = common.threads;
     request.sampler.memory_bytes = common.memory_or(0);
-    if (!region_.empty()) request.region = crs_.regions(store)(Region::parse(region_));
-    request.to = crs_.to(store);
+    if (!region_.empty()) request.region = crs_.regions(store, common)(Region::parse(region_));
+    request.to = crs_.to(store, common);
     request.output = output_;
     request.replace = may_replace(output_, common.force);
     ProgressMeter meter(common.progress, "cells");

@@ -72,7 +72,7 @@ class SampleCommand final : public Command {
     options.level = level.value_or(store.top());
     options.threads = common.threads;
     options.memory_bytes = common.memory_or(0);
-    const PlaceConversions conversions = conversions_for(store);
+    const PlaceConversions conversions = conversions_for(store, common);
     PlaceFile places(points_, stop_token());
     stream::Sink output(output_, may_replace(output_, common.force), stop_token());
     ProgressMeter meter(common.progress, "points");
@@ -100,23 +100,22 @@ class SampleCommand final : public Command {
   }
 
  private:
-  [[nodiscard]] PlaceConversions conversions_for(const stream::Store& store) const {
+  [[nodiscard]] PlaceConversions conversions_for(const stream::Store& store,
+                                                 const CommonOptions& common) const {
     PlaceConversions conversions;
     std::optional<CoordinateSystem> from;
     if (!points_crs_.empty()) {
-      const SystemPair systems = systems_of(store, points_crs_, shift_);
-      conversions.to_store = [systems](std::span<Point2> here) {
-        transform(systems.named, systems.store, here);
-      };
-      from = systems.named;
+      const Transformation change = transformation_to(store, points_crs_, shift_);
+      if (!change.note().empty()) common.say(change.note());
+      conversions.to_store = [change](std::span<Point2> here) { change.reverse(here); };
+      from = change.to();
     }
     if (!to_crs_.empty()) {
-      const SystemPair systems = systems_of(store, to_crs_, shift_);
-      if (!from) from = systems.store;
-      conversions.to_written = [from = *from, to = systems.named](std::span<Point2> here) {
-        transform(from, to, here);
-      };
-      conversions.writes_degrees = systems.named.is_geographic();
+      Transformation change = transformation_to(store, to_crs_, shift_);
+      conversions.writes_degrees = change.to().is_geographic();
+      if (from) change = Transformation(*from, change.to());
+      if (!change.note().empty()) common.say(change.note());
+      conversions.to_written = [change](std::span<Point2> here) { change.forward(here); };
     }
     return conversions;
   }

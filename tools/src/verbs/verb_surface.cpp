@@ -63,8 +63,9 @@ class SurfaceCommand final : public Command {
     const bool vtk = output_.ends_with(".vtk");
     if (tetrahedra_ != vtk) throw UsageError("--tetrahedra and an output named .vtk go together");
     const stream::Store store = open_store(store_);
-    const Detail detail = parse_detail(store, level_, region_, focuses_, crs_.regions(store));
-    const PlaceConversion places = crs_.places(store);
+    const Detail detail =
+        parse_detail(store, level_, region_, focuses_, crs_.regions(store, common));
+    const PlaceConversion places = crs_.places(store, common);
     const bool replace = may_replace(output_, common.force);
     SurfaceOutcome outcome;
     call_library(store_, criterion_, [&] {

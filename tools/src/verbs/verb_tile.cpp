@@ -82,7 +82,9 @@ class TileCommand final : public Command {
         ->type_name("nodata|HEIGHT");
     app.add_flag("--metadata", metadata_, "with the list of the tiles below in each tile");
     app.add_option("--vertical", vertical_,
-                   "ellipsoidal: heights are above the ellipsoid; ignore: take them as if");
+                   "ellipsoidal: heights are above the ellipsoid; ignore: take them as if; "
+                   "orthometric: above the sea, and go to the ellipsoid from the store's vertical "
+                   "CRS, or from EGM96 if it has none");
     app.add_option("--geoid", geoid_, "a geoid grid of GeographicLib, added to the heights")
         ->type_name("FILE");
     app.add_flag(

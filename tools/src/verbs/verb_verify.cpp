@@ -47,7 +47,7 @@ class VerifyCommand final : public Command {
         ->type_name("METRES");
     app.add_option("--vertical", vertical_,
                    "ellipsoidal: the store's heights are above the ellipsoid; ignore: take them as "
-                   "if");
+                   "if; orthometric: above the sea, as `terrace tile` says");
     app.add_option("--geoid", geoid_, "the geoid grid that the tiles were made with")
         ->type_name("FILE");
   }

@@ -20,7 +20,7 @@ struct GeoTiffOptions {
   Channel sample;        ///< type of the samples; scale, offset and unit where not the default
   WorldTransform world;  ///< from column and row to the sample's place, as in SourceInfo
   bool pixel_is_point = false;  ///< a sample stands for a point and not for its cell's area
-  Crs crs;                      ///< EPSG codes, else the name as a citation
+  Crs crs;                      ///< EPSG codes, else its GeoKeys, and the name as a citation
   std::optional<double> nodata;
   GeoTiffCompression compression = GeoTiffCompression::deflate;
   int level = 6;             ///< of the compression: 1 to 12 (deflate), 1 to 22 (zstd)

@@ -3,40 +3,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <mutex>
+#include <utility>
+#include <vector>
 
-#include <GeographicLib/Geocentric.hpp>
+#include <GeographicLib/Math.hpp>
 
 #include "base/portable_math.hpp"
-#include "earth/crs/projection_batch.hpp"
+#include "base/units.hpp"
+#include "earth/crs/crs_geo_keys.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
 namespace {
-
-using Matrix = std::array<double, 9>;
-using Vector = std::array<double, 3>;
-
-Vector product(const Matrix& m, const Vector& v) {
-  return {m[0] * v[0] + m[1] * v[1] + m[2] * v[2], m[3] * v[0] + m[4] * v[1] + m[5] * v[2],
-          m[6] * v[0] + m[7] * v[1] + m[8] * v[2]};
-}
-
-Matrix inverse(const Matrix& m) {
-  const auto minor = [&m](std::size_t a, std::size_t b, std::size_t c, std::size_t d) {
-    return m[a] * m[d] - m[b] * m[c];
-  };
-  const Matrix adjoint{minor(4, 5, 7, 8), minor(2, 1, 8, 7), minor(1, 2, 4, 5),
-                       minor(5, 3, 8, 6), minor(0, 2, 6, 8), minor(2, 0, 5, 3),
-                       minor(3, 4, 6, 7), minor(1, 0, 7, 6), minor(0, 1, 3, 4)};
-  const double determinant = m[0] * adjoint[0] + m[1] * adjoint[3] + m[2] * adjoint[6];
-  Matrix result{};
-  for (std::size_t i = 0; i < 9; ++i) result[i] = adjoint[i] / determinant;
-  return result;
-}
-
-GeographicLib::Geocentric geocentric_of(const Ellipsoid& ellipsoid) {
-  return {ellipsoid.semi_major, ellipsoid.flattening()};
-}
 
 std::string unit_name(double metres) {
   if (metres == 1) return "metre";
@@ -54,156 +34,177 @@ std::string angle_name(double degrees) {
   return {};
 }
 
-/// What is impossible whichever way it was described. Throws: CrsError.
-void check_numbers(const CrsDefinition& definition, const std::string& title) {
-  const auto fail = [&title](const char* what) {
-    throw CrsError("the CRS " + title + " has " + what, "give another with --crs EPSG:n");
-  };
-  const auto is_size = [](double value) { return value > 0 && std::isfinite(value); };
-  const Ellipsoid& ellipsoid = definition.ellipsoid;
-  if (!is_size(ellipsoid.semi_major) ||
-      !(ellipsoid.flattening() >= 0 && ellipsoid.flattening() < 0.5)) {
-    fail("an impossible ellipsoid");
+const CrsDefinition& wgs84() {
+  static const CrsDefinition definition = definition_of_epsg(4326);
+  return definition;
+}
+
+/// Throws: stream::Error if PROJ cannot compute what its database has.
+DatumChange change_between(const CrsDefinition& from, const CrsDefinition& to,
+                           const std::optional<GeographicArea>& area) {
+  try {
+    return {from, to, area};
+  } catch (const CrsError& error) {
+    throw stream::Error(
+        {.file = {}, .where = from.title(), .cause = error.what(), .remedy = error.remedy()});
   }
-  if (!is_size(definition.degrees_per_unit) || !is_size(definition.metres_per_unit) ||
-      !(definition.metres_per_height == 0 || is_size(definition.metres_per_height))) {
-    fail("a unit without a size");
-  }
-  if (!std::isfinite(definition.prime_meridian)) fail("no prime meridian");
-  if (!definition.shift) return;
-  for (const double value : *definition.shift) {
-    if (!std::isfinite(value)) fail("a shift to WGS 84 that is not finite");
-  }
+}
+
+[[noreturn]] void fail_without_way(const CoordinateSystem& from, const std::string& to,
+                                   const DatumChange& change) {
+  throw stream::Error(
+      {.file = {},
+       .where = {},
+       .cause = "the CRS " + from.title() + " has the datum " + from.definition().datum +
+                ", and no operation leads from it to " + to +
+                (change.better().empty() ? "" : ": " + change.better()),
+       .remedy =
+           std::string(change.better().empty() ? "" : "install that grid, or ") +
+           "give --towgs84 dx,dy,dz[,rx,ry,rz,ds], or convert the data to a system on WGS 84, "
+           "ETRS89 or NAD83 first"});
 }
 
 }  // namespace
 
-/// From a datum's geocentric coordinates to those of WGS 84 and back, for places on the ellipsoid.
-struct CoordinateSystem::Shift {
-  Shift(const Ellipsoid& ellipsoid, const DatumShift& s)
-      : own(geocentric_of(ellipsoid)), wgs84(GeographicLib::Geocentric::WGS84()) {
-    constexpr double kArcSecond = kDegree / 3600;
-    const double m = 1 + s[6] * 1e-6;
-    const double rx = s[3] * kArcSecond * m, ry = s[4] * kArcSecond * m, rz = s[5] * kArcSecond * m;
-    turn = {m, -rz, ry, rz, m, -rx, -ry, rx, m};
-    back = inverse(turn);
-    move = {s[0], s[1], s[2]};
-  }
-
-  [[nodiscard]] Point2 forward(const Point2& place) const {
-    Vector v{};
-    own.Forward(place[1], place[0], 0, v[0], v[1], v[2]);
-    v = product(turn, v);
-    for (std::size_t i = 0; i < 3; ++i) v[i] += move[i];
-    double latitude = 0, longitude = 0, height = 0;
-    wgs84.Reverse(v[0], v[1], v[2], latitude, longitude, height);
-    return {longitude, latitude};
-  }
-  [[nodiscard]] Point2 reverse(const Point2& place) const {
-    Vector v{};
-    wgs84.Forward(place[1], place[0], 0, v[0], v[1], v[2]);
-    for (std::size_t i = 0; i < 3; ++i) v[i] -= move[i];
-    v = product(back, v);
-    double latitude = 0, longitude = 0, height = 0;
-    own.Reverse(v[0], v[1], v[2], latitude, longitude, height);
-    return {longitude, latitude};
-  }
-
-  GeographicLib::Geocentric own, wgs84;
-  Matrix turn{}, back{};
-  Vector move{};
+struct CoordinateSystem::LazyChange {
+  std::once_flag once;
+  std::optional<DatumChange> change;
 };
 
-CoordinateSystem::CoordinateSystem() : CoordinateSystem(definition_of_epsg(4326)) {}
+CoordinateSystem::CoordinateSystem() : CoordinateSystem(wgs84()) {}
 
-CoordinateSystem::CoordinateSystem(const CrsDefinition& definition) : definition_(definition) {
-  check_numbers(definition_, title());
-  if (definition_.method) {
-    try {
-      projection_ =
-          make_projection(*definition_.method, definition_.parameters, definition_.ellipsoid);
-    } catch (const std::invalid_argument& error) {
-      throw CrsError("the CRS " + title() + " has no usable projection: " + error.what(),
-                     "give another with --crs EPSG:n");
-    }
-  }
-  if (definition_.shift) {
-    shift_ = std::make_shared<const Shift>(definition_.ellipsoid, *definition_.shift);
+CoordinateSystem::CoordinateSystem(const CrsDefinition& definition)
+    : data_(std::make_shared<const Data>(
+          Data{definition, definition.geographic ? nullptr : projection_of(definition)})),
+      wgs84_(std::make_shared<LazyChange>()) {}
+
+CoordinateSystem CoordinateSystem::parse(const std::string& text,
+                                         const std::optional<DatumShift>& shift) {
+  try {
+    CrsDefinition definition = definition_of_text(text);
+    CoordinateSystem system(definition);
+    if (!shift || system.counts_as_wgs84()) return system;
+    definition.shift = shift;
+    return CoordinateSystem(definition);
+  } catch (const CrsError& error) {
+    throw UsageError("'" + text.substr(0, 80) + "': " + error.what() + "; " + error.remedy());
   }
 }
 
-std::string CoordinateSystem::title() const {
-  const std::string& name = definition_.name;
-  if (definition_.epsg == 0) return name.empty() ? "without a name" : '"' + name + '"';
-  return "EPSG:" + std::to_string(definition_.epsg) + (name.empty() ? "" : " (" + name + ")");
+std::optional<CoordinateSystem> CoordinateSystem::of(const stream::Crs& crs,
+                                                     const std::string& file) {
+  try {
+    const std::optional<CrsDefinition> definition = definition_of(crs);
+    if (!definition) return std::nullopt;
+    return CoordinateSystem(*definition);
+  } catch (const CrsError& error) {
+    throw stream::Error(
+        {.file = file, .where = {}, .cause = error.what(), .remedy = error.remedy()});
+  }
+}
+
+CoordinateSystem CoordinateSystem::over(const stream::Box3& box) const {
+  CoordinateSystem copy = *this;
+  copy.area_.reset();
+  copy.wgs84_ = std::make_shared<LazyChange>();
+  if (box.empty()) return copy;
+  constexpr int kSteps = 8;
+  std::vector<Point2> places;
+  for (int j = 0; j <= kSteps; ++j) {
+    for (int i = 0; i <= kSteps; ++i) {
+      const double s = static_cast<double>(i) / kSteps, t = static_cast<double>(j) / kSteps;
+      places.push_back(
+          {box.min[0] + s * (box.max[0] - box.min[0]), box.min[1] + t * (box.max[1] - box.min[1])});
+    }
+  }
+  to_own_geographic(places);
+  std::erase_if(places,
+                [](const Point2& p) { return !std::isfinite(p[0]) || !(std::abs(p[1]) <= 90); });
+  if (places.empty()) return copy;
+  GeographicArea area{places[0][0], places[0][1], places[0][0], places[0][1]};
+  for (const Point2& p : places) {
+    const double longitude = p[0] + 360 * std::round((places[0][0] - p[0]) / 360);
+    area.west = std::min(area.west, longitude);
+    area.east = std::max(area.east, longitude);
+    area.south = std::min(area.south, p[1]);
+    area.north = std::max(area.north, p[1]);
+  }
+  if (area.east - area.west >= 180) {
+    area.west = -180;
+    area.east = 180;
+  } else {
+    area.west = GeographicLib::Math::AngNormalize(area.west);
+    area.east = GeographicLib::Math::AngNormalize(area.east);
+  }
+  copy.area_ = area;
+  return copy;
 }
 
 double CoordinateSystem::metres_per_unit() const {
-  return is_geographic() ? 0.0 : definition_.metres_per_unit;
+  return is_geographic() ? 0.0 : definition().metres_per_unit;
 }
 
 std::optional<double> CoordinateSystem::metres_per_height() const {
-  if (definition_.metres_per_height == 0) return std::nullopt;
-  return definition_.metres_per_height;
+  if (definition().metres_per_height == 0) return std::nullopt;
+  return definition().metres_per_height;
 }
 
 stream::Crs CoordinateSystem::crs() const {
+  const CrsDefinition& own = definition();
   stream::Crs crs;
-  crs.epsg = definition_.epsg;
-  crs.vertical_epsg = definition_.vertical_epsg;
-  crs.name = definition_.name;
-  crs.wkt = wkt_of(definition_);
+  crs.epsg = own.epsg();
+  crs.vertical_epsg = own.vertical_epsg;
+  crs.name = own.name;
+  crs.wkt = wkt_of(own);
   crs.geographic = is_geographic();
-  crs.horizontal_unit = is_geographic() ? angle_name(definition_.degrees_per_unit)
-                                        : unit_name(definition_.metres_per_unit);
-  if (definition_.metres_per_height != 0) {
-    crs.vertical_unit = unit_name(definition_.metres_per_height);
-  }
+  crs.horizontal_unit =
+      is_geographic() ? angle_name(own.degrees_per_unit) : unit_name(own.metres_per_unit);
+  if (own.metres_per_height != 0) crs.vertical_unit = unit_name(own.metres_per_height);
   return crs;
 }
 
-bool CoordinateSystem::reaches_wgs84() const {
-  return shift_ != nullptr || definition_.uncertainty >= 0;
+stream::Crs CoordinateSystem::crs_with_keys() const {
+  stream::Crs record = crs();
+  if (record.epsg == 0) record.geo_keys = geo_keys_of(definition());
+  return record;
 }
 
-double CoordinateSystem::uncertainty() const {
-  return shift_ != nullptr ? 0.0 : std::max(0.0, definition_.uncertainty);
+const DatumChange& CoordinateSystem::to_wgs84() const {
+  std::call_once(wgs84_->once,
+                 [this] { wgs84_->change = change_between(definition(), wgs84(), area_); });
+  return *wgs84_->change;
 }
 
-void CoordinateSystem::require_wgs84() const {
-  if (reaches_wgs84()) return;
-  throw stream::Error(
-      {.file = {},
-       .where = {},
-       .cause = "the CRS " + title() + " has the datum " + definition_.datum +
-                ", which is not WGS 84, and no shift to it",
-       .remedy = "give --towgs84 dx,dy,dz[,rx,ry,rz,ds], or convert the data to a system on "
-                 "WGS 84, ETRS89 or NAD83 first"});
+std::string CoordinateSystem::wgs84_note() const {
+  if (!reaches_wgs84() || counts_as_wgs84()) return {};
+  return title() + " to WGS 84 by " + to_wgs84().description();
 }
 
 void CoordinateSystem::to_own_geographic(std::span<Point2> places) const {
-  if (!projection_) {
-    const double unit = definition_.degrees_per_unit, meridian = definition_.prime_meridian;
+  const CrsDefinition& own = definition();
+  if (is_geographic()) {
+    const double unit = own.degrees_per_unit, meridian = own.prime_meridian;
     if (unit == 1 && meridian == 0) return;
     for (Point2& place : places) place = {place[0] * unit + meridian, place[1] * unit};
     return;
   }
-  const double unit = definition_.metres_per_unit;
+  const double unit = own.metres_per_unit;
   if (unit != 1) {
     for (Point2& place : places) place = {place[0] * unit, place[1] * unit};
   }
-  projection_->reverse(places);
-  if (definition_.prime_meridian != 0) {
+  data_->projection->reverse(places);
+  if (own.prime_meridian != 0) {
     for (Point2& place : places) {
-      place[0] = GeographicLib::Math::AngNormalize(place[0] + definition_.prime_meridian);
+      place[0] = GeographicLib::Math::AngNormalize(place[0] + own.prime_meridian);
     }
   }
 }
 
 void CoordinateSystem::from_own_geographic(std::span<Point2> places) const {
-  const double meridian = definition_.prime_meridian;
-  if (!projection_) {
-    const double unit = definition_.degrees_per_unit;
+  const CrsDefinition& own = definition();
+  const double meridian = own.prime_meridian;
+  if (is_geographic()) {
+    const double unit = own.degrees_per_unit;
     if (unit == 1 && meridian == 0) return;
     for (Point2& place : places) place = {(place[0] - meridian) / unit, place[1] / unit};
     return;
@@ -211,26 +212,24 @@ void CoordinateSystem::from_own_geographic(std::span<Point2> places) const {
   if (meridian != 0) {
     for (Point2& place : places) place[0] -= meridian;
   }
-  projection_->forward(places);
-  const double unit = definition_.metres_per_unit;
+  data_->projection->forward(places);
+  const double unit = own.metres_per_unit;
   if (unit != 1) {
     for (Point2& place : places) place = {place[0] / unit, place[1] / unit};
   }
 }
 
 void CoordinateSystem::to_geographic(std::span<Point2> places) const {
-  require_wgs84();
+  const DatumChange& change = to_wgs84();
+  if (!change.possible()) fail_without_way(*this, "WGS 84", change);
   to_own_geographic(places);
-  if (shift_) {
-    for (Point2& place : places) place = shift_->forward(place);
-  }
+  if (!change.identity()) change.forward(places);
 }
 
 void CoordinateSystem::from_geographic(std::span<Point2> places) const {
-  require_wgs84();
-  if (shift_) {
-    for (Point2& place : places) place = shift_->reverse(place);
-  }
+  const DatumChange& change = to_wgs84();
+  if (!change.possible()) fail_without_way(*this, "WGS 84", change);
+  if (!change.identity()) change.reverse(places);
   from_own_geographic(places);
 }
 
@@ -245,27 +244,54 @@ Point2 CoordinateSystem::from_geographic(Point2 place) const {
 }
 
 bool CoordinateSystem::same_places(const CoordinateSystem& other) const {
-  const CrsDefinition &a = definition_, &b = other.definition_;
-  const bool datum = a.ellipsoid == b.ellipsoid && a.prime_meridian == b.prime_meridian &&
-                     a.shift == b.shift && (a.uncertainty >= 0) == (b.uncertainty >= 0) &&
-                     (a.uncertainty >= 0 || a.datum == b.datum);
-  if (!datum || a.method != b.method) return false;
-  if (!a.method) return a.degrees_per_unit == b.degrees_per_unit;
-  return nearly_equal(a.parameters, b.parameters) && a.metres_per_unit == b.metres_per_unit;
+  return data_ == other.data_ || terrain::same_places(definition(), other.definition());
+}
+
+Transformation::Transformation(CoordinateSystem from, CoordinateSystem to)
+    : from_(std::move(from)),
+      to_(std::move(to)),
+      same_(from_.same_places(to_)),
+      change_(change_between(from_.definition(), same_ ? from_.definition() : to_.definition(),
+                             from_.area() ? from_.area() : to_.area())) {
+  if (!change_.possible()) {
+    // The remedy is for the one whose datum is another.
+    const bool other = from_.counts_as_wgs84() && !to_.counts_as_wgs84();
+    fail_without_way(other ? to_ : from_, (other ? from_ : to_).definition().datum, change_);
+  }
+}
+
+void Transformation::forward(std::span<Point2> places) const {
+  if (same_) return;
+  from_.to_own_geographic(places);
+  change_.forward(places);
+  to_.from_own_geographic(places);
+}
+
+void Transformation::reverse(std::span<Point2> places) const {
+  if (same_) return;
+  to_.to_own_geographic(places);
+  change_.reverse(places);
+  from_.from_own_geographic(places);
+}
+
+std::string Transformation::note() const {
+  if (same_ || change_.identity()) return {};
+  return from_.title() + " to " + to_.title() + " by " + change_.description();
 }
 
 void transform(const CoordinateSystem& from, const CoordinateSystem& to, std::span<Point2> places) {
-  if (from.same_places(to)) return;
-  const CrsDefinition &a = from.definition(), &b = to.definition();
-  // Datums that count as WGS 84 are one; another that both have needs no shift.
-  const bool one = a.datum == b.datum && a.ellipsoid == b.ellipsoid && a.shift == b.shift;
-  if (one) {
-    from.to_own_geographic(places);
-    to.from_own_geographic(places);
-  } else {
-    from.to_geographic(places);
-    to.from_geographic(places);
+  Transformation(from, to).forward(places);
+}
+
+DatumShift parse_datum_shift(const std::string& text) {
+  const std::vector<double> numbers = parse_numbers(text, "--towgs84");
+  if (numbers.size() != 3 && numbers.size() != 7) {
+    throw UsageError("--towgs84 takes three or seven numbers, dx,dy,dz[,rx,ry,rz,ds], not " +
+                     std::to_string(numbers.size()));
   }
+  DatumShift shift{};
+  std::copy(numbers.begin(), numbers.end(), shift.begin());
+  return shift;
 }
 
 }  // namespace terrace::terrain

@@ -2,10 +2,11 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
-#include <vector>
 
 #include "earth/crs/projection.hpp"
 #include "terrace/stream/source.hpp"
@@ -43,49 +44,70 @@ std::string name_of(Heights heights);
 /// per million, as a position vector transformation (EPSG 9606), the order of TOWGS84 in WKT.
 using DatumShift = std::array<double, 7>;
 
-/// A CRS taken apart. Angles in degrees, lengths in metres.
+/// A CRS taken apart: plain data, read from PROJ. Angles in degrees, lengths in metres.
 struct CrsDefinition {
-  int epsg = 0;  ///< of the horizontal system; 0: none
+  /// Of the horizontal system: "EPSG", "32632"; empty without a code.
+  std::string authority, code;
   std::string name;
+  std::string wkt;  ///< of the horizontal system without heights, WKT 2
+  bool geographic = true;
 
-  int base_epsg = 0;  ///< of the geographic system below
-  std::string base_name, datum;
+  std::string base_wkt;  ///< of the geographic system below, without heights
+  int base_epsg = 0;     ///< 0: none
+  std::string datum;
   Ellipsoid ellipsoid;
   double prime_meridian = 0.0;
-  /// Metres that positions may be off if the datum is taken as WGS 84; negative: another datum.
-  double uncertainty = -1.0;
+  double degrees_per_unit = 1;  ///< of the geographic system's coordinates
+  double metres_per_unit = 1;   ///< of a projected system's
+  /// Said beside the system, by TOWGS84 or --towgs84: it goes before all operations of the
+  /// database.
   std::optional<DatumShift> shift;
 
-  std::optional<ProjectionMethod> method;  ///< none: geographic
+  /// The projection where GeographicLib has it; PROJ computes the others from `wkt`.
+  std::optional<ProjectionMethod> method;
   ProjectionParameters parameters;
-  std::string conversion;       ///< name of the projection with its parameters
-  double degrees_per_unit = 1;  ///< of a geographic system's coordinates
-  double metres_per_unit = 1;   ///< of a projected system's
 
   Heights heights = Heights::unknown;
-  int vertical_epsg = 0;
+  std::string height_wkt;  ///< of a vertical system, or of a geographic one with three axes
   std::string vertical_name;
+  int vertical_epsg = 0;
   double metres_per_height = 0;  ///< 0: unknown
+
+  /// The code if it is EPSG's; else 0.
+  [[nodiscard]] int epsg() const;
+  /// "EPSG:32632 (WGS 84 / UTM zone 32N)", "\"ETRS89 / LCC\"", "without a name".
+  [[nodiscard]] std::string title() const;
 };
 
+/// What the user writes, or a file holds: a code, a name, WKT, PROJJSON, a PROJ string.
+/// Throws: CrsError.
+CrsDefinition definition_of_text(const std::string& text);
 /// The system of an EPSG code: geographic, projected or compound. Throws: CrsError.
 CrsDefinition definition_of_epsg(int code);
+/// The system that WKT (version 1, OGC's, GDAL's and ESRI's, or 2), PROJJSON or a PROJ string
+/// describes. Throws: CrsError.
+CrsDefinition definition_of_wkt(const std::string& text);
 /// Sets the vertical part from the code of a vertical system. Throws: CrsError.
 void set_vertical_epsg(CrsDefinition& definition, int code);
-/// The system that WKT describes: version 1 (OGC, GDAL's and ESRI's) or 2. Throws: CrsError.
-CrsDefinition definition_of_wkt(const std::string& text);
+/// Leaves what heights refer to unsaid.
+void forget_heights(CrsDefinition& definition);
 /// The system as WKT 2 (ISO 19162:2019), with a shift as a bound CRS.
 std::string wkt_of(const CrsDefinition& definition);
-/// The system that the keys of a GeoTIFF describe by parameters (no EPSG code in them).
-/// Throws: CrsError.
-CrsDefinition definition_of_geo_keys(const stream::Crs& crs);
 
 /// What a source or a store says, whichever way; nothing if it says nothing of a CRS.
 /// Throws: CrsError.
 std::optional<CrsDefinition> definition_of(const stream::Crs& crs);
 
-/// The datum by the name or the ellipsoid of it that files without codes use: uncertainty, and
-/// base_epsg where there is one. Leaves another datum negative.
-void recognise_datum(CrsDefinition& definition);
+/// The projection of a system that is not geographic: from longitudes (from its prime meridian) and
+/// latitudes in degrees to metres. Throws: CrsError.
+std::shared_ptr<const Projection> projection_of(const CrsDefinition& definition);
+/// The same, by PROJ whatever the method.
+std::shared_ptr<const Projection> proj_projection_of(const CrsDefinition& definition);
+
+/// Whether coordinates of both mean the same places on the earth's surface, but for names.
+bool same_places(const CrsDefinition& a, const CrsDefinition& b);
+/// Whether both have the same datum, prime meridians aside: no operation leads from one to the
+/// other.
+bool same_datum(const CrsDefinition& a, const CrsDefinition& b);
 
 }  // namespace terrace::terrain

@@ -1,20 +1,153 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "earth/crs/crs_geo_keys.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
 
-#include "earth/crs/crs_definition.hpp"
-#include "earth/crs/crs_names.hpp"
-#include "earth/crs/epsg_table.hpp"
-#include "earth/crs/geo_key_values.hpp"
+#include "base/portable_math.hpp"
+#include "earth/crs/crs_reading.hpp"
+#include "earth/crs/projection_names.hpp"
 
 namespace terrace::terrain {
 namespace {
 
-using Kind = KeyOfParameter::Kind;
+/// The value of a code that says: by the parameters beside it.
+constexpr int kUserDefined = 32767;
+
+[[noreturn]] void fail_geo_keys(const std::string& cause) {
+  throw CrsError(cause, "name the system by its code: --crs EPSG:n");
+}
+
+/// The keys of one file.
+class GeoKeyValues {
+ public:
+  explicit GeoKeyValues(const stream::Crs& crs) : crs_(crs) {}
+
+  [[nodiscard]] const stream::GeoKey* find(int key) const {
+    for (const stream::GeoKey& candidate : crs_.geo_keys) {
+      if (candidate.key == key) return &candidate;
+    }
+    return nullptr;
+  }
+  /// Nothing if there is none. Throws: CrsError if it is not finite.
+  [[nodiscard]] std::optional<double> number(int key) const {
+    const stream::GeoKey* const found = find(key);
+    if (found == nullptr || found->values.empty()) return std::nullopt;
+    if (!std::isfinite(found->values.front())) {
+      fail_geo_keys("GeoKey " + std::to_string(key) + " is not finite");
+    }
+    return found->values.front();
+  }
+  /// 0 if there is none. Throws: CrsError if it is not a whole number of 16 bits, as codes are.
+  [[nodiscard]] int code(int key) const {
+    const double value = number(key).value_or(0);
+    if (!(value >= 0 && value <= 65535 && value == std::floor(value))) {
+      fail_geo_keys("GeoKey " + std::to_string(key) + " is not a code");
+    }
+    return static_cast<int>(value);
+  }
+  /// Likewise 0 for what parameters describe.
+  [[nodiscard]] int known_code(int key) const {
+    const int value = code(key);
+    return value == kUserDefined ? 0 : value;
+  }
+  [[nodiscard]] std::string text(int key) const {
+    const stream::GeoKey* const found = find(key);
+    return found == nullptr ? std::string() : found->text;
+  }
+  /// Radians in the angular unit, metres in the linear one; 0 if the file names none.
+  /// Throws: CrsError for a unit that is not known.
+  [[nodiscard]] double unit(int key, const char* kind) const {
+    const int unit = code(key);
+    if (unit == 0) return 0;
+    if (unit == kUserDefined) {
+      if (const auto size = number(key + 1); size && *size > 0) return *size;
+      fail_geo_keys(std::string("its ") + kind + " unit is user-defined and has no size (GeoKey " +
+                    std::to_string(key + 1) + ")");
+    }
+    double factor = 0;
+    const char* category = nullptr;
+    const bool known =
+        proj_uom_get_info_from_database(proj_context(), "EPSG", std::to_string(unit).c_str(),
+                                        nullptr, &factor, &category) != 0;
+    if (!known || text_of(category) != kind || !(factor > 0)) {
+      fail_geo_keys(std::string("its ") + kind + " unit EPSG:" + std::to_string(unit) +
+                    " is not known");
+    }
+    return factor;
+  }
+  [[nodiscard]] double degrees_per_unit() const {
+    const double radians = unit(2054, "angular");
+    return radians == 0 ? 1 : degrees_of(radians);
+  }
+  [[nodiscard]] double metres_per_unit() const {
+    const double metres = unit(3076, "linear");
+    return metres == 0 ? 0 : metres_of(metres);
+  }
+
+ private:
+  const stream::Crs& crs_;
+};
+
+using Role = ParameterRole;
+
+/// Several keys have one role; a file has one of them.
+struct RoleOfKey {
+  int key;
+  Role role;
+};
+constexpr std::array<RoleOfKey, 19> kRoles{{
+    {3078, Role::parallel1},      {3079, Role::parallel2},      {3080, Role::longitude},
+    {3081, Role::latitude},       {3082, Role::false_easting},  {3083, Role::false_northing},
+    {3084, Role::longitude},      {3085, Role::latitude},       {3086, Role::false_easting},
+    {3087, Role::false_northing}, {3088, Role::longitude},      {3089, Role::latitude},
+    {3090, Role::false_easting},  {3091, Role::false_northing}, {3092, Role::scale},
+    {3093, Role::scale},          {3094, Role::azimuth},        {3095, Role::longitude},
+    {3096, Role::skew},
+}};
+
+/// GeoTIFF's own numbers of methods, with the codes of EPSG's method and its parameters.
+struct MethodOfKey {
+  int number;
+  int code;
+  std::array<int, 7> parameters;  ///< zeros fill it
+};
+constexpr std::array<MethodOfKey, 15> kMethods{{
+    {1, 9807, {8801, 8802, 8805, 8806, 8807}},
+    {3, 9812, {8811, 8812, 8813, 8814, 8815, 8806, 8807}},
+    {7, 9804, {8801, 8802, 8805, 8806, 8807}},
+    {-7, 9805, {8823, 8802, 8806, 8807}},  // with a standard parallel
+    {8, 9802, {8821, 8822, 8823, 8824, 8826, 8827}},
+    {9, 9801, {8801, 8802, 8805, 8806, 8807}},
+    {10, 9820, {8801, 8802, 8806, 8807}},
+    {11, 9822, {8821, 8822, 8823, 8824, 8826, 8827}},
+    {15, 9810, {8801, 8802, 8805, 8806, 8807}},
+    {-15, 9829, {8832, 8833, 8806, 8807}},  // not centred on the pole: of true scale there
+    {16, 9809, {8801, 8802, 8805, 8806, 8807}},
+    {18, 9806, {8801, 8802, 8806, 8807}},
+    {27, 9808, {8801, 8802, 8805, 8806, 8807}},
+    {1024, 1024, {8801, 8802, 8806, 8807}},
+    {9815, 9815, {8811, 8812, 8813, 8814, 8815, 8816, 8817}},
+}};
+
+/// Degrees, metres or a factor; nothing if no key has the role.
+std::optional<double> value_of(const GeoKeyValues& keys, Role role, double degrees, double metres) {
+  for (const RoleOfKey& row : kRoles) {
+    if (row.role != role) continue;
+    if (const auto value = keys.number(row.key)) {
+      const ParameterKind kind = kind_of(role);
+      return *value * (kind == ParameterKind::angle    ? degrees
+                       : kind == ParameterKind::length ? metres
+                                                       : 1.0);
+    }
+  }
+  return std::nullopt;
+}
 
 /// "GCS Name = X|Datum = Y|Ellipsoid = Z|" as GDAL and others write citations.
 std::string part_of(const std::string& citation, std::string_view part) {
@@ -24,156 +157,259 @@ std::string part_of(const std::string& citation, std::string_view part) {
   return citation.substr(at, citation.find('|', at) - at);
 }
 
-void read_base(const GeoKeyValues& keys, CrsDefinition& definition) {
-  const int code = keys.code(2048);
-  if (code != 0 && code != kUserDefined) {
-    const EpsgGeographic* const row = epsg_geographic(code);
-    if (row == nullptr)
-      fail_geo_keys("the geographic CRS EPSG:" + std::to_string(code) + " is not known");
-    CrsDefinition base = definition_of_epsg(code);
-    base.base_epsg = code;
-    base.epsg = 0;
-    definition = base;
-  } else {
-    const std::string citation = keys.text(2049);
-    definition.base_name = part_of(citation, "GCS Name");
-    if (definition.base_name.empty()) definition.base_name = citation;
-    definition.datum = part_of(citation, "Datum");
-    const int datum = keys.code(2050);
-    // The codes of datums and of the old systems on them: 6326 is that of 4326.
-    if (datum >= 6001 && datum < 6999) definition.base_epsg = datum - 2000;
-    const EpsgGeographic* const row = epsg_geographic(definition.base_epsg);
-    if (row != nullptr) {
-      definition.ellipsoid = epsg_tables().ellipsoids[static_cast<std::size_t>(row->ellipsoid)];
-      definition.base_name = row->name;
-      definition.datum = row->datum;
+ProjObject object_of_code(int code, PJ_CATEGORY category) {
+  return ProjObject(proj_create_from_database(proj_context(), "EPSG", std::to_string(code).c_str(),
+                                              category, 0, nullptr));
+}
+
+ProjObject required(ProjObject object, const std::string& what) {
+  if (object == nullptr) fail_geo_keys(what);
+  return object;
+}
+
+ProjObject base_of(const GeoKeyValues& keys) {
+  PJ_CONTEXT* const context = proj_context();
+  if (const int code = keys.known_code(2048); code != 0) {
+    return required(object_of_code(code, PJ_CATEGORY_CRS),
+                    "the geographic CRS EPSG:" + std::to_string(code) + " is not known");
+  }
+  const std::string citation = keys.text(2049);
+  std::string name = part_of(citation, "GCS Name"), datum = part_of(citation, "Datum");
+  if (name.empty()) name = citation;
+  const double degrees = keys.degrees_per_unit();
+  // Old files number the datum and mean the system on it: 6326 is that of 4326.
+  const int datum_code = keys.known_code(2050);
+  if (datum_code >= 6001 && datum_code < 6999 && degrees == 1 && !keys.number(2057)) {
+    if (ProjObject base = object_of_code(datum_code - 2000, PJ_CATEGORY_CRS)) return base;
+  }
+  double major = 0, inverse = 0;
+  if (const auto size = keys.number(2057)) {
+    major = *size;
+    if (const auto flattening = keys.number(2059)) {
+      inverse = *flattening;
+    } else if (const auto minor = keys.number(2058)) {
+      inverse = *minor == major ? 0 : major / (major - *minor);
     } else {
-      definition.base_epsg = 0;
+      fail_geo_keys("its ellipsoid has a size and no shape (GeoKeys 2058, 2059)");
     }
-    if (const auto major = keys.number(2057)) {
-      definition.ellipsoid.semi_major = *major;
-      if (const auto inverse = keys.number(2059)) {
-        definition.ellipsoid.inverse_flattening = *inverse;
-      } else if (const auto minor = keys.number(2058)) {
-        definition.ellipsoid.inverse_flattening = *minor == *major ? 0 : *major / (*major - *minor);
-      } else {
-        fail_geo_keys("its ellipsoid has a size and no shape (GeoKeys 2058, 2059)");
-      }
-    } else if (const int ellipsoid = keys.code(2056); ellipsoid != 0) {
-      constexpr std::array<std::pair<int, Ellipsoid>, 5> kCodes{
-          {{7030, {6378137, 298.257223563}},
-           {7019, {6378137, 298.257222101}},
-           {7004, {6377397.155, 299.1528128}},
-           {7022, {6378388, 297}},
-           {7008, {6378206.4, 294.978698213898}}}};
-      const auto* const known =
-          std::find_if(kCodes.begin(), kCodes.end(),
-                       [ellipsoid](const auto& pair) { return pair.first == ellipsoid; });
-      if (known == kCodes.end()) {
-        fail_geo_keys("its ellipsoid EPSG:" + std::to_string(ellipsoid) + " is not known");
-      }
-      definition.ellipsoid = known->second;
-    } else if (row == nullptr) {
-      fail_geo_keys("its datum is user-defined and has no ellipsoid (GeoKeys 2056 to 2059)");
-    }
-    if (const auto meridian = keys.number(2061)) definition.prime_meridian = *meridian;
-    const int meridian = keys.code(2051);
-    if (meridian != 0 && meridian != 8901 && meridian != kUserDefined) {
-      fail_geo_keys("its prime meridian EPSG:" + std::to_string(meridian) + " is not known");
-    }
-    recognise_datum(definition);
+  } else if (const int ellipsoid = keys.known_code(2056); ellipsoid != 0) {
+    const ProjObject known =
+        required(object_of_code(ellipsoid, PJ_CATEGORY_ELLIPSOID),
+                 "its ellipsoid EPSG:" + std::to_string(ellipsoid) + " is not known");
+    proj_ellipsoid_get_parameters(context, known.get(), &major, nullptr, nullptr, &inverse);
+  } else {
+    fail_geo_keys("its datum is user-defined and has no ellipsoid (GeoKeys 2056 to 2059)");
   }
-  definition.degrees_per_unit = keys.degrees_per_unit();
-  if (const stream::GeoKey* const shift = keys.find(2062);
-      shift != nullptr && definition.uncertainty < 0) {
-    DatumShift values{};
-    if (shift->values.size() != 3 && shift->values.size() != 7)
-      fail_geo_keys("GeoKey 2062 is no shift");
-    std::copy(shift->values.begin(), shift->values.end(), values.begin());
-    definition.shift = values;
+  double meridian = keys.number(2061).value_or(0);
+  if (const int code = keys.known_code(2051); code != 0) {
+    const ProjObject known =
+        required(object_of_code(code, PJ_CATEGORY_PRIME_MERIDIAN),
+                 "its prime meridian EPSG:" + std::to_string(code) + " is not known");
+    double unit = kDegree;
+    proj_prime_meridian_get_parameters(context, known.get(), &meridian, &unit, nullptr);
+    if (meridian != 0) meridian *= degrees_of(unit);
   }
+  const ProjObject axes(proj_create_ellipsoidal_2D_cs(context, PJ_ELLPS2D_LATITUDE_LONGITUDE,
+                                                      degrees == 1 ? "degree" : "unknown",
+                                                      degrees == 1 ? 0 : degrees * kDegree));
+  return required(ProjObject(proj_create_geographic_crs(
+                      context, name.empty() ? "unnamed" : name.c_str(),
+                      datum.empty() ? "unknown" : datum.c_str(), "unnamed", major, inverse,
+                      meridian == 0 ? "Greenwich" : "unknown", meridian, "degree", 0, axes.get())),
+                  "its geographic CRS is impossible");
 }
 
-/// GeoTIFF's own numbers of methods.
-ProjectionMethod method_of(const GeoKeyValues& keys, const ProjectionParameters& p) {
-  using M = ProjectionMethod;
-  const int code = keys.code(3075);
-  switch (code) {
-    case 1:
-      return M::transverse_mercator;
-    case 3:
-      return M::hotine_a;
-    case 9815:
-      return M::hotine_b;
-    case 7:
-      return keys.find(3078) != nullptr ? M::mercator_b : M::mercator_a;
-    case 8:
-      return M::lambert_2sp;
-    case 9:
-      return M::lambert_1sp;
-    case 10:
-      return M::lambert_azimuthal;
-    case 11:
-      return M::albers;
-    case 15:
-      return std::abs(p.latitude) == 90 ? M::polar_stereographic_a : M::polar_stereographic_b;
-    case 16:
-      return M::oblique_stereographic;
-    case 1024:
-      return M::web_mercator;
-    default:
-      fail_geo_keys(code == 0 ? "its projection has no method (GeoKey 3075)"
-                              : "its projection method " + std::to_string(code) +
-                                    " (GeoKey 3075) is not known");
+/// A bound CRS if there is a shift to WGS 84.
+void read_shift(const GeoKeyValues& keys, CrsDefinition& definition) {
+  const stream::GeoKey* const shift = keys.find(2062);
+  if (shift == nullptr) return;
+  DatumShift values{};
+  if (shift->values.size() != 3 && shift->values.size() != 7) {
+    fail_geo_keys("GeoKey 2062 is no shift");
   }
+  std::copy(shift->values.begin(), shift->values.end(), values.begin());
+  for (const double value : values) {
+    if (!std::isfinite(value)) fail_geo_keys("GeoKey 2062 is not finite");
+  }
+  if (definition.base_epsg == 0 || values != DatumShift{}) definition.shift = values;
 }
 
-void read_projection(const GeoKeyValues& keys, CrsDefinition& definition) {
-  definition.metres_per_unit = keys.metres_per_unit();
-  if (definition.metres_per_unit == 0) fail_geo_keys("its linear unit is missing (GeoKey 3076)");
-  const int conversion = keys.code(3074);
-  if (conversion != 0 && conversion != kUserDefined) {
-    const EpsgConversion* const row = epsg_conversion(conversion);
-    if (row == nullptr)
-      fail_geo_keys("its projection EPSG:" + std::to_string(conversion) + " is not known");
-    definition.method = row->method;
-    definition.parameters = row->parameters;
-    definition.conversion = row->name;
-    return;
+ProjObject conversion_of(const GeoKeyValues& keys, double degrees, double metres) {
+  if (const int code = keys.known_code(3074); code != 0) {
+    return required(object_of_code(code, PJ_CATEGORY_COORDINATE_OPERATION),
+                    "its projection EPSG:" + std::to_string(code) + " is not known");
   }
-  ProjectionParameters& p = definition.parameters;
-  for (const KeyOfParameter& parameter : kParameterKeys) {
-    const auto value = keys.number(parameter.key);
-    if (!value) continue;
-    p.*parameter.member = *value * (parameter.kind == Kind::angle    ? definition.degrees_per_unit
-                                    : parameter.kind == Kind::length ? definition.metres_per_unit
-                                                                     : 1.0);
+  const int number = keys.code(3075);
+  if (number == 0) fail_geo_keys("its projection has no method (GeoKey 3075)");
+  const double latitude = value_of(keys, Role::latitude, degrees, metres).value_or(0);
+  const bool other =
+      (number == 7 && keys.find(3078) != nullptr) || (number == 15 && std::abs(latitude) != 90);
+  const auto* const method = std::find_if(
+      kMethods.begin(), kMethods.end(),
+      [&](const MethodOfKey& row) { return row.number == (other ? -number : number); });
+  if (method == kMethods.end()) {
+    fail_geo_keys("its projection method " + std::to_string(number) +
+                  " (GeoKey 3075) is not known");
   }
-  definition.method = method_of(keys, p);
-  if (*definition.method == ProjectionMethod::polar_stereographic_b) {
-    p.parallel1 = std::exchange(p.latitude, 0);
+  const auto is_role = [&](Role role) { return value_of(keys, role, degrees, metres); };
+  std::vector<std::string> codes;
+  std::vector<PJ_PARAM_DESCRIPTION> parameters;
+  for (const int code : method->parameters) {
+    if (code != 0) codes.push_back(std::to_string(code));
   }
-  if (keys.find(3096) == nullptr) p.skew = p.azimuth;
+  for (std::size_t i = 0; i < codes.size(); ++i) {
+    const ParameterName& name = *parameter_of_code(method->parameters[i]);
+    std::optional<double> value = is_role(name.role);
+    // Polar systems keep the latitude of true scale where others have that of the origin; the skew
+    // is the azimuth where nothing is said.
+    if (!value && name.code == 8832) value = latitude;
+    if (!value && name.role == Role::skew) value = is_role(Role::azimuth);
+    const ParameterKind kind = kind_of(name.role);
+    parameters.push_back(
+        {.name = name.name,
+         .auth_name = "EPSG",
+         .code = codes[i].c_str(),
+         .value = value.value_or(kind == ParameterKind::scale ? 1 : 0),
+         .unit_name = kind == ParameterKind::angle    ? "degree"
+                      : kind == ParameterKind::length ? "metre"
+                                                      : "unity",
+         .unit_conv_factor = kind == ParameterKind::angle ? 0.017453292519943295 : 1,
+         .unit_type = kind == ParameterKind::angle    ? PJ_UT_ANGULAR
+                      : kind == ParameterKind::length ? PJ_UT_LINEAR
+                                                      : PJ_UT_SCALE});
+  }
+  const std::string code = std::to_string(method->code);
+  return required(ProjObject(proj_create_conversion(
+                      proj_context(), "unnamed", nullptr, nullptr, nullptr, "EPSG", code.c_str(),
+                      static_cast<int>(parameters.size()), parameters.data())),
+                  "its projection is impossible");
 }
 
 }  // namespace
 
 CrsDefinition definition_of_geo_keys(const stream::Crs& crs) {
   const GeoKeyValues keys(crs);
-  CrsDefinition definition;
-  read_base(keys, definition);
-  if (keys.code(1024) == 2) {
-    definition.epsg = definition.base_epsg;
-    definition.name = definition.base_name;
-    return definition;
+  PJ_CONTEXT* const context = proj_context();
+  const ProjObject base = base_of(keys);
+  ProjObject whole;
+  if (keys.code(1024) != 2) {
+    const double metres = keys.metres_per_unit();
+    if (metres == 0) fail_geo_keys("its linear unit is missing (GeoKey 3076)");
+    const ProjObject conversion = conversion_of(keys, keys.degrees_per_unit(), metres);
+    const ProjObject axes(proj_create_cartesian_2D_cs(context, PJ_CART2D_EASTING_NORTHING,
+                                                      metres == 1 ? "metre" : "unknown", metres));
+    std::string name = part_of(crs.name, "PCS Name");
+    if (name.empty()) name = crs.name;
+    whole = required(
+        ProjObject(proj_create_projected_crs(context, name.empty() ? "unnamed" : name.c_str(),
+                                             base.get(), conversion.get(), axes.get())),
+        "its projection is impossible");
   }
-  definition.heights = Heights::unknown;
-  definition.metres_per_height = 0;
-  definition.name = part_of(crs.name, "PCS Name");
-  if (definition.name.empty()) definition.name = crs.name;
-  read_projection(keys, definition);
-  definition.degrees_per_unit = 1;
+  CrsDefinition definition = read_crs(whole != nullptr ? whole.get() : base.get());
+  read_shift(keys, definition);
+  settle_code(definition);
   return definition;
+}
+
+void check_geo_keys(const stream::Crs& crs, const CrsDefinition& definition) {
+  const GeoKeyValues keys(crs);
+  const std::string code = "EPSG:" + std::to_string(definition.epsg());
+  const auto contradict = [&code](const std::string& what) {
+    throw ContradictoryCrs("the GeoKeys contradict each other: " + code + " and " + what,
+                           "say which is meant with --crs EPSG:n");
+  };
+  const int model = keys.code(1024), projected = keys.known_code(3072);
+  if ((model == 1 && definition.geographic) || (model == 2 && !definition.geographic)) {
+    contradict(model == 1 ? "a projected model" : "a geographic model");
+  }
+  if (definition.geographic) {
+    if (projected != 0) contradict("the projected CRS EPSG:" + std::to_string(projected));
+    return;
+  }
+  const int base = keys.known_code(2048);
+  if (base != 0 && definition.base_epsg != 0 && base != definition.base_epsg) {
+    contradict("the geographic CRS EPSG:" + std::to_string(base));
+  }
+  const double unit = keys.metres_per_unit();
+  if (unit != 0 && std::abs(unit / definition.metres_per_unit - 1) > 1e-9) {
+    contradict("the unit of " + std::to_string(unit) + " metres");
+  }
+  const bool parameters = std::any_of(kRoles.begin(), kRoles.end(), [&keys](const RoleOfKey& row) {
+    return keys.number(row.key).has_value();
+  });
+  if (!parameters) return;
+  const ProjObject own = proj_crs_of_text(definition.wkt);
+  const ProjObject conversion(proj_crs_get_coordoperation(proj_context(), own.get()));
+  const std::vector<ConversionParameter> meant = parameters_of(conversion.get());
+  const double angle = keys.degrees_per_unit();
+  const auto is_parallel = [](Role role) {
+    return role == Role::parallel1 || role == Role::parallel2;
+  };
+  for (const RoleOfKey& row : kRoles) {
+    const auto value = keys.number(row.key);
+    if (!value) continue;
+    const ParameterKind kind = kind_of(row.role);
+    const double given = *value * (kind == ParameterKind::angle                 ? angle
+                                   : kind == ParameterKind::length && unit != 0 ? unit
+                                                                                : 1.0);
+    // A key that the method does not know is left out; two parallels mean the same in either order.
+    bool known = false, good = false;
+    for (const ConversionParameter& parameter : meant) {
+      if (!parameter.role || (*parameter.role != row.role &&
+                              !(is_parallel(*parameter.role) && is_parallel(row.role)))) {
+        continue;
+      }
+      known = true;
+      good = good || std::abs(given - parameter.value) <=
+                         1e-8 * std::max({1.0, std::abs(given), std::abs(parameter.value)});
+    }
+    if (known && !good) {
+      contradict("GeoKey " + std::to_string(row.key) + " of " + std::to_string(*value));
+    }
+  }
+}
+
+std::vector<stream::GeoKey> geo_keys_of(const CrsDefinition& definition) {
+  const auto number = [](std::uint16_t key, double value) {
+    return stream::GeoKey{.key = key, .values = {value}};
+  };
+  if (definition.geographic) {
+    std::vector<stream::GeoKey> keys{
+        number(1024, 2), number(2048, kUserDefined),
+        stream::GeoKey{.key = 2049,
+                       .text = "GCS Name = " + definition.name + "|Datum = " + definition.datum +
+                               "|Ellipsoid = unnamed|Primem = " +
+                               (definition.prime_meridian == 0 ? "Greenwich" : "unnamed") + "|"},
+        number(2050, kUserDefined)};
+    if (definition.prime_meridian != 0) keys.push_back(number(2051, kUserDefined));
+    keys.push_back(number(2054, definition.degrees_per_unit == 1 ? 9102 : kUserDefined));
+    if (definition.degrees_per_unit != 1) {
+      keys.push_back(number(2055, definition.degrees_per_unit * kDegree));
+    }
+    keys.push_back(number(2056, kUserDefined));
+    keys.push_back(number(2057, definition.ellipsoid.semi_major));
+    if (definition.ellipsoid.inverse_flattening == 0) {
+      keys.push_back(number(2058, definition.ellipsoid.semi_major));
+    } else {
+      keys.push_back(number(2059, definition.ellipsoid.inverse_flattening));
+    }
+    if (definition.prime_meridian != 0) keys.push_back(number(2061, definition.prime_meridian));
+    if (definition.shift) {
+      keys.push_back({.key = 2062, .values = {definition.shift->begin(), definition.shift->end()}});
+    }
+    return keys;
+  }
+  const ProjObject own = proj_crs_of_text(definition.wkt);
+  const std::array<const char*, 2> options{"MULTILINE=NO", nullptr};
+  const auto written = [&](PJ_WKT_TYPE type) {
+    return own != nullptr ? text_of(proj_as_wkt(proj_context(), own.get(), type, options.data()))
+                          : std::string();
+  };
+  std::string wkt = written(PJ_WKT1_ESRI);
+  if (wkt.empty()) wkt = definition.wkt;
+  // GDAL looks for that citation where the model is nobody's.
+  return {number(1024, kUserDefined), number(3072, kUserDefined),
+          stream::GeoKey{.key = 3073, .text = "ESRI PE String = " + wkt}};
 }
 
 }  // namespace terrace::terrain

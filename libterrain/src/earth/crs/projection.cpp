@@ -2,21 +2,63 @@
 #include "earth/crs/projection.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <utility>
 
 #include <GeographicLib/AlbersEqualArea.hpp>
 #include <GeographicLib/LambertConformalConic.hpp>
+#include <GeographicLib/Math.hpp>
 #include <GeographicLib/PolarStereographic.hpp>
 #include <GeographicLib/TransverseMercator.hpp>
 
 #include "base/portable_math.hpp"
-#include "earth/crs/projection_batch.hpp"
 
 namespace terrace::terrain {
 namespace {
 
 using Parameters = ProjectionParameters;
+
+constexpr double kNowhere = std::numeric_limits<double>::quiet_NaN();
+
+/// A formula for one place, with false origin (metres) and central meridian (degrees), as a
+/// Projection: Formula has `Point2 forward(longitude difference, latitude) const` and
+/// `Point2 reverse(x, y) const`, which gives those.
+template <class Formula>
+class ProjectionBatch final : public Projection {
+ public:
+  ProjectionBatch(Formula formula, const ProjectionParameters& p)
+      : formula_(std::move(formula)),
+        longitude_(p.longitude),
+        east_(p.false_easting),
+        north_(p.false_northing) {}
+
+  void forward(std::span<Point2> places) const override {
+    for (Point2& place : places) {
+      const double turn = GeographicLib::Math::AngDiff(longitude_, place[0]);
+      if (!(std::abs(place[1]) <= 90.0) || !std::isfinite(turn)) {
+        place = {kNowhere, kNowhere};
+        continue;
+      }
+      const Point2 plane = formula_.forward(turn, place[1]);
+      place = {plane[0] + east_, plane[1] + north_};
+      if (!std::isfinite(place[0]) || !std::isfinite(place[1])) place = {kNowhere, kNowhere};
+    }
+  }
+
+  void reverse(std::span<Point2> places) const override {
+    for (Point2& place : places) {
+      const Point2 found = formula_.reverse(place[0] - east_, place[1] - north_);
+      place = {GeographicLib::Math::AngNormalize(found[0] + longitude_), found[1]};
+      if (!std::isfinite(place[0]) || !std::isfinite(place[1])) place = {kNowhere, kNowhere};
+    }
+  }
+
+ private:
+  Formula formula_;
+  double longitude_, east_, north_;
+};
 
 /// One of GeographicLib's projections with a central meridian, y counted from `latitude`.
 template <class Library>
@@ -71,6 +113,51 @@ class Albers {
   double sign_;
   WithMeridian<GeographicLib::AlbersEqualArea> cone_;
 };
+
+/// Lambert's conformal conic, and Mercator's as the cone that is a cylinder. GeographicLib 2.1.2
+/// takes a pole for a place a little beside it, which a flat cone shows thousands of kilometres
+/// away: the apex is put where it belongs, and the other pole nowhere.
+class ConformalCone {
+ public:
+  ConformalCone(const GeographicLib::LambertConformalConic& library, const ProjectionParameters& p,
+                double latitude)
+      : library_(library) {
+    for (const double parallel : {library.OriginLatitude(), p.parallel1, p.parallel2}) {
+      if (std::abs(parallel) == 90) {
+        throw std::invalid_argument("a parallel of a conformal cone lies at a pole");
+      }
+    }
+    double x = 0, y = 0, turned = 0, scale = 0;
+    library_.Forward(0, library_.OriginLatitude(), 90, x, y, turned, scale);
+    if (turned != 0) {
+      pole_ = turned > 0 ? 90 : -90;
+      apex_ = y + x / std::tan(turned * kDegree);
+    }
+    north_ = forward(0, latitude)[1];
+    if (!std::isfinite(north_)) throw std::invalid_argument("its origin is the pole at infinity");
+  }
+  [[nodiscard]] Point2 forward(double turn, double latitude) const {
+    if (latitude == pole_) return {0, apex_ - north_};
+    if (std::abs(latitude) == 90) return {kNowhere, kNowhere};
+    double x = 0, y = 0;
+    library_.Forward(0, latitude, turn, x, y);
+    return {x, y - north_};
+  }
+  [[nodiscard]] Point2 reverse(double x, double y) const {
+    double latitude = 0, turn = 0;
+    library_.Reverse(0, x, y + north_, latitude, turn);
+    return {turn, latitude};
+  }
+
+ private:
+  GeographicLib::LambertConformalConic library_;
+  double north_ = 0, pole_ = kNowhere, apex_ = kNowhere;
+};
+
+std::unique_ptr<const Projection> conformal_cone(
+    const GeographicLib::LambertConformalConic& library, const Parameters& p, double latitude) {
+  return std::make_unique<ProjectionBatch<ConformalCone>>(ConformalCone(library, p, latitude), p);
+}
 
 class Polar {
  public:
@@ -130,19 +217,19 @@ std::unique_ptr<const Projection> make(ProjectionMethod method, const Parameters
     case ProjectionMethod::transverse_mercator:
       return with_meridian(GeographicLib::TransverseMercator(a, f, p.scale), p, p.latitude);
     case ProjectionMethod::lambert_1sp:
-      return make_conformal_cone(LambertConformalConic(a, f, p.latitude, p.scale), p, p.latitude);
+      return conformal_cone(LambertConformalConic(a, f, p.latitude, p.scale), p, p.latitude);
     case ProjectionMethod::lambert_2sp:
-      return make_conformal_cone(LambertConformalConic(a, f, p.parallel1, p.parallel2, p.scale), p,
-                                 p.latitude);
+      return conformal_cone(LambertConformalConic(a, f, p.parallel1, p.parallel2, p.scale), p,
+                            p.latitude);
     case ProjectionMethod::albers:
       return std::make_unique<ProjectionBatch<Albers>>(Albers(p, ellipsoid), p);
     case ProjectionMethod::mercator_a:
       // A cone that touches at the equator.
-      return make_conformal_cone(LambertConformalConic(a, f, 0, p.scale), p, 0);
+      return conformal_cone(LambertConformalConic(a, f, 0, p.scale), p, 0);
     case ProjectionMethod::mercator_b: {
       double x = 0, y = 0, convergence = 0, scale = 1;
       LambertConformalConic(a, f, 0, 1).Forward(0, p.parallel1, 0, x, y, convergence, scale);
-      return make_conformal_cone(LambertConformalConic(a, f, 0, p.scale / scale), p, 0);
+      return conformal_cone(LambertConformalConic(a, f, 0, p.scale / scale), p, 0);
     }
     case ProjectionMethod::polar_stereographic_a:
       return polar_stereographic(p, ellipsoid, false);
@@ -150,16 +237,6 @@ std::unique_ptr<const Projection> make(ProjectionMethod method, const Parameters
       return polar_stereographic(p, ellipsoid, true);
     case ProjectionMethod::web_mercator:
       return std::make_unique<ProjectionBatch<WebMercator>>(WebMercator(a), p);
-    case ProjectionMethod::lambert_azimuthal:
-      return make_lambert_azimuthal(p, ellipsoid);
-    case ProjectionMethod::oblique_stereographic:
-      // On a pole, where its sphere has no size, it is the polar one.
-      return std::abs(p.latitude) == 90 ? polar_stereographic(p, ellipsoid, false)
-                                        : make_oblique_stereographic(p, ellipsoid);
-    case ProjectionMethod::hotine_a:
-      return make_hotine(p, ellipsoid, false);
-    case ProjectionMethod::hotine_b:
-      return make_hotine(p, ellipsoid, true);
   }
   throw std::invalid_argument("there is no such projection method");
 }
@@ -173,9 +250,8 @@ bool nearly_equal(const ProjectionParameters& one, const ProjectionParameters& o
     if (p->parallel1 < p->parallel2) std::swap(p->parallel1, p->parallel2);
   }
   using P = ProjectionParameters;
-  for (double P::*const member :
-       {&P::latitude, &P::longitude, &P::scale, &P::parallel1, &P::parallel2, &P::azimuth, &P::skew,
-        &P::false_easting, &P::false_northing}) {
+  for (double P::*const member : {&P::latitude, &P::longitude, &P::scale, &P::parallel1,
+                                  &P::parallel2, &P::false_easting, &P::false_northing}) {
     const double x = a.*member, y = b.*member;
     if (std::abs(x - y) > 1e-11 * std::max({1.0, std::abs(x), std::abs(y)})) return false;
   }
@@ -186,8 +262,8 @@ std::unique_ptr<const Projection> make_projection(ProjectionMethod method,
                                                   const ProjectionParameters& parameters,
                                                   const Ellipsoid& ellipsoid) {
   const ProjectionParameters& p = parameters;
-  for (const double value : {p.latitude, p.longitude, p.scale, p.parallel1, p.parallel2, p.azimuth,
-                             p.skew, p.false_easting, p.false_northing}) {
+  for (const double value : {p.latitude, p.longitude, p.scale, p.parallel1, p.parallel2,
+                             p.false_easting, p.false_northing}) {
     if (!std::isfinite(value)) throw std::invalid_argument("a parameter is not finite");
   }
   for (const double latitude : {p.latitude, p.parallel1, p.parallel2}) {

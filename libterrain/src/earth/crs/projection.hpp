@@ -22,7 +22,7 @@ struct Ellipsoid {
   friend bool operator==(const Ellipsoid&, const Ellipsoid&) = default;
 };
 
-/// The methods, each with its code in the EPSG dataset.
+/// The methods that are computed by GeographicLib, each with its code in the EPSG dataset.
 enum class ProjectionMethod : std::uint8_t {
   transverse_mercator,    ///< 9807
   lambert_1sp,            ///< 9801, conformal conic
@@ -30,13 +30,9 @@ enum class ProjectionMethod : std::uint8_t {
   albers,                 ///< 9822
   polar_stereographic_a,  ///< 9810: latitude of origin +-90 and scale
   polar_stereographic_b,  ///< 9829: parallel1 is the latitude of true scale
-  lambert_azimuthal,      ///< 9820, equal area
   web_mercator,           ///< 1024: a sphere's formulas on the ellipsoid's latitude
   mercator_a,             ///< 9804: scale on the equator
   mercator_b,             ///< 9805: parallel1 is the latitude of true scale
-  oblique_stereographic,  ///< 9809
-  hotine_a,  ///< 9812: false origin where the centre line meets the aposphere's equator
-  hotine_b,  ///< 9815: false origin in the centre
 };
 
 /// Degrees and metres. Which of them count depends on the method.
@@ -45,8 +41,6 @@ struct ProjectionParameters {
   double longitude = 0.0;  ///< likewise; from the prime meridian of the system
   double scale = 1.0;
   double parallel1 = 0.0, parallel2 = 0.0;
-  double azimuth = 0.0;  ///< of the centre line, clockwise from north
-  double skew = 0.0;     ///< angle from the skew to the rectified grid
   double false_easting = 0.0, false_northing = 0.0;
 
   friend bool operator==(const ProjectionParameters&, const ProjectionParameters&) = default;
@@ -66,12 +60,9 @@ class Projection {
   virtual void reverse(std::span<Point2> places) const = 0;
 };
 
-/// Transverse Mercator, conic, polar and Mercator ones are GeographicLib's (a few nanometres);
-/// Lambert's azimuthal, the oblique ones and Web Mercator follow IOGP Publication 373-7-2,
-/// Geomatics Guidance Note 7 part 2 (2019), and J. P. Snyder, Map Projections - A Working Manual
-/// (1987), USGS Professional Paper 1395, with GeographicLib's auxiliary latitudes; all invert each
-/// other within a micrometre in their area of use. Throws: std::invalid_argument for parameters
-/// that make no projection.
+/// By GeographicLib (a few nanometres); Web Mercator follows IOGP Publication 373-7-2, Geomatics
+/// Guidance Note 7 part 2 (2019). All invert each other within a micrometre in their area of use.
+/// Throws: std::invalid_argument for parameters that make no projection.
 std::unique_ptr<const Projection> make_projection(ProjectionMethod method,
                                                   const ProjectionParameters& parameters,
                                                   const Ellipsoid& ellipsoid);

@@ -130,7 +130,7 @@ std::uint64_t digest_of(const TiledRaster& raster, const GeographicBox& box) {
   add_raster(raster, digest);
   const CrsDefinition& crs = raster.crs.definition();
   const bool geographic = raster.crs.is_geographic();
-  const bool straight = geographic && !crs.shift;
+  const bool straight = geographic && raster.crs.counts_as_wgs84();
   const GeographicBox& all = raster.bounds;
   const bool inside = box.west >= all.west && box.east <= all.east && box.south >= all.south &&
                       box.north <= all.north;

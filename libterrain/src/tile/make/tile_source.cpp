@@ -62,13 +62,17 @@ std::unique_ptr<TileSource> open_tile_source(const stream::Store& given,
                                              const TileSourceOptions& options,
                                              const Context& context) {
   const stream::Store store = given.with_stop(context.stop);
+  std::optional<GeographicArea> area;
+  if (options.vertical == "orthometric") area = system_of(store).area();
   EllipsoidalHeights heights(store.schema(), options.vertical, options.geoid,
-                             options.memory_bytes / 4);
+                             options.memory_bytes / 4, area);
   if (!heights.note().empty()) context.say(heights.note());
+  const CoordinateSystem system = system_of(store);
+  if (!system.wgs84_note().empty()) context.say(system.wgs84_note());
   const std::optional<double> flat = flat_height(store, options.fill, heights.metres_per_unit());
   const std::optional<double> water = water_height(store, options.water);
   if (store.schema().grid) {
-    auto raster = std::make_unique<TiledRaster>(store, system_of(store), std::move(heights));
+    auto raster = std::make_unique<TiledRaster>(store, system, std::move(heights));
     raster->flat_fill = flat;
     raster->water_height = water;
     return std::make_unique<SourceOf<TiledRaster, RasterTileSurface>>(std::move(raster),
@@ -76,7 +80,7 @@ std::unique_ptr<TileSource> open_tile_source(const stream::Store& given,
   }
   const std::uint64_t window =
       std::max(kLeastWindowBytes, options.memory_bytes / options.threads / 2);
-  auto cloud = std::make_unique<TiledCloud>(store, system_of(store), std::move(heights), window);
+  auto cloud = std::make_unique<TiledCloud>(store, system, std::move(heights), window);
   cloud->flat_fill = flat;
   cloud->water_height = water;
   return std::make_unique<SourceOf<TiledCloud, PointTileSurface>>(std::move(cloud),

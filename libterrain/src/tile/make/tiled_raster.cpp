@@ -196,7 +196,7 @@ TiledRaster::TiledRaster(const stream::Store& tiled, CoordinateSystem system,
                          .remedy = {}});
   }
   const std::array<double, 6>& world = placement.world.xy;
-  upright = crs.is_geographic() && !crs.definition().shift && world[1] == 0.0 && world[3] == 0.0;
+  upright = crs.is_geographic() && crs.counts_as_wgs84() && world[1] == 0.0 && world[3] == 0.0;
   find_turn(*this);
   find_bounds(*this);
 }

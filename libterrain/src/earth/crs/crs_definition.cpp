@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "earth/crs/crs_definition.hpp"
+
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstdlib>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <system_error>
+
+#include <GeographicLib/Math.hpp>
+
+#include "earth/crs/crs_reading.hpp"
+#include "earth/crs/proj_pipeline.hpp"
+#include "earth/crs/projection_names.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+/// A projection that PROJ computes.
+class ProjProjection final : public Projection {
+ public:
+  ProjProjection(const std::string& pipeline, double degrees_per_unit, double metres_per_unit)
+      : pipeline_(pipeline), degrees_(degrees_per_unit), metres_(metres_per_unit) {}
+
+  void forward(std::span<Point2> places) const override {
+    if (degrees_ != 1) {
+      for (Point2& place : places) place = {place[0] / degrees_, place[1] / degrees_};
+    }
+    pipeline_.forward(places);
+    if (metres_ == 1) return;
+    for (Point2& place : places) place = {place[0] * metres_, place[1] * metres_};
+  }
+  void reverse(std::span<Point2> places) const override {
+    if (metres_ != 1) {
+      for (Point2& place : places) place = {place[0] / metres_, place[1] / metres_};
+    }
+    pipeline_.reverse(places);
+    for (Point2& place : places) {
+      place = {GeographicLib::Math::AngNormalize(place[0] * degrees_), place[1] * degrees_};
+    }
+  }
+
+ private:
+  ProjPipeline pipeline_;
+  double degrees_, metres_;
+};
+
+std::string wkt_name(std::string_view text) {
+  std::string result = "\"";
+  for (const char c : text) {
+    if (c == '"') result += '"';
+    result += c;
+  }
+  return result + '"';
+}
+
+/// In full, never with an exponent, which not every reader takes.
+std::string plain_number(double value) {
+  std::array<char, 400> text{};
+  const auto [end, error] =
+      std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::fixed);
+  return error == std::errc{} ? std::string(text.data(), end) : std::string("0");
+}
+
+/// With a shift: a bound system, the shift as a position vector transformation.
+std::string bound(const std::string& text, const DatumShift& shift) {
+  static constexpr std::array<const char*, 7> kNames{
+      "X-axis translation", "Y-axis translation", "Z-axis translation", "X-axis rotation",
+      "Y-axis rotation",    "Z-axis rotation",    "Scale difference"};
+  const ProjObject wgs84 = proj_crs_of_code("EPSG", "4326");
+  std::string result = "BOUNDCRS[SOURCECRS[" + text + "],TARGETCRS[" + wkt_of(wgs84.get()) +
+                       "],ABRIDGEDTRANSFORMATION[\"to WGS 84\",METHOD[\"Position Vector "
+                       "transformation (geog2D domain)\",ID[\"EPSG\",9606]]";
+  for (std::size_t i = 0; i < kNames.size(); ++i) {
+    // As a scale the difference is 1 + it; an abridged transformation has no units of its own.
+    const double value = i == 6 ? 1 + shift[i] * 1e-6 : shift[i];
+    result += std::string(",PARAMETER[\"") + kNames[i] + "\"," + plain_number(value) +
+              ",ID[\"EPSG\"," + std::to_string(8605 + i) + "]]";
+  }
+  return result + "]]";
+}
+
+bool near(const Ellipsoid& a, const Ellipsoid& b) {
+  return std::abs(a.semi_major / b.semi_major - 1) < 1e-9 &&
+         std::abs(a.flattening() - b.flattening()) < 1e-9;
+}
+
+/// Whether both projections have the same numbers, by their parameters or as PROJ writes them.
+bool same_projection(const CrsDefinition& a, const CrsDefinition& b) {
+  if (a.method && a.method == b.method) return nearly_equal(a.parameters, b.parameters);
+  return proj_pipeline_of(a) == proj_pipeline_of(b);
+}
+
+}  // namespace
+
+std::string name_of(Heights heights) {
+  switch (heights) {
+    case Heights::ellipsoidal:
+      return "ellipsoidal";
+    case Heights::orthometric:
+      return "orthometric";
+    case Heights::unknown:
+      break;
+  }
+  return {};
+}
+
+int CrsDefinition::epsg() const { return authority == "EPSG" ? std::atoi(code.c_str()) : 0; }
+
+std::string CrsDefinition::title() const {
+  if (code.empty()) return name.empty() ? "without a name" : '"' + name + '"';
+  return authority + ":" + code + (name.empty() ? "" : " (" + name + ")");
+}
+
+std::string wkt_of(const CrsDefinition& definition) {
+  const bool three = definition.heights == Heights::ellipsoidal && !definition.height_wkt.empty();
+  std::string text = three ? definition.height_wkt : definition.wkt;
+  if (definition.shift) text = bound(text, *definition.shift);
+  if (definition.heights != Heights::orthometric || definition.height_wkt.empty()) return text;
+  return "COMPOUNDCRS[" + wkt_name(definition.name + " + " + definition.vertical_name) + "," +
+         text + "," + definition.height_wkt + "]";
+}
+
+std::string proj_pipeline_of(const CrsDefinition& definition) {
+  PJ_CONTEXT* const context = proj_context();
+  proj_complaint();
+  const ProjObject crs = proj_crs_of_text(definition.wkt);
+  const ProjObject base = proj_crs_of_text(definition.base_wkt);
+  if (crs != nullptr && base != nullptr) {
+    const ProjOwned<PJ_OPERATION_FACTORY_CONTEXT> factory(
+        proj_create_operation_factory_context(context, nullptr));
+    const ProjOwned<PJ_OBJ_LIST> list(
+        proj_create_operations(context, base.get(), crs.get(), factory.get()));
+    const ProjObject first(list != nullptr ? proj_list_get(context, list.get(), 0) : nullptr);
+    const ProjObject normal(
+        first != nullptr ? proj_normalize_for_visualization(context, first.get()) : nullptr);
+    const char* const text = normal != nullptr
+                                 ? proj_as_proj_string(context, normal.get(), PJ_PROJ_5, nullptr)
+                                 : nullptr;
+    if (text != nullptr) return text;
+  }
+  const std::string why = proj_complaint();
+  throw CrsError("PROJ cannot compute the projection of the CRS " + definition.title() +
+                     (why.empty() ? "" : ": " + why),
+                 "give another with --crs EPSG:n");
+}
+
+std::shared_ptr<const Projection> proj_projection_of(const CrsDefinition& definition) {
+  return std::make_shared<ProjProjection>(proj_pipeline_of(definition), definition.degrees_per_unit,
+                                          definition.metres_per_unit);
+}
+
+std::shared_ptr<const Projection> projection_of(const CrsDefinition& definition) {
+  if (!definition.method) return proj_projection_of(definition);
+  try {
+    return make_projection(*definition.method, definition.parameters, definition.ellipsoid);
+  } catch (const std::invalid_argument& error) {
+    throw CrsError("the CRS " + definition.title() + " has no usable projection: " + error.what(),
+                   "give another with --crs EPSG:n");
+  }
+}
+
+bool same_datum(const CrsDefinition& a, const CrsDefinition& b) {
+  if (a.shift != b.shift || !near(a.ellipsoid, b.ellipsoid)) return false;
+  if (a.base_epsg != 0 && a.base_epsg == b.base_epsg) return true;
+  if (a.prime_meridian != b.prime_meridian) return false;
+  const ProjObject one = proj_crs_of_text(a.base_wkt), other = proj_crs_of_text(b.base_wkt);
+  return one != nullptr && other != nullptr &&
+         proj_is_equivalent_to_with_ctx(proj_context(), one.get(), other.get(),
+                                        PJ_COMP_EQUIVALENT_EXCEPT_AXIS_ORDER_GEOGCRS) != 0;
+}
+
+bool same_places(const CrsDefinition& a, const CrsDefinition& b) {
+  const auto same_unit = [](double x, double y) { return std::abs(x / y - 1) < 1e-9; };
+  if (a.geographic != b.geographic || a.prime_meridian != b.prime_meridian) return false;
+  if (!same_unit(a.degrees_per_unit, b.degrees_per_unit) && a.geographic) return false;
+  if (!a.geographic && !same_unit(a.metres_per_unit, b.metres_per_unit)) return false;
+  if (!same_datum(a, b)) return false;
+  return a.geographic || a.wkt == b.wkt || same_projection(a, b);
+}
+
+}  // namespace terrace::terrain

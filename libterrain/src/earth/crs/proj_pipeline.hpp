@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+
+#include "earth/crs/projection.hpp"
+
+namespace terrace::terrain {
+
+/// A coordinate operation that PROJ computes: x and y in, x and y out, in the units that its text
+/// says. Copies share one pool of PROJ's objects, of which each thread takes its own while it
+/// computes: const members may be called by several threads at once.
+class ProjPipeline {
+ public:
+  /// definition: "+proj=pipeline ...". Throws: CrsError if PROJ cannot compute it.
+  explicit ProjPipeline(const std::string& definition);
+
+  /// In place; NaN where there is no place. Some million places per second.
+  void forward(std::span<Point2> places) const;
+  void reverse(std::span<Point2> places) const;
+  /// What becomes of the height 0 there; NaN if nothing.
+  [[nodiscard]] double height(const Point2& place) const;
+
+ private:
+  class Pool;
+  std::shared_ptr<Pool> pool_;
+};
+
+}  // namespace terrace::terrain
