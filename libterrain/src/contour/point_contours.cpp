@@ -20,13 +20,20 @@ namespace {
 
 /// A part triangulated; with less memory per thread, fewer threads work.
 constexpr std::uint64_t kBytesPerWindow = std::uint64_t{40} << 20;
+/// Several parts are triangulated at once, which costs less per point; a point counts for its share
+/// of the triangulation and of the triangles that wait until lines are drawn.
+constexpr double kMostPointsAtOnce = 1U << 19;
+constexpr double kPartsPerThread = 4;
+constexpr double kBytesPerExpected = 3.0 * PointWindow::kBytesPerPoint + 3 * 240;
 
 using Triangle = ContourTriangles::Triangle;
 constexpr std::uint32_t kNoPart = ContourTriangles::kNoPart;
 
-/// Triangles that levels cross: those of a part, and such as have no vertex in any part at work.
+/// Triangles that levels cross: those of each of some parts, and such as have no vertex in any part
+/// at work.
 struct Crossed {
-  std::vector<Triangle> own, strange;
+  std::vector<std::vector<Triangle>> own;
+  std::vector<Triangle> strange;
 };
 
 bool places_less(const Triangle& s, const Triangle& t) {
@@ -60,9 +67,7 @@ class PointContours {
       if (!wanted.meets(bounds_)) throw_region_outside(parts.store);
     }
     for (std::size_t part = 0; part < tree_.size(); ++part) {
-      if (!tree_.box(part).meets(wanted)) continue;
-      rank_[part] = static_cast<std::uint32_t>(at_work_.size());
-      at_work_.push_back(part);
+      if (tree_.box(part).meets(wanted)) rank_[part] = parts_at_work_++;
     }
   }
 
@@ -70,21 +75,33 @@ class PointContours {
     const std::uint64_t memory = request_.memory_bytes / 2;
     const auto threads = static_cast<unsigned>(
         std::clamp<std::uint64_t>(memory / kBytesPerWindow, 1, std::max(1U, request_.threads)));
+    const double most_points =
+        std::min({static_cast<double>(memory / threads) / kBytesPerExpected, kMostPointsAtOnce,
+                  tree_.part(0).points / (kPartsPerThread * threads)});
+    std::vector<const WindowTree::Part*> loads;
+    tree_.for_each_part([&](const WindowTree::Part& part) { return part.points <= most_points; },
+                        [&](const WindowTree::Part& part) {
+                          if (first_at_work(part) < part.end) loads.push_back(&part);
+                        });
     std::vector<std::unique_ptr<PointWindow>> windows(threads);
     ContourTriangles lines(request_.interval, parts_.emit, parts_.limit);
     std::vector<Triangle> strange;
     in_order(
-        at_work_.size(), threads,
+        loads.size(), threads,
         [&](unsigned thread, std::size_t i) {
           std::unique_ptr<PointWindow>& window = windows[thread];
           if (window == nullptr) {
             window = std::make_unique<PointWindow>(parts_.store, request_.level, memory / threads);
           }
-          window->load(tree_.box(at_work_[i]));
-          return crossed(*window, static_cast<std::uint32_t>(i));
+          Crossed result;
+          add_crossed(*window, *loads[i], result);
+          ContourTriangles::sort(result.strange);
+          return result;
         },
         [&](std::size_t i, const Crossed& triangles) {
-          lines.add(triangles.own);
+          for (const std::vector<Triangle>& part : triangles.own) {
+            lines.add(part);
+          }
           // Several parts meet such a one.
           const auto middle =
               strange.insert(strange.end(), triangles.strange.begin(), triangles.strange.end());
@@ -94,7 +111,7 @@ class PointContours {
                                       return !places_less(s, t) && !places_less(t, s);
                                     }),
                         strange.end());
-          parts_.progress(static_cast<double>(i + 1) / static_cast<double>(at_work_.size()));
+          parts_.progress(static_cast<double>(i + 1) / static_cast<double>(loads.size()));
         });
     lines.finish(strange);
   }
@@ -112,7 +129,24 @@ class PointContours {
     return holds_place(*request_.region, ground_.world(middle));
   }
 
-  [[nodiscard]] Crossed crossed(const PointWindow& window, std::uint32_t part) const {
+  /// part.end if none is.
+  [[nodiscard]] std::size_t first_at_work(const WindowTree::Part& part) const {
+    std::size_t first = part.first;
+    while (first < part.end && rank_[first] == kNoPart) ++first;
+    return first;
+  }
+
+  /// If it does not fit after all, its halves may.
+  void add_crossed(PointWindow& window, const WindowTree::Part& part, Crossed& result) const {
+    if (first_at_work(part) == part.end) return;
+    try {
+      window.load(part.box);
+    } catch (const PointWindow::NoRoom&) {
+      if (part.is_window()) throw;
+      add_crossed(window, tree_.part(part.below), result);
+      add_crossed(window, tree_.part(part.above), result);
+      return;
+    }
     const tri::Delaunay2<double>& whole = window.triangulation();
     std::vector<std::int64_t> level_of(whole.vertex_slots());
     std::vector<std::uint32_t> part_of(whole.vertex_slots());
@@ -120,7 +154,12 @@ class PointContours {
       level_of[tri::slot(vertex)] = levels_.at_or_above(window.height(vertex));
       part_of[tri::slot(vertex)] = rank_[tree_.window_of(whole.point(vertex))];
     }
-    Crossed result;
+    // The ranks of parts in a box follow each other.
+    const std::uint32_t first_rank = rank_[first_at_work(part)];
+    const std::size_t before = result.own.size();
+    std::uint32_t count = 0;
+    for (std::size_t i = part.first; i < part.end; ++i) count += rank_[i] != kNoPart ? 1U : 0U;
+    result.own.resize(before + count);
     for (const tri::TriangleId id : whole.all_triangles()) {
       const std::array<tri::VertexId, 3> vertices = whole.vertices(id);
       const auto level = [&](std::size_t i) { return level_of[tri::slot(vertices[i])]; };
@@ -128,16 +167,16 @@ class PointContours {
       if (!window.is_certain(id)) continue;
       const auto at = [&](std::size_t i) { return part_of[tri::slot(vertices[i])]; };
       const std::uint32_t first = std::min({at(0), at(1), at(2)});
-      if (first != part && first != kNoPart) continue;
+      const bool is_own = first != kNoPart && first - first_rank < count;
+      if (!is_own && first != kNoPart) continue;
       Triangle triangle;
       for (std::size_t i = 0; i < 3; ++i) {
         triangle[i] = {whole.point(vertices[i]), window.height(vertices[i]), level(i), at(i)};
       }
-      if (wanted(triangle)) (first == part ? result.own : result.strange).push_back(triangle);
+      if (!wanted(triangle)) continue;
+      (is_own ? result.own[before + first - first_rank] : result.strange).push_back(triangle);
     }
-    ContourTriangles::sort(result.own);
-    ContourTriangles::sort(result.strange);
-    return result;
+    for (std::size_t i = before; i < result.own.size(); ++i) ContourTriangles::sort(result.own[i]);
   }
 
   const ContourParts& parts_;
@@ -146,8 +185,8 @@ class PointContours {
   ContourLevels levels_;
   WindowTree tree_;
   StoredBox bounds_;
-  std::vector<std::uint32_t> rank_;   ///< by part: its place in at_work_
-  std::vector<std::size_t> at_work_;  ///< parts that meet the region
+  std::vector<std::uint32_t> rank_;  ///< by part: which of those that meet the region it is
+  std::uint32_t parts_at_work_ = 0;
 };
 
 }  // namespace

@@ -15,11 +15,14 @@ namespace {
 
 /// Mean distances of points around the box.
 constexpr double kMargin = 3;
-/// Few, so that hardly more are looked at than lie near a circle's border; but boxes cost too.
-constexpr std::size_t kPointsPerGroup = 16;
-/// Peak bytes per point that was read, and more per point that is inserted: the triangulation and
-/// its bulk build, heights, origins and states by slots, a hint and a suspect's share.
-constexpr std::uint64_t kBytesRead = 2 * 32, kBytesInserted = 68 + 20 + 16 + 8 + 2 * (16 + 4) + 16;
+/// Of its longer side, at most.
+constexpr double kMostMargin = 0.05;
+/// Points to begin with.
+constexpr std::size_t kFirstPoints = 48;
+/// Peak bytes per point that was read and lies around; a point that is inserted has its place,
+/// height and origin twice while it is, 20 for sorting and then 68 in the triangulation, states,
+/// a hint and a suspect's share.
+constexpr std::uint64_t kBytesRead = 2 * 32;
 constexpr std::uint64_t kBytesBefore = std::uint64_t{8} << 20;  ///< what reads the store
 
 }  // namespace
@@ -37,7 +40,7 @@ std::array<Point2, 3> PointWindow::corners(tri::TriangleId triangle) const {
 }
 
 bool PointWindow::stands_before(const Origin& a, const Origin& b) const {
-  if (b.cluster == Origin{}.cluster) return true;
+  if (b.cluster == kNowhere) return true;
   const stream::ClusterId ca = read_[a.cluster], cb = read_[b.cluster];
   if (ca == cb) return a.index < b.index;
   const unsigned la = stream::level_of(ca), lb = stream::level_of(cb);
@@ -45,117 +48,136 @@ bool PointWindow::stands_before(const Origin& a, const Origin& b) const {
 }
 
 void PointWindow::check_memory(std::size_t more) const {
-  const std::uint64_t read = pending_.size() + more;
-  const std::uint64_t inserted = triangulation_.vertex_count() + taken_.size();
-  const std::uint64_t needed =
-      read * kBytesRead + inserted * kBytesInserted + kBytesBefore + frontier_.memory_bytes();
+  const std::uint64_t around = pending_.size();
+  const std::uint64_t inserted = triangulation_.vertex_count() + places_.size() + more;
+  const std::uint64_t needed = around * kBytesRead + inserted * kBytesPerPoint + kBytesBefore +
+                               frontier_.memory_bytes() + outer_.capacity() * sizeof(Outer) +
+                               groups_.capacity() * sizeof(Group);
   if (memory_bytes_ == 0 || needed <= memory_bytes_) return;
-  throw stream::Error(
-      {.file = store_.path().string(),
-       .where = {},
-       .cause = "a window of at least " + std::to_string(read) + " points needs " +
-                std::to_string((needed >> 20) + 1) + "M of memory, " +
-                std::to_string(memory_bytes_ >> 20) + "M are allowed for it",
-       .remedy = "give more `memory_bytes`, fewer `threads`, or a coarser `level`"});
+  throw NoRoom({.file = store_.path().string(),
+                .where = {},
+                .cause = "a window of at least " + std::to_string(around + inserted) +
+                         " points needs " + std::to_string((needed >> 20) + 1) + "M of memory, " +
+                         std::to_string(memory_bytes_ >> 20) + "M are allowed for it",
+                .remedy = "give more `memory_bytes`, fewer `threads`, or a coarser `level`"});
 }
 
 void PointWindow::take(const StoreWindow::Node& node) {
   check_memory(node.positions.size());
   const auto cluster = static_cast<std::uint32_t>(read_.size());
   read_.push_back(node.id);
-  const std::size_t begin = pending_.size();
+  constexpr double kAll = std::numeric_limits<double>::infinity();
+  Outer outer{{{kAll, kAll}, {-kAll, -kAll}}, pending_.size()};
   for (std::size_t i = 0; i < node.positions.size(); ++i) {
     const stream::Point3& p = node.positions[i];
-    pending_.push_back(
-        {{p[0], p[1]}, p[2] * scale_ + offset_, {cluster, static_cast<std::uint32_t>(i)}});
-  }
-  add_groups(begin, node.positions.size());
-}
-
-void PointWindow::add_groups(std::size_t begin, std::size_t count) {
-  if (count == 0) return;
-  constexpr double kAll = std::numeric_limits<double>::infinity();
-  StoredBox box{{kAll, kAll}, {-kAll, -kAll}};
-  const std::span<Pending> points(pending_.data() + begin, count);
-  for (const Pending& p : points) {
+    const Origin origin{cluster, static_cast<std::uint32_t>(i)};
+    const double height = p[2] * scale_ + offset_;
+    if (inner_.contains(p)) {
+      places_.push_back({p[0], p[1]});
+      taken_.push_back({height, origin});
+      continue;
+    }
+    pending_.push_back({{p[0], p[1]}, height, origin});
     for (std::size_t k = 0; k < 2; ++k) {
-      box.min[k] = std::min(box.min[k], p.place[k]);
-      box.max[k] = std::max(box.max[k], p.place[k]);
+      outer.box.min[k] = std::min(outer.box.min[k], p[k]);
+      outer.box.max[k] = std::max(outer.box.max[k], p[k]);
     }
   }
-  const std::size_t at = groups_.size();
-  groups_.push_back({box, begin, count, at + 1});
-  if (count <= kPointsPerGroup) return;
-  groups_[at].count = 0;
-  const std::size_t axis = box.max[0] - box.min[0] >= box.max[1] - box.min[1] ? 0 : 1;
-  const std::size_t half = count / 2;
-  std::nth_element(points.begin(), points.begin() + static_cast<std::ptrdiff_t>(half), points.end(),
-                   [axis](const Pending& a, const Pending& b) {
-                     return std::pair(a.place[axis], a.origin.index) <
-                            std::pair(b.place[axis], b.origin.index);
-                   });
-  add_groups(begin, half);
-  add_groups(begin + half, count - half);
-  groups_[at].next = groups_.size();
+  outer.count = pending_.size() - outer.begin;
+  left_ += outer.count;
+  if (outer.count > 0) outer_.push_back(outer);
 }
 
-void PointWindow::move_pending(Group& group, std::size_t at) {
-  taken_.push_back(pending_[at]);
-  pending_[at] = pending_[group.begin + --group.count];
+void PointWindow::take(Pending& point) {
+  places_.push_back(point.place);
+  taken_.push_back({point.height, point.origin});
+  point.origin.cluster = kNowhere;
+  --left_;
 }
 
-void PointWindow::take_inner() {
-  for (Group& group : groups_) {
-    if (!group.box.meets(inner_)) continue;
-    for (std::size_t at = group.begin; at < group.begin + group.count;) {
-      const Triangulation::Point& p = pending_[at].place;
-      if (inner_.contains({p[0], p[1], 0})) {
-        move_pending(group, at);
-      } else {
-        ++at;
-      }
+void PointWindow::grow_inner(const StoredBox& box) {
+  inner_ = box;
+  for (const Outer& outer : outer_) {
+    if (!outer.box.meets(inner_)) continue;
+    for (std::size_t i = outer.begin; i < outer.begin + outer.count; ++i) {
+      Pending& p = pending_[i];
+      if (p.origin.cluster != kNowhere && inner_.contains({p.place[0], p.place[1], 0})) take(p);
     }
   }
+  frontier_.read_meeting(inner_, [this](const StoreWindow::Node& node) { take(node); });
+}
+
+void PointWindow::take_nearest(std::size_t count) {
+  by_distance_.clear();
+  for (std::size_t i = 0; i < pending_.size(); ++i) {
+    const Pending& p = pending_[i];
+    if (p.origin.cluster == kNowhere) continue;
+    double distance = 0;
+    for (std::size_t k = 0; k < 2; ++k) {
+      distance = std::max({distance, inner_.min[k] - p.place[k], p.place[k] - inner_.max[k]});
+    }
+    by_distance_.emplace_back(distance, i);
+  }
+  count = std::min(count, by_distance_.size());
+  std::nth_element(by_distance_.begin(), by_distance_.begin() + static_cast<std::ptrdiff_t>(count),
+                   by_distance_.end());
+  for (std::size_t k = 0; k < count; ++k) take(pending_[by_distance_[k].second]);
 }
 
 void PointWindow::insert_taken() {
   check_memory(0);
-  places_.resize(taken_.size());
-  for (std::size_t i = 0; i < taken_.size(); ++i) places_[i] = taken_[i].place;
-  inserted_.resize(taken_.size());
-  if (triangulation_.vertex_count() == 0) {
-    const std::vector<tri::VertexId> built = triangulation_.build(places_);
-    for (std::size_t i = 0; i < built.size(); ++i) inserted_[i].vertex = built[i];
+  inserted_.clear();
+  std::vector<tri::VertexId> built;
+  const bool is_first = triangulation_.vertex_count() == 0;
+  if (is_first) {
+    built = triangulation_.build(places_);
+    std::vector<Triangulation::Point>().swap(places_);  // may be large
   } else {
+    inserted_.resize(places_.size());
     triangulation_.insert(places_, inserted_);
+    places_.clear();
   }
   heights_.resize(triangulation_.vertex_slots(), std::numeric_limits<double>::quiet_NaN());
   origins_.resize(triangulation_.vertex_slots());
-  states_.resize(triangulation_.triangle_slots(), kUnknown);
-  hull_certain_.resize(triangulation_.triangle_slots(), 0);
   for (std::size_t i = 0; i < taken_.size(); ++i) {
-    const std::uint32_t at = tri::slot(inserted_[i].vertex);
+    const std::uint32_t at = tri::slot(is_first ? built[i] : inserted_[i].vertex);
     if (!stands_before(taken_[i].origin, origins_[at])) continue;
     origins_[at] = taken_[i].origin;
     heights_[at] = taken_[i].height;
   }
-  taken_.clear();
+  if (is_first) {
+    std::vector<Taken>().swap(taken_);
+  } else {
+    taken_.clear();
+  }
 }
 
 void PointWindow::clear() {
   triangulation_.stop_journal();
   triangulation_.clear();
+  is_whole_ = false;
   heights_.clear();
   origins_.clear();
   states_.clear();
-  hull_certain_.clear();
   read_.clear();
-  pending_.clear();
+  places_.clear();
   taken_.clear();
+  pending_.clear();
+  left_ = 0;
+  outer_.clear();
   groups_.clear();
   suspects_.clear();
   suspect_triangles_ = 0;
   hull_.clear();
+}
+
+StoredBox PointWindow::with_margin() const {
+  const double width = box_.max[0] - box_.min[0], height = box_.max[1] - box_.min[1];
+  const auto inside = static_cast<double>(std::max<std::size_t>(places_.size(), 1));
+  const double margin =
+      std::min(kMargin * std::sqrt(width * height / inside), kMostMargin * std::max(width, height));
+  return {{box_.min[0] - margin, box_.min[1] - margin},
+          {box_.max[0] + margin, box_.max[1] + margin}};
 }
 
 void PointWindow::load(const StoredBox& box, Reach reach) {
@@ -169,25 +191,11 @@ void PointWindow::load(const StoredBox& box, Reach reach) {
     frontier_.begin(take);
     frontier_.read_meeting(box, take);
     // Triangles across the border need a few points more, which are cheaper in bulk.
-    const double width = box.max[0] - box.min[0], height = box.max[1] - box.min[1];
-    const auto inside =
-        static_cast<double>(std::count_if(pending_.begin(), pending_.end(), [&](const Pending& p) {
-          return box.contains({p.place[0], p.place[1], 0});
-        }));
-    const double margin = std::min(kMargin * std::sqrt(width * height / std::max(inside, 1.0)),
-                                   0.05 * std::max(width, height));
-    inner_ = {{box.min[0] - margin, box.min[1] - margin},
-              {box.max[0] + margin, box.max[1] + margin}};
-    frontier_.read_meeting(inner_, take);
-    take_inner();
+    grow_inner(with_margin());
+    if (places_.size() < kFirstPoints) take_nearest(kFirstPoints - places_.size());
     insert_taken();
-    triangulation_.start_journal();
-    examine_all();
-    while (add_missing()) {
-      insert_taken();
-      examine_changes();
-    }
-    triangulation_.stop_journal();
+    is_whole_ = left_ == 0 && frontier_.open().empty();
+    if (!is_whole_) settle();
   }
   make_hints();
 }

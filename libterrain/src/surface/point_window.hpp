@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include <terrace/stream/error.hpp>
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/delaunay2.hpp>
 #include <terrace/tri/heights.hpp>
@@ -41,6 +42,13 @@ class PointWindow {
     kCircles,
   };
 
+  /// What load() throws where memory_bytes do not suffice. It says what would be needed.
+  class NoRoom : public stream::Error {
+    using Error::Error;
+  };
+  /// Peak bytes per point of a window that is large beside its border.
+  static constexpr std::uint64_t kBytesPerPoint = 120;
+
   /// memory_bytes: what one window may take; 0: as much as there is. The store must outlive this.
   PointWindow(const stream::Store& store, unsigned level, std::uint64_t memory_bytes);
   PointWindow(const PointWindow&) = delete;
@@ -49,22 +57,24 @@ class PointWindow {
   /// Afterwards every triangle of the whole triangulation that meets the box, which is closed, is
   /// in triangulation() and certain. There are others around, certain or not.
   ///
-  /// Reads the clusters that meet the box and triangulates their points in the box in bulk; then,
-  /// while a triangle that meets the box has a circumcircle, or a hull edge that the box sees from
-  /// outside has a half-plane, in which a point may be missing, adds one: of what was read, or else
-  /// of the clusters whose boxes it meets, coarse levels first. So no width is guessed, and voids
-  /// and hulls cost a few clusters of coarse levels more. About 0.5 us per point, several times
-  /// that for windows that see much of the hull.
+  /// Reads the clusters that meet the box and triangulates their points in the box in bulk, then
+  /// those in a border as wide as most circumcircles reach over it; then, while a triangle that
+  /// meets the box has a circumcircle, or a hull edge that the box sees from outside has a
+  /// half-plane, in which a point may be missing, adds one: of what was read, or else of the
+  /// clusters whose boxes it meets, coarse levels first. So no width is guessed, and voids and
+  /// hulls cost a few clusters of coarse levels more. About 0.4 us per point in the box. Clusters
+  /// of unordered points overlap, and all that meet the box are read, 30 ns per point: the larger
+  /// the box, the less they count. A box that holds the store has nothing to settle.
   ///
-  /// Throws: stream::Error on a damaged store, or where memory_bytes do not suffice, saying what
-  /// would be needed; stream::Stopped. After that it can only be loaded again or destroyed.
+  /// Throws: NoRoom where memory_bytes do not suffice; stream::Error on a damaged store;
+  /// stream::Stopped. After that it can only be loaded again or destroyed.
   void load(const StoredBox& box, Reach reach = Reach::kTriangles);
 
   /// As it was loaded last. Vertices have no other order or number than this one gives them.
   [[nodiscard]] const tri::Delaunay2<double>& triangulation() const { return triangulation_; }
   /// Whether it is a triangle of the whole. Requires a living triangle.
   [[nodiscard]] bool is_certain(tri::TriangleId triangle) const {
-    return states_[tri::slot(triangle)] == kCertain;
+    return is_whole_ || (states_[tri::slot(triangle)] & kTriangleState) == kCertain;
   }
   /// In the store's vertical unit (scale and offset of the channel applied).
   [[nodiscard]] double height(tri::VertexId vertex) const { return heights_[tri::slot(vertex)]; }
@@ -99,9 +109,16 @@ class PointWindow {
   using Triangulation = tri::Delaunay2<double>;
   /// Where a vertex comes from: the sequence of its cluster in read_, and its place in that.
   struct Origin {
-    std::uint32_t cluster = 0xFFFFFFFF, index = 0;
+    std::uint32_t cluster = kNowhere, index = 0;
   };
-  /// A point that was read; taken for inserting where its cluster is no number.
+  static constexpr std::uint32_t kNowhere = 0xFFFFFFFF;
+  /// Of a point that is to be inserted.
+  struct Taken {
+    double height = 0;
+    Origin origin;
+  };
+  /// A point that was read and lies outside inner_; taken for inserting where its cluster is no
+  /// number.
   struct Pending {
     Triangulation::Point place{};
     double height = 0;
@@ -113,6 +130,13 @@ class PointWindow {
     StoredBox box;
     std::size_t begin = 0, count = 0, next = 0;
   };
+  /// What lies outside inner_ of one cluster. It is parted into groups when it is first looked
+  /// into.
+  struct Outer {
+    StoredBox box;
+    std::size_t begin = 0, count = 0;            ///< in pending_
+    std::size_t first_group = 0, end_group = 0;  ///< equal: not parted yet
+  };
   /// A triangle, or its hull edge, that needs all points in its cover.
   struct Suspect {
     static constexpr std::uint8_t kNone = 3;
@@ -120,27 +144,33 @@ class PointWindow {
     tri::TriangleId triangle = tri::kNoTriangle;
     std::uint8_t edge = kNone;
   };
-  enum State : std::uint8_t { kUnknown, kSuspect, kCertain };
+  /// Of a triangle; above it a bit for each edge that is certain to be of the hull.
+  enum State : std::uint8_t { kUnknown, kSuspect, kCertain, kTriangleState = 3, kHullEdge = 4 };
 
   void clear();
   void take(const StoreWindow::Node& node);
-  void add_groups(std::size_t begin, std::size_t count);
-  void take_inner();
-  void move_pending(Group& group, std::size_t at);
+  void take(Pending& point);
+  void grow_inner(const StoredBox& box);
+  void take_nearest(std::size_t count);
   void insert_taken();
   [[nodiscard]] bool stands_before(const Origin& a, const Origin& b) const;
   void check_memory(std::size_t more) const;
+  [[nodiscard]] StoredBox with_margin() const;
 
+  void settle();
   void examine_all();
   void examine_changes();
   void examine(tri::TriangleId triangle);
   void consider(tri::TriangleId triangle, const CircleCover& cover);
   void find_suspect_hull();
+  /// Lets inner_ hold most circles of suspects; false: there are few, or it would not help.
+  bool widen();
   /// False: nothing is missing.
   bool add_missing();
   bool read_missing();
-  void gather_near(const StoredBox& wide);
   bool find_missing(const Suspect& suspect, bool is_near);
+  void part(Outer& outer);
+  void add_groups(std::size_t begin, std::size_t count);
   [[nodiscard]] CircleCover circle(tri::TriangleId triangle) const;
 
   void make_hints();
@@ -158,21 +188,25 @@ class PointWindow {
   ClusterFrontier frontier_;
   StoredBox box_{}, inner_{};  ///< loaded; where all points are inserted
   Reach reach_ = Reach::kTriangles;
+  bool is_whole_ = false;  ///< all points of the store are inserted
   Triangulation triangulation_;
-  std::vector<double> heights_;             ///< by slot of vertex
-  std::vector<Origin> origins_;             ///< by slot of vertex
-  std::vector<std::uint8_t> states_;        ///< by slot of triangle
-  std::vector<std::uint8_t> hull_certain_;  ///< by slot of triangle, a bit for each edge
-  std::vector<stream::ClusterId> read_;     ///< in their order
-  std::vector<Pending> pending_, taken_;
+  std::vector<double> heights_;               ///< by slot of vertex
+  std::vector<Origin> origins_;               ///< by slot of vertex
+  std::vector<std::uint8_t> states_;          ///< by slot of triangle, see State
+  std::vector<stream::ClusterId> read_;       ///< in their order
+  std::vector<Triangulation::Point> places_;  ///< to be inserted
+  std::vector<Taken> taken_;                  ///< of places_
+  std::vector<Pending> pending_;
+  std::size_t left_ = 0;  ///< of pending_, not taken
+  std::vector<Outer> outer_;
   std::vector<Group> groups_;
-  std::vector<Triangulation::Point> places_;  ///< of taken_
   std::vector<Triangulation::Insertion> inserted_;
   std::vector<Suspect> suspects_;  ///< hull edges behind the first suspect_triangles_
   std::size_t suspect_triangles_ = 0;
   std::vector<tri::TriangleId> hull_;  ///< triangles that have or had a hull edge
   std::vector<std::uint32_t> open_near_, chosen_;
-  std::vector<std::pair<double, std::size_t>> points_near_;  ///< x and place in pending_
+  std::vector<std::pair<double, std::size_t>> by_distance_;  ///< of pending_
+  std::vector<double> reaches_;
   Triangulation::Changes changes_;
   // A vertex near each cell of a grid over the box.
   std::vector<tri::VertexId> hints_;

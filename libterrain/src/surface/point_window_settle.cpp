@@ -3,13 +3,26 @@
 #include <algorithm>
 #include <cstddef>
 #include <limits>
+#include <span>
 
+#include "base/interrupt.hpp"
 #include "surface/point_window.hpp"
 
 namespace terrace::terrain {
 namespace {
 
-constexpr std::uint32_t kNoTriangle = 0xFFFFFFFF;
+constexpr std::uint32_t kNoOpen = 0xFFFFFFFF;
+/// Few, so that hardly more are looked at than lie near a circle's border; but boxes cost too.
+constexpr std::size_t kPointsPerGroup = 16;
+/// Of the circles that reach over the border, as many as a wider border shall hold.
+constexpr double kWidened = 0.95;
+/// Of the window's longer side, at most each time.
+constexpr double kMostWidened = 0.03;
+constexpr unsigned kMostTimesWidened = 3;
+/// Of the window's sides: so far around are the clusters that most suspects may meet.
+constexpr double kNear = 0.05;
+/// For these each point is looked for by itself.
+constexpr std::size_t kFewSuspects = 12;
 
 /// Whether a triangle, its corners counter-clockwise, meets a box; sometimes true where it does not
 /// by a rounding.
@@ -39,11 +52,11 @@ CircleCover PointWindow::circle(tri::TriangleId triangle) const {
 
 void PointWindow::consider(tri::TriangleId triangle, const CircleCover& cover) {
   std::uint8_t& state = states_[tri::slot(triangle)];
-  if (state != kUnknown) return;
+  if ((state & kTriangleState) != kUnknown) return;
   if (holds(inner_, cover.bounds())) {
-    state = kCertain;
+    state |= kCertain;
   } else {
-    state = kSuspect;
+    state |= kSuspect;
     suspects_.push_back({cover, triangle});
   }
 }
@@ -64,11 +77,25 @@ void PointWindow::examine(tri::TriangleId triangle) {
   }
   consider(triangle, cover);
   for (const tri::TriangleId t : next) {
-    if (t != tri::kNoTriangle && states_[tri::slot(t)] == kUnknown) consider(t, circle(t));
+    if (t == tri::kNoTriangle || (states_[tri::slot(t)] & kTriangleState) != kUnknown) continue;
+    consider(t, circle(t));
   }
 }
 
+void PointWindow::settle() {
+  triangulation_.start_journal();
+  examine_all();
+  for (unsigned i = 0; i < kMostTimesWidened && widen(); ++i) check_interrupt();
+  while (add_missing()) {
+    check_interrupt();
+    insert_taken();
+    examine_changes();
+  }
+  triangulation_.stop_journal();
+}
+
 void PointWindow::examine_all() {
+  states_.assign(triangulation_.triangle_slots(), kUnknown);
   for (const tri::TriangleId t : triangulation_.all_triangles()) examine(t);
   suspect_triangles_ = suspects_.size();
   find_suspect_hull();
@@ -76,19 +103,17 @@ void PointWindow::examine_all() {
 
 void PointWindow::examine_changes() {
   triangulation_.take_changes(changes_);
-  for (const tri::TriangleId t : changes_.removed_triangles) {
-    states_[tri::slot(t)] = kUnknown;
-    hull_certain_[tri::slot(t)] = 0;
-  }
+  states_.resize(triangulation_.triangle_slots(), kUnknown);
+  for (const tri::TriangleId t : changes_.removed_triangles) states_[tri::slot(t)] = kUnknown;
   suspects_.resize(suspect_triangles_);
   std::erase_if(suspects_, [&](const Suspect& suspect) {
-    return states_[tri::slot(suspect.triangle)] != kSuspect;
+    return (states_[tri::slot(suspect.triangle)] & kTriangleState) != kSuspect;
   });
   for (const tri::TriangleId t : changes_.added_triangles) examine(t);
   // Of what stood beside new triangles, some have circles that meet the box and so name these.
   if (reach_ == Reach::kCircles) {
     for (const tri::TriangleId t : changes_.added_triangles) {
-      if (states_[tri::slot(t)] != kUnknown) continue;
+      if ((states_[tri::slot(t)] & kTriangleState) != kUnknown) continue;
       for (const tri::TriangleId other : triangulation_.neighbours(t)) {
         if (other != tri::kNoTriangle && circle(other).meets(box_)) consider(t, circle(t));
       }
@@ -110,7 +135,7 @@ void PointWindow::find_suspect_hull() {
     const auto next = triangulation_.neighbours(t);
     const std::array<Point2, 3> corner = corners(t);
     for (std::size_t i = 0; i < 3; ++i) {
-      if (next[i] != tri::kNoTriangle || (hull_certain_[tri::slot(t)] >> i & 1) != 0) continue;
+      if (next[i] != tri::kNoTriangle || (states_[tri::slot(t)] & kHullEdge << i) != 0) continue;
       const CircleCover cover = CircleCover::of_plane(corner[(i + 1) % 3], corner[(i + 2) % 3]);
       if (cover.meets(box_) || (reach_ == Reach::kCircles && circle(t).meets(box_))) {
         suspects_.push_back({cover, t, static_cast<std::uint8_t>(i)});
@@ -119,75 +144,117 @@ void PointWindow::find_suspect_hull() {
   }
 }
 
+bool PointWindow::widen() {
+  reaches_.clear();
+  for (const Suspect& suspect : suspects_) {
+    if (suspect.cover.has_plane) continue;
+    const StoredBox bounds = suspect.cover.bounds();
+    double reach = 0;
+    for (std::size_t k = 0; k < 2; ++k) {
+      reach = std::max({reach, inner_.min[k] - bounds.min[k], bounds.max[k] - inner_.max[k]});
+    }
+    reaches_.push_back(reach);
+  }
+  if (reaches_.size() < kFewSuspects) return false;
+  const auto at = reaches_.begin() +
+                  static_cast<std::ptrdiff_t>(kWidened * static_cast<double>(reaches_.size() - 1));
+  std::nth_element(reaches_.begin(), at, reaches_.end());
+  const double most = kMostWidened * std::max(box_.max[0] - box_.min[0], box_.max[1] - box_.min[1]);
+  // A little more, for rounding.
+  const double more = std::min(*at * (1 + 1e-6), most);
+  if (!(more > 0)) return false;
+  grow_inner(
+      {{inner_.min[0] - more, inner_.min[1] - more}, {inner_.max[0] + more, inner_.max[1] + more}});
+  insert_taken();
+  examine_changes();
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < suspects_.size(); ++i) {
+    const Suspect& suspect = suspects_[i];
+    if (i < suspect_triangles_ && holds(inner_, suspect.cover.bounds())) {
+      std::uint8_t& state = states_[tri::slot(suspect.triangle)];
+      state = static_cast<std::uint8_t>((state & ~kTriangleState) | kCertain);
+    } else {
+      suspects_[kept++] = suspect;
+    }
+  }
+  suspect_triangles_ -= suspects_.size() - kept;
+  suspects_.resize(kept);
+  return true;
+}
+
 bool PointWindow::add_missing() {
   if (triangulation_.triangle_count() == 0) {
     // Points on one line, or fewer than three: any other may make a triangle of them.
     while (true) {
-      for (Group& group : groups_) {
-        while (group.count > 0) move_pending(group, group.begin);
-      }
-      if (!taken_.empty()) return true;
+      take_nearest(std::max<std::size_t>(64, triangulation_.vertex_count()));
+      if (!places_.empty()) return true;
       constexpr std::size_t kAtOnce = 64;
       chosen_.clear();
       for (std::uint32_t k = 0; k < frontier_.open().size() && k < kAtOnce; ++k) {
         chosen_.push_back(k);
       }
       if (!read_missing()) return false;
+      if (!places_.empty()) return true;
     }
   }
-  // Most circles reach a little over the border; for these only what is near is looked at.
+  // What most suspects meet of the clusters that were not read lies near.
   StoredBox wide = inner_;
   for (std::size_t k = 0; k < 2; ++k) {
-    const double more = 0.1 * (inner_.max[k] - inner_.min[k]);
+    const double more = kNear * (inner_.max[k] - inner_.min[k]);
     wide.min[k] -= more;
     wide.max[k] += more;
   }
-  gather_near(wide);
+  open_near_.clear();
+  const auto open = frontier_.open();
+  for (std::uint32_t k = 0; k < open.size(); ++k) {
+    if (open[k].box.meets(wide)) open_near_.push_back(k);
+  }
   chosen_.clear();
   for (const Suspect& suspect : suspects_) {
     if (find_missing(suspect, holds(wide, suspect.cover.bounds()))) continue;
-    const std::uint32_t at = tri::slot(suspect.triangle);
+    std::uint8_t& state = states_[tri::slot(suspect.triangle)];
     if (suspect.edge == Suspect::kNone) {
-      states_[at] = kCertain;
+      state = static_cast<std::uint8_t>((state & ~kTriangleState) | kCertain);
     } else {
-      hull_certain_[at] = static_cast<std::uint8_t>(hull_certain_[at] | 1U << suspect.edge);
+      state = static_cast<std::uint8_t>(state | kHullEdge << suspect.edge);
     }
   }
   // Clusters are read to look into them: what they hold is found in the next round.
   const bool has_read = read_missing();
-  return has_read || !taken_.empty();
+  return has_read || !places_.empty();
 }
 
-void PointWindow::gather_near(const StoredBox& wide) {
+void PointWindow::add_groups(std::size_t begin, std::size_t count) {
   constexpr double kAll = std::numeric_limits<double>::infinity();
-  StoredBox around{{kAll, kAll}, {-kAll, -kAll}};
-  for (const Suspect& suspect : suspects_) {
-    const StoredBox bounds = suspect.cover.bounds();
-    if (!holds(wide, bounds)) continue;
+  StoredBox box{{kAll, kAll}, {-kAll, -kAll}};
+  const std::span<Pending> points(pending_.data() + begin, count);
+  for (const Pending& p : points) {
     for (std::size_t k = 0; k < 2; ++k) {
-      around.min[k] = std::min(around.min[k], bounds.min[k]);
-      around.max[k] = std::max(around.max[k], bounds.max[k]);
+      box.min[k] = std::min(box.min[k], p.place[k]);
+      box.max[k] = std::max(box.max[k], p.place[k]);
     }
   }
-  open_near_.clear();
-  points_near_.clear();
-  const auto open = frontier_.open();
-  for (std::uint32_t k = 0; k < open.size(); ++k) {
-    if (open[k].box.meets(around)) open_near_.push_back(k);
-  }
-  for (std::size_t g = 0; g < groups_.size();) {
-    const Group& group = groups_[g];
-    const bool meets = group.box.meets(around);
-    g = meets ? g + 1 : group.next;
-    if (!meets) continue;
-    for (std::size_t at = group.begin; at < group.begin + group.count; ++at) {
-      const Pending& p = pending_[at];
-      if (p.origin.cluster == kNoTriangle || !around.contains({p.place[0], p.place[1], 0}))
-        continue;
-      points_near_.emplace_back(p.place[0], at);
-    }
-  }
-  std::sort(points_near_.begin(), points_near_.end());
+  const std::size_t at = groups_.size();
+  groups_.push_back({box, begin, count, at + 1});
+  if (count <= kPointsPerGroup) return;
+  groups_[at].count = 0;
+  const std::size_t axis = box.max[0] - box.min[0] >= box.max[1] - box.min[1] ? 0 : 1;
+  const std::size_t half = count / 2;
+  std::nth_element(points.begin(), points.begin() + static_cast<std::ptrdiff_t>(half), points.end(),
+                   [axis](const Pending& a, const Pending& b) {
+                     return std::pair(a.place[axis], a.origin.index) <
+                            std::pair(b.place[axis], b.origin.index);
+                   });
+  add_groups(begin, half);
+  add_groups(begin + half, count - half);
+  groups_[at].next = groups_.size();
+}
+
+void PointWindow::part(Outer& outer) {
+  if (outer.first_group != outer.end_group) return;
+  outer.first_group = groups_.size();
+  add_groups(outer.begin, outer.count);
+  outer.end_group = groups_.size();
 }
 
 bool PointWindow::find_missing(const Suspect& suspect, bool is_near) {
@@ -198,7 +265,7 @@ bool PointWindow::find_missing(const Suspect& suspect, bool is_near) {
   double depth = std::numeric_limits<double>::infinity();
   const auto look_at_point = [&](std::size_t at) {
     const Pending& p = pending_[at];
-    if (p.origin.cluster == kNoTriangle) return;  // taken
+    if (p.origin.cluster == kNowhere) return;  // taken
     const StoredBox box{p.place, p.place};
     const double d = cover.depth(box);
     if (point < pending_.size() && !(d < depth)) return;
@@ -206,35 +273,33 @@ bool PointWindow::find_missing(const Suspect& suspect, bool is_near) {
     point = at;
     depth = d;
   };
-  if (is_near) {
-    auto one = std::lower_bound(points_near_.begin(), points_near_.end(),
-                                std::pair(bounds.min[0], std::size_t{0}));
-    for (; one != points_near_.end() && one->first <= bounds.max[0]; ++one) {
-      look_at_point(one->second);
-    }
-  } else {
-    for (std::size_t g = 0; g < groups_.size();) {
+  const auto may_hold = [&](const StoredBox& box) {
+    return bounds.meets(box) && cover.meets(box) &&
+           !(point < pending_.size() && cover.least_depth(box) > depth);
+  };
+  for (Outer& outer : outer_) {
+    if (!may_hold(outer.box)) continue;
+    part(outer);
+    for (std::size_t g = outer.first_group; g < outer.end_group;) {
       const Group& group = groups_[g];
-      const bool may_hold = bounds.meets(group.box) && cover.meets(group.box) &&
-                            !(point < pending_.size() && cover.least_depth(group.box) > depth);
-      g = may_hold ? g + 1 : group.next;
-      if (!may_hold) continue;
+      const bool looks = may_hold(group.box);
+      g = looks ? g + 1 : group.next;
+      if (!looks) continue;
       for (std::size_t k = 0; k < group.count; ++k) look_at_point(group.begin + k);
     }
   }
   if (point < pending_.size()) {
-    taken_.push_back(pending_[point]);
-    pending_[point].origin.cluster = kNoTriangle;
+    take(pending_[point]);
     return true;
   }
   // Else of the clusters that may hold some one of the highest level.
   const auto open = frontier_.open();
-  std::uint32_t best = kNoTriangle;
+  std::uint32_t best = kNoOpen;
   const auto look_at = [&](std::uint32_t k) {
-    if (best != kNoTriangle && open[k].level < open[best].level) return;
+    if (best != kNoOpen && open[k].level < open[best].level) return;
     if (!bounds.meets(open[k].box) || !cover.meets(open[k].box)) return;
     const double d = cover.depth(open[k].box);
-    if (best != kNoTriangle && open[k].level == open[best].level && !(d < depth)) return;
+    if (best != kNoOpen && open[k].level == open[best].level && !(d < depth)) return;
     best = k;
     depth = d;
   };
@@ -243,7 +308,7 @@ bool PointWindow::find_missing(const Suspect& suspect, bool is_near) {
   } else {
     for (std::uint32_t k = 0; k < open.size(); ++k) look_at(k);
   }
-  if (best == kNoTriangle) return false;
+  if (best == kNoOpen) return false;
   chosen_.push_back(best);
   return true;
 }

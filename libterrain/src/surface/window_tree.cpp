@@ -7,7 +7,6 @@
 namespace terrace::terrain {
 namespace {
 
-constexpr std::uint32_t kTreeWindow = std::uint32_t{1} << 31;
 constexpr std::uint64_t kMostCounted = std::uint64_t{1} << 18;
 /// Halvings of the store's area. More come only where points lie on each other.
 constexpr unsigned kDeepestTree = 48;
@@ -30,41 +29,47 @@ WindowTree::WindowTree(const stream::Store& store, unsigned level, std::size_t p
   const auto most = static_cast<std::size_t>(std::max(1.0, static_cast<double>(points) / each));
   const StoredBox all{{store.bounds().min[0], store.bounds().min[1]},
                       {store.bounds().max[0], store.bounds().max[1]}};
-  root_ = split(all, sample, most, 0);
+  split(all, sample, each, most, 0);
 }
 
-std::uint32_t WindowTree::split(const StoredBox& box, std::span<Point2> sample, std::size_t most,
-                                unsigned depth) {
+std::uint32_t WindowTree::split(const StoredBox& box, std::span<Point2> sample, double each,
+                                std::size_t most, unsigned depth) {
+  const auto number = static_cast<std::uint32_t>(parts_.size());
   const double width = box.max[0] - box.min[0], height = box.max[1] - box.min[1];
-  Node node;
-  node.axis = width >= height ? 0 : 1;
-  const double low = box.min[node.axis], high = box.max[node.axis];
-  node.middle = low + 0.5 * (high - low);
+  Part part{.box = box,
+            .points = static_cast<double>(sample.size()) * each,
+            .first = windows_.size(),
+            .axis = width >= height ? 0U : 1U};
+  const double low = box.min[part.axis], high = box.max[part.axis];
+  part.middle = low + 0.5 * (high - low);
+  parts_.push_back(part);
   if (sample.size() <= most || depth == kDeepestTree ||
-      !(low < node.middle && node.middle < high)) {
-    boxes_.push_back(box);
-    return kTreeWindow | static_cast<std::uint32_t>(boxes_.size() - 1);
+      !(low < part.middle && part.middle < high)) {
+    windows_.push_back(number);
+  } else {
+    const auto cut = std::partition(sample.begin(), sample.end(),
+                                    [&](const Point2& p) { return p[part.axis] < part.middle; });
+    const auto before = static_cast<std::size_t>(cut - sample.begin());
+    StoredBox half = box;
+    half.max[part.axis] = part.middle;
+    const std::uint32_t below = split(half, sample.first(before), each, most, depth + 1);
+    half = box;
+    half.min[part.axis] = part.middle;
+    const std::uint32_t above = split(half, sample.subspan(before), each, most, depth + 1);
+    parts_[number].below = below;
+    parts_[number].above = above;
   }
-  const auto cut = std::partition(sample.begin(), sample.end(),
-                                  [&](const Point2& p) { return p[node.axis] < node.middle; });
-  const auto before = static_cast<std::size_t>(cut - sample.begin());
-  StoredBox half = box;
-  half.max[node.axis] = node.middle;
-  node.below = split(half, sample.first(before), most, depth + 1);
-  half = box;
-  half.min[node.axis] = node.middle;
-  node.above = split(half, sample.subspan(before), most, depth + 1);
-  nodes_.push_back(node);
-  return static_cast<std::uint32_t>(nodes_.size() - 1);
+  parts_[number].end = windows_.size();
+  return number;
 }
 
 std::size_t WindowTree::window_of(const Point2& place) const {
-  std::uint32_t at = root_;
-  while ((at & kTreeWindow) == 0) {
-    const Node& node = nodes_[at];
-    at = place[node.axis] < node.middle ? node.below : node.above;
+  std::uint32_t at = 0;
+  while (!parts_[at].is_window()) {
+    const Part& part = parts_[at];
+    at = place[part.axis] < part.middle ? part.below : part.above;
   }
-  return at & ~kTreeWindow;
+  return parts_[at].first;
 }
 
 }  // namespace terrace::terrain
