@@ -212,7 +212,7 @@ TEST(CoordinateSystem, ADatumThatNobodyKnowsNeedsAShift) {
   } catch (const stream::Error& error) {
     const std::string what = error.what();
     EXPECT_NE(what.find("own grid"), std::string::npos) << what;
-    EXPECT_NE(what.find("--towgs84"), std::string::npos) << what;
+    EXPECT_NE(what.find("`shift`"), std::string::npos) << what;
   }
   EXPECT_THROW(Transformation(bare, CoordinateSystem()), stream::Error);
   Point2 own{400000, -100000};
@@ -487,7 +487,7 @@ TEST(GeoKeys, ContradictionsAreRefusedAndNamed) {
       const std::string what = error.what();
       EXPECT_NE(what.find("contradict"), std::string::npos) << what;
       EXPECT_NE(what.find("dem.tif"), std::string::npos) << what;
-      EXPECT_NE(what.find("--crs"), std::string::npos) << what;
+      EXPECT_NE(what.find("`crs`"), std::string::npos) << what;
     }
   }
   EXPECT_TRUE(CoordinateSystem::of(keys({{1024, {1}, ""},

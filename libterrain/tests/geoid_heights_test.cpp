@@ -135,7 +135,7 @@ TEST(EllipsoidalHeightsTest, TheStoresOwnVerticalSystemGoesBeforeTheDefault) {
   } catch (const stream::Error& error) {
     const std::string what = error.what();
     EXPECT_NE(what.find("us_nga_egm08_25.tif"), std::string::npos) << what;
-    EXPECT_NE(what.find("--geoid"), std::string::npos) << what;
+    EXPECT_NE(what.find("`geoid`"), std::string::npos) << what;
   }
 }
 

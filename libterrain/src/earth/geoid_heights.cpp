@@ -28,8 +28,8 @@ GeoidGrid::GeoidGrid(const std::string& file, std::uint64_t memory_bytes) {
   if (error) fail("cannot be read: " + error.message(), fetch);
   if (bytes > memory_bytes) {
     fail("takes " + std::to_string((bytes >> 20) + 1) + "M of memory, " +
-             std::to_string(memory_bytes >> 20) + "M are left of --memory",
-         "raise --memory or take a coarser grid");
+             std::to_string(memory_bytes >> 20) + "M are left of `memory_bytes`",
+         "raise `memory_bytes` or take a coarser grid");
   }
   try {
     const std::filesystem::path folder =
@@ -54,27 +54,27 @@ EllipsoidalHeights::EllipsoidalHeights(const stream::Schema& schema, const std::
   const bool said = vertical == "ellipsoidal" || vertical == "ignore";
   const bool orthometric = vertical == "orthometric";
   if (!vertical.empty() && !said && !orthometric) {
-    throw UsageError("--vertical is ellipsoidal, orthometric or ignore, not '" + vertical + "'");
+    throw UsageError("`vertical` is ellipsoidal, orthometric or ignore, not '" + vertical + "'");
   }
   if (said && !geoid.empty()) {
-    throw UsageError("--vertical " + vertical +
-                     " takes heights as they are, --geoid converts them: give one of the two");
+    throw UsageError("`vertical` " + vertical +
+                     " takes heights as they are, `geoid` converts them: give one of the two");
   }
   const std::string& recorded = schema.vertical;
   if (recorded == "ellipsoidal" && (!geoid.empty() || orthometric)) {
     throw UsageError("the store's heights are ellipsoidal already: leave " +
-                     std::string(geoid.empty() ? "--vertical orthometric" : "--geoid") +
-                     " out, or build the store with --vertical orthometric if they are not");
+                     std::string(geoid.empty() ? "`vertical` orthometric" : "`geoid`") +
+                     " out, or build the store with `vertical` orthometric if they are not");
   }
   if (recorded != "ellipsoidal" && vertical.empty() && geoid.empty()) {
     throw UsageError((recorded.empty()
                           ? std::string("the store does not say what its heights refer to")
                           : "the store's heights are " + recorded) +
-                     ", and globes want heights above the ellipsoid: give --vertical orthometric "
+                     ", and globes want heights above the ellipsoid: give `vertical` orthometric "
                      "(by the store's "
-                     "vertical CRS, or EGM96), --geoid FILE (a GeographicLib geoid grid), "
-                     "--vertical ellipsoidal "
-                     "if they are that, or --vertical ignore");
+                     "vertical CRS, or EGM96), `geoid` FILE (a GeographicLib geoid grid), "
+                     "`vertical` ellipsoidal "
+                     "if they are that, or `vertical` ignore");
   }
   // One unit in all verbs, whatever had to be assumed.
   const Ground ground(placement_of(schema));
@@ -133,8 +133,8 @@ void EllipsoidalHeights::find_operation(const stream::Schema& schema,
          .cause = "no operation leads from " + name + " to the ellipsoid" +
                   (choice.better.empty() ? "" : ": " + choice.better),
          .remedy = choice.better.empty()
-                       ? "give --geoid FILE (a GeographicLib geoid grid)"
-                       : "install that grid where PROJ finds it, or give --geoid FILE (a "
+                       ? "give `geoid` FILE (a GeographicLib geoid grid)"
+                       : "install that grid where PROJ finds it, or give `geoid` FILE (a "
                          "GeographicLib geoid grid)"});
   }
   add_note(name + " to the ellipsoid by " + quoted_with_accuracy(choice.name, choice.accuracy) +

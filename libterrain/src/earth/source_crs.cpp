@@ -31,7 +31,7 @@ CoordinateSystem read_sidecar(const std::string& file) {
   try {
     return CoordinateSystem::parse(file);
   } catch (const UsageError& error) {
-    fail(file, error.what(), "correct or remove it, or name the system: --crs EPSG:n");
+    fail(file, error.what(), "correct or remove it, or name the system: `crs` EPSG:n");
   }
 }
 
@@ -45,7 +45,7 @@ std::optional<CoordinateSystem> system_of_sidecars(const stream::SourceInfo& inf
     const CoordinateSystem other = read_sidecar(sidecar);
     if (system && !system->same_places(other)) {
       fail(sidecar, "its CRS is not that of " + name,
-           "convert one of the files, or name the CRS of all: --crs EPSG:n");
+           "convert one of the files, or name the CRS of all: `crs` EPSG:n");
     }
     if (!system) {
       system = other;
@@ -86,7 +86,7 @@ SourceCrs crs_of_source(const stream::SourceInfo& info, const std::optional<Datu
     if (other && !other->same_places(*found.system)) {
       fail(file,
            "its CRS is " + found.system->title() + ", that of " + sidecar + " is " + other->title(),
-           "remove the wrong one, or say which is meant: --crs EPSG:n");
+           "remove the wrong one, or say which is meant: `crs` EPSG:n");
     }
   }
   if (!found.system) {
@@ -105,7 +105,7 @@ SourceCrs crs_of_source(const stream::SourceInfo& info, const std::optional<Datu
     CrsDefinition shifted = found.system->definition();
     if (found.system->counts_as_wgs84()) {
       fail(file, "its CRS " + found.system->title() + " counts as WGS 84 and takes no shift",
-           "leave --towgs84 out");
+           "leave `shift` out");
     }
     shifted.shift = shift;
     found.system.emplace(shifted);

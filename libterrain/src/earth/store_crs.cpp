@@ -20,7 +20,7 @@ CoordinateSystem system_of(const stream::Store& store) {
     throw stream::Error({.file = file,
                          .where = {},
                          .cause = "has no CRS",
-                         .remedy = "build it anew with --crs EPSG:n"});
+                         .remedy = "build it anew with `crs` EPSG:n"});
   }
   return system->over(world_box(placement_of(store.schema()), store.bounds()));
 }
@@ -66,7 +66,7 @@ void PlaceConversion::operator()(std::span<stream::Point3> points) const {
         throw stream::Error({.file = {},
                              .where = "point " + number_text(p[0]) + " " + number_text(p[1]),
                              .cause = "has no place in " + change_->to().title(),
-                             .remedy = "take another --to-crs or a smaller --region"});
+                             .remedy = "take another `to_crs` or a smaller `region`"});
       }
       p[0] = places[i][0];
       p[1] = places[i][1];

@@ -5,7 +5,6 @@
 #include <limits>
 #include <span>
 
-#include "base/interrupt.hpp"
 #include "surface/point_window.hpp"
 
 namespace terrace::terrain {
@@ -85,9 +84,9 @@ void PointWindow::examine(tri::TriangleId triangle) {
 void PointWindow::settle() {
   triangulation_.start_journal();
   examine_all();
-  for (unsigned i = 0; i < kMostTimesWidened && widen(); ++i) check_interrupt();
+  for (unsigned i = 0; i < kMostTimesWidened && widen(); ++i) store_.check_stop();
   while (add_missing()) {
-    check_interrupt();
+    store_.check_stop();
     insert_taken();
     examine_changes();
   }

@@ -8,6 +8,7 @@
 
 #include "base/units.hpp"
 #include "cli/interrupt.hpp"
+#include "cli/option_names.hpp"
 #include "cli/terminal.hpp"
 #include "earth/source_crs.hpp"
 #include "terrace/stream/error.hpp"
@@ -140,7 +141,7 @@ Summary info_of_file(const std::string& path, const CommonOptions& common) {
   }
   text += "points:    " + with_commas(contents.points) + '\n';
   text += "crs:       " + printable_line(text_of(crs.crs, contents.world)) + '\n';
-  if (!crs.note.empty()) text += "note:      " + printable_line(crs.note) + '\n';
+  if (!crs.note.empty()) text += "note:      " + printable_line(with_option_names(crs.note)) + '\n';
   if (crs.heights != Heights::unknown) text += "vertical:  " + name_of(crs.heights) + '\n';
   text += "bounds:    " + text_of(contents.world) + '\n';
   if (contents.points > 0) {

@@ -177,6 +177,8 @@ class Store {
   /// The same store for work that may be given up: once `stop` is asked, all that reads throws
   /// Stopped. So whoever reads in loops needs no check of its own.
   [[nodiscard]] Store with_stop(std::stop_token stop) const;
+  /// Throws: Stopped once that is asked. For loops that go on without reading.
+  void check_stop() const;
 
   [[nodiscard]] const Schema& schema() const;
   [[nodiscard]] int version() const;
@@ -207,7 +209,6 @@ class Store {
  private:
   struct Impl;
   explicit Store(std::shared_ptr<Impl> impl);
-  void check_stop() const;
 
   std::shared_ptr<Impl> impl_;
   std::stop_token stop_;

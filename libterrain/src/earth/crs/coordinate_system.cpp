@@ -58,10 +58,9 @@ DatumChange change_between(const CrsDefinition& from, const CrsDefinition& to,
        .cause = "the CRS " + from.title() + " has the datum " + from.definition().datum +
                 ", and no operation leads from it to " + to +
                 (change.better().empty() ? "" : ": " + change.better()),
-       .remedy =
-           std::string(change.better().empty() ? "" : "install that grid, or ") +
-           "give --towgs84 dx,dy,dz[,rx,ry,rz,ds], or convert the data to a system on WGS 84, "
-           "ETRS89 or NAD83 first"});
+       .remedy = std::string(change.better().empty() ? "" : "install that grid, or ") +
+                 "give `shift` dx,dy,dz[,rx,ry,rz,ds], or convert the data to a system on WGS 84, "
+                 "ETRS89 or NAD83 first"});
 }
 
 }  // namespace
@@ -284,9 +283,9 @@ void transform(const CoordinateSystem& from, const CoordinateSystem& to, std::sp
 }
 
 DatumShift parse_datum_shift(const std::string& text) {
-  const std::vector<double> numbers = parse_numbers(text, "--towgs84");
+  const std::vector<double> numbers = parse_numbers(text, "`shift`");
   if (numbers.size() != 3 && numbers.size() != 7) {
-    throw UsageError("--towgs84 takes three or seven numbers, dx,dy,dz[,rx,ry,rz,ds], not " +
+    throw UsageError("`shift` takes three or seven numbers, dx,dy,dz[,rx,ry,rz,ds], not " +
                      std::to_string(numbers.size()));
   }
   DatumShift shift{};

@@ -20,7 +20,7 @@ namespace {
 constexpr int kUserDefined = 32767;
 
 [[noreturn]] void fail_geo_keys(const std::string& cause) {
-  throw CrsError(cause, "name the system by its code: --crs EPSG:n");
+  throw CrsError(cause, "name the system by its code: `crs` EPSG:n");
 }
 
 /// The keys of one file.
@@ -316,7 +316,7 @@ void check_geo_keys(const stream::Crs& crs, const CrsDefinition& definition) {
   const std::string code = "EPSG:" + std::to_string(definition.epsg());
   const auto contradict = [&code](const std::string& what) {
     throw ContradictoryCrs("the GeoKeys contradict each other: " + code + " and " + what,
-                           "say which is meant with --crs EPSG:n");
+                           "say which is meant with `crs` EPSG:n");
   };
   const int model = keys.code(1024), projected = keys.known_code(3072);
   if ((model == 1 && definition.geographic) || (model == 2 && !definition.geographic)) {

@@ -14,7 +14,7 @@
 namespace terrace::terrain {
 namespace {
 
-constexpr char kByCode[] = "name the system by its code: --crs EPSG:n";
+constexpr char kByCode[] = "name the system by its code: `crs` EPSG:n";
 
 struct Axis {
   std::string direction;
@@ -293,7 +293,7 @@ void read_vertical_crs(const PJ* crs, CrsDefinition& definition) {
   }
   if (axes[0].direction != "up") {
     throw CrsError("the vertical CRS \"" + name + "\" counts depths downwards",
-                   "name one of heights, or say what heights refer to with --vertical");
+                   "name one of heights, or say what heights refer to with `vertical`");
   }
   definition.vertical_epsg = epsg_of(crs);
   definition.vertical_name = name;

@@ -120,7 +120,7 @@ void set_vertical_epsg(CrsDefinition& definition, int code) {
   const ProjObject vertical = proj_crs_of_code("EPSG", std::to_string(code));
   if (vertical == nullptr || proj_get_type(vertical.get()) != PJ_TYPE_VERTICAL_CRS) {
     throw CrsError("the vertical CRS EPSG:" + std::to_string(code) + " is not known",
-                   "name one that is, or say what heights refer to with --vertical");
+                   "name one that is, or say what heights refer to with `vertical`");
   }
   forget_heights(definition);
   read_vertical_crs(vertical.get(), definition);
@@ -157,7 +157,7 @@ CrsDefinition definition_of_wkt(const std::string& text) {
   if (crs == nullptr) {
     const std::string why = proj_complaint();
     throw CrsError("the definition cannot be read" + (why.empty() ? "" : ": " + why),
-                   "correct the text, or name the system by its code: --crs EPSG:n");
+                   "correct the text, or name the system by its code: `crs` EPSG:n");
   }
   CrsDefinition definition = read_crs(crs.get());
   settle_code(definition);
@@ -196,7 +196,7 @@ std::optional<CrsDefinition> definition_of(const stream::Crs& crs) {
     if (crs.epsg != 0 && definition.epsg() != 0 && alias_of(crs.epsg) != definition.epsg()) {
       throw ContradictoryCrs("its CRS is EPSG:" + std::to_string(crs.epsg) + " by code and EPSG:" +
                                  std::to_string(definition.epsg()) + " by WKT",
-                             "say which is meant with --crs EPSG:n");
+                             "say which is meant with `crs` EPSG:n");
     }
   } else if (crs.epsg != 0) {
     definition = definition_of_epsg(crs.epsg);
@@ -213,7 +213,7 @@ std::optional<CrsDefinition> definition_of(const stream::Crs& crs) {
   if (!definition.geographic && unit && std::abs(*unit / definition.metres_per_unit - 1) > 1e-8) {
     throw ContradictoryCrs(
         "its CRS " + definition.title() + " contradicts its unit, " + crs.horizontal_unit,
-        "say what is meant with --crs EPSG:n");
+        "say what is meant with `crs` EPSG:n");
   }
   if (const auto height = metres_in_unit(crs.vertical_unit)) {
     definition.metres_per_height = *height;

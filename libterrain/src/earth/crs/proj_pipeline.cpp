@@ -60,7 +60,7 @@ class ProjPipeline::Pool {
     if (worker->operation() == nullptr) {
       const std::string why = proj_complaint();
       throw CrsError("PROJ cannot compute '" + definition_ + "'" + (why.empty() ? "" : ": " + why),
-                     "give another CRS with --crs EPSG:n");
+                     "give another CRS with `crs` EPSG:n");
     }
     return worker;
   }

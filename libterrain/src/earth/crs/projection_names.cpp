@@ -40,7 +40,7 @@ struct MethodName {
   int code;
   const char* name;
 };
-constexpr std::array<MethodName, 9> kMethods{{
+constexpr std::array<MethodName, 9> kMethodNames{{
     {ProjectionMethod::transverse_mercator, 9807, "Transverse Mercator"},
     {ProjectionMethod::lambert_1sp, 9801, "Lambert Conic Conformal (1SP)"},
     {ProjectionMethod::lambert_2sp, 9802, "Lambert Conic Conformal (2SP)"},
@@ -125,7 +125,7 @@ std::optional<KnownProjection> known_projection(const PJ* conversion) {
       0) {
     return std::nullopt;
   }
-  for (const MethodName& row : kMethods) {
+  for (const MethodName& row : kMethodNames) {
     if (!is_called(row.code, row.name, authority, code, name)) continue;
     KnownProjection known{.method = row.method, .parameters = {}};
     for (const ConversionParameter& parameter : parameters_of(conversion)) {
