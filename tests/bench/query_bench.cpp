@@ -20,12 +20,12 @@
 #include "cli/choices.hpp"
 #include "cli/cli.hpp"
 #include "earth/world.hpp"
-#include "sample/height_sampler.hpp"
 #include "sample/place_file.hpp"
 #include "sample/sample_run.hpp"
 #include "surface/store_window.hpp"
 #include "terrace/terrain/build.hpp"
 #include "terrace/terrain/detail.hpp"
+#include "terrace/terrain/heights.hpp"
 
 namespace {
 

@@ -135,11 +135,14 @@ std::multiset<Segment> segments_of(const std::vector<Corners>& triangles, double
 
 std::vector<terrain::ContourLine> lines_of(const stream::Store& store,
                                            const terrain::ContourRequest& request,
-                                           std::uint64_t points_per_part) {
+                                           std::uint64_t points_per_part, unsigned threads = 1,
+                                           std::uint64_t memory_bytes = std::uint64_t{1} << 30) {
   std::vector<terrain::ContourLine> lines;
   terrain::draw_point_contours(
       {.store = store,
        .request = request,
+       .threads = threads,
+       .memory_bytes = memory_bytes,
        .emit = [&](const terrain::ContourLine& line) { lines.push_back(line); },
        .limit = {},
        .progress = [](double) {},
@@ -148,7 +151,7 @@ std::vector<terrain::ContourLine> lines_of(const stream::Store& store,
 }
 
 /// The lines are those of the whole, in the same order for any number of threads and memory.
-void expect_contours(const stream::Store& store, terrain::ContourRequest request,
+void expect_contours(const stream::Store& store, const terrain::ContourRequest& request,
                      const std::vector<Corners>& triangles) {
   const auto wanted = [&](const Corners& t) {
     for (std::size_t i = 0; request.max_edge && i < 3; ++i) {
@@ -162,8 +165,6 @@ void expect_contours(const stream::Store& store, terrain::ContourRequest request
   const auto expected = segments_of(triangles, request.interval, wanted);
   for (const std::uint64_t most : {1u << 20, 900u, 70u}) {
     SCOPED_TRACE("parts of " + std::to_string(most));
-    request.threads = 1;
-    request.memory_bytes = std::uint64_t{1} << 30;
     const std::vector<terrain::ContourLine> lines = lines_of(store, request, most);
     std::multiset<Segment> segments;
     for (const terrain::ContourLine& line : lines) {
@@ -176,9 +177,8 @@ void expect_contours(const stream::Store& store, terrain::ContourRequest request
     }
     EXPECT_EQ(segments.size(), expected.size());
     EXPECT_TRUE(segments == expected);
-    request.threads = 3;
-    request.memory_bytes = std::uint64_t{64} << 20;
-    const std::vector<terrain::ContourLine> again = lines_of(store, request, most);
+    const std::vector<terrain::ContourLine> again =
+        lines_of(store, request, most, 3, std::uint64_t{64} << 20);
     ASSERT_EQ(again.size(), lines.size());
     for (std::size_t i = 0; i < lines.size(); ++i) EXPECT_EQ(again[i].points, lines[i].points);
   }

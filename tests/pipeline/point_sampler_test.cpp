@@ -17,8 +17,8 @@
 
 #include "../../libterrain/tests/temporary_folder.hpp"
 #include "cloud_case.hpp"
-#include "sample/height_sampler.hpp"
 #include "terrace/terrain/error.hpp"
+#include "terrace/terrain/heights.hpp"
 
 namespace terrace {
 namespace {
@@ -64,13 +64,13 @@ std::vector<Point2> places_of(const stream::Store& store, const Whole& whole, st
 }
 
 /// Answers, and that neither threads, memory nor what else is asked changes a bit.
-std::vector<SurfacePoint> sampled(const stream::Store& store, terrain::SamplerOptions options,
+std::vector<SurfacePoint> sampled(const stream::Store& store,
+                                  const terrain::SamplerOptions& options,
                                   const std::vector<Point2>& places) {
   std::vector<SurfacePoint> out(places.size()), again(1);
   terrain::make_sampler(store, options)->sample(places, out);
-  options.threads = 3;
-  options.memory_bytes = std::uint64_t{100} << 20;
-  const auto other = terrain::make_sampler(store, options);
+  const auto other = terrain::make_sampler(
+      store, options, {.threads = 3, .memory_bytes = std::uint64_t{100} << 20});
   Random random(23);
   std::vector<std::size_t> order(places.size());
   std::iota(order.begin(), order.end(), std::size_t{0});

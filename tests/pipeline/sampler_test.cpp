@@ -16,9 +16,9 @@
 #include <terrace/tri/interpolation.hpp>
 
 #include "../../libterrain/tests/temporary_folder.hpp"
-#include "sample/height_sampler.hpp"
 #include "terrace/terrain/build.hpp"
 #include "terrace/terrain/error.hpp"
+#include "terrace/terrain/heights.hpp"
 
 namespace terrace {
 namespace {
@@ -103,7 +103,7 @@ class Sampler : public testing::TestWithParam<Raster> {
     const stream::Store store = stream::Store::open(folder_.path() / "dem.store");
     std::vector<terrain::SurfacePoint> out(places.size()), again(places.size());
     terrain::make_sampler(store, {.method = method})->sample(places, out);
-    const auto many = terrain::make_sampler(store, {.method = method, .threads = 3});
+    const auto many = terrain::make_sampler(store, {.method = method}, {.threads = 3});
     for (std::size_t begin = 0; begin < places.size(); begin += 90) {
       const std::size_t size = std::min<std::size_t>(90, places.size() - begin);
       many->sample(std::span(places).subspan(begin, size), std::span(again).subspan(begin, size));

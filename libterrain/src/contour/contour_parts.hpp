@@ -6,10 +6,10 @@
 
 #include <terrace/stream/store.hpp>
 
-#include "contour/contour_run.hpp"
 #include "contour/line_joiner.hpp"
 #include "surface/ground_slope.hpp"
 #include "surface/store_window.hpp"
+#include "terrace/terrain/contours.hpp"
 #include "terrace/terrain/region.hpp"
 
 /// What write_contours() is made of.
@@ -20,6 +20,8 @@ namespace terrace::terrain {
 struct ContourParts {
   const stream::Store& store;
   const ContourRequest& request;
+  unsigned threads = 1;
+  std::uint64_t memory_bytes = std::uint64_t{1} << 30;
   std::function<void(ContourLine&&)> emit;  ///< as ContourText::add() wants them
   OpenLineLimit limit;
   std::function<void(double share)> progress;

@@ -10,10 +10,10 @@
 #include <terrace/stream/store.hpp>
 
 #include "base/fixed_text.hpp"
-#include "contour/contour_run.hpp"
 #include "contour/line_joiner.hpp"
 #include "earth/crs/coordinate_system.hpp"
 #include "surface/ground_slope.hpp"
+#include "terrace/terrain/contours.hpp"
 #include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {

@@ -50,8 +50,7 @@ void draw_lattice_contours(const ContourParts& parts) {
   const GroundSlope ground(store);
   const LatticeWindow lattice = lattice_of(store, ground, request.region);
   const std::int64_t band = std::clamp<std::int64_t>(
-      static_cast<std::int64_t>(request.memory_bytes / 4 / kContourBytesPerSample) /
-          lattice.columns,
+      static_cast<std::int64_t>(parts.memory_bytes / 4 / kContourBytesPerSample) / lattice.columns,
       2, kBandRows);
   const auto stored = [&](const Point2& p) {
     return Point2{p[0] + static_cast<double>(lattice.column),
@@ -73,12 +72,12 @@ void draw_lattice_contours(const ContourParts& parts) {
   }
 
   const auto windows = static_cast<std::size_t>((lattice.columns + kWindow - 1) / kWindow);
-  std::vector<std::unique_ptr<StoreWindow>> readers(std::max(1U, request.threads));
+  std::vector<std::unique_ptr<StoreWindow>> readers(parts.threads);
   std::vector<double> heights;
   for (std::int64_t row = 0; row + 1 < lattice.rows; row += band) {
     const std::int64_t rows = std::min(band + 1, lattice.rows - row);
     heights.resize(static_cast<std::size_t>(lattice.columns * rows));
-    parallel_for(windows, request.threads, [&](unsigned thread, std::size_t i) {
+    parallel_for(windows, parts.threads, [&](unsigned thread, std::size_t i) {
       if (readers[thread] == nullptr) {
         readers[thread] = std::make_unique<StoreWindow>(store);
       }

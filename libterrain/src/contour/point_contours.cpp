@@ -72,9 +72,9 @@ class PointContours {
   }
 
   void draw() {
-    const std::uint64_t memory = request_.memory_bytes / 2;
+    const std::uint64_t memory = parts_.memory_bytes / 2;
     const auto threads = static_cast<unsigned>(
-        std::clamp<std::uint64_t>(memory / kBytesPerWindow, 1, std::max(1U, request_.threads)));
+        std::clamp<std::uint64_t>(memory / kBytesPerWindow, 1, parts_.threads));
     const double most_points =
         std::min({static_cast<double>(memory / threads) / kBytesPerExpected, kMostPointsAtOnce,
                   tree_.part(0).points / (kPartsPerThread * threads)});

@@ -9,7 +9,8 @@
 #include <terrace/tri/delaunay2.hpp>
 
 #include "base/parallel.hpp"
-#include "sample/height_sampler.hpp"
+#include "sample/samplers.hpp"
+#include "surface/lattice_surface.hpp"
 #include "surface/store_window.hpp"
 
 namespace terrace::terrain {
@@ -80,13 +81,13 @@ struct Worker {
 template <class T>
 class LatticeSampler final : public HeightSampler {
  public:
-  LatticeSampler(const stream::Store& store, const SamplerOptions& options)
+  LatticeSampler(const stream::Store& store, const SamplerOptions& options, const Context& context)
       : store_(store),
         options_(options),
         raster_{0, 0, static_cast<std::int64_t>(store.schema().columns),
                 static_cast<std::int64_t>(store.schema().rows)},
         tile_(options.method == tri::Interpolation::kNaturalNeighbour ? kNaturalTile : kTile),
-        workers_(std::max(1U, options.threads)) {}
+        workers_(std::max(1U, context.threads)) {}
 
   void sample(std::span<const Point2> places, std::span<SurfacePoint> out) override {
     std::fill(out.begin(), out.end(), SurfacePoint{});
@@ -211,7 +212,7 @@ class LatticeSampler final : public HeightSampler {
     return std::clamp(std::floor(coordinate + 0.5), 0.0, static_cast<double>(size - 1));
   }
 
-  const stream::Store& store_;
+  stream::Store store_;
   SamplerOptions options_;
   LatticeWindow raster_;
   std::int64_t tile_;
@@ -224,11 +225,12 @@ class LatticeSampler final : public HeightSampler {
 }  // namespace
 
 std::unique_ptr<HeightSampler> make_lattice_sampler(const stream::Store& store,
-                                                    const SamplerOptions& options) {
+                                                    const SamplerOptions& options,
+                                                    const Context& context) {
   if (StoreWindow(store).float_is_exact()) {
-    return std::make_unique<LatticeSampler<float>>(store, options);
+    return std::make_unique<LatticeSampler<float>>(store, options, context);
   }
-  return std::make_unique<LatticeSampler<double>>(store, options);
+  return std::make_unique<LatticeSampler<double>>(store, options, context);
 }
 
 }  // namespace terrace::terrain

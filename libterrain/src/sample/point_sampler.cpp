@@ -11,8 +11,8 @@
 #include <terrace/tri/interpolation.hpp>
 
 #include "base/parallel.hpp"
-#include "sample/height_sampler.hpp"
 #include "sample/nearest_point.hpp"
+#include "sample/samplers.hpp"
 #include "surface/ground_slope.hpp"
 #include "surface/point_window.hpp"
 #include "surface/window_tree.hpp"
@@ -99,11 +99,11 @@ struct CloudWorker {
 
 class PointSampler final : public HeightSampler {
  public:
-  PointSampler(const stream::Store& store, const SamplerOptions& options)
+  PointSampler(const stream::Store& store, const SamplerOptions& options, const Context& context)
       : store_(store), options_(options), tree_(store, options.level, kWindowPoints) {
-    const std::uint64_t memory = options.memory_bytes / 2;
+    const std::uint64_t memory = context.memory_or(0) / 2;
     const auto threads =
-        std::clamp<std::uint64_t>(memory / kThreadBytes, 1, std::max(1U, options.threads));
+        std::clamp<std::uint64_t>(memory / kThreadBytes, 1, std::max(1U, context.threads));
     workers_.resize(threads);
     worker_bytes_ = memory / threads;
     const double whole = tree_.part(0).points;
@@ -308,7 +308,7 @@ class PointSampler final : public HeightSampler {
     });
   }
 
-  const stream::Store& store_;
+  stream::Store store_;
   SamplerOptions options_;
   WindowTree tree_;
   PointWindow::TooLong too_long_;
@@ -324,8 +324,9 @@ class PointSampler final : public HeightSampler {
 }  // namespace
 
 std::unique_ptr<HeightSampler> make_point_sampler(const stream::Store& store,
-                                                  const SamplerOptions& options) {
-  return std::make_unique<PointSampler>(store, options);
+                                                  const SamplerOptions& options,
+                                                  const Context& context) {
+  return std::make_unique<PointSampler>(store, options, context);
 }
 
 }  // namespace terrace::terrain

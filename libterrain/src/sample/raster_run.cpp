@@ -13,6 +13,7 @@
 #include <terrace/stream/geotiff_writer.hpp>
 
 #include "base/parallel.hpp"
+#include "base/progress_report.hpp"
 #include "earth/store_crs.hpp"
 #include "sample/raster_grid.hpp"
 #include "sample/raster_shader.hpp"
@@ -74,17 +75,17 @@ stream::Crs crs_with_keys(const stream::Store& store) {
 
 class RasterRun {
  public:
-  RasterRun(const stream::Store& store, const RasterRequest& request)
+  RasterRun(const stream::Store& store, const RasterRequest& request, const Context& context)
       : request_(request),
+        context_(context),
         grid_(raster_grid(store, request)),
         crs_(request.to ? request.to->to().crs_with_keys() : crs_with_keys(store)),
         ground_(store),
-        sampler_(make_sampler(store, request.sampler)),
+        sampler_(make_sampler(store, request.sampler, context)),
         shader_(grid_, store.schema(), crs_, request.value),
         nodata_(nodata(store, request.value)) {}
 
-  RasterOutcome run(const stream::Channel& heights,
-                    const std::function<void(std::uint64_t, double)>& progress) {
+  RasterOutcome run(const stream::Channel& heights, const ProgressReport& report) {
     stream::GeoTiffOptions options;
     options.columns = grid_.columns;
     options.rows = grid_.rows;
@@ -99,7 +100,7 @@ class RasterRun {
     const std::int64_t across = (grid_.columns + kRunTile - 1) / kRunTile;
     const std::int64_t down = (grid_.rows + kRunTile - 1) / kRunTile;
     std::int64_t side = 1;
-    while (side < kMostSide && bytes_of(2 * side) <= request_.sampler.memory_bytes / 2) side *= 2;
+    while (side < kMostSide && bytes_of(2 * side) <= context_.memory_or(0) / 2) side *= 2;
     std::vector<TilePlace> block;
     double done = 0;
     for_each_square({0, 0}, power_of_two(std::max(across, down)), side, {across, down},
@@ -111,7 +112,7 @@ class RasterRun {
                       make_tiles(block, writer);
                       done += static_cast<double>(block.size());
                       const double all = static_cast<double>(across) * static_cast<double>(down);
-                      if (progress) progress(outcome_.cells_with_data, done / all);
+                      report.update(outcome_.cells_with_data, done / all);
                     });
     writer.commit();
     outcome_.columns = grid_.columns;
@@ -147,7 +148,7 @@ class RasterRun {
     places_.resize(width_ * height);
     surface_.resize(places_.size());
     heights_.resize(places_.size());
-    parallel_for(height, request_.sampler.threads, [&](unsigned, std::size_t j) {
+    parallel_for(height, context_.threads, [&](unsigned, std::size_t j) {
       const std::span<Point2> line(places_.data() + j * width_, width_);
       const auto cell = [](std::int64_t first, std::size_t i) {
         return static_cast<double>(first + static_cast<std::int64_t>(i));
@@ -170,7 +171,7 @@ class RasterRun {
   void make_tiles(std::span<const TilePlace> block, stream::GeoTiffWriter& writer) {
     tiles_.resize(block.size());
     counts_.assign(block.size(), 0);
-    parallel_for(block.size(), request_.sampler.threads, [&](unsigned, std::size_t i) {
+    parallel_for(block.size(), context_.threads, [&](unsigned, std::size_t i) {
       make_tile(i, block[i].column * kRunTile, block[i].row * kRunTile);
     });
     for (std::size_t i = 0; i < block.size(); ++i) {
@@ -220,6 +221,7 @@ class RasterRun {
   }
 
   const RasterRequest& request_;
+  const Context& context_;
   RasterGrid grid_;
   stream::Crs crs_;
   GroundSlope ground_;
@@ -241,8 +243,10 @@ class RasterRun {
 }  // namespace
 
 RasterOutcome write_raster(const stream::Store& store, const RasterRequest& request,
-                           const std::function<void(std::uint64_t, double)>& progress) {
-  return RasterRun(store, request).run(store.schema().coordinates[2], progress);
+                           const Context& context) {
+  const stream::Store source = store.with_stop(context.stop);
+  const ProgressReport report(context, "cells");
+  return RasterRun(source, request, context).run(store.schema().coordinates[2], report);
 }
 
 }  // namespace terrace::terrain

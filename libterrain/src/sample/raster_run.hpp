@@ -9,7 +9,8 @@
 #include <terrace/stream/store.hpp>
 
 #include "earth/store_crs.hpp"
-#include "sample/height_sampler.hpp"
+#include "terrace/terrain/context.hpp"
+#include "terrace/terrain/heights.hpp"
 #include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
@@ -47,9 +48,10 @@ struct RasterOutcome {
 /// hillshade 1 to 255 (0: nodata) under a light from 315 degrees, 45 degrees high.
 ///
 /// Tiles come in the order of a quadtree, so that a store of points is triangulated little more
-/// than once. Memory: some tiles at a time within options.memory_bytes. Throws: stream::Error if
-/// the region does not meet the store; UsageError for a grid of more than 2^31 columns or rows.
+/// than once. Memory: some tiles at a time within the context's bound. Reports "cells". Throws:
+/// stream::Error if the region does not meet the store; UsageError for a grid of more than 2^31
+/// columns or rows.
 RasterOutcome write_raster(const stream::Store& store, const RasterRequest& request,
-                           const std::function<void(std::uint64_t cells, double share)>& progress);
+                           const Context& context);
 
 }  // namespace terrace::terrain

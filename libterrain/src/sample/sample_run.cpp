@@ -8,6 +8,7 @@
 
 #include "base/fixed_text.hpp"
 #include "base/parallel.hpp"
+#include "base/progress_report.hpp"
 #include "surface/ground_slope.hpp"
 
 namespace terrace::terrain {
@@ -50,11 +51,12 @@ class AnswerText {
 
 class Answers {
  public:
-  Answers(const stream::Store& store, const SamplerOptions& options, const PlaceFile& file)
+  Answers(const stream::Store& store, const SamplerOptions& options, const PlaceFile& file,
+          const Context& context)
       : store_(store),
-        options_(options),
+        threads_(context.threads),
         file_(file),
-        sampler_(make_sampler(store, options)),
+        sampler_(make_sampler(store, options, context)),
         ground_(store) {}
 
   SampleCounts answer(const PlaceBatch& batch, const PlaceConversions& conversions,
@@ -66,7 +68,7 @@ class Answers {
     surface_.assign(lines, SurfacePoint{});
     if (conversions.to_written) written_.resize(lines);
     if (layout_) {
-      parallel_for(pieces, options_.threads, [&](unsigned, std::size_t piece) {
+      parallel_for(pieces, threads_, [&](unsigned, std::size_t piece) {
         for (std::size_t i = piece * kLines; i < end_of(piece); ++i) {
           if (!is_place(batch, i)) continue;
           places_[i] = place_of(batch.line(i), *layout_, file_.name(), batch.first_line + i);
@@ -86,7 +88,7 @@ class Answers {
     texts_.resize(pieces);
     counts_.assign(pieces, {});
     const AnswerText numbers(store_, layout_ ? layout_->separator : ',');
-    parallel_for(pieces, options_.threads, [&](unsigned, std::size_t piece) {
+    parallel_for(pieces, threads_, [&](unsigned, std::size_t piece) {
       std::string& text = texts_[piece];
       text.clear();
       for (std::size_t i = piece * kLines; i < end_of(piece); ++i) {
@@ -148,7 +150,7 @@ class Answers {
   }
 
   const stream::Store& store_;
-  SamplerOptions options_;
+  unsigned threads_;
   const PlaceFile& file_;
   std::unique_ptr<HeightSampler> sampler_;
   GroundSlope ground_;
@@ -165,19 +167,21 @@ class Answers {
 SampleCounts answer_places(const stream::Store& store, const SamplerOptions& options,
                            PlaceFile& places, const PlaceConversions& conversions,
                            const std::function<void(std::string_view)>& write,
-                           const std::function<void(const SampleCounts&)>& progress) {
-  Answers answers(store, options, places);
+                           const Context& context) {
+  Answers answers(store, options, places, context);
+  const std::uint64_t memory = context.memory_or(0);
   const auto lines = static_cast<std::size_t>(
-      std::clamp<std::uint64_t>(options.memory_bytes / 3 / kBytesPerLine, 1000, kMostLines));
+      std::clamp<std::uint64_t>(memory / 3 / kBytesPerLine, 1000, kMostLines));
   const auto bytes = static_cast<std::size_t>(
-      std::clamp<std::uint64_t>(options.memory_bytes / 16, std::uint64_t{1} << 20, kMostBytes));
+      std::clamp<std::uint64_t>(memory / 16, std::uint64_t{1} << 20, kMostBytes));
+  const ProgressReport report(context, "points");
   PlaceBatch batch;
   SampleCounts sum;
   while (places.next(batch, bytes, lines)) {
     const SampleCounts counts = answers.answer(batch, conversions, write);
     sum.points += counts.points;
     sum.answered += counts.answered;
-    if (progress) progress(sum);
+    report.update(sum.points, 0);
   }
   return sum;
 }

@@ -9,8 +9,9 @@
 
 #include <terrace/stream/store.hpp>
 
-#include "sample/height_sampler.hpp"
 #include "sample/place_file.hpp"
+#include "terrace/terrain/context.hpp"
+#include "terrace/terrain/heights.hpp"
 
 namespace terrace::terrain {
 
@@ -32,11 +33,11 @@ struct PlaceConversions {
 /// written in another CRS stand in their columns, empty where they have none there, and the columns
 /// are called x and y, or longitude and latitude.
 ///
-/// write: what takes the lines, in order, many at a time.
+/// write: what takes the lines, in order, many at a time. Reports "points".
 /// Throws: stream::Error on bad lines and a damaged store, stream::Stopped, what `write` throws.
 SampleCounts answer_places(const stream::Store& store, const SamplerOptions& options,
                            PlaceFile& places, const PlaceConversions& conversions,
                            const std::function<void(std::string_view)>& write,
-                           const std::function<void(const SampleCounts&)>& progress);
+                           const Context& context);
 
 }  // namespace terrace::terrain

@@ -40,10 +40,11 @@ std::array<double, 2> part_within(const StoredBox& box, const Point2& from, cons
 
 }  // namespace
 
-SurfaceCrossings::SurfaceCrossings(const stream::Store& store, const SamplerOptions& options)
+SurfaceCrossings::SurfaceCrossings(const stream::Store& store, const SamplerOptions& options,
+                                   std::uint64_t memory_bytes)
     : store_(store),
       tree_(store, options.level, kCrossingWindowPoints),
-      window_(store, options.level, options.memory_bytes / 2) {
+      window_(store, options.level, memory_bytes / 2) {
   if (options.max_edge) too_long_ = longer_than(store, *options.max_edge);
 }
 

@@ -6,9 +6,9 @@
 
 #include <terrace/stream/store.hpp>
 
-#include "sample/height_sampler.hpp"
 #include "surface/point_window.hpp"
 #include "surface/window_tree.hpp"
+#include "terrace/terrain/heights.hpp"
 
 namespace terrace::terrain {
 
@@ -23,7 +23,8 @@ class SurfaceCrossings {
   };
 
   /// The level, the memory and max_edge count. The store must outlive this.
-  SurfaceCrossings(const stream::Store& store, const SamplerOptions& options);
+  SurfaceCrossings(const stream::Store& store, const SamplerOptions& options,
+                   std::uint64_t memory_bytes);
 
   /// Calls visit for each crossing between `from` and `to` (stored), in their order, a vertex once;
   /// those closer than 1e-12 of the way are one. Which sides of the line the ends of an edge lie on

@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <limits>
 
+#include "terrace/terrain/heights.hpp"
+
 /// The surface of a raster: what lies between its samples.
 ///
 /// A square of four samples with data is split along the diagonal from (column + 1, row) to
@@ -14,14 +16,6 @@
 /// that of the lattice edges between two samples with data, and of the samples themselves.
 
 namespace terrace::terrain {
-
-/// The surface at a place. NaN: there is none.
-struct SurfacePoint {
-  double height = std::numeric_limits<double>::quiet_NaN();
-  /// Height gained per column and per row.
-  double per_column = std::numeric_limits<double>::quiet_NaN();
-  double per_row = std::numeric_limits<double>::quiet_NaN();
-};
 
 /// Heights of a window of the lattice by rows, NaN where there is none; NaN outside as well.
 template <class T>

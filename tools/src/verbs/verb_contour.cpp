@@ -12,7 +12,7 @@
 #include "cli/detail_options.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/output.hpp"
-#include "contour/contour_run.hpp"
+#include "terrace/terrain/contours.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
@@ -54,13 +54,9 @@ class ContourCommand final : public Command {
     if (!region_.empty()) request.region = crs_.regions(store, common)(Region::parse(region_));
     if (const std::string note = system_of(store).wgs84_note(); !note.empty()) common.say(note);
     request.level = level.value_or(store.top());
-    request.threads = common.threads;
-    request.memory_bytes = common.memory_or(0);
     stream::Sink output(output_, may_replace(output_, common.force), stop_token());
-    ProgressMeter meter(common.progress, "lines");
     const ContourOutcome outcome = write_contours(
-        store, request, [&](std::string_view text) { output.write(text); },
-        [&](std::uint64_t lines, double share) { meter.update(lines, share); });
+        store, request, [&](std::string_view text) { output.write(text); }, common.context());
     output.commit();
 
     Summary summary;

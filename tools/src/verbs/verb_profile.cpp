@@ -16,7 +16,7 @@
 #include "cli/line_option.hpp"
 #include "cli/output.hpp"
 #include "earth/crs/coordinate_system.hpp"
-#include "sample/profile_run.hpp"
+#include "terrace/terrain/profile.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
@@ -72,11 +72,9 @@ class ProfileCommand final : public Command {
       change.reverse(request.line);
     }
     request.sampler.level = level.value_or(store.top());
-    request.sampler.threads = common.threads;
-    request.sampler.memory_bytes = common.memory_or(0);
     stream::Sink output(output_, may_replace(output_, common.force), stop_token());
-    const ProfileOutcome outcome =
-        write_profile(store, request, [&](std::string_view text) { output.write(text); });
+    const ProfileOutcome outcome = write_profile(
+        store, request, [&](std::string_view text) { output.write(text); }, common.context());
     output.commit();
     if (outcome.answered == 0) common.say("the line does not meet the store's data");
 

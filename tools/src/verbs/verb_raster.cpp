@@ -64,15 +64,11 @@ class RasterCommand final : public Command {
     if (output_ == "-") throw UsageError("a GeoTIFF cannot go to standard output; name a file");
     const stream::Store store = open_store(store_);
     request.sampler.level = level.value_or(store.top());
-    request.sampler.threads = common.threads;
-    request.sampler.memory_bytes = common.memory_or(0);
     if (!region_.empty()) request.region = crs_.regions(store, common)(Region::parse(region_));
     request.to = crs_.to(store, common);
     request.output = output_;
     request.replace = may_replace(output_, common.force);
-    ProgressMeter meter(common.progress, "cells");
-    const RasterOutcome outcome = write_raster(
-        store, request, [&](std::uint64_t cells, double share) { meter.update(cells, share); });
+    const RasterOutcome outcome = write_raster(store, request, common.context());
     if (!outcome.assumption.empty()) common.say(outcome.assumption);
 
     Summary summary;

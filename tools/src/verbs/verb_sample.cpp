@@ -70,15 +70,12 @@ class SampleCommand final : public Command {
     const std::optional<unsigned> level = parse_level(level_);
     const stream::Store store = open_store(store_);
     options.level = level.value_or(store.top());
-    options.threads = common.threads;
-    options.memory_bytes = common.memory_or(0);
     const PlaceConversions conversions = conversions_for(store, common);
     PlaceFile places(points_, stop_token());
     stream::Sink output(output_, may_replace(output_, common.force), stop_token());
-    ProgressMeter meter(common.progress, "points");
     const SampleCounts counts = answer_places(
         store, options, places, conversions, [&](std::string_view text) { output.write(text); },
-        [&](const SampleCounts& sum) { meter.update(sum.points, 0); });
+        common.context());
     output.commit();
     if (counts.points > 0 && counts.answered == 0) {
       common.say(

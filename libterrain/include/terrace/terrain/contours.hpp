@@ -8,6 +8,7 @@
 
 #include <terrace/stream/store.hpp>
 
+#include "terrace/terrain/context.hpp"
 #include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
@@ -18,8 +19,6 @@ struct ContourRequest {
   /// Triangles with a longer side, in metres on the ground, are left out.
   std::optional<double> max_edge{};
   std::optional<Region> region{};  ///< in the store's CRS
-  unsigned threads = 1;
-  std::uint64_t memory_bytes = std::uint64_t{1} << 30;
 };
 
 struct ContourOutcome {
@@ -35,13 +34,13 @@ struct ContourOutcome {
 /// convex hull, holes and all, where max_edge does not say otherwise. With a region, the lines of
 /// those squares of samples, or of those triangles, whose middles lie inside; they end there.
 ///
+/// write: what takes the text, in order, much at a time. Reports "lines".
 /// Lines and their order depend on neither threads nor memory. Memory: a band of rows, or a part of
 /// about 65,536 points per thread, and the lines that go on beyond. Throws: stream::Error if the
 /// store has no CRS, does not meet the region, is damaged, or if the lines at work do not fit;
 /// UsageError for a level that the store has not, and for max_edge with a raster at level 0.
-ContourOutcome write_contours(
-    const stream::Store& store, const ContourRequest& request,
-    const std::function<void(std::string_view)>& write,
-    const std::function<void(std::uint64_t lines, double share)>& progress);
+ContourOutcome write_contours(const stream::Store& store, const ContourRequest& request,
+                              const std::function<void(std::string_view)>& write,
+                              const Context& context = {});
 
 }  // namespace terrace::terrain

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "sample/profile_run.hpp"
+#include "terrace/terrain/profile.hpp"
 
 #include <algorithm>
 #include <array>
@@ -31,15 +31,15 @@ Point2 between(const Point2& a, const Point2& b, double t) {
 class ProfileRun {
  public:
   ProfileRun(const stream::Store& store, const ProfileRequest& request,
-             const std::function<void(std::string_view)>& write)
+             const std::function<void(std::string_view)>& write, const Context& context)
       : request_(request),
         write_(write),
         ground_(store),
         distance_(LineDistance::of(store)),
-        sampler_(make_sampler(store, request.sampler)),
+        sampler_(make_sampler(store, request.sampler, context)),
         heights_(FixedText::for_numbers_up_to(largest(store))) {
     if (!request.step && (!store.schema().grid || request.sampler.level > 0)) {
-      crossings_.emplace(store, request.sampler);
+      crossings_.emplace(store, request.sampler, context.memory_or(0));
     }
   }
 
@@ -207,8 +207,9 @@ class ProfileRun {
 }  // namespace
 
 ProfileOutcome write_profile(const stream::Store& store, const ProfileRequest& request,
-                             const std::function<void(std::string_view)>& write) {
-  return ProfileRun(store, request, write).run();
+                             const std::function<void(std::string_view)>& write,
+                             const Context& context) {
+  return ProfileRun(store.with_stop(context.stop), request, write, context).run();
 }
 
 }  // namespace terrace::terrain

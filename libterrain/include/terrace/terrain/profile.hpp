@@ -10,15 +10,16 @@
 
 #include <terrace/stream/store.hpp>
 
-#include "sample/height_sampler.hpp"
+#include "terrace/terrain/context.hpp"
+#include "terrace/terrain/heights.hpp"
 #include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
 
 struct ProfileRequest {
-  SamplerOptions sampler;
-  std::vector<Point2> line;    ///< in the store's CRS, straight between its places there
-  std::optional<double> step;  ///< metres
+  SamplerOptions sampler{};
+  std::vector<Point2> line{};    ///< in the store's CRS, straight between its places there
+  std::optional<double> step{};  ///< metres
 };
 
 struct ProfileOutcome {
@@ -38,6 +39,7 @@ struct ProfileOutcome {
 /// does not show; without a CRS they are the map's. Memory: some thousand rows at a time.
 /// Throws: stream::Error on a damaged store, stream::Stopped, UsageError as make_sampler().
 ProfileOutcome write_profile(const stream::Store& store, const ProfileRequest& request,
-                             const std::function<void(std::string_view)>& write);
+                             const std::function<void(std::string_view)>& write,
+                             const Context& context = {});
 
 }  // namespace terrace::terrain

@@ -2,24 +2,30 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
-#include <string>
 
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/interpolation.hpp>
 
-#include "surface/lattice_surface.hpp"
+#include "terrace/terrain/context.hpp"
 #include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
 
+/// The surface at a place. NaN: there is none.
+struct SurfacePoint {
+  double height = std::numeric_limits<double>::quiet_NaN();
+  /// Height gained per column and per row, or per unit of x and of y.
+  double per_column = std::numeric_limits<double>::quiet_NaN();
+  double per_row = std::numeric_limits<double>::quiet_NaN();
+};
+
 struct SamplerOptions {
   tri::Interpolation method = tri::Interpolation::kLinear;
   unsigned level = 0;  ///< the points of this level and above
-  unsigned threads = 1;
-  std::uint64_t memory_bytes = std::uint64_t{1} << 30;
   /// Metres on the ground: triangles with a longer side are no surface. Not for rasters at level 0.
   std::optional<double> max_edge{};
 };
@@ -27,7 +33,7 @@ struct SamplerOptions {
 /// Heights and gradients of a store's surface at many places at a time.
 ///
 /// Rasters at level 0:
-/// - linear: on the triangulated lattice of lattice_surface.hpp. On edges and samples, where
+/// - linear: on the triangulated lattice of all samples. On edges and samples, where
 ///   triangles differ, the gradient is the mean of those that meet there.
 /// - natural: Sibson's natural neighbours of all samples of the lattice and its gradient (see
 ///   terrace/tri/interpolation.hpp); nothing where one of them has no data.
@@ -60,15 +66,11 @@ class HeightSampler {
   virtual void sample(std::span<const Point2> places, std::span<SurfacePoint> out) = 0;
 };
 
-/// The store must outlive the sampler. Throws: UsageError for a level that the store has not,
-/// and for a max_edge that is refused.
+/// Takes half of the available memory unless the context gives another bound.
+/// Throws: UsageError for a level that the store does not have, and for a max_edge that is refused;
+/// stream::Error, stream::Stopped.
 std::unique_ptr<HeightSampler> make_sampler(const stream::Store& store,
-                                            const SamplerOptions& options);
-
-/// What make_sampler chooses from.
-std::unique_ptr<HeightSampler> make_lattice_sampler(const stream::Store& store,
-                                                    const SamplerOptions& options);
-std::unique_ptr<HeightSampler> make_point_sampler(const stream::Store& store,
-                                                  const SamplerOptions& options);
+                                            const SamplerOptions& options = {},
+                                            const Context& context = {});
 
 }  // namespace terrace::terrain

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "contour/contour_run.hpp"
+#include "terrace/terrain/contours.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,6 +8,7 @@
 
 #include <terrace/stream/error.hpp>
 
+#include "base/progress_report.hpp"
 #include "base/units.hpp"
 #include "contour/contour_parts.hpp"
 #include "contour/contour_text.hpp"
@@ -52,9 +53,11 @@ bool holds_place(const Region& region, const Point2& world) {
   return region.contains({world[0], world[1], low > -1e300 ? low : 0});
 }
 
-ContourOutcome write_contours(const stream::Store& store, const ContourRequest& request,
+ContourOutcome write_contours(const stream::Store& given, const ContourRequest& request,
                               const std::function<void(std::string_view)>& write,
-                              const std::function<void(std::uint64_t, double)>& progress) {
+                              const Context& context) {
+  const stream::Store store = given.with_stop(context.stop);
+  const std::uint64_t memory = context.memory_or(0);
   if (request.level > store.top()) {
     throw UsageError("the store has no level " + std::to_string(request.level) +
                      ": its top is level " + std::to_string(store.top()));
@@ -67,25 +70,25 @@ ContourOutcome write_contours(const stream::Store& store, const ContourRequest& 
                     "give a larger `interval`");
     }
   }
-  ContourText text(store, request.interval, request.threads, write);
+  ContourText text(store, request.interval, context.threads, write);
+  const ProgressReport report(context, "lines");
   ContourParts parts{
       .store = store,
       .request = request,
+      .threads = std::max(1U, context.threads),
+      .memory_bytes = memory,
       .emit = [&](ContourLine&& line) { text.add(std::move(line)); },
-      .limit = {.points = request.memory_bytes / 3 / kContourBytesPerPoint,
+      .limit = {.points = memory / 3 / kContourBytesPerPoint,
                 .exceeded =
                     [&] {
                       throw failure(
                           store,
                           "contour lines that are not at their ends have more than " +
-                              with_commas(request.memory_bytes / 3 / kContourBytesPerPoint) +
+                              with_commas(memory / 3 / kContourBytesPerPoint) +
                               " points, too many for `memory_bytes`",
                           "raise `memory_bytes` or `interval`, or take a smaller `region`");
                     }},
-      .progress =
-          [&](double share) {
-            if (progress) progress(text.outcome().lines, share);
-          },
+      .progress = [&](double share) { report.update(text.outcome().lines, share); },
   };
   if (store.schema().grid && request.level == 0) {
     draw_lattice_contours(parts);

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <memory>
+
+#include "terrace/terrain/heights.hpp"
+
+/// What make_sampler() chooses from.
+
+namespace terrace::terrain {
+
+/// Of a raster at level 0.
+std::unique_ptr<HeightSampler> make_lattice_sampler(const stream::Store& store,
+                                                    const SamplerOptions& options,
+                                                    const Context& context);
+/// Of points, or of a raster at a level above 0.
+std::unique_ptr<HeightSampler> make_point_sampler(const stream::Store& store,
+                                                  const SamplerOptions& options,
+                                                  const Context& context);
+
+}  // namespace terrace::terrain

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Every job of libterrain ends when its context says so, and leaves nothing; others go on.
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <optional>
+#include <span>
+#include <stop_token>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <terrace/stream/error.hpp>
+#include <terrace/stream/geotiff_writer.hpp>
+#include <terrace/stream/store.hpp>
+
+#include "../../libterrain/tests/temporary_folder.hpp"
+#include "sample/raster_run.hpp"
+#include "terrace/terrain/bounded_mesh.hpp"
+#include "terrace/terrain/build.hpp"
+#include "terrace/terrain/contours.hpp"
+#include "terrace/terrain/heights.hpp"
+#include "terrace/terrain/profile.hpp"
+#include "tile/make/tile_source.hpp"
+#include "tile/set/tile_set.hpp"
+
+namespace terrace {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A raster of 400 x 400 cells in UTM, and its points as a cloud.
+class Stop : public testing::Test {
+ protected:
+  static constexpr std::uint32_t kSize = 400;
+
+  void SetUp() override {
+    stream::GeoTiffOptions options;
+    options.columns = options.rows = kSize;
+    options.sample.type = stream::ScalarType::i16;
+    options.world.xy = {30, 0, 500000, 0, -30, 5200000};
+    options.crs.epsg = 32632;
+    std::vector<std::int16_t> samples(kSize * kSize);
+    for (std::uint32_t i = 0; i < samples.size(); ++i) {
+      const std::uint32_t column = i % kSize, row = i / kSize;
+      samples[i] = static_cast<std::int16_t>(400 + column * row % 61 + (column * 7 + row * 3) % 37);
+    }
+    stream::GeoTiffWriter writer(folder_.path() / "dem.tif", options);
+    writer.write_rows(std::as_bytes(std::span(samples)));
+    writer.commit();
+    terrain::build_store(
+        {.inputs = {(folder_.path() / "dem.tif").string()}, .store = folder_.path() / "a.store"});
+    store_.emplace(stream::Store::open(folder_.path() / "a.store"));
+  }
+
+  using Job = std::function<void(const terrain::Context&)>;
+  /// By what they are called; those with a file write `path`.
+  [[nodiscard]] std::map<std::string, Job> jobs(const std::string& path) const {
+    const stream::Store& store = *store_;
+    const auto nowhere = [](std::string_view) {};
+    return {
+        {"bounded mesh",
+         [=, &store](const terrain::Context& context) {
+           write_bounded_mesh(store, {.max_error = 2.0, .path = path + ".ply"}, context);
+         }},
+        {"raster",
+         [=, &store](const terrain::Context& context) {
+           terrain::RasterRequest request;
+           request.output = path + ".tif";
+           write_raster(store, request, context);
+         }},
+        {"heights",
+         [=, &store](const terrain::Context& context) {
+           const std::array<terrain::Point2, 2> places{{{1, 1}, {300, 200}}};
+           std::array<terrain::SurfacePoint, 2> surface{};
+           terrain::make_sampler(store, {}, context)->sample(places, surface);
+         }},
+        {"heights of a level",
+         [=, &store](const terrain::Context& context) {
+           const std::array<terrain::Point2, 2> places{{{1, 1}, {300, 200}}};
+           std::array<terrain::SurfacePoint, 2> surface{};
+           terrain::make_sampler(store, {.level = 1}, context)->sample(places, surface);
+         }},
+        {"profile",
+         [=, &store](const terrain::Context& context) {
+           write_profile(store, {.line = {{500100, 5199000}, {509000, 5191000}}}, nowhere, context);
+         }},
+        {"contours",
+         [=, &store](const terrain::Context& context) {
+           write_contours(store, {.interval = 10}, nowhere, context);
+         }},
+        {"contours of a level",
+         [=, &store](const terrain::Context& context) {
+           write_contours(store, {.interval = 10, .level = 1}, nowhere, context);
+         }},
+        {"tiles",
+         [=, &store](const terrain::Context& context) {
+           terrain::TileSourceOptions source;
+           source.vertical = "ignore";
+           source.memory_bytes = std::uint64_t{1} << 28;
+           const auto tiled = open_tile_source(store, source, context);
+           terrain::TileSetOptions options;
+           options.folder = path + ".tiles";
+           options.last_zoom = 9;
+           fs::create_directory(options.folder);
+           write_tile_set(tiled->surfaces(), options, context);
+         }},
+    };
+  }
+
+  tests::TemporaryFolder folder_;
+  std::optional<stream::Store> store_;
+};
+
+TEST_F(Stop, EndsEveryJobAndLeavesTheOthers) {
+  std::stop_source stop, other;
+  stop.request_stop();
+  const std::string path = (folder_.path() / "out").string();
+  for (const auto& [name, job] : jobs(path)) {
+    SCOPED_TRACE(name);
+    EXPECT_THROW(job({.stop = stop.get_token()}), stream::Stopped);
+    for (const auto& entry : fs::recursive_directory_iterator(folder_.path())) {
+      EXPECT_FALSE(entry.is_regular_file() && entry.path().string().starts_with(path))
+          << entry.path();
+    }
+    fs::remove_all(path + ".tiles");
+    EXPECT_NO_THROW(job({.stop = other.get_token()}));
+    for (const char* ending : {".ply", ".tif", ".tiles"}) fs::remove_all(path + ending);
+  }
+}
+
+TEST_F(Stop, ComesInTheMiddleOfAJob) {
+  const std::string path = (folder_.path() / "out").string();
+  for (const auto& [name, job] : jobs(path)) {
+    SCOPED_TRACE(name);
+    std::stop_source stop;
+    bool reported = false;
+    const terrain::Context context{.stop = stop.get_token(),
+                                   .progress = [&](const terrain::Progress&) {
+                                     reported = true;
+                                     stop.request_stop();
+                                   }};
+    try {
+      job(context);
+    } catch (const stream::Stopped&) {
+      EXPECT_TRUE(reported);
+    }
+    fs::remove_all(path + ".tiles");
+  }
+}
+
+}  // namespace
+}  // namespace terrace
