@@ -150,6 +150,44 @@ TEST(PointSampler, AnswersTheCoarserLevelsOfRasters) {
   for (unsigned level = 1; level <= store.top(); ++level) check_heights(store, level, 400);
 }
 
+TEST(PointSampler, AnswersAlikeHoweverManyPointsAreTriangulatedAtOnce) {
+  // In no order, so that boxes of clusters overlap; some windows have many places and some few.
+  const tests::TemporaryFolder folder;
+  Random random(41);
+  tests::Points points;
+  for (int i = 0; i < 70000; ++i) {
+    points.push_back({random.unit() * 100, random.unit() * 60, random.unit()});
+  }
+  const stream::Store store = stream::Store::open(tests::cloud_store(folder.path(), points));
+  std::vector<Point2> places;
+  for (int i = 0; i < 3000; ++i) {
+    const bool is_crowd = i % 100 != 0;
+    places.push_back({random.unit() * (is_crowd ? 40 : 100), random.unit() * (is_crowd ? 25 : 60)});
+  }
+  const Whole whole(store, 0);
+  const std::vector<double> expected =
+      tri::heights_at(whole.triangulation, whole.heights, places, Interpolation::kLinear, 1);
+  for (const Interpolation method : {Interpolation::kLinear, Interpolation::kNearest}) {
+    std::vector<SurfacePoint> first(places.size()), out(places.size());
+    terrain::make_sampler(store, {.method = method})->sample(places, first);
+    for (const unsigned megabytes : {40U, 64U, 1024U}) {
+      for (const unsigned threads : {1U, 3U}) {
+        SCOPED_TRACE(testing::Message() << megabytes << "M, " << threads << " threads");
+        terrain::make_sampler(
+            store,
+            {.method = method, .threads = threads, .memory_bytes = std::uint64_t{megabytes} << 20})
+            ->sample(places, out);
+        for (std::size_t i = 0; i < places.size(); ++i) {
+          ASSERT_TRUE(same_bits(first[i], out[i])) << i;
+          if (method == Interpolation::kLinear && !std::isnan(expected[i])) {
+            ASSERT_NEAR(out[i].height, expected[i], 1e-9) << i;
+          }
+        }
+      }
+    }
+  }
+}
+
 TEST(PointSampler, GivesNothingInTrianglesWithLongSides) {
   const tests::TemporaryFolder folder;
   const stream::Store store =

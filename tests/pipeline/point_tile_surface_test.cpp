@@ -105,9 +105,14 @@ struct CloudStore {
     for (Point2& p : globe) p[0] = terrain::wrapped_longitude(p[0]);
   }
 
-  [[nodiscard]] terrain::TiledCloud tiled() const {
-    return {store, crs, terrain::EllipsoidalHeights(store.schema(), "ellipsoidal", "", 0),
-            std::uint64_t{256} << 20};
+  /// is_whole: as if all of it fitted into memory.
+  [[nodiscard]] terrain::TiledCloud tiled(bool is_whole = false) const {
+    return {store,
+            crs,
+            terrain::EllipsoidalHeights(store.schema(), "ellipsoidal", "", 0),
+            std::uint64_t{256} << 20,
+            is_whole ? std::uint64_t{256} << 20 : 0,
+            2};
   }
 
  private:
@@ -196,6 +201,40 @@ TEST(PointTileSurface, HasTheSamplesOfABoxAndTheirRange) {
       EXPECT_EQ(got, expected);
     }
     EXPECT_GT(certain, all.globe.size() > 1 ? 8 : -1);
+  }
+}
+
+TEST(PointTileSurface, AnswersAlikeWhetherAllFitsIntoMemoryOrNot) {
+  for (const CloudCase& cloud : cases()) {
+    SCOPED_TRACE(cloud.name);
+    const CloudStore all(cloud);
+    const terrain::TiledCloud parts = all.tiled(), whole = all.tiled(true);
+    ASSERT_FALSE(parts.whole);
+    ASSERT_TRUE(whole.whole && whole.samples);
+    terrain::PointTileSurface some(parts), once(whole);
+    Random random(31);
+    for (int i = 0; i < 120; ++i) {
+      const GeographicBox box = some_box(all, random, i);
+      SCOPED_TRACE(testing::Message() << i << ": " << box.west << " " << box.south << " "
+                                      << box.east << " " << box.north);
+      terrain::SurfaceSamples expected, found;
+      some.samples(box, expected);
+      once.samples(box, found);
+      // In the same order, to the last bit.
+      EXPECT_EQ(found.longitude, expected.longitude);
+      EXPECT_EQ(found.latitude, expected.latitude);
+      EXPECT_EQ(found.height, expected.height);
+      EXPECT_EQ(once.crowded(box), some.crowded(box));
+      std::vector<double> longitude, latitude;
+      for (int k = 0; k < 20; ++k) {
+        longitude.push_back(random(box.west, box.east));
+        latitude.push_back(random(box.south, box.north));
+      }
+      std::vector<double> a(longitude.size()), b(longitude.size());
+      some.heights(longitude, latitude, a);
+      once.heights(longitude, latitude, b);
+      EXPECT_EQ(a, b);
+    }
   }
 }
 

@@ -35,8 +35,8 @@ struct ContourOutcome {
 /// those squares of samples, or of those triangles, whose middles lie inside; they end there.
 ///
 /// write: what takes the text, in order, much at a time. Reports "lines".
-/// Lines and their order depend on neither threads nor memory. Memory: a band of rows, or a part of
-/// about 65,536 points per thread, and the lines that go on beyond. Throws: stream::Error if the
+/// Lines and their order depend on neither threads nor memory. Memory: a band of rows, or parts of
+/// 65,536 to 2^19 points per thread, and the lines that go on beyond. Throws: stream::Error if the
 /// store has no CRS, does not meet the region, is damaged, or if the lines at work do not fit;
 /// UsageError for a level that the store has not, and for max_edge with a raster at level 0.
 ContourOutcome write_contours(const stream::Store& store, const ContourRequest& request,

@@ -20,6 +20,8 @@ constexpr double kMostSamples = 1U << 18;
 constexpr double kNarrowest = 1e-9;
 /// Points that are triangulated at once where places ask for it, at most.
 constexpr double kMostTogether = 1U << 15;
+/// Boxes of which it is remembered whether they are crowded.
+constexpr std::size_t kMostRemembered = 1U << 14;
 
 StoredBox box_around(std::span<const Point2> stored, std::span<const std::uint32_t> part) {
   StoredBox box{stored[part.front()], stored[part.front()]};
@@ -35,13 +37,27 @@ StoredBox box_around(std::span<const Point2> stored, std::span<const std::uint32
 }  // namespace
 
 TiledCloud::TiledCloud(const stream::Store& tiled, CoordinateSystem system,
-                       EllipsoidalHeights heights, std::uint64_t bytes)
+                       EllipsoidalHeights heights, std::uint64_t bytes, std::uint64_t whole_bytes,
+                       unsigned threads)
     : store(tiled),
       places(tiled, std::move(system)),
       vertical(std::move(heights)),
       fill(tiled),
       spacing(cloud_spacing(tiled, places)),
-      window_bytes(bytes) {}
+      window_bytes(bytes) {
+  constexpr std::uint64_t kMostTriangulated = std::uint64_t{1} << 29;
+  const std::uint64_t most =
+      whole_bytes / (PointWindow::kBytesPerPoint + CloudSamples::kBytesPerPoint);
+  if (tiled.points() >= std::min(most, kMostTriangulated)) return;
+  auto all = std::make_unique<PointWindow>(tiled, 0, whole_bytes);
+  try {
+    all->load(places.stored_bounds());
+  } catch (const PointWindow::NoRoom&) {
+    return;
+  }
+  samples = std::make_unique<CloudSamples>(tiled, places, vertical, threads);
+  whole = std::move(all);
+}
 
 PointTileSurface::PointTileSurface(const TiledCloud& cloud)
     : cloud_(cloud),
@@ -65,6 +81,16 @@ void PointTileSurface::expect(const GeographicBox& box) {
 
 bool PointTileSurface::crowded(const GeographicBox& box) {
   if (box.east - box.west < kNarrowest || box.north - box.south < kNarrowest) return false;
+  // Leaves beside each other ask the same of their sides.
+  if (crowded_.size() > kMostRemembered) crowded_.clear();
+  const std::array<double, 4> key{box.west, box.south, box.east, box.north};
+  if (const auto known = crowded_.find(key); known != crowded_.end()) return known->second;
+  const bool is_crowded = counts_as_crowded(box);
+  crowded_[key] = is_crowded;
+  return is_crowded;
+}
+
+bool PointTileSurface::counts_as_crowded(const GeographicBox& box) {
   double count = 0.0;
   for (const StoredBox& window : windows(box)) {
     count += census_.count(window, kMostSamples);
@@ -99,6 +125,10 @@ void PointTileSurface::drop_duplicates() {
 
 void PointTileSurface::samples(const GeographicBox& box, SurfaceSamples& out) {
   out.clear();
+  if (cloud_.samples) {
+    for (const StoredBox& window : windows(box)) cloud_.samples->add(window, box, out, order_);
+    return;
+  }
   WindowPoints more;
   points_.clear();
   for (const StoredBox& window : windows(box)) {
@@ -209,6 +239,10 @@ void PointTileSurface::surface_heights(std::span<const Point2> stored, std::span
     if (cloud_.places.stored_bounds().contains({stored[i][0], stored[i][1], 0.0})) {
       within.push_back(i);
     }
+  }
+  if (cloud_.whole) {
+    for (const std::uint32_t i : within) out[i] = cloud_.whole->at(stored[i]).height;
+    return;
   }
   part_heights(stored, within, out);
 }

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <map>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -14,6 +17,7 @@
 #include "surface/point_fill.hpp"
 #include "surface/point_window.hpp"
 #include "surface/store_window.hpp"
+#include "tile/make/cloud_samples.hpp"
 #include "tile/make/stored_places.hpp"
 #include "tile/make/tile_surface.hpp"
 
@@ -32,11 +36,15 @@ struct TiledCloud {
   std::optional<double> water_height{};
   /// Of a thread, for the triangles of a part.
   std::uint64_t window_bytes = 0;
+  /// All triangles and samples, if they fit into memory; else each thread makes and reads those of
+  /// a part at a time.
+  std::unique_ptr<const PointWindow> whole{};
+  std::unique_ptr<const CloudSamples> samples{};
 
-  /// Reads a level of the store, and a few clusters. Throws: stream::Error if no place of it can be
-  /// told on the globe.
+  /// Reads a level of the store, and a few clusters; all of it where it fits into whole_bytes.
+  /// Throws: stream::Error if no place of it can be told on the globe.
   TiledCloud(const stream::Store& tiled, CoordinateSystem system, EllipsoidalHeights heights,
-             std::uint64_t window_bytes);
+             std::uint64_t window_bytes, std::uint64_t whole_bytes, unsigned threads);
 };
 
 /// The surface of a store of irregular points: linear in the triangles of the Delaunay
@@ -69,6 +77,7 @@ class PointTileSurface final : public TileSurface {
   void part_heights(std::span<const Point2> stored, std::span<std::uint32_t> part,
                     std::span<double> out);
   bool holds(const StoredBox& box) const;
+  bool counts_as_crowded(const GeographicBox& box);
   /// Leaves the first of points at one x, y, in their order.
   void drop_duplicates();
 
@@ -81,6 +90,8 @@ class PointTileSurface final : public TileSurface {
   std::vector<StoredBox> windows_;
   WindowPoints points_;
   std::vector<std::uint32_t> slots_;
+  std::vector<std::uint64_t> order_;
+  std::map<std::array<double, 4>, bool> crowded_;  ///< what is known of boxes
 };
 
 }  // namespace terrace::terrain

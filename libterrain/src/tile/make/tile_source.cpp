@@ -80,7 +80,8 @@ std::unique_ptr<TileSource> open_tile_source(const stream::Store& given,
   }
   const std::uint64_t window =
       std::max(kLeastWindowBytes, options.memory_bytes / options.threads / 2);
-  auto cloud = std::make_unique<TiledCloud>(store, system, std::move(heights), window);
+  auto cloud = std::make_unique<TiledCloud>(store, system, std::move(heights), window,
+                                            options.memory_bytes / 2, options.threads);
   cloud->flat_fill = flat;
   cloud->water_height = water;
   return std::make_unique<SourceOf<TiledCloud, PointTileSurface>>(std::move(cloud),
