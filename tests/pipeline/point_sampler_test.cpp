@@ -173,9 +173,8 @@ TEST(PointSampler, AnswersAlikeHoweverManyPointsAreTriangulatedAtOnce) {
     for (const unsigned megabytes : {40U, 64U, 1024U}) {
       for (const unsigned threads : {1U, 3U}) {
         SCOPED_TRACE(testing::Message() << megabytes << "M, " << threads << " threads");
-        terrain::make_sampler(
-            store,
-            {.method = method, .threads = threads, .memory_bytes = std::uint64_t{megabytes} << 20})
+        terrain::make_sampler(store, {.method = method},
+                              {.threads = threads, .memory_bytes = std::uint64_t{megabytes} << 20})
             ->sample(places, out);
         for (std::size_t i = 0; i < places.size(); ++i) {
           ASSERT_TRUE(same_bits(first[i], out[i])) << i;

@@ -6,7 +6,6 @@
 #include <numeric>
 #include <tuple>
 
-#include "base/interrupt.hpp"
 #include "base/parallel.hpp"
 
 namespace terrace::terrain {
@@ -53,7 +52,6 @@ void CloudSamples::sort_into_cells(const stream::Store& store) {
     for (unsigned level = store.top() + 1; level-- > 0;) {
       store.for_each(level, [&](stream::ClusterId, const stream::ClusterRecord&,
                                 const stream::ClusterPoints& cluster) {
-        check_interrupt();
         for (const stream::Point3& p : cluster.positions) visit(p);
       });
     }
@@ -98,7 +96,7 @@ void CloudSamples::place(const stream::Store& store, const StoredPlaces& places,
   const stream::Channel& channel = store.schema().coordinates[2];
   const std::size_t pieces = (samples_.size() + kConvertedAtOnce - 1) / kConvertedAtOnce;
   parallel_for(pieces, threads, [&](unsigned, std::size_t piece) {
-    check_interrupt();
+    store.check_stop();
     const std::size_t begin = piece * kConvertedAtOnce;
     const std::size_t end = std::min(begin + kConvertedAtOnce, samples_.size());
     std::vector<Point2> globe;

@@ -22,7 +22,7 @@ class CloudSamples {
  public:
   static constexpr std::uint64_t kBytesPerPoint = 36;
 
-  /// Reads the store twice. Throws: stream::Error on a damaged store, Interrupted.
+  /// Reads the store twice. Throws: stream::Error on a damaged store, stream::Stopped.
   CloudSamples(const stream::Store& store, const StoredPlaces& places,
                const EllipsoidalHeights& vertical, unsigned threads);
 

@@ -49,7 +49,7 @@ TiledCloud::TiledCloud(const stream::Store& tiled, CoordinateSystem system,
   const std::uint64_t most =
       whole_bytes / (PointWindow::kBytesPerPoint + CloudSamples::kBytesPerPoint);
   if (tiled.points() >= std::min(most, kMostTriangulated)) return;
-  auto all = std::make_unique<PointWindow>(tiled, 0, whole_bytes);
+  auto all = std::make_unique<PointWindow>(store, 0, whole_bytes);
   try {
     all->load(places.stored_bounds());
   } catch (const PointWindow::NoRoom&) {
