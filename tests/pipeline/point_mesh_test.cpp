@@ -190,7 +190,7 @@ TEST_F(PointMesh, RefusesSamplesOfAPlaceThatAreFartherApartThanTheBound) {
                                          "up to 12.5 m"),
                 std::string::npos)
           << error.what();
-      EXPECT_NE(error.parts().remedy.find("--duplicates"), std::string::npos);
+      EXPECT_NE(error.parts().remedy.find("`duplicates`"), std::string::npos);
     }
     EXPECT_LE(write_bounded_mesh(store, options(12.5, window), common()).max_error, 12.5);
   }
