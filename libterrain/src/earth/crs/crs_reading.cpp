@@ -230,7 +230,7 @@ bool same_numbers(const CrsDefinition& a, const CrsDefinition& b, const PJ* code
   projection_of(a)->forward(one);
   projection_of(b)->forward(other);
   for (std::size_t i = 0; i < one.size(); ++i) {
-    for (const std::size_t axis : {0, 1}) {
+    for (std::size_t axis = 0; axis < 2; ++axis) {
       if (!std::isfinite(one[i][axis]) && !std::isfinite(other[i][axis])) continue;
       if (!(std::abs(one[i][axis] - other[i][axis]) < 1e-4)) return false;
     }

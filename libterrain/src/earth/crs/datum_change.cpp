@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "earth/crs/datum_change.hpp"
 
+#include <algorithm>
 #include <cassert>
-#include <ranges>
 #include <string>
 
 #include <GeographicLib/Math.hpp>
@@ -105,7 +105,8 @@ void DatumChange::forward(std::span<Point2> places) const {
 
 void DatumChange::reverse(std::span<Point2> places) const {
   assert(possible_);
-  for (const Step& step : steps_ | std::views::reverse) apply(step, false, places);
+  std::for_each(steps_.rbegin(), steps_.rend(),
+                [&](const Step& step) { apply(step, false, places); });
 }
 
 }  // namespace terrace::terrain
