@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Counts the cases of a run of `meson test`: not programs, but what they tested.
 
-tally.py LOG...   reads meson-logs/testlog.json of each build; names what was left out and why, and
-                  ends with the line "N passed, N failed, N skipped". Exit status 1 if a case failed,
-                  if none passed, or, with TERRACE_REQUIRE_ORACLES=1, if one was left out for want of
-                  a program or library that can be installed.
+tally.py LOG...   reads meson-logs/testlog.json of each build; names what was left out and why and
+                  the programs that failed with the end of what they printed, and ends with the line
+                  "N passed, N failed, N skipped". Exit status 1 if a case failed, if none passed,
+                  or, with TERRACE_REQUIRE_ORACLES=1, if one was left out for want of a program or
+                  library that can be installed.
 """
 
 import collections
@@ -30,6 +31,7 @@ class Tally:
     def __init__(self):
         self.passed = self.failed = self.skipped = 0
         self.left_out = collections.defaultdict(list)
+        self.failures = []
 
     def skip(self, reason, name):
         self.skipped += 1
@@ -46,6 +48,8 @@ class Tally:
         elif kind not in ('OK', 'EXPECTEDFAIL'):
             # It may have stopped before it could name a case.
             self.failed += self.failed == failed
+            cases = [case[2] for case in GTEST.finditer(text) if case[1] == 'FAILED']
+            self.failures.append((row['name'], kind, cases, text.strip().splitlines()[-30:]))
         elif not known:
             self.passed += 1
 
@@ -98,6 +102,9 @@ def main(logs):
         shown = ', '.join(names[:4]) + (f' and {len(names) - 4} more' if len(names) > 4 else '')
         print(f'left out: {len(names)}: {reason} ({shown})')
         missing += 0 if MAY_LACK.search(reason) else len(names)
+    for name, kind, cases, lines in tally.failures:
+        print(f'{kind}: {name}', *cases)
+        print(*('    ' + line for line in lines), sep='\n')
     required = os.environ.get('TERRACE_REQUIRE_ORACLES') == '1'
     if required and missing:
         print(f'{missing} cases lack what can be installed (./dev oracles), and TERRACE_REQUIRE_ORACLES=1')

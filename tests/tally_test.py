@@ -57,6 +57,8 @@ class TallyTest(unittest.TestCase):
         self.assertEqual(status, 1)
         self.assertEqual(lines[-1], '1 passed, 1 failed, 2 skipped')
         self.assertIn('left out: 1: TERRACE_DATA is not set (Grid.HasData)', lines)
+        self.assertIn('FAIL: program0 All/Grid.Of/3', lines)
+        self.assertIn('    ../grid_test.cpp:17: Skipped', lines)
 
     def test_cases_of_unittest_are_counted_and_named(self):
         status, lines = tally(('OK', UNITTEST))

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <span>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -79,22 +80,40 @@ stream::Schema schema_with(const std::string& vertical, const std::string& unit)
   return schema;
 }
 
+double converted(const EllipsoidalHeights& heights, const Point2& place, double height) {
+  heights.convert(std::span(&place, 1), std::span(&height, 1));
+  return height;
+}
+
 TEST_F(GeoidTest, HeightsBecomeEllipsoidalMetres) {
   const std::string file = write_grid("test.pgm");
   const EllipsoidalHeights plain(schema_with("ellipsoidal", "metre"), "", "", kMemory);
-  EXPECT_EQ(plain.convert({8, 47}, 500), 500);
+  EXPECT_EQ(converted(plain, {8, 47}, 500), 500);
   EXPECT_EQ(plain.note(), "");
   const EllipsoidalHeights feet(schema_with("orthometric", "foot"), "", file, kMemory);
-  EXPECT_NEAR(feet.convert({8, 45}, 1000), 304.8 + undulation(45), 0.01);
+  EXPECT_NEAR(converted(feet, {8, 45}, 1000), 304.8 + undulation(45), 0.01);
   EXPECT_TRUE(feet.has_geoid());
   const EllipsoidalHeights ignored(schema_with("orthometric", "metre"), "ignore", "", kMemory);
-  EXPECT_EQ(ignored.convert({8, 47}, 500), 500);
+  EXPECT_EQ(converted(ignored, {8, 47}, 500), 500);
   EXPECT_NE(ignored.note(), "");
   const EllipsoidalHeights said(schema_with("", "metre"), "ellipsoidal", "", kMemory);
-  EXPECT_EQ(said.convert({8, 47}, 500), 500);
+  EXPECT_EQ(converted(said, {8, 47}, 500), 500);
   const EllipsoidalHeights unknown(schema_with("", ""), "", file, kMemory);
   EXPECT_NE(unknown.note().find("unit"), std::string::npos);
   EXPECT_NE(unknown.note().find("orthometric"), std::string::npos);
+}
+
+TEST_F(GeoidTest, DigestsTellWhichOperationIsMeant) {
+  const auto digest_of = [](const char* vertical, const std::string& geoid) {
+    Digest digest;
+    EllipsoidalHeights(schema_with("orthometric", "metre"), vertical, geoid, kMemory)
+        .add_to(digest);
+    return digest.value();
+  };
+  const std::uint64_t egm96 = digest_of("orthometric", "");
+  EXPECT_EQ(egm96, digest_of("orthometric", ""));
+  EXPECT_NE(egm96, digest_of("", write_grid("test.pgm")));
+  EXPECT_NE(egm96, digest_of("ignore", ""));
 }
 
 TEST_F(GeoidTest, WhatWasNotSaidOrContradictsIsRefused) {
@@ -114,10 +133,10 @@ TEST_F(GeoidTest, WhatWasNotSaidOrContradictsIsRefused) {
 TEST(EllipsoidalHeightsTest, PROJsGridOfEgm96IsTheDefault) {
   const EllipsoidalHeights sea(schema_with("", "metre"), "orthometric", "", kMemory);
   EXPECT_TRUE(sea.has_geoid());
-  EXPECT_NEAR(sea.convert({8, 46}, 1000), 1051.852947, 1e-5);
+  EXPECT_NEAR(converted(sea, {8, 46}, 1000), 1051.852947, 1e-5);
   EXPECT_NE(sea.note().find("EGM96"), std::string::npos) << sea.note();
   const EllipsoidalHeights feet(schema_with("orthometric", "foot"), "orthometric", "", kMemory);
-  EXPECT_NEAR(feet.convert({8, 46}, 1000), 304.8 + 51.852947, 1e-5);
+  EXPECT_NEAR(converted(feet, {8, 46}, 1000), 304.8 + 51.852947, 1e-5);
   EXPECT_THROW(EllipsoidalHeights(schema_with("ellipsoidal", "metre"), "orthometric", "", kMemory),
                UsageError);
 }
@@ -125,8 +144,8 @@ TEST(EllipsoidalHeightsTest, PROJsGridOfEgm96IsTheDefault) {
 TEST(EllipsoidalHeightsTest, TheStoresOwnVerticalSystemGoesBeforeTheDefault) {
   stream::Schema schema = schema_with("orthometric", "metre");
   schema.crs.vertical_epsg = 5773;
-  EXPECT_NEAR(EllipsoidalHeights(schema, "orthometric", "", kMemory).convert({8, 46}, 0), 51.852947,
-              1e-5);
+  EXPECT_NEAR(converted(EllipsoidalHeights(schema, "orthometric", "", kMemory), {8, 46}, 0),
+              51.852947, 1e-5);
   // Debian has no grid of EGM2008; somebody else may.
   schema.crs.vertical_epsg = 3855;
   try {

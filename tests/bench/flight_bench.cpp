@@ -125,7 +125,7 @@ std::string fault(const View& viewer, const Store& store, int stop, double worst
 std::string fly(const char* name, const Flight& flight, View& viewer, View::Reader reader,
                 const Store& store) {
   settle(viewer, reader, flight.view(0.0), kBudget);
-  const View::Traffic before = viewer.traffic();
+  const terrace::terrain::ViewTraffic before = viewer.traffic();
   std::vector<double> times;
   double points = 0.0, changed = 0.0, spent = cpu_seconds();
   int at_target = 0;
@@ -159,7 +159,7 @@ std::string fly(const char* name, const Flight& flight, View& viewer, View::Read
       std::this_thread::sleep_for(std::chrono::duration<double>(rest));
     }
   }
-  const View::Traffic& after = viewer.traffic();
+  const terrace::terrain::ViewTraffic after = viewer.traffic();
   std::sort(times.begin(), times.end());
   const double count = frames();
   std::printf("%-27s %6.2f %6.2f %6.2f %9.2f %9.1f %6d %9.0f %8.0f %9zu %10.2f %8.2f %7.2f\n", name,

@@ -25,6 +25,7 @@
 #include <terrace/stream/store.hpp>
 #include <unistd.h>
 
+#include "../../libterrain/tests/made_raster.hpp"
 #include "../../libterrain/tests/temporary_folder.hpp"
 
 namespace terrace {
@@ -52,21 +53,13 @@ class Build : public testing::Test {
   void SetUp() override {
     stream::GeoTiffOptions options;
     options.columns = options.rows = kSize;
-    options.sample.type = stream::ScalarType::i16;
     options.world.xy = {30, 0, 500000, 0, -30, 5200000};
     options.nodata = -1;
-    std::vector<std::int16_t> samples(kSize * kSize);
-    for (std::uint32_t row = 0; row < kSize; ++row) {
-      for (std::uint32_t column = 0; column < kSize; ++column) {
-        const bool lake = (column / 90 + row / 70) % 7 == 0;
-        const std::uint32_t height = 400 + (column * row) % 61 + (column * 7 + row * 3) % 37;
-        samples[row * kSize + column] = lake ? std::int16_t{-1} : static_cast<std::int16_t>(height);
-        valid_ += lake ? 0 : 1;
-      }
-    }
-    stream::GeoTiffWriter writer(dem(), options);
-    writer.write_rows(std::as_bytes(std::span(samples)));
-    writer.commit();
+    tests::write_made_raster(dem(), options, [this](std::uint32_t column, std::uint32_t row) {
+      if ((column / 90 + row / 70) % 7 == 0) return -1;  // a lake
+      ++valid_;
+      return static_cast<int>(400 + (column * row) % 61 + (column * 7 + row * 3) % 37);
+    });
     request_.inputs = {dem().string()};
     request_.store = folder_.path() / "a.store";
   }

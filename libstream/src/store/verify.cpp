@@ -17,7 +17,8 @@ constexpr std::uint64_t mixed(std::uint64_t x) {
   return x ^ (x >> 31);
 }
 
-/// Of the point that heads cluster `ordinal`; `children`: what it heads on the levels below that.
+/// Fingerprint of the point that heads cluster `ordinal`. children: what it heads on the levels
+/// below.
 std::uint64_t hash_of(std::uint64_t ordinal, const Point3& p, std::span<const std::byte> payload,
                       std::span<const std::uint64_t> children) {
   std::uint64_t h = mixed(ordinal + 0x9e3779b97f4a7c15u);

@@ -81,7 +81,7 @@ void pack(const stream::PointBlock& block, std::size_t payload_size,
 /// source as well, which keeps more files of a mosaic open by it.
 constexpr std::uint64_t kSourceMemory = std::uint64_t{64} << 20;
 constexpr std::size_t kBlocksAhead = 4;
-/// Of a build, unless its context says otherwise.
+/// Memory bound of a build, unless its context gives another.
 constexpr std::uint64_t kMemory = std::uint64_t{256} << 20;
 
 /// Bytes at the peak with so many threads, beside the source's: a generous estimate; a benchmark

@@ -29,9 +29,9 @@ struct ContourParts {
   std::uint64_t points_per_part = std::uint64_t{1} << 16;
 };
 
-/// Of a raster at level 0.
+/// Draws the lines of a raster at level 0.
 void draw_lattice_contours(const ContourParts& parts);
-/// Of points, or of a raster at a level above 0.
+/// Draws the lines of points, or of a raster at a level above 0.
 void draw_point_contours(const ContourParts& parts);
 
 [[noreturn]] void throw_region_outside(const stream::Store& store);

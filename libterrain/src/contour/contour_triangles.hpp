@@ -22,7 +22,7 @@ namespace terrace::terrain {
 /// first part of one of its ends is. Memory: the lines that are not at their ends.
 class ContourTriangles {
  public:
-  /// Of vertices that are in no part.
+  /// The part number of vertices that lie in no part.
   static constexpr std::uint32_t kNoPart = 0xFFFFFFFFu;
 
   struct Corner {

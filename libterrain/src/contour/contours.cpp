@@ -17,7 +17,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// Of a point of a line at work (twice while it grows).
+/// Bytes per point of an unfinished line (the vector doubles while it grows).
 constexpr std::uint64_t kContourBytesPerPoint = 48;
 constexpr double kMostLevels = 1e15;
 

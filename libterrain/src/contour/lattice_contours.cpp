@@ -15,7 +15,7 @@ namespace terrace::terrain {
 namespace {
 
 constexpr std::int64_t kBandRows = 256, kWindow = 512;
-/// Of a sample of a band (height, level).
+/// Bytes per sample of a band: its height and its level.
 constexpr std::uint64_t kContourBytesPerSample = 16;
 
 /// The samples around the region.

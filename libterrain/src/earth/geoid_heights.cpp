@@ -4,6 +4,7 @@
 #include <cassert>
 #include <cmath>
 #include <filesystem>
+#include <string_view>
 #include <system_error>
 
 #include <GeographicLib/Geoid.hpp>
@@ -71,10 +72,8 @@ EllipsoidalHeights::EllipsoidalHeights(const stream::Schema& schema, const std::
                           ? std::string("the store does not say what its heights refer to")
                           : "the store's heights are " + recorded) +
                      ", and globes want heights above the ellipsoid: give `vertical` orthometric "
-                     "(by the store's "
-                     "vertical CRS, or EGM96), `geoid` FILE (a GeographicLib geoid grid), "
-                     "`vertical` ellipsoidal "
-                     "if they are that, or `vertical` ignore");
+                     "(by the store's vertical CRS, or EGM96), `geoid` FILE (a GeographicLib "
+                     "geoid grid), `vertical` ellipsoidal if they are that, or `vertical` ignore");
   }
   // One unit in all verbs, whatever had to be assumed.
   const Ground ground(placement_of(schema));
@@ -103,7 +102,7 @@ void EllipsoidalHeights::add_note(const std::string& what) {
 void EllipsoidalHeights::find_operation(const stream::Schema& schema,
                                         const std::optional<GeographicArea>& area) {
   constexpr int kEgm96 = 5773;
-  std::string name, wkt;
+  std::string name;
   OperationChoice choice;
   try {
     const std::optional<CrsDefinition> known = definition_of(schema.crs);
@@ -141,15 +140,27 @@ void EllipsoidalHeights::find_operation(const stream::Schema& schema,
            (choice.better.empty() ? "" : " (" + choice.better + ")"));
 }
 
-double EllipsoidalHeights::convert(const Point2& place, double height) const {
-  const double metres = height * metres_per_unit_;
-  if (operation_) return metres + operation_->height(place);
-  return geoid_ ? metres + geoid_->undulation(place) : metres;
+void EllipsoidalHeights::convert(std::span<const Point2> places, std::span<double> heights) const {
+  for (double& height : heights) height *= metres_per_unit_;
+  add_geoid(places, heights);
 }
 
-void EllipsoidalHeights::convert(std::span<const Point2> places, std::span<double> heights) const {
+void EllipsoidalHeights::add_geoid(std::span<const Point2> places,
+                                   std::span<double> heights) const {
   assert(places.size() == heights.size());
-  for (std::size_t i = 0; i < heights.size(); ++i) heights[i] = convert(places[i], heights[i]);
+  if (operation_) {
+    operation_->add_heights(places, heights);
+  } else if (geoid_) {
+    for (std::size_t i = 0; i < heights.size(); ++i) {
+      if (!std::isnan(heights[i])) heights[i] += geoid_->undulation(places[i]);
+    }
+  }
+}
+
+void EllipsoidalHeights::add_to(Digest& digest) const {
+  digest.add(metres_per_unit_);
+  digest.add(std::uint64_t{has_geoid()});
+  if (operation_) digest.add(std::string_view(operation_->definition()));
 }
 
 }  // namespace terrace::terrain

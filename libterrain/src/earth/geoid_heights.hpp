@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 
+#include "base/digest.hpp"
 #include "earth/crs/coordinate_system.hpp"
 #include "earth/crs/proj_pipeline.hpp"
 #include "terrace/stream/store.hpp"
@@ -56,12 +57,16 @@ class EllipsoidalHeights {
   /// heights in the store's vertical unit at places in WGS 84 degrees, to metres above the
   /// ellipsoid, in place. Sizes are equal.
   void convert(std::span<const Point2> places, std::span<double> heights) const;
-  [[nodiscard]] double convert(const Point2& place, double height) const;
+  /// The second half of that: heights in metres get what the geoid lies above the ellipsoid. Does
+  /// nothing unless has_geoid(). Ask for many places at once.
+  void add_geoid(std::span<const Point2> places, std::span<double> heights) const;
 
   /// Metres in a unit of the store's heights.
   [[nodiscard]] double metres_per_unit() const { return metres_per_unit_; }
   /// Whether a geoid is added: heights then depend on the place.
   [[nodiscard]] bool has_geoid() const { return geoid_ || operation_; }
+  /// All that the conversion depends on but the bytes of a geoid file: unit, and PROJ's operation.
+  void add_to(Digest& digest) const;
   /// What the user should know: an unknown unit, heights that were not converted. May be empty.
   [[nodiscard]] const std::string& note() const { return note_; }
 

@@ -21,8 +21,8 @@ class NearestPoint {
   /// cache_bytes: decoded clusters to keep. The store must outlive this.
   NearestPoint(const stream::Store& store, unsigned level, std::uint64_t cache_bytes);
 
-  /// Of several equally near ones the lexicographically smallest. Requires a finite place; NaN if
-  /// there are no points. Throws: stream::Error on a damaged store.
+  /// The nearest point; of several equally near, the lexicographically smallest. Requires a finite
+  /// place; NaN if there are no points. Throws: stream::Error on a damaged store.
   Point2 operator()(const Point2& place);
 
  private:

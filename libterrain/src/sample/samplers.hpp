@@ -9,11 +9,11 @@
 
 namespace terrace::terrain {
 
-/// Of a raster at level 0.
+/// Samples a raster at level 0.
 std::unique_ptr<HeightSampler> make_lattice_sampler(const stream::Store& store,
                                                     const SamplerOptions& options,
                                                     const Context& context);
-/// Of points, or of a raster at a level above 0.
+/// Samples points, or a raster at a level above 0.
 std::unique_ptr<HeightSampler> make_point_sampler(const stream::Store& store,
                                                   const SamplerOptions& options,
                                                   const Context& context);

@@ -13,9 +13,10 @@ namespace terrace::terrain {
 namespace {
 
 constexpr std::size_t kCrossingWindowPoints = 16384;
-/// Of a window's size. Boxes around slanting pieces hold more than these.
+/// A line is followed in pieces of this share of a window's size: boxes around slanting pieces hold
+/// more than the pieces.
 constexpr double kCrossingPiece = 0.5;
-/// Of the way: two crossings that rounding may tell apart are one.
+/// Share of the way within which two crossings count as one, since rounding may part them.
 constexpr double kSame = 1e-12;
 
 Point2 point_between(const Point2& a, const Point2& b, double t) {

@@ -21,7 +21,7 @@ bool holds(const StoredBox& box, const stream::Box3& other) {
          box.max[1] >= other.max[1];
 }
 
-/// Of a box that meets another: 1 of one without width or height that lies in it.
+/// Share of `other`, which meets `box`, that lies inside it; 1 if `other` has no area.
 double share_inside(const StoredBox& box, const stream::Box3& other) {
   double share = 1.0;
   for (std::size_t axis = 0; axis < 2; ++axis) {

@@ -15,7 +15,7 @@ namespace {
 
 /// Mean distances of points around the box.
 constexpr double kMargin = 3;
-/// Of its longer side, at most.
+/// The margin is at most this share of the longer side.
 constexpr double kMostMargin = 0.05;
 /// Points to begin with.
 constexpr std::size_t kFirstPoints = 48;

@@ -112,7 +112,7 @@ class PointWindow {
     std::uint32_t cluster = kNowhere, index = 0;
   };
   static constexpr std::uint32_t kNowhere = 0xFFFFFFFF;
-  /// Of a point that is to be inserted.
+  /// What is kept of a point that is to be inserted.
   struct Taken {
     double height = 0;
     Origin origin;
@@ -144,7 +144,7 @@ class PointWindow {
     tri::TriangleId triangle = tri::kNoTriangle;
     std::uint8_t edge = kNone;
   };
-  /// Of a triangle; above it a bit for each edge that is certain to be of the hull.
+  /// State of a triangle; the bits above tell which edges are certain to be on the hull.
   enum State : std::uint8_t { kUnknown, kSuspect, kCertain, kTriangleState = 3, kHullEdge = 4 };
 
   void clear();

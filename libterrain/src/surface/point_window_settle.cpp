@@ -13,12 +13,12 @@ namespace {
 constexpr std::uint32_t kNoOpen = 0xFFFFFFFF;
 /// Few, so that hardly more are looked at than lie near a circle's border; but boxes cost too.
 constexpr std::size_t kPointsPerGroup = 16;
-/// Of the circles that reach over the border, as many as a wider border shall hold.
+/// Share of the circles reaching over the border that a wider border is to hold.
 constexpr double kWidened = 0.95;
-/// Of the window's longer side, at most each time.
+/// Each widening is at most this share of the window's longer side.
 constexpr double kMostWidened = 0.03;
 constexpr unsigned kMostTimesWidened = 3;
-/// Of the window's sides: so far around are the clusters that most suspects may meet.
+/// Clusters that most suspects may meet lie within this share of the window's sides.
 constexpr double kNear = 0.05;
 /// For these each point is looked for by itself.
 constexpr std::size_t kFewSuspects = 12;
@@ -31,7 +31,7 @@ bool meets(const std::array<Point2, 3>& corner, const StoredBox& box) {
     if (low > box.max[k] || high < box.min[k]) return false;
   }
   for (std::size_t i = 0; i < 3; ++i) {
-    // Of the sides seen from outside, the inside is to the right.
+    // Seen from outside, the inside is to the right of a side.
     if (!HalfPlane{corner[(i + 1) % 3], corner[i]}.meets(box)) return false;
   }
   return true;
@@ -109,7 +109,7 @@ void PointWindow::examine_changes() {
     return (states_[tri::slot(suspect.triangle)] & kTriangleState) != kSuspect;
   });
   for (const tri::TriangleId t : changes_.added_triangles) examine(t);
-  // Of what stood beside new triangles, some have circles that meet the box and so name these.
+  // Neighbours of new triangles may have circles that meet the box, which makes these count too.
   if (reach_ == Reach::kCircles) {
     for (const tri::TriangleId t : changes_.added_triangles) {
       if ((states_[tri::slot(t)] & kTriangleState) != kUnknown) continue;
@@ -259,7 +259,7 @@ void PointWindow::part(Outer& outer) {
 bool PointWindow::find_missing(const Suspect& suspect, bool is_near) {
   const CircleCover& cover = suspect.cover;
   const StoredBox bounds = cover.bounds();
-  // Of points that were read the one farthest inside: what is left afterwards is smallest.
+  // Take the point farthest inside among those that were read: it leaves the smallest remainder.
   std::size_t point = pending_.size();
   double depth = std::numeric_limits<double>::infinity();
   const auto look_at_point = [&](std::size_t at) {

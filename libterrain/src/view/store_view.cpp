@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cassert>
 #include <chrono>
 #include <condition_variable>
@@ -59,7 +60,8 @@ class ViewFrame {
 /// The clusters of a store, members in stored coordinates, boxes in the view frame.
 class FramedSource final : public tri::ClusterSource {
  public:
-  FramedSource(const stream::Store& store, const ViewFrame& frame) : inner_(store), frame_(frame) {}
+  FramedSource(const stream::Store& store, const ViewFrame& frame)
+      : store_(store), inner_(store), frame_(frame) {}
 
   [[nodiscard]] unsigned top() const override { return inner_.top(); }
   [[nodiscard]] std::uint64_t cluster_count(unsigned level) const override {
@@ -70,8 +72,17 @@ class FramedSource final : public tri::ClusterSource {
     record.box = frame_.box_of(record.box);
     return record;
   }
-  tri::ClusterMembers read(tri::ClusterId id) override { return inner_.read(id); }
+  tri::ClusterMembers read(tri::ClusterId id) override {
+    const stream::ClusterRecord record =
+        store_.record(stream::cluster_id(tri::level_of(id), tri::ordinal_of(id)));
+    ++clusters_;
+    points_ += record.points;
+    bytes_ += record.bytes;
+    return inner_.read(id);
+  }
 
+  /// What was read so far; may be asked while another thread reads.
+  [[nodiscard]] ViewTraffic traffic() const { return {clusters_, points_, bytes_}; }
   [[nodiscard]] std::vector<std::uint64_t> counts() const {
     std::vector<std::uint64_t> counts;
     for (unsigned level = 0; level < top(); ++level) counts.push_back(cluster_count(level));
@@ -79,8 +90,10 @@ class FramedSource final : public tri::ClusterSource {
   }
 
  private:
+  const stream::Store& store_;
   StoreSource inner_;
   const ViewFrame& frame_;
+  std::atomic<std::uint64_t> clusters_ = 0, points_ = 0, bytes_ = 0;
 };
 
 /// Reads clusters on a thread of its own.
@@ -148,7 +161,7 @@ class ReadingThread {
   std::thread thread_;  ///< last: it uses all of these
 };
 
-/// Of a frame's time, what the calling thread reads in.
+/// Share of a frame's time that the calling thread spends reading.
 constexpr double kReadingShare = 0.4;
 
 }  // namespace
@@ -163,21 +176,13 @@ struct StoreView<Coord>::Impl {
     if (reader == Reader::thread) thread = std::make_unique<ReadingThread>(source);
   }
 
-  void give(tri::GivenCluster cluster) {
-    ++traffic.clusters;
-    const stream::ClusterRecord record = store.record(
-        stream::cluster_id(tri::level_of(cluster.cluster), tri::ordinal_of(cluster.cluster)));
-    traffic.points += record.points;
-    traffic.bytes += record.bytes;
-    control.give(std::move(cluster));
-  }
   /// What the step before asked for, as far as a part of the time goes.
   void read_within(double seconds) {
     const tri::StepBudget budget{.seconds = seconds, .clock = steady_seconds};
     meter.start(budget);
     for (const tri::ViewRequest& request : wanted) {
       if (!meter.has(request.members)) break;
-      give(tri::load(source, request));
+      control.give(tri::load(source, request));
       meter.spend(request.members);
     }
   }
@@ -186,7 +191,6 @@ struct StoreView<Coord>::Impl {
   ViewFrame frame;
   FramedSource source;
   Control control;
-  Traffic traffic;
   bool settled = false;
   std::vector<tri::ViewRequest> wanted;  ///< by the step before, without a thread that reads
   tri::StepMeter meter;
@@ -208,7 +212,9 @@ const typename StoreView<Coord>::Step& StoreView<Coord>::frame(const tri::View& 
                                                                double seconds) {
   const double begin = steady_seconds();
   if (impl_->thread) {
-    for (tri::GivenCluster& cluster : impl_->thread->take()) impl_->give(std::move(cluster));
+    for (tri::GivenCluster& cluster : impl_->thread->take()) {
+      impl_->control.give(std::move(cluster));
+    }
   } else {
     impl_->read_within(kReadingShare * seconds);
   }
@@ -246,8 +252,8 @@ stream::Point3 StoreView<Coord>::in_view_frame(tri::VertexId vertex) const {
 }
 
 template <class Coord>
-const typename StoreView<Coord>::Traffic& StoreView<Coord>::traffic() const {
-  return impl_->traffic;
+ViewTraffic StoreView<Coord>::traffic() const {
+  return impl_->source.traffic();
 }
 
 template class StoreView<std::int32_t>;

@@ -81,7 +81,7 @@ struct NumberRange {
 };
 inline constexpr NumberRange kAboveZero{.least = 0.0, .above_least = true};
 inline constexpr NumberRange kNotNegative{.least = 0.0};
-/// Of factors of lengths and costs: with these what they multiply stays a number.
+/// Range of factors of lengths and costs: products stay finite.
 inline constexpr NumberRange kFactor{.least = 1e-12, .most = 1e12};
 inline constexpr NumberRange kFactorOrZero{.least = 0.0, .most = 1e12};
 

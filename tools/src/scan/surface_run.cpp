@@ -80,7 +80,7 @@ void keep_tetrahedra(const std::vector<stream::Point3>& ground, const tri::Surfa
   tri::BasicShape3<Triangulation> shape(options.shape);
   shape.restore(triangulation);
   outcome.measures = tri::measure(shape.surface(triangulation).surface);
-  // Of equal points the first stands for all.
+  // The first of several equal points stands for all.
   constexpr auto kUnused = std::numeric_limits<std::uint32_t>::max();
   std::vector<std::uint32_t> number(triangulation.vertex_slots(), kUnused);
   for (std::size_t i = 0; i < vertices.size(); ++i) {

@@ -17,7 +17,7 @@ namespace terrace::tools {
 using namespace terrain;
 namespace {
 
-/// Of a row as it stands in the file.
+/// A row as it stands in the file.
 struct Row {
   std::uint32_t a = 0, b = 0;
   double distance = 0;

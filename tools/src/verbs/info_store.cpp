@@ -20,7 +20,7 @@ struct Sizes {
 };
 
 Sizes sizes_of(const stream::Store& store, const stream::LevelInfo& level) {
-  // Of a level with very many clusters every n-th is enough.
+  // Every n-th cluster is enough for a level that has very many.
   constexpr std::uint64_t kMost = 200000;
   const std::uint64_t stride = level.clusters / kMost + 1;
   const std::uint64_t representative = level.level == store.top() ? 0 : 1;

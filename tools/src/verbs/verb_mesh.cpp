@@ -1,4 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <cstdlib>  // tells which C library this is
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
+
 #include <memory>
 #include <optional>
 #include <string>
@@ -13,7 +18,6 @@
 #include "cli/crs_options.hpp"
 #include "cli/detail_options.hpp"
 #include "cli/interrupt.hpp"
-#include "cli/keep_memory.hpp"
 #include "cli/output.hpp"
 #include "cli/smooth_option.hpp"
 #include "mesh/height_overlay.hpp"
@@ -28,6 +32,19 @@ namespace terrace::tools {
 
 using namespace terrain;
 namespace {
+
+/// For work that allocates and frees blocks of about the same sizes again and again, on several
+/// threads: from here on what is freed stays with the process, where the C library can be told so.
+/// Else the system takes large blocks back each time and clears each page that it gives anew, which
+/// took 7 % of the time of meshing. What is in use at the same time does not grow.
+void keep_freed_memory() {
+#ifdef __GLIBC__
+  constexpr int kMegabyte = 1 << 20;
+  mallopt(M_MMAP_THRESHOLD, 32 * kMegabyte);  // the most that it takes
+  mallopt(M_TRIM_THRESHOLD, 512 * kMegabyte);
+  mallopt(M_TOP_PAD, kMegabyte);
+#endif
+}
 
 class MeshCommand final : public Command {
  public:

@@ -105,7 +105,7 @@ class TileCommand final : public Command {
   bool gzip_ = false, normals_ = false, metadata_ = false, resume_ = false;
 };
 
-/// Of the store that the tiles depend on.
+/// Identifies the store: a change invalidates every tile.
 std::string store_fingerprint(const stream::Store& store) {
   const std::vector<std::byte> manifest = read_tile_file((store.path() / "manifest.json").string());
   return std::to_string(checksum_of(manifest));

@@ -189,7 +189,7 @@ class Store {
   [[nodiscard]] std::uint64_t bytes() const;
   /// The CRC-32 of the manifest, which has those of all files: it names the store.
   [[nodiscard]] std::uint32_t checksum() const;
-  /// Of all points, in stored coordinates.
+  /// The bounding box of all points, in stored coordinates.
   [[nodiscard]] const Box3& bounds() const;
   /// Mean of stored coordinate 2 over all points.
   [[nodiscard]] double mean_height() const;

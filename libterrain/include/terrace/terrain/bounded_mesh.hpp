@@ -34,7 +34,7 @@ struct BoundedMeshOptions {
   Fill fill = Fill::none;
   std::optional<Region> region{};  ///< in the store's CRS
   std::string path{};              ///< of the mesh; "-" is standard output
-  stream::WriterOptions writer{};  ///< its format
+  stream::WriterOptions writer{};  ///< its format; the context's stop counts, not this one's
   /// Irregular samples meshed at once, at most; the mesh depends on it.
   std::size_t window_points = std::size_t{1} << 18;
 };

@@ -29,7 +29,7 @@ struct ContourOutcome {
 /// latitude per line, with its height as `elev`, higher ground on its right. See ContourLevels for
 /// what is exact.
 ///
-/// Of a raster at level 0 the surface is that of lattice_surface.hpp; else the Delaunay
+/// The surface of a raster at level 0 is its triangulated lattice of samples; else the Delaunay
 /// triangulation of the points of the level and above (see PointWindow), which spans the points'
 /// convex hull, holes and all, where max_edge does not say otherwise. With a region, the lines of
 /// those squares of samples, or of those triangles, whose middles lie inside; they end there.

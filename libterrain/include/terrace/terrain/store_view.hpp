@@ -9,6 +9,11 @@
 
 namespace terrace::terrain {
 
+struct ViewTraffic {
+  std::uint64_t clusters = 0, points = 0;
+  std::uint64_t bytes = 0;  ///< as they are stored
+};
+
 /// A store under a camera: clusters expand where the camera comes near and collapse where it has
 /// been, frame by frame, under budgets of time and memory. (J. Skala, Algorithms for manipulating
 /// large geometric data, section 8.4; the control is tri::ViewControl, which this feeds.)
@@ -54,12 +59,8 @@ class StoreView {
   [[nodiscard]] stream::Point3 in_view_frame(const stream::Point3& stored) const;
   [[nodiscard]] stream::Point3 in_view_frame(tri::VertexId vertex) const;
 
-  /// What has been read so far.
-  struct Traffic {
-    std::uint64_t clusters = 0, points = 0;
-    std::uint64_t bytes = 0;  ///< as they are stored
-  };
-  [[nodiscard]] const Traffic& traffic() const;
+  /// What has been read so far, the root included.
+  [[nodiscard]] ViewTraffic traffic() const;
 
  private:
   struct Impl;

@@ -28,10 +28,9 @@ class CoordinateSystem {
   explicit CoordinateSystem(const CrsDefinition& definition);
 
   /// What a user writes: "EPSG:n", "EPSG:n+m" (horizontal and vertical), a code of another
-  /// authority
-  /// ("ESRI:54030"), a name, WKT, PROJJSON, or the name of a file with one of these two (.prj,
-  /// .wkt). shift: of `--towgs84`, for a datum that does not count as WGS 84; it goes before PROJ's
-  /// operations. Throws: UsageError, naming the code or text and the remedy.
+  /// authority ("ESRI:54030"), a name, WKT, PROJJSON, or the name of a file with one of these two
+  /// (.prj, .wkt). shift: of `--towgs84`, for a datum that does not count as WGS 84; it goes before
+  /// PROJ's operations. Throws: UsageError, naming the code or text and the remedy.
   static CoordinateSystem parse(const std::string& text,
                                 const std::optional<DatumShift>& shift = std::nullopt);
   /// What a source or a store records. Nothing if it says nothing of a CRS.

@@ -46,7 +46,7 @@ using DatumShift = std::array<double, 7>;
 
 /// A CRS taken apart: plain data, read from PROJ. Angles in degrees, lengths in metres.
 struct CrsDefinition {
-  /// Of the horizontal system: "EPSG", "32632"; empty without a code.
+  /// The horizontal system's code, such as "EPSG" and "32632"; empty if it has none.
   std::string authority, code;
   std::string name;
   std::string wkt;  ///< of the horizontal system without heights, WKT 2

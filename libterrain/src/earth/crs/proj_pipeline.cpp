@@ -53,6 +53,8 @@ class ProjPipeline::Pool {
     std::unique_ptr<Worker> worker_;
   };
 
+  [[nodiscard]] const std::string& definition() const { return definition_; }
+
  private:
   [[nodiscard]] std::unique_ptr<Worker> made() const {
     proj_complaint();
@@ -114,6 +116,8 @@ void move_all(PJ* operation, PJ_DIRECTION direction, std::span<Point2> places) {
 ProjPipeline::ProjPipeline(const std::string& definition)
     : pool_(std::make_shared<Pool>(definition)) {}
 
+const std::string& ProjPipeline::definition() const { return pool_->definition(); }
+
 void ProjPipeline::forward(std::span<Point2> places) const {
   move_all(Pool::Loan(*pool_).operation(), PJ_FWD, places);
 }
@@ -122,9 +126,13 @@ void ProjPipeline::reverse(std::span<Point2> places) const {
   move_all(Pool::Loan(*pool_).operation(), PJ_INV, places);
 }
 
-double ProjPipeline::height(const Point2& place) const {
-  const double z = moved(Pool::Loan(*pool_).operation(), PJ_FWD, place).xyzt.z;
-  return std::isfinite(z) ? z : std::numeric_limits<double>::quiet_NaN();
+void ProjPipeline::add_heights(std::span<const Point2> places, std::span<double> heights) const {
+  const Pool::Loan loan(*pool_);
+  for (std::size_t i = 0; i < heights.size(); ++i) {
+    if (std::isnan(heights[i])) continue;
+    const double z = moved(loan.operation(), PJ_FWD, places[i]).xyzt.z;
+    heights[i] += std::isfinite(z) ? z : std::numeric_limits<double>::quiet_NaN();
+  }
 }
 
 }  // namespace terrace::terrain

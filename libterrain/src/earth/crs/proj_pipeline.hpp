@@ -17,11 +17,14 @@ class ProjPipeline {
   /// definition: "+proj=pipeline ...". Throws: CrsError if PROJ cannot compute it.
   explicit ProjPipeline(const std::string& definition);
 
+  [[nodiscard]] const std::string& definition() const;
+
   /// In place; NaN where there is no place. 0.6 (Krovak) to 4 million (LAEA) places per second.
   void forward(std::span<Point2> places) const;
   void reverse(std::span<Point2> places) const;
-  /// What becomes of the height 0 there; NaN if nothing.
-  [[nodiscard]] double height(const Point2& place) const;
+  /// Adds to each height what becomes of the height 0 at its place; NaN if nothing. Sizes are
+  /// equal.
+  void add_heights(std::span<const Point2> places, std::span<double> heights) const;
 
  private:
   class Pool;

@@ -60,28 +60,37 @@ class ProjectionBatch final : public Projection {
   double longitude_, east_, north_;
 };
 
-/// One of GeographicLib's projections with a central meridian, y counted from `latitude`.
+/// x, y of a place by one of GeographicLib's projections with a central meridian, and back.
+template <class Library>
+Point2 plane_of(const Library& library, double turn, double latitude) {
+  Point2 plane{};
+  library.Forward(0, latitude, turn, plane[0], plane[1]);
+  return plane;
+}
+template <class Library>
+Point2 place_of(const Library& library, double x, double y) {
+  Point2 place{};
+  library.Reverse(0, x, y, place[1], place[0]);
+  return place;
+}
+
+/// Such a projection with y counted from `latitude`.
 template <class Library>
 class WithMeridian {
  public:
-  WithMeridian(Library library, double latitude) : library_(std::move(library)) {
-    double x = 0;
-    library_.Forward(0, latitude, 0, x, north_);
-  }
+  WithMeridian(Library library, double latitude)
+      : library_(std::move(library)), north_(plane_of(library_, 0, latitude)[1]) {}
   [[nodiscard]] Point2 forward(double turn, double latitude) const {
-    double x = 0, y = 0;
-    library_.Forward(0, latitude, turn, x, y);
-    return {x, y - north_};
+    const Point2 plane = plane_of(library_, turn, latitude);
+    return {plane[0], plane[1] - north_};
   }
   [[nodiscard]] Point2 reverse(double x, double y) const {
-    double latitude = 0, turn = 0;
-    library_.Reverse(0, x, y + north_, latitude, turn);
-    return {turn, latitude};
+    return place_of(library_, x, y + north_);
   }
 
  private:
   Library library_;
-  double north_ = 0;
+  double north_;
 };
 
 template <class Library>
@@ -139,14 +148,11 @@ class ConformalCone {
   [[nodiscard]] Point2 forward(double turn, double latitude) const {
     if (latitude == pole_) return {0, apex_ - north_};
     if (std::abs(latitude) == 90) return {kNowhere, kNowhere};
-    double x = 0, y = 0;
-    library_.Forward(0, latitude, turn, x, y);
-    return {x, y - north_};
+    const Point2 plane = plane_of(library_, turn, latitude);
+    return {plane[0], plane[1] - north_};
   }
   [[nodiscard]] Point2 reverse(double x, double y) const {
-    double latitude = 0, turn = 0;
-    library_.Reverse(0, x, y + north_, latitude, turn);
-    return {turn, latitude};
+    return place_of(library_, x, y + north_);
   }
 
  private:

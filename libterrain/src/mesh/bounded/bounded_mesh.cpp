@@ -2,6 +2,7 @@
 #include "terrace/terrain/bounded_mesh.hpp"
 
 #include <optional>
+#include <stop_token>
 #include <string>
 
 #include <terrace/stream/error.hpp>
@@ -17,7 +18,8 @@ namespace {
 
 /// By a RasterMesher or a PointMesher.
 template <class Mesher>
-BoundedMeshResult mesh_by(Mesher mesher, const BoundedMeshOptions& options) {
+BoundedMeshResult mesh_by(Mesher mesher, const BoundedMeshOptions& options,
+                          const std::stop_token& stop) {
   const double metres = mesher.metres_vertical();
   BoundedMeshResult result;
   std::optional<MeshSpool> spool;
@@ -45,7 +47,9 @@ BoundedMeshResult mesh_by(Mesher mesher, const BoundedMeshOptions& options) {
                            .remedy = "allow more points"});
     }
   }
-  spool->write(options.path, options.writer, mesher.bounds());
+  stream::WriterOptions writer = options.writer;
+  writer.stop = stop;
+  spool->write(options.path, writer, mesher.bounds());
   result.max_error *= metres;
   result.rms_error *= metres;
   return result;
@@ -56,11 +60,12 @@ BoundedMeshResult mesh_by(Mesher mesher, const BoundedMeshOptions& options) {
 BoundedMeshResult write_bounded_mesh(const stream::Store& store, const BoundedMeshOptions& options,
                                      const Context& context) {
   const stream::Store source = store.with_stop(context.stop);
-  if (store.schema().grid) return mesh_by(RasterMesher(source, options, context), options);
+  if (store.schema().grid)
+    return mesh_by(RasterMesher(source, options, context), options, context.stop);
   if (options.fill != Fill::none) {
     throw UsageError("`fill` is for rasters: irregular points have no cells without data");
   }
-  return mesh_by(PointMesher(source, options, context), options);
+  return mesh_by(PointMesher(source, options, context), options, context.stop);
 }
 
 }  // namespace terrace::terrain

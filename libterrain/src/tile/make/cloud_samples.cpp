@@ -106,19 +106,12 @@ void CloudSamples::place(const stream::Store& store, const StoredPlaces& places,
       heights.push_back(samples_[i].height * channel.scale + channel.offset);
     }
     places.to_geographic(globe);
-    // A place that is none on the globe has no geoid either; it lies in no box.
+    vertical.convert(globe, heights);
     for (std::size_t k = 0; k < globe.size(); ++k) {
-      if (std::isfinite(globe[k][0]) && std::isfinite(globe[k][1]) && std::isfinite(heights[k])) {
-        heights[k] = vertical.convert(globe[k], heights[k]);
-      } else {
-        globe[k] = {NAN, NAN};
-      }
-    }
-    for (std::size_t k = 0; k < globe.size(); ++k) {
-      Sample& sample = samples_[begin + k];
-      sample.longitude = globe[k][0];
-      sample.latitude = globe[k][1];
-      sample.height = heights[k];
+      // What has no place on the globe, or no height, lies in no box.
+      const bool there = std::isfinite(heights[k]);
+      samples_[begin + k] = {there ? globe[k][0] : NAN, there ? globe[k][1] : NAN, heights[k],
+                             samples_[begin + k].number};
     }
   });
 }

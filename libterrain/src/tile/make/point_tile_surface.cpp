@@ -257,15 +257,15 @@ void PointTileSurface::heights(std::span<const double> longitude, std::span<cons
   const stream::Channel& channel = cloud_.store.schema().coordinates[2];
   for (std::size_t i = 0; i < places.size(); ++i) {
     // The line of 180 degrees has two numbers, and tiles on both sides of it.
-    const Point2 place{places[i][0] == 180.0 ? -180.0 : places[i][0], places[i][1]};
-    if (!std::isnan(out[i])) {
-      out[i] = cloud_.vertical.convert(place, out[i]);
-    } else if (cloud_.flat_fill) {
-      out[i] = *cloud_.flat_fill;
-    } else {
-      const double filled = cloud_.fill.height(stored[i][0], stored[i][1]);
-      out[i] = cloud_.vertical.convert(place, filled * channel.scale + channel.offset);
+    if (places[i][0] == 180.0) places[i][0] = -180.0;
+    if (std::isnan(out[i]) && !cloud_.flat_fill) {
+      out[i] = cloud_.fill.height(stored[i][0], stored[i][1]) * channel.scale + channel.offset;
     }
+  }
+  cloud_.vertical.convert(places, out);
+  if (!cloud_.flat_fill) return;
+  for (double& height : out) {
+    if (std::isnan(height)) height = *cloud_.flat_fill;
   }
 }
 
@@ -289,8 +289,7 @@ std::uint64_t PointTileSurface::digest(const GeographicBox& /*box*/) {
   Digest digest;
   digest.add(std::uint64_t{cloud_.store.checksum()});
   digest.add(cloud_.store.points());
-  digest.add(cloud_.vertical.metres_per_unit());
-  digest.add(std::uint64_t{cloud_.vertical.has_geoid()});
+  cloud_.vertical.add_to(digest);
   for (const std::optional<double>& option : {cloud_.flat_fill, cloud_.water_height}) {
     digest.add(std::uint64_t{option.has_value()});
     digest.add(option.value_or(0.0));

@@ -34,7 +34,7 @@ struct TiledCloud {
   std::optional<double> flat_fill{};
   /// Where the surface has this height (in the store's unit) is water.
   std::optional<double> water_height{};
-  /// Of a thread, for the triangles of a part.
+  /// Memory that a thread may use for the triangles of a part.
   std::uint64_t window_bytes = 0;
   /// All triangles and samples, if they fit into memory; else each thread makes and reads those of
   /// a part at a time.
@@ -66,11 +66,11 @@ class PointTileSurface final : public TileSurface {
                std::span<double> out) override;
   void water(std::span<const double> longitude, std::span<const double> latitude,
              std::span<std::uint8_t> out) override;
-  /// Of the whole store: a point changes the triangles around it, and the fill, far away.
+  /// Depends on the whole store: a point changes the triangles around it, and the fill far away.
   std::uint64_t digest(const GeographicBox& box) override;
 
  private:
-  /// Of the store's places, kept for the box asked for last.
+  /// Windows of the store for the box that was asked for last.
   const std::vector<StoredBox>& windows(const GeographicBox& box);
   /// In the store's vertical unit, by the stored places; NaN beyond the hull.
   void surface_heights(std::span<const Point2> stored, std::span<double> out);

@@ -30,15 +30,14 @@ void add_raster(const TiledRaster& raster, Digest& digest) {
   const stream::Crs crs = raster.crs.crs();
   digest.add(static_cast<std::uint64_t>(crs.epsg));
   digest.add(crs.wkt);
-  digest.add(raster.vertical.metres_per_unit());
-  digest.add(std::uint64_t{raster.vertical.has_geoid()});
+  raster.vertical.add_to(digest);
   for (const std::optional<double>& option : {raster.flat_fill, raster.water_height}) {
     digest.add(std::uint64_t{option.has_value()});
     digest.add(option.value_or(0.0));
   }
 }
 
-/// Of the samples of a window, and of the fill where it is asked.
+/// Adds the samples of a window, and the fill where it is used.
 void add_window(const TiledRaster& raster, const LatticeWindow& window, Digest& digest) {
   digest.add(raster.blocks.digest(window));
   if (raster.flat_fill) return;

@@ -55,26 +55,31 @@ bool RasterTileSurface::grid(const GeographicBox& box, SurfaceGrid& out) {
   out.longitude.resize(window.size());
   out.latitude.resize(window.size());
   out.height.resize(window.size());
+  filled_.clear();
   if (window.size() == 0) return true;
   const View view = this->view(window);
   raster_.geography.window(window.column, window.row, out.columns,
                            static_cast<std::size_t>(window.rows), out.longitude, out.latitude);
+  const double metres = raster_.vertical.metres_per_unit();
   for (std::size_t i = 0; i < out.height.size(); ++i) {
     const double longitude = wrapped(out.longitude[i]), latitude = out.latitude[i];
     out.longitude[i] = longitude;
-    // Written so that NaN is outside.
+    // Comparisons that NaN fails: it is outside.
     const bool inside = longitude >= box.west && longitude <= box.east && latitude >= box.south &&
                         latitude <= box.north;
     const double height = view.first[static_cast<std::int64_t>(i / out.columns) * view.stride +
                                      static_cast<std::int64_t>(i % out.columns)];
-    if (!inside) {
-      out.height[i] = std::numeric_limits<double>::quiet_NaN();
-    } else if (std::isnan(height)) {
-      out.height[i] = raster_.flat_fill.value_or(height);
-    } else {
-      out.height[i] = raster_.vertical.convert({longitude, latitude}, height);
-    }
+    out.height[i] = inside ? height * metres : std::numeric_limits<double>::quiet_NaN();
+    if (raster_.flat_fill && inside && std::isnan(height)) filled_.push_back(i);
   }
+  if (raster_.vertical.has_geoid()) {
+    places_.resize(out.height.size());
+    for (std::size_t i = 0; i < places_.size(); ++i) {
+      places_[i] = {out.longitude[i], out.latitude[i]};
+    }
+    raster_.vertical.add_geoid(places_, out.height);
+  }
+  for (const std::size_t i : filled_) out.height[i] = *raster_.flat_fill;
   return true;
 }
 
@@ -119,10 +124,9 @@ bool RasterTileSurface::rows(const GeographicBox& box, SurfaceRows& out) {
     for (std::size_t k = 0; k < across->count; ++k) to[k] = from[k] * metres;
     if (across->descending) std::reverse(to, to + across->count);
     if (raster_.vertical.has_geoid()) {
-      for (std::size_t k = 0; k < across->count; ++k) {
-        const double height = from[across->descending ? across->count - 1 - k : k];
-        to[k] = raster_.vertical.convert({out.longitude[k], out.latitude[i]}, height);
-      }
+      places_.clear();
+      for (const double place : out.longitude) places_.push_back({place, out.latitude[i]});
+      raster_.vertical.add_geoid(places_, {to, across->count});
     }
     if (raster_.flat_fill) {
       for (std::size_t k = 0; k < across->count; ++k) {

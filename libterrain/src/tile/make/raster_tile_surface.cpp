@@ -135,6 +135,10 @@ void RasterTileSurface::visit_places(std::span<const double> longitude,
 
 void RasterTileSurface::heights(std::span<const double> longitude, std::span<const double> latitude,
                                 std::span<double> out) {
+  const double metres = raster_.vertical.metres_per_unit();
+  // Heights of samples in metres, and how much of the geoid each needs: flat fill is above the
+  // ellipsoid already.
+  geoid_shares_.assign(out.size(), 1.0);
   visit_places(longitude, latitude,
                [&](std::size_t i, const Point2& p, const double* at, std::int64_t stride) {
                  const double fx = p[0] - std::floor(p[0]), fy = p[1] - std::floor(p[1]);
@@ -145,31 +149,33 @@ void RasterTileSurface::heights(std::span<const double> longitude, std::span<con
                  const double height =
                      weighed((1.0 - fy) * (1.0 - fx), at[0]) + weighed((1.0 - fy) * fx, at[1]) +
                      weighed(fy * (1.0 - fx), at[stride]) + weighed(fy * fx, at[stride + 1]);
-                 const Point2 place{longitude[i], latitude[i]};
-                 if (!std::isnan(height)) {
-                   out[i] = raster_.vertical.convert(place, height);
-                   return;
-                 }
+                 out[i] = height * metres;
+                 if (!std::isnan(height)) return;
                  // Samples that are not there are filled one by one: the surface goes through those
                  // that are, up to the last.
-                 out[i] = 0.0;
+                 out[i] = geoid_shares_[i] = 0.0;
                  for (unsigned k = 0; k < 4; ++k) {
                    const unsigned right = k & 1, down = k >> 1;
                    const double weight = (right != 0 ? fx : 1.0 - fx) * (down != 0 ? fy : 1.0 - fy);
-                   if (weight > 0.0) {
-                     const double sample = at[down * stride + right];
-                     const Point2 corner{std::floor(p[0]) + right, std::floor(p[1]) + down};
-                     out[i] += weight * corner_height(place, sample, corner);
+                   if (!(weight > 0.0)) continue;
+                   const double sample = at[down * stride + right];
+                   if (std::isnan(sample) && raster_.flat_fill) {
+                     out[i] += weight * *raster_.flat_fill;
+                     continue;
                    }
+                   const double column = std::floor(p[0]) + right, row = std::floor(p[1]) + down;
+                   out[i] +=
+                       weight *
+                       ((std::isnan(sample) ? raster_.fill.height(column, row) : sample) * metres);
+                   geoid_shares_[i] += weight;
                  }
                });
-}
-
-double RasterTileSurface::corner_height(const Point2& place, double sample,
-                                        const Point2& corner) const {
-  if (!std::isnan(sample)) return raster_.vertical.convert(place, sample);
-  if (raster_.flat_fill) return *raster_.flat_fill;
-  return raster_.vertical.convert(place, raster_.fill.height(corner[0], corner[1]));
+  if (!raster_.vertical.has_geoid()) return;
+  places_.resize(out.size());
+  for (std::size_t i = 0; i < places_.size(); ++i) places_[i] = {longitude[i], latitude[i]};
+  std::vector<double> geoid(out.size(), 0.0);
+  raster_.vertical.add_geoid(places_, geoid);
+  for (std::size_t i = 0; i < out.size(); ++i) out[i] += geoid_shares_[i] * geoid[i];
 }
 
 }  // namespace terrace::terrain

@@ -40,10 +40,6 @@ class RasterTileSurface final : public TileSurface {
   template <class Visit>
   void visit_places(std::span<const double> longitude, std::span<const double> latitude,
                     const Visit& visit);
-  /// Metres above the ellipsoid at a place, of a sample of the lattice or, if it is NaN, of what
-  /// fills it.
-  [[nodiscard]] double corner_height(const Point2& place, double sample,
-                                     const Point2& corner) const;
   /// The heights of a window: of the one that is held, or read into it.
   struct View {
     const double* first = nullptr;
@@ -55,6 +51,9 @@ class RasterTileSurface final : public TileSurface {
   HeightCache reader_;
   LatticeWindow held_{};
   std::vector<double> heights_;  ///< of the held window
+  std::vector<Point2> places_;   ///< where the geoid is asked for
+  std::vector<double> geoid_shares_;
+  std::vector<std::size_t> filled_;  ///< samples of a grid that get the flat fill
   SurfaceGrid grid_;
 };
 

@@ -62,12 +62,10 @@ std::unique_ptr<TileSource> open_tile_source(const stream::Store& given,
                                              const TileSourceOptions& options,
                                              const Context& context) {
   const stream::Store store = given.with_stop(context.stop);
-  std::optional<GeographicArea> area;
-  if (options.vertical == "orthometric") area = system_of(store).area();
-  EllipsoidalHeights heights(store.schema(), options.vertical, options.geoid,
-                             options.memory_bytes / 4, area);
-  if (!heights.note().empty()) context.say(heights.note());
   const CoordinateSystem system = system_of(store);
+  EllipsoidalHeights heights(store.schema(), options.vertical, options.geoid,
+                             options.memory_bytes / 4, system.area());
+  if (!heights.note().empty()) context.say(heights.note());
   if (!system.wgs84_note().empty()) context.say(system.wgs84_note());
   const std::optional<double> flat = flat_height(store, options.fill, heights.metres_per_unit());
   const std::optional<double> water = water_height(store, options.water);

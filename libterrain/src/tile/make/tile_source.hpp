@@ -33,7 +33,7 @@ class TileSource {
   std::vector<std::unique_ptr<TileSurface>> surfaces_;
 };
 
-/// Of a raster or of irregular points. Reads the store once or twice.
+/// The source for a raster or for irregular points. Reads the store once or twice.
 /// Throws: UsageError for options that make no sense or not for this kind of store; stream::Error
 /// if no place of it can be told on the globe, or on a damaged one; stream::Stopped.
 std::unique_ptr<TileSource> open_tile_source(const stream::Store& store,

@@ -33,7 +33,7 @@ struct TiledRaster {
   HeightBlocks blocks;
   GeographicBox bounds{};
   double spacing = 0.0;
-  /// Of a raster in degrees: the longitudes that it gives its samples, which may go beyond 180.
+  /// Range of the longitudes that a raster in degrees gives its samples; may go beyond 180.
   double first_longitude = 0.0, last_longitude = 0.0;
   /// Columns run along meridians, rows along parallels, at equal distances.
   bool upright = false;
@@ -48,7 +48,7 @@ Point2 world_place(const Placement& placement, double column, double row);
 double wrapped(double longitude);
 /// Places on the globe to those of the raster's lattice, in place.
 void find_on_lattice(const TiledRaster& raster, std::span<Point2> places);
-/// Of the raster, with all samples in the box; empty if there is none.
+/// The window of the raster that has all its samples in the box; empty if there is none.
 LatticeWindow window_around(const TiledRaster& raster, const GeographicBox& box);
 
 }  // namespace terrace::terrain

@@ -58,7 +58,7 @@ class SetCheck {
         context_(context),
         records_(read_tile_records(options.folder)) {}
 
-  /// Of all zooms together, so that the few large tiles of the upper ones share the threads.
+  /// Checks the tiles of all zooms together, so that the few large ones share the threads.
   void tiles(const std::vector<TileAddress>& tiles);
   /// tiles: of one zoom.
   void absent(unsigned zoom, const std::vector<TileAddress>& tiles);
