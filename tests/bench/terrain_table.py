@@ -2,16 +2,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Times error-bounded meshes, web-globe tiles and heights at points as whole processes.
 
-Prints four Markdown tables, medians of the runs. Meshes: triangles, seconds of reading (decoding with
+Prints five Markdown tables, medians of the runs. meshes: triangles, seconds of reading (decoding with
 checksums) and of meshing (checks at every sample included; of all threads together), wall clock.
-Tiles: of the raster as longitudes and latitudes, zoom 0 to the one that shows every sample. Points: a
-million random places in one call. Irregular points: the samples of the raster to tile as points.
+tiles: of the raster as longitudes and latitudes, zoom 0 to the one that shows every sample. heights: at
+a million random places in one call. points: the samples of the raster to tile as irregular points.
+passes: a scan in overlapping swaths, then as many points again in no order.
 
 usage: terrain_table.py TERRACE [--size 2049x2049] [--runs 3] [--errors 20,5,1] [--points 1000000]
-                        [--dem FILE.tif] [--tile-dem FILE.tif]
+                        [--pass 5000000] [--dem FILE.tif] [--tile-dem FILE.tif]
+                        [--only meshes,tiles,heights,points,passes]
 """
 import argparse
 import json
+import math
 import os
 import random
 import resource
@@ -104,6 +107,7 @@ def cloud_table(options, store, folder):
     places = os.path.join(folder, 'cloud.csv')
     choice = random.Random(1)
     with open(places, 'w') as file:
+        file.write('x,y\n')
         for _ in range(options.points):
             file.write(','.join(f"{choice.uniform(bounds['min'][k], bounds['max'][k]):.9f}"
                                 for k in (0, 1)) + '\n')
@@ -126,6 +130,52 @@ def cloud_table(options, store, folder):
                   f"| {median(runs, 'wall'):.2f} | {runs[0]['peak_rss_bytes'] / 2**20:.0f} |", flush=True)
 
 
+def write_passes(path, points):
+    """Two passes of so many points each over 10 km x 10 km: swaths of 1,000 m, half of each seen again
+    in the next, then places at random."""
+    side, swath, choice = 10000.0, 1000.0, random.Random(1)
+    lines = [k * swath / 2 for k in range(int(2 * side / swath) - 1)]
+    spacing = math.sqrt(len(lines) * swath * side / points)
+
+    def row(x, y):
+        z = 300 * math.sin(x / 900) * math.cos(y / 1300) + 40 * math.sin(x / 110 + y / 170)
+        return f'{500000 + x:.2f} {5200000 + y:.2f} {1000 + z + choice.gauss(0, 0.05):.2f}\n'
+
+    with open(path, 'w') as file:
+        for west in lines:
+            for along in range(int(side / spacing)):
+                file.writelines(row(west + across * spacing, along * spacing + choice.uniform(0, spacing / 2))
+                                for across in range(int(swath / spacing)))
+        for _ in range(points):
+            file.write(row(choice.uniform(0, side), choice.uniform(0, side)))
+
+
+def passes_table(options, folder):
+    points, cloud = os.path.join(folder, 'passes.xyz'), os.path.join(folder, 'passes.terrace')
+    write_passes(points, options.in_pass)
+    built = terrace(options.terrace, 'build', points, '--crs', 'EPSG:32632', '-o', cloud)
+    os.remove(points)
+    places, some = os.path.join(folder, 'passes.csv'), os.path.join(folder, 'some.csv')
+    choice = random.Random(1)
+    for path, count in ((places, options.points), (some, options.points // 10)):
+        with open(path, 'w') as file:
+            file.write('x,y\n')
+            file.writelines(f'{choice.uniform(500000, 510000):.3f},{choice.uniform(5200000, 5210000):.3f}\n'
+                            for _ in range(count))
+    out = os.path.join(folder, 'passes-out')
+    sample = ('sample', cloud, '-o', f'{out}.csv', '--force', '--points')
+    jobs = (('heights', (*sample, places)), ('heights, nearest, a tenth', (*sample, some, '--method', 'nearest')),
+            ('raster, 10 m', ('raster', cloud, '-o', f'{out}.tif', '--force', '--cell', 10)),
+            ('contours, 20 m', ('contour', cloud, '-o', f'{out}.geojson', '--force', '--interval', 20)))
+    print(f"\n| two passes, {built['points']:,} points | threads | CPU s | wall s | peak MiB |")
+    print('|---|---|---|---|---|')
+    for name, verb in jobs:
+        for threads in (1, 2):
+            runs = [terrace(options.terrace, *verb, '--threads', threads) for _ in range(options.runs)]
+            print(f"| {name} | {threads} | {median(runs, 'cpu'):.2f} | {median(runs, 'wall'):.2f} "
+                  f"| {runs[0]['peak_rss_bytes'] / 2**20:.0f} |", flush=True)
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument('terrace')
@@ -133,24 +183,30 @@ def main():
     parser.add_argument('--runs', type=int, default=3)
     parser.add_argument('--errors', default='20,5,1')
     parser.add_argument('--points', type=int, default=1000000)
+    parser.add_argument('--pass', type=int, default=5000000, dest='in_pass')
     parser.add_argument('--dem')
     parser.add_argument('--tile-dem')
+    parser.add_argument('--only', default='meshes,tiles,heights,points,passes')
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        def store_of(raster, name, *crs):
+        def store_of(raster, name):
+            store = os.path.join(folder, f'{name}.terrace')
+            if os.path.exists(store):
+                return store
             if not raster:
                 raster = os.path.join(folder, f'{name}.tif')
-                terrace(options.terrace, 'synth', 'dem', '--size', options.size, '-o', raster, *crs)
-            store = os.path.join(folder, f'{name}.terrace')
+                terrace(options.terrace, 'synth', 'dem', '--size', options.size, '-o', raster)
             terrace(options.terrace, 'build', raster, '-o', store)
             return store
 
-        store = store_of(options.dem, 'plane')
-        mesh_table(options, store, folder)
-        tiled = store_of(options.tile_dem, 'tiled', '--crs', 'EPSG:32632')
-        tile_table(options, tiled, folder)
-        sample_table(options, store, folder)
-        cloud_table(options, tiled, folder)
+        tables = {
+            'meshes': lambda: mesh_table(options, store_of(options.dem, 'plane'), folder),
+            'tiles': lambda: tile_table(options, store_of(options.tile_dem, 'tiled'), folder),
+            'heights': lambda: sample_table(options, store_of(options.dem, 'plane'), folder),
+            'points': lambda: cloud_table(options, store_of(options.tile_dem, 'tiled'), folder),
+            'passes': lambda: passes_table(options, folder)}
+        for name in options.only.split(','):
+            tables[name]()
 
 
 if __name__ == '__main__':
