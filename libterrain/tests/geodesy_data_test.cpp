@@ -16,8 +16,8 @@
 #include <GeographicLib/MGRS.hpp>
 #include <gtest/gtest.h>
 
-#include "earth/crs/coordinate_system.hpp"
 #include "earth/line_distance.hpp"
+#include "terrace/terrain/crs.hpp"
 #include "tile/format/ellipsoid.hpp"
 
 namespace terrace::terrain {

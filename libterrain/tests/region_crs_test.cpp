@@ -52,7 +52,7 @@ TEST(RegionCrs, HoldsWhatTheBoxHolds) {
         if (u < 0 || u > 1 || std::abs(place[1]) > 89.9) continue;
       }
       const bool inside = u > 0 && u < 1 && v > 0 && v < 1;
-      transform(from, to, {&place, 1});
+      Transformation(from, to).forward({&place, 1});
       EXPECT_EQ(region.contains({place[0], place[1], 0}), inside) << u << ' ' << v;
     }
   }
