@@ -12,7 +12,6 @@
 #include <terrace/tri/metric_triangles.hpp>
 #include <terrace/tri/multiresolution.hpp>
 
-#include "base/region_overlap.hpp"
 #include "earth/ground.hpp"
 #include "earth/world.hpp"
 #include "terrace/terrain/error.hpp"
@@ -55,6 +54,13 @@ tri::Detail in_stored_coordinates(const Detail& detail, const Placement& placeme
     stored.focuses.push_back({stored_box(placement, focus.region.box()), focus.level});
   }
   return stored;
+}
+
+/// The model knows boxes alone, so it takes what lies in those around polygons.
+Detail in_boxes(Detail detail) {
+  if (detail.region) detail.region = Region::of_box(detail.region->box());
+  for (FinerRegion& focus : detail.focuses) focus.region = Region::of_box(focus.region.box());
+  return detail;
 }
 
 /// The triangles of a field of metrics.
@@ -159,7 +165,7 @@ TriangleMesh mesh_of_model(const tri::Multiresolution2<Coord>& model, const Plac
   const auto add = [&](std::array<tri::VertexId, 3> corners) {
     if (mirrored) std::swap(corners[1], corners[2]);
     if (region &&
-        !touches(*region, {position(corners[0]), position(corners[1]), position(corners[2])})) {
+        !region->touches({position(corners[0]), position(corners[1]), position(corners[2])})) {
       return;
     }
     mesh.triangles.push_back({number_of(corners[0]), number_of(corners[1]), number_of(corners[2])});
@@ -198,7 +204,7 @@ TriangleMesh mesh_of_store(const stream::Store& store, const Detail& detail,
     throw UsageError("a mesh has the metric euclidean or elliptical:FILE, not " +
                      options.metric.text);
   }
-  check_memory(store, detail, memory_bytes,
+  check_memory(store, in_boxes(detail), memory_bytes,
                options.heights.bytes_per_vertex() +
                    (kind == MetricChoice::Kind::elliptical ? kBytesToFlip : 0));
   return store.schema().grid ? mesh_of<std::int32_t>(store, detail, options)
@@ -211,11 +217,14 @@ TriangleMesh points_of_store(const stream::Store& store, const Detail& detail) {
   TriangleMesh cloud;
   for_each_wanted(
       store, detail,
-      [&](stream::ClusterId id, const stream::ClusterRecord&, const stream::ClusterPoints& points) {
+      [&](stream::ClusterId id, const stream::ClusterRecord& record,
+          const stream::ClusterPoints& points) {
         const unsigned level = stream::level_of(id);
+        const bool whole = !detail.region || detail.region->overlap(world_box(
+                                                 placement, record.summary.box)) == Overlap::whole;
         for (std::size_t i = 0; i < points.size(); ++i) {
           const stream::Point3 place = world_point(placement, points.positions[i]);
-          if (detail.region && !detail.region->contains(place)) continue;
+          if (!whole && !detail.region->contains(place)) continue;
           cloud.positions.push_back(place);
           cloud.levels.push_back(static_cast<std::uint8_t>(level));
           if (!coarse) continue;

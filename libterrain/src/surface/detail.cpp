@@ -19,9 +19,10 @@ unsigned Detail::finest() const {
 }
 
 bool Detail::wants(unsigned cluster_level, const stream::Box3& world_box) const {
-  if (cluster_level >= level && (!region || region->box().intersects(world_box))) return true;
+  if (cluster_level >= level && (!region || region->overlap(world_box) != Overlap::none))
+    return true;
   return std::any_of(focuses.begin(), focuses.end(), [&](const FinerRegion& focus) {
-    return cluster_level >= focus.level && focus.region.box().intersects(world_box);
+    return cluster_level >= focus.level && focus.region.overlap(world_box) != Overlap::none;
   });
 }
 
