@@ -8,6 +8,10 @@ namespace terrace::terrain {
 namespace {
 
 constexpr std::size_t kMostGridSide = 1024, kCellsPerCorner = 10;
+constexpr auto kOutside = static_cast<std::uint8_t>(Overlap::none);
+constexpr auto kRing = static_cast<std::uint8_t>(Overlap::part);
+constexpr auto kInside = static_cast<std::uint8_t>(Overlap::whole);
+static_assert(kOutside == 0 && kRing == 1 && kInside == 2, "their sums tell of all cells");
 
 }  // namespace
 
@@ -32,7 +36,7 @@ RegionGrid::RegionGrid(const std::vector<Polygon>& polygons,
     // Points between the ends of an edge are rounded by less than this.
     margin_[axis] = std::max(std::abs(low_[axis]), std::abs(high_[axis])) * 0x1p-48;
   }
-  sums_.assign((side_ + 1) * (side_ + 1), kOutside);
+  cells_.assign(side_ * side_, kOutside);
   for (const Polygon& polygon : polygons) {
     for (const std::vector<Point2>& ring : polygon) {
       for (std::size_t i = 0; i < ring.size(); ++i) {
@@ -41,21 +45,15 @@ RegionGrid::RegionGrid(const std::vector<Polygon>& polygons,
     }
   }
   classify(inside);
+  sums_.assign((side_ + 1) * (side_ + 1), 0);
   for (std::size_t row = 0; row < side_; ++row) {
+    const std::size_t above = row * (side_ + 1), here = above + side_ + 1;
     std::uint32_t sum = 0;
     for (std::size_t column = 0; column < side_; ++column) {
-      sum += at(column, row);
-      at(column, row) = sum + sums_[row * (side_ + 1) + column + 1];
+      sum += cells_[row * side_ + column];
+      sums_[here + column + 1] = sum + sums_[above + column + 1];
     }
   }
-}
-
-/// Never falls where `value` grows, so whatever lies between two places lies between their cells.
-std::size_t RegionGrid::cell(std::size_t axis, double value) const {
-  const double place = (value - low_[axis]) * per_unit_[axis];
-  // `!(place > 0)` also takes NaN, which an extent near the smallest double brings about.
-  if (!(place > 0)) return 0;
-  return place < static_cast<double>(side_) ? static_cast<std::size_t>(place) : side_ - 1;
 }
 
 void RegionGrid::mark_edge(const Point2& a, const Point2& b) {
@@ -77,7 +75,8 @@ void RegionGrid::mark_edge(const Point2& a, const Point2& b) {
       last[axis] = cell(axis, std::max(start[axis], end[axis]) + margin_[axis]);
     }
     for (std::size_t row = first[1]; row <= last[1]; ++row) {
-      for (std::size_t column = first[0]; column <= last[0]; ++column) at(column, row) = kRing;
+      for (std::size_t column = first[0]; column <= last[0]; ++column)
+        cells_[row * side_ + column] = kRing;
     }
     start = end;
   }
@@ -87,9 +86,9 @@ void RegionGrid::mark_edge(const Point2& a, const Point2& b) {
 void RegionGrid::classify(const std::function<bool(const Point2&)>& inside) {
   for (std::size_t row = 0; row < side_; ++row) {
     const double y = low_[1] + (static_cast<double>(row) + 0.5) / per_unit_[1];
-    std::uint32_t side = kRing;
+    std::uint8_t side = kRing;
     for (std::size_t column = 0; column < side_; ++column) {
-      std::uint32_t& value = at(column, row);
+      std::uint8_t& value = cells_[row * side_ + column];
       if (value == kRing) {
         side = kRing;
         continue;

@@ -256,7 +256,7 @@ bool RegionShape::ask(const Ask& question) const {
 }
 
 bool RegionShape::covers(const Point2& place) const {
-  const Overlap known = grid_.overlap(place, place);
+  const Overlap known = grid_.overlap(place);
   if (known != Overlap::part) return known == Overlap::whole;
   return ask([&](const Prepared& shape) { return shape.any_meets(shape.geos().point(place)); });
 }
