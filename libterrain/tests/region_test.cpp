@@ -1,14 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "terrace/terrain/region.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <random>
+#include <thread>
+#include <vector>
 
 #include <gtest/gtest.h>
 
-#include "base/polygon.hpp"
+#include "base/orientation.hpp"
 #include "base/portable_math.hpp"
 #include "temporary_folder.hpp"
 #include "terrace/stream/error.hpp"
@@ -110,26 +116,383 @@ TEST(Orientation, IsExactNearALine) {
   }
 }
 
-// Oracle: a convex polygon is an intersection of half planes. Points on a 0..9 grid, so that
-// borders and corners are met often.
-TEST(Covers, AgreesWithHalfPlanesOfConvexPolygons) {
-  std::mt19937_64 random(11);
-  int inside = 0;
-  for (int trial = 0; trial < 5000; ++trial) {
-    SCOPED_TRACE(trial);
-    const auto grid = [&] { return static_cast<double>(random() % 10); };
-    Point2 a{grid(), grid()}, b{grid(), grid()}, c{grid(), grid()};
-    const int turn = orientation(a, b, c);
-    if (turn == 0) continue;
-    if (turn < 0) std::swap(b, c);
-    const Point2 p{grid(), grid()};
-    const bool expected =
-        orientation(a, b, p) >= 0 && orientation(b, c, p) >= 0 && orientation(c, a, p) >= 0;
-    EXPECT_EQ(covers({{a, b, c}}, p), expected);
-    EXPECT_EQ(covers({{c, b, a}}, p), expected);  // clockwise rings too
-    inside += expected ? 1 : 0;
+// ---- Polygons against their definition, in integers
+// ----------------------------------------------
+
+/// On a lattice of steps of a half.
+struct Step {
+  std::int64_t x = 0, y = 0;
+  friend bool operator==(const Step&, const Step&) = default;
+};
+using Ring = std::vector<Step>;
+
+int side(const Step& a, const Step& b, const Step& c) {
+  const std::int64_t twice = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+  return twice > 0 ? 1 : twice < 0 ? -1 : 0;
+}
+
+bool on_segment(const Step& p, const Step& a, const Step& b) {
+  return side(a, b, p) == 0 && std::min(a.x, b.x) <= p.x && p.x <= std::max(a.x, b.x) &&
+         std::min(a.y, b.y) <= p.y && p.y <= std::max(a.y, b.y);
+}
+
+bool segments_meet(const Step& a, const Step& b, const Step& c, const Step& d) {
+  if (side(a, b, c) * side(a, b, d) < 0 && side(c, d, a) * side(c, d, b) < 0) return true;
+  return on_segment(c, a, b) || on_segment(d, a, b) || on_segment(a, c, d) || on_segment(b, c, d);
+}
+
+const Step& next(const Ring& ring, std::size_t i) { return ring[(i + 1) % ring.size()]; }
+
+/// Without a corner that is given twice in a row.
+bool is_simple(const Ring& given) {
+  Ring ring;
+  for (std::size_t i = 0; i < given.size(); ++i) {
+    if (!(given[i] == next(given, i))) ring.push_back(given[i]);
   }
-  EXPECT_GT(inside, 300);
+  if (ring.size() < 3) return false;
+  for (std::size_t i = 0; i < ring.size(); ++i) {
+    if (on_segment(next(ring, i + 1), ring[i], next(ring, i)) ||
+        on_segment(ring[i], next(ring, i), next(ring, i + 1))) {
+      return false;
+    }
+    for (std::size_t k = i + 2; k < ring.size(); ++k) {
+      if ((k + 1) % ring.size() == i) continue;
+      if (segments_meet(ring[i], next(ring, i), ring[k], next(ring, k))) return false;
+    }
+  }
+  return true;
+}
+
+bool on_ring(const std::vector<Ring>& rings, const Step& p) {
+  for (const Ring& ring : rings) {
+    for (std::size_t i = 0; i < ring.size(); ++i) {
+      if (on_segment(p, ring[i], next(ring, i))) return true;
+    }
+  }
+  return false;
+}
+
+/// On a ring, or inside by the even-odd rule.
+bool holds(const std::vector<Ring>& rings, const Step& p) {
+  bool inside = on_ring(rings, p);
+  if (inside) return true;
+  for (const Ring& ring : rings) {
+    for (std::size_t i = 0; i < ring.size(); ++i) {
+      const Step &a = ring[i], &b = next(ring, i);
+      if ((a.y <= p.y) != (b.y <= p.y) && (side(a, b, p) > 0) == (a.y <= p.y)) inside = !inside;
+    }
+  }
+  return inside;
+}
+
+/// How a convex figure, given by its corners, lies to the polygon.
+Overlap overlap_of(const std::vector<Ring>& rings, const Ring& figure) {
+  bool meets = holds(rings, figure[0]), borders = false;
+  for (const Ring& ring : rings) {
+    for (std::size_t i = 0; i < ring.size(); ++i) {
+      for (std::size_t k = 0; k < figure.size(); ++k) {
+        borders = borders || segments_meet(ring[i], next(ring, i), figure[k], next(figure, k));
+      }
+    }
+    bool within = true;  // the ring is in the figure or, by the above, wholly outside
+    for (std::size_t k = 0; k < figure.size(); ++k) {
+      within = within && side(figure[k], next(figure, k), ring[0]) > 0;
+    }
+    borders = borders || within;
+  }
+  meets = meets || borders;
+  return !meets ? Overlap::none : borders ? Overlap::part : Overlap::whole;
+}
+
+/// Where the lattice lies among the doubles: at the last, steps are as small as doubles have them.
+struct StepsAt {
+  double origin, step;
+  [[nodiscard]] Point2 operator()(const Step& p) const {
+    return {origin + step * static_cast<double>(p.x), origin + step * static_cast<double>(p.y)};
+  }
+  [[nodiscard]] stream::Point3 at(const Step& p) const { return {(*this)(p)[0], (*this)(p)[1], 0}; }
+};
+constexpr StepsAt kFrames[] = {{0, 0.5}, {-7340032.25, 0.0625}, {0x1p52, 1}, {0, 0x1p-60}};
+constexpr double kAnyHeight = std::numeric_limits<double>::infinity();
+
+class RandomPlaces {
+ public:
+  explicit RandomPlaces(std::uint64_t seed) : random_(seed) {}
+  std::int64_t below(std::int64_t end) {
+    return static_cast<std::int64_t>(random_() % static_cast<std::uint64_t>(end));
+  }
+  /// Corners are met often.
+  Step place() { return {2 * below(10), 2 * below(10)}; }
+  Ring ring(std::int64_t most) {
+    Ring ring(static_cast<std::size_t>(3 + below(most - 2)));
+    for (Step& p : ring) p = place();
+    return ring;
+  }
+
+ private:
+  std::mt19937_64 random_;
+};
+
+Polygon polygon_of(const std::vector<Ring>& rings, const StepsAt& frame) {
+  Polygon polygon;
+  for (const Ring& ring : rings) {
+    polygon.emplace_back();
+    for (const Step& p : ring) polygon.back().push_back(frame(p));
+  }
+  return polygon;
+}
+
+void expect_all_places(const Region& region, const std::vector<std::vector<Ring>>& polygons,
+                       const StepsAt& frame) {
+  for (std::int64_t y = -1; y < 21; ++y) {
+    for (std::int64_t x = -1; x < 21; ++x) {
+      const Step p{x, y};
+      const bool expected = std::any_of(polygons.begin(), polygons.end(),
+                                        [&](const auto& rings) { return holds(rings, p); });
+      ASSERT_EQ(region.contains(frame.at(p)), expected) << x << ',' << y;
+      ASSERT_EQ(region.covers(frame(p)), expected) << x << ',' << y;
+    }
+  }
+}
+
+void expect_boxes_and_triangles(const Region& region, const std::vector<Ring>& rings,
+                                const StepsAt& frame, RandomPlaces& random,
+                                std::array<int, 3>& seen) {
+  for (int i = 0; i < 20; ++i) {
+    const Step a{random.below(22) - 1, random.below(22) - 1};
+    const Step b{a.x + 1 + random.below(6), a.y + 1 + random.below(6)};
+    const Point2 low = frame(a), high = frame(b);
+    const Overlap box = overlap_of(rings, {a, {b.x, a.y}, b, {a.x, b.y}});
+    ASSERT_EQ(region.overlap({{low[0], low[1], 0}, {high[0], high[1], 1}}), box);
+    ++seen[static_cast<std::size_t>(box)];
+    // A box without size: a place on a ring is not wholly inside, one beside is.
+    const Overlap place = !holds(rings, a)    ? Overlap::none
+                          : on_ring(rings, a) ? Overlap::part
+                                              : Overlap::whole;
+    ASSERT_EQ(region.overlap({{low[0], low[1], 0}, {low[0], low[1], 0}}), place);
+    const Step c{random.below(22) - 1, random.below(22) - 1};
+    const int turn = side(a, b, c);
+    if (turn == 0) continue;
+    const Overlap triangle = overlap_of(rings, turn > 0 ? Ring{a, b, c} : Ring{a, c, b});
+    ASSERT_EQ(region.touches({frame.at(a), frame.at(b), frame.at(c)}), triangle != Overlap::none);
+  }
+}
+
+// Law: a ring is taken if it is simple, and then everything is told as the integers tell it.
+TEST(Region, OneRingIsWhatTheIntegersSay) {
+  int taken = 0, refused = 0;
+  std::array<int, 3> seen{};
+  for (std::uint64_t seed = 1; seed <= 600; ++seed) {
+    SCOPED_TRACE(seed);
+    RandomPlaces random(seed);
+    const StepsAt& frame = kFrames[seed % std::size(kFrames)];
+    const std::vector<Ring> rings{random.ring(7)};
+    if (!is_simple(rings[0])) {
+      ++refused;
+      EXPECT_THROW(Region::of_polygons({polygon_of(rings, frame)}, -kAnyHeight, kAnyHeight),
+                   stream::Error);
+      continue;
+    }
+    ++taken;
+    const Region region = Region::of_polygons({polygon_of(rings, frame)}, -kAnyHeight, kAnyHeight);
+    expect_all_places(region, {rings}, frame);
+    expect_boxes_and_triangles(region, rings, frame, random, seen);
+    if (HasFatalFailure()) return;
+  }
+  EXPECT_GT(taken, 100);
+  EXPECT_GT(refused, 100);
+  for (const int count : seen) EXPECT_GT(count, 30);
+}
+
+// Polygons with holes, and several that overlap; which are valid is left to GEOS here.
+TEST(Region, HolesAndOverlapsAreWhatTheIntegersSay) {
+  int holes = 0, pairs = 0;
+  std::array<int, 3> seen{};
+  for (std::uint64_t seed = 1; seed <= 500; ++seed) {
+    SCOPED_TRACE(seed);
+    RandomPlaces random(seed);
+    const StepsAt& frame = kFrames[seed % std::size(kFrames)];
+    const std::int64_t x = 2 * random.below(4), y = 2 * random.below(4);
+    const std::vector<Ring> large{{{0, 0}, {18, 2}, {18, 18}, {2, 16}}, random.ring(4)};
+    const std::vector<Ring> other{{{x, y}, {x + 4, y}, {x + 6, y + 8}, {x, y + 6}}};
+    try {
+      const Region region =
+          Region::of_polygons({polygon_of(large, frame)}, -kAnyHeight, kAnyHeight);
+      ++holes;
+      expect_all_places(region, {large}, frame);
+      expect_boxes_and_triangles(region, large, frame, random, seen);
+      const Region both = Region::of_polygons({polygon_of(large, frame), polygon_of(other, frame)},
+                                              -kAnyHeight, kAnyHeight);
+      ++pairs;
+      expect_all_places(both, {large, other}, frame);
+    } catch (const stream::Error& error) {
+      EXPECT_FALSE(error.parts().where.empty());
+    }
+    if (HasFatalFailure()) return;
+  }
+  EXPECT_GT(holes, 30);
+  EXPECT_EQ(holes, pairs);
+  for (const int count : seen) EXPECT_GT(count, 30);
+}
+
+/// A closed outline that turns once and goes in and out; every corner at another angle.
+std::vector<Point2> jagged_ring(std::size_t corners, const Point2& middle, double radius) {
+  std::mt19937_64 random(corners);
+  std::vector<Point2> ring;
+  for (std::size_t i = 0; i < corners; ++i) {
+    const double angle = 360.0 * static_cast<double>(i) / static_cast<double>(corners);
+    const double r = radius * (0.8 + 0.2 * unit_interval(random()));
+    ring.push_back(
+        {middle[0] + r * portable_cos_degrees(angle), middle[1] + r * portable_sin_degrees(angle)});
+  }
+  return ring;
+}
+
+bool even_odd(const std::vector<Point2>& ring, const Point2& p) {
+  bool inside = false;
+  for (std::size_t i = 0; i < ring.size(); ++i) {
+    const Point2 &a = ring[i], &b = ring[(i + 1) % ring.size()];
+    const auto between = [&](std::size_t k) {
+      return std::min(a[k], b[k]) <= p[k] && p[k] <= std::max(a[k], b[k]);
+    };
+    if (between(0) && between(1) && orientation(a, b, p) == 0) return true;
+    if ((a[1] <= p[1]) == (b[1] <= p[1])) continue;
+    if ((orientation(a, b, p) > 0) == (a[1] <= p[1])) inside = !inside;
+  }
+  return inside;
+}
+
+// Among so many corners most answers are the grid's. Oracle: even-odd, exactly. From several
+// threads at once: of one object, by more threads than it prepares for.
+TEST(Region, ManyThreadsAskOneOfManyCorners) {
+  constexpr std::size_t kThreads = 8, kQuestions = 3000;
+  const std::vector<Point2> ring = jagged_ring(5000, {4e6, 7e6}, 1e5);
+  const Region region = Region::of_polygons({{ring}}, -kAnyHeight, kAnyHeight);
+  std::array<std::size_t, kThreads> wrong{}, inside{};
+  std::vector<std::thread> threads;
+  for (std::size_t t = 0; t < kThreads; ++t) {
+    threads.emplace_back([&, t] {
+      std::mt19937_64 random(t);
+      const auto near = [&] { return 2.2e5 * (unit_interval(random()) - 0.5); };
+      for (std::size_t i = 0; i < kQuestions; ++i) {
+        // Every other one is the middle of two corners, rounded: as near to a ring as can be.
+        const Point2 &a = ring[random() % ring.size()], &b = ring[random() % ring.size()];
+        const Point2 p = i % 2 == 0 ? Point2{4e6 + near(), 7e6 + near()}
+                                    : Point2{(a[0] + b[0]) / 2, (a[1] + b[1]) / 2};
+        const bool expected = even_odd(ring, p);
+        inside[t] += expected ? 1 : 0;
+        const stream::Box3 box{{p[0] - 20, p[1] - 20, 0}, {p[0] + 20, p[1] + 20, 0}};
+        const Overlap overlap = region.overlap(box);
+        const bool touches = region.touches(
+            {stream::Point3{p[0], p[1], 0}, {p[0] + 10, p[1], 0}, {p[0], p[1] + 10, 0}});
+        wrong[t] += region.covers(p) != expected || (expected && overlap == Overlap::none) ||
+                            (!expected && overlap == Overlap::whole) || (expected && !touches) ||
+                            (touches && overlap == Overlap::none)
+                        ? 1
+                        : 0;
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  for (std::size_t t = 0; t < kThreads; ++t) {
+    EXPECT_EQ(wrong[t], 0U) << t;
+    EXPECT_GT(inside[t], kQuestions / 5);
+    EXPECT_LT(inside[t], kQuestions);
+  }
+}
+
+TEST(Region, OverlapsByHeightsToo) {
+  const Region region = Region::of_polygons({{{{0, 0}, {10, 0}, {10, 10}, {0, 10}}}}, 5, 8);
+  EXPECT_EQ(region.overlap({{2, 2, 6}, {3, 3, 7}}), Overlap::whole);
+  EXPECT_EQ(region.overlap({{2, 2, 4}, {3, 3, 7}}), Overlap::part);
+  EXPECT_EQ(region.overlap({{2, 2, 9}, {3, 3, 11}}), Overlap::none);
+  EXPECT_EQ(region.overlap({}), Overlap::none);
+  EXPECT_FALSE(region.contains({2, 2, 4}));
+  EXPECT_TRUE(region.covers({2, 2}));
+  EXPECT_FALSE(region.touches({stream::Point3{2, 2, 1}, {3, 2, 2}, {2, 3, 4}}));
+  const Region box = Region::of_box({{0, 0, 5}, {10, 10, 8}});
+  EXPECT_EQ(box.overlap({{0, 2, 6}, {3, 3, 7}}), Overlap::whole);
+  EXPECT_EQ(box.overlap({{-1, 2, 6}, {3, 3, 7}}), Overlap::part);
+  EXPECT_EQ(box.overlap({{11, 2, 6}, {13, 3, 7}}), Overlap::none);
+  EXPECT_TRUE(box.covers({2, 2}));
+}
+
+// Oracle: the same box as a polygon.
+TEST(Region, BoxesTouchTheTrianglesThatTheirPolygonsDo) {
+  RandomPlaces random(5);
+  const StepsAt& frame = kFrames[0];
+  int touching = 0;
+  for (int i = 0; i < 5000; ++i) {
+    SCOPED_TRACE(i);
+    const Step low{6 + random.below(4), 6 + random.below(4)};
+    const Step high{low.x + 1 + random.below(5), low.y + 1 + random.below(5)};
+    const Region box = Region::of_box({frame.at(low), frame.at(high)});
+    const Region polygon = Region::of_polygons(
+        {polygon_of({{low, {high.x, low.y}, high, {low.x, high.y}}}, frame)}, 0, 0);
+    const std::array<stream::Point3, 3> triangle{frame.at(random.place()), frame.at(random.place()),
+                                                 frame.at(random.place())};
+    EXPECT_EQ(box.touches(triangle), polygon.touches(triangle));
+    touching += box.touches(triangle) ? 1 : 0;
+  }
+  EXPECT_GT(touching, 1000);
+  EXPECT_LT(touching, 4000);
+}
+
+TEST(Region, TakesRingsHoweverTheyAreWritten) {
+  for (const std::vector<Point2>& ring :
+       std::vector<std::vector<Point2>>{{{0, 0}, {4, 0}, {4, 4}, {0, 4}},
+                                        {{0, 4}, {4, 4}, {4, 0}, {0, 0}},
+                                        {{0, 0}, {4, 0}, {4, 4}, {0, 4}, {0, 0}},
+                                        {{0, 0}, {4, 0}, {4, 0}, {4, 0}, {4, 4}, {2, 4}, {0, 4}}}) {
+    const Region region = Region::of_polygons({{ring}}, -kAnyHeight, kAnyHeight);
+    EXPECT_TRUE(region.contains({4, 2, 0}));
+    EXPECT_TRUE(region.contains({1, 1, 0}));
+    EXPECT_FALSE(region.contains({4.01, 2, 0}));
+  }
+}
+
+TEST(Region, SaysWhatIsWrongWithRings) {
+  struct Case {
+    std::vector<Polygon> polygons;
+    const char *where, *cause;
+  };
+  const std::vector<Point2> square{{0, 0}, {9, 0}, {9, 9}, {0, 9}};
+  const std::vector<Point2> hole{{1, 1}, {5, 1}, {5, 5}, {1, 5}};
+  for (const Case& test : std::vector<Case>{
+           {{}, "", "no polygon"},
+           {{{square}, {}}, "polygon 2", "no ring"},
+           {{{{{0, 0}, {4, 4}}}}, "polygon 1, outer ring", "fewer than three corners"},
+           {{{{{0, 0}, {4, 4}, {0, 0}, {4, 4}}}}, "polygon 1, outer ring", "not valid"},
+           {{{{{0, 0}, {4, 4}, {2, 2}}}}, "polygon 1, outer ring", "not valid"},
+           {{{{{0, 0}, {4, 4}, {4, 0}, {0, 4}}}},
+            "polygon 1, outer ring",
+            "Self-intersection at 2, 2"},
+           {{{square}, {square, {{1, 1}, {3, 3}, {3, 1}, {1, 3}}}},
+            "polygon 2, hole 1",
+            "Self-intersection at 2, 2"},
+           {{{{{0, 0}, {NAN, 4}, {4, 0}}}}, "polygon 1, outer ring", "Invalid Coordinate"},
+           {{{{{0, 0}, {1, kAnyHeight}, {4, 0}}}}, "polygon 1, outer ring", "Invalid Coordinate"},
+           {{{hole, square}}, "polygon 1", "do not fit together"},
+           {{{square, hole, {{2, 2}, {7, 2}, {7, 7}}}}, "polygon 1", "do not fit together"},
+           {{{square, {{20, 1}, {25, 1}, {25, 5}}}}, "polygon 1", "Hole lies outside shell at 2"},
+       }) {
+    SCOPED_TRACE(test.cause);
+    try {
+      Region::of_polygons(test.polygons, 0, 1);
+      ADD_FAILURE() << "taken";
+    } catch (const stream::Error& error) {
+      EXPECT_EQ(error.parts().where, test.where);
+      EXPECT_NE(error.parts().cause.find(test.cause), std::string::npos) << error.parts().cause;
+      EXPECT_NE(error.parts().remedy.find("Fix geometries"), std::string::npos);
+    }
+  }
+  const TemporaryFile file(R"({"type":"Polygon","coordinates":[[[0,0],[4,4],[4,0],[0,4],[0,0]]]})");
+  try {
+    Region::parse(file.path());
+    ADD_FAILURE() << "taken";
+  } catch (const stream::Error& error) {
+    EXPECT_EQ(error.parts().file, file.path());
+  }
 }
 
 }  // namespace

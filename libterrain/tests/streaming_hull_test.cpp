@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include "base/polygon.hpp"
+#include "base/orientation.hpp"
 
 namespace terrace::terrain {
 

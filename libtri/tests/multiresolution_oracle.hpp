@@ -57,8 +57,11 @@ inline ClusterSet wanted(const WholeTree& tree, MemorySource& source, const Deta
   ClusterSet result;
   for (const auto& [id, parent] : tree.parents) {
     bool is_wanted = level_of(id) >= detail.level;
-    for (const Focus& focus : detail.focuses) {
-      if (level_of(id) >= focus.level && intersects(focus.box, source.at(id).record.box)) {
+    for (std::size_t i = 0; i < detail.focuses.size(); ++i) {
+      const Focus& focus = detail.focuses[i];
+      const Box3& box = source.at(id).record.box;
+      if (level_of(id) >= focus.level && intersects(focus.box, box) &&
+          (!detail.needs || detail.needs(i, box))) {
         is_wanted = true;
       }
     }

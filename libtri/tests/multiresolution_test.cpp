@@ -73,6 +73,10 @@ Detail random_detail(Case& c) {
     detail.focuses.push_back(
         {random_box(c), static_cast<unsigned>(below(c.random, c.source.top() + 1))});
   }
+  if (below(c.random, 2)) {
+    const Box3 half = random_box(c);
+    detail.needs = [half](std::size_t, const Box3& box) { return box.max[0] >= half.min[0]; };
+  }
   return detail;
 }
 

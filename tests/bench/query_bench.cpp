@@ -20,7 +20,9 @@
 #include "cli/choices.hpp"
 #include "cli/cli.hpp"
 #include "earth/world.hpp"
+#include "mesh/store_mesh.hpp"
 #include "sample/place_file.hpp"
+#include "sample/raster_run.hpp"
 #include "sample/sample_run.hpp"
 #include "surface/store_window.hpp"
 #include "terrace/terrain/build.hpp"
@@ -199,6 +201,77 @@ void region(benchmark::State& state) {
   state.SetItemsProcessed(static_cast<std::int64_t>(inside));
 }
 BENCHMARK(region)->Arg(1)->Arg(100)->Arg(1000)->Unit(benchmark::kMillisecond);
+
+/// An outline of 100,000 corners around most of the store, jagged at every scale as a coast is.
+terrace::terrain::Region coast() {
+  const terrace::stream::Box3 all = terrace::terrain::world_box(
+      terrace::terrain::placement_of(store().schema()), store().bounds());
+  const std::size_t corners = small() ? 2000 : 100000;
+  std::vector<terrace::terrain::Point2> ring(corners);
+  for (std::size_t i = 0; i < corners; ++i) {
+    const double turn = static_cast<double>(i) / static_cast<double>(corners);
+    double radius = 0.9;
+    for (int octave = 2; octave < 15; ++octave) {
+      const double waves = std::ldexp(1.0, octave);
+      const auto height = [&](double wave) {
+        return terrace::terrain::unit_interval(
+            terrace::terrain::scramble(static_cast<std::uint64_t>(std::fmod(wave, waves) + waves)));
+      };
+      const double wave = std::floor(turn * waves), t = turn * waves - wave;
+      radius -= 0.3 / waves * ((1 - t) * height(wave) + t * height(wave + 1));
+    }
+    const std::array<double, 2> direction{terrace::terrain::portable_cos_degrees(360 * turn),
+                                          terrace::terrain::portable_sin_degrees(360 * turn)};
+    // Between a circle and a square, so that it fills the store.
+    const double reach = radius / std::max(std::abs(direction[0]), std::abs(direction[1]));
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      ring[i][axis] = 0.5 * (all.min[axis] + all.max[axis]) +
+                      0.5 * (all.max[axis] - all.min[axis]) * reach * direction[axis];
+    }
+  }
+  return terrace::terrain::Region::of_polygons({{std::move(ring)}}, all.min[2], all.max[2]);
+}
+
+/// What a polygon costs above its box, which of course holds more; 0: the box, 1: the polygon.
+terrace::terrain::Region region_of(const benchmark::State& state) {
+  const terrace::terrain::Region polygon = coast();
+  return state.range(0) == 0 ? terrace::terrain::Region::of_box(polygon.box()) : polygon;
+}
+
+void prepare_polygon(benchmark::State& state) {
+  store();
+  for (auto _ : state) benchmark::DoNotOptimize(coast());
+}
+BENCHMARK(prepare_polygon)->Unit(benchmark::kMillisecond);
+
+/// All points inside, as the command writes them.
+void polygon_points(benchmark::State& state) {
+  const Store& source = store();
+  terrace::terrain::Detail detail;
+  detail.region = region_of(state);
+  std::size_t inside = 0;
+  for (auto _ : state) inside = terrace::terrain::points_of_store(source, detail).positions.size();
+  state.counters["inside"] = static_cast<double>(inside);
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(inside));
+}
+BENCHMARK(polygon_points)->DenseRange(0, 1)->Unit(benchmark::kMillisecond);
+
+/// The raster's own lattice inside, written as GeoTIFF.
+void polygon_raster(benchmark::State& state) {
+  static const terrace::tests::TemporaryFolder folder;
+  const Store& source = store();
+  terrace::terrain::RasterRequest request;
+  request.region = region_of(state);
+  request.output = (folder.path() / "out.tif").string();
+  request.replace = true;
+  std::uint64_t cells = 0;
+  for (auto _ : state) {
+    cells = terrace::terrain::write_raster(source, request, {.threads = 2}).cells_with_data;
+  }
+  state.counters["inside"] = static_cast<double>(cells);
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(cells));
+}
+BENCHMARK(polygon_raster)->DenseRange(0, 1)->Unit(benchmark::kMillisecond)->UseRealTime();
 
 }  // namespace
 

@@ -248,6 +248,16 @@ class RasterTest(QueryTest):
                         '--memory', '30M', '-o', two)
             self.assertTrue(filecmp.cmp(one, two, shallow=False))
 
+    def test_regions_whose_rings_cross_are_refused(self):
+        path = self.path('bow.geojson')
+        with open(path, 'w') as file:
+            json.dump({'type': 'Polygon', 'coordinates': [[[0, 0], [4, 4], [4, 0], [0, 4], [0, 0]]]}, file)
+        for verb, output in ('points', 'out.xyz'), ('raster', 'out.tif'), ('mesh', 'out.ply'):
+            text = self.expect_error(1, verb, self.store, '--region', path, '-o', self.path(output))
+            for part in (path, 'polygon 1, outer ring', 'Self-intersection at 2, 2', 'Fix geometries'):
+                self.assertIn(part, text)
+            self.assertFalse(os.path.exists(self.path(output)))
+
     def test_regions(self):
         box = [self.low[0] + 300, self.low[1] + 600, self.low[0] + 1200, self.low[1] + 1800]
         summary = json.loads(self.run_ok('raster', self.store, '--region', ','.join(map(str, box)),

@@ -35,6 +35,7 @@ IN_STREAM = ['libstream/src', 'libstream/tests', 'libstream/bench', 'libstream/f
 RESTRICTED = [
     (r'CGAL/|boost/|gmp(xx)?\.h|mpfr\.h', IN_TRI),
     (r'GeographicLib/|proj(_experimental)?\.h', ['libterrain/src/earth', 'libterrain/tests']),
+    (r'geos(_c)?\.h|geos/', ['libterrain/src/base']),
     (r'tiff(io|io\.hxx|conf|vers)?\.h|png\.h|zlib\.h|zstd\.h|libdeflate\.h', IN_STREAM),
     (r'lemon/', ['libmatching/src', 'libmatching/tests', 'libmatching/bench']),
     (r'cuda_runtime|cuda\.h|cuda_(device|rounds)',
@@ -192,7 +193,7 @@ def check_meson(root):
                 continue
             for name in re.findall(r"(?:dependency|subproject)\(\s*'([^']+)'", read(root, path)):
                 sibling = name.startswith('terrace-') and name[8:] not in [library] + SIBLINGS.get(library, [])
-                if sibling or (name in ('geographiclib', 'proj') and library != 'terrain') or (name in ('gmp', 'mpfr') and library != 'tri'):
+                if sibling or (name in ('geographiclib', 'proj', 'geos') and library != 'terrain') or (name in ('gmp', 'mpfr') and library != 'tri'):
                     yield f'{path}: depends on {name}'
         for folder, ending, list_path, cut in LISTED:
             folder = folder.format(library)

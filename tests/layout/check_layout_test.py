@@ -69,6 +69,7 @@ class CheckLayout(unittest.TestCase):
             ('tools/src/b.cpp', gpl + '#include <tiffio.h>\n', 'which only'),
             ('libtri/src/b.cpp', gpl + '#include <GeographicLib/UTMUPS.hpp>\n', 'which only'),
             ('tools/src/b.cpp', gpl + '#include <proj.h>\n', 'which only'),
+            ('libterrain/src/earth/b.cpp', gpl + '#include <geos_c.h>\n', 'which only'),
             ('libcluster/src/b.cpp', apache + '#include <lemon/matching.h>\n', 'which only'),
             ('libcluster/src/b.cpp', '#include <vector>\n', 'no SPDX line'),
             ('libcluster/src/b.cpp', gpl, 'not Apache-2.0'),

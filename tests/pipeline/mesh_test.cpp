@@ -143,6 +143,31 @@ TEST_F(Mesh, OfARegionIsThePartOfTheWholeThatReachesIn) {
   EXPECT_LE(inside, (2001.0 + 4 * kCell) * (2001.0 + 4 * kCell));
 }
 
+// Clusters beside the polygon are left out, yet the triangles are those of the whole that touch it.
+TEST_F(Mesh, OfAPolygonIsThePartOfTheWholeThatReachesIn) {
+  terrain::Detail detail;
+  detail.region = terrain::Region::of_polygons(
+      {{{{501003, 5190001}, {507004, 5197102}, {506904, 5197302}, {500903, 5190201}}}}, -1e9, 1e9);
+  const auto corners = [](const terrain::TriangleMesh& mesh, const auto& keep) {
+    std::vector<std::array<stream::Point3, 3>> triangles;
+    for (const auto& t : mesh.triangles) {
+      std::array<stream::Point3, 3> triangle{mesh.positions[t[0]], mesh.positions[t[1]],
+                                             mesh.positions[t[2]]};
+      std::sort(triangle.begin(), triangle.end());
+      if (keep(triangle)) triangles.push_back(triangle);
+    }
+    std::sort(triangles.begin(), triangles.end());
+    return triangles;
+  };
+  const auto part =
+      corners(mesh_of_store(*store_, detail, kMuch), [](const auto&) { return true; });
+  const auto whole =
+      corners(mesh_of_store(*store_, terrain::Detail{}, kMuch),
+              [&detail](const auto& triangle) { return detail.region->touches(triangle); });
+  EXPECT_GT(part.size(), 100U);
+  EXPECT_EQ(part, whole);
+}
+
 TEST_F(Mesh, SaysWhatMemoryItNeeds) {
   try {
     mesh_of_store(*store_, tools::parse_detail(*store_, "0", "", {}), std::uint64_t{1} << 20);

@@ -20,7 +20,7 @@
 #include <terrace/tri/point_tin.hpp>
 
 #include "../../libterrain/tests/temporary_folder.hpp"
-#include "base/polygon.hpp"
+#include "base/orientation.hpp"
 #include "mesh/bounded/streaming_hull.hpp"
 #include "mesh/mesh_file.hpp"
 #include "random.hpp"

@@ -8,7 +8,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "base/polygon.hpp"
+#include "base/orientation.hpp"
+#include "base/region_shape.hpp"
 #include "base/units.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/error.hpp"
@@ -120,7 +121,7 @@ Region Region::parse(const std::string& text) {
     }
     return region;
   }
-  return of_polygons(read_geojson(text), -kInfinity, kInfinity);
+  return of_shape(std::make_shared<RegionShape>(read_geojson(text), text), -kInfinity, kInfinity);
 }
 
 Region Region::of_box(const stream::Box3& box) {
@@ -130,9 +131,13 @@ Region Region::of_box(const stream::Box3& box) {
 }
 
 Region Region::of_polygons(std::vector<Polygon> polygons, double low, double high) {
+  return of_shape(std::make_shared<RegionShape>(std::move(polygons), ""), low, high);
+}
+
+Region Region::of_shape(std::shared_ptr<const RegionShape> shape, double low, double high) {
   Region region;
-  region.polygons_ = std::move(polygons);
-  for (const Polygon& polygon : region.polygons_) {
+  region.shape_ = std::move(shape);
+  for (const Polygon& polygon : region.polygons()) {
     for (const Point2& p : polygon.front()) {
       region.box_.include(stream::Point3{p[0], p[1], low});
       region.box_.include(stream::Point3{p[0], p[1], high});
@@ -141,13 +146,53 @@ Region Region::of_polygons(std::vector<Polygon> polygons, double low, double hig
   return region;
 }
 
+const std::vector<Polygon>& Region::polygons() const {
+  static const std::vector<Polygon> none;
+  return shape_ ? shape_->polygons() : none;
+}
+
 bool Region::contains(const stream::Point3& p) const {
-  if (!box_.contains(p)) return false;
-  if (polygons_.empty()) return true;
-  for (const Polygon& polygon : polygons_) {
-    if (covers(polygon, {p[0], p[1]})) return true;
+  return box_.contains(p) && (!shape_ || shape_->covers({p[0], p[1]}));
+}
+
+bool Region::covers(const Point2& place) const {
+  return contains({place[0], place[1], std::clamp(0.0, box_.min[2], box_.max[2])});
+}
+
+Overlap Region::overlap(const stream::Box3& box) const {
+  if (box.empty() || !box_.intersects(box)) return Overlap::none;
+  const bool inside = box_.contains(box.min) && box_.contains(box.max);
+  if (!shape_) return inside ? Overlap::whole : Overlap::part;
+  // Only what is within the bounds counts, and is finite.
+  Point2 low{}, high{};
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    low[axis] = std::max(box.min[axis], box_.min[axis]);
+    high[axis] = std::min(box.max[axis], box_.max[axis]);
   }
-  return false;
+  const Overlap flat = shape_->overlap(low, high);
+  return flat == Overlap::whole && !inside ? Overlap::part : flat;
+}
+
+bool Region::touches(const std::array<stream::Point3, 3>& triangle) const {
+  stream::Box3 bounds;
+  for (const stream::Point3& corner : triangle) bounds.include(corner);
+  if (!bounds.intersects(box_)) return false;
+  std::array<Point2, 3> flat{};
+  for (std::size_t i = 0; i < 3; ++i) flat[i] = {triangle[i][0], triangle[i][1]};
+  if (shape_) return shape_->touches(flat);
+  // Convex shapes whose bounds meet are apart only if a side of the triangle parts them.
+  const int turn = orientation(flat[0], flat[1], flat[2]);
+  for (std::size_t i = 0; i < 3; ++i) {
+    int least = 1, most = -1;
+    for (unsigned corner = 0; corner < 4; ++corner) {
+      const Point2 p{(corner & 1 ? box_.max : box_.min)[0], (corner & 2 ? box_.max : box_.min)[1]};
+      const int side = orientation(flat[i], flat[(i + 1) % 3], p);
+      least = std::min(least, side);
+      most = std::max(most, side);
+    }
+    if ((most < 0 && turn >= 0) || (least > 0 && turn <= 0)) return false;
+  }
+  return true;
 }
 
 }  // namespace terrace::terrain

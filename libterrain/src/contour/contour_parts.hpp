@@ -37,7 +37,7 @@ void draw_point_contours(const ContourParts& parts);
 [[noreturn]] void throw_region_outside(const stream::Store& store);
 /// The box in stored coordinates around a region's box.
 StoredBox box_around(const Region& region, const GroundSlope& ground);
-/// Whether a place of the CRS lies in the region, whatever its height.
-bool holds_place(const Region& region, const Point2& world);
+/// Whether places in a box of stored coordinates lie in the region, at any height.
+bool reaches_into(const StoredBox& box, const Region& region, const GroundSlope& ground);
 
 }  // namespace terrace::terrain

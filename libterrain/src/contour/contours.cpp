@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <utility>
 
@@ -48,9 +49,15 @@ StoredBox box_around(const Region& region, const GroundSlope& ground) {
   return box;
 }
 
-bool holds_place(const Region& region, const Point2& world) {
-  const double low = region.box().min[2];
-  return region.contains({world[0], world[1], low > -1e300 ? low : 0});
+bool reaches_into(const StoredBox& box, const Region& region, const GroundSlope& ground) {
+  constexpr double kAnyHeight = std::numeric_limits<double>::infinity();
+  stream::Box3 world;
+  for (unsigned corner = 0; corner < 4; ++corner) {
+    const Point2 p =
+        ground.world({(corner & 1 ? box.max : box.min)[0], (corner & 2 ? box.max : box.min)[1]});
+    world.include(stream::Box3{{p[0], p[1], -kAnyHeight}, {p[0], p[1], kAnyHeight}});
+  }
+  return region.overlap(world) != Overlap::none;
 }
 
 ContourOutcome write_contours(const stream::Store& given, const ContourRequest& request,

@@ -66,8 +66,8 @@ void draw_lattice_contours(const ContourParts& parts) {
   std::function<bool(std::int64_t, std::int64_t)> wanted;
   if (request.region) {
     wanted = [&](std::int64_t column, std::int64_t row) {
-      return holds_place(*request.region, ground.world(stored({static_cast<double>(column) + 0.5,
-                                                               static_cast<double>(row) + 0.5})));
+      return request.region->covers(ground.world(
+          stored({static_cast<double>(column) + 0.5, static_cast<double>(row) + 0.5})));
     };
   }
 
@@ -84,8 +84,15 @@ void draw_lattice_contours(const ContourParts& parts) {
       const std::int64_t column = static_cast<std::int64_t>(i) * kWindow;
       const LatticeWindow window{lattice.column + column, lattice.row + row,
                                  std::min(kWindow, lattice.columns - column), rows};
-      std::vector<double> part(window.size());
-      readers[thread]->heights(window, std::span(part));
+      std::vector<double> part(window.size(), NAN);
+      // The squares of the samples at the window's sides reach half a cell out of it.
+      const StoredBox around{
+          {static_cast<double>(window.column - 1), static_cast<double>(window.row - 1)},
+          {static_cast<double>(window.column + window.columns),
+           static_cast<double>(window.row + window.rows)}};
+      if (!request.region || reaches_into(around, *request.region, ground)) {
+        readers[thread]->heights(window, std::span(part));
+      }
       for (std::int64_t r = 0; r < rows; ++r) {
         std::copy_n(part.begin() + r * window.columns, window.columns,
                     heights.begin() + r * lattice.columns + column);

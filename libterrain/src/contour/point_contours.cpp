@@ -54,20 +54,24 @@ class PointContours {
         rank_(tree_.size(), kNoPart) {
     const stream::Box3& bounds = parts.store.bounds();
     bounds_ = {{bounds.min[0], bounds.min[1]}, {bounds.max[0], bounds.max[1]}};
-    StoredBox wanted = bounds_;
-    if (request_.region) {
-      wanted = box_around(*request_.region, ground_);
-      // So that a triangle meets the box if its middle, which is rounded, lies in the region.
+    // So that a triangle meets a box if its middle, which is rounded, lies there.
+    const auto widened = [&](StoredBox box) {
       for (std::size_t axis = 0; axis < 2; ++axis) {
         const double margin =
             1e-9 * std::max({std::abs(bounds_.min[axis]), std::abs(bounds_.max[axis]), 1e-300});
-        wanted.min[axis] -= margin;
-        wanted.max[axis] += margin;
+        box.min[axis] -= margin;
+        box.max[axis] += margin;
       }
-      if (!wanted.meets(bounds_)) throw_region_outside(parts.store);
+      return box;
+    };
+    const std::optional<Region>& region = request_.region;
+    if (region && !widened(box_around(*region, ground_)).meets(bounds_)) {
+      throw_region_outside(parts.store);
     }
     for (std::size_t part = 0; part < tree_.size(); ++part) {
-      if (tree_.box(part).meets(wanted)) rank_[part] = parts_at_work_++;
+      if (!region || reaches_into(widened(tree_.box(part)), *region, ground_)) {
+        rank_[part] = parts_at_work_++;
+      }
     }
   }
 
@@ -126,7 +130,7 @@ class PointContours {
     for (std::size_t axis = 0; axis < 2; ++axis) {
       middle[axis] = (t[0].place[axis] + t[1].place[axis] + t[2].place[axis]) / 3;
     }
-    return holds_place(*request_.region, ground_.world(middle));
+    return request_.region->covers(ground_.world(middle));
   }
 
   /// part.end if none is.

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "base/portable_math.hpp"
+#include "base/region_shape.hpp"
 #include "earth/crs/crs_definition.hpp"
 #include "terrace/stream/error.hpp"
 
@@ -107,9 +108,14 @@ Region region_in(const Region& region, const Transformation& change, const strea
   std::vector<Polygon> polygons = outlines(region);
   if (!change.identity()) {
     const Outline outline(change);
+    std::vector<Polygon> there;
     for (Polygon& polygon : polygons) {
       for (std::vector<Point2>& ring : polygon) ring = outline.ring(ring);
+      // Sides may come to lie on each other, as the meridians of 180 degrees east and west do.
+      for (Polygon& part : valid_polygons(polygon)) there.push_back(std::move(part));
     }
+    if (there.empty()) fail(to, "the region has no area in");
+    polygons = std::move(there);
   }
   if (to.is_geographic()) {
     const double turn = 360.0 / to.definition().degrees_per_unit;

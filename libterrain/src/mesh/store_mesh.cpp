@@ -12,7 +12,6 @@
 #include <terrace/tri/metric_triangles.hpp>
 #include <terrace/tri/multiresolution.hpp>
 
-#include "base/region_overlap.hpp"
 #include "earth/ground.hpp"
 #include "earth/world.hpp"
 #include "terrace/terrain/error.hpp"
@@ -44,16 +43,32 @@ tri::Box3 stored_box(const Placement& placement, const stream::Box3& world) {
           {outward(stored.max[0], 1), outward(stored.max[1], 1), outward(high, 1)}};
 }
 
+/// Triangles that reach out of a polygon have corners in the clusters beside it.
+Detail with_margin(const stream::Store& store, Detail detail, const Placement& placement) {
+  const stream::Box3 all = world_box(placement, store.bounds());
+  const auto clusters =
+      static_cast<double>(store.levels()[std::min(detail.finest(), store.top())].clusters);
+  detail.margin = 2 * std::sqrt((all.max[0] - all.min[0]) * (all.max[1] - all.min[1]) / clusters);
+  return detail;
+}
+
 tri::Detail in_stored_coordinates(const Detail& detail, const Placement& placement) {
   tri::Detail stored;
+  std::vector<Region> regions;
+  const auto add = [&](const Region& region, unsigned level) {
+    stored.focuses.push_back({stored_box(placement, region.box()), level});
+    regions.push_back(region);
+  };
   if (detail.region) {
-    stored.focuses.push_back({stored_box(placement, detail.region->box()), detail.level});
+    add(*detail.region, detail.level);
   } else {
     stored.level = detail.level;
   }
-  for (const FinerRegion& focus : detail.focuses) {
-    stored.focuses.push_back({stored_box(placement, focus.region.box()), focus.level});
-  }
+  for (const FinerRegion& focus : detail.focuses) add(focus.region, focus.level);
+  stored.needs = [&detail, placement, regions](std::size_t focus, const tri::Box3& box) {
+    return regions[focus].polygons().empty() ||
+           detail.reaches_into(regions[focus], world_box(placement, {box.min, box.max}));
+  };
   return stored;
 }
 
@@ -159,7 +174,7 @@ TriangleMesh mesh_of_model(const tri::Multiresolution2<Coord>& model, const Plac
   const auto add = [&](std::array<tri::VertexId, 3> corners) {
     if (mirrored) std::swap(corners[1], corners[2]);
     if (region &&
-        !touches(*region, {position(corners[0]), position(corners[1]), position(corners[2])})) {
+        !region->touches({position(corners[0]), position(corners[1]), position(corners[2])})) {
       return;
     }
     mesh.triangles.push_back({number_of(corners[0]), number_of(corners[1]), number_of(corners[2])});
@@ -198,11 +213,12 @@ TriangleMesh mesh_of_store(const stream::Store& store, const Detail& detail,
     throw UsageError("a mesh has the metric euclidean or elliptical:FILE, not " +
                      options.metric.text);
   }
-  check_memory(store, detail, memory_bytes,
+  const Detail wide = with_margin(store, detail, placement_of(store.schema()));
+  check_memory(store, wide, memory_bytes,
                options.heights.bytes_per_vertex() +
                    (kind == MetricChoice::Kind::elliptical ? kBytesToFlip : 0));
-  return store.schema().grid ? mesh_of<std::int32_t>(store, detail, options)
-                             : mesh_of<double>(store, detail, options);
+  return store.schema().grid ? mesh_of<std::int32_t>(store, wide, options)
+                             : mesh_of<double>(store, wide, options);
 }
 
 TriangleMesh points_of_store(const stream::Store& store, const Detail& detail) {
@@ -211,11 +227,14 @@ TriangleMesh points_of_store(const stream::Store& store, const Detail& detail) {
   TriangleMesh cloud;
   for_each_wanted(
       store, detail,
-      [&](stream::ClusterId id, const stream::ClusterRecord&, const stream::ClusterPoints& points) {
+      [&](stream::ClusterId id, const stream::ClusterRecord& record,
+          const stream::ClusterPoints& points) {
         const unsigned level = stream::level_of(id);
+        const bool whole = !detail.region || detail.region->overlap(world_box(
+                                                 placement, record.summary.box)) == Overlap::whole;
         for (std::size_t i = 0; i < points.size(); ++i) {
           const stream::Point3 place = world_point(placement, points.positions[i]);
-          if (detail.region && !detail.region->contains(place)) continue;
+          if (!whole && !detail.region->contains(place)) continue;
           cloud.positions.push_back(place);
           cloud.levels.push_back(static_cast<std::uint8_t>(level));
           if (!coarse) continue;

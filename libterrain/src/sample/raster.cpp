@@ -160,8 +160,8 @@ class RasterRun {
       }
       if (request_.to) request_.to->reverse(line);
       for (Point2& p : line) {
-        const bool wanted = !request_.region || request_.region->polygons().empty() ||
-                            request_.region->contains({p[0], p[1], 0});
+        const bool wanted =
+            !request_.region || request_.region->polygons().empty() || request_.region->covers(p);
         p = wanted ? ground_.stored(p) : Point2{NAN, NAN};
       }
     });

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "base/polygon.hpp"
+#include "base/orientation.hpp"
 #include "surface/ground_slope.hpp"
 
 namespace terrace::terrain {

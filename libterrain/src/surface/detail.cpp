@@ -19,10 +19,20 @@ unsigned Detail::finest() const {
 }
 
 bool Detail::wants(unsigned cluster_level, const stream::Box3& world_box) const {
-  if (cluster_level >= level && (!region || region->box().intersects(world_box))) return true;
+  if (cluster_level >= level && (!region || reaches_into(*region, world_box))) return true;
   return std::any_of(focuses.begin(), focuses.end(), [&](const FinerRegion& focus) {
-    return cluster_level >= focus.level && focus.region.box().intersects(world_box);
+    return cluster_level >= focus.level && reaches_into(focus.region, world_box);
   });
+}
+
+bool Detail::reaches_into(const Region& there, const stream::Box3& world_box) const {
+  if (!there.box().intersects(world_box)) return false;
+  stream::Box3 wide = world_box;
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    wide.min[axis] -= margin;
+    wide.max[axis] += margin;
+  }
+  return there.overlap(wide) != Overlap::none;
 }
 
 namespace {

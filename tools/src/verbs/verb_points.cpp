@@ -47,16 +47,19 @@ class PointOutput {
     }
   }
 
-  void add(stream::ClusterId id, const stream::ClusterPoints& points) {
+  void add(stream::ClusterId id, const stream::ClusterRecord& record,
+           const stream::ClusterPoints& points) {
     check_interrupt();
     std::span<const stream::OverlayValue> heights;
     if (overlay_ != nullptr) heights = overlay_->find(id);
     std::size_t next = 0;
     const std::size_t payload = schema_.payload_size();
+    const bool whole = !detail_.region || detail_.region->overlap(world_box(
+                                              placement_, record.summary.box)) == Overlap::whole;
     for (std::size_t i = 0; i < points.size(); ++i) {
       stream::Point3 p = world_point(placement_, points.positions[i]);
       while (next < heights.size() && heights[next].index < i) ++next;
-      if (!inside(p)) continue;
+      if (!whole && !inside(p)) continue;
       if (next < heights.size() && heights[next].index == i) {
         p[2] = heights[next].value;
         ++replaced_;
@@ -85,7 +88,7 @@ class PointOutput {
   static constexpr std::size_t kPointsPerBlock = 65536;
 
   [[nodiscard]] bool inside(const stream::Point3& p) const {
-    if (!detail_.region || detail_.region->contains(p)) return true;
+    if (detail_.region->contains(p)) return true;
     for (const FinerRegion& focus : detail_.focuses) {
       if (focus.region.contains(p)) return true;
     }
@@ -135,9 +138,10 @@ class PointsCommand final : public Command {
         {.format = format_, .replace = may_replace(output_, common.force), .stop = stop_token()});
     PointOutput output(store, detail, crs_.places(store, common), overlay ? &*overlay : nullptr,
                        *writer);
-    for_each_wanted(store, detail,
-                    [&output](stream::ClusterId id, const stream::ClusterRecord&,
-                              const stream::ClusterPoints& points) { output.add(id, points); });
+    for_each_wanted(
+        store, detail,
+        [&output](stream::ClusterId id, const stream::ClusterRecord& record,
+                  const stream::ClusterPoints& points) { output.add(id, record, points); });
     output.flush();
     const std::uint64_t points = writer->points();
     writer->finish();

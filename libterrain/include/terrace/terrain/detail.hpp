@@ -24,11 +24,17 @@ struct Detail {
   unsigned level = 0;
   std::optional<Region> region;
   std::vector<FinerRegion> focuses;
+  /// In units of the CRS: what lies so far outside polygons, but in the box around them, is wanted
+  /// as well.
+  double margin = 0;
 
   /// The finest level wanted anywhere.
   [[nodiscard]] unsigned finest() const;
   /// Whether a cluster of `cluster_level` whose descendants lie in `world_box` must be expanded.
   [[nodiscard]] bool wants(unsigned cluster_level, const stream::Box3& world_box) const;
+  /// Whether a cluster whose descendants lie in `world_box` may have points that are wanted in
+  /// `there`, which is `region` or that of a focus.
+  [[nodiscard]] bool reaches_into(const Region& there, const stream::Box3& world_box) const;
 };
 
 /// Visits every cluster that `detail` wants, the root first, then level by level downward; within a

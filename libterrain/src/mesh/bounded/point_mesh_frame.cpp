@@ -8,7 +8,7 @@
 #include <map>
 #include <utility>
 
-#include "base/polygon.hpp"
+#include "base/orientation.hpp"
 #include "mesh/bounded/streaming_hull.hpp"
 
 namespace terrace::terrain {

@@ -73,14 +73,17 @@ PointMeshSamples::PointMeshSamples(const stream::Store& store, const std::option
   const Placement placement = placement_of(store.schema());
   Detail detail;
   detail.region = region;
-  for_each_wanted(
-      store, detail,
-      [&](stream::ClusterId, const stream::ClusterRecord&, const stream::ClusterPoints& cluster) {
-        for (const stream::Point3& stored : cluster.positions) {
-          const stream::Point3 p = world_point(placement, stored);
-          if (!region || region->contains(p)) deal(cuts.cell_of({p[0], p[1]}), p);
-        }
-      });
+  for_each_wanted(store, detail,
+                  [&](stream::ClusterId, const stream::ClusterRecord& record,
+                      const stream::ClusterPoints& cluster) {
+                    const bool whole =
+                        !region ||
+                        region->overlap(world_box(placement, record.summary.box)) == Overlap::whole;
+                    for (const stream::Point3& stored : cluster.positions) {
+                      const stream::Point3 p = world_point(placement, stored);
+                      if (whole || region->contains(p)) deal(cuts.cell_of({p[0], p[1]}), p);
+                    }
+                  });
   // What is left takes no more than its room; nothing is buffered any more.
   for (std::vector<stream::Point3>& rest : waiting_) rest.shrink_to_fit();
   file_.read_at(0, {});

@@ -56,14 +56,17 @@ PointMeshScan scan_point_mesh(const stream::Store& store, const std::optional<Re
       scan.whole->add(p);
     }
   };
-  for_each_wanted(
-      store, detail,
-      [&](stream::ClusterId, const stream::ClusterRecord&, const stream::ClusterPoints& cluster) {
-        for (const stream::Point3& stored : cluster.positions) {
-          const stream::Point3 p = world_point(placement, stored);
-          if (!region || region->contains(p)) add(p);
-        }
-      });
+  for_each_wanted(store, detail,
+                  [&](stream::ClusterId, const stream::ClusterRecord& record,
+                      const stream::ClusterPoints& cluster) {
+                    const bool whole =
+                        !region ||
+                        region->overlap(world_box(placement, record.summary.box)) == Overlap::whole;
+                    for (const stream::Point3& stored : cluster.positions) {
+                      const stream::Point3 p = world_point(placement, stored);
+                      if (whole || region->contains(p)) add(p);
+                    }
+                  });
   if (scan.whole) {
     scan.some = {};
   } else {

@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-#include "base/polygon.hpp"
+#include "base/orientation.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -10,7 +10,6 @@
 #include <terrace/stream/error.hpp>
 
 #include "base/portable_math.hpp"
-#include "base/region_overlap.hpp"
 #include "base/stopwatch.hpp"
 #include "base/units.hpp"
 
@@ -19,7 +18,7 @@ namespace {
 
 void keep_what_touches(WindowTin& tin, const Region& region) {
   std::erase_if(tin.triangles, [&](const std::array<std::uint32_t, 3>& t) {
-    return !touches(region, {tin.positions[t[0]], tin.positions[t[1]], tin.positions[t[2]]});
+    return !region.touches({tin.positions[t[0]], tin.positions[t[1]], tin.positions[t[2]]});
   });
 }
 
@@ -265,6 +264,16 @@ WindowTin WindowMesher::mesh_as(const LatticeWindow& window, tri::TinQuality qua
 }
 
 WindowTin WindowMesher::mesh(const LatticeWindow& window) {
+  if (options_.region) {
+    constexpr double kAnyHeight = std::numeric_limits<double>::infinity();
+    const stream::Box3 box{
+        {static_cast<double>(window.column), static_cast<double>(window.row), -kAnyHeight},
+        {static_cast<double>(window.column + window.columns - 1),
+         static_cast<double>(window.row + window.rows - 1), kAnyHeight}};
+    WindowTin nothing;
+    nothing.window = window;
+    if (options_.region->overlap(world_box(placement_, box)) == Overlap::none) return nothing;
+  }
   const tri::TinQuality quality = options_.tin.quality;
   return reader_.float_is_exact() ? mesh_as<float>(window, quality, true)
                                   : mesh_as<double>(window, quality, true);

@@ -8,6 +8,7 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -55,6 +56,10 @@ struct Detail {
   static constexpr unsigned kTop = 255;  ///< any level that is not below the top means the top
   unsigned level = kTop;
   std::vector<Focus> focuses;
+  /// Narrows focuses that are no boxes: whether the focus of that number needs what lies in the
+  /// box, which meets the focus's own. Must be true of boxes around one of which it is. Null: it
+  /// does.
+  std::function<bool(std::size_t focus, const Box3& box)> needs{};
 };
 
 struct ModelOptions {

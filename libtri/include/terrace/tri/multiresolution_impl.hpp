@@ -101,8 +101,11 @@ ClusterTree::Judge MultiresolutionModel<Triangulation>::judge(const Detail& deta
   return [this, &detail](ChildRef child, unsigned child_level, bool) {
     if (child_level > detail.level) return Verdict::expand;
     Verdict verdict = child_level == detail.level ? Verdict::expand_alone : Verdict::collapse;
-    for (const Focus& focus : detail.focuses) {
-      if (child_level < focus.level || !intersects(focus.box, tree_.record(child).box)) continue;
+    for (std::size_t i = 0; i < detail.focuses.size(); ++i) {
+      const Focus& focus = detail.focuses[i];
+      const Box3& box = tree_.record(child).box;
+      if (child_level < focus.level || !intersects(focus.box, box)) continue;
+      if (detail.needs && !detail.needs(i, box)) continue;
       if (child_level > focus.level) return Verdict::expand;
       verdict = Verdict::expand_alone;
     }

@@ -11,7 +11,4 @@ namespace terrace::terrain {
 /// Predicates (1997), doi:10.1007/PL00009321; here one filter and the full expansion.
 int orientation(const Point2& a, const Point2& b, const Point2& c);
 
-/// True if `p` is inside (even-odd over all rings) or on a ring. Exact. O(vertices).
-bool covers(const Polygon& polygon, const Point2& p);
-
 }  // namespace terrace::terrain

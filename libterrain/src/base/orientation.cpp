@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "base/polygon.hpp"
+#include "base/orientation.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -66,25 +65,6 @@ int orientation(const Point2& a, const Point2& b, const Point2& c) {
   sum.add_product(c[0], a[1]);
   sum.add_product(-c[1], a[0]);
   return sum.sign();
-}
-
-bool covers(const Polygon& polygon, const Point2& p) {
-  bool inside = false;
-  for (const std::vector<Point2>& ring : polygon) {
-    for (std::size_t i = 0; i < ring.size(); ++i) {
-      const Point2& a = ring[i];
-      const Point2& b = ring[i + 1 == ring.size() ? 0 : i + 1];
-      const bool in_height = std::min(a[1], b[1]) <= p[1] && p[1] <= std::max(a[1], b[1]);
-      if (!in_height) continue;
-      const int side = orientation(a, b, p);
-      if (side == 0 && std::min(a[0], b[0]) <= p[0] && p[0] <= std::max(a[0], b[0])) return true;
-      // A ray to the right meets the edge's half-open span of heights: crossings are counted once.
-      const bool upward = a[1] <= p[1] && p[1] < b[1];
-      const bool downward = b[1] <= p[1] && p[1] < a[1];
-      if ((upward && side > 0) || (downward && side < 0)) inside = !inside;
-    }
-  }
-  return inside;
 }
 
 }  // namespace terrace::terrain

@@ -1,0 +1,324 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "base/region_shape.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include <geos_c.h>
+
+#include "base/units.hpp"
+#include "terrace/stream/error.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+/// 20 MB each for 100,000 corners. The grid leaves one question in a hundred, so a few serve many
+/// threads.
+constexpr unsigned kMostPrepared = 4;
+
+/// GEOS's functions, and what it said last.
+class Geos {
+ public:
+  struct Destroy {
+    GEOSContextHandle_t context;
+    void operator()(GEOSGeometry* g) const { GEOSGeom_destroy_r(context, g); }
+    void operator()(const GEOSPreparedGeometry* g) const { GEOSPreparedGeom_destroy_r(context, g); }
+    void operator()(GEOSSTRtree* tree) const { GEOSSTRtree_destroy_r(context, tree); }
+    void operator()(char* text) const { GEOSFree_r(context, text); }
+  };
+  template <class T>
+  using Owned = std::unique_ptr<T, Destroy>;
+  using Geometry = Owned<GEOSGeometry>;
+
+  Geos() : context_(GEOS_init_r()) {
+    if (context_ == nullptr) fail();
+    GEOSContext_setErrorMessageHandler_r(
+        context_, [](const char* message, void* to) { *static_cast<std::string*>(to) = message; },
+        &said_);
+  }
+  Geos(const Geos&) = delete;
+  Geos& operator=(const Geos&) = delete;
+  ~Geos() { GEOS_finish_r(context_); }
+
+  [[nodiscard]] GEOSContextHandle_t context() const { return context_; }
+  template <class T>
+  [[nodiscard]] Owned<T> own(T* made) const {
+    if (made == nullptr) fail();
+    return Owned<T>(made, Destroy{context_});
+  }
+  /// A predicate's answer.
+  [[nodiscard]] bool told(char answer) const {
+    if (answer != 0 && answer != 1) fail();
+    return answer == 1;
+  }
+
+  [[nodiscard]] Geometry point(const Point2& p) const {
+    return own(GEOSGeom_createPointFromXY_r(context_, p[0], p[1]));
+  }
+  /// Without the corner that closes it.
+  [[nodiscard]] Geometry ring(std::span<const Point2> corners) const {
+    std::vector<Point2> closed(corners.begin(), corners.end());
+    closed.push_back(corners.front());
+    GEOSCoordSequence* places = GEOSCoordSeq_copyFromBuffer_r(
+        context_, closed.front().data(), static_cast<unsigned>(closed.size()), 0, 0);
+    if (places == nullptr) fail();
+    return own(GEOSGeom_createLinearRing_r(context_, places));  // which it takes in any case
+  }
+  [[nodiscard]] Geometry polygon(std::span<const Point2> corners) const {
+    return own(GEOSGeom_createPolygon_r(context_, ring(corners).release(), nullptr, 0));
+  }
+  [[nodiscard]] Geometry polygon(const Polygon& rings) const {
+    std::vector<Geometry> holes;
+    for (std::size_t i = 1; i < rings.size(); ++i) holes.push_back(ring(rings[i]));
+    Geometry outer = ring(rings.front());
+    std::vector<GEOSGeometry*> given;
+    for (Geometry& hole : holes) given.push_back(hole.release());
+    return own(GEOSGeom_createPolygon_r(context_, outer.release(), given.data(),
+                                        static_cast<unsigned>(given.size())));
+  }
+
+ private:
+  [[noreturn]] void fail() const {
+    throw stream::Error({.file = {},
+                         .where = "region",
+                         .cause = "GEOS failed: " + (said_.empty() ? "out of memory" : said_),
+                         .remedy = "simplify the polygons, or give a box"});
+  }
+
+  GEOSContextHandle_t context_;
+  std::string said_;
+};
+
+/// What is wrong with a polygon, and where; nothing if it is valid.
+std::optional<std::string> fault_of(const Geos& geos, const GEOSGeometry* polygon) {
+  char* reason = nullptr;
+  GEOSGeometry* place = nullptr;
+  const char answer = GEOSisValidDetail_r(geos.context(), polygon, 0, &reason, &place);
+  const Geos::Owned<char> owned_reason(reason, {geos.context()});
+  const Geos::Geometry owned_place(place, {geos.context()});
+  if (geos.told(answer)) return std::nullopt;
+  std::string text = reason != nullptr ? reason : "not valid";
+  double x = 0, y = 0;
+  if (place != nullptr && GEOSGeomGetX_r(geos.context(), place, &x) == 1 &&
+      GEOSGeomGetY_r(geos.context(), place, &y) == 1) {
+    text += " at " + number_text(x) + ", " + number_text(y);
+  }
+  return text;
+}
+
+void require_valid(const Geos& geos, const std::vector<Polygon>& polygons,
+                   const std::string& file) {
+  std::string where;
+  const auto refuse = [&](const std::string& cause) {
+    throw stream::Error({.file = file,
+                         .where = where,
+                         .cause = cause,
+                         .remedy = "repair the polygons, for example by \"Fix geometries\" of QGIS "
+                                   "or ST_MakeValid of PostGIS"});
+  };
+  if (polygons.empty()) refuse("the region holds no polygon");
+  for (std::size_t i = 0; i < polygons.size(); ++i) {
+    const std::string polygon = "polygon " + std::to_string(i + 1);
+    where = polygon;
+    if (polygons[i].empty()) refuse("a polygon has no ring");
+    const auto at_ring = [&](std::size_t ring) {
+      where = polygon + ", " + (ring == 0 ? "outer ring" : "hole " + std::to_string(ring));
+    };
+    for (std::size_t ring = 0; ring < polygons[i].size(); ++ring) {
+      at_ring(ring);
+      if (polygons[i][ring].size() < 3) refuse("a ring has fewer than three corners");
+    }
+    const std::optional<std::string> fault = fault_of(geos, geos.polygon(polygons[i]).get());
+    if (!fault) continue;
+    for (std::size_t ring = 0; ring < polygons[i].size(); ++ring) {
+      at_ring(ring);
+      const auto own = fault_of(geos, geos.polygon(std::span(polygons[i][ring])).get());
+      if (own) refuse("the ring is not valid: " + *own);
+    }
+    where = polygon;
+    refuse("the polygon's rings do not fit together: " + *fault);
+  }
+}
+
+}  // namespace
+
+/// What GEOS makes of polygons to answer quickly. It fills its indexes while it answers, so only
+/// one thread at a time may ask.
+class RegionShape::Prepared {
+ public:
+  explicit Prepared(const std::vector<Polygon>& polygons)
+      : tree_(geos_.own(GEOSSTRtree_create_r(geos_.context(), 10))) {
+    for (const Polygon& polygon : polygons) {
+      shapes_.push_back(geos_.polygon(polygon));
+      prepared_.push_back(geos_.own(GEOSPrepare_r(geos_.context(), shapes_.back().get())));
+    }
+    for (std::size_t i = 0; i < shapes_.size(); ++i) {
+      GEOSSTRtree_insert_r(geos_.context(), tree_.get(), shapes_[i].get(), &prepared_[i]);
+    }
+  }
+
+  [[nodiscard]] const Geos& geos() const { return geos_; }
+  [[nodiscard]] bool any_meets(const Geos::Geometry& other) const {
+    return any(other, GEOSPreparedIntersects_r);
+  }
+  /// Without touching a ring. (`covers` compares all edges where one is touched.)
+  [[nodiscard]] bool any_holds(const Geos::Geometry& other) const {
+    return any(other, GEOSPreparedContainsProperly_r);
+  }
+
+ private:
+  using Shapes = Geos::Owned<const GEOSPreparedGeometry>;
+  using Predicate = char (*)(GEOSContextHandle_t, const GEOSPreparedGeometry*, const GEOSGeometry*);
+
+  [[nodiscard]] bool any(const Geos::Geometry& other, Predicate predicate) const {
+    struct Question {
+      GEOSContextHandle_t context;
+      const GEOSGeometry* other;
+      Predicate predicate;
+      char answer;
+    } question{geos_.context(), other.get(), predicate, 0};
+    GEOSSTRtree_query_r(
+        question.context, tree_.get(), question.other,
+        [](void* item, void* data) {
+          auto& asked = *static_cast<Question*>(data);
+          if (asked.answer != 0) return;
+          asked.answer =
+              asked.predicate(asked.context, static_cast<Shapes*>(item)->get(), asked.other);
+        },
+        &question);
+    return geos_.told(question.answer);
+  }
+
+  Geos geos_;
+  Geos::Owned<GEOSSTRtree> tree_;
+  std::vector<Geos::Geometry> shapes_;
+  std::vector<Shapes> prepared_;
+};
+
+namespace {
+
+const std::vector<Polygon>& found_valid(const std::vector<Polygon>& polygons,
+                                        const std::string& file) {
+  require_valid(Geos(), polygons, file);
+  return polygons;
+}
+
+}  // namespace
+
+RegionShape::RegionShape(std::vector<Polygon> polygons, const std::string& file)
+    : polygons_(std::move(polygons)),
+      grid_(found_valid(polygons_, file), [this](const Point2& place) {
+        return ask(
+            [&](const Prepared& shape) { return shape.any_meets(shape.geos().point(place)); });
+      }) {}
+
+RegionShape::~RegionShape() = default;
+
+/// Asks one that no other thread uses; waits if all are used.
+template <class Ask>
+bool RegionShape::ask(const Ask& question) const {
+  std::unique_ptr<Prepared> shape;
+  {
+    std::unique_lock lock(mutex_);
+    back_.wait(lock, [this] { return !idle_.empty() || made_ < kMostPrepared; });
+    if (idle_.empty()) {
+      ++made_;
+    } else {
+      shape = std::move(idle_.back());
+      idle_.pop_back();
+    }
+  }
+  const auto put_back = [&] {
+    {
+      const std::lock_guard lock(mutex_);
+      if (shape == nullptr) {
+        --made_;
+      } else {
+        idle_.push_back(std::move(shape));
+      }
+    }
+    back_.notify_one();
+  };
+  bool answer = false;
+  try {
+    if (shape == nullptr) shape = std::make_unique<Prepared>(polygons_);
+    answer = question(*shape);
+  } catch (...) {
+    put_back();
+    throw;
+  }
+  put_back();
+  return answer;
+}
+
+bool RegionShape::covers(const Point2& place) const {
+  const Overlap known = grid_.overlap(place);
+  if (known != Overlap::part) return known == Overlap::whole;
+  return ask([&](const Prepared& shape) { return shape.any_meets(shape.geos().point(place)); });
+}
+
+Overlap RegionShape::overlap(const Point2& low, const Point2& high) const {
+  const Overlap known = grid_.overlap(low, high);
+  if (known != Overlap::part) return known;
+  bool whole = false;
+  const bool meets = ask([&](const Prepared& shape) {
+    const std::array<Point2, 4> corners{low, {high[0], low[1]}, high, {low[0], high[1]}};
+    const Geos::Geometry box = shape.geos().polygon(std::span(corners));
+    whole = shape.any_holds(box);
+    return whole || shape.any_meets(box);
+  });
+  return whole ? Overlap::whole : meets ? Overlap::part : Overlap::none;
+}
+
+bool RegionShape::touches(const std::array<Point2, 3>& triangle) const {
+  const auto x = std::minmax({triangle[0][0], triangle[1][0], triangle[2][0]});
+  const auto y = std::minmax({triangle[0][1], triangle[1][1], triangle[2][1]});
+  const Overlap known = grid_.overlap({x.first, y.first}, {x.second, y.second});
+  if (known != Overlap::part) return known == Overlap::whole;
+  return ask([&](const Prepared& shape) {
+    return shape.any_meets(shape.geos().polygon(std::span(triangle)));
+  });
+}
+
+namespace {
+
+/// Lines and points, which have no area, are left out.
+void add_parts(const Geos& geos, const GEOSGeometry* shape, std::vector<Polygon>& polygons) {
+  const GEOSContextHandle_t context = geos.context();
+  const int type = GEOSGeomTypeId_r(context, shape);
+  if (type == GEOS_MULTIPOLYGON || type == GEOS_GEOMETRYCOLLECTION) {
+    for (int i = 0; i < GEOSGetNumGeometries_r(context, shape); ++i) {
+      add_parts(geos, GEOSGetGeometryN_r(context, shape, i), polygons);
+    }
+  }
+  if (type != GEOS_POLYGON || GEOSisEmpty_r(context, shape) != 0) return;
+  const auto corners_of = [&](const GEOSGeometry* ring) {
+    std::vector<Point2> corners(static_cast<std::size_t>(GEOSGetNumCoordinates_r(context, ring)));
+    GEOSCoordSeq_copyToBuffer_r(context, GEOSGeom_getCoordSeq_r(context, ring),
+                                corners.front().data(), 0, 0);
+    corners.pop_back();
+    return corners;
+  };
+  Polygon polygon{corners_of(GEOSGetExteriorRing_r(context, shape))};
+  for (int hole = 0; hole < GEOSGetNumInteriorRings_r(context, shape); ++hole) {
+    polygon.push_back(corners_of(GEOSGetInteriorRingN_r(context, shape, hole)));
+  }
+  polygons.push_back(std::move(polygon));
+}
+
+}  // namespace
+
+std::vector<Polygon> valid_polygons(const Polygon& polygon) {
+  const Geos geos;
+  const Geos::Geometry given = geos.polygon(polygon);
+  if (!fault_of(geos, given.get())) return {polygon};
+  std::vector<Polygon> result;
+  add_parts(geos, geos.own(GEOSMakeValid_r(geos.context(), given.get())).get(), result);
+  return result;
+}
+
+}  // namespace terrace::terrain

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "base/region_grid.hpp"
+#include "terrace/terrain/region.hpp"
+
+namespace terrace::terrain {
+
+/// Polygons prepared for questions, which GEOS answers where the grid does not. Its predicates
+/// compute in twice the digits of a double where rounding could matter. All functions may be called
+/// from several threads.
+class RegionShape {
+ public:
+  /// Throws: stream::Error that names `file`, the polygon, the ring and the place if there is no
+  /// polygon or one is not valid as OGC Simple Features has it. Polygons may overlap each other.
+  RegionShape(std::vector<Polygon> polygons, const std::string& file);
+  RegionShape(const RegionShape&) = delete;
+  RegionShape& operator=(const RegionShape&) = delete;
+  ~RegionShape();
+
+  [[nodiscard]] const std::vector<Polygon>& polygons() const { return polygons_; }
+  /// Requires that places, boxes and triangles have finite coordinates. A place on a ring is
+  /// covered.
+  [[nodiscard]] bool covers(const Point2& place) const;
+  [[nodiscard]] Overlap overlap(const Point2& low, const Point2& high) const;
+  /// Whether the closed triangle has a point in common with a polygon.
+  [[nodiscard]] bool touches(const std::array<Point2, 3>& triangle) const;
+
+ private:
+  class Prepared;
+
+  template <class Ask>
+  bool ask(const Ask& question) const;
+
+  std::vector<Polygon> polygons_;
+  mutable std::mutex mutex_;
+  mutable std::condition_variable back_;
+  mutable std::vector<std::unique_ptr<Prepared>> idle_;
+  mutable unsigned made_ = 0;
+  RegionGrid grid_;  // made by asking the above
+};
+
+/// The part of the plane that is inside the polygon by the even-odd rule, as valid polygons; the
+/// polygon itself where it is valid. None if it has no area.
+std::vector<Polygon> valid_polygons(const Polygon& polygon);
+
+}  // namespace terrace::terrain
