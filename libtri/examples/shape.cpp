@@ -7,8 +7,6 @@
 #include <cstdio>
 #include <vector>
 
-#include "terrace/tri/reconstruct.hpp"
-
 namespace tri = terrace::tri;
 
 // A dumbbell: `along` from end to end and `round` the axis, both from 0 to 1.
@@ -23,7 +21,7 @@ int main() {
   for (int i = 0; i < 4000; ++i) points.push_back(on_dumbbell((i + 0.5) / 4000, 0.618034 * i));
 
   // In one call.
-  const tri::SurfaceMeasures coarse = tri::measure(tri::reconstruct_surface(points).surface);
+  const tri::SurfaceMeasures coarse = tri::measure(tri::restore_surface(points).surface);
   std::printf("%zu faces, area %.3f, volume %.3f, %zu component, Euler characteristic %d\n",
               coarse.faces, coarse.area, coarse.volume, coarse.components,
               static_cast<int>(coarse.euler_characteristic));

@@ -33,7 +33,8 @@ BENCHES = ['tests/bench', 'libstream/bench', 'libcluster/bench', 'libmatching/be
 IN_TRI = ['libtri/src', 'libtri/tests', 'libtri/bench', 'libtri/fuzz', 'tests/bench']
 IN_STREAM = ['libstream/src', 'libstream/tests', 'libstream/bench', 'libstream/fuzz']
 RESTRICTED = [
-    (r'CGAL/|boost/|gmp(xx)?\.h|mpfr\.h', IN_TRI),
+    (r'CGAL/', IN_TRI + ['tools/src/scan']),
+    (r'boost/|gmp(xx)?\.h|mpfr\.h', IN_TRI),
     (r'GeographicLib/|proj(_experimental)?\.h', ['libterrain/src/earth', 'libterrain/tests']),
     (r'tiff(io|io\.hxx|conf|vers)?\.h|png\.h|zlib\.h|zstd\.h|libdeflate\.h', IN_STREAM),
     (r'lemon/', ['libmatching/src', 'libmatching/tests', 'libmatching/bench']),
@@ -60,6 +61,11 @@ MAY_DIFFER = {
     'libterrain/src/earth/crs/projection.cpp': EARTH,
     'libterrain/src/base/units.cpp': 'summaries for people, rounded; files have all digits',
 }
+
+# What of CGAL is LGPL. Whatever else it has counts as GPL: libraries, which are Apache-2.0, do without, and
+# a test or benchmark of theirs that compares with it is GPL itself.
+CGAL_LGPL = re.compile(r'CGAL/(Exact_(predicates|rational)|Gmpq|Mpzf|Simple_cartesian|hilbert_sort)')
+COMPARES = re.compile(r'lib[a-z]+/(tests|bench)/')
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 SOURCE_ENDINGS = ('.cpp', '.hpp', '.h', '.cu', '.cpp.in', '.py', '.sh')
@@ -96,6 +102,10 @@ def library_of(path):
     return room[3:] if room[:3] == 'lib' and room[3:] in LIBRARIES else None
 
 
+def is_gpl(name):
+    return name.startswith('CGAL/') and not CGAL_LGPL.match(name)
+
+
 def check_include(path, bracket, name):
     """The breaches of one #include line."""
     library = library_of(path)
@@ -116,6 +126,8 @@ def check_include(path, bracket, name):
     for pattern, folders in RESTRICTED:
         if re.match(pattern, name) and not any(below(path, folder) for folder in folders):
             yield f'includes <{name}>, which only {", ".join(folders)} may'
+    if library and is_gpl(name) and not COMPARES.match(path):
+        yield f'includes <{name}>, which is GPL; a library may not use it'
     if library and below(path, f'lib{library}/include'):
         own = name.startswith(tuple(f'terrace/{known}/' for known in [library] + SIBLINGS.get(library, [])))
         if not own and not (bracket == '<' and re.fullmatch(r'[a-z_0-9]+', name)):
@@ -129,19 +141,21 @@ def check_sources(root):
             if not name.endswith(SOURCE_ENDINGS) and name not in ('meson.build', 'meson_options.txt'):
                 continue
             lines = read(root, path).split('\n')
+            includes = [(number, match.groups()) for number, match in enumerate(map(INCLUDE.match, lines), 1) if match]
+            expected = licence
+            if COMPARES.match(path) and any(is_gpl(included) for _, (_, included) in includes):
+                expected = 'GPL-3.0-or-later'
             first = lines[1] if lines[0].startswith('#!') and len(lines) > 1 else lines[0]
             found = re.search(r'SPDX-License-Identifier: (\S+)', first)
             if not found:
-                yield f'{path}: has no SPDX line at its head; expected {licence}'
-            elif found.group(1) != licence:
-                yield f'{path}: its SPDX line says {found.group(1)}, not {licence}'
+                yield f'{path}: has no SPDX line at its head; expected {expected}'
+            elif found.group(1) != expected:
+                yield f'{path}: its SPDX line says {found.group(1)}, not {expected}'
             if not name.endswith(('.cpp', '.hpp', '.h', '.cu', '.cpp.in')):
                 continue
-            for number, line in enumerate(lines, 1):
-                match = INCLUDE.match(line)
-                if match:
-                    for breach in check_include(path, *match.groups()):
-                        yield f'{path}:{number}: {breach}'
+            for number, included in includes:
+                for breach in check_include(path, *included):
+                    yield f'{path}:{number}: {breach}'
 
 
 def check_inexact(root):

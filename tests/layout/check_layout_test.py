@@ -56,6 +56,7 @@ class CheckLayout(unittest.TestCase):
     def test_each_breach_is_found(self):
         apache = '// SPDX-License-Identifier: Apache-2.0\n'
         gpl = '// SPDX-License-Identifier: GPL-3.0-or-later\n'
+        licence = lambda room: f'// SPDX-License-Identifier: {check_layout.LICENCES[room]}\n'
         cases = [
             ('libcluster/src/b.cpp', apache + '#include "terrace/stream/a.hpp"\n', 'sibling'),
             ('libterrain/src/base/b.cpp', gpl + '#include <terrace/matching/a.hpp>\n', 'sibling'),
@@ -72,7 +73,11 @@ class CheckLayout(unittest.TestCase):
             ('libcluster/src/b.cpp', apache + '#include <lemon/matching.h>\n', 'which only'),
             ('libcluster/src/b.cpp', '#include <vector>\n', 'no SPDX line'),
             ('libcluster/src/b.cpp', gpl, 'not Apache-2.0'),
-            ('libtri/src/b.cpp', apache, 'not GPL-3.0-or-later'),
+            ('libtri/src/b.cpp', licence('libtri') + '#include <CGAL/Alpha_wrap_3/internal/gate_comparator.h>\n', 'is GPL'),
+            ('libtri/src/b.hpp', licence('libtri') + '#include <CGAL/Delaunay_triangulation_2.h>\n', 'is GPL'),
+            ('libtri/include/terrace/tri/a.hpp', licence('libtri') + '#include <CGAL/Surface_mesh.h>\n', 'is GPL'),
+            ('libtri/tests/b.cpp', apache + '#include <CGAL/Surface_mesh.h>\n', 'not GPL-3.0-or-later'),
+            ('tools/src/verbs/b.cpp', gpl + '#include <CGAL/Surface_mesh.h>\n', 'which only'),
             ('tests/b.py', '#!/usr/bin/env python3\n\n# SPDX-License-Identifier: GPL-3.0-or-later\n',
              'no SPDX line'),
             ('libtri/include/terrace/tri/b.hpp', gpl, 'is not in the list'),
@@ -85,6 +90,16 @@ class CheckLayout(unittest.TestCase):
             with self.subTest(path=path, expected=expected):
                 found = self.breaches(lambda root: write(root, path, text))
                 self.assertTrue(any(path in b and expected in b for b in found), found)
+
+    def test_tests_may_compare_with_what_is_gpl(self):
+        gpl = '// SPDX-License-Identifier: GPL-3.0-or-later\n'
+        for path in ('libtri/tests/b.cpp', 'libtri/bench/b.hpp', 'tools/src/scan/b.cpp'):
+            for include in ('#include <CGAL/Surface_mesh.h>\n', '#include <CGAL/alpha_wrap_3.h>\n'):
+                with self.subTest(path=path):
+                    self.assertEqual(self.breaches(lambda root: write(root, path, gpl + include)), [])
+        lgpl = f"// SPDX-License-Identifier: {check_layout.LICENCES['libtri']}\n#include <CGAL/Mpzf.h>\n"
+        for path in ('libtri/src/b.cpp', 'libtri/tests/b.cpp'):
+            self.assertEqual(self.breaches(lambda root: write(root, path, lgpl)), [])
 
     def test_functions_that_are_not_exact_need_a_reason(self):
         head = '// SPDX-License-Identifier: GPL-3.0-or-later\n'

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "terrace/tri/surface.hpp"
+#include "terrace/tri/shape.hpp"
 
 /// Faces, their edges, and which faces are connected by edges.
 

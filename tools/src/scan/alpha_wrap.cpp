@@ -3,18 +3,18 @@
 #include <CGAL/Surface_mesh.h>
 #include <CGAL/alpha_wrap_3.h>
 
-#include "methods.hpp"
+#include "scan/cgal_calls.hpp"
 
-namespace terrace::tri::reconstruct {
+namespace terrace::tools {
 
-Surface alpha_wrap(std::span<const Point3> points, double alpha, double offset) {
+tri::Surface alpha_wrap(std::span<const tri::Point3> points, double alpha, double offset) {
   using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
   std::vector<Kernel::Point_3> of_cgal;
   of_cgal.reserve(points.size());
-  for (const Point3& p : points) of_cgal.emplace_back(p[0], p[1], p[2]);
+  for (const tri::Point3& p : points) of_cgal.emplace_back(p[0], p[1], p[2]);
   CGAL::Surface_mesh<Kernel::Point_3> wrap;
   CGAL::alpha_wrap_3(of_cgal, alpha, offset, wrap);
-  Surface surface;
+  tri::Surface surface;
   std::vector<std::uint32_t> number(wrap.num_vertices() + wrap.number_of_removed_vertices());
   for (const auto v : wrap.vertices()) {
     number[v] = static_cast<std::uint32_t>(surface.points.size());
@@ -22,7 +22,7 @@ Surface alpha_wrap(std::span<const Point3> points, double alpha, double offset) 
     surface.points.push_back({p.x(), p.y(), p.z()});
   }
   for (const auto f : wrap.faces()) {
-    Face face{};
+    std::array<std::uint32_t, 3> face{};
     std::size_t i = 0;
     for (const auto v : wrap.vertices_around_face(wrap.halfedge(f))) face[i++] = number[v];
     surface.faces.push_back(face);
@@ -30,4 +30,4 @@ Surface alpha_wrap(std::span<const Point3> points, double alpha, double offset) 
   return surface;
 }
 
-}  // namespace terrace::tri::reconstruct
+}  // namespace terrace::tools
