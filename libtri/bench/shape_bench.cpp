@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // Restoring shapes: from scratch and after a change, on a torus of 200,000 points with noise, and
 // on the scans of the folder that TERRACE_DATA names, of which a table tells how good they come
 // out.

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // Points of a dumbbell. Its surface comes back from the points alone; then a part is sampled more
 // densely, and the shape follows the triangulation's changes.
 #include "terrace/tri/shape.hpp"

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // A view control over a small hierarchy with points of a 10 x 10 raster, records that lie, and
 // steps, gifts and pins in any order. Budgets hold, the triangulation stays valid and equal to one
 // built anew, and in the end a view that stays settles.

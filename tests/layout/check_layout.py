@@ -19,7 +19,7 @@ LICENCES = {
     'libstream': 'Apache-2.0',
     'libcluster': 'Apache-2.0',
     'libmatching': 'Apache-2.0',
-    'libtri': 'GPL-3.0-or-later',
+    'libtri': 'Apache-2.0',
     'libterrain': 'GPL-3.0-or-later',
     'tools': 'GPL-3.0-or-later',
     'tests': 'GPL-3.0-or-later',

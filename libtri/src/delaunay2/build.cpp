@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // Bulk construction: vertices are numbered along a Hilbert curve and inserted one by one, each near
 // the one before. Pure Hilbert order makes the curve's front a fan of long triangles; so a coarse
 // sample, every 32nd vertex, goes first (and of that every 32nd, and so on), which halves the work

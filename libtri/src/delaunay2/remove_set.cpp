@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // Removal of a set of vertices by one hole, after J. Skala, thesis, section 8.1, but set-wise: all
 // triangles at the vertices are taken out first. Where what they leave is a simple disc (or
 // several) it is filled at once. The thesis's rules that a vertex must lie on the hole's boundary,

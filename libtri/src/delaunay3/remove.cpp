@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // Removal of vertices, one or a set: all tetrahedra at them are taken out, and what they leave is
 // filled as a whole, whatever its form: with vertices that stay inside it (islands), with handles
 // and pinches, at the hull. A hole ends where tetrahedra that stay are beyond a facet; two that

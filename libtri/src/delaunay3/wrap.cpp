@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // Gift wrapping of a hole. A facet with the hole in front of it determines its tetrahedron: the
 // empty sphere grows along the facet's axis until it meets a vertex. So facets are taken in any
 // order; each new tetrahedron's other facets either meet an open one, which ends both, or become

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 // Masks of lanes where a mask is a vector, for grid_scan_impl.hpp; with functions bits_of() for

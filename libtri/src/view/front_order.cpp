@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // What comes next: of the clusters to expand, and of those to collapse.
 #include <algorithm>
 #include <cstddef>
