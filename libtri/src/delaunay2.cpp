@@ -252,7 +252,10 @@ void Delaunay2<Coord>::take_changes(Changes& changes) {
   planar::take_changes<Coord>(impl_->mesh, changes);
 }
 
+#ifdef TERRACE_TRI_CORE
 template class Delaunay2<std::int32_t>;
+#else
 template class Delaunay2<double>;
+#endif
 
 }  // namespace terrace::tri

@@ -25,16 +25,17 @@ LICENCES = {
     'tests': 'GPL-3.0-or-later',
 }
 
-# What may be included where: a pattern of the name, and the folders that may name it. Public headers
+# What may be included where: a pattern of the name, and the folders and files that may name it. Public headers
 # are stricter still, see check_public_header().
 TESTS = ['tests', 'libstream/tests', 'libcluster/tests', 'libmatching/tests', 'libtri/tests', 'libterrain/tests']
 BENCHES = ['tests/bench', 'libstream/bench', 'libcluster/bench', 'libmatching/bench', 'libtri/bench',
            'libterrain/bench']
-IN_TRI = ['libtri/src', 'libtri/tests', 'libtri/bench', 'libtri/fuzz', 'tests/bench']
+# Where CGAL is: what computes on integers must compile without it.
+IN_CGAL = ['libtri/src/delaunay2/double_kernel.cpp', 'libtri/src/delaunay2/elliptical_kernel.cpp', 'libtri/src/delaunay3',
+           'libtri/src/interpolation', 'libtri/src/shape', 'libtri/tests', 'libtri/bench', 'tools/src/scan', 'tests/bench']
 IN_STREAM = ['libstream/src', 'libstream/tests', 'libstream/bench', 'libstream/fuzz']
 RESTRICTED = [
-    (r'CGAL/', IN_TRI + ['tools/src/scan']),
-    (r'boost/|gmp(xx)?\.h|mpfr\.h', IN_TRI),
+    (r'CGAL/|boost/|gmp(xx)?\.h|mpfr\.h', IN_CGAL),
     (r'GeographicLib/|proj(_experimental)?\.h', ['libterrain/src/earth', 'libterrain/tests']),
     (r'tiff(io|io\.hxx|conf|vers)?\.h|png\.h|zlib\.h|zstd\.h|libdeflate\.h', IN_STREAM),
     (r'lemon/', ['libmatching/src', 'libmatching/tests', 'libmatching/bench']),
@@ -124,7 +125,7 @@ def check_include(path, bracket, name):
             TERRAIN_ROOMS[room] >= TERRAIN_ROOMS.get(here.group(1), -1):
         yield f'includes "{name}", whose room is not below its own'
     for pattern, folders in RESTRICTED:
-        if re.match(pattern, name) and not any(below(path, folder) for folder in folders):
+        if re.match(pattern, name) and not any(path == place or below(path, place) for place in folders):
             yield f'includes <{name}>, which only {", ".join(folders)} may'
     if library and is_gpl(name) and not COMPARES.match(path):
         yield f'includes <{name}>, which is GPL; a library may not use it'

@@ -79,6 +79,7 @@ class CheckLayout(unittest.TestCase):
             ('libtri/src/b.cpp', head('libtri') + '#include <CGAL/Alpha_wrap_3/internal/gate_comparator.h>\n', 'is GPL'),
             ('libtri/src/b.hpp', head('libtri') + '#include <CGAL/Delaunay_triangulation_2.h>\n', 'is GPL'),
             ('libtri/include/terrace/tri/a.hpp', head('libtri') + '#include <CGAL/Surface_mesh.h>\n', 'is GPL'),
+            ('libtri/src/delaunay2/int_kernel.hpp', head('libtri') + '#include <CGAL/Mpzf.h>\n', 'which only'),
             ('libtri/tests/b.cpp', apache + '#include <CGAL/Surface_mesh.h>\n', 'not GPL-3.0-or-later'),
             ('tools/src/verbs/b.cpp', gpl + '#include <CGAL/Surface_mesh.h>\n', 'which only'),
             ('tests/b.py', '#!/usr/bin/env python3\n\n# SPDX-License-Identifier: GPL-3.0-or-later\n',
@@ -101,7 +102,7 @@ class CheckLayout(unittest.TestCase):
                 with self.subTest(path=path):
                     self.assertEqual(self.breaches(lambda root: write(root, path, gpl + include)), [])
         lgpl = head('libtri') + '#include <CGAL/Mpzf.h>\n'
-        for path in ('libtri/src/b.cpp', 'libtri/tests/b.cpp'):
+        for path in ('libtri/src/shape/b.cpp', 'libtri/src/delaunay2/double_kernel.cpp', 'libtri/tests/b.cpp'):
             self.assertEqual(self.breaches(lambda root: write(root, path, lgpl)), [])
 
     def test_functions_that_are_not_exact_need_a_reason(self):

@@ -155,9 +155,12 @@ std::vector<VertexId> build(Mesh<Kernel>& mesh, std::span<const typename Kernel:
   return vertex_of;
 }
 
+#ifdef TERRACE_TRI_CORE
 template std::vector<VertexId> build(Mesh<IntKernel>&, std::span<const IntKernel::Point>);
+#else
 template std::vector<VertexId> build(Mesh<DoubleKernel>&, std::span<const DoubleKernel::Point>);
 template std::vector<VertexId> build(Mesh<EllipticalKernel>&,
                                      std::span<const EllipticalKernel::Point>);
+#endif
 
 }  // namespace terrace::tri::planar

@@ -121,8 +121,11 @@ void fill_hole(Mesh<Kernel>& mesh) {
   }
 }
 
+#ifdef TERRACE_TRI_CORE
 template void fill_hole(Mesh<IntKernel>&);
+#else
 template void fill_hole(Mesh<DoubleKernel>&);
 template void fill_hole(Mesh<EllipticalKernel>&);
+#endif
 
 }  // namespace terrace::tri::planar

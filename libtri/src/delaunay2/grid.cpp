@@ -155,9 +155,12 @@ std::uint32_t build_grid(Mesh<Kernel>& mesh, std::span<const typename Kernel::Co
   return first;
 }
 
+#ifdef TERRACE_TRI_CORE
 template std::uint32_t build_grid(Mesh<IntKernel>&, std::span<const IntKernel::Coord>,
                                   std::span<const IntKernel::Coord>);
+#else
 template std::uint32_t build_grid(Mesh<DoubleKernel>&, std::span<const DoubleKernel::Coord>,
                                   std::span<const DoubleKernel::Coord>);
+#endif
 
 }  // namespace terrace::tri::planar

@@ -85,7 +85,7 @@ class Geomorph2 {
   [[nodiscard]] Point3 old_position(const Model& model, VertexId vertex) const;
 
   // Of before the step, by slot: positions of vertices that are not what they were.
-  std::vector<std::uint32_t> old_index_;  // into old_positions_; kNone: as now
+  std::vector<std::uint32_t> old_index_;  // into old_positions_; kAsNow: as now
   std::vector<Point3> old_positions_;
   HeightPatches patches_;
 };
