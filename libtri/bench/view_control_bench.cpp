@@ -16,7 +16,7 @@
 
 #include "multiresolution_hierarchy.hpp"
 #include "terrace/tri/geomorph.hpp"
-#include "terrace/tri/view_control.hpp"
+#include "terrace/tri/view.hpp"
 
 namespace terrace::tri::bench {
 namespace {

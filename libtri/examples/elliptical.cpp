@@ -7,8 +7,7 @@
 #include <random>
 #include <vector>
 
-#include <terrace/tri/elliptical2.hpp>
-#include <terrace/tri/metric_triangles.hpp>
+#include <terrace/tri/elliptical.hpp>
 
 namespace tri = terrace::tri;
 using Point = std::array<double, 2>;

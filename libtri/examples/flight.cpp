@@ -10,7 +10,7 @@
 #include <vector>
 
 #include <terrace/tri/geomorph.hpp>
-#include <terrace/tri/view_control.hpp>
+#include <terrace/tri/view.hpp>
 
 namespace tri = terrace::tri;
 

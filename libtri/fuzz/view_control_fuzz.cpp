@@ -13,7 +13,7 @@
 #include "../tests/multiresolution_hierarchy.hpp"
 #include "delaunay2/access.hpp"
 #include "terrace/tri/geomorph.hpp"
-#include "terrace/tri/view_control.hpp"
+#include "terrace/tri/view.hpp"
 
 namespace {
 

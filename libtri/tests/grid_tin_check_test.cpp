@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "terrace/tri/grid_tin_check.hpp"
-
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -9,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "grid_windows.hpp"
+#include "terrace/tri/grid_tin.hpp"
 #include "tin/grid_make.hpp"
 
 namespace {

@@ -9,8 +9,7 @@
 
 #include <CGAL/Exact_rational.h>
 
-#include "terrace/tri/elliptical2.hpp"
-#include "terrace/tri/metric2.hpp"
+#include "terrace/tri/elliptical.hpp"
 
 /// Metrics for the tests, and what they mean, in rational numbers.
 

@@ -8,7 +8,7 @@
 #include <CGAL/Exact_rational.h>
 
 #include "terrace/tri/delaunay3.hpp"
-#include "terrace/tri/metric3.hpp"
+#include "terrace/tri/elliptical.hpp"
 
 /// Metrics of space for the tests, and what they mean, in rational numbers.
 

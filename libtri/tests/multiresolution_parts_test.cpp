@@ -3,9 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include "model/map.hpp"
 #include "multiresolution_hierarchy.hpp"
-#include "terrace/tri/multiresolution_map.hpp"
-#include "terrace/tri/multiresolution_source.hpp"
+#include "terrace/tri/multiresolution.hpp"
 
 namespace terrace::tri::test {
 namespace {

@@ -9,7 +9,9 @@
 #include <utility>
 #include <vector>
 
+#include "model/model.hpp"
 #include "terrace/tri/delaunay2.hpp"
+#include "view/control.hpp"
 
 namespace terrace::tri::test {
 

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "delaunay2/access.hpp"
+#include "view/cache.hpp"
 #include "view_world.hpp"
 
 namespace terrace::tri::test {

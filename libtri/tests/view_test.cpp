@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "multiresolution_hierarchy.hpp"
-#include "terrace/tri/view_columns.hpp"
+#include "view/columns.hpp"
 
 namespace terrace::tri::test {
 namespace {

@@ -12,7 +12,6 @@
 #include "multiresolution_hierarchy.hpp"
 #include "multiresolution_oracle.hpp"
 #include "terrace/tri/view.hpp"
-#include "terrace/tri/view_control.hpp"
 
 /// Hierarchies with true errors, and what a view asks of them, said in the plainest way.
 

@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "double_kernel.hpp"
-#include "terrace/tri/metric3.hpp"
+#include "terrace/tri/elliptical.hpp"
 
 /// Exact predicates in an elliptical metric, on the points as they are: nothing is mapped but
 /// differences inside the filters. Orientation is the same in all linear metrics; only spheres

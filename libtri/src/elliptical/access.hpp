@@ -6,7 +6,7 @@
 
 #include "delaunay2/elliptical_kernel.hpp"
 #include "delaunay2/mesh.hpp"
-#include "terrace/tri/elliptical2.hpp"
+#include "terrace/tri/elliptical.hpp"
 
 namespace terrace::tri {
 

@@ -6,7 +6,7 @@
 
 #include "delaunay3/elliptical_kernel.hpp"
 #include "delaunay3/mesh.hpp"
-#include "terrace/tri/elliptical3.hpp"
+#include "terrace/tri/elliptical.hpp"
 
 namespace terrace::tri {
 

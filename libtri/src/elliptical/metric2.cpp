@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "terrace/tri/metric2.hpp"
-
 #include <cmath>
 #include <stdexcept>
 #include <utility>
 
 #include "delaunay2/double_kernel.hpp"
 #include "portable_math.hpp"
+#include "terrace/tri/elliptical.hpp"
 
 namespace terrace::tri {
 namespace {

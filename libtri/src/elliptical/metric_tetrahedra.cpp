@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "terrace/tri/metric_tetrahedra.hpp"
-
 #include <map>
 #include <numeric>
 #include <string>
 
 #include "flips3.hpp"
+#include "terrace/tri/elliptical.hpp"
 
 namespace terrace::tri {
 namespace {

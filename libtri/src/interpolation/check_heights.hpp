@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "terrace/tri/heights.hpp"
+#include "terrace/tri/interpolation.hpp"
 
 namespace terrace::tri {
 

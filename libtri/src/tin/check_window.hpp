@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "terrace/tri/grid_tin_check.hpp"
+#include "terrace/tri/grid_tin.hpp"
 
 namespace terrace::tri::tin {
 

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "terrace/tri/grid_tin_check.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -12,6 +10,7 @@
 #include "check_samples.hpp"
 #include "check_window.hpp"
 #include "grid_make.hpp"
+#include "terrace/tri/grid_tin.hpp"
 
 namespace terrace::tri {
 namespace {

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <limits>
 
-#include "terrace/tri/view_front.hpp"
+#include "front.hpp"
 
 namespace terrace::tri {
 namespace {}  // namespace

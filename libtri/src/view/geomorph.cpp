@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "height_patches.hpp"
+
 namespace terrace::tri {
 namespace {
 
@@ -15,6 +17,11 @@ Point3 lifted(const std::array<Coord, 2>& point, double height) {
 }
 
 }  // namespace
+
+template <class Coord>
+Geomorph2<Coord>::Geomorph2() : patches_(std::make_unique<HeightPatches>()) {}
+template <class Coord>
+Geomorph2<Coord>::~Geomorph2() = default;
 
 template <class Coord>
 Point3 Geomorph2<Coord>::old_position(const Model& model, VertexId vertex) const {
@@ -53,32 +60,32 @@ void Geomorph2<Coord>::make(const Model& model, const typename Model::Delta& del
   }
 
   // A new vertex lies in a triangle that it destroyed, or outside the old hull.
-  patches_.clear();
+  patches_->clear();
   for (const std::array<VertexId, 3>& corners : changes.removed_corners) {
-    patches_.add(old_position(model, corners[0]), old_position(model, corners[1]),
-                 old_position(model, corners[2]));
+    patches_->add(old_position(model, corners[0]), old_position(model, corners[1]),
+                  old_position(model, corners[2]));
   }
-  patches_.build();
+  patches_->build();
   for (const VertexId vertex : changes.added_vertices) {
     const Point3 end = lifted(now.point(vertex), model.height(vertex));
     Point3 start = end;
-    start[2] = patches_.height(end[0], end[1]).value_or(end[2]);
+    start[2] = patches_->height(end[0], end[1]).value_or(end[2]);
     added.add(vertex, start, end);
   }
 
-  patches_.clear();
+  patches_->clear();
   for (const TriangleId triangle : changes.added_triangles) {
     const std::array<VertexId, 3> corners = now.vertices(triangle);
     const auto position = [&](std::size_t i) {
       return lifted(now.point(corners[i]), model.height(corners[i]));
     };
-    patches_.add(position(0), position(1), position(2));
+    patches_->add(position(0), position(1), position(2));
   }
-  patches_.build();
+  patches_->build();
   for (std::size_t i = 0; i < changes.removed_vertices.size(); ++i) {
     const Point3 start = lifted(changes.removed_points[i], delta.removed_heights[i]);
     Point3 end = start;
-    end[2] = patches_.height(start[0], start[1]).value_or(start[2]);
+    end[2] = patches_->height(start[0], start[1]).value_or(start[2]);
     removed.add(changes.removed_vertices[i], start, end);
   }
 

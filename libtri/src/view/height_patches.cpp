@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "height_patches.hpp"
+
 #include <algorithm>
 #include <limits>
-
-#include "terrace/tri/geomorph.hpp"
 
 namespace terrace::tri {
 namespace {

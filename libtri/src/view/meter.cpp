@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "terrace/tri/view_meter.hpp"
+#include "terrace/tri/view.hpp"
 
 namespace terrace::tri {
 namespace {

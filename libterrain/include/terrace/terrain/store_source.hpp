@@ -2,7 +2,7 @@
 #pragma once
 
 #include <terrace/stream/store.hpp>
-#include <terrace/tri/multiresolution_source.hpp>
+#include <terrace/tri/multiresolution.hpp>
 
 namespace terrace::terrain {
 

@@ -5,7 +5,7 @@
 #include <memory>
 
 #include <terrace/stream/store.hpp>
-#include <terrace/tri/view_control.hpp>
+#include <terrace/tri/view.hpp>
 
 namespace terrace::terrain {
 

@@ -10,8 +10,7 @@
 #include <vector>
 
 #include "terrace/tri/delaunay3.hpp"
-#include "terrace/tri/elliptical3.hpp"
-#include "terrace/tri/metric3.hpp"
+#include "terrace/tri/elliptical.hpp"
 
 /// Restoring the non-convex shape of points scanned from a surface: of the Delaunay tetrahedra,
 /// which fill the convex hull, those outside the shape are peeled off, starting from the hull
@@ -21,8 +20,6 @@
 /// that changes. measure() is for surfaces of any origin.
 
 namespace terrace::tri {
-
-using Point3 = std::array<double, 3>;
 
 struct Surface {
   std::vector<Point3> points;

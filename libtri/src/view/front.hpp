@@ -9,9 +9,9 @@
 #include <span>
 #include <vector>
 
-#include "terrace/tri/multiresolution_tree.hpp"
+#include "columns.hpp"
+#include "model/tree.hpp"
 #include "terrace/tri/view.hpp"
-#include "terrace/tri/view_columns.hpp"
 
 namespace terrace::tri {
 
@@ -35,7 +35,7 @@ class ViewFront {
     ClusterId id{};
     std::uint64_t members = 0;
   };
-  enum class Pin : std::uint8_t { expanded, collapsed };
+  using Pin = ViewPin;
 
   /// The tree must outlive it.
   ViewFront(const ClusterTree& tree, const ViewOptions& options);

@@ -9,9 +9,9 @@
 #include <span>
 #include <vector>
 
+#include "map.hpp"
 #include "terrace/tri/delaunay2.hpp"
-#include "terrace/tri/multiresolution_map.hpp"
-#include "terrace/tri/multiresolution_source.hpp"
+#include "terrace/tri/multiresolution.hpp"
 
 namespace terrace::tri {
 

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "terrace/tri/multiresolution_source.hpp"
+#include "terrace/tri/multiresolution.hpp"
 
 namespace terrace::tri {
 

@@ -9,34 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include "terrace/tri/multiresolution_source.hpp"
+#include "terrace/tri/view.hpp"
 
 namespace terrace::tri {
-
-/// A cluster as its loader hands it over.
-struct GivenCluster {
-  ClusterId cluster{};
-  /// As in ClusterMembers.
-  std::vector<Point3> positions;
-  std::vector<std::uint64_t> children;
-  /// Above level 0: the records of the clusters one level down headed by each member, in order, and
-  /// then by the cluster's own head (ViewRequest::head_child); the root has no head.
-  std::vector<ClusterRecord> child_records;
-};
-
-/// A cluster that is missing.
-struct ViewRequest {
-  ClusterId cluster{};
-  ClusterId head_child{};     ///< above level 0: what its head heads one level down
-  std::uint64_t members = 0;  ///< by its record
-  double importance = 0.0;    ///< its error over what is tolerated
-};
-
-/// Reads a cluster from a source, with all that give() needs, and blocks while the source does.
-/// Throws what the source throws; HierarchyError where it is too damaged to ask on.
-GivenCluster load(ClusterSource& source, const ViewRequest& request);
-/// The root.
-GivenCluster load_root(ClusterSource& source);
 
 /// Given clusters within a budget of bytes; what was not used for the longest time goes first. As
 /// a source it delivers what is there and never waits.

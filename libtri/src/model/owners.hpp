@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "terrace/tri/delaunay2.hpp"
-#include "terrace/tri/multiresolution_tree.hpp"
+#include "tree.hpp"
 
 namespace terrace::tri {
 
