@@ -8,7 +8,7 @@
 
 #include "grid_windows.hpp"
 #include "terrace/tri/grid_tin.hpp"
-#include "tin/grid_make.hpp"
+#include "tin/grid/make.hpp"
 
 namespace {
 

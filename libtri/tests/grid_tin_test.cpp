@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "grid_tin_oracle.hpp"
-#include "tin/grid_make.hpp"
+#include "tin/grid/make.hpp"
 
 namespace {
 

@@ -14,11 +14,11 @@
 #include <algorithm>
 #include <limits>
 
+#include "delaunay3/wrap/wrap.hpp"
 #include "double_kernel.hpp"
 #include "elliptical_kernel.hpp"
 #include "int_kernel.hpp"
 #include "predicates.hpp"
-#include "wrap.hpp"
 
 namespace terrace::tri::spatial {
 namespace {

@@ -5,9 +5,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "delaunay3/wrap/scan.hpp"
 #include "facet_table.hpp"
 #include "tetrahedron.hpp"
-#include "wrap_scan.hpp"
 
 namespace terrace::tri::spatial {
 

@@ -5,13 +5,13 @@
 // touch in edges or vertices only are filled one after the other.
 #include "remove.hpp"
 
+#include "delaunay3/wrap/wrap.hpp"
 #include "double_kernel.hpp"
 #include "ear_queue.hpp"
 #include "elliptical_kernel.hpp"
 #include "flat.hpp"
 #include "hilbert.hpp"
 #include "int_kernel.hpp"
-#include "wrap.hpp"
 
 namespace terrace::tri::spatial {
 namespace {
