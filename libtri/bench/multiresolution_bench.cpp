@@ -11,6 +11,7 @@
 
 #include <benchmark/benchmark.h>
 
+#include "model/model.hpp"
 #include "multiresolution_hierarchy.hpp"
 #include "terrace/tri/multiresolution.hpp"
 
