@@ -16,7 +16,7 @@ import re
 import sys
 
 # What no installation can mend: hardware, privileges, data that a machine need not have.
-MAY_LACK = re.compile(r'AVX|GPU|CUDA|nvidia|driver|privileges|TERRACE_DATA', re.IGNORECASE)
+MAY_LACK = re.compile(r'AVX|GPU|CUDA|nvidia|driver|privileges|sanitizer|TERRACE_DATA', re.IGNORECASE)
 
 GTEST = re.compile(r'^\[ +(OK|FAILED|SKIPPED) +\] ([\w/.]+)(?:, where .*)? \(\d+ ms\)', re.MULTILINE)
 GTEST_REASON = re.compile(r': Skipped\n(.*)\n')

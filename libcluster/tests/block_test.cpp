@@ -135,23 +135,21 @@ TEST(BlockClusterer, ResultsAreValidAndTheSameOnAllPaths) {
     }
     for (const Block& block : blocks) {
       const std::size_t turn = ++blocks_seen;
-      for (std::size_t k = 0; k < 2; ++k) {
-        const double facility_cost = kFacilityCosts[(turn + k) % 3];
-        const Effort effort = kEfforts[(turn / 3 + k) % 3];
-        SCOPED_TRACE(testing::Message() << block.name << ", seed " << seed << ", effort "
-                                        << static_cast<int>(effort) << ", cost " << facility_cost);
-        const BlockOptions options{.facility_cost = facility_cost, .effort = effort, .seed = seed};
-        BlockClustering expected;
-        portable.run(block.points, block.weights, options, expected);
-        laws::expect_valid(block.points, block.weights, options, expected, laws::kFloatSlack);
-        // Every one has seen other blocks before; so none is carried over either.
-        for (BlockClusterer& clusterer : clusterers) {
-          BlockClustering clustering;
-          clusterer.run(block.points, block.weights, options, clustering);
-          expect_same(clustering, expected);
-        }
-        if (testing::Test::HasFailure()) return;
+      const double facility_cost = kFacilityCosts[turn % 3];
+      const Effort effort = kEfforts[turn / 3 % 3];
+      SCOPED_TRACE(testing::Message() << block.name << ", seed " << seed << ", effort "
+                                      << static_cast<int>(effort) << ", cost " << facility_cost);
+      const BlockOptions options{.facility_cost = facility_cost, .effort = effort, .seed = seed};
+      BlockClustering expected;
+      portable.run(block.points, block.weights, options, expected);
+      laws::expect_valid(block.points, block.weights, options, expected, laws::kFloatSlack);
+      // Every one has seen other blocks before; so none is carried over either.
+      for (BlockClusterer& clusterer : clusterers) {
+        BlockClustering clustering;
+        clusterer.run(block.points, block.weights, options, clustering);
+        expect_same(clustering, expected);
       }
+      if (testing::Test::HasFailure()) return;
     }
   }
 }

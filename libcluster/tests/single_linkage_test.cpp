@@ -79,7 +79,7 @@ TEST(SingleLinkage, IsTheMinimumSpanningTree) {
 }
 
 TEST(SingleLinkage, ThreadsDoNotMatter) {
-  for (const auto& [name, points] : laws::linkage_inputs(20000, 3)) {
+  for (const auto& [name, points] : laws::linkage_inputs(8000, 3)) {
     if (name == "geometric spacing") continue;
     SCOPED_TRACE(testing::Message() << name << ", seed 3");
     const Dendrogram one = single_linkage(points);

@@ -15,7 +15,8 @@
 #include <gtest/gtest.h>
 #include <proj.h>
 
-#include "earth/crs/coordinate_system.hpp"
+#include "earth/crs/crs_definition.hpp"
+#include "terrace/terrain/crs.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -16,8 +16,8 @@
 #include <GeographicLib/MGRS.hpp>
 #include <gtest/gtest.h>
 
-#include "earth/crs/coordinate_system.hpp"
 #include "earth/line_distance.hpp"
+#include "terrace/terrain/crs.hpp"
 #include "tile/format/ellipsoid.hpp"
 
 namespace terrace::terrain {
@@ -85,8 +85,10 @@ TEST(GeodesyData, UtmAndUpsOfGeotrans) {
     GeographicLib::MGRS::Reverse(reference, zone, north, x, y, precision, false);
     ASSERT_EQ(precision, 5) << reference;
     const int code = zone == 0 ? (north ? 5041 : 5042) : (north ? 32600 : 32700) + zone;
-    const auto system =
-        systems.try_emplace(code, CoordinateSystem::parse("EPSG:" + std::to_string(code))).first;
+    auto system = systems.find(code);
+    if (system == systems.end()) {
+      system = systems.emplace(code, CoordinateSystem::parse("EPSG:" + std::to_string(code))).first;
+    }
     const Point2 place = system->second.from_geographic(Point2{longitude, latitude});
     // The reference names the south-western corner of its square metre.
     worst = std::max({worst, std::abs(place[0] - x - 0.5), std::abs(place[1] - y - 0.5)});

@@ -87,69 +87,75 @@ double converted(const EllipsoidalHeights& heights, const Point2& place, double 
 
 TEST_F(GeoidTest, HeightsBecomeEllipsoidalMetres) {
   const std::string file = write_grid("test.pgm");
-  const EllipsoidalHeights plain(schema_with("ellipsoidal", "metre"), "", "", kMemory);
+  const EllipsoidalHeights plain(schema_with("ellipsoidal", "metre"), HeightReference::recorded, "",
+                                 kMemory);
   EXPECT_EQ(converted(plain, {8, 47}, 500), 500);
   EXPECT_EQ(plain.note(), "");
-  const EllipsoidalHeights feet(schema_with("orthometric", "foot"), "", file, kMemory);
+  const EllipsoidalHeights feet(schema_with("orthometric", "foot"), HeightReference::recorded, file,
+                                kMemory);
   EXPECT_NEAR(converted(feet, {8, 45}, 1000), 304.8 + undulation(45), 0.01);
   EXPECT_TRUE(feet.has_geoid());
-  const EllipsoidalHeights ignored(schema_with("orthometric", "metre"), "ignore", "", kMemory);
+  const EllipsoidalHeights ignored(schema_with("orthometric", "metre"), HeightReference::ignore, "",
+                                   kMemory);
   EXPECT_EQ(converted(ignored, {8, 47}, 500), 500);
   EXPECT_NE(ignored.note(), "");
-  const EllipsoidalHeights said(schema_with("", "metre"), "ellipsoidal", "", kMemory);
+  const EllipsoidalHeights said(schema_with("", "metre"), HeightReference::ellipsoidal, "",
+                                kMemory);
   EXPECT_EQ(converted(said, {8, 47}, 500), 500);
-  const EllipsoidalHeights unknown(schema_with("", ""), "", file, kMemory);
+  const EllipsoidalHeights unknown(schema_with("", ""), HeightReference::recorded, file, kMemory);
   EXPECT_NE(unknown.note().find("unit"), std::string::npos);
   EXPECT_NE(unknown.note().find("orthometric"), std::string::npos);
 }
 
 TEST_F(GeoidTest, DigestsTellWhichOperationIsMeant) {
-  const auto digest_of = [](const char* vertical, const std::string& geoid) {
+  const auto digest_of = [](HeightReference vertical, const std::string& geoid) {
     Digest digest;
     EllipsoidalHeights(schema_with("orthometric", "metre"), vertical, geoid, kMemory)
         .add_to(digest);
     return digest.value();
   };
-  const std::uint64_t egm96 = digest_of("orthometric", "");
-  EXPECT_EQ(egm96, digest_of("orthometric", ""));
-  EXPECT_NE(egm96, digest_of("", write_grid("test.pgm")));
-  EXPECT_NE(egm96, digest_of("ignore", ""));
+  const std::uint64_t egm96 = digest_of(HeightReference::orthometric, "");
+  EXPECT_EQ(egm96, digest_of(HeightReference::orthometric, ""));
+  EXPECT_NE(egm96, digest_of(HeightReference::recorded, write_grid("test.pgm")));
+  EXPECT_NE(egm96, digest_of(HeightReference::ignore, ""));
 }
 
 TEST_F(GeoidTest, WhatWasNotSaidOrContradictsIsRefused) {
   const std::string file = write_grid("test.pgm");
-  const auto refused = [](const stream::Schema& schema, const char* vertical,
+  const auto refused = [](const stream::Schema& schema, HeightReference vertical,
                           const std::string& geoid) {
     EXPECT_THROW(EllipsoidalHeights(schema, vertical, geoid, kMemory), UsageError);
   };
-  refused(schema_with("orthometric", "metre"), "", "");
-  refused(schema_with("", "metre"), "", "");
-  refused(schema_with("ellipsoidal", "metre"), "", file);
-  refused(schema_with("orthometric", "metre"), "ignore", file);
-  refused(schema_with("orthometric", "metre"), "sea", "");
+  refused(schema_with("orthometric", "metre"), HeightReference::recorded, "");
+  refused(schema_with("", "metre"), HeightReference::recorded, "");
+  refused(schema_with("ellipsoidal", "metre"), HeightReference::recorded, file);
+  refused(schema_with("orthometric", "metre"), HeightReference::ignore, file);
 }
 
 // The heights of EGM96 in its 15' grid, as cs2cs of PROJ 9.1.1 gives them.
 TEST(EllipsoidalHeightsTest, PROJsGridOfEgm96IsTheDefault) {
-  const EllipsoidalHeights sea(schema_with("", "metre"), "orthometric", "", kMemory);
+  const EllipsoidalHeights sea(schema_with("", "metre"), HeightReference::orthometric, "", kMemory);
   EXPECT_TRUE(sea.has_geoid());
   EXPECT_NEAR(converted(sea, {8, 46}, 1000), 1051.852947, 1e-5);
   EXPECT_NE(sea.note().find("EGM96"), std::string::npos) << sea.note();
-  const EllipsoidalHeights feet(schema_with("orthometric", "foot"), "orthometric", "", kMemory);
+  const EllipsoidalHeights feet(schema_with("orthometric", "foot"), HeightReference::orthometric,
+                                "", kMemory);
   EXPECT_NEAR(converted(feet, {8, 46}, 1000), 304.8 + 51.852947, 1e-5);
-  EXPECT_THROW(EllipsoidalHeights(schema_with("ellipsoidal", "metre"), "orthometric", "", kMemory),
+  EXPECT_THROW(EllipsoidalHeights(schema_with("ellipsoidal", "metre"), HeightReference::orthometric,
+                                  "", kMemory),
                UsageError);
 }
 
 TEST(EllipsoidalHeightsTest, TheStoresOwnVerticalSystemGoesBeforeTheDefault) {
   stream::Schema schema = schema_with("orthometric", "metre");
   schema.crs.vertical_epsg = 5773;
-  EXPECT_NEAR(converted(EllipsoidalHeights(schema, "orthometric", "", kMemory), {8, 46}, 0),
-              51.852947, 1e-5);
+  EXPECT_NEAR(
+      converted(EllipsoidalHeights(schema, HeightReference::orthometric, "", kMemory), {8, 46}, 0),
+      51.852947, 1e-5);
   // Debian has no grid of EGM2008; somebody else may.
   schema.crs.vertical_epsg = 3855;
   try {
-    const EllipsoidalHeights egm2008(schema, "orthometric", "", kMemory);
+    const EllipsoidalHeights egm2008(schema, HeightReference::orthometric, "", kMemory);
     EXPECT_NE(egm2008.note().find("EGM2008"), std::string::npos);
   } catch (const stream::Error& error) {
     const std::string what = error.what();

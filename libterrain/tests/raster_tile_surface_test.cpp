@@ -105,7 +105,7 @@ TEST_F(RasterOfDegrees, RowsAreTheSamples) {
   for (const auto& world : worlds) {
     const stream::Store store = make<float>(stream::ScalarType::f32, world, 4326);
     TiledRaster raster(store, CoordinateSystem::of(store.schema().crs, "test").value(),
-                       {store.schema(), "ignore", "", 1 << 20});
+                       {store.schema(), HeightReference::ignore, "", 1 << 20});
     for (const bool flat : {false, true}) {
       if (flat) raster.flat_fill = 12.0;
       RasterTileSurface surface(raster), other(raster);
@@ -138,7 +138,7 @@ TEST_F(RasterOfDegrees, ProjectedOrTurnedRastersHaveNoRows) {
         std::pair{std::array<double, 6>{0.01, 0.001, 10, -0.001, 0.01, 44}, 4326}}) {
     const stream::Store store = make<float>(stream::ScalarType::f32, world, epsg);
     const TiledRaster raster(store, CoordinateSystem::of(store.schema().crs, "test").value(),
-                             {store.schema(), "ignore", "", 1 << 20});
+                             {store.schema(), HeightReference::ignore, "", 1 << 20});
     RasterTileSurface surface(raster);
     SurfaceRows rows;
     EXPECT_FALSE(surface.rows(surface.bounds(), rows));

@@ -8,8 +8,8 @@
 
 #include <benchmark/benchmark.h>
 
-#include "earth/crs/coordinate_system.hpp"
 #include "earth/grid_geography.hpp"
+#include "terrace/terrain/crs.hpp"
 
 namespace {
 

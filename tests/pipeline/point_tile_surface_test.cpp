@@ -19,9 +19,9 @@
 #include <terrace/tri/delaunay2.hpp>
 
 #include "../../libterrain/tests/temporary_folder.hpp"
-#include "earth/store_crs.hpp"
 #include "random.hpp"
 #include "terrace/terrain/build.hpp"
+#include "terrace/terrain/crs.hpp"
 #include "tile/make/cloud_spacing.hpp"
 #include "tile/make/crowded_leaf.hpp"
 #include "tile/make/sample_parts.hpp"
@@ -107,12 +107,13 @@ struct CloudStore {
 
   /// is_whole: as if all of it fitted into memory.
   [[nodiscard]] terrain::TiledCloud tiled(bool is_whole = false) const {
-    return {store,
-            crs,
-            terrain::EllipsoidalHeights(store.schema(), "ellipsoidal", "", 0),
-            std::uint64_t{256} << 20,
-            is_whole ? std::uint64_t{256} << 20 : 0,
-            2};
+    return {
+        store,
+        crs,
+        terrain::EllipsoidalHeights(store.schema(), terrain::HeightReference::ellipsoidal, "", 0),
+        std::uint64_t{256} << 20,
+        is_whole ? std::uint64_t{256} << 20 : 0,
+        2};
   }
 
  private:

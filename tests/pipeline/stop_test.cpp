@@ -17,14 +17,13 @@
 
 #include "../../libterrain/tests/made_raster.hpp"
 #include "../../libterrain/tests/temporary_folder.hpp"
-#include "sample/raster_run.hpp"
 #include "terrace/terrain/bounded_mesh.hpp"
 #include "terrace/terrain/build.hpp"
 #include "terrace/terrain/contours.hpp"
 #include "terrace/terrain/heights.hpp"
 #include "terrace/terrain/profile.hpp"
-#include "tile/make/tile_source.hpp"
-#include "tile/set/tile_set.hpp"
+#include "terrace/terrain/raster.hpp"
+#include "terrace/terrain/tiles.hpp"
 
 namespace terrace {
 namespace {
@@ -93,15 +92,9 @@ class Stop : public testing::Test {
          }},
         {"tiles",
          [=, &store](const terrain::Context& context) {
-           terrain::TileSourceOptions source;
-           source.vertical = "ignore";
-           source.memory_bytes = std::uint64_t{1} << 28;
-           const auto tiled = open_tile_source(store, source, context);
-           terrain::TileSetOptions options;
-           options.folder = path + ".tiles";
-           options.last_zoom = 9;
-           fs::create_directory(options.folder);
-           write_tile_set(tiled->surfaces(), options, context);
+           terrain::TilesRequest request{.folder = path + ".tiles", .last_zoom = 9};
+           request.vertical = terrain::HeightReference::ignore;
+           write_tiles(store, request, context);
          }},
     };
   }

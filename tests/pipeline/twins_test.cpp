@@ -15,9 +15,9 @@
 #include <terrace/stream/store.hpp>
 
 #include "../../libterrain/tests/temporary_folder.hpp"
-#include "earth/crs/coordinate_system.hpp"
 #include "earth/ground.hpp"
 #include "terrace/terrain/build.hpp"
+#include "terrace/terrain/crs.hpp"
 
 namespace terrace {
 namespace {

@@ -7,9 +7,9 @@
 #include <cmath>
 #include <vector>
 
-#include "earth/crs/coordinate_system.hpp"
 #include "fuzz_target.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::tools {
@@ -81,7 +81,7 @@ bool accepts(const std::uint8_t* data, std::size_t size) {
     } else if (how == "keys") {
       system = CoordinateSystem::of(crs_of_keys(text), "fuzz.tif");
     } else if (how == "shift") {
-      const DatumShift shift = parse_datum_shift(std::string(text));
+      const DatumShift shift = parse_datum_shift(std::string(text)).value_or(DatumShift{});
       for (const double value : shift) require(std::isfinite(value), "finite numbers of a shift");
       system = CoordinateSystem::parse("EPSG:4277", shift);
     }

@@ -16,6 +16,7 @@
 
 #include "base/progress_report.hpp"
 #include "base/units.hpp"
+#include "earth/crs/crs_definition.hpp"
 #include "earth/ground.hpp"
 #include "earth/source_crs.hpp"
 #include "earth/world.hpp"

@@ -12,7 +12,7 @@
 #include "base/file_marks.hpp"
 #include "base/parallel.hpp"
 #include "base/units.hpp"
-#include "earth/store_crs.hpp"
+#include "terrace/terrain/crs.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -11,9 +11,9 @@
 
 #include "base/fixed_text.hpp"
 #include "contour/line_joiner.hpp"
-#include "earth/crs/coordinate_system.hpp"
 #include "surface/ground_slope.hpp"
 #include "terrace/terrain/contours.hpp"
+#include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {

@@ -9,6 +9,7 @@
 
 #include <GeographicLib/Geoid.hpp>
 
+#include "earth/crs/crs_definition.hpp"
 #include "earth/crs/proj_object.hpp"
 #include "earth/ground.hpp"
 #include "earth/world.hpp"
@@ -49,16 +50,13 @@ GeoidGrid& GeoidGrid::operator=(GeoidGrid&&) noexcept = default;
 
 double GeoidGrid::undulation(const Point2& place) const { return (*geoid_)(place[1], place[0]); }
 
-EllipsoidalHeights::EllipsoidalHeights(const stream::Schema& schema, const std::string& vertical,
+EllipsoidalHeights::EllipsoidalHeights(const stream::Schema& schema, HeightReference vertical,
                                        const std::string& geoid, std::uint64_t memory_bytes,
                                        const std::optional<GeographicArea>& area) {
-  const bool said = vertical == "ellipsoidal" || vertical == "ignore";
-  const bool orthometric = vertical == "orthometric";
-  if (!vertical.empty() && !said && !orthometric) {
-    throw UsageError("`vertical` is ellipsoidal, orthometric or ignore, not '" + vertical + "'");
-  }
-  if (said && !geoid.empty()) {
-    throw UsageError("`vertical` " + vertical +
+  const bool ignored = vertical == HeightReference::ignore;
+  const bool orthometric = vertical == HeightReference::orthometric;
+  if ((ignored || vertical == HeightReference::ellipsoidal) && !geoid.empty()) {
+    throw UsageError("`vertical` " + std::string(ignored ? "ignore" : "ellipsoidal") +
                      " takes heights as they are, `geoid` converts them: give one of the two");
   }
   const std::string& recorded = schema.vertical;
@@ -67,7 +65,7 @@ EllipsoidalHeights::EllipsoidalHeights(const stream::Schema& schema, const std::
                      std::string(geoid.empty() ? "`vertical` orthometric" : "`geoid`") +
                      " out, or build the store with `vertical` orthometric if they are not");
   }
-  if (recorded != "ellipsoidal" && vertical.empty() && geoid.empty()) {
+  if (recorded != "ellipsoidal" && vertical == HeightReference::recorded && geoid.empty()) {
     throw UsageError((recorded.empty()
                           ? std::string("the store does not say what its heights refer to")
                           : "the store's heights are " + recorded) +
@@ -87,7 +85,7 @@ EllipsoidalHeights::EllipsoidalHeights(const stream::Schema& schema, const std::
   } else if (orthometric) {
     find_operation(schema, area);
   }
-  if (vertical == "ignore" && recorded != "ellipsoidal") {
+  if (ignored && recorded != "ellipsoidal") {
     add_note("heights are taken as ellipsoidal though they are " +
              (recorded.empty() ? std::string("of unknown reference") : recorded) +
              ": they may be off by up to about 100 m");

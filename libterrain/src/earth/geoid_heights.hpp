@@ -8,9 +8,10 @@
 #include <string>
 
 #include "base/digest.hpp"
-#include "earth/crs/coordinate_system.hpp"
 #include "earth/crs/proj_pipeline.hpp"
 #include "terrace/stream/store.hpp"
+#include "terrace/terrain/crs.hpp"
+#include "terrace/terrain/height_reference.hpp"
 
 namespace GeographicLib {
 class Geoid;
@@ -43,14 +44,11 @@ class GeoidGrid {
 /// Heights of a store as heights above the ellipsoid in metres, which globes want.
 class EllipsoidalHeights {
  public:
-  /// vertical: of `--vertical`, "ellipsoidal" (the heights are that, whatever the store says),
-  /// "ignore" (they are to be taken as if they were), "orthometric" (they are above the sea: PROJ
-  /// leads them from the store's vertical CRS to the ellipsoid, from EGM96 if there is none) or
-  /// empty. geoid: the file of `--geoid`, which goes before PROJ's, or empty. area: where the store
-  /// lies. Throws: UsageError if the store's heights are orthometric or unknown and neither was
-  /// said, or if the options contradict the store or one another; stream::Error as GeoidGrid, and
-  /// naming the grid that PROJ lacks.
-  EllipsoidalHeights(const stream::Schema& schema, const std::string& vertical,
+  /// geoid: a file with a grid, which goes before PROJ's operations, or empty. area: where the
+  /// store lies, by which an operation is chosen. Throws: UsageError if the store's heights are not
+  /// ellipsoidal and neither was given, or if the options contradict the store or one another;
+  /// stream::Error as GeoidGrid, and naming the grid that PROJ lacks.
+  EllipsoidalHeights(const stream::Schema& schema, HeightReference vertical,
                      const std::string& geoid, std::uint64_t memory_bytes,
                      const std::optional<GeographicArea>& area = std::nullopt);
 

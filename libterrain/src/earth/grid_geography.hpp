@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <span>
 
-#include "earth/crs/coordinate_system.hpp"
+#include "terrace/terrain/crs.hpp"
 
 namespace terrace::terrain {
 

@@ -9,6 +9,7 @@
 #include <GeographicLib/Constants.hpp>
 
 #include "base/portable_math.hpp"
+#include "earth/crs/crs_definition.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -6,9 +6,9 @@
 #include <string>
 #include <string_view>
 
-#include "earth/crs/coordinate_system.hpp"
 #include "earth/world.hpp"
 #include "terrace/stream/point.hpp"
+#include "terrace/terrain/crs.hpp"
 
 /// Ground distances. Points are stored as they came, in degrees, feet, or columns and rows; what is
 /// near or far is measured in metres on the ground.

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "base/portable_math.hpp"
+#include "earth/crs/crs_definition.hpp"
 #include "earth/ground.hpp"
 
 namespace terrace::terrain {

@@ -5,8 +5,8 @@
 
 #include <GeographicLib/Geodesic.hpp>
 
-#include "earth/crs/coordinate_system.hpp"
 #include "terrace/stream/store.hpp"
+#include "terrace/terrain/crs.hpp"
 
 namespace terrace::terrain {
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "base/portable_math.hpp"
+#include "earth/crs/crs_definition.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::terrain {

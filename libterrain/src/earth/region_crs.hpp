@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "earth/crs/coordinate_system.hpp"
+#include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {

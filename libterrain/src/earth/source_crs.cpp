@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <system_error>
 
+#include "earth/crs/crs_definition.hpp"
 #include "earth/ground.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/error.hpp"

@@ -4,8 +4,8 @@
 #include <optional>
 #include <string>
 
-#include "earth/crs/coordinate_system.hpp"
 #include "terrace/stream/source.hpp"
+#include "terrace/terrain/crs.hpp"
 
 namespace terrace::terrain {
 

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "earth/store_crs.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <utility>
 
 #include "base/units.hpp"
+#include "earth/crs/crs_definition.hpp"
 #include "earth/region_crs.hpp"
 #include "earth/world.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/terrain/crs.hpp"
 
 namespace terrace::terrain {
 
@@ -26,14 +26,12 @@ CoordinateSystem system_of(const stream::Store& store) {
 }
 
 Transformation transformation_to(const stream::Store& store, const std::string& named,
-                                 const std::string& shift) {
-  std::optional<DatumShift> values;
-  if (!shift.empty()) values = parse_datum_shift(shift);
+                                 const std::optional<DatumShift>& shift) {
   CoordinateSystem own = system_of(store);
-  const CoordinateSystem other = CoordinateSystem::parse(named, values);
-  if (values && !other.definition().shift && !own.counts_as_wgs84()) {
+  const CoordinateSystem other = CoordinateSystem::parse(named, shift);
+  if (shift && !other.definition().shift && !own.counts_as_wgs84()) {
     CrsDefinition shifted = own.definition();
-    shifted.shift = values;
+    shifted.shift = shift;
     own = CoordinateSystem(shifted);
   }
   return {own, other};

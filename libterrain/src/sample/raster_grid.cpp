@@ -13,8 +13,8 @@
 
 #include "base/portable_math.hpp"
 #include "base/units.hpp"
-#include "earth/store_crs.hpp"
 #include "earth/world.hpp"
+#include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {

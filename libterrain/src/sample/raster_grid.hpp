@@ -5,7 +5,7 @@
 
 #include <terrace/stream/store.hpp>
 
-#include "sample/raster_run.hpp"
+#include "terrace/terrain/raster.hpp"
 
 namespace terrace::terrain {
 

@@ -8,7 +8,7 @@
 
 #include "earth/ground.hpp"
 #include "sample/raster_grid.hpp"
-#include "sample/raster_run.hpp"
+#include "terrace/terrain/raster.hpp"
 
 namespace terrace::terrain {
 

@@ -29,6 +29,14 @@ Fill parse_fill(const std::string& text) {
       {{"none", Fill::none}, {"flat", Fill::flat}, {"interpolate", Fill::interpolate}});
 }
 
+HeightReference parse_height_reference(const std::string& text) {
+  if (text.empty()) return HeightReference::recorded;
+  return choice<HeightReference>(text, "--vertical",
+                                 {{"ellipsoidal", HeightReference::ellipsoidal},
+                                  {"orthometric", HeightReference::orthometric},
+                                  {"ignore", HeightReference::ignore}});
+}
+
 tri::TinQuality parse_quality(const std::string& text) {
   return choice<tri::TinQuality>(text, "--quality",
                                  {{"greedy", tri::TinQuality::kGreedy},

@@ -7,8 +7,9 @@
 #include <terrace/tri/interpolation.hpp>
 #include <terrace/tri/point_tin.hpp>
 
-#include "sample/raster_run.hpp"
-#include "terrace/terrain/bounded_mesh.hpp"
+#include "terrace/terrain/fill.hpp"
+#include "terrace/terrain/height_reference.hpp"
+#include "terrace/terrain/raster.hpp"
 
 /// Options whose value is one of a few names. All throw UsageError for another one.
 
@@ -18,6 +19,8 @@ using namespace terrain;
 
 /// "none", "flat", "interpolate".
 Fill parse_fill(const std::string& text);
+/// "ellipsoidal", "orthometric", "ignore", or empty: what the store records.
+HeightReference parse_height_reference(const std::string& text);
 /// "greedy", "removal", "fitted".
 tri::TinQuality parse_quality(const std::string& text);
 /// "all", "min", "max", "mean", "first", "error".

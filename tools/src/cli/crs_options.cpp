@@ -11,7 +11,7 @@ namespace terrace::tools {
 
 Transformation CrsOptions::change(const stream::Store& store, const std::string& named,
                                   const CommonOptions& common) const {
-  Transformation change = transformation_to(store, named, shift_);
+  Transformation change = transformation_to(store, named, parse_datum_shift(shift_));
   if (!change.note().empty()) common.say(change.note());
   return change;
 }

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "earth/store_crs.hpp"
+#include "terrace/terrain/crs.hpp"
 
 namespace CLI {
 class App;

@@ -7,7 +7,7 @@
 
 #include <terrace/stream/store.hpp>
 
-#include "earth/store_crs.hpp"
+#include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/detail.hpp"
 #include "terrace/terrain/region.hpp"
 

@@ -4,7 +4,9 @@
 #include <optional>
 
 #include "base/units.hpp"
-#include "earth/crs/coordinate_system.hpp"
+#include "earth/crs/crs_definition.hpp"
+#include "earth/crs/datum_change.hpp"
+#include "terrace/terrain/crs.hpp"
 
 namespace terrace::tools {
 

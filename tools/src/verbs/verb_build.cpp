@@ -13,8 +13,8 @@
 
 #include "base/units.hpp"
 #include "cli/interrupt.hpp"
-#include "earth/crs/coordinate_system.hpp"
 #include "terrace/terrain/build.hpp"
+#include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/error.hpp"
 #include "verbs/verbs.hpp"
 
@@ -66,7 +66,7 @@ class BuildCommand final : public Command {
     request_.replace = common.force;
     request_.effort = *effort_of(effort_);
     if (!crs_.empty()) request_.crs = CoordinateSystem::parse(crs_).crs();
-    if (!shift_.empty()) request_.datum_shift = parse_datum_shift(shift_);
+    request_.datum_shift = parse_datum_shift(shift_);
     if (block_ < 2 || block_ > 1'000'000) {
       throw UsageError("--block must be between 2 and 1000000, not " + std::to_string(block_));
     }

@@ -15,7 +15,7 @@
 #include "cli/interrupt.hpp"
 #include "cli/line_option.hpp"
 #include "cli/output.hpp"
-#include "earth/crs/coordinate_system.hpp"
+#include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/profile.hpp"
 #include "verbs/verbs.hpp"
 
@@ -67,7 +67,7 @@ class ProfileCommand final : public Command {
     request.line = parse_line(line_);
     const stream::Store store = open_store(store_);
     if (!line_crs_.empty()) {
-      const Transformation change = transformation_to(store, line_crs_, shift_);
+      const Transformation change = transformation_to(store, line_crs_, parse_datum_shift(shift_));
       if (!change.note().empty()) common.say(change.note());
       change.reverse(request.line);
     }

@@ -13,8 +13,8 @@
 #include "cli/detail_options.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/output.hpp"
-#include "sample/raster_run.hpp"
 #include "terrace/terrain/error.hpp"
+#include "terrace/terrain/raster.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {

@@ -16,8 +16,8 @@
 #include "cli/detail_options.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/output.hpp"
-#include "earth/crs/coordinate_system.hpp"
 #include "sample/sample_run.hpp"
+#include "terrace/terrain/crs.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
@@ -102,13 +102,14 @@ class SampleCommand final : public Command {
     PlaceConversions conversions;
     std::optional<CoordinateSystem> from;
     if (!points_crs_.empty()) {
-      const Transformation change = transformation_to(store, points_crs_, shift_);
+      const Transformation change =
+          transformation_to(store, points_crs_, parse_datum_shift(shift_));
       if (!change.note().empty()) common.say(change.note());
       conversions.to_store = [change](std::span<Point2> here) { change.reverse(here); };
       from = change.to();
     }
     if (!to_crs_.empty()) {
-      Transformation change = transformation_to(store, to_crs_, shift_);
+      Transformation change = transformation_to(store, to_crs_, parse_datum_shift(shift_));
       conversions.writes_degrees = change.to().is_geographic();
       if (from) change = Transformation(*from, change.to());
       if (!change.note().empty()) common.say(change.note());

@@ -12,11 +12,11 @@
 #include "base/units.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/output.hpp"
-#include "earth/crs/coordinate_system.hpp"
 #include "picture/canvas.hpp"
 #include "synth/synth_cloud.hpp"
 #include "synth/synth_dem.hpp"
 #include "terrace/stream/point_writer.hpp"
+#include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/error.hpp"
 #include "verbs/verbs.hpp"
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
 #include <charconv>
-#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -15,13 +14,8 @@
 #include "base/units.hpp"
 #include "cli/choices.hpp"
 #include "cli/interrupt.hpp"
-#include "terrace/terrain/bounded_mesh.hpp"
 #include "terrace/terrain/error.hpp"
-#include "tile/make/tile_source.hpp"
-#include "tile/set/tile_file.hpp"
-#include "tile/set/tile_inputs.hpp"
-#include "tile/set/tile_journal.hpp"
-#include "tile/set/tile_set.hpp"
+#include "terrace/terrain/tiles.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
@@ -29,29 +23,33 @@ namespace terrace::tools {
 using namespace terrain;
 namespace {
 
-/// What a thread needs: the samples of a leaf, their mesh and what is kept of the store.
-constexpr std::uint64_t kTileBytesPerThread = std::uint64_t{96} << 20;
-/// Fill and blocks of the store, and the lists of tiles.
-constexpr std::uint64_t kTileBytesBeside = std::uint64_t{80} << 20;
-
-std::pair<unsigned, unsigned> parse_zooms(const std::string& text, unsigned native) {
-  if (text.empty()) return {0, native};
+/// "LAST" or "FIRST-LAST"; the request's own without any.
+void set_zooms(const std::string& text, TilesRequest& request) {
+  if (text.empty()) return;
   const auto number = [&](std::string_view part) {
     unsigned value = 0;
     const auto result = std::from_chars(part.data(), part.data() + part.size(), value);
-    if (result.ec != std::errc{} || result.ptr != part.data() + part.size() ||
-        value > kDeepestZoom) {
-      throw UsageError("--zoom '" + text + "': FIRST-LAST, from 0 to " +
-                       std::to_string(kDeepestZoom));
+    if (result.ec != std::errc{} || result.ptr != part.data() + part.size()) {
+      throw UsageError("--zoom '" + text + "': FIRST-LAST, as in 0-14");
     }
     return value;
   };
   const std::size_t dash = text.find('-');
-  if (dash == std::string::npos) return {0, number(text)};
-  const std::pair zooms{number(std::string_view(text).substr(0, dash)),
-                        number(std::string_view(text).substr(dash + 1))};
-  if (zooms.first > zooms.second) throw UsageError("--zoom '" + text + "': the smaller one first");
-  return zooms;
+  if (dash != std::string::npos) {
+    request.first_zoom = number(std::string_view(text).substr(0, dash));
+  }
+  request.last_zoom =
+      number(std::string_view(text).substr(dash == std::string::npos ? 0 : dash + 1));
+}
+
+/// "interpolate", "flat" or "flat:METRES".
+void set_fill(const std::string& text, TilesRequest& request) {
+  if (text.starts_with("flat:")) {
+    request.flat_height = parse_number(text.substr(5), "--fill flat");
+  } else if (text != "interpolate" && text != "flat") {
+    throw UsageError("--fill '" + text + "': interpolate, flat or flat:METRES");
+  }
+  request.fill = text == "interpolate" ? Fill::interpolate : Fill::flat;
 }
 
 class TileCommand final : public Command {
@@ -96,8 +94,7 @@ class TileCommand final : public Command {
   Summary run(const CommonOptions& common) override;
 
  private:
-  [[nodiscard]] TileSetOptions options_for(const stream::Store& store, double spacing,
-                                           const CommonOptions& common) const;
+  [[nodiscard]] TilesRequest request(const CommonOptions& common) const;
 
   std::string store_, output_, format_ = "quantized-mesh", zoom_, quality_ = "removal";
   std::string fill_ = "interpolate", water_, vertical_, geoid_, name_;
@@ -105,80 +102,37 @@ class TileCommand final : public Command {
   bool gzip_ = false, normals_ = false, metadata_ = false, resume_ = false;
 };
 
-/// Identifies the store: a change invalidates every tile.
-std::string store_fingerprint(const stream::Store& store) {
-  const std::vector<std::byte> manifest = read_tile_file((store.path() / "manifest.json").string());
-  return std::to_string(checksum_of(manifest));
-}
-
-TileSetOptions TileCommand::options_for(const stream::Store& store, double spacing,
-                                        const CommonOptions& common) const {
-  TileSetOptions options;
-  options.name = name_.empty() ? store.path().stem().string() : name_;
-  const unsigned native = native_zoom(spacing);
-  std::tie(options.first_zoom, options.last_zoom) = parse_zooms(zoom_, native);
-  if (options.last_zoom > native) {
-    common.say("zoom " + std::to_string(native) + " shows every sample: deeper ones, to " +
-               std::to_string(options.last_zoom) + ", show no more");
+TilesRequest TileCommand::request(const CommonOptions& common) const {
+  if (format_ != "quantized-mesh") {
+    throw UsageError("--format '" + format_ + "': quantized-mesh is the one that works");
   }
-  options.max_error = max_error_.value_or(0.0);
-  options.mesh.quality = parse_quality(quality_);
-  options.mesh.normals = normals_;
-  options.mesh.water = !water_.empty();
-  options.gzip = gzip_;
-  options.metadata = metadata_;
-  options.resume = resume_;
-  options.replace = common.force;
-  options.source_fingerprint = store_fingerprint(store);
-  options.source_options = fill_ + "\n" + water_ + "\n" + vertical_;
-  if (!geoid_.empty()) options.source_options += "\n" + std::to_string(digest_of_file(geoid_));
-  return options;
+  TilesRequest request{.folder = output_, .name = name_};
+  set_zooms(zoom_, request);
+  request.max_error = max_error_;
+  request.quality = parse_quality(quality_);
+  request.vertical = parse_height_reference(vertical_);
+  request.geoid = geoid_;
+  set_fill(fill_, request);
+  request.water = !water_.empty();
+  if (request.water && water_ != "nodata") request.water_height = parse_number(water_, "--water");
+  request.normals = normals_;
+  request.metadata = metadata_;
+  request.gzip = gzip_;
+  request.resume = resume_;
+  request.replace = common.force;
+  return request;
 }
 
 Summary TileCommand::run(const CommonOptions& common) {
   const Stopwatch watch;
-  if (format_ != "quantized-mesh") {
-    throw UsageError("--format '" + format_ + "': quantized-mesh is the one that works");
-  }
-  const stream::Store store = open_store(store_);
-  const Context context = common.context();
-  const std::uint64_t memory = context.memory_or(0);
-  if (memory < kTileBytesBeside + kTileBytesPerThread) {
-    throw stream::Error(
-        {.file = store_,
-         .where = {},
-         .cause = "tiles need " + std::to_string((kTileBytesBeside + kTileBytesPerThread) >> 20) +
-                  "M of memory, --memory allows " + std::to_string(memory >> 20) + "M",
-         .remedy = "allow more"});
-  }
-  const TileFolder folder(output_, common.force, resume_);
-  const unsigned threads = static_cast<unsigned>(
-      std::min<std::uint64_t>(common.threads, (memory - kTileBytesBeside) / kTileBytesPerThread));
-
-  const std::unique_ptr<TileSource> source = open_tile_source(store,
-                                                              {.vertical = vertical_,
-                                                               .geoid = geoid_,
-                                                               .fill = fill_,
-                                                               .water = water_,
-                                                               .memory_bytes = memory,
-                                                               .threads = threads},
-                                                              context);
-  const std::vector<std::unique_ptr<TileSurface>>& surfaces = source->surfaces();
-  TileSetOptions options = options_for(store, surfaces.front()->spacing(), common);
-  options.folder = folder.path();
-  const TileSetResult result = write_tile_set(surfaces, options, context);
+  const TilesOutcome result = write_tiles(open_store(store_), request(common), common.context());
 
   Summary summary;
   nlohmann::ordered_json zooms = nlohmann::ordered_json::array();
-  for (const ZoomSummary& zoom : result.zooms) {
+  for (const TileZoom& zoom : result.zooms) {
     zooms.push_back({{"zoom", zoom.zoom}, {"tiles", zoom.tiles}, {"max_error", zoom.max_error}});
     summary.text += "zoom " + std::to_string(zoom.zoom) + ": " + with_commas(zoom.tiles) +
                     " tiles, within " + readable_bound(zoom.max_error) + " m\n";
-    if (zoom.max_error > max_error_of(options, zoom.zoom)) {
-      common.say("zoom " + std::to_string(zoom.zoom) + ": " +
-                 readable_number(max_error_of(options, zoom.zoom)) +
-                 " m was asked for, less than what the 15 bits of a tile's coordinates show here");
-    }
   }
   summary.json = {{"tiles", result.tiles},      {"bytes", result.bytes},
                   {"made", result.made},        {"kept", result.kept},

@@ -12,21 +12,16 @@
 #include <terrace/stream/store.hpp>
 
 #include "base/units.hpp"
+#include "cli/choices.hpp"
 #include "cli/interrupt.hpp"
 #include "terrace/terrain/error.hpp"
-#include "tile/make/tile_source.hpp"
-#include "tile/verify/tile_check.hpp"
+#include "terrace/terrain/tile_check.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
 
 using namespace terrain;
 namespace {
-
-/// What a thread needs: a tile, the samples of a part of it and what is kept of the store.
-constexpr std::uint64_t kVerifyBytesPerThread = std::uint64_t{96} << 20;
-/// Blocks of the raster, and the lists of tiles.
-constexpr std::uint64_t kVerifyBytesBeside = std::uint64_t{80} << 20;
 
 /// The problems in the summary's two forms.
 void add_problem(const stream::Problem& problem, nlohmann::ordered_json& list, std::string& text) {
@@ -93,36 +88,14 @@ Summary VerifyCommand::tiles(const CommonOptions& common) const {
   if (store_.empty() && (max_error_ || !vertical_.empty() || !geoid_.empty())) {
     throw UsageError("--max-error, --vertical and --geoid have a meaning with --store alone");
   }
-  const Context context = common.context();
-  const std::uint64_t memory = context.memory_or(0);
-  if (memory < kVerifyBytesBeside + kVerifyBytesPerThread) {
-    throw stream::Error(
-        {.file = path_,
-         .where = {},
-         .cause = "the check needs " +
-                  std::to_string((kVerifyBytesBeside + kVerifyBytesPerThread) >> 20) +
-                  "M of memory, --memory allows " + std::to_string(memory >> 20) + "M",
-         .remedy = "allow more"});
-  }
-  const auto threads = static_cast<unsigned>(std::min<std::uint64_t>(
-      common.threads, (memory - kVerifyBytesBeside) / kVerifyBytesPerThread));
-
   std::optional<stream::Store> store;
-  std::unique_ptr<TileSource> source;
-  if (!store_.empty()) {
-    store.emplace(open_store(store_));
-    source = open_tile_source(*store,
-                              {.vertical = vertical_,
-                               .geoid = geoid_,
-                               .fill = {"interpolate"},
-                               .water = {},
-                               .memory_bytes = memory,
-                               .threads = threads},
-                              context);
-  }
-  const std::vector<std::unique_ptr<TileSurface>> none;
-  const TileCheckResult result = check_tile_set({.folder = path_, .max_error = max_error_}, threads,
-                                                source ? source->surfaces() : none, context);
+  if (!store_.empty()) store.emplace(open_store(store_));
+  const TileCheckResult result = check_tiles({.folder = path_,
+                                              .max_error = max_error_,
+                                              .store = store ? &*store : nullptr,
+                                              .vertical = parse_height_reference(vertical_),
+                                              .geoid = geoid_},
+                                             common.context());
 
   Summary summary;
   nlohmann::ordered_json problems = nlohmann::ordered_json::array();

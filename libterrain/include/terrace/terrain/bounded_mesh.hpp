@@ -12,18 +12,12 @@
 #include <terrace/tri/point_tin.hpp>
 
 #include "terrace/terrain/context.hpp"
+#include "terrace/terrain/fill.hpp"
 #include "terrace/terrain/region.hpp"
 
 /// Meshes whose vertical error is bounded, and measured at every sample.
 
 namespace terrace::terrain {
-
-/// What a raster's cells without data become.
-enum class Fill : std::uint8_t {
-  none,         ///< holes
-  flat,         ///< samples at the lowest height of the store
-  interpolate,  ///< samples between the heights around
-};
 
 struct BoundedMeshOptions {
   double max_error = 0.0;        ///< metres
@@ -31,7 +25,7 @@ struct BoundedMeshOptions {
   tri::TinQuality quality = tri::TinQuality::kRemoval;
   /// kAll: an error where samples of one place differ by more than max_error.
   tri::PointDuplicates duplicates = tri::PointDuplicates::kAll;
-  Fill fill = Fill::none;
+  Fill fill = Fill::none;          ///< of a raster's cells
   std::optional<Region> region{};  ///< in the store's CRS
   std::string path{};              ///< of the mesh; "-" is standard output
   stream::WriterOptions writer{};  ///< its format; the context's stop counts, not this one's

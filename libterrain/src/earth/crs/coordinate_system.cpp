@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "earth/crs/coordinate_system.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <mutex>
@@ -11,8 +9,12 @@
 
 #include "base/portable_math.hpp"
 #include "base/units.hpp"
+#include "earth/crs/crs_definition.hpp"
 #include "earth/crs/crs_geo_keys.hpp"
+#include "earth/crs/datum_change.hpp"
+#include "earth/crs/projection.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
@@ -65,6 +67,11 @@ DatumChange change_between(const CrsDefinition& from, const CrsDefinition& to,
 
 }  // namespace
 
+struct CoordinateSystem::Data {
+  CrsDefinition definition;
+  std::shared_ptr<const Projection> projection;  ///< none: geographic
+};
+
 struct CoordinateSystem::LazyChange {
   std::once_flag once;
   std::optional<DatumChange> change;
@@ -76,6 +83,15 @@ CoordinateSystem::CoordinateSystem(const CrsDefinition& definition)
     : data_(std::make_shared<const Data>(
           Data{definition, definition.geographic ? nullptr : projection_of(definition)})),
       wgs84_(std::make_shared<LazyChange>()) {}
+
+const CrsDefinition& CoordinateSystem::definition() const { return data_->definition; }
+bool CoordinateSystem::is_geographic() const { return definition().geographic; }
+std::string CoordinateSystem::title() const { return definition().title(); }
+Heights CoordinateSystem::heights() const { return definition().heights; }
+bool CoordinateSystem::reaches_wgs84() const { return to_wgs84().possible(); }
+bool CoordinateSystem::counts_as_wgs84() const {
+  return to_wgs84().possible() && to_wgs84().identity();
+}
 
 CoordinateSystem CoordinateSystem::parse(const std::string& text,
                                          const std::optional<DatumShift>& shift) {
@@ -250,39 +266,37 @@ Transformation::Transformation(CoordinateSystem from, CoordinateSystem to)
     : from_(std::move(from)),
       to_(std::move(to)),
       same_(from_.same_places(to_)),
-      change_(change_between(from_.definition(), same_ ? from_.definition() : to_.definition(),
-                             from_.area() ? from_.area() : to_.area())) {
-  if (!change_.possible()) {
+      change_(std::make_shared<const DatumChange>(
+          change_between(from_.definition(), same_ ? from_.definition() : to_.definition(),
+                         from_.area() ? from_.area() : to_.area()))) {
+  if (!change_->possible()) {
     // The remedy is for the one whose datum is another.
     const bool other = from_.counts_as_wgs84() && !to_.counts_as_wgs84();
-    fail_without_way(other ? to_ : from_, (other ? from_ : to_).definition().datum, change_);
+    fail_without_way(other ? to_ : from_, (other ? from_ : to_).definition().datum, *change_);
   }
 }
 
 void Transformation::forward(std::span<Point2> places) const {
   if (same_) return;
   from_.to_own_geographic(places);
-  change_.forward(places);
+  change_->forward(places);
   to_.from_own_geographic(places);
 }
 
 void Transformation::reverse(std::span<Point2> places) const {
   if (same_) return;
   to_.to_own_geographic(places);
-  change_.reverse(places);
+  change_->reverse(places);
   from_.from_own_geographic(places);
 }
 
 std::string Transformation::note() const {
-  if (same_ || change_.identity()) return {};
-  return from_.title() + " to " + to_.title() + " by " + change_.description();
+  if (same_ || change_->identity()) return {};
+  return from_.title() + " to " + to_.title() + " by " + change_->description();
 }
 
-void transform(const CoordinateSystem& from, const CoordinateSystem& to, std::span<Point2> places) {
-  Transformation(from, to).forward(places);
-}
-
-DatumShift parse_datum_shift(const std::string& text) {
+std::optional<DatumShift> parse_datum_shift(const std::string& text) {
+  if (text.empty()) return std::nullopt;
   const std::vector<double> numbers = parse_numbers(text, "`shift`");
   if (numbers.size() != 3 && numbers.size() != 7) {
     throw UsageError("`shift` takes three or seven numbers, dx,dy,dz[,rx,ry,rz,ds], not " +

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -9,7 +8,7 @@
 #include <string>
 
 #include "earth/crs/projection.hpp"
-#include "terrace/stream/source.hpp"
+#include "terrace/terrain/crs.hpp"
 
 namespace terrace::terrain {
 
@@ -31,18 +30,8 @@ class ContradictoryCrs : public CrsError {
   using CrsError::CrsError;
 };
 
-/// What heights refer to.
-enum class Heights : std::uint8_t {
-  unknown,
-  ellipsoidal,  ///< the ellipsoid
-  orthometric,  ///< mean sea level, by some geoid or levelling
-};
 /// "ellipsoidal", "orthometric", or empty: as stores record it.
 std::string name_of(Heights heights);
-
-/// To WGS 84's geocentric axes: translation in metres, rotation in arc-seconds and scale in parts
-/// per million, as a position vector transformation (EPSG 9606), the order of TOWGS84 in WKT.
-using DatumShift = std::array<double, 7>;
 
 /// A CRS taken apart: plain data, read from PROJ. Angles in degrees, lengths in metres.
 struct CrsDefinition {

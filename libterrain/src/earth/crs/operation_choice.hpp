@@ -5,13 +5,9 @@
 #include <string>
 
 #include "earth/crs/proj_object.hpp"
+#include "terrace/terrain/crs.hpp"
 
 namespace terrace::terrain {
-
-/// Degrees. west is greater than east across the antimeridian.
-struct GeographicArea {
-  double west = 0, south = 0, east = 0, north = 0;
-};
 
 /// An operation of PROJ's database between two systems.
 struct OperationChoice {

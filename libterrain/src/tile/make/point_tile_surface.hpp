@@ -11,12 +11,12 @@
 
 #include <terrace/stream/store.hpp>
 
-#include "earth/crs/coordinate_system.hpp"
 #include "earth/geoid_heights.hpp"
 #include "surface/cluster_census.hpp"
 #include "surface/point_fill.hpp"
 #include "surface/point_window.hpp"
 #include "surface/store_window.hpp"
+#include "terrace/terrain/crs.hpp"
 #include "tile/make/cloud_samples.hpp"
 #include "tile/make/stored_places.hpp"
 #include "tile/make/tile_surface.hpp"

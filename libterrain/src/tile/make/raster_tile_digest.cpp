@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "base/digest.hpp"
+#include "earth/crs/crs_definition.hpp"
 #include "tile/make/tiled_raster.hpp"
 
 namespace terrace::terrain {

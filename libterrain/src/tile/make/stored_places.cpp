@@ -10,6 +10,7 @@
 #include <terrace/stream/error.hpp>
 
 #include "base/portable_math.hpp"
+#include "earth/crs/crs_definition.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -6,9 +6,9 @@
 
 #include <terrace/stream/store.hpp>
 
-#include "earth/crs/coordinate_system.hpp"
 #include "earth/world.hpp"
 #include "surface/store_window.hpp"
+#include "terrace/terrain/crs.hpp"
 #include "tile/format/tile_address.hpp"
 
 namespace terrace::terrain {

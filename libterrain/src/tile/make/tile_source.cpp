@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <optional>
+#include <string>
 #include <utility>
 
-#include "base/units.hpp"
+#include <terrace/stream/error.hpp>
+
 #include "earth/geoid_heights.hpp"
-#include "earth/store_crs.hpp"
+#include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/error.hpp"
 #include "tile/make/point_tile_surface.hpp"
 #include "tile/make/raster_tile_surface.hpp"
@@ -15,7 +17,12 @@
 namespace terrace::terrain {
 namespace {
 
-/// What the triangles of a part may take of a thread, whatever --memory says.
+/// What a thread needs: the samples of a leaf or of a part of a tile, their mesh and what is kept
+/// of the store.
+constexpr std::uint64_t kBytesPerThread = std::uint64_t{96} << 20;
+/// Fill and blocks of the store, and the lists of tiles.
+constexpr std::uint64_t kBytesBeside = std::uint64_t{80} << 20;
+/// What the triangles of a part may take of a thread, whatever the memory allowed.
 constexpr std::uint64_t kLeastWindowBytes = std::uint64_t{64} << 20;
 
 template <class Tiled, class Surface>
@@ -35,55 +42,63 @@ class SourceOf final : public TileSource {
   std::unique_ptr<Tiled> tiled_;
 };
 
-/// Metres of --fill; nothing: heights are taken from those around.
-std::optional<double> flat_height(const stream::Store& store, const std::string& fill,
+/// Metres above the ellipsoid; nothing: heights are taken from those around.
+std::optional<double> flat_height(const stream::Store& store, const TilesRequest& request,
                                   double metres_per_unit) {
-  if (fill == "interpolate") return std::nullopt;
-  if (fill.starts_with("flat:")) return parse_number(fill.substr(5), "`fill` flat");
-  if (fill != "flat") throw UsageError("`fill` '" + fill + "': interpolate, flat or flat:METRES");
+  if (request.fill == Fill::none) throw UsageError("`fill` none: globes have no holes");
+  if (request.fill == Fill::interpolate) return std::nullopt;
   const stream::Channel& z = store.schema().coordinates[2];
-  return (store.bounds().min[2] * z.scale + z.offset) * metres_per_unit;
-}
-
-std::optional<double> water_height(const stream::Store& store, const std::string& water) {
-  if (water.empty()) return std::nullopt;
-  if (water != "nodata") return parse_number(water, "`water`");
-  if (!store.schema().grid) {
-    throw UsageError(
-        "`water` nodata is for rasters: irregular points have no cells without data; give the "
-        "height of the water");
-  }
-  return std::nullopt;
+  const double lowest = (store.bounds().min[2] * z.scale + z.offset) * metres_per_unit;
+  return request.flat_height.value_or(lowest);
 }
 
 }  // namespace
 
+TileResources tile_resources(const Context& context, const std::string& path) {
+  const std::uint64_t memory = context.memory_or(0);
+  if (memory < kBytesBeside + kBytesPerThread) {
+    throw stream::Error(
+        {.file = path,
+         .where = {},
+         .cause = "tiles need " + std::to_string((kBytesBeside + kBytesPerThread) >> 20) +
+                  "M of memory, `memory_bytes` allows " + std::to_string(memory >> 20) + "M",
+         .remedy = "allow more"});
+  }
+  const std::uint64_t threads = (memory - kBytesBeside) / kBytesPerThread;
+  return {memory, static_cast<unsigned>(std::min<std::uint64_t>(context.threads, threads))};
+}
+
 std::unique_ptr<TileSource> open_tile_source(const stream::Store& given,
-                                             const TileSourceOptions& options,
+                                             const TilesRequest& request,
+                                             const TileResources& resources,
                                              const Context& context) {
+  if (request.water && !request.water_height && !given.schema().grid) {
+    throw UsageError(
+        "`water` nodata is for rasters: irregular points have no cells without data; give the "
+        "height of the water");
+  }
   const stream::Store store = given.with_stop(context.stop);
   const CoordinateSystem system = system_of(store);
-  EllipsoidalHeights heights(store.schema(), options.vertical, options.geoid,
-                             options.memory_bytes / 4, system.area());
+  EllipsoidalHeights heights(store.schema(), request.vertical, request.geoid,
+                             resources.memory_bytes / 4, system.area());
   if (!heights.note().empty()) context.say(heights.note());
   if (!system.wgs84_note().empty()) context.say(system.wgs84_note());
-  const std::optional<double> flat = flat_height(store, options.fill, heights.metres_per_unit());
-  const std::optional<double> water = water_height(store, options.water);
+  const std::optional<double> flat = flat_height(store, request, heights.metres_per_unit());
   if (store.schema().grid) {
     auto raster = std::make_unique<TiledRaster>(store, system, std::move(heights));
     raster->flat_fill = flat;
-    raster->water_height = water;
+    raster->water_height = request.water_height;
     return std::make_unique<SourceOf<TiledRaster, RasterTileSurface>>(std::move(raster),
-                                                                      options.threads);
+                                                                      resources.threads);
   }
   const std::uint64_t window =
-      std::max(kLeastWindowBytes, options.memory_bytes / options.threads / 2);
+      std::max(kLeastWindowBytes, resources.memory_bytes / resources.threads / 2);
   auto cloud = std::make_unique<TiledCloud>(store, system, std::move(heights), window,
-                                            options.memory_bytes / 2, options.threads);
+                                            resources.memory_bytes / 2, resources.threads);
   cloud->flat_fill = flat;
-  cloud->water_height = water;
+  cloud->water_height = request.water_height;
   return std::make_unique<SourceOf<TiledCloud, PointTileSurface>>(std::move(cloud),
-                                                                  options.threads);
+                                                                  resources.threads);
 }
 
 }  // namespace terrace::terrain

@@ -9,17 +9,20 @@
 #include <terrace/stream/store.hpp>
 
 #include "terrace/terrain/context.hpp"
+#include "terrace/terrain/tiles.hpp"
 #include "tile/make/tile_surface.hpp"
 
 namespace terrace::terrain {
 
-struct TileSourceOptions {
-  std::string vertical, geoid;       ///< as in EllipsoidalHeights
-  std::string fill = "interpolate";  ///< of `terrace tile --fill`
-  std::string water;                 ///< of `terrace tile --water`
+/// What a job over tiles may take.
+struct TileResources {
   std::uint64_t memory_bytes = 0;
   unsigned threads = 1;
 };
+
+/// As the context allows. path: named in errors. Throws: stream::Error if not even one thread has
+/// the memory that it needs.
+TileResources tile_resources(const Context& context, const std::string& path);
 
 /// The surfaces of a store, one per thread, and what they share.
 class TileSource {
@@ -37,7 +40,8 @@ class TileSource {
 /// Throws: UsageError for options that make no sense or not for this kind of store; stream::Error
 /// if no place of it can be told on the globe, or on a damaged one; stream::Stopped.
 std::unique_ptr<TileSource> open_tile_source(const stream::Store& store,
-                                             const TileSourceOptions& options,
+                                             const TilesRequest& request,
+                                             const TileResources& resources,
                                              const Context& context);
 
 }  // namespace terrace::terrain

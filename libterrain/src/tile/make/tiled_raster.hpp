@@ -6,12 +6,12 @@
 
 #include <terrace/stream/store.hpp>
 
-#include "earth/crs/coordinate_system.hpp"
 #include "earth/geoid_heights.hpp"
 #include "earth/grid_geography.hpp"
 #include "earth/world.hpp"
 #include "surface/raster_fill.hpp"
 #include "surface/store_window.hpp"
+#include "terrace/terrain/crs.hpp"
 #include "tile/format/tile_address.hpp"
 #include "tile/make/height_blocks.hpp"
 

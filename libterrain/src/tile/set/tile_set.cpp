@@ -2,17 +2,24 @@
 #include "tile/set/tile_set.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
+#include <memory>
 #include <span>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include <terrace/stream/atomic_file.hpp>
 #include <terrace/stream/error.hpp>
+#include <terrace/stream/file_lock.hpp>
 
 #include "base/units.hpp"
 #include "terrace/terrain/error.hpp"
+#include "tile/make/tile_source.hpp"
 #include "tile/set/tile_file.hpp"
+#include "tile/set/tile_inputs.hpp"
 #include "tile/set/tile_journal.hpp"
 #include "tile/set/tile_set_writer.hpp"
 
@@ -24,17 +31,34 @@ namespace fs = std::filesystem;
 constexpr const char* kLayerName = "layer.json";
 constexpr const char* kLockName = ".terrace-tiles.lock";
 
-std::string fingerprint_of(const TileSetOptions& options) {
+/// What the surface depends on besides the store.
+std::string source_options_of(const TilesRequest& request) {
+  std::string text = request.fill == Fill::interpolate ? "interpolate" : "flat";
+  if (request.flat_height) text += ":" + number_text(*request.flat_height);
+  text += "\n";
+  if (request.water) {
+    text += request.water_height ? number_text(*request.water_height) : std::string("nodata");
+  }
+  constexpr std::array<const char*, 4> kReferences{"", "ellipsoidal", "orthometric", "ignore"};
+  text += std::string("\n") + kReferences.at(static_cast<std::size_t>(request.vertical));
+  if (!request.geoid.empty()) text += "\n" + std::to_string(digest_of_file(request.geoid));
+  return text;
+}
+
+/// A text that is the same for the same store and options, and only for them.
+std::string fingerprint_of(const stream::Store& store, const TileSetOptions& options) {
+  const TilesRequest& request = options.request;
   std::string text = "1 ";
-  text += options.source_fingerprint + " ";
+  text +=
+      std::to_string(checksum_of(read_tile_file((store.path() / "manifest.json").string()))) + " ";
   text += std::to_string(checksum_of(std::as_bytes(std::span(options.source_options))));
-  for (const double number : {static_cast<double>(options.first_zoom),
-                              static_cast<double>(options.last_zoom), options.max_error}) {
+  for (const double number :
+       {static_cast<double>(request.first_zoom), static_cast<double>(options.last_zoom),
+        request.max_error.value_or(0.0)}) {
     text.append(" ").append(number_text(number));
   }
-  text.append(" ").append(std::to_string(static_cast<int>(options.mesh.quality)));
-  for (const bool flag :
-       {options.mesh.normals, options.mesh.water, options.gzip, options.metadata}) {
+  text.append(" ").append(std::to_string(static_cast<int>(request.quality)));
+  for (const bool flag : {request.normals, request.water, request.gzip, request.metadata}) {
     text += flag ? " yes" : " no";
   }
   return text;
@@ -71,18 +95,27 @@ void write_layer(const std::string& path, const std::string& text) {
   file.commit();
 }
 
-}  // namespace
+/// The folder of a tile set for as long as a run writes to it: made if need be, and locked against
+/// other runs.
+class TileFolder {
+ public:
+  /// `folder` may be written if it is not there, or empty, or `force` and a tile set of ours, or
+  /// `resume` and a begun one, and no other run writes to it. Throws: stream::Error with the
+  /// remedy.
+  TileFolder(const std::string& folder, bool force, bool resume);
+  /// A folder that was made here and stayed empty goes.
+  ~TileFolder();
+  TileFolder(const TileFolder&) = delete;
+  TileFolder& operator=(const TileFolder&) = delete;
 
-double max_error_of(const TileSetOptions& options, unsigned zoom) {
-  if (options.max_error == 0.0) return expected_error(zoom);
-  return std::ldexp(options.max_error, static_cast<int>(options.last_zoom - zoom));
-}
+  /// Where links lead.
+  [[nodiscard]] const std::string& path() const { return path_; }
 
-unsigned native_zoom(double spacing) {
-  unsigned zoom = 0;
-  while (zoom < kDeepestZoom && std::ldexp(180.0 / 64.0, -static_cast<int>(zoom)) > spacing) ++zoom;
-  return zoom;
-}
+ private:
+  std::string path_;
+  bool made_ = false;
+  stream::FileLock lock_;
+};
 
 TileFolder::TileFolder(const std::string& folder, bool force, bool resume)
     : path_(stream::follow_links(folder).string()) {
@@ -125,31 +158,82 @@ TileFolder::~TileFolder() {
   if (made_) fs::remove(path_, ignored);  // fails if it is not empty, as it should
 }
 
-TileSetResult write_tile_set(const std::vector<std::unique_ptr<TileSurface>>& surfaces,
-                             const TileSetOptions& options, const Context& context) {
-  if (options.metadata && options.first_zoom > 0) {
-    throw UsageError("`metadata` says in each tile which lie below it, from zoom 0 on: `zoom` 0-" +
-                     std::to_string(options.last_zoom) + ", or go without");
+/// The zoom at which a 64th of a tile is not wider than the distance of samples.
+unsigned native_zoom(double spacing) {
+  unsigned zoom = 0;
+  while (zoom < kDeepestZoom && std::ldexp(180.0 / 64.0, -static_cast<int>(zoom)) > spacing) ++zoom;
+  return zoom;
+}
+
+/// Throws: UsageError for what does not go together.
+void check_request(const TilesRequest& request) {
+  for (const unsigned zoom : {request.first_zoom, request.last_zoom.value_or(0)}) {
+    if (zoom > kDeepestZoom) {
+      throw UsageError("`zoom` " + std::to_string(zoom) + ": from 0 to " +
+                       std::to_string(kDeepestZoom));
+    }
+  }
+  if (request.max_error && !(*request.max_error > 0.0 && std::isfinite(*request.max_error))) {
+    throw UsageError("`max_error` is a number of metres above 0");
+  }
+  if (request.metadata && request.first_zoom > 0) {
+    throw UsageError(
+        "`metadata` says in each tile which lie below it, from zoom 0 on: begin with `zoom` 0, or "
+        "go without");
+  }
+}
+
+}  // namespace
+
+double TileSetOptions::max_error(unsigned zoom) const {
+  if (!request.max_error) return expected_error(zoom);
+  return std::ldexp(*request.max_error, static_cast<int>(last_zoom - zoom));
+}
+
+TilesOutcome write_tiles(const stream::Store& store, const TilesRequest& request,
+                         const Context& context) {
+  check_request(request);
+  const TileResources resources = tile_resources(context, store.path().string());
+  const TileFolder folder(request.folder, request.replace, request.resume);
+  const auto source = open_tile_source(store, request, resources, context);
+  const std::vector<std::unique_ptr<TileSurface>>& surfaces = source->surfaces();
+  const unsigned native = native_zoom(surfaces.front()->spacing());
+  const TileSetOptions options{.request = request,
+                               .folder = folder.path(),
+                               .last_zoom = request.last_zoom.value_or(native),
+                               .source_options = source_options_of(request)};
+  if (request.first_zoom > options.last_zoom) {
+    throw UsageError("`zoom` " + std::to_string(request.first_zoom) + "-" +
+                     std::to_string(options.last_zoom) + ": the smaller one first");
+  }
+  if (options.last_zoom > native) {
+    context.say("zoom " + std::to_string(native) + " shows every sample: deeper ones, to " +
+                std::to_string(options.last_zoom) + ", show no more");
   }
   const std::string layer_path = options.folder + "/" + kLayerName;
-  const std::string fingerprint = fingerprint_of(options);
-  if (options.resume && !options.replace) refuse_another(layer_path, fingerprint);
+  const std::string fingerprint = fingerprint_of(store, options);
+  if (request.resume && !request.replace) refuse_another(layer_path, fingerprint);
   TileSetWriter writer(surfaces, options, context, layer_path);
-  for (unsigned zoom = options.last_zoom + 1; zoom-- > options.first_zoom;) writer.write_zoom(zoom);
+  for (unsigned zoom = options.last_zoom + 1; zoom-- > request.first_zoom;) writer.write_zoom(zoom);
   writer.finish();
 
   TileLayer layer;
-  layer.name = options.name;
+  layer.name = request.name.empty() ? store.path().stem().string() : request.name;
   layer.bounds = surfaces.front()->bounds();
-  layer.first_zoom = options.first_zoom;
+  layer.first_zoom = request.first_zoom;
   layer.last_zoom = options.last_zoom;
-  if (options.mesh.normals) layer.extensions.emplace_back("octvertexnormals");
-  if (options.mesh.water) layer.extensions.emplace_back("watermask");
-  if (options.metadata) layer.extensions.emplace_back("metadata");
+  if (request.normals) layer.extensions.emplace_back("octvertexnormals");
+  if (request.water) layer.extensions.emplace_back("watermask");
+  if (request.metadata) layer.extensions.emplace_back("metadata");
   for (const auto& tiles : writer.present) layer.available.push_back(ranges_of(tiles));
   layer.max_errors.assign(options.last_zoom + 1, 0.0);
-  for (const ZoomSummary& zoom : writer.result.zooms) {
-    layer.max_errors[zoom.zoom] = std::max(zoom.max_error, max_error_of(options, zoom.zoom));
+  for (const TileZoom& zoom : writer.result.zooms) {
+    const double bound = options.max_error(zoom.zoom);
+    if (zoom.max_error > bound) {
+      context.say("zoom " + std::to_string(zoom.zoom) + ": " + readable_number(bound) +
+                  " m was asked for, less than what the 15 bits of a tile's coordinates show here");
+    }
+    layer.max_errors[zoom.zoom] = std::max(zoom.max_error, bound);
   }
   layer.fingerprint = fingerprint;
   write_layer(layer_path, layer_json(layer));

@@ -69,8 +69,8 @@ void TileSetWriter::begin_change() {
 TileSetWriter::Written TileSetWriter::write_tile(const TileAddress& tile, const ZoomPlan& plan,
                                                  TileSurface& surface) {
   context_.check_stop();
-  TileInputs inputs{options_.mesh, options_.gzip, options_.source_options, {}};
-  if (options_.metadata) inputs.metadata = children_json(tile, deeper_);
+  TileInputs inputs{options_.mesh(), options_.request.gzip, options_.source_options, {}};
+  if (options_.request.metadata) inputs.metadata = children_json(tile, deeper_);
   const std::uint64_t digest = digest_of(tile, plan, inputs, surface);
   const std::string path = options_.folder + "/" + tile_path(tile);
   std::vector<std::byte> before;
@@ -82,11 +82,11 @@ TileSetWriter::Written TileSetWriter::write_tile(const TileAddress& tile, const 
       return {false, true, *earlier};
     }
   }
-  MadeTile made = make_tile(tile, plan, surface, options_.mesh);
+  MadeTile made = make_tile(tile, plan, surface, options_.mesh());
   if (!made.has_data && tile.zoom > 0) return {true, true, {.inputs = digest}};
   made.mesh.metadata = std::move(inputs.metadata);
   std::vector<std::byte> bytes = encode_tile(made.mesh, made.header);
-  if (options_.gzip) bytes = stream::gzip(bytes);
+  if (options_.request.gzip) bytes = stream::gzip(bytes);
   if (before.empty()) before = read_tile_file(path);
   const Written written{
       true, bytes == before, {bytes.size(), checksum_of(bytes), digest, made.max_error}};
@@ -100,8 +100,8 @@ TileSetWriter::Written TileSetWriter::write_tile(const TileAddress& tile, const 
 void TileSetWriter::write_tiles(const ZoomPlan& plan, const std::vector<TileAddress>& tiles) {
   std::vector<TileAddress> there;
   std::vector<TileJournal::Record> records;
-  ZoomSummary summary{.zoom = plan.zoom};
-  TileSetResult added;
+  TileZoom summary{.zoom = plan.zoom};
+  TilesOutcome added;
   ProgressReport report(context_, "tiles");
   in_order(
       tiles.size(), static_cast<unsigned>(surfaces_.size()),
@@ -138,7 +138,7 @@ void TileSetWriter::write_zoom(unsigned zoom) {
   double range = 1.25 * widest_range(tiles, surface);
   for (;;) {
     try {
-      write_tiles(plan_zoom(zoom, max_error_of(options_, zoom), range, surface), tiles);
+      write_tiles(plan_zoom(zoom, options_.max_error(zoom), range, surface), tiles);
       return;
     } catch (const HeightsTooFar&) {
       if (range > 1e7) {

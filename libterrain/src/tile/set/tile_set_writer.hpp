@@ -34,7 +34,7 @@ class TileSetWriter {
   /// runs were writing, and has the journal say what is there.
   void finish();
 
-  TileSetResult result;
+  TilesOutcome result;
   std::vector<std::vector<TileAddress>> present;  ///< per zoom, sorted by row, then column
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "tile/verify/tile_check.hpp"
+#include "terrace/terrain/tile_check.hpp"
 
 #include <algorithm>
 #include <charconv>
@@ -16,6 +16,7 @@
 #include "base/progress_report.hpp"
 #include "base/units.hpp"
 #include "tile/format/tile_layer.hpp"
+#include "tile/make/tile_source.hpp"
 #include "tile/set/tile_candidates.hpp"
 #include "tile/set/tile_file.hpp"
 #include "tile/set/tile_journal.hpp"
@@ -49,14 +50,14 @@ std::uint64_t byte_of(std::string_view where) {
 
 class SetCheck {
  public:
-  SetCheck(const TileCheckOptions& options, TileLayer layer, unsigned threads,
+  SetCheck(const TileCheckRequest& request, TileLayer layer, unsigned threads,
            const std::vector<std::unique_ptr<TileSurface>>& surfaces, const Context& context)
-      : options_(options),
+      : request_(request),
         layer_(std::move(layer)),
         threads_(threads),
         surfaces_(surfaces),
         context_(context),
-        records_(read_tile_records(options.folder)) {}
+        records_(read_tile_records(request.folder)) {}
 
   /// Checks the tiles of all zooms together, so that the few large ones share the threads.
   void tiles(const std::vector<TileAddress>& tiles);
@@ -67,7 +68,7 @@ class SetCheck {
 
  private:
   [[nodiscard]] std::string path_of(const TileAddress& tile) const {
-    return options_.folder + "/" + tile_path(tile);
+    return request_.folder + "/" + tile_path(tile);
   }
   [[nodiscard]] double bound_of(unsigned zoom) const;
   [[nodiscard]] bool is_as_written(const TileAddress& tile, std::span<const std::byte> bytes) const;
@@ -76,7 +77,7 @@ class SetCheck {
                const TileAddress& neighbour, const BorderSide& other);
   void add(unsigned zoom, const TileHeights& heights);
 
-  const TileCheckOptions& options_;
+  const TileCheckRequest& request_;
   TileLayer layer_;
   unsigned threads_;
   const std::vector<std::unique_ptr<TileSurface>>& surfaces_;
@@ -85,8 +86,8 @@ class SetCheck {
 };
 
 double SetCheck::bound_of(unsigned zoom) const {
-  if (options_.max_error) {
-    return std::ldexp(*options_.max_error, static_cast<int>(layer_.last_zoom - zoom));
+  if (request_.max_error) {
+    return std::ldexp(*request_.max_error, static_cast<int>(layer_.last_zoom - zoom));
   }
   return zoom < layer_.max_errors.size() ? layer_.max_errors[zoom] : expected_error(zoom);
 }
@@ -220,20 +221,27 @@ bool is_tile_folder(const std::string& folder) {
          std::filesystem::exists(folder + "/" + TileJournal::kName);
 }
 
-TileCheckResult check_tile_set(const TileCheckOptions& options, unsigned threads,
-                               const std::vector<std::unique_ptr<TileSurface>>& surfaces,
-                               const Context& context) {
-  const std::string layer_path = options.folder + "/layer.json";
+TileCheckResult check_tiles(const TileCheckRequest& request, const Context& context) {
+  const TileResources resources = tile_resources(context, request.folder);
+  std::unique_ptr<TileSource> source;
+  if (request.store != nullptr) {
+    source = open_tile_source(*request.store,
+                              {.folder = {}, .vertical = request.vertical, .geoid = request.geoid},
+                              resources, context);
+  }
+  const std::string layer_path = request.folder + "/layer.json";
   if (!std::filesystem::exists(layer_path)) {
-    throw stream::Error({.file = options.folder,
+    throw stream::Error({.file = request.folder,
                          .where = {},
                          .cause = "holds a tile set that was begun and not finished",
                          .remedy = "finish it first: make the set again with `resume`"});
   }
   TileLayer layer = read_layer(layer_path);
-  TileInventory inventory = take_inventory(options.folder, layer, context);
+  TileInventory inventory = take_inventory(request.folder, layer, context);
   const unsigned first = layer.first_zoom;
-  SetCheck check(options, std::move(layer), threads, surfaces, context);
+  const std::vector<std::unique_ptr<TileSurface>> none;
+  SetCheck check(request, std::move(layer), resources.threads, source ? source->surfaces() : none,
+                 context);
   check.result.problems = std::move(inventory.problems);
   check.result.torn = inventory.torn;
   std::vector<TileAddress> all;
@@ -242,7 +250,7 @@ TileCheckResult check_tile_set(const TileCheckOptions& options, unsigned threads
     all.insert(all.end(), inventory.tiles[zoom].begin(), inventory.tiles[zoom].end());
   }
   check.tiles(all);
-  if (!surfaces.empty()) {
+  if (source) {
     for (unsigned zoom = first; zoom < inventory.tiles.size(); ++zoom) {
       check.absent(zoom, inventory.tiles[zoom]);
     }

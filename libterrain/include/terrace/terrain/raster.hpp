@@ -8,8 +8,8 @@
 
 #include <terrace/stream/store.hpp>
 
-#include "earth/store_crs.hpp"
 #include "terrace/terrain/context.hpp"
+#include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/heights.hpp"
 #include "terrace/terrain/region.hpp"
 
@@ -17,14 +17,13 @@ namespace terrace::terrain {
 
 enum class RasterValue : std::uint8_t { height, slope, aspect, hillshade };
 
-/// What `terrace raster` was asked to write.
 struct RasterRequest {
   RasterValue value = RasterValue::height;
-  SamplerOptions sampler;
-  std::optional<double> cell;        ///< width and height in units of the output's CRS
-  std::optional<Region> region;      ///< in the store's CRS
-  std::optional<Transformation> to;  ///< to the output's CRS if it is not the store's
-  std::string output;
+  SamplerOptions sampler{};
+  std::optional<double> cell{};        ///< width and height in units of the output's CRS
+  std::optional<Region> region{};      ///< in the store's CRS
+  std::optional<Transformation> to{};  ///< to the output's CRS if it is not the store's
+  std::string output;                  ///< a GeoTIFF
   bool replace = false;
 };
 
@@ -52,6 +51,6 @@ struct RasterOutcome {
 /// stream::Error if the region does not meet the store; UsageError for a grid of more than 2^31
 /// columns or rows.
 RasterOutcome write_raster(const stream::Store& store, const RasterRequest& request,
-                           const Context& context);
+                           const Context& context = {});
 
 }  // namespace terrace::terrain

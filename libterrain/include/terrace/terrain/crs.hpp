@@ -1,23 +1,48 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
 
-#include "earth/crs/crs_definition.hpp"
-#include "earth/crs/datum_change.hpp"
-#include "earth/crs/projection.hpp"
-#include "terrace/stream/source.hpp"
+#include <terrace/stream/point.hpp>
+#include <terrace/stream/source.hpp>
+#include <terrace/stream/store.hpp>
+
+#include "terrace/terrain/region.hpp"
+
+/// Coordinate reference systems, and the ways between them.
 
 namespace terrace::terrain {
+
+struct CrsDefinition;
+class DatumChange;
+
+/// What heights refer to.
+enum class Heights : std::uint8_t {
+  unknown,
+  ellipsoidal,  ///< the ellipsoid
+  orthometric,  ///< mean sea level, by some geoid or levelling
+};
+
+/// To WGS 84's geocentric axes: translation in metres, rotation in arc-seconds and scale in parts
+/// per million, as a position vector transformation (EPSG 9606), the order of TOWGS84 in WKT.
+using DatumShift = std::array<double, 7>;
+
+/// Degrees. west is greater than east across the antimeridian.
+struct GeographicArea {
+  double west = 0, south = 0, east = 0, north = 0;
+};
 
 /// A coordinate reference system: what x and y mean on the earth. Definitions and datums are
 /// PROJ's, projections GeographicLib's where it has them, else PROJ's.
 ///
 /// x is always the longitude or easting, y the latitude or northing, in the system's own units
-/// (degrees, metres, feet). To WGS 84 leads one operation for the whole area; to_wgs84() names it.
+/// (degrees, metres, feet). To WGS 84 leads one operation for the whole area; wgs84_note() names
+/// it.
 ///
 /// Copies are cheap; const members may be called by several threads at once.
 class CoordinateSystem {
@@ -29,8 +54,8 @@ class CoordinateSystem {
 
   /// What a user writes: "EPSG:n", "EPSG:n+m" (horizontal and vertical), a code of another
   /// authority ("ESRI:54030"), a name, WKT, PROJJSON, or the name of a file with one of these two
-  /// (.prj, .wkt). shift: of `--towgs84`, for a datum that does not count as WGS 84; it goes before
-  /// PROJ's operations. Throws: UsageError, naming the code or text and the remedy.
+  /// (.prj, .wkt). shift: for a datum that does not count as WGS 84; it goes before PROJ's
+  /// operations. Throws: UsageError, naming the code or text and the remedy.
   static CoordinateSystem parse(const std::string& text,
                                 const std::optional<DatumShift>& shift = std::nullopt);
   /// What a source or a store records. Nothing if it says nothing of a CRS.
@@ -40,13 +65,12 @@ class CoordinateSystem {
   /// The same system for data that lie in a box of it: operations are chosen for that area.
   [[nodiscard]] CoordinateSystem over(const stream::Box3& box) const;
 
-  [[nodiscard]] const CrsDefinition& definition() const { return data_->definition; }
-  [[nodiscard]] bool is_geographic() const { return definition().geographic; }
+  [[nodiscard]] bool is_geographic() const;
   /// "EPSG:32632 (WGS 84 / UTM zone 32N)", "\"ETRS89 / LCC\"".
-  [[nodiscard]] std::string title() const { return definition().title(); }
+  [[nodiscard]] std::string title() const;
   /// Metres in a unit of x and y; 0 if geographic.
   [[nodiscard]] double metres_per_unit() const;
-  [[nodiscard]] Heights heights() const { return definition().heights; }
+  [[nodiscard]] Heights heights() const;
   /// Metres in a unit of heights, if known.
   [[nodiscard]] std::optional<double> metres_per_height() const;
 
@@ -55,17 +79,13 @@ class CoordinateSystem {
   /// The same with the GeoKeys that a system without an EPSG code needs in a GeoTIFF.
   [[nodiscard]] stream::Crs crs_with_keys() const;
 
-  /// The way to WGS 84, found when it is first asked for.
-  [[nodiscard]] const DatumChange& to_wgs84() const;
   /// What the user should know of it: "EPSG:... to WGS 84 by \"...\" within 2 m"; empty if nothing
   /// is done or nothing can be.
   [[nodiscard]] std::string wgs84_note() const;
   /// Whether longitudes and latitudes of WGS 84 can be had.
-  [[nodiscard]] bool reaches_wgs84() const { return to_wgs84().possible(); }
+  [[nodiscard]] bool reaches_wgs84() const;
   /// Whether those of its own datum are taken as they are.
-  [[nodiscard]] bool counts_as_wgs84() const {
-    return to_wgs84().possible() && to_wgs84().identity();
-  }
+  [[nodiscard]] bool counts_as_wgs84() const;
 
   /// x, y to longitude and latitude of WGS 84 in degrees, in place, and back. What has no place
   /// there becomes NaN. Longitudes lie in [-180, 180], but those of a geographic system that counts
@@ -85,11 +105,13 @@ class CoordinateSystem {
   /// Where the data lie, if over() said it; on the system's own datum.
   [[nodiscard]] const std::optional<GeographicArea>& area() const { return area_; }
 
+  /// What this library knows it by.
+  [[nodiscard]] const CrsDefinition& definition() const;
+  /// The way to WGS 84, found when it is first asked for.
+  [[nodiscard]] const DatumChange& to_wgs84() const;
+
  private:
-  struct Data {
-    CrsDefinition definition;
-    std::shared_ptr<const Projection> projection;  ///< none: geographic
-  };
+  struct Data;
   struct LazyChange;
 
   std::shared_ptr<const Data> data_;
@@ -118,14 +140,48 @@ class Transformation {
  private:
   CoordinateSystem from_, to_;
   bool same_;
-  DatumChange change_;
+  std::shared_ptr<const DatumChange> change_;
 };
 
-/// x, y of `from` to x, y of `to`, in place; nothing is done where they are the same. For many
-/// calls a Transformation is faster. Throws: as Transformation.
-void transform(const CoordinateSystem& from, const CoordinateSystem& to, std::span<Point2> places);
+/// The CRS of a store. Throws: stream::Error if it has none, or one that is not known.
+CoordinateSystem system_of(const stream::Store& store);
 
-/// "dx,dy,dz" or "dx,dy,dz,rx,ry,rz,ds" of `--towgs84`. Throws: UsageError.
-DatumShift parse_datum_shift(const std::string& text);
+/// From a store's CRS to another, named as for CoordinateSystem::parse, by the operation that is
+/// best where the store lies. shift: of the one whose datum does not count as WGS 84; of the named
+/// one if neither does. Throws: UsageError for a CRS that is none, stream::Error if the store has
+/// no CRS, or if nothing leads from one datum to the other.
+Transformation transformation_to(const stream::Store& store, const std::string& named,
+                                 const std::optional<DatumShift>& shift = std::nullopt);
+
+/// Regions in another CRS as regions in the store's; made by default, it leaves them as they are.
+class RegionConversion {
+ public:
+  RegionConversion() = default;
+  /// to_regions: from the store's CRS to that of the regions.
+  RegionConversion(const stream::Store& store, Transformation to_regions);
+  /// Outlines, a box's too, get so many corners that they run within a millionth of their length of
+  /// the true curve. Throws: stream::Error if one leaves the places that the other CRS shows.
+  [[nodiscard]] Region operator()(Region region) const;
+
+ private:
+  std::optional<Transformation> to_regions_;
+  stream::Box3 bounds_;
+};
+
+/// Places of the store's CRS in another; made by default, it leaves them as they are. Heights stay.
+class PlaceConversion {
+ public:
+  PlaceConversion() = default;
+  explicit PlaceConversion(Transformation change);
+  /// x and y in place. Throws: stream::Error for a point that has no place there.
+  void operator()(std::span<stream::Point3> points) const;
+  [[nodiscard]] bool has_effect() const { return change_.has_value(); }
+
+ private:
+  std::optional<Transformation> change_;
+};
+
+/// "dx,dy,dz" or "dx,dy,dz,rx,ry,rz,ds"; nothing if the text is empty. Throws: UsageError.
+std::optional<DatumShift> parse_datum_shift(const std::string& text);
 
 }  // namespace terrace::terrain

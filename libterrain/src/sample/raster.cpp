@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "sample/raster_run.hpp"
+#include "terrace/terrain/raster.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -14,10 +14,11 @@
 
 #include "base/parallel.hpp"
 #include "base/progress_report.hpp"
-#include "earth/store_crs.hpp"
+#include "earth/crs/crs_definition.hpp"
 #include "sample/raster_grid.hpp"
 #include "sample/raster_shader.hpp"
 #include "surface/ground_slope.hpp"
+#include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {

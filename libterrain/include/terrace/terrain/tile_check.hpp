@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,15 +9,19 @@
 #include <terrace/stream/store.hpp>
 
 #include "terrace/terrain/context.hpp"
-#include "tile/make/tile_surface.hpp"
+#include "terrace/terrain/height_reference.hpp"
 
 namespace terrace::terrain {
 
-struct TileCheckOptions {
+struct TileCheckRequest {
   std::string folder;
   /// The bound at the deepest zoom, metres, twice as much at each zoom above; without, what
   /// layer.json states, or else what globes expect of each zoom.
-  std::optional<double> max_error;
+  std::optional<double> max_error{};
+  /// Where the samples come from with which heights are compared; without, they are not.
+  const stream::Store* store = nullptr;
+  HeightReference vertical = HeightReference::recorded;  ///< of the store
+  std::string geoid{};                                   ///< as the tiles were made with
 };
 
 struct ZoomCheck {
@@ -39,15 +42,13 @@ struct TileCheckResult {
 /// Whether `folder` is one of tiles, whole or begun.
 bool is_tile_folder(const std::string& folder);
 
-/// Decodes and checks every tile of a set: layer.json against the files, each tile by itself
-/// (check_tile_mesh), its bytes against the checksum in the journal where there is one, the sides
-/// that neighbours share, across the line of 180 degrees too, and the heights against every sample
-/// of `surfaces` if there are any (all of the same samples, one per thread). Depends on the files
-/// alone, not on the number of threads. Memory: of one row of tiles' borders, and of a tile and a
-/// part of its samples per thread. Throws: stream::Error if layer.json cannot be read or the store
-/// is damaged; stream::Stopped.
-TileCheckResult check_tile_set(const TileCheckOptions& options, unsigned threads,
-                               const std::vector<std::unique_ptr<TileSurface>>& surfaces,
-                               const Context& context);
+/// Decodes and checks every tile of a set: layer.json against the files, each tile's bytes and
+/// mesh by itself, its bytes against the checksum in the journal where there is one, the sides that
+/// neighbours share, across the line of 180 degrees too, and the heights against every sample of
+/// the store if one is given. The result does not depend on the number of threads. Memory: of one
+/// row of tiles' borders, and of a tile and a part of its samples per thread; at least 176 MiB.
+/// Throws: stream::Error if layer.json cannot be read, the store is damaged or the memory does not
+/// suffice; UsageError as write_tiles(); stream::Stopped.
+TileCheckResult check_tiles(const TileCheckRequest& request, const Context& context = {});
 
 }  // namespace terrace::terrain

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <terrace/stream/store.hpp>
+#include <terrace/tri/grid_tin.hpp>
+
+#include "terrace/terrain/context.hpp"
+#include "terrace/terrain/fill.hpp"
+#include "terrace/terrain/height_reference.hpp"
+
+/// Sets of quantized-mesh tiles, which web globes stream.
+
+namespace terrace::terrain {
+
+struct TilesRequest {
+  std::string folder;  ///< made if it is not there
+  std::string name{};  ///< in layer.json; without one, the store's
+  unsigned first_zoom = 0;
+  std::optional<unsigned> last_zoom{};  ///< without one, the zoom that shows every sample
+  /// Metres at the deepest zoom; twice as much at each zoom above. Without one, what globes expect
+  /// of each zoom: 77067 / 2^zoom.
+  std::optional<double> max_error{};
+  tri::TinQuality quality = tri::TinQuality::kRemoval;
+  HeightReference vertical = HeightReference::recorded;
+  std::string geoid{};            ///< file of a geoid grid of GeographicLib, goes before PROJ's
+  Fill fill = Fill::interpolate;  ///< globes have no holes: not `none`
+  std::optional<double> flat_height{};  ///< of Fill::flat, metres above the ellipsoid
+  /// With a mask of what is water: what has no data, or what has this height (store's unit).
+  bool water = false;
+  std::optional<double> water_height{};
+  bool normals = false;   ///< at the vertices, for lighting
+  bool metadata = false;  ///< the tiles below each tile, in the tile
+  bool gzip = false;
+  bool resume = false;   ///< goes on with an interrupted run, or mends a finished set
+  bool replace = false;  ///< a finished set may be another one
+};
+
+struct TileZoom {
+  unsigned zoom = 0;
+  std::uint64_t tiles = 0;
+  double max_error = 0.0;  ///< metres, verified at every sample
+};
+
+struct TilesOutcome {
+  std::uint64_t tiles = 0, bytes = 0;
+  std::uint64_t made = 0;     ///< of these, that were not known to be there and the same
+  std::uint64_t kept = 0;     ///< of these, whose files were whole and the same: not touched
+  std::uint64_t removed = 0;  ///< tiles of an earlier set that this one does not have
+  std::vector<TileZoom> zooms;
+};
+
+/// Writes a tile set: quantized-mesh 1.0 tiles in the geographic tiling of two tiles at zoom 0, and
+/// layer.json.
+///
+/// Each tile is within its zoom's bound of every sample, checked on what a client decodes; where
+/// the 15 bits of a tile's coordinates are coarser than the bound, a note says so. The bytes do not
+/// depend on the number of threads.
+///
+/// Tiles are written beside their names and renamed one by one, and the disk is asked once, at the
+/// end, to keep them all; layer.json comes last. A journal stays in the folder and says of each
+/// tile what it was made from and the checksum of its file. A tile for which both are as they were
+/// is not made again, be it that the run before was interrupted or that samples changed elsewhere;
+/// one that is made again and comes out the same is not touched. So the folder is the same as if
+/// it had been empty before. `resume` without `replace` is refused for a finished set of other
+/// samples or options. The folder is locked against other runs.
+///
+/// Memory: within the context's bound, at least 176 MiB. Reports "tiles". Throws: UsageError for
+/// options that do not go together or not with this store; stream::Error for a folder that holds
+/// something else, a store that is damaged or of which no place can be told on the globe, and too
+/// little memory; stream::Stopped.
+TilesOutcome write_tiles(const stream::Store& store, const TilesRequest& request,
+                         const Context& context = {});
+
+}  // namespace terrace::terrain
