@@ -20,7 +20,7 @@ LICENCES = {
     'libcluster': 'Apache-2.0',
     'libmatching': 'Apache-2.0',
     'libtri': 'Apache-2.0',
-    'libterrain': 'GPL-3.0-or-later',
+    'libterrain': 'Apache-2.0',
     'tools': 'GPL-3.0-or-later',
     'tests': 'GPL-3.0-or-later',
 }
