@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // Builds a store of a raster or a point file, shows its coarsest mesh, expands what lies in one
 // place to all its points, and collapses it again. Usage: expand_region INPUT STORE
 #include <cstdio>

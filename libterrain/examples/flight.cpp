@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // A camera flies over a store: the mesh grows finer where it looks, coarser where it has been, and
 // each frame tells which triangles came and went. Usage: flight INPUT STORE
 #include <algorithm>

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // Heights and slopes at places of a store, and what lies along a line. Usage: heights INPUT STORE
 #include <algorithm>
 #include <cmath>

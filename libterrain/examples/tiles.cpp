@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // Tiles for a web globe, begun, stopped on the way, and finished. Usage: tiles INPUT STORE FOLDER
 #include <cstdio>
 #include <stop_token>

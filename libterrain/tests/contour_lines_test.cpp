@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // Contour lines of random lattices with plateaus and holes: each crossing of an edge by a level is
 // on one line, ends lie at borders only, and bands do not matter.
 #include "contour/contour_lines.hpp"

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // Contour lines of Delaunay triangulations, in parts and whole, against the segments of every
 // triangle by itself.
 #include "contour/contour_triangles.hpp"

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // Every projected system of the EPSG dataset in PROJ's database: it is understood, its WKT reads
 // back, places come back from it, and GeographicLib and PROJ compute the same where both can.
 #include <algorithm>

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // Published numbers that others agree on: geodesics, geocentric places, the grids of UTM and UPS.
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // The bytes of a store are a function of input and options: not of the compiler or its
 // optimisation.
 #include <cstdlib>

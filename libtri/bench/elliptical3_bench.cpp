@@ -18,7 +18,7 @@
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <benchmark/benchmark.h>
 
-#include "terrace/tri/metric_tetrahedra.hpp"
+#include "terrace/tri/elliptical.hpp"
 
 namespace {
 

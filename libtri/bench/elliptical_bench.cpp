@@ -15,7 +15,7 @@
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <benchmark/benchmark.h>
 
-#include "terrace/tri/metric_triangles.hpp"
+#include "terrace/tri/elliptical.hpp"
 
 namespace {
 

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // Error-bounded meshes of a raster in windows of 512 cells, on one thread: triangles, and seconds
 // of meshing (settling of sides included) and of the check at every sample.
 //

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // How the time of expanding and collapsing is shared between the triangulation, its journal, the
 // source and the model's own bookkeeping. Times in microseconds per cluster (of the moving focus:
 // per step); `own/tri` is the model's own share over the triangulation's, which the project keeps
@@ -11,6 +11,7 @@
 
 #include <benchmark/benchmark.h>
 
+#include "model/model.hpp"
 #include "multiresolution_hierarchy.hpp"
 #include "terrace/tri/multiresolution.hpp"
 

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // Error-bounded surfaces of 4.2 million irregular points over fractal terrain (midpoint
 // displacement of exponent 0.8; a small one with TERRACE_BENCH_SMALL), one thread, at errors that
 // leave about 1 % and about half of the samples as vertices of the greedy surface. The counters

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // Restoring shapes: from scratch and after a change, on a torus of 200,000 points with noise, and
 // on the scans of the folder that TERRACE_DATA names, of which a table tells how good they come
 // out.
@@ -19,7 +19,6 @@
 #include <benchmark/benchmark.h>
 
 #include "../tests/scan_file.hpp"
-#include "terrace/tri/reconstruct.hpp"
 #include "terrace/tri/shape.hpp"
 
 namespace {
@@ -186,7 +185,7 @@ void scan_rows(const char* name, const Surface& original, const SurfaceMeasures&
 void print_table(const std::filesystem::path& folder) {
   std::printf(
       "Scans, points alone; build and restoring in seconds, best of 3; i: integers of 24 bits, d:\n"
-      "doubles; area and volume over the original's, its openings closed. CGAL's: whole calls.\n"
+      "doubles; area and volume over the original's, its openings closed.\n"
       "%-12s %-14s %6s %6s %7s %6s %5s %6s %6s %6s %7s %7s\n",
       "", "", "build", "shape", "faces", "chi", "comp", "nonman", "lost", "put b.", "area",
       "volume");
@@ -201,16 +200,6 @@ void print_table(const std::filesystem::path& folder) {
     }
     scan_rows<std::int32_t>(scan.name, original, measures, volume);
     scan_rows<double>(scan.name, original, measures, volume);
-    if (&scan != kScans) continue;  // CGAL's on the first
-    for (const auto method : {SurfaceMethod::kAdvancingFront, SurfaceMethod::kAlphaWrap}) {
-      SurfaceOptions options;
-      options.method = method;
-      ReconstructedSurface found;
-      const double time = seconds([&] { found = reconstruct_surface(original.points, options); });
-      const bool front = method == SurfaceMethod::kAdvancingFront;
-      print_row(scan.name, front ? "adv. front" : "alpha wrap", 0.0, time, measure(found.surface),
-                front ? original.points.size() - found.input.size() : 0, 0, 1.0, measures, volume);
-    }
   }
   std::printf("\n");
 }

@@ -20,8 +20,8 @@
 #include <CGAL/Delaunay_triangulation_2.h>
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 
+#include "model/model.hpp"
 #include "multiresolution_hierarchy.hpp"
-#include "terrace/tri/multiresolution.hpp"
 
 namespace terrace::tri::bench {
 namespace {

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // A camera flies over a grid of points in clusters of about 140, three levels, with as tight an
 // error as keeps about 500,000 of them in the model: 600 frames, each moving by 1 % of the width of
 // what is seen, a step of 10 ms at most per frame. What a step asks for is given before the next
@@ -16,7 +16,7 @@
 
 #include "multiresolution_hierarchy.hpp"
 #include "terrace/tri/geomorph.hpp"
-#include "terrace/tri/view_control.hpp"
+#include "terrace/tri/view.hpp"
 
 namespace terrace::tri::bench {
 namespace {

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // A coarse grid gets detail in one place and loses it again; a consumer that only knows the changes
 // keeps its own list of triangles.
 #include <cstdio>

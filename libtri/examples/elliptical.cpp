@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // Edges that follow a direction: everywhere, and in two regions only. Detail comes and goes.
 #include <algorithm>
 #include <cmath>
@@ -7,8 +7,7 @@
 #include <random>
 #include <vector>
 
-#include <terrace/tri/elliptical2.hpp>
-#include <terrace/tri/metric_triangles.hpp>
+#include <terrace/tri/elliptical.hpp>
 
 namespace tri = terrace::tri;
 using Point = std::array<double, 2>;

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // A camera flies over a terrain that is never in memory as a whole. Each frame the control brings
 // the model nearer to what the camera wants and names the clusters it lacks; here a "loader" brings
 // them two frames later, in a viewer it would be threads or requests to a server.
@@ -10,7 +10,7 @@
 #include <vector>
 
 #include <terrace/tri/geomorph.hpp>
-#include <terrace/tri/view_control.hpp>
+#include <terrace/tri/view.hpp>
 
 namespace tri = terrace::tri;
 

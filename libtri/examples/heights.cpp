@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // A hill on scattered points: heights, slopes and aspects at queries, a smoother version of it as
 // an overlay, and how good the mesh is.
 #include <cmath>

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // A raster of 27 x 27 heights in two levels: the middle of every 3 x 3 cells stands for its
 // neighbours. The model is coarse, then fine in one corner, then coarse again.
 #include "terrace/tri/multiresolution.hpp"

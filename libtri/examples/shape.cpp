@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // Points of a dumbbell. Its surface comes back from the points alone; then a part is sampled more
 // densely, and the shape follows the triangulation's changes.
 #include "terrace/tri/shape.hpp"
@@ -6,8 +6,6 @@
 #include <cmath>
 #include <cstdio>
 #include <vector>
-
-#include "terrace/tri/reconstruct.hpp"
 
 namespace tri = terrace::tri;
 
@@ -23,7 +21,7 @@ int main() {
   for (int i = 0; i < 4000; ++i) points.push_back(on_dumbbell((i + 0.5) / 4000, 0.618034 * i));
 
   // In one call.
-  const tri::SurfaceMeasures coarse = tri::measure(tri::reconstruct_surface(points).surface);
+  const tri::SurfaceMeasures coarse = tri::measure(tri::restore_surface(points).surface);
   std::printf("%zu faces, area %.3f, volume %.3f, %zu component, Euler characteristic %d\n",
               coarse.faces, coarse.area, coarse.volume, coarse.components,
               static_cast<int>(coarse.euler_characteristic));

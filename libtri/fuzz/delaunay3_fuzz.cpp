@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // Operations on points of a lattice of 6 x 6 x 5, so that ties, duplicates and flat states are
 // everywhere. After each one the triangulation must be valid and equal to one built anew.
 #include <algorithm>

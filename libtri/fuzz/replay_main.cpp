@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // Runs a fuzz target over the files of a corpus folder, so that the target compiles everywhere and
 // every input that once failed stays tested.
 #include <cstdint>

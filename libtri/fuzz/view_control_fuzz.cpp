@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // A view control over a small hierarchy with points of a 10 x 10 raster, records that lie, and
 // steps, gifts and pins in any order. Budgets hold, the triangulation stays valid and equal to one
 // built anew, and in the end a view that stays settles.
@@ -13,7 +13,7 @@
 #include "../tests/multiresolution_hierarchy.hpp"
 #include "delaunay2/access.hpp"
 #include "terrace/tri/geomorph.hpp"
-#include "terrace/tri/view_control.hpp"
+#include "terrace/tri/view.hpp"
 
 namespace {
 

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #include "terrace/tri/delaunay2.hpp"
 
 #include <cassert>
@@ -252,7 +252,10 @@ void Delaunay2<Coord>::take_changes(Changes& changes) {
   planar::take_changes<Coord>(impl_->mesh, changes);
 }
 
+#ifdef TERRACE_TRI_CORE
 template class Delaunay2<std::int32_t>;
+#else
 template class Delaunay2<double>;
+#endif
 
 }  // namespace terrace::tri

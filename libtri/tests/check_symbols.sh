@@ -1,5 +1,5 @@
 #!/bin/sh
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 # check_symbols.sh NM ARCHIVE: fails if the archive defines a weak function. The linker may take
 # such a function for the whole program, which then stops on processors that lack the instructions.
 set -eu

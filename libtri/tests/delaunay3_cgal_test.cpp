@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // Sets of tetrahedra and signs of predicates against CGAL's, on made points.
 #include <algorithm>
 #include <cmath>

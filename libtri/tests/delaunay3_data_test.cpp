@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // Tetrahedra of scans, and of point sets that were hard for others, in the data folder that
 // TERRACE_DATA names.
 #include <cstdlib>

@@ -1,6 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
-#include "terrace/tri/elliptical2.hpp"
-
+// SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <limits>
 #include <random>
@@ -13,6 +11,7 @@
 #include "multiresolution_hierarchy.hpp"
 #include "multiresolution_oracle.hpp"
 #include "points.hpp"
+#include "terrace/tri/elliptical.hpp"
 #include "terrace/tri/multiresolution.hpp"
 
 namespace terrace::tri::test {
@@ -204,8 +203,6 @@ TEST(Metric2, MapsMeasureEllipses) {
 }
 
 // ---- Levels of detail --------------------------------------------------------------------------
-
-static_assert(DynamicTriangulation<EllipticalDelaunay2>);
 
 constexpr LinearMap2 kSlanted{0.3, -0.2, -0.2, 0.9};
 /// With a metric of its own, as the oracle makes triangulations by default.

@@ -1,6 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
-#include "terrace/tri/elliptical3.hpp"
-
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -14,6 +12,7 @@
 #include "metrics3.hpp"
 #include "multiresolution_hierarchy.hpp"
 #include "points3.hpp"
+#include "terrace/tri/elliptical.hpp"
 #include "terrace/tri/multiresolution.hpp"
 
 namespace terrace::tri::test {
@@ -253,8 +252,6 @@ TEST(MetricField3, HasClosedBoxesOfWhichTheFirstHolds) {
 }
 
 // ---- Levels of detail --------------------------------------------------------------------------
-
-static_assert(DynamicTriangulation<EllipticalDelaunay3>);
 
 TEST(EllipticalModel3, HasLevelsOfDetail) {
   const LinearMap3 map = ellipsoid_map({3, 1, 2}, rotations()[3]);

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // The shape in an elliptical metric: that of the mapped points.
 #include <algorithm>
 #include <cmath>
@@ -13,7 +13,6 @@
 #include "points3.hpp"
 #include "shape/gabriel.hpp"
 #include "terrace/tri/multiresolution.hpp"
-#include "terrace/tri/reconstruct.hpp"
 #include "terrace/tri/shape.hpp"
 
 namespace terrace::tri::test {
@@ -116,9 +115,9 @@ TEST(EllipticalShape3, FollowsTheModel) {
 TEST(EllipticalShape3, AnEllipsoidOfStretchedSamplesComesBack) {
   const Space radii{1, 1, 40};
   const auto points = ellipsoid(2000, radii);
-  SurfaceOptions options;
+  RestoreOptions options;
   options.metric = ellipsoid_map(radii);
-  const ReconstructedSurface surface = reconstruct_surface(points, options);
+  const RestoredSurface surface = restore_surface(points, options);
   const SurfaceMeasures measures = measure(surface.surface);
   EXPECT_TRUE(measures.closed);
   EXPECT_EQ(measures.vertices, 2000u);
@@ -128,16 +127,13 @@ TEST(EllipticalShape3, AnEllipsoidOfStretchedSamplesComesBack) {
   EXPECT_NEAR(measures.volume, 4.0 / 3 * 3.141592653589793 * 40, 1.5);
   // Edges: with 1, which restores even samples (see ShapeOptions).
   options.shape = {ShapeCriterion::kEdgeLength, ShapeRule::kFlood, 1.0, true};
-  EXPECT_EQ(measure(reconstruct_surface(points, options).surface).faces, 3996u);
+  EXPECT_EQ(measure(restore_surface(points, options).surface).faces, 3996u);
 
   options.quantise_bits = 20;
-  EXPECT_THROW(static_cast<void>(reconstruct_surface(points, options)), std::invalid_argument);
+  EXPECT_THROW(static_cast<void>(restore_surface(points, options)), std::invalid_argument);
   options.quantise_bits = 0;
-  options.method = SurfaceMethod::kAlphaWrap;
-  EXPECT_THROW(static_cast<void>(reconstruct_surface(points, options)), std::invalid_argument);
-  options.method = SurfaceMethod::kShape;
   options.metric = LinearMap3{1, 0, 0, 0, 1, 0, 1, 1, 0};
-  EXPECT_THROW(static_cast<void>(reconstruct_surface(points, options)), std::invalid_argument);
+  EXPECT_THROW(static_cast<void>(restore_surface(points, options)), std::invalid_argument);
 }
 
 TEST(EllipticalShape3, AStretchedTorusKeepsItsHoleInTheMetricOnly) {
@@ -148,10 +144,10 @@ TEST(EllipticalShape3, AStretchedTorusKeepsItsHoleInTheMetricOnly) {
     points.push_back({(1 + 0.4 * std::cos(v)) * std::cos(u),
                       30 * (1 + 0.4 * std::cos(v)) * std::sin(u), 0.4 * std::sin(v)});
   }
-  SurfaceOptions options;
-  const double euclidean = measure(reconstruct_surface(points).surface).volume;
+  RestoreOptions options;
+  const double euclidean = measure(restore_surface(points).surface).volume;
   options.metric = ellipsoid_map({1, 30, 1});
-  const SurfaceMeasures measures = measure(reconstruct_surface(points, options).surface);
+  const SurfaceMeasures measures = measure(restore_surface(points, options).surface);
   const double wanted = kTurn * kTurn / 2 * 0.16 * 30;
   EXPECT_TRUE(measures.closed);
   EXPECT_EQ(measures.components, 1u);

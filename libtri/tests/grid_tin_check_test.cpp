@@ -1,6 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
-#include "terrace/tri/grid_tin_check.hpp"
-
+// SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -9,7 +7,8 @@
 #include <gtest/gtest.h>
 
 #include "grid_windows.hpp"
-#include "tin/grid_make.hpp"
+#include "terrace/tri/grid_tin.hpp"
+#include "tin/grid/make.hpp"
 
 namespace {
 

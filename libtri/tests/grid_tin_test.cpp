@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #include "terrace/tri/grid_tin.hpp"
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "grid_tin_oracle.hpp"
-#include "tin/grid_make.hpp"
+#include "tin/grid/make.hpp"
 
 namespace {
 

@@ -1,6 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
-#include "terrace/tri/metric_tetrahedra.hpp"
-
+// SPDX-License-Identifier: Apache-2.0
 #include <limits>
 #include <map>
 #include <random>
@@ -13,6 +11,7 @@
 #include "delaunay3/predicates.hpp"
 #include "metrics3.hpp"
 #include "points3.hpp"
+#include "terrace/tri/elliptical.hpp"
 
 namespace terrace::tri::test {
 namespace {

@@ -1,6 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
-#include "terrace/tri/metric_triangles.hpp"
-
+// SPDX-License-Identifier: Apache-2.0
 #include <limits>
 #include <map>
 #include <random>
@@ -13,6 +11,7 @@
 #include "delaunay2/predicates.hpp"
 #include "metrics.hpp"
 #include "points.hpp"
+#include "terrace/tri/elliptical.hpp"
 
 namespace terrace::tri::test {
 namespace {

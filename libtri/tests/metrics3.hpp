@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <algorithm>
@@ -8,7 +8,7 @@
 #include <CGAL/Exact_rational.h>
 
 #include "terrace/tri/delaunay3.hpp"
-#include "terrace/tri/metric3.hpp"
+#include "terrace/tri/elliptical.hpp"
 
 /// Metrics of space for the tests, and what they mean, in rational numbers.
 

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // The model in space, and the shape that follows it by its deltas.
 #include <cmath>
 #include <cstdint>

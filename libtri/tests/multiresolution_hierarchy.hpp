@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <algorithm>
@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "terrace/tri/multiresolution_source.hpp"
+#include "terrace/tri/multiresolution.hpp"
 
 /// Hierarchies of clusters in memory, for the tests: small, made by nearest-centre clustering, with
 /// all that a source could do wrong.

@@ -1,11 +1,11 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #include <map>
 
 #include <gtest/gtest.h>
 
+#include "model/map.hpp"
 #include "multiresolution_hierarchy.hpp"
-#include "terrace/tri/multiresolution_map.hpp"
-#include "terrace/tri/multiresolution_source.hpp"
+#include "terrace/tri/multiresolution.hpp"
 
 namespace terrace::tri::test {
 namespace {

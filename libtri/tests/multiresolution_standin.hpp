@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -9,7 +9,9 @@
 #include <utility>
 #include <vector>
 
+#include "model/model.hpp"
 #include "terrace/tri/delaunay2.hpp"
+#include "view/control.hpp"
 
 namespace terrace::tri::test {
 

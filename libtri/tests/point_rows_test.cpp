@@ -1,5 +1,5 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
-#include "tin/point_rows.hpp"
+// SPDX-License-Identifier: Apache-2.0
+#include "tin/rows/point_rows.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -16,7 +16,7 @@
 #include "delaunay2/double_kernel.hpp"
 #include "point_tin_oracle.hpp"
 #include "terrace/tri/point_tin.hpp"
-#include "tin/point_rows_places.hpp"
+#include "tin/rows/places.hpp"
 
 namespace terrace::tri {
 namespace {

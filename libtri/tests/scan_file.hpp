@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include "terrace/tri/surface.hpp"
+#include "terrace/tri/shape.hpp"
 
 /// Scans for tests and benchmarks: PLY (ASCII and little-endian binary, points first, then faces
 /// with one list as their first property) and OBJ with triangles.

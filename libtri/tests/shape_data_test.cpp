@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // Scans of the data folder that TERRACE_DATA names.
 #include <cstdlib>
 #include <filesystem>

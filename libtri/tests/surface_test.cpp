@@ -1,12 +1,13 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
-#include "terrace/tri/surface.hpp"
-
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <string>
 #include <utility>
 
 #include <gtest/gtest.h>
+
+#include "terrace/tri/shape.hpp"
 
 namespace terrace::tri {
 namespace {
@@ -77,6 +78,19 @@ TEST(SurfaceTest, TwoApartAndPointsInNone) {
   EXPECT_EQ(measured.vertices, 8u);
   EXPECT_EQ(measured.euler_characteristic, 4);
   EXPECT_TRUE(measured.closed);
+}
+
+TEST(SurfaceTest, ComponentsAreTurnedOutward) {
+  Surface surface = tetrahedron();
+  for (const auto& p : tetrahedron().points) surface.points.push_back({p[0] + 5, p[1], p[2]});
+  for (const auto& f : tetrahedron().faces) surface.faces.push_back({f[0] + 4, f[2] + 4, f[1] + 4});
+  const auto first = tetrahedron().faces;
+  EXPECT_NEAR(measure(surface).volume, 0.0, 1e-12);
+  turn_outward(surface);
+  EXPECT_NEAR(measure(surface).volume, 1.0 / 3, 1e-12);
+  EXPECT_TRUE(std::equal(first.begin(), first.end(), surface.faces.begin()));
+  surface.faces[0][0] = 99;
+  EXPECT_THROW(turn_outward(surface), std::invalid_argument);
 }
 
 TEST(SurfaceTest, FarFromTheOriginTheVolumeStays) {

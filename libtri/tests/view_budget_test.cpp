@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "delaunay2/access.hpp"
+#include "view/cache.hpp"
 #include "view_world.hpp"
 
 namespace terrace::tri::test {

@@ -1,6 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
-#include "terrace/tri/view_control.hpp"
-
+// SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <limits>
 
@@ -8,6 +6,7 @@
 
 #include "delaunay2/access.hpp"
 #include "multiresolution_standin.hpp"
+#include "terrace/tri/view.hpp"
 #include "view_world.hpp"
 
 namespace terrace::tri::test {

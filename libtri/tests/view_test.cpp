@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #include "terrace/tri/view.hpp"
 
 #include <array>
@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "multiresolution_hierarchy.hpp"
-#include "terrace/tri/view_columns.hpp"
+#include "view/columns.hpp"
 
 namespace terrace::tri::test {
 namespace {

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <algorithm>
@@ -12,7 +12,6 @@
 #include "multiresolution_hierarchy.hpp"
 #include "multiresolution_oracle.hpp"
 #include "terrace/tri/view.hpp"
-#include "terrace/tri/view_control.hpp"
 
 /// Hierarchies with true errors, and what a view asks of them, said in the plainest way.
 

@@ -19,21 +19,23 @@ LICENCES = {
     'libstream': 'Apache-2.0',
     'libcluster': 'Apache-2.0',
     'libmatching': 'Apache-2.0',
-    'libtri': 'GPL-3.0-or-later',
-    'libterrain': 'GPL-3.0-or-later',
+    'libtri': 'Apache-2.0',
+    'libterrain': 'Apache-2.0',
     'tools': 'GPL-3.0-or-later',
     'tests': 'GPL-3.0-or-later',
 }
 
-# What may be included where: a pattern of the name, and the folders that may name it. Public headers
+# What may be included where: a pattern of the name, and the folders and files that may name it. Public headers
 # are stricter still, see check_public_header().
 TESTS = ['tests', 'libstream/tests', 'libcluster/tests', 'libmatching/tests', 'libtri/tests', 'libterrain/tests']
 BENCHES = ['tests/bench', 'libstream/bench', 'libcluster/bench', 'libmatching/bench', 'libtri/bench',
            'libterrain/bench']
-IN_TRI = ['libtri/src', 'libtri/tests', 'libtri/bench', 'libtri/fuzz', 'tests/bench']
+# Where CGAL is: what computes on integers must compile without it.
+IN_CGAL = ['libtri/src/delaunay2/double_kernel.cpp', 'libtri/src/delaunay2/elliptical_kernel.cpp', 'libtri/src/delaunay3',
+           'libtri/src/interpolation', 'libtri/src/shape', 'libtri/tests', 'libtri/bench', 'tools/src/scan', 'tests/bench']
 IN_STREAM = ['libstream/src', 'libstream/tests', 'libstream/bench', 'libstream/fuzz']
 RESTRICTED = [
-    (r'CGAL/|boost/|gmp(xx)?\.h|mpfr\.h', IN_TRI),
+    (r'CGAL/|boost/|gmp(xx)?\.h|mpfr\.h', IN_CGAL),
     (r'GeographicLib/|proj(_experimental)?\.h', ['libterrain/src/earth', 'libterrain/tests']),
     (r'geos(_c)?\.h|geos/', ['libterrain/src/base']),
     (r'tiff(io|io\.hxx|conf|vers)?\.h|png\.h|zlib\.h|zstd\.h|libdeflate\.h', IN_STREAM),
@@ -61,6 +63,11 @@ MAY_DIFFER = {
     'libterrain/src/earth/crs/projection.cpp': EARTH,
     'libterrain/src/base/units.cpp': 'summaries for people, rounded; files have all digits',
 }
+
+# What of CGAL is LGPL. Whatever else it has counts as GPL: libraries, which are Apache-2.0, do without, and
+# a test or benchmark of theirs that compares with it is GPL itself.
+CGAL_LGPL = re.compile(r'CGAL/(Exact_(predicates|rational)|Gmpq|Mpzf|Simple_cartesian|hilbert_sort)')
+COMPARES = re.compile(r'lib[a-z]+/(tests|bench)/')
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 SOURCE_ENDINGS = ('.cpp', '.hpp', '.h', '.cu', '.cpp.in', '.py', '.sh')
@@ -97,6 +104,10 @@ def library_of(path):
     return room[3:] if room[:3] == 'lib' and room[3:] in LIBRARIES else None
 
 
+def is_gpl(name):
+    return name.startswith('CGAL/') and not CGAL_LGPL.match(name)
+
+
 def check_include(path, bracket, name):
     """The breaches of one #include line."""
     library = library_of(path)
@@ -115,8 +126,10 @@ def check_include(path, bracket, name):
             TERRAIN_ROOMS[room] >= TERRAIN_ROOMS.get(here.group(1), -1):
         yield f'includes "{name}", whose room is not below its own'
     for pattern, folders in RESTRICTED:
-        if re.match(pattern, name) and not any(below(path, folder) for folder in folders):
+        if re.match(pattern, name) and not any(path == place or below(path, place) for place in folders):
             yield f'includes <{name}>, which only {", ".join(folders)} may'
+    if library and is_gpl(name) and not COMPARES.match(path):
+        yield f'includes <{name}>, which is GPL; a library may not use it'
     if library and below(path, f'lib{library}/include'):
         own = name.startswith(tuple(f'terrace/{known}/' for known in [library] + SIBLINGS.get(library, [])))
         if not own and not (bracket == '<' and re.fullmatch(r'[a-z_0-9]+', name)):
@@ -130,19 +143,21 @@ def check_sources(root):
             if not name.endswith(SOURCE_ENDINGS) and name not in ('meson.build', 'meson_options.txt'):
                 continue
             lines = read(root, path).split('\n')
+            includes = [(number, match.groups()) for number, match in enumerate(map(INCLUDE.match, lines), 1) if match]
+            expected = licence
+            if COMPARES.match(path) and any(is_gpl(included) for _, (_, included) in includes):
+                expected = 'GPL-3.0-or-later'
             first = lines[1] if lines[0].startswith('#!') and len(lines) > 1 else lines[0]
             found = re.search(r'SPDX-License-Identifier: (\S+)', first)
             if not found:
-                yield f'{path}: has no SPDX line at its head; expected {licence}'
-            elif found.group(1) != licence:
-                yield f'{path}: its SPDX line says {found.group(1)}, not {licence}'
+                yield f'{path}: has no SPDX line at its head; expected {expected}'
+            elif found.group(1) != expected:
+                yield f'{path}: its SPDX line says {found.group(1)}, not {expected}'
             if not name.endswith(('.cpp', '.hpp', '.h', '.cu', '.cpp.in')):
                 continue
-            for number, line in enumerate(lines, 1):
-                match = INCLUDE.match(line)
-                if match:
-                    for breach in check_include(path, *match.groups()):
-                        yield f'{path}:{number}: {breach}'
+            for number, included in includes:
+                for breach in check_include(path, *included):
+                    yield f'{path}:{number}: {breach}'
 
 
 def check_inexact(root):

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #include "mesh/store_mesh.hpp"
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 #include <utility>
 
 #include <terrace/stream/error.hpp>
-#include <terrace/tri/metric_triangles.hpp>
+#include <terrace/tri/elliptical.hpp>
 #include <terrace/tri/multiresolution.hpp>
 
 #include "earth/ground.hpp"

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@
 #include <terrace/stream/error.hpp>
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/delaunay2.hpp>
-#include <terrace/tri/heights.hpp>
+#include <terrace/tri/interpolation.hpp>
 
 #include "surface/circle_cover.hpp"
 #include "surface/cluster_frontier.hpp"

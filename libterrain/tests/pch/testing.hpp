@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // Compiled once for all tests; each test includes what it uses all the same.
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // Bulk construction: vertices are numbered along a Hilbert curve and inserted one by one, each near
 // the one before. Pure Hilbert order makes the curve's front a fan of long triangles; so a coarse
 // sample, every 32nd vertex, goes first (and of that every 32nd, and so on), which halves the work
@@ -155,9 +155,12 @@ std::vector<VertexId> build(Mesh<Kernel>& mesh, std::span<const typename Kernel:
   return vertex_of;
 }
 
+#ifdef TERRACE_TRI_CORE
 template std::vector<VertexId> build(Mesh<IntKernel>&, std::span<const IntKernel::Point>);
+#else
 template std::vector<VertexId> build(Mesh<DoubleKernel>&, std::span<const DoubleKernel::Point>);
 template std::vector<VertexId> build(Mesh<EllipticalKernel>&,
                                      std::span<const EllipticalKernel::Point>);
+#endif
 
 }  // namespace terrace::tri::planar

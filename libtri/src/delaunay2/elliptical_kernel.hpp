@@ -1,10 +1,10 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <memory>
 
 #include "double_kernel.hpp"
-#include "terrace/tri/metric2.hpp"
+#include "terrace/tri/elliptical.hpp"
 
 /// Exact predicates in an elliptical metric, on the points as they are: nothing is mapped, so
 /// nothing is rounded. What turns left and what lies between is the same in all linear metrics;

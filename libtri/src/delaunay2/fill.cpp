@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #include "fill.hpp"
 
 #include <cmath>
@@ -121,8 +121,11 @@ void fill_hole(Mesh<Kernel>& mesh) {
   }
 }
 
+#ifdef TERRACE_TRI_CORE
 template void fill_hole(Mesh<IntKernel>&);
+#else
 template void fill_hole(Mesh<DoubleKernel>&);
 template void fill_hole(Mesh<EllipticalKernel>&);
+#endif
 
 }  // namespace terrace::tri::planar

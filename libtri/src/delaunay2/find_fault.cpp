@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #include <sstream>
 
 #include "../elliptical/access.hpp"
@@ -134,7 +134,9 @@ std::string find_fault(const Delaunay2<Coord>& triangulation) {
   return Inspection(Delaunay2Access::mesh(triangulation)).run();
 }
 
+#ifdef TERRACE_TRI_CORE
 template std::string find_fault(const Delaunay2<std::int32_t>&);
+#else
 template std::string find_fault(const Delaunay2<double>&);
 
 std::string find_fault(const EllipticalDelaunay2& triangulation) {
@@ -142,5 +144,6 @@ std::string find_fault(const EllipticalDelaunay2& triangulation) {
   const EllipticalKernel::Scope scope(impl.metric);
   return Inspection(impl.mesh).run();
 }
+#endif
 
 }  // namespace terrace::tri

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #include "flat.hpp"
 
 #include <algorithm>
@@ -102,17 +102,20 @@ void remove_flat(Mesh<Kernel>& mesh, std::uint32_t vertex) {
   mesh.last_vertex = mesh.line.empty() ? kNone : mesh.line.front();
 }
 
+#ifdef TERRACE_TRI_CORE
 template Inserted insert_flat(Mesh<IntKernel>&, const IntKernel::Point&);
+template void make_fan(Mesh<IntKernel>&, std::uint32_t);
+template void become_flat(Mesh<IntKernel>&, std::vector<std::uint32_t>);
+template void remove_flat(Mesh<IntKernel>&, std::uint32_t);
+#else
 template Inserted insert_flat(Mesh<DoubleKernel>&, const DoubleKernel::Point&);
 template Inserted insert_flat(Mesh<EllipticalKernel>&, const EllipticalKernel::Point&);
-template void make_fan(Mesh<IntKernel>&, std::uint32_t);
 template void make_fan(Mesh<DoubleKernel>&, std::uint32_t);
 template void make_fan(Mesh<EllipticalKernel>&, std::uint32_t);
-template void become_flat(Mesh<IntKernel>&, std::vector<std::uint32_t>);
 template void become_flat(Mesh<DoubleKernel>&, std::vector<std::uint32_t>);
 template void become_flat(Mesh<EllipticalKernel>&, std::vector<std::uint32_t>);
-template void remove_flat(Mesh<IntKernel>&, std::uint32_t);
 template void remove_flat(Mesh<DoubleKernel>&, std::uint32_t);
 template void remove_flat(Mesh<EllipticalKernel>&, std::uint32_t);
+#endif
 
 }  // namespace terrace::tri::planar

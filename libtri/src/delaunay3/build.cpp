@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // Bulk construction: vertices are numbered along a Hilbert curve and inserted one by one, each near
 // the one before, coarse samples first. Fine samples are inserted by two threads, see
 // parts_insert.cpp.

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // The hole of one vertex filled by cutting ears, after J. Skala, thesis, section 8.2, and O.
 // Devillers, "On deletion in Delaunay triangulations", doi:10.1142/S0218195902000815. An ear is the
 // tetrahedron of two neighbouring facets. Ears wait in a queue; that whose sphere contains the
@@ -14,11 +14,11 @@
 #include <algorithm>
 #include <limits>
 
+#include "delaunay3/wrap/wrap.hpp"
 #include "double_kernel.hpp"
 #include "elliptical_kernel.hpp"
 #include "int_kernel.hpp"
 #include "predicates.hpp"
-#include "wrap.hpp"
 
 namespace terrace::tri::spatial {
 namespace {

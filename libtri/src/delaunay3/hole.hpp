@@ -1,13 +1,13 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
+#include "delaunay3/wrap/scan.hpp"
 #include "facet_table.hpp"
 #include "tetrahedron.hpp"
-#include "wrap_scan.hpp"
 
 namespace terrace::tri::spatial {
 

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // Insertion of many vertices by two threads. Vertices are numbered along a Hilbert curve, so the
 // first half of the numbers lies on one side of space and the second on the other. Each thread
 // inserts the vertices of one half as long as it meets tetrahedra of that half only; others are put

@@ -1,17 +1,17 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // Removal of vertices, one or a set: all tetrahedra at them are taken out, and what they leave is
 // filled as a whole, whatever its form: with vertices that stay inside it (islands), with handles
 // and pinches, at the hull. A hole ends where tetrahedra that stay are beyond a facet; two that
 // touch in edges or vertices only are filled one after the other.
 #include "remove.hpp"
 
+#include "delaunay3/wrap/wrap.hpp"
 #include "double_kernel.hpp"
 #include "ear_queue.hpp"
 #include "elliptical_kernel.hpp"
 #include "flat.hpp"
 #include "hilbert.hpp"
 #include "int_kernel.hpp"
-#include "wrap.hpp"
 
 namespace terrace::tri::spatial {
 namespace {

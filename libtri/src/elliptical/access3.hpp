@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -6,7 +6,7 @@
 
 #include "delaunay3/elliptical_kernel.hpp"
 #include "delaunay3/mesh.hpp"
-#include "terrace/tri/elliptical3.hpp"
+#include "terrace/tri/elliptical.hpp"
 
 namespace terrace::tri {
 

@@ -1,6 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
-#include "terrace/tri/elliptical2.hpp"
-
+// SPDX-License-Identifier: Apache-2.0
 #include <cassert>
 #include <stdexcept>
 #include <string>
@@ -11,6 +9,7 @@
 #include "delaunay2/remove.hpp"
 #include "delaunay2/take_changes.hpp"
 #include "elliptical/access.hpp"
+#include "terrace/tri/elliptical.hpp"
 
 namespace terrace::tri {
 namespace {

@@ -1,6 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
-#include "terrace/tri/elliptical3.hpp"
-
+// SPDX-License-Identifier: Apache-2.0
 #include <cassert>
 #include <stdexcept>
 #include <string>
@@ -11,6 +9,7 @@
 #include "delaunay3/remove.hpp"
 #include "delaunay3/take_changes.hpp"
 #include "elliptical/access3.hpp"
+#include "terrace/tri/elliptical.hpp"
 
 namespace terrace::tri {
 namespace {

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // Flips of tetrahedra of one region. A facet that is not Delaunay, with apices d and e: where the
 // line from d to e goes through the facet, two tetrahedra become three; where it passes an edge,
 // the three at that edge become two if there are only three; where it meets the edge, the four (or

@@ -1,12 +1,11 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
-#include "terrace/tri/metric2.hpp"
-
+// SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <stdexcept>
 #include <utility>
 
 #include "delaunay2/double_kernel.hpp"
 #include "portable_math.hpp"
+#include "terrace/tri/elliptical.hpp"
 
 namespace terrace::tri {
 namespace {

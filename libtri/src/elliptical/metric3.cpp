@@ -1,11 +1,10 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
-#include "terrace/tri/metric3.hpp"
-
+// SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <stdexcept>
 #include <utility>
 
 #include "delaunay3/double_kernel.hpp"
+#include "terrace/tri/elliptical.hpp"
 
 namespace terrace::tri {
 namespace {

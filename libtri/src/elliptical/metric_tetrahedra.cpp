@@ -1,11 +1,10 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
-#include "terrace/tri/metric_tetrahedra.hpp"
-
+// SPDX-License-Identifier: Apache-2.0
 #include <map>
 #include <numeric>
 #include <string>
 
 #include "flips3.hpp"
+#include "terrace/tri/elliptical.hpp"
 
 namespace terrace::tri {
 namespace {

@@ -1,12 +1,11 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
-#include "terrace/tri/metric_triangles.hpp"
-
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <map>
 #include <string>
 
 #include "delaunay2/elliptical_kernel.hpp"
 #include "delaunay2/predicates.hpp"
+#include "terrace/tri/elliptical.hpp"
 
 namespace terrace::tri {
 namespace {

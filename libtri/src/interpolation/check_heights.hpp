@@ -1,10 +1,10 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <stdexcept>
 #include <string>
 
-#include "terrace/tri/heights.hpp"
+#include "terrace/tri/interpolation.hpp"
 
 namespace terrace::tri {
 

@@ -1,8 +1,8 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
+#include "owners.hpp"
+
 #include <algorithm>
 #include <iterator>
-
-#include "terrace/tri/multiresolution_owners.hpp"
 
 namespace terrace::tri {
 namespace {

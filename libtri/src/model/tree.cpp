@@ -1,9 +1,9 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
+#include "tree.hpp"
+
 #include <algorithm>
 #include <cassert>
 #include <string>
-
-#include "terrace/tri/multiresolution_tree.hpp"
 
 namespace terrace::tri {
 namespace {

@@ -1,12 +1,13 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
-#include "terrace/tri/surface.hpp"
-
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "shape/surface_parts.hpp"
+#include "terrace/tri/shape.hpp"
 
 namespace terrace::tri {
 namespace {
@@ -71,6 +72,18 @@ SurfaceMeasures measure(const Surface& surface) {
                                 static_cast<std::int64_t>(result.edges) +
                                 static_cast<std::int64_t>(result.faces);
   return result;
+}
+
+void turn_outward(Surface& surface) {
+  check(surface);
+  SurfaceParts parts = parts_of(surface.faces);
+  std::vector<double> volume(surface.faces.size());
+  for (std::uint32_t f = 0; f < surface.faces.size(); ++f) {
+    const std::uint32_t part = parts.root(f);
+    volume[part] += volume6_from(surface, surface.points[surface.faces[part][0]], f);
+  }
+  for (std::uint32_t f = 0; f < surface.faces.size(); ++f)
+    if (volume[parts.root(f)] < 0.0) std::swap(surface.faces[f][1], surface.faces[f][2]);
 }
 
 }  // namespace terrace::tri

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <algorithm>
@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "terrace/tri/surface.hpp"
+#include "terrace/tri/shape.hpp"
 
 /// Faces, their edges, and which faces are connected by edges.
 

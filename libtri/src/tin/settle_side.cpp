@@ -1,11 +1,11 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <utility>
 
-#include "check_window.hpp"
 #include "terrace/tri/grid_tin.hpp"
+#include "tin/check/window.hpp"
 
 namespace terrace::tri {
 namespace {

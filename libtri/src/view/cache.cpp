@@ -1,9 +1,9 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
+#include "cache.hpp"
+
 #include <cassert>
 #include <string>
 #include <utility>
-
-#include "terrace/tri/view_cache.hpp"
 
 namespace terrace::tri {
 namespace {

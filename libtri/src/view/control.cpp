@@ -1,10 +1,11 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
+#include "control.hpp"
+
 #include <string>
 #include <utility>
 
-#include "terrace/tri/view_control.hpp"
-
 namespace terrace::tri {
+#ifdef TERRACE_TRI_CORE
 namespace detail {
 
 void check(const GivenCluster& cluster, unsigned top) {
@@ -34,4 +35,10 @@ ViewOptions checked(ViewOptions options) {
 }
 
 }  // namespace detail
+
+template class ViewControl<Delaunay2<std::int32_t>>;
+#else
+template class ViewControl<Delaunay2<double>>;
+#endif
+
 }  // namespace terrace::tri

@@ -1,9 +1,9 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
+#include "front.hpp"
+
 #include <algorithm>
 #include <cassert>
 #include <limits>
-
-#include "terrace/tri/view_front.hpp"
 
 namespace terrace::tri {
 namespace {

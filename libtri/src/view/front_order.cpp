@@ -1,10 +1,10 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // What comes next: of the clusters to expand, and of those to collapse.
 #include <algorithm>
 #include <cstddef>
 #include <limits>
 
-#include "terrace/tri/view_front.hpp"
+#include "front.hpp"
 
 namespace terrace::tri {
 namespace {}  // namespace

@@ -1,10 +1,10 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <utility>
 
-#include "terrace/tri/view_meter.hpp"
+#include "terrace/tri/view.hpp"
 
 namespace terrace::tri {
 namespace {

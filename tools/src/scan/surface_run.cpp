@@ -13,6 +13,7 @@
 #include "earth/ground.hpp"
 #include "earth/world.hpp"
 #include "mesh/store_mesh.hpp"
+#include "scan/cgal_surface.hpp"
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::tools {
@@ -35,12 +36,12 @@ std::optional<double> positive_number(const std::string& text) {
 }
 
 void check_memory(const stream::Store& store, const Detail& detail,
-                  const tri::SurfaceOptions& options, std::uint64_t memory_bytes) {
+                  const SurfaceCriterion& criterion, std::uint64_t memory_bytes) {
   std::uint64_t points = 0;
   for_each_wanted_record(
       store, detail,
       [&](stream::ClusterId, const stream::ClusterRecord& record) { points += record.points; });
-  const bool ours = options.method == tri::SurfaceMethod::kShape;
+  const bool ours = criterion.method == SurfaceMethod::kShape;
   const std::uint64_t needed = points * (ours ? kSurfaceBytesPerPoint : kCgalBytesPerPoint);
   if (needed <= memory_bytes) return;
   throw stream::Error({.file = store.path().string(),
@@ -74,7 +75,7 @@ std::vector<stream::Point3> on_ground(const std::vector<stream::Point3>& positio
 }
 
 template <class Triangulation>
-void keep_tetrahedra(const std::vector<stream::Point3>& ground, const tri::SurfaceOptions& options,
+void keep_tetrahedra(const std::vector<stream::Point3>& ground, const tri::RestoreOptions& options,
                      TriangleMesh points, Triangulation triangulation, SurfaceOutcome& outcome) {
   const std::vector<tri::VertexId> vertices = triangulation.build(ground, 2);
   tri::BasicShape3<Triangulation> shape(options.shape);
@@ -99,38 +100,38 @@ void keep_tetrahedra(const std::vector<stream::Point3>& ground, const tri::Surfa
 
 }  // namespace
 
-tri::SurfaceOptions parse_criterion(const std::string& text) {
+SurfaceCriterion parse_criterion(const std::string& text) {
   const std::size_t colon = text.find(':');
   const std::string name = text.substr(0, colon);
-  tri::SurfaceOptions options;
+  SurfaceCriterion criterion;
   std::optional<double> value;
   if (colon != std::string::npos) {
     value = positive_number(text.substr(colon + 1));
     if (!value) throw UsageError("--criterion: a positive number must follow '" + name + ":'");
   }
   if (name == "edge") {
-    options.shape.criterion = tri::ShapeCriterion::kEdgeLength;
-    if (value) options.shape.edge_factor = *value;
+    criterion.restore.shape.criterion = tri::ShapeCriterion::kEdgeLength;
+    if (value) criterion.restore.shape.edge_factor = *value;
   } else if (name == "alpha-wrap") {
-    options.method = tri::SurfaceMethod::kAlphaWrap;
-    if (value) options.alpha = *value;
+    criterion.method = SurfaceMethod::kAlphaWrap;
+    if (value) criterion.alpha = *value;
   } else if (name == "advancing-front" && !value) {
-    options.method = tri::SurfaceMethod::kAdvancingFront;
+    criterion.method = SurfaceMethod::kAdvancingFront;
   } else if (name != "gabriel" || value) {
     throw UsageError(
         "--criterion is edge[:FACTOR], gabriel, advancing-front or alpha-wrap[:METRES], not '" +
         text + "'");
   }
-  return options;
+  return criterion;
 }
 
 std::optional<tri::LinearMap3> surface_metric(const MetricChoice& metric,
-                                              const tri::SurfaceOptions& options) {
+                                              const SurfaceCriterion& criterion) {
   if (metric.kind == MetricChoice::Kind::euclidean) return std::nullopt;
   if (metric.kind != MetricChoice::Kind::elliptical) {
     throw UsageError("a surface has the metric euclidean or elliptical:FILE, not " + metric.text);
   }
-  if (options.method != tri::SurfaceMethod::kShape) {
+  if (criterion.method != SurfaceMethod::kShape) {
     throw UsageError("--metric is for --criterion gabriel and edge");
   }
   if (metric.has_boxes()) {
@@ -140,16 +141,17 @@ std::optional<tri::LinearMap3> surface_metric(const MetricChoice& metric,
 }
 
 SurfaceOutcome surface_of_store(const stream::Store& store, const Detail& detail,
-                                const tri::SurfaceOptions& options, bool tetrahedra,
+                                const SurfaceCriterion& criterion, bool tetrahedra,
                                 std::uint64_t memory_bytes) {
-  if (tetrahedra && options.method != tri::SurfaceMethod::kShape) {
+  if (tetrahedra && criterion.method != SurfaceMethod::kShape) {
     throw UsageError("--tetrahedra is for --criterion gabriel and edge");
   }
-  check_memory(store, detail, options, memory_bytes);
+  check_memory(store, detail, criterion, memory_bytes);
   TriangleMesh points = points_of_store(store, detail);
   const std::vector<stream::Point3> ground = on_ground(points.positions, store.schema());
   SurfaceOutcome outcome;
   if (tetrahedra) {
+    const tri::RestoreOptions& options = criterion.restore;
     if (options.metric) {
       keep_tetrahedra(ground, options, std::move(points), tri::EllipticalDelaunay3(*options.metric),
                       outcome);
@@ -158,10 +160,21 @@ SurfaceOutcome surface_of_store(const stream::Store& store, const Detail& detail
     }
     return outcome;
   }
-  tri::ReconstructedSurface surface = tri::reconstruct_surface(ground, options);
+  tri::RestoredSurface surface;
+  switch (criterion.method) {
+    case SurfaceMethod::kShape:
+      surface = tri::restore_surface(ground, criterion.restore);
+      break;
+    case SurfaceMethod::kAdvancingFront:
+      surface = advancing_front_surface(ground);
+      break;
+    case SurfaceMethod::kAlphaWrap:
+      surface.surface = alpha_wrap_surface(ground, criterion.alpha);
+      break;
+  }
   outcome.measures = tri::measure(surface.surface);
   outcome.mesh.triangles = std::move(surface.surface.faces);
-  if (!surface.input.empty()) {
+  if (criterion.method != SurfaceMethod::kAlphaWrap) {
     for (const std::size_t i : surface.input) {
       outcome.mesh.positions.push_back(points.positions[i]);
       outcome.mesh.levels.push_back(points.levels[i]);

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include <terrace/stream/store.hpp>
-#include <terrace/tri/reconstruct.hpp>
+#include <terrace/tri/shape.hpp>
 
 #include "mesh/scene.hpp"
 #include "terrace/terrain/detail.hpp"
@@ -18,14 +18,22 @@ namespace terrace::tools {
 
 using namespace terrain;
 
+enum class SurfaceMethod : std::uint8_t { kShape, kAdvancingFront, kAlphaWrap };
+
+struct SurfaceCriterion {
+  SurfaceMethod method = SurfaceMethod::kShape;
+  tri::RestoreOptions restore;  ///< of kShape
+  double alpha = 0.0;           ///< of kAlphaWrap, metres, see alpha_wrap_surface()
+};
+
 /// What --criterion says: edge, edge:FACTOR, gabriel, advancing-front, alpha-wrap or
 /// alpha-wrap:ALPHA (metres). Throws: UsageError.
-tri::SurfaceOptions parse_criterion(const std::string& text);
+SurfaceCriterion parse_criterion(const std::string& text);
 
 /// The one elliptical metric of a surface, between positions in metres; none where it is Euclidean.
 /// Throws: UsageError for another kind of metric, one with boxes, or with a method of CGAL's.
 std::optional<tri::LinearMap3> surface_metric(const MetricChoice& metric,
-                                              const tri::SurfaceOptions& options);
+                                              const SurfaceCriterion& criterion);
 
 /// A surface, or the tetrahedra inside it. Positions are in the store's CRS.
 struct SurfaceOutcome {
@@ -39,7 +47,7 @@ struct SurfaceOutcome {
 /// stream::Error on a damaged store, and where the points do not fit into memory_bytes, saying what
 /// they need.
 SurfaceOutcome surface_of_store(const stream::Store& store, const Detail& detail,
-                                const tri::SurfaceOptions& options, bool tetrahedra,
+                                const SurfaceCriterion& criterion, bool tetrahedra,
                                 std::uint64_t memory_bytes);
 
 }  // namespace terrace::tools

@@ -58,8 +58,8 @@ class SurfaceCommand final : public Command {
 
   Summary run(const CommonOptions& common) override {
     const Stopwatch watch;
-    tri::SurfaceOptions options = parse_criterion(criterion_);
-    options.metric = surface_metric(MetricChoice::parse(metric_), options);
+    SurfaceCriterion criterion = parse_criterion(criterion_);
+    criterion.restore.metric = surface_metric(MetricChoice::parse(metric_), criterion);
     const bool vtk = output_.ends_with(".vtk");
     if (tetrahedra_ != vtk) throw UsageError("--tetrahedra and an output named .vtk go together");
     const stream::Store store = open_store(store_);
@@ -69,7 +69,7 @@ class SurfaceCommand final : public Command {
     const bool replace = may_replace(output_, common.force);
     SurfaceOutcome outcome;
     call_library(store_, criterion_, [&] {
-      outcome = surface_of_store(store, detail, options, tetrahedra_, common.memory_or(0));
+      outcome = surface_of_store(store, detail, criterion, tetrahedra_, common.memory_or(0));
     });
     places(outcome.mesh.positions);
     const stream::WriterOptions writer{.format = format_, .replace = replace, .stop = stop_token()};

@@ -1,8 +1,8 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <terrace/stream/store.hpp>
-#include <terrace/tri/multiresolution_source.hpp>
+#include <terrace/tri/multiresolution.hpp>
 
 namespace terrace::terrain {
 

@@ -1,11 +1,11 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
 #include <memory>
 
 #include <terrace/stream/store.hpp>
-#include <terrace/tri/view_control.hpp>
+#include <terrace/tri/view.hpp>
 
 namespace terrace::terrain {
 

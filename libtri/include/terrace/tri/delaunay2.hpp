@@ -1,10 +1,11 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <iterator>
+#include <limits>
 #include <memory>
 #include <span>
 #include <vector>
@@ -35,6 +36,35 @@ inline constexpr TriangleId kNoTriangle{0xFFFFFFFFu};
 }
 [[nodiscard]] constexpr std::uint32_t slot(TriangleId triangle) {
   return static_cast<std::uint32_t>(triangle);
+}
+
+/// x, y and z or a height.
+using Point3 = std::array<double, 3>;
+
+/// A closed box. Empty when min > max on any axis.
+struct Box3 {
+  Point3 min{}, max{};
+  friend bool operator==(const Box3&, const Box3&) = default;
+};
+
+/// The box of a region in the plane: any height is inside.
+constexpr Box3 box2(double min_x, double min_y, double max_x, double max_y) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  return {{min_x, min_y, -kInfinity}, {max_x, max_y, kInfinity}};
+}
+/// Whether the boxes have a point in common; false if a bound is not a number.
+constexpr bool intersects(const Box3& a, const Box3& b) {
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (!(a.min[i] <= b.max[i] && b.min[i] <= a.max[i])) return false;
+  }
+  return true;
+}
+/// Whether all of `inner` lies in `outer`.
+constexpr bool contains(const Box3& outer, const Box3& inner) {
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (!(outer.min[i] <= inner.min[i] && inner.max[i] <= outer.max[i])) return false;
+  }
+  return true;
 }
 
 /// Where a point lies, see Delaunay2::locate().

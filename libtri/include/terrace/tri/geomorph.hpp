@@ -1,10 +1,10 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
+#include <memory>
 #include <vector>
 
 #include "terrace/tri/multiresolution.hpp"
@@ -29,35 +29,7 @@ struct Slides {
   }
 };
 
-/// Triangles over the plane with heights, none over another, in which points are found. Build it,
-/// ask, build it again; a tree of boxes over the triangles, O(n log n) to build, about O(log n) a
-/// question.
-class HeightPatches {
- public:
-  using Corner = Point3;
-  void clear() { triangles_.clear(); }
-  void add(const Corner& a, const Corner& b, const Corner& c) { triangles_.push_back({a, b, c}); }
-  void build();
-  /// The height of the surface above x, y, linear in the triangle that holds the point; none if
-  /// no triangle does, to within rounding.
-  [[nodiscard]] std::optional<double> height(double x, double y) const;
-
- private:
-  struct Node {
-    std::array<double, 4> box;   // least x, y, greatest x, y
-    std::uint32_t first, count;  // triangles of a leaf; count 0: the children are at first, first+1
-  };
-  // Thrice the middle of a triangle.
-  struct Place {
-    double x, y;
-    std::uint32_t triangle;
-  };
-  void split(std::uint32_t node, std::uint32_t first, std::uint32_t last);
-
-  std::vector<std::array<Corner, 3>> triangles_, sorted_;
-  std::vector<Place> places_;
-  std::vector<Node> nodes_;
-};
+class HeightPatches;
 
 /// How a terrain slides over a step instead of popping: for each vertex that came or went, or whose
 /// height changed, where it starts and where it ends. x and y stay.
@@ -75,6 +47,9 @@ class Geomorph2 {
  public:
   using Model = MultiresolutionModel<Delaunay2<Coord>>;
 
+  Geomorph2();
+  ~Geomorph2();
+
   Slides added, removed, reassigned;
 
   /// delta: of the model's last step, which needs ModelOptions::old_heights. Replaces the slides.
@@ -85,9 +60,9 @@ class Geomorph2 {
   [[nodiscard]] Point3 old_position(const Model& model, VertexId vertex) const;
 
   // Of before the step, by slot: positions of vertices that are not what they were.
-  std::vector<std::uint32_t> old_index_;  // into old_positions_; kNone: as now
+  std::vector<std::uint32_t> old_index_;  // into old_positions_; kAsNow: as now
   std::vector<Point3> old_positions_;
-  HeightPatches patches_;
+  std::unique_ptr<HeightPatches> patches_;
 };
 
 extern template class Geomorph2<std::int32_t>;

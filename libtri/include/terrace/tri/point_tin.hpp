@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "terrace/tri/tin_quality.hpp"
+#include "terrace/tri/grid_tin.hpp"
 
 /// Error-bounded triangulated surfaces (TINs) of irregular points: few vertices, and the surface is
 /// vertically within a given error of every sample.
@@ -18,8 +18,6 @@
 /// while every sample stays within the error.
 
 namespace terrace::tri {
-
-using Point3 = std::array<double, 3>;
 
 /// Which of several samples at one x,y counts: one height stands for them and it alone is measured,
 /// unless all count.

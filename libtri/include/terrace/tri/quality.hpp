@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -7,9 +7,7 @@
 #include <vector>
 
 #include "terrace/tri/delaunay2.hpp"
-#include "terrace/tri/heights.hpp"
 #include "terrace/tri/interpolation.hpp"
-#include "terrace/tri/multiresolution_source.hpp"
 
 /// Measures of a triangulation and of the surface on it. Angles, aspects and edges are those in the
 /// plane, where the triangulation is Delaunay. Coordinates are taken as doubles; sizes whose

@@ -1,20 +1,60 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
+#include <span>
 #include <vector>
 
 #include "terrace/tri/delaunay3.hpp"
-#include "terrace/tri/elliptical3.hpp"
-#include "terrace/tri/surface.hpp"
+#include "terrace/tri/elliptical.hpp"
 
 /// Restoring the non-convex shape of points scanned from a surface: of the Delaunay tetrahedra,
 /// which fill the convex hull, those outside the shape are peeled off, starting from the hull
 /// (J. Skala's thesis, section 8.3). What remains is the inside, its outer facets the surface.
+///
+/// restore_surface() goes from points to a surface in one call. BasicShape3 follows a triangulation
+/// that changes. measure() is for surfaces of any origin.
 
 namespace terrace::tri {
+
+struct Surface {
+  std::vector<Point3> points;
+  /// Numbers of points, counter-clockwise seen from outside.
+  std::vector<std::array<std::uint32_t, 3>> faces;
+};
+
+struct SurfaceMeasures {
+  std::size_t faces = 0;
+  std::size_t vertices = 0;  ///< points that are in a face
+  std::size_t edges = 0;
+  double area = 0.0;
+  /// Enclosed by the faces, by the divergence theorem; where the surface is not closed it depends
+  /// on where the openings are.
+  double volume = 0.0;
+  /// Sets of faces connected by edges.
+  std::size_t components = 0;
+  /// vertices - edges + faces. 2 for a sphere, 2 - 2g for a closed surface with g handles; each
+  /// vertex or edge where a surface touches itself takes away from that.
+  std::int64_t euler_characteristic = 0;
+  std::size_t border_edges = 0;        ///< in one face
+  std::size_t non_manifold_edges = 0;  ///< in three or more
+  /// Every edge is in as many faces one way as the other.
+  bool closed = true;
+};
+
+/// O(n log n). Sums are in the order of the faces. Faces with two equal corners are not allowed.
+/// Throws std::invalid_argument naming the face whose corner is not the number of a point, or two
+/// of whose corners are the same.
+SurfaceMeasures measure(const Surface& surface);
+
+/// Turns the components (faces connected by edges) whose volume is negative inside out. Of a
+/// component that is not closed the volume is the one from its first corner. O(n log n). Throws as
+/// measure().
+void turn_outward(Surface& surface);
 
 /// Which facets of a tetrahedron are likely to lie on the surface ("boundary" facets), as seen from
 /// that tetrahedron: those that are small beside it.
@@ -134,5 +174,32 @@ using EllipticalShape3 = BasicShape3<EllipticalDelaunay3>;
 extern template class BasicShape3<Delaunay3<std::int32_t>>;
 extern template class BasicShape3<Delaunay3<double>>;
 extern template class BasicShape3<EllipticalDelaunay3>;
+
+struct RestoreOptions {
+  ShapeOptions shape;
+  /// 0 triangulates the points as they are. 1 to 30: rounded to integers of so many bits over the
+  /// longest side of their box, faster; 24 is finer than a float. Of points that become one the
+  /// first stands for all. The surface has the given coordinates in any case.
+  unsigned quantise_bits = 0;
+  /// An elliptical metric in which the points are triangulated and the facets judged, see
+  /// EllipticalShape3. Not together with quantise_bits.
+  std::optional<LinearMap3> metric;
+};
+
+struct RestoredSurface {
+  Surface surface;
+  /// The number of the input point that each point of the surface is.
+  std::vector<std::size_t> input;
+};
+
+/// The surface that the points were scanned from. Without faces where all points (after any
+/// rounding) are in one plane; duplicates do not matter. A function of the points, their order and
+/// the options.
+///
+/// Throws std::invalid_argument naming the index of a point that is not finite, or an option that
+/// is not in its range (a metric together with rounding among them).
+///
+/// Cost: a triangulation and a flood, 0.1 to 0.3 s per 100,000 points.
+RestoredSurface restore_surface(std::span<const Point3> points, const RestoreOptions& options = {});
 
 }  // namespace terrace::tri

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -6,8 +6,7 @@
 #include <vector>
 
 #include "terrace/tri/delaunay2.hpp"
-#include "terrace/tri/heights.hpp"
-#include "terrace/tri/multiresolution_source.hpp"
+#include "terrace/tri/interpolation.hpp"
 
 /// Smoothing of heights. The result is an overlay, a list of changed heights; nothing else changes.
 

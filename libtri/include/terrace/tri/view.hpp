@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -6,13 +6,15 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "terrace/tri/multiresolution.hpp"
-#include "terrace/tri/multiresolution_source.hpp"
 
-/// What a view of a multiresolution model asks for, see ViewControl.
+/// Level of detail by view: what is asked for (View), with what means (ViewOptions, StepBudget),
+/// and what drives a multiresolution model by it (ViewControl).
 
 namespace terrace::tri {
 
@@ -122,5 +124,158 @@ struct StepBudget {
   /// Seconds since any moment; must be there if `seconds` is finite.
   std::function<double()> clock;
 };
+
+/// What a step needs to spend; all times are of StepBudget::clock.
+class StepMeter {
+ public:
+  void start(const StepBudget& budget);
+  /// Whether one more operation on this many points fits. The first one always does.
+  [[nodiscard]] bool has(std::size_t points) const;
+  /// Call it after each operation.
+  void spend(std::size_t points);
+  /// Call it before the first operation, and at the end of the step.
+  void ready() { last_ = now(); }
+  void end();
+
+ private:
+  [[nodiscard]] double now() const { return timed_ ? budget_->clock() : 0.0; }
+
+  const StepBudget* budget_ = nullptr;
+  bool timed_ = false;
+  double begin_ = 0.0, last_ = 0.0;
+  std::size_t operations_ = 0, points_ = 0;
+  // Seconds per point of operations and of the end, as in the steps before.
+  double operation_rate_ = 0.0, end_rate_ = 0.0;
+};
+
+/// A cluster as its loader hands it over.
+struct GivenCluster {
+  ClusterId cluster{};
+  /// As in ClusterMembers.
+  std::vector<Point3> positions;
+  std::vector<std::uint64_t> children;
+  /// Above level 0: the records of the clusters one level down headed by each member, in order, and
+  /// then by the cluster's own head (ViewRequest::head_child); the root has no head.
+  std::vector<ClusterRecord> child_records;
+};
+
+/// A cluster that is missing.
+struct ViewRequest {
+  ClusterId cluster{};
+  ClusterId head_child{};     ///< above level 0: what its head heads one level down
+  std::uint64_t members = 0;  ///< by its record
+  double importance = 0.0;    ///< its error over what is tolerated
+};
+
+/// Reads a cluster from a source, with all that give() needs, and blocks while the source does.
+/// Throws what the source throws; HierarchyError where it is too damaged to ask on.
+GivenCluster load(ClusterSource& source, const ViewRequest& request);
+/// The root.
+GivenCluster load_root(ClusterSource& source);
+
+enum class ViewPin : std::uint8_t { expanded, collapsed };
+
+/// Level of detail by view: a multiresolution model that follows a camera under budgets of memory
+/// and time, and never waits for data. Each step it tells which clusters it lacks; whoever drives
+/// it loads them in any manner and gives them, whenever they are there.
+///
+/// With S the expanded clusters, a view that stays, enough budgets and all clusters given, steps
+/// end at
+///     { c : want(c) > 1 }  and  { c in S : keep(c) >= collapse_below }
+/// whatever interrupts them, want and keep being the demands of the view and of the view widened by
+/// the guard, each no greater than that of the cluster above. So what a step has done the next one
+/// does not undo. (J. Skala, Algorithms for manipulating large geometric data, section 8.4, expands
+/// by closeness alone.)
+///
+/// Order of a step: what is wanted most is expanded first. Where the points would be too many,
+/// clusters of less than collapse_below times its demand are collapsed for it: out of view first,
+/// the farthest of them first, then those of the least demand. What time is left goes to collapsing
+/// what is no longer wanted, in the same order; once that is a quarter of the points, it comes
+/// before expanding. Under max_points the outcome depends on sizes, but
+/// it too stays once it is reached.
+///
+/// Cost of a step without changes: O(expanded clusters + collapsed clusters next to wanted ones).
+/// Memory beside the model: 85 bytes per expanded cluster and 65 per cluster that could be expanded
+/// (with outlines 32 more each), and the given clusters that are kept.
+///
+/// Triangulation: Delaunay2, for points in the plane with heights.
+template <class Triangulation>
+class ViewControl {
+ public:
+  using Model = MultiresolutionModel<Triangulation>;
+  using Delta = typename Model::Delta;
+  using Pin = ViewPin;
+
+  struct Fault {
+    ClusterId cluster{};
+    std::string what;
+  };
+  /// What a step did and what it lacks. Lives until the next step.
+  struct Step {
+    const Delta* delta = nullptr;
+    std::size_t expanded = 0, collapsed = 0;  ///< clusters
+    /// Wanted clusters that remain collapsed: not given yet; given, but the step's budget was
+    /// spent; no room under max_points or max_cached_bytes.
+    std::size_t missing = 0, pending = 0, blocked = 0;
+    /// The greatest demand among these; at most 1: the view is as detailed as it should be.
+    double worst = 0.0;
+    /// Whether another step with the same view and no new clusters would change nothing.
+    bool settled = false;
+    /// The missing ones that are worth loading, most important first, as far as max_points and
+    /// max_cached_bytes have room for them; then those that may be wanted soon.
+    std::vector<ViewRequest> wanted;
+    /// Of these, those that no step has named before, or only before they were withdrawn or
+    /// forgotten: for a caller who starts loading at once.
+    std::vector<ViewRequest> requests;
+    /// Named before and of no use any more, in ascending order.
+    std::vector<ClusterId> withdrawn;
+    /// Clusters that contradict themselves; they stay collapsed until they are given again.
+    std::vector<Fault> faults;
+  };
+
+  /// counts: clusters of each level below the top, as ClusterSource::cluster_count tells. root: all
+  /// of cluster_id(counts.size(), 0).
+  /// Throws: HierarchyError, std::length_error; std::invalid_argument for options out of range.
+  ViewControl(std::vector<std::uint64_t> counts, GivenCluster root, ViewOptions options = {});
+  ~ViewControl();
+  ViewControl(const ViewControl&) = delete;
+  ViewControl& operator=(const ViewControl&) = delete;
+
+  [[nodiscard]] const Model& model() const;
+  [[nodiscard]] const ViewOptions& options() const;
+
+  /// Brings the model nearer to what the view asks for. Throws std::invalid_argument for a
+  /// tolerance that is negative or not a number, or seconds without a clock; nothing has changed
+  /// then. Clock and cone must not throw.
+  const Step& step(const View& view, const StepBudget& budget = {});
+
+  /// Hands over a cluster, asked for or not. It is kept, as far as max_cached_bytes goes, also
+  /// after it was expanded, for when it comes back. False: it is larger than the budget.
+  /// Throws HierarchyError where counts of members, children and records do not agree.
+  bool give(GivenCluster cluster);
+  /// Loading it has failed, or was given up: it may be asked for again.
+  void forget(ClusterId cluster);
+
+  /// Overrides the view: what is pinned expanded is so as soon as the cluster above it is, and then
+  /// all above it stays; what is pinned collapsed takes all below along.
+  void pin(ClusterId cluster, Pin how);
+  void unpin(ClusterId cluster);
+
+  /// Bytes of the given clusters.
+  [[nodiscard]] std::size_t cached_bytes() const;
+  /// Bytes held beside the triangulation and the given clusters.
+  [[nodiscard]] std::size_t memory_bytes() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// The view control of points in the plane with heights.
+template <class Coord>
+using ViewControl2 = ViewControl<Delaunay2<Coord>>;
+
+extern template class ViewControl<Delaunay2<std::int32_t>>;
+extern template class ViewControl<Delaunay2<double>>;
 
 }  // namespace terrace::tri

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+/// The inner loop of filling a hole: what a facet makes of every vertex, in double.
+
+namespace terrace::tri::spatial {
+
+/// A facet, with a normal that points into the hole. For a vertex, relative to the facet's first
+/// corner: volume = its scalar product with the normal; power = its power with respect to the
+/// smallest sphere through the facet's corners. The sphere through the corners and the vertex has
+/// its centre at power / (2 volume) normals from that one's.
+struct ScanFacet {
+  double corner[3];
+  double normal[3];
+  double diameter[3];  ///< twice the vector from the corner to the smallest sphere's centre
+  double power_error;  ///< bounds of the absolute errors of the two, for every vertex
+  double volume_error;
+};
+
+/// Coordinates of the vertices; the arrays are as long as a multiple of kScanPadding. NaN: no
+/// vertex. Memory for a power and a volume of each.
+struct ScanVertices {
+  const double* x;
+  const double* y;
+  const double* z;
+  std::size_t count;  ///< with padding
+  double* power;
+  double* volume;
+};
+inline constexpr std::size_t kScanPadding = 8;
+
+/// Lists the vertices that may have positive volume and, of these, the least power / volume, and
+/// leaves power and volume of all. Returns their number; `near` has room for all vertices.
+using ScanFunction = std::size_t (*)(const ScanVertices& vertices, const ScanFacet& facet,
+                                     std::uint32_t* near);
+
+/// The same for several processors: what they list may differ where bounds of errors are met.
+enum class ScanPath : std::uint8_t { kPortable, kAvx2, kAvx512 };
+bool supported(ScanPath path);
+ScanFunction scan_function(ScanPath path);  ///< of a supported path
+ScanFunction best_scan_function();
+
+std::size_t scan_portable(const ScanVertices& vertices, const ScanFacet& facet,
+                          std::uint32_t* near);
+std::size_t scan_avx2(const ScanVertices& vertices, const ScanFacet& facet, std::uint32_t* near);
+std::size_t scan_avx512(const ScanVertices& vertices, const ScanFacet& facet, std::uint32_t* near);
+
+}  // namespace terrace::tri::spatial

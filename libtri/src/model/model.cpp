@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "model.hpp"
+
+#ifndef TERRACE_TRI_CORE
+#include "terrace/tri/elliptical.hpp"
+#endif
+
+namespace terrace::tri {
+
+#ifdef TERRACE_TRI_CORE
+template class MultiresolutionModel<Delaunay2<std::int32_t>>;
+#else
+template class MultiresolutionModel<Delaunay2<double>>;
+template class MultiresolutionModel<Delaunay3<std::int32_t>>;
+template class MultiresolutionModel<Delaunay3<double>>;
+template class MultiresolutionModel<EllipticalDelaunay2>;
+template class MultiresolutionModel<EllipticalDelaunay3>;
+#endif
+
+}  // namespace terrace::tri

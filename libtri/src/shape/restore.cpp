@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "terrace/tri/shape.hpp"
+
+namespace terrace::tri {
+namespace {
+
+using Face = std::array<std::uint32_t, 3>;
+
+void check(std::span<const Point3> points, const RestoreOptions& options) {
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    for (const double c : points[i])
+      if (!std::isfinite(c))
+        throw std::invalid_argument("point " + std::to_string(i) +
+                                    ": coordinates are not finite; leave such points out");
+  }
+  if (options.quantise_bits > 30)
+    throw std::invalid_argument("quantise_bits is " + std::to_string(options.quantise_bits) +
+                                ", but must be at most 30");
+  if (options.metric) {
+    if (options.quantise_bits != 0)
+      throw std::invalid_argument("a metric and quantise_bits are given; leave one of them out");
+    check_metric(*options.metric, "the metric of a surface");
+  }
+}
+
+/// Points that are in no face are left out.
+RestoredSurface compact(std::span<const Point3> points, std::vector<Face> faces) {
+  RestoredSurface result;
+  constexpr std::uint32_t kUnused = std::numeric_limits<std::uint32_t>::max();
+  std::vector<std::uint32_t> number(points.size(), kUnused);
+  for (const Face& face : faces)
+    for (const std::uint32_t v : face) number[v] = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (number[i] == kUnused) continue;
+    number[i] = static_cast<std::uint32_t>(result.input.size());
+    result.input.push_back(i);
+    result.surface.points.push_back(points[i]);
+  }
+  for (Face& face : faces)
+    for (std::uint32_t& v : face) v = number[v];
+  result.surface.faces = std::move(faces);
+  return result;
+}
+
+template <class Triangulation>
+std::vector<Face> shape_faces(std::span<const typename Triangulation::Point> points,
+                              const ShapeOptions& options,
+                              Triangulation triangulation = Triangulation()) {
+  const std::vector<VertexId> vertices = triangulation.build(points);
+  std::vector<std::uint32_t> point_of(triangulation.vertex_slots());
+  for (std::size_t i = vertices.size(); i-- > 0;)
+    point_of[slot(vertices[i])] = static_cast<std::uint32_t>(i);
+  BasicShape3<Triangulation> shape(options);
+  shape.restore(triangulation);
+  ShapeSurface surface = shape.surface(triangulation);
+  for (Face& face : surface.surface.faces)
+    for (std::uint32_t& v : face) v = point_of[slot(surface.vertices[v])];
+  return std::move(surface.surface.faces);
+}
+
+std::vector<std::array<std::int32_t, 3>> quantised(std::span<const Point3> points, unsigned bits) {
+  std::vector<std::array<std::int32_t, 3>> result(points.size());
+  if (points.empty()) return result;
+  Point3 min = points[0], max = points[0];
+  for (const Point3& p : points) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      min[k] = std::min(min[k], p[k]);
+      max[k] = std::max(max[k], p[k]);
+    }
+  }
+  // Halves, so that no difference overflows.
+  double side = 0.0;
+  for (std::size_t k = 0; k < 3; ++k) side = std::max(side, max[k] / 2 - min[k] / 2);
+  if (side == 0.0) return result;
+  const auto last = static_cast<double>((std::uint32_t{1} << bits) - 1);
+  for (std::size_t i = 0; i < points.size(); ++i)
+    for (std::size_t k = 0; k < 3; ++k)
+      result[i][k] = static_cast<std::int32_t>((points[i][k] / 2 - min[k] / 2) / side * last + 0.5);
+  return result;
+}
+
+}  // namespace
+
+RestoredSurface restore_surface(std::span<const Point3> points, const RestoreOptions& options) {
+  check(points, options);
+  if (options.metric)
+    return compact(points,
+                   shape_faces(points, options.shape, EllipticalDelaunay3(*options.metric)));
+  if (options.quantise_bits == 0)
+    return compact(points, shape_faces<Delaunay3<double>>(points, options.shape));
+  const auto integers = quantised(points, options.quantise_bits);
+  return compact(points, shape_faces<Delaunay3<std::int32_t>>(integers, options.shape));
+}
+
+}  // namespace terrace::tri

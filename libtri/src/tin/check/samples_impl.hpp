@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Included once for each instruction set. What is here must not be shared between objects, so
+// nothing has a name outside its object, and no function of another header is called.
+#include "samples.hpp"
+
+namespace terrace::tri::tin {
+namespace {
+
+using Reals = double __attribute__((vector_size(64)));
+using Ints = std::int64_t __attribute__((vector_size(64)));
+using Bytes = std::uint8_t __attribute__((vector_size(8)));
+
+constexpr Reals kLane = {0, 1, 2, 3, 4, 5, 6, 7};
+
+[[gnu::always_inline]] inline Reals load(const float* from) {
+  float __attribute__((vector_size(32))) lanes;
+  __builtin_memcpy(&lanes, from, sizeof lanes);
+  return __builtin_convertvector(lanes, Reals);
+}
+[[gnu::always_inline]] inline Reals load(const double* from) {
+  Reals lanes;
+  __builtin_memcpy(&lanes, from, sizeof lanes);
+  return lanes;
+}
+
+/// The least whole number that is not below a number of at least 0.
+[[gnu::always_inline]] inline std::int64_t up(double value) {
+  const auto down = static_cast<std::int64_t>(value);
+  return static_cast<double>(down) < value ? down + 1 : down;
+}
+
+template <class V>
+[[gnu::always_inline]] inline V least(V a, V b) {
+  return b < a ? b : a;
+}
+template <class V>
+[[gnu::always_inline]] inline V greatest(V a, V b) {
+  return b > a ? b : a;
+}
+
+/// Samples against one triangle.
+template <class T>
+struct Taker {
+  const CheckWindow<T>& window;
+  double base, slope_x;
+  Reals most, squares;
+  Ints covered;
+  Ints missing = {};
+
+  [[gnu::always_inline]] Taker(const CheckWindow<T>& samples, const CheckTriangle& triangle,
+                               double slope, const CheckSums& sums)
+      : window(samples), base(triangle.a[2]), slope_x(slope) {
+    __builtin_memcpy(&most, sums.most, sizeof most);
+    __builtin_memcpy(&squares, sums.squares, sizeof squares);
+    __builtin_memcpy(&covered, sums.covered, sizeof covered);
+  }
+
+  /// A block of samples from number `at` on, of which those inside count; its columns relative to
+  /// the first corner, and what the plane rises along the row.
+  [[gnu::always_inline]] void take(std::int64_t at, Ints inside, Reals across, double rise_y) {
+    const std::int64_t left = window.columns * window.rows - at;
+    Reals height;
+    if (left >= kCheckLanes) {
+      height = load(window.heights + at);
+    } else {
+      T last[kCheckLanes] = {};
+      for (std::int64_t i = 0; i < left; ++i) last[i] = window.heights[at + i];
+      height = load(last);
+    }
+    const Ints with_data = (Ints)(height - height == 0.0);
+    missing |= inside & ~with_data;
+    const Ints ok = inside & with_data;
+    // Relative to a corner, so that nothing is lost where heights are large.
+    const Reals difference = (height - base) - (rise_y + slope_x * across);
+    const Reals error = (Reals)((Ints)difference & ok & std::int64_t{0x7FFFFFFFFFFFFFFF});
+    most = error > most ? error : most;
+    Bytes flags;
+    __builtin_memcpy(&flags, window.flags + at, sizeof flags);
+    const Ints known = __builtin_convertvector(flags, Ints);
+    const Ints first = ok & (Ints)(known == 0);
+    squares += (Reals)((Ints)(error * error) & first);
+    covered -= first;
+    flags = __builtin_convertvector(known | (ok & 1), Bytes);
+    __builtin_memcpy(window.flags + at, &flags, sizeof flags);
+  }
+
+  [[gnu::always_inline]] bool finish(CheckSums& sums) const {
+    __builtin_memcpy(sums.most, &most, sizeof most);
+    __builtin_memcpy(sums.squares, &squares, sizeof squares);
+    __builtin_memcpy(sums.covered, &covered, sizeof covered);
+    std::int64_t any = 0;
+    for (int i = 0; i < kCheckLanes; ++i) any |= missing[i];
+    return any != 0;
+  }
+};
+
+template <class T>
+[[gnu::always_inline]] inline bool check(const CheckWindow<T>& window,
+                                         const CheckTriangle& triangle, CheckSums& sums) {
+  const double *const a = triangle.a, *const b = triangle.b, *const c = triangle.c;
+  const double* const corner[4] = {a, b, c, a};
+  const double bz = b[2] - a[2], cz = c[2] - a[2];
+  const double slope_x = (bz * (c[1] - a[1]) - cz * (b[1] - a[1])) / triangle.area;
+  const double slope_y = (cz * (b[0] - a[0]) - bz * (c[0] - a[0])) / triangle.area;
+  const double far = window.tolerance;
+  const double left = greatest(0.0, least(a[0], least(b[0], c[0])) - far);
+  const double right =
+      least(static_cast<double>(window.columns - 1), greatest(a[0], greatest(b[0], c[0])) + far);
+  const double highest = greatest(0.0, least(a[1], least(b[1], c[1])) - far);
+  const double lowest =
+      least(static_cast<double>(window.rows - 1), greatest(a[1], greatest(b[1], c[1])) + far);
+  if (!(left <= right) || !(highest <= lowest)) return false;
+  Taker<T> taker(window, triangle, slope_x, sums);
+  const std::int64_t first = up(left);
+  const std::int64_t top = up(highest), bottom = static_cast<std::int64_t>(lowest);
+  // Inside: along_x (x - p.x) + along_y (y - p.y) + margin >= 0.
+  double along_x[3], along_y[3];
+  for (int i = 0; i < 3; ++i) {
+    along_x[i] = corner[i][1] - corner[i + 1][1];
+    along_y[i] = corner[i + 1][0] - corner[i][0];
+  }
+  // Up to this width divisions would take longer than the blocks that lie outside.
+  if (right - left < 8 * kCheckLanes) {
+    for (std::int64_t x = first; static_cast<double>(x) <= right; x += kCheckLanes) {
+      const Reals columns = static_cast<double>(x) + kLane;
+      const Reals across = columns - a[0];
+      const Reals before_right = right - columns;
+      Reals edge[3];
+      for (int i = 0; i < 3; ++i)
+        edge[i] = along_x[i] * (columns - corner[i][0]) + triangle.margin[i];
+      for (std::int64_t row = top; row <= bottom; ++row) {
+        const auto y = static_cast<double>(row);
+        Reals inside = before_right;
+        for (int i = 0; i < 3; ++i) {
+          const Reals of_edge = edge[i] + along_y[i] * (y - corner[i][1]);
+          inside = of_edge < inside ? of_edge : inside;
+        }
+        taker.take(row * window.columns + x, (Ints)(inside >= 0.0), across, slope_y * (y - a[1]));
+      }
+    }
+    return taker.finish(sums);
+  }
+  for (std::int64_t row = top; row <= bottom; ++row) {
+    const auto y = static_cast<double>(row);
+    double from = left, to = right;
+    for (int i = 0; i < 3; ++i) {
+      const double rest = along_y[i] * (y - corner[i][1]) + triangle.margin[i];
+      if (along_x[i] > 0) {
+        from = greatest(from, corner[i][0] - rest / along_x[i]);
+      } else if (along_x[i] < 0) {
+        to = least(to, corner[i][0] - rest / along_x[i]);
+      } else if (rest < 0) {
+        to = -1;
+      }
+    }
+    if (!(from <= to)) continue;
+    const auto last = static_cast<std::int64_t>(to);
+    const double rise_y = slope_y * (y - a[1]);
+    for (std::int64_t x = up(from); x <= last; x += kCheckLanes) {
+      const Reals columns = static_cast<double>(x) + kLane;
+      taker.take(row * window.columns + x, (Ints)(columns <= static_cast<double>(last)),
+                 columns - a[0], rise_y);
+    }
+  }
+  return taker.finish(sums);
+}
+
+}  // namespace
+}  // namespace terrace::tri::tin

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gaps.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "rows.hpp"
+
+namespace terrace::tri::tin {
+
+template <class T>
+GridGaps::GridGaps(const GridSamples<T>& samples, std::int32_t columns, std::int32_t rows)
+    : columns_(columns) {
+  const auto width = static_cast<std::size_t>(columns), height = static_cast<std::size_t>(rows);
+  flags_.resize(width * height);
+  for (std::size_t y = 0; y < height; ++y)
+    for (std::size_t x = 0; x < width; ++x)
+      if (std::isnan(samples.heights[y * samples.stride + x])) flags_[y * width + x] = kMissing;
+  inner_before_.resize((width + 1) * height);
+  for (std::int32_t y = 0; y < rows; ++y) {
+    std::uint16_t before = 0;
+    for (std::int32_t x = 0; x < columns; ++x) {
+      bool has = false, lacks = false;
+      for (std::int32_t v = std::max(y - 1, 0); v <= std::min(y + 1, rows - 1); ++v)
+        for (std::int32_t u = std::max(x - 1, 0); u <= std::min(x + 1, columns - 1); ++u)
+          ((flags_[index(u, v)] & kMissing) != 0 ? lacks : has) = true;
+      std::uint8_t& own = flags_[index(x, y)];
+      if ((own & kMissing) != 0) {
+        if (has) own |= kCoastal;
+      } else if (!lacks) {
+        own |= kInner;
+        ++before;
+      }
+      inner_before_[static_cast<std::size_t>(y) * (width + 1) + static_cast<std::size_t>(x) + 1] =
+          before;
+    }
+  }
+}
+
+template <class T>
+bool GridGaps::mixed(const GridCorner<T>& a, const GridCorner<T>& b, const GridCorner<T>& c) const {
+  for (const GridCorner<T>* corner : {&a, &b, &c})
+    if ((flags_[index(corner->x, corner->y)] & kInner) != 0) return true;
+  return !visit_rows(a, b, c, [&](std::int32_t y, std::int32_t first, std::int32_t last) {
+    const std::uint16_t* const row =
+        inner_before_.data() +
+        static_cast<std::size_t>(y) * (static_cast<std::size_t>(columns_) + 1);
+    return row[first] == row[last + 1];
+  });
+}
+
+template <class T>
+std::uint32_t GridGaps::cure(const GridSamples<T>& samples, const Ground& ground,
+                             const GridCorner<T>& a, const GridCorner<T>& b,
+                             const GridCorner<T>& c) const {
+  const GridCorner<T>* const corners[3] = {&a, &b, &c};
+  const bool whole = !std::isnan(a.z) && !std::isnan(b.z) && !std::isnan(c.z);
+  int best_rank = 0;
+  std::int64_t best_depth = -1;
+  std::uint32_t best = kNone;
+  visit_rows(a, b, c, [&](std::int32_t y, std::int32_t first, std::int32_t last) {
+    if (y < samples.first_y || y > samples.last_y) return true;
+    first = std::max(first, samples.first_x);
+    last = std::min(last, samples.last_x);
+    for (std::int32_t x = first; x <= last; ++x) {
+      const std::uint8_t flags = flags_[index(x, y)];
+      if ((flags & kVertex) != 0) continue;
+      // Data that is missing beside data; else the shore, then inner samples.
+      const bool missing = (flags & kMissing) != 0;
+      const int rank = whole                   ? (flags & kCoastal) != 0 ? 2
+                                                 : missing               ? 1
+                                                                         : 0
+                       : missing               ? 0
+                       : (flags & kInner) == 0 ? 2
+                                               : 1;
+      if (rank == 0 || rank < best_rank) continue;
+      const GridCorner<T> p{x, y, T{}};
+      const std::int64_t depth = std::min({turn(a, b, p), turn(b, c, p), turn(c, a, p)});
+      if (rank == best_rank && depth <= best_depth) continue;
+      best_rank = rank;
+      best_depth = depth;
+      best = static_cast<std::uint32_t>(y) << 16 | static_cast<std::uint32_t>(x);
+    }
+    return true;
+  });
+  return best != kNone || whole ? best : beside_inner(samples, ground, corners);
+}
+
+/// A triangle that has no samples but its corners and those on a side of the window: a neighbour
+/// of one of these that is inner, as near as possible to a corner without data.
+template <class T>
+std::uint32_t GridGaps::beside_inner(const GridSamples<T>& samples, const Ground& ground,
+                                     const GridCorner<T>* const (&corners)[3]) const {
+  std::uint32_t best = kNone;
+  std::int64_t best_square = 0;
+  const auto compare = [&](std::int32_t x, std::int32_t y) {
+    if ((flags_[index(x, y)] & kVertex) != 0) return;
+    for (const GridCorner<T>* outer : corners) {
+      if ((flags_[index(outer->x, outer->y)] & kMissing) == 0) continue;
+      const std::int64_t square = ground.square(GridCorner<T>{x, y, T{}}, *outer);
+      if (best != kNone && square >= best_square) continue;
+      best_square = square;
+      best = static_cast<std::uint32_t>(y) << 16 | static_cast<std::uint32_t>(x);
+    }
+  };
+  visit_rows(*corners[0], *corners[1], *corners[2],
+             [&](std::int32_t y, std::int32_t first, std::int32_t last) {
+               for (std::int32_t x = first; x <= last; ++x) {
+                 if ((flags_[index(x, y)] & kInner) == 0) continue;
+                 for (std::int32_t v = std::max(y - 1, samples.first_y);
+                      v <= std::min(y + 1, samples.last_y); ++v)
+                   for (std::int32_t u = std::max(x - 1, samples.first_x);
+                        u <= std::min(x + 1, samples.last_x); ++u)
+                     compare(u, v);
+               }
+               return true;
+             });
+  return best;
+}
+
+template GridGaps::GridGaps(const GridSamples<float>&, std::int32_t, std::int32_t);
+template GridGaps::GridGaps(const GridSamples<double>&, std::int32_t, std::int32_t);
+template bool GridGaps::mixed(const GridCorner<float>&, const GridCorner<float>&,
+                              const GridCorner<float>&) const;
+template bool GridGaps::mixed(const GridCorner<double>&, const GridCorner<double>&,
+                              const GridCorner<double>&) const;
+template std::uint32_t GridGaps::cure(const GridSamples<float>&, const Ground&,
+                                      const GridCorner<float>&, const GridCorner<float>&,
+                                      const GridCorner<float>&) const;
+template std::uint32_t GridGaps::cure(const GridSamples<double>&, const Ground&,
+                                      const GridCorner<double>&, const GridCorner<double>&,
+                                      const GridCorner<double>&) const;
+
+}  // namespace terrace::tri::tin

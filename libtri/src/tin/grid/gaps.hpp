@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "scan.hpp"
+#include "tin/ground.hpp"
+#include "tin/mesh.hpp"
+
+/// Where a window lacks data. The whole window is triangulated, samples without data too, until no
+/// triangle is mixed; then those that have a corner without data are left out. A triangle is mixed
+/// if
+/// - its corners have data, but not all samples in it do, or
+/// - a corner has no data, but it contains an *inner* sample, one whose 8 neighbours have data,
+///   perhaps as a corner.
+/// So each inner sample lies in triangles with data only. The other samples with data, the *shore*,
+/// are where the border may run.
+
+namespace terrace::tri::tin {
+
+class GridGaps {
+ public:
+  /// Heights that are NaN are missing.
+  template <class T>
+  GridGaps(const GridSamples<T>& samples, std::int32_t columns, std::int32_t rows);
+
+  /// Marks a sample as a vertex.
+  void take(std::int32_t x, std::int32_t y) { flags_[index(x, y)] |= kVertex; }
+
+  /// Of a triangle with at least one corner without data.
+  template <class T>
+  bool mixed(const GridCorner<T>& a, const GridCorner<T>& b, const GridCorner<T>& c) const;
+
+  /// Which sample (row << 16 | column) to insert so that a mixed triangle goes, or kNone if there
+  /// is none in the samples' range: of several the one deepest in the triangle, on the shore or
+  /// next to it if possible.
+  template <class T>
+  std::uint32_t cure(const GridSamples<T>& samples, const Ground& ground, const GridCorner<T>& a,
+                     const GridCorner<T>& b, const GridCorner<T>& c) const;
+
+ private:
+  static constexpr std::uint8_t kMissing = 1, kInner = 2, kVertex = 4, kCoastal = 8;
+  std::size_t index(std::int32_t x, std::int32_t y) const {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(columns_) +
+           static_cast<std::size_t>(x);
+  }
+  template <class T>
+  std::uint32_t beside_inner(const GridSamples<T>& samples, const Ground& ground,
+                             const GridCorner<T>* const (&corners)[3]) const;
+
+  std::int32_t columns_;
+  std::vector<std::uint8_t> flags_;
+  std::vector<std::uint16_t> inner_before_;  ///< inner samples on the left, columns + 1 per row
+};
+
+}  // namespace terrace::tri::tin

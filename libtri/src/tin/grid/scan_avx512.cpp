@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cstddef>
+#include <cstdint>
+
+#include <immintrin.h>
+
+namespace {
+
+using Ints16 = std::int32_t __attribute__((vector_size(64)));
+using Ints8 = std::int64_t __attribute__((vector_size(64)));
+using Reals16 = float __attribute__((vector_size(64)));
+using Reals8 = double __attribute__((vector_size(64)));
+
+// Masks of lanes; as grid_scan_masks.hpp, in registers of their own.
+
+[[gnu::always_inline]] inline __mmask16 not_negative(Ints16 lanes) {
+  return static_cast<__mmask16>(~_mm512_movepi32_mask((__m512i)lanes));
+}
+[[gnu::always_inline]] inline __mmask8 not_negative(Ints8 lanes) {
+  return static_cast<__mmask8>(~_mm512_movepi64_mask((__m512i)lanes));
+}
+[[gnu::always_inline]] inline __mmask16 at_most(Ints16 a, Ints16 b) {
+  return _mm512_cmple_epi32_mask((__m512i)a, (__m512i)b);
+}
+[[gnu::always_inline]] inline __mmask8 at_most(Ints8 a, Ints8 b) {
+  return _mm512_cmple_epi64_mask((__m512i)a, (__m512i)b);
+}
+[[gnu::always_inline]] inline __mmask16 more(Ints16 a, Ints16 b) {
+  return _mm512_cmpgt_epi32_mask((__m512i)a, (__m512i)b);
+}
+[[gnu::always_inline]] inline __mmask8 more(Ints8 a, Ints8 b) {
+  return _mm512_cmpgt_epi64_mask((__m512i)a, (__m512i)b);
+}
+[[gnu::always_inline]] inline __mmask16 either(__mmask16 a, __mmask16 b) {
+  return static_cast<__mmask16>(a | b);
+}
+[[gnu::always_inline]] inline __mmask8 either(__mmask8 a, __mmask8 b) {
+  return static_cast<__mmask8>(a | b);
+}
+[[gnu::always_inline]] inline Ints16 chosen(__mmask16 mask, Ints16 a, Ints16 b) {
+  return (Ints16)_mm512_mask_mov_epi32((__m512i)b, mask, (__m512i)a);
+}
+[[gnu::always_inline]] inline Ints8 chosen(__mmask8 mask, Ints8 a, Ints8 b) {
+  return (Ints8)_mm512_mask_mov_epi64((__m512i)b, mask, (__m512i)a);
+}
+[[gnu::always_inline]] inline unsigned bits_of(__mmask16 mask) { return mask; }
+[[gnu::always_inline]] inline unsigned bits_of(__mmask8 mask) { return mask; }
+[[gnu::always_inline]] inline __mmask16 both(__mmask16 a, __mmask16 b) {
+  return static_cast<__mmask16>(a & b);
+}
+[[gnu::always_inline]] inline __mmask8 both(__mmask8 a, __mmask8 b) {
+  return static_cast<__mmask8>(a & b);
+}
+[[gnu::always_inline]] inline Reals16 kept(Reals16 lanes, __mmask16 mask) {
+  return (Reals16)_mm512_maskz_mov_ps(mask, (__m512)lanes);
+}
+[[gnu::always_inline]] inline Reals8 kept(Reals8 lanes, __mmask8 mask) {
+  return (Reals8)_mm512_maskz_mov_pd(mask, (__m512d)lanes);
+}
+[[gnu::always_inline]] inline unsigned beyond(Reals16 lanes, Reals16 limit, __mmask16 mask) {
+  return _mm512_mask_cmp_ps_mask(mask, (__m512)lanes, (__m512)limit, _CMP_NLE_UQ);
+}
+[[gnu::always_inline]] inline unsigned beyond(Reals8 lanes, Reals8 limit, __mmask8 mask) {
+  return _mm512_mask_cmp_pd_mask(mask, (__m512d)lanes, (__m512d)limit, _CMP_NLE_UQ);
+}
+[[gnu::always_inline]] inline unsigned equal(Ints16 a, Ints16 b) {
+  return _mm512_cmpeq_epi32_mask((__m512i)a, (__m512i)b);
+}
+[[gnu::always_inline]] inline unsigned equal(Ints8 a, Ints8 b) {
+  return _mm512_cmpeq_epi64_mask((__m512i)a, (__m512i)b);
+}
+
+}  // namespace
+
+#include "scan_impl.hpp"
+
+namespace terrace::tri::tin {
+
+const GridScan<float> kGridScanFloatAvx512{worst_in<float, 1>, worst_in<float, kGridCoarse>,
+                                           within_in<float>};
+const GridScan<double> kGridScanDoubleAvx512{worst_in<double, 1>, worst_in<double, kGridCoarse>,
+                                             within_in<double>};
+
+}  // namespace terrace::tri::tin

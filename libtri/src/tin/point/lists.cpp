@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lists.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace terrace::tri::tin::points {
+
+float rounded_up(double error) {
+  constexpr float kHighest = std::numeric_limits<float>::max();
+  if (!(error < double{kHighest})) return kHighest;
+  const auto rounded = static_cast<float>(error);
+  return rounded < error || rounded == 0 ? std::nextafter(rounded, kHighest) : rounded;
+}
+
+Measured list_samples(Mesh& mesh, std::uint32_t step, double bound) {
+  Pool<Sample>& samples = *mesh.samples;
+  for (std::uint32_t& head : span_of(mesh.heads)) head = kNone;
+  for (Triangle& triangle : mesh.triangles) triangle.error = 0;
+  Measured result;
+  double squares = 0;
+  // Neighbours in the order of samples are near each other, so walks are short.
+  std::uint32_t at = 0;
+  while (!mesh.triangles[at].live()) ++at;
+  for (std::uint64_t i = 0; i < samples.size(); i += step) {
+    const auto index = static_cast<std::uint32_t>(i);
+    Sample& sample = samples[index];
+    if (sample.next == kIsVertex) {
+      ++result.errors.covered;
+      continue;
+    }
+    const Spot spot = mesh.locate({sample.x, sample.y}, at);
+    if (spot.triangle == kNone) {
+      sample.next = kOutside;
+      ++result.errors.uncovered;
+      continue;
+    }
+    at = spot.triangle;
+    sample.next = mesh.heads[at];
+    mesh.heads[at] = index;
+    ++result.errors.covered;
+    Triangle& triangle = mesh.triangles[at];
+    const double error = std::abs(height_in(mesh, triangle, sample.x, sample.y) - sample.z);
+    squares += error * error;
+    if (error > result.errors.largest) {
+      result.errors.largest = error;
+      result.errors.largest_at = number(sample);
+    }
+    if (!(error > bound)) continue;
+    ++result.above;
+    if (stuck(sample)) continue;
+    ++result.to_mend;
+    if (!(triangle.error > 0)) result.waiting.push_back(at);
+    if (rounded_up(error) > triangle.error) {
+      triangle.error = rounded_up(error);
+      triangle.place = index;
+    }
+  }
+  if (result.errors.covered > 0)
+    result.errors.rms = std::sqrt(squares / static_cast<double>(result.errors.covered));
+  return result;
+}
+
+}  // namespace terrace::tri::tin::points

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "delaunay2/double_kernel.hpp"
+#include "pool.hpp"
+#include "samples.hpp"
+
+namespace terrace::tri::tin::points {
+
+using Kernel = planar::DoubleKernel;
+using Place2 = std::array<double, 2>;
+
+struct Vertex {
+  double x;
+  double y;
+  double z;
+  std::uint32_t sample;  ///< index in Samples::all; kNone: of the frame
+};
+
+/// Where a walk ended.
+struct Spot {
+  std::uint32_t triangle = kNone;  ///< that contains the place; kNone: outside
+  unsigned zeros = 0;              ///< on how many of its edges' lines the place lies
+  unsigned edge = 0;               ///< one of these
+};
+
+struct Mesh {
+  Pool<Sample>* samples = nullptr;
+  Pool<Vertex> vertices;
+  Triangles triangles;        ///< `place`: the sample to be inserted next
+  Pool<std::uint32_t> heads;  ///< of the triangles' lists of samples, kNone: empty
+
+  [[nodiscard]] Place2 place(std::uint32_t v) const { return {vertices[v].x, vertices[v].y}; }
+  /// Walks from a triangle to the one that contains p, exactly. The region is convex, so a border
+  /// edge with p beyond it is the proof that p is outside.
+  [[nodiscard]] Spot locate(const Place2& p, std::uint32_t start) const {
+    std::uint32_t at = start;
+    std::uint32_t from = kNone;
+    // Which edge is tried first changes, so that no walk is endless in a mesh that is not Delaunay.
+    std::uint32_t random = start * 2654435761u + 1;
+    for (;;) {
+      const Triangle& t = triangles[at];
+      Spot spot{at, 0, 0};
+      bool moved = false;
+      random = random * 1664525u + 1013904223u;
+      unsigned i = (random >> 16) % 3;
+      for (unsigned k = 0; k < 3; ++k, i = after(i)) {
+        if (t.next[i] == from && from != kNone) continue;
+        const int side =
+            Kernel::orientation(place(t.corner[after(i)]), place(t.corner[before(i)]), p);
+        if (side > 0) continue;
+        if (side == 0) {
+          ++spot.zeros;
+          spot.edge = i;
+          continue;
+        }
+        if (t.next[i] == kNone) return {};
+        from = at;
+        at = t.next[i];
+        moved = true;
+        break;
+      }
+      if (!moved) return spot;
+    }
+  }
+};
+
+/// The plane of a triangle about one of its vertices. `sound`: doubles can tell its slope.
+struct Plane {
+  double gx;
+  double gy;
+  bool sound;
+};
+inline Plane plane_of(const Vertex& p, const Vertex& a, const Vertex& b) {
+  const double ux = a.x - p.x;
+  const double uy = a.y - p.y;
+  const double uz = a.z - p.z;
+  const double wx = b.x - p.x;
+  const double wy = b.y - p.y;
+  const double wz = b.z - p.z;
+  const double left = ux * wy;
+  const double right = uy * wx;
+  const double det = left - right;
+  const double size = (left < 0 ? -left : left) + (right < 0 ? -right : right);
+  return {(uz * wy - wz * uy) / det, (ux * wz - wx * uz) / det, det > 0x1p-36 * size};
+}
+
+/// The height of a triangle's surface at a place inside it: a convex combination of its vertices'
+/// whatever rounding does, so that no sliver is an outlier.
+inline double height_in(const Vertex& a, const Vertex& b, const Vertex& c, double x, double y) {
+  const double ax = a.x - x;
+  const double ay = a.y - y;
+  const double bx = b.x - x;
+  const double by = b.y - y;
+  const double cx = c.x - x;
+  const double cy = c.y - y;
+  const auto positive = [](double w) { return w > 0 ? w : 0; };
+  const double wa = positive(bx * cy - by * cx);
+  const double wb = positive(cx * ay - cy * ax);
+  const double wc = positive(ax * by - ay * bx);
+  const double sum = wa + wb + wc;
+  // All zero: the place is a vertex, or the triangle has no area that doubles can tell.
+  if (!(sum > 0)) {
+    const double da = ax * ax + ay * ay;
+    const double db = bx * bx + by * by;
+    const double dc = cx * cx + cy * cy;
+    return da <= db && da <= dc ? a.z : db <= dc ? b.z : c.z;
+  }
+  // Exact at the vertices, and where heights are equal.
+  if (wb == sum) return b.z;
+  if (wc == sum) return c.z;
+  return a.z + (wb * (b.z - a.z) + wc * (c.z - a.z)) / sum;
+}
+inline double height_in(const Mesh& mesh, const Triangle& t, double x, double y) {
+  return height_in(mesh.vertices[t.corner[0]], mesh.vertices[t.corner[1]],
+                   mesh.vertices[t.corner[2]], x, y);
+}
+
+}  // namespace terrace::tri::tin::points

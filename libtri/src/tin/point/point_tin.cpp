@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/tri/point_tin.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include "greedy.hpp"
+#include "lists.hpp"
+#include "removal.hpp"
+#include "samples.hpp"
+#include "start.hpp"
+#include "tin/lattice.hpp"
+#include "tin/rows/point_rows.hpp"
+
+namespace terrace::tri {
+
+void tin::points::check_options(const PointTinOptions& options, std::span<const Point3> frame) {
+  if (!(options.max_error >= 0) || !std::isfinite(options.max_error))
+    throw std::invalid_argument("point_tin: max_error is not a number of at least 0");
+  if (!(options.min_angle_degrees >= 0 && options.min_angle_degrees <= 30))
+    throw std::invalid_argument("point_tin: min_angle_degrees is not within 0 to 30");
+  if (!options.lattice) return;
+  if (!tin::valid(*options.lattice))
+    throw std::invalid_argument("point_tin: a lattice needs a step above 0");
+  if (frame.empty()) throw std::invalid_argument("point_tin: a lattice needs a frame");
+  for (std::size_t i = 0; i < frame.size(); ++i)
+    for (std::size_t k = 0; k < 2; ++k)
+      if (!(frame[i][k] >= 0 && frame[i][k] < 0x1p30 && frame[i][k] == std::floor(frame[i][k])))
+        throw std::invalid_argument("point_tin: vertex " + std::to_string(i) +
+                                    " of the frame is not on the lattice");
+}
+
+namespace {
+
+using namespace tin::points;
+using tin::kNone;
+
+constexpr std::size_t kUnlimited = std::numeric_limits<std::size_t>::max();
+
+/// Makes the mesh, for one bound after another.
+class Maker {
+ public:
+  Maker(Samples& samples, std::span<const Point3> frame, const PointTinOptions& options)
+      : samples_(samples.all), frame_(frame), options_(options) {}
+
+  /// False: there is no surface.
+  bool make(double bound, std::size_t max_vertices, TinQuality quality) {
+    mesh_ = {};
+    mesh_.samples = &samples_;
+    for (Sample& sample : span_of(samples_)) {
+      sample.next = kUnlisted;
+      sample.id = number(sample);
+    }
+    if (frame_.empty()) {
+      start_with_hull(mesh_);
+    } else {
+      start_with_frame(mesh_, frame_);
+    }
+    if (mesh_.triangles.empty()) return false;
+    const std::size_t fixed = mesh_.vertices.size();
+    // So much that growing, which takes twice the memory for a moment, is rare; what is not used
+    // costs addresses alone.
+    mesh_.triangles.reserve(mesh_.triangles.size() + samples_.size());
+    Greedy greedy(mesh_, bound, !frame_.empty(), options_.lattice);
+    insert_greedily(greedy, bound, max_vertices);
+    removed_ = 0;
+    if (quality == TinQuality::kGreedy) {
+      mend(greedy, bound, max_vertices);
+      inserted_ = mesh_.vertices.size() - fixed;
+      return true;
+    }
+    inserted_ = mesh_.vertices.size() - fixed;
+    greedy.stop_delaunay();
+    const auto remove = [&] {
+      removed_ += remove_vertices(mesh_, fixed, bound, options_.min_angle_degrees);
+    };
+    remove();
+    if (quality == TinQuality::kFitted) {
+      // Moved vertices have errors at their own samples.
+      for (Sample& sample : span_of(samples_))
+        if (sample.next == kIsVertex) sample.next = kUnlisted;
+      list_samples(mesh_, 1, bound);
+      fit_heights(mesh_, fixed, bound, options_.lattice);
+      remove();
+    }
+    mend(greedy, bound, max_vertices);
+    return true;
+  }
+
+  [[nodiscard]] const Measured& measured() const { return measured_; }
+  [[nodiscard]] std::size_t vertices() const { return mesh_.vertices.size() - removed_; }
+
+  /// Leaves nothing behind.
+  void publish(PointTin& result) {
+    result.errors = measured_.errors;
+    result.stuck = measured_.above - measured_.to_mend;
+    result.inserted = inserted_;
+    result.removed = removed_;
+    // Memory for the result comes after that of the samples is gone.
+    for (Vertex& vertex : span_of(mesh_.vertices))
+      vertex.sample = vertex.sample == kNone ? kNoSample : number(samples_[vertex.sample]);
+    samples_.release();
+    mesh_.heads.release();
+    std::vector<std::uint32_t> number_of =
+        tin::triangle_of_vertices(mesh_.triangles, mesh_.vertices.size());
+    result.vertices.reserve(vertices());
+    result.sample.reserve(vertices());
+    for (std::uint32_t v = 0; v < mesh_.vertices.size(); ++v) {
+      if (number_of[v] == kNone) continue;
+      number_of[v] = static_cast<std::uint32_t>(result.vertices.size());
+      const Vertex& vertex = mesh_.vertices[v];
+      result.vertices.push_back({vertex.x, vertex.y, vertex.z});
+      result.sample.push_back(vertex.sample);
+    }
+    result.triangles.reserve(2 * vertices());
+    for (const tin::Triangle& t : mesh_.triangles)
+      if (t.live())
+        result.triangles.push_back(
+            {number_of[t.corner[0]], number_of[t.corner[1]], number_of[t.corner[2]]});
+  }
+
+ private:
+  /// While triangles are large, few of their samples choose the vertices as well as all, and need
+  /// not be dealt anew each time.
+  void insert_greedily(Greedy& greedy, double bound, std::size_t max_vertices) {
+    constexpr std::uint32_t kSteps[] = {64, 8, 1};
+    constexpr std::size_t kSamplesPerTriangle = 8;
+    // So few that they and their triangles stay in the cache.
+    constexpr std::size_t kTogether = 8192;
+    for (const std::uint32_t step : kSteps) {
+      const std::size_t listed = samples_.size() / step;
+      if (step > 1 && listed < 1024) continue;
+      const bool last = step == 1 && max_vertices == kUnlimited;
+      greedy.start(list_samples(mesh_, step, bound).waiting, last ? kTogether : samples_.size());
+      greedy.run(max_vertices, step > 1 ? listed / kSamplesPerTriangle : kUnlimited);
+    }
+  }
+
+  /// Measures; and inserts what rounding hid from the lists, next to never.
+  void mend(Greedy& greedy, double bound, std::size_t max_vertices) {
+    measured_ = list_samples(mesh_, 1, bound);
+    while (measured_.to_mend > 0 && mesh_.vertices.size() < max_vertices) {
+      greedy.start(measured_.waiting, samples_.size());
+      greedy.run(max_vertices, kUnlimited);
+      measured_ = list_samples(mesh_, 1, bound);
+    }
+  }
+
+  Pool<Sample>& samples_;
+  std::span<const Point3> frame_;
+  const PointTinOptions& options_;
+  Mesh mesh_;
+  Measured measured_;
+  std::size_t inserted_ = 0;
+  std::size_t removed_ = 0;
+};
+
+/// The smallest bound that leaves at most max_points after removal, nearly: where greedy insertion
+/// stops at max_points is too large a bound, as removal then leaves about 0.6 of them; the number
+/// of vertices is about a power of the bound.
+bool make_of_points(Maker& maker, const PointTinOptions& options) {
+  constexpr int kTries = 6;
+  constexpr double kFull = 0.98;
+  const std::size_t limit = options.max_points;
+  if (!maker.make(options.max_error, limit, TinQuality::kGreedy)) return false;
+  if (options.quality == TinQuality::kGreedy) return true;
+  double best = std::max(maker.measured().errors.largest, options.max_error);
+  double bound = best;
+  double too_small = options.max_error;
+  double last = bound;
+  for (int i = 0; i < kTries && bound > 0; ++i) {
+    maker.make(bound, kUnlimited, options.quality);
+    last = bound;
+    const double part = static_cast<double>(maker.vertices()) / static_cast<double>(limit);
+    if (part <= 1) {
+      best = bound;
+      if (part >= kFull || bound <= options.max_error) break;
+    } else {
+      too_small = bound;
+    }
+    // Vertices go down about as the inverse of the bound; a little to the safe side.
+    bound = std::max(last * part * 1.01, options.max_error);
+    if (!(bound > too_small && bound < best)) bound = (too_small + best) / 2;
+  }
+  if (last != best) maker.make(best, kUnlimited, options.quality);
+  return true;
+}
+
+}  // namespace
+
+PointTin point_tin(std::span<const double> x, std::span<const double> y, std::span<const double> z,
+                   std::span<const Point3> frame, const PointTinOptions& options) {
+  check_options(options, frame);
+  Samples samples = take_samples(x, y, z, options.duplicates);
+  PointTin result;
+  result.duplicates = samples.duplicates;
+  result.duplicate_range = samples.duplicate_range;
+  result.errors.uncovered = samples.all.size();
+  Maker maker(samples, frame, options);
+  if (options.max_points == 0 ? maker.make(options.max_error, kUnlimited, options.quality)
+                              : make_of_points(maker, options))
+    maker.publish(result);
+  return result;
+}
+
+}  // namespace terrace::tri

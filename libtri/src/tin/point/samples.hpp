@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "pool.hpp"
+#include "terrace/tri/point_tin.hpp"
+#include "tin/mesh.hpp"
+
+namespace terrace::tri::tin::points {
+
+inline constexpr std::uint32_t kOutside = 0xFFFFFFFEu;
+inline constexpr std::uint32_t kIsVertex = 0xFFFFFFFDu;
+inline constexpr std::uint32_t kUnlisted = 0xFFFFFFFCu;
+
+/// Below this, no product of coordinates overflows.
+inline constexpr double kLargest = 1e100;
+
+/// A sample as a member of its triangle's list. Half a cache line: walking a list brings what is
+/// measured.
+struct Sample {
+  double x;
+  double y;
+  double z;
+  std::uint32_t next;  ///< the next of the list, kNone at its end; or why it is in none
+  /// The caller's number; with kStuck set where it can not become a vertex.
+  std::uint32_t id;
+};
+inline constexpr std::uint32_t kStuck = 0x80000000u;
+inline bool stuck(const Sample& sample) { return (sample.id & kStuck) != 0; }
+inline std::uint32_t number(const Sample& sample) { return sample.id & ~kStuck; }
+
+struct Samples {
+  /// Along a curve: neighbours are near each other. Every place once, or, with kAll, twice where
+  /// heights differ.
+  Pool<Sample> all;
+  std::size_t duplicates = 0;
+  double duplicate_range = 0;  ///< the largest difference of heights at one place
+};
+
+/// Checks, sorts and merges; throws as point_tin() does.
+Samples take_samples(std::span<const double> x, std::span<const double> y,
+                     std::span<const double> z, PointDuplicates duplicates);
+
+}  // namespace terrace::tri::tin::points

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+
+#include "mesh.hpp"
+
+namespace terrace::tri::tin::points {
+
+/// The first mesh: the frame's vertices alone. Throws as point_tin() does where it is no convex
+/// polygon.
+void start_with_frame(Mesh& mesh, std::span<const Point3> frame);
+
+/// The first mesh: the corners of the samples' hull. None where all samples are on one line.
+void start_with_hull(Mesh& mesh);
+
+}  // namespace terrace::tri::tin::points

@@ -1,0 +1,260 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "places.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include "tin/point/samples.hpp"
+
+namespace terrace::tri::tin::rows {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
+/// Places of columns and rows are off equal distances by less than that.
+constexpr double kRegular = 1e-3;
+/// Samples that are farther off a lattice would make scans slow.
+constexpr double kFarthestOff = 4.0;
+
+struct Region {
+  std::array<double, 2> low, high;
+
+  explicit Region(std::span<const Point3> frame)
+      : low{frame[0][0], frame[0][1]}, high{frame[0][0], frame[0][1]} {
+    for (const Point3& p : frame) {
+      for (std::size_t k = 0; k < 2; ++k) {
+        low[k] = std::min(low[k], p[k]);
+        high[k] = std::max(high[k], p[k]);
+      }
+    }
+  }
+  /// NaN is not.
+  [[nodiscard]] bool contains(double x, double y) const {
+    return x >= low[0] && x <= high[0] && y >= low[1] && y <= high[1];
+  }
+};
+
+/// Ascending at equal distances, nearly.
+bool regular(std::span<const double> places) {
+  if (places.empty() || places.size() > kMostRows || !std::isfinite(places.front())) return false;
+  if (places.size() == 1) return true;
+  const double first = places.front();
+  const double step = (places.back() - first) / static_cast<double>(places.size() - 1);
+  if (!(step > 0.0 && std::isfinite(step))) return false;
+  for (std::size_t i = 0; i < places.size(); ++i)
+    if (!(std::abs(places[i] - (first + static_cast<double>(i) * step)) <= kRegular * step))
+      return false;
+  return true;
+}
+
+/// With what scans want before and after.
+std::vector<double> padded(std::span<const double> places) {
+  std::vector<double> all{-kInfinity};
+  all.reserve(places.size() + 1 + kRowPad);
+  all.insert(all.end(), places.begin(), places.end());
+  all.insert(all.end(), kRowPad, kInfinity);
+  return all;
+}
+
+double per_unit(std::span<const double> places) {
+  const double extent = places.back() - places.front();
+  return extent > 0.0 ? static_cast<double>(places.size() - 1) / extent : 0.0;
+}
+
+/// Copies rows of `columns` numbers to longer ones.
+std::vector<double> padded_rows(std::span<const double> from, std::size_t columns,
+                                std::size_t stride) {
+  const std::size_t rows = from.size() / columns;
+  std::vector<double> to((rows + 1) * stride);
+  for (std::size_t row = 0; row < rows; ++row) {
+    const auto start = to.begin() + static_cast<std::ptrdiff_t>(row * stride);
+    std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(row * columns), columns, start);
+    std::fill_n(start + static_cast<std::ptrdiff_t>(columns), stride - columns, kMissing);
+  }
+  std::fill_n(to.end() - static_cast<std::ptrdiff_t>(stride), stride, kMissing);
+  return to;
+}
+
+/// Heights, without those outside the frame. `place_of(row, column)`.
+template <class PlaceOf>
+void copy_heights(std::span<const double> from, std::size_t columns, const Region& region,
+                  const PlaceOf& place_of, PaddedSamples& out) {
+  const std::size_t stride = out.layout.stride;
+  out.z = padded_rows(from, columns, stride);
+  for (std::size_t row = 0; row * columns < from.size(); ++row) {
+    double* const to = out.z.data() + row * stride;
+    for (std::size_t column = 0; column < columns; ++column) {
+      if (std::isnan(to[column])) continue;
+      if (!(std::abs(to[column]) < points::kLargest))
+        throw std::invalid_argument("point_tin: z of sample " +
+                                    std::to_string(row * columns + column) +
+                                    " is not finite or too large");
+      ++out.known;
+      const auto [x, y] = place_of(row, column);
+      if (!region.contains(x, y)) to[column] = kMissing;
+    }
+  }
+}
+
+/// The affine map of columns and rows to places nearest to that of some of the samples, and back.
+bool find_lattice(const SampleGrid& samples, std::size_t rows, RowSamples& layout) {
+  constexpr std::size_t kEach = 8;
+  const auto along = [](std::size_t i, std::size_t count) { return i * (count - 1) / (kEach - 1); };
+  const double middle_column = static_cast<double>(samples.columns - 1) / 2;
+  const double middle_row = static_cast<double>(rows - 1) / 2;
+  std::array<double, 2> mean{}, by_column{}, by_row{};
+  double columns_squared = 0, rows_squared = 0;
+  for (std::size_t j = 0; j < kEach; ++j) {
+    for (std::size_t i = 0; i < kEach; ++i) {
+      // Mirrored, so that the places are even about the middle though whole.
+      const std::size_t column = i < kEach / 2
+                                     ? along(i, samples.columns)
+                                     : samples.columns - 1 - along(kEach - 1 - i, samples.columns);
+      const std::size_t row =
+          j < kEach / 2 ? along(j, rows) : rows - 1 - along(kEach - 1 - j, rows);
+      const std::size_t at = row * samples.columns + column;
+      const double c = static_cast<double>(column) - middle_column;
+      const double r = static_cast<double>(row) - middle_row;
+      const std::array<double, 2> place{samples.x[at], samples.y[at]};
+      for (std::size_t k = 0; k < 2; ++k) {
+        mean[k] += place[k] / (kEach * kEach);
+        by_column[k] += c * place[k];
+        by_row[k] += r * place[k];
+      }
+      columns_squared += c * c;
+      rows_squared += r * r;
+    }
+  }
+  for (std::size_t k = 0; k < 2; ++k) {
+    by_column[k] /= columns_squared;
+    by_row[k] /= rows_squared;
+  }
+  const double determinant = by_column[0] * by_row[1] - by_column[1] * by_row[0];
+  if (!(std::abs(determinant) > 0.0 && std::isfinite(determinant))) return false;
+  layout.mirrored = determinant < 0.0;
+  layout.column_x = by_row[1] / determinant;
+  layout.column_y = -by_row[0] / determinant;
+  layout.row_x = -by_column[1] / determinant;
+  layout.row_y = by_column[0] / determinant;
+  layout.column_0 = middle_column - (layout.column_x * mean[0] + layout.column_y * mean[1]);
+  layout.row_0 = middle_row - (layout.row_x * mean[0] + layout.row_y * mean[1]);
+  return true;
+}
+
+/// How far samples are off, columns or rows; infinite where one has a height and no place.
+double off_lattice(const SampleGrid& samples, const RowSamples& layout) {
+  double off = 0.0;
+  for (std::size_t i = 0; i < samples.z.size(); ++i) {
+    if (std::isnan(samples.z[i])) continue;
+    const double column = static_cast<double>(i % samples.columns);
+    const double row = static_cast<double>(i / samples.columns);
+    const double x = samples.x[i], y = samples.y[i];
+    const double across = layout.column_0 + (layout.column_x * x + layout.column_y * y) - column;
+    const double down = layout.row_0 + (layout.row_x * x + layout.row_y * y) - row;
+    const double own = std::max(std::abs(across), std::abs(down));
+    if (!(std::abs(across) + std::abs(down) < kInfinity)) return kInfinity;
+    off = std::max(off, own);
+  }
+  return off;
+}
+
+}  // namespace
+
+bool is_rectangle(std::span<const Point3> frame) {
+  if (frame.size() < 4) return false;
+  std::array<double, 2> low{kFarthest, kFarthest}, high{0.0, 0.0};
+  for (const Point3& p : frame) {
+    if (!(std::abs(p[2]) < points::kLargest)) return false;
+    for (std::size_t k = 0; k < 2; ++k) {
+      if (!(p[k] >= 0.0 && p[k] < kFarthest && p[k] == std::floor(p[k]))) return false;
+      low[k] = std::min(low[k], p[k]);
+      high[k] = std::max(high[k], p[k]);
+    }
+  }
+  const double width = high[0] - low[0], height = high[1] - low[1];
+  if (!(width > 0.0 && height > 0.0)) return false;
+  // Places along the sides, from the south-west corner on.
+  const double whole = 2.0 * (width + height);
+  const auto along = [&](const Point3& p) {
+    if (p[1] == low[1]) return p[0] - low[0];
+    if (p[0] == high[0]) return width + (p[1] - low[1]);
+    if (p[1] == high[1]) return width + height + (high[0] - p[0]);
+    return p[0] == low[0] ? 2.0 * width + height + (high[1] - p[1]) : -1.0;
+  };
+  unsigned corners = 0, turns = 0;
+  for (std::size_t i = 0; i < frame.size(); ++i) {
+    const double here = along(frame[i]), next = along(frame[i + 1 == frame.size() ? 0 : i + 1]);
+    if (here < 0.0 || here >= whole || here == next) return false;
+    turns += next < here ? 1 : 0;
+    corners +=
+        here == 0.0 || here == width || here == width + height || here == 2.0 * width + height ? 1
+                                                                                               : 0;
+  }
+  return corners == 4 && turns == 1;
+}
+
+RowSamples PaddedSamples::view() const {
+  RowSamples all = layout;
+  all.x = x.data() + (all.upright ? 1 : 0);
+  all.y = y.data() + (all.upright ? 1 : 0);
+  all.z = z.data();
+  return all;
+}
+
+std::optional<PaddedSamples> padded_samples(const SampleRows& samples,
+                                            std::span<const Point3> frame) {
+  if (!regular(samples.x) || !regular(samples.y)) return std::nullopt;
+  const std::size_t columns = samples.x.size();
+  PaddedSamples out;
+  RowSamples& layout = out.layout;
+  layout.stride = columns + kRowPad;
+  layout.columns = static_cast<std::int32_t>(columns);
+  layout.rows = static_cast<std::int32_t>(samples.y.size());
+  layout.upright = true;
+  layout.column_x = per_unit(samples.x);
+  layout.row_y = per_unit(samples.y);
+  layout.column_0 = -samples.x[0] * layout.column_x;
+  layout.row_0 = -samples.y[0] * layout.row_y;
+  layout.off = kRegular;
+  copy_heights(
+      samples.z, columns, Region(frame),
+      [&](std::size_t row, std::size_t column) {
+        return std::array<double, 2>{samples.x[column], samples.y[row]};
+      },
+      out);
+  out.x = padded(samples.x);
+  out.y = padded(samples.y);
+  return out;
+}
+
+std::optional<PaddedSamples> padded_samples(const SampleGrid& samples,
+                                            std::span<const Point3> frame) {
+  const std::size_t columns = samples.columns;
+  const std::size_t rows = columns == 0 ? 0 : samples.z.size() / columns;
+  if (columns < 2 || rows < 2 || columns > kMostRows || rows > kMostRows) return std::nullopt;
+  PaddedSamples out;
+  RowSamples& layout = out.layout;
+  layout.stride = columns + kRowPad;
+  layout.columns = static_cast<std::int32_t>(columns);
+  layout.rows = static_cast<std::int32_t>(rows);
+  if (!find_lattice(samples, rows, layout)) return std::nullopt;
+  // A little more, for what is rounded.
+  layout.off = off_lattice(samples, layout) + 1e-6;
+  if (!(layout.off <= kFarthestOff)) return std::nullopt;
+  copy_heights(
+      samples.z, columns, Region(frame),
+      [&](std::size_t row, std::size_t column) {
+        const std::size_t i = row * columns + column;
+        return std::array<double, 2>{samples.x[i], samples.y[i]};
+      },
+      out);
+  out.x = padded_rows(samples.x, columns, layout.stride);
+  out.y = padded_rows(samples.y, columns, layout.stride);
+  return out;
+}
+
+}  // namespace terrace::tri::tin::rows

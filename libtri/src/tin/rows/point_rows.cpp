@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "point_rows.hpp"
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "surface.hpp"
+
+namespace terrace::tri {
+namespace {
+
+/// Whether a RowSurface does what is asked for.
+bool has_surface(std::span<const Point3> frame, const PointTinOptions& options) {
+  return options.lattice && options.max_points == 0 && tin::rows::is_rectangle(frame);
+}
+
+std::array<double, 2> place_of(const SampleRows& samples, std::size_t i) {
+  return {samples.x[i % samples.x.size()], samples.y[i / samples.x.size()]};
+}
+std::array<double, 2> place_of(const SampleGrid& samples, std::size_t i) {
+  return {samples.x[i], samples.y[i]};
+}
+
+void check_sizes(const SampleRows& samples) {
+  if (samples.x.size() * samples.y.size() != samples.z.size())
+    throw std::invalid_argument("point_tin: not a height for each row and column");
+}
+void check_sizes(const SampleGrid& samples) {
+  if (samples.x.size() != samples.z.size() || samples.y.size() != samples.z.size())
+    throw std::invalid_argument("point_tin: arrays of different lengths");
+  if (samples.columns == 0 ? !samples.z.empty() : samples.z.size() % samples.columns != 0)
+    throw std::invalid_argument("point_tin: not a height for each row and column");
+}
+
+template <class Samples>
+PointTin tin_of_points(const Samples& samples, std::span<const Point3> frame,
+                       const PointTinOptions& options) {
+  std::vector<double> x, y, z;
+  std::vector<std::uint32_t> number;
+  for (std::size_t i = 0; i < samples.z.size(); ++i) {
+    if (std::isnan(samples.z[i])) continue;
+    const std::array<double, 2> place = place_of(samples, i);
+    x.push_back(place[0]);
+    y.push_back(place[1]);
+    z.push_back(samples.z[i]);
+    number.push_back(static_cast<std::uint32_t>(i));
+  }
+  PointTin tin = point_tin(x, y, z, frame, options);
+  for (std::uint32_t& sample : tin.sample)
+    if (sample != kNoSample) sample = number[sample];
+  if (tin.errors.largest_at != kNoSample) tin.errors.largest_at = number[tin.errors.largest_at];
+  return tin;
+}
+
+}  // namespace
+
+namespace tin::rows {
+
+template <class Samples>
+PointTin make_tin(const Samples& samples, std::span<const Point3> frame,
+                  const PointTinOptions& options, RowPath path) {
+  points::check_options(options, frame);
+  check_sizes(samples);
+  if (samples.z.size() > std::size_t{1} << 29)
+    throw std::length_error("point_tin: more than 2^29 samples");
+  if (!has_surface(frame, options)) return tin_of_points(samples, frame, options);
+  std::optional<PaddedSamples> padded = padded_samples(samples, frame);
+  if (!padded) return tin_of_points(samples, frame, options);
+  RowSurface surface(*std::move(padded), frame, options, path);
+  surface.refine();
+  if (options.quality != TinQuality::kGreedy) {
+    surface.arrange();
+    surface.remove();
+  }
+  if (options.quality == TinQuality::kFitted) {
+    surface.fit();
+    surface.remove();
+  }
+  return surface.result();
+}
+
+template PointTin make_tin(const SampleRows&, std::span<const Point3>, const PointTinOptions&,
+                           RowPath);
+template PointTin make_tin(const SampleGrid&, std::span<const Point3>, const PointTinOptions&,
+                           RowPath);
+
+}  // namespace tin::rows
+
+PointTin point_tin(const SampleRows& samples, std::span<const Point3> frame,
+                   const PointTinOptions& options) {
+  return tin::rows::make_tin(samples, frame, options, tin::rows::best_row_path());
+}
+
+PointTin point_tin(const SampleGrid& samples, std::span<const Point3> frame,
+                   const PointTinOptions& options) {
+  return tin::rows::make_tin(samples, frame, options, tin::rows::best_row_path());
+}
+
+}  // namespace terrace::tri

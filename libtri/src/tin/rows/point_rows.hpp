@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+
+#include "scan.hpp"
+#include "terrace/tri/point_tin.hpp"
+
+namespace terrace::tri::tin {
+
+namespace points {
+
+/// Throws as point_tin() does.
+void check_options(const PointTinOptions& options, std::span<const Point3> frame);
+
+}  // namespace points
+
+namespace rows {
+
+/// point_tin() of SampleRows or SampleGrid, with a given instruction set.
+template <class Samples>
+PointTin make_tin(const Samples& samples, std::span<const Point3> frame,
+                  const PointTinOptions& options, RowPath path);
+
+}  // namespace rows
+}  // namespace terrace::tri::tin

@@ -1,0 +1,325 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <memory>
+#include <set>
+#include <string>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "cache.hpp"
+#include "front.hpp"
+#include "model/model.hpp"
+#include "terrace/tri/view.hpp"
+
+/// The template ViewControl of view.hpp, for those who instantiate it.
+
+namespace terrace::tri {
+
+namespace detail {
+
+/// Throws HierarchyError where a given cluster contradicts itself.
+void check(const GivenCluster& cluster, unsigned top);
+ViewOptions checked(ViewOptions options);
+
+}  // namespace detail
+
+template <class Triangulation>
+struct ViewControl<Triangulation>::Impl {
+  Impl(std::vector<std::uint64_t> counts, GivenCluster root, ViewOptions options);
+
+  const Step& step(const View& view, const StepBudget& budget);
+  [[nodiscard]] ClusterTree& tree() { return model_.impl_->tree_; }
+
+  using Slot = ClusterTree::Slot;
+  using Candidate = ViewFront::Candidate;
+  struct Asked {
+    std::uint64_t step = 0;
+    double bytes = 0.0;
+  };
+
+  void expand_wanted();
+  bool collapse_unwanted(std::size_t up_to);
+  enum class Room { enough, none, later };
+  [[nodiscard]] std::size_t lacking(std::size_t points) const {
+    const std::size_t needed = model_.point_count() + points;
+    return needed > options_.max_points ? needed - options_.max_points : 0;
+  }
+  [[nodiscard]] bool could_fit(const Candidate& candidate, std::size_t points);
+  [[nodiscard]] Room make_room(const Candidate& candidate);
+  void ask(const Candidate& candidate);
+  void ask_soon();
+  void request(const Candidate& candidate, double importance, double bytes);
+  void expand(const Candidate& candidate, const GivenCluster& given);
+  void collapse(Slot slot);
+  void withdraw();
+
+  ViewOptions options_;
+  ViewCache cache_;
+  Model model_;
+  ViewFront front_;
+  std::unordered_map<ClusterId, Asked> asked_;
+  std::set<ClusterId> faulty_;
+
+  Step result_;
+  StepMeter meter_;
+  std::uint64_t number_ = 0;  // of the step
+  bool evict_ = true;         // whether room can still be made in this step
+  std::size_t claimed_ = 0;   // points of clusters that are given or asked for and wanted
+  double claimed_bytes_ = 0.0;
+};
+
+template <class Triangulation>
+ViewControl<Triangulation>::Impl::Impl(std::vector<std::uint64_t> counts, GivenCluster root,
+                                       ViewOptions options)
+    : options_(detail::checked(std::move(options))),
+      cache_([&] {
+        if (root.cluster != cluster_id(static_cast<unsigned>(counts.size()), 0)) {
+          throw HierarchyError(root.cluster, "it is not the root above " +
+                                                 std::to_string(counts.size()) + " levels");
+        }
+        detail::check(root, static_cast<unsigned>(counts.size()));
+        ViewCache cache(std::move(counts));
+        cache.give(root);
+        return cache;
+      }()),
+      model_(cache_, Detail{}, options_.model),
+      front_(tree(), options_) {
+  front_.add(ClusterTree::kRoot, root.child_records, nullptr);
+  cache_.drop(root.cluster);
+  cache_.limit(options_.max_cached_bytes);
+}
+
+template <class Triangulation>
+auto ViewControl<Triangulation>::Impl::step(const View& view, const StepBudget& budget)
+    -> const Step& {
+  check(view);
+  meter_.start(budget);
+  result_ = {};
+  ++number_;
+  evict_ = true;
+  claimed_ = 0;
+  claimed_bytes_ = 0.0;
+  for (const auto& [id, asked] : asked_) claimed_bytes_ += asked.bytes;
+
+  front_.start(view);
+  meter_.ready();
+  model_.open_step();
+  expand_wanted();
+  ask_soon();
+  const bool done = collapse_unwanted(0);
+  withdraw();
+  result_.delta = &model_.close_step();
+  meter_.end();
+  result_.settled = done && result_.pending == 0 && result_.expanded == 0 && result_.collapsed == 0;
+  return result_;
+}
+
+// Until no more than so many points of unwanted clusters are left; false if the budget ended first.
+template <class Triangulation>
+bool ViewControl<Triangulation>::Impl::collapse_unwanted(std::size_t up_to) {
+  while (front_.points_below(options_.collapse_below) > up_to || up_to == 0) {
+    if (!meter_.has(0)) return false;
+    const Slot slot = front_.next_to_collapse(options_.collapse_below);
+    if (slot == ClusterTree::kNoSlot) break;
+    collapse(slot);
+  }
+  return true;
+}
+
+template <class Triangulation>
+void ViewControl<Triangulation>::Impl::expand_wanted() {
+  while (const auto candidate = front_.next()) {
+    if (!faulty_.empty() && faulty_.count(candidate->id)) continue;
+    const GivenCluster* given = cache_.find(candidate->id, false);
+    Room room = Room::none;
+    if (!given) {
+      ++result_.missing;
+      ask(*candidate);
+    } else {
+      room = make_room(*candidate);
+      if (room == Room::later) ++result_.pending;
+      if (room == Room::none) ++result_.blocked;
+      if (room == Room::later) {
+        claimed_ += given->positions.size();
+        claimed_bytes_ += ViewCache::bytes_of(level_of(candidate->id), candidate->members);
+      }
+      if (room != Room::none) cache_.find(candidate->id, true);
+    }
+    if (room == Room::enough) {
+      expand(*candidate, *given);
+    } else {
+      result_.worst = std::max(result_.worst, candidate->want);
+    }
+  }
+}
+
+// Whether room could be made for so many points. Once there is none for a cluster, none is made for
+// a lesser one; but what is unwanted anyway always gives way. So it does not matter where a step
+// was interrupted.
+template <class Triangulation>
+bool ViewControl<Triangulation>::Impl::could_fit(const Candidate& candidate, std::size_t points) {
+  const std::size_t lack = lacking(points);
+  if (lack == 0) return true;
+  const double unwanted = options_.collapse_below;
+  if (evict_ && front_.points_below(unwanted * candidate.want) >= lack) return true;
+  if (points == candidate.members) evict_ = false;
+  return front_.points_below(unwanted) >= lack;
+}
+
+template <class Triangulation>
+auto ViewControl<Triangulation>::Impl::make_room(const Candidate& candidate) -> Room {
+  const std::size_t members = static_cast<std::size_t>(candidate.members);
+  collapse_unwanted(model_.point_count() / 4 + 1);
+  if (lacking(members) > 0) {
+    if (!could_fit(candidate, members)) return Room::none;
+    const double below = options_.collapse_below * (evict_ ? candidate.want : 1.0);
+    while (lacking(members) > 0) {
+      if (!meter_.has(0)) return Room::later;
+      const Slot slot = front_.next_to_collapse(below);
+      if (slot == ClusterTree::kNoSlot) return Room::none;  // pins hold them
+      collapse(slot);
+    }
+  }
+  // What went may have had this cluster below it.
+  const auto place = tree().find(candidate.id);
+  if (!place || *place != candidate.place) return Room::none;
+  return meter_.has(members) ? Room::enough : Room::later;
+}
+
+template <class Triangulation>
+void ViewControl<Triangulation>::Impl::ask(const Candidate& candidate) {
+  const std::size_t members = static_cast<std::size_t>(
+      std::min<std::uint64_t>(candidate.members, ClusterTree::kMaxMembers));
+  const unsigned level = level_of(candidate.id);
+  // Nothing is asked for that could not be expanded, or kept until then.
+  const std::size_t claims = claimed_ + members;
+  const auto known = asked_.find(candidate.id);
+  const double bytes = ViewCache::bytes_of(level, members);
+  const double more = known == asked_.end() ? bytes : 0.0;
+  if (!could_fit(candidate, members) || !could_fit(candidate, claims) ||
+      claimed_bytes_ + more > static_cast<double>(cache_.max_bytes())) {
+    --result_.missing;
+    ++result_.blocked;
+    return;
+  }
+  claimed_ += members;
+  claimed_bytes_ += more;
+  request(candidate, candidate.want, bytes);
+}
+
+// Asks early for what may be wanted soon, and holds on to it if it is there.
+template <class Triangulation>
+void ViewControl<Triangulation>::Impl::ask_soon() {
+  for (const Candidate& candidate : front_.soon()) {
+    if (!faulty_.empty() && faulty_.count(candidate.id)) continue;
+    const double bytes = ViewCache::bytes_of(level_of(candidate.id), candidate.members);
+    const bool known = asked_.count(candidate.id) != 0;
+    if (!known && claimed_bytes_ + bytes > static_cast<double>(cache_.max_bytes())) break;
+    if (!known) claimed_bytes_ += bytes;
+    if (!cache_.find(candidate.id, true)) request(candidate, std::min(candidate.keep, 1.0), bytes);
+  }
+}
+
+template <class Triangulation>
+void ViewControl<Triangulation>::Impl::request(const Candidate& candidate, double importance,
+                                               double bytes) {
+  ViewRequest request{candidate.id, {}, candidate.members, importance};
+  if (level_of(candidate.id) > 0) request.head_child = tree().head_child(candidate.place);
+  result_.wanted.push_back(request);
+  const auto [known, fresh] = asked_.try_emplace(candidate.id, Asked{number_, bytes});
+  if (fresh) result_.requests.push_back(request);
+  known->second.step = number_;
+}
+
+template <class Triangulation>
+void ViewControl<Triangulation>::Impl::expand(const Candidate& candidate,
+                                              const GivenCluster& given) {
+  cache_.expect(candidate.id, front_.record(candidate.place));
+  try {
+    model_.expand(candidate.id);
+  } catch (const HierarchyError& error) {
+    result_.faults.push_back({candidate.id, error.what()});
+    faulty_.insert(candidate.id);
+    cache_.drop(candidate.id);
+    return;
+  }
+  ++result_.expanded;
+  front_.add(tree().child_slot(candidate.place), given.child_records, &candidate);
+  meter_.spend(given.positions.size());
+}
+
+template <class Triangulation>
+void ViewControl<Triangulation>::Impl::collapse(Slot slot) {
+  const ClusterId id = tree().id(slot);
+  const ChildRef place = tree().place(slot);
+  const std::size_t points = tree().size(slot);
+  model_.collapse(id);
+  front_.drop(slot, place);
+  cache_.find(id, true);  // likely to come back
+  ++result_.collapsed;
+  meter_.spend(points);
+}
+
+// What was asked for and is neither wanted now nor within the band of hysteresis.
+template <class Triangulation>
+void ViewControl<Triangulation>::Impl::withdraw() {
+  for (const auto& [id, asked] : asked_) {
+    if (asked.step == number_) continue;
+    const auto place = tree().find(id);
+    if (place && front_.keep(*place) >= options_.collapse_below) continue;
+    result_.withdrawn.push_back(id);
+  }
+  std::sort(result_.withdrawn.begin(), result_.withdrawn.end());
+  for (const ClusterId id : result_.withdrawn) asked_.erase(id);
+}
+
+template <class Triangulation>
+ViewControl<Triangulation>::ViewControl(std::vector<std::uint64_t> counts, GivenCluster root,
+                                        ViewOptions options)
+    : impl_(std::make_unique<Impl>(std::move(counts), std::move(root), std::move(options))) {}
+template <class Triangulation>
+ViewControl<Triangulation>::~ViewControl() = default;
+template <class Triangulation>
+auto ViewControl<Triangulation>::model() const -> const Model& {
+  return impl_->model_;
+}
+template <class Triangulation>
+const ViewOptions& ViewControl<Triangulation>::options() const {
+  return impl_->options_;
+}
+template <class Triangulation>
+auto ViewControl<Triangulation>::step(const View& view, const StepBudget& budget) -> const Step& {
+  return impl_->step(view, budget);
+}
+template <class Triangulation>
+bool ViewControl<Triangulation>::give(GivenCluster cluster) {
+  detail::check(cluster, impl_->model_.top());
+  impl_->asked_.erase(cluster.cluster);
+  impl_->faulty_.erase(cluster.cluster);
+  return impl_->cache_.give(std::move(cluster));
+}
+template <class Triangulation>
+void ViewControl<Triangulation>::forget(ClusterId cluster) {
+  impl_->asked_.erase(cluster);
+}
+template <class Triangulation>
+void ViewControl<Triangulation>::pin(ClusterId cluster, Pin how) {
+  impl_->front_.pin(cluster, how);
+}
+template <class Triangulation>
+void ViewControl<Triangulation>::unpin(ClusterId cluster) {
+  impl_->front_.unpin(cluster);
+}
+template <class Triangulation>
+std::size_t ViewControl<Triangulation>::cached_bytes() const {
+  return impl_->cache_.bytes();
+}
+template <class Triangulation>
+std::size_t ViewControl<Triangulation>::memory_bytes() const {
+  return impl_->model_.memory_bytes() + impl_->front_.memory() + impl_->asked_.size() * 64;
+}
+
+}  // namespace terrace::tri
