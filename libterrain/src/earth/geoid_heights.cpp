@@ -10,6 +10,7 @@
 #include <GeographicLib/Geoid.hpp>
 
 #include "earth/crs/crs_definition.hpp"
+#include "earth/crs/operation_choice.hpp"
 #include "earth/crs/proj_object.hpp"
 #include "earth/ground.hpp"
 #include "earth/world.hpp"
