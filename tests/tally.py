@@ -15,8 +15,9 @@ import os
 import re
 import sys
 
-# What no installation can mend: hardware, privileges, data that a machine need not have.
-MAY_LACK = re.compile(r'AVX|GPU|CUDA|nvidia|driver|privileges|sanitizer|TERRACE_DATA', re.IGNORECASE)
+# What no installation can mend: hardware, privileges, data that a machine need not have; and a compiler of a
+# gigabyte.
+MAY_LACK = re.compile(r'AVX|GPU|CUDA|nvidia|driver|privileges|sanitizer|Emscripten|TERRACE_DATA', re.IGNORECASE)
 
 GTEST = re.compile(r'^\[ +(OK|FAILED|SKIPPED) +\] ([\w/.]+)(?:, where .*)? \(\d+ ms\)', re.MULTILINE)
 GTEST_REASON = re.compile(r': Skipped\n(.*)\n')

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "interpolation/blocks.hpp"
+#include "for_blocks.hpp"
 #include "pool.hpp"
 
 /// Sorting of points by the cell of a space-filling curve that they are in.

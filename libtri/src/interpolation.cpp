@@ -9,7 +9,7 @@
 
 #include "delaunay2/access.hpp"
 #include "delaunay2/hilbert.hpp"
-#include "interpolation/blocks.hpp"
+#include "for_blocks.hpp"
 #include "interpolation/check_heights.hpp"
 #include "interpolation/sampler.hpp"
 #include "portable_math.hpp"

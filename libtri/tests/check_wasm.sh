@@ -8,5 +8,5 @@ shift 3
 [ -n "$compiler" ] || { echo "skipped: em++ (Emscripten) is not installed"; exit 77; }
 mkdir -p "$folder"
 "$compiler" -std=c++20 -O1 -fexceptions -Wall -Wextra -Wshorten-64-to-32 -Werror -DTERRACE_TRI_CORE -DNDEBUG -ffp-contract=off \
-  -sALLOW_MEMORY_GROWTH=1 -I "$root/include" -I "$root/src" "$@" "$root/examples/flight.cpp" -o "$folder/flight.js"
+  -sALLOW_MEMORY_GROWTH=1 -sSINGLE_FILE=1 -I "$root/include" -I "$root/src" "$@" "$root/examples/flight.cpp" -o "$folder/flight.js"
 node "$folder/flight.js"

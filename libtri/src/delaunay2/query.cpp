@@ -2,7 +2,7 @@
 #include "query.hpp"
 
 #include <algorithm>
-#include <bit>
+#include <cstring>
 
 #include "double_kernel.hpp"
 #include "elliptical_kernel.hpp"
@@ -55,8 +55,12 @@ std::uint64_t mix(std::uint64_t z) {
 }
 template <class Coord>
 std::uint64_t bits(Coord c) {
-  if constexpr (std::is_same_v<Coord, double>)
-    return std::bit_cast<std::uint64_t>(c + 0.0);  // one zero
+  if constexpr (std::is_same_v<Coord, double>) {
+    c += 0.0;  // one zero
+    std::uint64_t result = 0;
+    std::memcpy(&result, &c, sizeof result);
+    return result;
+  }
   return static_cast<std::uint64_t>(c);
 }
 

@@ -34,14 +34,15 @@ void for_blocks(std::size_t count, std::size_t block, unsigned threads, Make mak
       next = blocks;
     }
   };
-  std::vector<std::jthread> others;
+  std::vector<std::thread> others;  // no jthread: not all standard libraries have it
+  others.reserve(used);
   try {
     for (std::size_t i = 1; i < used; ++i) others.emplace_back(run);
   } catch (const std::system_error&) {
     // The system grants no more threads. Those there are do the same work.
   }
   run();
-  others.clear();
+  for (std::thread& other : others) other.join();
   if (failure) std::rethrow_exception(failure);
 }
 
