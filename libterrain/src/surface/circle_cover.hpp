@@ -21,6 +21,13 @@ struct HalfPlane {
   std::array<double, 2> a{}, b{};
 
   [[nodiscard]] bool meets(const StoredBox& box) const { return !(leftness(box) > 0); }
+  /// Whether hardly anything of the box lies in it. Boxes of stores are a little larger than what
+  /// they hold.
+  [[nodiscard]] bool grazes(const StoredBox& box) const {
+    const double across = std::abs(b[0] - a[0]) * (box.max[1] - box.min[1]) +
+                          std::abs(b[1] - a[1]) * (box.max[0] - box.min[0]);
+    return leftness(box) > -across / 64;
+  }
   /// Of the corner that lies farthest to the right: above 0 only if it is left of the line for
   /// certain. Proportional to the distance, for comparing.
   [[nodiscard]] double leftness(const StoredBox& box) const {

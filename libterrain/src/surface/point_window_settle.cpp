@@ -309,6 +309,13 @@ bool PointWindow::find_missing(const Suspect& suspect, bool is_near) {
   }
   if (best == kNoOpen) return false;
   chosen_.push_back(best);
+  if (cover.has_plane && !cover.has_disk && cover.plane.grazes(open[best].box)) {
+    // Hardly anything lies beyond this edge of the hull, but on its line: on a straight border,
+    // much. None of that makes the plane smaller, so all of it has to be looked into.
+    for (std::uint32_t k = 0; k < open.size(); ++k) {
+      if (open[k].level == open[best].level && cover.meets(open[k].box)) chosen_.push_back(k);
+    }
+  }
   return true;
 }
 
