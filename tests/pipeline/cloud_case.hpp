@@ -69,6 +69,10 @@ inline Points points_of(const std::string& kind) {
       const double t = random.unit() * 1000, s = random.unit() * 60;
       add(0.8 * t - 0.6 * s, 0.6 * t + 0.8 * s);
     }
+  } else if (kind == "straight borders") {  // a tile that was cut out of a scan
+    for (int i = 0; i < 3000; ++i) add(std::round(random.unit() * 1e3), random.unit() * 1000);
+    for (int i = 0; i < 600; ++i) add(i % 2 * 1000, random.unit() * 1000);
+    for (int i = 0; i < 600; ++i) add(random.unit() * 1000, i % 2 * 1000);
   } else if (kind == "circle") {  // slivers along the hull, all the same circle within
     for (int i = 0; i < 700; ++i) add(std::cos(i * 0.1) * 1000, std::sin(i * 0.1) * 1000);
   } else if (kind == "parabola") {

@@ -142,8 +142,9 @@ TEST_P(Clouds, WindowsHaveTheTrianglesOfTheWhole) {
 
 INSTANTIATE_TEST_SUITE_P(PointWindow, Clouds,
                          testing::Values("random", "lattice", "duplicates", "voids", "clusters",
-                                         "turned", "circle", "parabola", "far", "huge", "tiny",
-                                         "line", "nearly a line", "one", "two", "one place"),
+                                         "turned", "straight borders", "circle", "parabola", "far",
+                                         "huge", "tiny", "line", "nearly a line", "one", "two",
+                                         "one place"),
                          [](const auto& one) {
                            std::string name = one.param;
                            std::replace(name.begin(), name.end(), ' ', '_');
