@@ -169,9 +169,8 @@ class MeshCommand final : public Command {
         (all ? "" : " of " + with_commas(result.samples)) + " samples (RMS " +
         readable_number(result.rms_error) + " m), in " + readable_seconds(watch.seconds()) + "\n";
     if (!all) {
-      summary.text += with_commas(result.uncovered) +
-                      " samples lie on no triangle: " + why_uncovered(result, store.schema().grid) +
-                      "\n";
+      summary.text += with_commas(result.uncovered) + " samples lie on no triangle: " +
+                      why_uncovered(result, store.schema().grid, options.region.has_value()) + "\n";
     }
     if (result.duplicates > 0) {
       summary.text +=
@@ -184,8 +183,9 @@ class MeshCommand final : public Command {
     return summary;
   }
 
-  static std::string why_uncovered(const BoundedMeshResult& result, bool grid) {
+  static std::string why_uncovered(const BoundedMeshResult& result, bool grid, bool region) {
     if (result.triangles == 0) return "nothing spans an area";
+    if (grid && region) return "they are at the region's border or beside cells without data";
     return grid ? "they are beside cells without data"
                 : "the file's format rounds the border of the mesh";
   }
