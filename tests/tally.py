@@ -15,8 +15,8 @@ import os
 import re
 import sys
 
-# What no installation can mend: hardware, privileges, data that a machine need not have; and a compiler of a
-# gigabyte.
+# Reasons that no installation can mend (hardware, privileges, data that a machine need not have), and
+# Emscripten, which takes a gigabyte.
 MAY_LACK = re.compile(r'AVX|GPU|CUDA|nvidia|driver|privileges|sanitizer|Emscripten|TERRACE_DATA', re.IGNORECASE)
 
 GTEST = re.compile(r'^\[ +(OK|FAILED|SKIPPED) +\] ([\w/.]+)(?:, where .*)? \(\d+ ms\)', re.MULTILINE)

@@ -324,7 +324,7 @@ const std::vector<std::byte>& GeoTiffBlocks::decoded(const Part& part, std::uint
 }
 
 void GeoTiffBlocks::decode(const Part& part, std::uint64_t offset, std::uint64_t bytes) {
-  // Of a tile that hangs over the lower edge, some writers leave out the rows beyond.
+  // Some writers leave out a tile's rows beyond the lower edge of the image.
   const std::uint64_t due = layout_.row_bytes() * layout_.rows_in_image(part.down);
   if (bytes > kMostGrowth * due + kMostOverhead) {
     fail(part, offset,

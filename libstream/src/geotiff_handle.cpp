@@ -124,7 +124,7 @@ GeoTiffHandle::GeoTiffHandle(const std::string& file, std::uint64_t memory_bytes
   if (status.st_size == 0) fail({}, "is empty", "fetch or write the file again");
   io_->size = file_bytes_ = static_cast<std::uint64_t>(status.st_size);
 
-  // Of a directory, the longest arrays are those of the blocks' places: 8 bytes in memory for at
+  // The longest arrays of a directory are those of the blocks' places: 8 bytes in memory for at
   // least 2 in the file. Codecs need a decoded block at most.
   const std::uint64_t most =
       std::max({memory_bytes, std::min(4 * file_bytes_ + kMiB, 1024 * kMiB), 4 * kMiB});

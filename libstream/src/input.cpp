@@ -94,7 +94,7 @@ class Input::Descriptor {
   [[nodiscard]] bool skip(std::uint64_t count) const {
     return ::lseek(fd_, static_cast<off_t>(count), SEEK_CUR) >= 0;
   }
-  /// Of a regular file.
+  /// Known for a regular file only.
   [[nodiscard]] std::optional<std::uint64_t> size() const { return size_; }
 
  private:

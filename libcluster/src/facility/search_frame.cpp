@@ -34,7 +34,7 @@ std::vector<Point3> scaled(std::span<const Point3> points, const Scaling& scalin
   return result;
 }
 
-// Of a box with one corner at the origin, the longest of its diagonals.
+// The longest diagonal of a box with one corner at the origin.
 double mapped_diagonal(const LinearMap& map, const Point3& extent) {
   double longest = 0.0;
   for (unsigned corner = 0; corner < 4; ++corner) {

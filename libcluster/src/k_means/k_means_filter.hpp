@@ -28,7 +28,7 @@ class KMeansFilter {
   /// One assignment. Returns whether a point changed its cluster since the last.
   bool assign(std::span<const Point3> centres);
 
-  /// Of the clusters; always added up in the same order.
+  /// Sums of the clusters, always added up in the same order.
   [[nodiscard]] std::span<Sum> sums() { return sums_; }
   /// The cluster of the point at a place.
   [[nodiscard]] std::uint32_t cluster(std::size_t place) const { return cluster_[place]; }

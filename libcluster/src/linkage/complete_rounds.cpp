@@ -84,7 +84,7 @@ void CompleteRounds<T>::begin_minima(std::size_t count) {
   }
 }
 
-/// Of cluster c out of `count`.
+/// For cluster c out of `count`.
 template <class T>
 void CompleteRounds<T>::note_minima(std::uint32_t c, const Cluster& cluster, std::uint32_t count,
                                     Columns& columns) {
@@ -317,7 +317,7 @@ void CompleteRounds<T>::chain() {
       chain.push_back(start);
     }
     const std::uint32_t c = chain.back();
-    // Of equally near ones the last on the chain: it would never end otherwise.
+    // Among equally near ones take the last on the chain: it would never end otherwise.
     Nearest best{std::numeric_limits<T>::infinity(), kNone};
     if (chain.size() > 1) best = {entry(c, chain[chain.size() - 2]), chain[chain.size() - 2]};
     best = nearest_of(c, best);

@@ -27,8 +27,8 @@ struct LinkageKernels {
   /// out[k] = max(from[first[k]], from[second[k]])
   void (*pick)(const T* from, const std::uint32_t* first, const std::uint32_t* second,
                std::size_t count, T* out);
-  /// Of how many k < count first[k] is one of the `length` numbers after a, modulo m, and second[k]
-  /// is not. All numbers are below m.
+  /// For how many k < count first[k] is one of the `length` numbers after a, modulo m, and
+  /// second[k] is not. All numbers are below m.
   std::uint32_t (*straddling)(const std::uint32_t* first, const std::uint32_t* second,
                               std::size_t count, std::uint32_t a, std::uint32_t length,
                               std::uint32_t m);

@@ -183,7 +183,7 @@ void SpanningTree::search_from(const Group& group, std::uint32_t own) {
 void SpanningTree::merge() {
   for (const std::uint32_t root : roots_) {
     const TreeEdge& edge = shortest_[root];
-    // Of two components that chose each other, one comes first.
+    // Two components may have chosen each other: one comes first.
     if (root != largest_ && sets_.unite(edge.low, edge.high)) edges_.push_back(edge);
   }
   for (const std::uint32_t root : roots_) sets_.flatten(root);

@@ -23,7 +23,7 @@ class UnionFind {
   }
   /// After calls for all members in ascending order root() is one step for each.
   void flatten(std::uint32_t x) { parent_[x] = parent_[parent_[x]]; }
-  /// Of a flattened member. Changes nothing: for several threads at once.
+  /// The root of a flattened member. Changes nothing: for several threads at once.
   [[nodiscard]] std::uint32_t root(std::uint32_t x) const { return parent_[x]; }
   /// False if they were one set already.
   bool unite(std::uint32_t x, std::uint32_t y) {

@@ -182,7 +182,7 @@ class Pricing {
     for (std::uint32_t k = 0; k < count; ++k) points[k] = points_[members_[k].vertex];
     const BoxTree<D> tree(std::move(points));
     const auto& nodes = tree.nodes();
-    // Of each box the largest potential, and the part if all its points are in one.
+    // For each box the largest potential, and the part if all its points are in one.
     std::vector<std::int64_t> most(nodes.size());
     std::vector<std::uint32_t> part(nodes.size()), deepest(nodes.size());
     for (std::size_t x = nodes.size(); x-- > 0;) {

@@ -83,11 +83,11 @@ std::uint32_t Solver::solve() {
     const bool unlimited = exposed <= 2 || limit > kLimit / 16;
     const std::uint32_t before = exposed;
     for (std::uint32_t v = 0; v < n_; ++v) {
-      // Of an exposed blossom its base is the root, so that each pass searches from it once.
+      // The base of an exposed blossom is its root, so that each pass searches from it once.
       if (!is_exposed(v) || nodes_[top(v)].base != v) continue;
       const bool last = exposed == 2 && late_ != kNone && is_exposed(late_);
       if (v == late_ && !last) continue;
-      // Of the last two the late vertex is the root: its tree is one edge.
+      // When two are left the late vertex is the root: its tree is one edge.
       const std::uint32_t root = top(last ? late_ : v);
       const Outcome outcome =
           search(root, unlimited || last ? std::numeric_limits<std::int64_t>::max() : limit);
@@ -114,7 +114,7 @@ std::int64_t Solver::first_limit() const {
 
 std::vector<std::uint32_t> Solver::mates() {
   std::vector<std::uint32_t> mate(n_, kNone), open;
-  // Of a blossom's parts each is a range of its list of vertices.
+  // Each of a blossom's parts is a range of its list of vertices.
   std::vector<std::uint32_t> position(n_, 0);
   const auto holds = [&](std::uint32_t node, std::uint32_t vertex) {
     const Node& x = nodes_[node];

@@ -54,7 +54,7 @@ class Solver {
   std::uint32_t node_count() const { return static_cast<std::uint32_t>(nodes_.size()); }
   std::int64_t potential(std::uint32_t vertex) const { return vertices_[vertex].potential; }
   std::uint32_t parent(std::uint32_t node) const { return nodes_[node].parent; }
-  /// Of a blossom in use; 0 for vertices.
+  /// The dual value of a blossom in use; 0 for vertices.
   std::int64_t blossom_dual(std::uint32_t node) const { return nodes_[node].dual; }
   bool in_use(std::uint32_t node) const { return nodes_[node].first != kNone; }
   std::size_t edge_count() const { return edges_.size(); }

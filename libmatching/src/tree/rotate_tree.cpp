@@ -90,7 +90,7 @@ class Rotation {
     return children.a == child ? children.b : children.a;
   }
 
-  // Of those swaps below v that make the boxes of its children smaller the best is made.
+  // Makes the best of the swaps below v that shrink the boxes of its children.
   double rotate(std::uint32_t v) {
     const auto [a, b] = children_[v - count_];
     Swap best;

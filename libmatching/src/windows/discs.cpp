@@ -58,7 +58,7 @@ void Discs::take(std::size_t w, std::span<const std::uint32_t> points,
 // A moat gives way for all points inside at once, the outer ones first; what is left the discs
 // give.
 void Discs::give_way(const std::vector<double>& excess) {
-  // Of each moat what its points need; then what it and those outward give.
+  // For each moat, what its points need; then what it and those outward give.
   std::vector<std::vector<double>> given(windows_.size());
   for (std::size_t w = 0; w < windows_.size(); ++w) given[w].assign(windows_[w].moats.size(), 0.0);
   for (std::size_t i = 0; i < radius_.size(); ++i) {
@@ -120,7 +120,7 @@ class Excess {
     }
   }
 
-  /// Of each point the distance to the nearest other one, but at most `most`.
+  /// Each point's distance to the nearest other one, but at most `most`.
   std::vector<double> nearest(std::span<const double> most) const {
     std::vector<double> result(points_.size(), 0.0);
     for_each_chunk([&](std::uint32_t k, std::vector<std::uint32_t>&) {
@@ -133,8 +133,8 @@ class Excess {
     return result;
   }
 
-  /// Of each point i the largest share * (own[i] + others[j] - distance) over the points j of other
-  /// windows, at least 0.
+  /// For each point i the largest share * (own[i] + others[j] - distance) over the points j of
+  /// other windows, at least 0.
   std::vector<double> operator()(std::span<const double> own, std::span<const double> others,
                                  double share) {
     const auto& nodes = tree_.nodes();

@@ -28,7 +28,7 @@ class IndexPage {
 
   [[nodiscard]] std::uint32_t clusters() const { return clusters_; }
   [[nodiscard]] Entry entry(std::uint32_t i) const;
-  /// Of cluster i in the data file; i = clusters() is behind the last.
+  /// Offset of cluster i in the data file; i = clusters() is behind the last.
   [[nodiscard]] std::uint64_t offset(std::uint32_t i) const { return offsets_[i]; }
   /// Offset of the cluster behind the last.
   [[nodiscard]] std::uint64_t end() const { return offsets_[clusters_]; }

@@ -33,7 +33,7 @@ struct Layout {
       : grid(schema.grid), level(of_level), payload_size(schema.payload_size()) {
     for (const Channel& channel : schema.attributes) attributes.push_back(channel.type);
   }
-  /// Of a cluster: coordinates, attributes and children of all its points fit kMostDecodedBytes.
+  /// Most points in a cluster: their coordinates, attributes and children fit kMostDecodedBytes.
   [[nodiscard]] std::uint64_t most_points() const {
     const std::uint64_t bytes = sizeof(Point3) + payload_size + sizeof(std::uint64_t) * level;
     return std::min<std::uint64_t>(kMostPoints, kMostDecodedBytes / bytes);

@@ -70,7 +70,7 @@ class LevelReader {
   [[nodiscard]] std::shared_ptr<const IndexPage> page(std::uint64_t number) const;
   /// The entry and where its bytes begin. Throws: Error.
   [[nodiscard]] Entry entry(std::uint64_t ordinal, std::uint64_t& offset) const;
-  /// Of the i-th cluster of `page`, checked against the manifest. Throws: Damage.
+  /// The entry of the i-th cluster of `page`, checked against the manifest. Throws: Damage.
   [[nodiscard]] Entry entry(const IndexPage& page, std::uint32_t i) const;
   /// Throws: Error.
   void read(std::uint64_t ordinal, ReadSpace& space, ClusterPoints& out) const;

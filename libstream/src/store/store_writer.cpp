@@ -22,7 +22,7 @@ class StoreWriter::Encoded {
  public:
   unsigned level = 0;
   PreparedBlock block;
-  // Of the block's points, for level 0.
+  // Totals over the block's points, for level 0.
   std::uint64_t points = 0;
   double height_sum = 0.0;
   Box3 bounds;

@@ -40,8 +40,8 @@ class RegionGrid {
   std::size_t side_ = 256;
   Point2 low_{}, high_{}, per_unit_{}, margin_{};
   std::vector<std::uint8_t> cells_;  ///< an Overlap each: so small that caches keep them
-  /// Of those numbers over all cells with a lower column and row, so that any rectangle of cells is
-  /// told from four.
+  /// Sums of those numbers over all cells with a lower column and row: any rectangle's sum is had
+  /// from four of them.
   std::vector<std::uint32_t> sums_;
 };
 

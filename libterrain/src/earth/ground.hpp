@@ -47,7 +47,7 @@ class Ground {
 
   /// What had to be assumed because the source does not say; empty if nothing.
   [[nodiscard]] const std::string& assumption() const { return assumption_; }
-  /// Of a unit of heights, weighed.
+  /// Metres in a unit of heights, times the weight of heights.
   [[nodiscard]] double metres_vertical() const { return metres_vertical_; }
 
  private:

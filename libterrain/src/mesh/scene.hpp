@@ -22,7 +22,7 @@ struct TriangleMesh {
   std::vector<std::uint32_t> representatives;  ///< of the clusters: vertex numbers, any length
   std::vector<Rgb> colours;
   std::vector<std::array<float, 3>> normals;  ///< unit length
-  /// Of a cloud that is coarse somewhere: the levels that are left out around a point, 0 for none.
+  /// For a cloud that is coarse somewhere: how many levels are left out around each point.
   std::vector<std::uint8_t> left_out;
 };
 

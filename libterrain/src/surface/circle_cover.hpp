@@ -28,7 +28,7 @@ struct HalfPlane {
                           std::abs(b[1] - a[1]) * (box.max[0] - box.min[0]);
     return leftness(box) > -across / 64;
   }
-  /// Of the corner that lies farthest to the right: above 0 only if it is left of the line for
+  /// How far left the rightmost corner of the box lies: above 0 only if it is left of the line for
   /// certain. Proportional to the distance, for comparing.
   [[nodiscard]] double leftness(const StoredBox& box) const {
     const double ux = b[0] - a[0], uy = b[1] - a[1];

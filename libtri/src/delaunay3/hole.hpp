@@ -31,11 +31,11 @@ struct Hole {
   /// Fill the hole of one vertex by ear_queue.cpp, a second method to compare with.
   bool by_ears = false;
 
-  // Of hole_filling.hpp: open facets, as a stack, some of them closed again; facets by corners.
+  // For hole_filling.hpp: open facets, as a stack, some of them closed again; facets by corners.
   std::vector<std::uint32_t> pending;
   std::vector<FacetEntry> table;
 
-  // Of wrap.cpp: coordinates of the vertices by local number, padded; what a facet makes of each;
+  // For wrap.cpp: coordinates of the vertices by local number, padded; what a facet makes of each;
   // numbers of those that may be the next corner.
   std::vector<double> x, y, z;
   std::vector<double> power, volume;

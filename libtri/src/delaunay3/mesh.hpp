@@ -43,7 +43,7 @@ struct Mesh {
   using Vertex = typename Kernel::Vertex;  ///< point and incident
 
   Pool<Vertex> vertex;  ///< slot 0 is the ghost
-  /// Of all points there have been since the slots were forgotten.
+  /// Holds all points there have been since the slots were forgotten.
   typename Kernel::Lattice lattice;
   // By tetrahedron slot. Empty while all points are coplanar ("flat").
   Pool<Tetrahedron> tetrahedron;

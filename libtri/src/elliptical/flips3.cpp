@@ -27,7 +27,7 @@ Flips3::Key Flips3::key_of(Side side) const {
   return key;
 }
 
-/// Of a tetrahedron of the region; true too where nothing can be done, at the region's border.
+/// Asked of a tetrahedron of the region; also true at its border, where nothing can be done.
 bool Flips3::is_delaunay(std::uint32_t t, std::uint32_t i) const {
   const Side mate = tetrahedron[t].mate[i];
   if (mate == kHullSide) return true;

@@ -143,7 +143,7 @@ class Flips {
       if (mate == kNoSide) continue;
       const std::uint32_t o = triangle_of(mate);
       const std::uint32_t k = index_of(mate);
-      // Of the neighbour, two corners are this triangle's.
+      // Two of the neighbour's corners are this triangle's.
       if (region_[triangle_[o].corner[k]] != region) continue;
       const auto& [a, b, c] = triangle_[t].corner;
       // A corner inside lies within the angle at the opposite one: the four are convex.

@@ -47,12 +47,12 @@ struct VoronoiCell {
   std::vector<Vector> round;   ///< corners of the cell by edge of the rim
   std::vector<Number> area;    ///< twice the area taken from each corner
   Number total = 0;            ///< twice the cell's
-  /// Of doubles: the sum of squares of errors of centres, in units of rounding; an estimate.
+  /// With doubles: the sum of squares of errors of centres, in units of rounding; an estimate.
   Number error = 0;
   Number extent = 0;  ///< of doubles: the sum of squares of `round`
 
   void measure(const Cavity& cavity, const Query& p);
-  /// Of doubles, after measure(): whether the weights will be right to kTolerance.
+  /// With doubles, after measure(): whether the weights will be right to kTolerance.
   [[nodiscard]] bool accurate() const;
   /// The derivatives of the weights area / total by the query's coordinates, by corner. On a vertex
   /// (find_link()): numbers s(i) so that the sum of s(i) * (height(i) - height of the vertex) is

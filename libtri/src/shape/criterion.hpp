@@ -40,7 +40,7 @@ struct Gabriel {
 
 /// The length, without over- or underflow. Symmetric.
 inline double distance(const Vector3& a, const Vector3& b) {
-  // Of finite doubles the difference of quarters is finite; below, scaling is exact.
+  // The difference of quarters of finite doubles is finite; below, scaling is exact.
   constexpr double kBig = 0x1p480, kSmall = 0x1p-480;
   Vector3 d = minus(a, b);
   const double m = largest(d);
@@ -65,7 +65,7 @@ Vector3 edge(const Mesh&, const Vector3& a, const Vector3& b) {
   }
 }
 
-/// Of that.
+/// The length that goes with it.
 template <class Mesh>
 double edge_length(const Mesh& mesh, const Vector3& a, const Vector3& b) {
   if constexpr (is_elliptical<Mesh>) {

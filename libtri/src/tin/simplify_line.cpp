@@ -58,7 +58,7 @@ SimplifiedLine simplify_line(std::span<const double> t, std::span<const double> 
                              double max_error, const std::optional<TinLattice>& lattice) {
   check(t, heights, max_error, lattice);
   SimplifiedLine result;
-  // Of samples at one place the first stands.
+  // The first of several samples at one place stands for all.
   std::vector<std::size_t> samples;
   for (std::size_t i = 0; i < t.size(); ++i)
     if (i == 0 || t[i] != t[i - 1]) samples.push_back(i);

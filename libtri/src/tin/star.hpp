@@ -22,7 +22,7 @@ struct PolygonFill {
   std::array<std::array<std::uint8_t, kMaxRing>, kMaxRing> apex;
 };
 
-/// Of the ways to cut a polygon of `size` corners that is given counter-clockwise into triangles,
+/// Among the ways to cut a counter-clockwise polygon of `size` corners into triangles, finds
 /// the one whose worst triangle is the least bad. `worst(i, m, j, limit)`, for corners i < m < j:
 /// what the triangle costs, or anything above `limit`, if it is more than that or not
 /// counter-clockwise or not wanted. False: there is none of at most `limit`. Dynamic programming,
@@ -64,7 +64,7 @@ class AnyFill {
  public:
   AnyFill(const Fits& fits, PolygonFill& fill) : fits_(fits), fill_(fill) {}
 
-  /// Of a polygon of `size` corners; false: there is none.
+  /// Looks for a polygon of `size` corners; false: there is none.
   bool find(std::size_t size) {
     found_.fill(0);
     failed_.fill(0);

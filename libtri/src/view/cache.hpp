@@ -31,7 +31,7 @@ class ViewCache final : public ClusterSource {
   [[nodiscard]] std::size_t bytes() const { return bytes_; }
   [[nodiscard]] std::size_t max_bytes() const { return max_bytes_; }
   [[nodiscard]] std::size_t size() const { return places_.size(); }
-  /// Of a cluster that holds this many members.
+  /// What a cluster with this many members takes.
   [[nodiscard]] static double bytes_of(unsigned level, std::uint64_t members);
 
   /// Makes the record known that the model will ask for.

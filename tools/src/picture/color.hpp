@@ -29,8 +29,8 @@ struct HeightTint {
   double low = 0.0, high = 1.0;
   bool shore = false;
 
-  /// Of heights that stand for equal parts of what is shown. Those that are not finite are ignored.
-  /// O(n log n).
+  /// heights: each stands for an equal part of what is shown. Those that are not finite are
+  /// ignored. O(n log n).
   static HeightTint of(std::vector<double> heights);
   [[nodiscard]] Rgb colour(double height) const;
 };

@@ -73,7 +73,7 @@ void draw_dendrogram(const Dendrogram& tree, Canvas& canvas) {
   const double margin = 0.03 * std::min(canvas.width(), canvas.height());
   const double wide = canvas.width() - 2 * margin, high = canvas.height() - 2 * margin;
   const double top = tree.merges.back().height;
-  // Of equal points all merges lie at 0.
+  // All merges of equal points lie at 0.
   const double scale = top > 0 ? high / top : 0.0;
   const double step = wide / static_cast<double>(tree.points);
   // Two samples make a pixel; crowded lines are one sample wide.

@@ -19,7 +19,7 @@ class CsvRows {
   /// The next line that is not empty, without its end; false at the end of the file.
   /// Throws: stream::Error on a line too long to be a row.
   bool next(std::string_view& line);
-  /// Of the line that next() gave: "line 3".
+  /// The place of the line that next() gave: "line 3".
   [[nodiscard]] std::string where() const { return "line " + std::to_string(number_); }
 
  private:

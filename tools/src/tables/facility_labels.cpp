@@ -43,7 +43,7 @@ class ParentSink final : public cluster::HierarchySink {
 
   void root(const cluster::FinishedBlock&) override {}
 
-  /// Of the levels below the root. Clusters on each.
+  /// The number of clusters on each level below the root.
   [[nodiscard]] const std::vector<std::size_t>& counts() const { return counts_; }
   [[nodiscard]] const std::vector<std::uint32_t>& parents(std::size_t level) const {
     return parents_[level];

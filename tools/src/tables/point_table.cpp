@@ -45,7 +45,7 @@ void PointTable::drop(const std::string& name) {
 
 std::uint64_t reading_within_memory(const stream::PointSource& source, std::uint64_t memory_bytes) {
   // The program itself and the blocks that are read ahead.
-  constexpr std::uint64_t kBeside = std::uint64_t{20} << 20;
+  constexpr std::uint64_t kBeside = std::uint64_t{24} << 20;
   const std::uint64_t reading = source.reading_bytes();
   if (reading == 0 || kBeside + reading <= memory_bytes) return reading;
   throw stream::Error(

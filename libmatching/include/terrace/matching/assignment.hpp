@@ -16,7 +16,7 @@ inline constexpr std::uint32_t kUnassigned = 0xFFFFFFFFu;
 /// Which column each row got, what that costs, and the proof that nothing is cheaper.
 template <class Number>
 struct BasicAssignment {
-  /// Of each row: its column, or kUnassigned. As many rows have one as rows and columns allow;
+  /// Each row's column, or kUnassigned. As many rows have one as rows and columns allow;
   /// all columns are different.
   std::vector<std::uint32_t> column;
   Number cost = 0;  ///< sum of the chosen entries, added in row order

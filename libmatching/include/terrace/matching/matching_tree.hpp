@@ -32,7 +32,7 @@ struct MatchingTree {
   /// consecutive, clusters by ascending label, then those that join the clusters; within each by
   /// ascending level.
   std::vector<MatchingTreeRow> rows;
-  /// Of each row's node: the mean of all points below by their weights.
+  /// For each row's node, the weighted mean of all points below it.
   std::vector<Point> positions;
   /// The last row's node; 0 where there is one point; kNobody where there is none, and if stopped.
   std::uint32_t root = kNobody;

@@ -55,7 +55,7 @@ struct Crs {
   bool geographic = false;      ///< x, y are longitude and latitude
   std::string horizontal_unit;  ///< "metre", "foot", "US survey foot", "degree"; empty if unknown
   std::string vertical_unit;    ///< likewise for heights
-  /// Of a GeoTIFF, in ascending order: datum, projection and their parameters. Not kept in a store.
+  /// A GeoTIFF's keys in ascending order: datum, projection, parameters. Not kept in a store.
   std::vector<GeoKey> geo_keys{};
 
   friend bool operator==(const Crs&, const Crs&) = default;

@@ -38,7 +38,7 @@ struct ContourOutcome {
 /// Lines and their order depend on neither threads nor memory. Memory: a band of rows, or parts of
 /// 65,536 to 2^19 points per thread, and the lines that go on beyond. Throws: stream::Error if the
 /// store has no CRS, does not meet the region, is damaged, or if the lines at work do not fit;
-/// UsageError for a level that the store has not, and for max_edge with a raster at level 0.
+/// UsageError for a level that the store does not have, and for max_edge with a raster at level 0.
 ContourOutcome write_contours(const stream::Store& store, const ContourRequest& request,
                               const std::function<void(std::string_view)>& write,
                               const Context& context = {});

@@ -48,8 +48,8 @@ struct TileZoom {
 
 struct TilesOutcome {
   std::uint64_t tiles = 0, bytes = 0;
-  std::uint64_t made = 0;     ///< of these, that were not known to be there and the same
-  std::uint64_t kept = 0;     ///< of these, whose files were whole and the same: not touched
+  std::uint64_t made = 0;     ///< of these, written anew: missing before, or out of date
+  std::uint64_t kept = 0;     ///< of these, left alone: their files were whole and up to date
   std::uint64_t removed = 0;  ///< tiles of an earlier set that this one does not have
   std::vector<TileZoom> zooms;
 };
@@ -63,8 +63,8 @@ struct TilesOutcome {
 ///
 /// Tiles are written beside their names and renamed one by one, and the disk is asked once, at the
 /// end, to keep them all; layer.json comes last. A journal stays in the folder and says of each
-/// tile what it was made from and the checksum of its file. A tile for which both are as they were
-/// is not made again, be it that the run before was interrupted or that samples changed elsewhere;
+/// tile what it was made from and the checksum of its file. A tile for which both still hold
+/// is not made again, whether the previous run was interrupted or samples changed elsewhere;
 /// one that is made again and comes out the same is not touched. So the folder is the same as if
 /// it had been empty before. `resume` without `replace` is refused for a finished set of other
 /// samples or options. The folder is locked against other runs.

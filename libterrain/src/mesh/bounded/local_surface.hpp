@@ -20,7 +20,7 @@ struct ProfilePlace {
 /// The Delaunay triangulation of some samples as a surface.
 class LocalSurface {
  public:
-  /// Of samples at one place that one counts which `duplicates` names.
+  /// duplicates: which of several samples at one place counts.
   LocalSurface(const MeshSamples& samples, tri::PointDuplicates duplicates);
 
   /// Nothing outside the samples' hull.

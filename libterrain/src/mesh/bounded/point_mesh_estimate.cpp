@@ -6,7 +6,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// Of a cell's width and height: about an eighth of its area.
+/// The middle's share of a cell's width and height: about an eighth of its area.
 constexpr double kMiddle = 0.35;
 /// With fewer samples there the whole cell is taken.
 constexpr std::size_t kFewSamples = 500;

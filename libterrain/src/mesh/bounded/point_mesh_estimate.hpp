@@ -17,9 +17,9 @@ class PointMeshEstimate {
   PointMeshEstimate(const PointMeshCuts& cuts, PointMeshSamples& samples,
                     tri::PointDuplicates duplicates);
 
-  /// Of a cell's mesh by greedy insertion. max_error: in the unit of heights.
+  /// Vertices of a cell's mesh by greedy insertion. max_error: in the unit of heights.
   [[nodiscard]] double in_cell(std::uint32_t cell, double max_error) const;
-  /// Of a cell's mesh on the average, from four cells here and there.
+  /// The average over all cells, estimated from four of them.
   [[nodiscard]] double per_cell(double max_error) const;
 
  private:

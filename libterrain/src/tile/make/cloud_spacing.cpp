@@ -24,7 +24,7 @@ struct Seed {
   StoredBox box;
 };
 
-/// Of clusters of level 0, evenly over the store; of a store of one block, of its points.
+/// Seeds from clusters of level 0, evenly over the store, or from its points if it is one block.
 std::vector<Seed> some_seeds(const stream::Store& store, const StoredPlaces& places) {
   std::vector<Seed> seeds;
   stream::ClusterPoints points;
@@ -68,7 +68,7 @@ StoredBox box_of(const Seed& seed, ClusterCensus& census) {
   return box;
 }
 
-/// Of different places of a store, in degrees of latitude.
+/// The different places of a store, in degrees of latitude.
 std::vector<stream::Point3> on_the_ground(const WindowPoints& points, const StoredPlaces& places,
                                           std::vector<Point2>& stored) {
   stored.clear();

@@ -12,7 +12,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// Of the places along one axis of a window those in a range.
+/// The places along one axis of a window that lie in a range.
 struct Part {
   std::size_t first = 0, count = 0;
   bool descending = false;

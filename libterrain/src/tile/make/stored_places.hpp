@@ -25,7 +25,7 @@ class StoredPlaces {
 
   /// Around all points of the store, a little larger where it is projected.
   [[nodiscard]] const GeographicBox& bounds() const { return bounds_; }
-  /// Of all points, in stored coordinates.
+  /// The bounds of all points, in stored coordinates.
   [[nodiscard]] const StoredBox& stored_bounds() const { return stored_; }
 
   /// The boxes of stored coordinates outside of which no point of a geographic box lies: none if it
@@ -48,7 +48,7 @@ class StoredPlaces {
   Placement placement_;
   StoredBox stored_;
   GeographicBox bounds_;
-  /// Of a store in degrees: its own longitudes, and the unit's number all around the globe.
+  /// For a store in degrees: its range of longitudes, and a full turn in its unit.
   double first_longitude_ = 0.0, last_longitude_ = 0.0, turn_ = 360.0;
   Point2 margin_{};  ///< stored: what converting there and back may be off, and more
 };

@@ -58,7 +58,7 @@ struct LeafUnits {
   void convert(std::vector<double>& degrees) const {
     for (double& place : degrees) place = at(place);
   }
-  /// Of places without a height too: those may lie outside, and nothing holds them back.
+  /// Also for places without a height, which may lie outside the tile and are not clamped.
   void convert(std::vector<double>& degrees, std::span<const double> heights) const {
     for (std::size_t i = 0; i < degrees.size(); ++i) {
       degrees[i] = std::isnan(heights[i]) ? (degrees[i] - from) * units : at(degrees[i]);

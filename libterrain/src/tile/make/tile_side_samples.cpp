@@ -29,7 +29,7 @@ TileSides::SamplesAt TileSides::add_samples(const Side& side, std::vector<double
   // both.
   const bool on_180 = !side.along_parallel && std::abs(longitude.front()) == 180.0;
   if (on_180 && !surface_.sides_take_samples()) return found;
-  // Of what both tiles beside the side have alike: its ends, and a unit to either side.
+  // From what both tiles beside the side share: its ends, and a unit to either side.
   const double unit = tile_width(tile_.zoom) / kTileUnits;
   const double reach_longitude = side.along_parallel ? 0.0 : unit;
   const double reach_latitude = side.along_parallel ? unit : 0.0;
@@ -39,7 +39,7 @@ TileSides::SamplesAt TileSides::add_samples(const Side& side, std::vector<double
   const double from = t.front(), to = t.back();
   const std::optional<SurfaceSamples> near = samples_near(band);
   if (!near) {
-    // Of the smallest leaves, which have few places.
+    // The smallest leaves have few places.
     for (double at = from + 1.0; at < to; at += 1.0) t.push_back(at);
   } else {
     for (std::size_t i = 0; i < near->size(); ++i) {

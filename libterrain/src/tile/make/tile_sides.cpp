@@ -19,7 +19,7 @@ constexpr double kMostSidePlaces = 4096.0;
 /// between have what the side has.
 constexpr double kSideShare = 0.75;
 
-/// Of a tile's part at a depth; exact.
+/// The width of a tile's part at a depth; exact.
 double width_at(unsigned zoom, unsigned depth) {
   return std::ldexp(180.0, -static_cast<int>(zoom + depth));
 }

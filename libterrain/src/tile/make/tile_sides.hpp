@@ -88,7 +88,7 @@ class TileSides {
   /// Samples in a box around places on a side or at its end, the same for all tiles there; nothing
   /// if they may be too many.
   std::optional<SurfaceSamples> samples_near(const GeographicBox& box);
-  /// Of samples at the end of a side: the same for all sides and tiles that meet there.
+  /// The samples at the end of a side: the same for all sides and tiles that meet there.
   std::optional<Samples> samples_at_corner(double longitude, double latitude);
   [[nodiscard]] bool is_cut(const Side& side) const;
   /// Whether a leaf beside a side has too many samples; the same for both tiles.

@@ -80,7 +80,7 @@ class TileSurface {
     static_cast<void>(out);
     return false;
   }
-  /// Of the heights of samples in the box, cheaply. Nothing if there is no sample.
+  /// The range of the samples' heights in the box, cheaply. Nothing if there is no sample.
   virtual std::optional<HeightRange> range(const GeographicBox& box) = 0;
   /// The surface's heights at places, filled where there are no samples: never NaN.
   virtual void heights(std::span<const double> longitude, std::span<const double> latitude,

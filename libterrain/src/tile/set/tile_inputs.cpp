@@ -14,7 +14,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// Of the ways of making tiles: to be raised when equal inputs are to give other bytes.
+/// Version of the way tiles are made: raise it when equal inputs are to give other bytes.
 constexpr std::uint64_t kGeneration = 1;
 
 }  // namespace

@@ -76,7 +76,7 @@ Lines read_lines(const std::string& path) {
     read.records.push_back(*record);
     read.good_bytes += line.size() + 1;
   }
-  // Of equal addresses the last comes first.
+  // The last of several equal addresses comes first.
   std::reverse(read.records.begin(), read.records.end());
   std::stable_sort(read.records.begin(), read.records.end(), by_address);
   const auto same = [](const TileJournal::Record& a, const TileJournal::Record& b) {

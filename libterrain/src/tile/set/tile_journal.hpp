@@ -42,7 +42,7 @@ class TileJournal {
 
   /// What an earlier run has finished; nullptr if not this tile.
   [[nodiscard]] const FinishedTile* find(const TileAddress& tile) const;
-  /// Of a tile that is not known as such yet.
+  /// Adds a line for a tile whose state is new.
   void add(const TileAddress& tile, const FinishedTile& finished);
   /// Replaces all lines by these, sorted by address, if they say anything else. Nothing is added
   /// after that. Throws: stream::Error.

@@ -19,7 +19,7 @@ namespace {
 
 using stream::Point3;
 
-/// Of a normal's upward part: a normal has 2 x 8 bits.
+/// How far a normal's upward component may be off: a normal has 2 x 8 bits.
 constexpr double kNormalSlack = 0.02;
 
 class MeshCheck {

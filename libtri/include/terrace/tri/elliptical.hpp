@@ -134,7 +134,7 @@ class EllipticalDelaunay2 {
   [[nodiscard]] Location locate(const Point& point, VertexId hint = kNoVertex) const;
   /// The vertex nearest to the point in the metric.
   [[nodiscard]] VertexId nearest(const Point& point, VertexId hint = kNoVertex) const;
-  /// Of the original coordinates: equal to that of a Delaunay2<double> with the same triangles.
+  /// Hashes the original coordinates: equal to that of a Delaunay2<double> with the same triangles.
   [[nodiscard]] std::uint64_t hash() const;
   [[nodiscard]] std::size_t memory_bytes() const;
 
@@ -289,7 +289,8 @@ class EllipticalDelaunay3 {
   [[nodiscard]] Location3 locate(const Point& point, VertexId hint = kNoVertex) const;
   /// The vertex nearest to the point in the metric.
   [[nodiscard]] VertexId nearest(const Point& point, VertexId hint = kNoVertex) const;
-  /// Of the original coordinates: equal to that of a Delaunay3<double> with the same tetrahedra.
+  /// Hashes the original coordinates: equal to that of a Delaunay3<double> with the same
+  /// tetrahedra.
   [[nodiscard]] std::uint64_t hash() const;
   [[nodiscard]] std::size_t memory_bytes() const;
 

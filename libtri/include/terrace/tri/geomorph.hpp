@@ -59,7 +59,7 @@ class Geomorph2 {
  private:
   [[nodiscard]] Point3 old_position(const Model& model, VertexId vertex) const;
 
-  // Of before the step, by slot: positions of vertices that are not what they were.
+  // By slot, the positions before the step of vertices that have moved since.
   std::vector<std::uint32_t> old_index_;  // into old_positions_; kAsNow: as now
   std::vector<Point3> old_positions_;
   std::unique_ptr<HeightPatches> patches_;

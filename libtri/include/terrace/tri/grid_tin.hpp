@@ -41,7 +41,7 @@ struct GridTinCheck {
   std::size_t covered = 0;                  ///< of these, in a triangle
   std::size_t uncovered = 0;                ///< of these, in none
   std::vector<std::uint32_t> uncovered_at;  ///< their numbers, row by row
-  /// Of the uncovered ones, those whose 8 neighbours (as far as they are in the window) have data.
+  /// Uncovered samples whose 8 neighbours (as far as they are in the window) have data.
   std::size_t uncovered_inner = 0;
   std::size_t nodata_covered = 0;  ///< samples without data that are in a triangle
   std::size_t turned = 0;          ///< triangles without area or turned against the first one
@@ -108,7 +108,7 @@ struct GridVertex {
 struct GridTin {
   std::vector<GridVertex> vertices;  ///< those that are in a triangle
   std::vector<std::array<std::uint32_t, 3>> triangles;
-  /// Of the mesh against all samples that it covers, by check_grid_tin(); without `measure` only
+  /// Errors against all samples that the mesh covers, by check_grid_tin(); without `measure` only
   /// the number of samples with data is set.
   GridTinCheck check;
 };

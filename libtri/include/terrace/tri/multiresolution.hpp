@@ -113,9 +113,9 @@ struct Detail {
   static constexpr unsigned kTop = 255;  ///< any level that is not below the top means the top
   unsigned level = kTop;
   std::vector<Focus> focuses;
-  /// Narrows focuses that are no boxes: whether the focus of that number needs what lies in the
-  /// box, which meets the focus's own. Must be true of boxes around one of which it is. Null: it
-  /// does.
+  /// Narrows focuses that are not boxes: whether the focus of that number needs what lies in the
+  /// box, which meets the focus's own. Must also be true of every box that contains one of which it
+  /// is true. Without it a focus needs all that meets its box.
   std::function<bool(std::size_t focus, const Box3& box)> needs{};
 };
 
@@ -209,7 +209,7 @@ class MultiresolutionModel {
   /// Points present; more than vertices where some have equal coordinates.
   [[nodiscard]] std::size_t point_count() const;
 
-  /// Of the point that stands for a living vertex. O(1).
+  /// These tell about the point that stands for a living vertex. O(1).
   [[nodiscard]] PointId point_id(VertexId vertex) const;
   [[nodiscard]] unsigned level(VertexId vertex) const;
   [[nodiscard]] double height(VertexId vertex) const;

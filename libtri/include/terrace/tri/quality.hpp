@@ -22,7 +22,7 @@ struct TriangleQuality {
   double aspect = 1;
   std::array<double, 3> edges{};  ///< lengths, edge i opposite to corner i
   double area = 0;
-  /// Of the sloping triangle. NaN where a height is, as the volumes.
+  /// Area of the sloping triangle. NaN, as the volumes are, where a height is NaN.
   double surface_area = 0;
   /// Between the surface and the datum height, where it is above; where it is below, >= 0 too.
   double volume_above = 0;

@@ -19,7 +19,7 @@ enum class Smoothing : std::uint8_t {
   /// step towards the mean, then a slightly larger one away from it. What is rough goes, what is
   /// wide stays as high as it was.
   kTaubin,
-  /// Of the neighbours only those of similar height count, so that steps stay steps: Tukey's
+  /// Only neighbours of similar height count, so that steps stay steps: Tukey's
   /// biweight, (1 - (d / edge_height)^2)^2 for differences d below edge_height, else 0. C. Tomasi,
   /// R. Manduchi, "Bilateral filtering for gray and color images", doi:10.1109/ICCV.1998.710815.
   kBilateral,

@@ -33,7 +33,7 @@ struct Camera {
   Point3 position{};
   Point3 direction{};  ///< of the axis, length 1
   std::array<Plane, 5> planes{};
-  /// Of a ground unit: at distance 1 (perspective), or anywhere (orthographic).
+  /// Pixels per ground unit: at distance 1 (perspective), or anywhere (orthographic).
   double pixels = 1.0;
   double height = 1.0;  ///< of the picture, in ground units; orthographic only
 };
@@ -104,7 +104,7 @@ struct ViewOptions {
   double ask_above = 0.85;
   /// Points of the model, the most there may be. The root's are always there.
   std::size_t max_points = std::size_t{1} << 28;
-  /// Of the clusters given and kept, see ViewControl::give().
+  /// Memory for clusters that were given and are kept, see ViewControl::give().
   std::size_t max_cached_bytes = std::size_t{1} << 28;
   /// Clusters that may show an outline, because a normal of theirs may be perpendicular to a line
   /// of sight, are held to this fraction of View::pixel_error. 1: all are alike.
@@ -224,7 +224,7 @@ class ViewControl {
     /// The missing ones that are worth loading, most important first, as far as max_points and
     /// max_cached_bytes have room for them; then those that may be wanted soon.
     std::vector<ViewRequest> wanted;
-    /// Of these, those that no step has named before, or only before they were withdrawn or
+    /// The ones among these that no step has named before, or only before they were withdrawn or
     /// forgotten: for a caller who starts loading at once.
     std::vector<ViewRequest> requests;
     /// Named before and of no use any more, in ascending order.

@@ -9,7 +9,7 @@
 namespace terrace::tri::spatial {
 namespace {
 
-// Of memory that is aligned for one double only.
+// From memory that is aligned for one double only.
 [[gnu::always_inline]] inline Lanes load(const double* from) {
   Lanes lanes;
   __builtin_memcpy(&lanes, from, sizeof lanes);

@@ -61,7 +61,7 @@ class Wrapping {
       }
       square += (high - low) * (high - low);
     }
-    // Of any vector from vertex to vertex, rounded up.
+    // The length of any vector from vertex to vertex, rounded up.
     length_ = std::sqrt(square) * (1 + 0x1p-40);
     if constexpr (kMapped) {
       // Both ends of a vector are off by 9 u spread() times their distances from the first vertex.

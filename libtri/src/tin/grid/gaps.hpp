@@ -28,7 +28,7 @@ class GridGaps {
   /// Marks a sample as a vertex.
   void take(std::int32_t x, std::int32_t y) { flags_[index(x, y)] |= kVertex; }
 
-  /// Of a triangle with at least one corner without data.
+  /// For a triangle with at least one corner without data.
   template <class T>
   bool mixed(const GridCorner<T>& a, const GridCorner<T>& b, const GridCorner<T>& c) const;
 

@@ -111,7 +111,7 @@ struct Spans {
     start[i] = towards * (kStep * plane.min_y - p.y) + p.x * size + half;
     scale[i] = along_x == 0 ? 0.0 : 1.0 / unit;
   }
-  /// Of row plane.min_y + down.
+  /// The columns of row plane.min_y + down.
   [[gnu::always_inline]] void row(double down, std::int32_t& left, std::int32_t& right) const {
     for (int i = 0; i < 3; ++i) {
       if (sign[i] == 0) continue;

@@ -37,7 +37,7 @@ struct RowWorst {
   std::uint32_t place;  ///< row << 16 | column
 };
 
-/// Of numbers.
+/// An interval of numbers.
 struct RowInterval {
   double low, high;
 };

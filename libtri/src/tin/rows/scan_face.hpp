@@ -50,7 +50,7 @@ constexpr double kFlat = 1e-6;
   return at;
 }
 
-/// Of the lattice; a little larger than wanted where samples stand at about equal distances only.
+/// A box of the lattice, a little too large where samples are only about equally spaced.
 struct Box {
   std::int32_t first_column, last_column, first_row, last_row;
 };
