@@ -4,7 +4,7 @@
 #include <cstdlib>
 #include <vector>
 
-#include "../src/store/overlay_page.hpp"
+#include "store/overlay_page.hpp"
 
 namespace {
 

@@ -6,9 +6,9 @@
 #include <cstdlib>
 #include <string>
 
-#include "../src/store/cluster_decoder.hpp"
-#include "../src/store/index_page.hpp"
-#include "../src/store/manifest.hpp"
+#include "store/manifest.hpp"
+#include "store/read/cluster_decoder.hpp"
+#include "store/read/index_page.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace {

@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "../src/geotiff_unpack.hpp"
+#include "format/geotiff/unpack.hpp"
 #include "raster_testing.hpp"
 #include "temp_folder.hpp"
 #include "terrace/stream/error.hpp"

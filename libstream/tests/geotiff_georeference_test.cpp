@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "../src/geotiff_georeference.hpp"
-
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
@@ -9,7 +7,8 @@
 
 #include <gtest/gtest.h>
 
-#include "../src/geotiff_keys.hpp"
+#include "format/geotiff/georeference.hpp"
+#include "format/geotiff/keys.hpp"
 #include "gdal_tools.hpp"
 #include "raster_testing.hpp"
 #include "temp_folder.hpp"

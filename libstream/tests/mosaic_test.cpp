@@ -10,7 +10,7 @@
 
 #include <gtest/gtest.h>
 
-#include "../src/format_geotiff.hpp"
+#include "format/formats.hpp"
 #include "raster_testing.hpp"
 #include "temp_folder.hpp"
 #include "terrace/stream/error.hpp"

@@ -16,7 +16,7 @@
 
 #include <gtest/gtest.h>
 
-#include "../src/store/bytes.hpp"
+#include "store/codec/bytes.hpp"
 #include "stand_in_hierarchy.hpp"
 #include "store_testing.hpp"
 #include "terrace/stream/error.hpp"

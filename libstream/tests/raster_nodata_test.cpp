@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "../src/raster_nodata.hpp"
-
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -11,7 +9,8 @@
 
 #include <gtest/gtest.h>
 
-#include "../src/raster_overlay.hpp"
+#include "raster/nodata.hpp"
+#include "raster/overlay.hpp"
 #include "raster_testing.hpp"
 
 namespace terrace::stream {

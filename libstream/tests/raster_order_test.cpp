@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "../src/raster_order.hpp"
-
 #include <algorithm>
 #include <cstdlib>
 #include <random>
@@ -8,6 +6,8 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+
+#include "raster/order.hpp"
 
 namespace terrace::stream {
 namespace {

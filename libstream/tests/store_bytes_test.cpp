@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "../src/store/bytes.hpp"
+#include "store/codec/bytes.hpp"
 
 namespace terrace::stream::store {
 namespace {

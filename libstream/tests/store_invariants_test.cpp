@@ -9,8 +9,8 @@
 
 #include <gtest/gtest.h>
 
-#include "../src/store/cluster_decoder.hpp"
-#include "../src/store/form.hpp"
+#include "store/codec/form.hpp"
+#include "store/read/cluster_decoder.hpp"
 #include "store_inputs.hpp"
 #include "store_mending.hpp"
 #include "store_testing.hpp"

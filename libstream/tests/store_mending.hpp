@@ -13,8 +13,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "../src/store/index_page.hpp"
-#include "../src/store/manifest.hpp"
+#include "store/manifest.hpp"
+#include "store/read/index_page.hpp"
 
 /// Stores as bytes in memory that anything can be done to: mend() makes all checksums right again,
 /// so that what lies behind them is reached. For tests and for the fuzzer.

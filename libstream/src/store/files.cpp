@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "files.hpp"
+#include "store/files.hpp"
 
 #include <cerrno>
 #include <utility>
@@ -8,7 +8,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "../file_size_signal.hpp"
+#include "io/file_size_signal.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::stream::store {

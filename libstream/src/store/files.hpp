@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 
-#include "bytes.hpp"
+#include "store/codec/bytes.hpp"
 
 namespace terrace::stream::store {
 

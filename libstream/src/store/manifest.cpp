@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "manifest.hpp"
+#include "store/manifest.hpp"
 
 #include <charconv>
 #include <cmath>
 
 #include <nlohmann/json.hpp>
 
-#include "bytes.hpp"
-#include "files.hpp"
-#include "layout.hpp"
+#include "store/codec/bytes.hpp"
+#include "store/codec/layout.hpp"
+#include "store/files.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::stream::store {

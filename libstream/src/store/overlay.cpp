@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include "files.hpp"
-#include "manifest.hpp"
-#include "overlay_page.hpp"
+#include "store/files.hpp"
+#include "store/manifest.hpp"
+#include "store/overlay_page.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::stream {

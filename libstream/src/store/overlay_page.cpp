@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "overlay_page.hpp"
+#include "store/overlay_page.hpp"
 
 #include <cmath>
 #include <limits>

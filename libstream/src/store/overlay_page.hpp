@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "bytes.hpp"
+#include "store/codec/bytes.hpp"
 #include "terrace/stream/overlay.hpp"
 
 namespace terrace::stream::store {

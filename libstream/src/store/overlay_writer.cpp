@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "overlay_page.hpp"
+#include "store/overlay_page.hpp"
 #include "terrace/stream/atomic_file.hpp"
 
 namespace terrace::stream {

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "verify.hpp"
+#include "store/verify.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <string>
 
-#include "bytes.hpp"
+#include "store/codec/bytes.hpp"
 
 namespace terrace::stream::store {
 namespace {

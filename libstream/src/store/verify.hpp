@@ -6,8 +6,8 @@
 #include <stop_token>
 #include <vector>
 
-#include "level_reader.hpp"
-#include "manifest.hpp"
+#include "store/manifest.hpp"
+#include "store/read/level_reader.hpp"
 
 namespace terrace::stream::store {
 

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "format/foreign_format.hpp"
+
+#include <algorithm>
+#include <cstddef>
+
+namespace terrace::stream {
+namespace {
+
+using std::string_view_literals::operator""sv;
+
+/// How a format shows in the first bytes.
+struct Mark {
+  std::size_t at = 0;
+  std::string_view bytes;
+  bool any_case = false;
+};
+
+struct KnownFormat {
+  ForeignFormat format;
+  std::string_view endings;  ///< ".a .b"
+  Mark first, second{};      ///< both, if there are two; of the first with text, it may be indented
+};
+
+constexpr std::string_view kPdal = "convert it, e.g. 'pdal translate FILE out.ply'";
+constexpr std::string_view kRaster = "convert it, e.g. 'gdal_translate FILE out.tif'";
+constexpr std::string_view kMesh =
+    "convert it, e.g. 'assimp export FILE out.ply', or with MeshLab, to PLY";
+constexpr std::string_view kVector =
+    "convert its points, e.g. 'ogr2ogr -f CSV -lco GEOMETRY=AS_XYZ out.csv FILE', to text";
+
+// What tells more comes first.
+constexpr KnownFormat kRows[] = {
+    // Points.
+    {{"COPC (a cloud-optimised LAZ file)", kPdal}, "", {0, "LASF"}, {377, "copc"}},
+    {{"LAS", kPdal}, ".las", {0, "LASF"}},
+    {{"LAZ (compressed LAS)", kPdal}, ".laz", {0, {}}},
+    {{"E57", "convert it, e.g. with CloudCompare or 'pdal translate FILE out.ply', to PLY"},
+     ".e57",
+     {0, "ASTM-E57"}},
+    {{"PCD (a cloud of the Point Cloud Library)",
+      "convert it, e.g. 'pcl_pcd2ply FILE out.ply' or 'pdal translate FILE out.ply'"},
+     ".pcd",
+     {0, "# .PCD"}},
+    // Rasters.
+    {{"an ESRI ASCII grid", kRaster}, "", {0, "ncols", true}},
+    {{"an ESRI binary grid", kRaster}, ".adf", {0, "HDR1.2\0\0"sv}},
+    {{"SRTM .hgt (a grid without a header)",
+      "convert it, e.g. 'gdal_translate FILE out.tif'; its name must be that of its tile, as "
+      "N46E008.hgt"},
+     ".hgt",
+     {}},
+    {{"HDF5 or NetCDF 4",
+      "convert a variable of it ('gdalinfo FILE' lists them), e.g. 'gdal_translate "
+      "NETCDF:FILE:VARIABLE out.tif'"},
+     ".h5 .hdf5 .he5",
+     {0, "\x89HDF\r\n\x1a\n"sv}},
+    {{"NetCDF",
+      "convert a variable of it ('gdalinfo FILE' lists them), e.g. 'gdal_translate "
+      "NETCDF:FILE:VARIABLE out.tif'"},
+     ".nc .nc4 .cdf",
+     {0, "CDF"}},
+    {{"HDF4", kRaster}, ".hdf", {0, "\x0e\x03\x13\x01"sv}},
+    {{"GRIB", kRaster}, ".grib .grib2 .grb .grb2", {0, "GRIB"}},
+    {{"JPEG 2000", kRaster}, ".jp2 .j2k", {4, "jP  "}},
+    {{"JPEG 2000", kRaster}, "", {0, "\xff\x4f\xff\x51"sv}},
+    {{"an ERDAS Imagine raster", kRaster}, ".img", {0, "EHFA_HEADER_TAG"}},
+    {{"DTED", kRaster}, ".dt0 .dt1 .dt2", {0, "UHL1"}},
+    {{"USGS DEM", kRaster}, ".dem", {}},
+    {{"a Surfer grid", kRaster}, "", {0, "DSBB"}},
+    {{"a Surfer grid", kRaster}, "", {0, "DSRB"}},
+    {{"a Surfer grid", kRaster}, ".grd", {0, "DSAA"}},
+    {{"a virtual raster of GDAL", kRaster}, ".vrt", {0, "<VRTDataset"}},
+    {{"a PNG picture",
+      "heights in colours must be turned into numbers, e.g. by gdal_calc.py, in a "
+      "GeoTIFF"},
+     ".png",
+     {0, "\x89PNG\r\n"sv}},
+    {{"a JPEG picture", "its numbers are colours, not heights: look for the GeoTIFF"},
+     ".jpg .jpeg",
+     {0, "\xff\xd8\xff"sv}},
+    // Vectors.
+    {{"a shapefile", kVector}, ".shp", {0, "\0\0\x27\x0a"sv}},
+    {{"a GeoPackage",
+      "convert it, e.g. 'gdal_translate FILE out.tif' (a raster) or 'ogr2ogr -f CSV -lco "
+      "GEOMETRY=AS_XYZ out.csv FILE' (points)"},
+     ".gpkg",
+     {0, "SQLite format 3"},
+     {68, "GPKG"}},
+    {{"an SQLite database (MBTiles?)", kRaster}, ".mbtiles .sqlite", {0, "SQLite format 3"}},
+    {{"an HTML page", "a server may have sent it in place of the file: download that again"},
+     ".html .htm",
+     {0, "<!doctype html", true}},
+    {{"an HTML page", "a server may have sent it in place of the file: download that again"},
+     "",
+     {0, "<html", true}},
+    {{"XML (GML, KML, LandXML?)", kVector}, ".kml .gml .xml", {}},
+    // Meshes.
+    {{"glTF", kMesh}, ".glb", {0, "glTF"}},
+    {{"glTF", kMesh}, ".gltf", {}},
+    {{"JSON (GeoJSON?)", kVector}, ".json .geojson", {}},
+    {{"STL", kMesh}, ".stl", {0, "solid "}},
+    {{"OFF", kMesh}, ".off", {0, "OFF\n"}},
+    {{"OFF", kMesh}, "", {0, "OFF\r"}},
+    {{"OFF", kMesh}, "", {0, "COFF"}},
+    {{"OFF", kMesh}, "", {0, "NOFF"}},
+    {{"VTK", "convert it, e.g. with ParaView, to PLY"}, ".vtk .vtp .vtu", {0, "# vtk DataFile"}},
+    {{"Wavefront OBJ (a mesh)", kMesh}, ".obj", {}},
+    // What may hold any of them.
+    {{"compressed by gzip", "unpack it: 'gzip -dk FILE'"}, ".gz", {0, "\x1f\x8b"sv}},
+    {{"compressed by bzip2", "unpack it: 'bzip2 -dk FILE'"}, ".bz2", {0, "BZh"}},
+    {{"compressed by xz", "unpack it: 'xz -dk FILE'"},
+     ".xz",
+     {0,
+      "\xfd"
+      "7zXZ\0"sv}},
+    {{"compressed by zstd", "unpack it: 'zstd -d FILE'"}, ".zst", {0, "\x28\xb5\x2f\xfd"sv}},
+    {{"a zip archive", "unpack it: 'unzip FILE'"}, ".zip .kmz", {0, "PK\x03\x04"sv}},
+    {{"a 7z archive", "unpack it: '7z x FILE'"}, ".7z", {0, "7z\xbc\xaf\x27\x1c"sv}},
+    {{"a RAR archive", "unpack it: 'unrar x FILE'"}, ".rar", {0, "Rar!\x1a\x07"sv}},
+    {{"a tar archive", "unpack it: 'tar xf FILE'"}, ".tar .tgz", {257, "ustar"}},
+    {{"a pointer of Git LFS, not the file", "fetch the file: 'git lfs pull'"},
+     "",
+     {0, "version https://git-lfs"}},
+};
+
+bool shows(const Mark& mark, std::string_view head) {
+  if (mark.bytes.empty() || head.size() < mark.at + mark.bytes.size()) return false;
+  const std::string_view found = head.substr(mark.at, mark.bytes.size());
+  const auto lower = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; };
+  return std::equal(found.begin(), found.end(), mark.bytes.begin(),
+                    [&](char a, char b) { return a == b || (mark.any_case && lower(a) == b); });
+}
+
+bool has_word(std::string_view words, std::string_view word) {
+  for (std::size_t at = 0; at < words.size();) {
+    const std::size_t end = std::min(words.find(' ', at), words.size());
+    if (words.substr(at, end - at) == word) return true;
+    at = end + 1;
+  }
+  return false;
+}
+
+}  // namespace
+
+const ForeignFormat* foreign_format_of_content(std::string_view head) {
+  // Text may be indented, and begin with the mark of UTF-8.
+  std::string_view text = head;
+  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+  text.remove_prefix(std::min(text.find_first_not_of(" \t\r\n"), text.size()));
+  for (const KnownFormat& row : kRows) {
+    if (!shows(row.first, row.first.at == 0 ? text : head)) continue;
+    if (!row.second.bytes.empty() && !shows(row.second, head)) continue;
+    // The type of point of LAS has its highest bits set where points are compressed.
+    constexpr std::size_t kPointType = 104;
+    if (row.format.name == "LAS" && head.size() > kPointType &&
+        (static_cast<unsigned char>(head[kPointType]) & 0xC0U) != 0) {
+      return foreign_format_of_ending(".laz");
+    }
+    return &row.format;
+  }
+  return nullptr;
+}
+
+const ForeignFormat* foreign_format_of_ending(std::string_view ending) {
+  if (ending.empty()) return nullptr;
+  for (const KnownFormat& row : kRows) {
+    if (has_word(row.endings, ending)) return &row.format;
+  }
+  return nullptr;
+}
+
+}  // namespace terrace::stream

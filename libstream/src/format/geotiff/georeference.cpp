@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "format/geotiff/georeference.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <string_view>
+
+#include "format/geotiff/tags.hpp"
+
+namespace terrace::stream {
+namespace {
+
+constexpr char kSetAnew[] = "set the georeferencing anew (gdal_edit.py -a_ullr)";
+
+bool all_finite(const std::vector<double>& values) {
+  return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
+}
+
+/// Moves the origin by `shift` cells along both axes.
+WorldTransform shifted(WorldTransform world, double shift) {
+  world.xy[2] += shift * (world.xy[0] + world.xy[1]);
+  world.xy[5] += shift * (world.xy[3] + world.xy[4]);
+  return world;
+}
+
+/// The value of attribute `name` in the text of an XML tag.
+std::string_view attribute(std::string_view tag, std::string_view name) {
+  const std::string pattern = std::string(" ").append(name).append("=\"");
+  const std::size_t begin = tag.find(pattern);
+  if (begin == tag.npos) return {};
+  tag.remove_prefix(begin + pattern.size());
+  return tag.substr(0, tag.find('"'));
+}
+
+std::string_view trimmed(std::string_view text) {
+  const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; };
+  while (!text.empty() && blank(text.front())) text.remove_prefix(1);
+  while (!text.empty() && blank(text.back())) text.remove_suffix(1);
+  return text;
+}
+
+std::optional<double> number_in(std::string_view text) {
+  text = trimmed(text);
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{}) return std::nullopt;
+  return value;
+}
+
+}  // namespace
+
+WorldTransform geotiff_transform(const GeoTiffHandle& handle, const GeoKeys& keys,
+                                 std::vector<std::string>& comments) {
+  const auto matrix = handle.doubles(kModelTransformation);
+  const auto scale = handle.doubles(kModelPixelScale);
+  const auto tie = handle.doubles(kModelTiepoint);
+  const double to_sample =
+      keys.number(kGTRasterType).value_or(kPixelIsArea) == kPixelIsPoint ? 0.0 : 0.5;
+
+  // As GDAL does, scale and tie point go before a matrix if a file has both against the rules.
+  if (scale.size() >= 2 && tie.size() >= 6) {
+    if (!all_finite(scale) || !all_finite(tie)) {
+      handle.fail("ModelPixelScale", "is not finite", kSetAnew);
+    }
+    if (scale[0] == 0 || scale[1] == 0) handle.fail("ModelPixelScale", "is zero", kSetAnew);
+    if (scale[1] < 0) {
+      comments.emplace_back("the pixel scale's negative y is read as positive, as by GDAL");
+    }
+    const double sx = scale[0], sy = std::abs(scale[1]);
+    return shifted({{sx, 0, tie[3] - tie[0] * sx, 0, -sy, tie[4] + tie[1] * sy}}, to_sample);
+  }
+  if (matrix.size() >= 8) {
+    const WorldTransform world{{matrix[0], matrix[1], matrix[3], matrix[4], matrix[5], matrix[7]}};
+    const double determinant = world.xy[0] * world.xy[4] - world.xy[1] * world.xy[3];
+    if (!all_finite(matrix) || !std::isfinite(determinant) || determinant == 0) {
+      handle.fail("ModelTransformation", "does not map cells to distinct places", kSetAnew);
+    }
+    return shifted(world, to_sample);
+  }
+  if (tie.size() > 6) {
+    handle.fail("ModelTiepoint",
+                "has " + std::to_string(tie.size() / 6) +
+                    " ground control points instead of a transformation",
+                "rectify it first: gdalwarp");
+  }
+  comments.emplace_back("no georeferencing: a plain grid with cells of 1 x 1, y = -row");
+  return {{1, 0, 0, 0, -1, 0}};
+}
+
+BandMetadata band_metadata(const std::string& xml, unsigned band) {
+  BandMetadata found;
+  std::string_view rest = xml;
+  const std::string sample = std::to_string(band);
+  for (;;) {
+    const std::size_t begin = rest.find("<Item");
+    if (begin == rest.npos) return found;
+    rest.remove_prefix(begin + 5);
+    const std::size_t end = rest.find('>');
+    if (end == rest.npos) return found;
+    const std::string_view tag = rest.substr(0, end);
+    rest.remove_prefix(end + 1);
+    const std::string_view text = rest.substr(0, rest.find('<'));
+    if (attribute(tag, "sample") != sample) continue;
+    const std::string_view role = attribute(tag, "role");
+    if (role == "scale") found.scale = number_in(text);
+    if (role == "offset") found.offset = number_in(text);
+    if (role == "unittype") found.unit = canonical_unit(std::string(trimmed(text)));
+  }
+}
+
+std::string canonical_unit(const std::string& text) {
+  for (const char* name : {"m", "metre", "metres", "meter", "meters", "Metre", "Meter", "METERS"}) {
+    if (text == name) return "metre";
+  }
+  for (const char* name : {"ft", "foot", "feet", "international foot", "Foot"}) {
+    if (text == name) return "foot";
+  }
+  for (const char* name : {"us-ft", "sfoot", "US survey foot", "us_survey_foot", "foot_us"}) {
+    if (text == name) return "US survey foot";
+  }
+  return text;
+}
+
+}  // namespace terrace::stream

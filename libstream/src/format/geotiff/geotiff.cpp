@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <utility>
+
+#include "format/formats.hpp"
+#include "format/geotiff/blocks.hpp"
+#include "format/geotiff/georeference.hpp"
+#include "format/geotiff/handle.hpp"
+#include "format/geotiff/keys.hpp"
+#include "format/geotiff/layout.hpp"
+#include "format/geotiff/tags.hpp"
+#include "raster/nodata.hpp"
+#include "raster/order.hpp"
+#include "terrace/stream/raster.hpp"
+
+namespace terrace::stream {
+namespace {
+
+class GeoTiffRaster final : public Raster {
+ public:
+  GeoTiffRaster(const std::string& file, const RasterOptions& options)
+      : handle_(file, options.memory_bytes),
+        layout_(geotiff_layout(handle_, options.band)),
+        nodata_(NodataRule::parse(handle_.text(kGdalNodata), layout_.type)),
+        blocks_(handle_, layout_, nodata_, options.memory_bytes, options.cache_bytes) {
+    describe();
+  }
+
+  [[nodiscard]] const RasterInfo& info() const override { return info_; }
+  bool read_over(const CellWindow& window, const CellBuffer& out) override {
+    return blocks_.read_over(window, out);
+  }
+
+ private:
+  void describe() {
+    info_.format = "geotiff";
+    info_.files = {handle_.file()};
+    info_.columns = layout_.columns;
+    info_.rows = layout_.rows;
+    info_.block_columns = std::min(layout_.block_columns, layout_.columns);
+    info_.block_rows = std::min(layout_.block_rows, layout_.rows);
+    info_.held_bytes = blocks_.held_bytes();
+    const GeoKeys keys(handle_.shorts(kGeoKeyDirectory), handle_.doubles(kGeoDoubleParams),
+                       handle_.text(kGeoAsciiParams));
+    info_.crs = crs_of(keys);
+    info_.world = geotiff_transform(handle_, keys, info_.comments);
+    info_.nodata = nodata_.value;
+    describe_sample();
+    if (nodata_.unmatched) {
+      info_.comments.push_back("nodata " + handle_.text(kGdalNodata) + " is no value of type " +
+                               std::string(name_of(layout_.type)));
+    }
+    info_.comments.insert(info_.comments.end(), keys.faults().begin(), keys.faults().end());
+    info_.comments.insert(info_.comments.end(), handle_.warnings().begin(),
+                          handle_.warnings().end());
+  }
+
+  void describe_sample() {
+    const BandMetadata band = band_metadata(handle_.text(kGdalMetadata), layout_.band);
+    info_.sample.name = "height";
+    info_.sample.type = layout_.type;
+    info_.sample.scale = band.scale.value_or(1.0);
+    info_.sample.offset = band.offset.value_or(0.0);
+    info_.sample.unit = band.unit.empty() ? info_.crs.vertical_unit : band.unit;
+    if (info_.crs.vertical_unit.empty()) info_.crs.vertical_unit = info_.sample.unit;
+    if (info_.sample.scale == 0 || !std::isfinite(info_.sample.scale) ||
+        !std::isfinite(info_.sample.offset)) {
+      handle_.fail("GDAL_METADATA", "scale or offset of the band is zero or not finite",
+                   "set it anew (gdal_edit.py -scale -offset)");
+    }
+  }
+
+  GeoTiffHandle handle_;
+  GeoTiffLayout layout_;
+  NodataRule nodata_;
+  GeoTiffBlocks blocks_;
+  RasterInfo info_;
+};
+
+bool looks_like_tiff(std::span<const std::byte> head) {
+  if (head.size() < 4) return false;
+  static constexpr std::array<const char*, 4> kMagic{"II*\0", "MM\0*", "II+\0", "MM\0+"};
+  return std::any_of(kMagic.begin(), kMagic.end(),
+                     [&](const char* magic) { return std::memcmp(head.data(), magic, 4) == 0; });
+}
+
+std::unique_ptr<PointSource> open_points(std::span<const std::string> files,
+                                         const SourceOptions& options) {
+  RasterOptions raster{.band = options.band, .memory_bytes = options.memory_bytes};
+  const std::uint64_t window = window_bytes(options);
+  raster.cache_bytes = window / 6;
+  if (files.size() == 1) return points_of(open_geotiff(files.front(), raster), options);
+  constexpr std::size_t kOpenAtOnce = 32;
+  raster.cache_bytes /= kOpenAtOnce / 4;  // few of them meet in one window
+  const RasterOpener opener = [raster](const std::string& file) {
+    return open_geotiff(file, raster);
+  };
+  return points_of(open_mosaic({files.begin(), files.end()}, opener, options.crs.has_value(),
+                               kOpenAtOnce, options.memory_bytes - window),
+                   options);
+}
+
+}  // namespace
+
+std::unique_ptr<Raster> open_geotiff(const std::string& file, const RasterOptions& options) {
+  return std::make_unique<GeoTiffRaster>(file, options);
+}
+
+const Format& geotiff_format() {
+  static const Format format{.name = "geotiff",
+                             .endings = {".tif", ".tiff", ".gtiff", ".btf", ".tf8"},
+                             .recognise = looks_like_tiff,
+                             .open = open_points};
+  return format;
+}
+
+}  // namespace terrace::stream

@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "format/geotiff/layout.hpp"
+
+#include <algorithm>
+#include <optional>
+
+namespace terrace::stream {
+namespace {
+
+constexpr std::uint32_t kMostCells = 1u << 30;  // columns and rows are 30-bit integers downstream
+
+const char* name_of_codec(std::uint16_t compression) {
+  switch (compression) {
+    case COMPRESSION_LZW:
+      return "LZW";
+    case COMPRESSION_OJPEG:
+      return "old-style JPEG";
+    case COMPRESSION_JPEG:
+      return "JPEG";
+    case COMPRESSION_ADOBE_DEFLATE:
+    case COMPRESSION_DEFLATE:
+      return "Deflate";
+    case COMPRESSION_LZMA:
+      return "LZMA";
+    case COMPRESSION_LERC:
+      return "LERC";
+    case COMPRESSION_ZSTD:
+      return "ZSTD";
+    case COMPRESSION_WEBP:
+      return "WebP";
+    case COMPRESSION_JXL:
+      return "JPEG XL";
+    case COMPRESSION_SGILOG:
+    case COMPRESSION_SGILOG24:
+      return "SGI LogLuv";
+    default:
+      return "unknown codec";
+  }
+}
+
+/// The type in memory of a stored sample; nothing if there is none.
+std::optional<ScalarType> type_in_memory(std::uint16_t format, unsigned bits) {
+  if (format == SAMPLEFORMAT_IEEEFP) {
+    if (bits == 16 || bits == 24 || bits == 32) return ScalarType::f32;
+    if (bits == 64) return ScalarType::f64;
+    return std::nullopt;
+  }
+  const bool is_signed = format == SAMPLEFORMAT_INT;
+  if (!is_signed && format != SAMPLEFORMAT_UINT && format != SAMPLEFORMAT_VOID) return std::nullopt;
+  if (bits == 0 || (bits > 32 && bits != 64)) return std::nullopt;
+  if (bits <= 8) return is_signed ? ScalarType::i8 : ScalarType::u8;
+  if (bits <= 16) return is_signed ? ScalarType::i16 : ScalarType::u16;
+  if (bits <= 32) return is_signed ? ScalarType::i32 : ScalarType::u32;
+  return is_signed ? ScalarType::i64 : ScalarType::u64;
+}
+
+void check_codec(const GeoTiffHandle& handle, const GeoTiffLayout& layout) {
+  const std::string name = std::string(name_of_codec(layout.compression)) + " (" +
+                           std::to_string(layout.compression) + ")";
+  const char* remedy = "rewrite it: gdal_translate -co COMPRESS=DEFLATE -co TILED=YES";
+  if (TIFFIsCODECConfigured(layout.compression) == 0) {
+    handle.fail({}, "compression " + name + " is not in this system's libtiff", remedy);
+  }
+  switch (layout.compression) {
+    case COMPRESSION_OJPEG:
+    case COMPRESSION_SGILOG:
+    case COMPRESSION_SGILOG24:
+      handle.fail({}, "compression " + name + " is not supported", remedy);
+    default:
+      break;
+  }
+  const auto photometric = handle.value_or<std::uint16_t>(TIFFTAG_PHOTOMETRIC, 1);
+  if (photometric == PHOTOMETRIC_YCBCR) {
+    if (layout.compression != COMPRESSION_JPEG || layout.separate) {
+      handle.fail({}, "YCbCr colours are not supported", remedy);
+    }
+    TIFFSetField(handle.tiff(), TIFFTAG_JPEGCOLORMODE, JPEGCOLORMODE_RGB);
+  }
+}
+
+void read_size(const GeoTiffHandle& handle, GeoTiffLayout& layout) {
+  const auto columns = handle.value<std::uint32_t>(TIFFTAG_IMAGEWIDTH);
+  const auto rows = handle.value<std::uint32_t>(TIFFTAG_IMAGELENGTH);
+  if (!columns || !rows || *columns == 0 || *rows == 0) {
+    handle.fail({}, "has no size", "check the file (tiffinfo)");
+  }
+  layout.columns = *columns;
+  layout.rows = *rows;
+  if (layout.columns >= kMostCells || layout.rows >= kMostCells) {
+    handle.fail({},
+                std::to_string(layout.columns) + " x " + std::to_string(layout.rows) +
+                    " cells: columns and rows must each be fewer than 2^30",
+                "split it (gdal_translate -srcwin)");
+  }
+  if (handle.value_or<std::uint32_t>(TIFFTAG_IMAGEDEPTH, 1) > 1) {
+    handle.fail({}, "is a volume (ImageDepth), not a raster");
+  }
+}
+
+void read_sample(const GeoTiffHandle& handle, GeoTiffLayout& layout, int band) {
+  layout.bands = handle.value_or<std::uint16_t>(TIFFTAG_SAMPLESPERPIXEL, 1);
+  if (layout.bands == 0) handle.fail({}, "has no bands", "check the file (tiffinfo)");
+  if (band < 1 || static_cast<std::uint32_t>(band) > layout.bands) {
+    handle.fail({},
+                "has no band " + std::to_string(band) + ", only " + std::to_string(layout.bands),
+                "choose another band");
+  }
+  layout.band = static_cast<std::uint32_t>(band - 1);
+  layout.separate = layout.bands > 1 && handle.value_or<std::uint16_t>(TIFFTAG_PLANARCONFIG, 1) ==
+                                            PLANARCONFIG_SEPARATE;
+  layout.bits = handle.value_or<std::uint16_t>(TIFFTAG_BITSPERSAMPLE, 1);
+  layout.sample_format = handle.value_or<std::uint16_t>(TIFFTAG_SAMPLEFORMAT, SAMPLEFORMAT_UINT);
+  const auto type = type_in_memory(layout.sample_format, layout.bits);
+  if (!type) {
+    static const char* const kFormats[] = {
+        "",          "unsigned integer", "signed integer", "float",
+        "undefined", "complex integer",  "complex float"};
+    const std::string format = layout.sample_format < std::size(kFormats)
+                                   ? kFormats[layout.sample_format]
+                                   : "SampleFormat " + std::to_string(layout.sample_format);
+    handle.fail({}, std::to_string(layout.bits) + "-bit " + format + " samples are not supported",
+                "convert it: gdal_translate -ot Float32");
+  }
+  layout.type = *type;
+}
+
+void read_blocks(const GeoTiffHandle& handle, GeoTiffLayout& layout) {
+  layout.tiled = TIFFIsTiled(handle.tiff()) != 0;
+  if (layout.tiled) {
+    layout.block_columns = handle.value_or<std::uint32_t>(TIFFTAG_TILEWIDTH, 0);
+    layout.block_rows = handle.value_or<std::uint32_t>(TIFFTAG_TILELENGTH, 0);
+  } else {
+    layout.block_columns = layout.columns;
+    layout.block_rows =
+        std::min(handle.value_or<std::uint32_t>(TIFFTAG_ROWSPERSTRIP, layout.rows), layout.rows);
+  }
+  const char* const what = layout.tiled ? "tile" : "strip";
+  if (layout.block_columns == 0 || layout.block_rows == 0 ||
+      layout.block_columns > (1u << 31) - 1 || layout.block_rows > (1u << 31) - 1) {
+    handle.fail({},
+                std::string("absurd ") + what + " size " + std::to_string(layout.block_columns) +
+                    " x " + std::to_string(layout.block_rows),
+                "check the file (tiffinfo)");
+  }
+  layout.blocks_across = (layout.columns + layout.block_columns - 1) / layout.block_columns;
+  layout.blocks_down = (layout.rows + layout.block_rows - 1) / layout.block_rows;
+  const std::uint64_t planes = layout.separate ? layout.bands : 1;
+  const std::uint64_t across = layout.blocks_across, down = layout.blocks_down;
+  // Both factors are below 2^30 and planes below 2^16: 2^60 first, then checked against the file.
+  // Each block has at least one byte in the file's tables of places and sizes.
+  if (across * down > handle.file_bytes() || across * down * planes > handle.file_bytes() ||
+      across * down * planes > UINT32_MAX) {
+    handle.fail({},
+                "claims " + std::to_string(across) + " x " + std::to_string(down) + " " + what +
+                    "s, more than a file of " + std::to_string(handle.file_bytes()) +
+                    " bytes can list",
+                "fetch the file again; it is damaged or cut short");
+  }
+}
+
+}  // namespace
+
+std::string GeoTiffLayout::place(std::uint32_t across, std::uint32_t down) const {
+  if (tiled) return "tile " + std::to_string(across) + "," + std::to_string(down);
+  return "strip " + std::to_string(down);
+}
+
+GeoTiffLayout geotiff_layout(const GeoTiffHandle& handle, int band) {
+  GeoTiffLayout layout;
+  read_size(handle, layout);
+  read_sample(handle, layout, band);
+  layout.compression = handle.value_or<std::uint16_t>(TIFFTAG_COMPRESSION, COMPRESSION_NONE);
+  check_codec(handle, layout);
+  read_blocks(handle, layout);
+  layout.swapped = TIFFIsByteSwapped(handle.tiff()) != 0;
+  layout.plain =
+      layout.compression == COMPRESSION_NONE && layout.bits == 8 * size_of(layout.type) &&
+      handle.value_or<std::uint16_t>(TIFFTAG_FILLORDER, FILLORDER_MSB2LSB) == FILLORDER_MSB2LSB;
+  return layout;
+}
+
+}  // namespace terrace::stream

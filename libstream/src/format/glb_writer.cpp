@@ -1,0 +1,244 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <array>
+#include <cassert>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "format/writers.hpp"
+#include "io/bytes.hpp"
+#include "terrace/stream/error.hpp"
+#include "terrace/stream/sink.hpp"
+
+/// glTF 2.0 (ISO/IEC 12113), section 4.4: GLB is a header of 12 bytes, a JSON chunk and a binary
+/// chunk, each padded to 4 bytes. The bounds of the positions stand in the JSON, before the
+/// positions: its place is kept, and it is written at the end.
+
+namespace terrace::stream {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::size_t kGlbPieceBytes = 64u << 10;
+constexpr std::uint64_t kHeaderBytes = 12, kChunkHeaderBytes = 8;
+constexpr std::size_t kMaxStride = 252;  // of a vertex buffer, by the specification
+// Values of the specification: componentType, target, mode.
+constexpr int kFloat = 5126, kUnsignedInt = 5125;
+constexpr int kArrayBuffer = 34962, kElementArrayBuffer = 34963;
+constexpr int kPoints = 0, kTriangles = 4;
+
+/// z up to y up: a rotation, so that triangles keep their sense.
+std::array<double, 3> y_up(const Point3& p) { return {p[0], p[2], -p[1]}; }
+
+/// Application-specific attributes begin with an underscore and are upper case by convention.
+std::string attribute_name(const std::string& name) {
+  std::string out = "_";
+  for (const char c : name) {
+    const bool lower = c >= 'a' && c <= 'z';
+    const bool plain = (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+    out += lower ? static_cast<char>(c - 'a' + 'A') : plain ? c : '_';
+  }
+  return out;
+}
+
+class GlbWriter final : public MeshWriter {
+ public:
+  GlbWriter(const std::string& path, const MeshHeader& header, const WriterOptions& options)
+      : header_(header), counts_(header), stride_(4 * (3 + header.attributes.size())) {
+    const auto refuse = [&](std::string cause) {
+      throw Error({.file = path,
+                   .where = {},
+                   .cause = std::move(cause),
+                   .remedy = "write PLY, or a smaller part"});
+    };
+    if (stride_ > kMaxStride) refuse("GLB holds at most 60 attributes");
+    // Two sizes that cannot overflow first, then the whole.
+    constexpr std::uint64_t kMost = std::numeric_limits<std::uint32_t>::max();
+    if (header.vertices >= kMost / stride_ || header.triangles >= kMost / 12 ||
+        kHeaderBytes + 2 * kChunkHeaderBytes + 4096 * (1 + header.attributes.size()) +
+                binary_bytes() >
+            kMost) {
+      refuse("GLB holds at most 4 GiB");
+    }
+    if (header.bounds && !header.bounds->empty()) {
+      origin_ = glb_origin(*header.bounds);
+      origin_known_ = true;
+    }
+    // The longest numbers show how much room the JSON may need; blanks fill what is left.
+    constexpr double kLongest = -1.2345678901234567e-300;
+    json_bytes_ = json({kLongest, kLongest, kLongest}, {kLongest, kLongest, kLongest},
+                       {kLongest, kLongest, kLongest})
+                      .size() +
+                  36;
+    json_bytes_ += (4 - json_bytes_ % 4) % 4;
+    sink_.emplace(path, options.replace, options.stop);
+    std::string text;
+    append_little_endian(text, std::uint32_t{0x46546C67});  // "glTF"
+    append_little_endian(text, std::uint32_t{2});
+    append_little_endian(text, static_cast<std::uint32_t>(kHeaderBytes + kChunkHeaderBytes +
+                                                          json_bytes_ + binary_chunk_bytes()));
+    append_little_endian(text, static_cast<std::uint32_t>(json_bytes_));
+    append_little_endian(text, std::uint32_t{0x4E4F534A});  // "JSON"
+    text.append(json_bytes_, ' ');
+    if (header_.vertices > 0) {
+      append_little_endian(text, static_cast<std::uint32_t>(binary_bytes()));
+      append_little_endian(text, std::uint32_t{0x004E4942});  // "BIN"
+    }
+    sink_->write(text);
+  }
+
+  void add_vertices(std::span<const Point3> positions, std::span<const float> attributes) override {
+    counts_.add_vertices(positions, attributes);
+    if (!origin_known_ && !positions.empty()) {
+      origin_ = positions.front();
+      origin_known_ = true;
+    }
+    const float* values = attributes.data();
+    for (const Point3& p : positions) {
+      const auto local = y_up({p[0] - origin_[0], p[1] - origin_[1], p[2] - origin_[2]});
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const auto stored = static_cast<float>(local[axis]);
+        if (stored < min_[axis]) min_[axis] = stored;
+        if (stored > max_[axis]) max_[axis] = stored;
+        append_little_endian(piece_, stored);
+      }
+      for (std::size_t i = 0; i < header_.attributes.size(); ++i) {
+        append_little_endian(piece_, *values++);
+      }
+      flush_if_full();
+    }
+    flush();
+  }
+
+  void add_triangles(std::span<const TriangleIndices> triangles) override {
+    counts_.add_triangles(triangles);
+    for (const TriangleIndices& triangle : triangles) {
+      for (const std::uint32_t index : triangle) append_little_endian(piece_, index);
+      flush_if_full();
+    }
+    flush();
+  }
+
+  void finish() override {
+    assert(counts_.complete());
+    const auto widened = [](const std::array<float, 3>& v) {
+      return std::array<double, 3>{v[0], v[1], v[2]};
+    };
+    const std::string text = json(y_up(origin_), widened(min_), widened(max_));
+    assert(text.size() <= json_bytes_);
+    sink_->write_at(kHeaderBytes + kChunkHeaderBytes, text);
+    sink_->commit();
+  }
+
+ private:
+  [[nodiscard]] std::uint64_t binary_bytes() const {
+    return header_.vertices * stride_ + header_.triangles * 12;
+  }
+  [[nodiscard]] std::uint64_t binary_chunk_bytes() const {
+    return header_.vertices == 0 ? 0 : kChunkHeaderBytes + binary_bytes();
+  }
+
+  [[nodiscard]] std::string json(const std::array<double, 3>& translation,
+                                 const std::array<double, 3>& min,
+                                 const std::array<double, 3>& max) const {
+    Json out;
+    out["asset"] = {{"version", "2.0"}, {"generator", "terrace"}};
+    out["scene"] = 0;
+    if (header_.vertices == 0) {
+      out["scenes"] = Json::array({Json::object()});
+      return out.dump();
+    }
+    out["scenes"] = Json::array({{{"nodes", {0}}}});
+    out["nodes"] = Json::array({{{"mesh", 0}, {"translation", translation}}});
+    Json primitive;
+    primitive["attributes"]["POSITION"] = 0;
+    Json accessors = Json::array();
+    accessors.push_back({{"bufferView", 0},
+                         {"componentType", kFloat},
+                         {"count", header_.vertices},
+                         {"type", "VEC3"},
+                         {"min", min},
+                         {"max", max}});
+    for (std::size_t i = 0; i < header_.attributes.size(); ++i) {
+      primitive["attributes"][attribute_name(header_.attributes[i])] = accessors.size();
+      accessors.push_back({{"bufferView", 0},
+                           {"byteOffset", 12 + 4 * i},
+                           {"componentType", kFloat},
+                           {"count", header_.vertices},
+                           {"type", "SCALAR"}});
+    }
+    const std::uint64_t vertex_bytes = header_.vertices * stride_;
+    Json views = Json::array();
+    views.push_back({{"buffer", 0},
+                     {"byteLength", vertex_bytes},
+                     {"byteStride", stride_},
+                     {"target", kArrayBuffer}});
+    if (header_.triangles > 0) {
+      primitive["indices"] = accessors.size();
+      accessors.push_back({{"bufferView", 1},
+                           {"componentType", kUnsignedInt},
+                           {"count", header_.triangles * 3},
+                           {"type", "SCALAR"}});
+      views.push_back({{"buffer", 0},
+                       {"byteOffset", vertex_bytes},
+                       {"byteLength", header_.triangles * 12},
+                       {"target", kElementArrayBuffer}});
+    }
+    primitive["mode"] = header_.triangles > 0 ? kTriangles : kPoints;
+    primitive["material"] = 0;
+    out["meshes"] = Json::array({{{"primitives", Json::array({primitive})}}});
+    // Without a material glTF's default is a mirror of metal, dark in most viewers.
+    out["materials"] =
+        Json::array({{{"pbrMetallicRoughness", {{"metallicFactor", 0.0}, {"roughnessFactor", 1.0}}},
+                      {"doubleSided", true}}});
+    out["accessors"] = accessors;
+    out["bufferViews"] = views;
+    out["buffers"] = Json::array({{{"byteLength", binary_bytes()}}});
+    return out.dump();
+  }
+
+  void flush_if_full() {
+    if (piece_.size() >= kGlbPieceBytes) flush();
+  }
+  void flush() {
+    sink_->write(piece_);
+    piece_.clear();
+  }
+
+  MeshHeader header_;
+  MeshCounts counts_;
+  std::size_t stride_;
+  std::optional<Sink> sink_;
+  Point3 origin_{};
+  bool origin_known_ = false;
+  std::array<float, 3> min_{kInfinity, kInfinity, kInfinity};
+  std::array<float, 3> max_{-kInfinity, -kInfinity, -kInfinity};
+  std::size_t json_bytes_ = 0;
+  std::string piece_;
+
+  static constexpr float kInfinity = std::numeric_limits<float>::infinity();
+};
+
+}  // namespace
+
+Point3 glb_origin(const Box3& bounds) {
+  Point3 origin;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    origin[axis] = bounds.min[axis] * 0.5 + bounds.max[axis] * 0.5;
+  }
+  return origin;
+}
+
+float glb_coordinate(double coordinate, double origin) {
+  return static_cast<float>(coordinate - origin);
+}
+
+std::unique_ptr<MeshWriter> open_glb_writer(const std::string& path, const MeshHeader& header,
+                                            const WriterOptions& options) {
+  return std::make_unique<GlbWriter>(path, header, options);
+}
+
+}  // namespace terrace::stream

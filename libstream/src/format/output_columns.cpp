@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "format/output_columns.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <cstring>
+
+#include "format/ply/decode.hpp"
+#include "format/with_type.hpp"
+#include "io/bytes.hpp"
+#include "io/number.hpp"
+
+namespace terrace::stream {
+namespace {
+
+bool is_axis(const std::string& name) {
+  return name.size() == 1 && std::string_view("xyzXYZ").find(name[0]) != std::string_view::npos;
+}
+
+std::string word_of(const std::string& name) {
+  std::string out = name.empty() ? "attribute" : name;
+  for (char& c : out) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte <= 0x20 || byte == 0x7f) c = '_';
+  }
+  return out;
+}
+
+}  // namespace
+
+OutputColumns::OutputColumns(std::span<const Channel> attributes) {
+  for (const Channel& channel : attributes) {
+    const std::string word = word_of(channel.name);
+    std::string name = word;
+    const auto taken = [&] {
+      return is_axis(name) ||
+             std::any_of(columns_.begin(), columns_.end(),
+                         [&](const OutputColumn& column) { return column.name == name; });
+    };
+    for (int n = 2; taken(); ++n) name = word + "_" + std::to_string(n);
+    const bool real = channel.scale != 1.0 || channel.offset != 0.0;
+    columns_.push_back({.name = name,
+                        .stored = channel.type,
+                        .written = real ? ScalarType::f64 : channel.type,
+                        .scale = channel.scale,
+                        .offset = channel.offset,
+                        .real = real});
+  }
+}
+
+void OutputColumns::check(const PointBlock& block) const {
+  assert(block.attributes.size() == columns_.size());
+  for (std::size_t i = 0; i < columns_.size(); ++i) {
+    assert(block.attributes[i].type == columns_[i].stored);
+    assert(block.attributes[i].bytes.size() == block.size() * size_of(columns_[i].stored));
+  }
+  (void)block;
+}
+
+void OutputColumns::append_text(std::string& out, const PointBlock& block, std::size_t i,
+                                char separator) const {
+  for (std::size_t c = 0; c < columns_.size(); ++c) {
+    const OutputColumn& column = columns_[c];
+    const std::byte* raw = block.attributes[c].bytes.data() + i * size_of(column.stored);
+    out += separator;
+    if (column.real) {
+      append_number(out, to_double(raw, column.stored) * column.scale + column.offset);
+      continue;
+    }
+    with_type(column.stored, [&](auto value) {
+      std::memcpy(&value, raw, sizeof value);
+      append_number(out, value);
+    });
+  }
+}
+
+void OutputColumns::append_bytes(std::string& out, const PointBlock& block, std::size_t i) const {
+  for (std::size_t c = 0; c < columns_.size(); ++c) {
+    const OutputColumn& column = columns_[c];
+    const std::byte* raw = block.attributes[c].bytes.data() + i * size_of(column.stored);
+    if (column.real) {
+      append_little_endian(out, to_double(raw, column.stored) * column.scale + column.offset);
+      continue;
+    }
+    with_type(column.stored, [&](auto value) {
+      std::memcpy(&value, raw, sizeof value);
+      append_little_endian(out, value);
+    });
+  }
+}
+
+}  // namespace terrace::stream

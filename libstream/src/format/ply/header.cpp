@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "format/ply/header.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <optional>
+#include <string_view>
+#include <utility>
+
+#include "io/line_reader.hpp"
+#include "io/text.hpp"
+#include "terrace/stream/error.hpp"
+
+namespace terrace::stream {
+namespace {
+
+constexpr std::uint64_t kMaxHeaderBytes = 1u << 20;
+constexpr std::size_t kMaxElements = 100;
+constexpr std::size_t kMaxProperties = 1000;
+
+/// The lines of the header, with the errors that name them.
+class HeaderReader {
+ public:
+  explicit HeaderReader(Input& input) : input_(&input), lines_(input) {}
+
+  std::string_view next() {
+    std::string_view line;
+    if (input_->offset() > kMaxHeaderBytes) {
+      fail("the header is longer than " + std::to_string(kMaxHeaderBytes) + " bytes",
+           "this is no PLY file, or its end_header is missing");
+    }
+    if (!lines_.next(line)) {
+      if (lines_.number() == 0) {
+        throw Error(
+            {.file = input_->name(), .where = {}, .cause = "the file is empty", .remedy = {}});
+      }
+      fail("the file ends before end_header", "the file is cut off");
+    }
+    return line;
+  }
+  [[noreturn]] void fail(std::string cause, std::string remedy) const {
+    throw Error({.file = input_->name(),
+                 .where = "line " + std::to_string(lines_.number()),
+                 .cause = std::move(cause),
+                 .remedy = std::move(remedy)});
+  }
+  std::uint64_t finish() {
+    lines_.release();
+    return lines_.number();
+  }
+
+ private:
+  Input* input_;
+  LineReader lines_;
+};
+
+PlyEncoding parse_format(const std::vector<std::string_view>& words, const HeaderReader& reader) {
+  if (words.size() != 3 || words[2] != "1.0") {
+    reader.fail("not a format of PLY 1.0", "expected 'format ascii 1.0' or the like");
+  }
+  if (words[1] == "ascii") return PlyEncoding::ascii;
+  if (words[1] == "binary_little_endian") return PlyEncoding::little_endian;
+  if (words[1] == "binary_big_endian") return PlyEncoding::big_endian;
+  reader.fail("unknown format " + in_quotes(words[1]),
+              "known are ascii, binary_little_endian and binary_big_endian");
+}
+
+PlyElement parse_element(const std::vector<std::string_view>& words, const HeaderReader& reader) {
+  PlyElement element;
+  if (words.size() != 3) reader.fail("not 'element NAME COUNT'", "correct the header");
+  element.name = words[1];
+  const char* const end = words[2].data() + words[2].size();
+  const auto [rest, error] = std::from_chars(words[2].data(), end, element.count);
+  if (error != std::errc{} || rest != end) {
+    reader.fail(in_quotes(words[2]) + " is no number of items", "correct the header");
+  }
+  return element;
+}
+
+PlyProperty parse_property(const std::vector<std::string_view>& words, const HeaderReader& reader) {
+  const auto type_of = [&](std::string_view word) {
+    const std::optional<ScalarType> type = scalar_type_of(word);
+    if (!type) reader.fail("unknown type " + in_quotes(word), "correct the header");
+    return *type;
+  };
+  PlyProperty property;
+  if (words.size() == 5 && words[1] == "list") {
+    property.list = true;
+    property.count_type = type_of(words[2]);
+    if (property.count_type == ScalarType::f32 || property.count_type == ScalarType::f64) {
+      reader.fail("the length of a list is no integer", "correct the header");
+    }
+    property.type = type_of(words[3]);
+  } else if (words.size() == 3) {
+    property.type = type_of(words[1]);
+  } else {
+    reader.fail("not 'property TYPE NAME' or 'property list TYPE TYPE NAME'", "correct the header");
+  }
+  property.name = words.back();
+  return property;
+}
+
+/// Refuses counts that the file has no bytes for, before anything is made ready for them.
+void check_counts(const PlyHeader& header, const Input& input) {
+  if (!input.size()) return;
+  // The last number of an ASCII file needs no separator after it.
+  std::uint64_t left = *input.size() - std::min(*input.size(), input.offset());
+  if (header.encoding == PlyEncoding::ascii) ++left;
+  for (const PlyElement& element : header.elements) {
+    const std::uint64_t least = header.encoding == PlyEncoding::ascii
+                                    ? 2 * element.properties.size()
+                                    : element.binary_bytes();
+    if (least == 0) continue;
+    if (element.count > left / least) {
+      throw Error({.file = input.name(),
+                   .where = "byte " + std::to_string(input.offset()),
+                   .cause = "the header promises " + std::to_string(element.count) + " items of " +
+                            in_quotes(element.name) + " of at least " + std::to_string(least) +
+                            " bytes, but only " + std::to_string(left) + " bytes are left",
+                   .remedy = "the file is cut off or its header is wrong"});
+    }
+    left -= element.count * least;
+  }
+}
+
+}  // namespace
+
+bool PlyElement::has_lists() const {
+  return std::any_of(properties.begin(), properties.end(),
+                     [](const PlyProperty& property) { return property.list; });
+}
+
+std::size_t PlyElement::binary_bytes() const {
+  std::size_t bytes = 0;
+  for (const PlyProperty& p : properties) bytes += size_of(p.list ? p.count_type : p.type);
+  return bytes;
+}
+
+PlyHeader read_ply_header(Input& input) {
+  PlyHeader header;
+  HeaderReader reader(input);
+  if (trim(reader.next()) != "ply") reader.fail("does not begin with 'ply'", "this is no PLY file");
+  bool format_seen = false;
+  for (;;) {
+    const std::string_view line = reader.next();
+    const std::vector<std::string_view> words = split_fields(line, ' ');
+    if (words.empty()) continue;
+    if (words[0] == "comment" || words[0] == "obj_info") {
+      std::string_view text = trim_left(line);
+      if (words[0] == "comment") text = trim_left(text.substr(words[0].size()));
+      header.comments.emplace_back(text);
+    } else if (words[0] == "format") {
+      if (format_seen) reader.fail("a second format line", "correct the header");
+      header.encoding = parse_format(words, reader);
+      format_seen = true;
+    } else if (words[0] == "element") {
+      PlyElement element = parse_element(words, reader);
+      for (const PlyElement& other : header.elements) {
+        if (other.name == element.name) {
+          reader.fail("a second element " + in_quotes(element.name), "correct the header");
+        }
+      }
+      header.elements.push_back(std::move(element));
+    } else if (words[0] == "property") {
+      if (header.elements.empty()) {
+        reader.fail("a property before the first element", "correct the header");
+      }
+      auto& properties = header.elements.back().properties;
+      PlyProperty property = parse_property(words, reader);
+      for (const PlyProperty& other : properties) {
+        if (other.name == property.name) {
+          reader.fail("a second property " + in_quotes(property.name), "correct the header");
+        }
+      }
+      properties.push_back(std::move(property));
+      if (properties.size() > kMaxProperties) {
+        reader.fail("more than " + std::to_string(kMaxProperties) + " properties",
+                    "this is no file of points");
+      }
+    } else if (words[0] == "end_header") {
+      break;
+    } else {
+      reader.fail("unknown keyword " + in_quotes(words[0]), "this is no PLY 1.0 header");
+    }
+    if (header.elements.size() > kMaxElements) {
+      reader.fail("more than " + std::to_string(kMaxElements) + " elements",
+                  "this is no file of points");
+    }
+  }
+  if (!format_seen) reader.fail("the header has no format line", "correct the header");
+  header.lines = reader.finish();
+  check_counts(header, input);
+  return header;
+}
+
+}  // namespace terrace::stream

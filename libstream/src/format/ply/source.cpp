@@ -1,0 +1,343 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cassert>
+#include <cstdint>
+#include <cstdlib>
+#include <limits>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "format/chain.hpp"
+#include "format/formats.hpp"
+#include "format/ply/decode.hpp"
+#include "format/ply/header.hpp"
+#include "io/line_reader.hpp"
+#include "io/text.hpp"
+#include "terrace/stream/error.hpp"
+#include "terrace/stream/input.hpp"
+
+namespace terrace::stream {
+namespace {
+
+/// Most bytes that are decoded at once.
+constexpr std::size_t kChunkBytes = 128u << 10;
+
+/// A property of the vertices and where its values go: to a coordinate, to an attribute, or, a
+/// list, nowhere.
+struct Field {
+  PlyProperty property;
+  std::size_t offset = 0;  ///< in a row of fixed size
+  int axis = -1;
+  int attribute = -1;
+};
+
+class PlySource final : public PointSource {
+ public:
+  PlySource(const std::string& file, const SourceOptions& options)
+      : input_(file, options.stop),
+        lines_(input_),
+        header_(read_ply_header(input_)),
+        block_points_(options.block_points) {
+    const auto vertex = std::find_if(header_.elements.begin(), header_.elements.end(),
+                                     [](const PlyElement& e) { return e.name == "vertex"; });
+    if (vertex == header_.elements.end()) {
+      throw Error({.file = input_.name(),
+                   .where = "header",
+                   .cause = "there is no element 'vertex'",
+                   .remedy = "only PLY files of points or meshes are read"});
+    }
+    count_ = vertex->count;
+    stride_ = vertex->binary_bytes();
+    has_lists_ = vertex->has_lists();
+    swap_ = (header_.encoding == PlyEncoding::big_endian) ==
+            (std::endian::native == std::endian::little);
+    info_.format = "ply";
+    info_.files = {file};
+    info_.points = count_;
+    info_.comments = header_.comments;
+    if (options.crs) info_.crs = *options.crs;
+    make_fields(*vertex);
+    for (auto element = header_.elements.begin(); element != vertex; ++element) {
+      skip_element(*element);
+    }
+  }
+
+  const SourceInfo& info() const override { return info_; }
+
+  bool next(PointBlock& block) override {
+    const auto wanted =
+        static_cast<std::size_t>(std::min<std::uint64_t>(block_points_, count_ - delivered_));
+    block.positions.resize(wanted);
+    block.attributes.resize(info_.attributes.size());
+    for (std::size_t i = 0; i < block.attributes.size(); ++i) {
+      block.attributes[i].type = info_.attributes[i].type;
+      block.attributes[i].bytes.resize(wanted * size_of(info_.attributes[i].type));
+    }
+    if (header_.encoding == PlyEncoding::ascii) {
+      for (std::size_t i = 0; i < wanted; ++i) read_line(block, i);
+    } else if (has_lists_) {
+      for (std::size_t i = 0; i < wanted; ++i) read_row(block, i);
+    } else {
+      read_rows(block, wanted);
+    }
+    check_finite(block);
+    delivered_ += wanted;
+    return wanted > 0;
+  }
+
+  Progress progress() const override {
+    return {.points = delivered_,
+            .nodata = 0,
+            .fraction =
+                count_ == 0 ? 1.0 : static_cast<double>(delivered_) / static_cast<double>(count_)};
+  }
+
+ private:
+  [[noreturn]] void fail(std::string where, std::string cause, std::string remedy) const {
+    throw Error({.file = input_.name(),
+                 .where = std::move(where),
+                 .cause = std::move(cause),
+                 .remedy = std::move(remedy)});
+  }
+  [[noreturn]] void fail_end(const std::string& element, std::uint64_t item) const {
+    fail("byte " + std::to_string(input_.offset()),
+         "the file ends in item " + std::to_string(item) + " of element " + in_quotes(element),
+         "the file is cut off or its header is wrong");
+  }
+
+  void make_fields(const PlyElement& vertex) {
+    std::array<bool, 3> found{};
+    std::size_t offset = 0;
+    for (const PlyProperty& property : vertex.properties) {
+      Field field{.property = property, .offset = offset};
+      offset += size_of(property.list ? property.count_type : property.type);
+      if (!property.list) {
+        const std::size_t axis = std::string_view("xyz").find(property.name);
+        if (property.name.size() == 1 && axis != std::string_view::npos) {
+          if (size_of(property.type) == 8 && property.type != ScalarType::f64) {
+            fail("header", "the coordinate " + in_quotes(property.name) + " is a 64-bit integer",
+                 "store it as double");
+          }
+          field.axis = static_cast<int>(axis);
+          found[axis] = true;
+          info_.coordinates[axis] = {.name = property.name, .type = property.type};
+        } else {
+          field.attribute = static_cast<int>(info_.attributes.size());
+          info_.attributes.push_back({.name = property.name, .type = property.type});
+        }
+      }
+      fields_.push_back(std::move(field));
+    }
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (!found[axis]) {
+        fail("header", std::string("the vertices have no property '") + "xyz"[axis] + "'",
+             "only PLY files of points or meshes are read");
+      }
+    }
+  }
+
+  /// Moves past an element that comes before the vertices.
+  void skip_element(const PlyElement& element) {
+    if (element.properties.empty()) return;
+    if (header_.encoding == PlyEncoding::ascii) {
+      for (std::uint64_t i = 0; i < element.count; ++i) {
+        if (!lines_.skip()) fail_end(element.name, i);
+      }
+    } else if (!element.has_lists()) {
+      const std::uint64_t bytes = element.binary_bytes();
+      if (element.count > std::numeric_limits<std::uint64_t>::max() / bytes ||
+          !input_.skip(element.count * bytes)) {
+        fail_end(element.name, 0);
+      }
+    } else {
+      for (std::uint64_t i = 0; i < element.count; ++i) {
+        for (const PlyProperty& property : element.properties) {
+          const bool good = property.list ? skip_list(property, element.name, i)
+                                          : input_.skip(size_of(property.type));
+          if (!good) fail_end(element.name, i);
+        }
+      }
+    }
+  }
+
+  /// Brings the next value of a binary file into `raw`; false if the file ends before.
+  bool read_scalar(ScalarType type, std::byte* raw) {
+    const std::size_t bytes = size_of(type);
+    const std::string_view window = input_.fill(bytes);
+    if (window.size() < bytes) return false;
+    decode_values({.rows = window.data(), .stride = bytes, .count = 1, .type = type, .swap = swap_},
+                  raw);
+    input_.consume(bytes);
+    return true;
+  }
+
+  bool skip_list(const PlyProperty& property, const std::string& element, std::uint64_t item) {
+    std::array<std::byte, 8> raw{};
+    if (!read_scalar(property.count_type, raw.data())) return false;
+    const std::int64_t length = to_integer(raw.data(), property.count_type);
+    if (length < 0) {
+      fail("byte " + std::to_string(input_.offset()),
+           "list " + in_quotes(property.name) + " in item " + std::to_string(item) +
+               " of element " + in_quotes(element) + " has the length " + std::to_string(length),
+           "the file is damaged");
+    }
+    const auto size = static_cast<std::uint64_t>(size_of(property.type));
+    const auto items = static_cast<std::uint64_t>(length);
+    return items <= std::numeric_limits<std::uint64_t>::max() / size && input_.skip(items * size);
+  }
+
+  /// Vertices of fixed size in a binary file.
+  void read_rows(PointBlock& block, std::size_t wanted) {
+    for (std::size_t done = 0; done < wanted;) {
+      const std::size_t rows =
+          std::min(wanted - done, std::max<std::size_t>(1, kChunkBytes / stride_));
+      const std::string_view window = input_.fill(rows * stride_);
+      if (window.size() < rows * stride_) {
+        fail_end("vertex", delivered_ + done + window.size() / stride_);
+      }
+      for (const Field& field : fields_) {
+        const PackedColumn column{.rows = window.data() + field.offset,
+                                  .stride = stride_,
+                                  .count = rows,
+                                  .type = field.property.type,
+                                  .swap = swap_};
+        if (field.axis >= 0) {
+          decode_coordinate(column, block.positions.data() + done,
+                            static_cast<std::size_t>(field.axis));
+        } else {
+          decode_values(column, attribute_at(block, field, done));
+        }
+      }
+      input_.consume(rows * stride_);
+      done += rows;
+    }
+  }
+
+  /// A vertex that has lists, in a binary file.
+  void read_row(PointBlock& block, std::size_t i) {
+    std::array<std::byte, 8> raw{};
+    for (const Field& field : fields_) {
+      const bool good = field.property.list ? skip_list(field.property, "vertex", delivered_ + i)
+                                            : read_scalar(field.property.type, raw.data());
+      if (!good) fail_end("vertex", delivered_ + i);
+      store(block, field, i, raw.data());
+    }
+  }
+
+  /// A vertex in an ASCII file: one line that is not blank.
+  void read_line(PointBlock& block, std::size_t i) {
+    std::string_view line;
+    do {
+      if (!lines_.next(line)) fail_end("vertex", delivered_ + i);
+      line = trim_left(line);
+    } while (line.empty());
+    std::array<std::byte, 8> raw{};
+    for (const Field& field : fields_) {
+      const PlyProperty& property = field.property;
+      read_word(line, property.list ? property.count_type : property.type, property, raw.data());
+      if (property.list) {
+        const std::int64_t length = to_integer(raw.data(), property.count_type);
+        // Each item takes two bytes of the line but the last: a longer list cannot be there.
+        if (length < 0 || static_cast<std::uint64_t>(length) > line.size()) {
+          fail_line("list " + in_quotes(property.name) + " has the length " +
+                    std::to_string(length));
+        }
+        for (std::int64_t n = 0; n < length; ++n) {
+          read_word(line, property.type, property, raw.data());
+        }
+      } else {
+        store(block, field, i, raw.data());
+      }
+    }
+    if (!line.empty()) fail_line("more values than the vertex has properties");
+  }
+
+  [[noreturn]] void fail_line(std::string cause) const {
+    fail("line " + std::to_string(header_.lines + lines_.number()), std::move(cause),
+         "the file is damaged or its header is wrong");
+  }
+
+  /// Takes the first word of `line` as a value of `type`, and the blanks after it.
+  void read_word(std::string_view& line, ScalarType type, const PlyProperty& property,
+                 std::byte* raw) const {
+    const char* const end = line.data() + line.size();
+    const char* const rest = parse_scalar(line.data(), end, type, raw);
+    if (rest == nullptr) {
+      const std::string_view word = line.substr(0, line.find_first_of(" \t"));
+      fail_line(word.empty() ? "the line ends before property " + in_quotes(property.name)
+                             : in_quotes(word) + " is no " + std::string(name_of(type)) +
+                                   " for property " + in_quotes(property.name));
+    }
+    line = trim_left({rest, static_cast<std::size_t>(end - rest)});
+  }
+
+  std::byte* attribute_at(PointBlock& block, const Field& field, std::size_t i) const {
+    return block.attributes[static_cast<std::size_t>(field.attribute)].bytes.data() +
+           i * size_of(field.property.type);
+  }
+
+  void store(PointBlock& block, const Field& field, std::size_t i, const std::byte* raw) const {
+    if (field.axis >= 0) {
+      block.positions[i][static_cast<std::size_t>(field.axis)] =
+          to_double(raw, field.property.type);
+    } else if (field.attribute >= 0) {
+      std::copy_n(raw, size_of(field.property.type), attribute_at(block, field, i));
+    }
+  }
+
+  void check_finite(const PointBlock& block) const {
+    // A number less itself is zero unless it is infinite or NaN, and a sum of zeros stays zero.
+    double sum = 0.0;
+    for (const Point3& p : block.positions) sum += (p[0] - p[0]) + (p[1] - p[1]) + (p[2] - p[2]);
+    if (sum == 0.0) return;
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      const Point3& p = block.positions[i];
+      if ((p[0] - p[0]) + (p[1] - p[1]) + (p[2] - p[2]) == 0.0) continue;
+      fail("vertex " + std::to_string(delivered_ + i), "a coordinate is infinite or NaN",
+           "leave such vertices out");
+    }
+  }
+
+  Input input_;
+  LineReader lines_;  ///< of what follows the header
+  PlyHeader header_;
+  std::size_t block_points_;
+  SourceInfo info_;
+  std::vector<Field> fields_;
+  std::uint64_t count_ = 0, delivered_ = 0;
+  std::size_t stride_ = 0;
+  bool has_lists_ = false, swap_ = false;
+};
+
+bool recognise_ply(std::span<const std::byte> head) {
+  const std::string_view text(reinterpret_cast<const char*>(head.data()), head.size());
+  return text.starts_with("ply\n") || text.starts_with("ply\r") || text.starts_with("ply ");
+}
+
+std::unique_ptr<PointSource> open_one_ply(const std::string& file, const SourceOptions& options) {
+  assert(options.block_points > 0);
+  return std::make_unique<PlySource>(file, options);
+}
+
+std::unique_ptr<PointSource> open_ply(std::span<const std::string> files,
+                                      const SourceOptions& options) {
+  return open_in_turn(files, options, &open_one_ply);
+}
+
+}  // namespace
+
+const Format& ply_format() {
+  static const Format format{.name = "ply",
+                             .endings = {".ply"},
+                             .streams = true,
+                             .recognise = &recognise_ply,
+                             .open = &open_ply};
+  return format;
+}
+
+}  // namespace terrace::stream

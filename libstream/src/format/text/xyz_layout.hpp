@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "io/line_reader.hpp"
+
+namespace terrace::stream {
+
+/// How the columns of a text of points are written and what they mean.
+struct TextLayout {
+  static constexpr std::size_t kMaxColumns = 1000;
+
+  char separator = ' ';  ///< ',' or ';', or ' ' for runs of blanks and tabs
+  std::size_t columns = 0;
+  std::array<std::size_t, 3> xyz{0, 1, 2};  ///< columns of the coordinates
+  std::vector<std::size_t> attributes;      ///< the other columns, in order
+  std::vector<std::string> names;           ///< of the attributes
+  bool geographic = false;                  ///< the header says longitude and latitude
+  std::vector<std::string> comments;        ///< before the first point
+};
+
+/// ';' if the line has one, else ',' if it has one, else ' '.
+char separator_of(std::string_view line);
+/// True for a line that starts with '#' or "//" (after trim_left).
+bool is_comment(std::string_view line);
+/// True if no field is a number.
+bool is_header(const std::vector<std::string_view>& fields);
+
+/// Reads comments, the header line if there is one, and looks at the first line of numbers, which
+/// `lines` then returns next. `file` is for messages.
+/// Throws: Error if there is no line of at least three columns, or the header does not fit it.
+TextLayout read_text_layout(LineReader& lines, const std::string& file);
+
+}  // namespace terrace::stream

@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <bit>
+#include <cassert>
+#include <cmath>
+#include <cstring>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "format/chain.hpp"
+#include "format/formats.hpp"
+#include "format/text/xyz_layout.hpp"
+#include "io/line_reader.hpp"
+#include "io/number.hpp"
+#include "io/text.hpp"
+#include "terrace/stream/error.hpp"
+#include "terrace/stream/input.hpp"
+
+namespace terrace::stream {
+namespace {
+
+/// Reads `columns` numbers that fill the line. False if anything is wrong with it.
+/// kSeparator is ',' or ';', or ' ' for runs of blanks.
+template <char kSeparator>
+bool parse_row(const char* at, const char* end, std::size_t columns, double* row) {
+  for (std::size_t i = 0;; ++i) {
+    while (at != end && is_blank(*at)) ++at;
+    at = parse_real(at, end, row[i]);
+    if (at == nullptr) return false;
+    const char* const number_end = at;
+    while (at != end && is_blank(*at)) ++at;
+    if (i + 1 == columns) return at == end;
+    if constexpr (kSeparator == ' ') {
+      if (at == number_end) return false;
+    } else {
+      if (at == end || *at != kSeparator) return false;
+      ++at;
+    }
+  }
+}
+
+using ParseRow = bool (*)(const char*, const char*, std::size_t, double*);
+
+ParseRow row_parser(char separator) {
+  switch (separator) {
+    case ',':
+      return &parse_row<','>;
+    case ';':
+      return &parse_row<';'>;
+    default:
+      return &parse_row<' '>;
+  }
+}
+
+class XyzSource final : public PointSource {
+ public:
+  XyzSource(const std::string& file, const SourceOptions& options)
+      : input_(file, options.stop), lines_(input_), block_points_(options.block_points) {
+    constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+    if (input_.fill(kByteOrderMark.size()).starts_with(kByteOrderMark)) {
+      input_.consume(kByteOrderMark.size());
+    }
+    layout_ = read_text_layout(lines_, input_.name());
+    parse_row_ = row_parser(layout_.separator);
+    row_.resize(layout_.columns);
+    info_.format = "xyz";
+    info_.files = {file};
+    for (std::size_t axis = 0; axis < 3; ++axis) info_.coordinates[axis].name = "xyz"[axis];
+    if (layout_.geographic) {
+      info_.crs.geographic = true;
+      info_.crs.horizontal_unit = "degree";
+      info_.coordinates[0].unit = info_.coordinates[1].unit = "degree";
+    }
+    if (options.crs) info_.crs = *options.crs;
+    for (const std::string& name : layout_.names) {
+      info_.attributes.push_back({.name = name, .type = ScalarType::f64});
+    }
+    info_.comments = layout_.comments;
+  }
+
+  const SourceInfo& info() const override { return info_; }
+
+  bool next(PointBlock& block) override {
+    const std::size_t attributes = layout_.attributes.size();
+    block.positions.resize(block_points_);
+    block.attributes.resize(attributes);
+    for (Column& column : block.attributes) {
+      column.type = ScalarType::f64;
+      column.bytes.resize(block_points_ * sizeof(double));
+    }
+    const auto [ix, iy, iz] = layout_.xyz;
+    std::size_t count = 0;
+    std::string_view line;
+    while (count < block_points_ && lines_.next(line)) {
+      const char* const begin = line.data();
+      const char* const end = begin + line.size();
+      if (!parse_row_(begin, end, layout_.columns, row_.data())) {
+        line = trim_left(line);
+        if (line.empty() || is_comment(line)) continue;
+        refuse(line);
+      }
+      const Point3 point{row_[ix], row_[iy], row_[iz]};
+      // Infinities and NaN are what remains when a number less itself is not zero.
+      if (!((point[0] - point[0]) + (point[1] - point[1]) + (point[2] - point[2]) == 0.0)) {
+        refuse(line);
+      }
+      block.positions[count] = point;
+      for (std::size_t i = 0; i < attributes; ++i) {
+        std::memcpy(block.attributes[i].bytes.data() + count * sizeof(double),
+                    &row_[layout_.attributes[i]], sizeof(double));
+      }
+      ++count;
+    }
+    lines_.release();
+    block.positions.resize(count);
+    for (Column& column : block.attributes) column.bytes.resize(count * sizeof(double));
+    delivered_ += count;
+    return count > 0;
+  }
+
+  Progress progress() const override {
+    Progress progress{.points = delivered_, .nodata = 0, .fraction = 0.0};
+    if (input_.size() && *input_.size() > 0) {
+      progress.fraction =
+          std::min(1.0, static_cast<double>(input_.offset()) / static_cast<double>(*input_.size()));
+    }
+    return progress;
+  }
+
+ private:
+  /// Says what is wrong with a line that is no point.
+  [[noreturn]] void refuse(std::string_view line) const {
+    const auto fail = [&](std::string cause, std::string remedy) {
+      throw Error({.file = input_.name(),
+                   .where = "line " + std::to_string(lines_.number()),
+                   .cause = std::move(cause),
+                   .remedy = std::move(remedy)});
+    };
+    const std::vector<std::string_view> fields = split_fields(line, layout_.separator);
+    if (fields.size() != layout_.columns) {
+      fail("has " + std::to_string(fields.size()) + " columns, the lines before have " +
+               std::to_string(layout_.columns),
+           "every line needs the same columns");
+    }
+    for (std::size_t i = 0; i < fields.size(); ++i) {
+      const std::string_view field = fields[i];
+      const std::string column = "column " + std::to_string(i + 1);
+      if (field.empty()) fail(column + " is empty", "every column needs a number");
+      double value = 0;
+      const char* const end = field.data() + field.size();
+      if (parse_real(field.data(), end, value) != end) {
+        fail(column + ", " + in_quotes(field) + ", is no number of a double's range",
+             "leave the column out, or correct it");
+      }
+      const bool coordinate =
+          std::find(layout_.xyz.begin(), layout_.xyz.end(), i) != layout_.xyz.end();
+      if (coordinate && !std::isfinite(value)) {
+        fail(column + " is " + std::string(field) + ", but a coordinate must be finite",
+             "leave the line out");
+      }
+    }
+    fail("is no point", "each line needs the same number of numbers");
+    std::abort();
+  }
+
+  Input input_;
+  LineReader lines_;
+  std::size_t block_points_;
+  TextLayout layout_;
+  ParseRow parse_row_ = nullptr;
+  std::vector<double> row_;
+  SourceInfo info_;
+  std::uint64_t delivered_ = 0;
+};
+
+/// True for text whose first line that is no comment, or the one after a header, begins a table of
+/// numbers.
+bool recognise_xyz(std::span<const std::byte> head) {
+  std::string_view text(reinterpret_cast<const char*>(head.data()), head.size());
+  const auto is_text = [](char c) {
+    const auto byte = static_cast<unsigned char>(c);
+    return byte >= 0x20 ? byte != 0x7f : c == '\n' || c == '\r' || c == '\t';
+  };
+  if (!std::all_of(text.begin(), text.end(), is_text)) return false;
+  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+  for (bool header_seen = false; !text.empty();) {
+    const std::size_t end = std::min(text.find_first_of("\r\n"), text.size());
+    const std::string_view line = trim_left(text.substr(0, end));
+    text.remove_prefix(std::min(end + 1, text.size()));
+    if (line.empty() || is_comment(line)) continue;
+    const auto fields = split_fields(line, separator_of(line));
+    if (!is_header(fields)) {
+      // A line of one column or with words among its numbers is prose, or another format.
+      return fields.size() >= 2 &&
+             std::count_if(fields.begin(), fields.end(), [](std::string_view field) {
+               return !is_header({field});
+             }) >= std::min<std::ptrdiff_t>(3, static_cast<std::ptrdiff_t>(fields.size()));
+    }
+    if (header_seen) return false;
+    header_seen = true;
+  }
+  return false;
+}
+
+std::unique_ptr<PointSource> open_one_xyz(const std::string& file, const SourceOptions& options) {
+  assert(options.block_points > 0);
+  return std::make_unique<XyzSource>(file, options);
+}
+
+std::unique_ptr<PointSource> open_xyz(std::span<const std::string> files,
+                                      const SourceOptions& options) {
+  return open_in_turn(files, options, &open_one_xyz);
+}
+
+}  // namespace
+
+const Format& xyz_format() {
+  static const Format format{.name = "xyz",
+                             .endings = {".xyz", ".csv", ".tsv", ".txt"},
+                             .streams = true,
+                             .recognise = &recognise_xyz,
+                             .open = &open_xyz};
+  return format;
+}
+
+}  // namespace terrace::stream

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "format/writers.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+
+#include "terrace/stream/error.hpp"
+#include "terrace/stream/input.hpp"
+
+namespace terrace::stream {
+namespace {
+
+constexpr std::array<WriterFormat, 4> kPointFormats{{{"xyz", ".xyz", ".txt", true},
+                                                     {"csv", ".csv", "", true},
+                                                     {"ply", ".ply", "", false},
+                                                     {"ply-ascii", "", "", false}}};
+constexpr std::array kPointOpeners{&open_xyz_writer, &open_csv_writer, &open_ply_writer,
+                                   &open_ply_ascii_writer};
+
+constexpr std::array<WriterFormat, 4> kMeshFormats{{{"obj", ".obj", "", true},
+                                                    {"ply", ".ply", "", false},
+                                                    {"ply-ascii", "", "", true},
+                                                    {"glb", ".glb", "", false}}};
+constexpr std::array kMeshOpeners{&open_obj_writer, &open_ply_mesh_writer,
+                                  &open_ply_ascii_mesh_writer, &open_glb_writer};
+
+std::string known(std::span<const WriterFormat> table) {
+  std::string out;
+  for (const WriterFormat& row : table) {
+    if (!out.empty()) out += ", ";
+    out += row.name;
+    if (!row.ending.empty()) out.append(" (").append(row.ending);
+    if (!row.second_ending.empty()) out.append(", ").append(row.second_ending);
+    if (!row.ending.empty()) out += ")";
+  }
+  return out;
+}
+
+std::string lower_ending(const std::string& path) {
+  std::string ending = std::filesystem::path(path).extension().string();
+  for (char& c : ending) {
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  }
+  return ending;
+}
+
+}  // namespace
+
+std::size_t choose_format(std::span<const WriterFormat> table, const std::string& path,
+                          const WriterOptions& options) {
+  const bool to_stdout = path == kStandardStream;
+  const std::string ending = lower_ending(path);
+  for (std::size_t i = 0; i < table.size(); ++i) {
+    const WriterFormat& row = table[i];
+    if (!options.format.empty()) {
+      if (row.name != options.format) continue;
+    } else if (to_stdout) {
+      if (!row.streams) continue;
+    } else if (ending.empty() || (row.ending != ending && row.second_ending != ending)) {
+      continue;
+    }
+    if (to_stdout && !row.streams) {
+      throw Error({.file = "standard output",
+                   .where = {},
+                   .cause = std::string(row.name) + " cannot be written to a pipe",
+                   .remedy = "name a file"});
+    }
+    return i;
+  }
+  if (!options.format.empty()) {
+    throw Error({.file = path,
+                 .where = {},
+                 .cause = "unknown output format '" + options.format + "'",
+                 .remedy = "known are " + known(table)});
+  }
+  throw Error({.file = path,
+               .where = {},
+               .cause = "its ending names no format that can be written",
+               .remedy = "known are " + known(table)});
+}
+
+std::unique_ptr<PointWriter> open_point_writer(const std::string& path, const PointHeader& header,
+                                               const WriterOptions& options) {
+  return kPointOpeners[choose_format(kPointFormats, path, options)](path, header, options);
+}
+
+std::unique_ptr<MeshWriter> open_mesh_writer(const std::string& path, const MeshHeader& header,
+                                             const WriterOptions& options) {
+  return kMeshOpeners[choose_format(kMeshFormats, path, options)](path, header, options);
+}
+
+MeshRounding::MeshRounding(const std::string& path, const Box3& bounds,
+                           const WriterOptions& options) {
+  if (kMeshFormats[choose_format(kMeshFormats, path, options)].name != "glb" || bounds.empty()) {
+    return;
+  }
+  origin_ = glb_origin(bounds);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    // Half a unit in the last of 24 bits, and what doubles lose when the origin is taken off and
+    // added again.
+    const double half =
+        std::max(bounds.max[axis] - (*origin_)[axis], (*origin_)[axis] - bounds.min[axis]);
+    largest_[axis] = half * 0x1p-24 + (half + std::abs((*origin_)[axis])) * 0x1p-51;
+  }
+}
+
+Point3 MeshRounding::operator()(const Point3& p) const {
+  if (!origin_) return p;
+  Point3 read;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double origin = (*origin_)[axis];
+    read[axis] = origin + static_cast<double>(glb_coordinate(p[axis], origin));
+  }
+  return read;
+}
+
+}  // namespace terrace::stream

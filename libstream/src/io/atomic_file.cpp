@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/stream/atomic_file.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <cerrno>
+#include <cstring>
+#include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "io/file_size_signal.hpp"
+#include "io/temporary.hpp"
+#include "terrace/stream/error.hpp"
+
+namespace terrace::stream {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr std::size_t kBufferBytes = 1u << 20;
+
+std::string remedy_for(int error_number) {
+  switch (error_number) {
+    case ENOSPC:
+    case EDQUOT:
+      return "free space or choose another disk";
+    case EFBIG:
+      return "raise the file size limit (ulimit -f) or choose another file system";
+    case EACCES:
+    case EPERM:
+    case EROFS:
+      return "choose a folder that can be written";
+    case ENOENT:
+      return "make the folder first";
+    default:
+      return {};
+  }
+}
+
+}  // namespace
+
+struct AtomicFile::Impl {
+  fs::path target;  ///< as it was named
+  fs::path place;   ///< where links lead
+  fs::path temporary;
+  bool replace = false;
+  int descriptor = -1;
+  std::uint64_t flushed = 0;  // bytes in the file; the buffer continues there
+  std::vector<std::byte> buffer;
+
+  ~Impl() {
+    if (descriptor < 0) return;
+    ::unlink(temporary.c_str());
+    ::close(descriptor);
+  }
+
+  [[noreturn]] void fail(const std::string& action, int error_number) const {
+    throw system_error(target.string(), action, error_number, remedy_for(error_number));
+  }
+
+  void check_target() const {
+    std::error_code error;
+    const fs::file_status status = fs::status(target, error);
+    if (status.type() == fs::file_type::not_found) return;
+    if (error) fail("cannot be looked at", error.value());
+    if (status.type() != fs::file_type::regular) {
+      throw Error({.file = target.string(),
+                   .where = {},
+                   .cause = "exists and is not a regular file",
+                   .remedy = "choose another name"});
+    }
+    if (!replace) fail_because_it_exists();
+  }
+
+  [[noreturn]] void fail_because_it_exists() const {
+    throw Error({.file = target.string(),
+                 .where = {},
+                 .cause = "exists already",
+                 .remedy = "remove it, choose another name, or ask to replace it"});
+  }
+
+  /// Creates and locks the temporary. Between the two steps another writer may take it for
+  /// abandoned: it has the lock then, or has had it and has removed the name.
+  void create() {
+    sweep_temporaries(place);
+    for (int attempt = 0;; ++attempt) {
+      temporary = folder_of(place) / temporary_name(place, attempt);
+      descriptor = ::open(temporary.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+      if (descriptor < 0) {
+        if (errno == EEXIST && attempt < 1000) continue;
+        fail("cannot be created", errno);
+      }
+      // Without locks (some network disks) we go on.
+      const bool taken = ::flock(descriptor, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+      struct stat status {};
+      if (!taken && ::fstat(descriptor, &status) == 0 && status.st_nlink > 0) return;
+      ::close(std::exchange(descriptor, -1));
+    }
+  }
+
+  void write_through(std::uint64_t offset, std::span<const std::byte> bytes) {
+    const FileSizeSignalBlock block;
+    while (!bytes.empty()) {
+      const ssize_t n =
+          ::pwrite(descriptor, bytes.data(), bytes.size(), static_cast<off_t>(offset));
+      if (n < 0) {
+        if (errno == EINTR) continue;
+        fail("cannot be written", errno);
+      }
+      bytes = bytes.subspan(static_cast<std::size_t>(n));
+      offset += static_cast<std::uint64_t>(n);
+    }
+  }
+
+  void flush() {
+    write_through(flushed, buffer);
+    flushed += buffer.size();
+    buffer.clear();
+  }
+
+  void publish() {
+    if (replace) {
+      if (::rename(temporary.c_str(), place.c_str()) != 0)
+        fail("cannot be renamed into place", errno);
+      return;
+    }
+    // Linking, unlike renaming, refuses a name that has been taken meanwhile.
+    if (::link(temporary.c_str(), place.c_str()) == 0) {
+      ::unlink(temporary.c_str());
+      return;
+    }
+    if (errno == EEXIST) fail_because_it_exists();
+    check_target();  // a file system without hard links: look, then rename
+    if (::rename(temporary.c_str(), place.c_str()) != 0)
+      fail("cannot be renamed into place", errno);
+  }
+
+  /// Makes the new name durable; a folder that cannot be opened or synced has no say in that.
+  void sync_folder() const {
+    const int folder_descriptor =
+        ::open(folder_of(place).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (folder_descriptor < 0) return;
+    ::fsync(folder_descriptor);
+    ::close(folder_descriptor);
+  }
+};
+
+AtomicFile::AtomicFile(const fs::path& target, bool replace) : impl_(std::make_unique<Impl>()) {
+  impl_->target = target;
+  impl_->replace = replace;
+  if (!target.has_filename()) {
+    throw Error({.file = target.string(),
+                 .where = {},
+                 .cause = "names no file",
+                 .remedy = "give the name of a file"});
+  }
+  impl_->check_target();
+  impl_->place = follow_links(target);
+  impl_->create();
+}
+
+AtomicFile::~AtomicFile() = default;
+AtomicFile::AtomicFile(AtomicFile&&) noexcept = default;
+AtomicFile& AtomicFile::operator=(AtomicFile&&) noexcept = default;
+
+void AtomicFile::write(std::span<const std::byte> bytes) {
+  assert(impl_->descriptor >= 0);
+  Impl& impl = *impl_;
+  if (impl.buffer.size() + bytes.size() > kBufferBytes) impl.flush();
+  if (bytes.size() >= kBufferBytes) {
+    impl.write_through(impl.flushed, bytes);
+    impl.flushed += bytes.size();
+    return;
+  }
+  impl.buffer.insert(impl.buffer.end(), bytes.begin(), bytes.end());
+}
+
+void AtomicFile::write(std::string_view text) {
+  write(std::as_bytes(std::span(text.data(), text.size())));
+}
+
+void AtomicFile::write_at(std::uint64_t offset, std::span<const std::byte> bytes) {
+  assert(impl_->descriptor >= 0);
+  impl_->flush();
+  impl_->write_through(offset, bytes);
+  impl_->flushed = std::max(impl_->flushed, offset + bytes.size());
+}
+
+std::size_t AtomicFile::read_at(std::uint64_t offset, std::span<std::byte> bytes) {
+  assert(impl_->descriptor >= 0);
+  impl_->flush();
+  std::size_t done = 0;
+  while (done < bytes.size()) {
+    const ssize_t n = ::pread(impl_->descriptor, bytes.data() + done, bytes.size() - done,
+                              static_cast<off_t>(offset + done));
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) impl_->fail("cannot be read back", errno);
+    if (n == 0) break;
+    done += static_cast<std::size_t>(n);
+  }
+  return done;
+}
+
+std::uint64_t AtomicFile::size() const { return impl_->flushed + impl_->buffer.size(); }
+
+void AtomicFile::commit() {
+  assert(impl_->descriptor >= 0);
+  Impl& impl = *impl_;
+  impl.flush();
+  if (::fsync(impl.descriptor) != 0) impl.fail("cannot be synced", errno);
+  impl.publish();
+  // From here on the temporary's name is gone: the descriptor is only closed, and last of all, so
+  // that the lock outlives the name.
+  const int descriptor = std::exchange(impl.descriptor, -1);
+  if (::close(descriptor) != 0 && errno != EINTR) impl.fail("cannot be closed", errno);
+  impl.sync_folder();
+}
+
+const fs::path& AtomicFile::target() const { return impl_->target; }
+
+void remove_abandoned(const fs::path& target) { sweep_temporaries(follow_links(target)); }
+
+}  // namespace terrace::stream

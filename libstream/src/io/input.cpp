@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/stream/input.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <cerrno>
+#include <cstring>
+#include <map>
+#include <utility>
+
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "io/peek.hpp"
+#include "io/stop_waiter.hpp"
+#include "terrace/stream/error.hpp"
+
+namespace terrace::stream {
+namespace {
+
+/// Pipes whose first bytes have been looked at: they cannot be opened again without losing them.
+std::map<std::string, std::unique_ptr<Input>>& heads() {
+  thread_local std::map<std::string, std::unique_ptr<Input>> kept;
+  return kept;
+}
+
+std::string shown(const std::string& file) {
+  return file == kStandardStream ? "standard input" : file;
+}
+
+int open_for_reading(const std::string& file) {
+  if (file == kStandardStream) return STDIN_FILENO;
+  struct stat status {};
+  // To open a pipe without O_NONBLOCK is to wait for its writer where no stop ends the wait. poll()
+  // waits for it too.
+  const bool pipe = ::stat(file.c_str(), &status) == 0 && S_ISFIFO(status.st_mode);
+  const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | (pipe ? O_NONBLOCK : 0));
+  if (fd < 0) throw system_error(file, "cannot open", errno, "check the name and its permissions");
+  return fd;
+}
+
+}  // namespace
+
+/// An open file, closed with the object.
+class Input::Descriptor {
+ public:
+  Descriptor(const std::string& file, const std::stop_token& stop)
+      : fd_(open_for_reading(file)), owned_(file != kStandardStream) {
+    struct stat status {};
+    if (::fstat(fd_, &status) == 0 && S_ISREG(status.st_mode)) {
+      // Standard input that is a file may have been read before: what is left counts.
+      const off_t at = owned_ ? 0 : std::max<off_t>(0, ::lseek(fd_, 0, SEEK_CUR));
+      size_ = static_cast<std::uint64_t>(std::max<off_t>(0, status.st_size - at));
+      ::posix_fadvise(fd_, 0, 0, POSIX_FADV_SEQUENTIAL);
+      return;
+    }
+    try {
+      waiter_.emplace(stop);
+    } catch (...) {
+      if (owned_) ::close(fd_);
+      throw;
+    }
+  }
+  ~Descriptor() {
+    if (owned_) ::close(fd_);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+
+  /// Returns 0 at the end. Throws: Error with the name of the input, Stopped.
+  [[nodiscard]] std::size_t read(char* to, std::size_t most, const std::string& name) const {
+    for (;;) {
+      if (waiter_) waiter_->wait(fd_, POLLIN);
+      const ssize_t got = ::read(fd_, to, most);
+      if (got >= 0) return static_cast<std::size_t>(got);
+      if (errno == EISDIR) {
+        throw Error({.file = name,
+                     .where = {},
+                     .cause = "is a folder, not a file",
+                     .remedy = "name the files in it"});
+      }
+      if (errno == EBADF) {
+        throw Error({.file = name,
+                     .where = {},
+                     .cause = "is closed",
+                     .remedy = "name a file, or connect it to one"});
+      }
+      // EAGAIN: another reader of the same pipe was faster.
+      if (errno != EINTR && errno != EAGAIN) throw system_error(name, "cannot read", errno);
+    }
+  }
+  [[nodiscard]] bool skip(std::uint64_t count) const {
+    return ::lseek(fd_, static_cast<off_t>(count), SEEK_CUR) >= 0;
+  }
+  /// Known for a regular file only.
+  [[nodiscard]] std::optional<std::uint64_t> size() const { return size_; }
+
+ private:
+  int fd_;
+  bool owned_;
+  std::optional<std::uint64_t> size_;
+  std::optional<StopWaiter> waiter_;  ///< of all but regular files, which never keep one waiting
+};
+
+Input::Input(const std::string& file, const std::stop_token& stop, std::size_t at_once) {
+  const auto kept = heads().find(file);
+  if (kept != heads().end()) {
+    *this = std::move(*kept->second);
+    heads().erase(kept);
+    buffer_.resize(std::max(buffer_.size(), at_once));
+    return;
+  }
+  name_ = shown(file);
+  descriptor_ = std::make_unique<Descriptor>(file, stop);
+  size_ = descriptor_->size();
+  buffer_.resize(at_once);
+}
+
+Input::~Input() = default;
+Input& Input::operator=(Input&&) noexcept = default;
+
+bool Input::read_more() {
+  const std::size_t got = descriptor_->read(buffer_.data() + end_, buffer_.size() - end_, name_);
+  end_ += got;
+  ended_ = got == 0;
+  return !ended_;
+}
+
+std::string_view Input::fill(std::size_t wanted) {
+  if (end_ - begin_ >= wanted || ended_) return window();
+  if (begin_ > 0 && (begin_ == end_ || begin_ + wanted > buffer_.size())) {
+    std::memmove(buffer_.data(), buffer_.data() + begin_, end_ - begin_);
+    end_ -= begin_;
+    begin_ = 0;
+  }
+  if (begin_ + wanted > buffer_.size()) buffer_.resize(begin_ + wanted);
+  while (end_ - begin_ < wanted && read_more()) {
+  }
+  return window();
+}
+
+void Input::consume(std::size_t count) {
+  assert(count <= end_ - begin_);
+  begin_ += count;
+  offset_ += count;
+}
+
+bool Input::skip(std::uint64_t count) {
+  const auto in_window = static_cast<std::size_t>(std::min<std::uint64_t>(count, end_ - begin_));
+  consume(in_window);
+  count -= in_window;
+  if (count == 0) return true;
+  if (size_) {
+    if (count > *size_ - std::min(*size_, offset_)) return false;
+    if (!descriptor_->skip(count)) throw system_error(name_, "cannot seek", errno);
+    offset_ += count;
+    return true;
+  }
+  while (count > 0) {
+    if (fill(1).empty()) return false;
+    const auto step = static_cast<std::size_t>(std::min<std::uint64_t>(count, end_ - begin_));
+    consume(step);
+    count -= step;
+  }
+  return true;
+}
+
+bool is_rereadable(const std::string& file) {
+  struct stat status {};
+  return file != kStandardStream && ::stat(file.c_str(), &status) == 0 && S_ISREG(status.st_mode);
+}
+
+std::vector<char> peek_head(const std::string& file, std::size_t most,
+                            const std::stop_token& stop) {
+  auto kept = heads().find(file);
+  if (kept == heads().end()) {
+    auto input = std::make_unique<Input>(file, stop, most);
+    if (is_rereadable(file)) {
+      const std::string_view head = input->fill(most).substr(0, most);
+      return {head.begin(), head.end()};
+    }
+    kept = heads().emplace(file, std::move(input)).first;
+  }
+  const std::string_view head = kept->second->fill(most).substr(0, most);
+  return {head.begin(), head.end()};
+}
+
+void drop_heads() { heads().clear(); }
+
+}  // namespace terrace::stream

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/line_reader.hpp"
+
+#include <string>
+
+#include "terrace/stream/error.hpp"
+
+namespace terrace::stream {
+
+bool LineReader::next(std::string_view& line) {
+  release();
+  std::string_view window = input_->window();
+  std::size_t length = window.find('\n');
+  std::size_t line_end = 1;
+  while (length == std::string_view::npos) {
+    const std::size_t searched = window.size();
+    if (searched <= kMaxLine) window = input_->fill(searched + 1);
+    if (window.size() == searched) {  // the last line, or one that never ends
+      if (searched == 0) return false;
+      length = searched;
+      line_end = 0;
+    } else {
+      length = window.find('\n', searched);
+    }
+  }
+  if (length > kMaxLine) {
+    throw Error({.file = input_->name(),
+                 .where = "line " + std::to_string(number_ + 1),
+                 .cause = "longer than " + std::to_string(kMaxLine) + " bytes",
+                 .remedy = "this is no text of points, or its line ends are missing"});
+  }
+  pending_ = length + line_end;
+  ++number_;
+  line = window.substr(0, length);
+  if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+  return true;
+}
+
+bool LineReader::skip() {
+  release();
+  for (bool blank = true;;) {
+    const std::string_view window = input_->fill(1);
+    if (window.empty()) return !blank;
+    const std::size_t end = window.find('\n');
+    const std::string_view part = window.substr(0, end);
+    blank = blank && part.find_first_not_of(" \t\r") == std::string_view::npos;
+    input_->consume(end == std::string_view::npos ? part.size() : end + 1);
+    if (end == std::string_view::npos) continue;
+    ++number_;
+    if (!blank) return true;
+  }
+}
+
+}  // namespace terrace::stream

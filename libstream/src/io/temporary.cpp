@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/temporary.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdint>
+#include <cstdio>
+#include <set>
+#include <string_view>
+#include <system_error>
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "store/manifest.hpp"
+#include "terrace/stream/atomic_file.hpp"
+#include "terrace/stream/error.hpp"
+#include "terrace/stream/file_lock.hpp"
+
+namespace terrace::stream {
+namespace fs = std::filesystem;
+namespace {
+
+/// File systems take names of 255 bytes at most: a hash (64-bit FNV-1a) stands for a long one.
+std::string prefix_of(const fs::path& target) {
+  constexpr std::size_t kMostNamed = 200;
+  std::string name = target.filename().string();
+  if (name.size() > kMostNamed) {
+    std::uint64_t hash = 0xcbf29ce484222325;
+    for (const char c : name) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3;
+    name = "terrace-" + std::to_string(hash);
+  }
+  return std::string(".").append(name).append(".tmp-");
+}
+
+bool drop_ending(std::string& name, std::string_view ending) {
+  if (!name.ends_with(ending)) return false;
+  name.resize(name.size() - ending.size());
+  return true;
+}
+
+bool nothing_at(const fs::path& path) {
+  struct stat status {};
+  return ::lstat(path.c_str(), &status) != 0 && errno == ENOENT;
+}
+
+/// PID or PID-ATTEMPT. Keeps `a` and `a.tmp-b` apart, whose prefixes begin alike.
+bool is_number_of_writer(std::string_view text) {
+  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
+  const std::size_t dash = std::min(text.find('-'), text.size());
+  const std::string_view pid = text.substr(0, dash), attempt = text.substr(dash);
+  return !pid.empty() && std::all_of(pid.begin(), pid.end(), is_digit) && attempt.size() != 1 &&
+         (attempt.empty() || std::all_of(attempt.begin() + 1, attempt.end(), is_digit));
+}
+
+/// The temporaries beside `target`, whole or in part, without their endings.
+std::set<std::string> temporaries_of(const fs::path& target) {
+  const std::string prefix = prefix_of(target);
+  std::set<std::string> names;
+  std::error_code error;
+  fs::directory_iterator entry(folder_of(target), error);
+  for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
+    std::string name = entry->path().filename().string();
+    if (!name.starts_with(prefix)) continue;
+    if (!drop_ending(name, kLockEnding)) drop_ending(name, kReplacedEnding);
+    if (!is_number_of_writer(std::string_view(name).substr(prefix.size()))) continue;
+    names.insert(std::move(name));
+  }
+  return names;
+}
+
+fs::path with_ending(const fs::path& path, const char* ending) {
+  return fs::path(path).concat(ending);
+}
+
+/// The lock of a temporary; not exclusive if its writer lives or may live.
+FileLock lock_of_dead(const fs::path& temporary) {
+  std::error_code error;
+  const fs::file_status status = fs::symlink_status(temporary, error);
+  try {
+    return FileLock(fs::is_regular_file(status) ? temporary : with_ending(temporary, kLockEnding));
+  } catch (const Error&) {
+    return {};  // somebody else's, or not to be written
+  }
+}
+
+bool put_back(const fs::path& replaced, const fs::path& target) {
+  if (!nothing_at(target) || !store::looks_like_store(replaced)) return false;
+  return rename_exclusively(replaced, target) == 0;
+}
+
+}  // namespace
+
+fs::path follow_links(fs::path path) {
+  constexpr int kMostLinks = 40;  // as Linux
+  for (int links = 0; links <= kMostLinks; ++links) {
+    std::error_code error;
+    const fs::path next = fs::read_symlink(path, error);
+    if (error) return path;
+    path = next.is_absolute() ? next : path.parent_path() / next;
+  }
+  throw system_error(path.string(), "cannot be followed", ELOOP);
+}
+
+fs::path folder_of(const fs::path& target) {
+  return target.has_parent_path() ? target.parent_path() : fs::path(".");
+}
+
+std::string temporary_name(const fs::path& target, int attempt) {
+  std::string name = prefix_of(target) + std::to_string(::getpid());
+  return attempt == 0 ? name : name + '-' + std::to_string(attempt);
+}
+
+void sweep_temporaries(const fs::path& target) {
+  for (const std::string& name : temporaries_of(target)) {
+    const fs::path temporary = folder_of(target) / name;
+    const FileLock lock = lock_of_dead(temporary);
+    if (!lock.exclusive()) continue;
+    const fs::path replaced = with_ending(temporary, kReplacedEnding);
+    put_back(replaced, target);
+    // Unless nothing else bears the name and putting it back has failed.
+    if (!nothing_at(target) || !store::looks_like_store(replaced)) remove_store_folder(replaced);
+    // A file goes with its lock.
+    std::error_code ignored;
+    if (fs::is_directory(fs::symlink_status(temporary, ignored))) remove_store_folder(temporary);
+  }
+}
+
+bool put_back_replaced(fs::path target) {
+  if (!target.has_filename()) target = target.parent_path();
+  if (!nothing_at(target)) return false;
+  for (const std::string& name : temporaries_of(target)) {
+    const fs::path temporary = folder_of(target) / name;
+    const fs::path replaced = with_ending(temporary, kReplacedEnding);
+    if (nothing_at(replaced)) continue;
+    const FileLock lock = lock_of_dead(temporary);
+    if (lock.exclusive() && put_back(replaced, target)) return true;
+  }
+  return false;
+}
+
+int rename_exclusively(const fs::path& from, const fs::path& to) {
+#ifdef RENAME_NOREPLACE
+  if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return 0;
+  if (errno != EINVAL && errno != ENOSYS) return errno;
+#endif
+  // Without it an empty folder that appears just now would be replaced; anything else would not.
+  if (!nothing_at(to)) return EEXIST;
+  return ::rename(from.c_str(), to.c_str()) == 0 ? 0 : errno;
+}
+
+void remove_store_folder(const fs::path& folder) noexcept {
+  std::error_code ignored;
+  fs::remove(folder / store::kManifestName, ignored);
+  fs::remove_all(folder, ignored);
+}
+
+}  // namespace terrace::stream

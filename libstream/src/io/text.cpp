@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/text.hpp"
+
+#include <algorithm>
+
+namespace terrace::stream {
+
+std::string_view trim(std::string_view line) {
+  line = trim_left(line);
+  while (!line.empty() && is_blank(line.back())) line.remove_suffix(1);
+  return line;
+}
+
+std::vector<std::string_view> split_fields(std::string_view line, char separator) {
+  std::vector<std::string_view> fields;
+  line = trim(line);
+  if (separator != ' ') {
+    for (;;) {
+      const std::size_t end = line.find(separator);
+      fields.push_back(trim(line.substr(0, end)));
+      if (end == std::string_view::npos) return fields;
+      line.remove_prefix(end + 1);
+    }
+  }
+  while (!line.empty()) {
+    const std::size_t end = std::min(line.find_first_of(" \t"), line.size());
+    fields.push_back(line.substr(0, end));
+    line = trim_left(line.substr(end));
+  }
+  return fields;
+}
+
+std::string in_quotes(std::string_view text) {
+  constexpr std::size_t kMostShown = 40;
+  std::string out = "'";
+  for (const char c : text.substr(0, kMostShown)) {
+    const bool control = static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
+    out += control ? '?' : c;
+  }
+  out += text.size() > kMostShown ? "...'" : "'";
+  return out;
+}
+
+}  // namespace terrace::stream

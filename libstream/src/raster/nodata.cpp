@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "raster/nodata.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <string_view>
+#include <system_error>
+
+namespace terrace::stream {
+namespace {
+
+template <class T>
+std::optional<T> whole_number(std::string_view text) {
+  T value{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
+  return value;
+}
+
+/// The number at the start of `text`; from_chars also reads "nan" and "inf" in any case, the other
+/// spellings are what old C libraries of Windows print.
+std::optional<double> leading_number(std::string_view text) {
+  if (text.find(".#QNAN") != text.npos || text.find(".#SNAN") != text.npos ||
+      text.find(".#IND") != text.npos) {
+    return std::numeric_limits<double>::quiet_NaN();
+  }
+  if (text.find(".#INF") != text.npos) {
+    const double infinity = std::numeric_limits<double>::infinity();
+    return text.starts_with('-') ? -infinity : infinity;
+  }
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error == std::errc::invalid_argument) return std::nullopt;
+  if (error == std::errc::result_out_of_range) {
+    // Beyond the doubles: as good as infinite, or as zero.
+    const bool tiny =
+        text.find("e-") != std::string_view::npos || text.find("E-") != std::string_view::npos;
+    value = tiny ? 0.0 : std::numeric_limits<double>::infinity();
+    if (text.front() == '-') value = -value;
+  }
+  return value;
+}
+
+/// GDAL's notion of equal: |a - b| < epsilon |a + b| 2, solved for a.
+void set_float_range(NodataRule& rule, double value, double epsilon, double most) {
+  const double k = 2 * epsilon;
+  const double near = value * ((1 - k) / (1 + k)), far = value * ((1 + k) / (1 - k));
+  rule.low = std::min({near, far, value});
+  rule.high = std::max({near, far, value});
+  // The far side may be beyond all doubles; samples there are infinite and so without data anyhow.
+  rule.low = std::max(rule.low, -most);
+  rule.high = std::min(rule.high, most);
+  rule.unmatched = rule.low > rule.high;
+}
+
+std::int64_t highest_integer(ScalarType type) {
+  const bool is_unsigned =
+      type == ScalarType::u8 || type == ScalarType::u16 || type == ScalarType::u32;
+  const std::size_t bits = 8 * size_of(type) - (is_unsigned ? 0 : 1);
+  return static_cast<std::int64_t>((std::uint64_t{1} << bits) - 1);
+}
+
+std::int64_t lowest_integer(ScalarType type) {
+  const bool is_unsigned =
+      type == ScalarType::u8 || type == ScalarType::u16 || type == ScalarType::u32;
+  return is_unsigned ? 0 : -highest_integer(type) - 1;
+}
+
+}  // namespace
+
+NodataRule NodataRule::parse(const std::string& text, ScalarType type) {
+  std::string_view trimmed = text;
+  while (!trimmed.empty() && std::isspace(static_cast<unsigned char>(trimmed.front())) != 0) {
+    trimmed.remove_prefix(1);
+  }
+  while (!trimmed.empty() && std::isspace(static_cast<unsigned char>(trimmed.back())) != 0) {
+    trimmed.remove_suffix(1);
+  }
+  if (trimmed.starts_with('+')) trimmed.remove_prefix(1);
+  NodataRule rule;
+  if (trimmed.empty()) return rule;
+  rule.value = leading_number(trimmed);
+  if (!rule.value) return rule;
+  const double value = *rule.value;
+  switch (type) {
+    case ScalarType::f32:
+      if (std::isfinite(value)) {
+        set_float_range(rule, value, std::numeric_limits<float>::epsilon(),
+                        std::numeric_limits<float>::max());
+        if (!rule.unmatched) {  // subnormal floats are coarser than that
+          constexpr double kMost = std::numeric_limits<float>::max();
+          const double rounded = static_cast<float>(std::clamp(value, -kMost, kMost));
+          rule.low = std::min(rule.low, rounded);
+          rule.high = std::max(rule.high, rounded);
+        }
+      }
+      return rule;
+    case ScalarType::f64:
+      if (std::isfinite(value)) {
+        set_float_range(rule, value, std::numeric_limits<double>::epsilon(),
+                        std::numeric_limits<double>::max());
+      }
+      return rule;
+    case ScalarType::u64:
+      // A double cannot tell large integers apart, so the text decides where it is one.
+      if (const auto exact = whole_number<std::uint64_t>(trimmed)) {
+        rule.low_unsigned = rule.high_unsigned = *exact;
+      } else if (value >= 0 && value < 0x1p64 && value == std::floor(value)) {
+        rule.low_unsigned = rule.high_unsigned = static_cast<std::uint64_t>(value);
+      } else {
+        rule.unmatched = true;
+      }
+      return rule;
+    default:
+      if (const auto exact = whole_number<std::int64_t>(trimmed)) {
+        rule.low_integer = rule.high_integer = *exact;
+      } else if (value >= -0x1p63 && value < 0x1p63 && value == std::floor(value)) {
+        rule.low_integer = rule.high_integer = static_cast<std::int64_t>(value);
+      }
+      rule.unmatched = rule.low_integer > rule.high_integer ||
+                       rule.low_integer < lowest_integer(type) ||
+                       rule.low_integer > highest_integer(type);
+      return rule;
+  }
+}
+
+}  // namespace terrace::stream

@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <utility>
+
+#include "format/with_type.hpp"
+#include "raster/order.hpp"
+#include "terrace/stream/raster.hpp"
+
+namespace terrace::stream {
+namespace {
+
+/// More tiles than these in one window are not worth their list.
+constexpr std::uint64_t kMostTiles = 1u << 18;
+constexpr std::size_t kMostBlockPoints = std::size_t{1} << 40;
+
+double aspect_of(const WorldTransform& world, double wanted) {
+  if (wanted > 0) return wanted;
+  const auto& m = world.xy;
+  const double width = std::sqrt(m[0] * m[0] + m[3] * m[3]);
+  const double height = std::sqrt(m[1] * m[1] + m[4] * m[4]);
+  const double aspect = height / width;
+  return std::isfinite(aspect) && aspect > 0 ? aspect : 1.0;
+}
+
+bool is_wide_integer(ScalarType type) { return type == ScalarType::i64 || type == ScalarType::u64; }
+
+SourceInfo source_info(const RasterInfo& raster, const SourceOptions& options) {
+  SourceInfo info;
+  info.format = raster.format;
+  info.files = raster.files;
+  info.grid = true;
+  info.coordinates[0].name = "column";
+  info.coordinates[1].name = "row";
+  info.coordinates[0].type = info.coordinates[1].type = ScalarType::u32;
+  info.coordinates[2] = raster.sample;
+  if (is_wide_integer(raster.sample.type)) {
+    Channel exact = raster.sample;
+    exact.name = "sample";
+    info.attributes = {exact};
+  }
+  info.world = raster.world;
+  info.crs = options.crs.value_or(raster.crs);
+  info.columns = raster.columns;
+  info.rows = raster.rows;
+  info.points = raster.columns * raster.rows;
+  info.nodata = raster.nodata;
+  info.comments = raster.comments;
+  return info;
+}
+
+class RasterSource final : public PointSource {
+ public:
+  RasterSource(std::unique_ptr<Raster> raster, const SourceOptions& options)
+      : raster_(std::move(raster)),
+        info_(source_info(raster_->info(), options)),
+        block_points_(std::clamp<std::size_t>(options.block_points, 1, kMostBlockPoints)),
+        aspect_(aspect_of(info_.world, options.cell_aspect)) {
+    const std::size_t cell_bytes = size_of(raster_->info().sample.type) + 1;
+    const std::uint64_t cells =
+        std::min(window_bytes(options) / cell_bytes, kMostTiles * block_points_ / 2);
+    window_size_ = window_size(raster_->info(), cells, block_points_, aspect_);
+    reading_bytes_ =
+        window_size_.columns * window_size_.rows * cell_bytes + raster_->info().held_bytes;
+  }
+
+  [[nodiscard]] const SourceInfo& info() const override { return info_; }
+  [[nodiscard]] Progress progress() const override { return progress_; }
+  [[nodiscard]] std::uint64_t reading_bytes() const override { return reading_bytes_; }
+
+  bool next(PointBlock& block) override {
+    block.clear();
+    while (block.empty()) {
+      if (next_tile_ == order_.size() && !next_window()) return false;
+      if (next_tile_ < order_.size()) emit(order_[next_tile_++], block);
+    }
+    return true;
+  }
+
+ private:
+  /// Reads the next window; false after the last. One without valid cells leaves no tiles.
+  bool next_window() {
+    if (row_ >= info_.rows) return false;
+    window_ = {.column = column_,
+               .row = row_,
+               .columns = std::min(window_size_.columns, info_.columns - column_),
+               .rows = std::min(window_size_.rows, info_.rows - row_)};
+    column_ += window_.columns;
+    if (column_ == info_.columns) {
+      column_ = 0;
+      row_ += window_.rows;
+    }
+    const std::size_t cells = window_.columns * window_.rows;
+    const ScalarType type = raster_->info().sample.type;
+    std::fill_n(valid_.begin(), dirty_cells_, std::uint8_t{0});
+    dirty_cells_ = 0;
+    if (valid_.size() < cells) {
+      valid_.resize(cells);
+      samples_.resize(cells * size_of(type));
+    }
+    next_tile_ = 0;
+    order_.clear();
+    dirty_cells_ = cells;  // even if reading throws
+    const bool any = raster_->read_over(
+        window_, {.samples = samples_.data(), .valid = valid_.data(), .stride = window_.columns});
+    if (!any) {
+      dirty_cells_ = 0;
+      progress_.nodata += cells;
+      advance_progress(cells);
+      return true;
+    }
+    tiles_ = tiles_of({window_.columns, window_.rows}, block_points_, aspect_);
+    order_ = hilbert_order(static_cast<std::uint32_t>(tiles_.columns),
+                           static_cast<std::uint32_t>(tiles_.rows));
+    return true;
+  }
+
+  void advance_progress(std::uint64_t cells) {
+    cells_done_ += cells;
+    progress_.fraction = static_cast<double>(cells_done_) / static_cast<double>(*info_.points);
+  }
+
+  void emit(std::uint32_t tile, PointBlock& block) {
+    const std::uint64_t across = tile % tiles_.columns, down = tile / tiles_.columns;
+    const std::uint64_t left = across * window_.columns / tiles_.columns;
+    const std::uint64_t right = (across + 1) * window_.columns / tiles_.columns;
+    const std::uint64_t top = down * window_.rows / tiles_.rows;
+    const std::uint64_t bottom = (down + 1) * window_.rows / tiles_.rows;
+    const std::uint64_t cells = (right - left) * (bottom - top);
+    const ScalarType type = raster_->info().sample.type;
+    block.positions.resize(cells);
+    if (!info_.attributes.empty()) {
+      block.attributes.resize(1);
+      block.attributes[0].type = type;
+      block.attributes[0].bytes.resize(cells * size_of(type));
+    } else {
+      block.attributes.clear();
+    }
+    const std::size_t count = with_type(type, [&](auto sample) {
+      return convert<decltype(sample)>(left, right, top, bottom, block);
+    });
+    block.positions.resize(count);
+    for (Column& column : block.attributes) column.bytes.resize(count * size_of(type));
+    progress_.points += count;
+    progress_.nodata += cells - count;
+    advance_progress(cells);
+  }
+
+  template <class T>
+  std::size_t convert(std::uint64_t left, std::uint64_t right, std::uint64_t top,
+                      std::uint64_t bottom, PointBlock& block) {
+    const std::size_t width = right - left;
+    const double first_column = static_cast<double>(window_.column + left);
+    Point3* out = block.positions.data();
+    std::byte* exact = block.attributes.empty() ? nullptr : block.attributes[0].bytes.data();
+    for (std::uint64_t r = top; r < bottom; ++r) {
+      const std::size_t cell = r * window_.columns + left;
+      const T* const samples = reinterpret_cast<const T*>(samples_.data()) + cell;
+      const std::uint8_t* const valid = valid_.data() + cell;
+      const double row = static_cast<double>(window_.row + r);
+      const bool whole = std::memchr(valid, 0, width) == nullptr;
+      if (whole) {
+        for (std::size_t i = 0; i < width; ++i) {
+          out[i] = {first_column + static_cast<double>(i), row, static_cast<double>(samples[i])};
+        }
+        out += width;
+      } else {
+        for (std::size_t i = 0; i < width; ++i) {  // writes every cell, keeps the valid ones
+          *out = {first_column + static_cast<double>(i), row, static_cast<double>(samples[i])};
+          out += valid[i];
+        }
+      }
+      if (exact == nullptr) continue;
+      for (std::size_t i = 0; i < width; ++i) {
+        if (valid[i] == 0) continue;
+        std::memcpy(exact, samples + i, sizeof(T));
+        exact += sizeof(T);
+      }
+    }
+    return static_cast<std::size_t>(out - block.positions.data());
+  }
+
+  std::unique_ptr<Raster> raster_;
+  SourceInfo info_;
+  std::size_t block_points_;
+  double aspect_;
+  GridSize window_size_;
+  std::uint64_t reading_bytes_ = 0;
+
+  std::uint64_t column_ = 0, row_ = 0;  // where the next window begins
+  CellWindow window_;
+  std::vector<std::byte> samples_;  // of the window
+  std::vector<std::uint8_t> valid_;
+  std::size_t dirty_cells_ = 0;  // so many at the front of valid_ may not be zero
+  GridSize tiles_;
+  std::vector<std::uint32_t> order_;  // of the window's tiles
+  std::size_t next_tile_ = 0;
+  std::uint64_t cells_done_ = 0;
+  Progress progress_;
+};
+
+}  // namespace
+
+std::unique_ptr<PointSource> points_of(std::unique_ptr<Raster> raster,
+                                       const SourceOptions& options) {
+  return std::make_unique<RasterSource>(std::move(raster), options);
+}
+
+}  // namespace terrace::stream

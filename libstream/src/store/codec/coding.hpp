@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+
+#include "store/codec/rans.hpp"
+#include "store/codec/symbols.hpp"
+
+/// Coding in either direction by one description: `value` is read when encoding and written when
+/// decoding.
+
+namespace terrace::stream::store {
+
+template <class Coder>
+TERRACE_STORE_INLINE void code_symbol(Coder& coder, unsigned context, unsigned& symbol) {
+  if constexpr (Coder::kDecoding) {
+    symbol = coder.symbol(context);
+  } else {
+    coder.symbol(context, symbol);
+  }
+}
+
+/// Returns the class of the number.
+template <class Coder>
+TERRACE_STORE_INLINE unsigned code_number(Coder& coder, unsigned context, std::uint64_t& value) {
+  if constexpr (Coder::kDecoding) {
+    const unsigned c = coder.symbol(context);
+    value = kClassRange[c].base + coder.raw(kClassRange[c].bits);
+    return c;
+  } else {
+    const unsigned c = class_of(value);
+    coder.symbol(context, c);
+    coder.raw(value - kClassRange[c].base, kClassRange[c].bits);
+    return c;
+  }
+}
+
+/// A number known to be below `size` (>= 1), every value costing the same but for a bit
+/// (truncated binary).
+template <class Coder>
+TERRACE_STORE_INLINE void code_uniform(Coder& coder, std::uint64_t& value, std::uint64_t size) {
+  const unsigned bits = static_cast<unsigned>(std::bit_width(size)) - 1;
+  const std::uint64_t power = std::uint64_t{1} << bits;
+  const std::uint64_t shorter = power - (size - power);  // this many values take `bits` bits
+  if constexpr (Coder::kDecoding) {
+    value = coder.raw(bits);
+    if (value >= shorter) value = (value << 1 | coder.raw(1)) - shorter;
+  } else if (value < shorter) {
+    coder.raw(value, bits);
+  } else {
+    coder.raw((value + shorter) >> 1, bits);
+    coder.raw((value + shorter) & 1, 1);
+  }
+}
+
+}  // namespace terrace::stream::store

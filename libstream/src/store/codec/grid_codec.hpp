@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "store/codec/coding.hpp"
+#include "store/codec/predictor.hpp"
+
+/// Clusters of a raster: which cells they have, as runs row by row, and the heights of the cells in
+/// that order, each predicted from its neighbours within the cluster. A cluster needs no other.
+///
+/// One description serves both directions: the functions are templates over SymbolEncoder and
+/// SymbolDecoder.
+
+namespace terrace::stream::store {
+
+class GridCodec {
+ public:
+  /// Whether a box of this many cells may be coded as runs by a cluster of n points. Beyond, a
+  /// cluster is so thin that the k-d codec is smaller, and the raster would cost memory.
+  static bool fits(std::uint64_t width, std::uint64_t height, std::uint64_t n) {
+    const std::uint64_t cells = 8 * n + 1024;
+    return width <= cells && height <= cells && (width + kPadX) * (height + kPadY) <= cells;
+  }
+
+  /// Encoding: enters the points (cells relative to the box). False if two lie in one cell.
+  bool place(std::uint32_t width, std::uint32_t height, const std::uint64_t* x,
+             const std::uint64_t* y, const std::uint64_t* z, std::uint32_t n) {
+    start(width, height);
+    for (std::uint32_t i = 0; i < n; ++i) {
+      const std::size_t cell =
+          cell_of(static_cast<std::uint32_t>(x[i]), static_cast<std::uint32_t>(y[i]));
+      if (mask_[cell] != 0) return false;
+      mask_[cell] = 1;
+      values_[cell] = static_cast<std::int64_t>(z[i]);
+      points_[cell] = i;
+    }
+    return true;
+  }
+  /// Encoding, after `positions`: the point in the i-th coded cell.
+  [[nodiscard]] std::uint32_t point(std::size_t i) const { return points_[cells_[i]]; }
+
+  /// The cells, in the order of rows and columns. Decoding fills x and y with n cells.
+  template <class Coder>
+  void positions(Coder& shared, std::uint32_t width, std::uint32_t height, std::uint32_t n,
+                 std::uint64_t* x, std::uint64_t* y) {
+    typename Coder::Local coder = shared;
+    if constexpr (Coder::kDecoding) start(width, height);
+    cells_.resize(n);
+    std::uint32_t found = 0;
+    Border left{context::kRunStart}, right{context::kRunEnd};
+    std::uint64_t runs_above = 0;
+    bool row_above = false;
+    for (std::uint32_t row = 0; row < height; ++row) {
+      std::uint64_t runs = 0;
+      if constexpr (!Coder::kDecoding) runs = count_runs(row);
+      code_number(
+          coder, context::kRunCount + static_cast<unsigned>(std::min<std::uint64_t>(runs_above, 2)),
+          runs);
+      std::uint64_t column = 0;
+      for (std::uint64_t run = 0; run < runs; ++run) {
+        std::uint64_t begin = 0, end = 0;
+        if constexpr (!Coder::kDecoding) find_run(row, column, begin, end);
+        if (run == 0) {
+          left.code(coder, row_above, 0, begin);
+          right.code(coder, row_above, begin + 1, end);
+          row_above = true;
+        } else {
+          std::uint64_t gap = begin - column - 1, length = end - begin - 1;
+          code_number(coder, context::kRunGap, gap);
+          code_number(coder, context::kRunLength, length);
+          if constexpr (Coder::kDecoding) {
+            if (gap >= width || length >= width) throw Damage("a run lies outside of its cluster");
+            begin = column + 1 + gap;
+            end = begin + 1 + length;
+          }
+        }
+        if constexpr (Coder::kDecoding) {
+          if (begin >= end || end > width || end - begin > n - found) {
+            throw Damage("a run lies outside of its cluster");
+          }
+        }
+        std::size_t cell = cell_of(static_cast<std::uint32_t>(begin), row);
+        for (std::uint64_t c = begin; c < end; ++c, ++cell, ++found) {
+          cells_[found] = static_cast<std::uint32_t>(cell);
+          if constexpr (Coder::kDecoding) {
+            mask_[cell] = 1;
+            x[found] = c;
+            y[found] = row;
+          }
+        }
+        column = end;
+      }
+      runs_above = runs;
+    }
+    if (found != n) throw Damage("a cluster has too few cells");
+    find_patterns(height);
+    if constexpr (Coder::kDecoding) shared = coder;
+  }
+
+  /// The heights of the cells, in [0, size). Encoding has them from `place`, decoding fills z.
+  template <class Coder>
+  void heights(Coder& shared, const Predictor& predictor, std::uint64_t size, std::uint64_t* z) {
+    if (size == 1) {
+      if constexpr (Coder::kDecoding) std::fill(z, z + cells_.size(), 0);
+      return;
+    }
+    const auto most = static_cast<std::int64_t>(std::min<std::uint64_t>(size - 1, INT64_MAX));
+    typename Coder::Local coder = shared;
+    const std::ptrdiff_t up = stride_;
+    std::int64_t last = most / 2;
+    std::size_t i = 0;
+    for (const std::uint32_t cell : cells_) {
+      const unsigned pattern = patterns_[cell];
+      std::int64_t* const at = values_.data() + cell;
+      std::uint8_t* const magnitude = magnitudes_.data() + cell;
+
+      std::int64_t predicted = last;
+      if (pattern != 0) {
+        const auto& c = predictor.coefficients[pattern];
+        const auto term = [&](Neighbour n, std::int64_t value) {
+          return static_cast<std::uint64_t>(static_cast<std::int64_t>(c[n])) *
+                 static_cast<std::uint64_t>(value);
+        };
+        // Unsigned: sums of extreme values wrap, in both directions alike.
+        const std::uint64_t sum = term(kWest, at[-1]) + term(kNorth, at[-up]) +
+                                  term(kNorthWest, at[-up - 1]) + term(kNorthEast, at[-up + 1]) +
+                                  term(kWestWest, at[-2]) + term(kNorthNorth, at[-2 * up]);
+        predicted = static_cast<std::int64_t>(sum + 128) >> 8;
+      }
+      predicted = std::clamp<std::int64_t>(predicted, 0, most);
+
+      const unsigned near =
+          2u * magnitude[-1] + 2u * magnitude[-up] + magnitude[-up - 1] + magnitude[-up + 1];
+      const unsigned step =
+          kStep[pattern].base +
+          std::min<unsigned>((near * kStep[pattern].scale) >> 10, kStep[pattern].most);
+
+      std::uint64_t residual = 0;
+      if constexpr (!Coder::kDecoding) {
+        residual = zigzag(static_cast<std::int64_t>(static_cast<std::uint64_t>(*at) -
+                                                    static_cast<std::uint64_t>(predicted)));
+      }
+      const unsigned coded = code_number(coder, context::kHeight + step, residual);
+      *magnitude = kMagnitude[coded];
+      if constexpr (Coder::kDecoding) {
+        const std::uint64_t value =
+            static_cast<std::uint64_t>(predicted) + static_cast<std::uint64_t>(unzigzag(residual));
+        *at = static_cast<std::int64_t>(value);
+        z[i] = value;
+      }
+      last = *at;
+      ++i;
+    }
+    if constexpr (Coder::kDecoding) shared = coder;
+  }
+
+  /// Training: enters the cells of `positions` into the least squares.
+  void fit(PredictorFit& sums) const;
+
+ private:
+  static constexpr std::uint32_t kPadX = 4, kPadY = 2;
+
+  /// A border of the first run of the rows: coded as the step from the row above, in the context of
+  /// the step before.
+  struct Border {
+    unsigned context;
+    std::int64_t at = 0, step = 0;
+
+    template <class Coder>
+    void code(Coder& coder, bool row_above, std::uint64_t lowest, std::uint64_t& value) {
+      std::uint64_t number = 0;
+      if (!row_above) {
+        number = value - lowest;
+        code_number(coder, context + 5, number);
+        if (number > UINT32_MAX) throw Damage("a run lies outside of its cluster");
+        value = lowest + number;
+        step = 0;
+      } else {
+        number = zigzag(static_cast<std::int64_t>(value) - at);
+        code_number(coder,
+                    context + static_cast<unsigned>(std::clamp<std::int64_t>(step, -2, 2) + 2),
+                    number);
+        if (number > 2ull * UINT32_MAX) throw Damage("a run lies outside of its cluster");
+        step = unzigzag(number);
+        value = static_cast<std::uint64_t>(at + step);
+      }
+      at = static_cast<std::int64_t>(value);
+    }
+  };
+
+  /// How neighbours' magnitudes make a context: their mean where the pattern has them. Cells that
+  /// have both W and N are kept apart from those at the edges, which are predicted worse.
+  struct Step {
+    std::uint16_t scale = 0;
+    std::uint8_t base = 0, most = 0;
+  };
+  static const std::array<Step, kPatterns> kStep;
+  static const std::array<std::uint8_t, kSymbols> kMagnitude;
+
+  [[nodiscard]] std::size_t cell_of(std::uint32_t column, std::uint32_t row) const {
+    return static_cast<std::size_t>(row + kPadY) * static_cast<std::size_t>(stride_) + column + 2;
+  }
+  void start(std::uint32_t width, std::uint32_t height);
+  void find_patterns(std::uint32_t height);
+  [[nodiscard]] std::uint64_t count_runs(std::uint32_t row) const;
+  void find_run(std::uint32_t row, std::uint64_t from, std::uint64_t& begin,
+                std::uint64_t& end) const;
+
+  std::ptrdiff_t stride_ = 0;
+  std::vector<std::uint8_t> mask_, patterns_, magnitudes_;
+  std::vector<std::int64_t> values_;
+  std::vector<std::uint32_t> points_, cells_;
+};
+
+}  // namespace terrace::stream::store

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "store/codec/numbers.hpp"
+
+#include <algorithm>
+
+namespace terrace::stream::store {
+namespace {
+
+constexpr double kLargest = 9007199254740992.0;  // 2^53
+
+bool same_bits(double a, double b) {
+  return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
+}
+
+bool holds(double value, NumberForm form) {
+  const unsigned digits = form < kFloatDecimals ? form : form - kFloatDecimals;
+  const double scaled = value * kPowersOfTen[digits];
+  if (!(std::abs(scaled) < kLargest)) return false;
+  return same_bits(to_double(to_integer(value, form), form), value);
+}
+
+bool all_integers(std::span<const double> values) {
+  // One pass without branches: this is what nearly every raster and every column number takes.
+  std::uint64_t difference = 0;
+  for (const double value : values) {
+    const double bounded = std::abs(value) < kLargest ? value : 0.5;
+    const auto k = static_cast<std::int64_t>(bounded);
+    difference |=
+        std::bit_cast<std::uint64_t>(static_cast<double>(k)) ^ std::bit_cast<std::uint64_t>(value);
+  }
+  return difference == 0;
+}
+
+/// The first form of base, base + 1, ... base + 9 that holds all values; nothing: kDoubleBits.
+/// A value that n digits hold is held by n + 1, so one pass is enough but for the largest values.
+NumberForm decimals(std::span<const double> values, NumberForm base) {
+  auto form = base;
+  std::size_t settled = 0;  // values before this one were tried with fewer digits
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    while (!holds(values[i], form)) {
+      if (++form == base + 10) return kDoubleBits;
+      settled = i;
+    }
+  }
+  for (const double value : values.first(settled)) {
+    if (!holds(value, form)) return kDoubleBits;
+  }
+  return form;
+}
+
+}  // namespace
+
+NumberForm form_of(std::span<const double> values) {
+  if (all_integers(values)) return kIntegerForm;
+  // NaN has no place in an order: nothing but the bits will do.
+  if (std::any_of(values.begin(), values.end(), [](double v) { return std::isnan(v); })) {
+    return kDoubleBits;
+  }
+  const bool floats = std::all_of(values.begin(), values.end(), [](double v) {
+    return std::abs(v) <= std::numeric_limits<float>::max() && same_bits(static_cast<float>(v), v);
+  });
+  const NumberForm bits = floats ? kFloatBits : kDoubleBits;
+  NumberForm best = bits;
+  const auto [low, high] = std::minmax_element(values.begin(), values.end());
+  const auto range = [&, least = *low, most = *high](NumberForm form) {
+    return static_cast<std::uint64_t>(to_integer(most, form)) -
+           static_cast<std::uint64_t>(to_integer(least, form));
+  };
+  for (const NumberForm base : {kIntegerForm, kFloatDecimals}) {
+    if (base == kFloatDecimals && !floats) continue;
+    const NumberForm form = decimals(values, base);
+    if (form != kDoubleBits && range(form) < range(best)) best = form;
+  }
+  return best;
+}
+
+}  // namespace terrace::stream::store

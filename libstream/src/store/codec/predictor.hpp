@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <vector>
+
+#include "store/codec/bytes.hpp"
+
+/// Prediction of a height from its neighbours that are known already: a linear combination whose
+/// coefficients (in 1/256, adding up to 256) are fitted by least squares, one set for each of the
+/// 64 patterns of neighbours that can be there.
+
+namespace terrace::stream::store {
+
+/// Neighbours in this order; bit i of a pattern says that neighbour i is there.
+enum Neighbour : unsigned { kWest, kNorth, kNorthWest, kNorthEast, kWestWest, kNorthNorth };
+inline constexpr unsigned kNeighbours = 6;
+inline constexpr unsigned kPatterns = 1u << kNeighbours;
+
+struct Predictor {
+  using Coefficients = std::array<std::int32_t, kNeighbours>;
+  std::array<Coefficients, kPatterns> coefficients = defaults();
+
+  /// Planes where three neighbours span one, else the nearest neighbour. Pattern 0 predicts
+  /// nothing.
+  static std::array<Coefficients, kPatterns> defaults();
+
+  void write(Bytes& out) const;
+  /// Throws: Damage.
+  static Predictor read(ByteReader& in);
+};
+
+/// Sums up what the least squares need. All arithmetic in one fixed order.
+class PredictorFit {
+ public:
+  PredictorFit() : sums_(kPatterns) {}
+
+  void add(unsigned pattern, std::int64_t value,
+           const std::array<std::int64_t, kNeighbours>& neighbours);
+  [[nodiscard]] Predictor fit() const;
+
+ private:
+  static constexpr unsigned kUnknowns = kNeighbours - 1;
+  struct Sums {
+    std::uint64_t count = 0;
+    std::array<std::array<double, kUnknowns>, kUnknowns> products{};
+    std::array<double, kUnknowns> targets{};
+  };
+  std::vector<Sums> sums_;
+};
+
+}  // namespace terrace::stream::store

@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "store/codec/bytes.hpp"
+#include "store/codec/symbols.hpp"
+
+/// The entropy coder: static rANS with a 32-bit state and 16-bit words from the front of a byte
+/// string, raw bits from its back.
+/// Source: J. Duda, Asymmetric numeral systems, arXiv:1311.2540; F. Giesen, Interleaved entropy
+/// coders, arXiv:1402.3392.
+
+/// A decoder that is not inlined keeps its state in memory: half the speed.
+#if defined(__GNUC__)
+#define TERRACE_STORE_INLINE [[gnu::always_inline]] inline
+#else
+#define TERRACE_STORE_INLINE inline
+#endif
+
+namespace terrace::stream::store {
+
+inline constexpr unsigned kScaleBits = 11;
+inline constexpr std::uint32_t kScale = 1u << kScaleBits;
+/// The state lies in [kLow, 2^32) between symbols.
+inline constexpr std::uint32_t kLow = 1u << 16;
+
+/// Frequencies of a context, adding up to kScale. Symbols of frequency 0 go by the escape, which
+/// always has one.
+using Frequencies = std::array<std::uint16_t, kSymbols>;
+
+/// A context's table as the encoder uses it.
+struct EncodeTable {
+  struct Entry {
+    std::uint16_t frequency = 0, start = 0;
+  };
+  std::array<Entry, kSymbols> entries{};
+};
+
+/// A context's table as the decoder uses it. Two small arrays rather than one of 32-bit slots: a
+/// set of tables then stays in the caches that are near, also when clusters are read at random.
+struct DecodeTable {
+  struct Range {
+    std::uint16_t frequency = 0, start = 0;
+  };
+  std::array<std::uint8_t, kScale> symbols{};  ///< by slot
+  std::array<Range, kSymbols> ranges{};        ///< by symbol
+};
+
+EncodeTable encode_table(const Frequencies& frequencies);
+void fill_decode_table(const Frequencies& frequencies, DecodeTable& table);
+
+/// Bits, most significant first; `append_reversed` puts them so that the first is in the last byte.
+class BitWriter {
+ public:
+  void clear() {
+    words_.clear();
+    hold_ = 0;
+    held_ = 0;
+  }
+  /// Requires value < 2^bits, bits <= 64.
+  void put(std::uint64_t value, unsigned bits) {
+    if (bits > 32) {
+      put(value >> 32, bits - 32);
+      value &= 0xffffffff;
+      bits = 32;
+    }
+    hold_ = (hold_ << bits) | value;
+    held_ += bits;
+    if (held_ >= 32) {
+      held_ -= 32;
+      words_.push_back(static_cast<std::uint32_t>(hold_ >> held_));
+    }
+  }
+  void append_reversed(Bytes& out) const {
+    std::uint64_t rest = hold_;
+    unsigned left = held_;
+    if (left % 8 != 0) {
+      rest <<= 8 - left % 8;
+      left += 8 - left % 8;
+    }
+    for (; left > 0; left -= 8, rest >>= 8) out.push_back(static_cast<std::uint8_t>(rest));
+    for (std::size_t i = words_.size(); i-- > 0;) store::put(out, words_[i]);
+  }
+
+ private:
+  std::vector<std::uint32_t> words_;
+  std::uint64_t hold_ = 0;  ///< the lower held_ (< 32) bits are still to go
+  unsigned held_ = 0;
+};
+
+/// Collects the symbols of one cluster. Without tables it only counts, for training.
+class SymbolEncoder {
+ public:
+  static constexpr bool kDecoding = false;
+  using Local = SymbolEncoder&;
+
+  /// `tables`: one per context; empty to count. They must outlive the encoder.
+  explicit SymbolEncoder(std::span<const EncodeTable> tables) : tables_(tables) {}
+
+  /// In counting: occurrences by context and symbol.
+  std::vector<std::array<std::uint32_t, kSymbols>>& counts() { return counts_; }
+
+  void start() {
+    used_ = 0;
+    bits_.clear();
+  }
+  TERRACE_STORE_INLINE void symbol(unsigned context, unsigned symbol) {
+    if (tables_.empty()) {
+      if (context >= counts_.size()) counts_.resize(context + 1);
+      ++counts_[context][symbol];
+      return;
+    }
+    if (used_ == symbols_.size()) symbols_.resize(2 * used_ + 256);
+    std::uint32_t coded = symbol;
+    if (tables_[context].entries[symbol].frequency == 0) [[unlikely]] {
+      coded = kEscape;
+      bits_.put(symbol, kEscapeBits);
+    }
+    symbols_[used_++] = context << 8 | coded;
+  }
+  TERRACE_STORE_INLINE void raw(std::uint64_t value, unsigned bits) {
+    if (bits > 0 && !tables_.empty()) bits_.put(value, bits);
+  }
+  /// Appends the byte string. `last` (< 2^16) is what the decoder finds in its final state.
+  void finish(Bytes& out, std::uint32_t last);
+
+ private:
+  std::span<const EncodeTable> tables_;
+  std::vector<std::uint32_t> symbols_;  ///< the first used_, as context << 8 | symbol
+  std::size_t used_ = 0;
+  std::vector<std::uint16_t> words_;
+  BitWriter bits_;
+  std::vector<std::array<std::uint32_t, kSymbols>> counts_;
+};
+
+/// Bytes that must be readable before and behind a cluster's byte string.
+inline constexpr std::size_t kPadding = 16;
+
+/// Decodes what SymbolEncoder wrote. Reads at most kPadding bytes to either side of the string
+/// whatever is in it; `finish` tells whether the string was consumed exactly.
+class SymbolDecoder {
+ public:
+  static constexpr bool kDecoding = true;
+  /// Inner loops work on a copy, which the compiler can keep in registers.
+  using Local = SymbolDecoder;
+
+  SymbolDecoder(std::span<const DecodeTable* const> tables, ByteView bytes)
+      : tables_(tables.data()),
+        next_(bytes.data()),
+        end_(bytes.data() + bytes.size()),
+        limit_bits_(bytes.size() * 8) {
+    if (bytes.size() < 4) throw Damage("a cluster has too few bytes");
+    state_ = load<std::uint32_t>(next_);
+    next_ += 4;
+  }
+
+  TERRACE_STORE_INLINE unsigned symbol(unsigned context) {
+    const DecodeTable& table = *tables_[context];
+    const std::uint32_t slot = state_ & (kScale - 1);
+    const unsigned symbol = table.symbols[slot];
+    const DecodeTable::Range range = table.ranges[symbol];
+    state_ = range.frequency * (state_ >> kScaleBits) + slot - range.start;
+    const std::uint32_t refilled = state_ << 16 | load<std::uint16_t>(next_);
+    // Selected, not branched upon: whether a word is due is close to a coin toss.
+    const bool low = state_ < kLow;
+    state_ = low ? refilled : state_;
+    next_ += low ? 2 : 0;
+    next_ = next_ > end_ ? end_ : next_;
+    if (symbol == kEscape) [[unlikely]]
+      return escaped();
+    return symbol;
+  }
+  TERRACE_STORE_INLINE std::uint64_t raw(unsigned bits) {
+    if (bits > 56) [[unlikely]] {
+      const std::uint64_t high = short_raw(bits - 32);
+      return high << 32 | short_raw(32);
+    }
+    return short_raw(bits);
+  }
+  /// The encoder's `last`. Throws: Damage unless both ends have met, with zero bits between.
+  std::uint32_t finish() const {
+    const bool met = next_ == end_ - (used_bits_ + 7) / 8;
+    if (!met || (used_bits_ % 8 != 0 && (*next_ & (0xff >> used_bits_ % 8)) != 0) ||
+        state_ < kLow || state_ >= 2 * kLow) {
+      throw Damage("a cluster's bytes do not end where its points do");
+    }
+    return state_ - kLow;
+  }
+
+ private:
+  /// Requires bits <= 56.
+  TERRACE_STORE_INLINE std::uint64_t short_raw(unsigned bits) {
+    const std::uint64_t hold = load<std::uint64_t>(end_ - 8 - (used_bits_ >> 3));
+    const std::uint64_t value = (hold << (used_bits_ & 7)) >> 1 >> (63 - bits);
+    used_bits_ += bits;
+    used_bits_ = used_bits_ > limit_bits_ ? limit_bits_ : used_bits_;
+    return value;
+  }
+  TERRACE_STORE_INLINE unsigned escaped() {
+    const std::uint64_t symbol = short_raw(kEscapeBits);
+    if (symbol >= kClasses) throw_bad_symbol();
+    return static_cast<unsigned>(symbol);
+  }
+  [[noreturn]] static void throw_bad_symbol();
+
+  const DecodeTable* const* tables_;
+  const std::uint8_t* next_;
+  const std::uint8_t* end_;
+  std::size_t limit_bits_;
+  std::size_t used_bits_ = 0;
+  std::uint32_t state_;
+};
+
+}  // namespace terrace::stream::store

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "store/codec/tables.hpp"
+
+#include <algorithm>
+#include <cassert>
+
+namespace terrace::stream::store {
+namespace {
+
+Frequencies escape_only() {
+  Frequencies frequencies{};
+  frequencies[kEscape] = kScale;
+  return frequencies;
+}
+
+}  // namespace
+
+Frequencies normalised(const std::array<std::uint32_t, kSymbols>& counts) {
+  std::uint64_t total = 0, once = 0;
+  for (unsigned s = 0; s < kClasses; ++s) {
+    total += counts[s];
+    once += counts[s] == 1;
+  }
+  if (total == 0) return escape_only();
+  // As many unseen symbols are to be expected as there were that came once (Good-Turing).
+  const std::uint64_t escape =
+      std::clamp<std::uint64_t>(once * kScale / (total + 1), 1, kScale / 16);
+  const std::uint64_t available = kScale - escape;
+
+  Frequencies frequencies{};
+  frequencies[kEscape] = static_cast<std::uint16_t>(escape);
+  std::uint64_t given = 0;
+  for (unsigned s = 0; s < kClasses; ++s) {
+    if (counts[s] == 0) continue;
+    const std::uint64_t share = std::max<std::uint64_t>(1, counts[s] * available / total);
+    frequencies[s] = static_cast<std::uint16_t>(share);
+    given += share;
+  }
+  // Rounding is settled with the most frequent symbols, which feel it least.
+  while (given != available) {
+    const auto largest = std::max_element(frequencies.begin(), frequencies.begin() + kClasses);
+    if (given < available) {
+      *largest = static_cast<std::uint16_t>(*largest + (available - given));
+      given = available;
+    } else {
+      const std::uint64_t excess = std::min<std::uint64_t>(given - available, *largest / 8u + 1u);
+      *largest = static_cast<std::uint16_t>(*largest - excess);
+      given -= excess;
+    }
+  }
+  return frequencies;
+}
+
+void Tables::write(Bytes& out) const {
+  predictor.write(out);
+  for (const Frequencies& context : frequencies) {
+    const auto used = std::count_if(context.begin(), context.begin() + kClasses,
+                                    [](std::uint16_t f) { return f != 0; });
+    put_varint(out, static_cast<std::uint64_t>(used));
+    unsigned previous = 0;
+    for (unsigned s = 0; s < kClasses; ++s) {
+      if (context[s] == 0) continue;
+      put_varint(out, s - previous);
+      put_varint(out, context[s]);
+      previous = s;
+    }
+  }
+}
+
+Tables Tables::read(ByteView bytes, unsigned contexts) {
+  ByteReader in(bytes);
+  Tables tables;
+  tables.predictor = Predictor::read(in);
+  tables.frequencies.reserve(contexts);
+  for (unsigned c = 0; c < contexts; ++c) {
+    Frequencies frequencies{};
+    std::uint64_t symbol = 0, left = kScale;
+    const std::uint64_t used = in.varint();
+    for (std::uint64_t i = 0; i < used; ++i) {
+      const std::uint64_t step = in.varint();
+      if (step >= kClasses || (i > 0 && step == 0) || symbol + step >= kClasses) {
+        throw Damage("a table names a symbol that does not exist");
+      }
+      symbol += step;
+      const std::uint64_t frequency = in.varint();
+      if (frequency == 0 || frequency >= left)
+        throw Damage("the frequencies of a table do not add up");
+      frequencies[symbol] = static_cast<std::uint16_t>(frequency);
+      left -= frequency;
+    }
+    frequencies[kEscape] = static_cast<std::uint16_t>(left);
+    tables.frequencies.push_back(frequencies);
+  }
+  if (in.left() != 0) throw Damage("bytes follow the tables");
+  return tables;
+}
+
+EncodingTables::EncodingTables(const Tables& from) : predictor(from.predictor) {
+  tables.reserve(from.frequencies.size());
+  for (const Frequencies& frequencies : from.frequencies) {
+    tables.push_back(encode_table(frequencies));
+  }
+}
+
+DecodingTables::DecodingTables(const Tables& from) : predictor(from.predictor) {
+  static const DecodeTable unseen = [] {
+    DecodeTable table;
+    fill_decode_table(escape_only(), table);
+    return table;
+  }();
+  const auto seen = [](const Frequencies& f) { return f[kEscape] != kScale; };
+  storage_.resize(static_cast<std::size_t>(
+      std::count_if(from.frequencies.begin(), from.frequencies.end(), seen)));
+  std::size_t next = 0;
+  for (const Frequencies& frequencies : from.frequencies) {
+    if (seen(frequencies)) {
+      fill_decode_table(frequencies, storage_[next]);
+      tables.push_back(&storage_[next++]);
+    } else {
+      tables.push_back(&unseen);
+    }
+  }
+}
+
+}  // namespace terrace::stream::store

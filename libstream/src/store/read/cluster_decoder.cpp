@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "store/read/cluster_decoder.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+#include "store/codec/column_codec.hpp"
+#include "store/codec/form.hpp"
+
+namespace terrace::stream::store {
+namespace {
+
+template <class T>
+void scatter(std::span<const std::int64_t> values, std::size_t stride, std::byte* out) {
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const T value = static_cast<T>(values[i]);
+    std::memcpy(out + i * stride, &value, sizeof value);
+  }
+}
+
+void scatter(ScalarType type, NumberForm form, std::span<std::int64_t> values, std::size_t stride,
+             std::byte* out) {
+  switch (type) {
+    case ScalarType::i8:
+    case ScalarType::u8:
+      return scatter<std::uint8_t>(values, stride, out);
+    case ScalarType::i16:
+    case ScalarType::u16:
+      return scatter<std::uint16_t>(values, stride, out);
+    case ScalarType::i32:
+    case ScalarType::u32:
+      return scatter<std::uint32_t>(values, stride, out);
+    case ScalarType::i64:
+    case ScalarType::u64:
+      return scatter<std::uint64_t>(values, stride, out);
+    case ScalarType::f32:
+      for (std::int64_t& value : values) {
+        if (form == kFloatBits) {
+          const auto bits = static_cast<std::int32_t>(value);
+          value = bits < 0 ? bits ^ INT32_MAX : bits;
+        } else {
+          value = std::bit_cast<std::int32_t>(static_cast<float>(to_double(value, form)));
+        }
+      }
+      return scatter<std::uint32_t>(values, stride, out);
+    case ScalarType::f64:
+      for (std::int64_t& value : values) {
+        if (form == kDoubleBits) {
+          value = value < 0 ? value ^ INT64_MAX : value;
+        } else {
+          value = std::bit_cast<std::int64_t>(to_double(value, form));
+        }
+      }
+      return scatter<std::uint64_t>(values, stride, out);
+  }
+}
+
+}  // namespace
+
+void ClusterDecoder::decode(const Layout& layout, const DecodingTables& tables, const Entry& entry,
+                            ByteView bytes, bool root, ClusterPoints& out) {
+  const std::uint32_t n = entry.points;
+  out.has_representative = !root;
+  if (n == 0) {
+    if (!root) throw Damage("a cluster has no representative");
+    if (!bytes.empty()) throw Damage("a cluster without points has bytes");
+    out.positions.clear();
+    out.payload.clear();
+    out.children.clear();
+    out.representative_payload.clear();
+    out.representative_children.clear();
+    return;
+  }
+  if (n > layout.most_points()) throw Damage("a cluster has too many points");
+  SymbolDecoder coder(tables.tables, bytes);
+  positions(coder, layout, tables.predictor, entry);
+
+  payload_.resize(n * layout.payload_size);
+  std::size_t offset = 0;
+  for (unsigned a = 0; a < layout.attributes.size(); ++a) {
+    const ScalarType type = layout.attributes[a];
+    const bool floating = type == ScalarType::f32 || type == ScalarType::f64;
+    NumberForm form = kIntegerForm;
+    column_.resize(n);
+    code_column(coder, a, floating, form, column_.data(), n);
+    scatter(type, form, column_, layout.payload_size, payload_.data() + offset);
+    offset += size_of(type);
+  }
+  children_.resize(std::size_t{n} * layout.level);
+  if (layout.level > 0) code_children(coder, layout.level, children_.data(), n);
+
+  std::uint64_t upper = 0;
+  if (n >= kLow) upper = coder.raw(16);
+  const std::uint32_t last = coder.finish() | static_cast<std::uint32_t>(upper) << 16;
+  if (root ? last != 0 : last >= n)
+    throw Damage("a cluster's representative is not one of its points");
+  representative_ = last;
+  deliver(entry, root ? n : last, out);
+
+  // Everything but the representative, in the order of coding.
+  const std::size_t stride = layout.payload_size;
+  const std::uint32_t members = root ? n : n - 1;
+  out.payload.resize(members * stride);
+  out.representative_payload.resize(root ? 0 : stride);
+  if (stride > 0) {
+    const std::byte* const from = payload_.data();
+    const std::size_t before = root ? n * stride : last * stride;
+    std::copy(from, from + before, out.payload.begin());
+    if (!root) {
+      std::copy(from + before, from + before + stride, out.representative_payload.begin());
+      std::copy(from + before + stride, from + n * stride,
+                out.payload.begin() + static_cast<std::ptrdiff_t>(before));
+    }
+  }
+  out.children.resize(std::size_t{members} * layout.level);
+  out.representative_children.resize(root ? 0 : layout.level);
+  std::uint64_t* to = out.children.data();
+  for (std::uint32_t i = 0; i < n && layout.level > 0; ++i) {
+    std::uint64_t* const at = !root && i == last ? out.representative_children.data() : to;
+    for (unsigned j = 0; j < layout.level; ++j) {
+      at[j] = static_cast<std::uint64_t>(children_[i + std::size_t{n} * j]);
+    }
+    if (at == to) to += layout.level;
+  }
+}
+
+void ClusterDecoder::positions(SymbolDecoder& coder, const Layout& layout,
+                               const Predictor& predictor, const Entry& entry) {
+  const std::uint32_t n = entry.points;
+  const unsigned form = coder.symbol(context::kForm);
+  if (form > (kSplitForm | kOwnBoxForm)) throw Damage("a cluster has an unknown form");
+  const IntegerBox outer{{0, 0, 0}, entry.size};
+  box_ = outer;
+  if (form & kOwnBoxForm) code_box(coder, outer, box_);
+  for (std::vector<std::uint64_t>& axis : relative_) {
+    if (axis.size() < n) axis.resize(n);
+  }
+  if (form & kSplitForm) {
+    split_.code(coder, {{0, 0, 0}, box_.size},
+                {relative_[0].data(), relative_[1].data(), relative_[2].data()}, nullptr, n);
+    return;
+  }
+  if (!layout.grid || !GridCodec::fits(box_.size[0], box_.size[1], n)) {
+    throw Damage("a cluster's box does not suit its form");
+  }
+  grid_.positions(coder, static_cast<std::uint32_t>(box_.size[0]),
+                  static_cast<std::uint32_t>(box_.size[1]), n, relative_[0].data(),
+                  relative_[1].data());
+  grid_.heights(coder, predictor, box_.size[2], relative_[2].data());
+  const std::uint64_t highest = *std::max_element(relative_[2].begin(), relative_[2].begin() + n);
+  if (highest >= box_.size[2]) throw Damage("a height lies outside of its cluster's box");
+}
+
+void ClusterDecoder::deliver(const Entry& entry, std::uint32_t representative,
+                             ClusterPoints& out) const {
+  const std::uint32_t n = entry.points;
+  out.positions.resize(representative < n ? n - 1 : n);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::uint64_t origin = static_cast<std::uint64_t>(entry.low[axis]) + box_.low[axis];
+    const std::uint64_t* const values = relative_[axis].data();
+    const auto convert = [&](auto form) {
+      const auto number = [&](std::uint32_t i) {
+        return to_double(static_cast<std::int64_t>(origin + values[i]), form);
+      };
+      const std::uint32_t before = std::min(representative, n);
+      for (std::uint32_t i = 0; i < before; ++i) out.positions[i][axis] = number(i);
+      if (representative < n) out.representative[axis] = number(representative);
+      for (std::uint32_t i = before + 1; i < n; ++i) out.positions[i - 1][axis] = number(i);
+    };
+    if (entry.forms[axis] == kIntegerForm) {
+      convert(std::integral_constant<NumberForm, kIntegerForm>{});
+    } else {
+      convert(entry.forms[axis]);
+    }
+  }
+}
+
+}  // namespace terrace::stream::store

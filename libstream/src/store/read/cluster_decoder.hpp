@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "store/codec/grid_codec.hpp"
+#include "store/codec/layout.hpp"
+#include "store/codec/tables.hpp"
+
+namespace terrace::stream::store {
+
+/// Decodes clusters. Keeps its memory from one to the next. One object per thread.
+class ClusterDecoder {
+ public:
+  /// bytes: entry.bytes of them, with kPadding readable bytes before and behind.
+  /// root: no point is the representative.
+  /// Throws: Damage if the bytes are not a cluster of entry.points points in the entry's box.
+  void decode(const Layout& layout, const DecodingTables& tables, const Entry& entry,
+              ByteView bytes, bool root, ClusterPoints& out);
+  /// The place of the last representative in the order of coding.
+  [[nodiscard]] std::uint32_t representative() const { return representative_; }
+
+ private:
+  void positions(SymbolDecoder& coder, const Layout& layout, const Predictor& predictor,
+                 const Entry& entry);
+  void deliver(const Entry& entry, std::uint32_t representative, ClusterPoints& out) const;
+
+  std::uint32_t representative_ = 0;
+  IntegerBox box_;
+  std::array<std::vector<std::uint64_t>, 3> relative_;
+  GridCodec grid_;
+  SplitCodec split_;
+  std::vector<std::int64_t> column_;
+  std::vector<std::byte> payload_;
+  std::vector<std::int64_t> children_;
+};
+
+}  // namespace terrace::stream::store

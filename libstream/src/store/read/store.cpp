@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/stream/store.hpp"
+
+#include <cassert>
+#include <mutex>
+#include <utility>
+
+#include "io/temporary.hpp"
+#include "store/read/level_reader.hpp"
+#include "store/verify.hpp"
+#include "terrace/stream/atomic_file.hpp"
+
+namespace terrace::stream {
+
+using namespace store;
+
+struct Store::Impl {
+  std::filesystem::path path;
+  Manifest manifest;
+  std::uint64_t bytes = 0;
+  std::vector<LevelInfo> infos;
+  std::vector<std::unique_ptr<LevelReader>> levels;
+
+  std::mutex mutex;
+  std::vector<std::unique_ptr<ReadSpace>> spaces;
+
+  const LevelReader& level(unsigned number) const {
+    if (number >= levels.size()) {
+      throw Error({.file = path.string(),
+                   .where = {},
+                   .cause = "there is no level " + std::to_string(number) + ", the top is " +
+                            std::to_string(levels.size() - 1),
+                   .remedy = {}});
+    }
+    return *levels[number];
+  }
+  /// Memory for one thread's reading, kept for the next.
+  std::unique_ptr<ReadSpace> borrow() {
+    const std::lock_guard lock(mutex);
+    if (spaces.empty()) return std::make_unique<ReadSpace>();
+    auto space = std::move(spaces.back());
+    spaces.pop_back();
+    return space;
+  }
+  void give_back(std::unique_ptr<ReadSpace> space) {
+    const std::lock_guard lock(mutex);
+    spaces.push_back(std::move(space));
+  }
+};
+
+Store::Store(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+Store Store::with_stop(std::stop_token stop) const {
+  Store other = *this;
+  other.stop_ = std::move(stop);
+  return other;
+}
+
+void Store::check_stop() const {
+  if (stop_.stop_requested()) throw Stopped();
+}
+
+Store Store::open(const std::filesystem::path& path) {
+  const auto manifest_path = path / kManifestName;
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(manifest_path, error) && !recover(path)) {
+    throw Error({.file = path.string(),
+                 .where = {},
+                 .cause = "there is no store here",
+                 .remedy = "name a folder that terrace build has written"});
+  }
+  auto impl = std::make_shared<Impl>();
+  impl->path = path;
+  const std::string text = read_whole(manifest_path, kMostManifestBytes);
+  impl->manifest = parse_manifest(text, manifest_path);
+  impl->bytes = text.size();
+  for (unsigned l = 0; l < impl->manifest.levels.size(); ++l) {
+    const LevelEntry& level = impl->manifest.levels[l];
+    impl->infos.push_back({.level = l,
+                           .points = level.points,
+                           .members = level.members,
+                           .clusters = level.clusters,
+                           .bytes = level.data.bytes + level.index.bytes,
+                           .index_bytes = level.index.bytes});
+    impl->bytes += level.data.bytes + level.index.bytes;
+    impl->levels.push_back(std::make_unique<LevelReader>(path, impl->manifest, l));
+  }
+  return Store(std::move(impl));
+}
+
+bool Store::recover(const std::filesystem::path& path) {
+  return put_back_replaced(follow_links(path));
+}
+
+const Schema& Store::schema() const { return impl_->manifest.schema; }
+int Store::version() const { return impl_->manifest.version; }
+const std::filesystem::path& Store::path() const { return impl_->path; }
+unsigned Store::top() const { return static_cast<unsigned>(impl_->levels.size()) - 1; }
+std::span<const LevelInfo> Store::levels() const { return impl_->infos; }
+std::uint64_t Store::points() const { return impl_->manifest.points; }
+std::uint32_t Store::checksum() const { return impl_->manifest.checksum; }
+std::uint64_t Store::bytes() const { return impl_->bytes; }
+const Box3& Store::bounds() const { return impl_->manifest.bounds; }
+double Store::mean_height() const { return impl_->manifest.mean_height; }
+ClusterId Store::root() const { return cluster_id(top(), 0); }
+
+ClusterRecord Store::record(ClusterId id) const {
+  check_stop();
+  const LevelReader& level = impl_->level(level_of(id));
+  std::uint64_t offset = 0;
+  const Entry entry = level.entry(ordinal_of(id), offset);
+  return record_of(entry, level_of(id), offset, level.top());
+}
+
+void Store::read(ClusterId id, ClusterPoints& out) const {
+  check_stop();
+  const LevelReader& level = impl_->level(level_of(id));
+  auto space = impl_->borrow();
+  level.read(ordinal_of(id), *space, out);
+  impl_->give_back(std::move(space));
+}
+
+void Store::for_each(
+    unsigned number,
+    const std::function<void(ClusterId, const ClusterRecord&, const ClusterPoints&)>& visit) const {
+  const LevelReader& level = impl_->level(number);
+  const std::uint64_t members = impl_->infos[number].members;
+  const auto miscounted = [&] {
+    return Error({.file = level.data().path().string(),
+                  .where = {},
+                  .cause = "the clusters do not have the " + std::to_string(members) +
+                           " members that the manifest tells",
+                  .remedy = "restore the file or build the store anew"});
+  };
+  ClusterDecoder decoder;
+  ClusterPoints points;
+  std::uint64_t visited = 0;
+  level.for_each_page([&](std::uint64_t first, const IndexPage& page, ByteView bytes) {
+    const std::uint64_t start = page.offset(0);
+    std::uint64_t offset = start;
+    for (std::uint32_t i = 0; i < page.clusters(); ++i) {
+      check_stop();
+      const std::uint64_t ordinal = first + i;
+      Entry entry;
+      try {
+        entry = level.entry(page, i);
+      } catch (const Damage& damage) {
+        throw level.damaged(ordinal, damage.what());
+      }
+      level.decode(ordinal, entry, offset, bytes.subspan(kPadding + (offset - start), entry.bytes),
+                   decoder, points);
+      visited += points.size();
+      if (visited > members) throw miscounted();
+      visit(cluster_id(number, ordinal), record_of(entry, number, offset, level.top()), points);
+      offset += entry.bytes;
+    }
+  });
+  if (visited != members) throw miscounted();
+}
+
+bool Store::verify(const std::function<void(const Problem&)>& report) const {
+  return verify_store(*this, impl_->manifest, impl_->levels, stop_, report);
+}
+
+}  // namespace terrace::stream

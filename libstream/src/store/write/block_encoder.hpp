@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "store/codec/grid_codec.hpp"
+#include "store/codec/layout.hpp"
+#include "store/codec/tables.hpp"
+
+namespace terrace::stream::store {
+
+/// Encodes the clusters of a block, each into a byte string of its own. Keeps its memory between
+/// blocks. One object per thread.
+class BlockEncoder {
+ public:
+  /// Takes in a block, which must outlive the calls below.
+  /// Throws: Error on a position that is not finite or a cluster of more than kMostPoints points.
+  void load(const Layout& layout, const ClusteredBlock& block);
+
+  /// Training: the loaded block enters the least squares ...
+  void fit(PredictorFit& sums);
+  /// ... and its symbols, under that predictor, are counted.
+  void count(const Predictor& predictor, Counts& counts);
+
+  /// Appends the clusters' bytes and entries.
+  void encode(const EncodingTables& tables, Bytes& bytes, std::vector<Entry>& entries);
+
+ private:
+  void load_axis(std::size_t axis);
+  void load_attributes();
+  Entry enter(std::size_t cluster);
+  template <class Use>
+  void positions(SymbolEncoder& coder, Use&& heights);
+  void encode_cluster(SymbolEncoder& coder, const Predictor& predictor);
+
+  const Layout* layout_ = nullptr;
+  const ClusteredBlock* block_ = nullptr;
+  // The block, as integers.
+  std::array<NumberForm, 3> forms_{};
+  std::array<unsigned, 3> shifts_{};
+  std::array<std::vector<std::int64_t>, 3> axes_;
+  std::vector<NumberForm> attribute_forms_;
+  std::vector<std::vector<std::int64_t>> attributes_;
+  // The present cluster.
+  std::span<const std::uint32_t> members_;
+  std::uint32_t representative_ = 0;
+  IntegerBox coded_box_;  ///< within the entry's box
+  IntegerBox entry_box_;
+  bool own_box_ = false;
+  std::array<std::vector<std::uint64_t>, 3> relative_;  ///< to coded_box_
+  std::vector<std::uint32_t> order_;                    ///< of coding, as numbers within members_
+  GridCodec grid_;
+  SplitCodec split_;
+  std::vector<std::int64_t> column_;
+  std::vector<double> doubles_;
+};
+
+}  // namespace terrace::stream::store

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include "store/files.hpp"
+#include "store/manifest.hpp"
+#include "store/write/block_encoder.hpp"
+#include "store/write/raw_block.hpp"
+
+namespace terrace::stream::store {
+
+/// Blocks of a level that share tables, and how many of them, from the first, are held back until
+/// the tables are made from them.
+inline constexpr std::uint64_t kSegmentBlocks = 1024;
+inline constexpr std::size_t kTrainingBlocks = 64;
+
+/// Tables in both shapes: a block that was encoded with those of an earlier segment is decoded.
+struct SharedTables {
+  explicit SharedTables(Tables made) : tables(std::move(made)), encoding(tables) {}
+  Tables tables;
+  EncodingTables encoding;
+};
+using SharedTablesPtr = std::shared_ptr<const SharedTables>;
+
+/// A block on its way into a level: raw while there are no tables, else encoded.
+struct PreparedBlock {
+  std::size_t clusters = 0;
+  std::unique_ptr<RawBlock> raw;
+  // If encoded:
+  SharedTablesPtr tables;
+  Bytes bytes;
+  std::vector<Entry> entries;
+  std::vector<ClusterSummary> summaries;
+};
+
+/// The two files of a level. One thread at a time. The bytes depend on the blocks and their order
+/// alone, not on which of them came encoded.
+class LevelWriter {
+ public:
+  LevelWriter(const std::filesystem::path& folder, Layout layout);
+
+  /// What blocks are to be encoded with just now; null while there are no tables.
+  [[nodiscard]] const SharedTablesPtr& tables() const { return tables_; }
+  [[nodiscard]] const Layout& layout() const { return layout_; }
+  [[nodiscard]] std::uint64_t clusters() const { return clusters_; }
+
+  /// Returns the ordinal of the block's first cluster.
+  std::uint64_t append(PreparedBlock block, bool root);
+  /// Writes what is held back, the directory and the tables; syncs and closes. `members` of the
+  /// result are the points of all clusters, representatives left out; `points` is not set.
+  LevelEntry finish(bool root);
+
+  /// Whether the next block starts a segment: its tables are not those of the last.
+  [[nodiscard]] bool at_segment_start() const { return blocks_ % kSegmentBlocks == 0; }
+
+ private:
+  void train();
+  void write(const PreparedBlock& block);
+  void write_full_page();
+
+  Layout layout_;
+  OutputFile data_, index_;
+  std::vector<RawBlock> held_;
+  SharedTablesPtr tables_;
+  BlockEncoder encoder_;
+  std::uint64_t blocks_ = 0, clusters_ = 0, points_ = 0;
+  std::uint64_t segment_start_ = 0;  ///< ordinal of the present segment's first cluster
+  std::vector<Entry> page_;
+  std::uint64_t page_offset_ = 0, data_end_ = 0;
+  Bytes directory_, table_bytes_;
+  std::uint32_t table_count_ = 0;
+};
+
+}  // namespace terrace::stream::store

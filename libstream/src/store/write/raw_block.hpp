@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "store/codec/layout.hpp"
+#include "store/codec/tables.hpp"
+#include "store/read/cluster_decoder.hpp"
+
+namespace terrace::stream::store {
+
+/// A clustered block that owns its data.
+struct RawBlock {
+  unsigned level = 0;
+  std::vector<Point3> positions;
+  std::vector<std::byte> payload;
+  std::vector<std::uint64_t> children;
+  std::vector<std::uint32_t> first, order, representatives;
+  std::vector<ClusterSummary> summaries;
+
+  RawBlock() = default;
+  explicit RawBlock(const ClusteredBlock& block);
+  [[nodiscard]] ClusteredBlock view() const;
+};
+
+/// The block that was encoded into `bytes` and `entries`; encoded again it gives the same bytes as
+/// the first original would. The boxes of entries may be grown, so the summaries are the caller's.
+RawBlock decoded_block(const Layout& layout, const Tables& tables, const Bytes& bytes,
+                       std::span<const Entry> entries, std::vector<ClusterSummary> summaries,
+                       bool root);
+
+}  // namespace terrace::stream::store

@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cassert>
+#include <mutex>
+#include <utility>
+
+#include "store/write/level_writer.hpp"
+#include "store/write/staging.hpp"
+#include "terrace/stream/error.hpp"
+#include "terrace/stream/store.hpp"
+
+namespace terrace::stream {
+
+using namespace store;
+
+std::size_t Schema::payload_size() const {
+  std::size_t size = 0;
+  for (const Channel& channel : attributes) size += size_of(channel.type);
+  return size;
+}
+
+class StoreWriter::Encoded {
+ public:
+  unsigned level = 0;
+  PreparedBlock block;
+  // Totals over the block's points, for level 0.
+  std::uint64_t points = 0;
+  double height_sum = 0.0;
+  Box3 bounds;
+
+  /// Enters the points. Two sums side by side, in a fixed order: one would wait for itself.
+  void sum_up(std::span<const Point3> positions) {
+    std::array<double, 2> sums{};
+    for (std::size_t i = 0; i < positions.size(); ++i) sums[i % 2] += positions[i][2];
+    height_sum = sums[0] + sums[1];
+    Box3 box;
+    for (const Point3& p : positions) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        box.min[axis] = p[axis] < box.min[axis] ? p[axis] : box.min[axis];
+        box.max[axis] = p[axis] > box.max[axis] ? p[axis] : box.max[axis];
+      }
+    }
+    bounds = box;
+  }
+};
+
+void StoreWriter::EncodedDeleter::operator()(Encoded* block) const { delete block; }
+
+struct StoreWriter::Impl {
+  Impl(const std::filesystem::path& path, Schema given, bool replace_old)
+      : schema(std::move(given)), replace(replace_old), staging(path) {}
+
+  /// An encoder nobody uses; memory for as many as there are threads.
+  std::unique_ptr<BlockEncoder> borrow() {
+    const std::lock_guard lock(mutex);
+    if (encoders.empty()) return std::make_unique<BlockEncoder>();
+    auto encoder = std::move(encoders.back());
+    encoders.pop_back();
+    return encoder;
+  }
+  void give_back(std::unique_ptr<BlockEncoder> encoder) {
+    const std::lock_guard lock(mutex);
+    encoders.push_back(std::move(encoder));
+  }
+  SharedTablesPtr tables(unsigned level) {
+    const std::lock_guard lock(mutex);
+    return level < tables_by_level.size() ? tables_by_level[level] : nullptr;
+  }
+  EncodedPtr encode(const ClusteredBlock& block);
+  std::uint64_t append(EncodedPtr encoded, bool root);
+
+  Schema schema;
+  bool replace;
+  Staging staging;
+  std::vector<std::unique_ptr<LevelWriter>> levels;
+  std::uint64_t points = 0;
+  double height_sum = 0.0;
+  Box3 bounds;
+  bool broken = false;  ///< an append or finish has thrown
+
+  // Shared between threads.
+  std::mutex mutex;
+  std::vector<std::unique_ptr<BlockEncoder>> encoders;
+  std::vector<SharedTablesPtr> tables_by_level;
+};
+
+StoreWriter::EncodedPtr StoreWriter::Impl::encode(const ClusteredBlock& block) {
+  assert(block.first.size() == block.representatives.size() + 1);
+  assert(block.payload.size() == block.positions.size() * schema.payload_size());
+  assert(block.children.size() == block.positions.size() * block.level);
+  EncodedPtr encoded(new Encoded);
+  encoded->level = block.level;
+  encoded->block.clusters = block.representatives.size();
+  encoded->points = block.positions.size();
+  if (block.level == 0) encoded->sum_up(block.positions);
+  if (const SharedTablesPtr shared = tables(block.level)) {
+    const Layout layout(schema, block.level);
+    auto encoder = borrow();
+    encoder->load(layout, block);
+    encoder->encode(shared->encoding, encoded->block.bytes, encoded->block.entries);
+    encoded->block.tables = shared;
+    encoded->block.summaries.assign(block.summaries.begin(), block.summaries.end());
+    give_back(std::move(encoder));
+  } else {
+    encoded->block.raw = std::make_unique<RawBlock>(block);
+  }
+  return encoded;
+}
+
+std::uint64_t StoreWriter::Impl::append(EncodedPtr encoded, bool root) {
+  assert(encoded != nullptr);
+  if (broken) {
+    throw Error({.file = staging.target().string(),
+                 .where = {},
+                 .cause = "writing has failed before",
+                 .remedy = {}});
+  }
+  broken = true;  // until this has gone well
+  const unsigned level = encoded->level;
+  while (levels.size() <= level) {
+    levels.push_back(std::make_unique<LevelWriter>(
+        staging.folder(), Layout(schema, static_cast<unsigned>(levels.size()))));
+  }
+  if (level == 0) {
+    points += encoded->points;
+    height_sum += encoded->height_sum;
+    bounds.include(encoded->bounds);
+  }
+  LevelWriter& writer = *levels[level];
+  const std::uint64_t ordinal = writer.append(std::move(encoded->block), root);
+  {
+    const std::lock_guard lock(mutex);
+    if (tables_by_level.size() < levels.size()) tables_by_level.resize(levels.size());
+    // At the end of a segment nobody need encode with tables that are about to go.
+    tables_by_level[level] = writer.at_segment_start() ? nullptr : writer.tables();
+  }
+  broken = false;
+  return ordinal;
+}
+
+StoreWriter::StoreWriter(const std::filesystem::path& path, Schema schema, bool replace) {
+  std::error_code error;
+  const auto status = std::filesystem::status(path, error);
+  if (std::filesystem::exists(status)) {
+    if (!replace) {
+      throw Error({.file = path.string(),
+                   .where = {},
+                   .cause = "exists already",
+                   .remedy = "choose another name or remove it"});
+    }
+    if (!looks_like_store(path)) {
+      throw Error({.file = path.string(),
+                   .where = {},
+                   .cause = "exists and is not a store, so it is not replaced",
+                   .remedy = "choose another name or remove it"});
+    }
+  }
+  if (schema.attributes.size() > kMostAttributes) {
+    throw Error({.file = path.string(),
+                 .where = {},
+                 .cause = "there are too many attributes",
+                 .remedy = {}});
+  }
+  impl_ = std::make_unique<Impl>(path, std::move(schema), replace);
+}
+
+StoreWriter::~StoreWriter() = default;
+
+StoreWriter::EncodedPtr StoreWriter::encode(const ClusteredBlock& block) const {
+  return impl_->encode(block);
+}
+
+std::uint64_t StoreWriter::append(EncodedPtr block) {
+  return impl_->append(std::move(block), /*root=*/false);
+}
+
+std::uint64_t StoreWriter::clusters(unsigned level) const {
+  return level < impl_->levels.size() ? impl_->levels[level]->clusters() : 0;
+}
+
+Schema& StoreWriter::schema() { return impl_->schema; }
+
+std::uint64_t StoreWriter::finish(const ClusteredBlock& root, bool publish) {
+  Impl& w = *impl_;
+  assert(root.representatives.size() == 1 && root.representatives[0] == UINT32_MAX);
+  assert(w.levels.size() == root.level && "all levels below the top have clusters, no other has");
+
+  const std::uint64_t top_points = root.positions.size();
+  RawBlock block(root);
+  if (block.summaries.empty() && root.level > 0) {
+    block.summaries.push_back({.box = w.bounds, .error = 0.0, .descendants = w.points});
+  }
+  w.append(w.encode(block.view()), /*root=*/true);
+  w.broken = true;
+
+  Manifest manifest;
+  manifest.points = w.points;
+  manifest.bounds = w.bounds;
+  manifest.mean_height = w.points == 0 ? 0.0 : w.height_sum / static_cast<double>(w.points);
+  std::uint64_t bytes = 0;
+  for (std::size_t l = 0; l < w.levels.size(); ++l) {
+    const bool top = l == root.level;
+    manifest.levels.push_back(w.levels[l]->finish(top));
+    bytes += manifest.levels[l].data.bytes + manifest.levels[l].index.bytes;
+  }
+  for (std::size_t l = manifest.levels.size(); l-- > 0;) {
+    manifest.levels[l].points =
+        manifest.levels[l].members +
+        (l + 1 < manifest.levels.size() ? manifest.levels[l + 1].points : 0);
+  }
+  assert(manifest.levels.back().points == top_points);
+  static_cast<void>(top_points);
+  manifest.schema = std::move(w.schema);
+  const std::string text = to_text(manifest);
+  w.schema = std::move(manifest.schema);
+  // What was written must be readable: this also finds counts that the caller got wrong.
+  const auto path = w.staging.folder() / kManifestName;
+  static_cast<void>(parse_manifest(text, path));
+  OutputFile file(path);
+  file.write({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
+  file.finish();
+  if (publish) w.staging.publish(w.replace);
+  return bytes + text.size();
+}
+
+}  // namespace terrace::stream
