@@ -47,18 +47,15 @@ class Survey {
            static_cast<double>(5'338'000'000 + random_() % 2'000'000) / 1000.0,
            static_cast<double>(random_() % 900'000) / 1000.0};
     }
-    block_.attributes.resize(header_.attributes.size());
-    for (std::size_t c = 0; c < block_.attributes.size(); ++c) {
-      Column& column = block_.attributes[c];
-      column.type = header_.attributes[c].type;
-      column.bytes.resize(count * size_of(column.type));
-      for (std::size_t i = 0; i < count; ++i) {
+    block_.payload.clear();
+    for (std::size_t i = 0; i < count; ++i) {
+      for (const Channel& channel : header_.attributes) {
         const float confidence = static_cast<float>(random_() % 1000) / 1000.0f;
         const std::uint64_t bits = random_();
-        const void* from = column.type == ScalarType::f32 ? static_cast<const void*>(&confidence)
-                                                          : static_cast<const void*>(&bits);
-        const auto* bytes = static_cast<const std::byte*>(from);
-        std::copy_n(bytes, size_of(column.type), column.bytes.data() + i * size_of(column.type));
+        const auto bytes = channel.type == ScalarType::f32
+                               ? std::as_bytes(std::span(&confidence, 1))
+                               : std::as_bytes(std::span(&bits, 1)).first(size_of(channel.type));
+        block_.payload.insert(block_.payload.end(), bytes.begin(), bytes.end());
       }
     }
     return block_;

@@ -22,7 +22,7 @@ using testing::StandInHierarchy;
 bool is_small() { return std::getenv("TERRACE_BENCH_SMALL") != nullptr; }
 
 struct Input {
-  Schema schema;
+  StoreSchema schema;
   std::vector<testing::OwnedBlock> blocks;
   std::uint64_t points = 0;
 };

@@ -60,25 +60,18 @@ inline Reading read_through(const std::string& file, const SourceOptions& option
   };
   try {
     const auto source = open_source(std::span(&file, 1), options);
-    const std::size_t columns = source->info().attributes.size();
+    const std::size_t record = source->info().payload_size();
     PointBlock block;
     while (source->next(block)) {
       require(!block.empty() && block.size() <= options.block_points, "size of a block");
-      require(block.attributes.size() == columns, "number of columns");
-      for (std::size_t c = 0; c < columns; ++c) {
-        const Column& column = block.attributes[c];
-        require(column.type == source->info().attributes[c].type, "type of a column");
-        require(column.bytes.size() == block.size() * size_of(column.type), "length of a column");
-      }
+      require(block.payload.size() == block.size() * record, "size of the records");
       for (std::size_t i = 0; i < block.size(); ++i) {
         for (const double value : block.positions[i]) {
           require(value - value == 0.0, "finite coordinates");
         }
         // In the order of the points, so that blocks of any size fold alike.
         fold(&block.positions[i], sizeof(Point3));
-        for (const Column& column : block.attributes) {
-          fold(column.bytes.data() + i * size_of(column.type), size_of(column.type));
-        }
+        fold(block.payload.data() + i * record, record);
       }
       reading.points += block.size();
     }

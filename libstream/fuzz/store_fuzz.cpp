@@ -20,8 +20,8 @@ void require(bool condition) {
   if (!condition) std::abort();
 }
 
-Schema schema_for(bool grid) {
-  Schema schema;
+StoreSchema schema_for(bool grid) {
+  StoreSchema schema;
   schema.grid = grid;
   for (const ScalarType type : {ScalarType::u8, ScalarType::f32, ScalarType::f64}) {
     schema.attributes.push_back({std::string(name_of(type)), type, 1.0, 0.0, {}});

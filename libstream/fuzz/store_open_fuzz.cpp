@@ -79,7 +79,7 @@ class Promises {
 
  private:
   void check_point(const Point3& p, const ClusterRecord& record) {
-    const Schema& schema = store_.schema();
+    const StoreSchema& schema = store_.schema();
     require(record.summary.box.contains(p), "points in the cluster's box");
     require(store_.bounds().contains(p), "points in the bounds");
     if (!schema.grid) return;

@@ -102,14 +102,12 @@ void expect_samples(const std::string& path, const TiffSpec& spec,
           static_cast<std::size_t>(p[1]) * spec.columns + static_cast<std::size_t>(p[0]);
       ++times.at(cell);
       if (exact) {
-        std::memcpy(seen.data() + cell * size, block.attributes[0].bytes.data() + i * size, size);
+        std::memcpy(seen.data() + cell * size, block.payload.data() + i * size, size);
       } else {
         ASSERT_EQ(p[2], whole.value(cell));
       }
     }
-    if (exact) {
-      ASSERT_EQ(block.attributes[0].bytes.size(), block.size() * size);
-    }
+    ASSERT_EQ(block.payload.size(), exact ? block.size() * size : 0);
   }
   ASSERT_EQ(std::count(times.begin(), times.end(), 1), static_cast<std::ptrdiff_t>(times.size()));
   ASSERT_EQ(source->progress().points, times.size());

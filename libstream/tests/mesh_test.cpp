@@ -113,8 +113,9 @@ TEST_F(MeshFile, PlyIsReadBackBitForBit) {
     EXPECT_TRUE(same_bits(all.points.positions, mesh.positions));
     ASSERT_EQ(all.info.attributes.size(), 1u);
     EXPECT_EQ(all.info.attributes[0].name, "level");
-    const auto levels = all.points.attributes[0].as<float>();
-    EXPECT_TRUE(std::equal(levels.begin(), levels.end(), mesh.levels.begin(), mesh.levels.end()));
+    const auto levels = all.values<float>(0);
+    ASSERT_EQ(levels.size(), mesh.levels.size());
+    for (std::size_t i = 0; i < levels.size(); ++i) ASSERT_EQ(levels[i], mesh.levels[i]);
     const std::string bytes = read_text(file);
     const std::size_t body = bytes.find("end_header\n") + 11;
     if (format == "ply") {

@@ -16,8 +16,8 @@
 
 #include <gtest/gtest.h>
 
-#include "store/codec/bytes.hpp"
 #include "stand_in_hierarchy.hpp"
+#include "store/codec/bytes.hpp"
 #include "store_testing.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/store.hpp"

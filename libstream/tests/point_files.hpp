@@ -24,23 +24,23 @@ struct AllPoints {
   SourceInfo info;
   PointBlock points;
   std::size_t largest_block = 0;
+
+  /// Values of an attribute, whose type is T.
+  template <class T>
+  [[nodiscard]] AttributeView<T> values(std::size_t attribute) const {
+    return info.view<T>(points.payload, attribute);
+  }
 };
 
 inline AllPoints read_all(PointSource& source) {
   AllPoints all;
   all.info = source.info();
-  all.points.attributes.resize(all.info.attributes.size());
   PointBlock block;
   while (source.next(block)) {
     all.largest_block = std::max(all.largest_block, block.size());
     all.points.positions.insert(all.points.positions.end(), block.positions.begin(),
                                 block.positions.end());
-    for (std::size_t i = 0; i < block.attributes.size(); ++i) {
-      Column& to = all.points.attributes[i];
-      to.type = block.attributes[i].type;
-      to.bytes.insert(to.bytes.end(), block.attributes[i].bytes.begin(),
-                      block.attributes[i].bytes.end());
-    }
+    all.points.payload.insert(all.points.payload.end(), block.payload.begin(), block.payload.end());
   }
   return all;
 }
@@ -99,13 +99,25 @@ inline double any_double(std::mt19937_64& random) {
   }
 }
 
-template <class T>
-Column column_of(ScalarType type, const std::vector<T>& values) {
-  Column column;
-  column.type = type;
-  column.bytes.resize(values.size() * sizeof(T));
-  if (!values.empty()) std::memcpy(column.bytes.data(), values.data(), column.bytes.size());
-  return column;
+/// Appends values to packed records, one after the other.
+template <class... T>
+void append_values(std::vector<std::byte>& payload, const T&... values) {
+  const auto append = [&payload](const auto& value) {
+    const auto bytes = std::as_bytes(std::span(&value, 1));
+    payload.insert(payload.end(), bytes.begin(), bytes.end());
+  };
+  (append(values), ...);
+}
+
+/// Appends a value of that type with any bits, but finite where it is a double or a float.
+inline void append_any(std::vector<std::byte>& payload, ScalarType type, std::mt19937_64& random) {
+  if (type == ScalarType::f64) return append_values(payload, any_double(random));
+  if (type == ScalarType::f32) {
+    return append_values(payload, static_cast<float>(random() % 100000) / 7.0f);
+  }
+  const std::uint64_t bits = random();
+  const auto bytes = std::as_bytes(std::span(&bits, 1)).first(size_of(type));
+  payload.insert(payload.end(), bytes.begin(), bytes.end());
 }
 
 }  // namespace terrace::stream

@@ -139,7 +139,7 @@ TEST_F(Source, ChainsFilesOfOneFormat) {
   EXPECT_EQ(all.info.files, files);
   EXPECT_EQ(all.points.positions,
             (std::vector<Point3>{{1, 2, 3}, {5, 6, 7}, {9, 9, 9}, {0, 0, 0}}));
-  EXPECT_EQ(all.points.attributes[0].as<double>()[3], 0.0);
+  EXPECT_EQ(all.values<double>(0)[3], 0.0);
 
   const std::string ply = put("a.ply", kPly);
   const AllPoints two = read_all({ply, ply});
@@ -176,7 +176,7 @@ TEST_F(Source, ReadsStandardInputAndPipes) {
       const AllPoints all = read_all(std::vector<std::string>{"-"}, options);
       EXPECT_EQ(all.points.size(), 50000u);
       EXPECT_EQ(all.points.positions[49999][0], 49999.0);
-      EXPECT_EQ(all.points.attributes[0].as<double>()[4097], 4097.0);
+      EXPECT_EQ(all.values<double>(0)[4097], 4097.0);
     }
     writer.join();
     close(ends[0]);

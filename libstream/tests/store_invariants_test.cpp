@@ -28,8 +28,8 @@ using testing::TemporaryFolder;
 
 constexpr std::uint64_t kColumns = 60, kRows = 50;
 
-Schema small_grid() {
-  Schema schema = testing::grid_schema(ScalarType::i16);
+StoreSchema small_grid() {
+  StoreSchema schema = testing::grid_schema(ScalarType::i16);
   schema.columns = kColumns;
   schema.rows = kRows;
   return schema;
@@ -489,7 +489,7 @@ const store::Tables& even_tables(unsigned contexts) {
 std::string decoding(bool grid, std::uint32_t points, std::uint32_t last,
                      const std::function<void(store::SymbolEncoder&)>& write,
                      const std::function<void(store::Bytes&)>& change = {}) {
-  Schema schema;
+  StoreSchema schema;
   schema.grid = grid;
   const store::Layout layout(schema, 0);
   const store::EncodingTables encoding(even_tables(layout.contexts()));
@@ -594,7 +594,7 @@ TEST(StoreInvariants, ClustersThatBreakTheirRulesAreNotRead) {
 
 /// Clusters that would take much memory are neither written nor read, however few bytes they are.
 TEST(StoreInvariants, ClustersOfManyBytesAreNotWritten) {
-  Schema schema = testing::cloud_schema();
+  StoreSchema schema = testing::cloud_schema();
   for (int i = 0; i < 4096; ++i) {
     schema.attributes.push_back(testing::channel(std::to_string(i)));
   }

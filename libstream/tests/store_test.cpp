@@ -129,7 +129,7 @@ TEST(Store, CloudsOfAllNumbersComeBackBitForBit) {
 }
 
 TEST(Store, AttributesOfAllTypesComeBackBitForBit) {
-  Schema schema = testing::cloud_schema();
+  StoreSchema schema = testing::cloud_schema();
   for (const ScalarType type : testing::kAllTypes)
     schema.attributes.push_back(testing::channel(std::string(name_of(type)), type));
   auto blocks = testing::cloud_blocks(testing::Numbers::decimals, 6000, 900, 5);
@@ -149,7 +149,7 @@ TEST(Store, AttributesOfAllTypesComeBackBitForBit) {
 }
 
 TEST(Store, DecimalAttributesAreSmall) {
-  Schema schema = testing::cloud_schema();
+  StoreSchema schema = testing::cloud_schema();
   schema.attributes.push_back(testing::channel("t", ScalarType::f64));
   auto blocks = testing::cloud_blocks(testing::Numbers::decimals, 6000, 900, 7);
   std::uint64_t row = 0;
@@ -190,7 +190,7 @@ TEST(Store, GoldenStoresAreSound) {
 /// sanitizers' build, Clang at -O1, find the same checksums. They change with the format alone.
 TEST(Store, ChecksumsAreTheSameWithEveryCompiler) {
   const TemporaryFolder folder;
-  const auto checksum = [&](const char* name, const Schema& schema, const auto& blocks) {
+  const auto checksum = [&](const char* name, const StoreSchema& schema, const auto& blocks) {
     testing::write_store(folder.path() / name, schema, blocks,
                          {.block_points = 900, .cluster_points = 60});
     return Store::open(folder.path() / name).checksum();

@@ -50,8 +50,8 @@ inline Channel channel(std::string name, ScalarType type = ScalarType::f64) {
   return {std::move(name), type, 1.0, 0.0, {}};
 }
 
-inline Schema grid_schema(ScalarType type) {
-  Schema schema;
+inline StoreSchema grid_schema(ScalarType type) {
+  StoreSchema schema;
   schema.grid = true;
   schema.coordinates = {
       channel("column", ScalarType::i32), channel("row", ScalarType::i32),
@@ -71,8 +71,8 @@ inline Schema grid_schema(ScalarType type) {
   return schema;
 }
 
-inline Schema cloud_schema() {
-  Schema schema;
+inline StoreSchema cloud_schema() {
+  StoreSchema schema;
   schema.coordinates = {channel("x"), channel("y"), channel("z")};
   schema.format = "test";
   return schema;
@@ -251,7 +251,7 @@ inline PointBag all_points(const Store& store) {
   return bag;
 }
 
-inline std::uint64_t write_store(const std::filesystem::path& path, const Schema& schema,
+inline std::uint64_t write_store(const std::filesystem::path& path, const StoreSchema& schema,
                                  const std::vector<Block>& blocks,
                                  const StandInHierarchy::Options& options) {
   StoreWriter writer(path, schema);
@@ -261,7 +261,7 @@ inline std::uint64_t write_store(const std::filesystem::path& path, const Schema
 }
 
 /// Writes the blocks, reads them back in every way, and verifies. Returns the bytes of the store.
-inline std::uint64_t check_round_trip(const Schema& schema, const std::vector<Block>& blocks,
+inline std::uint64_t check_round_trip(const StoreSchema& schema, const std::vector<Block>& blocks,
                                       const StandInHierarchy::Options& options) {
   const TemporaryFolder folder;
   const auto path = folder.path() / "store";

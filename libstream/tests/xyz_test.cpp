@@ -63,9 +63,9 @@ TEST_F(Xyz, NamesCoordinatesAndAttributesByTheHeader) {
   EXPECT_EQ(all.info.attributes[0].name, "id");
   EXPECT_EQ(all.info.attributes[1].name, "class");
   EXPECT_EQ(all.info.attributes[2].name, "class_2");
-  EXPECT_EQ(all.points.attributes[0].as<double>()[1], 8.0);
-  EXPECT_EQ(all.points.attributes[1].as<double>()[0], 2.0);
-  EXPECT_TRUE(std::isnan(all.points.attributes[2].as<double>()[1]));
+  EXPECT_EQ(all.values<double>(0)[1], 8.0);
+  EXPECT_EQ(all.values<double>(1)[0], 2.0);
+  EXPECT_TRUE(std::isnan(all.values<double>(2)[1]));
 }
 
 TEST_F(Xyz, LettersGoBeforeWords) {
@@ -81,7 +81,7 @@ TEST_F(Xyz, UnnamedColumnsAreNumbered) {
   ASSERT_EQ(all.info.attributes.size(), 2u);
   EXPECT_EQ(all.info.attributes[0].name, "a3");
   EXPECT_EQ(all.info.attributes[1].name, "a4");
-  EXPECT_EQ(all.points.attributes[1].as<double>()[1], 10.0);
+  EXPECT_EQ(all.values<double>(1)[1], 10.0);
 }
 
 TEST_F(Xyz, RefusesBadTextWithItsLine) {
@@ -147,7 +147,7 @@ TEST_F(Xyz, BlocksAreBoundedAndInFileOrder) {
     ASSERT_EQ(all.points.size(), 1000u);
     for (std::size_t i = 0; i < 1000; ++i) {
       EXPECT_EQ(all.points.positions[i][0], static_cast<double>(i));
-      EXPECT_EQ(all.points.attributes[0].as<double>()[i], -static_cast<double>(i));
+      EXPECT_EQ(all.values<double>(0)[i], -static_cast<double>(i));
     }
   }
 }
@@ -183,10 +183,10 @@ TEST_F(Xyz, WritesWhatItReadsBitForBit) {
       block.positions.push_back({any_double(random), any_double(random), any_double(random)});
     }
     for (std::size_t c = 0; c < columns; ++c) {
-      std::vector<double> values;
-      for (std::size_t i = 0; i < count; ++i) values.push_back(any_double(random));
       header.attributes.push_back({.name = "value " + std::to_string(c)});
-      block.attributes.push_back(column_of(ScalarType::f64, values));
+    }
+    for (std::size_t i = 0; i < count * columns; ++i) {
+      append_values(block.payload, any_double(random));
     }
     for (const std::string name : {"out.xyz", "out.csv"}) {
       const auto path = folder_.path() / name;
@@ -196,9 +196,9 @@ TEST_F(Xyz, WritesWhatItReadsBitForBit) {
       writer->finish();
       const AllPoints all = read_file(path);
       EXPECT_TRUE(same_bits(all.points.positions, block.positions));
-      ASSERT_EQ(all.points.attributes.size(), columns);
+      EXPECT_EQ(all.points.payload, block.payload);
+      ASSERT_EQ(all.info.attributes.size(), columns);
       for (std::size_t c = 0; c < columns; ++c) {
-        EXPECT_EQ(all.points.attributes[c].bytes, block.attributes[c].bytes);
         if (name == "out.csv") {
           EXPECT_EQ(all.info.attributes[c].name, "value_" + std::to_string(c));
         }
@@ -216,10 +216,8 @@ TEST_F(Xyz, WritesTypedColumnsInShortestFormAndScaledOnesAsRealValues) {
                      {.name = "a,b", .type = ScalarType::u8}}};
   PointBlock block;
   block.positions = {{0.1, -2, 1e300}};
-  block.attributes = {
-      column_of<std::int64_t>(ScalarType::i64, {-9007199254740993}),
-      column_of<float>(ScalarType::f32, {0.1f}), column_of<std::uint16_t>(ScalarType::u16, {65535}),
-      column_of<std::uint8_t>(ScalarType::u8, {200}), column_of<std::uint8_t>(ScalarType::u8, {7})};
+  append_values(block.payload, std::int64_t{-9007199254740993}, 0.1f, std::uint16_t{65535},
+                std::uint8_t{200}, std::uint8_t{7});
   const auto path = folder_.path() / "typed.csv";
   const auto writer = open_point_writer(path, header);
   writer->append(block);

@@ -73,8 +73,8 @@ TEST_F(GeoidTest, RefusesWhatIsNoGrid) {
   EXPECT_THROW(GeoidGrid((folder_ / "text.pgm").string(), kMemory), stream::Error);
 }
 
-stream::Schema schema_with(const std::string& vertical, const std::string& unit) {
-  stream::Schema schema;
+stream::StoreSchema schema_with(const std::string& vertical, const std::string& unit) {
+  stream::StoreSchema schema;
   schema.vertical = vertical;
   schema.coordinates[2].unit = unit;
   return schema;
@@ -122,7 +122,7 @@ TEST_F(GeoidTest, DigestsTellWhichOperationIsMeant) {
 
 TEST_F(GeoidTest, WhatWasNotSaidOrContradictsIsRefused) {
   const std::string file = write_grid("test.pgm");
-  const auto refused = [](const stream::Schema& schema, HeightReference vertical,
+  const auto refused = [](const stream::StoreSchema& schema, HeightReference vertical,
                           const std::string& geoid) {
     EXPECT_THROW(EllipsoidalHeights(schema, vertical, geoid, kMemory), UsageError);
   };
@@ -147,7 +147,7 @@ TEST(EllipsoidalHeightsTest, PROJsGridOfEgm96IsTheDefault) {
 }
 
 TEST(EllipsoidalHeightsTest, TheStoresOwnVerticalSystemGoesBeforeTheDefault) {
-  stream::Schema schema = schema_with("orthometric", "metre");
+  stream::StoreSchema schema = schema_with("orthometric", "metre");
   schema.crs.vertical_epsg = 5773;
   EXPECT_NEAR(
       converted(EllipsoidalHeights(schema, HeightReference::orthometric, "", kMemory), {8, 46}, 0),
@@ -165,7 +165,7 @@ TEST(EllipsoidalHeightsTest, TheStoresOwnVerticalSystemGoesBeforeTheDefault) {
 }
 
 TEST(EllipsoidalHeightsTest, AnUnknownUnitIsThatOfTheGroundAsInOtherVerbs) {
-  stream::Schema schema;
+  stream::StoreSchema schema;
   schema.vertical = "ellipsoidal";
   schema.crs.horizontal_unit = "foot";
   const EllipsoidalHeights feet(schema, {}, {}, kMemory);

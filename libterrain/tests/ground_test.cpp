@@ -13,8 +13,8 @@ namespace terrace::terrain {
 using namespace terrain;
 namespace {
 
-Placement geographic(double cell) {
-  Placement placement;
+stream::Placement geographic(double cell) {
+  stream::Placement placement;
   placement.world.xy = {cell, 0, 8.0, 0, -cell, 47.0};
   placement.crs.epsg = 4326;
   placement.crs.geographic = true;
@@ -63,7 +63,7 @@ TEST(Ground, MapsDegreesAtTheLatitudeOfTheBlock) {
 }
 
 TEST(Ground, TakesUnitsFromTheSource) {
-  Placement placement;
+  stream::Placement placement;
   placement.world.xy = {10, 0, 0, 0, -20, 0};  // oblong cells
   placement.crs.horizontal_unit = "US survey foot";
   placement.crs.vertical_unit = "foot";
@@ -83,13 +83,13 @@ TEST(Ground, TakesUnitsFromTheSource) {
 }
 
 TEST(Ground, SaysThatUnknownUnitsAreMetres) {
-  const Ground ground{Placement{}};
+  const Ground ground{stream::Placement{}};
   EXPECT_NE(ground.assumption().find("metres"), std::string::npos);
   EXPECT_EQ(ground.map(around(0, 0)), (GroundMap{1, 0, 0, 0, 1, 0, 0, 0, 1}));
 }
 
 TEST(Ground, UndoesTheGrowthOfWebMercator) {
-  Placement placement;
+  stream::Placement placement;
   placement.crs.epsg = 3857;
   placement.crs.horizontal_unit = "metre";
   const Ground ground(placement);
@@ -123,7 +123,7 @@ TEST(Ground, KnowsTheLocalScaleOfProjections) {
                            Case{2263, 1000000, 200000, 1200.0 / 3937.0}}) {
     SCOPED_TRACE(test.code);
     const CoordinateSystem system(definition_of_epsg(test.code));
-    Placement placement;
+    stream::Placement placement;
     placement.world.xy = {10, 0, test.x, 0, -10, test.y};
     placement.crs = system.crs();
     const Ground ground(placement);
@@ -141,7 +141,7 @@ TEST(Ground, KnowsTheLocalScaleOfProjections) {
 }
 
 TEST(World, BoxOfARotatedRasterHoldsAllCorners) {
-  Placement placement;
+  stream::Placement placement;
   placement.world.xy = {0.8, -0.6, 100, 0.6, 0.8, 200};
   placement.coordinates[2] = {.name = "z", .scale = -2, .offset = 5, .unit = ""};
   const stream::Box3 box = world_box(placement, {.min = {0, 0, 0}, .max = {10, 10, 1}});

@@ -19,7 +19,6 @@
 #include "base/portable_math.hpp"
 #include "cli/choices.hpp"
 #include "cli/cli.hpp"
-#include "earth/world.hpp"
 #include "mesh/store_mesh.hpp"
 #include "sample/place_file.hpp"
 #include "sample/raster_run.hpp"
@@ -126,7 +125,7 @@ void sample_lines(benchmark::State& state) {
   const Store& source = store();
   static const terrace::tests::TemporaryFolder folder;
   const std::string name = (folder.path() / "places.csv").string();
-  const terrace::terrain::Placement placement = terrace::terrain::placement_of(source.schema());
+  const terrace::terrain::Placement placement = terrace::terrain::source.schema();
   std::ofstream file(name);
   file.precision(12);
   for (const auto& [column, row] : random_places()) {
@@ -147,8 +146,8 @@ BENCHMARK(sample_lines)->Unit(benchmark::kMillisecond);
 
 /// A square anywhere within the bounds that covers this share of their area, in the store's CRS.
 terrace::terrain::Region random_square(double share, std::uint64_t seed) {
-  const terrace::stream::Box3 all = terrace::terrain::world_box(
-      terrace::terrain::placement_of(store().schema()), store().bounds());
+  const terrace::stream::Box3 all =
+      terrace::terrain::world_box(terrace::terrain::store().schema(), store().bounds());
   std::string text[2];
   for (std::size_t axis = 0; axis < 2; ++axis) {
     const double side = std::sqrt(share) * (all.max[axis] - all.min[axis]);
@@ -167,7 +166,7 @@ terrace::terrain::Region random_square(double share, std::uint64_t seed) {
 /// often keeps it.
 void region(benchmark::State& state) {
   const Store& source = store();
-  const terrace::terrain::Placement placement = terrace::terrain::placement_of(source.schema());
+  const terrace::terrain::Placement placement = terrace::terrain::source.schema();
   const double share = static_cast<double>(state.range(0)) / 10000;
   const std::uint64_t squares = small() ? 2 : share < 0.005 ? 200 : share < 0.05 ? 40 : 10;
   std::uint64_t inside = 0, delivered = 0, clusters = 0, bytes = 0, reads = 0;
@@ -204,8 +203,8 @@ BENCHMARK(region)->Arg(1)->Arg(100)->Arg(1000)->Unit(benchmark::kMillisecond);
 
 /// An outline of 100,000 corners around most of the store, jagged at every scale as a coast is.
 terrace::terrain::Region coast() {
-  const terrace::stream::Box3 all = terrace::terrain::world_box(
-      terrace::terrain::placement_of(store().schema()), store().bounds());
+  const terrace::stream::Box3 all =
+      terrace::terrain::world_box(terrace::terrain::store().schema(), store().bounds());
   const std::size_t corners = small() ? 2000 : 100000;
   std::vector<terrace::terrain::Point2> ring(corners);
   for (std::size_t i = 0; i < corners; ++i) {

@@ -19,7 +19,6 @@
 #include <terrace/stream/source.hpp>
 
 #include "earth/ground.hpp"
-#include "earth/world.hpp"
 
 namespace {
 
@@ -42,7 +41,7 @@ int measure(const std::string& file, std::size_t block_points, double facility_c
   source_options.block_points = block_points;
   const std::array files{file};
   const auto source = terrace::stream::open_source(files, source_options);
-  const terrace::terrain::Ground ground(terrace::terrain::placement_of(source->info()));
+  const terrace::terrain::Ground ground(terrace::terrain::source->info());
 
   NullSink sink;
   terrace::cluster::HierarchyOptions options;

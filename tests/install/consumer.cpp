@@ -29,7 +29,7 @@ int main(int argc, char** argv) {
   if (argc != 2) return fail("usage: consumer FOLDER");
   const std::filesystem::path path = std::filesystem::path(argv[1]) / "consumer.store";
 
-  stream::Schema schema;
+  stream::StoreSchema schema;
   schema.coordinates = {stream::Channel{"x"}, stream::Channel{"y"}, stream::Channel{"z"}};
   stream::StoreWriter writer(path, schema);
   terrain::StoreSink sink(writer);

@@ -75,7 +75,7 @@ void expect_every_sample(const fs::path& raster, const fs::path& scratch) {
   EXPECT_TRUE(store.verify([](const stream::Problem& problem) {
     ADD_FAILURE() << problem.file << ": " << problem.offset << ": " << problem.what;
   }));
-  const stream::Schema& schema = store.schema();
+  const stream::StoreSchema& schema = store.schema();
   const std::size_t cells = schema.columns * schema.rows;
   EXPECT_EQ(outcome.points + outcome.nodata, cells);
   EXPECT_EQ(store.points(), outcome.points);

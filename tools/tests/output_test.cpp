@@ -62,12 +62,12 @@ class MayReplace : public ::testing::Test {
     const std::vector<std::uint64_t> large{0, 9007199254740993, ~std::uint64_t{0}, 7, 10};
     stream::PointBlock block;
     block.positions = {{0, -0.0, 1e300}, {0.1, 1.0 / 3, 1e21}, {1e-7, 123456789, 1e15}, {}, {}};
-    block.attributes.resize(2);
-    block.attributes[0].type = stream::ScalarType::f32;
-    const auto bytes = std::as_bytes(std::span(small)), more = std::as_bytes(std::span(large));
-    block.attributes[0].bytes.assign(bytes.begin(), bytes.end());
-    block.attributes[1].type = stream::ScalarType::u64;
-    block.attributes[1].bytes.assign(more.begin(), more.end());
+    for (std::size_t i = 0; i < small.size(); ++i) {
+      const auto bytes = std::as_bytes(std::span(&small[i], 1));
+      const auto more = std::as_bytes(std::span(&large[i], 1));
+      block.payload.insert(block.payload.end(), bytes.begin(), bytes.end());
+      block.payload.insert(block.payload.end(), more.begin(), more.end());
+    }
     writer->append(block);
     writer->finish();
   }

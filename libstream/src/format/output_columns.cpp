@@ -5,10 +5,9 @@
 #include <cassert>
 #include <cstring>
 
-#include "format/ply/decode.hpp"
-#include "format/with_type.hpp"
 #include "io/bytes.hpp"
 #include "io/number.hpp"
+#include "with_type.hpp"
 
 namespace terrace::stream {
 namespace {
@@ -45,47 +44,44 @@ OutputColumns::OutputColumns(std::span<const Channel> attributes) {
                         .scale = channel.scale,
                         .offset = channel.offset,
                         .real = real});
+    record_bytes_ += size_of(channel.type);
   }
 }
 
 void OutputColumns::check(const PointBlock& block) const {
-  assert(block.attributes.size() == columns_.size());
-  for (std::size_t i = 0; i < columns_.size(); ++i) {
-    assert(block.attributes[i].type == columns_[i].stored);
-    assert(block.attributes[i].bytes.size() == block.size() * size_of(columns_[i].stored));
-  }
+  assert(block.payload.size() == block.size() * record_bytes_);
   (void)block;
 }
 
 void OutputColumns::append_text(std::string& out, const PointBlock& block, std::size_t i,
                                 char separator) const {
-  for (std::size_t c = 0; c < columns_.size(); ++c) {
-    const OutputColumn& column = columns_[c];
-    const std::byte* raw = block.attributes[c].bytes.data() + i * size_of(column.stored);
+  const std::byte* raw = block.payload.data() + i * record_bytes_;
+  for (const OutputColumn& column : columns_) {
     out += separator;
     if (column.real) {
-      append_number(out, to_double(raw, column.stored) * column.scale + column.offset);
-      continue;
+      append_number(out, to_double(column.stored, raw) * column.scale + column.offset);
+    } else {
+      with_type(column.stored, [&](auto value) {
+        std::memcpy(&value, raw, sizeof value);
+        append_number(out, value);
+      });
     }
-    with_type(column.stored, [&](auto value) {
-      std::memcpy(&value, raw, sizeof value);
-      append_number(out, value);
-    });
+    raw += size_of(column.stored);
   }
 }
 
 void OutputColumns::append_bytes(std::string& out, const PointBlock& block, std::size_t i) const {
-  for (std::size_t c = 0; c < columns_.size(); ++c) {
-    const OutputColumn& column = columns_[c];
-    const std::byte* raw = block.attributes[c].bytes.data() + i * size_of(column.stored);
+  const std::byte* raw = block.payload.data() + i * record_bytes_;
+  for (const OutputColumn& column : columns_) {
     if (column.real) {
-      append_little_endian(out, to_double(raw, column.stored) * column.scale + column.offset);
-      continue;
+      append_little_endian(out, to_double(column.stored, raw) * column.scale + column.offset);
+    } else {
+      with_type(column.stored, [&](auto value) {
+        std::memcpy(&value, raw, sizeof value);
+        append_little_endian(out, value);
+      });
     }
-    with_type(column.stored, [&](auto value) {
-      std::memcpy(&value, raw, sizeof value);
-      append_little_endian(out, value);
-    });
+    raw += size_of(column.stored);
   }
 }
 

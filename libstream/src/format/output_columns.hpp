@@ -22,7 +22,7 @@ class OutputColumns {
   /// characters.
   [[nodiscard]] const std::string& name(std::size_t column) const { return columns_[column].name; }
 
-  /// Asserts that the block has these columns.
+  /// Asserts that the block has records of these columns.
   void check(const PointBlock& block) const;
   /// Appends the values of point `i` as text, `separator` before each.
   void append_text(std::string& out, const PointBlock& block, std::size_t i, char separator) const;
@@ -37,6 +37,7 @@ class OutputColumns {
     bool real;  ///< scale and offset are applied
   };
   std::vector<OutputColumn> columns_;
+  std::size_t record_bytes_ = 0;
 };
 
 }  // namespace terrace::stream

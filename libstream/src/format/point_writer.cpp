@@ -3,10 +3,10 @@
 
 namespace terrace::stream {
 
-void to_world(const SourceInfo& info, PointBlock& block) {
-  const std::array<double, 6>& m = info.world.xy;
+void to_world(const Placement& placement, PointBlock& block) {
+  const std::array<double, 6>& m = placement.world.xy;
   // Points that are stored as they are stay bit for bit what they are (1 * -0.0 + 0 would not).
-  if (info.world != WorldTransform{}) {
+  if (placement.world != WorldTransform{}) {
     for (Point3& p : block.positions) {
       const double x = p[0] * m[0] + p[1] * m[1] + m[2];
       const double y = p[0] * m[3] + p[1] * m[4] + m[5];
@@ -14,7 +14,7 @@ void to_world(const SourceInfo& info, PointBlock& block) {
       p[1] = y;
     }
   }
-  const Channel& height = info.coordinates[2];
+  const Channel& height = placement.coordinates[2];
   if (height.scale != 1.0 || height.offset != 0.0) {
     for (Point3& p : block.positions) p[2] = p[2] * height.scale + height.offset;
   }

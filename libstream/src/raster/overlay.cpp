@@ -7,7 +7,7 @@
 #include <limits>
 #include <type_traits>
 
-#include "format/with_type.hpp"
+#include "with_type.hpp"
 
 namespace terrace::stream {
 namespace {

@@ -4,9 +4,9 @@
 #include <cstring>
 #include <utility>
 
-#include "format/with_type.hpp"
 #include "raster/order.hpp"
 #include "terrace/stream/raster.hpp"
+#include "with_type.hpp"
 
 namespace terrace::stream {
 namespace {
@@ -130,18 +130,12 @@ class RasterSource final : public PointSource {
     const std::uint64_t cells = (right - left) * (bottom - top);
     const ScalarType type = raster_->info().sample.type;
     block.positions.resize(cells);
-    if (!info_.attributes.empty()) {
-      block.attributes.resize(1);
-      block.attributes[0].type = type;
-      block.attributes[0].bytes.resize(cells * size_of(type));
-    } else {
-      block.attributes.clear();
-    }
+    block.payload.resize(info_.attributes.empty() ? 0 : cells * size_of(type));
     const std::size_t count = with_type(type, [&](auto sample) {
       return convert<decltype(sample)>(left, right, top, bottom, block);
     });
     block.positions.resize(count);
-    for (Column& column : block.attributes) column.bytes.resize(count * size_of(type));
+    if (!info_.attributes.empty()) block.payload.resize(count * size_of(type));
     progress_.points += count;
     progress_.nodata += cells - count;
     advance_progress(cells);
@@ -153,7 +147,7 @@ class RasterSource final : public PointSource {
     const std::size_t width = right - left;
     const double first_column = static_cast<double>(window_.column + left);
     Point3* out = block.positions.data();
-    std::byte* exact = block.attributes.empty() ? nullptr : block.attributes[0].bytes.data();
+    std::byte* exact = block.payload.empty() ? nullptr : block.payload.data();
     for (std::uint64_t r = top; r < bottom; ++r) {
       const std::size_t cell = r * window_.columns + left;
       const T* const samples = reinterpret_cast<const T*>(samples_.data()) + cell;

@@ -34,7 +34,7 @@ struct LevelEntry {
 
 struct Manifest {
   int version = kVersion;
-  Schema schema;
+  StoreSchema schema;
   std::uint64_t points = 0;
   Box3 bounds;
   double mean_height = 0.0;

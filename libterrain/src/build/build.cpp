@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <memory>
 #include <stop_token>
 #include <utility>
@@ -19,7 +18,6 @@
 #include "earth/crs/crs_definition.hpp"
 #include "earth/ground.hpp"
 #include "earth/source_crs.hpp"
-#include "earth/world.hpp"
 #include "terrace/terrain/store_sink.hpp"
 
 namespace terrace::terrain {
@@ -31,13 +29,9 @@ constexpr std::array<std::pair<const char*, cluster::Effort>, 4> kEfforts{
      {"fine", cluster::Effort::fine},
      {"full", cluster::Effort::full}}};
 
-stream::Schema schema_of(const stream::SourceInfo& info, const SourceCrs& crs,
-                         const BuildRequest& request) {
-  stream::Schema schema;
-  schema.grid = info.grid;
-  schema.coordinates = info.coordinates;
-  schema.attributes = info.attributes;
-  schema.world = info.world;
+stream::StoreSchema schema_of(const stream::SourceInfo& info, const SourceCrs& crs,
+                              const BuildRequest& request) {
+  stream::StoreSchema schema{info};
   schema.crs = crs.crs;
   schema.vertical = request.vertical.empty() ? name_of(crs.heights) : request.vertical;
   if (schema.vertical != name_of(crs.heights)) {
@@ -50,8 +44,6 @@ stream::Schema schema_of(const stream::SourceInfo& info, const SourceCrs& crs,
       schema.crs.wkt = wkt_of(definition);
     }
   }
-  schema.columns = info.columns;
-  schema.rows = info.rows;
   schema.format = info.format;
   schema.parameters = {{"block", std::to_string(request.block_points)},
                        {"facility_cost", number_text(request.facility_cost)},
@@ -62,20 +54,6 @@ stream::Schema schema_of(const stream::SourceInfo& info, const SourceCrs& crs,
     schema.parameters.emplace_back("metric", request.metric.canonical());
   }
   return schema;
-}
-
-/// Attribute values of each point side by side, in the order of the schema.
-void pack(const stream::PointBlock& block, std::size_t payload_size,
-          std::vector<std::byte>& payload) {
-  payload.resize(block.size() * payload_size);
-  std::size_t at = 0;
-  for (const stream::Column& column : block.attributes) {
-    const std::size_t size = stream::size_of(column.type);
-    for (std::size_t i = 0; i < block.size(); ++i) {
-      std::memcpy(payload.data() + i * payload_size + at, column.bytes.data() + i * size, size);
-    }
-    at += size;
-  }
 }
 
 /// What a source takes, unless it says that it needs more. What --memory leaves over goes to the
@@ -121,12 +99,6 @@ unsigned threads_within_memory(const BuildRequest& request, const Context& conte
                 in_mebibytes(source_bytes) + " of it to read the input",
        .remedy = "raise `memory_bytes`, lower `block_points`, or rewrite large strips and tiles "
                  "as small tiles: gdal_translate -co TILED=YES"});
-}
-
-std::size_t payload_size(const stream::SourceInfo& info) {
-  std::size_t bytes = 0;
-  for (const stream::Channel& channel : info.attributes) bytes += stream::size_of(channel.type);
-  return bytes;
 }
 
 /// Height of a cell over its width on the ground, in the middle of the raster.
@@ -194,12 +166,12 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   auto source = stream::open_source(request.inputs, source_options);
   const stream::SourceInfo& info = source->info();
   const SourceCrs crs = crs_of_source(info, request.datum_shift);
-  Placement placement = placement_of(info);
+  stream::Placement placement = info;
   placement.crs = crs.crs;
   const Ground ground(placement, request.z_weight);
   BuildOutcome outcome;
   const std::uint64_t source_bytes = std::max(kSourceMemory, source->reading_bytes());
-  const std::size_t payload_bytes = payload_size(info);
+  const std::size_t payload_bytes = info.payload_size();
   const unsigned threads =
       threads_within_memory(request, context, memory_bytes, payload_bytes, source_bytes);
   if (info.grid) {
@@ -210,7 +182,7 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
     source = stream::open_source(request.inputs, source_options);
   }
 
-  const stream::Schema schema = schema_of(source->info(), crs, request);
+  const stream::StoreSchema schema = schema_of(source->info(), crs, request);
   stream::StoreWriter writer(request.store, schema, request.replace);
   StoreSink sink(writer, request.most_points == 0);
   cluster::HierarchyOptions options;
@@ -229,7 +201,6 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   cluster::HierarchyBuilder builder(options, sink);
 
   stream::PointBlock block;
-  std::vector<std::byte> payload;
   stream::Progress so_far;
   // The reading ends for two reasons: the context's, or a failure that push() tells.
   const auto next = [&] {
@@ -242,8 +213,7 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   };
   const ProgressReport report(context, "points");
   while (next()) {
-    pack(block, options.payload_size, payload);
-    builder.push(block.positions, payload);
+    builder.push(block.positions, block.payload);
     so_far = source->progress();
     if (context.stop.stop_requested()) throw stream::Stopped();
     report.update(so_far.points, so_far.fraction);
@@ -259,7 +229,7 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
                                                             " cells, all nodata)"),
                          .remedy = "check the file and its nodata value"});
   }
-  writer.schema().nodata = so_far.nodata;
+  writer.set_nodata(so_far.nodata);
   const cluster::HierarchyResult result = builder.finish();
   outcome.points = result.points;
   outcome.nodata = so_far.nodata;

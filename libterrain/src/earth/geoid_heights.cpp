@@ -13,7 +13,6 @@
 #include "earth/crs/operation_choice.hpp"
 #include "earth/crs/proj_object.hpp"
 #include "earth/ground.hpp"
-#include "earth/world.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/error.hpp"
 
@@ -51,7 +50,7 @@ GeoidGrid& GeoidGrid::operator=(GeoidGrid&&) noexcept = default;
 
 double GeoidGrid::undulation(const Point2& place) const { return (*geoid_)(place[1], place[0]); }
 
-EllipsoidalHeights::EllipsoidalHeights(const stream::Schema& schema, HeightReference vertical,
+EllipsoidalHeights::EllipsoidalHeights(const stream::StoreSchema& schema, HeightReference vertical,
                                        const std::string& geoid, std::uint64_t memory_bytes,
                                        const std::optional<GeographicArea>& area) {
   const bool ignored = vertical == HeightReference::ignore;
@@ -75,7 +74,7 @@ EllipsoidalHeights::EllipsoidalHeights(const stream::Schema& schema, HeightRefer
                      "geoid grid), `vertical` ellipsoidal if they are that, or `vertical` ignore");
   }
   // One unit in all verbs, whatever had to be assumed.
-  const Ground ground(placement_of(schema));
+  const Ground ground(schema);
   metres_per_unit_ = ground.metres_vertical();
   if (!metres_in_unit(schema.coordinates[2].unit) && !metres_in_unit(schema.crs.vertical_unit)) {
     note_ = ground.assumption().empty() ? "the unit of heights is unknown and taken as metres"
@@ -98,7 +97,7 @@ void EllipsoidalHeights::add_note(const std::string& what) {
   note_ += (note_.empty() ? "" : "; ") + what;
 }
 
-void EllipsoidalHeights::find_operation(const stream::Schema& schema,
+void EllipsoidalHeights::find_operation(const stream::StoreSchema& schema,
                                         const std::optional<GeographicArea>& area) {
   constexpr int kEgm96 = 5773;
   std::string name;

@@ -48,7 +48,7 @@ class EllipsoidalHeights {
   /// store lies, by which an operation is chosen. Throws: UsageError if the store's heights are not
   /// ellipsoidal and neither was given, or if the options contradict the store or one another;
   /// stream::Error as GeoidGrid, and naming the grid that PROJ lacks.
-  EllipsoidalHeights(const stream::Schema& schema, HeightReference vertical,
+  EllipsoidalHeights(const stream::StoreSchema& schema, HeightReference vertical,
                      const std::string& geoid, std::uint64_t memory_bytes,
                      const std::optional<GeographicArea>& area = std::nullopt);
 
@@ -69,7 +69,7 @@ class EllipsoidalHeights {
   [[nodiscard]] const std::string& note() const { return note_; }
 
  private:
-  void find_operation(const stream::Schema& schema, const std::optional<GeographicArea>& area);
+  void find_operation(const stream::StoreSchema& schema, const std::optional<GeographicArea>& area);
   void add_note(const std::string& what);
 
   double metres_per_unit_ = 1.0;

@@ -67,7 +67,7 @@ std::optional<double> metres_in_unit(std::string_view unit) {
   return std::nullopt;
 }
 
-Ground::Ground(Placement placement, double z_weight) : placement_(std::move(placement)) {
+Ground::Ground(stream::Placement placement, double z_weight) : placement_(std::move(placement)) {
   const stream::Crs& crs = placement_.crs;
   const auto assume = [this](const std::string& what) {
     assumption_ += (assumption_.empty() ? "" : "; ") + what;

@@ -6,7 +6,6 @@
 #include <string>
 #include <string_view>
 
-#include "earth/world.hpp"
 #include "terrace/stream/point.hpp"
 #include "terrace/terrain/crs.hpp"
 
@@ -34,7 +33,7 @@ std::optional<double> metres_in_unit(std::string_view unit);
 class Ground {
  public:
   /// z_weight: what heights are multiplied by besides, `--z-weight`.
-  explicit Ground(Placement placement, double z_weight = 1.0);
+  explicit Ground(stream::Placement placement, double z_weight = 1.0);
 
   /// The map near the centre of `stored`, a box in stored coordinates: the local scale of the
   /// projection, on the axes of the CRS (its east and north, not the meridian's). Without a known
@@ -55,7 +54,7 @@ class Ground {
 
   [[nodiscard]] std::array<double, 3> projected_scale(const stream::Point3& centre) const;
 
-  Placement placement_;
+  stream::Placement placement_;
   Kind kind_ = Kind::linear;
   std::optional<CoordinateSystem> system_;  ///< of projected ones
   double degrees_ = 1.0;                    ///< of a unit of x, y

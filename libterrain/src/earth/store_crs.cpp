@@ -7,7 +7,6 @@
 #include "base/units.hpp"
 #include "earth/crs/crs_definition.hpp"
 #include "earth/region_crs.hpp"
-#include "earth/world.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/crs.hpp"
 
@@ -22,7 +21,7 @@ CoordinateSystem system_of(const stream::Store& store) {
                          .cause = "has no CRS",
                          .remedy = "build it anew with `crs` EPSG:n"});
   }
-  return system->over(world_box(placement_of(store.schema()), store.bounds()));
+  return system->over(world_box(store.schema(), store.bounds()));
 }
 
 Transformation transformation_to(const stream::Store& store, const std::string& named,
@@ -38,8 +37,7 @@ Transformation transformation_to(const stream::Store& store, const std::string& 
 }
 
 RegionConversion::RegionConversion(const stream::Store& store, Transformation to_regions)
-    : to_regions_(std::move(to_regions)),
-      bounds_(world_box(placement_of(store.schema()), store.bounds())) {}
+    : to_regions_(std::move(to_regions)), bounds_(world_box(store.schema(), store.bounds())) {}
 
 Region RegionConversion::operator()(Region region) const {
   if (!to_regions_) return region;

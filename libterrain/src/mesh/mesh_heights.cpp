@@ -68,7 +68,7 @@ double rms_step(const tri::Delaunay2<Coord>& triangulation, const std::vector<do
 /// Heights as the store has them, before and after.
 template <class Coord>
 std::vector<tri::HeightChange> smoothed(const tri::Multiresolution2<Coord>& model,
-                                        const Placement& placement,
+                                        const stream::Placement& placement,
                                         const std::optional<Region>& region,
                                         const std::vector<double>& heights,
                                         tri::SmoothingOptions options) {
@@ -100,7 +100,8 @@ std::uint64_t HeightOptions::bytes_per_vertex() const {
 
 template <class Coord>
 std::vector<double> changed_heights(const tri::Multiresolution2<Coord>& model,
-                                    const Placement& placement, const std::optional<Region>& region,
+                                    const stream::Placement& placement,
+                                    const std::optional<Region>& region,
                                     const HeightOptions& options) {
   const auto& triangulation = model.triangulation();
   const stream::Channel& z = placement.coordinates[2];
@@ -143,9 +144,10 @@ std::vector<double> changed_heights(const tri::Multiresolution2<Coord>& model,
 }
 
 template std::vector<double> changed_heights(const tri::Multiresolution2<std::int32_t>&,
-                                             const Placement&, const std::optional<Region>&,
+                                             const stream::Placement&, const std::optional<Region>&,
                                              const HeightOptions&);
-template std::vector<double> changed_heights(const tri::Multiresolution2<double>&, const Placement&,
-                                             const std::optional<Region>&, const HeightOptions&);
+template std::vector<double> changed_heights(const tri::Multiresolution2<double>&,
+                                             const stream::Placement&, const std::optional<Region>&,
+                                             const HeightOptions&);
 
 }  // namespace terrace::terrain

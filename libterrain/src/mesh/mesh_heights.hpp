@@ -9,7 +9,6 @@
 #include <terrace/tri/multiresolution.hpp>
 #include <terrace/tri/smoothing.hpp>
 
-#include "earth/world.hpp"
 #include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
@@ -36,14 +35,17 @@ struct HeightOptions {
 /// can not be written; std::invalid_argument where smoothing leaves the range of doubles.
 template <class Coord>
 std::vector<double> changed_heights(const tri::Multiresolution2<Coord>& model,
-                                    const Placement& placement, const std::optional<Region>& region,
+                                    const stream::Placement& placement,
+                                    const std::optional<Region>& region,
                                     const HeightOptions& options);
 
 extern template std::vector<double> changed_heights(const tri::Multiresolution2<std::int32_t>&,
-                                                    const Placement&, const std::optional<Region>&,
+                                                    const stream::Placement&,
+                                                    const std::optional<Region>&,
                                                     const HeightOptions&);
 extern template std::vector<double> changed_heights(const tri::Multiresolution2<double>&,
-                                                    const Placement&, const std::optional<Region>&,
+                                                    const stream::Placement&,
+                                                    const std::optional<Region>&,
                                                     const HeightOptions&);
 
 }  // namespace terrace::terrain

@@ -13,7 +13,6 @@
 #include <terrace/tri/multiresolution.hpp>
 
 #include "earth/ground.hpp"
-#include "earth/world.hpp"
 #include "terrace/terrain/error.hpp"
 #include "terrace/terrain/store_source.hpp"
 
@@ -25,7 +24,7 @@ namespace {
 constexpr std::uint64_t kBytesPerVertex = 66 + 20 + 32 + 24 + 4 + 1 + 2 * 12;
 
 /// The box in stored coordinates around a box in the CRS. Heights are left free where `world` is.
-tri::Box3 stored_box(const Placement& placement, const stream::Box3& world) {
+tri::Box3 stored_box(const stream::Placement& placement, const stream::Box3& world) {
   stream::Box3 stored;
   for (unsigned corner = 0; corner < 4; ++corner) {
     const Point2 place = stored_place(placement, {(corner & 1 ? world.max : world.min)[0],
@@ -44,7 +43,7 @@ tri::Box3 stored_box(const Placement& placement, const stream::Box3& world) {
 }
 
 /// Triangles that reach out of a polygon have corners in the clusters beside it.
-Detail with_margin(const stream::Store& store, Detail detail, const Placement& placement) {
+Detail with_margin(const stream::Store& store, Detail detail, const stream::Placement& placement) {
   const stream::Box3 all = world_box(placement, store.bounds());
   const auto clusters =
       static_cast<double>(store.levels()[std::min(detail.finest(), store.top())].clusters);
@@ -52,7 +51,7 @@ Detail with_margin(const stream::Store& store, Detail detail, const Placement& p
   return detail;
 }
 
-tri::Detail in_stored_coordinates(const Detail& detail, const Placement& placement) {
+tri::Detail in_stored_coordinates(const Detail& detail, const stream::Placement& placement) {
   tri::Detail stored;
   std::vector<Region> regions;
   const auto add = [&](const Region& region, unsigned level) {
@@ -101,7 +100,7 @@ void check_memory(const stream::Store& store, const Detail& detail, std::uint64_
 
 /// The metric in the coordinates of the triangulation.
 tri::MetricField2 field_of(const MetricChoice& metric, const stream::Store& store,
-                           const Placement& placement) {
+                           const stream::Placement& placement) {
   const std::array<double, 6>& m = placement.world.xy;
   const Ground ground(placement);
   std::vector<tri::MetricField2::Region> regions;
@@ -138,8 +137,9 @@ tri::MetricField2 field_of(const MetricChoice& metric, const stream::Store& stor
 
 /// `heights`: by slot in real units; empty: the model's.
 template <class Coord>
-TriangleMesh mesh_of_model(const tri::Multiresolution2<Coord>& model, const Placement& placement,
-                           const std::optional<Region>& region, const std::vector<double>& heights,
+TriangleMesh mesh_of_model(const tri::Multiresolution2<Coord>& model,
+                           const stream::Placement& placement, const std::optional<Region>& region,
+                           const std::vector<double>& heights,
                            const std::optional<tri::MetricField2>& field) {
   const auto& triangulation = model.triangulation();
   const auto position = [&](tri::VertexId v) {
@@ -190,7 +190,7 @@ TriangleMesh mesh_of_model(const tri::Multiresolution2<Coord>& model, const Plac
 template <class Coord>
 TriangleMesh mesh_of(const stream::Store& store, const Detail& detail, const MeshOptions& options) {
   StoreSource source(store);
-  const Placement placement = placement_of(store.schema());
+  const stream::Placement& placement = store.schema();
   std::optional<tri::MetricField2> field;
   if (options.metric.kind == MetricChoice::Kind::elliptical) {
     field = field_of(options.metric, store, placement);
@@ -213,7 +213,7 @@ TriangleMesh mesh_of_store(const stream::Store& store, const Detail& detail,
     throw UsageError("a mesh has the metric euclidean or elliptical:FILE, not " +
                      options.metric.text);
   }
-  const Detail wide = with_margin(store, detail, placement_of(store.schema()));
+  const Detail wide = with_margin(store, detail, store.schema());
   check_memory(store, wide, memory_bytes,
                options.heights.bytes_per_vertex() +
                    (kind == MetricChoice::Kind::elliptical ? kBytesToFlip : 0));
@@ -222,7 +222,7 @@ TriangleMesh mesh_of_store(const stream::Store& store, const Detail& detail,
 }
 
 TriangleMesh points_of_store(const stream::Store& store, const Detail& detail) {
-  const Placement placement = placement_of(store.schema());
+  const stream::Placement& placement = store.schema();
   const bool coarse = detail.level > 0;
   TriangleMesh cloud;
   for_each_wanted(

@@ -13,7 +13,6 @@
 
 #include "base/portable_math.hpp"
 #include "base/units.hpp"
-#include "earth/world.hpp"
 #include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/error.hpp"
 
@@ -39,7 +38,7 @@ stream::Box3 area_of(const stream::Store& store) {
     stored.max = {last(store.schema().columns), last(store.schema().rows), 0};
   }
   stored.min[2] = stored.max[2] = 0;
-  return world_box(placement_of(store.schema()), stored);
+  return world_box(store.schema(), stored);
 }
 
 /// The box of the output's CRS around one of the store's CRS.

@@ -6,13 +6,12 @@
 
 #include <terrace/tri/interpolation.hpp>
 
-#include "earth/world.hpp"
-
 namespace terrace::terrain {
 namespace {
 
-Placement placement(const RasterGrid& grid, const stream::Schema& schema, const stream::Crs& crs) {
-  Placement placement = placement_of(schema);
+stream::Placement placement(const RasterGrid& grid, const stream::StoreSchema& schema,
+                            const stream::Crs& crs) {
+  stream::Placement placement = schema;
   placement.world.xy = {grid.step_x, 0, grid.x, 0, grid.step_y, grid.y};
   // Heights are scaled already.
   placement.coordinates[2].scale = 1;
@@ -25,7 +24,7 @@ Placement placement(const RasterGrid& grid, const stream::Schema& schema, const 
 
 }  // namespace
 
-RasterShader::RasterShader(const RasterGrid& grid, const stream::Schema& schema,
+RasterShader::RasterShader(const RasterGrid& grid, const stream::StoreSchema& schema,
                            const stream::Crs& crs, RasterValue value)
     : value_(value), ground_(placement(grid, schema, crs)) {}
 

@@ -16,7 +16,7 @@ namespace terrace::terrain {
 class RasterShader {
  public:
   /// value: any but the height. crs: of the grid.
-  RasterShader(const RasterGrid& grid, const stream::Schema& schema, const stream::Crs& crs,
+  RasterShader(const RasterGrid& grid, const stream::StoreSchema& schema, const stream::Crs& crs,
                RasterValue value);
 
   /// Metres per cell going east and north, and per unit of height, at a cell.

@@ -7,7 +7,6 @@
 #include <string>
 #include <utility>
 
-#include "earth/world.hpp"
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
@@ -47,7 +46,7 @@ class Descent {
       : store_(store),
         detail_(detail),
         visit_(visit),
-        placement_(placement_of(store.schema())),
+        placement_(store.schema()),
         finest_(detail.finest()),
         heads_(store.top()) {}
 
@@ -104,7 +103,7 @@ class Descent {
   const stream::Store& store_;
   const Detail& detail_;
   const Visit& visit_;
-  Placement placement_;
+  stream::Placement placement_;
   unsigned finest_;
   std::vector<std::vector<std::uint64_t>> heads_;  // per level, ordinals met in higher levels
 };

@@ -9,8 +9,6 @@
 #include <mutex>
 #include <vector>
 
-#include "earth/world.hpp"
-
 namespace terrace::terrain {
 
 struct GroundSlope::Table {
@@ -45,7 +43,7 @@ struct GroundSlope::Table {
 };
 
 GroundSlope::GroundSlope(const stream::Store& store)
-    : placement_(placement_of(store.schema())), ground_(placement_), grid_(store.schema().grid) {
+    : placement_(store.schema()), ground_(placement_), grid_(store.schema().grid) {
   if (ground_.same_everywhere()) map_ = ground_.map({});
   if (ground_.projected()) table_ = std::make_shared<Table>(store.bounds());
 }

@@ -38,7 +38,7 @@ class GroundSlope {
   [[nodiscard]] const std::string& assumption() const { return ground_.assumption(); }
 
  private:
-  Placement placement_;
+  stream::Placement placement_;
   Ground ground_;
   bool grid_;
   /// The map at the middle of each of kSide x kSide parts of the store's bounds, made when it is

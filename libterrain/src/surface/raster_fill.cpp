@@ -18,7 +18,7 @@ constexpr std::size_t kMostFilledCells = std::size_t{1} << 20;
 }  // namespace
 
 RasterFill::RasterFill(const stream::Store& store) {
-  const stream::Schema& schema = store.schema();
+  const stream::StoreSchema& schema = store.schema();
   std::size_t reduction = 1;
   const auto reduced = [&](std::uint64_t count) {
     return (static_cast<std::size_t>(count) + reduction - 1) / reduction;

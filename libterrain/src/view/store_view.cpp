@@ -30,7 +30,7 @@ class ViewFrame {
  public:
   explicit ViewFrame(const stream::Store& store) {
     const stream::Box3& bounds = store.bounds();
-    const Placement placement = placement_of(store.schema());
+    const stream::Placement& placement = store.schema();
     map_ = Ground(placement).map(bounds);
     if (bounds.empty()) return;
     // Heights count from 0 of the store's vertical unit, not from the sample 0.

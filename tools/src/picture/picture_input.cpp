@@ -17,7 +17,6 @@
 #include "mesh/store_mesh.hpp"
 #include "picture/height_grid.hpp"
 #include "scan/surface_run.hpp"
-#include "tables/column_value.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/source.hpp"
 #include "terrace/terrain/detail.hpp"
@@ -30,7 +29,7 @@ namespace {
 
 /// Moves positions in stored coordinates to metres on the ground about their middle, and keeps the
 /// heights as the source has them.
-void put_on_ground(PictureInput& input, const Placement& placement, const Ground& ground) {
+void put_on_ground(PictureInput& input, const stream::Placement& placement, const Ground& ground) {
   stream::Box3 box;
   for (const stream::Point3& p : input.mesh.positions) box.include(p);
   const GroundMap map = ground.map(box);
@@ -58,7 +57,7 @@ bool looks_geographic(const MeshFile& file) {
 
 PictureInput from_mesh(MeshFile file) {
   PictureInput input;
-  Placement placement;
+  stream::Placement placement;
   const bool geographic = looks_geographic(file);
   placement.crs.geographic = geographic;
   placement.crs.horizontal_unit = geographic ? "degree" : "metre";
@@ -95,11 +94,15 @@ void append_cloud(const stream::SourceInfo& info, const stream::PointBlock& bloc
   const auto level = attribute(info, {"level"});
   const auto representative = attribute(info, {"representative"});
   for (std::size_t i = 0; i < block.size(); ++i) {
-    const auto value = [&](std::size_t column) { return value_at(block.attributes[column], i); };
+    const std::byte* const record = block.payload.data() + i * info.payload_size();
+    const auto value = [&](std::size_t column) {
+      return stream::to_double(info.attributes[column].type,
+                               record + info.attribute_offset(column));
+    };
     if (red && green && blue) {
       const auto byte = [&](std::size_t column) {
         // 16-bit colours are told by their type; what is stored as a float is 0 to 255.
-        const bool wide = block.attributes[column].type == stream::ScalarType::u16;
+        const bool wide = info.attributes[column].type == stream::ScalarType::u16;
         return static_cast<std::uint8_t>(
             std::clamp(wide ? value(column) / 257 : value(column), 0.0, 255.0));
       };
@@ -154,7 +157,7 @@ PictureInput from_source(const std::string& path, std::uint64_t most_cells,
     input.mesh = grid->mesh();
     input.terrain = true;
   }
-  const Placement placement = placement_of(info);
+  const stream::Placement& placement = info;
   put_on_ground(input, placement, Ground(placement));
   return input;
 }
@@ -162,7 +165,7 @@ PictureInput from_source(const std::string& path, std::uint64_t most_cells,
 /// All cells of a raster's store, reduced.
 TriangleMesh grid_of_store(const stream::Store& store, std::uint64_t most_cells,
                            ProgressMode progress) {
-  const stream::Schema& schema = store.schema();
+  const stream::StoreSchema& schema = store.schema();
   HeightGrid grid(schema.columns, schema.rows, most_cells);
   ProgressMeter meter(progress, "points");
   std::uint64_t points = 0;
@@ -198,7 +201,7 @@ PictureInput from_store(const std::string& path, const PictureSelection& selecti
                         std::uint64_t most_cells, const CommonOptions& common) {
   const stream::Store store = open_store(path);
   const bool whole = selection.focuses.empty() && selection.region.empty();
-  const Placement stored = placement_of(store.schema());
+  const stream::Placement& stored = store.schema();
   PictureInput input;
   input.terrain = store.schema().grid || store.schema().crs.epsg != 0;
 
@@ -215,7 +218,7 @@ PictureInput from_store(const std::string& path, const PictureSelection& selecti
   const std::string level = chosen ? selection.level : finest_level(store, selection.region);
   const Detail detail = parse_detail(store, level, selection.region, selection.focuses);
   // These positions are in the CRS already.
-  Placement world;
+  stream::Placement world;
   world.crs = stored.crs;
   world.coordinates[0].unit = stored.coordinates[0].unit;
   world.coordinates[2].unit = stored.coordinates[2].unit;

@@ -11,7 +11,6 @@
 
 #include "base/units.hpp"
 #include "earth/ground.hpp"
-#include "earth/world.hpp"
 #include "mesh/store_mesh.hpp"
 #include "scan/cgal_surface.hpp"
 #include "terrace/terrain/error.hpp"
@@ -54,11 +53,11 @@ void check_memory(const stream::Store& store, const Detail& detail,
 
 /// Metres about the middle of the positions.
 std::vector<stream::Point3> on_ground(const std::vector<stream::Point3>& positions,
-                                      const stream::Schema& schema) {
+                                      const stream::StoreSchema& schema) {
   stream::Box3 box;
   for (const stream::Point3& p : positions) box.include(p);
   // The positions are in the CRS already.
-  Placement placement = placement_of(schema);
+  stream::Placement placement = schema;
   placement.world = {};
   for (stream::Channel& channel : placement.coordinates) channel.scale = 1, channel.offset = 0;
   const GroundMap map = Ground(placement).map(box);

@@ -15,7 +15,7 @@ void write_labels(const std::string& path, const ClusterOutcome& outcome, bool r
 /// The table with two more columns, `cluster` and `representative` (the number of the point that
 /// stands for the cluster), both -1 for outliers; columns of these names are replaced. format: of
 /// point files, empty: by ending. Throws: stream::Error, Interrupted.
-void write_clustered(const std::string& path, const std::string& format, PointTable table,
+void write_clustered(const std::string& path, const std::string& format, const PointTable& table,
                      const ClusterOutcome& outcome, bool replace);
 
 }  // namespace terrace::tools

@@ -7,8 +7,6 @@
 
 #include "base/units.hpp"
 #include "cli/interrupt.hpp"
-#include "earth/world.hpp"
-#include "tables/column_value.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/point_writer.hpp"
 #include "terrace/stream/raster.hpp"
@@ -20,27 +18,20 @@ using namespace terrain;
 
 std::vector<double> PointTable::column(const std::string& name) const {
   std::string known;
-  for (std::size_t c = 0; c < attributes.size(); ++c) {
+  for (std::size_t c = 0; c < info.attributes.size(); ++c) {
     const stream::Channel& channel = info.attributes[c];
     known += (known.empty() ? "" : ", ") + channel.name;
     if (channel.name != name) continue;
     std::vector<double> values(size());
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      values[i] = value_at(attributes[c], i) * channel.scale + channel.offset;
+    const std::byte* at = payload.data() + info.attribute_offset(c);
+    for (double& value : values) {
+      value = stream::to_double(channel.type, at) * channel.scale + channel.offset;
+      at += info.payload_size();
     }
     return values;
   }
   throw UsageError("the points have no column '" + name + "'" +
                    (known.empty() ? ": they have none but x, y and z" : "; there are: " + known));
-}
-
-void PointTable::drop(const std::string& name) {
-  for (std::size_t c = attributes.size(); c > 0; --c) {
-    if (info.attributes[c - 1].name != name) continue;
-    const auto at = static_cast<std::ptrdiff_t>(c - 1);
-    info.attributes.erase(info.attributes.begin() + at);
-    attributes.erase(attributes.begin() + at);
-  }
 }
 
 std::uint64_t reading_within_memory(const stream::PointSource& source, std::uint64_t memory_bytes) {
@@ -65,12 +56,7 @@ PointTable read_point_table(const std::string& file, const std::string& format,
   const std::uint64_t reading = reading_within_memory(*source, memory_bytes);
   PointTable table;
   table.info = source->info();
-  table.attributes.resize(table.info.attributes.size());
-  std::size_t bytes_per_point = sizeof(stream::Point3);
-  for (std::size_t c = 0; c < table.attributes.size(); ++c) {
-    table.attributes[c].type = table.info.attributes[c].type;
-    bytes_per_point += stream::size_of(table.attributes[c].type);
-  }
+  const std::size_t bytes_per_point = sizeof(stream::Point3) + table.info.payload_size();
   ProgressMeter meter(common.progress, "points");
   stream::PointBlock block;
   while (source->next(block)) {
@@ -86,10 +72,7 @@ PointTable read_point_table(const std::string& file, const std::string& format,
                                      "number"});
     }
     table.positions.insert(table.positions.end(), block.positions.begin(), block.positions.end());
-    for (std::size_t c = 0; c < table.attributes.size(); ++c) {
-      std::vector<std::byte>& bytes = table.attributes[c].bytes;
-      bytes.insert(bytes.end(), block.attributes[c].bytes.begin(), block.attributes[c].bytes.end());
-    }
+    table.payload.insert(table.payload.end(), block.payload.begin(), block.payload.end());
     const stream::Progress progress = source->progress();
     meter.update(progress.points, progress.fraction);
   }
@@ -107,7 +90,7 @@ GroundFrame GroundFrame::of(const PointTable& table, double z_weight) {
   stream::Box3 box;
   for (const stream::Point3& p : table.positions) box.include(p);
   // The positions are in the CRS already.
-  Placement placement;
+  stream::Placement placement;
   placement.crs = table.info.crs;
   placement.coordinates[0].unit = table.info.coordinates[0].unit;
   placement.coordinates[2].unit = table.info.coordinates[2].unit;

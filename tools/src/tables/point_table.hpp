@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -16,16 +18,14 @@ using namespace terrain;
 /// rasters the order of the file).
 struct PointTable {
   stream::SourceInfo info;
-  std::vector<stream::Point3> positions;   ///< in the coordinates of the CRS
-  std::vector<stream::Column> attributes;  ///< one per info.attributes
-  std::uint64_t nodata = 0;                ///< cells without data, left out
+  std::vector<stream::Point3> positions;  ///< in the coordinates of the CRS
+  std::vector<std::byte> payload;         ///< packed records, see stream::StoreSchema
+  std::uint64_t nodata = 0;               ///< cells without data, left out
 
   [[nodiscard]] std::size_t size() const { return positions.size(); }
   /// The attribute of that name as doubles, scale and offset applied.
   /// Throws: UsageError naming the columns that there are.
   [[nodiscard]] std::vector<double> column(const std::string& name) const;
-  /// Drops the attribute of that name, if there is one.
-  void drop(const std::string& name);
 };
 
 /// What reading the source takes, which is not left for anything else. Throws: stream::Error if it

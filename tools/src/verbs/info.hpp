@@ -5,7 +5,6 @@
 
 #include "cli/cli.hpp"
 #include "cli/summary.hpp"
-#include "earth/world.hpp"
 #include "terrace/stream/source.hpp"
 
 namespace terrace::tools {

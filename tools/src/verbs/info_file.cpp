@@ -42,7 +42,7 @@ struct Contents {
 
 Contents stream_through(stream::PointSource& source, const CommonOptions& common) {
   const stream::SourceInfo& info = source.info();
-  const Placement placement = placement_of(info);
+  const stream::Placement& placement = info;
   // Without rotation the box in the CRS is that of the stored box: no point need be transformed.
   const bool upright = info.world.xy[1] == 0 && info.world.xy[3] == 0;
   Contents contents;

@@ -51,8 +51,8 @@ std::string padded(const std::string& text, std::size_t width) {
 Summary info_of_store(const std::string& path, const CommonOptions& common) {
   static_cast<void>(common);
   const stream::Store store = open_store(path);
-  const stream::Schema& schema = store.schema();
-  const Placement placement = placement_of(schema);
+  const stream::StoreSchema& schema = store.schema();
+  const stream::Placement& placement = schema;
   const stream::Box3 bounds = world_box(placement, store.bounds());
   const stream::Channel& z = schema.coordinates[2];
   const double mean = store.mean_height() * z.scale + z.offset;

@@ -158,8 +158,7 @@ class ClusterCommand final : public Command {
     const std::size_t outliers = static_cast<std::size_t>(
         std::count(outcome.labels.begin(), outcome.labels.end(), cluster::kOutlier));
     const std::uint64_t points = table.size();
-    if (!output_.empty())
-      write_clustered(output_, format_, std::move(table), outcome, replace_points);
+    if (!output_.empty()) write_clustered(output_, format_, table, outcome, replace_points);
     Summary summary = cluster_summary(outcome, points, outliers, watch.seconds());
     // Costs are a result; they stay out of the way of another one on standard output.
     summary.text_is_result = output_ != "-" && labels_ != "-" && dendrogram_ != "-";

@@ -17,7 +17,6 @@
 #include "cli/detail_options.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/output.hpp"
-#include "earth/world.hpp"
 #include "mesh/height_overlay.hpp"
 #include "terrace/terrain/detail.hpp"
 #include "verbs/verbs.hpp"
@@ -35,17 +34,10 @@ class PointOutput {
   PointOutput(const stream::Store& store, const Detail& detail, PlaceConversion places,
               stream::Overlay* overlay, stream::PointWriter& writer)
       : schema_(store.schema()),
-        placement_(placement_of(schema_)),
         detail_(detail),
         places_(std::move(places)),
         overlay_(overlay),
-        writer_(writer) {
-    for (const stream::Channel& channel : schema_.attributes) {
-      stream::Column column;
-      column.type = channel.type;
-      block_.attributes.push_back(std::move(column));
-    }
-  }
+        writer_(writer) {}
 
   void add(stream::ClusterId id, const stream::ClusterRecord& record,
            const stream::ClusterPoints& points) {
@@ -55,9 +47,9 @@ class PointOutput {
     std::size_t next = 0;
     const std::size_t payload = schema_.payload_size();
     const bool whole = !detail_.region || detail_.region->overlap(world_box(
-                                              placement_, record.summary.box)) == Overlap::whole;
+                                              schema_, record.summary.box)) == Overlap::whole;
     for (std::size_t i = 0; i < points.size(); ++i) {
-      stream::Point3 p = world_point(placement_, points.positions[i]);
+      stream::Point3 p = world_point(schema_, points.positions[i]);
       while (next < heights.size() && heights[next].index < i) ++next;
       if (!whole && !inside(p)) continue;
       if (next < heights.size() && heights[next].index == i) {
@@ -66,11 +58,7 @@ class PointOutput {
       }
       block_.positions.push_back(p);
       const std::byte* values = points.payload.data() + i * payload;
-      for (stream::Column& column : block_.attributes) {
-        const std::size_t size = stream::size_of(column.type);
-        column.bytes.insert(column.bytes.end(), values, values + size);
-        values += size;
-      }
+      block_.payload.insert(block_.payload.end(), values, values + payload);
     }
     if (block_.size() >= kPointsPerBlock) flush();
   }
@@ -95,8 +83,7 @@ class PointOutput {
     return false;
   }
 
-  const stream::Schema& schema_;
-  Placement placement_;
+  const stream::StoreSchema& schema_;
   const Detail& detail_;
   PlaceConversion places_;
   stream::Overlay* overlay_;

@@ -13,7 +13,7 @@ namespace terrace::stream {
 
 /// What a file of points says before its first point.
 struct PointHeader {
-  /// Columns after the coordinates, in the order of PointBlock::attributes. Types are kept where
+  /// Columns after the coordinates, as PointBlock::payload has them. Types are kept where
   /// the format has types. A column whose scale is not 1 or offset not 0 is written as real values
   /// (float64).
   std::vector<Channel> attributes{};
@@ -22,7 +22,7 @@ struct PointHeader {
 
 /// Stored coordinates to the coordinates of the CRS: WorldTransform, then scale and offset of the
 /// third coordinate. Attributes stay.
-void to_world(const SourceInfo& info, PointBlock& block);
+void to_world(const Placement& placement, PointBlock& block);
 
 /// Writes a stream of points to a file, which appears under its name, whole and synced, with
 /// finish(); a writer destroyed before leaves nothing. Bounded memory; same points, same bytes.
@@ -31,7 +31,7 @@ class PointWriter {
   virtual ~PointWriter() = default;
 
   /// Appends points. `block.positions` are world coordinates and written as doubles, exactly;
-  /// `block.attributes` are the columns of the header. Throws: Error if the disk is full or the
+  /// `block.payload` has records of the header's columns. Throws: Error if the disk is full or the
   /// like.
   virtual void append(const PointBlock& block) = 0;
   /// Publishes the file. Nothing may be appended afterwards.

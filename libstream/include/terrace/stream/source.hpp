@@ -9,95 +9,20 @@
 #include <span>
 #include <stop_token>
 #include <string>
-#include <string_view>
 #include <vector>
 
-#include "terrace/stream/point.hpp"
+#include "terrace/stream/schema.hpp"
 
 namespace terrace::stream {
 
-/// The types of a column. Multi-byte values are little-endian on disk, native in memory.
-enum class ScalarType : std::uint8_t { i8, u8, i16, u16, i32, u32, i64, u64, f32, f64 };
-
-/// Bytes of one value.
-std::size_t size_of(ScalarType type);
-/// "int8", "uint8", ..., "float32", "float64": the names in manifests and PLY headers.
-std::string_view name_of(ScalarType type);
-/// The type of that name (also PLY's "char", "uchar", "short", ...); nothing if there is none.
-std::optional<ScalarType> scalar_type_of(std::string_view name);
-
-/// A column of the points: what a stored value means. Real value = stored * scale + offset.
-struct Channel {
-  std::string name;
-  ScalarType type = ScalarType::f64;
-  double scale = 1.0;
-  double offset = 0.0;
-  std::string unit{};  ///< "metre", "foot", ...; empty if unknown
-
-  friend bool operator==(const Channel&, const Channel&) = default;
-};
-
-/// A GeoKey of a GeoTIFF that tells of its CRS, as it stands in the file.
-struct GeoKey {
-  std::uint16_t key = 0;
-  std::vector<double> values{};  ///< numbers of any type
-  std::string text{};
-
-  friend bool operator==(const GeoKey&, const GeoKey&) = default;
-};
-
-/// A coordinate reference system as the file names it. Nothing here interprets it.
-struct Crs {
-  int epsg = 0;                 ///< EPSG code of the horizontal CRS; 0 if none is given
-  int vertical_epsg = 0;        ///< EPSG code of the vertical CRS; 0 if none is given
-  std::string name;             ///< citation or name
-  std::string wkt;              ///< WKT where the file has one
-  bool geographic = false;      ///< x, y are longitude and latitude
-  std::string horizontal_unit;  ///< "metre", "foot", "US survey foot", "degree"; empty if unknown
-  std::string vertical_unit;    ///< likewise for heights
-  /// A GeoTIFF's keys in ascending order: datum, projection, parameters. Not kept in a store.
-  std::vector<GeoKey> geo_keys{};
-
-  friend bool operator==(const Crs&, const Crs&) = default;
-};
-
-/// How the stored coordinates of a source relate to its CRS:
-///   x = xy[0] * c0 + xy[1] * c1 + xy[2]
-///   y = xy[3] * c0 + xy[4] * c1 + xy[5]
-///   z = channel[2].scale * c2 + channel[2].offset
-/// For a raster (c0, c1, c2) = (column, row, raw sample) and xy maps to the *sample's* place (the
-/// centre of the cell for PixelIsArea). For points that are stored as they are, xy is the identity.
-struct WorldTransform {
-  std::array<double, 6> xy{1, 0, 0, 0, 1, 0};
-
-  friend bool operator==(const WorldTransform&, const WorldTransform&) = default;
-};
-
 /// What is known of a source before its first point.
-struct SourceInfo {
-  std::string format;                  ///< "geotiff", "xyz", "ply", ...
-  std::vector<std::string> files;      ///< as the caller named them
-  bool grid = false;                   ///< coordinates are integer column, row and a raw sample
-  std::array<Channel, 3> coordinates;  ///< of the stored coordinates c0, c1, c2
-  std::vector<Channel> attributes;     ///< further columns, in order
-  WorldTransform world;
-  Crs crs;
+struct SourceInfo : Schema {
+  std::string format;                   ///< "geotiff", "xyz", "ply", ...
+  std::vector<std::string> files;       ///< as the caller named them
   std::optional<Box3> bounds;           ///< in stored coordinates, if known beforehand
-  std::uint64_t columns = 0, rows = 0;  ///< of the raster or mosaic; 0 otherwise
   std::optional<std::uint64_t> points;  ///< number of points if known; for rasters an upper bound
   std::optional<double> nodata;         ///< of the (first) raster, raw units
   std::vector<std::string> comments;
-};
-
-/// One column's values for a block of points, packed.
-struct Column {
-  ScalarType type = ScalarType::f64;
-  std::vector<std::byte> bytes;
-
-  template <class T>
-  [[nodiscard]] std::span<const T> as() const {
-    return {reinterpret_cast<const T*>(bytes.data()), bytes.size() / sizeof(T)};
-  }
 };
 
 /// A block of points in *stored coordinates* (see WorldTransform). Every coordinate type but 64-bit
@@ -106,11 +31,14 @@ struct Column {
 /// A block keeps points together that lie together: consumers cluster a block as a whole.
 struct PointBlock {
   std::vector<Point3> positions;
-  std::vector<Column> attributes;  ///< one per SourceInfo::attributes, each positions.size() long
+  std::vector<std::byte> payload;  ///< Schema::payload_size() bytes per point: packed attributes
 
   [[nodiscard]] std::size_t size() const { return positions.size(); }
   [[nodiscard]] bool empty() const { return positions.empty(); }
-  void clear();
+  void clear() {
+    positions.clear();
+    payload.clear();
+  }
 };
 
 /// How far a source has come. Bytes are of the input files, where the source knows them.

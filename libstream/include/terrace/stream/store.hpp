@@ -14,8 +14,7 @@
 #include <utility>
 #include <vector>
 
-#include "terrace/stream/point.hpp"
-#include "terrace/stream/source.hpp"
+#include "terrace/stream/schema.hpp"
 
 /// The store: a folder that holds every input point exactly once in a hierarchy of clusters, each
 /// readable on its own. FORMAT.md describes the bytes.
@@ -68,20 +67,12 @@ struct ClusteredBlock {
 };
 
 /// What a store says of its points and how it was made. No time, path or host is ever in it.
-struct Schema {
-  bool grid = false;
-  std::array<Channel, 3> coordinates;
-  std::vector<Channel> attributes;
-  WorldTransform world;
-  Crs crs;
-  std::string vertical;  ///< "ellipsoidal", "orthometric", or empty: unknown
-  std::uint64_t columns = 0, rows = 0;
-  std::uint64_t nodata = 0;  ///< cells left out; set before finish()
-  std::string format;        ///< of the source
+struct StoreSchema : Schema {
+  std::string vertical{};    ///< "ellipsoidal", "orthometric", or empty: unknown
+  std::uint64_t nodata = 0;  ///< cells left out; see StoreWriter::set_nodata()
+  std::string format{};      ///< of the source
   /// Parameters of the clustering, in this order, as name and value (already printed).
-  std::vector<std::pair<std::string, std::string>> parameters;
-
-  [[nodiscard]] std::size_t payload_size() const;
+  std::vector<std::pair<std::string, std::string>> parameters{};
 };
 
 /// Writes a store. It appears under its name, whole and synced, when finish() returns, and not
@@ -96,7 +87,7 @@ class StoreWriter {
   using EncodedPtr = std::unique_ptr<Encoded, EncodedDeleter>;
 
   /// Throws: Error if `path` exists (unless `replace`, and it is a store) or cannot be written.
-  StoreWriter(const std::filesystem::path& path, Schema schema, bool replace = false);
+  StoreWriter(const std::filesystem::path& path, StoreSchema schema, bool replace = false);
   ~StoreWriter();
   StoreWriter(const StoreWriter&) = delete;
   StoreWriter& operator=(const StoreWriter&) = delete;
@@ -109,7 +100,9 @@ class StoreWriter {
   /// Number of clusters appended to `level` so far.
   [[nodiscard]] std::uint64_t clusters(unsigned level) const;
 
-  [[nodiscard]] Schema& schema();
+  [[nodiscard]] const StoreSchema& schema() const;
+  /// Cells that the source left out: known when it has ended, to be told before finish().
+  void set_nodata(std::uint64_t cells);
 
   /// Writes the points of the top level (as a block of one cluster whose representative is
   /// UINT32_MAX), syncs and publishes. Without `publish` it was a trial, and nothing stays. Returns
@@ -180,7 +173,7 @@ class Store {
   /// Throws: Stopped once that is asked. For loops that go on without reading.
   void check_stop() const;
 
-  [[nodiscard]] const Schema& schema() const;
+  [[nodiscard]] const StoreSchema& schema() const;
   [[nodiscard]] int version() const;
   [[nodiscard]] const std::filesystem::path& path() const;
   [[nodiscard]] unsigned top() const;

@@ -6,7 +6,7 @@
 
 #include <tiff.h>
 
-#include "format/with_type.hpp"
+#include "with_type.hpp"
 
 namespace terrace::stream {
 namespace {

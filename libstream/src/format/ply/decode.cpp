@@ -8,9 +8,9 @@
 #include <limits>
 #include <type_traits>
 
-#include "format/with_type.hpp"
 #include "io/number.hpp"
 #include "io/text.hpp"
+#include "with_type.hpp"
 
 namespace terrace::stream {
 namespace {
@@ -56,9 +56,9 @@ void copy_coordinate(const PackedColumn& column, Point3* points, std::size_t axi
 }
 
 template <class T, bool kSwap>
-void copy_values(const PackedColumn& column, std::byte* to) {
+void copy_values(const PackedColumn& column, std::byte* to, std::size_t to_stride) {
   const char* at = column.rows;
-  for (std::size_t i = 0; i < column.count; ++i, at += column.stride, to += sizeof(T)) {
+  for (std::size_t i = 0; i < column.count; ++i, at += column.stride, to += to_stride) {
     const T value = load<T, kSwap>(at);
     std::memcpy(to, &value, sizeof value);
   }
@@ -99,16 +99,12 @@ void decode_coordinate(const PackedColumn& column, Point3* points, std::size_t a
   });
 }
 
-void decode_values(const PackedColumn& column, std::byte* to) {
+void decode_values(const PackedColumn& column, std::byte* to, std::size_t to_stride) {
   with_type(column.type, [&](auto tag) {
     using T = typename Unsigned<sizeof(tag)>::type;
-    column.swap ? copy_values<T, true>(column, to) : copy_values<T, false>(column, to);
+    column.swap ? copy_values<T, true>(column, to, to_stride)
+                : copy_values<T, false>(column, to, to_stride);
   });
-}
-
-double to_double(const std::byte* raw, ScalarType type) {
-  return with_type(type,
-                   [&](auto tag) { return static_cast<double>(load_native<decltype(tag)>(raw)); });
 }
 
 std::int64_t to_integer(const std::byte* raw, ScalarType type) {

@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "terrace/stream/point.hpp"
-#include "terrace/stream/source.hpp"
+#include "terrace/stream/schema.hpp"
 
 namespace terrace::stream {
 
@@ -20,11 +20,9 @@ struct PackedColumn {
 
 /// Copies the column into coordinate `axis` of `points`.
 void decode_coordinate(const PackedColumn& column, Point3* points, std::size_t axis);
-/// Copies the column's values to `to`, packed, in this machine's byte order.
-void decode_values(const PackedColumn& column, std::byte* to);
+/// Copies the column's values to `to`, `to_stride` bytes apart, in this machine's byte order.
+void decode_values(const PackedColumn& column, std::byte* to, std::size_t to_stride);
 
-/// The value at `raw`, in this machine's byte order, as a double.
-double to_double(const std::byte* raw, ScalarType type);
 /// The value of an integer type at `raw`; negative ones keep their sign, uint64 wraps to negative.
 std::int64_t to_integer(const std::byte* raw, ScalarType type);
 

@@ -33,7 +33,7 @@ struct Field {
   PlyProperty property;
   std::size_t offset = 0;  ///< in a row of fixed size
   int axis = -1;
-  int attribute = -1;
+  int attribute = -1;  ///< where it begins in a point's record
 };
 
 class PlySource final : public PointSource {
@@ -73,11 +73,7 @@ class PlySource final : public PointSource {
     const auto wanted =
         static_cast<std::size_t>(std::min<std::uint64_t>(block_points_, count_ - delivered_));
     block.positions.resize(wanted);
-    block.attributes.resize(info_.attributes.size());
-    for (std::size_t i = 0; i < block.attributes.size(); ++i) {
-      block.attributes[i].type = info_.attributes[i].type;
-      block.attributes[i].bytes.resize(wanted * size_of(info_.attributes[i].type));
-    }
+    block.payload.resize(wanted * record_bytes_);
     if (header_.encoding == PlyEncoding::ascii) {
       for (std::size_t i = 0; i < wanted; ++i) read_line(block, i);
     } else if (has_lists_) {
@@ -127,7 +123,8 @@ class PlySource final : public PointSource {
           found[axis] = true;
           info_.coordinates[axis] = {.name = property.name, .type = property.type};
         } else {
-          field.attribute = static_cast<int>(info_.attributes.size());
+          field.attribute = static_cast<int>(record_bytes_);
+          record_bytes_ += size_of(property.type);
           info_.attributes.push_back({.name = property.name, .type = property.type});
         }
       }
@@ -171,7 +168,7 @@ class PlySource final : public PointSource {
     const std::string_view window = input_.fill(bytes);
     if (window.size() < bytes) return false;
     decode_values({.rows = window.data(), .stride = bytes, .count = 1, .type = type, .swap = swap_},
-                  raw);
+                  raw, bytes);
     input_.consume(bytes);
     return true;
   }
@@ -210,7 +207,7 @@ class PlySource final : public PointSource {
           decode_coordinate(column, block.positions.data() + done,
                             static_cast<std::size_t>(field.axis));
         } else {
-          decode_values(column, attribute_at(block, field, done));
+          decode_values(column, attribute_at(block, field, done), record_bytes_);
         }
       }
       input_.consume(rows * stride_);
@@ -277,14 +274,13 @@ class PlySource final : public PointSource {
   }
 
   std::byte* attribute_at(PointBlock& block, const Field& field, std::size_t i) const {
-    return block.attributes[static_cast<std::size_t>(field.attribute)].bytes.data() +
-           i * size_of(field.property.type);
+    return block.payload.data() + i * record_bytes_ + static_cast<std::size_t>(field.attribute);
   }
 
   void store(PointBlock& block, const Field& field, std::size_t i, const std::byte* raw) const {
     if (field.axis >= 0) {
       block.positions[i][static_cast<std::size_t>(field.axis)] =
-          to_double(raw, field.property.type);
+          to_double(field.property.type, raw);
     } else if (field.attribute >= 0) {
       std::copy_n(raw, size_of(field.property.type), attribute_at(block, field, i));
     }
@@ -310,7 +306,7 @@ class PlySource final : public PointSource {
   SourceInfo info_;
   std::vector<Field> fields_;
   std::uint64_t count_ = 0, delivered_ = 0;
-  std::size_t stride_ = 0;
+  std::size_t stride_ = 0, record_bytes_ = 0;
   bool has_lists_ = false, swap_ = false;
 };
 

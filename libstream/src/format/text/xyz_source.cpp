@@ -86,11 +86,8 @@ class XyzSource final : public PointSource {
   bool next(PointBlock& block) override {
     const std::size_t attributes = layout_.attributes.size();
     block.positions.resize(block_points_);
-    block.attributes.resize(attributes);
-    for (Column& column : block.attributes) {
-      column.type = ScalarType::f64;
-      column.bytes.resize(block_points_ * sizeof(double));
-    }
+    block.payload.resize(block_points_ * attributes * sizeof(double));
+    std::byte* record = block.payload.data();
     const auto [ix, iy, iz] = layout_.xyz;
     std::size_t count = 0;
     std::string_view line;
@@ -108,15 +105,15 @@ class XyzSource final : public PointSource {
         refuse(line);
       }
       block.positions[count] = point;
-      for (std::size_t i = 0; i < attributes; ++i) {
-        std::memcpy(block.attributes[i].bytes.data() + count * sizeof(double),
-                    &row_[layout_.attributes[i]], sizeof(double));
+      for (const std::size_t column : layout_.attributes) {
+        std::memcpy(record, &row_[column], sizeof(double));
+        record += sizeof(double);
       }
       ++count;
     }
     lines_.release();
     block.positions.resize(count);
-    for (Column& column : block.attributes) column.bytes.resize(count * sizeof(double));
+    block.payload.resize(count * attributes * sizeof(double));
     delivered_ += count;
     return count > 0;
   }

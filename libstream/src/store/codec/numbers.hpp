@@ -8,7 +8,7 @@
 #include <limits>
 #include <span>
 
-#include "terrace/stream/source.hpp"
+#include "terrace/stream/schema.hpp"
 
 /// Doubles as integers of the same order, bit for bit. A *number form* says how:
 ///    0 ..  9  k / 10^n, n = form: decimals, and with n = 0 plain integers

@@ -92,7 +92,7 @@ bool Store::recover(const std::filesystem::path& path) {
   return put_back_replaced(follow_links(path));
 }
 
-const Schema& Store::schema() const { return impl_->manifest.schema; }
+const StoreSchema& Store::schema() const { return impl_->manifest.schema; }
 int Store::version() const { return impl_->manifest.version; }
 const std::filesystem::path& Store::path() const { return impl_->path; }
 unsigned Store::top() const { return static_cast<unsigned>(impl_->levels.size()) - 1; }

@@ -12,12 +12,6 @@ namespace terrace::stream {
 
 using namespace store;
 
-std::size_t Schema::payload_size() const {
-  std::size_t size = 0;
-  for (const Channel& channel : attributes) size += size_of(channel.type);
-  return size;
-}
-
 class StoreWriter::Encoded {
  public:
   unsigned level = 0;
@@ -46,7 +40,7 @@ class StoreWriter::Encoded {
 void StoreWriter::EncodedDeleter::operator()(Encoded* block) const { delete block; }
 
 struct StoreWriter::Impl {
-  Impl(const std::filesystem::path& path, Schema given, bool replace_old)
+  Impl(const std::filesystem::path& path, StoreSchema given, bool replace_old)
       : schema(std::move(given)), replace(replace_old), staging(path) {}
 
   /// An encoder nobody uses; memory for as many as there are threads.
@@ -68,7 +62,7 @@ struct StoreWriter::Impl {
   EncodedPtr encode(const ClusteredBlock& block);
   std::uint64_t append(EncodedPtr encoded, bool root);
 
-  Schema schema;
+  StoreSchema schema;
   bool replace;
   Staging staging;
   std::vector<std::unique_ptr<LevelWriter>> levels;
@@ -137,7 +131,7 @@ std::uint64_t StoreWriter::Impl::append(EncodedPtr encoded, bool root) {
   return ordinal;
 }
 
-StoreWriter::StoreWriter(const std::filesystem::path& path, Schema schema, bool replace) {
+StoreWriter::StoreWriter(const std::filesystem::path& path, StoreSchema schema, bool replace) {
   std::error_code error;
   const auto status = std::filesystem::status(path, error);
   if (std::filesystem::exists(status)) {
@@ -177,7 +171,9 @@ std::uint64_t StoreWriter::clusters(unsigned level) const {
   return level < impl_->levels.size() ? impl_->levels[level]->clusters() : 0;
 }
 
-Schema& StoreWriter::schema() { return impl_->schema; }
+const StoreSchema& StoreWriter::schema() const { return impl_->schema; }
+
+void StoreWriter::set_nodata(std::uint64_t cells) { impl_->schema.nodata = cells; }
 
 std::uint64_t StoreWriter::finish(const ClusteredBlock& root, bool publish) {
   Impl& w = *impl_;

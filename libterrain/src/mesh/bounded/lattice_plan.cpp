@@ -6,8 +6,6 @@
 #include <cassert>
 #include <cmath>
 
-#include "earth/world.hpp"
-
 namespace terrace::terrain {
 namespace {
 
@@ -22,12 +20,12 @@ std::vector<std::int64_t> cut(std::int64_t first, std::int64_t samples, std::int
 }  // namespace
 
 LatticeWindow lattice_of(const stream::Store& store, const std::optional<Region>& region) {
-  const stream::Schema& schema = store.schema();
+  const stream::StoreSchema& schema = store.schema();
   assert(schema.grid);
   const auto columns = static_cast<std::int64_t>(schema.columns);
   const auto rows = static_cast<std::int64_t>(schema.rows);
   if (!region) return {0, 0, columns, rows};
-  const Placement placement = placement_of(schema);
+  const stream::Placement& placement = schema;
   stream::Box3 box;
   for (unsigned corner = 0; corner < 4; ++corner) {
     const Point2 stored =

@@ -7,7 +7,6 @@
 
 #include <terrace/stream/error.hpp>
 
-#include "earth/world.hpp"
 #include "terrace/terrain/detail.hpp"
 
 namespace terrace::terrain {
@@ -70,7 +69,7 @@ PointMeshSamples::PointMeshSamples(const stream::Store& store, const std::option
       counts_(cuts.cells.size(), 0),
       waiting_(cuts.cells.size()),
       chunks_(cuts.cells.size()) {
-  const Placement placement = placement_of(store.schema());
+  const stream::Placement& placement = store.schema();
   Detail detail;
   detail.region = region;
   for_each_wanted(store, detail,

@@ -6,7 +6,6 @@
 
 #include <terrace/stream/error.hpp>
 
-#include "earth/world.hpp"
 #include "mesh/bounded/streaming_hull.hpp"
 #include "terrace/terrain/detail.hpp"
 
@@ -27,7 +26,7 @@ void thin_out(std::vector<Point2>& places) {
 
 PointMeshScan scan_point_mesh(const stream::Store& store, const std::optional<Region>& region,
                               std::size_t few) {
-  const Placement placement = placement_of(store.schema());
+  const stream::Placement& placement = store.schema();
   Detail detail;
   detail.region = region;
   PointMeshScan scan;

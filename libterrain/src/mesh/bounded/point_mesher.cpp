@@ -42,7 +42,7 @@ PointMesher::PointMesher(const stream::Store& store, const BoundedMeshOptions& o
     : store_(store),
       options_(options),
       context_(context),
-      placement_(placement_of(store.schema())),
+      placement_(store.schema()),
       bounds_(world_box(placement_, store.bounds())),
       rounding_(options.path, bounds_, options.writer) {
   const Stopwatch reading;

@@ -9,7 +9,6 @@
 #include <terrace/stream/store.hpp>
 
 #include "earth/ground.hpp"
-#include "earth/world.hpp"
 #include "mesh/bounded/mesh_spool.hpp"
 #include "mesh/bounded/point_mesh_cuts.hpp"
 #include "mesh/bounded/point_mesh_plan.hpp"
@@ -54,7 +53,7 @@ class PointMesher {
   const stream::Store& store_;
   const BoundedMeshOptions& options_;
   const Context& context_;
-  Placement placement_;
+  stream::Placement placement_;
   stream::Box3 bounds_;
   stream::MeshRounding rounding_;
   PointMeshScan scan_;

@@ -40,7 +40,7 @@ RasterMesher::RasterMesher(const stream::Store& store, const BoundedMeshOptions&
     : store_(store),
       options_(options),
       context_(context),
-      placement_(placement_of(store.schema())),
+      placement_(store.schema()),
       whole_(lattice_of(store, options.region)),
       bounds_(world_box(placement_, store.bounds())),
       rounding_(options.path, bounds_, options.writer) {

@@ -9,7 +9,6 @@
 #include <terrace/stream/mesh_writer.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "earth/world.hpp"
 #include "mesh/bounded/mesh_spool.hpp"
 #include "mesh/bounded/window_tin.hpp"
 #include "surface/raster_fill.hpp"
@@ -55,7 +54,7 @@ class RasterMesher {
   const stream::Store& store_;
   const BoundedMeshOptions& options_;
   const Context& context_;
-  Placement placement_;
+  stream::Placement placement_;
   LatticeWindow whole_;
   stream::Box3 bounds_;
   stream::MeshRounding rounding_;

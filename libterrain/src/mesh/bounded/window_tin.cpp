@@ -73,7 +73,7 @@ WindowMesher::WindowMesher(const stream::Store& store, WindowTinOptions options,
     : store_(store),
       options_(std::move(options)),
       rounding_(rounding),
-      placement_(placement_of(store.schema())),
+      placement_(store.schema()),
       reader_(store, std::uint64_t{8} << 20) {}
 
 bool WindowMesher::in_region(const LatticeWindow& window, std::int64_t column, std::int64_t row,
@@ -87,7 +87,7 @@ bool WindowMesher::in_region(const LatticeWindow& window, std::int64_t column, s
 
 template <class T>
 WindowMesher::Samples<T> WindowMesher::read(const LatticeWindow& window) {
-  const stream::Schema& schema = store_.schema();
+  const stream::StoreSchema& schema = store_.schema();
   LatticeWindow wide{window.column - 1, window.row - 1, window.columns + 2, window.rows + 2};
   std::vector<T> heights(wide.size());
   reader_.heights(wide, std::span<T>(heights));

@@ -11,7 +11,6 @@
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/grid_tin.hpp>
 
-#include "earth/world.hpp"
 #include "surface/raster_fill.hpp"
 #include "surface/store_window.hpp"
 #include "terrace/terrain/region.hpp"
@@ -86,7 +85,7 @@ class WindowMesher {
   const stream::Store& store_;
   WindowTinOptions options_;
   const stream::MeshRounding& rounding_;
-  Placement placement_;
+  stream::Placement placement_;
   StoreWindow reader_;
 };
 

@@ -20,7 +20,7 @@ constexpr double kSmooth = 1.0;
 constexpr double kDigestMargin = 2.0;
 
 void add_raster(const TiledRaster& raster, Digest& digest) {
-  const stream::Schema& schema = raster.store.schema();
+  const stream::StoreSchema& schema = raster.store.schema();
   digest.add(schema.columns);
   digest.add(schema.rows);
   for (const double number : schema.world.xy) digest.add(number);
@@ -45,7 +45,7 @@ void add_window(const TiledRaster& raster, const LatticeWindow& window, Digest& 
   raster.blocks.for_each_incomplete(
       window, [&](const LatticeWindow& block) { digest.add(raster.fill.digest(block)); });
   // What hangs over the raster's borders.
-  const stream::Schema& schema = raster.store.schema();
+  const stream::StoreSchema& schema = raster.store.schema();
   const auto columns = static_cast<std::int64_t>(schema.columns);
   const auto rows = static_cast<std::int64_t>(schema.rows);
   const std::int64_t right = window.column + window.columns - columns;
@@ -62,7 +62,7 @@ void add_window(const TiledRaster& raster, const LatticeWindow& window, Digest& 
 /// The lattice around places of it, two samples over its borders at most: what lies beyond is asked
 /// there. Some part of the raster is always in it.
 LatticeWindow window_of(const TiledRaster& raster, const stream::Box3& around, double margin) {
-  const stream::Schema& schema = raster.store.schema();
+  const stream::StoreSchema& schema = raster.store.schema();
   LatticeWindow window;
   const auto span = [&](std::size_t axis, std::uint64_t count, std::int64_t& first,
                         std::int64_t& size) {
@@ -78,7 +78,7 @@ LatticeWindow window_of(const TiledRaster& raster, const stream::Box3& around, d
 }
 
 void add_everything(const TiledRaster& raster, Digest& digest) {
-  const stream::Schema& schema = raster.store.schema();
+  const stream::StoreSchema& schema = raster.store.schema();
   const auto columns = static_cast<std::int64_t>(schema.columns);
   const auto rows = static_cast<std::int64_t>(schema.rows);
   add_window(raster, {-2, -2, columns + 4, rows + 4}, digest);

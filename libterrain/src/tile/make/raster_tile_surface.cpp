@@ -84,7 +84,7 @@ void RasterTileSurface::visit_places(std::span<const double> longitude,
     places[i] = {turned == 180.0 ? -180.0 : turned, std::clamp(latitude[i], -90.0, 90.0)};
   }
   find_on_lattice(raster_, places);
-  const stream::Schema& schema = raster_.store.schema();
+  const stream::StoreSchema& schema = raster_.store.schema();
   const double last_column = static_cast<double>(schema.columns - 1);
   const double last_row = static_cast<double>(schema.rows - 1);
   for (Point2& p : places) {

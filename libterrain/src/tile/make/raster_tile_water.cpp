@@ -84,7 +84,7 @@ bool WaterMask<View>::is_uniform(const WaterPart& part, std::span<const Point2> 
     low = {std::min(low[0], p[0]), std::min(low[1], p[1])};
     high = {std::max(high[0], p[0]), std::max(high[1], p[1])};
   }
-  const stream::Schema& schema = raster_.store.schema();
+  const stream::StoreSchema& schema = raster_.store.schema();
   const auto from = [](double at, double margin) {
     return static_cast<std::int64_t>(std::floor(std::clamp(at - margin, -2.0, 1e12)));
   };
@@ -163,7 +163,7 @@ void WaterMask<View>::read(const WaterPart& part, std::span<const Point2> places
 
 template <class View>
 void WaterMask<View>::look(const WaterPart& part, std::span<Point2> places) {
-  const stream::Schema& schema = raster_.store.schema();
+  const stream::StoreSchema& schema = raster_.store.schema();
   const double right = static_cast<double>(schema.columns);
   const double bottom = static_cast<double>(schema.rows);
   for (Point2& p : places) {

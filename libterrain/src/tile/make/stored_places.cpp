@@ -48,7 +48,7 @@ double wrapped_longitude(double longitude) {
 }
 
 StoredPlaces::StoredPlaces(const stream::Store& store, CoordinateSystem system)
-    : crs_(std::move(system)), placement_(placement_of(store.schema())) {
+    : crs_(std::move(system)), placement_(store.schema()) {
   const stream::Box3& box = store.bounds();
   stored_ = {{box.min[0], box.min[1]}, {box.max[0], box.max[1]}};
   const bool degrees = crs_.is_geographic();

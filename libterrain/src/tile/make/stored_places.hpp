@@ -6,7 +6,6 @@
 
 #include <terrace/stream/store.hpp>
 
-#include "earth/world.hpp"
 #include "surface/store_window.hpp"
 #include "terrace/terrain/crs.hpp"
 #include "tile/format/tile_address.hpp"
@@ -45,7 +44,7 @@ class StoredPlaces {
   [[nodiscard]] double in_turn(double longitude) const;
 
   CoordinateSystem crs_;
-  Placement placement_;
+  stream::Placement placement_;
   StoredBox stored_;
   GeographicBox bounds_;
   /// For a store in degrees: its range of longitudes, and a full turn in its unit.

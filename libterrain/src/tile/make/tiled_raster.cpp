@@ -13,7 +13,7 @@
 
 namespace terrace::terrain {
 
-Point2 world_place(const Placement& placement, double column, double row) {
+Point2 world_place(const stream::Placement& placement, double column, double row) {
   const stream::Point3 p = world_point(placement, {column, row, 0.0});
   return {p[0], p[1]};
 }
@@ -26,7 +26,7 @@ double wrapped(double longitude) {
 namespace {
 
 /// Lattice coordinates (column, row) of places in the CRS, in place, and back.
-void to_lattice(const Placement& placement, std::span<Point2> places) {
+void to_lattice(const stream::Placement& placement, std::span<Point2> places) {
   for (Point2& p : places) p = stored_place(placement, p);
 }
 
@@ -71,7 +71,7 @@ void find_turn(TiledRaster& raster) {
 /// Where the raster lies on the globe, and how close its samples are.
 void find_bounds(TiledRaster& raster) {
   constexpr std::int64_t kSteps = 64;
-  const stream::Schema& schema = raster.store.schema();
+  const stream::StoreSchema& schema = raster.store.schema();
   const double columns = static_cast<double>(schema.columns - 1);
   const double rows = static_cast<double>(schema.rows - 1);
   std::vector<Point2> places;
@@ -184,7 +184,7 @@ TiledRaster::TiledRaster(const stream::Store& tiled, CoordinateSystem system,
                          EllipsoidalHeights heights)
     : store(tiled),
       crs(std::move(system)),
-      placement(placement_of(tiled.schema())),
+      placement(tiled.schema()),
       geography(crs, tiled.schema().world),
       vertical(std::move(heights)),
       fill(tiled),

@@ -8,7 +8,6 @@
 
 #include "earth/geoid_heights.hpp"
 #include "earth/grid_geography.hpp"
-#include "earth/world.hpp"
 #include "surface/raster_fill.hpp"
 #include "surface/store_window.hpp"
 #include "terrace/terrain/crs.hpp"
@@ -21,7 +20,7 @@ namespace terrace::terrain {
 struct TiledRaster {
   stream::Store store;
   CoordinateSystem crs;
-  Placement placement;
+  stream::Placement placement;
   GridGeography geography;
   EllipsoidalHeights vertical;
   /// Heights where there is no data: nothing takes those around, else this height in metres.
@@ -43,7 +42,7 @@ struct TiledRaster {
 };
 
 /// A place of the lattice, between samples too, in the raster's CRS.
-Point2 world_place(const Placement& placement, double column, double row);
+Point2 world_place(const stream::Placement& placement, double column, double row);
 /// Longitudes in [-180, 180], whatever turn they were in.
 double wrapped(double longitude);
 /// Places on the globe to those of the raster's lattice, in place.

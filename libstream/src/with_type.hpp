@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <utility>
 
-#include "terrace/stream/source.hpp"
+#include "terrace/stream/schema.hpp"
 
 namespace terrace::stream {
 

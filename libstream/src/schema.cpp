@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "terrace/stream/schema.hpp"
+
 #include <array>
 #include <utility>
 
-#include "terrace/stream/source.hpp"
+#include "with_type.hpp"
 
 namespace terrace::stream {
 namespace {
@@ -37,9 +39,36 @@ std::optional<ScalarType> scalar_type_of(std::string_view name) {
   return std::nullopt;
 }
 
-void PointBlock::clear() {
-  positions.clear();
-  for (Column& column : attributes) column.bytes.clear();
+double to_double(ScalarType type, const std::byte* bytes) {
+  return with_type(type, [bytes](auto value) {
+    std::memcpy(&value, bytes, sizeof value);
+    return static_cast<double>(value);
+  });
+}
+
+Box3 world_box(const Placement& placement, const Box3& stored) {
+  Box3 box;
+  if (stored.empty()) return box;
+  for (unsigned corner = 0; corner < 8; ++corner) {
+    box.include(world_point(placement, {(corner & 1) != 0 ? stored.max[0] : stored.min[0],
+                                        (corner & 2) != 0 ? stored.max[1] : stored.min[1],
+                                        (corner & 4) != 0 ? stored.max[2] : stored.min[2]}));
+  }
+  return box;
+}
+
+std::array<double, 2> stored_place(const Placement& placement, const std::array<double, 2>& world) {
+  const std::array<double, 6>& xy = placement.world.xy;
+  const double x = world[0] - xy[2], y = world[1] - xy[5];
+  if (xy[1] == 0.0 && xy[3] == 0.0) return {x / xy[0], y / xy[4]};
+  const double determinant = xy[0] * xy[4] - xy[1] * xy[3];
+  return {(xy[4] * x - xy[1] * y) / determinant, (xy[0] * y - xy[3] * x) / determinant};
+}
+
+std::size_t Schema::attribute_offset(std::size_t attribute) const {
+  std::size_t offset = 0;
+  for (std::size_t i = 0; i < attribute; ++i) offset += size_of(attributes[i].type);
+  return offset;
 }
 
 }  // namespace terrace::stream

@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cassert>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "terrace/stream/point.hpp"
+
+/// What the numbers of a point mean: its coordinates, where they lie in a coordinate reference
+/// system, and the packed record of its attributes. Sources, stores and writers share it.
+
+namespace terrace::stream {
+
+/// The types of a column. Multi-byte values are little-endian on disk, native in memory.
+enum class ScalarType : std::uint8_t { i8, u8, i16, u16, i32, u32, i64, u64, f32, f64 };
+
+/// Bytes of one value.
+std::size_t size_of(ScalarType type);
+/// "int8", "uint8", ..., "float32", "float64": the names in manifests and PLY headers.
+std::string_view name_of(ScalarType type);
+/// The type of that name (also PLY's "char", "uchar", "short", ...); nullopt if there is none.
+std::optional<ScalarType> scalar_type_of(std::string_view name);
+/// The value of that type at `bytes`, which need not be aligned, rounded to a double.
+double to_double(ScalarType type, const std::byte* bytes);
+
+/// A column of the points: what a stored value means. Real value = stored * scale + offset.
+struct Channel {
+  std::string name;
+  ScalarType type = ScalarType::f64;
+  double scale = 1.0;
+  double offset = 0.0;
+  std::string unit{};  ///< "metre", "foot", ...; empty if unknown
+
+  friend bool operator==(const Channel&, const Channel&) = default;
+};
+
+/// A GeoKey of a GeoTIFF that tells of its CRS, as it stands in the file.
+struct GeoKey {
+  std::uint16_t key = 0;
+  std::vector<double> values{};  ///< numbers of any type
+  std::string text{};
+
+  friend bool operator==(const GeoKey&, const GeoKey&) = default;
+};
+
+/// A coordinate reference system as the file names it. Nothing here interprets it.
+struct Crs {
+  int epsg = 0;                 ///< EPSG code of the horizontal CRS; 0 if none is given
+  int vertical_epsg = 0;        ///< EPSG code of the vertical CRS; 0 if none is given
+  std::string name;             ///< citation or name
+  std::string wkt;              ///< WKT where the file has one
+  bool geographic = false;      ///< x, y are longitude and latitude
+  std::string horizontal_unit;  ///< "metre", "foot", "US survey foot", "degree"; empty if unknown
+  std::string vertical_unit;    ///< likewise for heights
+  /// A GeoTIFF's keys in ascending order: datum, projection, parameters. Not kept in a store.
+  std::vector<GeoKey> geo_keys{};
+
+  friend bool operator==(const Crs&, const Crs&) = default;
+};
+
+/// How the stored coordinates of a source relate to its CRS:
+///   x = xy[0] * c0 + xy[1] * c1 + xy[2]
+///   y = xy[3] * c0 + xy[4] * c1 + xy[5]
+///   z = channel[2].scale * c2 + channel[2].offset
+/// For a raster (c0, c1, c2) = (column, row, raw sample) and xy maps to the *sample's* place (the
+/// centre of the cell for PixelIsArea). For points that are stored as they are, xy is the identity.
+struct WorldTransform {
+  std::array<double, 6> xy{1, 0, 0, 0, 1, 0};
+
+  friend bool operator==(const WorldTransform&, const WorldTransform&) = default;
+};
+
+/// Where stored coordinates lie: what a source and a store have in common.
+struct Placement {
+  WorldTransform world;
+  std::array<Channel, 3> coordinates;  ///< of the stored coordinates c0, c1, c2
+  Crs crs;
+};
+
+/// Coordinates of the CRS for a point in stored coordinates.
+[[nodiscard]] inline Point3 world_point(const Placement& placement, const Point3& stored) {
+  const std::array<double, 6>& xy = placement.world.xy;
+  return {stored[0] * xy[0] + stored[1] * xy[1] + xy[2],
+          stored[0] * xy[3] + stored[1] * xy[4] + xy[5],
+          stored[2] * placement.coordinates[2].scale + placement.coordinates[2].offset};
+}
+/// The axis-aligned box in the CRS around a box in stored coordinates; empty stays empty. Around a
+/// rotated raster it is larger than the rotated box.
+[[nodiscard]] Box3 world_box(const Placement& placement, const Box3& stored);
+/// Stored x, y (column and row of a raster) of a place in the CRS: world_point() back.
+[[nodiscard]] std::array<double, 2> stored_place(const Placement& placement,
+                                                 const std::array<double, 2>& world);
+
+/// One attribute of packed records, read as values of type T.
+template <class T>
+class AttributeView {
+ public:
+  /// records: whole records of record_bytes each, the attribute `offset` bytes into them.
+  AttributeView(std::span<const std::byte> records, std::size_t record_bytes, std::size_t offset)
+      : first_(records.data() + offset),
+        stride_(record_bytes),
+        size_(records.size() / record_bytes) {
+    assert(records.size() % record_bytes == 0 && offset + sizeof(T) <= record_bytes);
+  }
+
+  [[nodiscard]] std::size_t size() const { return size_; }
+  [[nodiscard]] T operator[](std::size_t i) const {
+    assert(i < size_);
+    T value;
+    std::memcpy(&value, first_ + i * stride_, sizeof value);
+    return value;
+  }
+
+ private:
+  const std::byte* first_;
+  std::size_t stride_, size_;
+};
+
+/// What a point consists of. The values of its attributes stand side by side in one record, without
+/// gaps, in the order of `attributes` and in the byte order of the machine; records of many points
+/// follow one another.
+struct Schema : Placement {
+  bool grid = false;                    ///< coordinates are integer column, row and a raw sample
+  std::vector<Channel> attributes;      ///< further columns, in order
+  std::uint64_t columns = 0, rows = 0;  ///< of the raster or mosaic; 0 otherwise
+
+  /// Bytes of one record.
+  [[nodiscard]] std::size_t payload_size() const { return attribute_offset(attributes.size()); }
+  /// Where an attribute begins in a record.
+  [[nodiscard]] std::size_t attribute_offset(std::size_t attribute) const;
+  /// An attribute of packed records; T is its type.
+  template <class T>
+  [[nodiscard]] AttributeView<T> view(std::span<const std::byte> records,
+                                      std::size_t attribute) const {
+    assert(size_of(attributes[attribute].type) == sizeof(T));
+    return {records, payload_size(), attribute_offset(attribute)};
+  }
+};
+
+}  // namespace terrace::stream
