@@ -10,6 +10,7 @@
 
 #include "stand_in_hierarchy.hpp"
 #include "store_testing.hpp"
+#include "terrace/stream/byte_source.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/overlay.hpp"
 
@@ -166,6 +167,64 @@ TEST(Store, DecimalAttributesAreSmall) {
   const std::uint64_t without = testing::check_round_trip(
       testing::cloud_schema(), blocks, {.block_points = 900, .cluster_points = 60});
   EXPECT_LT(with, without + 6000 * 2);
+}
+
+/// The files of a store in memory, by name.
+std::map<std::string, std::vector<std::byte>> files_in_memory(const std::filesystem::path& store) {
+  std::map<std::string, std::vector<std::byte>> files;
+  for (const auto& entry : std::filesystem::directory_iterator(store)) {
+    const std::string bytes = testing::bytes_of(entry.path());
+    const auto view = std::as_bytes(std::span(bytes));
+    files[entry.path().filename()] = {view.begin(), view.end()};
+  }
+  return files;
+}
+
+TEST(Store, OpensFromMemory) {
+  const std::filesystem::path folder =
+      std::filesystem::path(TERRACE_TEST_DATA) / "stores" / "cloud";
+  const auto files = files_in_memory(folder);
+  const Store store = Store::open("memory", [&files](const std::string& name) {
+    return bytes_in_memory("memory/" + name, files.at(name));
+  });
+  EXPECT_EQ(store.path(), "memory");
+  EXPECT_TRUE(store.verify(testing::expect_no_problem));
+  EXPECT_EQ(testing::all_points(store), testing::all_points(Store::open(folder)));
+}
+
+TEST(Store, FailuresOfTheCallersBytesReachTheCaller) {
+  const auto files = files_in_memory(std::filesystem::path(TERRACE_TEST_DATA) / "stores" / "grid");
+  struct Lost : std::runtime_error {
+    using std::runtime_error::runtime_error;
+  };
+  // Each read in turn is the one that fails: opening and verifying throw what the function threw.
+  for (int failing = 0;; ++failing) {
+    int reads = 0;
+    const auto open = [&] {
+      return Store::open("server", [&](const std::string& name) {
+        const auto& bytes = files.at(name);
+        return bytes_by_function("server/" + name, bytes.size(),
+                                 [&](std::uint64_t offset, std::span<std::byte> out) {
+                                   if (reads++ == failing) throw Lost("connection");
+                                   std::copy_n(bytes.begin() + static_cast<std::ptrdiff_t>(offset),
+                                               out.size(), out.begin());
+                                 });
+      });
+    };
+    try {
+      testing::all_points(open());
+      EXPECT_GT(failing, 5);
+      break;
+    } catch (const Lost&) {
+    }
+  }
+  // A file that is shorter than the manifest says is refused at once.
+  const auto cut = [&](const std::string& name) {
+    auto bytes = files.at(name);
+    if (name != "manifest.json") bytes.pop_back();
+    return bytes_in_memory("server/" + name, std::move(bytes));
+  };
+  EXPECT_THROW(Store::open("server", cut), Error);
 }
 
 /// data/stores/README.md: every version reads them, for ever.

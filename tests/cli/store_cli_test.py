@@ -169,6 +169,38 @@ class StoreTest(unittest.TestCase):
         for x, y, _ in points:
             self.assertTrue(box[0] <= x <= box[2] and box[1] <= y <= box[3])
 
+    def test_points_near_a_place(self):
+        low = json.loads(self.run_ok('info', self.store, '--json'))['bounds']['min']
+        x, y = low[0] + 1234, low[1] + 777
+        everything = [tuple(map(float, line.split()))
+                      for line in self.run_ok('points', self.store, '-o', '-').splitlines()]
+
+        def near(*options):
+            rows = self.run_ok('points', self.store, '-o', '-', *options).splitlines()
+            return [tuple(map(float, row.split())) for row in rows]
+
+        flat = sorted(math.hypot(p[0] - x, p[1] - y) for p in everything)
+        found = near('--near', f'{x},{y}', '-k', 20)
+        self.assertEqual([row[3] for row in found], sorted(row[3] for row in found))
+        scale = found[-1][3] / flat[19]
+        self.assertAlmostEqual(scale, 1, delta=2e-3)  # metres on the ground, not of the projection
+        for row, distance in zip(found, flat):
+            self.assertIn(row[:3], everything)
+            self.assertAlmostEqual(row[3], scale * distance, delta=1e-6)
+        within = near('--near', f'{x},{y}', '--within', 100)
+        self.assertEqual(len(within), sum(scale * distance <= 100 for distance in flat))
+        z = everything[0][2]
+        deep = near('--near', f'{x},{y},{z}', '-k', 3)
+        self.assertAlmostEqual(deep[0][3], min(
+            math.hypot(scale * math.hypot(p[0] - x, p[1] - y), p[2] - z) for p in everything),
+            delta=1e-6)
+        self.assertEqual(near('--near', f'{x},{y}', '-k', 0), [])
+        for wrong in (['--near', f'{x},{y}'], ['--near', f'{x}', '-k', 2],
+                      ['--near', f'{x},{y}', '-k', 2, '--within', 3],
+                      ['--near', f'{x},{y}', '--within', -1], ['-k', 2], ['--within', 2],
+                      ['--near', f'{x},{y}', '-k', 2, '--region', '0,0,1,1']):
+            self.expect_error(2, 'points', self.store, '-o', '-', *wrong)
+
     def test_mesh_in_every_format(self):
         for ending in ('ply', 'obj', 'glb'):
             out = self.path(f'mesh.{ending}')

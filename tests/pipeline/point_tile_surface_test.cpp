@@ -301,12 +301,12 @@ TEST(PointTileSurface, IsThatOfAllPointsWhateverWasAskedBefore) {
   }
 }
 
-TEST(ClusterCensus, CountsWhatTheClustersHave) {
+TEST(StoreWindow, TheIndexTellsNumbersAndHeightsOfABox) {
   const CloudStore all(cases().front());
-  terrain::ClusterCensus census(all.store);
+  stream::StoreQuery query(all.store);
   const stream::Box3& bounds = all.store.bounds();
   // The index grows boxes a little.
-  EXPECT_NEAR(census.count({{bounds.min[0], bounds.min[1]}, {bounds.max[0], bounds.max[1]}}, 1e9),
+  EXPECT_NEAR(query.estimate(terrain::tall(terrain::flat(bounds))),
               static_cast<double>(all.store.points()), 1.0);
   std::vector<std::pair<stream::Box3, std::uint64_t>> clusters;
   for (std::uint64_t i = 0; i < all.store.levels()[0].clusters; ++i) {
@@ -322,7 +322,7 @@ TEST(ClusterCensus, CountsWhatTheClustersHave) {
     double low = 1e9, high = -1e9;
     int met = 0;
     for (const auto& [around, count] : clusters) {
-      if (!box.meets({{around.min[0], around.min[1]}, {around.max[0], around.max[1]}})) continue;
+      if (!box.meets(around)) continue;
       double share = static_cast<double>(count);
       for (std::size_t axis = 0; axis < 2; ++axis) {
         const double from = std::max(box.min[axis], around.min[axis]);
@@ -336,9 +336,9 @@ TEST(ClusterCensus, CountsWhatTheClustersHave) {
       low = std::min(low, around.min[2]);
       high = std::max(high, around.max[2]);
     }
-    EXPECT_NEAR(census.count(box, 1e9), expected, 1e-6 * expected);
-    EXPECT_EQ(census.count(box, 500) > 500, expected > 500);
-    const auto heights = census.heights(box);
+    EXPECT_NEAR(query.estimate(terrain::tall(box)), expected, 1e-6 * expected);
+    EXPECT_EQ(query.estimate(terrain::tall(box), 500) > 500, expected > 500);
+    const auto heights = terrain::cluster_heights(query, box);
     ASSERT_EQ(heights.has_value(), met > 0);
     if (!heights) continue;
     EXPECT_EQ(heights->low, low);

@@ -8,7 +8,6 @@
 
 #include "store/codec/bytes.hpp"
 #include "store/codec/layout.hpp"
-#include "store/files.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::stream::store {
@@ -292,8 +291,8 @@ void check_places(const Manifest& m) {
   }
 }
 
-[[noreturn]] void damaged(const std::filesystem::path& file, const std::string& cause) {
-  throw Error({.file = file.string(),
+[[noreturn]] void damaged(const std::string& file, const std::string& cause) {
+  throw Error({.file = file,
                .where = {},
                .cause = "damaged manifest: " + cause,
                .remedy = "restore the file or build the store anew"});
@@ -317,7 +316,16 @@ std::string to_text(const Manifest& manifest) {
   return text;
 }
 
-Manifest parse_manifest(const std::string& text, const std::filesystem::path& file) {
+std::string read_manifest(const ByteSource& file) {
+  if (file.size() > kMostManifestBytes) {
+    throw Error({.file = file.name(), .where = {}, .cause = "the file is too large", .remedy = {}});
+  }
+  std::string text(file.size(), '\0');
+  file.read(0, std::as_writable_bytes(std::span(text)));
+  return text;
+}
+
+Manifest parse_manifest(const std::string& text, const std::string& file) {
   Json json;
   try {
     json = Json::parse(text);
@@ -327,7 +335,7 @@ Manifest parse_manifest(const std::string& text, const std::filesystem::path& fi
     // Before anything that a newer version may do otherwise.
     const auto version = json.at("version").get<std::int64_t>();
     if (version > kVersion) {
-      throw Error({.file = file.string(),
+      throw Error({.file = file,
                    .where = {},
                    .cause = "store version " + std::to_string(version) +
                             " was written by a newer terrace; this one reads up to version " +
@@ -370,7 +378,7 @@ bool looks_like_store(const std::filesystem::path& folder) {
   const auto path = folder / kManifestName;
   if (!std::filesystem::is_regular_file(path, error)) return false;
   try {
-    const Json json = Json::parse(read_whole(path, kMostManifestBytes), nullptr, false);
+    const Json json = Json::parse(read_manifest(*open_file(path)), nullptr, false);
     const auto format = json.is_object() ? json.find("format") : json.end();
     return format != json.end() && *format == kFormatName;
   } catch (const Error&) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "terrace/stream/byte_source.hpp"
 #include "terrace/stream/store.hpp"
 
 namespace terrace::stream::store {
@@ -48,9 +49,12 @@ std::string hexadecimal(std::uint32_t value);
 /// The manifest as JSON text, its own checksum included.
 std::string to_text(const Manifest& manifest);
 
+/// The text of a manifest. Throws: Error if it is too large or cannot be read.
+std::string read_manifest(const ByteSource& file);
+
 /// Throws: Error, in the name of `file`, if the text is not a manifest of this version or earlier,
 /// or not the one that was written.
-Manifest parse_manifest(const std::string& text, const std::filesystem::path& file);
+Manifest parse_manifest(const std::string& text, const std::string& file);
 
 /// Whether `text`, which parse_manifest() has made `manifest` of, has the keys of the format, all
 /// of them, no others and in the format's order.

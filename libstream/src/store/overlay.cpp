@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include "store/files.hpp"
 #include "store/manifest.hpp"
 #include "store/overlay_page.hpp"
+#include "terrace/stream/byte_source.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::stream {
@@ -19,7 +19,7 @@ namespace {
 
 constexpr const char* kRestoreOverlay = "restore the file or make the overlay anew";
 
-InputFile open_file(const std::filesystem::path& path) {
+std::unique_ptr<ByteSource> open_overlay(const std::filesystem::path& path) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error)) {
     throw Error({.file = path.string(),
@@ -27,7 +27,7 @@ InputFile open_file(const std::filesystem::path& path) {
                  .cause = "there is no overlay here",
                  .remedy = "name an overlay that terrace has written"});
   }
-  return {path, std::filesystem::file_size(path)};
+  return open_file(path);
 }
 
 struct PageEntry {
@@ -39,7 +39,8 @@ constexpr std::size_t kNoPage = std::numeric_limits<std::size_t>::max();
 }  // namespace
 
 struct Overlay::Impl {
-  InputFile file;
+  std::filesystem::path path;
+  std::unique_ptr<ByteSource> file;
   std::vector<LevelInfo> levels;  // of the store
   std::string channel{};
   std::uint64_t values = 0;
@@ -49,7 +50,7 @@ struct Overlay::Impl {
   OverlayPage page{};
 
   [[nodiscard]] Error damaged(std::uint64_t offset, const std::string& cause) const {
-    return Error({.file = file.path().string(),
+    return Error({.file = file->name(),
                   .where = "byte " + std::to_string(offset),
                   .cause = cause,
                   .remedy = kRestoreOverlay});
@@ -62,8 +63,8 @@ struct Overlay::Impl {
 
 void Overlay::Impl::read_header(const Store& store) {
   try {
-    Bytes bytes(std::min<std::uint64_t>(file.size(), kOverlayHeadBytes));
-    file.read(0, bytes);
+    Bytes bytes(std::min<std::uint64_t>(file->size(), kOverlayHeadBytes));
+    file->read(0, std::as_writable_bytes(std::span(bytes)));
     if (bytes.size() < kOverlayMarkBytes + 4 ||
         !std::equal(kOverlayMark, kOverlayMark + kOverlayMarkBytes, bytes.begin())) {
       throw Damage("the file does not say that it is an overlay");
@@ -71,7 +72,7 @@ void Overlay::Impl::read_header(const Store& store) {
     // Before anything that a newer version may do otherwise.
     const auto version = load<std::uint32_t>(bytes.data() + kOverlayMarkBytes);
     if (version > kOverlayVersion) {
-      throw Error({.file = file.path().string(),
+      throw Error({.file = file->name(),
                    .where = {},
                    .cause = "overlay version " + std::to_string(version) +
                             " was written by a newer terrace; this one reads up to version " +
@@ -84,18 +85,18 @@ void Overlay::Impl::read_header(const Store& store) {
     pages_end = in.get<std::uint64_t>();
     const auto name = in.get<std::uint32_t>();
     const std::uint64_t end = kOverlayHeadBytes + std::uint64_t{name} + 4;
-    if (name > kMostOverlayNameBytes || end > file.size()) {
+    if (name > kMostOverlayNameBytes || end > file->size()) {
       throw Damage("the header has an impossible size");
     }
     Bytes rest(name + std::size_t{4});
-    file.read(kOverlayHeadBytes, rest);
+    file->read(kOverlayHeadBytes, std::as_writable_bytes(std::span(rest)));
     const std::uint32_t checksum = crc32(crc32(bytes), rest.data(), name);
     if (checksum != load<std::uint32_t>(rest.data() + name) || version < 1) {
       throw Damage("the checksum of the header is wrong");
     }
     channel.assign(rest.begin(), rest.begin() + static_cast<std::ptrdiff_t>(name));
     if (made_for != store.checksum()) {
-      throw Error({.file = file.path().string(),
+      throw Error({.file = file->name(),
                    .where = {},
                    .cause = "was made for the store with the checksum " + hexadecimal(made_for) +
                             ", " + store.path().string() + " has " + hexadecimal(store.checksum()),
@@ -109,9 +110,9 @@ void Overlay::Impl::read_header(const Store& store) {
 
 void Overlay::Impl::read_directory(std::uint64_t count, std::uint64_t header_end,
                                    std::uint64_t most_values) {
-  if (pages_end < header_end || pages_end > file.size() - 4 ||
-      count != (file.size() - 4 - pages_end) / kOverlayEntryBytes ||
-      count * kOverlayEntryBytes != file.size() - 4 - pages_end) {
+  if (pages_end < header_end || pages_end > file->size() - 4 ||
+      count != (file->size() - 4 - pages_end) / kOverlayEntryBytes ||
+      count * kOverlayEntryBytes != file->size() - 4 - pages_end) {
     throw Damage("the directory does not have the size that the header tells");
   }
   try {
@@ -122,7 +123,7 @@ void Overlay::Impl::read_directory(std::uint64_t count, std::uint64_t header_end
     for (std::uint64_t left = count; left > 0;) {
       const std::uint64_t piece = std::min<std::uint64_t>(left, 4096);
       bytes.resize(piece * kOverlayEntryBytes);
-      file.read(at, bytes);
+      file->read(at, std::as_writable_bytes(std::span(bytes)));
       checksum = crc32(checksum, bytes.data(), bytes.size());
       ByteReader in(bytes);
       for (std::uint64_t i = 0; i < piece; ++i) {
@@ -147,7 +148,7 @@ void Overlay::Impl::read_directory(std::uint64_t count, std::uint64_t header_end
       left -= piece;
     }
     bytes.resize(4);
-    file.read(at, bytes);
+    file->read(at, std::as_writable_bytes(std::span(bytes)));
     if (checksum != load<std::uint32_t>(bytes.data())) {
       throw Damage("the checksum of the directory is wrong");
     }
@@ -170,7 +171,7 @@ void Overlay::Impl::load_page(std::size_t number) {
       throw Damage("the page is too long for its values");
     }
     Bytes bytes(size);
-    file.read(entry.offset, bytes);
+    file->read(entry.offset, std::as_writable_bytes(std::span(bytes)));
     decode_overlay_page(bytes, entry.values, levels, page);
     if (static_cast<std::uint64_t>(page.clusters.front()) != entry.first_cluster ||
         (!last &&
@@ -189,13 +190,15 @@ Overlay::Overlay(Overlay&&) noexcept = default;
 Overlay& Overlay::operator=(Overlay&&) noexcept = default;
 
 Overlay Overlay::open(const std::filesystem::path& path, const Store& store) {
-  auto impl = std::make_unique<Impl>(
-      Impl{.file = open_file(path), .levels = {store.levels().begin(), store.levels().end()}});
+  auto impl =
+      std::make_unique<Impl>(Impl{.path = path,
+                                  .file = open_overlay(path),
+                                  .levels = {store.levels().begin(), store.levels().end()}});
   impl->read_header(store);
   return Overlay(std::move(impl));
 }
 
-const std::filesystem::path& Overlay::path() const { return impl_->file.path(); }
+const std::filesystem::path& Overlay::path() const { return impl_->path; }
 const std::string& Overlay::channel() const { return impl_->channel; }
 std::uint64_t Overlay::values() const { return impl_->values; }
 

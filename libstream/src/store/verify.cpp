@@ -43,10 +43,15 @@ bool holds(const Box3& outer, const Box3& inner) {
 
 class Verification {
  public:
-  Verification(const Store& store, const Manifest& manifest,
+  Verification(const Store& store, const ByteSource& manifest_file, const Manifest& manifest,
                const std::vector<std::unique_ptr<LevelReader>>& levels, const std::stop_token& stop,
                const std::function<void(const Problem&)>& report)
-      : store_(store), manifest_(manifest), levels_(levels), stop_(stop), report_(report) {}
+      : store_(store),
+        manifest_file_(manifest_file),
+        manifest_(manifest),
+        levels_(levels),
+        stop_(stop),
+        report_(report) {}
 
   bool run() {
     check_manifest();
@@ -64,13 +69,13 @@ class Verification {
   }
 
  private:
-  void problem(const std::filesystem::path& file, std::uint64_t offset, std::string what) {
+  void problem(const std::string& file, std::uint64_t offset, std::string what) {
     good_ = false;
-    if (report_) report_({.file = file.string(), .offset = offset, .what = std::move(what)});
+    if (report_) report_({.file = file, .offset = offset, .what = std::move(what)});
   }
   void cluster_problem(unsigned level, std::uint64_t ordinal, std::uint64_t offset,
                        const std::string& what) {
-    problem(levels_[level]->data().path(), offset,
+    problem(levels_[level]->data().name(), offset,
             "cluster " + std::to_string(level) + "/" + std::to_string(ordinal) + ": " + what);
   }
 
@@ -79,29 +84,29 @@ class Verification {
   }
 
   void check_manifest() {
-    const auto path = store_.path() / kManifestName;
     try {
-      if (!is_as_written(read_whole(path, kMostManifestBytes), manifest_)) {
-        problem(path, 0, "the manifest does not have the keys of the format in their order");
+      if (!is_as_written(read_manifest(manifest_file_), manifest_)) {
+        problem(manifest_file_.name(), 0,
+                "the manifest does not have the keys of the format in their order");
       }
     } catch (const Error& error) {
-      problem(path, 0, error.what());
+      problem(manifest_file_.name(), 0, error.what());
     }
   }
 
-  void check_file(const InputFile& file, std::uint32_t expected) {
+  void check_file(const ByteSource& file, std::uint32_t expected) {
     try {
       Bytes bytes(1u << 20);
       std::uint32_t checksum = 0;
       for (std::uint64_t offset = 0; offset < file.size(); offset += bytes.size()) {
         check_stop();
         bytes.resize(std::min<std::uint64_t>(bytes.size(), file.size() - offset));
-        file.read(offset, bytes);
+        file.read(offset, std::as_writable_bytes(std::span(bytes)));
         checksum = crc32(checksum, bytes.data(), bytes.size());
       }
-      if (checksum != expected) problem(file.path(), 0, "the checksum of the file is wrong");
+      if (checksum != expected) problem(file.name(), 0, "the checksum of the file is wrong");
     } catch (const Error& error) {
-      problem(file.path(), 0, error.what());
+      problem(file.name(), 0, error.what());
     }
   }
 
@@ -112,16 +117,16 @@ class Verification {
       try {
         check_page(l, p, data_end);
       } catch (const Error& error) {
-        problem(level.index().path(), level.page_offset(p), error.what());
+        problem(level.index().name(), level.page_offset(p), error.what());
       } catch (const Damage& damage) {
-        problem(level.index().path(), level.page_offset(p), damage.what());
+        problem(level.index().name(), level.page_offset(p), damage.what());
       }
     }
     if (data_end != level.data().size()) {
-      problem(level.data().path(), data_end, "the clusters do not end where the file does");
+      problem(level.data().name(), data_end, "the clusters do not end where the file does");
     }
     if (sums_[l].members != manifest_.levels[l].members) {
-      problem(store_.path() / kManifestName, 0,
+      problem(manifest_file_.name(), 0,
               "level " + std::to_string(l) + " has " + std::to_string(sums_[l].members) +
                   " members, not " + std::to_string(manifest_.levels[l].members));
     }
@@ -132,7 +137,7 @@ class Verification {
     const LevelReader& level = *levels_[l];
     const auto page = level.page(number);
     if (page->offset(0) != data_end) {
-      problem(level.index().path(), level.page_offset(number),
+      problem(level.index().name(), level.page_offset(number),
               "the page's clusters do not follow those of the page before");
     }
     data_end = page->end();
@@ -144,7 +149,7 @@ class Verification {
         level.read(ordinal, space_, points_);
         check_cluster(l, ordinal, record_of(entry, l, offset, level.top()));
       } catch (const Error& error) {
-        problem(level.data().path(), page->offset(i), error.what());
+        problem(level.data().name(), page->offset(i), error.what());
       }
     }
   }
@@ -236,14 +241,14 @@ class Verification {
                       static_cast<std::uint64_t>(orphan - sums.headed.begin()), 0,
                       "no point above heads it");
     } else if (sums.heads != sums.representatives) {
-      problem(levels_[l]->data().path(), 0,
+      problem(levels_[l]->data().name(), 0,
               "the representatives of level " + std::to_string(l) +
                   " are not the points above that head its clusters");
     }
   }
 
   void check_totals() {
-    const auto manifest = store_.path() / kManifestName;
+    const auto manifest = manifest_file_.name();
     if (bounds_ != manifest_.bounds) problem(manifest, 0, "the bounds are not those of the points");
     if (manifest_.points == 0) return;
     const double mean = height_sum_ / static_cast<double>(manifest_.points);
@@ -255,6 +260,7 @@ class Verification {
   }
 
   const Store& store_;
+  const ByteSource& manifest_file_;
   const Manifest& manifest_;
   const std::vector<std::unique_ptr<LevelReader>>& levels_;
   const std::stop_token& stop_;
@@ -270,10 +276,10 @@ class Verification {
 
 }  // namespace
 
-bool verify_store(const Store& store, const Manifest& manifest,
+bool verify_store(const Store& store, const ByteSource& manifest_file, const Manifest& manifest,
                   const std::vector<std::unique_ptr<LevelReader>>& levels,
                   const std::stop_token& stop, const std::function<void(const Problem&)>& report) {
-  return Verification(store, manifest, levels, stop, report).run();
+  return Verification(store, manifest_file, manifest, levels, stop, report).run();
 }
 
 }  // namespace terrace::stream::store

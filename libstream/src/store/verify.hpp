@@ -13,7 +13,8 @@ namespace terrace::stream::store {
 
 /// Checks every byte and every invariant of an open store; see Store::verify.
 /// Memory: two bits per cluster and some buffers.
-bool verify_store(const Store& store, const Manifest& manifest,
+/// manifest_file: what `manifest` was read from.
+bool verify_store(const Store& store, const ByteSource& manifest_file, const Manifest& manifest,
                   const std::vector<std::unique_ptr<LevelReader>>& levels,
                   const std::stop_token& stop, const std::function<void(const Problem&)>& report);
 

@@ -18,7 +18,7 @@ double square_of(double dx, double dy) { return dx * dx + dy * dy; }
 }  // namespace
 
 NearestPoint::NearestPoint(const stream::Store& store, unsigned level, std::uint64_t cache_bytes)
-    : reader_(store, cache_bytes), root_(store.root()), level_(level) {}
+    : query_(store, cache_bytes), level_(level) {}
 
 void NearestPoint::add(const Point2& point, const Point2& place) {
   const double square = square_of(point[0] - place[0], point[1] - place[1]);
@@ -28,30 +28,7 @@ void NearestPoint::add(const Point2& point, const Point2& place) {
   nearest_.push_back(point);
 }
 
-void NearestPoint::look_into(const StoreWindow::Node& node, const Point2& place) {
-  const unsigned at = stream::level_of(node.id);
-  for (std::size_t i = 0; i < node.positions.size(); ++i) {
-    add({node.positions[i][0], node.positions[i][1]}, place);
-  }
-  if (at <= level_) return;
-  for (std::size_t i = 0; i < node.positions.size(); ++i) {
-    for (unsigned below = level_; below < at; ++below) {
-      const StoredBox& box = node.boxes[i * at + below];
-      if (box.min == box.max) continue;  // the point itself, whatever is in it
-      const auto out = [&](std::size_t k) {
-        return std::max({box.min[k] - place[k], place[k] - box.max[k], 0.0});
-      };
-      const double least = square_of(out(0), out(1)) * (1 - kDoubt);
-      if (least > bound_) continue;
-      branches_.push_back({least, stream::cluster_id(below, node.children[i * at + below])});
-      std::push_heap(branches_.begin(), branches_.end(),
-                     [](const Branch& a, const Branch& b) { return a.least > b.least; });
-    }
-  }
-}
-
 Point2 NearestPoint::operator()(const Point2& place) {
-  branches_.clear();
   nearest_.clear();
   // The last answer is no farther than it is; it will be found again if there is nothing nearer.
   bound_ = std::numeric_limits<double>::infinity();
@@ -59,15 +36,22 @@ Point2 NearestPoint::operator()(const Point2& place) {
     const double square = square_of((*last_)[0] - place[0], (*last_)[1] - place[1]);
     bound_ = square * (1 + kDoubt);
   }
-  look_into(reader_.node(root_), place);
-  while (!branches_.empty()) {
-    std::pop_heap(branches_.begin(), branches_.end(),
-                  [](const Branch& a, const Branch& b) { return a.least > b.least; });
-    const Branch branch = branches_.back();
-    branches_.pop_back();
-    if (branch.least > bound_) break;
-    look_into(reader_.node(branch.id), place);
-  }
+  query_.best_first(
+      level_,
+      [&place](const stream::Box3& box) {
+        // Of one place: the point that heads it, whatever is in it.
+        if (box.min[0] == box.max[0] && box.min[1] == box.max[1]) {
+          return std::numeric_limits<double>::infinity();
+        }
+        const auto out = [&](std::size_t k) {
+          return std::max({box.min[k] - place[k], place[k] - box.max[k], 0.0});
+        };
+        return square_of(out(0), out(1)) * (1 - kDoubt);
+      },
+      [&](const stream::StoreQuery::Node& node) {
+        for (const stream::Point3& p : node.positions) add({p[0], p[1]}, place);
+        return bound_;
+      });
   std::erase_if(nearest_, [&](const Point2& p) {
     return square_of(p[0] - place[0], p[1] - place[1]) > bound_;
   });

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include <terrace/stream/store.hpp>
+#include <terrace/stream/store_query.hpp>
 
-#include "surface/store_window.hpp"
 #include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
@@ -26,19 +26,11 @@ class NearestPoint {
   Point2 operator()(const Point2& place);
 
  private:
-  struct Branch {
-    double least = 0;  ///< of the squares of distances in it, never too large
-    stream::ClusterId id{};
-  };
-
-  void look_into(const StoreWindow::Node& node, const Point2& place);
   void add(const Point2& point, const Point2& place);
 
-  StoreWindow reader_;
-  stream::ClusterId root_;
+  stream::StoreQuery query_;
   unsigned level_;
-  std::vector<Branch> branches_;  ///< a heap, the least on top
-  std::vector<Point2> nearest_;   ///< as near as rounding can tell, and maybe farther ones before
+  std::vector<Point2> nearest_;  ///< as near as rounding can tell, and maybe farther ones before
   std::optional<Point2> last_;
   double bound_ = 0;  ///< the square of the distance of the nearest, or a little more
 };

@@ -15,7 +15,7 @@ ClusterFrontier::ClusterFrontier(const stream::Store& store, unsigned level)
 void ClusterFrontier::begin(const Take& take) {
   entries_.clear();
   open_.clear();
-  const StoreWindow::Node& root = reader_.node(root_);
+  const stream::StoreQuery::Node& root = reader_.node(root_);
   take(root);
   add_below(root);
 }
@@ -30,12 +30,13 @@ bool ClusterFrontier::settle(Open& open) const {
   }
 }
 
-void ClusterFrontier::add_below(const StoreWindow::Node& node) {
-  const unsigned at = stream::level_of(node.id);
+void ClusterFrontier::add_below(const stream::StoreQuery::Node& node) {
+  const unsigned at = node.level();
   if (at <= level_) return;
   for (std::size_t i = 0; i < node.positions.size(); ++i) {
     for (unsigned below = level_; below < at; ++below) {
-      entries_.push_back({node.boxes[i * at + below], node.children[i * at + below]});
+      const stream::StoreQuery::Branch& branch = node.branch(i, below);
+      entries_.push_back({flat(branch.box), branch.ordinal});
     }
     Open next{
         {}, static_cast<std::uint32_t>(entries_.size() - 1), static_cast<std::uint8_t>(at - 1)};
@@ -45,7 +46,7 @@ void ClusterFrontier::add_below(const StoreWindow::Node& node) {
 
 void ClusterFrontier::read_one(std::size_t at, const Take& take) {
   const Open open = open_[at];
-  const StoreWindow::Node& node =
+  const stream::StoreQuery::Node& node =
       reader_.node(stream::cluster_id(open.level, entries_[open.entry].ordinal));
   take(node);
   add_below(node);

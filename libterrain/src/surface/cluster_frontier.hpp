@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <terrace/stream/store.hpp>
+#include <terrace/stream/store_query.hpp>
 
 #include "surface/store_window.hpp"
 
@@ -24,7 +25,7 @@ class ClusterFrontier {
     std::uint8_t level = 0;
   };
   /// Takes the members of a cluster.
-  using Take = std::function<void(const StoreWindow::Node& node)>;
+  using Take = std::function<void(const stream::StoreQuery::Node& node)>;
 
   /// level: the points of this level and above. The store must outlive this.
   ClusterFrontier(const stream::Store& store, unsigned level);
@@ -50,11 +51,11 @@ class ClusterFrontier {
   };
 
   void read_one(std::size_t at, const Take& take);
-  void add_below(const StoreWindow::Node& node);
+  void add_below(const stream::StoreQuery::Node& node);
   /// Takes empty boxes off: all that is below has the x,y of the head. False: nothing is left.
   bool settle(Open& open) const;
 
-  StoreWindow reader_;
+  stream::StoreQuery reader_;
   stream::ClusterId root_;
   unsigned level_;
   std::vector<Entry> entries_;

@@ -62,7 +62,7 @@ void PointWindow::check_memory(std::size_t more) const {
                 .remedy = "give more `memory_bytes`, fewer `threads`, or a coarser `level`"});
 }
 
-void PointWindow::take(const StoreWindow::Node& node) {
+void PointWindow::take(const stream::StoreQuery::Node& node) {
   check_memory(node.positions.size());
   const auto cluster = static_cast<std::uint32_t>(read_.size());
   read_.push_back(node.id);
@@ -104,7 +104,7 @@ void PointWindow::grow_inner(const StoredBox& box) {
       if (p.origin.cluster != kNowhere && inner_.contains({p.place[0], p.place[1], 0})) take(p);
     }
   }
-  frontier_.read_meeting(inner_, [this](const StoreWindow::Node& node) { take(node); });
+  frontier_.read_meeting(inner_, [this](const stream::StoreQuery::Node& node) { take(node); });
 }
 
 void PointWindow::take_nearest(std::size_t count) {
@@ -187,7 +187,7 @@ void PointWindow::load(const StoredBox& box, Reach reach) {
   const StoredBox bounds{{store_.bounds().min[0], store_.bounds().min[1]},
                          {store_.bounds().max[0], store_.bounds().max[1]}};
   if (box.meets(bounds)) {
-    const auto take = [this](const StoreWindow::Node& node) { this->take(node); };
+    const auto take = [this](const stream::StoreQuery::Node& node) { this->take(node); };
     frontier_.begin(take);
     frontier_.read_meeting(box, take);
     // Triangles across the border need a few points more, which are cheaper in bulk.

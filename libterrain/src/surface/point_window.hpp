@@ -148,7 +148,7 @@ class PointWindow {
   enum State : std::uint8_t { kUnknown, kSuspect, kCertain, kTriangleState = 3, kHullEdge = 4 };
 
   void clear();
-  void take(const StoreWindow::Node& node);
+  void take(const stream::StoreQuery::Node& node);
   void take(Pending& point);
   void grow_inner(const StoredBox& box);
   void take_nearest(std::size_t count);

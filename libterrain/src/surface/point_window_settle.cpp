@@ -323,7 +323,7 @@ bool PointWindow::read_missing() {
   if (chosen_.empty()) return false;
   std::sort(chosen_.begin(), chosen_.end());
   chosen_.erase(std::unique(chosen_.begin(), chosen_.end()), chosen_.end());
-  frontier_.read(chosen_, [this](const StoreWindow::Node& node) { take(node); });
+  frontier_.read(chosen_, [this](const stream::StoreQuery::Node& node) { take(node); });
   return true;
 }
 

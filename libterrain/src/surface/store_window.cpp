@@ -5,119 +5,60 @@
 #include <cassert>
 #include <cstddef>
 #include <limits>
-#include <utility>
 
 namespace terrace::terrain {
 namespace {
 
-constexpr std::uint64_t kInnerBytes = std::uint64_t{4} << 20;
+constexpr std::size_t kMostSome = 12;
 
-StoredBox flat(const stream::Box3& box) {
-  return {{box.min[0], box.min[1]}, {box.max[0], box.max[1]}};
+/// Visits the clusters that hold the points of `level` and above in the box.
+template <class Visit>
+void descend(stream::StoreQuery& query, const StoredBox& box, unsigned level, const Visit& visit) {
+  query.descend(
+      level,
+      [&box](unsigned, const stream::StoreQuery::Branch& branch) { return box.meets(branch.box); },
+      visit);
 }
 
 }  // namespace
 
+std::optional<ClusterHeights> cluster_heights(stream::StoreQuery& query, const StoredBox& box) {
+  constexpr double kFar = std::numeric_limits<double>::infinity();
+  ClusterHeights found{.low = kFar, .high = -kFar, .some = {}};
+  query.cut(
+      tall(box),
+      [&](const stream::Point3& head, const stream::StoreQuery::Branch& cluster) {
+        found.low = std::min(found.low, cluster.box.min[2]);
+        found.high = std::max(found.high, cluster.box.max[2]);
+        if (found.some.size() < kMostSome && box.contains(head)) found.some.push_back(head);
+        return true;
+      },
+      [&](const stream::StoreQuery::Branch& cluster) {
+        // What lies below cannot widen the range.
+        const bool known = found.low <= cluster.box.min[2] && found.high >= cluster.box.max[2];
+        return !(known && found.some.size() == kMostSome);
+      });
+  if (found.low > found.high) return std::nullopt;
+  return found;
+}
+
 StoreWindow::StoreWindow(const stream::Store& store, std::uint64_t cache_bytes)
-    : store_(store),
-      leaves_{.most_bytes = cache_bytes},
-      inner_{.most_bytes = kInnerBytes},
-      wanted_(store.top() + 1) {
-  fill(root_, store.root());
-}
-
-void StoreWindow::fill(Node& node, stream::ClusterId id) {
-  const unsigned level = stream::level_of(id);
-  store_.read(id, points_);
-  node.id = id;
-  // Not copied: the next cluster is read into what the node held before.
-  std::swap(node.positions, points_.positions);
-  std::swap(node.children, points_.children);
-  node.boxes.clear();
-  for (std::size_t i = 0; i < node.positions.size(); ++i) {
-    for (unsigned below = 0; below < level; ++below) {
-      const std::uint64_t ordinal = node.children[i * level + below];
-      node.boxes.push_back(flat(store_.record(stream::cluster_id(below, ordinal)).summary.box));
-    }
-  }
-  // The node itself and its entries in list and map count too.
-  node.bytes = node.positions.capacity() * sizeof(stream::Point3) +
-               node.children.capacity() * sizeof(std::uint64_t) +
-               node.boxes.capacity() * sizeof(StoredBox) + sizeof(Node) + 64;
-}
-
-void StoreWindow::Cache::drop(Nodes& to) {
-  by_id.erase(static_cast<std::uint64_t>(nodes.back().id));
-  held_bytes -= nodes.back().bytes;
-  to.splice(to.begin(), nodes, std::prev(nodes.end()));
-}
-
-const StoreWindow::Node& StoreWindow::node(stream::ClusterId id) {
-  if (id == root_.id) return root_;
-  Cache& cache = stream::level_of(id) == 0 ? leaves_ : inner_;
-  if (cache.most_bytes == 0) {
-    fill(passing_, id);
-    return passing_;
-  }
-  const auto key = static_cast<std::uint64_t>(id);
-  if (const auto found = cache.by_id.find(key); found != cache.by_id.end()) {
-    cache.nodes.splice(cache.nodes.begin(), cache.nodes, found->second);
-    return cache.nodes.front();
-  }
-  // A node that has to go lends its memory to the one that comes. Until that one is whole it is in
-  // no map, so damage leaves nothing behind.
-  Nodes fresh, gone;
-  if (cache.held_bytes >= cache.most_bytes && !cache.nodes.empty()) {
-    cache.drop(fresh);
-  } else {
-    fresh.emplace_front();
-  }
-  fill(fresh.front(), id);
-  cache.held_bytes += fresh.front().bytes;
-  cache.nodes.splice(cache.nodes.begin(), fresh);
-  cache.by_id[key] = cache.nodes.begin();
-  while (cache.held_bytes > cache.most_bytes && cache.nodes.size() > 1) cache.drop(gone);
-  return cache.nodes.front();
-}
-
-template <class Visit>
-void StoreWindow::descend(const StoredBox& box, unsigned level, const Visit& visit) {
-  for (std::vector<std::uint64_t>& ordinals : wanted_) ordinals.clear();
-  const auto deliver = [&](const Node& node, unsigned at) {
-    visit(node, at);
-    for (std::size_t i = 0; i < node.positions.size(); ++i) {
-      // What a point heads on a level lies within what it heads on the level above.
-      for (unsigned below = at; below-- > level;) {
-        if (!node.boxes[i * at + below].meets(box)) break;
-        wanted_[below].push_back(node.children[i * at + below]);
-      }
-    }
-  };
-  const unsigned top = store_.top();
-  if (level > top) return;
-  deliver(root_, top);
-  for (unsigned at = top; at-- > level;) {
-    // In order of ordinals: so are the bytes in the file.
-    std::sort(wanted_[at].begin(), wanted_[at].end());
-    for (const std::uint64_t ordinal : wanted_[at]) {
-      deliver(node(stream::cluster_id(at, ordinal)), at);
-    }
-  }
-}
+    : query_(store, cache_bytes) {}
 
 template <class Height>
 void StoreWindow::scatter(const LatticeWindow& window, std::span<Height> out, unsigned level) {
-  assert(store_.schema().grid);
+  const stream::StoreSchema& schema = query_.store().schema();
+  assert(schema.grid);
   assert(out.size() == window.size());
   std::fill(out.begin(), out.end(), std::numeric_limits<Height>::quiet_NaN());
   if (window.columns <= 0 || window.rows <= 0) return;
-  const stream::Channel& channel = store_.schema().coordinates[2];
+  const stream::Channel& channel = schema.coordinates[2];
   const auto columns = static_cast<std::size_t>(window.columns);
   const StoredBox box{{static_cast<double>(window.column), static_cast<double>(window.row)},
                       {static_cast<double>(window.column + window.columns - 1),
                        static_cast<double>(window.row + window.rows - 1)}};
   const double scale = channel.scale, offset = channel.offset;
-  descend(box, level, [&](const Node& node, unsigned) {
+  descend(query_, box, level, [&](const stream::StoreQuery::Node& node) {
     for (const stream::Point3& p : node.positions) {
       if (!box.contains(p)) continue;
       const auto column = static_cast<std::size_t>(static_cast<std::int64_t>(p[0] - box.min[0]));
@@ -137,7 +78,7 @@ void StoreWindow::heights(const LatticeWindow& window, std::span<float> out, uns
 }
 
 bool StoreWindow::float_is_exact() const {
-  const stream::Channel& channel = store_.schema().coordinates[2];
+  const stream::Channel& channel = query_.store().schema().coordinates[2];
   if (channel.scale != 1.0 || channel.offset != 0.0) return false;
   switch (channel.type) {
     case stream::ScalarType::i8:
@@ -153,11 +94,11 @@ bool StoreWindow::float_is_exact() const {
 
 void StoreWindow::points(const StoredBox& box, WindowPoints& out, unsigned level) {
   out.clear();
-  descend(box, level, [&](const Node& node, unsigned at) {
+  descend(query_, box, level, [&](const stream::StoreQuery::Node& node) {
     for (const stream::Point3& p : node.positions) {
       if (!box.contains(p)) continue;
       out.positions.push_back(p);
-      out.levels.push_back(static_cast<std::uint8_t>(at));
+      out.levels.push_back(static_cast<std::uint8_t>(node.level()));
     }
   });
 }

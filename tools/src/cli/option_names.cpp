@@ -10,7 +10,7 @@ namespace terrace::tools {
 namespace {
 
 /// Parameter and option. tests/layout checks that all parameters that libterrain names are here.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 24> kOptions{{
+constexpr std::array<std::pair<std::string_view, std::string_view>, 26> kOptions{{
     {"block_points", "--block"},
     {"cell", "--cell"},
     {"crs", "--crs"},
@@ -26,6 +26,7 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 24> kOptions
     {"memory_bytes", "--memory"},
     {"metadata", "--metadata"},
     {"metric", "--metric"},
+    {"near", "--near"},
     {"region", "--region"},
     {"replace", "--force"},
     {"resume", "--resume"},
@@ -34,6 +35,7 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 24> kOptions
     {"to_crs", "--to-crs"},
     {"vertical", "--vertical"},
     {"water", "--water"},
+    {"within", "--within"},
     {"zoom", "--zoom"},
 }};
 

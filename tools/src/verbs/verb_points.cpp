@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
 #include <cstddef>
 #include <cstring>
 #include <memory>
@@ -11,6 +12,7 @@
 #include <terrace/stream/overlay.hpp>
 #include <terrace/stream/point_writer.hpp>
 #include <terrace/stream/store.hpp>
+#include <terrace/stream/store_query.hpp>
 
 #include "base/units.hpp"
 #include "cli/crs_options.hpp"
@@ -19,6 +21,8 @@
 #include "cli/output.hpp"
 #include "mesh/height_overlay.hpp"
 #include "terrace/terrain/detail.hpp"
+#include "terrace/terrain/error.hpp"
+#include "terrace/terrain/near_points.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
@@ -92,6 +96,36 @@ class PointOutput {
   std::uint64_t replaced_ = 0;
 };
 
+/// Points that were found near a place, in their order, with the distance in metres as a further
+/// column.
+void write_found(const stream::Store& store, const std::vector<stream::FoundPoint>& found,
+                 const PlaceConversion& places, stream::PointWriter& writer) {
+  const stream::StoreSchema& schema = store.schema();
+  const std::size_t own = schema.payload_size(), record = own + sizeof(double);
+  stream::PointBlock block;
+  block.payload.resize(found.size() * record);
+  std::vector<std::size_t> by_cluster(found.size());
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    block.positions.push_back(world_point(schema, found[i].position));
+    std::memcpy(block.payload.data() + i * record + own, &found[i].distance, sizeof(double));
+    by_cluster[i] = i;
+  }
+  if (own > 0) {
+    std::sort(by_cluster.begin(), by_cluster.end(),
+              [&](std::size_t a, std::size_t b) { return found[a].cluster < found[b].cluster; });
+    stream::ClusterPoints points;
+    std::optional<stream::ClusterId> read;
+    for (const std::size_t i : by_cluster) {
+      if (read != found[i].cluster) store.read(found[i].cluster, points);
+      read = found[i].cluster;
+      std::memcpy(block.payload.data() + i * record, points.payload.data() + found[i].member * own,
+                  own);
+    }
+  }
+  places(block.positions);
+  if (!block.empty()) writer.append(block);
+}
+
 class PointsCommand final : public Command {
  public:
   void define(CLI::App& app) override {
@@ -106,9 +140,19 @@ class PointsCommand final : public Command {
     app.add_option("--focus", focuses_,
                    "BOX:L, points of level L and above inside the box; repeatable")
         ->allow_extra_args(false);
+    app.add_option("--near", near_,
+                   "X,Y[,Z] in the store's CRS: the points near a place, the nearest first, with "
+                   "their distance in metres on the ground; without Z heights do not count")
+        ->excludes("--region")
+        ->excludes("--focus");
+    app.add_option("-k", count_, "with --near: so many points")->needs("--near");
+    app.add_option("--within", radius_, "with --near: all points up to this distance, in metres")
+        ->needs("--near")
+        ->excludes("-k");
     app.add_option("--overlay", overlay_,
                    "a file of mesh --save-overlay: its heights in place of the store's")
-        ->type_name("FILE");
+        ->type_name("FILE")
+        ->excludes("--near");
     crs_.define(app);
     not_yet(app, {"--max-points"});
   }
@@ -118,6 +162,7 @@ class PointsCommand final : public Command {
     const stream::Store store = open_store(store_);
     const Detail detail =
         parse_detail(store, level_, region_, focuses_, crs_.regions(store, common));
+    if (!near_.empty()) return near(store, detail.level, watch, common);
     std::optional<stream::Overlay> overlay;
     if (!overlay_.empty()) overlay.emplace(open_height_overlay(overlay_, store));
     const auto writer = stream::open_point_writer(
@@ -148,7 +193,43 @@ class PointsCommand final : public Command {
   }
 
  private:
-  std::string store_, output_, format_, level_, region_, overlay_;
+  Summary near(const stream::Store& store, unsigned level, const Stopwatch& watch,
+               const CommonOptions& common) const {
+    const std::vector<double> v = parse_numbers(near_, "--near");
+    if (v.size() != 2 && v.size() != 3) throw UsageError("--near needs X,Y or X,Y,Z");
+    if (!count_ && !radius_) throw UsageError("--near needs -k or --within");
+    NearPlace place{.xy = {v[0], v[1]}};
+    if (v.size() == 3) place.z = v[2];
+    stream::StoreQuery query(store);
+    const std::vector<stream::FoundPoint> found =
+        count_ ? nearest_points(query, place, *count_, level)
+               : points_within(query, place, *radius_, level);
+    std::vector<stream::Channel> attributes = store.schema().attributes;
+    attributes.push_back({.name = "distance", .unit = "metre"});
+    const auto writer = stream::open_point_writer(
+        output_, {.attributes = std::move(attributes), .comments = {kWriterMark}},
+        {.format = format_, .replace = may_replace(output_, common.force), .stop = stop_token()});
+    write_found(store, found, crs_.places(store, common), *writer);
+    writer->finish();
+    Summary summary;
+    summary.json = {{"vertices", found.size()},
+                    {"triangles", 0},
+                    {"seconds", watch.seconds()},
+                    {"peak_rss_bytes", peak_rss_bytes()}};
+    summary.text = output_ + ": " + with_commas(found.size()) + " points";
+    if (!found.empty()) {
+      summary.json["nearest_metres"] = found.front().distance;
+      summary.json["farthest_metres"] = found.back().distance;
+      summary.text += ", " + readable_number(found.front().distance) + " to " +
+                      readable_number(found.back().distance) + " m away";
+    }
+    summary.text += ", in " + readable_seconds(watch.seconds()) + "\n";
+    return summary;
+  }
+
+  std::string store_, output_, format_, level_, region_, overlay_, near_;
+  std::optional<std::size_t> count_;
+  std::optional<double> radius_;
   std::vector<std::string> focuses_;
   CrsOptions crs_;
 };

@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "terrace/stream/byte_source.hpp"
 #include "terrace/stream/schema.hpp"
 
 /// The store: a folder that holds every input point exactly once in a hierarchy of clusters, each
@@ -163,6 +164,9 @@ class Store {
  public:
   /// Throws: Error if there is no store, a newer version, or a damaged manifest.
   static Store open(const std::filesystem::path& path);
+  /// The same where the files are not in a folder: in memory, in an archive, on a server. `name`
+  /// stands for the folder in messages and as path(). Throws as above, and what `files` throws.
+  static Store open(const std::string& name, const OpenByName& files);
   /// A store that a writer moved aside to replace it gets its name back if the writer died then:
   /// true if so. open() does it by itself.
   static bool recover(const std::filesystem::path& path);

@@ -17,17 +17,28 @@ constexpr std::uint64_t kCachedContexts = 512 * kCachedTables;
 /// A writer makes one set per 1024 blocks, and no block without a cluster.
 constexpr std::uint64_t kFewestClustersOfTables = 1024;
 
-Error damaged_file(const InputFile& file, std::uint64_t offset, const std::string& cause) {
-  return Error({.file = file.path().string(),
+Error damaged_file(const ByteSource& file, std::uint64_t offset, const std::string& cause) {
+  return Error({.file = file.name(),
                 .where = "byte " + std::to_string(offset),
                 .cause = cause,
                 .remedy = kRestoreStore});
 }
 
+std::unique_ptr<ByteSource> open_listed(const OpenByName& files, const FileEntry& entry) {
+  auto file = files(entry.name);
+  if (file->size() != entry.bytes) {
+    throw Error({.file = file->name(),
+                 .where = {},
+                 .cause = "the manifest says " + std::to_string(entry.bytes) +
+                          " bytes, the file has " + std::to_string(file->size()),
+                 .remedy = kRestoreStore});
+  }
+  return file;
+}
+
 }  // namespace
 
-LevelReader::LevelReader(const std::filesystem::path& folder, const Manifest& manifest,
-                         unsigned level)
+LevelReader::LevelReader(const OpenByName& files, const Manifest& manifest, unsigned level)
     : layout_(manifest.schema, level),
       clusters_(manifest.levels[level].clusters),
       pages_(clusters_ / kPageClusters + (clusters_ % kPageClusters != 0)),
@@ -35,16 +46,16 @@ LevelReader::LevelReader(const std::filesystem::path& folder, const Manifest& ma
       top_(level + 1 == manifest.levels.size()),
       store_points_(manifest.points),
       bounds_(manifest.bounds),
-      data_(folder / manifest.levels[level].data.name, manifest.levels[level].data.bytes),
-      index_(folder / manifest.levels[level].index.name, manifest.levels[level].index.bytes),
+      data_(open_listed(files, manifest.levels[level].data)),
+      index_(open_listed(files, manifest.levels[level].index)),
       page_cache_(std::clamp<std::uint64_t>(pages_, 1, kCachedPages)),
       tables_cache_(1) {
   for (unsigned below = 0; below < level; ++below) {
     clusters_below_.push_back(manifest.levels[below].clusters);
   }
   const std::uint64_t size = manifest.levels[level].directory_bytes;
-  if (size > index_.size())
-    throw damaged_file(index_, 0, "the index is smaller than its directory");
+  if (size > index_->size())
+    throw damaged_file(*index_, 0, "the index is smaller than its directory");
   read_directory(size);
   const std::uint64_t most_cached = std::min(kCachedTables, kCachedContexts / layout_.contexts());
   tables_cache_ = SlotCache<DecodingTables>(
@@ -52,13 +63,13 @@ LevelReader::LevelReader(const std::filesystem::path& folder, const Manifest& ma
 }
 
 void LevelReader::read_directory(std::uint64_t size) {
-  const std::uint64_t start = index_.size() - size;
+  const std::uint64_t start = index_->size() - size;
   const std::uint64_t most_tables = 1 + clusters_ / kFewestClustersOfTables;
   if (size > 8 * (pages_ + 1) + 8 + most_tables * (20 + Tables::most_bytes(layout_.contexts()))) {
-    throw damaged_file(index_, start, "the directory is too large for the level's clusters");
+    throw damaged_file(*index_, start, "the directory is too large for the level's clusters");
   }
   tail_.resize(size);
-  index_.read(start, tail_);
+  index_->read(start, std::as_writable_bytes(std::span(tail_)));
   try {
     if (size < 4 ||
         crc32(ByteView(tail_).first(size - 4)) != load<std::uint32_t>(tail_.data() + size - 4)) {
@@ -95,20 +106,20 @@ void LevelReader::read_directory(std::uint64_t size) {
     if (in.left() != 0) throw Damage("bytes follow the directory");
     if (tables_at_.empty() && clusters_ > 0) throw Damage("the level has no tables");
   } catch (const Damage& damage) {
-    throw damaged_file(index_, start, damage.what());
+    throw damaged_file(*index_, start, damage.what());
   }
 }
 
 std::shared_ptr<const IndexPage> LevelReader::read_page(std::uint64_t number) const {
   const std::uint64_t start = directory_[number];
   Bytes bytes(directory_[number + 1] - start);
-  index_.read(start, bytes);
+  index_->read(start, std::as_writable_bytes(std::span(bytes)));
   try {
     return std::make_shared<const IndexPage>(
         std::move(bytes), static_cast<std::uint32_t>(std::min<std::uint64_t>(
                               kPageClusters, clusters_ - number * kPageClusters)));
   } catch (const Damage& damage) {
-    throw damaged_file(index_, start, damage.what());
+    throw damaged_file(*index_, start, damage.what());
   }
 }
 
@@ -118,7 +129,7 @@ std::shared_ptr<const IndexPage> LevelReader::page(std::uint64_t number) const {
 
 Entry LevelReader::entry(std::uint64_t ordinal, std::uint64_t& offset) const {
   if (ordinal >= clusters_) {
-    throw Error({.file = index_.path().string(),
+    throw Error({.file = index_->name(),
                  .where = {},
                  .cause = "there is no cluster " + std::to_string(layout_.level) + "/" +
                           std::to_string(ordinal) + ", the level has " + std::to_string(clusters_),
@@ -130,7 +141,7 @@ Entry LevelReader::entry(std::uint64_t ordinal, std::uint64_t& offset) const {
     offset = page->offset(i);
     return entry(*page, i);
   } catch (const Damage& damage) {
-    throw damaged_file(index_, directory_[ordinal / kPageClusters], damage.what());
+    throw damaged_file(*index_, directory_[ordinal / kPageClusters], damage.what());
   }
 }
 
@@ -173,20 +184,20 @@ std::shared_ptr<const DecodingTables> LevelReader::tables(std::uint64_t ordinal)
       return std::make_shared<const DecodingTables>(
           Tables::read(ByteView(tail_).subspan(at.offset, at.size), layout_.contexts()));
     } catch (const Damage& damage) {
-      throw damaged_file(index_, index_.size() - tail_.size() + at.offset, damage.what());
+      throw damaged_file(*index_, index_->size() - tail_.size() + at.offset, damage.what());
     }
   });
 }
 
 void LevelReader::check_range(std::uint64_t ordinal, std::uint64_t offset,
                               std::uint64_t size) const {
-  if (offset > data_.size() || size > data_.size() - offset) {
+  if (offset > data_->size() || size > data_->size() - offset) {
     throw damaged(ordinal, "its bytes are said to lie behind the end of the file");
   }
 }
 
 Error LevelReader::damaged(std::uint64_t ordinal, const std::string& cause) const {
-  return Error({.file = data_.path().string(),
+  return Error({.file = data_->name(),
                 .where = "cluster " + std::to_string(layout_.level) + "/" + std::to_string(ordinal),
                 .cause = cause,
                 .remedy = kRestoreStore});
@@ -234,7 +245,8 @@ void LevelReader::read(std::uint64_t ordinal, ReadSpace& space, ClusterPoints& o
   const Entry entry = this->entry(ordinal, offset);
   check_range(ordinal, offset, entry.bytes);
   space.bytes.resize(entry.bytes + 2 * kPadding);
-  data_.read(offset, {space.bytes.data() + kPadding, entry.bytes});
+  data_->read(offset,
+              std::as_writable_bytes(std::span(space.bytes).subspan(kPadding, entry.bytes)));
   decode(ordinal, entry, offset, ByteView(space.bytes).subspan(kPadding, entry.bytes),
          space.decoder, out);
 }

@@ -2,15 +2,14 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <memory>
 #include <mutex>
 #include <vector>
 
-#include "store/files.hpp"
 #include "store/manifest.hpp"
 #include "store/read/cluster_decoder.hpp"
 #include "store/read/index_page.hpp"
+#include "terrace/stream/byte_source.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::stream::store {
@@ -56,13 +55,13 @@ struct ReadSpace {
 class LevelReader {
  public:
   /// Reads directory and tables. Throws: Error.
-  LevelReader(const std::filesystem::path& folder, const Manifest& manifest, unsigned level);
+  LevelReader(const OpenByName& files, const Manifest& manifest, unsigned level);
 
   [[nodiscard]] const Layout& layout() const { return layout_; }
   [[nodiscard]] std::uint64_t clusters() const { return clusters_; }
   [[nodiscard]] bool top() const { return top_; }
-  [[nodiscard]] const InputFile& data() const { return data_; }
-  [[nodiscard]] const InputFile& index() const { return index_; }
+  [[nodiscard]] const ByteSource& data() const { return *data_; }
+  [[nodiscard]] const ByteSource& index() const { return *index_; }
   [[nodiscard]] std::uint64_t pages() const { return pages_; }
   [[nodiscard]] std::uint64_t page_offset(std::uint64_t page) const { return directory_[page]; }
 
@@ -88,7 +87,7 @@ class LevelReader {
       const std::uint64_t size = page->end() - begin;
       check_range(number * kPageClusters, begin, size);
       bytes.resize(size + 2 * kPadding);
-      data_.read(begin, {bytes.data() + kPadding, size});
+      data_->read(begin, std::as_writable_bytes(std::span(bytes).subspan(kPadding, size)));
       visit(number * kPageClusters, *page, ByteView(bytes));
     }
   }
@@ -115,7 +114,7 @@ class LevelReader {
   std::uint64_t store_points_;
   Box3 bounds_;                                ///< of the store
   std::vector<std::uint64_t> clusters_below_;  ///< of each level below
-  InputFile data_, index_;
+  std::unique_ptr<ByteSource> data_, index_;
   Bytes tail_;
   std::vector<std::uint64_t> directory_;  ///< pages_ + 1 offsets in the index file
   std::vector<TablesAt> tables_at_;

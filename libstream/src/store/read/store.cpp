@@ -5,10 +5,10 @@
 #include <mutex>
 #include <utility>
 
-#include "io/temporary.hpp"
 #include "store/read/level_reader.hpp"
 #include "store/verify.hpp"
-#include "terrace/stream/atomic_file.hpp"
+#include "terrace/stream/byte_source.hpp"
+#include "terrace/stream/error.hpp"
 
 namespace terrace::stream {
 
@@ -16,6 +16,7 @@ using namespace store;
 
 struct Store::Impl {
   std::filesystem::path path;
+  std::unique_ptr<ByteSource> manifest_file;
   Manifest manifest;
   std::uint64_t bytes = 0;
   std::vector<LevelInfo> infos;
@@ -60,19 +61,12 @@ void Store::check_stop() const {
   if (stop_.stop_requested()) throw Stopped();
 }
 
-Store Store::open(const std::filesystem::path& path) {
-  const auto manifest_path = path / kManifestName;
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(manifest_path, error) && !recover(path)) {
-    throw Error({.file = path.string(),
-                 .where = {},
-                 .cause = "there is no store here",
-                 .remedy = "name a folder that terrace build has written"});
-  }
+Store Store::open(const std::string& name, const OpenByName& files) {
   auto impl = std::make_shared<Impl>();
-  impl->path = path;
-  const std::string text = read_whole(manifest_path, kMostManifestBytes);
-  impl->manifest = parse_manifest(text, manifest_path);
+  impl->path = name;
+  impl->manifest_file = files(kManifestName);
+  const std::string text = read_manifest(*impl->manifest_file);
+  impl->manifest = parse_manifest(text, impl->manifest_file->name());
   impl->bytes = text.size();
   for (unsigned l = 0; l < impl->manifest.levels.size(); ++l) {
     const LevelEntry& level = impl->manifest.levels[l];
@@ -83,13 +77,9 @@ Store Store::open(const std::filesystem::path& path) {
                            .bytes = level.data.bytes + level.index.bytes,
                            .index_bytes = level.index.bytes});
     impl->bytes += level.data.bytes + level.index.bytes;
-    impl->levels.push_back(std::make_unique<LevelReader>(path, impl->manifest, l));
+    impl->levels.push_back(std::make_unique<LevelReader>(files, impl->manifest, l));
   }
   return Store(std::move(impl));
-}
-
-bool Store::recover(const std::filesystem::path& path) {
-  return put_back_replaced(follow_links(path));
 }
 
 const StoreSchema& Store::schema() const { return impl_->manifest.schema; }
@@ -126,7 +116,7 @@ void Store::for_each(
   const LevelReader& level = impl_->level(number);
   const std::uint64_t members = impl_->infos[number].members;
   const auto miscounted = [&] {
-    return Error({.file = level.data().path().string(),
+    return Error({.file = level.data().name(),
                   .where = {},
                   .cause = "the clusters do not have the " + std::to_string(members) +
                            " members that the manifest tells",
@@ -159,7 +149,7 @@ void Store::for_each(
 }
 
 bool Store::verify(const std::function<void(const Problem&)>& report) const {
-  return verify_store(*this, impl_->manifest, impl_->levels, stop_, report);
+  return verify_store(*this, *impl_->manifest_file, impl_->manifest, impl_->levels, stop_, report);
 }
 
 }  // namespace terrace::stream

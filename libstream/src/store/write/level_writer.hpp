@@ -6,9 +6,9 @@
 #include <memory>
 #include <vector>
 
-#include "store/files.hpp"
 #include "store/manifest.hpp"
 #include "store/write/block_encoder.hpp"
+#include "store/write/output_file.hpp"
 #include "store/write/raw_block.hpp"
 
 namespace terrace::stream::store {

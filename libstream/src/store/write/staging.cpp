@@ -12,7 +12,7 @@
 #include <unistd.h>
 
 #include "io/temporary.hpp"
-#include "store/files.hpp"
+#include "store/write/output_file.hpp"
 #include "terrace/stream/atomic_file.hpp"
 #include "terrace/stream/error.hpp"
 

@@ -210,7 +210,7 @@ std::uint64_t StoreWriter::finish(const ClusteredBlock& root, bool publish) {
   w.schema = std::move(manifest.schema);
   // What was written must be readable: this also finds counts that the caller got wrong.
   const auto path = w.staging.folder() / kManifestName;
-  static_cast<void>(parse_manifest(text, path));
+  static_cast<void>(parse_manifest(text, path.string()));
   OutputFile file(path);
   file.write({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
   file.finish();

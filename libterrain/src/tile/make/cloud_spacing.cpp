@@ -9,7 +9,6 @@
 
 #include "base/point_spacing.hpp"
 #include "base/portable_math.hpp"
-#include "surface/cluster_census.hpp"
 
 namespace terrace::terrain {
 namespace {
@@ -40,7 +39,7 @@ std::vector<Seed> some_seeds(const stream::Store& store, const StoredPlaces& pla
     const stream::ClusterId id = stream::cluster_id(0, number);
     store.read(id, points);
     const stream::Box3 box = store.record(id).summary.box;
-    seeds.push_back({points.representative, {{box.min[0], box.min[1]}, {box.max[0], box.max[1]}}});
+    seeds.push_back({points.representative, flat(box)});
   }
   return seeds;
 }
@@ -55,10 +54,11 @@ StoredBox grown(StoredBox box) {
 }
 
 /// The seed's box, or a smaller one around the seed that has not too many points near it.
-StoredBox box_of(const Seed& seed, ClusterCensus& census) {
+StoredBox box_of(const Seed& seed, stream::StoreQuery& query) {
   constexpr unsigned kHalvings = 60;
   StoredBox box = seed.box;
-  for (unsigned i = 0; i < kHalvings && census.count(grown(box), kMostPoints) > kMostPoints; ++i) {
+  for (unsigned i = 0; i < kHalvings && query.estimate(tall(grown(box)), kMostPoints) > kMostPoints;
+       ++i) {
     for (std::size_t axis = 0; axis < 2; ++axis) {
       const double quarter = 0.25 * (box.max[axis] - box.min[axis]);
       box.min[axis] = seed.at[axis] - quarter;
@@ -95,13 +95,12 @@ std::vector<stream::Point3> on_the_ground(const WindowPoints& points, const Stor
 
 double cloud_spacing(const stream::Store& store, const StoredPlaces& places) {
   StoreWindow reader(store);
-  ClusterCensus census(store);
   std::vector<float> distances;
   WindowPoints points;
   std::vector<Point2> stored;
   for (const Seed& seed : some_seeds(store, places)) {
-    const StoredBox box = box_of(seed, census), around = grown(box);
-    if (census.count(around, kMostPoints) > kMostPoints) continue;
+    const StoredBox box = box_of(seed, reader.query()), around = grown(box);
+    if (reader.query().estimate(tall(around), kMostPoints) > kMostPoints) continue;
     points.clear();
     reader.points(around, points);
     const std::vector<stream::Point3> ground = on_the_ground(points, places, stored);

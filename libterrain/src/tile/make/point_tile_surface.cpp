@@ -62,7 +62,6 @@ TiledCloud::TiledCloud(const stream::Store& tiled, CoordinateSystem system,
 PointTileSurface::PointTileSurface(const TiledCloud& cloud)
     : cloud_(cloud),
       reader_(cloud.store, std::uint64_t{8} << 20),
-      census_(cloud.store),
       window_(cloud.store, 0, cloud.window_bytes) {}
 
 const std::vector<StoredBox>& PointTileSurface::windows(const GeographicBox& box) {
@@ -93,7 +92,7 @@ bool PointTileSurface::crowded(const GeographicBox& box) {
 bool PointTileSurface::counts_as_crowded(const GeographicBox& box) {
   double count = 0.0;
   for (const StoredBox& window : windows(box)) {
-    count += census_.count(window, kMostSamples);
+    count += estimate(window, kMostSamples);
     if (count > kMostSamples) return true;
   }
   return false;
@@ -163,7 +162,7 @@ std::optional<HeightRange> PointTileSurface::range(const GeographicBox& box) {
   std::optional<HeightRange> range;
   const stream::Channel& channel = cloud_.store.schema().coordinates[2];
   for (const StoredBox& window : windows(box)) {
-    const auto found = census_.heights(window);
+    const auto found = cluster_heights(reader_.query(), window);
     if (!found) continue;
     const auto metres = [&](double stored) {
       return (stored * channel.scale + channel.offset) * cloud_.vertical.metres_per_unit();
@@ -204,10 +203,9 @@ void PointTileSurface::part_heights(std::span<const Point2> stored, std::span<st
              all.contains({box.max[0], box.max[1], 0.0});
     };
     std::optional<StoredBox> wanted;
-    if (expected_ && within(*expected_) &&
-        census_.count(*expected_, kMostTogether) <= kMostTogether) {
+    if (expected_ && within(*expected_) && estimate(*expected_, kMostTogether) <= kMostTogether) {
       wanted = expected_;
-    } else if (box.min == box.max || census_.count(box, kMostTogether) <= kMostTogether) {
+    } else if (box.min == box.max || estimate(box, kMostTogether) <= kMostTogether) {
       wanted = box;
     }
     if (!wanted) {

@@ -12,7 +12,6 @@
 #include <terrace/stream/store.hpp>
 
 #include "earth/geoid_heights.hpp"
-#include "surface/cluster_census.hpp"
 #include "surface/point_fill.hpp"
 #include "surface/point_window.hpp"
 #include "surface/store_window.hpp"
@@ -78,12 +77,15 @@ class PointTileSurface final : public TileSurface {
                     std::span<double> out);
   bool holds(const StoredBox& box) const;
   bool counts_as_crowded(const GeographicBox& box);
+  /// About the number of points in the window, see stream::StoreQuery::estimate().
+  double estimate(const StoredBox& window, double limit) {
+    return reader_.query().estimate(tall(window), limit);
+  }
   /// Leaves the first of points at one x, y, in their order.
   void drop_duplicates();
 
   const TiledCloud& cloud_;
   StoreWindow reader_;
-  ClusterCensus census_;
   PointWindow window_;
   std::optional<StoredBox> held_, expected_;  ///< what the window holds, and is to hold
   std::optional<GeographicBox> asked_;

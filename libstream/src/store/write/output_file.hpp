@@ -52,25 +52,6 @@ class OutputFile {
   std::uint32_t checksum_ = 0;
 };
 
-/// A file read at any place, by any thread (pread).
-class InputFile {
- public:
-  /// Throws: Error if it cannot be opened or does not have `size` bytes.
-  InputFile(std::filesystem::path path, std::uint64_t size);
-
-  /// Fills `out` from `offset`. Throws: Error if the file ends before.
-  void read(std::uint64_t offset, std::span<std::uint8_t> out) const;
-  [[nodiscard]] std::uint64_t size() const { return size_; }
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-  Descriptor fd_;
-  std::uint64_t size_ = 0;
-};
-
-/// The whole file; `most` guards the memory. Throws: Error.
-std::string read_whole(const std::filesystem::path& path, std::uint64_t most);
 /// fsync of a folder. Throws: Error.
 void sync_folder(const std::filesystem::path& folder);
 

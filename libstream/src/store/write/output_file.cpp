@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "store/files.hpp"
+#include "store/write/output_file.hpp"
 
 #include <cerrno>
 #include <utility>
 
 #include <fcntl.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include "io/file_size_signal.hpp"
@@ -69,56 +68,6 @@ void OutputFile::finish() {
   const FileSizeSignalBlock no_signal;
   if (::fsync(fd_.get()) != 0) throw failed(path_, "cannot sync");
   if (::close(fd_.release()) != 0) throw failed(path_, "cannot close");
-}
-
-InputFile::InputFile(std::filesystem::path path, std::uint64_t size)
-    : path_(std::move(path)), size_(size) {
-  fd_ = Descriptor(::open(path_.c_str(), O_RDONLY | O_CLOEXEC));
-  if (!fd_.open()) throw failed(path_, "cannot open");
-  struct stat status {};
-  if (::fstat(fd_.get(), &status) != 0) throw failed(path_, "cannot inspect");
-  if (!S_ISREG(status.st_mode) || static_cast<std::uint64_t>(status.st_size) != size) {
-    throw Error({.file = path_.string(),
-                 .where = {},
-                 .cause = "the manifest says " + std::to_string(size) + " bytes, the file has " +
-                          std::to_string(status.st_size),
-                 .remedy = "restore the file or build the store anew"});
-  }
-}
-
-void InputFile::read(std::uint64_t offset, std::span<std::uint8_t> out) const {
-  std::size_t done = 0;
-  while (done < out.size()) {
-    const ssize_t got =
-        ::pread(fd_.get(), out.data() + done, out.size() - done, static_cast<off_t>(offset + done));
-    if (got < 0 && errno == EINTR) continue;
-    if (got < 0) throw failed(path_, "cannot read");
-    if (got == 0) {
-      throw Error({.file = path_.string(),
-                   .where = "byte " + std::to_string(offset + done),
-                   .cause = "the file ends too early",
-                   .remedy = "restore the file or build the store anew"});
-    }
-    done += static_cast<std::size_t>(got);
-  }
-}
-
-std::string read_whole(const std::filesystem::path& path, std::uint64_t most) {
-  Descriptor fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
-  if (!fd.open()) throw failed(path, "cannot open");
-  std::string text;
-  char chunk[1 << 14];
-  for (;;) {
-    const ssize_t got = ::read(fd.get(), chunk, sizeof chunk);
-    if (got < 0 && errno == EINTR) continue;
-    if (got < 0) throw failed(path, "cannot read");
-    if (got == 0) return text;
-    text.append(chunk, static_cast<std::size_t>(got));
-    if (text.size() > most) {
-      throw Error(
-          {.file = path.string(), .where = {}, .cause = "the file is too large", .remedy = {}});
-    }
-  }
 }
 
 void sync_folder(const std::filesystem::path& folder) {

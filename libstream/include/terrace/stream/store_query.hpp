@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <list>
+#include <unordered_map>
+#include <vector>
+
+#include "terrace/stream/store.hpp"
+
+namespace terrace::stream {
+
+/// A linear map, row-major. As a metric the length of a vector v is |map v|: the rows of a scale to
+/// metres measure on the ground, a row of zeros leaves a coordinate out of account.
+using LinearMap = std::array<double, 9>;
+
+inline constexpr LinearMap kIdentityMap{1, 0, 0, 0, 1, 0, 0, 0, 1};
+
+/// A point that a query found: member number `member` of a cluster, so that Store::read() gives its
+/// attributes.
+struct FoundPoint {
+  Point3 position{};  ///< stored coordinates
+  ClusterId cluster{};
+  std::uint32_t member = 0;
+  double distance = 0.0;  ///< from the place that was asked for, in the metric; 0 of a box
+};
+
+/// Queries by place: range, radius, nearest points, count; and the ways down the hierarchy that
+/// they and others take. All boxes and places are in stored coordinates.
+///
+/// What a query reads is the clusters whose boxes say that they may matter, about 25 ns per point,
+/// and the index entries on the way. The root and 6 MiB of the decoded clusters above level 0 are
+/// kept, so near queries cost a tenth of that.
+///
+/// One object per thread; any number of them share a Store, which must outlive them. All functions
+/// throw Error on a damaged store and Stopped if the store is to stop.
+class StoreQuery {
+ public:
+  /// A cluster that a point heads, as the index tells of it: all that lies below is in its box.
+  struct Branch {
+    Box3 box;
+    std::uint64_t ordinal = 0;
+    std::uint64_t descendants = 0;  ///< points of level 0 below, representative included
+  };
+  /// A decoded cluster and the clusters that its members head.
+  struct Node {
+    ClusterId id{};
+    std::vector<Point3> positions;  ///< of the members
+    std::vector<Branch> branches;   ///< level() per member, level 0 first
+    std::uint64_t bytes = 0;
+
+    [[nodiscard]] unsigned level() const { return level_of(id); }
+    /// What a member heads on a level below this node's.
+    [[nodiscard]] const Branch& branch(std::size_t member, unsigned below) const {
+      return branches[member * level() + below];
+    }
+  };
+
+  /// leaf_bytes: decoded clusters of level 0 to keep, those used last, for callers that ask for
+  /// near places again. Without it, ranges that do not overlap are read fastest.
+  explicit StoreQuery(const Store& store, std::uint64_t leaf_bytes = 0);
+  StoreQuery(const StoreQuery&) = delete;
+  StoreQuery& operator=(const StoreQuery&) = delete;
+
+  [[nodiscard]] const Store& store() const { return store_; }
+
+  /// The points of `level` and above in the box: higher levels first, within a level by id.
+  [[nodiscard]] std::vector<FoundPoint> in_box(const Box3& box, unsigned level = 0);
+  /// The points of `level` and above whose distance is at most `radius`, the nearest first; of
+  /// equally near ones those with smaller coordinates first. Requires finite arguments.
+  [[nodiscard]] std::vector<FoundPoint> within(const Point3& place, double radius,
+                                               const LinearMap& metric = kIdentityMap,
+                                               unsigned level = 0);
+  /// The `count` nearest points of `level` and above, all if there are fewer, in the order of
+  /// within(). Distances are those of double arithmetic. O(count + what is read, times log).
+  [[nodiscard]] std::vector<FoundPoint> nearest(const Point3& place, std::size_t count,
+                                                const LinearMap& metric = kIdentityMap,
+                                                unsigned level = 0);
+  /// How many points (of level 0 and above) lie in the box. Only clusters that cross its border are
+  /// read.
+  [[nodiscard]] std::uint64_t count(const Box3& box);
+  /// About the same from the index alone: of clusters that cross the border, the share of their
+  /// boxes inside counts. Ends early with any number above `limit` if there are more.
+  [[nodiscard]] double estimate(const Box3& box,
+                                double limit = std::numeric_limits<double>::infinity());
+
+  /// One cluster, for those that find their own way. Valid until the next call of anything.
+  const Node& node(ClusterId id);
+
+  /// Visits the root and then, level by level down to `level` and within a level by id, each
+  /// cluster that wants(level, branch) says is wanted. A branch is asked about only if the one of
+  /// the same point on the level above was wanted, since it lies within that.
+  template <class Wants, class Visit>
+  void descend(unsigned level, const Wants& wants, const Visit& visit);
+
+  /// Visits the root and then clusters of `level` and above, the least first by least(box), as long
+  /// as that is not above what the last visit(node) returned. least: never too large for any point
+  /// in the box; infinite: the box need not be looked into.
+  template <class Least, class Visit>
+  void best_first(unsigned level, const Least& least, const Visit& visit);
+
+  /// Cuts what lies below the root at the border of a box: take(head, branch) is called for
+  /// clusters that lie inside as a whole and for those of level 0 on the border, until it returns
+  /// false. Before a cluster on the border is looked into, opens(branch) is asked. Of a store of
+  /// one block every point is such a branch, without descendants but itself.
+  template <class Take, class Opens>
+  void cut(const Box3& box, const Take& take, const Opens& opens);
+
+ private:
+  using Nodes = std::list<Node>;
+
+  /// Nodes up to a number of bytes, the one used last in front.
+  struct Cache {
+    std::uint64_t most_bytes = 0, held_bytes = 0;
+    Nodes nodes{};
+    std::unordered_map<std::uint64_t, Nodes::iterator> by_id{};
+
+    /// Takes out the node that was not used for longest and puts it into `to`.
+    void drop(Nodes& to);
+  };
+  struct Open {
+    double least = 0;
+    ClusterId id{};
+  };
+
+  void fill(Node& node, ClusterId id);
+
+  const Store& store_;
+  Node root_, passing_;  ///< passing: what is not kept
+  Cache leaves_, inner_;
+  ClusterPoints points_;
+  std::vector<std::vector<std::uint64_t>> wanted_;  ///< per level, ordinals on the way down
+  std::vector<Open> open_;                          ///< a heap, the least on top
+  std::vector<ClusterId> crossing_;
+};
+
+template <class Wants, class Visit>
+void StoreQuery::descend(unsigned level, const Wants& wants, const Visit& visit) {
+  for (std::vector<std::uint64_t>& ordinals : wanted_) ordinals.clear();
+  const auto deliver = [&](const Node& node) {
+    visit(node);
+    const unsigned at = node.level();
+    if (at <= level) return;
+    for (std::size_t i = 0; i < node.positions.size(); ++i) {
+      for (unsigned below = at; below-- > level;) {
+        const Branch& branch = node.branch(i, below);
+        if (!wants(below, branch)) break;
+        wanted_[below].push_back(branch.ordinal);
+      }
+    }
+  };
+  if (level > store_.top()) return;
+  deliver(root_);
+  for (unsigned at = store_.top(); at-- > level;) {
+    // In order of ordinals: so are the bytes in the file.
+    std::sort(wanted_[at].begin(), wanted_[at].end());
+    for (const std::uint64_t ordinal : wanted_[at]) deliver(node(cluster_id(at, ordinal)));
+  }
+}
+
+template <class Least, class Visit>
+void StoreQuery::best_first(unsigned level, const Least& least, const Visit& visit) {
+  const auto later = [](const Open& a, const Open& b) { return a.least > b.least; };
+  open_.clear();
+  double bound = 0;
+  const auto look_into = [&](const Node& node) {
+    bound = visit(node);
+    const unsigned at = node.level();
+    for (std::size_t i = 0; i < node.positions.size(); ++i) {
+      for (unsigned below = level; below < at; ++below) {
+        const Branch& branch = node.branch(i, below);
+        const double distance = least(branch.box);
+        if (distance > bound || distance == std::numeric_limits<double>::infinity()) continue;
+        open_.push_back({distance, cluster_id(below, branch.ordinal)});
+        std::push_heap(open_.begin(), open_.end(), later);
+      }
+    }
+  };
+  if (level > store_.top()) return;
+  look_into(root_);
+  while (!open_.empty()) {
+    std::pop_heap(open_.begin(), open_.end(), later);
+    const Open next = open_.back();
+    open_.pop_back();
+    if (next.least > bound) break;
+    look_into(node(next.id));
+  }
+}
+
+template <class Take, class Opens>
+void StoreQuery::cut(const Box3& box, const Take& take, const Opens& opens) {
+  if (root_.level() == 0) {
+    for (const Point3& p : root_.positions) {
+      if (!box.contains(p)) continue;
+      if (!take(p, Branch{.box = {p, p}, .ordinal = 0, .descendants = 1})) return;
+    }
+    return;
+  }
+  crossing_.assign(1, root_.id);
+  while (!crossing_.empty()) {
+    const Node& at = node(crossing_.back());
+    crossing_.pop_back();
+    for (std::size_t i = 0; i < at.positions.size(); ++i) {
+      // What a point heads on a level lies within what it heads on the level above.
+      for (unsigned below = at.level(); below-- > 0;) {
+        const Branch& branch = at.branch(i, below);
+        if (!box.intersects(branch.box)) break;
+        if (below == 0 || (box.contains(branch.box.min) && box.contains(branch.box.max))) {
+          if (!take(at.positions[i], branch)) return;
+          break;
+        }
+        if (!opens(branch)) break;
+        crossing_.push_back(cluster_id(below, branch.ordinal));
+      }
+    }
+  }
+}
+
+}  // namespace terrace::stream

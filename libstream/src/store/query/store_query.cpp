@@ -1,0 +1,248 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/stream/store_query.hpp"
+
+#include <cassert>
+#include <cmath>
+#include <iterator>
+#include <utility>
+
+namespace terrace::stream {
+namespace {
+
+constexpr std::uint64_t kInnerBytes = std::uint64_t{6} << 20;
+constexpr double kFar = std::numeric_limits<double>::infinity();
+/// More than sums of three products round by, for each unit of their terms.
+constexpr double kRounding = 8 * std::numeric_limits<double>::epsilon();
+
+/// The length of a vector whatever its size: squares neither overflow nor vanish. Infinite if it is
+/// larger than a double can tell.
+double norm(const Point3& v) {
+  const double most = std::max({std::abs(v[0]), std::abs(v[1]), std::abs(v[2])});
+  if (most > 1e-140 && most < 1e140) return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+  if (most == 0.0) return 0.0;
+  if (!(most < kFar)) return kFar;
+  int exponent = 0;
+  static_cast<void>(std::frexp(most, &exponent));
+  double square = 0;
+  for (const double c : v) {
+    const double scaled = std::ldexp(c, -exponent);
+    square += scaled * scaled;
+  }
+  return std::ldexp(std::sqrt(square), exponent);
+}
+
+/// Half the way from b to a, which no finite numbers make infinite.
+Point3 half_way(const Point3& a, const Point3& b) {
+  return {0.5 * a[0] - 0.5 * b[0], 0.5 * a[1] - 0.5 * b[1], 0.5 * a[2] - 0.5 * b[2]};
+}
+
+double distance_of(const LinearMap& map, const Point3& a, const Point3& b) {
+  const Point3 half = half_way(a, b);
+  Point3 mapped;
+  for (std::size_t row = 0; row < 3; ++row) {
+    mapped[row] = map[3 * row] * half[0] + map[3 * row + 1] * half[1] + map[3 * row + 2] * half[2];
+    if (std::isnan(mapped[row])) mapped[row] = kFar;  // of terms that are infinite
+  }
+  return 2 * norm(mapped);
+}
+
+/// Not above distance_of() from `place` to any point in the box, rounding included: the distance to
+/// the box around the mapped box.
+double least_distance(const LinearMap& map, const Point3& place, const Box3& box) {
+  const Point3 low = half_way(box.min, place), high = half_way(box.max, place);
+  Point3 out;
+  for (std::size_t row = 0; row < 3; ++row) {
+    double least = 0, most = 0, terms = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double a = map[3 * row + axis] * low[axis], b = map[3 * row + axis] * high[axis];
+      least += std::min(a, b);
+      most += std::max(a, b);
+      terms += std::max(std::abs(a), std::abs(b));
+    }
+    const double slack = kRounding * terms;
+    const double beyond = std::max(least - slack, -(most + slack));
+    out[row] = beyond > 0.0 ? beyond : 0.0;  // also where infinite terms give NaN
+  }
+  // What is farther than a double can tell is no reason not to look.
+  return std::min(2 * norm(out) * (1 - kRounding), std::numeric_limits<double>::max());
+}
+
+bool is_nearer(const FoundPoint& a, const FoundPoint& b) {
+  if (a.distance != b.distance) return a.distance < b.distance;
+  if (a.position != b.position) return a.position < b.position;
+  return a.cluster != b.cluster ? a.cluster < b.cluster : a.member < b.member;
+}
+
+/// Share of `other`, which meets `box`, that lies inside it; 1 if `other` has no extent.
+double share_inside(const Box3& box, const Box3& other) {
+  double share = 1.0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    // Halves, as the whole may be more than a double can tell.
+    const double length = 0.5 * other.max[axis] - 0.5 * other.min[axis];
+    const double inside = 0.5 * std::min(box.max[axis], other.max[axis]) -
+                          0.5 * std::max(box.min[axis], other.min[axis]);
+    if (length > 0.0) share *= inside / length;
+  }
+  return share;
+}
+
+}  // namespace
+
+StoreQuery::StoreQuery(const Store& store, std::uint64_t leaf_bytes)
+    : store_(store),
+      leaves_{.most_bytes = leaf_bytes},
+      inner_{.most_bytes = kInnerBytes},
+      wanted_(store.top() + 1) {
+  fill(root_, store.root());
+}
+
+void StoreQuery::fill(Node& node, ClusterId id) {
+  const unsigned level = level_of(id);
+  store_.read(id, points_);
+  node.id = id;
+  // Not copied: the next cluster is read into what the node held before.
+  std::swap(node.positions, points_.positions);
+  node.branches.clear();
+  for (std::size_t i = 0; i < node.positions.size(); ++i) {
+    for (unsigned below = 0; below < level; ++below) {
+      const std::uint64_t ordinal = points_.children[i * level + below];
+      const ClusterSummary summary = store_.record(cluster_id(below, ordinal)).summary;
+      node.branches.push_back({summary.box, ordinal, summary.descendants});
+    }
+  }
+  // The node itself and its entries in list and map count too.
+  node.bytes = node.positions.capacity() * sizeof(Point3) +
+               node.branches.capacity() * sizeof(Branch) + sizeof(Node) + 64;
+}
+
+void StoreQuery::Cache::drop(Nodes& to) {
+  by_id.erase(static_cast<std::uint64_t>(nodes.back().id));
+  held_bytes -= nodes.back().bytes;
+  to.splice(to.begin(), nodes, std::prev(nodes.end()));
+}
+
+const StoreQuery::Node& StoreQuery::node(ClusterId id) {
+  if (id == root_.id) return root_;
+  Cache& cache = level_of(id) == 0 ? leaves_ : inner_;
+  if (cache.most_bytes == 0) {
+    fill(passing_, id);
+    return passing_;
+  }
+  const auto key = static_cast<std::uint64_t>(id);
+  if (const auto found = cache.by_id.find(key); found != cache.by_id.end()) {
+    cache.nodes.splice(cache.nodes.begin(), cache.nodes, found->second);
+    return cache.nodes.front();
+  }
+  // A node that has to go lends its memory to the one that comes. Until that one is whole it is in
+  // no map, so damage leaves nothing behind.
+  Nodes fresh, gone;
+  if (cache.held_bytes >= cache.most_bytes && !cache.nodes.empty()) {
+    cache.drop(fresh);
+  } else {
+    fresh.emplace_front();
+  }
+  fill(fresh.front(), id);
+  cache.held_bytes += fresh.front().bytes;
+  cache.nodes.splice(cache.nodes.begin(), fresh);
+  cache.by_id[key] = cache.nodes.begin();
+  while (cache.held_bytes > cache.most_bytes && cache.nodes.size() > 1) cache.drop(gone);
+  return cache.nodes.front();
+}
+
+std::vector<FoundPoint> StoreQuery::in_box(const Box3& box, unsigned level) {
+  std::vector<FoundPoint> found;
+  descend(
+      level, [&](unsigned, const Branch& branch) { return box.intersects(branch.box); },
+      [&](const Node& node) {
+        for (std::size_t i = 0; i < node.positions.size(); ++i) {
+          if (!box.contains(node.positions[i])) continue;
+          found.push_back({.position = node.positions[i],
+                           .cluster = node.id,
+                           .member = static_cast<std::uint32_t>(i)});
+        }
+      });
+  return found;
+}
+
+std::vector<FoundPoint> StoreQuery::within(const Point3& place, double radius,
+                                           const LinearMap& metric, unsigned level) {
+  assert(radius - radius == 0.0);
+  std::vector<FoundPoint> found;
+  descend(
+      level,
+      [&](unsigned, const Branch& branch) {
+        return least_distance(metric, place, branch.box) <= radius;
+      },
+      [&](const Node& node) {
+        for (std::size_t i = 0; i < node.positions.size(); ++i) {
+          const double distance = distance_of(metric, node.positions[i], place);
+          if (!(distance <= radius)) continue;
+          found.push_back({.position = node.positions[i],
+                           .cluster = node.id,
+                           .member = static_cast<std::uint32_t>(i),
+                           .distance = distance});
+        }
+      });
+  std::sort(found.begin(), found.end(), is_nearer);
+  return found;
+}
+
+std::vector<FoundPoint> StoreQuery::nearest(const Point3& place, std::size_t count,
+                                            const LinearMap& metric, unsigned level) {
+  std::vector<FoundPoint> found;  // a heap, the farthest on top
+  if (count == 0) return found;
+  best_first(
+      level, [&](const Box3& box) { return least_distance(metric, place, box); },
+      [&](const Node& node) {
+        for (std::size_t i = 0; i < node.positions.size(); ++i) {
+          const FoundPoint point{.position = node.positions[i],
+                                 .cluster = node.id,
+                                 .member = static_cast<std::uint32_t>(i),
+                                 .distance = distance_of(metric, node.positions[i], place)};
+          if (found.size() == count) {
+            if (!is_nearer(point, found.front())) continue;
+            std::pop_heap(found.begin(), found.end(), is_nearer);
+            found.back() = point;
+          } else {
+            found.push_back(point);
+          }
+          std::push_heap(found.begin(), found.end(), is_nearer);
+        }
+        return found.size() < count ? kFar : found.front().distance;
+      });
+  std::sort_heap(found.begin(), found.end(), is_nearer);
+  return found;
+}
+
+std::uint64_t StoreQuery::count(const Box3& box) {
+  std::uint64_t sum = 0;
+  ClusterPoints border;
+  cut(
+      box,
+      [&](const Point3& head, const Branch& branch) {
+        if (box.contains(branch.box.min) && box.contains(branch.box.max)) {
+          sum += branch.descendants;
+          return true;
+        }
+        sum += box.contains(head) ? 1 : 0;
+        store_.read(cluster_id(0, branch.ordinal), border);
+        for (const Point3& p : border.positions) sum += box.contains(p) ? 1 : 0;
+        return true;
+      },
+      [](const Branch&) { return true; });
+  return sum;
+}
+
+double StoreQuery::estimate(const Box3& box, double limit) {
+  double sum = 0.0;
+  cut(
+      box,
+      [&](const Point3&, const Branch& branch) {
+        sum += static_cast<double>(branch.descendants) * share_inside(box, branch.box);
+        return sum <= limit;
+      },
+      [](const Branch&) { return true; });
+  return sum;
+}
+
+}  // namespace terrace::stream

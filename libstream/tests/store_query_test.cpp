@@ -1,0 +1,244 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/stream/store_query.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <random>
+#include <span>
+#include <stop_token>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "store_testing.hpp"
+#include "terrace/stream/error.hpp"
+
+namespace terrace::stream {
+namespace {
+
+using testing::TemporaryFolder;
+using testing::uniform;
+
+/// A store and all its points with their levels, for brute force.
+class QueriedStore {
+ public:
+  QueriedStore(const StoreSchema& schema, const std::vector<testing::Block>& blocks,
+               const testing::StandInHierarchy::Options& options) {
+    testing::write_store(folder_->path() / "s", schema, blocks, options);
+    store_ = std::make_unique<Store>(Store::open(folder_->path() / "s"));
+    for (unsigned level = 0; level <= store_->top(); ++level) {
+      store_->for_each(level, [&](ClusterId id, const ClusterRecord&, const ClusterPoints& points) {
+        for (std::size_t i = 0; i < points.size(); ++i) {
+          points_.push_back({.position = points.positions[i],
+                             .cluster = id,
+                             .member = static_cast<std::uint32_t>(i)});
+        }
+      });
+    }
+  }
+
+  [[nodiscard]] const Store& store() const { return *store_; }
+  [[nodiscard]] const std::vector<FoundPoint>& points() const { return points_; }
+
+ private:
+  std::unique_ptr<TemporaryFolder> folder_ = std::make_unique<TemporaryFolder>();
+  std::unique_ptr<Store> store_;
+  std::vector<FoundPoint> points_;
+};
+
+constexpr double kFarAway = std::numeric_limits<double>::infinity();
+
+using Key = std::tuple<double, Point3, ClusterId, std::uint32_t>;
+
+Key key_of(const FoundPoint& point) {
+  return {point.distance, point.position, point.cluster, point.member};
+}
+
+std::vector<Key> keys_of(std::vector<FoundPoint> points, bool sorted) {
+  std::vector<Key> keys;
+  for (const FoundPoint& point : points) keys.push_back(key_of(point));
+  if (!sorted) std::sort(keys.begin(), keys.end());
+  return keys;
+}
+
+/// Distances as long doubles, which hold the squares of all doubles here.
+double distance_between(const LinearMap& map, const Point3& a, const Point3& b) {
+  long double square = 0;
+  for (std::size_t row = 0; row < 3; ++row) {
+    long double c = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      c += static_cast<long double>(map[3 * row + axis]) *
+           (static_cast<long double>(a[axis]) - static_cast<long double>(b[axis]));
+    }
+    square += c * c;
+  }
+  return static_cast<double>(std::sqrt(square));
+}
+
+std::vector<QueriedStore> stores_of_all_kinds() {
+  std::vector<QueriedStore> stores;
+  for (const auto numbers : {testing::Numbers::decimals, testing::Numbers::doubles,
+                             testing::Numbers::extremes, testing::Numbers::mixed}) {
+    stores.emplace_back(
+        testing::cloud_schema(), testing::cloud_blocks(numbers, 4000, 500, 11),
+        testing::StandInHierarchy::Options{.block_points = 500, .cluster_points = 40});
+  }
+  stores.emplace_back(
+      testing::grid_schema(ScalarType::i16),
+      testing::grid_blocks(ScalarType::i16, testing::Relief::fractal, 70, 60, 20, 12),
+      testing::StandInHierarchy::Options{.block_points = 400, .cluster_points = 40});
+  // One block, so that the root holds all points; and no point at all.
+  stores.emplace_back(testing::cloud_schema(),
+                      testing::cloud_blocks(testing::Numbers::decimals, 30, 500, 13),
+                      testing::StandInHierarchy::Options{});
+  stores.emplace_back(testing::cloud_schema(), std::vector<testing::Block>{},
+                      testing::StandInHierarchy::Options{});
+  return stores;
+}
+
+/// Boxes of all sizes around points and anywhere, flat and inverted ones too.
+Box3 random_box(std::mt19937_64& random, const QueriedStore& queried) {
+  const auto& points = queried.points();
+  const auto corner = [&]() -> Point3 {
+    if (!points.empty() && random() % 4 != 0) return points[random() % points.size()].position;
+    return {300 * uniform(random) - 50, 300 * uniform(random) - 50, 200 * uniform(random)};
+  };
+  Box3 box;
+  box.include(corner());
+  if (random() % 8 != 0) box.include(corner());
+  if (random() % 4 == 0) {
+    box.min[2] = -std::numeric_limits<double>::infinity();
+    box.max[2] = std::numeric_limits<double>::infinity();
+  }
+  if (random() % 16 == 0) std::swap(box.min, box.max);
+  return box;
+}
+
+TEST(StoreQuery, RangesAndCountsAreThoseOfBruteForce) {
+  for (const QueriedStore& queried : stores_of_all_kinds()) {
+    StoreQuery query(queried.store(), 1 << 16);
+    for (std::uint64_t seed = 1; seed <= 60; ++seed) {
+      SCOPED_TRACE(std::to_string(queried.points().size()) + " points, seed " +
+                   std::to_string(seed));
+      std::mt19937_64 random(seed);
+      const Box3 box = random_box(random, queried);
+      for (unsigned level = 0; level <= queried.store().top() + 1; ++level) {
+        std::vector<FoundPoint> expected;
+        for (const FoundPoint& point : queried.points()) {
+          if (level_of(point.cluster) >= level && box.contains(point.position)) {
+            expected.push_back(point);
+          }
+        }
+        const auto found = query.in_box(box, level);
+        EXPECT_TRUE(std::is_sorted(
+            found.begin(), found.end(), [](const FoundPoint& a, const FoundPoint& b) {
+              return level_of(a.cluster) > level_of(b.cluster) ||
+                     (level_of(a.cluster) == level_of(b.cluster) && a.cluster < b.cluster);
+            }));
+        ASSERT_EQ(keys_of(found, false), keys_of(expected, false)) << "level " << level;
+        if (level > 0) continue;
+        ASSERT_EQ(query.count(box), expected.size());
+        // Whatever the shares of clusters on the border are, those inside count in full.
+        EXPECT_LE(query.estimate(box), static_cast<double>(queried.points().size()) * (1 + 1e-9));
+      }
+    }
+    const Box3 all{{-kFarAway, -kFarAway, -kFarAway}, {kFarAway, kFarAway, kFarAway}};
+    EXPECT_EQ(query.count(all), queried.points().size());
+    EXPECT_EQ(query.estimate(all), static_cast<double>(queried.points().size()));
+    if (queried.points().size() > 100) {
+      EXPECT_GT(query.estimate(all, 50), 50);
+    }
+  }
+}
+
+TEST(StoreQuery, NearestPointsAndRadiiAreThoseOfBruteForce) {
+  for (const QueriedStore& queried : stores_of_all_kinds()) {
+    StoreQuery query(queried.store(), 1 << 16);
+    for (std::uint64_t seed = 1; seed <= 60; ++seed) {
+      SCOPED_TRACE(std::to_string(queried.points().size()) + " points, seed " +
+                   std::to_string(seed));
+      std::mt19937_64 random(seed);
+      LinearMap metric = kIdentityMap;
+      if (seed % 3 == 0) metric = {1, 0, 0, 0, 1, 0, 0, 0, 0};
+      if (seed % 3 == 1) {
+        for (double& c : metric) c = 2 * uniform(random) - 1;
+      }
+      const Box3 box = random_box(random, queried);
+      const Point3 place = std::isfinite(box.min[2]) ? box.min : Point3{box.min[0], box.min[1], 7};
+      const auto level = static_cast<unsigned>(random() % (queried.store().top() + 1));
+      std::vector<FoundPoint> expected;
+      for (const FoundPoint& point : queried.points()) {
+        if (level_of(point.cluster) < level) continue;
+        expected.push_back(point);
+      }
+      // All of them first: their distances are right, and their order is what they say.
+      const auto all = query.nearest(place, expected.size() + 1, metric, level);
+      ASSERT_EQ(all.size(), expected.size());
+      for (const FoundPoint& point : all) {
+        const double exact = distance_between(metric, point.position, place);
+        double terms = 0;
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          terms += std::abs(point.position[axis]) + std::abs(place[axis]);
+        }
+        if (exact < 1e308 && terms < 1e308) {
+          ASSERT_NEAR(point.distance, exact, 1e-14 * (exact + terms) + 1e-322);
+        }
+      }
+      std::vector<Key> in_order = keys_of(all, true);
+      EXPECT_TRUE(std::is_sorted(in_order.begin(), in_order.end()));
+      // Fewer of them, and those within a radius, are the first of all.
+      for (const std::size_t count : {std::size_t{0}, std::size_t{1}, std::size_t{7},
+                                      static_cast<std::size_t>(random() % 500)}) {
+        std::vector<Key> first = in_order;
+        first.resize(std::min(first.size(), count));
+        ASSERT_EQ(keys_of(query.nearest(place, count, metric, level), true), first);
+      }
+      if (all.empty()) continue;
+      const double radius = all[random() % all.size()].distance;
+      if (!std::isfinite(radius)) continue;
+      std::erase_if(in_order, [&](const Key& key) { return std::get<0>(key) > radius; });
+      ASSERT_EQ(keys_of(query.within(place, radius, metric, level), true), in_order);
+    }
+  }
+}
+
+TEST(StoreQuery, FoundPointsLeadToTheirAttributes) {
+  StoreSchema schema = testing::cloud_schema();
+  schema.attributes.push_back(testing::channel("sum"));
+  auto blocks = testing::cloud_blocks(testing::Numbers::decimals, 3000, 500, 3);
+  for (auto& block : blocks) {
+    for (const Point3& p : block.positions) {
+      const double sum = p[0] + p[1] + p[2];
+      const auto bytes = std::as_bytes(std::span(&sum, 1));
+      block.payload.insert(block.payload.end(), bytes.begin(), bytes.end());
+    }
+  }
+  const QueriedStore queried(schema, blocks, {.block_points = 500, .cluster_points = 40});
+  StoreQuery query(queried.store());
+  ClusterPoints points;
+  for (const FoundPoint& point : query.nearest({50, 50, 50}, 100)) {
+    queried.store().read(point.cluster, points);
+    EXPECT_EQ(points.positions[point.member], point.position);
+    EXPECT_EQ(queried.store().schema().view<double>(points.payload, 0)[point.member],
+              point.position[0] + point.position[1] + point.position[2]);
+  }
+}
+
+TEST(StoreQuery, EndsOnceTheStoreIsAskedToStop) {
+  const QueriedStore queried(testing::cloud_schema(),
+                             testing::cloud_blocks(testing::Numbers::decimals, 20000, 500, 5),
+                             {.block_points = 500, .cluster_points = 40});
+  std::stop_source stop;
+  const Store stopped = queried.store().with_stop(stop.get_token());
+  StoreQuery query(stopped);
+  EXPECT_EQ(query.nearest({50, 50, 50}, 3).size(), 3u);
+  stop.request_stop();
+  EXPECT_THROW(query.in_box({{0, 0, 0}, {300, 300, 100}}), Stopped);
+}
+
+}  // namespace
+}  // namespace terrace::stream

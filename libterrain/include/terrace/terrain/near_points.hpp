@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include <terrace/stream/store_query.hpp>
+
+namespace terrace::terrain {
+
+/// A place in a store's CRS. Without a height it is a vertical line: heights then count for nothing
+/// in distances.
+struct NearPlace {
+  std::array<double, 2> xy{};
+  std::optional<double> z{};
+};
+
+/// The `count` points of `level` and above that are nearest to the place on the ground, all if
+/// there are fewer; the nearest first, of equally near ones those with smaller coordinates first.
+///
+/// Distances are in metres, measured by the scale that the CRS has at the place (degrees by the
+/// ellipsoid's radii there): within a kilometre right to about 1e-4 of themselves outside the polar
+/// regions. They do not reach across the antimeridian.
+///
+/// query: of the store; queries at near places are fast. Throws: UsageError for a level that the
+/// store does not have or numbers that are not finite; stream::Error on a damaged store.
+[[nodiscard]] std::vector<stream::FoundPoint> nearest_points(stream::StoreQuery& query,
+                                                             const NearPlace& place,
+                                                             std::size_t count, unsigned level = 0);
+
+/// The points of `level` and above that are at most `radius` metres from the place, in the same
+/// order and with the same distances. Throws as above, and UsageError for a negative radius.
+[[nodiscard]] std::vector<stream::FoundPoint> points_within(stream::StoreQuery& query,
+                                                            const NearPlace& place, double radius,
+                                                            unsigned level = 0);
+
+}  // namespace terrace::terrain

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/terrain/near_points.hpp"
+
+#include <cmath>
+#include <string>
+
+#include <terrace/stream/schema.hpp>
+#include <terrace/stream/store.hpp>
+
+#include "earth/ground.hpp"
+#include "terrace/terrain/error.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+/// The place in stored coordinates and the metric that holds there.
+struct Local {
+  stream::Point3 place{};
+  stream::LinearMap metric{};
+};
+
+Local local(const stream::Store& store, const NearPlace& near, unsigned level) {
+  if (level > store.top()) {
+    throw UsageError("the store has no level " + std::to_string(level) + ", its top is " +
+                     std::to_string(store.top()));
+  }
+  if (!std::isfinite(near.xy[0]) || !std::isfinite(near.xy[1]) ||
+      !std::isfinite(near.z.value_or(0))) {
+    throw UsageError("`near` needs finite coordinates");
+  }
+  const stream::StoreSchema& schema = store.schema();
+  const std::array<double, 2> xy = stream::stored_place(schema, near.xy);
+  const stream::Channel& height = schema.coordinates[2];
+  Local result{.place = {xy[0], xy[1], 0.0}, .metric = {}};
+  if (near.z) result.place[2] = (*near.z - height.offset) / height.scale;
+  stream::Box3 here;
+  here.include(result.place);
+  result.metric = Ground(schema).map(here);
+  if (!near.z) {
+    for (std::size_t row = 0; row < 3; ++row) result.metric[3 * row + 2] = 0.0;
+  }
+  return result;
+}
+
+}  // namespace
+
+std::vector<stream::FoundPoint> nearest_points(stream::StoreQuery& query, const NearPlace& place,
+                                               std::size_t count, unsigned level) {
+  const Local here = local(query.store(), place, level);
+  return query.nearest(here.place, count, here.metric, level);
+}
+
+std::vector<stream::FoundPoint> points_within(stream::StoreQuery& query, const NearPlace& place,
+                                              double radius, unsigned level) {
+  if (!(radius >= 0.0) || !std::isfinite(radius)) {
+    throw UsageError("`within` needs a radius of 0 or more");
+  }
+  const Local here = local(query.store(), place, level);
+  return query.within(here.place, radius, here.metric, level);
+}
+
+}  // namespace terrace::terrain
