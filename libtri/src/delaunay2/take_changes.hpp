@@ -10,9 +10,9 @@ constexpr std::array<VertexId, 3> vertex_ids(const std::array<std::uint32_t, 3>&
   return {VertexId{corner[0]}, VertexId{corner[1]}, VertexId{corner[2]}};
 }
 
-/// Turns the journal's records into net changes and empties it.
-template <class Coord, class Mesh>
-void take_changes(Mesh& mesh, typename Delaunay2<Coord>::Changes& changes) {
+/// Turns the journal's records into net changes and empties it. Changes: that of a Delaunay2.
+template <class Kernel, class Changes>
+void take_changes(Mesh<Kernel>& mesh, Changes& changes) {
   changes.clear();
   auto& journal = mesh.journal;
   for (const auto& record : journal.vertices()) {

@@ -30,8 +30,8 @@ template <class Kernel, class Work>
 std::thread in_thread(const Work& work) {
   try {
     if constexpr (std::is_same_v<Kernel, EllipticalKernel>) {
-      return std::thread([work, &metric = EllipticalKernel::metric()] {
-        const EllipticalKernel::Scope scope(metric);
+      return std::thread([work, &form = EllipticalKernel::form()] {
+        const EllipticalKernel::Scope scope(form);
         work();
       });
     } else {

@@ -8,6 +8,7 @@
 #include <limits>
 #include <memory>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 /// Dynamic Delaunay triangulation of the plane: exact, canonical, compact.
@@ -136,19 +137,24 @@ class AliveRange {
   std::uint32_t slots_;
 };
 
+/// The default metric of a triangulation; metric.hpp has elliptical ones.
+struct Euclidean {};
+
 /// Coord = std::int32_t: exact for coordinates of at most 30 bits (0 <= c < 2^30); integer
 /// arithmetic only, the same on every machine. About 60 bytes per vertex.
 /// Coord = double: any finite coordinates; exact predicates, no point is ever moved. -0.0 and 0.0
 /// are equal. About 68 bytes per vertex.
+/// Metric = EllipticalMetric2, with doubles: see metric.hpp.
 ///
 /// No points, one, two, or all on one line are ordinary states: they have vertices and no triangle.
 /// At most 2^29 - 2 vertices. Const functions may be called from several threads at once.
-template <class Coord>
+template <class Coord, class Metric = Euclidean>
 class Delaunay2 {
  public:
   using Point = std::array<Coord, 2>;
 
-  Delaunay2();
+  Delaunay2() : Delaunay2(Metric()) {}
+  explicit Delaunay2(const Metric& metric);
   ~Delaunay2();
   /// A moved-from triangulation can only be destroyed or assigned to.
   Delaunay2(Delaunay2&&) noexcept;
@@ -172,7 +178,9 @@ class Delaunay2 {
   /// directly in canonical form: O(n), no predicate. The vertex of column i, row j is the returned
   /// one + j * columns + i. step > 0. Doubles: x0 + i * step is computed with one rounding each for
   /// product and sum; where these would not be exact, std::invalid_argument (use build()).
-  VertexId build_grid(Coord x0, Coord y0, Coord step, std::uint32_t columns, std::uint32_t rows);
+  /// In the Euclidean metric only.
+  VertexId build_grid(Coord x0, Coord y0, Coord step, std::uint32_t columns,
+                      std::uint32_t rows) requires std::is_same_v<Metric, Euclidean>;
   /// hint: a vertex near the point, for the walk; kNoVertex: the last one used.
   Insertion insert(const Point& point, VertexId hint = kNoVertex);
   /// Inserts a set near the hint, in any order (it is sorted inside). results: as many as points,
@@ -192,6 +200,7 @@ class Delaunay2 {
 
   // ---- Reading --------------------------------------------------------------------------------
 
+  [[nodiscard]] const Metric& metric() const;
   [[nodiscard]] std::size_t vertex_count() const;
   /// Finite triangles. 0 while all points are collinear.
   [[nodiscard]] std::size_t triangle_count() const;
@@ -262,8 +271,8 @@ class Delaunay2 {
   std::unique_ptr<Impl> impl_;
 };
 
-template <class Coord>
-void Delaunay2<Coord>::Changes::clear() {
+template <class Coord, class Metric>
+void Delaunay2<Coord, Metric>::Changes::clear() {
   removed_vertices.clear();
   removed_points.clear();
   added_vertices.clear();

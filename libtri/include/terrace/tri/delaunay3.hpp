@@ -58,17 +58,19 @@ struct Location3 {
 /// Coord = std::int32_t: exact for coordinates of at most 30 bits (0 <= c < 2^30).
 /// Coord = double: any finite coordinates; exact predicates, no point is ever moved. -0.0 and 0.0
 /// are equal.
+/// Metric = EllipticalMetric3, with doubles: see metric.hpp.
 ///
 /// No points, one, two, or all on one line or plane are ordinary states: they have vertices and no
 /// tetrahedron. Then an insertion or removal of one vertex costs O(n) moves of 4 bytes.
 /// At most 2^29 - 2 vertices and 2^30 - 2 tetrahedra, those of the structure's own included.
 /// Const functions may be called from several threads at once.
-template <class Coord>
+template <class Coord, class Metric = Euclidean>
 class Delaunay3 {
  public:
   using Point = std::array<Coord, 3>;
 
-  Delaunay3();
+  Delaunay3() : Delaunay3(Metric()) {}
+  explicit Delaunay3(const Metric& metric);
   ~Delaunay3();
   /// A moved-from triangulation can only be destroyed or assigned to.
   Delaunay3(Delaunay3&&) noexcept;
@@ -111,6 +113,7 @@ class Delaunay3 {
 
   // ---- Reading --------------------------------------------------------------------------------
 
+  [[nodiscard]] const Metric& metric() const;
   [[nodiscard]] std::size_t vertex_count() const;
   /// Finite tetrahedra. 0 while all points are coplanar. O(1).
   [[nodiscard]] std::size_t tetrahedron_count() const;
@@ -183,8 +186,8 @@ class Delaunay3 {
   std::unique_ptr<Impl> impl_;
 };
 
-template <class Coord>
-void Delaunay3<Coord>::Changes::clear() {
+template <class Coord, class Metric>
+void Delaunay3<Coord, Metric>::Changes::clear() {
   removed_vertices.clear();
   removed_points.clear();
   added_vertices.clear();

@@ -147,7 +147,7 @@ struct ModelOptions {
 /// more for points above level 0. With clusters of 140 members about 21 bytes per
 /// vertex.
 ///
-/// Triangulation: Delaunay2, Delaunay3, EllipticalDelaunay2 or EllipticalDelaunay3.
+/// Triangulation: Delaunay2 or Delaunay3, in any metric.
 template <class Triangulation>
 class MultiresolutionModel {
  public:
@@ -166,7 +166,7 @@ class MultiresolutionModel {
 
   /// Starts with the points of the given detail, built in one go. The first delta covers what comes
   /// after: begin with a look at the triangulation. The source must outlive the model.
-  /// `empty`: the triangulation to fill, where it has options of its own (a metric).
+  /// `empty`: the triangulation to fill, which brings the metric.
   /// Throws: what the source throws, HierarchyError, std::length_error.
   explicit MultiresolutionModel(ClusterSource& source, const Detail& start = {},
                                 ModelOptions options = {}, Triangulation empty = Triangulation());
@@ -243,11 +243,11 @@ class MultiresolutionModel {
 };
 
 /// The model of points in the plane: std::int32_t for rasters in column and row, else double.
-template <class Coord>
-using Multiresolution2 = MultiresolutionModel<Delaunay2<Coord>>;
+template <class Coord, class Metric = Euclidean>
+using Multiresolution2 = MultiresolutionModel<Delaunay2<Coord, Metric>>;
 /// The model of points in space: tetrahedra in place of triangles; a height is the z of a vertex.
-template <class Coord>
-using Multiresolution3 = MultiresolutionModel<Delaunay3<Coord>>;
+template <class Coord, class Metric = Euclidean>
+using Multiresolution3 = MultiresolutionModel<Delaunay3<Coord, Metric>>;
 
 extern template class MultiresolutionModel<Delaunay2<std::int32_t>>;
 extern template class MultiresolutionModel<Delaunay2<double>>;

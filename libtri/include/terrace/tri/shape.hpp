@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "terrace/tri/delaunay3.hpp"
-#include "terrace/tri/elliptical.hpp"
+#include "terrace/tri/metric.hpp"
 
 /// Restoring the non-convex shape of points scanned from a surface: of the Delaunay tetrahedra,
 /// which fill the convex hull, those outside the shape are peeled off, starting from the hull
@@ -106,8 +106,14 @@ struct ShapeSurface {
 /// function of the point set and the options, whatever the triangulation's and this object's
 /// history.
 ///
-/// One byte per tetrahedron slot and four per vertex slot. Triangulation: Delaunay3 or
-/// EllipticalDelaunay3; see the names below.
+/// One byte per tetrahedron slot and four per vertex slot. Triangulation: any Delaunay3; see
+/// Shape3 below.
+///
+/// In an elliptical metric the tetrahedra are those of the metric, smallest spheres are its
+/// smallest ellipsoids (exact), and lengths of edges, both those of ShapeCriterion::kEdgeLength and
+/// those that decide which tetrahedron is put back, are its lengths (in doubles, of differences
+/// mapped by the triangulation's map). So it is the shape of the mapped points: samples that are
+/// denser across the long axes than along them are as good as even ones.
 template <class Triangulation>
 class BasicShape3 {
  public:
@@ -161,19 +167,12 @@ class BasicShape3 {
   std::unique_ptr<Impl> impl_;
 };
 
-template <class Coord>
-using Shape3 = BasicShape3<Delaunay3<Coord>>;
-
-/// In an elliptical metric: the tetrahedra are those of the metric, smallest spheres are its
-/// smallest ellipsoids (exact), and lengths of edges, those that decide what is put back among
-/// them, are its lengths (in doubles, of differences mapped by the triangulation's map). So it is
-/// the shape of the mapped points: samples that are denser across the long axes than along them
-/// are as good as even ones.
-using EllipticalShape3 = BasicShape3<EllipticalDelaunay3>;
+template <class Coord, class Metric = Euclidean>
+using Shape3 = BasicShape3<Delaunay3<Coord, Metric>>;
 
 extern template class BasicShape3<Delaunay3<std::int32_t>>;
 extern template class BasicShape3<Delaunay3<double>>;
-extern template class BasicShape3<EllipticalDelaunay3>;
+extern template class BasicShape3<Delaunay3<double, EllipticalMetric3>>;
 
 struct RestoreOptions {
   ShapeOptions shape;
@@ -182,8 +181,8 @@ struct RestoreOptions {
   /// first stands for all. The surface has the given coordinates in any case.
   unsigned quantise_bits = 0;
   /// An elliptical metric in which the points are triangulated and the facets judged, see
-  /// EllipticalShape3. Not together with quantise_bits.
-  std::optional<LinearMap3> metric;
+  /// BasicShape3. Not together with quantise_bits.
+  std::optional<EllipticalMetric3> metric;
 };
 
 struct RestoredSurface {
