@@ -6,38 +6,17 @@
 #include <stdexcept>
 #include <string>
 
+#include "check_input.hpp"
 #include "delaunay2/access.hpp"
 #include "delaunay2/build.hpp"
 #include "delaunay2/insert.hpp"
 #include "delaunay2/query.hpp"
 #include "delaunay2/remove.hpp"
-#include "delaunay2/take_changes.hpp"
 
 namespace terrace::tri {
 namespace {
 
-using planar::kMaxVertices;
 using planar::kNone;
-
-template <class Kernel, class Point>
-void check_points(std::span<const Point> points) {
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if (Kernel::valid(points[i])) continue;
-    const bool integers = std::is_same_v<Kernel, planar::IntKernel>;
-    throw std::invalid_argument(
-        "point " + std::to_string(i) + ": coordinates " + std::to_string(points[i][0]) + ", " +
-        std::to_string(points[i][1]) +
-        (integers ? " are not in the range 0 <= c < 2^30; move or scale the points"
-                  : " are not finite; leave such points out"));
-  }
-}
-
-void check_count(std::size_t present, std::size_t added) {
-  if (added > kMaxVertices - present)
-    throw std::length_error("a triangulation holds at most 2^29 - 2 vertices; " +
-                            std::to_string(present) + " are there and " + std::to_string(added) +
-                            " were to be added");
-}
 
 /// Coordinates of the lines of a grid; throws where they would be rounded or out of range.
 template <class Kernel, class Coord>
@@ -101,7 +80,7 @@ template <class Coord, class Metric>
 auto Delaunay2<Coord, Metric>::insert(const Point& point, VertexId hint) -> Insertion {
   assert(hint == kNoVertex || alive(hint));
   check_count(impl_->mesh.vertex_count, 1);
-  check_points<typename Impl::Kernel>(std::span(&point, 1));
+  check_points<typename Impl::Kernel>(std::span<const Point>(&point, 1));
   [[maybe_unused]] const auto scope = impl_->scope();
   const planar::Inserted inserted = planar::insert_point(impl_->mesh, point, slot(hint));
   return {VertexId{inserted.vertex}, inserted.created};
@@ -228,7 +207,7 @@ bool Delaunay2<Coord, Metric>::alive(TriangleId triangle) const {
 template <class Coord, class Metric>
 Location Delaunay2<Coord, Metric>::locate(const Point& point, VertexId hint) const {
   assert(hint == kNoVertex || alive(hint));
-  check_points<typename Impl::Kernel>(std::span(&point, 1));
+  check_points<typename Impl::Kernel>(std::span<const Point>(&point, 1));
   [[maybe_unused]] const auto scope = impl_->scope();
   return planar::locate(impl_->mesh, point, slot(hint));
 }
@@ -236,7 +215,7 @@ Location Delaunay2<Coord, Metric>::locate(const Point& point, VertexId hint) con
 template <class Coord, class Metric>
 VertexId Delaunay2<Coord, Metric>::nearest(const Point& point, VertexId hint) const {
   assert(hint == kNoVertex || alive(hint));
-  check_points<typename Impl::Kernel>(std::span(&point, 1));
+  check_points<typename Impl::Kernel>(std::span<const Point>(&point, 1));
   [[maybe_unused]] const auto scope = impl_->scope();
   return VertexId{planar::nearest(impl_->mesh, point, slot(hint))};
 }
@@ -261,8 +240,14 @@ void Delaunay2<Coord, Metric>::stop_journal() {
 }
 template <class Coord, class Metric>
 void Delaunay2<Coord, Metric>::take_changes(Changes& changes) {
-  assert(impl_->mesh.journal.on());
-  planar::take_changes(impl_->mesh, changes);
+  auto& mesh = impl_->mesh;
+  assert(mesh.journal.on());
+  changes.clear();
+  mesh.journal.take(
+      [&](std::uint32_t v) { return mesh.vertex_alive(v) ? &mesh.point[v] : nullptr; },
+      [&](std::uint32_t t) { return mesh.triangle_alive(t) ? &mesh.triangle[t].corner : nullptr; },
+      [](const auto& corner) { return planar::is_finite(corner); }, changes,
+      changes.removed_triangles, changes.added_triangles);
 }
 
 #ifdef TERRACE_TRI_CORE

@@ -2,42 +2,15 @@
 #include "terrace/tri/delaunay3.hpp"
 
 #include <cassert>
-#include <stdexcept>
-#include <string>
 
+#include "check_input.hpp"
 #include "delaunay3/access.hpp"
 #include "delaunay3/build.hpp"
 #include "delaunay3/insert.hpp"
 #include "delaunay3/query.hpp"
 #include "delaunay3/remove.hpp"
-#include "delaunay3/take_changes.hpp"
 
 namespace terrace::tri {
-namespace {
-
-using spatial::kMaxVertices;
-
-template <class Kernel, class Point>
-void check_points(std::span<const Point> points) {
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if (Kernel::valid(points[i])) continue;
-    const bool integers = std::is_same_v<Kernel, spatial::IntKernel>;
-    throw std::invalid_argument(
-        "point " + std::to_string(i) + ": coordinates " + std::to_string(points[i][0]) + ", " +
-        std::to_string(points[i][1]) + ", " + std::to_string(points[i][2]) +
-        (integers ? " are not in the range 0 <= c < 2^30; move or scale the points"
-                  : " are not finite; leave such points out"));
-  }
-}
-
-void check_count(std::size_t present, std::size_t added) {
-  if (added > kMaxVertices - present)
-    throw std::length_error("a triangulation holds at most 2^29 - 2 vertices; " +
-                            std::to_string(present) + " are there and " + std::to_string(added) +
-                            " were to be added");
-}
-
-}  // namespace
 
 template <class Coord, class Metric>
 Delaunay3<Coord, Metric>::Delaunay3(const Metric& metric) : impl_(std::make_unique<Impl>(metric)) {}
@@ -62,7 +35,7 @@ template <class Coord, class Metric>
 auto Delaunay3<Coord, Metric>::insert(const Point& point, VertexId hint) -> Insertion {
   assert(hint == kNoVertex || alive(hint));
   check_count(impl_->mesh.vertex_count, 1);
-  check_points<typename Impl::Kernel>(std::span(&point, 1));
+  check_points<typename Impl::Kernel>(std::span<const Point>(&point, 1));
   [[maybe_unused]] const auto scope = impl_->scope();
   const spatial::Inserted inserted = spatial::insert_point(impl_->mesh, point, slot(hint));
   return {VertexId{inserted.vertex}, inserted.created};
@@ -139,7 +112,8 @@ auto Delaunay3<Coord, Metric>::point(VertexId vertex) const -> Point {
 template <class Coord, class Metric>
 std::array<VertexId, 4> Delaunay3<Coord, Metric>::vertices(TetrahedronId tetrahedron) const {
   assert(alive(tetrahedron));
-  return spatial::vertex_ids(impl_->mesh.tetrahedron[slot(tetrahedron)].corner);
+  const auto& [a, b, c, d] = impl_->mesh.tetrahedron[slot(tetrahedron)].corner;
+  return {VertexId{a}, VertexId{b}, VertexId{c}, VertexId{d}};
 }
 
 template <class Coord, class Metric>
@@ -194,7 +168,7 @@ bool Delaunay3<Coord, Metric>::alive(TetrahedronId tetrahedron) const {
 template <class Coord, class Metric>
 Location3 Delaunay3<Coord, Metric>::locate(const Point& point, VertexId hint) const {
   assert(hint == kNoVertex || alive(hint));
-  check_points<typename Impl::Kernel>(std::span(&point, 1));
+  check_points<typename Impl::Kernel>(std::span<const Point>(&point, 1));
   [[maybe_unused]] const auto scope = impl_->scope();
   return spatial::locate(impl_->mesh, point, slot(hint));
 }
@@ -202,7 +176,7 @@ Location3 Delaunay3<Coord, Metric>::locate(const Point& point, VertexId hint) co
 template <class Coord, class Metric>
 VertexId Delaunay3<Coord, Metric>::nearest(const Point& point, VertexId hint) const {
   assert(hint == kNoVertex || alive(hint));
-  check_points<typename Impl::Kernel>(std::span(&point, 1));
+  check_points<typename Impl::Kernel>(std::span<const Point>(&point, 1));
   [[maybe_unused]] const auto scope = impl_->scope();
   return VertexId{spatial::nearest(impl_->mesh, point, slot(hint))};
 }
@@ -227,8 +201,16 @@ void Delaunay3<Coord, Metric>::stop_journal() {
 }
 template <class Coord, class Metric>
 void Delaunay3<Coord, Metric>::take_changes(Changes& changes) {
-  assert(impl_->mesh.journal.on());
-  spatial::take_changes(impl_->mesh, changes);
+  auto& mesh = impl_->mesh;
+  assert(mesh.journal.on());
+  changes.clear();
+  mesh.journal.take(
+      [&](std::uint32_t v) { return mesh.vertex_alive(v) ? &mesh.vertex[v].point : nullptr; },
+      [&](std::uint32_t t) {
+        return mesh.tetrahedron_alive(t) ? &mesh.tetrahedron[t].corner : nullptr;
+      },
+      [](const auto& corner) { return spatial::is_finite(corner); }, changes,
+      changes.removed_tetrahedra, changes.added_tetrahedra);
 }
 
 template class Delaunay3<std::int32_t>;

@@ -128,8 +128,8 @@ class Flips {
     return region_[t.corner[1]] == region && region_[t.corner[2]] == region ? region : kNoRegion;
   }
 
-  /// Flips what is to be flipped at the pending sides, which lie in triangles of the region, and
-  /// what becomes so.
+  /// Flips until no pending side violates the Delaunay condition. Pending sides lie in triangles of
+  /// the region; a flip adds those around it.
   void settle(std::uint32_t region) {
     while (!pending_.empty()) {
       const Side side = pending_.back();

@@ -15,8 +15,8 @@
 #include "terrace/tri/delaunay2.hpp"
 #include "terrace/tri/delaunay3.hpp"
 
-/// A triangulation of a hierarchy of clusters whose detail is raised and lowered, and what it needs
-/// to know of that hierarchy, whoever stores it.
+/// A triangulation of a hierarchy of clusters whose detail is raised and lowered, and the interface
+/// by which it reads that hierarchy, wherever it is stored.
 ///
 /// Level 0 is full resolution; levels grow coarser upward to the top. A cluster of level L is
 /// headed by one point whose highest level is above L and has as members points whose highest level
@@ -65,8 +65,7 @@ struct ClusterRecord {
 /// one in which neighbours follow each other (row by row for rasters, a k-d tree's for clouds)
 /// is 1.2 to 1.6 times as fast as a random one, and about as fast as a Hilbert curve. A member of
 /// level L has L `children`: the ordinals of the clusters that it heads on levels 0, 1, ... L - 1;
-/// those of member i start at children[i * L]. What the spans show lives until the next call of
-/// read().
+/// those of member i start at children[i * L]. The spans are valid until the next call of read().
 struct ClusterMembers {
   std::span<const Point3> positions;
   std::span<const std::uint64_t> children;

@@ -17,7 +17,6 @@
 
 #include "delaunay3/double_kernel.hpp"
 #include "delaunay3/elliptical_kernel.hpp"
-#include "delaunay3/hole_filling.hpp"
 #include "delaunay3/int_kernel.hpp"
 #include "delaunay3/predicates.hpp"
 
