@@ -8,6 +8,7 @@
 
 #include "delaunay2/access.hpp"
 #include "metrics.hpp"
+#include "model/model.hpp"
 #include "multiresolution_hierarchy.hpp"
 #include "multiresolution_oracle.hpp"
 #include "points.hpp"
@@ -151,6 +152,13 @@ TEST(EllipticalMetric2, NearestIsNearestInTheMetric) {
     }
   }
 }
+
+/// A grid is triangulated in the Euclidean metric only.
+template <class Triangulation>
+concept HasGrid = requires(Triangulation t) {
+  t.build_grid(0.0, 0.0, 1.0, 2u, 2u);
+};
+static_assert(HasGrid<Delaunay2<double>> && !HasGrid<Elliptical2>);
 
 TEST(EllipticalMetric2, RefusesBadInputAndStaysUnchanged) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
