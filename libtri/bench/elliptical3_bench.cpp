@@ -18,7 +18,7 @@
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <benchmark/benchmark.h>
 
-#include "terrace/tri/elliptical.hpp"
+#include "terrace/tri/metric.hpp"
 
 namespace {
 
@@ -53,7 +53,7 @@ tri::LinearMap3 map_of(Metric metric) {
                              -3.0 / 7, -3.0 / 7, 6.0 / 7, -2.0 / 7};
   switch (metric) {
     case kRound:
-      return tri::kIdentityMap3;
+      return tri::kIdentityMap<3>;
     case kUpright:
       return tri::ellipsoid_map({5, 1, 2});
     case kTurned:
@@ -89,7 +89,8 @@ void euclidean(benchmark::State& state) {
 void elliptical(benchmark::State& state) {
   const auto points = input_points(static_cast<Input>(state.range(0)));
   measure(state, points.size(), [&] {
-    tri::EllipticalDelaunay3 triangulation(map_of(static_cast<Metric>(state.range(1))));
+    tri::Delaunay3<double, tri::EllipticalMetric3> triangulation(
+        map_of(static_cast<Metric>(state.range(1))));
     const double start = now();
     triangulation.build(points);
     return now() - start;
@@ -178,8 +179,10 @@ void euclidean_sets(benchmark::State& state) {
   change_sets(state, tri::Delaunay3<double>(), state.range(0) != 0);
 }
 void elliptical_sets(benchmark::State& state) {
-  change_sets(state, tri::EllipticalDelaunay3(map_of(static_cast<Metric>(state.range(1)))),
-              state.range(0) != 0);
+  change_sets(
+      state,
+      tri::Delaunay3<double, tri::EllipticalMetric3>(map_of(static_cast<Metric>(state.range(1)))),
+      state.range(0) != 0);
 }
 
 /// Three boxes that cover most of the cube, ellipsoids of the given ratio. Counts besides how many

@@ -15,7 +15,7 @@
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <benchmark/benchmark.h>
 
-#include "terrace/tri/elliptical.hpp"
+#include "terrace/tri/metric.hpp"
 
 namespace {
 
@@ -48,7 +48,7 @@ std::vector<Point> input_points(Input input) {
 tri::LinearMap2 map_of(Metric metric) {
   switch (metric) {
     case kRound:
-      return tri::kIdentityMap2;
+      return tri::kIdentityMap<2>;
     case kUpright:
       return tri::ellipse_map(5, 1, 0);
     case kSlanted:
@@ -84,7 +84,8 @@ void euclidean(benchmark::State& state) {
 void elliptical(benchmark::State& state) {
   const auto points = input_points(static_cast<Input>(state.range(0)));
   measure(state, points.size(), [&] {
-    tri::EllipticalDelaunay2 triangulation(map_of(static_cast<Metric>(state.range(1))));
+    tri::Delaunay2<double, tri::EllipticalMetric2> triangulation(
+        map_of(static_cast<Metric>(state.range(1))));
     const double start = now();
     triangulation.build(points);
     return now() - start;

@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-#include <terrace/tri/elliptical.hpp>
+#include <terrace/tri/metric.hpp>
 
 namespace tri = terrace::tri;
 using Point = std::array<double, 2>;
@@ -49,7 +49,7 @@ int main() {
 
   // One ellipse, four times as long as wide, its long axis 30 degrees from +x.
   const tri::LinearMap2 ellipse = tri::ellipse_map(4, 1, 30);
-  tri::EllipticalDelaunay2 slanted(ellipse);
+  tri::Delaunay2<double, tri::EllipticalMetric2> slanted(ellipse);
   slanted.build(points);
   const double everywhere = stretch(slanted, all(slanted), everything, 30);
   std::printf("one ellipse: edges are %.2f times as long along it as across\n", everywhere);
@@ -58,7 +58,7 @@ int main() {
   const std::uint64_t before = slanted.hash();
   std::vector<Point> detail;
   for (int i = 0; i < 500; ++i) detail.push_back({40 + 10 * unit(), 40 + 10 * unit()});
-  std::vector<tri::EllipticalDelaunay2::Insertion> inserted(detail.size());
+  std::vector<tri::Delaunay2<double, tri::EllipticalMetric2>::Insertion> inserted(detail.size());
   slanted.insert(detail, inserted);
   std::vector<tri::VertexId> added;
   for (const auto& [vertex, created] : inserted)

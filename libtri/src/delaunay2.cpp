@@ -6,38 +6,17 @@
 #include <stdexcept>
 #include <string>
 
+#include "check_input.hpp"
 #include "delaunay2/access.hpp"
 #include "delaunay2/build.hpp"
 #include "delaunay2/insert.hpp"
 #include "delaunay2/query.hpp"
 #include "delaunay2/remove.hpp"
-#include "delaunay2/take_changes.hpp"
 
 namespace terrace::tri {
 namespace {
 
-using planar::kMaxVertices;
 using planar::kNone;
-
-template <class Kernel, class Point>
-void check_points(std::span<const Point> points) {
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if (Kernel::valid(points[i])) continue;
-    const bool integers = std::is_same_v<Kernel, planar::IntKernel>;
-    throw std::invalid_argument(
-        "point " + std::to_string(i) + ": coordinates " + std::to_string(points[i][0]) + ", " +
-        std::to_string(points[i][1]) +
-        (integers ? " are not in the range 0 <= c < 2^30; move or scale the points"
-                  : " are not finite; leave such points out"));
-  }
-}
-
-void check_count(std::size_t present, std::size_t added) {
-  if (added > kMaxVertices - present)
-    throw std::length_error("a triangulation holds at most 2^29 - 2 vertices; " +
-                            std::to_string(present) + " are there and " + std::to_string(added) +
-                            " were to be added");
-}
 
 /// Coordinates of the lines of a grid; throws where they would be rounded or out of range.
 template <class Kernel, class Coord>
@@ -66,26 +45,28 @@ std::vector<Coord> grid_lines(Coord begin, Coord step, std::uint32_t count, cons
 
 }  // namespace
 
-template <class Coord>
-Delaunay2<Coord>::Delaunay2() : impl_(std::make_unique<Impl>()) {}
-template <class Coord>
-Delaunay2<Coord>::~Delaunay2() = default;
-template <class Coord>
-Delaunay2<Coord>::Delaunay2(Delaunay2&&) noexcept = default;
-template <class Coord>
-Delaunay2<Coord>& Delaunay2<Coord>::operator=(Delaunay2&&) noexcept = default;
+template <class Coord, class Metric>
+Delaunay2<Coord, Metric>::Delaunay2(const Metric& metric) : impl_(std::make_unique<Impl>(metric)) {}
+template <class Coord, class Metric>
+Delaunay2<Coord, Metric>::~Delaunay2() = default;
+template <class Coord, class Metric>
+Delaunay2<Coord, Metric>::Delaunay2(Delaunay2&&) noexcept = default;
+template <class Coord, class Metric>
+Delaunay2<Coord, Metric>& Delaunay2<Coord, Metric>::operator=(Delaunay2&&) noexcept = default;
 
-template <class Coord>
-std::vector<VertexId> Delaunay2<Coord>::build(std::span<const Point> points) {
+template <class Coord, class Metric>
+std::vector<VertexId> Delaunay2<Coord, Metric>::build(std::span<const Point> points) {
   assert(vertex_count() == 0);
   check_count(0, points.size());
   check_points<typename Impl::Kernel>(points);
+  [[maybe_unused]] const auto scope = impl_->scope();
   return planar::build(impl_->mesh, points);
 }
 
-template <class Coord>
-VertexId Delaunay2<Coord>::build_grid(Coord x0, Coord y0, Coord step, std::uint32_t columns,
-                                      std::uint32_t rows) {
+template <class Coord, class Metric>
+VertexId Delaunay2<Coord, Metric>::build_grid(
+    Coord x0, Coord y0, Coord step, std::uint32_t columns,
+    std::uint32_t rows) requires std::is_same_v<Metric, Euclidean> {
   using Kernel = typename Impl::Kernel;
   assert(vertex_count() == 0);
   if (!(step > 0)) throw std::invalid_argument("grid: step must be positive");
@@ -95,22 +76,24 @@ VertexId Delaunay2<Coord>::build_grid(Coord x0, Coord y0, Coord step, std::uint3
   return VertexId{planar::build_grid<Kernel>(impl_->mesh, xs, ys)};
 }
 
-template <class Coord>
-auto Delaunay2<Coord>::insert(const Point& point, VertexId hint) -> Insertion {
+template <class Coord, class Metric>
+auto Delaunay2<Coord, Metric>::insert(const Point& point, VertexId hint) -> Insertion {
   assert(hint == kNoVertex || alive(hint));
   check_count(impl_->mesh.vertex_count, 1);
-  check_points<typename Impl::Kernel>(std::span(&point, 1));
+  check_points<typename Impl::Kernel>(std::span<const Point>(&point, 1));
+  [[maybe_unused]] const auto scope = impl_->scope();
   const planar::Inserted inserted = planar::insert_point(impl_->mesh, point, slot(hint));
   return {VertexId{inserted.vertex}, inserted.created};
 }
 
-template <class Coord>
-void Delaunay2<Coord>::insert(std::span<const Point> points, std::span<Insertion> results,
-                              VertexId hint) {
+template <class Coord, class Metric>
+void Delaunay2<Coord, Metric>::insert(std::span<const Point> points, std::span<Insertion> results,
+                                      VertexId hint) {
   assert(hint == kNoVertex || alive(hint));
   assert(results.empty() || results.size() == points.size());
   check_count(impl_->mesh.vertex_count, points.size());
   check_points<typename Impl::Kernel>(points);
+  [[maybe_unused]] const auto scope = impl_->scope();
   planar::insert_points(impl_->mesh, points, slot(hint),
                         [&](std::size_t i, const planar::Inserted& inserted) {
                           if (!results.empty())
@@ -118,63 +101,70 @@ void Delaunay2<Coord>::insert(std::span<const Point> points, std::span<Insertion
                         });
 }
 
-template <class Coord>
-void Delaunay2<Coord>::remove(VertexId vertex) {
+template <class Coord, class Metric>
+void Delaunay2<Coord, Metric>::remove(VertexId vertex) {
   assert(alive(vertex));
+  [[maybe_unused]] const auto scope = impl_->scope();
   planar::remove_vertex(impl_->mesh, slot(vertex));
 }
 
-template <class Coord>
-void Delaunay2<Coord>::remove(std::span<const VertexId> vertices) {
+template <class Coord, class Metric>
+void Delaunay2<Coord, Metric>::remove(std::span<const VertexId> vertices) {
   impl_->set.clear();
   for (const VertexId vertex : vertices) {
     assert(alive(vertex));
     impl_->set.push_back(slot(vertex));
   }
+  [[maybe_unused]] const auto scope = impl_->scope();
   planar::remove_set(impl_->mesh, std::span<const std::uint32_t>(impl_->set));
 }
 
-template <class Coord>
-void Delaunay2<Coord>::clear() {
+template <class Coord, class Metric>
+void Delaunay2<Coord, Metric>::clear() {
   impl_->mesh.clear();
 }
 
-template <class Coord>
-void Delaunay2<Coord>::reserve(std::size_t vertices) {
+template <class Coord, class Metric>
+void Delaunay2<Coord, Metric>::reserve(std::size_t vertices) {
   check_count(0, vertices);
   impl_->mesh.point.reserve(vertices + 1);
   impl_->mesh.incident.reserve(vertices + 1);
   impl_->mesh.triangle.reserve(2 * vertices);
 }
 
-template <class Coord>
-std::size_t Delaunay2<Coord>::vertex_count() const {
+template <class Coord, class Metric>
+const Metric& Delaunay2<Coord, Metric>::metric() const {
+  return impl_->metric;
+}
+
+template <class Coord, class Metric>
+std::size_t Delaunay2<Coord, Metric>::vertex_count() const {
   return impl_->mesh.vertex_count;
 }
 
-template <class Coord>
-std::size_t Delaunay2<Coord>::triangle_count() const {
+template <class Coord, class Metric>
+std::size_t Delaunay2<Coord, Metric>::triangle_count() const {
   const auto& mesh = impl_->mesh;
   if (mesh.flat) return 0;
   // Of 2 n - 2 triangles, as many are ghosts as there are hull edges.
   return 2 * std::size_t{mesh.vertex_count} - 2 - planar::degree(mesh, planar::kGhost);
 }
 
-template <class Coord>
-auto Delaunay2<Coord>::point(VertexId vertex) const -> Point {
+template <class Coord, class Metric>
+auto Delaunay2<Coord, Metric>::point(VertexId vertex) const -> Point {
   assert(alive(vertex));
   return impl_->mesh.point[slot(vertex)];
 }
 
-template <class Coord>
-std::array<VertexId, 3> Delaunay2<Coord>::vertices(TriangleId triangle) const {
+template <class Coord, class Metric>
+std::array<VertexId, 3> Delaunay2<Coord, Metric>::vertices(TriangleId triangle) const {
   assert(alive(triangle));
   const auto& [a, b, c] = impl_->mesh.triangle[slot(triangle)].corner;
   return {VertexId{a}, VertexId{b}, VertexId{c}};
 }
 
-template <class Coord>
-std::array<TriangleId, 3> Delaunay2<Coord>::neighbours(TriangleId triangle) const {
+template <class Coord, class Metric>
+std::array<TriangleId, 3> Delaunay2<Coord, Metric>::neighbours(TriangleId triangle) const {
   assert(alive(triangle));
   std::array<TriangleId, 3> result;
   for (std::size_t i = 0; i < 3; ++i) {
@@ -184,78 +174,87 @@ std::array<TriangleId, 3> Delaunay2<Coord>::neighbours(TriangleId triangle) cons
   return result;
 }
 
-template <class Coord>
-TriangleId Delaunay2<Coord>::triangle_at(VertexId vertex) const {
+template <class Coord, class Metric>
+TriangleId Delaunay2<Coord, Metric>::triangle_at(VertexId vertex) const {
   assert(alive(vertex));
   const auto& mesh = impl_->mesh;
   return mesh.flat ? kNoTriangle : TriangleId{mesh.finite_side(mesh.incident[slot(vertex)])};
 }
 
-template <class Coord>
-void Delaunay2<Coord>::adjacent(VertexId vertex, std::vector<VertexId>& result) const {
+template <class Coord, class Metric>
+void Delaunay2<Coord, Metric>::adjacent(VertexId vertex, std::vector<VertexId>& result) const {
   assert(alive(vertex));
   planar::adjacent(impl_->mesh, slot(vertex), result);
 }
 
-template <class Coord>
-std::uint32_t Delaunay2<Coord>::vertex_slots() const {
+template <class Coord, class Metric>
+std::uint32_t Delaunay2<Coord, Metric>::vertex_slots() const {
   return impl_->mesh.point.size();
 }
-template <class Coord>
-std::uint32_t Delaunay2<Coord>::triangle_slots() const {
+template <class Coord, class Metric>
+std::uint32_t Delaunay2<Coord, Metric>::triangle_slots() const {
   return impl_->mesh.triangle.size();
 }
-template <class Coord>
-bool Delaunay2<Coord>::alive(VertexId vertex) const {
+template <class Coord, class Metric>
+bool Delaunay2<Coord, Metric>::alive(VertexId vertex) const {
   return impl_->mesh.vertex_alive(slot(vertex));
 }
-template <class Coord>
-bool Delaunay2<Coord>::alive(TriangleId triangle) const {
+template <class Coord, class Metric>
+bool Delaunay2<Coord, Metric>::alive(TriangleId triangle) const {
   return impl_->mesh.triangle_alive(slot(triangle));
 }
 
-template <class Coord>
-Location Delaunay2<Coord>::locate(const Point& point, VertexId hint) const {
+template <class Coord, class Metric>
+Location Delaunay2<Coord, Metric>::locate(const Point& point, VertexId hint) const {
   assert(hint == kNoVertex || alive(hint));
-  check_points<typename Impl::Kernel>(std::span(&point, 1));
+  check_points<typename Impl::Kernel>(std::span<const Point>(&point, 1));
+  [[maybe_unused]] const auto scope = impl_->scope();
   return planar::locate(impl_->mesh, point, slot(hint));
 }
 
-template <class Coord>
-VertexId Delaunay2<Coord>::nearest(const Point& point, VertexId hint) const {
+template <class Coord, class Metric>
+VertexId Delaunay2<Coord, Metric>::nearest(const Point& point, VertexId hint) const {
   assert(hint == kNoVertex || alive(hint));
-  check_points<typename Impl::Kernel>(std::span(&point, 1));
+  check_points<typename Impl::Kernel>(std::span<const Point>(&point, 1));
+  [[maybe_unused]] const auto scope = impl_->scope();
   return VertexId{planar::nearest(impl_->mesh, point, slot(hint))};
 }
 
-template <class Coord>
-std::uint64_t Delaunay2<Coord>::hash() const {
+template <class Coord, class Metric>
+std::uint64_t Delaunay2<Coord, Metric>::hash() const {
   return planar::hash(impl_->mesh);
 }
 
-template <class Coord>
-std::size_t Delaunay2<Coord>::memory_bytes() const {
+template <class Coord, class Metric>
+std::size_t Delaunay2<Coord, Metric>::memory_bytes() const {
   return impl_->mesh.bytes() + impl_->set.capacity() * sizeof(std::uint32_t);
 }
 
-template <class Coord>
-void Delaunay2<Coord>::start_journal() {
+template <class Coord, class Metric>
+void Delaunay2<Coord, Metric>::start_journal() {
   impl_->mesh.journal.start();
 }
-template <class Coord>
-void Delaunay2<Coord>::stop_journal() {
+template <class Coord, class Metric>
+void Delaunay2<Coord, Metric>::stop_journal() {
   impl_->mesh.journal.stop();
 }
-template <class Coord>
-void Delaunay2<Coord>::take_changes(Changes& changes) {
-  assert(impl_->mesh.journal.on());
-  planar::take_changes<Coord>(impl_->mesh, changes);
+template <class Coord, class Metric>
+void Delaunay2<Coord, Metric>::take_changes(Changes& changes) {
+  auto& mesh = impl_->mesh;
+  assert(mesh.journal.on());
+  changes.clear();
+  mesh.journal.take(
+      [&](std::uint32_t v) { return mesh.vertex_alive(v) ? &mesh.point[v] : nullptr; },
+      [&](std::uint32_t t) { return mesh.triangle_alive(t) ? &mesh.triangle[t].corner : nullptr; },
+      [](const auto& corner) { return planar::is_finite(corner); }, changes,
+      changes.removed_triangles, changes.added_triangles);
 }
 
 #ifdef TERRACE_TRI_CORE
 template class Delaunay2<std::int32_t>;
 #else
 template class Delaunay2<double>;
+template class Delaunay2<double, EllipticalMetric2>;
 #endif
 
 }  // namespace terrace::tri

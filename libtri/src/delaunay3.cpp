@@ -2,76 +2,53 @@
 #include "terrace/tri/delaunay3.hpp"
 
 #include <cassert>
-#include <stdexcept>
-#include <string>
 
+#include "check_input.hpp"
 #include "delaunay3/access.hpp"
 #include "delaunay3/build.hpp"
 #include "delaunay3/insert.hpp"
 #include "delaunay3/query.hpp"
 #include "delaunay3/remove.hpp"
-#include "delaunay3/take_changes.hpp"
 
 namespace terrace::tri {
-namespace {
 
-using spatial::kMaxVertices;
+template <class Coord, class Metric>
+Delaunay3<Coord, Metric>::Delaunay3(const Metric& metric) : impl_(std::make_unique<Impl>(metric)) {}
+template <class Coord, class Metric>
+Delaunay3<Coord, Metric>::~Delaunay3() = default;
+template <class Coord, class Metric>
+Delaunay3<Coord, Metric>::Delaunay3(Delaunay3&&) noexcept = default;
+template <class Coord, class Metric>
+Delaunay3<Coord, Metric>& Delaunay3<Coord, Metric>::operator=(Delaunay3&&) noexcept = default;
 
-template <class Kernel, class Point>
-void check_points(std::span<const Point> points) {
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if (Kernel::valid(points[i])) continue;
-    const bool integers = std::is_same_v<Kernel, spatial::IntKernel>;
-    throw std::invalid_argument(
-        "point " + std::to_string(i) + ": coordinates " + std::to_string(points[i][0]) + ", " +
-        std::to_string(points[i][1]) + ", " + std::to_string(points[i][2]) +
-        (integers ? " are not in the range 0 <= c < 2^30; move or scale the points"
-                  : " are not finite; leave such points out"));
-  }
-}
-
-void check_count(std::size_t present, std::size_t added) {
-  if (added > kMaxVertices - present)
-    throw std::length_error("a triangulation holds at most 2^29 - 2 vertices; " +
-                            std::to_string(present) + " are there and " + std::to_string(added) +
-                            " were to be added");
-}
-
-}  // namespace
-
-template <class Coord>
-Delaunay3<Coord>::Delaunay3() : impl_(std::make_unique<Impl>()) {}
-template <class Coord>
-Delaunay3<Coord>::~Delaunay3() = default;
-template <class Coord>
-Delaunay3<Coord>::Delaunay3(Delaunay3&&) noexcept = default;
-template <class Coord>
-Delaunay3<Coord>& Delaunay3<Coord>::operator=(Delaunay3&&) noexcept = default;
-
-template <class Coord>
-std::vector<VertexId> Delaunay3<Coord>::build(std::span<const Point> points, unsigned threads) {
+template <class Coord, class Metric>
+std::vector<VertexId> Delaunay3<Coord, Metric>::build(std::span<const Point> points,
+                                                      unsigned threads) {
   assert(vertex_count() == 0);
   check_count(0, points.size());
   check_points<typename Impl::Kernel>(points);
+  [[maybe_unused]] const auto scope = impl_->scope();
   return spatial::build(impl_->mesh, points, threads);
 }
 
-template <class Coord>
-auto Delaunay3<Coord>::insert(const Point& point, VertexId hint) -> Insertion {
+template <class Coord, class Metric>
+auto Delaunay3<Coord, Metric>::insert(const Point& point, VertexId hint) -> Insertion {
   assert(hint == kNoVertex || alive(hint));
   check_count(impl_->mesh.vertex_count, 1);
-  check_points<typename Impl::Kernel>(std::span(&point, 1));
+  check_points<typename Impl::Kernel>(std::span<const Point>(&point, 1));
+  [[maybe_unused]] const auto scope = impl_->scope();
   const spatial::Inserted inserted = spatial::insert_point(impl_->mesh, point, slot(hint));
   return {VertexId{inserted.vertex}, inserted.created};
 }
 
-template <class Coord>
-void Delaunay3<Coord>::insert(std::span<const Point> points, std::span<Insertion> results,
-                              VertexId hint) {
+template <class Coord, class Metric>
+void Delaunay3<Coord, Metric>::insert(std::span<const Point> points, std::span<Insertion> results,
+                                      VertexId hint) {
   assert(hint == kNoVertex || alive(hint));
   assert(results.empty() || results.size() == points.size());
   check_count(impl_->mesh.vertex_count, points.size());
   check_points<typename Impl::Kernel>(points);
+  [[maybe_unused]] const auto scope = impl_->scope();
   spatial::insert_points(impl_->mesh, points, slot(hint),
                          [&](std::size_t i, const spatial::Inserted& inserted) {
                            if (!results.empty())
@@ -79,60 +56,68 @@ void Delaunay3<Coord>::insert(std::span<const Point> points, std::span<Insertion
                          });
 }
 
-template <class Coord>
-void Delaunay3<Coord>::remove(VertexId vertex) {
+template <class Coord, class Metric>
+void Delaunay3<Coord, Metric>::remove(VertexId vertex) {
   assert(alive(vertex));
   const std::uint32_t one = slot(vertex);
+  [[maybe_unused]] const auto scope = impl_->scope();
   spatial::remove_set(impl_->mesh, std::span(&one, 1));
 }
 
-template <class Coord>
-void Delaunay3<Coord>::remove(std::span<const VertexId> vertices) {
+template <class Coord, class Metric>
+void Delaunay3<Coord, Metric>::remove(std::span<const VertexId> vertices) {
   impl_->set.clear();
   for (const VertexId vertex : vertices) {
     assert(alive(vertex));
     impl_->set.push_back(slot(vertex));
   }
+  [[maybe_unused]] const auto scope = impl_->scope();
   spatial::remove_set(impl_->mesh, std::span<const std::uint32_t>(impl_->set));
 }
 
-template <class Coord>
-void Delaunay3<Coord>::clear() {
+template <class Coord, class Metric>
+void Delaunay3<Coord, Metric>::clear() {
   impl_->mesh.clear();
 }
 
-template <class Coord>
-void Delaunay3<Coord>::reserve(std::size_t vertices) {
+template <class Coord, class Metric>
+void Delaunay3<Coord, Metric>::reserve(std::size_t vertices) {
   check_count(0, vertices);
   impl_->mesh.vertex.reserve(vertices + 1);
   impl_->mesh.tetrahedron.reserve(7 * vertices);
   impl_->mesh.mark.reserve(7 * vertices);
 }
 
-template <class Coord>
-std::size_t Delaunay3<Coord>::vertex_count() const {
+template <class Coord, class Metric>
+const Metric& Delaunay3<Coord, Metric>::metric() const {
+  return impl_->metric;
+}
+
+template <class Coord, class Metric>
+std::size_t Delaunay3<Coord, Metric>::vertex_count() const {
   return impl_->mesh.vertex_count;
 }
 
-template <class Coord>
-std::size_t Delaunay3<Coord>::tetrahedron_count() const {
+template <class Coord, class Metric>
+std::size_t Delaunay3<Coord, Metric>::tetrahedron_count() const {
   return impl_->mesh.finite_count;
 }
 
-template <class Coord>
-auto Delaunay3<Coord>::point(VertexId vertex) const -> Point {
+template <class Coord, class Metric>
+auto Delaunay3<Coord, Metric>::point(VertexId vertex) const -> Point {
   assert(alive(vertex));
   return impl_->mesh.vertex[slot(vertex)].point;
 }
 
-template <class Coord>
-std::array<VertexId, 4> Delaunay3<Coord>::vertices(TetrahedronId tetrahedron) const {
+template <class Coord, class Metric>
+std::array<VertexId, 4> Delaunay3<Coord, Metric>::vertices(TetrahedronId tetrahedron) const {
   assert(alive(tetrahedron));
-  return spatial::vertex_ids(impl_->mesh.tetrahedron[slot(tetrahedron)].corner);
+  const auto& [a, b, c, d] = impl_->mesh.tetrahedron[slot(tetrahedron)].corner;
+  return {VertexId{a}, VertexId{b}, VertexId{c}, VertexId{d}};
 }
 
-template <class Coord>
-std::array<TetrahedronId, 4> Delaunay3<Coord>::neighbours(TetrahedronId tetrahedron) const {
+template <class Coord, class Metric>
+std::array<TetrahedronId, 4> Delaunay3<Coord, Metric>::neighbours(TetrahedronId tetrahedron) const {
   assert(alive(tetrahedron));
   std::array<TetrahedronId, 4> result;
   for (std::size_t i = 0; i < 4; ++i) {
@@ -142,82 +127,94 @@ std::array<TetrahedronId, 4> Delaunay3<Coord>::neighbours(TetrahedronId tetrahed
   return result;
 }
 
-template <class Coord>
-TetrahedronId Delaunay3<Coord>::tetrahedron_at(VertexId vertex) const {
+template <class Coord, class Metric>
+TetrahedronId Delaunay3<Coord, Metric>::tetrahedron_at(VertexId vertex) const {
   assert(alive(vertex));
   const auto& mesh = impl_->mesh;
   return mesh.flat ? kNoTetrahedron
                    : TetrahedronId{mesh.finite_side(mesh.vertex[slot(vertex)].incident)};
 }
 
-template <class Coord>
-void Delaunay3<Coord>::adjacent(VertexId vertex, std::vector<VertexId>& result) const {
+template <class Coord, class Metric>
+void Delaunay3<Coord, Metric>::adjacent(VertexId vertex, std::vector<VertexId>& result) const {
   assert(alive(vertex));
   spatial::adjacent(impl_->mesh, slot(vertex), result);
 }
 
-template <class Coord>
-void Delaunay3<Coord>::tetrahedra_at(VertexId vertex, std::vector<TetrahedronId>& result) const {
+template <class Coord, class Metric>
+void Delaunay3<Coord, Metric>::tetrahedra_at(VertexId vertex,
+                                             std::vector<TetrahedronId>& result) const {
   assert(alive(vertex));
   spatial::tetrahedra_at(impl_->mesh, slot(vertex), result);
 }
 
-template <class Coord>
-std::uint32_t Delaunay3<Coord>::vertex_slots() const {
+template <class Coord, class Metric>
+std::uint32_t Delaunay3<Coord, Metric>::vertex_slots() const {
   return impl_->mesh.vertex.size();
 }
-template <class Coord>
-std::uint32_t Delaunay3<Coord>::tetrahedron_slots() const {
+template <class Coord, class Metric>
+std::uint32_t Delaunay3<Coord, Metric>::tetrahedron_slots() const {
   return impl_->mesh.tetrahedron.size();
 }
-template <class Coord>
-bool Delaunay3<Coord>::alive(VertexId vertex) const {
+template <class Coord, class Metric>
+bool Delaunay3<Coord, Metric>::alive(VertexId vertex) const {
   return impl_->mesh.vertex_alive(slot(vertex));
 }
-template <class Coord>
-bool Delaunay3<Coord>::alive(TetrahedronId tetrahedron) const {
+template <class Coord, class Metric>
+bool Delaunay3<Coord, Metric>::alive(TetrahedronId tetrahedron) const {
   return impl_->mesh.tetrahedron_alive(slot(tetrahedron));
 }
 
-template <class Coord>
-Location3 Delaunay3<Coord>::locate(const Point& point, VertexId hint) const {
+template <class Coord, class Metric>
+Location3 Delaunay3<Coord, Metric>::locate(const Point& point, VertexId hint) const {
   assert(hint == kNoVertex || alive(hint));
-  check_points<typename Impl::Kernel>(std::span(&point, 1));
+  check_points<typename Impl::Kernel>(std::span<const Point>(&point, 1));
+  [[maybe_unused]] const auto scope = impl_->scope();
   return spatial::locate(impl_->mesh, point, slot(hint));
 }
 
-template <class Coord>
-VertexId Delaunay3<Coord>::nearest(const Point& point, VertexId hint) const {
+template <class Coord, class Metric>
+VertexId Delaunay3<Coord, Metric>::nearest(const Point& point, VertexId hint) const {
   assert(hint == kNoVertex || alive(hint));
-  check_points<typename Impl::Kernel>(std::span(&point, 1));
+  check_points<typename Impl::Kernel>(std::span<const Point>(&point, 1));
+  [[maybe_unused]] const auto scope = impl_->scope();
   return VertexId{spatial::nearest(impl_->mesh, point, slot(hint))};
 }
 
-template <class Coord>
-std::uint64_t Delaunay3<Coord>::hash() const {
+template <class Coord, class Metric>
+std::uint64_t Delaunay3<Coord, Metric>::hash() const {
   return spatial::hash(impl_->mesh);
 }
 
-template <class Coord>
-std::size_t Delaunay3<Coord>::memory_bytes() const {
+template <class Coord, class Metric>
+std::size_t Delaunay3<Coord, Metric>::memory_bytes() const {
   return impl_->mesh.bytes() + impl_->set.capacity() * sizeof(std::uint32_t);
 }
 
-template <class Coord>
-void Delaunay3<Coord>::start_journal() {
+template <class Coord, class Metric>
+void Delaunay3<Coord, Metric>::start_journal() {
   impl_->mesh.journal.start();
 }
-template <class Coord>
-void Delaunay3<Coord>::stop_journal() {
+template <class Coord, class Metric>
+void Delaunay3<Coord, Metric>::stop_journal() {
   impl_->mesh.journal.stop();
 }
-template <class Coord>
-void Delaunay3<Coord>::take_changes(Changes& changes) {
-  assert(impl_->mesh.journal.on());
-  spatial::take_changes<Coord>(impl_->mesh, changes);
+template <class Coord, class Metric>
+void Delaunay3<Coord, Metric>::take_changes(Changes& changes) {
+  auto& mesh = impl_->mesh;
+  assert(mesh.journal.on());
+  changes.clear();
+  mesh.journal.take(
+      [&](std::uint32_t v) { return mesh.vertex_alive(v) ? &mesh.vertex[v].point : nullptr; },
+      [&](std::uint32_t t) {
+        return mesh.tetrahedron_alive(t) ? &mesh.tetrahedron[t].corner : nullptr;
+      },
+      [](const auto& corner) { return spatial::is_finite(corner); }, changes,
+      changes.removed_tetrahedra, changes.added_tetrahedra);
 }
 
 template class Delaunay3<std::int32_t>;
 template class Delaunay3<double>;
+template class Delaunay3<double, EllipticalMetric3>;
 
 }  // namespace terrace::tri

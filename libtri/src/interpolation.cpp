@@ -39,7 +39,7 @@ void answer_all(const Mesh& mesh, std::span<const Point2> queries, std::vector<R
   if (mesh.vertex_count == 0) return;
   for (std::size_t done = 0; done < queries.size(); done += kSorted) {
     const auto part = queries.subspan(done, std::min(kSorted, queries.size() - done));
-    const auto order = planar::hilbert_order<planar::DoubleKernel>(part);
+    const auto order = planar::hilbert_order<double>(part);
     for_blocks(
         part.size(), kBlock, threads, [&] { return std::make_unique<Sampler>(mesh); },
         [&](std::size_t begin, std::size_t end, std::unique_ptr<Sampler>& sampler) {

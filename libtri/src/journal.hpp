@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "terrace/tri/delaunay2.hpp"
+
 /// What slots held when a change first touched them. One bit per slot tells whether it was touched
 /// already, so the cost of recording does not depend on how often a slot is used again.
 
@@ -46,11 +48,43 @@ class Journal {
     if (vertices_.first_touch(slot)) vertices_.records.push_back({slot, was_alive, before});
   }
 
-  [[nodiscard]] const std::vector<CellRecord>& cells() const { return cells_.records; }
-  [[nodiscard]] const std::vector<VertexRecord>& vertices() const { return vertices_.records; }
-  [[nodiscard]] bool vertex_touched(std::uint32_t slot) const { return vertices_.touched(slot); }
-  void forget_vertex(std::uint32_t slot) { vertices_.untouch(slot); }
-  void clear() {
+  /// Turns the records into net changes and empties the journal. What is there now: point(slot) is
+  /// that of a living vertex, corners(slot) those of a finite cell, else nullptr;
+  /// is_finite(corners) judges recorded ones. `changes`: a triangulation's, empty; the last two are
+  /// its lists of cells.
+  template <class PointNow, class CornersNow, class IsFinite, class Changes, class CellId>
+  void take(const PointNow& point, const CornersNow& corners, const IsFinite& is_finite,
+            Changes& changes, std::vector<CellId>& removed_cells,
+            std::vector<CellId>& added_cells) {
+    for (const VertexRecord& record : vertices_.records) {
+      const Point* const now = point(record.slot);
+      if (record.was_alive && now != nullptr && record.before == *now) {
+        // The same again; so its cells may be the same as well.
+        vertices_.untouch(record.slot);
+        continue;
+      }
+      if (record.was_alive) {
+        changes.removed_vertices.push_back(VertexId{record.slot});
+        changes.removed_points.push_back(record.before);
+      }
+      if (now != nullptr) changes.added_vertices.push_back(VertexId{record.slot});
+    }
+    const auto of_same_vertices = [&](const Corners& cell) {
+      for (const std::uint32_t v : cell)
+        if (vertices_.touched(v)) return false;
+      return true;
+    };
+    for (const CellRecord& record : cells_.records) {
+      const bool before = is_finite(record.before);
+      const Corners* const now = corners(record.slot);
+      if (before && now != nullptr && record.before == *now && of_same_vertices(*now)) continue;
+      if (before) {
+        removed_cells.push_back(CellId{record.slot});
+        auto& ids = changes.removed_corners.emplace_back();
+        for (std::size_t i = 0; i < kCorners; ++i) ids[i] = VertexId{record.before[i]};
+      }
+      if (now != nullptr) added_cells.push_back(CellId{record.slot});
+    }
     cells_.clear();
     vertices_.clear();
   }

@@ -6,7 +6,6 @@
 #include <string>
 
 #include "delaunay3/access.hpp"
-#include "elliptical/access3.hpp"
 #include "shape/criterion.hpp"
 #include "shape/flood.hpp"
 #include "shape/published.hpp"
@@ -14,30 +13,6 @@
 #include "shape/state.hpp"
 
 namespace terrace::tri {
-namespace {
-
-template <class Coord>
-const auto& mesh_of(const Delaunay3<Coord>& triangulation) {
-  return Delaunay3Access::mesh(triangulation);
-}
-const auto& mesh_of(const EllipticalDelaunay3& triangulation) {
-  return EllipticalDelaunay3Access::impl(triangulation).mesh;
-}
-
-/// Does some work in the metric of a triangulation.
-template <class Coord, class Work>
-void in_metric_of(const Delaunay3<Coord>&, const Work& work) {
-  work();
-}
-template <class Work>
-void in_metric_of(const EllipticalDelaunay3& triangulation, const Work& work) {
-  const spatial::EllipticalKernel::Scope scope(
-      EllipticalDelaunay3Access::impl(triangulation).metric);
-  work();
-}
-
-}  // namespace
-
 template <class Triangulation>
 struct BasicShape3<Triangulation>::Impl {
   ShapeOptions options;
@@ -45,13 +20,12 @@ struct BasicShape3<Triangulation>::Impl {
 
   template <class Work>
   void with_criterion(const Triangulation& triangulation, const Work& work) const {
-    in_metric_of(triangulation, [&] {
-      if (options.criterion == ShapeCriterion::kGabriel) {
-        work(shape::Gabriel{});
-      } else {
-        work(shape::EdgeLength{options.edge_factor});
-      }
-    });
+    [[maybe_unused]] const auto scope = Delaunay3Access::scope(triangulation);
+    if (options.criterion == ShapeCriterion::kGabriel) {
+      work(shape::Gabriel{});
+    } else {
+      work(shape::EdgeLength{options.edge_factor});
+    }
   }
 };
 
@@ -73,7 +47,7 @@ BasicShape3<Triangulation>& BasicShape3<Triangulation>::operator=(BasicShape3&&)
 
 template <class Triangulation>
 void BasicShape3<Triangulation>::restore(const Triangulation& triangulation) {
-  const auto& mesh = mesh_of(triangulation);
+  const auto& mesh = Delaunay3Access::mesh(triangulation);
   shape::State& state = impl_->state;
   const bool keep_vertices = impl_->options.keep_vertices;
   impl_->with_criterion(triangulation, [&](const auto& criterion) {
@@ -90,7 +64,7 @@ template <class Triangulation>
 void BasicShape3<Triangulation>::update(const Triangulation& triangulation,
                                         const typename Triangulation::Changes& changes) {
   if (impl_->options.rule != ShapeRule::kFlood) return restore(triangulation);
-  const auto& mesh = mesh_of(triangulation);
+  const auto& mesh = Delaunay3Access::mesh(triangulation);
   impl_->with_criterion(triangulation, [&](const auto& criterion) {
     shape::update_flood(mesh, impl_->state, criterion, changes);
     if (impl_->options.keep_vertices) shape::rescue(mesh, impl_->state);
@@ -131,7 +105,7 @@ std::vector<TetrahedronId> BasicShape3<Triangulation>::kept_tetrahedra() const {
 
 template <class Triangulation>
 ShapeSurface BasicShape3<Triangulation>::surface(const Triangulation& triangulation) const {
-  const auto& mesh = mesh_of(triangulation);
+  const auto& mesh = Delaunay3Access::mesh(triangulation);
   const auto& of = impl_->state.of;
   ShapeSurface result;
   std::vector<std::array<std::uint32_t, 3>>& faces = result.surface.faces;
@@ -160,7 +134,7 @@ ShapeSurface BasicShape3<Triangulation>::surface(const Triangulation& triangulat
 
 template <class Triangulation>
 double BasicShape3<Triangulation>::volume(const Triangulation& triangulation) const {
-  const auto& mesh = mesh_of(triangulation);
+  const auto& mesh = Delaunay3Access::mesh(triangulation);
   double sum = 0.0;
   for (std::uint32_t t = 0; t < impl_->state.of.size(); ++t) {
     if (!shape::is_kept(impl_->state.of[t])) continue;
@@ -188,6 +162,6 @@ std::size_t BasicShape3<Triangulation>::memory_bytes() const {
 
 template class BasicShape3<Delaunay3<std::int32_t>>;
 template class BasicShape3<Delaunay3<double>>;
-template class BasicShape3<EllipticalDelaunay3>;
+template class BasicShape3<Delaunay3<double, EllipticalMetric3>>;
 
 }  // namespace terrace::tri

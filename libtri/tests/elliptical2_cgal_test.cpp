@@ -9,7 +9,7 @@
 #include <CGAL/Triangulation_vertex_base_with_info_2.h>
 #include <gtest/gtest.h>
 
-#include "elliptical/access.hpp"
+#include "delaunay2/access.hpp"
 #include "metrics.hpp"
 #include "points.hpp"
 
@@ -40,12 +40,12 @@ std::vector<Corners> mapped_triangles(const std::vector<PlanePoint>& points, con
   return result;
 }
 
-TEST(EllipticalDelaunay2, TrianglesAreCgalsOfTheMappedPointsTiesIncluded) {
+TEST(EllipticalMetric2, TrianglesAreCgalsOfTheMappedPointsTiesIncluded) {
   for (const PointSet kind : kPointSets) {
     for (std::size_t m = 0; m < lower_maps().size(); ++m) {
       SCOPED_TRACE(name(kind) + " map " + std::to_string(m));
       const auto points = make_points<double>(kind, 220, 31 + m);
-      EllipticalDelaunay2 triangulation(lower_maps()[m]);
+      Elliptical2 triangulation(lower_maps()[m]);
       triangulation.build(points);
       ASSERT_EQ(find_fault(triangulation), "");
       ASSERT_TRUE(triangles_of(triangulation) == mapped_triangles(points, lower_maps()[m]));
@@ -53,14 +53,14 @@ TEST(EllipticalDelaunay2, TrianglesAreCgalsOfTheMappedPointsTiesIncluded) {
   }
 }
 
-TEST(EllipticalDelaunay2, TrianglesAreCgalsOfTheMappedPointsForEllipses) {
+TEST(EllipticalMetric2, TrianglesAreCgalsOfTheMappedPointsForEllipses) {
   for (const double angle : {0.0, 17.0, 45.0, 90.0, 123.456, -60.0}) {
     for (const double ratio : {1.0, 3.0, 40.0}) {
       SCOPED_TRACE("angle " + std::to_string(angle) + " ratio " + std::to_string(ratio));
       const LinearMap2 map = ellipse_map(ratio, 1, angle);
       EXPECT_EQ(map[1], map[2]);
       const auto points = make_points<double>(PointSet::kUniform, 3000, 5);
-      EllipticalDelaunay2 triangulation(map);
+      Elliptical2 triangulation(map);
       triangulation.build(points);
       ASSERT_TRUE(triangles_of(triangulation) == mapped_triangles(points, map));
     }
@@ -89,8 +89,8 @@ TEST(EllipticalKernel, SignsAreExact) {
                            round % 5 == 0 ? static_cast<int>(random() % 200) - 100 : 0);
       }
     } while (map[0] * map[3] == map[1] * map[2]);
-    const planar::EllipticalMetric metric(map);
-    const EllipticalKernel::Scope scope(metric);
+    const planar::QuadraticForm form(map);
+    const EllipticalKernel::Scope scope(form);
     ASSERT_EQ(EllipticalKernel::in_circle(p[0], p[1], p[2], p[3]),
               in_ellipse(map, p[0], p[1], p[2], p[3]));
     using Q = CGAL::Exact_rational;

@@ -6,12 +6,13 @@
 
 #include <gtest/gtest.h>
 
-#include "elliptical/access.hpp"
+#include "delaunay2/access.hpp"
 #include "metrics.hpp"
+#include "model/model.hpp"
 #include "multiresolution_hierarchy.hpp"
 #include "multiresolution_oracle.hpp"
 #include "points.hpp"
-#include "terrace/tri/elliptical.hpp"
+#include "terrace/tri/metric.hpp"
 #include "terrace/tri/multiresolution.hpp"
 
 namespace terrace::tri::test {
@@ -19,12 +20,12 @@ namespace {
 
 // ---- Laws --------------------------------------------------------------------------------------
 
-TEST(EllipticalDelaunay2, NoVertexIsInsideAnEllipse) {
+TEST(EllipticalMetric2, NoVertexIsInsideAnEllipse) {
   // Symmetric maps on points with ties, where CGAL's choice among mapped points may differ.
   const LinearMap2 map = ellipse_map(4, 1, 30);
   for (const PointSet kind : kPointSets) {
     SCOPED_TRACE(name(kind));
-    EllipticalDelaunay2 triangulation(map);
+    Elliptical2 triangulation(map);
     triangulation.build(make_points<double>(kind, 60, 2));
     ASSERT_EQ(find_fault(triangulation), "");
     for (const TriangleId id : triangulation.all_triangles()) {
@@ -35,14 +36,14 @@ TEST(EllipticalDelaunay2, NoVertexIsInsideAnEllipse) {
   }
 }
 
-TEST(EllipticalDelaunay2, WithAMapThatKeepsCirclesItIsDelaunay2) {
+TEST(EllipticalMetric2, WithAMapThatKeepsCirclesItIsDelaunay2) {
   for (const LinearMap2& map :
-       {kIdentityMap2, LinearMap2{1e-200, 0, 0, 1e-200}, LinearMap2{0, -3, 3, 0},
+       {kIdentityMap<2>, LinearMap2{1e-200, 0, 0, 1e-200}, LinearMap2{0, -3, 3, 0},
         LinearMap2{0, 1, 1, 0}, LinearMap2{3, -4, 4, 3}, LinearMap2{1e300, 0, 0, -1e300}}) {
     for (const PointSet kind : kPointSets) {
       SCOPED_TRACE(name(kind) + " " + std::to_string(map[0]));
       const auto points = make_points<double>(kind, 300, 3);
-      EllipticalDelaunay2 elliptical(map);
+      Elliptical2 elliptical(map);
       Delaunay2<double> plain;
       elliptical.build(points);
       plain.build(points);
@@ -52,15 +53,15 @@ TEST(EllipticalDelaunay2, WithAMapThatKeepsCirclesItIsDelaunay2) {
   }
 }
 
-TEST(EllipticalDelaunay2, RandomOperationsEqualRebuild) {
+TEST(EllipticalMetric2, RandomOperationsEqualRebuild) {
   const LinearMap2 maps[] = {ellipse_map(5, 1, 33), {1, 0, 0, 2}, ellipse_map(100, 1, 90)};
   for (const PointSet kind : kPointSets) {
     for (std::uint64_t seed = 0; seed < 3; ++seed) {
       SCOPED_TRACE(name(kind) + " seed " + std::to_string(seed));
       std::mt19937_64 random(seed);
       const auto points = make_points<double>(kind, 250, seed + 100);
-      EllipticalDelaunay2 triangulation(maps[seed]);
-      std::vector<EllipticalDelaunay2::Insertion> results;
+      Elliptical2 triangulation(maps[seed]);
+      std::vector<Elliptical2::Insertion> results;
       for (int step = 0; step < 30; ++step) {
         std::vector<VertexId> alive;
         for (const VertexId v : triangulation.all_vertices()) alive.push_back(v);
@@ -92,7 +93,7 @@ TEST(EllipticalDelaunay2, RandomOperationsEqualRebuild) {
         for (const VertexId v : triangulation.all_vertices())
           left.push_back(triangulation.point(v));
         std::shuffle(left.begin(), left.end(), random);
-        EllipticalDelaunay2 fresh(maps[seed]);
+        Elliptical2 fresh(maps[seed]);
         fresh.build(left);
         ASSERT_EQ(triangulation.hash(), fresh.hash()) << "step " << step;
       }
@@ -100,7 +101,7 @@ TEST(EllipticalDelaunay2, RandomOperationsEqualRebuild) {
   }
 }
 
-TEST(EllipticalDelaunay2, PointsThatWouldFallTogetherWhenMappedStayApart) {
+TEST(EllipticalMetric2, PointsThatWouldFallTogetherWhenMappedStayApart) {
   // So flat an ellipse, so far out, that neighbours along it have the same mapped doubles.
   const LinearMap2 map = ellipse_map(1e12, 1, 45);
   std::vector<PlanePoint> points;
@@ -113,7 +114,7 @@ TEST(EllipticalDelaunay2, PointsThatWouldFallTogetherWhenMappedStayApart) {
     return PlanePoint{map[0] * p[0] + map[1] * p[1], map[2] * p[0] + map[3] * p[1]};
   };
   ASSERT_EQ(mapped(points[0]), mapped(points[2]));
-  EllipticalDelaunay2 triangulation(map);
+  Elliptical2 triangulation(map);
   const auto vertices = triangulation.build(points);
   EXPECT_EQ(triangulation.vertex_count(), points.size());
   for (std::size_t i = 0; i < points.size(); ++i)
@@ -125,12 +126,12 @@ TEST(EllipticalDelaunay2, PointsThatWouldFallTogetherWhenMappedStayApart) {
   EXPECT_EQ(find_fault(triangulation), "");
 }
 
-TEST(EllipticalDelaunay2, NearestIsNearestInTheMetric) {
+TEST(EllipticalMetric2, NearestIsNearestInTheMetric) {
   const LinearMap2 map = ellipse_map(6, 1, 20);
   for (const PointSet kind : {PointSet::kUniform, PointSet::kFewBits, PointSet::kGrid,
                               PointSet::kCircle, PointSet::kHorizontal}) {
     SCOPED_TRACE(name(kind));
-    EllipticalDelaunay2 triangulation(map);
+    Elliptical2 triangulation(map);
     triangulation.build(make_points<double>(kind, 100, 8));
     for (const PlanePoint& q : make_points<double>(kind, 60, 9)) {
       using Q = CGAL::Exact_rational;
@@ -152,16 +153,23 @@ TEST(EllipticalDelaunay2, NearestIsNearestInTheMetric) {
   }
 }
 
-TEST(EllipticalDelaunay2, RefusesBadInputAndStaysUnchanged) {
+/// A grid is triangulated in the Euclidean metric only.
+template <class Triangulation>
+concept HasGrid = requires(Triangulation t) {
+  t.build_grid(0.0, 0.0, 1.0, 2u, 2u);
+};
+static_assert(HasGrid<Delaunay2<double>> && !HasGrid<Elliptical2>);
+
+TEST(EllipticalMetric2, RefusesBadInputAndStaysUnchanged) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_THROW(EllipticalDelaunay2({1, 2, 2, 4}), std::invalid_argument);
-  EXPECT_THROW(EllipticalDelaunay2({0, 0, 0, 0}), std::invalid_argument);
-  EXPECT_THROW(EllipticalDelaunay2({1, 0, 0, kNan}), std::invalid_argument);
+  EXPECT_THROW(EllipticalMetric2({1, 2, 2, 4}), std::invalid_argument);
+  EXPECT_THROW(EllipticalMetric2({0, 0, 0, 0}), std::invalid_argument);
+  EXPECT_THROW(EllipticalMetric2({1, 0, 0, kNan}), std::invalid_argument);
   EXPECT_THROW(static_cast<void>(ellipse_map(0, 1, 0)), std::invalid_argument);
   EXPECT_THROW(static_cast<void>(ellipse_map(1, 1e-320, 0)), std::invalid_argument);
   EXPECT_THROW(static_cast<void>(ellipse_map(1, 1, kNan)), std::invalid_argument);
   EXPECT_THROW(static_cast<void>(ellipse_map(1, 1, std::array{1.0, 1.0})), std::invalid_argument);
-  EllipticalDelaunay2 triangulation({1, 0, 0, 2});
+  Elliptical2 triangulation(LinearMap2{1, 0, 0, 2});
   try {
     triangulation.build(std::vector<PlanePoint>{{0, 0}, {1, 0}, {0, kNan}});
     FAIL();
@@ -206,8 +214,8 @@ TEST(Metric2, MapsMeasureEllipses) {
 
 constexpr LinearMap2 kSlanted{0.3, -0.2, -0.2, 0.9};
 /// With a metric of its own, as the oracle makes triangulations by default.
-struct Slanted : EllipticalDelaunay2 {
-  Slanted() : EllipticalDelaunay2(kSlanted) {}
+struct Slanted : Elliptical2 {
+  Slanted() : Elliptical2(kSlanted) {}
 };
 
 TEST(EllipticalModel, HasLevelsOfDetail) {
@@ -234,10 +242,9 @@ TEST(EllipticalModel, HasLevelsOfDetail) {
       ASSERT_EQ(model.triangulation().hash(), coarse);
 
       // The metric may be given to the model.
-      MultiresolutionModel<EllipticalDelaunay2> given(source, {}, {},
-                                                      EllipticalDelaunay2(kSlanted));
+      MultiresolutionModel<Elliptical2> given(source, {}, {}, Elliptical2(kSlanted));
       ASSERT_EQ(given.triangulation().hash(), coarse);
-      ASSERT_EQ(given.triangulation().map(), kSlanted);
+      ASSERT_EQ(given.triangulation().metric().map(), kSlanted);
     }
   }
 }

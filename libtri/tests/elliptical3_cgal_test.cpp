@@ -9,7 +9,7 @@
 #include <CGAL/Triangulation_vertex_base_with_info_3.h>
 #include <gtest/gtest.h>
 
-#include "elliptical/access3.hpp"
+#include "delaunay3/access.hpp"
 #include "metrics3.hpp"
 #include "points3.hpp"
 
@@ -43,12 +43,12 @@ std::vector<Corners3> mapped_tetrahedra(const std::vector<Space>& points, const 
   return result;
 }
 
-TEST(EllipticalDelaunay3, TetrahedraAreCgalsOfTheMappedPointsTiesIncluded) {
+TEST(EllipticalMetric3, TetrahedraAreCgalsOfTheMappedPointsTiesIncluded) {
   for (const PointSet3 kind : kPointSets3) {
     for (std::size_t m = 0; m < lower_maps3().size(); ++m) {
       SCOPED_TRACE(name(kind) + " map " + std::to_string(m));
       const auto points = make_points3<double>(kind, 60, 31 + m);
-      EllipticalDelaunay3 triangulation(lower_maps3()[m]);
+      Elliptical3 triangulation(lower_maps3()[m]);
       triangulation.build(points);
       ASSERT_EQ(find_fault(triangulation), "");
       ASSERT_TRUE(tetrahedra_of(triangulation) == mapped_tetrahedra(points, lower_maps3()[m]));
@@ -56,7 +56,7 @@ TEST(EllipticalDelaunay3, TetrahedraAreCgalsOfTheMappedPointsTiesIncluded) {
   }
 }
 
-TEST(EllipticalDelaunay3, TetrahedraAreCgalsOfTheMappedPointsForEllipsoids) {
+TEST(EllipticalMetric3, TetrahedraAreCgalsOfTheMappedPointsForEllipsoids) {
   for (const LinearMap3& axes : rotations()) {
     for (const double ratio : {3.0, 40.0}) {
       SCOPED_TRACE("axes " + std::to_string(axes[0]) + " ratio " + std::to_string(ratio));
@@ -65,7 +65,7 @@ TEST(EllipticalDelaunay3, TetrahedraAreCgalsOfTheMappedPointsForEllipsoids) {
       EXPECT_EQ(map[2], map[6]);
       EXPECT_EQ(map[5], map[7]);
       const auto points = make_points3<double>(PointSet3::kUniform, 600, 5);
-      EllipticalDelaunay3 triangulation(map);
+      Elliptical3 triangulation(map);
       triangulation.build(points);
       ASSERT_TRUE(tetrahedra_of(triangulation) == mapped_tetrahedra(points, map));
     }
@@ -112,8 +112,8 @@ TEST(EllipticalKernel3, SignsAreExact) {
     SCOPED_TRACE("round " + std::to_string(round));
     const auto p = hard_points(round, 5, random);
     const LinearMap3 map = hard_map(round, random);
-    const spatial::EllipticalMetric metric(map);
-    const EllipticalKernel::Scope scope(metric);
+    const spatial::QuadraticForm form(map);
+    const EllipticalKernel::Scope scope(form);
     Corners3 c{p[0], p[1], p[2], p[3]};
     const int turn = EllipticalKernel::orientation(c[0], c[1], c[2], c[3]);
     if (turn < 0) std::swap(c[0], c[1]);
@@ -145,9 +145,9 @@ TEST(EllipticalKernel3, MappedDifferencesAreWithinTheirBound) {
     SCOPED_TRACE("round " + std::to_string(round));
     const auto p = hard_points(round, 2, random);
     const LinearMap3 map = hard_map(round, random);
-    const spatial::EllipticalMetric metric(map);
-    if (!(metric.spread() < 0x1p28)) continue;
-    const EllipticalKernel::Scope scope(metric);
+    const spatial::QuadraticForm form(map);
+    if (!(form.spread() < 0x1p28)) continue;
+    const EllipticalKernel::Scope scope(form);
     // Only lengths can be told, as R is M but for a turn and a power of two.
     const Space got = EllipticalKernel::mapped(p[1], p[0]);
     const double length = std::hypot(got[0], got[1], got[2]);
@@ -157,7 +157,7 @@ TEST(EllipticalKernel3, MappedDifferencesAreWithinTheirBound) {
     int exponent = 0;
     std::frexp(most, &exponent);
     wanted = std::ldexp(wanted, -exponent);
-    ASSERT_NEAR(length, wanted, (9 * metric.spread() + 8) * 0x1p-53 * wanted);
+    ASSERT_NEAR(length, wanted, (9 * form.spread() + 8) * 0x1p-53 * wanted);
   }
 }
 
@@ -170,8 +170,8 @@ TEST(EllipticalKernel3, SmallestSpheresAreExact) {
     const auto p = hard_points(round, 4, random);
     if (EllipticalKernel::collinear(p[0], p[1], p[2])) continue;
     const LinearMap3 map = hard_map(round, random);
-    const spatial::EllipticalMetric metric(map);
-    const EllipticalKernel::Scope scope(metric);
+    const spatial::QuadraticForm form(map);
+    const EllipticalKernel::Scope scope(form);
     // The smallest sphere through both ends of an edge that contains the third corner, or that of
     // all three; by its centre.
     std::array<Rationals, 4> at;

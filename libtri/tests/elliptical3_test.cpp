@@ -8,11 +8,10 @@
 #include <gtest/gtest.h>
 
 #include "delaunay3/access.hpp"
-#include "elliptical/access3.hpp"
 #include "metrics3.hpp"
 #include "multiresolution_hierarchy.hpp"
 #include "points3.hpp"
-#include "terrace/tri/elliptical.hpp"
+#include "terrace/tri/metric.hpp"
 #include "terrace/tri/multiresolution.hpp"
 
 namespace terrace::tri::test {
@@ -20,12 +19,12 @@ namespace {
 
 // ---- Laws --------------------------------------------------------------------------------------
 
-TEST(EllipticalDelaunay3, NoVertexIsInsideAnEllipsoid) {
+TEST(EllipticalMetric3, NoVertexIsInsideAnEllipsoid) {
   for (std::size_t axes = 2; axes < rotations().size(); ++axes) {
     const LinearMap3 map = ellipsoid_map({4, 1, 2}, rotations()[axes]);
     for (const PointSet3 kind : kPointSets3) {
       SCOPED_TRACE(name(kind) + " axes " + std::to_string(axes));
-      EllipticalDelaunay3 triangulation(map);
+      Elliptical3 triangulation(map);
       triangulation.build(make_points3<double>(kind, 25, 2));
       ASSERT_EQ(find_fault(triangulation), "");
       for (const Corners3& t : tetrahedra_of(triangulation))
@@ -35,16 +34,16 @@ TEST(EllipticalDelaunay3, NoVertexIsInsideAnEllipsoid) {
   }
 }
 
-TEST(EllipticalDelaunay3, WithAMapThatKeepsSpheresItIsDelaunay3) {
+TEST(EllipticalMetric3, WithAMapThatKeepsSpheresItIsDelaunay3) {
   for (const LinearMap3& map :
-       {kIdentityMap3, LinearMap3{1e-200, 0, 0, 0, 1e-200, 0, 0, 0, 1e-200},
+       {kIdentityMap<3>, LinearMap3{1e-200, 0, 0, 0, 1e-200, 0, 0, 0, 1e-200},
         LinearMap3{0, -3, 0, 3, 0, 0, 0, 0, 3}, LinearMap3{0, 1, 0, 0, 0, 1, 1, 0, 0},
         LinearMap3{3, -4, 0, 4, 3, 0, 0, 0, 5}, LinearMap3{2, -1, 2, 2, 2, -1, -1, 2, 2},
         LinearMap3{1e300, 0, 0, 0, -1e300, 0, 0, 0, 1e300}}) {
     for (const PointSet3 kind : kPointSets3) {
       SCOPED_TRACE(name(kind) + " " + std::to_string(map[0]));
       const auto points = make_points3<double>(kind, 200, 3);
-      EllipticalDelaunay3 elliptical(map);
+      Elliptical3 elliptical(map);
       Delaunay3<double> plain;
       elliptical.build(points);
       plain.build(points);
@@ -56,7 +55,7 @@ TEST(EllipticalDelaunay3, WithAMapThatKeepsSpheresItIsDelaunay3) {
 
 /// Maps of whole numbers and powers of two that keep the lexicographic order: small whole points
 /// are mapped without rounding.
-TEST(EllipticalDelaunay3, OfWholePointsAndMapsItIsDelaunay3OfTheMappedPoints) {
+TEST(EllipticalMetric3, OfWholePointsAndMapsItIsDelaunay3OfTheMappedPoints) {
   for (const LinearMap3& m :
        {LinearMap3{4, 0, 0, 0, 1, 0, 0, 0, 0.5}, LinearMap3{1, 0, 0, 3, 1, 0, -2, 5, 1},
         LinearMap3{2, 0, 0, -7, 0.25, 0, 1, 0, 8}, LinearMap3{1, 0, 0, 0, 1, 0, 1, -1, 1}}) {
@@ -69,7 +68,7 @@ TEST(EllipticalDelaunay3, OfWholePointsAndMapsItIsDelaunay3OfTheMappedPoints) {
       for (const Space& p : points)
         mapped.push_back(
             {m[0] * p[0], m[3] * p[0] + m[4] * p[1], m[6] * p[0] + m[7] * p[1] + m[8] * p[2]});
-      EllipticalDelaunay3 elliptical(m);
+      Elliptical3 elliptical(m);
       Delaunay3<double> plain;
       const auto vertices = elliptical.build(points);
       const auto others = plain.build(mapped);
@@ -92,7 +91,7 @@ TEST(EllipticalDelaunay3, OfWholePointsAndMapsItIsDelaunay3OfTheMappedPoints) {
   }
 }
 
-TEST(EllipticalDelaunay3, RandomOperationsEqualRebuild) {
+TEST(EllipticalMetric3, RandomOperationsEqualRebuild) {
   const LinearMap3 maps[] = {ellipsoid_map({5, 1, 2}, rotations()[3]),
                              {1, 0, 0, 0, 2, 0, 0, 0, 1},
                              ellipsoid_map({1000, 1, 1}, rotations()[4])};
@@ -101,8 +100,8 @@ TEST(EllipticalDelaunay3, RandomOperationsEqualRebuild) {
       SCOPED_TRACE(name(kind) + " seed " + std::to_string(seed));
       std::mt19937_64 random(seed);
       const auto points = make_points3<double>(kind, 120, seed + 100);
-      EllipticalDelaunay3 triangulation(maps[seed]);
-      std::vector<EllipticalDelaunay3::Insertion> results;
+      Elliptical3 triangulation(maps[seed]);
+      std::vector<Elliptical3::Insertion> results;
       for (int step = 0; step < 12; ++step) {
         std::vector<VertexId> alive;
         for (const VertexId v : triangulation.all_vertices()) alive.push_back(v);
@@ -134,7 +133,7 @@ TEST(EllipticalDelaunay3, RandomOperationsEqualRebuild) {
         for (const VertexId v : triangulation.all_vertices())
           left.push_back(triangulation.point(v));
         std::shuffle(left.begin(), left.end(), random);
-        EllipticalDelaunay3 fresh(maps[seed]);
+        Elliptical3 fresh(maps[seed]);
         fresh.build(left);
         ASSERT_EQ(triangulation.hash(), fresh.hash()) << "step " << step;
       }
@@ -142,12 +141,12 @@ TEST(EllipticalDelaunay3, RandomOperationsEqualRebuild) {
   }
 }
 
-TEST(EllipticalDelaunay3, ThreadsLeaveNoTrace) {
+TEST(EllipticalMetric3, ThreadsLeaveNoTrace) {
   const LinearMap3 map = ellipsoid_map({6, 1, 3}, rotations()[3]);
   for (const PointSet3 kind : {PointSet3::kUniform, PointSet3::kGrid, PointSet3::kClusters}) {
     SCOPED_TRACE(name(kind));
     const auto points = make_points3<double>(kind, 12'000, 6);
-    EllipticalDelaunay3 one(map), two(map);
+    Elliptical3 one(map), two(map);
     const auto vertices = one.build(points, 1);
     ASSERT_EQ(two.build(points, 2), vertices);
     ASSERT_EQ(find_fault(two), "");
@@ -163,12 +162,12 @@ TEST(EllipticalDelaunay3, ThreadsLeaveNoTrace) {
   }
 }
 
-TEST(EllipticalDelaunay3, NearestIsNearestInTheMetric) {
+TEST(EllipticalMetric3, NearestIsNearestInTheMetric) {
   const LinearMap3 map = ellipsoid_map({6, 1, 2}, rotations()[4]);
   for (const PointSet3 kind : {PointSet3::kUniform, PointSet3::kFewBits, PointSet3::kGrid,
                                PointSet3::kSphere, PointSet3::kPlane}) {
     SCOPED_TRACE(name(kind));
-    EllipticalDelaunay3 triangulation(map);
+    Elliptical3 triangulation(map);
     triangulation.build(make_points3<double>(kind, 100, 8));
     for (const Space& q : make_points3<double>(kind, 40, 9)) {
       VertexId best = kNoVertex;
@@ -189,17 +188,17 @@ TEST(EllipticalDelaunay3, NearestIsNearestInTheMetric) {
   }
 }
 
-TEST(EllipticalDelaunay3, RefusesBadInputAndStaysUnchanged) {
+TEST(EllipticalMetric3, RefusesBadInputAndStaysUnchanged) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_THROW(EllipticalDelaunay3({1, 2, 3, 4, 5, 6, 7, 8, 9}), std::invalid_argument);
-  EXPECT_THROW(EllipticalDelaunay3({0, 0, 0, 0, 0, 0, 0, 0, 0}), std::invalid_argument);
-  EXPECT_THROW(EllipticalDelaunay3({1, 0, 0, 0, 1, 0, 0, 0, kNan}), std::invalid_argument);
+  EXPECT_THROW(EllipticalMetric3({1, 2, 3, 4, 5, 6, 7, 8, 9}), std::invalid_argument);
+  EXPECT_THROW(EllipticalMetric3({0, 0, 0, 0, 0, 0, 0, 0, 0}), std::invalid_argument);
+  EXPECT_THROW(EllipticalMetric3({1, 0, 0, 0, 1, 0, 0, 0, kNan}), std::invalid_argument);
   EXPECT_THROW(static_cast<void>(ellipsoid_map({0, 1, 1})), std::invalid_argument);
   EXPECT_THROW(static_cast<void>(ellipsoid_map({1, 1e-320, 1})), std::invalid_argument);
   EXPECT_THROW(static_cast<void>(ellipsoid_map({1, 1, kNan})), std::invalid_argument);
   EXPECT_THROW(static_cast<void>(ellipsoid_map({1, 1, 1}, {1, 1, 0, 0, 1, 0, 0, 0, 1})),
                std::invalid_argument);
-  EllipticalDelaunay3 triangulation({1, 0, 0, 0, 2, 0, 0, 0, 1});
+  Elliptical3 triangulation(LinearMap3{1, 0, 0, 0, 2, 0, 0, 0, 1});
   try {
     triangulation.build(std::vector<Space>{{0, 0, 0}, {1, 0, 0}, {0, 0, kNan}});
     FAIL();
@@ -239,16 +238,16 @@ TEST(MetricField3, HasClosedBoxesOfWhichTheFirstHolds) {
     }
   };
   const Box3 box{{0, 0, 0}, {1, 1, 1}};
-  refuses({{box, kIdentityMap3}, {{{0, 0, 1}, {1, 1, 0}}, kIdentityMap3}}, "region 1");
-  refuses({{{{0, kNan, 0}, {1, 1, 1}}, kIdentityMap3}}, "region 0");
+  refuses({{box, kIdentityMap<3>}, {{{0, 0, 1}, {1, 1, 0}}, kIdentityMap<3>}}, "region 1");
+  refuses({{{{0, kNan, 0}, {1, 1, 1}}, kIdentityMap<3>}}, "region 0");
   refuses({{box, {1, 1, 1, 1, 1, 1, 1, 1, 1}}}, "region 0");
   EXPECT_THROW(MetricField3(std::function<LinearMap3(const Space&)>()), std::invalid_argument);
   const MetricField3 field(
       {{box, ellipsoid_map({0.5, 1, 1})}, {{{1, 0, 0}, {2, 1, 1}}, ellipsoid_map({0.25, 1, 1})}});
   EXPECT_EQ(field({1, 1, 1})[0], 2);
   EXPECT_EQ(field({1.5, 0, 1})[0], 4);
-  EXPECT_EQ(field({2.5, 0, 0}), kIdentityMap3);
-  EXPECT_EQ(field({0.5, 0.5, 1.5}), kIdentityMap3);
+  EXPECT_EQ(field({2.5, 0, 0}), kIdentityMap<3>);
+  EXPECT_EQ(field({0.5, 0.5, 1.5}), kIdentityMap<3>);
 }
 
 // ---- Levels of detail --------------------------------------------------------------------------
@@ -263,7 +262,7 @@ TEST(EllipticalModel3, HasLevelsOfDetail) {
       for (Point3& p : points)
         for (double& c : p) c = static_cast<double>(below(random, range));
       MemorySource source = make_hierarchy(points, 2, 8.0, random);
-      MultiresolutionModel<EllipticalDelaunay3> model(source, {}, {}, EllipticalDelaunay3(map));
+      MultiresolutionModel<Elliptical3> model(source, {}, {}, Elliptical3(map));
       const std::uint64_t coarse = model.triangulation().hash();
       for (int step = 0; step < 12; ++step) {
         const auto corner = [&] { return static_cast<double>(below(random, range)); };
@@ -285,17 +284,17 @@ TEST(EllipticalModel3, HasLevelsOfDetail) {
           const auto& more = source.at(id).positions;
           present.insert(present.end(), more.begin(), more.end());
         }
-        EllipticalDelaunay3 scratch(map);
+        Elliptical3 scratch(map);
         scratch.build(present);
         ASSERT_EQ(model.triangulation().hash(), scratch.hash());
       }
       model.set_level(0);
-      EllipticalDelaunay3 whole(map);
+      Elliptical3 whole(map);
       whole.build(points);
       ASSERT_EQ(model.triangulation().hash(), whole.hash());
       model.set_level(Detail::kTop);
       ASSERT_EQ(model.triangulation().hash(), coarse);
-      ASSERT_EQ(model.triangulation().map(), map);
+      ASSERT_EQ(model.triangulation().metric().map(), map);
     }
   }
 }

@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "elliptical/access3.hpp"
+#include "delaunay3/access.hpp"
 #include "metrics3.hpp"
 #include "multiresolution_hierarchy.hpp"
 #include "points3.hpp"
@@ -44,7 +44,7 @@ std::vector<ShapeOptions> all_options() {
 }
 
 /// Whole maps that keep the lexicographic order map small whole points without rounding.
-TEST(EllipticalShape3, OfWholePointsAndMapsItIsTheShapeOfTheMappedPoints) {
+TEST(EllipticalShape, OfWholePointsAndMapsItIsTheShapeOfTheMappedPoints) {
   for (const LinearMap3& m :
        {LinearMap3{4, 0, 0, 0, 1, 0, 0, 0, 0.5}, LinearMap3{1, 0, 0, 3, 1, 0, -2, 5, 1}}) {
     for (const PointSet3 kind : {PointSet3::kFiveBits, PointSet3::kGrid, PointSet3::kSphere,
@@ -54,7 +54,7 @@ TEST(EllipticalShape3, OfWholePointsAndMapsItIsTheShapeOfTheMappedPoints) {
       for (const Space& p : points)
         mapped.push_back(
             {m[0] * p[0], m[3] * p[0] + m[4] * p[1], m[6] * p[0] + m[7] * p[1] + m[8] * p[2]});
-      EllipticalDelaunay3 elliptical(m);
+      Elliptical3 elliptical(m);
       Delaunay3<double> plain;
       elliptical.build(points);
       const auto vertices = plain.build(mapped);
@@ -64,7 +64,7 @@ TEST(EllipticalShape3, OfWholePointsAndMapsItIsTheShapeOfTheMappedPoints) {
         SCOPED_TRACE(name(kind) + " map " + std::to_string(m[3]) + " criterion " +
                      std::to_string(static_cast<int>(options.criterion)) + " rule " +
                      std::to_string(static_cast<int>(options.rule)));
-        EllipticalShape3 shape(options);
+        Shape3<double, EllipticalMetric3> shape(options);
         Shape3<double> other(options);
         shape.restore(elliptical);
         other.restore(plain);
@@ -89,14 +89,14 @@ TEST(EllipticalShape3, OfWholePointsAndMapsItIsTheShapeOfTheMappedPoints) {
   }
 }
 
-TEST(EllipticalShape3, FollowsTheModel) {
+TEST(EllipticalShape, FollowsTheModel) {
   const LinearMap3 map = ellipsoid_map({3, 1, 2}, rotations()[3]);
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937_64 random(seed);
     MemorySource source = make_hierarchy(ellipsoid(400, {30, 10, 20}), 2, 8.0, random);
-    MultiresolutionModel<EllipticalDelaunay3> model(source, {}, {}, EllipticalDelaunay3(map));
-    EllipticalShape3 shape;
+    MultiresolutionModel<Elliptical3> model(source, {}, {}, Elliptical3(map));
+    Shape3<double, EllipticalMetric3> shape;
     shape.restore(model.triangulation());
     for (int step = 0; step < 10; ++step) {
       const Box3 box{{-40, -40, -40},
@@ -105,14 +105,14 @@ TEST(EllipticalShape3, FollowsTheModel) {
                               ? model.refine(box, static_cast<unsigned>(below(random, 2)))
                               : model.coarsen(box, 1 + static_cast<unsigned>(below(random, 2)));
       shape.update(model.triangulation(), delta.changes);
-      EllipticalShape3 again;
+      Shape3<double, EllipticalMetric3> again;
       again.restore(model.triangulation());
       ASSERT_EQ(shape.kept_tetrahedra(), again.kept_tetrahedra());
     }
   }
 }
 
-TEST(EllipticalShape3, AnEllipsoidOfStretchedSamplesComesBack) {
+TEST(EllipticalShape, AnEllipsoidOfStretchedSamplesComesBack) {
   const Space radii{1, 1, 40};
   const auto points = ellipsoid(2000, radii);
   RestoreOptions options;
@@ -131,12 +131,10 @@ TEST(EllipticalShape3, AnEllipsoidOfStretchedSamplesComesBack) {
 
   options.quantise_bits = 20;
   EXPECT_THROW(static_cast<void>(restore_surface(points, options)), std::invalid_argument);
-  options.quantise_bits = 0;
-  options.metric = LinearMap3{1, 0, 0, 0, 1, 0, 1, 1, 0};
-  EXPECT_THROW(static_cast<void>(restore_surface(points, options)), std::invalid_argument);
+  EXPECT_THROW((options.metric = LinearMap3{1, 0, 0, 0, 1, 0, 1, 1, 0}), std::invalid_argument);
 }
 
-TEST(EllipticalShape3, AStretchedTorusKeepsItsHoleInTheMetricOnly) {
+TEST(EllipticalShape, AStretchedTorusKeepsItsHoleInTheMetricOnly) {
   constexpr double kTurn = 6.283185307179586;
   std::vector<Space> points;
   for (int i = 0; i < 3000; ++i) {
@@ -156,7 +154,7 @@ TEST(EllipticalShape3, AStretchedTorusKeepsItsHoleInTheMetricOnly) {
   EXPECT_GT(std::abs(euclidean - wanted), 0.1 * wanted);
 }
 
-TEST(EllipticalShape3, TheFilterOfSmallestEllipsoidsAgreesWithTheExactTest) {
+TEST(EllipticalShape, TheFilterOfSmallestEllipsoidsAgreesWithTheExactTest) {
   using spatial::EllipticalKernel;
   std::mt19937_64 random(9);
   int filtered = 0;
@@ -164,8 +162,8 @@ TEST(EllipticalShape3, TheFilterOfSmallestEllipsoidsAgreesWithTheExactTest) {
     SCOPED_TRACE("round " + std::to_string(round));
     const LinearMap3 map =
         ellipsoid_map({std::ldexp(1.0, round % 20), 1, 3}, rotations()[random() % 5]);
-    const spatial::EllipticalMetric metric(map);
-    const EllipticalKernel::Scope scope(metric);
+    const spatial::QuadraticForm form(map);
+    const EllipticalKernel::Scope scope(form);
     std::array<Space, 4> p;
     for (Space& point : p)
       for (double& c : point) c = static_cast<double>(random() % 12) * (round % 2 == 0 ? 1 : 0.1);
@@ -174,7 +172,7 @@ TEST(EllipticalShape3, TheFilterOfSmallestEllipsoidsAgreesWithTheExactTest) {
     ASSERT_EQ(shape::in_smallest_ellipsoid(p[0], p[1], p[2], p[3]), exact);
     const int side = shape::filter_smallest_sphere(
         EllipticalKernel::mapped(p[1], p[0]), EllipticalKernel::mapped(p[2], p[0]),
-        EllipticalKernel::mapped(p[3], p[0]), metric.spread());
+        EllipticalKernel::mapped(p[3], p[0]), form.spread());
     filtered += side != 0;
   }
   EXPECT_GT(filtered, 2000);

@@ -11,7 +11,7 @@
 #include "delaunay3/predicates.hpp"
 #include "metrics3.hpp"
 #include "points3.hpp"
-#include "terrace/tri/elliptical.hpp"
+#include "terrace/tri/metric.hpp"
 
 namespace terrace::tri::test {
 namespace {
@@ -160,8 +160,8 @@ class Check {
       const auto [other, k] = sides.at(true);
       const LinearMap3 map = field_(facet[0]);
       if (!in_region(one, map) || !in_region(other, map)) continue;
-      const auto& metric = metrics_.try_emplace(map, map).first->second;
-      const EllipticalKernel::Scope scope(metric);
+      const auto& form = forms_.try_emplace(map, map).first->second;
+      const EllipticalKernel::Scope scope(form);
       const Corners3& t = after_[one];
       const Space &d = t[i], &e = after_[other][k];
       const int side = in_ellipsoid(map, t, e);
@@ -205,7 +205,7 @@ class Check {
   const MetricField3& field_;
   std::map<Facet, std::map<bool, std::pair<std::size_t, std::size_t>>> facets_;
   std::map<SpaceEdge, std::vector<std::size_t>> edges_;
-  std::map<LinearMap3, spatial::EllipticalMetric> metrics_;
+  std::map<LinearMap3, spatial::QuadraticForm> forms_;
 };
 
 template <class Coord>
@@ -225,7 +225,7 @@ TYPED_TEST(MetricTetrahedraTest, KeepWhatIsGuaranteed) {
       const MetricTetrahedra result = metric_tetrahedra(triangulation, field);
       const auto before = own_tetrahedra(triangulation);
       const auto after = corners_of_all(triangulation, result.tetrahedra);
-      const std::size_t changed = Check(before, after, field).run(result.stuck, kIdentityMap3);
+      const std::size_t changed = Check(before, after, field).run(result.stuck, kIdentityMap<3>);
       if (kind == PointSet3::kUniform && count == 200) {
         EXPECT_GT(changed, 100u);
       }
@@ -276,7 +276,7 @@ TYPED_TEST(MetricTetrahedraTest, OfOneMetricAreThoseOfTheEllipticalTriangulation
       for (const auto& p : points)
         doubles.push_back(
             {static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2])});
-      EllipticalDelaunay3 elliptical(maps[m]);
+      Elliptical3 elliptical(maps[m]);
       elliptical.build(doubles);
       const MetricField3 everywhere([&](const Space&) { return maps[m]; });
       const MetricTetrahedra result = metric_tetrahedra(triangulation, everywhere);
@@ -294,22 +294,22 @@ TYPED_TEST(MetricTetrahedraTest, OfOneMetricAreThoseOfTheEllipticalTriangulation
 
 TEST(MetricTetrahedra3, StartFromAnEllipticalTriangulationToo) {
   const auto points = make_points3<double>(PointSet3::kFiveBits, 300, 45);
-  EllipticalDelaunay3 triangulation(ellipsoid_map({3, 1, 1}, rotations()[3]));
+  Elliptical3 triangulation(ellipsoid_map({3, 1, 1}, rotations()[3]));
   triangulation.build(points);
   const MetricField3 field([&](const Space& p) {
-    return p[0] < 16 ? triangulation.map() : ellipsoid_map({1, 4, 2}, rotations()[4]);
+    return p[0] < 16 ? triangulation.metric().map() : ellipsoid_map({1, 4, 2}, rotations()[4]);
   });
   const MetricTetrahedra result = metric_tetrahedra(triangulation, field);
   const auto before = own_tetrahedra(triangulation);
   const auto after = corners_of_all(triangulation, result.tetrahedra);
-  EXPECT_GT(Check(before, after, field).run(result.stuck, triangulation.map()), 100u);
+  EXPECT_GT(Check(before, after, field).run(result.stuck, triangulation.metric().map()), 100u);
 }
 
 TEST(MetricTetrahedra3, RefuseWhatIsNoField) {
   Delaunay3<double> triangulation;
   triangulation.build(std::vector<Space>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 1, 1}});
   const MetricField3 bad([&](const Space& p) {
-    return p[0] > 0 ? LinearMap3{1, 0, 0, 0, 1, 0, 0, 0, 0} : kIdentityMap3;
+    return p[0] > 0 ? LinearMap3{1, 0, 0, 0, 1, 0, 0, 0, 0} : kIdentityMap<3>;
   });
   try {
     static_cast<void>(metric_tetrahedra(triangulation, bad));

@@ -11,7 +11,7 @@
 #include "delaunay2/predicates.hpp"
 #include "metrics.hpp"
 #include "points.hpp"
-#include "terrace/tri/elliptical.hpp"
+#include "terrace/tri/metric.hpp"
 
 namespace terrace::tri::test {
 namespace {
@@ -70,7 +70,7 @@ std::set<PlaneEdge> border(const std::map<PlaneEdge, PlanePoint>& edges) {
 
 /// All that is guaranteed. Returns the number of triangles that are not among `before`.
 std::size_t check(const std::vector<Corners>& before, const std::vector<Corners>& after,
-                  const MetricField2& field, const LinearMap2& given = kIdentityMap2) {
+                  const MetricField2& field, const LinearMap2& given = kIdentityMap<2>) {
   // A triangulation of the same: positive areas, every edge matched, the same border; so it covers
   // what is within the border once. And it has the same corners.
   EXPECT_EQ(before.size(), after.size());
@@ -92,7 +92,7 @@ std::size_t check(const std::vector<Corners>& before, const std::vector<Corners>
   std::copy_if(after.begin(), after.end(), std::back_inserter(mixed_after), mixed);
   EXPECT_TRUE(mixed_before == mixed_after);
   // Within regions edges are Delaunay, ties broken as always.
-  std::map<LinearMap2, planar::EllipticalMetric> metrics;
+  std::map<LinearMap2, planar::QuadraticForm> forms;
   for (const auto& [edge, apex] : edges_after) {
     const auto mate = edges_after.find({edge.second, edge.first});
     const LinearMap2 map = field(apex);
@@ -100,8 +100,8 @@ std::size_t check(const std::vector<Corners>& before, const std::vector<Corners>
         field(mate->second) != map)
       continue;
     EXPECT_LE(in_ellipse(map, apex, edge.first, edge.second, mate->second), 0);
-    const auto& metric = metrics.try_emplace(map, map).first->second;
-    const planar::EllipticalKernel::Scope scope(metric);
+    const auto& form = forms.try_emplace(map, map).first->second;
+    const planar::EllipticalKernel::Scope scope(form);
     EXPECT_FALSE(planar::inside_circle<planar::EllipticalKernel>(apex, edge.first, edge.second,
                                                                  mate->second));
   }
@@ -174,7 +174,7 @@ TYPED_TEST(MetricTriangles, OfOneMetricAreThoseOfTheEllipticalTriangulation) {
       std::vector<PlanePoint> doubles;
       for (const auto& p : points)
         doubles.push_back({static_cast<double>(p[0]), static_cast<double>(p[1])});
-      EllipticalDelaunay2 elliptical(maps[m]);
+      Elliptical2 elliptical(maps[m]);
       elliptical.build(doubles);
       const MetricField2 everywhere([&](const PlanePoint&) { return maps[m]; });
       ASSERT_TRUE(corners_of_all(triangulation, metric_triangles(triangulation, everywhere)) ==
@@ -189,13 +189,14 @@ TYPED_TEST(MetricTriangles, OfOneMetricAreThoseOfTheEllipticalTriangulation) {
 
 TEST(MetricTriangles2, StartFromAnEllipticalTriangulationToo) {
   const auto points = make_points<double>(PointSet::kSevenBits, 700, 45);
-  EllipticalDelaunay2 triangulation(ellipse_map(3, 1, 80));
+  Elliptical2 triangulation(ellipse_map(3, 1, 80));
   triangulation.build(points);
-  const MetricField2 field(
-      [&](const PlanePoint& p) { return p[0] < 60 ? triangulation.map() : ellipse_map(1, 6, 10); });
+  const MetricField2 field([&](const PlanePoint& p) {
+    return p[0] < 60 ? triangulation.metric().map() : ellipse_map(1, 6, 10);
+  });
   EXPECT_GT(check(triangles_of(triangulation),
                   corners_of_all(triangulation, metric_triangles(triangulation, field)), field,
-                  triangulation.map()),
+                  triangulation.metric().map()),
             100u);
 }
 
@@ -242,22 +243,22 @@ TEST(MetricField2, RefusesWhatIsNoField) {
     }
   };
   const Box3 box = box2(0, 0, 1, 1);
-  refuses({{box, kIdentityMap2}, {box2(1, 0, 0, 1), kIdentityMap2}}, "region 1");
-  refuses({{box2(0, kNan, 1, 1), kIdentityMap2}}, "region 0");
+  refuses({{box, kIdentityMap<2>}, {box2(1, 0, 0, 1), kIdentityMap<2>}}, "region 1");
+  refuses({{box2(0, kNan, 1, 1), kIdentityMap<2>}}, "region 0");
   refuses({{box, {1, 1, 1, 1}}}, "region 0");
   EXPECT_THROW(MetricField2(std::function<LinearMap2(const PlanePoint&)>()), std::invalid_argument);
 
   Delaunay2<double> triangulation;
   triangulation.build(std::vector<PlanePoint>{{0, 0}, {1, 0}, {0, 1}, {1, 1}});
   const MetricField2 bad([&](const PlanePoint& p) {
-    return p[0] > 0 ? LinearMap2{1, 0, 0, kNan} : kIdentityMap2;
+    return p[0] > 0 ? LinearMap2{1, 0, 0, kNan} : kIdentityMap<2>;
   });
   EXPECT_THROW(static_cast<void>(metric_triangles(triangulation, bad)), std::invalid_argument);
   // Closed boxes, the first one holds, Euclidean outside.
   const MetricField2 field({{box, {2, 0, 0, 1}}, {box2(1, 0, 2, 1), {3, 0, 0, 1}}});
   EXPECT_EQ(field({1, 1})[0], 2);
   EXPECT_EQ(field({1.5, 0})[0], 3);
-  EXPECT_EQ(field({2.5, 0}), kIdentityMap2);
+  EXPECT_EQ(field({2.5, 0}), kIdentityMap<2>);
 }
 
 }  // namespace

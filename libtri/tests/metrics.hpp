@@ -9,11 +9,13 @@
 
 #include <CGAL/Exact_rational.h>
 
-#include "terrace/tri/elliptical.hpp"
+#include "terrace/tri/metric.hpp"
 
 /// Metrics for the tests, and what they mean, in rational numbers.
 
 namespace terrace::tri::test {
+
+using Elliptical2 = Delaunay2<double, EllipticalMetric2>;
 
 using PlanePoint = std::array<double, 2>;
 using Corners = std::array<PlanePoint, 3>;

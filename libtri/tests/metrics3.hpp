@@ -8,11 +8,13 @@
 #include <CGAL/Exact_rational.h>
 
 #include "terrace/tri/delaunay3.hpp"
-#include "terrace/tri/elliptical.hpp"
+#include "terrace/tri/metric.hpp"
 
 /// Metrics of space for the tests, and what they mean, in rational numbers.
 
 namespace terrace::tri::test {
+
+using Elliptical3 = Delaunay3<double, EllipticalMetric3>;
 
 using Space = std::array<double, 3>;
 using Corners3 = std::array<Space, 4>;
@@ -32,7 +34,7 @@ inline const std::vector<LinearMap3>& lower_maps3() {
 /// Rotations with rational entries that are not all doubles, and those of the axes.
 inline const std::vector<LinearMap3>& rotations() {
   static const std::vector<LinearMap3> axes{
-      kIdentityMap3,
+      kIdentityMap<3>,
       {0, 1, 0, 0, 0, 1, 1, 0, 0},
       {0.6, 0.8, 0, -0.8, 0.6, 0, 0, 0, 1},
       {2.0 / 3, -1.0 / 3, 2.0 / 3, 2.0 / 3, 2.0 / 3, -1.0 / 3, -1.0 / 3, 2.0 / 3, 2.0 / 3},

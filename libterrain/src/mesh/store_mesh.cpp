@@ -9,7 +9,7 @@
 #include <utility>
 
 #include <terrace/stream/error.hpp>
-#include <terrace/tri/elliptical.hpp>
+#include <terrace/tri/metric.hpp>
 #include <terrace/tri/multiresolution.hpp>
 
 #include "earth/ground.hpp"

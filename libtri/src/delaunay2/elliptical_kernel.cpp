@@ -27,7 +27,7 @@ Number cross(const Vector& a, const Vector& b) { return a.x * b.y - a.y * b.x; }
 
 }  // namespace
 
-struct EllipticalMetric::Exact {
+struct QuadraticForm::Exact {
   Number xx, twice_xy, yy;
 
   [[nodiscard]] Number square(const Vector& v) const {
@@ -35,9 +35,10 @@ struct EllipticalMetric::Exact {
   }
 };
 
-constinit thread_local const EllipticalMetric* EllipticalKernel::metric_ = nullptr;
+constinit thread_local const QuadraticForm* EllipticalKernel::form_ = nullptr;
 
-EllipticalMetric::EllipticalMetric(const LinearMap2& map) {
+QuadraticForm::QuadraticForm(const EllipticalMetric2& metric) {
+  const LinearMap2& map = metric.map();
   const auto exact = [](const LinearMap2& m) {
     const Number a(m[0]), b(m[1]), c(m[2]), d(m[3]);
     const Number mixed = a * b + c * d;
@@ -60,7 +61,7 @@ EllipticalMetric::EllipticalMetric(const LinearMap2& map) {
 int EllipticalKernel::in_circle_exact(const Point& a, const Point& b, const Point& c,
                                       const Point& p) {
   const Vector u(p, a), v(p, b), w(p, c);
-  const EllipticalMetric::Exact& q = *metric_->exact_;
+  const QuadraticForm::Exact& q = *form_->exact_;
   return static_cast<int>(CGAL::sign(q.square(u) * cross(v, w) + q.square(v) * cross(w, u) +
                                      q.square(w) * cross(u, v)));
 }
@@ -73,7 +74,7 @@ int EllipticalKernel::compare_distance(const Point& p, const Point& a, const Poi
   // 9 u of each dot, 1 u of the difference.
   if (std::abs(difference) > 16 * 0x1p-53 * size + 0x1p-400 && size < 0x1p400)
     return difference < 0 ? -1 : 1;
-  const EllipticalMetric::Exact& q = *metric_->exact_;
+  const QuadraticForm::Exact& q = *form_->exact_;
   return static_cast<int>(CGAL::sign(q.square(Vector(p, a)) - q.square(Vector(p, b))));
 }
 

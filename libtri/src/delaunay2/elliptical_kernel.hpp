@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "double_kernel.hpp"
-#include "terrace/tri/elliptical.hpp"
+#include "terrace/tri/metric.hpp"
 
 /// Exact predicates in an elliptical metric, on the points as they are: nothing is mapped, so
 /// nothing is rounded. What turns left and what lies between is the same in all linear metrics;
@@ -12,11 +12,10 @@
 
 namespace terrace::tri::planar {
 
-/// A map M made ready for the predicates, which need M only by Q = M^T M.
-class EllipticalMetric {
+/// A metric made ready for the predicates, which need its map M only by Q = M^T M.
+class QuadraticForm {
  public:
-  /// Requires a finite, invertible map.
-  explicit EllipticalMetric(const LinearMap2& map);
+  explicit QuadraticForm(const EllipticalMetric2& metric);
 
  private:
   friend class EllipticalKernel;
@@ -26,19 +25,19 @@ class EllipticalMetric {
   std::shared_ptr<const Exact> exact_;
 };
 
-/// The algorithms call kernels statically; so the metric that is meant is set per thread, by a
-/// Scope, for as long as a call takes.
+/// The algorithms call kernels statically, so the metric is set per thread, by a Scope, for the
+/// duration of a call.
 class EllipticalKernel : public DoubleKernel {
  public:
   class Scope {
    public:
-    explicit Scope(const EllipticalMetric& metric) : before_(metric_) { metric_ = &metric; }
-    ~Scope() { metric_ = before_; }
+    explicit Scope(const QuadraticForm& form) : before_(form_) { form_ = &form; }
+    ~Scope() { form_ = before_; }
     Scope(const Scope&) = delete;
     Scope& operator=(const Scope&) = delete;
 
    private:
-    const EllipticalMetric* before_;
+    const QuadraticForm* before_;
   };
 
   /// > 0 where p lies inside the ellipse of the metric through the counter-clockwise a, b, c; 0
@@ -67,7 +66,7 @@ class EllipticalKernel : public DoubleKernel {
     double cross_size, dot_size;  ///< sums of absolute values of the products
   };
   static Sized sized_angle(const Point& apex, const Point& b, const Point& c) {
-    const EllipticalMetric& q = *metric_;
+    const QuadraticForm& q = *form_;
     const double bx = b[0] - apex[0];
     const double by = b[1] - apex[1];
     const double cx = c[0] - apex[0];
@@ -82,7 +81,7 @@ class EllipticalKernel : public DoubleKernel {
   }
   static int in_circle_exact(const Point& a, const Point& b, const Point& c, const Point& p);
 
-  static constinit thread_local const EllipticalMetric* metric_;
+  static constinit thread_local const QuadraticForm* form_;
 };
 
 }  // namespace terrace::tri::planar

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <sstream>
 
-#include "../elliptical/access.hpp"
 #include "access.hpp"
 #include "predicates.hpp"
 
@@ -129,8 +128,9 @@ class Inspection {
 
 }  // namespace
 
-template <class Coord>
-std::string find_fault(const Delaunay2<Coord>& triangulation) {
+template <class Coord, class Metric>
+std::string find_fault(const Delaunay2<Coord, Metric>& triangulation) {
+  [[maybe_unused]] const auto scope = Delaunay2Access::scope(triangulation);
   return Inspection(Delaunay2Access::mesh(triangulation)).run();
 }
 
@@ -138,12 +138,7 @@ std::string find_fault(const Delaunay2<Coord>& triangulation) {
 template std::string find_fault(const Delaunay2<std::int32_t>&);
 #else
 template std::string find_fault(const Delaunay2<double>&);
-
-std::string find_fault(const EllipticalDelaunay2& triangulation) {
-  const auto& impl = EllipticalDelaunay2Access::impl(triangulation);
-  const EllipticalKernel::Scope scope(impl.metric);
-  return Inspection(impl.mesh).run();
-}
+template std::string find_fault(const Delaunay2<double, EllipticalMetric2>&);
 #endif
 
 }  // namespace terrace::tri

@@ -13,7 +13,7 @@ namespace terrace::tri::planar {
 template <class Kernel>
 Inserted insert_flat(Mesh<Kernel>& mesh, const typename Kernel::Point& p);
 
-/// Whether p lies on the line of the sorted points, or there is no line yet.
+/// Whether p lies on the line of the sorted points; true while they do not span one.
 template <class Kernel>
 bool on_line(const Mesh<Kernel>& mesh, const typename Kernel::Point& p) {
   const auto& line = mesh.line;

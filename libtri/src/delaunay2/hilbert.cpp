@@ -8,9 +8,6 @@
 #include <vector>
 
 #include "../curve_sort.hpp"
-#include "double_kernel.hpp"
-#include "elliptical_kernel.hpp"
-#include "int_kernel.hpp"
 
 namespace terrace::tri::planar {
 namespace {
@@ -73,11 +70,10 @@ std::uint32_t hilbert_key(std::uint32_t x, std::uint32_t y) {
 }
 
 /// Maps points of a set to cells of its bounding square.
-template <class Kernel>
+template <class Coord>
 class Cells {
  public:
-  using Point = typename Kernel::Point;
-  using Coord = typename Kernel::Coord;
+  using Point = std::array<Coord, 2>;
 
   Cells(std::span<const Point> points, std::span<const std::uint32_t> order) : points_(points) {
     Point high = points[order[0]];
@@ -128,24 +124,22 @@ class Cells {
 
 }  // namespace
 
-template <class Kernel>
-Pool<std::uint32_t> hilbert_order(std::span<const typename Kernel::Point> points) {
+template <class Coord>
+Pool<std::uint32_t> hilbert_order(std::span<const std::array<Coord, 2>> points) {
   Pool<std::uint32_t> order;
   order.resize(static_cast<std::uint32_t>(points.size()));
   const std::span<std::uint32_t> all = span_of(order);
   std::iota(all.begin(), all.end(), 0u);
   if (all.empty()) return order;
   sort_along_curve<32>(
-      all, [&](std::span<const std::uint32_t> range) { return Cells<Kernel>(points, range); });
+      all, [&](std::span<const std::uint32_t> range) { return Cells<Coord>(points, range); });
   return order;
 }
 
 #ifdef TERRACE_TRI_CORE
-template Pool<std::uint32_t> hilbert_order<IntKernel>(std::span<const IntKernel::Point>);
+template Pool<std::uint32_t> hilbert_order(std::span<const std::array<std::int32_t, 2>>);
 #else
-template Pool<std::uint32_t> hilbert_order<DoubleKernel>(std::span<const DoubleKernel::Point>);
-template Pool<std::uint32_t> hilbert_order<EllipticalKernel>(
-    std::span<const EllipticalKernel::Point>);
+template Pool<std::uint32_t> hilbert_order(std::span<const std::array<double, 2>>);
 #endif
 
 }  // namespace terrace::tri::planar

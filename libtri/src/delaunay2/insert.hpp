@@ -33,7 +33,7 @@ template <class Kernel, class Done>
 void insert_points(Mesh<Kernel>& mesh, std::span<const typename Kernel::Point> points,
                    std::uint32_t hint, Done done) {
   constexpr std::uint32_t kSample = 8;
-  const Pool<std::uint32_t> order = hilbert_order<Kernel>(points);
+  const Pool<std::uint32_t> order = hilbert_order<typename Kernel::Coord>(points);
   const auto insert = [&](std::uint32_t i) {
     const Inserted inserted = insert_point(mesh, points[i], hint);
     hint = inserted.vertex;

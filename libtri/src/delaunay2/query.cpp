@@ -26,7 +26,7 @@ Location locate_flat(const Mesh<Kernel>& mesh, const typename Kernel::Point& p) 
   return result;
 }
 
-/// Whether a is to be preferred to b as the vertex nearest to p.
+/// Whether a is preferred to b as the vertex nearest to p.
 template <class Kernel>
 bool nearer(const Mesh<Kernel>& mesh, const typename Kernel::Point& p, std::uint32_t a,
             std::uint32_t b) {

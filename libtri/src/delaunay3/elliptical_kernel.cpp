@@ -70,7 +70,7 @@ bool small_difference(const Point& from, const Point& to, Triple<Int128>& result
 
 }  // namespace
 
-struct EllipticalMetric::Exact {
+struct QuadraticForm::Exact {
   std::array<Number, 6> q;      ///< of the map as it was given
   std::array<double, 6> near;   ///< times a power of two, each within 2^-52 of itself or 0
   std::array<bool, 6> is_zero;  ///< of q
@@ -102,19 +102,19 @@ struct EllipticalMetric::Exact {
   }
 };
 
-constinit thread_local const EllipticalMetric* EllipticalKernel::metric_ = nullptr;
+constinit thread_local const QuadraticForm* EllipticalKernel::form_ = nullptr;
 
-EllipticalMetric::EllipticalMetric(const LinearMap3& map) : map_(map) {
+QuadraticForm::QuadraticForm(const EllipticalMetric3& metric) : map_(metric.map()) {
   int exponent = 0;
   double most = 0;
-  for (const double m : map) most = std::max(most, std::abs(m));
+  for (const double m : map_) most = std::max(most, std::abs(m));
   std::frexp(most, &exponent);
   // What underflows here is too small to matter to the filters.
-  LinearMap3 near_one = map;
+  LinearMap3 near_one = map_;
   for (double& m : near_one) m = std::ldexp(m, -exponent);
 
   Exact exact;
-  exact.q = square_of<Number>(map);
+  exact.q = square_of<Number>(map_);
   using Rational = CGAL::Exact_rational;
   const std::array<Rational, 6> q = square_of<Rational>(near_one);
   for (std::size_t k = 0; k < 6; ++k) {
@@ -160,7 +160,7 @@ EllipticalMetric::EllipticalMetric(const LinearMap3& map) : map_(map) {
 int EllipticalKernel::in_sphere(const Point& a, const Point& b, const Point& c, const Point& d,
                                 const Point& p) {
   const std::array<const Point*, 4> corner = {&a, &b, &c, &d};
-  const EllipticalMetric::Exact& q = *metric_->exact_;
+  const QuadraticForm::Exact& q = *form_->exact_;
   // Grids, where ties are frequent and must not be dear: the value is a sum over the entries of Q
   // of whole numbers. At a tie they mostly vanish one by one.
   std::array<Triple<Int128>, 4> whole;
@@ -195,17 +195,16 @@ int EllipticalKernel::compare_distance(const Point& p, const Point& a, const Poi
   const auto square = [](const Point& m) { return m[0] * m[0] + m[1] * m[1] + m[2] * m[2]; };
   const double to_a = square(mapped(a, p)), to_b = square(mapped(b, p));
   // 2 * 9 u spread by the maps, 3 u by the squares, of each.
-  const double bound = (20 * metric_->spread_ + 8) * 0x1p-53 * (to_a + to_b);
-  if (metric_->spread_ < 0x1p28 && to_a + to_b < 0x1p900 &&
-      std::abs(to_a - to_b) > bound + 0x1p-900)
+  const double bound = (20 * form_->spread_ + 8) * 0x1p-53 * (to_a + to_b);
+  if (form_->spread_ < 0x1p28 && to_a + to_b < 0x1p900 && std::abs(to_a - to_b) > bound + 0x1p-900)
     return to_a < to_b ? -1 : 1;
-  const EllipticalMetric::Exact& q = *metric_->exact_;
+  const QuadraticForm::Exact& q = *form_->exact_;
   const Triple<Number> u = exactly(p, a), v = exactly(p, b);
   return static_cast<int>(CGAL::sign(q.product(u, u) - q.product(v, v)));
 }
 
 int EllipticalKernel::angle(const Point& from, const Point& a, const Point& b) {
-  return static_cast<int>(CGAL::sign(metric_->exact_->product(exactly(from, a), exactly(from, b))));
+  return static_cast<int>(CGAL::sign(form_->exact_->product(exactly(from, a), exactly(from, b))));
 }
 
 bool EllipticalKernel::in_smallest_sphere(const Point& a, const Point& b, const Point& c,
@@ -215,7 +214,7 @@ bool EllipticalKernel::in_smallest_sphere(const Point& a, const Point& b, const 
   if (angle(b, a, c) <= 0) return angle(d, a, c) < 0;
   if (angle(c, a, b) <= 0) return angle(d, a, b) < 0;
   // The centre is (f e + g f) / (2 n), e and f the edges from a; scalar products only.
-  const EllipticalMetric::Exact& q = *metric_->exact_;
+  const QuadraticForm::Exact& q = *form_->exact_;
   const Triple<Number> e = exactly(a, b), f = exactly(a, c), v = exactly(a, d);
   const Number ee = q.product(e, e), ff = q.product(f, f), ef = q.product(e, f);
   const Number n = ee * ff - ef * ef;

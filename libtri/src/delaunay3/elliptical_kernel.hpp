@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "double_kernel.hpp"
-#include "terrace/tri/elliptical.hpp"
+#include "terrace/tri/metric.hpp"
 
 /// Exact predicates in an elliptical metric, on the points as they are: nothing is mapped but
 /// differences inside the filters. Orientation is the same in all linear metrics; only spheres
@@ -12,17 +12,16 @@
 
 namespace terrace::tri::spatial {
 
-/// A map M made ready for the predicates, which need M only by Q = M^T M.
+/// A metric made ready for the predicates, which need its map M only by Q = M^T M.
 ///
 /// Filters use the upper triangular R with R^T R = Q (times a power of two), its diagonal positive:
 /// it differs from M by a turn or a mirror, so sizes are those of M and turns are kept. Each of its
 /// entries is rounded from an exact one, within 5 u of itself, u = 2^-53. A difference mapped by it
 /// is then wrong by 9 u |R| |d| component by component (difference 1, entry 5, product 1, sums 2),
 /// and d = R^-1 m: so by 9 u spread() times the length of the mapped difference m.
-class EllipticalMetric {
+class QuadraticForm {
  public:
-  /// Requires a finite, invertible map.
-  explicit EllipticalMetric(const LinearMap3& map);
+  explicit QuadraticForm(const EllipticalMetric3& metric);
 
   /// A bound of the norm of |R| |R^-1|: 1 for axes along those of the coordinates, else it grows
   /// with the ratio of the longest semi-axis to the shortest. May be infinite.
@@ -38,22 +37,22 @@ class EllipticalMetric {
   std::shared_ptr<const Exact> exact_;
 };
 
-/// The algorithms call kernels statically; so the metric that is meant is set per thread, by a
-/// Scope, for as long as a call takes.
+/// The algorithms call kernels statically, so the metric is set per thread, by a Scope, for the
+/// duration of a call.
 class EllipticalKernel : public DoubleKernel {
  public:
   class Scope {
    public:
-    explicit Scope(const EllipticalMetric& metric) : before_(metric_) { metric_ = &metric; }
-    ~Scope() { metric_ = before_; }
+    explicit Scope(const QuadraticForm& form) : before_(form_) { form_ = &form; }
+    ~Scope() { form_ = before_; }
     Scope(const Scope&) = delete;
     Scope& operator=(const Scope&) = delete;
 
    private:
-    const EllipticalMetric* before_;
+    const QuadraticForm* before_;
   };
   /// That of the scope, to be set in other threads as well.
-  static const EllipticalMetric& metric() { return *metric_; }
+  static const QuadraticForm& form() { return *form_; }
 
   /// What the points have in common does not help: the metric's own numbers are anything.
   struct Lattice {
@@ -64,7 +63,7 @@ class EllipticalKernel : public DoubleKernel {
   class Probe {
    public:
     Probe(const Point& p, Lattice) : x_{p[0], p[0]}, y_{p[1], p[1]}, z_{p[2], p[2]} {
-      const EllipticalMetric& m = *metric_;
+      const QuadraticForm& m = *form_;
       r00_ = both(m.r00_), r01_ = both(m.r01_), r02_ = both(m.r02_);
       r11_ = both(m.r11_), r12_ = both(m.r12_), r22_ = both(m.r22_);
       filter2_ = m.filter2_;
@@ -120,7 +119,7 @@ class EllipticalKernel : public DoubleKernel {
 
   /// The difference p - origin mapped by M, the same on every machine, rounded.
   static Point by_map(const Point& p, const Point& origin) {
-    const LinearMap3& m = metric_->map_;
+    const LinearMap3& m = form_->map_;
     const double x = p[0] - origin[0], y = p[1] - origin[1], z = p[2] - origin[2];
     return {m[0] * x + m[1] * y + m[2] * z, m[3] * x + m[4] * y + m[5] * z,
             m[6] * x + m[7] * y + m[8] * z};
@@ -128,13 +127,13 @@ class EllipticalKernel : public DoubleKernel {
 
   /// The difference p - origin mapped by R, wrong by 9 u spread() times its length.
   static Point mapped(const Point& p, const Point& origin) {
-    const EllipticalMetric& m = *metric_;
+    const QuadraticForm& m = *form_;
     const double x = p[0] - origin[0], y = p[1] - origin[1], z = p[2] - origin[2];
     return {m.r00_ * x + m.r01_ * y + m.r02_ * z, m.r11_ * y + m.r12_ * z, m.r22_ * z};
   }
 
  private:
-  static constinit thread_local const EllipticalMetric* metric_;
+  static constinit thread_local const QuadraticForm* form_;
 };
 
 }  // namespace terrace::tri::spatial

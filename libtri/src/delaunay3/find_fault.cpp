@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <sstream>
 
-#include "../elliptical/access3.hpp"
 #include "access.hpp"
 #include "flat.hpp"
 #include "predicates.hpp"
@@ -154,18 +153,14 @@ class Inspection {
 
 }  // namespace
 
-template <class Coord>
-std::string find_fault(const Delaunay3<Coord>& triangulation) {
+template <class Coord, class Metric>
+std::string find_fault(const Delaunay3<Coord, Metric>& triangulation) {
+  [[maybe_unused]] const auto scope = Delaunay3Access::scope(triangulation);
   return Inspection(Delaunay3Access::mesh(triangulation)).run();
 }
 
 template std::string find_fault(const Delaunay3<std::int32_t>&);
 template std::string find_fault(const Delaunay3<double>&);
-
-std::string find_fault(const EllipticalDelaunay3& triangulation) {
-  const auto& impl = EllipticalDelaunay3Access::impl(triangulation);
-  const EllipticalKernel::Scope scope(impl.metric);
-  return Inspection(impl.mesh).run();
-}
+template std::string find_fault(const Delaunay3<double, EllipticalMetric3>&);
 
 }  // namespace terrace::tri

@@ -9,9 +9,6 @@
 #include <vector>
 
 #include "../curve_sort.hpp"
-#include "double_kernel.hpp"
-#include "elliptical_kernel.hpp"
-#include "int_kernel.hpp"
 
 namespace terrace::tri::spatial {
 namespace {
@@ -76,11 +73,10 @@ std::uint32_t hilbert_key(const std::array<std::uint32_t, 3>& cell) {
 
 /// Maps points of a set to cells of its bounding cube. The cube is filled, so that the middle of
 /// the curve is a plane between two halves of points spread evenly.
-template <class Kernel>
+template <class Coord>
 class Cells {
  public:
-  using Point = typename Kernel::Point;
-  using Coord = typename Kernel::Coord;
+  using Point = std::array<Coord, 3>;
 
   Cells(std::span<const Point> points, std::span<const std::uint32_t> order) : points_(points) {
     Point high = points[order[0]];
@@ -130,24 +126,20 @@ class Cells {
 
 }  // namespace
 
-template <class Kernel>
-Pool<std::uint32_t> hilbert_order(std::span<const typename Kernel::Point> points,
-                                  unsigned threads) {
+template <class Coord>
+Pool<std::uint32_t> hilbert_order(std::span<const std::array<Coord, 3>> points, unsigned threads) {
   Pool<std::uint32_t> order;
   order.resize(static_cast<std::uint32_t>(points.size()));
   const std::span<std::uint32_t> all = span_of(order);
   std::iota(all.begin(), all.end(), 0u);
   if (all.empty()) return order;
   sort_along_curve<3 * kBits>(
-      all, [&](std::span<const std::uint32_t> range) { return Cells<Kernel>(points, range); },
+      all, [&](std::span<const std::uint32_t> range) { return Cells<Coord>(points, range); },
       threads);
   return order;
 }
 
-template Pool<std::uint32_t> hilbert_order<IntKernel>(std::span<const IntKernel::Point>, unsigned);
-template Pool<std::uint32_t> hilbert_order<DoubleKernel>(std::span<const DoubleKernel::Point>,
-                                                         unsigned);
-template Pool<std::uint32_t> hilbert_order<EllipticalKernel>(
-    std::span<const EllipticalKernel::Point>, unsigned);
+template Pool<std::uint32_t> hilbert_order(std::span<const std::array<std::int32_t, 3>>, unsigned);
+template Pool<std::uint32_t> hilbert_order(std::span<const std::array<double, 3>>, unsigned);
 
 }  // namespace terrace::tri::spatial

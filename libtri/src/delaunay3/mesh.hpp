@@ -1,23 +1,69 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cassert>
+#include <cstddef>
 #include <cstdint>
 #include <stdexcept>
 #include <vector>
 
 #include "../journal.hpp"
 #include "../pool.hpp"
-#include "cavity.hpp"
-#include "hole.hpp"
-#include "tetrahedron.hpp"
+#include "delaunay3/wrap/scan.hpp"
+#include "facet_table.hpp"
 
 /// The data of a tetrahedralisation and the steps that all algorithms share. No geometry here.
 
 namespace terrace::tri::spatial {
 
+/// Beyond each hull facet lies a ghost tetrahedron that joins it to this vertex "at infinity"; so
+/// every facet has two tetrahedra.
+inline constexpr std::uint32_t kGhost = 0;
+inline constexpr std::uint32_t kFreeCorner = 0xFFFFFFFFu;
+
+/// A side of a tetrahedron: tetrahedron * 4 + index of the corner opposite to it.
+using Side = std::uint32_t;
+
+constexpr Side make_side(std::uint32_t tetrahedron, std::uint32_t index) {
+  return tetrahedron * 4 + index;
+}
+constexpr std::uint32_t tetrahedron_of(Side side) { return side >> 2; }
+constexpr std::uint32_t index_of(Side side) { return side & 3; }
+
+struct Tetrahedron {
+  /// In order: det(b - a, c - a, d - a) > 0; with a ghost it is so for any point beyond its facet.
+  /// A free slot has kFreeCorner first, then the next free slot.
+  std::array<std::uint32_t, 4> corner;
+  /// mate[i]: the same facet as the side opposite to corner[i], seen from the neighbour.
+  std::array<Side, 4> mate;
+};
+static_assert(sizeof(Tetrahedron) == 32);
+
+/// Corners of the facet opposite to corner i, so that corner i and these three are in order.
+inline constexpr std::array<std::array<std::uint8_t, 3>, 4> kFacet = {
+    {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}};
+
+constexpr std::array<std::uint32_t, 3> facet_of(const Tetrahedron& t, std::uint32_t i) {
+  const auto& f = kFacet[i];
+  return {t.corner[f[0]], t.corner[f[1]], t.corner[f[2]]};
+}
+
+/// Index of the ghost among the corners, or 4.
+constexpr std::uint32_t ghost_index(const std::array<std::uint32_t, 4>& corner) {
+  std::uint32_t i = 0;
+  while (i < 4 && corner[i] != kGhost) ++i;
+  return i;
+}
+constexpr bool has_ghost(const std::array<std::uint32_t, 4>& corner) {
+  return corner[0] == kGhost || corner[1] == kGhost || corner[2] == kGhost || corner[3] == kGhost;
+}
+/// A finite tetrahedron in use.
+constexpr bool is_finite(const std::array<std::uint32_t, 4>& corner) {
+  return corner[0] != kFreeCorner && !has_ghost(corner);
+}
+
 inline constexpr std::uint32_t kNone = 0xFFFFFFFFu;
-inline constexpr std::uint32_t kMaxVertices = (std::uint32_t{1} << 29) - 2;
 inline constexpr std::uint32_t kMaxTetrahedra = (std::uint32_t{1} << 30) - 2;
 
 // What Vertex::incident holds: a tetrahedron at the vertex (below 2^30), or one of these.
@@ -35,6 +81,78 @@ inline constexpr std::uint32_t kFreeVertexBit = 0x80000000u;
 inline constexpr std::uint8_t kUnknown = 0;
 inline constexpr std::uint8_t kTaken = 1;  ///< in the cavity or hole
 inline constexpr std::uint8_t kKept = 2;   ///< tested, and not in it
+
+/// Scratch memory of insertion, see cavity_insert.hpp.
+struct Cavity {
+  struct Facet {
+    std::array<std::uint32_t, 3> corner;  ///< with the new vertex before them in order
+    Side outer;                           ///< the same facet, seen from outside
+    std::array<std::uint32_t, 3> local;   ///< numbers of the corners among the boundary's vertices
+    std::uint32_t slot;                   ///< of the tetrahedron on it
+  };
+  /// With up to so many facets the boundary has 63 vertices, which are numbered from 1 with six
+  /// bits.
+  static constexpr std::size_t kSmall = 2 * 63 - 4;
+  static constexpr std::uint32_t kStride = 64;
+
+  std::vector<std::uint32_t> inside;  ///< slots of the tetrahedra in conflict, as a queue
+  std::vector<Facet> facets;
+  /// By directed edge of local numbers: which side has it. Never cleared.
+  std::vector<Side> by_edge = std::vector<Side>(std::size_t{kStride} * kStride);
+  /// The same for large cavities: both vertices of an edge, the smaller first, and a side.
+  struct Edge {
+    std::uint64_t vertices;
+    Side side;
+  };
+  std::vector<Edge> edges;
+
+  [[nodiscard]] std::size_t bytes() const {
+    return inside.capacity() * sizeof(std::uint32_t) + facets.capacity() * sizeof(Facet) +
+           by_edge.capacity() * sizeof(Side) + edges.capacity() * sizeof(Edge);
+  }
+};
+
+/// What the removal of vertices leaves: open facets round it, and the vertices on and in it, which
+/// have local numbers; scratch memory of removal. Local number 0 is the ghost's.
+template <class Point>
+struct Hole {
+  struct Facet {
+    /// Local numbers; a corner inside the hole and these are in order.
+    std::array<std::uint32_t, 3> corner;
+    Side outer;  ///< the side beyond; kMatched once both tetrahedra are there
+  };
+  static constexpr Side kMatched = 0xFFFFFFFFu;
+
+  std::vector<std::uint32_t> vertex;    ///< by local number
+  std::vector<Point> point;             ///< of vertex, in parallel
+  std::vector<std::uint32_t> incident;  ///< a new tetrahedron at each vertex
+  std::vector<Facet> facets;
+  std::vector<std::uint32_t> slots;  ///< of the tetrahedra taken out
+
+  /// Fill the hole of one vertex by ear_queue.cpp, a second method to compare with.
+  bool by_ears = false;
+
+  // For wrap.hpp: open facets, as a stack, some of them closed again; facets by corners.
+  std::vector<std::uint32_t> pending;
+  std::vector<FacetEntry> table;
+
+  // For wrap.cpp: coordinates of the vertices by local number, padded; what a facet makes of each;
+  // numbers of those that may be the next corner.
+  std::vector<double> x, y, z;
+  std::vector<double> power, volume;
+  std::vector<std::uint32_t> near;
+  ScanFunction scan = best_scan_function();
+
+  [[nodiscard]] std::size_t bytes() const {
+    return (vertex.capacity() + incident.capacity() + slots.capacity() + near.capacity() +
+            pending.capacity()) *
+               sizeof(std::uint32_t) +
+           point.capacity() * sizeof(Point) + facets.capacity() * sizeof(Facet) +
+           (x.capacity() + y.capacity() + z.capacity() + power.capacity() + volume.capacity()) *
+               sizeof(double) +
+           table.capacity() * sizeof(FacetEntry);
+  }
+};
 
 template <class KernelT>
 struct Mesh {

@@ -27,7 +27,7 @@ Location3 locate_flat(const Mesh<Kernel>& mesh, const typename Kernel::Point& p)
   return result;
 }
 
-/// Whether a is to be preferred to b as the vertex nearest to p.
+/// Whether a is preferred to b as the vertex nearest to p.
 template <class Kernel>
 bool nearer(const Mesh<Kernel>& mesh, const typename Kernel::Point& p, std::uint32_t a,
             std::uint32_t b) {
@@ -37,7 +37,7 @@ bool nearer(const Mesh<Kernel>& mesh, const typename Kernel::Point& p, std::uint
   return order < 0 || (order == 0 && lexicographically_less(at_a, at_b));
 }
 
-/// A neighbour of the vertex that is to be preferred to it, or the vertex itself.
+/// A neighbour of the vertex that is preferred to it, or the vertex itself.
 template <class Kernel>
 std::uint32_t better_neighbour(const Mesh<Kernel>& mesh, const typename Kernel::Point& p,
                                std::uint32_t vertex) {

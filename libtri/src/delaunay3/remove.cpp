@@ -112,7 +112,7 @@ class Removal {
       __builtin_prefetch(&mesh_.tetrahedron[tetrahedron_of(mate)]);
   }
 
-  /// Whether all is to be made anew: where no tetrahedron is left to start from; where the
+  /// Whether all has to be rebuilt: where no tetrahedron is left to start from; where the
   /// survivors are coplanar, which requires that all of them are at the one hole; and where a
   /// hole's vertices are so many that looking at each of them for each facet would cost more.
   [[nodiscard]] bool must_restart() const {
@@ -148,7 +148,7 @@ void remove_set(Mesh<Kernel>& mesh, std::span<const std::uint32_t> vertices) {
   std::vector<typename Kernel::Point> points;
   points.reserve(vertices.size());
   for (const std::uint32_t v : vertices) points.push_back(mesh.vertex[v].point);
-  const Pool<std::uint32_t> order = hilbert_order<Kernel>(points);
+  const Pool<std::uint32_t> order = hilbert_order<typename Kernel::Coord>(points);
   std::vector<std::uint32_t> part;
   for (std::uint32_t begin = 0; begin < order.size();) {
     part.clear();

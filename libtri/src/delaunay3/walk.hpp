@@ -21,7 +21,7 @@ struct Everywhere {
 /// Remembering visibility walk: from tetrahedron to tetrahedron through the first facet that
 /// separates the present one from p, never testing the facet just crossed. In a (perturbed)
 /// Delaunay triangulation no such walk goes round in a circle. `start` may be a ghost. `part`: see
-/// part.hpp.
+/// parts_insert.cpp.
 template <class Kernel, class Part = Everywhere>
 WalkEnd walk(const Mesh<Kernel>& mesh, const typename Kernel::Point& p, std::uint32_t start,
              const Part& part = {}) {

@@ -2,7 +2,7 @@
 #include "model.hpp"
 
 #ifndef TERRACE_TRI_CORE
-#include "terrace/tri/elliptical.hpp"
+#include "terrace/tri/metric.hpp"
 #endif
 
 namespace terrace::tri {
@@ -13,8 +13,8 @@ template class MultiresolutionModel<Delaunay2<std::int32_t>>;
 template class MultiresolutionModel<Delaunay2<double>>;
 template class MultiresolutionModel<Delaunay3<std::int32_t>>;
 template class MultiresolutionModel<Delaunay3<double>>;
-template class MultiresolutionModel<EllipticalDelaunay2>;
-template class MultiresolutionModel<EllipticalDelaunay3>;
+template class MultiresolutionModel<Delaunay2<double, EllipticalMetric2>>;
+template class MultiresolutionModel<Delaunay3<double, EllipticalMetric3>>;
 #endif
 
 }  // namespace terrace::tri

@@ -16,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "check_input.hpp"
 #include "owners.hpp"
 #include "terrace/tri/multiresolution.hpp"
 #include "tree.hpp"
@@ -100,8 +101,6 @@ struct MultiresolutionModel<Triangulation>::Impl {
 
   using Slot = ClusterTree::Slot;
   using Verdict = ClusterTree::Verdict;
-  static constexpr std::size_t kMaxVertices = (std::size_t{1} << 29) - 2;
-
   static constexpr std::size_t kKeptPoints = 1 << 16;
 
   struct Staged {

@@ -8,7 +8,7 @@
 #include "../delaunay3/star.hpp"
 #include "state.hpp"
 
-/// The flood rule: removed is what can be reached from beyond the hull by facets that are no
+/// The flood rule removes what can be reached from beyond the hull by facets that are not
 /// boundary facets as seen from the tetrahedron behind them. Which of these steps there are depends
 /// on the tetrahedra alone, so the set reached does not depend on any order.
 ///

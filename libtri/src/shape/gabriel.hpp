@@ -98,7 +98,7 @@ bool in_smallest_sphere(const std::array<Coord, 3>& pa, const std::array<Coord, 
 inline bool in_smallest_ellipsoid(const Vector3& a, const Vector3& b, const Vector3& c,
                                   const Vector3& d) {
   using Kernel = spatial::EllipticalKernel;
-  const double spread = Kernel::metric().spread();
+  const double spread = Kernel::form().spread();
   const int side = spread < 0x1p28
                        ? filter_smallest_sphere(Kernel::mapped(b, a), Kernel::mapped(c, a),
                                                 Kernel::mapped(d, a), spread)

@@ -27,11 +27,8 @@ void check(std::span<const Point3> points, const RestoreOptions& options) {
   if (options.quantise_bits > 30)
     throw std::invalid_argument("quantise_bits is " + std::to_string(options.quantise_bits) +
                                 ", but must be at most 30");
-  if (options.metric) {
-    if (options.quantise_bits != 0)
-      throw std::invalid_argument("a metric and quantise_bits are given; leave one of them out");
-    check_metric(*options.metric, "the metric of a surface");
-  }
+  if (options.metric && options.quantise_bits != 0)
+    throw std::invalid_argument("a metric and quantise_bits are given; leave one of them out");
 }
 
 /// Points that are in no face are left out.
@@ -95,8 +92,8 @@ std::vector<std::array<std::int32_t, 3>> quantised(std::span<const Point3> point
 RestoredSurface restore_surface(std::span<const Point3> points, const RestoreOptions& options) {
   check(points, options);
   if (options.metric)
-    return compact(points,
-                   shape_faces(points, options.shape, EllipticalDelaunay3(*options.metric)));
+    return compact(points, shape_faces(points, options.shape,
+                                       Delaunay3<double, EllipticalMetric3>(*options.metric)));
   if (options.quantise_bits == 0)
     return compact(points, shape_faces<Delaunay3<double>>(points, options.shape));
   const auto integers = quantised(points, options.quantise_bits);

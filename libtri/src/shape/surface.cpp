@@ -1,16 +1,92 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
+#include <numeric>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "shape/surface_parts.hpp"
 #include "terrace/tri/shape.hpp"
 
 namespace terrace::tri {
 namespace {
+
+struct SurfaceEdge {
+  std::uint64_t ends;  ///< the smaller number in the upper half
+  std::uint32_t face;
+  std::int32_t way;  ///< +1: from the smaller to the larger
+};
+
+/// Three per face, sorted by their ends and then by face.
+std::vector<SurfaceEdge> sorted_edges(std::span<const std::array<std::uint32_t, 3>> faces) {
+  std::vector<SurfaceEdge> edges;
+  edges.reserve(3 * faces.size());
+  for (std::uint32_t f = 0; f < faces.size(); ++f) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::uint32_t from = faces[f][i], to = faces[f][(i + 1) % 3];
+      edges.push_back(
+          {std::uint64_t{std::min(from, to)} << 32 | std::max(from, to), f, from < to ? 1 : -1});
+    }
+  }
+  std::sort(edges.begin(), edges.end(), [](const SurfaceEdge& a, const SurfaceEdge& b) {
+    return a.ends != b.ends ? a.ends < b.ends : a.face < b.face;
+  });
+  return edges;
+}
+
+/// Disjoint sets of faces.
+class SurfaceParts {
+ public:
+  explicit SurfaceParts(std::size_t faces) : parent_(faces), count_(faces) {
+    std::iota(parent_.begin(), parent_.end(), 0u);
+  }
+  void join(std::uint32_t a, std::uint32_t b) {
+    a = root(a);
+    b = root(b);
+    if (a == b) return;
+    parent_[std::max(a, b)] = std::min(a, b);
+    --count_;
+  }
+  /// The first face of its set.
+  std::uint32_t root(std::uint32_t a) {
+    while (parent_[a] != a) a = parent_[a] = parent_[parent_[a]];
+    return a;
+  }
+  [[nodiscard]] std::size_t count() const { return count_; }
+
+ private:
+  std::vector<std::uint32_t> parent_;
+  std::size_t count_;
+};
+
+SurfaceParts parts_of(std::span<const std::array<std::uint32_t, 3>> faces) {
+  SurfaceParts parts(faces.size());
+  const std::vector<SurfaceEdge> edges = sorted_edges(faces);
+  for (std::size_t i = 1; i < edges.size(); ++i)
+    if (edges[i].ends == edges[i - 1].ends) parts.join(edges[i].face, edges[i - 1].face);
+  return parts;
+}
+
+Point3 normal2(const Surface& surface, std::uint32_t face) {
+  const auto& [a, b, c] = surface.faces[face];
+  Point3 u, v;
+  for (std::size_t k = 0; k < 3; ++k) {
+    u[k] = surface.points[b][k] - surface.points[a][k];
+    v[k] = surface.points[c][k] - surface.points[a][k];
+  }
+  return {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
+}
+
+/// Six times the volume between a point and a face, positive where the face is turned away.
+double volume6_from(const Surface& surface, const Point3& from, std::uint32_t face) {
+  const Point3 normal = normal2(surface, face);
+  const Point3& a = surface.points[surface.faces[face][0]];
+  return (a[0] - from[0]) * normal[0] + (a[1] - from[1]) * normal[1] + (a[2] - from[2]) * normal[2];
+}
 
 void check(const Surface& surface) {
   for (std::size_t f = 0; f < surface.faces.size(); ++f) {

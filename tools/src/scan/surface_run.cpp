@@ -124,8 +124,8 @@ SurfaceCriterion parse_criterion(const std::string& text) {
   return criterion;
 }
 
-std::optional<tri::LinearMap3> surface_metric(const MetricChoice& metric,
-                                              const SurfaceCriterion& criterion) {
+std::optional<tri::EllipticalMetric3> surface_metric(const MetricChoice& metric,
+                                                     const SurfaceCriterion& criterion) {
   if (metric.kind == MetricChoice::Kind::euclidean) return std::nullopt;
   if (metric.kind != MetricChoice::Kind::elliptical) {
     throw UsageError("a surface has the metric euclidean or elliptical:FILE, not " + metric.text);
@@ -152,8 +152,8 @@ SurfaceOutcome surface_of_store(const stream::Store& store, const Detail& detail
   if (tetrahedra) {
     const tri::RestoreOptions& options = criterion.restore;
     if (options.metric) {
-      keep_tetrahedra(ground, options, std::move(points), tri::EllipticalDelaunay3(*options.metric),
-                      outcome);
+      keep_tetrahedra(ground, options, std::move(points),
+                      tri::Delaunay3<double, tri::EllipticalMetric3>(*options.metric), outcome);
     } else {
       keep_tetrahedra(ground, options, std::move(points), tri::Delaunay3<double>(), outcome);
     }

@@ -32,8 +32,8 @@ SurfaceCriterion parse_criterion(const std::string& text);
 
 /// The one elliptical metric of a surface, between positions in metres; none where it is Euclidean.
 /// Throws: UsageError for another kind of metric, one with boxes, or with a method of CGAL's.
-std::optional<tri::LinearMap3> surface_metric(const MetricChoice& metric,
-                                              const SurfaceCriterion& criterion);
+std::optional<tri::EllipticalMetric3> surface_metric(const MetricChoice& metric,
+                                                     const SurfaceCriterion& criterion);
 
 /// A surface, or the tetrahedra inside it. Positions are in the store's CRS.
 struct SurfaceOutcome {

@@ -8,6 +8,7 @@
 #include <limits>
 #include <memory>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 /// Dynamic Delaunay triangulation of the plane: exact, canonical, compact.
@@ -18,13 +19,13 @@
 /// for Delaunay and weighted Delaunay 3D triangulations", doi:10.1016/j.comgeo.2010.09.010). So
 /// collapse after expand gives back the very triangles, in any order of operations.
 ///
-/// x grows to the right and y upwards; "left" and "counter-clockwise" are meant in this frame.
+/// x grows to the right and y upwards; "left" and "counter-clockwise" refer to this frame.
 
 namespace terrace::tri {
 
 /// 32-bit handles: numbers of slots. A vertex handle stays valid until its vertex is removed, a
-/// triangle handle until an operation removes the triangle; both slots are then used again, those
-/// freed last first, in blocks of 64. So data kept in plain arrays indexed by slot stays dense.
+/// triangle handle until an operation removes the triangle; slots are then reused, the most
+/// recently freed blocks of 64 first. So data kept in plain arrays indexed by slot stays dense.
 enum class VertexId : std::uint32_t {};
 enum class TriangleId : std::uint32_t {};
 inline constexpr VertexId kNoVertex{0xFFFFFFFFu};
@@ -52,7 +53,7 @@ constexpr Box3 box2(double min_x, double min_y, double max_x, double max_y) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   return {{min_x, min_y, -kInfinity}, {max_x, max_y, kInfinity}};
 }
-/// Whether the boxes have a point in common; false if a bound is not a number.
+/// Whether the boxes have a point in common; false if a bound is NaN.
 constexpr bool intersects(const Box3& a, const Box3& b) {
   for (std::size_t i = 0; i < 3; ++i) {
     if (!(a.min[i] <= b.max[i] && b.min[i] <= a.max[i])) return false;
@@ -78,7 +79,7 @@ enum class Place : std::uint8_t {
 struct Location {
   Place place = Place::kOutside;
   /// kVertex, kEdge, kInside: a triangle that contains the point (of two at an edge, either);
-  /// kOutside: a triangle at a hull edge that the point sees. kNoTriangle while there is none.
+  /// kOutside: a triangle at a hull edge that the point sees. kNoTriangle without triangles.
   TriangleId triangle = kNoTriangle;
   /// kEdge, kOutside: the edge lies opposite to vertices(triangle)[edge].
   std::uint8_t edge = 0;
@@ -136,19 +137,24 @@ class AliveRange {
   std::uint32_t slots_;
 };
 
+/// The default metric of a triangulation; metric.hpp has elliptical ones.
+struct Euclidean {};
+
 /// Coord = std::int32_t: exact for coordinates of at most 30 bits (0 <= c < 2^30); integer
 /// arithmetic only, the same on every machine. About 60 bytes per vertex.
 /// Coord = double: any finite coordinates; exact predicates, no point is ever moved. -0.0 and 0.0
 /// are equal. About 68 bytes per vertex.
+/// Metric = EllipticalMetric2, with doubles: see metric.hpp.
 ///
-/// No points, one, two, or all on one line are ordinary states: they have vertices and no triangle.
+/// An empty set, one point, two, and collinear points are ordinary states without triangles.
 /// At most 2^29 - 2 vertices. Const functions may be called from several threads at once.
-template <class Coord>
+template <class Coord, class Metric = Euclidean>
 class Delaunay2 {
  public:
   using Point = std::array<Coord, 2>;
 
-  Delaunay2();
+  Delaunay2() : Delaunay2(Metric()) {}
+  explicit Delaunay2(const Metric& metric);
   ~Delaunay2();
   /// A moved-from triangulation can only be destroyed or assigned to.
   Delaunay2(Delaunay2&&) noexcept;
@@ -172,18 +178,20 @@ class Delaunay2 {
   /// directly in canonical form: O(n), no predicate. The vertex of column i, row j is the returned
   /// one + j * columns + i. step > 0. Doubles: x0 + i * step is computed with one rounding each for
   /// product and sum; where these would not be exact, std::invalid_argument (use build()).
-  VertexId build_grid(Coord x0, Coord y0, Coord step, std::uint32_t columns, std::uint32_t rows);
-  /// hint: a vertex near the point, for the walk; kNoVertex: the last one used.
+  /// In the Euclidean metric only.
+  VertexId build_grid(Coord x0, Coord y0, Coord step, std::uint32_t columns,
+                      std::uint32_t rows) requires std::is_same_v<Metric, Euclidean>;
+  /// hint: a vertex near the point, where the walk starts; kNoVertex: the last one used.
   Insertion insert(const Point& point, VertexId hint = kNoVertex);
-  /// Inserts a set near the hint, in any order (it is sorted inside). results: as many as points,
-  /// in parallel, or none. Of equal points one is the created one. Nothing is inserted if one point
-  /// is invalid.
+  /// Inserts a set near the hint, in any order (it is sorted inside). results: one per point, in
+  /// the same order, or empty. Only one of several equal points counts as created. Nothing is
+  /// inserted if one point is invalid.
   void insert(std::span<const Point> points, std::span<Insertion> results,
               VertexId hint = kNoVertex);
   void remove(VertexId vertex);
   /// Removes a set (all different) by enlarging one hole (J. Skala, thesis, section 8.1); faster
-  /// than one by one where the set is compact. Where no hole is possible, one by one after the
-  /// attempt.
+  /// than one by one where the set is compact. Falls back to one by one where the hole cannot be
+  /// filled as a whole.
   void remove(std::span<const VertexId> vertices);
   /// Removes everything and gives the memory back; a journal goes on.
   void clear();
@@ -192,6 +200,7 @@ class Delaunay2 {
 
   // ---- Reading --------------------------------------------------------------------------------
 
+  [[nodiscard]] const Metric& metric() const;
   [[nodiscard]] std::size_t vertex_count() const;
   /// Finite triangles. 0 while all points are collinear.
   [[nodiscard]] std::size_t triangle_count() const;
@@ -199,15 +208,15 @@ class Delaunay2 {
   [[nodiscard]] std::array<VertexId, 3> vertices(TriangleId triangle) const;  ///< counter-clockwise
   /// Neighbour opposite to vertices()[i]; kNoTriangle beyond the hull.
   [[nodiscard]] std::array<TriangleId, 3> neighbours(TriangleId triangle) const;
-  /// A triangle at the vertex; kNoTriangle while there is none. O(1).
+  /// A triangle at the vertex; kNoTriangle while there are no triangles. O(1).
   [[nodiscard]] TriangleId triangle_at(VertexId vertex) const;
   /// Vertices joined to this one by an edge, counter-clockwise, a hull vertex's from its next on
   /// the hull to its previous. While all points are collinear: those before and after on the line.
   void adjacent(VertexId vertex, std::vector<VertexId>& result) const;
 
-  /// Handles of vertices and triangles are below these numbers; they shrink only
-  /// by clear(), and when an empty triangulation is built.
-  /// Not all slots below are alive: free ones, and those that the structure uses for itself.
+  /// Handles of vertices and triangles are below these numbers, which shrink only by clear() and
+  /// when an empty triangulation is built. Not every slot below is alive: some are free, and some
+  /// are used by the structure itself.
   [[nodiscard]] std::uint32_t vertex_slots() const;
   [[nodiscard]] std::uint32_t triangle_slots() const;
   [[nodiscard]] bool alive(VertexId vertex) const;      ///< any handle; false for kNoVertex
@@ -223,7 +232,7 @@ class Delaunay2 {
   /// in a triangulation", doi:10.1142/S0129054102001047) from the hint. The point must be valid as
   /// for insert(). About sqrt(n) steps from afar, a few from nearby.
   [[nodiscard]] Location locate(const Point& point, VertexId hint = kNoVertex) const;
-  /// The vertex nearest to the point, of several the lexicographically smallest; kNoVertex when
+  /// The vertex nearest to the point, the lexicographically smallest on ties; kNoVertex when
   /// empty. Exact. Costs a walk.
   [[nodiscard]] VertexId nearest(const Point& point, VertexId hint = kNoVertex) const;
 
@@ -236,7 +245,7 @@ class Delaunay2 {
   // ---- Observing ------------------------------------------------------------------------------
 
   /// The net difference between two moments: what was there at the first and is not at the second,
-  /// and the reverse. A slot used again appears on both sides: apply removals first.
+  /// and the reverse. A reused slot appears on both sides: apply removals first.
   struct Changes {
     std::vector<VertexId> removed_vertices;
     std::vector<Point> removed_points;  ///< of removed_vertices, in parallel
@@ -248,12 +257,12 @@ class Delaunay2 {
     void clear();
   };
 
-  /// Starts to record changes, from nothing if it was recording already. While recording, a change
+  /// Starts recording; what was recorded before is dropped. While recording, a change
   /// costs some nanoseconds per triangle, and 2 bits per vertex beside the records are held.
   void start_journal();
   void stop_journal();
   /// The changes since start_journal() or the last call; recording goes on. `changes` is
-  /// overwritten, its capacity used again. Requires a started journal. O(number of slots touched).
+  /// overwritten and its capacity reused. Requires a started journal. O(number of slots touched).
   void take_changes(Changes& changes);
 
  private:
@@ -262,8 +271,8 @@ class Delaunay2 {
   std::unique_ptr<Impl> impl_;
 };
 
-template <class Coord>
-void Delaunay2<Coord>::Changes::clear() {
+template <class Coord, class Metric>
+void Delaunay2<Coord, Metric>::Changes::clear() {
   removed_vertices.clear();
   removed_points.clear();
   added_vertices.clear();

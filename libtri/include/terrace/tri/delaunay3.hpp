@@ -45,7 +45,7 @@ enum class Place3 : std::uint8_t {
 struct Location3 {
   Place3 place = Place3::kOutside;
   /// kVertex, kEdge, kFacet, kInside: a tetrahedron that contains the point (of several, any);
-  /// kOutside: one at a hull facet that the point sees. kNoTetrahedron while there is none.
+  /// kOutside: one at a hull facet that the point sees. kNoTetrahedron without tetrahedra.
   TetrahedronId tetrahedron = kNoTetrahedron;
   /// kFacet, kOutside: the facet lies opposite to vertices(tetrahedron)[corner[0]]; kEdge: the edge
   /// is that of the two corners other than corner[0] and corner[1].
@@ -58,17 +58,19 @@ struct Location3 {
 /// Coord = std::int32_t: exact for coordinates of at most 30 bits (0 <= c < 2^30).
 /// Coord = double: any finite coordinates; exact predicates, no point is ever moved. -0.0 and 0.0
 /// are equal.
+/// Metric = EllipticalMetric3, with doubles: see metric.hpp.
 ///
-/// No points, one, two, or all on one line or plane are ordinary states: they have vertices and no
-/// tetrahedron. Then an insertion or removal of one vertex costs O(n) moves of 4 bytes.
+/// An empty set, one point, two, and collinear or coplanar points are ordinary states without
+/// tetrahedra. Then an insertion or removal of one vertex costs O(n) moves of 4 bytes.
 /// At most 2^29 - 2 vertices and 2^30 - 2 tetrahedra, those of the structure's own included.
 /// Const functions may be called from several threads at once.
-template <class Coord>
+template <class Coord, class Metric = Euclidean>
 class Delaunay3 {
  public:
   using Point = std::array<Coord, 3>;
 
-  Delaunay3();
+  Delaunay3() : Delaunay3(Metric()) {}
+  explicit Delaunay3(const Metric& metric);
   ~Delaunay3();
   /// A moved-from triangulation can only be destroyed or assigned to.
   Delaunay3(Delaunay3&&) noexcept;
@@ -87,19 +89,19 @@ class Delaunay3 {
 
   /// Adds points to an empty triangulation, fast. Returns the vertex of each point, equal points
   /// the same. O(n log n) where points are spread as those of a volume or a surface are; besides
-  /// the result 20 bytes per point for sorting, freed before the tetrahedra are made. At most two
-  /// threads are of use; the result, handles included, is the same for any number.
+  /// the result 20 bytes per point for sorting, freed before the tetrahedra are made. More than two
+  /// threads do not help; the result, handles included, is the same for any number.
   std::vector<VertexId> build(std::span<const Point> points, unsigned threads = 1);
-  /// hint: a vertex near the point, for the walk; kNoVertex: the last one used.
+  /// hint: a vertex near the point, where the walk starts; kNoVertex: the last one used.
   Insertion insert(const Point& point, VertexId hint = kNoVertex);
-  /// Inserts a set near the hint, in any order (it is sorted inside). results: as many as points,
-  /// in parallel, or none. Of equal points one is the created one. Nothing is inserted if one point
-  /// is invalid.
+  /// Inserts a set near the hint, in any order (it is sorted inside). results: one per point, in
+  /// the same order, or empty. Only one of several equal points counts as created. Nothing is
+  /// inserted if one point is invalid.
   void insert(std::span<const Point> points, std::span<Insertion> results,
               VertexId hint = kNoVertex);
   /// Usually changes the tetrahedra at the vertex only. But where the hole that it leaves (or that
-  /// a very large set leaves) has so many vertices that filling it would cost more than making all
-  /// tetrahedra anew, that is done: vertices keep their handles, no tetrahedron does.
+  /// a very large set leaves) has so many vertices that filling it would cost more than a rebuild,
+  /// all tetrahedra are rebuilt: vertices keep their handles, tetrahedra do not.
   void remove(VertexId vertex);
   /// Removes a set (all different): what its tetrahedra leave is filled as a whole, with whatever
   /// other vertices stand inside it. Two to five times as fast as one by one where it is compact.
@@ -111,6 +113,7 @@ class Delaunay3 {
 
   // ---- Reading --------------------------------------------------------------------------------
 
+  [[nodiscard]] const Metric& metric() const;
   [[nodiscard]] std::size_t vertex_count() const;
   /// Finite tetrahedra. 0 while all points are coplanar. O(1).
   [[nodiscard]] std::size_t tetrahedron_count() const;
@@ -119,7 +122,7 @@ class Delaunay3 {
   [[nodiscard]] std::array<VertexId, 4> vertices(TetrahedronId tetrahedron) const;
   /// Neighbour opposite to vertices()[i]; kNoTetrahedron beyond the hull.
   [[nodiscard]] std::array<TetrahedronId, 4> neighbours(TetrahedronId tetrahedron) const;
-  /// A tetrahedron at the vertex; kNoTetrahedron while there is none. O(1).
+  /// A tetrahedron at the vertex; kNoTetrahedron while there are no tetrahedra. O(1).
   [[nodiscard]] TetrahedronId tetrahedron_at(VertexId vertex) const;
   /// Vertices joined to this one by an edge, by slot. None while all points are coplanar.
   void adjacent(VertexId vertex, std::vector<VertexId>& result) const;
@@ -127,8 +130,8 @@ class Delaunay3 {
   void tetrahedra_at(VertexId vertex, std::vector<TetrahedronId>& result) const;
 
   /// Handles of vertices and tetrahedra are below these numbers; they shrink only by clear(), and
-  /// when an empty triangulation is built. Not all slots below are alive: free ones, and those that
-  /// the structure uses for itself.
+  /// when an empty triangulation is built. Not every slot below is alive: some are free, and some
+  /// are used by the structure itself.
   [[nodiscard]] std::uint32_t vertex_slots() const;
   [[nodiscard]] std::uint32_t tetrahedron_slots() const;
   [[nodiscard]] bool alive(VertexId vertex) const;            ///< any handle; false for kNoVertex
@@ -144,12 +147,12 @@ class Delaunay3 {
   /// in a triangulation", doi:10.1142/S0129054102001047) from the hint. The point must be valid as
   /// for insert(). About the cube root of n steps from afar, a few from nearby.
   [[nodiscard]] Location3 locate(const Point& point, VertexId hint = kNoVertex) const;
-  /// The vertex nearest to the point, of several the lexicographically smallest; kNoVertex when
+  /// The vertex nearest to the point, the lexicographically smallest on ties; kNoVertex when
   /// empty. Exact. Costs a walk; O(n) while all points are coplanar.
   [[nodiscard]] VertexId nearest(const Point& point, VertexId hint = kNoVertex) const;
 
-  /// A hash of the set of tetrahedra by their coordinates, or of the points while there is none:
-  /// the same for equal point sets whatever their history. O(n).
+  /// A hash of the set of tetrahedra by their coordinates, or of the points while there are no
+  /// tetrahedra: the same for equal point sets whatever their history. O(n).
   [[nodiscard]] std::uint64_t hash() const;
   /// Bytes of memory held, unused capacity included.
   [[nodiscard]] std::size_t memory_bytes() const;
@@ -157,7 +160,7 @@ class Delaunay3 {
   // ---- Observing ------------------------------------------------------------------------------
 
   /// The net difference between two moments: what was there at the first and is not at the second,
-  /// and the reverse. A slot used again appears on both sides: apply removals first.
+  /// and the reverse. A reused slot appears on both sides: apply removals first.
   struct Changes {
     std::vector<VertexId> removed_vertices;
     std::vector<Point> removed_points;  ///< of removed_vertices, in parallel
@@ -169,12 +172,12 @@ class Delaunay3 {
     void clear();
   };
 
-  /// Starts to record changes, from nothing if it was recording already. While recording, a change
+  /// Starts recording; what was recorded before is dropped. While recording, a change
   /// costs some nanoseconds per tetrahedron, and a bit per slot beside the records is held.
   void start_journal();
   void stop_journal();
   /// The changes since start_journal() or the last call; recording goes on. `changes` is
-  /// overwritten, its capacity used again. Requires a started journal. O(number of slots touched).
+  /// overwritten and its capacity reused. Requires a started journal. O(number of slots touched).
   void take_changes(Changes& changes);
 
  private:
@@ -183,8 +186,8 @@ class Delaunay3 {
   std::unique_ptr<Impl> impl_;
 };
 
-template <class Coord>
-void Delaunay3<Coord>::Changes::clear() {
+template <class Coord, class Metric>
+void Delaunay3<Coord, Metric>::Changes::clear() {
   removed_vertices.clear();
   removed_points.clear();
   added_vertices.clear();

@@ -37,8 +37,8 @@ class HeightPatches;
 /// A new vertex starts on the surface of before the step and ends at its own height: draw the new
 /// triangles with `added` and `reassigned` going from start to end. A removed one goes from its
 /// height down to the surface of after the step: a renderer that draws the old triangles until the
-/// slide is over moves `removed`, and `reassigned`, likewise. Collapse mirrors expand: what a step
-/// and its inverse say is the same with start and end changed over.
+/// slide is over moves `removed`, and `reassigned`, likewise. Collapse mirrors expand: a step and
+/// its inverse give the same slides with start and end exchanged.
 ///
 /// A vertex outside the other surface (the hull grew, or there were no triangles) stays at its own
 /// height.

@@ -15,8 +15,8 @@
 #include "terrace/tri/delaunay2.hpp"
 #include "terrace/tri/delaunay3.hpp"
 
-/// A triangulation of a hierarchy of clusters whose detail is raised and lowered, and what it needs
-/// to know of that hierarchy, whoever stores it.
+/// A triangulation of a hierarchy of clusters whose detail is raised and lowered, and the interface
+/// by which it reads that hierarchy, wherever it is stored.
 ///
 /// Level 0 is full resolution; levels grow coarser upward to the top. A cluster of level L is
 /// headed by one point whose highest level is above L and has as members points whose highest level
@@ -65,8 +65,7 @@ struct ClusterRecord {
 /// one in which neighbours follow each other (row by row for rasters, a k-d tree's for clouds)
 /// is 1.2 to 1.6 times as fast as a random one, and about as fast as a Hilbert curve. A member of
 /// level L has L `children`: the ordinals of the clusters that it heads on levels 0, 1, ... L - 1;
-/// those of member i start at children[i * L]. What the spans show lives until the next call of
-/// read().
+/// those of member i start at children[i * L]. The spans are valid until the next call of read().
 struct ClusterMembers {
   std::span<const Point3> positions;
   std::span<const std::uint64_t> children;
@@ -147,7 +146,7 @@ struct ModelOptions {
 /// more for points above level 0. With clusters of 140 members about 21 bytes per
 /// vertex.
 ///
-/// Triangulation: Delaunay2, Delaunay3, EllipticalDelaunay2 or EllipticalDelaunay3.
+/// Triangulation: Delaunay2 or Delaunay3, in any metric.
 template <class Triangulation>
 class MultiresolutionModel {
  public:
@@ -166,7 +165,7 @@ class MultiresolutionModel {
 
   /// Starts with the points of the given detail, built in one go. The first delta covers what comes
   /// after: begin with a look at the triangulation. The source must outlive the model.
-  /// `empty`: the triangulation to fill, where it has options of its own (a metric).
+  /// `empty`: the triangulation to fill, which brings the metric.
   /// Throws: what the source throws, HierarchyError, std::length_error.
   explicit MultiresolutionModel(ClusterSource& source, const Detail& start = {},
                                 ModelOptions options = {}, Triangulation empty = Triangulation());
@@ -243,11 +242,11 @@ class MultiresolutionModel {
 };
 
 /// The model of points in the plane: std::int32_t for rasters in column and row, else double.
-template <class Coord>
-using Multiresolution2 = MultiresolutionModel<Delaunay2<Coord>>;
+template <class Coord, class Metric = Euclidean>
+using Multiresolution2 = MultiresolutionModel<Delaunay2<Coord, Metric>>;
 /// The model of points in space: tetrahedra in place of triangles; a height is the z of a vertex.
-template <class Coord>
-using Multiresolution3 = MultiresolutionModel<Delaunay3<Coord>>;
+template <class Coord, class Metric = Euclidean>
+using Multiresolution3 = MultiresolutionModel<Delaunay3<Coord, Metric>>;
 
 extern template class MultiresolutionModel<Delaunay2<std::int32_t>>;
 extern template class MultiresolutionModel<Delaunay2<double>>;

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "terrace/tri/delaunay3.hpp"
-#include "terrace/tri/elliptical.hpp"
+#include "terrace/tri/metric.hpp"
 
 /// Restoring the non-convex shape of points scanned from a surface: of the Delaunay tetrahedra,
 /// which fill the convex hull, those outside the shape are peeled off, starting from the hull
@@ -51,8 +51,8 @@ struct SurfaceMeasures {
 /// of whose corners are the same.
 SurfaceMeasures measure(const Surface& surface);
 
-/// Turns the components (faces connected by edges) whose volume is negative inside out. Of a
-/// component that is not closed the volume is the one from its first corner. O(n log n). Throws as
+/// Turns the components (faces connected by edges) whose volume is negative inside out. The volume
+/// of a component that is not closed is measured from its first corner. O(n log n). Throws as
 /// measure().
 void turn_outward(Surface& surface);
 
@@ -69,7 +69,7 @@ enum class ShapeCriterion : std::uint8_t {
 };
 
 enum class ShapeRule : std::uint8_t {
-  /// A tetrahedron beyond an open facet is removed as soon as that facet is no boundary facet as
+  /// A tetrahedron beyond an open facet is removed as soon as that facet is not a boundary facet as
   /// seen from it. Open facets are those of the hull and of what has been removed. So the removed
   /// ones are what can be reached from outside: a function of the tetrahedra alone. Between
   /// surfaces that face each other across a gap or round a hole, a few tetrahedra may stay whose
@@ -85,15 +85,15 @@ enum class ShapeRule : std::uint8_t {
 struct ShapeOptions {
   ShapeCriterion criterion = ShapeCriterion::kGabriel;
   ShapeRule rule = ShapeRule::kFlood;
-  /// Of ShapeCriterion::kEdgeLength; the smaller, the more is removed. 0.5 is the thesis's, for the
-  /// published rule. The flood rule goes through the first hole: with 0.5 it empties even a sphere
+  /// For ShapeCriterion::kEdgeLength; smaller values remove more. The thesis uses 0.5 with the
+  /// published rule. The flood rule leaks through the first hole: with 0.5 it empties even a sphere
   /// of regular samples, which 1 restores.
   double edge_factor = 0.5;
   /// No vertex loses all of its tetrahedra. Published rule: a removal that would take the last one
-  /// does not happen. Flood rule: after the flood tetrahedra are put back until every vertex has
-  /// one: always the one with the shortest longest edge (of equal ones the lexicographically
-  /// first, corners sorted) among those that have a vertex without tetrahedra and share a facet
-  /// with what is kept; where none does, among all that have such a vertex.
+  /// is skipped. Flood rule: after the flood tetrahedra are put back until every vertex has one:
+  /// always the one with the shortest longest edge (the lexicographically first on ties, corners
+  /// sorted) among those that have a vertex without tetrahedra and share a facet with what is kept;
+  /// where no such tetrahedron shares a facet, among all that have such a vertex.
   bool keep_vertices = true;
 };
 
@@ -106,8 +106,14 @@ struct ShapeSurface {
 /// function of the point set and the options, whatever the triangulation's and this object's
 /// history.
 ///
-/// One byte per tetrahedron slot and four per vertex slot. Triangulation: Delaunay3 or
-/// EllipticalDelaunay3; see the names below.
+/// One byte per tetrahedron slot and four per vertex slot. Triangulation: any Delaunay3; see
+/// Shape3 below.
+///
+/// In an elliptical metric the tetrahedra are those of the metric, smallest spheres are its
+/// smallest ellipsoids (exact), and lengths of edges, both those of ShapeCriterion::kEdgeLength and
+/// those that decide which tetrahedron is put back, are its lengths (in doubles, of differences
+/// mapped by the triangulation's map). So it is the shape of the mapped points: samples that are
+/// denser across the long axes than along them are as good as even ones.
 template <class Triangulation>
 class BasicShape3 {
  public:
@@ -140,7 +146,7 @@ class BasicShape3 {
   /// Tetrahedra put back after the flood for the sake of a vertex.
   [[nodiscard]] std::size_t rescued_count() const;
   /// Vertices that the rule itself leaves without a tetrahedron, by slot: with keep_vertices and
-  /// the flood rule those that have been given one back. None while there are no tetrahedra at all.
+  /// the flood rule those that have been given one back. Empty while there are no tetrahedra.
   [[nodiscard]] std::vector<VertexId> lost_vertices() const;
   /// Kept tetrahedra by slot. O(slots).
   [[nodiscard]] std::vector<TetrahedronId> kept_tetrahedra() const;
@@ -161,29 +167,22 @@ class BasicShape3 {
   std::unique_ptr<Impl> impl_;
 };
 
-template <class Coord>
-using Shape3 = BasicShape3<Delaunay3<Coord>>;
-
-/// In an elliptical metric: the tetrahedra are those of the metric, smallest spheres are its
-/// smallest ellipsoids (exact), and lengths of edges, those that decide what is put back among
-/// them, are its lengths (in doubles, of differences mapped by the triangulation's map). So it is
-/// the shape of the mapped points: samples that are denser across the long axes than along them
-/// are as good as even ones.
-using EllipticalShape3 = BasicShape3<EllipticalDelaunay3>;
+template <class Coord, class Metric = Euclidean>
+using Shape3 = BasicShape3<Delaunay3<Coord, Metric>>;
 
 extern template class BasicShape3<Delaunay3<std::int32_t>>;
 extern template class BasicShape3<Delaunay3<double>>;
-extern template class BasicShape3<EllipticalDelaunay3>;
+extern template class BasicShape3<Delaunay3<double, EllipticalMetric3>>;
 
 struct RestoreOptions {
   ShapeOptions shape;
   /// 0 triangulates the points as they are. 1 to 30: rounded to integers of so many bits over the
-  /// longest side of their box, faster; 24 is finer than a float. Of points that become one the
-  /// first stands for all. The surface has the given coordinates in any case.
+  /// longest side of their box, faster; 24 is finer than a float. The first of several points that
+  /// become one stands for all. The surface has the given coordinates in any case.
   unsigned quantise_bits = 0;
   /// An elliptical metric in which the points are triangulated and the facets judged, see
-  /// EllipticalShape3. Not together with quantise_bits.
-  std::optional<LinearMap3> metric;
+  /// BasicShape3. Not together with quantise_bits.
+  std::optional<EllipticalMetric3> metric;
 };
 
 struct RestoredSurface {

@@ -90,7 +90,7 @@ NormalCone terrain_cone(const ClusterRecord& record);
 
 struct ViewOptions {
   /// A cluster is expanded when its error is above what is tolerated, and collapsed when it falls
-  /// below this share of it. Between the two it stays as it is: a camera that trembles changes
+  /// below this share of it. Between the two it stays as it is, so a jittering camera changes
   /// nothing. More than 0, at most 1.
   double collapse_below = 0.75;
   /// A cluster is out of view when it is outside the picture by more than this, as a share of its
@@ -100,28 +100,29 @@ struct ViewOptions {
   /// it are known, and loaded, before they are seen.
   double guard = 0.05;
   /// Clusters are asked for before they are wanted: when their demand by the view widened by the
-  /// guard is above this, and not below collapse_below. Infinity: none are.
+  /// guard is above this, and not below collapse_below. Infinity: never ahead of time.
   double ask_above = 0.85;
-  /// Points of the model, the most there may be. The root's are always there.
+  /// Upper limit of points in the model. The root's are always there.
   std::size_t max_points = std::size_t{1} << 28;
   /// Memory for clusters that were given and are kept, see ViewControl::give().
   std::size_t max_cached_bytes = std::size_t{1} << 28;
   /// Clusters that may show an outline, because a normal of theirs may be perpendicular to a line
   /// of sight, are held to this fraction of View::pixel_error. 1: all are alike.
   double silhouette = 1.0;
-  /// Tells the normals of a cluster, once when the one above it is expanded; none: terrain_cone().
+  /// Gives the normals of a cluster, asked once, when its parent is expanded. Empty:
+  /// terrain_cone().
   std::function<NormalCone(ClusterId, const ClusterRecord&)> cone;
   ModelOptions model;
 };
 
-/// What a step may spend. Whatever the budget, a step does one operation at least, if there is one.
+/// What a step may spend. Whatever the budget, a step does at least one operation if any is due.
 struct StepBudget {
   /// Clusters to be expanded or collapsed. The same inputs then give the same steps on any machine.
   std::size_t operations = std::numeric_limits<std::size_t>::max();
-  /// Asked of `clock`, between clusters; the next one is left for the next step where it would, by
-  /// what the ones before took, not be done in time.
+  /// Checked by `clock` between clusters; a cluster is left for the next step if, judging by those
+  /// before, it would not be done in time.
   double seconds = std::numeric_limits<double>::infinity();
-  /// Seconds since any moment; must be there if `seconds` is finite.
+  /// Seconds since any moment; required if `seconds` is finite.
   std::function<double()> clock;
 };
 
@@ -168,7 +169,7 @@ struct ViewRequest {
 };
 
 /// Reads a cluster from a source, with all that give() needs, and blocks while the source does.
-/// Throws what the source throws; HierarchyError where it is too damaged to ask on.
+/// Throws what the source throws; HierarchyError if it is too damaged to continue.
 GivenCluster load(ClusterSource& source, const ViewRequest& request);
 /// The root.
 GivenCluster load_root(ClusterSource& source);
@@ -191,8 +192,8 @@ enum class ViewPin : std::uint8_t { expanded, collapsed };
 /// clusters of less than collapse_below times its demand are collapsed for it: out of view first,
 /// the farthest of them first, then those of the least demand. What time is left goes to collapsing
 /// what is no longer wanted, in the same order; once that is a quarter of the points, it comes
-/// before expanding. Under max_points the outcome depends on sizes, but
-/// it too stays once it is reached.
+/// before expanding. Under max_points the outcome depends on sizes, but it is stable too once
+/// reached.
 ///
 /// Cost of a step without changes: O(expanded clusters + collapsed clusters next to wanted ones).
 /// Memory beside the model: 85 bytes per expanded cluster and 65 per cluster that could be expanded
@@ -227,7 +228,7 @@ class ViewControl {
     /// The ones among these that no step has named before, or only before they were withdrawn or
     /// forgotten: for a caller who starts loading at once.
     std::vector<ViewRequest> requests;
-    /// Named before and of no use any more, in ascending order.
+    /// Named before and no longer needed, in ascending order.
     std::vector<ClusterId> withdrawn;
     /// Clusters that contradict themselves; they stay collapsed until they are given again.
     std::vector<Fault> faults;
@@ -253,11 +254,11 @@ class ViewControl {
   /// after it was expanded, for when it comes back. False: it is larger than the budget.
   /// Throws HierarchyError where counts of members, children and records do not agree.
   bool give(GivenCluster cluster);
-  /// Loading it has failed, or was given up: it may be asked for again.
+  /// Loading it failed or was cancelled: it may be requested again.
   void forget(ClusterId cluster);
 
-  /// Overrides the view: what is pinned expanded is so as soon as the cluster above it is, and then
-  /// all above it stays; what is pinned collapsed takes all below along.
+  /// Overrides the view: a cluster pinned expanded is expanded as soon as its parent is, and then
+  /// its ancestors stay expanded; one pinned collapsed keeps everything below it collapsed.
   void pin(ClusterId cluster, Pin how);
   void unpin(ClusterId cluster);
 

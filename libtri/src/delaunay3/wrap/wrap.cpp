@@ -17,7 +17,6 @@
 
 #include "delaunay3/double_kernel.hpp"
 #include "delaunay3/elliptical_kernel.hpp"
-#include "delaunay3/hole_filling.hpp"
 #include "delaunay3/int_kernel.hpp"
 #include "delaunay3/predicates.hpp"
 
@@ -65,7 +64,7 @@ class Wrapping {
     length_ = std::sqrt(square) * (1 + 0x1p-40);
     if constexpr (kMapped) {
       // Both ends of a vector are off by 9 u spread() times their distances from the first vertex.
-      const double spread = EllipticalKernel::metric().spread();
+      const double spread = EllipticalKernel::form().spread();
       length_ *= 1 + 0x1p-20;
       vector_error_ = spread < 0x1p28 ? 18.5 * kUnit * spread * length_ : kInfinity;
     }

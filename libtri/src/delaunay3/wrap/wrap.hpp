@@ -1,10 +1,99 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "delaunay3/hole_filling.hpp"
+#include <array>
+#include <cassert>
+#include <cstdint>
+
+#include "delaunay3/facet_table.hpp"
 #include "delaunay3/mesh.hpp"
 
 namespace terrace::tri::spatial {
+
+/// What every way to fill a hole does: keeps the open facets, makes a tetrahedron on one, and joins
+/// what meets. Facets may be taken in any order, as long as each gets the tetrahedron that belongs
+/// there.
+template <class Kernel>
+class HoleFilling {
+ public:
+  using Point = typename Kernel::Point;
+
+  explicit HoleFilling(Mesh<Kernel>& mesh)
+      : mesh_(mesh), hole_(mesh.hole), table_(mesh.hole.table) {
+    hole_.incident.resize(hole_.vertex.size());
+    hole_.pending.clear();
+    table_.clear(hole_.facets.size());
+    for (std::uint32_t i = 0; i < hole_.facets.size(); ++i) {
+      table_.find_or_add(hole_.facets[i].corner, i);
+      if (is_finite_facet(i)) hole_.pending.push_back(i);
+    }
+    std::uint32_t gone = 0;
+    for (const std::uint32_t t : hole_.slots)
+      if (!has_ghost(mesh_.tetrahedron[t].corner)) ++gone;
+    mesh_.finite_count -= gone;
+  }
+
+  /// A finite open facet, the last that became one, or kNone.
+  std::uint32_t next_open() {
+    while (!hole_.pending.empty()) {
+      const std::uint32_t i = hole_.pending.back();
+      hole_.pending.pop_back();
+      if (is_open(i)) return i;
+    }
+    return kNone;
+  }
+  [[nodiscard]] bool is_open(std::uint32_t i) const {
+    return hole_.facets[i].outer != hole_.kMatched;
+  }
+  [[nodiscard]] bool is_finite_facet(std::uint32_t i) const {
+    const auto& corner = hole_.facets[i].corner;
+    return corner[0] != 0 && corner[1] != 0 && corner[2] != 0;
+  }
+
+  /// Makes the tetrahedron of an open facet and a vertex, or the ghost. Facets that become open are
+  /// the last ones.
+  void attach(std::uint32_t i, std::uint32_t apex) {
+    const auto [a, b, c] = hole_.facets[i].corner;
+    if (used_ == hole_.slots.size()) hole_.slots.push_back(mesh_.new_tetrahedron());
+    const std::uint32_t t = hole_.slots[used_++];
+    const std::array<std::uint32_t, 4> local = {apex, a, b, c};
+    for (std::size_t k = 0; k < 4; ++k) {
+      mesh_.tetrahedron[t].corner[k] = hole_.vertex[local[k]];
+      hole_.incident[local[k]] = t;
+    }
+    if (apex != 0) ++mesh_.finite_count;
+    mesh_.link(make_side(t, 0), hole_.facets[i].outer);
+    hole_.facets[i].outer = hole_.kMatched;
+    for (std::uint32_t k = 1; k < 4; ++k) {
+      const auto& f = kFacet[k];
+      // Seen from the other side.
+      const std::array<std::uint32_t, 3> corner = {local[f[0]], local[f[2]], local[f[1]]};
+      const auto next = static_cast<std::uint32_t>(hole_.facets.size());
+      const std::uint32_t known = table_.find_or_add(corner, next);
+      if (known != next) {
+        assert(is_open(known));
+        mesh_.link(make_side(t, k), hole_.facets[known].outer);
+        hole_.facets[known].outer = hole_.kMatched;
+        continue;
+      }
+      hole_.facets.push_back({corner, make_side(t, k)});
+      if (is_finite_facet(next)) hole_.pending.push_back(next);
+    }
+  }
+
+  /// Every vertex of the hole has a new tetrahedron; slots left over are freed.
+  void finish() {
+    for (std::uint32_t k = 1; k < hole_.vertex.size(); ++k)
+      mesh_.vertex[hole_.vertex[k]].incident = hole_.incident[k];
+    for (; used_ < hole_.slots.size(); ++used_) mesh_.free_tetrahedron_slot(hole_.slots[used_]);
+  }
+
+ private:
+  Mesh<Kernel>& mesh_;
+  Hole<Point>& hole_;
+  FacetTable table_;
+  std::size_t used_ = 0;  ///< slots that have been used again
+};
 
 /// Fills mesh.hole, of which at least one facet is finite and whose vertices are not all vertices
 /// of a plane, see wrap.cpp. Vertices at it get tetrahedra; slots left over are freed.

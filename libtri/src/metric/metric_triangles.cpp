@@ -5,7 +5,7 @@
 
 #include "delaunay2/elliptical_kernel.hpp"
 #include "delaunay2/predicates.hpp"
-#include "terrace/tri/elliptical.hpp"
+#include "terrace/tri/metric.hpp"
 
 namespace terrace::tri {
 namespace {
@@ -15,11 +15,8 @@ using namespace planar;
 constexpr std::uint32_t kNoRegion = 0xFFFFFFFFu;
 constexpr Side kNoSide = 0xFFFFFFFFu;
 
-template <class Coord>
-LinearMap2 map_of(const Delaunay2<Coord>&) {
-  return kIdentityMap2;
-}
-LinearMap2 map_of(const EllipticalDelaunay2& triangulation) { return triangulation.map(); }
+const LinearMap2& map_of(const Euclidean&) { return kIdentityMap<2>; }
+const LinearMap2& map_of(const EllipticalMetric2& metric) { return metric.map(); }
 
 /// A copy of triangles that edges can be flipped in. No ghosts: kNoSide lies beyond the hull.
 class Flips {
@@ -56,7 +53,7 @@ class Flips {
             make_side(other, previous_index(static_cast<std::uint32_t>(at - corner.begin())));
       }
     }
-    find_regions(field, map_of(triangulation));
+    find_regions(field, map_of(triangulation.metric()));
   }
 
   void run() {
@@ -68,8 +65,8 @@ class Flips {
     }
     for (std::uint32_t region = 0; region < maps_.size(); ++region) {
       if (members[region].empty()) continue;
-      const EllipticalMetric metric(maps_[region]);
-      const EllipticalKernel::Scope scope(metric);
+      const QuadraticForm form(maps_[region]);
+      const EllipticalKernel::Scope scope(form);
       for (const std::uint32_t t : members[region]) {
         for (std::uint32_t i = 0; i < 3; ++i) pending_.push_back(make_side(t, i));
         settle(region);
@@ -131,8 +128,8 @@ class Flips {
     return region_[t.corner[1]] == region && region_[t.corner[2]] == region ? region : kNoRegion;
   }
 
-  /// Flips what is to be flipped at the pending sides, which lie in triangles of the region, and
-  /// what becomes so.
+  /// Flips until no pending side violates the Delaunay condition. Pending sides lie in triangles of
+  /// the region; a flip adds those around it.
   void settle(std::uint32_t region) {
     while (!pending_.empty()) {
       const Side side = pending_.back();
@@ -206,8 +203,7 @@ template std::vector<std::array<VertexId, 3>> metric_triangles(const Delaunay2<s
 template std::vector<std::array<VertexId, 3>> metric_triangles(const Delaunay2<double>&,
                                                                const MetricField2&,
                                                                const std::optional<Box3>&);
-template std::vector<std::array<VertexId, 3>> metric_triangles(const EllipticalDelaunay2&,
-                                                               const MetricField2&,
-                                                               const std::optional<Box3>&);
+template std::vector<std::array<VertexId, 3>> metric_triangles(
+    const Delaunay2<double, EllipticalMetric2>&, const MetricField2&, const std::optional<Box3>&);
 
 }  // namespace terrace::tri
