@@ -19,13 +19,13 @@
 #include "base/portable_math.hpp"
 #include "cli/choices.hpp"
 #include "cli/cli.hpp"
-#include "mesh/store_mesh.hpp"
 #include "sample/place_file.hpp"
 #include "sample/raster_run.hpp"
 #include "sample/sample_run.hpp"
 #include "surface/store_window.hpp"
 #include "terrace/terrain/build.hpp"
 #include "terrace/terrain/detail.hpp"
+#include "terrace/terrain/detail_mesh.hpp"
 #include "terrace/terrain/heights.hpp"
 
 namespace {
@@ -249,7 +249,7 @@ void polygon_points(benchmark::State& state) {
   terrace::terrain::Detail detail;
   detail.region = region_of(state);
   std::size_t inside = 0;
-  for (auto _ : state) inside = terrace::terrain::points_of_store(source, detail).positions.size();
+  for (auto _ : state) inside = terrace::terrain::detail_points(source, detail).positions.size();
   state.counters["inside"] = static_cast<double>(inside);
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(inside));
 }

@@ -21,13 +21,12 @@
 
 #include "../../libterrain/tests/temporary_folder.hpp"
 #include "cli/detail_options.hpp"
-#include "mesh/store_mesh.hpp"
 #include "terrace/terrain/build.hpp"
+#include "terrace/terrain/detail_mesh.hpp"
 
 namespace terrace {
 namespace {
 
-constexpr std::uint64_t kMuch = std::uint64_t{4} << 30;
 constexpr std::uint32_t kSize = 500;
 constexpr double kCell = 30, kLeft = 500000, kTop = 5200000;
 
@@ -92,7 +91,7 @@ TEST_F(Mesh, OfALevelHasThePointsOfThatLevelAndAbove) {
   for (unsigned level = 0; level <= store_->top(); ++level) {
     SCOPED_TRACE(level);
     const terrain::TriangleMesh mesh =
-        mesh_of_store(*store_, tools::parse_detail(*store_, std::to_string(level), "", {}), kMuch);
+        detail_mesh(*store_, tools::parse_detail(*store_, std::to_string(level), "", {}));
     EXPECT_EQ(mesh.positions.size(), store_->levels()[level].points);
     expect_sound(mesh);
     for (const std::uint8_t l : mesh.levels) EXPECT_GE(l, level);
@@ -101,7 +100,7 @@ TEST_F(Mesh, OfALevelHasThePointsOfThatLevelAndAbove) {
 
 TEST_F(Mesh, OfLevelZeroIsTheGrid) {
   const terrain::TriangleMesh mesh =
-      mesh_of_store(*store_, tools::parse_detail(*store_, "0", "", {}), kMuch);
+      detail_mesh(*store_, tools::parse_detail(*store_, "0", "", {}));
   EXPECT_EQ(mesh.positions.size(), std::size_t{kSize} * kSize);
   EXPECT_EQ(mesh.triangles.size(), std::size_t{2} * (kSize - 1) * (kSize - 1));
   double area = 0;
@@ -113,7 +112,7 @@ TEST_F(Mesh, HoldsEveryPointInsideAFocusAndFewOutside) {
   // Columns 200 to 260, rows 100 to 160, borders on samples.
   const std::string box = "506000,5195200,507800,5197000";
   const terrain::TriangleMesh mesh =
-      mesh_of_store(*store_, tools::parse_detail(*store_, "top", "", {box + ":0"}), kMuch);
+      detail_mesh(*store_, tools::parse_detail(*store_, "top", "", {box + ":0"}));
   expect_sound(mesh);
   std::set<std::pair<double, double>> inside;
   for (const auto& p : mesh.positions) {
@@ -128,7 +127,7 @@ TEST_F(Mesh, HoldsEveryPointInsideAFocusAndFewOutside) {
 TEST_F(Mesh, OfARegionIsThePartOfTheWholeThatReachesIn) {
   const std::string box = "505003,5190001,507004,5192002";
   const terrain::TriangleMesh part =
-      mesh_of_store(*store_, tools::parse_detail(*store_, "0", box, {}), kMuch);
+      detail_mesh(*store_, tools::parse_detail(*store_, "0", box, {}));
   expect_sound(part);
   // At full resolution the region's triangles are grid triangles.
   double inside = 0;
@@ -159,10 +158,9 @@ TEST_F(Mesh, OfAPolygonIsThePartOfTheWholeThatReachesIn) {
     std::sort(triangles.begin(), triangles.end());
     return triangles;
   };
-  const auto part =
-      corners(mesh_of_store(*store_, detail, kMuch), [](const auto&) { return true; });
+  const auto part = corners(detail_mesh(*store_, detail), [](const auto&) { return true; });
   const auto whole =
-      corners(mesh_of_store(*store_, terrain::Detail{}, kMuch),
+      corners(detail_mesh(*store_, terrain::Detail{}),
               [&detail](const auto& triangle) { return detail.region->touches(triangle); });
   EXPECT_GT(part.size(), 100U);
   EXPECT_EQ(part, whole);
@@ -170,7 +168,8 @@ TEST_F(Mesh, OfAPolygonIsThePartOfTheWholeThatReachesIn) {
 
 TEST_F(Mesh, SaysWhatMemoryItNeeds) {
   try {
-    mesh_of_store(*store_, tools::parse_detail(*store_, "0", "", {}), std::uint64_t{1} << 20);
+    static_cast<void>(detail_mesh(*store_, tools::parse_detail(*store_, "0", "", {}), {},
+                                  {.memory_bytes = std::uint64_t{1} << 20}));
     FAIL() << "one MiB was enough";
   } catch (const stream::Error& error) {
     EXPECT_NE(std::string(error.what()).find("needs"), std::string::npos) << error.what();
@@ -180,8 +179,8 @@ TEST_F(Mesh, SaysWhatMemoryItNeeds) {
 TEST_F(Mesh, PointsOfTheSameDetailAreItsVertices) {
   const terrain::Detail detail =
       tools::parse_detail(*store_, "1", "", {"506000,5195200,507800,5197000:0"});
-  const terrain::TriangleMesh mesh = mesh_of_store(*store_, detail, kMuch);
-  const terrain::TriangleMesh cloud = points_of_store(*store_, detail);
+  const terrain::TriangleMesh mesh = detail_mesh(*store_, detail);
+  const terrain::TriangleMesh cloud = detail_points(*store_, detail);
   std::vector<stream::Point3> a = mesh.positions, b = cloud.positions;
   std::sort(a.begin(), a.end());
   std::sort(b.begin(), b.end());

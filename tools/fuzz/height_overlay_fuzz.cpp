@@ -11,9 +11,9 @@
 #include <terrace/stream/store.hpp>
 
 #include "fuzz_target.hpp"
-#include "mesh/height_overlay.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/build.hpp"
+#include "terrace/terrain/detail_mesh.hpp"
 
 namespace terrace::tools {
 

@@ -90,11 +90,11 @@ std::vector<tri::HeightChange> smoothed(const tri::Multiresolution2<Coord>& mode
 
 }  // namespace
 
-std::uint64_t HeightOptions::bytes_per_vertex() const {
-  std::uint64_t bytes = any() ? 8 : 0;
+std::uint64_t height_bytes_per_vertex(const HeightOptions& options) {
+  std::uint64_t bytes = options.any() ? 8 : 0;
   // Heights of two steps, what changed, the vertices, and 16 bytes per edge end.
-  if (smoothing) bytes += 3 * 8 + 16 + 4 + 6 * 16;
-  if (overlay != nullptr || save != nullptr) bytes += sizeof(Named);
+  if (options.smoothing) bytes += 3 * 8 + 16 + 4 + 6 * 16;
+  if (options.overlay != nullptr || options.save != nullptr) bytes += sizeof(Named);
   return bytes;
 }
 

@@ -2,29 +2,11 @@
 #pragma once
 
 #include <array>
-#include <cstdint>
-#include <optional>
 #include <vector>
 
-#include "terrace/stream/point.hpp"
+#include "terrace/terrain/triangle_mesh.hpp"
 
 namespace terrace::terrain {
-
-using Rgb = std::array<std::uint8_t, 3>;
-
-/// Vertices with what is known of them, and triangles between them: none for a cloud of points.
-/// The optional columns are empty or as long as `positions`.
-struct TriangleMesh {
-  std::vector<stream::Point3> positions;
-  std::vector<std::array<std::uint32_t, 3>> triangles;  ///< either orientation
-  std::vector<std::uint8_t> levels;                     ///< of a store
-  std::vector<std::int32_t> classes;                    ///< class or cluster
-  std::vector<std::uint32_t> representatives;  ///< of the clusters: vertex numbers, any length
-  std::vector<Rgb> colours;
-  std::vector<std::array<float, 3>> normals;  ///< unit length
-  /// For a cloud that is coarse somewhere: how many levels are left out around each point.
-  std::vector<std::uint8_t> left_out;
-};
 
 /// True if the mesh is seen from above without overlap: nearly all triangles, seen along z, turn
 /// the same way. A cloud of points is none.

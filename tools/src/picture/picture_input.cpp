@@ -14,12 +14,12 @@
 #include "cli/interrupt.hpp"
 #include "earth/ground.hpp"
 #include "mesh/mesh_file.hpp"
-#include "mesh/store_mesh.hpp"
 #include "picture/height_grid.hpp"
 #include "scan/surface_run.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/source.hpp"
 #include "terrace/terrain/detail.hpp"
+#include "terrace/terrain/detail_mesh.hpp"
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::tools {
@@ -224,11 +224,11 @@ PictureInput from_store(const std::string& path, const PictureSelection& selecti
   world.coordinates[2].unit = stored.coordinates[2].unit;
   const Ground ground(world);
   if (!store.schema().grid && !selection.triangles) {
-    input.mesh = points_of_store(store, detail);
+    input.mesh = detail_points(store, detail);
     put_on_ground(input, world, ground);
     return input;
   }
-  input.mesh = mesh_of_store(store, detail, common.memory_or(0));
+  input.mesh = detail_mesh(store, detail, {}, common.context());
   put_on_ground(input, world, ground);
   if (input.terrain || !mostly_steep(input.mesh)) return input;
   input = {};

@@ -11,8 +11,8 @@
 
 #include "base/units.hpp"
 #include "earth/ground.hpp"
-#include "mesh/store_mesh.hpp"
 #include "scan/cgal_surface.hpp"
+#include "terrace/terrain/detail_mesh.hpp"
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::tools {
@@ -146,7 +146,7 @@ SurfaceOutcome surface_of_store(const stream::Store& store, const Detail& detail
     throw UsageError("--tetrahedra is for --criterion gabriel and edge");
   }
   check_memory(store, detail, criterion, memory_bytes);
-  TriangleMesh points = points_of_store(store, detail);
+  TriangleMesh points = detail_points(store, detail);
   const std::vector<stream::Point3> ground = on_ground(points.positions, store.schema());
   SurfaceOutcome outcome;
   if (tetrahedra) {

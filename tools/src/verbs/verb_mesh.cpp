@@ -20,12 +20,11 @@
 #include "cli/interrupt.hpp"
 #include "cli/output.hpp"
 #include "cli/smooth_option.hpp"
-#include "mesh/height_overlay.hpp"
-#include "mesh/mesh_output.hpp"
-#include "mesh/store_mesh.hpp"
 #include "terrace/terrain/bounded_mesh.hpp"
 #include "terrace/terrain/detail.hpp"
+#include "terrace/terrain/detail_mesh.hpp"
 #include "terrace/terrain/error.hpp"
+#include "terrace/terrain/triangle_mesh.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
@@ -199,7 +198,8 @@ class MeshCommand final : public Command {
     if (quality_ != "removal" || !duplicates_.empty() || fill_ != "none") {
       throw UsageError("--quality, --duplicates and --fill belong to --max-error and --max-points");
     }
-    MeshOptions options{{.smoothing = parse_smoothing(smooth_)}, MetricChoice::parse(metric_)};
+    DetailMeshOptions options{{.smoothing = parse_smoothing(smooth_)},
+                              MetricChoice::parse(metric_)};
     const bool save = !save_overlay_.empty();
     if (save && smooth_.empty()) throw UsageError("--save-overlay needs --smooth");
     if (save && save_overlay_ == output_) {
@@ -219,7 +219,7 @@ class MeshCommand final : public Command {
           &writer.emplace(save_overlay_, store, store.schema().coordinates[2].name,
                           may_replace(save_overlay_, common.force));
     }
-    TriangleMesh mesh = mesh_of_store(store, detail, common.memory_or(0), options);
+    TriangleMesh mesh = detail_mesh(store, detail, options, common.context());
     places(mesh.positions);
     write_mesh(output_, mesh, {.format = format_, .replace = replace, .stop = stop_token()});
     if (writer) writer->finish();

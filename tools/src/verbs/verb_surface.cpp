@@ -13,12 +13,12 @@
 #include "cli/interrupt.hpp"
 #include "cli/library_call.hpp"
 #include "cli/output.hpp"
-#include "mesh/mesh_output.hpp"
 #include "mesh/vtk_file.hpp"
 #include "scan/surface_run.hpp"
 #include "terrace/terrain/detail.hpp"
 #include "terrace/terrain/error.hpp"
 #include "terrace/terrain/metric_choice.hpp"
+#include "terrace/terrain/triangle_mesh.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "mesh/store_mesh.hpp"
+#include "terrace/terrain/detail_mesh.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -188,7 +188,8 @@ TriangleMesh mesh_of_model(const tri::Multiresolution2<Coord>& model,
 }
 
 template <class Coord>
-TriangleMesh mesh_of(const stream::Store& store, const Detail& detail, const MeshOptions& options) {
+TriangleMesh mesh_of(const stream::Store& store, const Detail& detail,
+                     const DetailMeshOptions& options) {
   StoreSource source(store);
   const stream::Placement& placement = store.schema();
   std::optional<tri::MetricField2> field;
@@ -206,22 +207,23 @@ TriangleMesh mesh_of(const stream::Store& store, const Detail& detail, const Mes
 
 }  // namespace
 
-TriangleMesh mesh_of_store(const stream::Store& store, const Detail& detail,
-                           std::uint64_t memory_bytes, const MeshOptions& options) {
+TriangleMesh detail_mesh(const stream::Store& given, const Detail& detail,
+                         const DetailMeshOptions& options, const Context& context) {
+  const stream::Store store = given.with_stop(context.stop);
   const MetricChoice::Kind kind = options.metric.kind;
   if (kind != MetricChoice::Kind::euclidean && kind != MetricChoice::Kind::elliptical) {
     throw UsageError("a mesh has the metric euclidean or elliptical:FILE, not " +
                      options.metric.text);
   }
   const Detail wide = with_margin(store, detail, store.schema());
-  check_memory(store, wide, memory_bytes,
-               options.heights.bytes_per_vertex() +
+  check_memory(store, wide, context.memory_or(0),
+               height_bytes_per_vertex(options.heights) +
                    (kind == MetricChoice::Kind::elliptical ? kBytesToFlip : 0));
   return store.schema().grid ? mesh_of<std::int32_t>(store, wide, options)
                              : mesh_of<double>(store, wide, options);
 }
 
-TriangleMesh points_of_store(const stream::Store& store, const Detail& detail) {
+TriangleMesh detail_points(const stream::Store& store, const Detail& detail) {
   const stream::Placement& placement = store.schema();
   const bool coarse = detail.level > 0;
   TriangleMesh cloud;
@@ -256,6 +258,19 @@ unsigned level_within(const stream::Store& store, std::uint64_t most_points) {
     if (level.points <= most_points) return level.level;
   }
   return store.top();
+}
+
+stream::Overlay open_height_overlay(const std::string& path, const stream::Store& store) {
+  stream::Overlay overlay = stream::Overlay::open(path, store);
+  const std::string& heights = store.schema().coordinates[2].name;
+  if (overlay.channel() != heights) {
+    throw stream::Error({.file = path,
+                         .where = {},
+                         .cause = "has other values of '" + overlay.channel() +
+                                  "', not of the heights '" + heights + "'",
+                         .remedy = "name an overlay that terrace mesh has written"});
+  }
+  return overlay;
 }
 
 }  // namespace terrace::terrain

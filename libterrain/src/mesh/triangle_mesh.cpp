@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "mesh/mesh_output.hpp"
+#include "terrace/terrain/triangle_mesh.hpp"
 
 #include <algorithm>
 #include <cstddef>
