@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "terrace/cluster/effort.hpp"
 #include "terrace/cluster/point.hpp"
 
 /// Facility location on one block of points: choose representatives (facilities) among the points
@@ -17,18 +18,9 @@
 /// Source: J. Skála, Algorithms for manipulating large geometric data, 4.2.3, 7.1, 7.3. Departs
 /// from it in: the start (equal distances along a space-filling curve instead of Meyerson's),
 /// candidates along that curve instead of random ones, facilities moved to the median of their
-/// clients, an exact last assignment. The thesis's own search is in local_search.hpp.
+/// clients, an exact last assignment. The thesis's own search is in facility_location.hpp.
 
 namespace terrace::cluster {
-
-/// How long to search. Costs are means over blocks of m = 10 000 points relative to the thesis's
-/// full search, m ceil(log10 m) candidates: the first figure for surfaces, the other for volumes.
-enum class Effort : std::uint8_t {
-  fast,      ///< a candidate per 32 points or more; 1.2 to 2.9 % above
-  standard,  ///< and moves and assigns twice; 0.8 to 2.3 % above
-  fine,      ///< three sweeps of one per 16 points; 0.4 to 1.2 % above
-  full,      ///< m ceil(log2 m) candidates at random, 3.5 times the thesis's; equal within 0.1 %
-};
 
 struct BlockOptions {
   double facility_cost = 1.0;  ///< positive; times the diagonal of the bounding box

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "terrace/cluster/block.hpp"
-#include "terrace/cluster/bounds.hpp"
 #include "terrace/cluster/metric.hpp"
 #include "terrace/cluster/point.hpp"
 

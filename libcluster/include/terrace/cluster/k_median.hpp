@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "terrace/cluster/facility.hpp"
+#include "terrace/cluster/facility_location.hpp"
 
 /// k-median: exactly k facilities, which cost nothing, and the least sum of connection costs.
 /// As the original method of stream clustering had it, a binary search over the facility cost for a
@@ -21,7 +21,7 @@ struct KMedianOptions {
   /// that with half of the facilities replaced at random. At least 1; the best counts.
   std::uint32_t restarts = 32;
   /// Subgradient steps for lower_bound, each O(facilities * clients); 0: none is worked out.
-  std::uint32_t bound_iterations = 300;
+  std::uint32_t bound_steps = 300;
   std::uint64_t seed = 1;
   unsigned threads = 1;  ///< 0: one per core. Never changes the result.
 };
@@ -45,6 +45,6 @@ struct KMedianOptions {
 /// not a number.
 [[nodiscard]] FacilitySolution k_median(const FacilityPoints& problem, std::size_t k,
                                         const KMedianOptions& options = {.restarts = 1,
-                                                                         .bound_iterations = 0});
+                                                                         .bound_steps = 0});
 
 }  // namespace terrace::cluster

@@ -9,7 +9,6 @@
 #include <variant>
 #include <vector>
 
-#include "terrace/cluster/bounds.hpp"
 #include "terrace/cluster/point.hpp"
 
 /// Distances between points. A distance is always measured *from a facility to a client*: in a
