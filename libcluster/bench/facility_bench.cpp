@@ -3,7 +3,7 @@
 // instance in TERRACE_DATA/facility (OR-Library, UflLib, Kratica), then mean and worst by group.
 // Without the data, and with TERRACE_BENCH_SMALL, of instances that it makes, where the best bound
 // stands for the optimum. Columns, all in percent of the optimum but for costs and seconds:
-//   search   facility_search with its default options, one thread; k_median for p-median
+//   search   interchange with default options, one thread; k_median for p-median
 //            instances, their bound included in the seconds
 //   JV, JMS  jain_vazirani and greedy_stars
 //   bound    lower_bound from the search's solution

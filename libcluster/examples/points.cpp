@@ -19,7 +19,7 @@ int main() {
 
   // Ways along streets, not as the crow flies.
   FacilityPoints problem{.points = points, .metric = Minkowski{1.0}, .facility_cost = 0.2};
-  problem.outlier_price = 0.1;  // who would be farther than that from a facility is left out
+  problem.outlier_price = 0.1;  // points farther than that from every facility are left out
   FacilitySolution solution = solve(problem, {.effort = Effort::fine});
   solution.lower_bound = lower_bound(problem, solution).lower_bound;
 

@@ -67,7 +67,7 @@ FacilitySolution solve_fast(const FacilityPoints& problem, const FacilityOptions
   }
   if (!linear_map(problem.metric, bounds_of(problem.points))) {
     refuse(kFast, "needs a metric that a linear map of the points makes Euclidean, and \"" +
-                      name_of(problem.metric) + "\" is none on these points");
+                      name_of(problem.metric) + "\" is not one on these points");
   }
   if (problem.channels.size() > 0) refuse(kFast, "has no channels");
   if (std::isfinite(problem.outlier_price)) refuse(kFast, "leaves nobody out");

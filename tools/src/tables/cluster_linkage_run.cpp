@@ -25,7 +25,7 @@ cluster::Dendrogram complete_tree(const ClusterRequest& request, const FacilityP
   if (points) return cluster::complete_linkage(*points, options);
   if (!cluster::is_symmetric(problem.metric)) {
     throw UsageError(
-        "--method complete needs a symmetric metric: a field of ellipses is none "
+        "--method complete needs a symmetric metric: a field of ellipses is not symmetric "
         "(the points lie in several of its regions)");
   }
   return cluster::complete_linkage(

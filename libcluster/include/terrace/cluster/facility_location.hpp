@@ -240,9 +240,9 @@ struct FacilityReport {
 /// The result depends on the problem and the options, but not on threads.
 /// Throws: std::invalid_argument as check(problem); on a strategy that the problem does not admit,
 /// with the reason; on a batch of 0, no restarts, `seconds` that are not a number; on a start that
-/// is no solution of the problem, or that the strategy does not take; on a distance of the caller's
-/// that is negative or not a number, naming facility and client; if the matrix of points or
-/// entities exceeds the limit or the memory of a strategy cannot be allocated, saying how many
+/// is not a solution of the problem, or that the strategy does not take; on a distance of the
+/// caller's that is negative or not a number, naming facility and client; if the matrix of points
+/// or entities exceeds the limit or the memory of a strategy cannot be allocated, saying how many
 /// bytes are needed. std::runtime_error if LP rounding is not built in, naming the option, or GLPK
 /// fails.
 /// Cost of a local search: candidates times a gain, at most O(n), and O(n * facilities) for the
@@ -283,8 +283,8 @@ struct LowerBoundOptions {
 /// whose cost is the target of the steps (the better, the sooner the bound is good); without
 /// facilities, a greedy one is made. The limit of the bound is the value of the linear relaxation.
 /// 12 bytes per entry of the matrix, O(facilities * clients) per step.
-/// Throws: std::invalid_argument as check(), on a start that is no solution of the problem, or if
-/// the memory cannot be allocated, saying how much it is.
+/// Throws: std::invalid_argument as check(), on a start that is not a solution of the problem, or
+/// if the memory cannot be allocated, saying how much it is.
 [[nodiscard]] LowerBound lower_bound(const FacilityMatrix& problem,
                                      const FacilitySolution& start = {},
                                      const LowerBoundOptions& options = {});
@@ -295,8 +295,8 @@ struct LowerBoundOptions {
 /// points take about a second a step on one core. Otherwise O(n^2) per step. Weights, channels and
 /// the outlier price count. The bound holds for the distances as computed from the given
 /// coordinates; what bringing them into range rounds is taken off too.
-/// Throws: std::invalid_argument as check(), on a start that is no solution of the problem, and on
-/// a distance of the caller's that is negative or not a number.
+/// Throws: std::invalid_argument as check(), on a start that is not a solution of the problem, and
+/// on a distance of the caller's that is negative or not a number.
 [[nodiscard]] LowerBound lower_bound(const FacilityPoints& problem, const FacilitySolution& start,
                                      const LowerBoundOptions& options = {.steps = 100});
 [[nodiscard]] LowerBound lower_bound(const FacilityEntities& problem, const FacilitySolution& start,

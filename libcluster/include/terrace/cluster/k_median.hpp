@@ -20,7 +20,7 @@ struct KMedianOptions {
   /// Descents by exchanges: the first from what the binary search found, each further one from
   /// that with half of the facilities replaced at random. At least 1; the best counts.
   std::uint32_t restarts = 32;
-  /// Subgradient steps for lower_bound, each O(facilities * clients); 0: none is worked out.
+  /// Subgradient steps for lower_bound, each O(facilities * clients); 0: no bound.
   std::uint32_t bound_steps = 300;
   std::uint64_t seed = 1;
   unsigned threads = 1;  ///< 0: one per core. Never changes the result.
@@ -30,7 +30,7 @@ struct KMedianOptions {
 /// listed, if need be some without clients. No exchange of one of them for another improves the
 /// solution by more than rounding.
 /// Where no facility cost gives exactly k, the nearest number is brought to k greedily: the
-/// facility that spares most opens, or the one that is missed least closes.
+/// facility that saves most opens, or the one whose closing costs least closes.
 /// Cost: O(facilities * clients) per round of exchanges, some rounds per restart.
 /// Throws: std::invalid_argument as check() does, if k is 0 or above the number of facilities, or
 /// without restarts.
@@ -38,7 +38,7 @@ struct KMedianOptions {
                                         const KMedianOptions& options = {});
 
 /// The same for points. facility_cost is not read. Clients farther than outlier_price diagonals
-/// from all facilities are left out and pay that. Distances are worked out as they are needed, in
+/// from all facilities are left out and pay that. Distances are computed as they are needed, in
 /// O(points) memory: a round of exchanges takes points^2 of them, seconds for 20,000 points. Of
 /// large sets the binary search considers a random sample of at least 4 k places.
 /// A facility always serves itself. Throws: as above, and on a custom distance that is negative or

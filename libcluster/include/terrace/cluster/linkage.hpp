@@ -37,7 +37,7 @@ enum class MatrixEntry {
 
 struct LinkageOptions {
   unsigned threads = 1;  ///< never change the result
-  // Of complete linkage, which has a matrix:
+  // For complete linkage, which has a matrix:
   MatrixEntry entry = MatrixEntry::float64;
   std::uint64_t memory_limit = 0;  ///< bytes the matrix may take; 0: no limit
   SimdPath path = SimdPath::automatic;

@@ -31,13 +31,13 @@ class MatrixSearch {
   [[nodiscard]] const NearestOpen& state() const { return state_; }
 
   /// What changes if the closed `candidate` is opened together with the closings that go best with
-  /// it: positive spares. Fills closings(). O(clients + open).
+  /// it: positive savings. Fills closings(). O(clients + open).
   double gain(std::uint32_t candidate);
   /// What gain() found worth closing.
   [[nodiscard]] std::span<const std::uint32_t> closings() const { return closings_; }
   /// Carries out what gain() found.
   void open(std::uint32_t candidate);
-  /// Closes facilities one after the other, each time the one that spares most, while any does.
+  /// Closes facilities one after the other, each time the one that saves most, while any does.
   /// Returns whether there was one.
   bool drop();
 

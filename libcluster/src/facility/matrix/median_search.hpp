@@ -19,7 +19,7 @@ class MedianSearch {
   MedianSearch(const CostRows& costs, unsigned threads);
 
   void reset(std::span<const std::uint32_t> open);
-  /// Opens those of `candidates` that spare most, or closes those that are missed least, until k
+  /// Opens those of `candidates` that save most, or closes those whose closing costs least, until k
   /// are open. Requires: enough candidates.
   void bring_to(std::size_t k, std::span<const std::uint32_t> candidates);
   /// Exchanges until none helps.

@@ -23,7 +23,7 @@ void check_strategy(FacilityStrategy strategy, bool has_boxes, bool has_triangle
     case FacilityStrategy::kd_tree:
       if (has_boxes) return;
       throw std::invalid_argument(asked +
-                                  "needs bounds on distances to boxes, and there are none of " +
+                                  "needs bounds on distances to boxes, which do not exist for " +
                                   what + ": take automatic or full_scan");
     case FacilityStrategy::facilities:
       if (has_triangles) return;

@@ -19,7 +19,7 @@ namespace terrace::cluster {
 /// also where the distance is short.
 [[nodiscard]] double rounding_of_frame(const FacilityPoints& problem, const SearchFrame& frame);
 
-/// Weighted distances, worked out row by row; nobody pays more than the price of being left out.
+/// Weighted distances, computed row by row; no client pays more than its outlier price.
 template <class Space>
 class PointRows final : public CostRows {
  public:

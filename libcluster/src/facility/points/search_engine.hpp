@@ -28,10 +28,10 @@ class SearchEngine {
   /// and joins that facility otherwise (or is left out if that is cheaper). O(clients *
   /// facilities).
   virtual void start(std::mt19937_64& random) = 0;
-  /// Throws: std::invalid_argument if it is no solution of the problem.
+  /// Throws: std::invalid_argument if it is not a solution of the problem.
   void start(const FacilitySolution& solution);
 
-  /// What opening `candidate` would spare: it takes the clients that are nearer to it than to their
+  /// What opening `candidate` would save: it takes the clients that are nearer to it than to their
   /// facility, and all clients of the facilities that are not worth keeping then. An open facility
   /// is a candidate as well; it costs nothing to open.
   [[nodiscard]] double gain(std::uint32_t candidate);
