@@ -18,8 +18,7 @@
 
 #include "../tests/inputs.hpp"
 #include "terrace/cluster/block.hpp"
-#include "terrace/cluster/local_search.hpp"
-#include "terrace/cluster/point_search.hpp"
+#include "terrace/cluster/facility_location.hpp"
 
 namespace {
 
@@ -36,8 +35,7 @@ constexpr std::array kEfforts{"fast", "standard", "fine", "full"};
 constexpr std::array kPaths{SimdPath::portable, SimdPath::avx2, SimdPath::avx512};
 constexpr std::array kPathNames{"portable", "avx2", "avx512"};
 
-constexpr std::array kLengths{SearchLength::tenth, SearchLength::log10_full,
-                              SearchLength::log2_full};
+constexpr std::array kLengths{Effort::standard, Effort::fine, Effort::full};
 constexpr std::array kLengthNames{"Q_tenth_%", "Q_log10_%", "Q_log2_%"};
 
 struct Input {
@@ -62,10 +60,8 @@ Input make_input(std::size_t which) {
     const auto first = points.begin() + static_cast<std::ptrdiff_t>(b * all / kBlocks * kBlockSize);
     input.blocks.emplace_back(first, first + static_cast<std::ptrdiff_t>(kBlockSize));
     for (std::size_t k = 0; k < kLengths.size(); ++k) {
-      // The same solution as local_search()'s, sooner.
       const FacilityPoints problem{.points = input.blocks.back()};
-      const FacilitySolution solution =
-          search_points(problem, {.length = kLengths[k], .seed = b + 1});
+      const FacilitySolution solution = solve(problem, {.effort = kLengths[k], .seed = b + 1});
       input.costs[k].push_back(solution.cost());
     }
   }
@@ -125,13 +121,11 @@ void cluster_blocks(benchmark::State& state, std::size_t which, Effort effort, S
   report_quality(state, input, *clusterer, effort);
 }
 
-/// The reference search of 0.1 m iterations, for scale.
+/// The textbook's search by full scans, 0.1 m candidates, for scale.
 void reference(benchmark::State& state, std::size_t which) {
-  const Input& input = input_of(which);
-  BlockClustering clustering;
+  const FacilityPoints problem{.points = input_of(which).blocks[0]};
   for ([[maybe_unused]] const auto iteration : state) {
-    local_search(input.blocks[0], {}, 1.0, SearchLength::tenth, 1, clustering);
-    benchmark::DoNotOptimize(clustering.assignment.data());
+    benchmark::DoNotOptimize(solve(problem, {.strategy = FacilityStrategy::full_scan}).cost());
   }
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(kBlockSize));
 }

@@ -12,8 +12,7 @@
 #include <benchmark/benchmark.h>
 
 #include "../tests/linkage_laws.hpp"
-#include "terrace/cluster/cuda_linkage.hpp"
-#include "terrace/cluster/single_linkage.hpp"
+#include "terrace/cluster/linkage.hpp"
 
 namespace {
 
@@ -38,8 +37,7 @@ Dendrogram on_cpu(Kind kind, const std::vector<Point3>& points) {
 Dendrogram on_gpu(Kind kind, const std::vector<Point3>& points) {
   if (kind == Kind::single) return cuda_single_linkage(points);
   return cuda_complete_linkage(
-      points,
-      {.entry = kind == Kind::complete_float ? MatrixEntry::float32 : MatrixEntry::float64});
+      points, kind == Kind::complete_float ? MatrixEntry::float32 : MatrixEntry::float64);
 }
 
 bool equal_heights(const Dendrogram& a, const Dendrogram& b) {

@@ -3,7 +3,7 @@
 // instance in TERRACE_DATA/facility (OR-Library, UflLib, Kratica), then mean and worst by group.
 // Without the data, and with TERRACE_BENCH_SMALL, of instances that it makes, where the best bound
 // stands for the optimum. Columns, all in percent of the optimum but for costs and seconds:
-//   search   facility_search with its default options, one thread; k_median for p-median
+//   search   interchange with default options, one thread; k_median for p-median
 //            instances, their bound included in the seconds
 //   JV, JMS  jain_vazirani and greedy_stars
 //   bound    lower_bound from the search's solution
@@ -19,10 +19,8 @@
 #include "../tests/facility_instances.hpp"
 #include "../tests/inputs.hpp"
 #include "terrace/cluster/block.hpp"
-#include "terrace/cluster/facility_search.hpp"
+#include "terrace/cluster/facility_location.hpp"
 #include "terrace/cluster/k_median.hpp"
-#include "terrace/cluster/lower_bound.hpp"
-#include "terrace/cluster/primal_dual.hpp"
 
 namespace {
 
@@ -52,16 +50,17 @@ Row measure(const instances::Instance& instance) {
     row.bound = found.lower_bound;
     return row;
   }
-  row.found_seconds = seconds_of([&] { found = facility_search(matrix); });
+  row.found_seconds = seconds_of([&] { found = solve(matrix); });
   row.found = found.cost();
   row.bound_seconds = seconds_of([&] { row.bound = lower_bound(matrix, found).lower_bound; });
-  PrimalDual result;
-  row.growth_seconds = seconds_of([&] { result = jain_vazirani(matrix); });
-  row.growth = result.solution.cost();
-  row.growth_bound = result.solution.lower_bound;
-  row.stars_seconds = seconds_of([&] { result = greedy_stars(matrix); });
-  row.stars = result.solution.cost();
-  row.stars_bound = result.solution.lower_bound;
+  row.growth_seconds =
+      seconds_of([&] { found = solve(matrix, {.strategy = FacilityStrategy::jain_vazirani}); });
+  row.growth = found.cost();
+  row.growth_bound = found.lower_bound;
+  row.stars_seconds =
+      seconds_of([&] { found = solve(matrix, {.strategy = FacilityStrategy::greedy_stars}); });
+  row.stars = found.cost();
+  row.stars_bound = found.lower_bound;
   return row;
 }
 
@@ -159,7 +158,7 @@ void print_points() {
       for (const unsigned threads : {1u, 2u}) {
         const double seconds = seconds_of([&] {
           solution.lower_bound =
-              lower_bound(problem, solution, {.iterations = steps, .threads = threads}).lower_bound;
+              lower_bound(problem, solution, {.steps = steps, .threads = threads}).lower_bound;
         });
         std::printf("elevation model, %-17zu %9zu %9u %9u %9.3f %9.3f\n", points.size(),
                     solution.facilities.size(), steps, threads, 100.0 * solution.gap(), seconds);
@@ -180,7 +179,7 @@ void print_medians() {
     for (const unsigned threads : {1u, 2u}) {
       FacilitySolution solution;
       const double seconds = seconds_of([&] {
-        solution = k_median(problem, k, {.restarts = 1, .bound_iterations = 0, .threads = threads});
+        solution = k_median(problem, k, {.restarts = 1, .bound_steps = 0, .threads = threads});
       });
       std::printf("uniform in a cube, %-15zu %9zu %9u %12.4f %9.3f\n", points.size(), k, threads,
                   solution.cost(), seconds);

@@ -10,8 +10,7 @@
 #include <benchmark/benchmark.h>
 
 #include "../tests/inputs.hpp"
-#include "terrace/cluster/complete_linkage.hpp"
-#include "terrace/cluster/single_linkage.hpp"
+#include "terrace/cluster/linkage.hpp"
 
 namespace {
 
@@ -46,8 +45,7 @@ double status_mebibytes(const std::string& key) {
 void complete(benchmark::State& state, Input input, MatrixEntry entry) {
   const auto count = static_cast<std::size_t>(state.range(0));
   const std::vector<Point3> points = make_points(input, count);
-  const CompleteLinkageOptions options{.threads = static_cast<unsigned>(state.range(1)),
-                                       .entry = entry};
+  const LinkageOptions options{.threads = static_cast<unsigned>(state.range(1)), .entry = entry};
   const double before = status_mebibytes("VmRSS");
   for ([[maybe_unused]] const auto iteration : state) {
     const Dendrogram dendrogram = complete_linkage(points, options);
@@ -67,8 +65,8 @@ void complete_function(benchmark::State& state, bool row) {
     return std::sqrt((p[0] - q[0]) * (p[0] - q[0]) + (p[1] - q[1]) * (p[1] - q[1]) +
                      (p[2] - q[2]) * (p[2] - q[2]));
   };
-  const CompleteLinkageOptions options{.threads = static_cast<unsigned>(state.range(1)),
-                                       .entry = MatrixEntry::float32};
+  const LinkageOptions options{.threads = static_cast<unsigned>(state.range(1)),
+                               .entry = MatrixEntry::float32};
   for ([[maybe_unused]] const auto iteration : state) {
     const Dendrogram dendrogram = complete_linkage(count, distance, options);
     benchmark::DoNotOptimize(dendrogram.merges.data());
@@ -78,7 +76,7 @@ void complete_function(benchmark::State& state, bool row) {
 void single(benchmark::State& state, Input input) {
   const auto count = static_cast<std::size_t>(state.range(0));
   const std::vector<Point3> points = make_points(input, count);
-  const SingleLinkageOptions options{.threads = static_cast<unsigned>(state.range(1))};
+  const LinkageOptions options{.threads = static_cast<unsigned>(state.range(1))};
   for ([[maybe_unused]] const auto iteration : state) {
     const Dendrogram dendrogram = single_linkage(points, options);
     benchmark::DoNotOptimize(dendrogram.merges.data());

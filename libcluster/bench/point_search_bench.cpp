@@ -18,7 +18,8 @@
 #include <benchmark/benchmark.h>
 
 #include "../tests/inputs.hpp"
-#include "terrace/cluster/point_search.hpp"
+#include "facility/points/make_search.hpp"
+#include "terrace/cluster/facility_location.hpp"
 
 namespace {
 
@@ -45,7 +46,7 @@ const std::vector<Point3>& input(std::size_t which) {
 constexpr const char* kInputs[] = {"scan", "shuf", "cube"};
 
 struct Setting {
-  GainStrategy strategy = GainStrategy::full_scan;
+  FacilityStrategy strategy = FacilityStrategy::full_scan;
   Metric metric = Euclidean{};
   unsigned threads = 1;
   std::size_t batch = 1;
@@ -53,34 +54,34 @@ struct Setting {
 
 void search(benchmark::State& state, std::size_t which, const Setting& setting) {
   const FacilityPoints problem{.points = input(which), .metric = setting.metric};
-  PointSearchOptions options;
+  FacilityOptions options;
   options.strategy = setting.strategy;
   options.threads = setting.threads;
   options.batch = setting.batch;
   using Clock = std::chrono::steady_clock;
   double seconds = 0.0;
   std::size_t gains = 0;
-  PointSearchStatistics statistics;
+  FacilityReport report;
   double cost = 0.0;
   for ([[maybe_unused]] const auto iteration : state) {
     std::mt19937_64 random(options.seed);
-    PointSearch engine(problem, options.strategy, options.threads);
-    engine.start(random);
+    const auto engine = make_search(problem, options.strategy, options.threads);
+    engine->start(random);
     const auto begin = Clock::now();
-    engine.improve(candidate_count(options.length, kPoints), random, options.batch);
+    engine->improve(candidate_count(options.effort, kPoints), random, options.batch);
     seconds += std::chrono::duration<double>(Clock::now() - begin).count();
-    gains += engine.statistics().candidates;
-    benchmark::DoNotOptimize(engine.cost());
+    gains += engine->statistics().candidates;
+    benchmark::DoNotOptimize(engine->cost());
   }
-  cost = search_points(problem, options, &statistics).cost();
+  cost = solve(problem, options, &report).cost();
   const double reference =
-      search_points(problem, {.strategy = options.strategy, .seed = options.seed}).cost();
+      solve(problem, {.strategy = options.strategy, .seed = options.seed}).cost();
   state.counters["ns_per_gain"] = 1e9 * seconds / static_cast<double>(gains);
-  state.counters["positive"] = statistics.positive_share();
-  state.counters["inspected"] = statistics.inspected_share();
+  state.counters["positive"] = report.search.positive_share();
+  state.counters["inspected"] = report.search.inspected_share();
   state.counters["Q_%"] = 100.0 * (cost / reference - 1.0);
   state.counters["wrong_%"] =
-      100.0 * static_cast<double>(statistics.wrongly_assigned) / static_cast<double>(kPoints);
+      100.0 * static_cast<double>(report.search.wrongly_assigned) / static_cast<double>(kPoints);
 }
 
 /// The production engine on the same block.
@@ -88,9 +89,9 @@ void fast(benchmark::State& state, std::size_t which) {
   const FacilityPoints problem{.points = input(which)};
   double cost = 0.0;
   for ([[maybe_unused]] const auto iteration : state) {
-    cost = search_points(problem, {.strategy = GainStrategy::fast}).cost();
+    cost = solve(problem, {.strategy = FacilityStrategy::fast}).cost();
   }
-  const double reference = search_points(problem, {}).cost();
+  const double reference = solve(problem, {}).cost();
   state.counters["Q_%"] = 100.0 * (cost / reference - 1.0);
 }
 
@@ -99,20 +100,20 @@ void fast(benchmark::State& state, std::size_t which) {
 int main(int argc, char** argv) {
   const EllipticalField field({{{{-2, -2, -2}, {0.5, 0.5, 2}}, Elliptical(2.0, 0.7, 30.0)},
                                {{{0.5, 0.5, -2}, {2, 2, 2}}, Elliptical(0.7, 2.0, 0.0)}});
-  const std::vector<std::pair<GainStrategy, Metric>> plain{
-      {GainStrategy::full_scan, Euclidean{}},
-      {GainStrategy::quadtree, Euclidean{}},
-      {GainStrategy::octree, Euclidean{}},
-      {GainStrategy::kd_tree, Euclidean{}},
-      {GainStrategy::facilities, Euclidean{}},
-      {GainStrategy::full_scan, Minkowski{1.0}},
-      {GainStrategy::kd_tree, Minkowski{1.0}},
-      {GainStrategy::facilities, Minkowski{1.0}},
-      {GainStrategy::full_scan, SquaredEuclidean{}},
-      {GainStrategy::kd_tree, SquaredEuclidean{}},
-      {GainStrategy::full_scan, field},
-      {GainStrategy::kd_tree, field},
-      {GainStrategy::facilities, Elliptical(2, 1, 30)}};
+  const std::vector<std::pair<FacilityStrategy, Metric>> plain{
+      {FacilityStrategy::full_scan, Euclidean{}},
+      {FacilityStrategy::quadtree, Euclidean{}},
+      {FacilityStrategy::octree, Euclidean{}},
+      {FacilityStrategy::kd_tree, Euclidean{}},
+      {FacilityStrategy::facilities, Euclidean{}},
+      {FacilityStrategy::full_scan, Minkowski{1.0}},
+      {FacilityStrategy::kd_tree, Minkowski{1.0}},
+      {FacilityStrategy::facilities, Minkowski{1.0}},
+      {FacilityStrategy::full_scan, SquaredEuclidean{}},
+      {FacilityStrategy::kd_tree, SquaredEuclidean{}},
+      {FacilityStrategy::full_scan, field},
+      {FacilityStrategy::kd_tree, field},
+      {FacilityStrategy::facilities, Elliptical(2, 1, 30)}};
   for (std::size_t which = 0; which < 3; ++which) {
     const std::string name = std::string(kInputs[which]) + "/";
     const auto add = [&](const std::string& setting, const Setting& values) {
@@ -123,7 +124,8 @@ int main(int argc, char** argv) {
     for (const auto& [strategy, metric] : plain) {
       add(std::string(name_of(strategy)) + "/" + name_of(metric), {strategy, metric});
     }
-    for (const GainStrategy strategy : {GainStrategy::full_scan, GainStrategy::facilities}) {
+    for (const FacilityStrategy strategy :
+         {FacilityStrategy::full_scan, FacilityStrategy::facilities}) {
       const std::string prefix = std::string(name_of(strategy)) + "/";
       add(prefix + "threads:2", {strategy, Euclidean{}, 2});
       for (const std::size_t batch : {std::size_t{4}, std::size_t{16}}) {

@@ -2,8 +2,7 @@
 // Which of three depots to open for six shops, and how far from the optimum the answer may be.
 #include <cstdio>
 
-#include <terrace/cluster/facility_search.hpp>
-#include <terrace/cluster/lower_bound.hpp>
+#include <terrace/cluster/facility_location.hpp>
 
 int main() {
   using namespace terrace::cluster;
@@ -15,7 +14,7 @@ int main() {
   };
   const FacilityMatrix problem{
       .facilities = 3, .clients = 6, .opening = opening, .connection = connection};
-  FacilitySolution solution = facility_search(problem);
+  FacilitySolution solution = solve(problem);
   solution.lower_bound = lower_bound(problem, solution).lower_bound;
   for (std::size_t i = 0; i < solution.assignment.size(); ++i) {
     std::printf("shop %zu from depot %u\n", i, solution.facilities[solution.assignment[i]]);

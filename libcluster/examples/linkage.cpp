@@ -4,6 +4,8 @@
 //     linkage single|complete|complete-float [THREADS] < points
 // Without arguments it clusters two small rings, and prints how many clusters each linkage makes of
 // them below a height.
+#include "terrace/cluster/linkage.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -13,9 +15,6 @@
 #include <stdexcept>
 #include <string>
 #include <vector>
-
-#include "terrace/cluster/complete_linkage.hpp"
-#include "terrace/cluster/single_linkage.hpp"
 
 namespace {
 

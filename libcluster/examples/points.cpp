@@ -4,8 +4,7 @@
 #include <cstdio>
 #include <vector>
 
-#include <terrace/cluster/lower_bound.hpp>
-#include <terrace/cluster/point_search.hpp>
+#include <terrace/cluster/facility_location.hpp>
 
 int main() {
   using namespace terrace::cluster;
@@ -20,8 +19,8 @@ int main() {
 
   // Ways along streets, not as the crow flies.
   FacilityPoints problem{.points = points, .metric = Minkowski{1.0}, .facility_cost = 0.2};
-  problem.outlier_price = 0.1;  // who would be farther than that from a facility is left out
-  FacilitySolution solution = search_points(problem, {.length = SearchLength::log10_full});
+  problem.outlier_price = 0.1;  // points farther than that from every facility are left out
+  FacilitySolution solution = solve(problem, {.effort = Effort::fine});
   solution.lower_bound = lower_bound(problem, solution).lower_bound;
 
   const auto outliers =

@@ -17,7 +17,7 @@
 #include <string>
 #include <vector>
 
-#include "terrace/cluster/point_search.hpp"
+#include "terrace/cluster/facility_location.hpp"
 
 using namespace terrace::cluster;
 
@@ -102,7 +102,7 @@ FacilitySolution segment(const Image& image, double facility_cost, double colour
   const std::vector<double> weights(3, colour_weight);
   const FacilityPoints problem{
       .points = positions, .channels = {colours, weights}, .facility_cost = facility_cost};
-  return search_points(problem, {.length = SearchLength::tenth, .assign_nearest = true});
+  return solve(problem, {.assign_nearest = true});
 }
 
 void paint(Image& image, const FacilitySolution& solution) {

@@ -5,7 +5,7 @@
 #include "clustering_laws.hpp"
 #include "inputs.hpp"
 #include "terrace/cluster/block.hpp"
-#include "terrace/cluster/local_search.hpp"
+#include "terrace/cluster/facility_location.hpp"
 
 namespace terrace::cluster {
 namespace {
@@ -55,17 +55,16 @@ Costs costs_over(const std::vector<std::vector<Point3>>& blocks, double facility
   std::uint64_t seed = 0;
   for (const std::vector<Point3>& points : blocks) {
     ++seed;
-    const auto reference = [&](SearchLength length) {
-      local_search(points, {}, facility_cost, length, seed, clustering);
-      return clustering.cost();
+    const auto reference = [&](Effort effort) {
+      return laws::textbook_search(points, facility_cost, effort, seed).cost();
     };
     const auto ours = [&](Effort effort) {
       clusterer.run(points, {}, {.facility_cost = facility_cost, .effort = effort, .seed = seed},
                     clustering);
       return clustering.cost();
     };
-    costs.tenth += reference(SearchLength::tenth);
-    costs.full += reference(SearchLength::log10_full);
+    costs.tenth += reference(Effort::standard);
+    costs.full += reference(Effort::fine);
     costs.fast += ours(Effort::fast);
     costs.standard += ours(Effort::standard);
     costs.fine += ours(Effort::fine);

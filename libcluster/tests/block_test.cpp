@@ -8,7 +8,7 @@
 
 #include "clustering_laws.hpp"
 #include "inputs.hpp"
-#include "terrace/cluster/local_search.hpp"
+#include "terrace/cluster/facility_location.hpp"
 
 namespace terrace::cluster {
 namespace {

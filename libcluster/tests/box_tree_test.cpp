@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "facility/box_tree.hpp"
+#include "facility/points/box_tree.hpp"
 
 #include <algorithm>
 #include <random>

@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "terrace/cluster/block.hpp"
+#include "terrace/cluster/facility_location.hpp"
 
 /// What every clustering of a block promises, checked independently of how it was found.
 
@@ -98,6 +99,14 @@ inline double optimum(std::span<const Point3> points, std::span<const double> we
     best = std::min(best, cost);
   }
   return best;
+}
+
+/// The textbook's search, whose costs others are measured against: every candidate is judged by a
+/// scan of all points.
+inline FacilitySolution textbook_search(std::span<const Point3> points, double facility_cost,
+                                        Effort effort, std::uint64_t seed) {
+  return solve(FacilityPoints{.points = points, .facility_cost = facility_cost},
+               {.strategy = FacilityStrategy::full_scan, .effort = effort, .seed = seed});
 }
 
 }  // namespace terrace::cluster::laws

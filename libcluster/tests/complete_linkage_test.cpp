@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "terrace/cluster/complete_linkage.hpp"
-
 #include <limits>
 
 #include <gtest/gtest.h>
 
 #include "linkage_laws.hpp"
+#include "terrace/cluster/linkage.hpp"
 
 namespace terrace::cluster {
 namespace {

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "terrace/cluster/cuda_linkage.hpp"
-
 #include <cmath>
 #include <stdexcept>
 
 #include <gtest/gtest.h>
 
 #include "linkage_laws.hpp"
-#include "terrace/cluster/single_linkage.hpp"
+#include "terrace/cluster/linkage.hpp"
 
 namespace terrace::cluster {
 namespace {
@@ -58,7 +56,7 @@ TEST(CudaLinkage, GivesTheDendrogramsOfTheCpu) {
     const std::vector<Point3> points = inputs::cube(count, random);
     EXPECT_EQ(cuda_complete_linkage(points), complete_linkage(points));
     // Roundings to float are equal now and then: several runs are valid.
-    EXPECT_EQ(laws::complete_fault(cuda_complete_linkage(points, {.entry = MatrixEntry::float32}),
+    EXPECT_EQ(laws::complete_fault(cuda_complete_linkage(points, MatrixEntry::float32),
                                    laws::distances_of(points), laws::kFloatTolerance),
               "");
     EXPECT_EQ(cuda_single_linkage(points), single_linkage(points));

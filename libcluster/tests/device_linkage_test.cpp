@@ -7,8 +7,7 @@
 #include "cuda/device_single.hpp"
 #include "linkage_laws.hpp"
 #include "loop_device.hpp"
-#include "terrace/cluster/complete_linkage.hpp"
-#include "terrace/cluster/single_linkage.hpp"
+#include "terrace/cluster/linkage.hpp"
 
 namespace terrace::cluster {
 namespace {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "terrace/cluster/entities.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -12,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "inputs.hpp"
+#include "terrace/cluster/facility_location.hpp"
 
 namespace terrace::cluster {
 namespace {
@@ -81,29 +80,28 @@ TEST(Entities, PointsByIndexAreThePointsThemselves) {
   const auto function = [&](std::uint32_t f, std::uint32_t c) {
     return distance(Euclidean{}, points[f], points[c]);
   };
-  EntityProblem problem{.count = points.size(), .distance = function};
+  FacilityEntities problem{.count = points.size(), .distance = function};
   problem.facility_cost = 0.5 * unit;
   problem.outlier_price = 0.2 * unit;
-  const FacilitySolution expected = search_points(by_points);
+  const FacilitySolution expected = solve(by_points);
   for (const bool is_metric : {false, true}) {
     problem.symmetric = problem.triangle_inequality = is_metric;
-    PointSearchStatistics statistics;
-    const FacilitySolution solution = search_entities(problem, {.threads = 2}, &statistics);
+    FacilityReport report;
+    const FacilitySolution solution = solve(problem, {.threads = 2}, &report);
     EXPECT_EQ(solution.facilities, expected.facilities);
     EXPECT_EQ(solution.assignment, expected.assignment);
     EXPECT_NEAR(solution.cost(), expected.cost(), 1e-12 * expected.cost());
     if (is_metric) {
-      EXPECT_LT(statistics.inspected_share(), 0.9);
+      EXPECT_LT(report.search.inspected_share(), 0.9);
     }
   }
-  EXPECT_NO_THROW((void)search_entities(problem, {.strategy = GainStrategy::facilities}));
+  EXPECT_NO_THROW((void)solve(problem, {.strategy = FacilityStrategy::facilities}));
   problem.triangle_inequality = false;
-  EXPECT_THROW((void)search_entities(problem, {.strategy = GainStrategy::facilities}),
+  EXPECT_THROW((void)solve(problem, {.strategy = FacilityStrategy::facilities}),
                std::invalid_argument);
-  EXPECT_THROW((void)search_entities(problem, {.strategy = GainStrategy::kd_tree}),
+  EXPECT_THROW((void)solve(problem, {.strategy = FacilityStrategy::kd_tree}),
                std::invalid_argument);
-  EXPECT_THROW((void)search_entities(problem, {.strategy = GainStrategy::fast}),
-               std::invalid_argument);
+  EXPECT_THROW((void)solve(problem, {.strategy = FacilityStrategy::fast}), std::invalid_argument);
 }
 
 TEST(Entities, TrianglesClusterByPlaceAndShape) {
@@ -122,7 +120,7 @@ TEST(Entities, TrianglesClusterByPlaceAndShape) {
     }
     triangles.push_back(t);
   }
-  EntityProblem problem;
+  FacilityEntities problem;
   problem.count = triangles.size();
   problem.distance = [&](std::uint32_t f, std::uint32_t c) {
     return triangle_distance(triangles[f], triangles[c]);
@@ -130,7 +128,7 @@ TEST(Entities, TrianglesClusterByPlaceAndShape) {
   problem.symmetric = problem.triangle_inequality = true;
   problem.facility_cost = 20.0;
   const FacilitySolution solution =
-      search_entities(problem, {.length = SearchLength::log10_full, .assign_nearest = true});
+      solve(problem, {.effort = Effort::fine, .assign_nearest = true});
   ASSERT_EQ(solution.facilities.size(), 3u);
   for (std::size_t i = 3; i < triangles.size(); ++i) {
     EXPECT_EQ(solution.assignment[i], solution.assignment[i % 3]);
@@ -155,29 +153,28 @@ TEST(Entities, WordsClusterByEdits) {
   const std::vector<std::string> words{"terrain",  "terrains", "terrane",   "terain",
                                        "cluster",  "clusters", "clutter",   "bluster",
                                        "facility", "faculty",  "facilities"};
-  EntityProblem problem;
+  FacilityEntities problem;
   problem.count = words.size();
   problem.distance = [&](std::uint32_t f, std::uint32_t c) { return edits(words[f], words[c]); };
   problem.symmetric = problem.triangle_inequality = true;
   problem.facility_cost = 6.0;
-  const FacilitySolution solution =
-      search_entities(problem, {.iterations = 200, .assign_nearest = true});
+  const FacilitySolution solution = solve(problem, {.steps = 200, .assign_nearest = true});
   ASSERT_EQ(solution.facilities.size(), 3u);
   const auto cluster = [&](std::size_t word) { return solution.assignment[word]; };
   for (const std::size_t i : {1u, 2u, 3u}) EXPECT_EQ(cluster(i), cluster(0));
   for (const std::size_t i : {5u, 6u, 7u}) EXPECT_EQ(cluster(i), cluster(4));
   for (const std::size_t i : {9u, 10u}) EXPECT_EQ(cluster(i), cluster(8));
   problem.outlier_price = 1.5;
-  const FacilitySolution fewer = search_entities(problem, {.iterations = 200});
+  const FacilitySolution fewer = solve(problem, {.steps = 200});
   EXPECT_GT(std::count(fewer.assignment.begin(), fewer.assignment.end(), kOutlier), 0);
   EXPECT_LT(fewer.cost(), solution.cost());
 }
 
 TEST(Entities, BadInputIsNamed) {
   const auto zero = [](std::uint32_t, std::uint32_t) { return 0.0; };
-  const auto message = [](const EntityProblem& problem, unsigned threads = 1) -> std::string {
+  const auto message = [](const FacilityEntities& problem, unsigned threads = 1) -> std::string {
     try {
-      (void)search_entities(problem, {.threads = threads});
+      (void)solve(problem, {.threads = threads});
     } catch (const std::invalid_argument& error) {
       return error.what();
     }

@@ -14,7 +14,7 @@
 #include <string_view>
 #include <vector>
 
-#include "terrace/cluster/facility.hpp"
+#include "terrace/cluster/facility_location.hpp"
 
 /// Facility location and p-median instances of OR-Library and UflLib, for tests and benchmarks.
 

@@ -5,10 +5,8 @@
 #include <gtest/gtest.h>
 
 #include "matrix_laws.hpp"
-#include "terrace/cluster/facility_search.hpp"
+#include "terrace/cluster/facility_location.hpp"
 #include "terrace/cluster/k_median.hpp"
-#include "terrace/cluster/lower_bound.hpp"
-#include "terrace/cluster/primal_dual.hpp"
 
 namespace terrace::cluster {
 namespace {
@@ -40,23 +38,25 @@ TEST(FacilityInstances, CostsAreNearTheKnownOptima) {
     SCOPED_TRACE(instance.file);
     instances::load(*folder, instance);
     const FacilityMatrix matrix = instance.matrix();
-    const FacilitySolution found =
-        facility_search(matrix, {.restarts = 2, .perturbations = 60, .threads = 2});
+    const FacilitySolution found = solve(matrix, {.restarts = 2, .steps = 60, .threads = 2});
     laws::expect_solution(matrix, found);
-    const DualBound bound = lower_bound(matrix, found);
+    const LowerBound bound = lower_bound(matrix, found);
     EXPECT_LE(bound.lower_bound, instance.optimum * (1.0 + kDigits));
     EXPECT_LE(bound.lower_bound, found.cost());
-    EXPECT_LE(dual_ascent(matrix).lower_bound, bound.lower_bound);
+    EXPECT_LE(lower_bound(matrix, {}, {.steps = 0}).lower_bound, bound.lower_bound);
     if (instance.proved) {
       EXPECT_GE(found.cost(), instance.optimum * (1.0 - kDigits));
     }
-    for (const PrimalDual& result : {jain_vazirani(matrix), greedy_stars(matrix)}) {
-      laws::expect_solution(matrix, result.solution);
-      EXPECT_LE(result.solution.lower_bound, instance.optimum * (1.0 + kDigits));
-      EXPECT_GE(result.solution.cost(), found.cost() * (1.0 - kDigits));
+    for (const FacilityStrategy strategy :
+         {FacilityStrategy::jain_vazirani, FacilityStrategy::greedy_stars}) {
+      FacilityReport report;
+      const FacilitySolution grown = solve(matrix, {.strategy = strategy}, &report);
+      laws::expect_solution(matrix, grown);
+      EXPECT_LE(grown.lower_bound, instance.optimum * (1.0 + kDigits));
+      EXPECT_GE(grown.cost(), found.cost() * (1.0 - kDigits));
       if (instance.is_metric()) {
-        EXPECT_LE(result.solution.cost(), 3.0 * result.solution.lower_bound);
-        EXPECT_LE(result.divisor, 1.861);
+        EXPECT_LE(grown.cost(), 3.0 * grown.lower_bound);
+        EXPECT_LE(report.divisor, 1.861);
       }
     }
     const double above = found.cost() / instance.optimum - 1.0;

@@ -10,7 +10,7 @@
 #include "inputs.hpp"
 #include "search_laws.hpp"
 #include "terrace/cluster/block.hpp"
-#include "terrace/cluster/point_search.hpp"
+#include "terrace/cluster/facility_location.hpp"
 
 namespace terrace::cluster {
 namespace {
@@ -37,16 +37,15 @@ TEST(FastStrategy, IsAsGoodAsTheSearchUnderLinearMetrics) {
       p.metric = metric;
       p.facility_cost = 0.7;
       if (weighted) laws::add_weights(p, random);
-      PointSearchStatistics statistics;
-      const FacilitySolution fast =
-          search_points(p.view(), {.strategy = GainStrategy::fast}, &statistics);
+      FacilityReport report;
+      const FacilitySolution fast = solve(p.view(), {.strategy = FacilityStrategy::fast}, &report);
       ASSERT_NO_FATAL_FAILURE(laws::expect_solution(p, fast, 1e-8));
-      const FacilitySolution search = search_points(p.view());
+      const FacilitySolution search = solve(p.view());
       EXPECT_LT(fast.cost(), search.cost());
       // In single precision ties are broken otherwise than in double.
-      EXPECT_LE(statistics.wrongly_assigned, 3u);
-      const FacilitySolution full = search_points(
-          p.view(), {.strategy = GainStrategy::fast, .length = SearchLength::log2_full});
+      EXPECT_LE(report.search.wrongly_assigned, 3u);
+      const FacilitySolution full =
+          solve(p.view(), {.strategy = FacilityStrategy::fast, .effort = Effort::full});
       EXPECT_LT(full.cost(), fast.cost());
     }
   }
@@ -57,7 +56,7 @@ TEST(FastStrategy, EuclideanIsTheBlockClusterer) {
   OwnedProblem p;
   p.points = inputs::scan(2, 60, random);
   p.facility_cost = 1.0;
-  const FacilitySolution fast = search_points(p.view(), {.strategy = GainStrategy::fast});
+  const FacilitySolution fast = solve(p.view(), {.strategy = FacilityStrategy::fast});
   BlockClusterer clusterer;
   BlockClustering clustering;
   clusterer.run(p.points, {}, {}, clustering);
@@ -71,7 +70,7 @@ TEST(FastStrategy, DegenerateInputs) {
     for (OwnedProblem& p : laws::problems(90, 3)) {
       p.metric = metric;
       SCOPED_TRACE(name_of(metric) + ", " + p.name);
-      const FacilitySolution solution = search_points(p.view(), {.strategy = GainStrategy::fast});
+      const FacilitySolution solution = solve(p.view(), {.strategy = FacilityStrategy::fast});
       laws::expect_solution(p, solution, 1e-8);
     }
   }
@@ -83,7 +82,7 @@ TEST(FastStrategy, WhatItLacksIsRefused) {
   p.points = inputs::cube(30, random);
   const auto message = [](const OwnedProblem& problem) -> std::string {
     try {
-      (void)search_points(problem.view(), {.strategy = GainStrategy::fast});
+      (void)solve(problem.view(), {.strategy = FacilityStrategy::fast});
     } catch (const std::invalid_argument& error) {
       return error.what();
     }
@@ -101,7 +100,6 @@ TEST(FastStrategy, WhatItLacksIsRefused) {
   bad = p;
   bad.outlier_price = 1.0;
   EXPECT_NE(message(bad), "");
-  EXPECT_THROW(PointSearch(p.view(), GainStrategy::fast), std::invalid_argument);
 }
 
 }  // namespace

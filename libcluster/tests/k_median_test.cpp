@@ -46,7 +46,7 @@ TEST(KMedian, EndsWhereNoExchangeHelps) {
     const std::size_t k = 1 + problem.facilities / (2 + seed % 5);
     SCOPED_TRACE(testing::Message() << "seed " << seed << ", " << problem.kind << ", k " << k);
     const FacilitySolution solution =
-        k_median(matrix, k, {.restarts = 1, .bound_iterations = 20, .seed = seed});
+        k_median(matrix, k, {.restarts = 1, .bound_steps = 20, .seed = seed});
     laws::expect_solution(matrix, solution, false);
     ASSERT_EQ(solution.facilities.size(), k);
     EXPECT_LE(solution.lower_bound, solution.cost());
@@ -121,8 +121,7 @@ TEST(KMedian, PointsAreTheirMatrix) {
     const std::size_t k = 1 + random() % points.size();
     SCOPED_TRACE(testing::Message()
                  << "seed " << seed << ", " << name_of(problem.metric) << ", k " << k);
-    const FacilitySolution solution =
-        k_median(problem, k, {.restarts = 12, .bound_iterations = 50});
+    const FacilitySolution solution = k_median(problem, k, {.restarts = 12, .bound_steps = 50});
     expect_medians(problem, k, solution);
     std::vector<double> opening(points.size(), 0.0), connection;
     for (const Point3& a : points) {
@@ -163,21 +162,21 @@ TEST(KMedian, FindsSeparateClusters) {
   }
   FacilityPoints problem;
   problem.points = points;
-  const FacilitySolution one = k_median(problem, 12, {.restarts = 1, .bound_iterations = 0});
+  const FacilitySolution one = k_median(problem, 12, {.restarts = 1, .bound_steps = 0});
   expect_medians(problem, 12, one);
   for (std::size_t i = 0; i < points.size(); ++i) {
     ASSERT_EQ(one.assignment[i], one.assignment[i % 12]);
   }
   for (const unsigned threads : {2u, 5u}) {
     const FacilitySolution many =
-        k_median(problem, 12, {.restarts = 1, .bound_iterations = 0, .threads = threads});
+        k_median(problem, 12, {.restarts = 1, .bound_steps = 0, .threads = threads});
     EXPECT_TRUE(laws::same(one, many));
   }
 }
 
 TEST(KMedian, ThreadsDoNotChangeTheResult) {
   const laws::MatrixProblem problem = laws::random_problem(6 * 3 + 2, 120, 150);
-  KMedianOptions options{.restarts = 5, .bound_iterations = 10};
+  KMedianOptions options{.restarts = 5, .bound_steps = 10};
   const FacilitySolution one = k_median(problem.matrix(), 7, options);
   for (const unsigned threads : {2u, 3u, 0u}) {
     options.threads = threads;

@@ -3,8 +3,7 @@
 // fcluster(), its labels renumbered by first appearance.
 #include <gtest/gtest.h>
 
-#include "terrace/cluster/complete_linkage.hpp"
-#include "terrace/cluster/single_linkage.hpp"
+#include "terrace/cluster/linkage.hpp"
 
 namespace terrace::cluster {
 namespace {

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "terrace/cluster/lower_bound.hpp"
-
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 
 #include <gtest/gtest.h>
 
+#include "facility/bounds/matrix_dual.hpp"
 #include "matrix_laws.hpp"
-#include "terrace/cluster/facility_search.hpp"
+#include "terrace/cluster/facility_location.hpp"
 
 namespace terrace::cluster {
 namespace {
@@ -20,8 +19,8 @@ TEST(LowerBound, IsBelowTheOptimum) {
     const laws::MatrixProblem problem = laws::random_problem(seed, 10, 25);
     SCOPED_TRACE(testing::Message() << "seed " << seed << ", " << problem.kind);
     const double best = laws::optimum(problem.matrix());
-    const DualBound ascent = dual_ascent(problem.matrix());
-    const DualBound bound = lower_bound(problem.matrix(), {}, {.iterations = 200});
+    const LowerBound ascent = lower_bound(problem.matrix(), {}, {.steps = 0});
+    const LowerBound bound = lower_bound(problem.matrix(), {}, {.steps = 200});
     // Not a hair above: the bound is rounded down, the optimum as it comes.
     EXPECT_LE(ascent.lower_bound, best);
     EXPECT_LE(bound.lower_bound, best);
@@ -42,7 +41,7 @@ TEST(LowerBound, DualsOfTheAscentAreFeasible) {
     const laws::MatrixProblem problem = laws::random_problem(seed, 30, 50);
     SCOPED_TRACE(testing::Message() << "seed " << seed << ", " << problem.kind);
     const FacilityMatrix matrix = problem.matrix();
-    const DualBound bound = dual_ascent(matrix);
+    const LowerBound bound = lower_bound(matrix, {}, {.steps = 0});
     double sum = 0.0;
     for (const double v : bound.duals) sum += v;
     for (std::size_t j = 0; j < matrix.facilities; ++j) {
@@ -81,7 +80,7 @@ TEST(LowerBound, ProvesOptimaWithoutAGap) {
     for (std::size_t i = 0; i < 12; ++i) connection[j * 12 + i] = std::abs(at[j] - at[i]);
   }
   const FacilityMatrix problem{12, 12, opening, connection};
-  FacilitySolution solution = facility_search(problem);
+  FacilitySolution solution = solve(problem);
   solution.lower_bound = lower_bound(problem, solution).lower_bound;
   EXPECT_GE(solution.gap(), 0.0);
   EXPECT_LT(solution.gap(), 1e-6);
@@ -90,10 +89,9 @@ TEST(LowerBound, ProvesOptimaWithoutAGap) {
 
 TEST(LowerBound, ThreadsDoNotChangeTheResult) {
   const laws::MatrixProblem problem = laws::random_problem(6 * 9 + 2, 400, 120);
-  const DualBound one = lower_bound(problem.matrix(), {}, {.iterations = 30, .threads = 1});
+  const LowerBound one = lower_bound(problem.matrix(), {}, {.steps = 30, .threads = 1});
   for (const unsigned threads : {2u, 5u, 0u}) {
-    const DualBound many =
-        lower_bound(problem.matrix(), {}, {.iterations = 30, .threads = threads});
+    const LowerBound many = lower_bound(problem.matrix(), {}, {.steps = 30, .threads = threads});
     EXPECT_EQ(many.lower_bound, one.lower_bound);
     EXPECT_EQ(many.duals, one.duals);
   }
@@ -108,7 +106,7 @@ TEST(LowerBound, HugeAndTinyCosts) {
       laws::MatrixProblem scaled = problem;
       scaled.scale(std::ldexp(1.0, exponent));
       const double best = laws::optimum(scaled.matrix());
-      const DualBound bound = lower_bound(scaled.matrix(), {}, {.iterations = 100});
+      const LowerBound bound = lower_bound(scaled.matrix(), {}, {.steps = 100});
       EXPECT_LE(bound.lower_bound, best);
       if (best > 0.0) {
         EXPECT_GE(bound.lower_bound, 0.7 * best);
@@ -133,7 +131,7 @@ TEST(LowerBound, RefusesWhatDoesNotFit) {
   other.assignment = {0, kOutlier};
   EXPECT_THROW(static_cast<void>(lower_bound(problem, other)), std::invalid_argument);
   const FacilityMatrix empty{0, 0, {}, {}};
-  EXPECT_THROW(static_cast<void>(dual_ascent(empty)), std::invalid_argument);
+  EXPECT_THROW(static_cast<void>(lower_bound(empty)), std::invalid_argument);
 }
 
 }  // namespace

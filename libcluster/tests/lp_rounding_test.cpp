@@ -1,26 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "terrace/cluster/lp_rounding.hpp"
-
 #include <cmath>
 #include <stdexcept>
 
 #include <gtest/gtest.h>
 
 #include "matrix_laws.hpp"
-#include "terrace/cluster/lower_bound.hpp"
-#include "terrace/cluster/primal_dual.hpp"
+#include "terrace/cluster/facility_location.hpp"
 
 namespace terrace::cluster {
 namespace {
 
+const FacilityOptions kRounding{.strategy = FacilityStrategy::lp_rounding};
+
+double bound_by(const FacilityMatrix& matrix, FacilityStrategy strategy) {
+  return solve(matrix, {.strategy = strategy}).lower_bound;
+}
+
 TEST(LpRounding, SaysSoWhereItIsNotBuilt) {
   const std::vector<double> one{1.0};
   if (has_lp_rounding()) {
-    EXPECT_NO_THROW(static_cast<void>(lp_rounding({1, 1, one, one})));
+    EXPECT_NO_THROW(static_cast<void>(solve(FacilityMatrix{1, 1, one, one}, kRounding)));
     return;
   }
   try {
-    static_cast<void>(lp_rounding({1, 1, one, one}));
+    static_cast<void>(solve(FacilityMatrix{1, 1, one, one}, kRounding));
     FAIL() << "it worked";
   } catch (const std::runtime_error& error) {
     EXPECT_NE(std::string(error.what()).find("-Dterrace_glpk=enabled"), std::string::npos);
@@ -33,16 +36,17 @@ TEST(LpRounding, KeepsItsPromises) {
     const laws::MatrixProblem problem = laws::random_problem(seed, 10, 20);
     SCOPED_TRACE(testing::Message() << "seed " << seed << ", " << problem.kind);
     const FacilityMatrix matrix = problem.matrix();
-    const LpRounding result = lp_rounding(matrix);
-    laws::expect_solution(matrix, result.solution);
+    FacilityReport result;
+    const FacilitySolution solution = solve(matrix, kRounding, &result);
+    laws::expect_solution(matrix, solution);
     const double best = laws::optimum(matrix);
-    EXPECT_LE(result.solution.lower_bound, best);
-    EXPECT_GE(result.solution.cost(), best * (1.0 - 1e-12));
+    EXPECT_LE(solution.lower_bound, best);
+    EXPECT_GE(solution.cost(), best * (1.0 - 1e-12));
     EXPECT_LE(result.relaxation, best * (1.0 + 1e-9));
     // Strong duality.
-    EXPECT_NEAR(result.solution.lower_bound, result.relaxation, 1e-7 * result.relaxation + 1e-12);
+    EXPECT_NEAR(solution.lower_bound, result.relaxation, 1e-7 * result.relaxation + 1e-12);
     if (problem.metric) {
-      EXPECT_LE(result.solution.cost(), 4.0 * result.relaxation * (1.0 + 1e-9));
+      EXPECT_LE(solution.cost(), 4.0 * result.relaxation * (1.0 + 1e-9));
     }
   }
 }
@@ -55,13 +59,15 @@ TEST(LpRounding, NoBoundIsAboveTheRelaxation) {
     const laws::MatrixProblem problem = laws::random_problem(seed, 30, 40);
     SCOPED_TRACE(testing::Message() << "seed " << seed << ", " << problem.kind);
     const FacilityMatrix matrix = problem.matrix();
-    const double limit = lp_rounding(matrix).relaxation;
+    FacilityReport report;
+    (void)solve(matrix, kRounding, &report);
+    const double limit = report.relaxation;
     const double most = limit * (1.0 + 1e-9);
     const double bound = lower_bound(matrix).lower_bound;
     EXPECT_LE(bound, most);
-    EXPECT_LE(dual_ascent(matrix).lower_bound, most);
-    EXPECT_LE(jain_vazirani(matrix).solution.lower_bound, most);
-    EXPECT_LE(greedy_stars(matrix).solution.lower_bound, most);
+    EXPECT_LE(lower_bound(matrix, {}, {.steps = 0}).lower_bound, most);
+    EXPECT_LE(bound_by(matrix, FacilityStrategy::jain_vazirani), most);
+    EXPECT_LE(bound_by(matrix, FacilityStrategy::greedy_stars), most);
     if (limit == 0.0) continue;
     share += bound / limit;
     ++count;
@@ -80,14 +86,16 @@ TEST(LpRounding, FiftyByFifty) {
     }
   }
   const FacilityMatrix matrix{50, 50, opening, connection};
-  const LpRounding result = lp_rounding(matrix);
-  laws::expect_solution(matrix, result.solution);
-  EXPECT_LE(result.solution.gap(), 3.0);
+  FacilityReport result;
+  const FacilitySolution solution = solve(matrix, kRounding, &result);
+  laws::expect_solution(matrix, solution);
+  EXPECT_LE(solution.gap(), 3.0);
   EXPECT_NEAR(lower_bound(matrix).lower_bound, result.relaxation, 0.01 * result.relaxation);
 }
 
 TEST(LpRounding, RefusesWhatIsNoProblem) {
-  EXPECT_THROW(static_cast<void>(lp_rounding({0, 1, {}, {}})), std::invalid_argument);
+  EXPECT_THROW(static_cast<void>(solve(FacilityMatrix{0, 1, {}, {}}, kRounding)),
+               std::invalid_argument);
 }
 
 }  // namespace

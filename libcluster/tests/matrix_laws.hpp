@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "inputs.hpp"
-#include "terrace/cluster/facility.hpp"
+#include "terrace/cluster/facility_location.hpp"
 
 /// Small random problems with a cost matrix, their optimum by brute force, and what every solution
 /// promises, checked independently of how it was found.

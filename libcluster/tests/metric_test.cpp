@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "inputs.hpp"
-#include "terrace/cluster/facility.hpp"
+#include "terrace/cluster/facility_location.hpp"
 
 namespace terrace::cluster {
 namespace {

@@ -4,10 +4,10 @@
 
 #include <gtest/gtest.h>
 
+#include "facility/bounds/matrix_dual.hpp"
 #include "inputs.hpp"
 #include "matrix_laws.hpp"
-#include "terrace/cluster/facility_search.hpp"
-#include "terrace/cluster/lower_bound.hpp"
+#include "terrace/cluster/facility_location.hpp"
 
 namespace terrace::cluster {
 namespace {
@@ -126,7 +126,7 @@ TEST(PointBound, IsBelowTheOptimum) {
     SCOPED_TRACE(testing::Message() << "seed " << seed << ", " << name_of(c.problem.metric));
     const AsMatrix same(c.problem);
     const double best = laws::optimum(same.matrix);
-    const DualBound bound = lower_bound(c.problem, start_of(c.problem, seed % 2 == 0));
+    const LowerBound bound = lower_bound(c.problem, start_of(c.problem, seed % 2 == 0));
     EXPECT_LE(bound.lower_bound, best);
     ASSERT_EQ(bound.duals.size(), c.points.size());
     // What the duals are worth by the definition.
@@ -157,8 +157,7 @@ TEST(PointBound, IsThatOfTheMatrix) {
     c.refer();
     SCOPED_TRACE(testing::Message() << "seed " << seed << ", " << name_of(c.problem.metric));
     const AsMatrix same(c.problem);
-    const FacilitySolution found =
-        facility_search(same.matrix, {.restarts = 1, .perturbations = 20});
+    const FacilitySolution found = solve(same.matrix, {.restarts = 1, .steps = 20});
     const double limit = lower_bound(same.matrix, found).lower_bound;
     FacilitySolution start;
     for (const std::uint32_t j : found.facilities) {
@@ -167,7 +166,7 @@ TEST(PointBound, IsThatOfTheMatrix) {
     for (const std::uint32_t k : found.assignment) {
       start.assignment.push_back(found.facilities[k] < n ? k : kOutlier);
     }
-    const DualBound bound = lower_bound(c.problem, start, {.iterations = 200});
+    const LowerBound bound = lower_bound(c.problem, start, {.steps = 200});
     EXPECT_LE(bound.lower_bound, found.cost());
     EXPECT_GE(bound.lower_bound, 0.97 * limit);
     EXPECT_NEAR(bound.lower_bound, dual_value(same.matrix, bound.duals), 1e-6 * found.cost());
@@ -182,9 +181,9 @@ TEST(PointBound, ThreadsDoNotChangeTheResult) {
     problem.points = points;
     if (!boxes) problem.metric = metrics().back();
     FacilitySolution start = start_of(problem, false);
-    const DualBound one = lower_bound(problem, start, {.iterations = 8, .threads = 1});
+    const LowerBound one = lower_bound(problem, start, {.steps = 8, .threads = 1});
     for (const unsigned threads : {2u, 3u, 0u}) {
-      const DualBound many = lower_bound(problem, start, {.iterations = 8, .threads = threads});
+      const LowerBound many = lower_bound(problem, start, {.steps = 8, .threads = threads});
       EXPECT_EQ(many.lower_bound, one.lower_bound);
       EXPECT_EQ(many.duals, one.duals);
     }
@@ -213,7 +212,7 @@ TEST(PointBound, HugeTinyAndFarCoordinates) {
       twin.points = near;
       const double best = laws::optimum(AsMatrix(twin).matrix);
       const double bound =
-          lower_bound(problem, start_of(problem, false), {.iterations = 200}).lower_bound / scale;
+          lower_bound(problem, start_of(problem, false), {.steps = 200}).lower_bound / scale;
       EXPECT_LE(bound, best * (1.0 + 1e-14));
       EXPECT_GE(bound, 0.9 * best);
     }
@@ -225,9 +224,36 @@ TEST(PointBound, EqualAndSinglePoints) {
     const std::vector<Point3> points(count, Point3{3, 4, 5});
     FacilityPoints problem;
     problem.points = points;
-    const DualBound bound = lower_bound(problem, start_of(problem, true));
+    const LowerBound bound = lower_bound(problem, start_of(problem, true));
     EXPECT_EQ(bound.lower_bound, 0.0);
   }
+}
+
+TEST(PointBound, EntitiesHaveTheBoundOfTheirMatrix) {
+  std::mt19937_64 random(7);
+  const std::vector<Point3> points = inputs::cube(60, random);
+  const double unit = diagonal(Euclidean{}, bounds_of(points));
+  for (const double price : {kInfinity, 0.2}) {
+    FacilityPoints by_points{.points = points, .facility_cost = 0.4, .outlier_price = price};
+    const AsMatrix same(by_points);
+    const FacilityEntities problem{
+        .count = points.size(),
+        .distance = [&](std::uint32_t f,
+                        std::uint32_t c) { return distance(Euclidean{}, points[f], points[c]); },
+        .facility_cost = 0.4 * unit,
+        .outlier_price = price * unit};
+    const FacilitySolution found = solve(problem, {.effort = Effort::full, .assign_nearest = true});
+    const LowerBound bound = lower_bound(problem, found, {.steps = 200});
+    EXPECT_LE(bound.lower_bound, found.cost());
+    EXPECT_GE(bound.lower_bound, 0.95 * found.cost());
+    EXPECT_NEAR(bound.lower_bound, dual_value(same.matrix, bound.duals), 1e-9 * found.cost());
+    EXPECT_EQ(lower_bound(problem, found, {.steps = 200, .threads = 2}).duals, bound.duals);
+  }
+  FacilityEntities problem{.count = 3,
+                           .distance = [](std::uint32_t, std::uint32_t) { return 1.0; }};
+  EXPECT_THROW(static_cast<void>(lower_bound(problem, FacilitySolution{})), std::invalid_argument);
+  problem.distance = {};
+  EXPECT_THROW(static_cast<void>(lower_bound(problem, FacilitySolution{})), std::invalid_argument);
 }
 
 TEST(PointBound, RefusesWhatDoesNotFit) {

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "terrace/cluster/point_search.hpp"
-
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "facility/points/make_search.hpp"
+#include "facility/points/search_frame.hpp"
 #include "inputs.hpp"
 #include "search_laws.hpp"
 
@@ -18,14 +19,15 @@ namespace {
 using inputs::kInfinity;
 using laws::OwnedProblem;
 
-constexpr GainStrategy kSearches[] = {GainStrategy::full_scan, GainStrategy::quadtree,
-                                      GainStrategy::octree, GainStrategy::kd_tree,
-                                      GainStrategy::facilities};
+constexpr FacilityStrategy kSearches[] = {FacilityStrategy::full_scan, FacilityStrategy::quadtree,
+                                          FacilityStrategy::octree, FacilityStrategy::kd_tree,
+                                          FacilityStrategy::facilities};
 
-bool admits(const OwnedProblem& p, GainStrategy strategy) {
-  if (strategy == GainStrategy::full_scan) return true;
-  if (strategy == GainStrategy::facilities) {
-    return best_strategy(p.view()) == GainStrategy::facilities;
+bool admits(const OwnedProblem& p, FacilityStrategy strategy) {
+  if (strategy == FacilityStrategy::full_scan) return true;
+  if (strategy == FacilityStrategy::facilities) {
+    return linear_map(p.metric, bounds_of(p.points)) ||
+           (is_symmetric(p.metric) && obeys_triangle_inequality(p.metric));
   }
   return !std::holds_alternative<CustomMetric>(p.metric);
 }
@@ -60,33 +62,33 @@ void expect_same(const FacilitySolution& a, const FacilitySolution& b) {
 TEST(PointSearch, GainIsWhatOpeningSparesInEveryStrategy) {
   for (const OwnedProblem& p : all_problems(60)) {
     SCOPED_TRACE(p.name);
-    std::vector<PointSearch> searches;
-    for (const GainStrategy strategy : kSearches) {
-      if (admits(p, strategy)) searches.emplace_back(p.view(), strategy);
+    std::vector<std::unique_ptr<SearchEngine>> searches;
+    for (const FacilityStrategy strategy : kSearches) {
+      if (admits(p, strategy)) searches.push_back(make_search(p.view(), strategy));
     }
     for (std::uint64_t seed = 1; seed <= 2; ++seed) {
       SCOPED_TRACE(testing::Message() << "seed " << seed);
-      for (PointSearch& search : searches) {
+      for (const auto& search : searches) {
         std::mt19937_64 random(seed);
-        search.start(random);
+        search->start(random);
       }
       std::mt19937_64 random(seed);
       for (int step = 0; step < 25; ++step) {
         const auto candidate = static_cast<std::uint32_t>(random() % p.points.size());
-        const FacilitySolution before = searches[0].solution();
-        const double gain = searches[0].gain(candidate);
-        for (PointSearch& search : searches) {
-          ASSERT_EQ(search.gain(candidate), gain);  // to the last bit
+        const FacilitySolution before = searches[0]->solution();
+        const double gain = searches[0]->gain(candidate);
+        for (const auto& search : searches) {
+          ASSERT_EQ(search->gain(candidate), gain);  // to the last bit
         }
         // Losses are carried out as well: the law does not depend on the sign.
         if (gain <= 0 && step % 3 != 0) continue;
-        for (PointSearch& search : searches) search.open(candidate);
-        const FacilitySolution after = searches[0].solution();
+        for (const auto& search : searches) search->open(candidate);
+        const FacilitySolution after = searches[0]->solution();
         ASSERT_NEAR(before.cost() - after.cost(), gain, 1e-9 * before.cost());
-        ASSERT_NEAR(searches[0].cost(), after.cost(), 1e-9 * before.cost());
+        ASSERT_NEAR(searches[0]->cost(), after.cost(), 1e-9 * before.cost());
         ASSERT_NO_FATAL_FAILURE(laws::expect_solution(p, after));
-        for (PointSearch& search : searches) {
-          ASSERT_NO_FATAL_FAILURE(expect_same(search.solution(), after));
+        for (const auto& search : searches) {
+          ASSERT_NO_FATAL_FAILURE(expect_same(search->solution(), after));
         }
       }
     }
@@ -98,30 +100,32 @@ TEST(PointSearch, WholeSearchesAgree) {
     SCOPED_TRACE(p.name);
     const FacilityPoints view = p.view();
     for (const std::size_t batch : {1u, 4u}) {
-      PointSearchOptions options;
-      options.strategy = GainStrategy::full_scan;
-      options.length = SearchLength::log10_full;
+      FacilityOptions options;
+      options.strategy = FacilityStrategy::full_scan;
+      options.effort = Effort::fine;
       options.batch = batch;
-      PointSearchStatistics full;
-      const FacilitySolution expected = search_points(view, options, &full);
+      FacilityReport full_report;
+      const FacilitySolution expected = solve(view, options, &full_report);
       ASSERT_NO_FATAL_FAILURE(laws::expect_solution(p, expected));
+      const SearchStatistics& full = full_report.search;
       EXPECT_EQ(full.inspected, full.candidates * p.points.size());
-      for (const GainStrategy strategy : kSearches) {
+      for (const FacilityStrategy strategy : kSearches) {
         options.strategy = strategy;
         if (!admits(p, strategy)) {
-          EXPECT_THROW((void)search_points(view, options), std::invalid_argument);
+          EXPECT_THROW((void)solve(view, options), std::invalid_argument);
           continue;
         }
         SCOPED_TRACE(name_of(strategy));
-        PointSearchStatistics statistics;
-        expect_same(search_points(view, options, &statistics), expected);
+        FacilityReport report;
+        expect_same(solve(view, options, &report), expected);
+        const SearchStatistics& statistics = report.search;
         EXPECT_EQ(statistics.positive, full.positive);
         EXPECT_EQ(statistics.opened, full.opened);
         EXPECT_EQ(statistics.wrongly_assigned, full.wrongly_assigned);
       }
-      options.strategy = GainStrategy::automatic;
+      options.strategy = FacilityStrategy::automatic;
       options.threads = 3;
-      expect_same(search_points(view, options), expected);
+      expect_same(solve(view, options), expected);
     }
   }
 }
@@ -133,16 +137,16 @@ TEST(PointSearch, ThreadsDoNotChangeTheSolution) {
   p.outlier_price = 0.2;
   laws::add_weights(p, random);
   for (const std::size_t batch : {1u, 7u}) {
-    for (const GainStrategy strategy : kSearches) {
+    for (const FacilityStrategy strategy : kSearches) {
       SCOPED_TRACE(testing::Message() << name_of(strategy) << ", batch " << batch);
-      PointSearchOptions options;
+      FacilityOptions options;
       options.strategy = strategy;
-      options.iterations = 300;
+      options.steps = 300;
       options.batch = batch;
-      const FacilitySolution one = search_points(p.view(), options);
+      const FacilitySolution one = solve(p.view(), options);
       for (const unsigned threads : {2u, 5u}) {
         options.threads = threads;
-        expect_same(search_points(p.view(), options), one);
+        expect_same(solve(p.view(), options), one);
       }
     }
   }
@@ -153,12 +157,12 @@ TEST(PointSearch, BatchAppliesTheGreatestGainAlone) {
   OwnedProblem p;
   p.points = inputs::cube(400, points_random);
   constexpr std::size_t kBatch = 5;
-  PointSearch search(p.view());
-  PointSearch by_hand(p.view());
+  const auto search = make_search(p.view());
+  const auto by_hand = make_search(p.view());
   std::mt19937_64 random(9), same(9);
-  search.start(random);
-  by_hand.start(same);
-  search.improve(200, random, kBatch);
+  search->start(random);
+  by_hand->start(same);
+  search->improve(200, random, kBatch);
   std::size_t discarded = 0;
   for (std::size_t done = 0; done < 200;) {
     const std::size_t now = std::min(kBatch, 200 - done);
@@ -167,21 +171,21 @@ TEST(PointSearch, BatchAppliesTheGreatestGainAlone) {
     std::uint32_t chosen = 0;
     for (std::size_t k = 0; k < now; ++k) {
       const auto candidate = static_cast<std::uint32_t>(((same() >> 32) * 400) >> 32);
-      const double gain = by_hand.gain(candidate);
+      const double gain = by_hand->gain(candidate);
       positive += gain > 0 ? 1u : 0u;
       if (gain > best) {
         best = gain;
         chosen = candidate;
       }
     }
-    if (positive > 0) by_hand.open(chosen);
+    if (positive > 0) by_hand->open(chosen);
     done += now - (positive > 1 ? positive - 1 : 0);
     discarded += positive > 1 ? positive - 1 : 0;
   }
-  expect_same(search.solution(), by_hand.solution());
+  expect_same(search->solution(), by_hand->solution());
   EXPECT_GT(discarded, 0u);
-  EXPECT_EQ(search.statistics().candidates, 200 + discarded);
-  EXPECT_EQ(search.statistics().positive, search.statistics().opened + discarded);
+  EXPECT_EQ(search->statistics().candidates, 200 + discarded);
+  EXPECT_EQ(search->statistics().positive, search->statistics().opened + discarded);
 }
 
 TEST(PointSearch, NeverBeatsTheOptimumAndComesNear) {
@@ -198,11 +202,11 @@ TEST(PointSearch, NeverBeatsTheOptimumAndComesNear) {
       if (seed % 4 == 0) p.outlier_price = 0.3;
       p.facility_cost = 0.1 + 0.3 * inputs::uniform(random);
       SCOPED_TRACE(name_of(metric) + ", seed " + std::to_string(seed));
-      PointSearchOptions options;
-      options.iterations = 40;
+      FacilityOptions options;
+      options.steps = 40;
       options.seed = seed;
       options.assign_nearest = true;
-      const FacilitySolution found = search_points(p.view(), options);
+      const FacilitySolution found = solve(p.view(), options);
       const double best = laws::optimum(p);
       ASSERT_GE(found.cost(), best * (1 - 1e-9));
       if (best == 0.0) continue;
@@ -236,14 +240,14 @@ TEST(PointSearch, TheSingleOutlierIsLeftOut) {
     SCOPED_TRACE(name_of(metric));
     p.metric = metric;
     p.outlier_price = kInfinity;
-    PointSearchOptions options;
-    options.length = SearchLength::log10_full;
-    const FacilitySolution connected = search_points(p.view(), options);
+    FacilityOptions options;
+    options.effort = Effort::fine;
+    const FacilitySolution connected = solve(p.view(), options);
     EXPECT_EQ(connected.facilities.size(), 3u);
     EXPECT_NE(connected.assignment.back(), kOutlier);
     EXPECT_EQ(connected.outlier_cost, 0.0);
     p.outlier_price = 0.3;
-    const FacilitySolution left_out = search_points(p.view(), options);
+    const FacilitySolution left_out = solve(p.view(), options);
     EXPECT_EQ(left_out.facilities.size(), 3u);
     EXPECT_EQ(std::count(left_out.assignment.begin(), left_out.assignment.end(), kOutlier), 1);
     EXPECT_EQ(left_out.assignment.back(), kOutlier);
@@ -258,7 +262,7 @@ TEST(PointSearch, AllLeftOutButAFacility) {
   p.points = inputs::cube(50, random);
   p.facility_cost = 10.0;
   p.outlier_price = 1e-6;
-  const FacilitySolution solution = search_points(p.view(), {.length = SearchLength::log2_full});
+  const FacilitySolution solution = solve(p.view(), {.effort = Effort::full});
   EXPECT_EQ(solution.facilities.size(), 1u);
   EXPECT_EQ(std::count(solution.assignment.begin(), solution.assignment.end(), kOutlier), 49);
   laws::expect_solution(p, solution);
@@ -279,7 +283,7 @@ TEST(PointSearch, ScaleAndOffsetDoNotMatter) {
     SCOPED_TRACE(name_of(metric));
     OwnedProblem plain = p;
     plain.metric = metric;
-    const FacilitySolution expected = search_points(plain.view());
+    const FacilitySolution expected = solve(plain.view());
     for (const int exponent : {-1000, -990, 40, 900, 1022}) {
       SCOPED_TRACE(exponent);
       OwnedProblem q = plain;
@@ -287,8 +291,9 @@ TEST(PointSearch, ScaleAndOffsetDoNotMatter) {
         for (double& x : point) x = std::ldexp(x, exponent);
       }
       for (double& x : q.channel_weights) x = std::ldexp(x, exponent);
-      for (const GainStrategy strategy : {GainStrategy::full_scan, GainStrategy::kd_tree}) {
-        const FacilitySolution solution = search_points(q.view(), {.strategy = strategy});
+      for (const FacilityStrategy strategy :
+           {FacilityStrategy::full_scan, FacilityStrategy::kd_tree}) {
+        const FacilitySolution solution = solve(q.view(), {.strategy = strategy});
         EXPECT_EQ(solution.facilities, expected.facilities);
         EXPECT_EQ(solution.assignment, expected.assignment);
       }
@@ -296,18 +301,18 @@ TEST(PointSearch, ScaleAndOffsetDoNotMatter) {
     OwnedProblem heavy = plain;
     heavy.weights.assign(p.points.size(), 1e300);
     heavy.facility_cost = plain.facility_cost * 1e300;
-    EXPECT_EQ(search_points(heavy.view()).facilities, expected.facilities);
+    EXPECT_EQ(solve(heavy.view()).facilities, expected.facilities);
   }
   // Squares of 1e300 are beyond double: the search is right, its costs are infinite.
   OwnedProblem squares = p;
   squares.metric = SquaredEuclidean{};
   squares.channel_weights.clear();
   squares.values.clear();
-  const FacilitySolution expected = search_points(squares.view());
+  const FacilitySolution expected = solve(squares.view());
   for (Point3& q : squares.points) {
     for (double& x : q) x *= 0x1p1000;
   }
-  const FacilitySolution solution = search_points(squares.view());
+  const FacilitySolution solution = solve(squares.view());
   EXPECT_EQ(solution.assignment, expected.assignment);
   EXPECT_EQ(solution.cost(), kInfinity);
 }
@@ -321,7 +326,7 @@ TEST(PointSearch, ChannelsSeparateWhatLiesTogether) {
     p.values.push_back((i % 2 == 0 ? 0.0 : 100.0) + inputs::uniform(random));
   }
   p.facility_cost = 1.0;
-  const FacilitySolution solution = search_points(p.view(), {.length = SearchLength::log10_full});
+  const FacilitySolution solution = solve(p.view(), {.effort = Effort::fine});
   ASSERT_EQ(solution.facilities.size(), 2u);
   for (std::size_t i = 2; i < 200; ++i) {
     EXPECT_EQ(solution.assignment[i], solution.assignment[i % 2]);
@@ -333,46 +338,46 @@ TEST(PointSearch, StartsFromAGivenSolution) {
   std::mt19937_64 random(12);
   OwnedProblem p;
   p.points = inputs::cube(300, random);
-  const FacilitySolution first = search_points(p.view());
-  PointSearchOptions options;
-  options.iterations = 0;
+  const FacilitySolution first = solve(p.view());
+  FacilityOptions options;
+  options.steps = 0;
   options.start = &first;
-  expect_same(search_points(p.view(), options), first);
-  options.iterations = 500;
-  EXPECT_LT(search_points(p.view(), options).cost(), first.cost());
+  expect_same(solve(p.view(), options), first);
+  options.steps = 500;
+  EXPECT_LT(solve(p.view(), options).cost(), first.cost());
 
   FacilitySolution bad = first;
   bad.assignment.pop_back();
   options.start = &bad;
-  EXPECT_THROW((void)search_points(p.view(), options), std::invalid_argument);
+  EXPECT_THROW((void)solve(p.view(), options), std::invalid_argument);
   bad = first;
   bad.assignment[7] = 4000;
-  EXPECT_THROW((void)search_points(p.view(), options), std::invalid_argument);
+  EXPECT_THROW((void)solve(p.view(), options), std::invalid_argument);
   bad.assignment[7] = kOutlier;
-  EXPECT_THROW((void)search_points(p.view(), options), std::invalid_argument);
+  EXPECT_THROW((void)solve(p.view(), options), std::invalid_argument);
   bad = first;
   bad.facilities[0] = 300;
-  EXPECT_THROW((void)search_points(p.view(), options), std::invalid_argument);
+  EXPECT_THROW((void)solve(p.view(), options), std::invalid_argument);
   bad.facilities.clear();
-  EXPECT_THROW((void)search_points(p.view(), options), std::invalid_argument);
+  EXPECT_THROW((void)solve(p.view(), options), std::invalid_argument);
 }
 
 TEST(PointSearch, AssignNearestLeavesNobodyWronglyAssigned) {
   for (const OwnedProblem& p : all_problems(100)) {
     SCOPED_TRACE(p.name);
     std::mt19937_64 random(2);
-    PointSearch search(p.view());
-    search.start(random);
-    search.improve(10, random);
-    const double before = search.cost();
-    const std::size_t wrong = search.wrongly_assigned();
-    search.assign_nearest();
-    EXPECT_EQ(search.wrongly_assigned(), 0u);
-    EXPECT_LE(search.cost(), before * (1 + 1e-12));
+    const auto search = make_search(p.view());
+    search->start(random);
+    search->improve(10, random);
+    const double before = search->cost();
+    const std::size_t wrong = search->wrongly_assigned();
+    search->assign_nearest();
+    EXPECT_EQ(search->wrongly_assigned(), 0u);
+    EXPECT_LE(search->cost(), before * (1 + 1e-12));
     if (wrong > 0) {
-      EXPECT_LT(search.cost(), before);
+      EXPECT_LT(search->cost(), before);
     }
-    ASSERT_NO_FATAL_FAILURE(laws::expect_solution(p, search.solution()));
+    ASSERT_NO_FATAL_FAILURE(laws::expect_solution(p, search->solution()));
   }
 }
 
@@ -381,8 +386,8 @@ TEST(PointSearch, ProgressIsToldAndStops) {
   OwnedProblem p;
   p.points = inputs::cube(500, random);
   std::size_t last = 0, calls = 0;
-  PointSearchOptions options;
-  options.iterations = 1000;
+  FacilityOptions options;
+  options.steps = 1000;
   options.progress = [&](std::size_t done, std::size_t total) {
     EXPECT_EQ(total, 1000u);
     EXPECT_GE(done, last);
@@ -390,13 +395,13 @@ TEST(PointSearch, ProgressIsToldAndStops) {
     ++calls;
     return true;
   };
-  const FacilitySolution whole = search_points(p.view(), options);
+  const FacilitySolution whole = solve(p.view(), options);
   EXPECT_EQ(last, 1000u);
   EXPECT_GT(calls, 100u);
   options.progress = [](std::size_t done, std::size_t) { return done < 100; };
-  PointSearchStatistics statistics;
-  const FacilitySolution part = search_points(p.view(), options, &statistics);
-  EXPECT_LT(statistics.candidates, 120u);
+  FacilityReport report;
+  const FacilitySolution part = solve(p.view(), options, &report);
+  EXPECT_LT(report.search.candidates, 120u);
   EXPECT_GT(part.cost(), whole.cost());
   laws::expect_solution(p, part);
 }
@@ -404,28 +409,28 @@ TEST(PointSearch, ProgressIsToldAndStops) {
 TEST(PointSearch, WhatAStrategyLacksIsSaid) {
   OwnedProblem p;
   p.points = {{0, 0, 0}, {1, 0, 0}, {0, 2, 0}};
-  const auto message = [&](GainStrategy strategy) -> std::string {
+  const auto message = [&](FacilityStrategy strategy) -> std::string {
     try {
-      (void)search_points(p.view(), {.strategy = strategy});
+      (void)solve(p.view(), {.strategy = strategy});
     } catch (const std::invalid_argument& error) {
       return error.what();
     }
     return "";
   };
   p.metric = SquaredEuclidean{};
-  EXPECT_NE(message(GainStrategy::facilities).find("\"squared\""), std::string::npos);
-  EXPECT_NE(message(GainStrategy::facilities).find("kd_tree"), std::string::npos);
-  EXPECT_EQ(message(GainStrategy::kd_tree), "");
+  EXPECT_NE(message(FacilityStrategy::facilities).find("\"squared\""), std::string::npos);
+  EXPECT_NE(message(FacilityStrategy::facilities).find("kd_tree"), std::string::npos);
+  EXPECT_EQ(message(FacilityStrategy::kd_tree), "");
   p.metric = CustomMetric{[](const Point3&, const Point3&) { return 0.0; }};
-  EXPECT_NE(message(GainStrategy::octree).find("\"custom\""), std::string::npos);
-  EXPECT_NE(message(GainStrategy::facilities).find("\"custom\""), std::string::npos);
-  EXPECT_EQ(message(GainStrategy::automatic), "");
+  EXPECT_NE(message(FacilityStrategy::octree).find("\"custom\""), std::string::npos);
+  EXPECT_NE(message(FacilityStrategy::facilities).find("\"custom\""), std::string::npos);
+  EXPECT_EQ(message(FacilityStrategy::automatic), "");
   p.metric = CustomMetric{[](const Point3& a, const Point3& b) { return a[1] - b[1]; }};
-  EXPECT_NE(message(GainStrategy::automatic).find("distance from facility"), std::string::npos);
+  EXPECT_NE(message(FacilityStrategy::automatic).find("distance from facility"), std::string::npos);
   p.metric = Euclidean{};
-  EXPECT_THROW((void)search_points(p.view(), {.batch = 0}), std::invalid_argument);
+  EXPECT_THROW((void)solve(p.view(), {.batch = 0}), std::invalid_argument);
   p.points.clear();
-  EXPECT_THROW((void)search_points(p.view()), std::invalid_argument);
+  EXPECT_THROW((void)solve(p.view()), std::invalid_argument);
 }
 
 }  // namespace

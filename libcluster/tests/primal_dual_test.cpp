@@ -1,15 +1,37 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "terrace/cluster/primal_dual.hpp"
-
 #include <cmath>
 #include <stdexcept>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
 #include "matrix_laws.hpp"
+#include "terrace/cluster/facility_location.hpp"
 
 namespace terrace::cluster {
 namespace {
+
+struct PrimalDual {
+  FacilitySolution solution;
+  std::vector<double> duals;
+  double divisor;
+};
+
+PrimalDual grow(const FacilityMatrix& problem, FacilityStrategy strategy) {
+  FacilityReport report;
+  FacilitySolution solution = solve(problem, {.strategy = strategy}, &report);
+  EXPECT_EQ(report.strategy, strategy);
+  return {std::move(solution), report.duals, report.divisor};
+}
+
+PrimalDual jain_vazirani(const FacilityMatrix& problem) {
+  return grow(problem, FacilityStrategy::jain_vazirani);
+}
+
+PrimalDual greedy_stars(const FacilityMatrix& problem) {
+  return grow(problem, FacilityStrategy::greedy_stars);
+}
 
 double sum_of(const std::vector<double>& values) {
   double sum = 0.0;

@@ -12,7 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "inputs.hpp"
-#include "terrace/cluster/facility.hpp"
+#include "terrace/cluster/facility_location.hpp"
 
 /// Facility location of points judged from outside: costs from the definitions, in the points' own
 /// coordinates, and the least cost over all solutions.

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "terrace/cluster/single_linkage.hpp"
-
 #include <limits>
 #include <stdexcept>
 
 #include <gtest/gtest.h>
 
 #include "linkage_laws.hpp"
+#include "terrace/cluster/linkage.hpp"
 
 namespace terrace::cluster {
 namespace {

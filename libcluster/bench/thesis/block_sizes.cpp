@@ -39,8 +39,8 @@ constexpr std::array<ThesisRow, 6> kThesis{
 
 const NamedSet& lucy() { return large_sets()[3]; }
 
-BlockSizeRun run_once(std::uint64_t points, std::size_t block, SearchLength length,
-                      GainStrategy strategy) {
+BlockSizeRun run_once(std::uint64_t points, std::size_t block, Effort effort,
+                      FacilityStrategy strategy) {
   const auto set = lucy().make(points);
   BlockSizeRun result{.block = block};
   result.costs.reserve(static_cast<std::size_t>(points / block + 1));
@@ -48,7 +48,7 @@ BlockSizeRun run_once(std::uint64_t points, std::size_t block, SearchLength leng
   {
     StreamOptions options;
     options.block = block;
-    options.length = length;
+    options.effort = effort;
     options.strategy = strategy;
     StreamClustering stream(
         options, [&](const StreamBlock& b) { result.costs.push_back(b.solution.cost()); });
@@ -92,8 +92,8 @@ std::vector<std::string> row_7_5(const std::string& name, const BlockSizeRun& te
 const std::vector<BlockSizeRun>& block_size_runs(Setting& setting) {
   for (std::size_t i = setting.block_size_runs.size(); i < kThesis.size(); ++i) {
     setting.block_size_runs.push_back(run_once(setting.points(lucy().thesis_points),
-                                               setting.block(kThesis[i].block),
-                                               SearchLength::log10_full, GainStrategy::facilities));
+                                               setting.block(kThesis[i].block), Effort::fine,
+                                               FacilityStrategy::facilities));
   }
   return setting.block_size_runs;
 }
@@ -137,15 +137,14 @@ void table_7_5(Setting& setting) {
   const auto& runs = block_size_runs(setting);
   for (std::size_t i = 0; i < runs.size(); ++i) {
     const BlockSizeRun tenth =
-        run_once(points, runs[i].block, SearchLength::tenth, GainStrategy::facilities);
+        run_once(points, runs[i].block, Effort::standard, FacilityStrategy::facilities);
     auto row = row_7_5(std::to_string(runs[i].block), tenth, runs[i]);
     for (const char* figure : kThesis[i].table_7_5) row.push_back(quoted(figure));
     table.add(row);
   }
   const BlockSizeRun tenth =
-      run_once(subset, largest, SearchLength::tenth, GainStrategy::full_scan);
-  const BlockSizeRun full =
-      run_once(subset, largest, SearchLength::log10_full, GainStrategy::full_scan);
+      run_once(subset, largest, Effort::standard, FacilityStrategy::full_scan);
+  const BlockSizeRun full = run_once(subset, largest, Effort::fine, FacilityStrategy::full_scan);
   auto row = row_7_5(std::to_string(largest) + ", full scan", tenth, full);
   for (const char* figure : kThesis.back().table_7_5) row.push_back(quoted(figure));
   table.add(row);

@@ -4,8 +4,9 @@
 #include <random>
 
 #include "../../tests/inputs.hpp"
+#include "facility/points/make_search.hpp"
 #include "tables.hpp"
-#include "terrace/cluster/point_search.hpp"
+#include "terrace/cluster/facility_location.hpp"
 
 namespace terrace::cluster::thesis {
 namespace {
@@ -72,29 +73,29 @@ void figure_7_12(Setting& setting) {
               {"candidates", "facilities", "cost", "[cost]", "more", "[more]", "wrongly assigned",
                "share"}};
   double full_cost = 0.0;
-  for (const SearchLength length : {SearchLength::log10_full, SearchLength::tenth}) {
-    const bool full = length == SearchLength::log10_full;
+  for (const Effort effort : {Effort::fine, Effort::standard}) {
+    const bool full = effort == Effort::fine;
     double cost = 0.0;
     double facilities = 0.0;
     double wrong = 0.0;
     for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
-      PointSearchStatistics statistics;
+      FacilityReport report;
       const FacilitySolution solution =
-          search_points({.points = points}, {.length = length, .seed = seed}, &statistics);
+          solve(FacilityPoints{.points = points}, {.effort = effort, .seed = seed}, &report);
       cost += solution.cost() / static_cast<double>(kSeeds);
       facilities += static_cast<double>(solution.facilities.size()) / static_cast<double>(kSeeds);
-      wrong += static_cast<double>(statistics.wrongly_assigned) / static_cast<double>(kSeeds);
+      wrong += static_cast<double>(report.search.wrongly_assigned) / static_cast<double>(kSeeds);
       if (seed > 1) continue;
-      const std::size_t candidates = candidate_count(length, kPoints);
+      const std::size_t candidates = candidate_count(effort, kPoints);
       setting.report.plot(
           full ? "figure-7.12a" : "figure-7.12b",
           scatter("After " + std::to_string(candidates) + " candidates: cost " +
                       fixed(solution.cost(), 1) + ", " +
-                      std::to_string(statistics.wrongly_assigned) + " points wrongly assigned",
+                      std::to_string(report.search.wrongly_assigned) + " points wrongly assigned",
                   points, solution));
     }
     if (full) full_cost = cost;
-    table.add({std::to_string(candidate_count(length, kPoints)), fixed(facilities, 1),
+    table.add({std::to_string(candidate_count(effort, kPoints)), fixed(facilities, 1),
                fixed(cost, 1), full ? "[187]" : "[194.6]",
                full ? "-" : percent(cost / full_cost - 1.0), full ? "[-]" : "[4 %]",
                fixed(wrong, 1), percent(wrong / static_cast<double>(kPoints), 2)});

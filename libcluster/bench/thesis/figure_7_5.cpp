@@ -99,7 +99,7 @@ void figure_7_5(Setting& setting) {
     Histogram& histogram = histograms[order];
     StreamOptions options;
     options.block = block;
-    options.length = SearchLength::log10_full;
+    options.effort = Effort::fine;
     StreamClustering stream(options, [&](const StreamBlock& b) { histogram.add(b); });
     run(*set, {&stream, 1});
     table.add({names[order], fixed(stream.seconds(), 2), grouped(histogram.clusters),

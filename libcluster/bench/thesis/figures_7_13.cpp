@@ -5,9 +5,10 @@
 #include <array>
 #include <random>
 
+#include "facility/points/make_search.hpp"
 #include "sets.hpp"
 #include "tables.hpp"
-#include "terrace/cluster/point_search.hpp"
+#include "terrace/cluster/facility_location.hpp"
 
 namespace terrace::cluster::thesis {
 namespace {
@@ -17,7 +18,7 @@ constexpr std::size_t kBins = 50;
 
 /// Sums over the blocks, per bin of candidates.
 struct Course {
-  std::array<PointSearchStatistics, kBins> bins{};
+  std::array<SearchStatistics, kBins> bins{};
 };
 
 struct Blocks {
@@ -36,17 +37,18 @@ struct Blocks {
   }
 };
 
-Course follow(const Blocks& blocks, double facility_cost, GainStrategy strategy) {
+Course follow(const Blocks& blocks, double facility_cost, FacilityStrategy strategy) {
   Course course;
   std::uint64_t seed = 0;
   for (const auto& points : blocks.blocks) {
     std::mt19937_64 random(++seed);
-    PointSearch search({.points = points, .facility_cost = facility_cost}, strategy);
-    search.start(random);
-    PointSearchStatistics before = search.statistics();
-    for (PointSearchStatistics& bin : course.bins) {
-      (void)search.improve(blocks.per_bin, random);
-      const PointSearchStatistics now = search.statistics();
+    const auto search =
+        make_search(FacilityPoints{.points = points, .facility_cost = facility_cost}, strategy);
+    search->start(random);
+    SearchStatistics before = search->statistics();
+    for (SearchStatistics& bin : course.bins) {
+      (void)search->improve(blocks.per_bin, random);
+      const SearchStatistics now = search->statistics();
       bin.candidates += now.candidates - before.candidates;
       bin.positive += now.positive - before.positive;
       bin.inspected += now.inspected - before.inspected;
@@ -57,7 +59,7 @@ Course follow(const Blocks& blocks, double facility_cost, GainStrategy strategy)
   return course;
 }
 
-using Share = double (PointSearchStatistics::*)() const;
+using Share = double (SearchStatistics::*)() const;
 
 /// One curve for each facility cost: a table of five stages and, to plot, all bins.
 void report_courses(Setting& setting, const std::string& name, const std::string& title,
@@ -94,7 +96,7 @@ void report_courses(Setting& setting, const std::string& name, const std::string
   setting.report.plot(name, plot);
 }
 
-std::array<Course, kCosts.size()> all_courses(const Blocks& blocks, GainStrategy strategy) {
+std::array<Course, kCosts.size()> all_courses(const Blocks& blocks, FacilityStrategy strategy) {
   std::array<Course, kCosts.size()> courses;
   for (std::size_t c = 0; c < kCosts.size(); ++c) courses[c] = follow(blocks, kCosts[c], strategy);
   return courses;
@@ -115,20 +117,21 @@ void figure_7_13(Setting& setting) {
                      ".\nThe thesis: all positive at first, fewer later, especially for great "
                      "facility costs.",
                  "Share of positive gains (figure 7.13)",
-                 all_courses(blocks, GainStrategy::facilities), blocks.per_bin,
-                 &PointSearchStatistics::positive_share);
+                 all_courses(blocks, FacilityStrategy::facilities), blocks.per_bin,
+                 &SearchStatistics::positive_share);
 }
 
 void figure_7_14(Setting& setting) {
   const Blocks blocks(setting);
-  for (const GainStrategy strategy : {GainStrategy::facilities, GainStrategy::kd_tree}) {
+  for (const FacilityStrategy strategy :
+       {FacilityStrategy::facilities, FacilityStrategy::kd_tree}) {
     const std::string name = name_of(strategy);
     report_courses(
         setting, "figure-7.14-" + name,
         "Figure 7.14, " + name + ": share of clients and facilities inspected. " + sample(blocks) +
             ".\nThe thesis: more at first, less for small facility costs.",
         "Share of vertices inspected, " + name + " (figure 7.14)", all_courses(blocks, strategy),
-        blocks.per_bin, &PointSearchStatistics::inspected_share);
+        blocks.per_bin, &SearchStatistics::inspected_share);
   }
 }
 

@@ -65,15 +65,15 @@ void StreamClustering::cluster(std::size_t level) {
     for (double& w : weights_) w *= static_cast<double>(weights_.size()) / sum;
     problem.weights = weights_;
   }
-  PointSearchOptions search;
+  FacilityOptions search;
   search.strategy = options_.strategy;
-  search.length = options_.length;
+  search.effort = options_.effort;
   search.seed = (levels_[level].blocks++ << 8) + level + 1;
   search.batch = options_.batch;
   search.threads = options_.threads;
 
   const auto start = std::chrono::steady_clock::now();
-  const FacilitySolution solution = search_points(problem, search);
+  const FacilitySolution solution = solve(problem, search);
   seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
   if (level == 0) {

@@ -8,8 +8,7 @@
 #include <vector>
 
 #include "sets.hpp"
-#include "terrace/cluster/facility.hpp"
-#include "terrace/cluster/point_search.hpp"
+#include "terrace/cluster/facility_location.hpp"
 
 /// The thesis's clustering of data streams (4.3, 7.1) as it stands there, on one block at a time;
 /// HierarchyBuilder is what this library makes of it.
@@ -19,8 +18,8 @@ namespace terrace::cluster::thesis {
 struct StreamOptions {
   std::size_t block = 10'000;  ///< points clustered together (m)
   double facility_cost = 1.0;  ///< times the diagonal of the block
-  GainStrategy strategy = GainStrategy::facilities;
-  SearchLength length = SearchLength::tenth;
+  FacilityStrategy strategy = FacilityStrategy::facilities;
+  Effort effort = Effort::standard;
   std::size_t batch = 1;
   unsigned threads = 1;
 };

@@ -5,9 +5,10 @@
 #include <random>
 #include <vector>
 
+#include "facility/points/make_search.hpp"
 #include "sets.hpp"
 #include "tables.hpp"
-#include "terrace/cluster/point_search.hpp"
+#include "terrace/cluster/facility_location.hpp"
 
 namespace terrace::cluster::thesis {
 namespace {
@@ -22,17 +23,17 @@ Times search(std::span<const Point3> points) {
   const auto begin = Clock::now();
   Times times;
   std::mt19937_64 random(1);
-  PointSearch search({.points = points}, GainStrategy::full_scan);
-  search.start(random);
+  const auto search = make_search(FacilityPoints{.points = points}, FacilityStrategy::full_scan);
+  search->start(random);
   auto last = Clock::now();
   times.start = seconds(last - begin);
-  const std::size_t candidates = candidate_count(SearchLength::tenth, points.size());
+  const std::size_t candidates = candidate_count(Effort::standard, points.size());
   for (std::size_t k = 0; k < candidates; ++k) {
     const auto candidate = static_cast<std::uint32_t>(random() % points.size());
-    const bool better = search.gain(candidate) > 0.0;
+    const bool better = search->gain(candidate) > 0.0;
     const auto judged = Clock::now();
     times.gains += seconds(judged - last);
-    if (better) search.open(candidate);
+    if (better) search->open(candidate);
     last = Clock::now();
     times.reassignments += seconds(last - judged);
   }

@@ -9,9 +9,9 @@
 namespace terrace::cluster::thesis {
 namespace {
 
-constexpr std::array kStrategies{GainStrategy::full_scan,  GainStrategy::quadtree,
-                                 GainStrategy::octree,     GainStrategy::kd_tree,
-                                 GainStrategy::facilities, GainStrategy::fast};
+constexpr std::array kStrategies{FacilityStrategy::full_scan,  FacilityStrategy::quadtree,
+                                 FacilityStrategy::octree,     FacilityStrategy::kd_tree,
+                                 FacilityStrategy::facilities, FacilityStrategy::fast};
 constexpr std::size_t kExact = 5;  // all but the last give the same solution
 
 struct ThesisRow {
@@ -43,7 +43,7 @@ void table_7_6(Setting& setting) {
     const NamedSet& named = large_sets()[i];
     const auto set = named.make(setting.points(named.thesis_points));
     std::vector<StreamClustering> streams;
-    for (const GainStrategy strategy : kStrategies) {
+    for (const FacilityStrategy strategy : kStrategies) {
       StreamOptions options;
       options.block = block;
       options.facility_cost = 2.0;

@@ -9,8 +9,7 @@
 #include "../../tests/linkage_laws.hpp"
 #include "sets.hpp"
 #include "tables.hpp"
-#include "terrace/cluster/complete_linkage.hpp"
-#include "terrace/cluster/cuda_linkage.hpp"
+#include "terrace/cluster/linkage.hpp"
 
 namespace terrace::cluster::thesis {
 namespace {
@@ -69,7 +68,7 @@ void table_7_8(Setting& setting) {
     make_scan(count, count)->read(0, points);
 
     Dendrogram one, many, device;
-    CompleteLinkageOptions options;
+    LinkageOptions options;
     options.entry = MatrixEntry::float32;
     const double one_time = shortest([&] { return complete_linkage(points, options); }, one);
     options.threads = setting.threads;
@@ -88,7 +87,7 @@ void table_7_8(Setting& setting) {
                                  quoted(thesis.saved)};
     if (cuda.available) {
       const double gpu_time =
-          shortest([&] { return cuda_complete_linkage(points, {.entry = options.entry}); }, device);
+          shortest([&] { return cuda_complete_linkage(points, options.entry); }, device);
       // Not necessarily the processor's dendrogram: floats are equal now and then.
       check(device, distances, "on the GPU");
       row[5] = fixed(1e3 * gpu_time, 2);

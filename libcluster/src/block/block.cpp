@@ -10,8 +10,8 @@
 #include "block/engine.hpp"
 #include "block/exact_finish.hpp"
 #include "block/linear_block.hpp"
+#include "facility/points/make_search.hpp"
 #include "scaling.hpp"
-#include "terrace/cluster/local_search.hpp"
 
 namespace terrace::cluster {
 namespace {
@@ -80,8 +80,7 @@ SearchPlan plan_of(const BlockOptions& options, std::size_t count) {
       plan.polish = 3;
       break;
     case Effort::full:
-      plan.random_candidates =
-          static_cast<std::uint32_t>(candidate_count(SearchLength::log2_full, count));
+      plan.random_candidates = static_cast<std::uint32_t>(candidate_count(Effort::full, count));
       plan.polish = 3;
       break;
   }

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "facility/search_frame.hpp"
+#include "facility/points/search_frame.hpp"
 #include "scaling.hpp"
 
 namespace terrace::cluster {

@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "terrace/cluster/block.hpp"
-#include "terrace/cluster/facility.hpp"
+#include "terrace/cluster/facility_location.hpp"
 
 namespace terrace::cluster {
 

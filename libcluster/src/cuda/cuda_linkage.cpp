@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "terrace/cluster/cuda_linkage.hpp"
-
 #include <stdexcept>
 
 #include "linkage/linkage_points.hpp"
+#include "terrace/cluster/linkage.hpp"
 
 #ifdef TERRACE_CLUSTER_CUDA
 #include "cuda/cuda_rounds.hpp"
@@ -35,11 +34,10 @@ CudaStatus cuda_available() {
               "): cluster on the CPU, or see to the GPU and its driver"};
 }
 
-Dendrogram cuda_complete_linkage(std::span<const Point3> points,
-                                 const CudaLinkageOptions& options) {
+Dendrogram cuda_complete_linkage(std::span<const Point3> points, MatrixEntry entry) {
   return device::dendrogram_of(checked(points), [&](std::span<const Point3> ordered) {
-    return options.entry == MatrixEntry::float32 ? device::cuda_complete_rounds<float>(ordered)
-                                                 : device::cuda_complete_rounds<double>(ordered);
+    return entry == MatrixEntry::float32 ? device::cuda_complete_rounds<float>(ordered)
+                                         : device::cuda_complete_rounds<double>(ordered);
   });
 }
 
@@ -59,7 +57,7 @@ CudaStatus cuda_available() {
 }
 
 // Without a device checked() throws.
-Dendrogram cuda_complete_linkage(std::span<const Point3> points, const CudaLinkageOptions&) {
+Dendrogram cuda_complete_linkage(std::span<const Point3> points, MatrixEntry) {
   (void)checked(points);
   return {};
 }

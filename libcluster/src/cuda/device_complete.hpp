@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "cuda/device_compact.hpp"
+#include "cuda/device_band.hpp"
 #include "terrace/cluster/point.hpp"
 
 /// Complete linkage in rounds on a device (see device_primitives.hpp). All but the loop over the

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "terrace/cluster/band_index.hpp"
+#include "terrace/cluster/band_matrix.hpp"
 
 /// What kernels are written with. A kernel is a function object whose body is plain code marked
 /// TERRACE_CLUSTER_HOST_DEVICE, and a *device* runs it once for each index, in any order and all at

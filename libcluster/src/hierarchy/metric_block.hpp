@@ -16,7 +16,7 @@ class MetricBlockClusterer {
   MetricBlockClusterer(std::vector<double> channel_weights, SimdPath path);
 
   /// points: on the ground. channels: row by row. The costs in `result` are not filled in.
-  /// Throws: std::invalid_argument on a distance of a custom metric that is none.
+  /// Throws: std::invalid_argument on a distance of a custom metric that is negative or not finite.
   void run(const Metric& metric, std::span<const Point3> points, std::span<const double> weights,
            std::span<const double> channels, const BlockOptions& options, BlockClustering& result);
 

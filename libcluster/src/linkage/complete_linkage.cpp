@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "terrace/cluster/complete_linkage.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -11,6 +9,7 @@
 #include "linkage/complete_rounds.hpp"
 #include "linkage/linkage_points.hpp"
 #include "linkage/linkage_tree.hpp"
+#include "terrace/cluster/linkage.hpp"
 
 namespace terrace::cluster {
 namespace {
@@ -52,7 +51,7 @@ void check_distance(double value, double most, std::size_t i, std::size_t j) {
 }
 
 template <class T>
-Dendrogram of_points(std::span<const Point3> points, const CompleteLinkageOptions& options) {
+Dendrogram of_points(std::span<const Point3> points, const LinkageOptions& options) {
   const LinkageKernels<T>& kernels = kernels_of<T>(options.path);
   const LinkagePoints linkage_points(points);
   BandMatrix<T> matrix(points.size(), options.memory_limit);
@@ -116,7 +115,7 @@ void order_by_distance(std::span<std::uint32_t> things, const PairDistance& dist
 
 template <class T>
 Dendrogram of_function(std::size_t count, const PairDistance& distance,
-                       const CompleteLinkageOptions& options) {
+                       const LinkageOptions& options) {
   const LinkageKernels<T>& kernels = kernels_of<T>(options.path);
   BandMatrix<T> matrix(count, options.memory_limit);
   const auto checked = [&](std::uint32_t i, std::uint32_t j) {
@@ -142,19 +141,19 @@ Dendrogram of_function(std::size_t count, const PairDistance& distance,
 
 }  // namespace
 
-Dendrogram complete_linkage(std::span<const Point3> points, const CompleteLinkageOptions& options) {
+Dendrogram complete_linkage(std::span<const Point3> points, const LinkageOptions& options) {
   return options.entry == MatrixEntry::float32 ? of_points<float>(points, options)
                                                : of_points<double>(points, options);
 }
 
 Dendrogram complete_linkage(std::size_t count, const PairDistance& distance,
-                            const CompleteLinkageOptions& options) {
+                            const LinkageOptions& options) {
   return options.entry == MatrixEntry::float32 ? of_function<float>(count, distance, options)
                                                : of_function<double>(count, distance, options);
 }
 
 template <class T>
-Dendrogram complete_linkage(BandMatrix<T>&& distances, const CompleteLinkageOptions& options) {
+Dendrogram complete_linkage(BandMatrix<T>&& distances, const LinkageOptions& options) {
   const std::size_t n = distances.size();
   for (std::size_t i = 0; n % 2 == 0 && i < n / 2; ++i) {
     const std::size_t j = i + n / 2;
@@ -172,7 +171,7 @@ Dendrogram complete_linkage(BandMatrix<T>&& distances, const CompleteLinkageOpti
   return make_dendrogram(n, links);
 }
 
-template Dendrogram complete_linkage(BandMatrix<float>&&, const CompleteLinkageOptions&);
-template Dendrogram complete_linkage(BandMatrix<double>&&, const CompleteLinkageOptions&);
+template Dendrogram complete_linkage(BandMatrix<float>&&, const LinkageOptions&);
+template Dendrogram complete_linkage(BandMatrix<double>&&, const LinkageOptions&);
 
 }  // namespace terrace::cluster

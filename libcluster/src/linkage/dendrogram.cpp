@@ -79,7 +79,7 @@ Dendrogram make_dendrogram(std::size_t points, std::span<const Link> links) {
       throw std::invalid_argument("link " + std::to_string(r) + " of " + text_of(link) + " " +
                                   what);
     };
-    if (link.i >= points || link.j >= points) fail("names a point that there is not");
+    if (link.i >= points || link.j >= points) fail("names a point that does not exist");
     if (!(link.height >= 0.0)) fail("has a height that is negative or not a number");
   }
   Dendrogram dendrogram{.points = points, .merges = {}};
@@ -136,7 +136,7 @@ std::string dendrogram_fault(const Dendrogram& dendrogram) {
     const Merge& merge = dendrogram.merges[r];
     const std::string row = "row " + std::to_string(r) + ": ";
     if (!(merge.a < merge.b)) return row + "a is not below b";
-    if (merge.b >= n + r) return row + "a cluster that there is not yet";
+    if (merge.b >= n + r) return row + "a cluster that does not exist yet";
     if (merged[merge.a] || merged[merge.b]) return row + "a cluster that is merged already";
     merged[merge.a] = merged[merge.b] = true;
     if (merge.size != size_of(merge.a) + size_of(merge.b)) return row + "the size is wrong";

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "terrace/cluster/single_linkage.hpp"
-
 #include <algorithm>
 #include <bit>
 #include <stdexcept>
@@ -10,6 +8,7 @@
 #include "linkage/linkage_tree.hpp"
 #include "linkage/spanning_tree.hpp"
 #include "linkage/union_find.hpp"
+#include "terrace/cluster/linkage.hpp"
 
 namespace terrace::cluster {
 namespace {
@@ -47,8 +46,7 @@ std::vector<std::uint32_t> distinct(const std::vector<Point3>& points, std::vect
 
 }  // namespace
 
-std::vector<Link> spanning_tree(std::span<const Point3> points,
-                                const SingleLinkageOptions& options) {
+std::vector<Link> spanning_tree(std::span<const Point3> points, const LinkageOptions& options) {
   const LinkagePoints linkage_points(points);
   std::vector<Link> links;
   if (points.size() < 2) return links;
@@ -64,7 +62,7 @@ std::vector<Link> spanning_tree(std::span<const Point3> points,
   return links;
 }
 
-Dendrogram single_linkage(std::span<const Point3> points, const SingleLinkageOptions& options) {
+Dendrogram single_linkage(std::span<const Point3> points, const LinkageOptions& options) {
   return make_dendrogram(points.size(), spanning_tree(points, options));
 }
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include <CLI/CLI.hpp>
-#include <terrace/cluster/cuda_linkage.hpp>
+#include <terrace/cluster/linkage.hpp>
 
 #include "base/units.hpp"
 #include "cli/interrupt.hpp"

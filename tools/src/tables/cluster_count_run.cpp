@@ -63,7 +63,7 @@ ClusterOutcome cluster_by_k_median(const ClusterRequest& request, const Facility
   ClusterOutcome outcome;
   take(outcome, cluster::k_median(problem, request.k,
                                   {.restarts = static_cast<std::uint32_t>(request.restarts),
-                                   .bound_iterations = steps,
+                                   .bound_steps = steps,
                                    .seed = request.seed,
                                    .threads = request.threads}));
   outcome.opening_cost.reset();

@@ -4,10 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include <terrace/cluster/lower_bound.hpp>
-#include <terrace/cluster/point_matrix.hpp>
-#include <terrace/cluster/point_search.hpp>
-#include <terrace/cluster/primal_dual.hpp>
+#include <terrace/cluster/facility_location.hpp>
 
 #include "base/units.hpp"
 #include "tables/cluster_methods.hpp"
@@ -18,17 +15,18 @@ using namespace terrain;
 
 using cluster::FacilityPoints;
 using cluster::FacilitySolution;
+using cluster::FacilityStrategy;
 
 namespace {
 
-constexpr std::array<std::pair<const char*, cluster::GainStrategy>, 7> kStrategies{
-    {{"automatic", cluster::GainStrategy::automatic},
-     {"fast", cluster::GainStrategy::fast},
-     {"full-scan", cluster::GainStrategy::full_scan},
-     {"quadtree", cluster::GainStrategy::quadtree},
-     {"octree", cluster::GainStrategy::octree},
-     {"kd-tree", cluster::GainStrategy::kd_tree},
-     {"facilities", cluster::GainStrategy::facilities}}};
+constexpr std::array<std::pair<const char*, FacilityStrategy>, 7> kStrategies{
+    {{"automatic", FacilityStrategy::automatic},
+     {"fast", FacilityStrategy::fast},
+     {"full-scan", FacilityStrategy::full_scan},
+     {"quadtree", FacilityStrategy::quadtree},
+     {"octree", FacilityStrategy::octree},
+     {"kd-tree", FacilityStrategy::kd_tree},
+     {"facilities", FacilityStrategy::facilities}}};
 
 /// Steps towards the lower bound: as many as were asked for, else what takes seconds, as a step
 /// looks at some clusters' worth of points around each point.
@@ -44,45 +42,33 @@ double bound_of(const ClusterRequest& request, const FacilityPoints& problem,
                                           static_cast<double>(solution.facilities.size()));
   if (steps == 0) return 0.0;
   cluster::LowerBoundOptions options;
-  options.iterations = steps;
+  options.steps = steps;
   options.threads = request.threads;
-  options.progress = [&](std::uint32_t done, std::uint32_t total) {
+  options.progress = [&](std::size_t done, std::size_t total) {
     progress(static_cast<double>(done) / static_cast<double>(total));
     return true;
   };
   return cluster::lower_bound(problem, solution, options).lower_bound;
 }
 
-cluster::SearchLength length_of(cluster::Effort effort) {
-  switch (effort) {
-    case cluster::Effort::fast:
-    case cluster::Effort::standard:
-      return cluster::SearchLength::tenth;
-    case cluster::Effort::fine:
-      return cluster::SearchLength::log10_full;
-    case cluster::Effort::full:
-      break;
-  }
-  return cluster::SearchLength::log2_full;
-}
-
 }  // namespace
 
 ClusterOutcome cluster_by_facilities(const ClusterRequest& request, const FacilityPoints& problem,
                                      const ClusterProgress& progress) {
-  cluster::PointSearchOptions options;
+  cluster::FacilityOptions options;
   for (const auto& [name, strategy] : kStrategies) {
     if (request.strategy == name) options.strategy = strategy;
   }
-  options.length = length_of(request.effort);
+  // In this command `fast` means as much as `default`: on one block it would save milliseconds.
+  options.effort = std::max(request.effort, cluster::Effort::standard);
   if (request.iterations == "tenth") {
-    options.length = cluster::SearchLength::tenth;
+    options.effort = cluster::Effort::standard;
   } else if (request.iterations == "log10") {
-    options.length = cluster::SearchLength::log10_full;
+    options.effort = cluster::Effort::fine;
   } else if (request.iterations == "log2") {
-    options.length = cluster::SearchLength::log2_full;
+    options.effort = cluster::Effort::full;
   } else if (!request.iterations.empty()) {
-    options.iterations = parse_count(request.iterations);
+    options.steps = parse_count(request.iterations);
   }
   options.seed = request.seed;
   options.threads = request.threads;
@@ -97,9 +83,9 @@ ClusterOutcome cluster_by_facilities(const ClusterRequest& request, const Facili
   if (request.strategy == "automatic" && request.iterations.empty() && request.batch == 1 &&
       problem.channels.size() == 0 && std::isinf(problem.outlier_price) &&
       problem.points.size() < kFastPoints && mapped(problem)) {
-    options.strategy = cluster::GainStrategy::fast;
+    options.strategy = FacilityStrategy::fast;
   }
-  FacilitySolution solution = cluster::search_points(problem, options);
+  FacilitySolution solution = cluster::solve(problem, options);
   progress(1.0);
   solution.lower_bound = bound_of(request, problem, solution, progress);
   ClusterOutcome outcome;
@@ -110,9 +96,9 @@ ClusterOutcome cluster_by_facilities(const ClusterRequest& request, const Facili
 ClusterOutcome cluster_by_growth(const ClusterRequest& request, const FacilityPoints& problem,
                                  const ClusterProgress& progress) {
   // Beside the matrix the growth keeps the clients sorted by facility, half as much again.
-  const cluster::PointMatrix matrix = cluster::point_matrix(problem, request.memory_bytes / 3 * 2);
-  cluster::PrimalDual grown = cluster::greedy_stars(matrix.view());
-  FacilitySolution& solution = grown.solution;
+  FacilitySolution solution = cluster::solve(
+      problem,
+      {.strategy = FacilityStrategy::greedy_stars, .memory_limit = request.memory_bytes / 3 * 2});
   solution.lower_bound =
       std::max(solution.lower_bound, bound_of(request, problem, solution, progress));
   ClusterOutcome outcome;

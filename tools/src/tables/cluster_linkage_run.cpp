@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
 
-#include <terrace/cluster/complete_linkage.hpp>
-#include <terrace/cluster/cuda_linkage.hpp>
-#include <terrace/cluster/single_linkage.hpp>
+#include <terrace/cluster/linkage.hpp>
 
 #include "tables/cluster_methods.hpp"
 #include "terrace/terrain/error.hpp"
@@ -19,7 +17,7 @@ namespace {
 
 cluster::Dendrogram complete_tree(const ClusterRequest& request, const FacilityPoints& problem,
                                   const std::optional<std::vector<Point3>>& points) {
-  cluster::CompleteLinkageOptions options;
+  cluster::LinkageOptions options;
   options.threads = request.threads;
   options.entry =
       request.single_precision ? cluster::MatrixEntry::float32 : cluster::MatrixEntry::float64;
@@ -27,7 +25,7 @@ cluster::Dendrogram complete_tree(const ClusterRequest& request, const FacilityP
   if (points) return cluster::complete_linkage(*points, options);
   if (!cluster::is_symmetric(problem.metric)) {
     throw UsageError(
-        "--method complete needs a symmetric metric: a field of ellipses is none "
+        "--method complete needs a symmetric metric: a field of ellipses is not symmetric "
         "(the points lie in several of its regions)");
   }
   return cluster::complete_linkage(
@@ -51,9 +49,9 @@ ClusterOutcome cluster_by_linkage(const ClusterRequest& request, const FacilityP
     if (!points) throw UsageError("--device cuda takes --metric euclidean or elliptical");
     outcome.dendrogram =
         single ? cluster::cuda_single_linkage(*points)
-               : cluster::cuda_complete_linkage(
-                     *points, {.entry = request.single_precision ? cluster::MatrixEntry::float32
-                                                                 : cluster::MatrixEntry::float64});
+               : cluster::cuda_complete_linkage(*points, request.single_precision
+                                                             ? cluster::MatrixEntry::float32
+                                                             : cluster::MatrixEntry::float64);
   } else if (!single) {
     outcome.dendrogram = complete_tree(request, problem, points);
   } else if (points) {

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include <terrace/cluster/facility.hpp>
+#include <terrace/cluster/facility_location.hpp>
 
 #include "tables/cluster_run.hpp"
 

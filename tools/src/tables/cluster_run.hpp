@@ -10,7 +10,7 @@
 
 #include <terrace/cluster/block.hpp>
 #include <terrace/cluster/dendrogram.hpp>
-#include <terrace/cluster/facility.hpp>
+#include <terrace/cluster/facility_location.hpp>
 
 namespace terrace::tools {
 

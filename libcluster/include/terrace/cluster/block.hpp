@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "terrace/cluster/effort.hpp"
 #include "terrace/cluster/point.hpp"
 
 /// Facility location on one block of points: choose representatives (facilities) among the points
@@ -17,23 +18,14 @@
 /// Source: J. Skála, Algorithms for manipulating large geometric data, 4.2.3, 7.1, 7.3. Departs
 /// from it in: the start (equal distances along a space-filling curve instead of Meyerson's),
 /// candidates along that curve instead of random ones, facilities moved to the median of their
-/// clients, an exact last assignment. The thesis's own search is in local_search.hpp.
+/// clients, an exact last assignment. The thesis's own search is in facility_location.hpp.
 
 namespace terrace::cluster {
-
-/// How long to search. Costs are means over blocks of m = 10 000 points relative to the thesis's
-/// full search, m ceil(log10 m) candidates: the first figure for surfaces, the other for volumes.
-enum class Effort : std::uint8_t {
-  fast,      ///< a candidate per 32 points or more; 1.2 to 2.9 % above
-  standard,  ///< and moves and assigns twice; 0.8 to 2.3 % above
-  fine,      ///< three sweeps of one per 16 points; 0.4 to 1.2 % above
-  full,      ///< m ceil(log2 m) candidates at random, 3.5 times the thesis's; equal within 0.1 %
-};
 
 struct BlockOptions {
   double facility_cost = 1.0;  ///< positive; times the diagonal of the bounding box
   Effort effort = Effort::standard;
-  std::uint64_t seed = 1;  ///< of Effort::full; the others try no random candidates
+  std::uint64_t seed = 1;  ///< only Effort::full tries random candidates
 };
 
 /// Facilities in the order of their cluster numbers, which is the order of a space-filling curve:
@@ -41,7 +33,7 @@ struct BlockOptions {
 /// the facility of a cluster is assigned to itself.
 /// Every point is assigned to the nearest facility (a weight multiplies all its distances alike),
 /// as computed in single precision in the unit of the block's box: another facility may be nearer
-/// by a millionth of the diagonal at most. Among equals, duplicates included, the lowest number
+/// by at most a millionth of the diagonal. Among equals, duplicates included, the lowest number
 /// wins.
 struct BlockClustering {
   std::vector<std::uint32_t> facilities;
@@ -73,7 +65,7 @@ class BlockClusterer {
   /// weights: n positive finite numbers, or empty for 1 each. They multiply distances.
   /// Blocks of fewer than 2500 points get Effort::full whatever the options say (a reduced search
   /// is up to 30 % off there, thesis table 7.5). Requires n < 2^24. n = 0 gives an empty result.
-  /// Costs are infinite where they exceed the range of double; the clustering is right even so.
+  /// Costs are infinite where they exceed the range of double; the clustering is correct even then.
   /// Time: for blocks of 10 000 points at standard effort and with AVX-512, 0.05 to 0.1 us a point;
   /// O(n k) for large n. Memory: about 140 bytes a point, kept for the next block.
   void run(std::span<const Point3> points, std::span<const double> weights,

@@ -10,15 +10,14 @@
 #include <vector>
 
 #include "terrace/cluster/block.hpp"
-#include "terrace/cluster/bounds.hpp"
 #include "terrace/cluster/metric.hpp"
 #include "terrace/cluster/point.hpp"
 
-/// The streaming cluster hierarchy: one pass over points of any number in constant memory, by
-/// divide and conquer over blocks, every level kept. Source: J. Skála, Algorithms for manipulating
-/// large geometric data, 4.3, 7.1.2, 7.2. Departs from it in: blocks are clustered in parallel;
-/// distances are ground distances, under any metric; a level that fits one block becomes the top
-/// without being clustered; a facility cost that is too low to reduce a block is raised.
+/// The streaming cluster hierarchy: one pass over any number of points in constant memory, by
+/// divide and conquer over blocks; every level is kept. Source: J. Skála, Algorithms for
+/// manipulating large geometric data, 4.3, 7.1.2, 7.2. Departs from it in: blocks are clustered in
+/// parallel; distances are ground distances, under any metric; a level that fits one block becomes
+/// the top without being clustered; a facility cost that is too low to reduce a block is raised.
 ///
 /// Points come to level 0. Each block of a level is clustered on its own; the representative of
 /// each cluster, an input point, goes on to the level above, where it heads that cluster. So every
@@ -44,13 +43,13 @@ struct Summary {
   friend bool operator==(const Summary&, const Summary&) = default;
 };
 
-/// Stands for the representative that the root does not have.
+/// In place of a representative, which the root does not have.
 inline constexpr std::uint32_t kNoRepresentative = 0xffffffff;
 
 /// A finished block as the sink sees it. Points are numbered within the block. Cluster c has the
 /// points order[first[c]] ... order[first[c + 1] - 1], representative among them, in ascending
 /// number. children has `level` ordinals per point: the clusters that it heads on levels 0, 1, ...
-/// The spans are good until the call returns.
+/// The spans are valid until the call returns.
 struct FinishedBlock {
   unsigned level = 0;
   std::uint64_t block = 0;  ///< ordinal of the block on its level
@@ -94,32 +93,32 @@ struct PayloadChannels {
 
 struct HierarchyOptions {
   std::size_t block_size = 10000;  ///< most points clustered together; 2 to 2^24 - 1
-  /// Each block has a seed of its own, mixed from this one, its level and its ordinal. Of the
-  /// points of a block at most half, rounded up, become representatives, else there might be no
-  /// end to the levels: where the facility cost is too low for that, it is raised for that block.
+  /// Each block has a seed of its own, mixed from this one, its level and its ordinal. At most half
+  /// of a block's points, rounded up, become representatives; otherwise the levels might never end.
+  /// Where the facility cost is too low for that, it is raised for that block.
   BlockOptions block;
-  /// How the block is clustered: on the ground, after `ground`; the boxes of a field are in that
-  /// frame. Where it is linear in the box of a block (Euclidean, elliptical, a field with one
-  /// region there) and there are no channels, the blocks are clustered as by BlockClusterer. Else
-  /// by search_points() with the strategy `automatic`: Effort::fast and standard try 0.1 m
-  /// candidates, fine m ceil(log10 m), full m ceil(log2 m), and blocks of fewer than 2500 points at
-  /// least m ceil(log10 m); clusters are then in the order of their representatives. That is ten to
-  /// a hundred times slower. Summary::error stays a ground distance, the Euclidean one.
+  /// Distances on the ground, after `ground`; the boxes of a field are in that frame. Where the
+  /// metric is linear in the box of a block (Euclidean, elliptical, a field with one region there)
+  /// and there are no channels, the block is clustered as by BlockClusterer. Otherwise it is
+  /// clustered by the local search of solve() in facility_location.hpp, of the effort that `block`
+  /// says, blocks of fewer than 2500 points with Effort::fine at least; clusters are then in the
+  /// order of their representatives. That is ten to a hundred times slower. Summary::error stays a
+  /// ground distance, the Euclidean one.
   Metric metric = Euclidean{};
-  /// In place of `metric`: the one for a block with these bounds, for a field where `ground`
-  /// depends on the block and so the frame that the boxes are in. Called from any thread.
+  /// In place of `metric`: the metric for a block with these bounds. A field needs it where
+  /// `ground` depends on the block, as does the frame of the boxes then. Called from any thread.
   std::function<Metric(const Bounds&)> metric_of;
-  PayloadChannels channels;      ///< none: position alone
+  PayloadChannels channels;      ///< empty: position alone
   std::size_t payload_size = 0;  ///< bytes that travel with each point
   /// Threads that work, the caller's included: it clusters blocks while it would have to wait. Any
-  /// number gives the same hierarchy; 1 (or 0) does all in the caller's thread and makes none.
+  /// number gives the same hierarchy; 1 (or 0) does everything in the caller's thread.
   unsigned threads = 1;
   /// The ground map for a block with these bounds; empty: the identity. Called from any thread.
   std::function<GroundMap(const Bounds&)> ground;
   SimdPath simd = SimdPath::automatic;
-  /// Called once when the work has failed, from the thread where it did: for an owner who waits for
-  /// input meanwhile and would see the exception only in the next push(). Must not throw nor call
-  /// the builder.
+  /// Called once when the work has failed, from the thread in which it failed: for an owner who is
+  /// waiting for input and would see the exception only in the next push(). Must neither throw nor
+  /// call the builder.
   std::function<void()> on_failure;
 };
 
@@ -139,16 +138,16 @@ class HierarchyBuilder {
   /// Throws: std::invalid_argument if block_size, facility_cost, the metric or a channel's weight
   /// is out of range, channels have no function, or the SIMD path is not available.
   HierarchyBuilder(HierarchyOptions options, HierarchySink& sink);
-  /// Stops without finishing: waits for the blocks that are being clustered at this moment; then
-  /// the sink gets no more calls.
+  /// Stops without finishing: waits for the blocks that are being clustered; then the sink gets no
+  /// more calls.
   ~HierarchyBuilder();
   HierarchyBuilder(const HierarchyBuilder&) = delete;
   HierarchyBuilder& operator=(const HierarchyBuilder&) = delete;
 
   /// Appends points. A batch that fits into one block is never torn: if it does not fit into what
-  /// is left of the present block, that block is closed first. (So tiles of a raster stay whole.) A
+  /// is left of the present block, that block is closed first, so tiles of a raster stay whole. A
   /// larger batch is a plain stream: it fills the present block, and is cut wherever one is full.
-  /// An empty batch only tells of failures.
+  /// An empty batch only reports failures.
   /// Throws: std::invalid_argument on a coordinate that is not finite, naming its index in the
   /// batch, and on a payload of another size than payload_size bytes per point (the builder is
   /// unchanged); what the sink or `ground` threw, and std::invalid_argument on a ground map that is

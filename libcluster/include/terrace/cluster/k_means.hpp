@@ -12,7 +12,7 @@
 ///     SSE = sum of weight(i) * |point i - its centre|^2.
 /// Lloyd's iteration (assign each point to the nearest centre, move each centre to the mean of its
 /// points) from seeds by k-means++ or from centres of the caller. Exact: a filter over a tree of
-/// boxes leaves out centres that can be nearest to no point of a box, and nothing else.
+/// boxes rules out only centres that cannot be nearest to any point of a box.
 /// Sources: S. Lloyd, Least squares quantization in PCM, IEEE Trans. Inf. Theory 28 (1982);
 /// D. Arthur, S. Vassilvitskii, k-means++: the advantages of careful seeding, SODA 2007;
 /// T. Kanungo et al., An efficient k-means clustering algorithm: analysis and implementation,
@@ -23,7 +23,7 @@ namespace terrace::cluster {
 struct KMeansOptions {
   std::size_t clusters = 8;          ///< k, from 1 to the number of points
   std::uint64_t seed = 1;            ///< of k-means++
-  std::size_t restarts = 1;          ///< runs from different seeds, of which the best counts
+  std::size_t restarts = 1;          ///< runs from different seeds; the best counts
   std::size_t max_iterations = 300;  ///< of each run; 0 only assigns
   /// A run ends when no centre moves by more than this share of the diagonal of the points'
   /// bounding box. 0: when no assignment changes.
@@ -36,7 +36,7 @@ struct KMeansResult {
   std::vector<std::uint32_t> assignment;  ///< of point i: the nearest centre, the lowest of equals
   double sse = 0.0;                       ///< in the square of the points' unit
   std::size_t iterations = 0;             ///< how often the points were assigned and centres moved
-  bool converged = false;                 ///< or else max_iterations ended it
+  bool converged = false;                 ///< false: max_iterations ended the run
 };
 
 /// points: n positions, finite, any offset and scale; 2D data has z = 0. n < 2^32.
@@ -50,7 +50,7 @@ struct KMeansResult {
 /// The result depends on points, their order, weights and options, but not on threads.
 /// Assignments equal those of plain Lloyd from the same centres; the centres do up to rounding, as
 /// the points of a box are added up once.
-/// Throws: std::invalid_argument if a point or weight is not as said (naming its index), k is 0 or
+/// Throws: std::invalid_argument if a point or weight is out of range (naming its index), k is 0 or
 /// above n, restarts is 0, or tolerance is negative or not a number.
 /// Time: O(n log n) once, then per iteration O(n) at worst about the borders of clusters and
 /// O(k) boxes inside them: 100 000 points in the plane and k = 100 take below a millisecond each.
@@ -59,7 +59,7 @@ struct KMeansResult {
                                    const KMeansOptions& options);
 
 /// The same from the given centres, at least one and at most n, finite. options.clusters, seed and
-/// restarts are without effect.
+/// restarts have no effect.
 [[nodiscard]] KMeansResult k_means_from(std::span<const Point3> centres,
                                         std::span<const Point3> points,
                                         std::span<const double> weights,

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "terrace/cluster/facility.hpp"
+#include "terrace/cluster/facility_location.hpp"
 
 /// k-median: exactly k facilities, which cost nothing, and the least sum of connection costs.
 /// As the original method of stream clustering had it, a binary search over the facility cost for a
@@ -20,8 +20,8 @@ struct KMedianOptions {
   /// Descents by exchanges: the first from what the binary search found, each further one from
   /// that with half of the facilities replaced at random. At least 1; the best counts.
   std::uint32_t restarts = 32;
-  /// Subgradient steps for lower_bound, each O(facilities * clients); 0: none is worked out.
-  std::uint32_t bound_iterations = 300;
+  /// Subgradient steps for lower_bound, each O(facilities * clients); 0: no bound.
+  std::uint32_t bound_steps = 300;
   std::uint64_t seed = 1;
   unsigned threads = 1;  ///< 0: one per core. Never changes the result.
 };
@@ -30,7 +30,7 @@ struct KMedianOptions {
 /// listed, if need be some without clients. No exchange of one of them for another improves the
 /// solution by more than rounding.
 /// Where no facility cost gives exactly k, the nearest number is brought to k greedily: the
-/// facility that spares most opens, or the one that is missed least closes.
+/// facility that saves most opens, or the one whose closing costs least closes.
 /// Cost: O(facilities * clients) per round of exchanges, some rounds per restart.
 /// Throws: std::invalid_argument as check() does, if k is 0 or above the number of facilities, or
 /// without restarts.
@@ -38,13 +38,13 @@ struct KMedianOptions {
                                         const KMedianOptions& options = {});
 
 /// The same for points. facility_cost is not read. Clients farther than outlier_price diagonals
-/// from all facilities are left out and pay that. Distances are worked out as they are needed, in
+/// from all facilities are left out and pay that. Distances are computed as they are needed, in
 /// O(points) memory: a round of exchanges takes points^2 of them, seconds for 20,000 points. Of
 /// large sets the binary search considers a random sample of at least 4 k places.
 /// A facility always serves itself. Throws: as above, and on a custom distance that is negative or
 /// not a number.
 [[nodiscard]] FacilitySolution k_median(const FacilityPoints& problem, std::size_t k,
                                         const KMedianOptions& options = {.restarts = 1,
-                                                                         .bound_iterations = 0});
+                                                                         .bound_steps = 0});
 
 }  // namespace terrace::cluster

@@ -9,7 +9,6 @@
 #include <variant>
 #include <vector>
 
-#include "terrace/cluster/bounds.hpp"
 #include "terrace/cluster/point.hpp"
 
 /// Distances between points. A distance is always measured *from a facility to a client*: in a
@@ -23,7 +22,7 @@ using LinearMap = std::array<double, 9>;
 
 inline constexpr LinearMap kIdentityMap{1, 0, 0, 0, 1, 0, 0, 0, 1};
 
-/// sqrt(sum of squares). The thesis's metric wherever it names none.
+/// sqrt(sum of squares). The thesis's metric wherever it does not name one.
 struct Euclidean {};
 
 /// The square of the Euclidean distance, what k-means sums. No triangle inequality.
@@ -128,8 +127,7 @@ void check(const Metric& metric);
 /// Columns of attributes beside the positions (colour, intensity, curvature), each with a weight
 /// that says how many ground units a unit of the attribute is worth. They add to the distance as
 /// further axes do: under the root for Euclidean and elliptical distances, to the sum of squares or
-/// of p-th powers for the others. What is symmetric or obeys the triangle inequality goes on to do
-/// so.
+/// of p-th powers for the others. Symmetry and the triangle inequality are kept.
 struct Channels {
   std::span<const double> values;   ///< points x weights.size(), row by row; finite
   std::span<const double> weights;  ///< one per channel; not negative, finite

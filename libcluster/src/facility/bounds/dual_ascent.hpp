@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "facility/matrix/client_order.hpp"
+
+namespace terrace::cluster {
+
+/// Erlenkotter's procedure: feasible duals under improvement.
+class DualAscent {
+ public:
+  /// Begins with the least cost of each client. O(facilities * clients).
+  DualAscent(const ClientOrder& order, std::span<const double> opening);
+
+  /// Raises the duals of these clients in turn until none can be raised.
+  void raise(std::span<const std::uint32_t> clients);
+  /// One round of dual adjustment. Returns whether the sum of the duals has grown.
+  bool adjust();
+
+  [[nodiscard]] const std::vector<double>& duals() const { return duals_; }
+  [[nodiscard]] double total() const;
+
+ private:
+  struct State {
+    std::vector<double> duals, slack;
+    std::vector<std::uint32_t> reach;
+  };
+
+  bool raise_one(std::uint32_t client);
+  void lower_one(std::uint32_t client);
+  void find_support();
+  [[nodiscard]] std::uint32_t payments(std::uint32_t client, std::uint32_t (&two)[2]) const;
+
+  const ClientOrder* order_;
+  std::vector<double> duals_;
+  std::vector<double> slack_;         // opening cost less what is paid, by facility
+  std::vector<std::uint32_t> reach_;  // per client: how many facilities cost at most its dual
+  std::vector<std::uint32_t> all_;
+  std::vector<char> tight_;    // by facility: nothing is left of the slack
+  std::vector<char> support_;  // a few tight facilities that every client can reach one of
+};
+
+}  // namespace terrace::cluster

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "facility/bounds/lagrangian.hpp"
+#include "facility/matrix/cost_rows.hpp"
+
+namespace terrace::cluster {
+
+/// L(v) of a problem whose rows are at hand, or worked out one by one. O(facilities * clients) per
+/// evaluation.
+class RowDual final : public DualFunction {
+ public:
+  /// `ceiling`: what a client pays at most (the price of leaving it out), or empty.
+  RowDual(const CostRows& costs, std::span<const double> opening, std::span<const double> ceiling,
+          unsigned threads);
+
+  DualValue evaluate(std::span<const double> duals, std::span<double> slope) override;
+  void clamp(std::span<double> duals) const override;
+  /// The cheapest connection of each client: no smaller dual makes sense.
+  [[nodiscard]] std::span<const double> floor() const { return floor_; }
+
+ private:
+  const CostRows* costs_;
+  std::span<const double> opening_, ceiling_;
+  unsigned threads_;
+  std::vector<double> floor_, paid_;
+};
+
+/// L(v), rounded down so that no solution costs less; 0 where that would be negative.
+/// O(facilities * clients). Throws: std::invalid_argument as check() does, if there is not one dual
+/// per client, or one is not finite, naming it.
+[[nodiscard]] double dual_value(const FacilityMatrix& problem, std::span<const double> duals);
+
+/// L of k-median: facilities cost nothing, and the k that are paid most are open,
+///     L(v) = sum_i v_i - sum of the k greatest of sum_i max(0, v_i - c_ij).
+class MedianDual final : public DualFunction {
+ public:
+  MedianDual(const CostRows& costs, std::size_t k, unsigned threads);
+
+  DualValue evaluate(std::span<const double> duals, std::span<double> slope) override;
+  void clamp(std::span<double> duals) const override;
+
+ private:
+  const CostRows* costs_;
+  std::size_t k_;
+  unsigned threads_;
+  std::vector<double> paid_;
+  std::vector<std::uint32_t> order_;
+};
+
+}  // namespace terrace::cluster

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include "facility/matrix/strategies.hpp"
+#include "facility/points/point_space.hpp"
+
+namespace terrace::cluster {
+namespace {
+
+void check_memory(std::uint64_t n, std::uint64_t limit, const char* what) {
+  if (limit == 0) limit = std::numeric_limits<std::size_t>::max() / 2;
+  // n is below 2^32, so that n^2 is in range and 8 n^2 may not be.
+  if (n * n <= limit / sizeof(double)) return;
+  throw std::invalid_argument("the costs of " + std::to_string(n) + " " + what + " would need " +
+                              std::to_string((n * n >> 17) + 1) +
+                              " MiB of memory, but the limit is " + std::to_string(limit >> 20) +
+                              " MiB; take fewer " + what + ", or a method without a matrix");
+}
+
+template <class Space>
+CostMatrix fill(const Space& space, const SearchFrame& frame) {
+  const PointRows<Space> rows(space, frame.weights, frame.outlier_price);
+  const std::size_t n = frame.weights.size();
+  CostMatrix matrix;
+  matrix.opening.assign(n, frame.true_facility_cost);
+  matrix.connection.resize(n * n);
+  std::vector<double> scratch;
+  for (std::size_t j = 0; j < n; ++j) {
+    const double* const row = rows.row(j, scratch);
+    double* const out = matrix.connection.data() + j * n;
+    for (std::size_t i = 0; i < n; ++i) out[i] = std::ldexp(row[i], frame.cost_exponent);
+  }
+  check(matrix.view());
+  return matrix;
+}
+
+}  // namespace
+
+CostMatrix cost_matrix(const FacilityPoints& problem, std::uint64_t memory_limit) {
+  check_memory(problem.points.size(), memory_limit, "points");
+  SearchFrame frame = make_frame(problem);
+  return with_space(problem, frame, problem.points,
+                    [&](const auto& space) { return fill(space, frame); });
+}
+
+CostMatrix cost_matrix(const FacilityEntities& problem, std::uint64_t memory_limit) {
+  check_memory(problem.count, memory_limit, "entities");
+  return fill(space_of(problem), make_frame(problem));
+}
+
+}  // namespace terrace::cluster

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "terrace/cluster/facility_location.hpp"
+
+namespace terrace::cluster {
+
+/// Connection costs as the searches see them: by facility, stored or worked out on the fly, and
+/// multiplied by a power of two so that sums neither overflow nor vanish.
+class CostRows {
+ public:
+  virtual ~CostRows() = default;
+  [[nodiscard]] std::size_t facilities() const { return facilities_; }
+  [[nodiscard]] std::size_t clients() const { return clients_; }
+  /// The costs of all clients from facility j; valid until `scratch` is used again.
+  virtual const double* row(std::size_t facility, std::vector<double>& scratch) const = 0;
+  /// The costs of some clients, the same values as in the row.
+  virtual void gather(std::size_t facility, std::span<const std::uint32_t> clients,
+                      double* out) const = 0;
+
+ protected:
+  CostRows(std::size_t facilities, std::size_t clients)
+      : facilities_(facilities), clients_(clients) {}
+  CostRows(const CostRows&) = default;
+  CostRows& operator=(const CostRows&) = default;
+
+ private:
+  std::size_t facilities_, clients_;
+};
+
+/// A matrix whose costs are at most 2^900; it is copied only if they have to be scaled to be so, or
+/// if they are all so small that they lack digits.
+class MatrixRows final : public CostRows {
+ public:
+  explicit MatrixRows(const FacilityMatrix& matrix);
+
+  const double* row(std::size_t facility, std::vector<double>& scratch) const override;
+  void gather(std::size_t facility, std::span<const std::uint32_t> clients,
+              double* out) const override;
+  [[nodiscard]] double cost(std::size_t facility, std::size_t client) const {
+    return connection_[facility * clients() + client];
+  }
+  [[nodiscard]] std::span<const double> opening() const { return opening_; }
+  /// A scaled cost in the unit of the matrix: infinite where that exceeds the range of double.
+  [[nodiscard]] double unscaled(double cost) const;
+  /// A cost of the matrix, scaled.
+  [[nodiscard]] double scaled(double cost) const;
+
+ private:
+  std::span<const double> opening_, connection_;
+  std::vector<double> owned_;
+  int exponent_ = 0;
+};
+
+/// Where each client goes if these facilities are open: to the cheapest, the first of equals.
+/// Facilities without clients are closed. Costs are those of the matrix, infinite where they exceed
+/// the range of double. Requires: `open` ascending, not empty.
+FacilitySolution solution_of(const FacilityMatrix& matrix, std::span<const std::uint32_t> open);
+
+}  // namespace terrace::cluster

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <stdexcept>
+
+#include "draws.hpp"
+#include "facility/matrix/cost_rows.hpp"
+#include "facility/matrix/matrix_search.hpp"
+#include "facility/matrix/strategies.hpp"
+#include "parallel.hpp"
+
+namespace terrace::cluster {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+struct Length {
+  std::uint32_t restarts;
+  std::size_t perturbations;  // of each
+};
+
+Length length_of(const FacilityOptions& options) {
+  constexpr Length kByEffort[] = {{2, 50}, {8, 200}, {8, 1000}, {32, 1000}};
+  const Length& length = kByEffort[static_cast<std::size_t>(options.effort)];
+  return {options.restarts.value_or(length.restarts), options.steps.value_or(length.perturbations)};
+}
+
+struct Found {
+  double cost = 0.0;
+  std::vector<std::uint32_t> open;
+};
+
+// Disturbed solutions that end up worse are given up: the search goes on from the best.
+Found search(const MatrixRows& costs, const FacilityOptions& options, std::size_t perturbations,
+             std::uint32_t run, Clock::time_point start) {
+  std::mt19937_64 random(seed_of_run(options.seed, run));
+  MatrixSearch work(costs, costs.opening());
+  const std::uint32_t seed_facility = draw_below(costs.facilities(), random);
+  work.reset(std::span(&seed_facility, 1));
+  work.descend(random);
+  MatrixSearch best = work;
+  const auto most = static_cast<std::uint32_t>(std::min<std::size_t>(8, costs.facilities()));
+  for (std::size_t p = 0; p < perturbations; ++p) {
+    if (std::chrono::duration<double>(Clock::now() - start).count() > options.seconds) break;
+    work.perturb(1 + draw_below(most, random), random);
+    work.descend(random);
+    if (work.cost() <= best.cost()) {
+      best = work;
+    } else {
+      work = best;
+    }
+  }
+  Found found{best.cost(), {}};
+  const auto open = best.state().facilities();
+  found.open.assign(open.begin(), open.end());
+  std::sort(found.open.begin(), found.open.end());
+  return found;
+}
+
+}  // namespace
+
+FacilitySolution interchange(const FacilityMatrix& problem, const FacilityOptions& options) {
+  const Length length = length_of(options);
+  if (length.restarts == 0) {
+    throw std::invalid_argument("a search without restarts: give at least 1");
+  }
+  if (std::isnan(options.seconds)) {
+    throw std::invalid_argument("the time limit is not a number: give seconds, or infinity");
+  }
+  const auto start = Clock::now();
+  const MatrixRows costs(problem);
+  std::vector<Found> found(length.restarts);
+  parallel(length.restarts, options.threads, [&](std::size_t run) {
+    found[run] =
+        search(costs, options, length.perturbations, static_cast<std::uint32_t>(run), start);
+  });
+  const auto best = std::min_element(
+      found.begin(), found.end(), [](const Found& a, const Found& b) { return a.cost < b.cost; });
+  return solution_of(problem, best->open);
+}
+
+}  // namespace terrace::cluster

@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <functional>
+#include <queue>
+
+#include "facility/bounds/matrix_dual.hpp"
+#include "facility/matrix/client_order.hpp"
+#include "facility/matrix/strategies.hpp"
+
+namespace terrace::cluster {
+namespace {
+
+using Event = std::pair<double, std::uint32_t>;  // when, and who
+using Events = std::priority_queue<Event, std::vector<Event>, std::greater<>>;
+
+class Growth {
+ public:
+  Growth(const MatrixRows& costs, const ClientOrder& order)
+      : costs_(&costs),
+        order_(&order),
+        reach_(order.clients(), 0),
+        connected_(order.clients(), 0),
+        duals_(order.clients(), 0.0),
+        offers_(costs.facilities()),
+        opened_(costs.facilities(), 0) {}
+
+  void run() {
+    for (std::uint32_t i = 0; i < duals_.size(); ++i) reaches_.push({order_->cost(i)[0], i});
+    for (std::uint32_t j = 0; j < offers_.size(); ++j) {
+      if (costs_->opening()[j] == 0.0) payments_.push({0.0, j});
+    }
+    for (std::size_t waiting = duals_.size(); waiting > 0;) {
+      // At equal times facilities open first: who reaches them then is connected at once.
+      if (!payments_.empty() &&
+          (reaches_.empty() || payments_.top().first <= reaches_.top().first)) {
+        const auto [time, j] = payments_.top();
+        payments_.pop();
+        if (!opened_[j] && time == payment_time(j)) waiting -= open(j, time);
+      } else {
+        const auto [time, i] = reaches_.top();
+        reaches_.pop();
+        if (!connected_[i]) waiting -= reach(i, time);
+      }
+    }
+  }
+
+  // In the order of opening, those that share no payer with one that stays.
+  [[nodiscard]] std::vector<std::uint32_t> independent() const {
+    std::vector<char> used(duals_.size(), 0);  // has paid for a facility that stays
+    std::vector<std::uint32_t> stay;
+    for (const std::uint32_t j : opening_order_) {
+      bool free = true;
+      for (std::size_t i = 0; i < duals_.size() && free; ++i) {
+        free = !(used[i] && duals_[i] > costs_->cost(j, i));
+      }
+      if (!free) continue;
+      stay.push_back(j);
+      for (std::size_t i = 0; i < duals_.size(); ++i) {
+        if (duals_[i] > costs_->cost(j, i)) used[i] = 1;
+      }
+    }
+    std::sort(stay.begin(), stay.end());
+    return stay;
+  }
+
+  [[nodiscard]] const std::vector<double>& duals() const { return duals_; }
+
+ private:
+  struct Offers {
+    double fixed = 0.0;         // of connected clients
+    double costs = 0.0;         // connection costs of the clients whose offers grow
+    std::uint32_t growing = 0;  // how many they are
+  };
+
+  // When the offers, growing as they do now, will be the opening cost.
+  [[nodiscard]] double payment_time(std::uint32_t j) const {
+    const Offers& o = offers_[j];
+    if (costs_->opening()[j] == 0.0) return 0.0;
+    return (costs_->opening()[j] - o.fixed + o.costs) / o.growing;
+  }
+
+  void announce(std::uint32_t j) {
+    if (!opened_[j] && offers_[j].growing > 0) payments_.push({payment_time(j), j});
+  }
+
+  std::size_t reach(std::uint32_t i, double time) {
+    const std::uint32_t r = reach_[i]++;
+    const std::uint32_t j = order_->facility(i)[r];
+    if (opened_[j]) {
+      connect(i, time);
+      return 1;
+    }
+    Offers& o = offers_[j];
+    ++o.growing;
+    o.costs += order_->cost(i)[r];
+    announce(j);
+    if (reach_[i] < order_->facilities()) reaches_.push({order_->cost(i)[reach_[i]], i});
+    return 0;
+  }
+
+  std::size_t open(std::uint32_t j, double time) {
+    opened_[j] = 1;
+    opening_order_.push_back(j);
+    std::size_t count = 0;
+    for (std::uint32_t i = 0; i < duals_.size(); ++i) {
+      // Just those whose offer has been counted: rounding of the time must not miss one.
+      if (connected_[i] || !has_reached(i, j)) continue;
+      connect(i, time);
+      ++count;
+    }
+    return count;
+  }
+
+  [[nodiscard]] bool has_reached(std::uint32_t i, std::uint32_t j) const {
+    const double c = costs_->cost(j, i);
+    const std::uint32_t next = reach_[i];
+    if (next == order_->facilities()) return true;
+    const double next_cost = order_->cost(i)[next];
+    return c < next_cost || (c == next_cost && j < order_->facility(i)[next]);
+  }
+
+  void connect(std::uint32_t i, double time) {
+    connected_[i] = 1;
+    duals_[i] = std::max(time, order_->cost(i)[reach_[i] == 0 ? 0 : reach_[i] - 1]);
+    for (std::uint32_t r = 0; r < reach_[i]; ++r) {
+      const std::uint32_t j = order_->facility(i)[r];
+      Offers& o = offers_[j];
+      if (opened_[j]) continue;
+      --o.growing;
+      o.costs -= order_->cost(i)[r];
+      if (o.growing == 0) o.costs = 0.0;
+      o.fixed += duals_[i] - order_->cost(i)[r];
+      announce(j);
+    }
+  }
+
+  const MatrixRows* costs_;
+  const ClientOrder* order_;
+  std::vector<std::uint32_t> reach_;  // per client: how many facilities its offer has reached
+  std::vector<char> connected_;
+  std::vector<double> duals_;
+  std::vector<Offers> offers_;
+  std::vector<char> opened_;
+  std::vector<std::uint32_t> opening_order_;
+  Events reaches_, payments_;
+};
+
+}  // namespace
+
+FacilitySolution jain_vazirani(const FacilityMatrix& problem, FacilityReport& report) {
+  const MatrixRows costs(problem);
+  const ClientOrder order(costs);
+  Growth growth(costs, order);
+  growth.run();
+  FacilitySolution solution = solution_of(problem, growth.independent());
+  report.duals = growth.duals();
+  for (double& v : report.duals) v = costs.unscaled(v);
+  solution.lower_bound = dual_value(problem, report.duals);
+  return solution;
+}
+
+}  // namespace terrace::cluster

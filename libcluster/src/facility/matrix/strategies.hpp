@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "terrace/cluster/facility_location.hpp"
+
+/// The strategies on a matrix, see FacilityStrategy, and the matrix of other problems. Each fills
+/// in what it knows for the report. Require: check(problem) has passed.
+
+namespace terrace::cluster {
+
+/// Throws: std::invalid_argument without restarts or if `seconds` is not a number.
+[[nodiscard]] FacilitySolution interchange(const FacilityMatrix& problem,
+                                           const FacilityOptions& options);
+/// Throw: std::invalid_argument if the memory cannot be allocated.
+[[nodiscard]] FacilitySolution jain_vazirani(const FacilityMatrix& problem, FacilityReport& report);
+[[nodiscard]] FacilitySolution greedy_stars(const FacilityMatrix& problem, FacilityReport& report);
+/// Throws: std::runtime_error if the library was built without GLPK or GLPK fails.
+[[nodiscard]] FacilitySolution lp_rounding(const FacilityMatrix& problem, FacilityReport& report);
+
+/// All costs of a problem of points or entities, so that strategies on a matrix can take it.
+struct CostMatrix {
+  std::vector<double> opening, connection;
+
+  [[nodiscard]] FacilityMatrix view() const {
+    return {opening.size(), opening.size(), opening, connection};
+  }
+};
+
+/// Each point or entity is a facility and a client. A client whose connection would cost more than
+/// its outlier price pays that price to whatever facility it is connected to. O(n^2) distances.
+/// Throws: std::invalid_argument if the 8 n^2 bytes exceed `memory_limit` (0: no limit), saying how
+/// many they are, or if a cost is beyond the range of double, as check() of a matrix says it;
+/// std::bad_alloc.
+[[nodiscard]] CostMatrix cost_matrix(const FacilityPoints& problem, std::uint64_t memory_limit);
+[[nodiscard]] CostMatrix cost_matrix(const FacilityEntities& problem, std::uint64_t memory_limit);
+
+}  // namespace terrace::cluster

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <memory>
+
+#include "facility/points/search_engine.hpp"
+#include "terrace/cluster/facility_location.hpp"
+
+namespace terrace::cluster {
+
+/// The local search for a problem that check() has passed. strategy: of a local search, or
+/// automatic.
+/// Throws: std::invalid_argument if the problem does not admit the strategy.
+[[nodiscard]] std::unique_ptr<SearchEngine> make_search(
+    const FacilityPoints& problem, FacilityStrategy strategy = FacilityStrategy::automatic,
+    unsigned threads = 1);
+[[nodiscard]] std::unique_ptr<SearchEngine> make_search(
+    const FacilityEntities& problem, FacilityStrategy strategy = FacilityStrategy::automatic,
+    unsigned threads = 1);
+
+/// The candidates of a search over so many points; at least one, unless there are no points.
+[[nodiscard]] std::size_t candidate_count(Effort effort, std::size_t points);
+
+/// The whole search that the options ask for.
+[[nodiscard]] FacilitySolution run_search(SearchEngine& engine, const FacilityOptions& options,
+                                          FacilityReport* report);
+
+}  // namespace terrace::cluster

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "facility/matrix/cost_rows.hpp"
+#include "facility/points/fast_distances.hpp"
+#include "facility/points/search_frame.hpp"
+#include "facility/points/search_space.hpp"
+#include "facility/points/with_space.hpp"
+
+namespace terrace::cluster {
+
+/// How far costs of the frame, summed over all clients, may be from those of the given coordinates:
+/// bringing coordinates into range and mapping them rounds by units in the last place of the box,
+/// also where the distance is short.
+[[nodiscard]] double rounding_of_frame(const FacilityPoints& problem, const SearchFrame& frame);
+
+/// Weighted distances, computed row by row; no client pays more than its outlier price.
+template <class Space>
+class PointRows final : public CostRows {
+ public:
+  PointRows(const Space& space, std::span<const double> weights, double price)
+      : CostRows(weights.size(), weights.size()),
+        space_(&space),
+        distances_(space),
+        weights_(weights),
+        price_(price) {}
+
+  const double* row(std::size_t facility, std::vector<double>& scratch) const override {
+    const auto count = static_cast<std::uint32_t>(clients());
+    scratch.resize(count);
+    distances_.from(static_cast<std::uint32_t>(facility)).fill(count, scratch.data());
+    for (std::uint32_t i = 0; i < count; ++i) {
+      scratch[i] = weights_[i] * std::min(scratch[i], price_);
+    }
+    return scratch.data();
+  }
+  void gather(std::size_t facility, std::span<const std::uint32_t> which,
+              double* out) const override {
+    const auto from = space_->from(static_cast<std::uint32_t>(facility));
+    for (std::size_t k = 0; k < which.size(); ++k) {
+      out[k] = weights_[which[k]] * std::min(from(which[k]), price_);
+    }
+  }
+
+ private:
+  const Space* space_;
+  FastDistances<Space> distances_;
+  std::span<const double> weights_;
+  double price_;
+};
+
+}  // namespace terrace::cluster

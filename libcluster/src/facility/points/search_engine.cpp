@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "facility/points/search_engine.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "draws.hpp"
+#include "parallel.hpp"
+
+namespace terrace::cluster {
+namespace {
+
+[[noreturn]] void refuse_start(const std::string& what) {
+  throw std::invalid_argument("the start of the search: " + what);
+}
+
+}  // namespace
+
+SearchEngine::SearchEngine(SearchFrame& frame, FacilityStrategy strategy, unsigned threads)
+    : strategy_(strategy),
+      state_(frame),
+      team_(threads_for(std::numeric_limits<std::size_t>::max(), threads)),
+      verdicts_(1) {}
+
+void SearchEngine::replace(std::vector<std::uint32_t> facility, std::vector<double> distance) {
+  state_.assign(std::move(facility), std::move(distance));
+  connections_replaced();
+}
+
+void SearchEngine::start(const FacilitySolution& solution) {
+  const std::size_t count = state_.size();
+  const double price = state_.outlier_price();
+  if (solution.facilities.empty()) refuse_start("no facility is open");
+  if (solution.assignment.size() != count) {
+    refuse_start(std::to_string(solution.assignment.size()) + " assignments for " +
+                 std::to_string(count) + " clients");
+  }
+  std::vector<std::uint32_t> facility(count);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const std::uint32_t c = solution.assignment[i];
+    if (c != kOutlier && c >= solution.facilities.size()) {
+      refuse_start("client " + std::to_string(i) + " is in cluster " + std::to_string(c) + " of " +
+                   std::to_string(solution.facilities.size()));
+    }
+    if (c == kOutlier && !std::isfinite(price)) {
+      refuse_start("client " + std::to_string(i) + " is left out, but outliers have no price");
+    }
+    facility[i] = c == kOutlier ? kOutlier : solution.facilities[c];
+  }
+  for (const std::uint32_t j : solution.facilities) {
+    if (j >= count) refuse_start("facility " + std::to_string(j) + " is not among the points");
+    facility[j] = j;
+  }
+  std::vector<double> distances(count, price);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    if (facility[i] == kOutlier) continue;
+    const double d = facility[i] == i ? 0.0 : distance(facility[i], i);
+    if (d > price) {
+      facility[i] = kOutlier;
+    } else {
+      distances[i] = d;
+    }
+  }
+  replace(std::move(facility), std::move(distances));
+}
+
+double SearchEngine::gain(std::uint32_t candidate) {
+  assert(candidate < state_.size());
+  judge(candidate, true, verdicts_[0]);
+  return state_.unscaled(verdicts_[0].gain);
+}
+
+void SearchEngine::open(std::uint32_t candidate) {
+  assert(candidate < state_.size());
+  judge(candidate, true, verdicts_[0]);
+  apply(verdicts_[0]);
+}
+
+bool SearchEngine::improve(std::size_t candidates, std::mt19937_64& random, std::size_t batch,
+                           const FacilityProgress& progress) {
+  assert(batch > 0);
+  const std::size_t step = std::max<std::size_t>(candidates / 256, 1);
+  std::size_t done = 0, next_report = 0;
+  while (done < candidates) {
+    if (progress && done >= next_report) {
+      if (!progress(done, candidates)) return false;
+      next_report = done + step;
+    }
+    const std::size_t now = std::min(batch, candidates - done);
+    if (verdicts_.size() < now) verdicts_.resize(now);
+    for (std::size_t k = 0; k < now; ++k) {
+      verdicts_[k].candidate = draw_below(state_.size(), random);
+    }
+    if (now == 1) {
+      judge(verdicts_[0].candidate, true, verdicts_[0]);
+    } else {
+      team_.run(now, [this](std::size_t k) { judge(verdicts_[k].candidate, false, verdicts_[k]); });
+    }
+    std::size_t positive = 0;
+    const Verdict* best = nullptr;
+    for (std::size_t k = 0; k < now; ++k) {
+      const Verdict& verdict = verdicts_[k];
+      statistics_.inspected += verdict.inspected;
+      if (!(verdict.gain > 0.0)) continue;
+      ++positive;
+      if (!best || verdict.gain > best->gain) best = &verdict;
+    }
+    statistics_.candidates += now;
+    statistics_.vertices += now * (state_.size() + state_.open().size());
+    statistics_.positive += positive;
+    done += now - (positive > 1 ? positive - 1 : 0);
+    if (best) {
+      apply(*best);
+      ++statistics_.opened;
+    }
+  }
+  return !progress || progress(done, candidates);
+}
+
+}  // namespace terrace::cluster

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <random>
+#include <vector>
+
+#include "facility/points/search_state.hpp"
+#include "terrace/cluster/facility_location.hpp"
+#include "thread_team.hpp"
+
+namespace terrace::cluster {
+
+/// The local search, step by step, for any distances. What depends on the distances is in
+/// SpaceSearch. Client 0 is the one open facility at first. Costs and gains are in the unit of the
+/// problem. Law: cost() before open(p) minus cost() after is gain(p), whatever the sign, up to
+/// rounding.
+class SearchEngine {
+ public:
+  /// strategy: of a local search, not automatic. threads: 0: one per core.
+  SearchEngine(SearchFrame& frame, FacilityStrategy strategy, unsigned threads);
+  virtual ~SearchEngine() = default;
+
+  /// Meyerson's initial solution (4.2.3): the clients in random order, each of which opens a
+  /// facility with probability w d / fc, d being the distance from the nearest facility so far,
+  /// and joins that facility otherwise (or is left out if that is cheaper). O(clients *
+  /// facilities).
+  virtual void start(std::mt19937_64& random) = 0;
+  /// Throws: std::invalid_argument if it is not a solution of the problem.
+  void start(const FacilitySolution& solution);
+
+  /// What opening `candidate` would save: it takes the clients that are nearer to it than to their
+  /// facility, and all clients of the facilities that are not worth keeping then. An open facility
+  /// is a candidate as well; it costs nothing to open.
+  [[nodiscard]] double gain(std::uint32_t candidate);
+  /// Carries out what gain() judged.
+  void open(std::uint32_t candidate);
+  /// Tries random candidates as FacilityOptions::batch and ::progress say. False if stopped.
+  bool improve(std::size_t candidates, std::mt19937_64& random, std::size_t batch = 1,
+               const FacilityProgress& progress = {});
+
+  /// Connects each client to its nearest open facility; of equally near ones to the present one or
+  /// else the lowest number. Leaves out whom that price suits better. The cost does not rise.
+  virtual void assign_nearest() = 0;
+  /// Clients that some open facility, or the outlier price, would suit better.
+  /// O(clients * facilities).
+  [[nodiscard]] virtual std::size_t wrongly_assigned() const = 0;
+
+  [[nodiscard]] FacilityStrategy strategy() const { return strategy_; }
+  [[nodiscard]] std::size_t size() const { return state_.size(); }  ///< clients
+  [[nodiscard]] std::size_t facility_count() const { return state_.open().size(); }
+  [[nodiscard]] double cost() const { return state_.unscaled(state_.cost()); }
+  [[nodiscard]] FacilitySolution solution() const { return state_.solution(); }
+  /// Since the construction; wrongly_assigned is left at 0.
+  [[nodiscard]] const SearchStatistics& statistics() const { return statistics_; }
+
+ protected:
+  /// Fills in verdict. parallel: the threads of the engine may be used.
+  virtual void judge(std::uint32_t candidate, bool parallel, Verdict& verdict) = 0;
+  virtual void apply(const Verdict& verdict) = 0;
+  [[nodiscard]] virtual double distance(std::uint32_t facility, std::uint32_t client) const = 0;
+  virtual void connections_replaced() = 0;
+  void replace(std::vector<std::uint32_t> facility, std::vector<double> distance);
+
+  const FacilityStrategy strategy_;
+  SearchState state_;
+  ThreadTeam team_;
+
+ private:
+  SearchStatistics statistics_;
+  std::vector<Verdict> verdicts_;  // of a batch
+};
+
+}  // namespace terrace::cluster

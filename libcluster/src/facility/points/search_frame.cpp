@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "facility/points/search_frame.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <variant>
+
+#include "facility/points/search_norms.hpp"
+#include "ground.hpp"
+#include "portable_math.hpp"
+#include "scaling.hpp"
+
+namespace terrace::cluster {
+namespace {
+
+int exponent_of(double value) {
+  int exponent = 0;
+  std::frexp(value, &exponent);
+  return exponent;
+}
+
+void multiply(std::vector<Point3>& points, int exponent) {
+  if (exponent == 0) return;
+  for (Point3& p : points) {
+    for (double& x : p) x = std::ldexp(x, exponent);
+  }
+}
+
+std::vector<Point3> scaled(std::span<const Point3> points, const Scaling& scaling) {
+  std::vector<Point3> result(points.size());
+  std::transform(points.begin(), points.end(), result.begin(),
+                 [&](const Point3& p) { return scaling.scaled(p); });
+  return result;
+}
+
+// The longest diagonal of a box with one corner at the origin.
+double mapped_diagonal(const LinearMap& map, const Point3& extent) {
+  double longest = 0.0;
+  for (unsigned corner = 0; corner < 4; ++corner) {
+    Point3 v = extent;
+    if (corner & 1u) v[0] = -v[0];
+    if (corner & 2u) v[1] = -v[1];
+    longest = std::max(longest, std::sqrt(squared_length(mapped(map, v))));
+  }
+  return longest;
+}
+
+// A channel as an axis: differences in ground units are value * 2^exponent.
+struct Channel {
+  double least = 0.0, weight = 0.0;  // weight in [0.5, 1) or 0
+  int shift = 0;                     // of half differences, to below 1
+  int exponent = std::numeric_limits<int>::min();
+  double range = 0.0;  // as value() gives it
+
+  Channel(const Channels& channels, std::size_t c, std::size_t count) {
+    double least_half = 0.0, most_half = 0.0;
+    for (std::size_t i = 0; i < count; ++i) {
+      const double half = 0.5 * channels.values[i * channels.size() + c];
+      least_half = i == 0 ? half : std::min(least_half, half);
+      most_half = i == 0 ? half : std::max(most_half, half);
+    }
+    least = least_half;
+    int weight_exponent = 0;
+    weight = std::frexp(channels.weights[c], &weight_exponent);
+    if (weight == 0.0 || most_half == least_half) {
+      weight = 0.0;
+      return;
+    }
+    shift = exponent_of(most_half - least_half);
+    exponent = shift + 1 + weight_exponent;
+    range = value(2.0 * most_half);
+  }
+  [[nodiscard]] double value(double original) const {
+    return weight * std::ldexp(0.5 * original - least, -shift);
+  }
+};
+
+// As the metric measures the box: the positions' diagonal and the channels together.
+double whole_diagonal(const Metric& metric, const Point3& extent, double positions,
+                      const std::vector<double>& ranges) {
+  const std::vector<double> origin(ranges.size(), 0.0);
+  const auto length = [&](auto norm) {
+    return norm(extent[0], extent[1], extent[2], ranges.data(), origin.data(), ranges.size());
+  };
+  if (std::holds_alternative<SquaredEuclidean>(metric)) return length(SquaredNorm{});
+  if (const auto* minkowski = std::get_if<Minkowski>(&metric)) {
+    if (std::isinf(minkowski->p)) return length(MaximumNorm{});
+    if (minkowski->p == 1.0) return length(CityBlockNorm{});
+    return length(PowerNorm{minkowski->p});
+  }
+  double longest = positions;
+  for (const double range : ranges) longest = portable::length(longest, range);
+  return longest;
+}
+
+// Puts weights and costs in range; unit_exponent is that of a distance of weight 1.
+void set_costs(SearchFrame& frame, double facility_cost, double outlier_price, int unit_exponent) {
+  const double heaviest = *std::max_element(frame.weights.begin(), frame.weights.end());
+  const int weight_exponent = exponent_of(heaviest);
+  for (double& w : frame.weights) w = std::ldexp(w, -weight_exponent);
+  frame.true_facility_cost = std::ldexp(facility_cost, unit_exponent);
+  // A cost beyond all distances means one facility, however far beyond it is.
+  frame.facility_cost = std::min(std::ldexp(facility_cost, -weight_exponent), 0x1p1000);
+  frame.outlier_price = outlier_price;
+  frame.cost_exponent = unit_exponent + weight_exponent;
+}
+
+}  // namespace
+
+std::optional<LinearMap> linear_map(const Metric& metric, const Bounds& box) {
+  if (std::holds_alternative<Euclidean>(metric)) return kIdentityMap;
+  if (const auto* elliptical = std::get_if<Elliptical>(&metric)) return elliptical->map();
+  if (const auto* field = std::get_if<EllipticalField>(&metric)) return field->uniform_in(box);
+  return std::nullopt;
+}
+
+SearchFrame make_frame(const FacilityPoints& problem) {
+  SearchFrame frame;
+  const std::size_t count = problem.points.size();
+  const Scaling scaling(problem.points);
+  int exponent = 0;
+  double positions = 0.0;  // the diagonal without channels, in units of 2^exponent
+  Point3 extent = scaling.extent;
+  const Bounds box = bounds_of(problem.points);
+  if (std::holds_alternative<CustomMetric>(problem.metric)) {
+    positions = diagonal(problem.metric, box);
+    extent = {positions, 0, 0};
+  } else {
+    frame.points = scaled(problem.points, scaling);
+    exponent = scaling.exponent;
+    positions = scaling.diagonal;
+    const std::optional<LinearMap> linear = linear_map(problem.metric, box);
+    if (linear && *linear != kIdentityMap) {
+      LinearMap map = *linear;
+      int map_exponent = std::numeric_limits<int>::min();
+      for (const double m : map) {
+        if (m != 0.0) map_exponent = std::max(map_exponent, exponent_of(m));
+      }
+      for (double& m : map) m = std::ldexp(m, -map_exponent);
+      for (Point3& p : frame.points) p = mapped(map, p);
+      // Along the longest semi-axis the points may have become tiny.
+      const Scaling again(frame.points);
+      frame.points = scaled(frame.points, again);
+      const int change = map_exponent + again.exponent;
+      positions = std::holds_alternative<Elliptical>(problem.metric)
+                      ? std::ldexp(mapped_diagonal(map, extent), -again.exponent)
+                      : std::ldexp(positions, -change);
+      exponent += change;
+    }
+  }
+
+  frame.channel_count = problem.channels.size();
+  std::vector<Channel> channels;
+  int greatest = scaling.diagonal > 0.0 ? exponent : std::numeric_limits<int>::min();
+  for (std::size_t c = 0; c < frame.channel_count; ++c) {
+    channels.emplace_back(problem.channels, c, count);
+    greatest = std::max(greatest, channels.back().exponent);
+  }
+  // The caller's function wants the points as they are, hence the unit as it is.
+  if (frame.points.empty() || greatest == std::numeric_limits<int>::min()) greatest = exponent;
+  multiply(frame.points, exponent - greatest);
+  positions = std::ldexp(positions, exponent - greatest);
+  for (double& x : extent) x = std::ldexp(x, exponent - greatest);
+  std::vector<double> ranges;
+  frame.channels.resize(count * frame.channel_count);
+  for (std::size_t c = 0; c < frame.channel_count; ++c) {
+    const Channel& channel = channels[c];
+    if (channel.weight == 0.0) continue;  // zeros
+    const int shift = channel.exponent - greatest;
+    ranges.push_back(std::ldexp(channel.range, shift));
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::size_t k = i * frame.channel_count + c;
+      frame.channels[k] = std::ldexp(channel.value(problem.channels.values[k]), shift);
+    }
+  }
+
+  const double whole = whole_diagonal(problem.metric, extent, positions, ranges);
+  frame.weights.assign(problem.weights.begin(), problem.weights.end());
+  if (frame.weights.empty()) frame.weights.assign(count, 1.0);
+  const bool squared = std::holds_alternative<SquaredEuclidean>(problem.metric);
+  // All points equal: no outlier then, whatever infinity times zero may be.
+  const double price =
+      whole > 0.0 ? problem.outlier_price * whole : std::numeric_limits<double>::infinity();
+  set_costs(frame, problem.facility_cost * whole, price, squared ? 2 * greatest : greatest);
+  return frame;
+}
+
+SearchFrame make_frame(const FacilityEntities& problem) {
+  SearchFrame frame;
+  frame.weights.assign(problem.weights.begin(), problem.weights.end());
+  if (frame.weights.empty()) frame.weights.assign(problem.count, 1.0);
+  set_costs(frame, problem.facility_cost, problem.outlier_price, 0);
+  return frame;
+}
+
+}  // namespace terrace::cluster

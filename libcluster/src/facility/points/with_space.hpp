@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+#include <span>
+#include <type_traits>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "facility/points/search_frame.hpp"
+#include "facility/points/search_space.hpp"
+#include "portable_math.hpp"
+
+namespace terrace::cluster {
+
+/// The distances of a problem of entities.
+inline IndexSpace space_of(const FacilityEntities& problem) {
+  return {problem.distance, problem.symmetric && problem.triangle_inequality};
+}
+
+/// Calls visit(space) with the distances of the problem among the points of its frame, which
+/// are moved out of it. `original` are the points in the order of the frame's. The space is visit's
+/// to keep: it points to nothing outside.
+template <class Visit>
+auto with_space(const FacilityPoints& problem, SearchFrame& frame, std::span<const Point3> original,
+                const Visit& visit) {
+  using Result = decltype(visit(NormSpace<EuclideanNorm, false>(frame, {}, true)));
+  if (linear_map(problem.metric, bounds_of(original))) {
+    if (frame.channel_count == 0) return visit(NormSpace<EuclideanNorm, false>(frame, {}, true));
+    return visit(NormSpace<EuclideanNorm, true>(frame, {}, true));
+  }
+  const auto with_norm = [&](auto norm, bool triangles) -> Result {
+    return visit(NormSpace<decltype(norm), true>(frame, norm, triangles));
+  };
+  return std::visit(
+      [&](const auto& metric) -> Result {
+        using M = std::decay_t<decltype(metric)>;
+        if constexpr (std::is_same_v<M, Minkowski>) {
+          if (std::isinf(metric.p)) return with_norm(MaximumNorm{}, true);
+          if (metric.p == 1.0) return with_norm(CityBlockNorm{}, true);
+          return with_norm(PowerNorm{metric.p}, metric.p >= 1.0);
+        } else if constexpr (std::is_same_v<M, EllipticalField>) {
+          return visit(FieldSpace(frame, original, metric));
+        } else if constexpr (std::is_same_v<M, CustomMetric>) {
+          // The caller's function on positions as they are; channels join under the root.
+          auto distance = [points = std::vector<Point3>(original.begin(), original.end()),
+                           channels = frame.channels, count = frame.channel_count,
+                           function = metric.distance](std::uint32_t j, std::uint32_t i) {
+            double d = function(points[j], points[i]);
+            for (std::size_t c = 0; c < count && d >= 0.0; ++c) {
+              d = portable::length(d, channels[j * count + c] - channels[i * count + c]);
+            }
+            return d;
+          };
+          return visit(
+              IndexSpace(std::move(distance), metric.symmetric && metric.triangle_inequality));
+        } else {
+          return with_norm(SquaredNorm{}, false);
+        }
+      },
+      problem.metric);
+}
+
+}  // namespace terrace::cluster
