@@ -140,7 +140,7 @@ inline void for_each_level(StoreFiles& files, nlohmann::ordered_json& manifest,
 /// Makes sizes and checksums right: of clusters, pages, directories, files and the manifest. Files
 /// that are too damaged to tell where something is keep what they have.
 inline void mend(StoreFiles& files) {
-  std::string& text = files[store::kManifestName];
+  std::string& text = files[kManifestName];
   auto manifest = nlohmann::ordered_json::parse(text, nullptr, /*allow_exceptions=*/false);
   if (!manifest.is_object()) return;
   for_each_level(files, manifest, [](LevelBytes& level, nlohmann::ordered_json& segment) {
@@ -166,9 +166,9 @@ inline void mend(StoreFiles& files) {
 /// Calls edit(manifest) and mends.
 inline void edit_manifest(StoreFiles& files,
                           const std::function<void(nlohmann::ordered_json&)>& edit) {
-  auto manifest = nlohmann::ordered_json::parse(files[store::kManifestName]);
+  auto manifest = nlohmann::ordered_json::parse(files[kManifestName]);
   edit(manifest);
-  files[store::kManifestName] = manifest.dump(2) + "\n";
+  files[kManifestName] = manifest.dump(2) + "\n";
   mend(files);
 }
 
@@ -176,7 +176,7 @@ inline void edit_manifest(StoreFiles& files,
 /// left of it, moves what lies behind it, and mends.
 inline void edit_page(StoreFiles& files, unsigned level, std::size_t page,
                       const std::function<void(std::vector<store::Entry>&, std::uint64_t&)>& edit) {
-  auto manifest = nlohmann::ordered_json::parse(files[store::kManifestName]);
+  auto manifest = nlohmann::ordered_json::parse(files[kManifestName]);
   unsigned number = 0;
   for_each_level(files, manifest, [&](LevelBytes& bytes, nlohmann::ordered_json&) {
     if (number++ != level) return;

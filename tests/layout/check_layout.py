@@ -5,6 +5,7 @@
 check_layout.py ROOT    prints one line per breach; exit status 1 if there is one.
 """
 
+import collections
 import os
 import re
 import sys
@@ -15,6 +16,10 @@ SIBLINGS = {'terrain': ['stream', 'cluster', 'tri']}
 # The rooms of libterrain, in ranks: a room knows those of lower rank only.
 TERRAIN_ROOMS = {'base': 0, 'earth': 1, 'build': 2, 'surface': 2, 'view': 2, 'sample': 3, 'contour': 3,
                  'mesh': 3, 'tile': 3}
+# The same in libstream; a room in a room (`store/read`) belongs to it.
+STREAM_ROOMS = {'io': 0, 'raster': 1, 'store': 1, 'format': 2}
+# So many sources a newcomer can overlook.
+MOST_SOURCES = 40
 LICENCES = {
     'libstream': 'Apache-2.0',
     'libcluster': 'Apache-2.0',
@@ -120,11 +125,12 @@ def check_include(path, bracket, name):
             if target.startswith('..') or not below(target, f'lib{library}'):
                 if '..' in name.split('/'):
                     yield f'includes "{name}", a file outside its library'
-    here = re.match(r'libterrain/src/([a-z]+)/', path)
-    room = name.split('/')[0]
-    if here and room in TERRAIN_ROOMS and room != here.group(1) and \
-            TERRAIN_ROOMS[room] >= TERRAIN_ROOMS.get(here.group(1), -1):
-        yield f'includes "{name}", whose room is not below its own'
+    here = re.match(r'lib(terrain|stream)/src/([a-z]+)/', path)
+    if here:
+        rooms = TERRAIN_ROOMS if here.group(1) == 'terrain' else STREAM_ROOMS
+        room, own = name.split('/')[0], here.group(2)
+        if room in rooms and room != own and rooms[room] >= rooms.get(own, -1):
+            yield f'includes "{name}", whose room is not below its own'
     for pattern, folders in RESTRICTED:
         if re.match(pattern, name) and not any(path == place or below(path, place) for place in folders):
             yield f'includes <{name}>, which only {", ".join(folders)} may'
@@ -235,12 +241,22 @@ def check_rooms(root):
             yield f'tools/{name}: is missing'
 
 
+def check_folders(root):
+    for folder in [f'lib{library}/src' for library in LIBRARIES] + ['tools/src']:
+        sources = collections.Counter(os.path.dirname(path) for path in files_below(root, folder)
+                                      if path.endswith(('.cpp', '.hpp', '.h', '.cu')))
+        for place, count in sorted(sources.items()):
+            if count > MOST_SOURCES:
+                yield f'{place}: has {count} sources, more than {MOST_SOURCES}'
+
+
 def breaches(root):
     yield from check_rooms(root)
     yield from check_sources(root)
     yield from check_inexact(root)
     yield from check_command(root)
     yield from check_meson(root)
+    yield from check_folders(root)
 
 
 def main():

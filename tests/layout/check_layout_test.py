@@ -65,6 +65,7 @@ class CheckLayout(unittest.TestCase):
             ('libterrain/src/base/b.cpp', head('libterrain') + '#include <terrace/matching/a.hpp>\n', 'sibling'),
             ('libterrain/src/base/b.cpp', head('libterrain') + '#include "earth/ground.hpp"\n', 'room is not below'),
             ('libterrain/src/mesh/b.cpp', head('libterrain') + '#include "tile/set.hpp"\n', 'room is not below'),
+            ('libstream/src/io/b.cpp', head('libstream') + '#include "store/manifest.hpp"\n', 'room is not below'),
             ('libtri/tests/b.cpp', head('libtri') + '#  include <terrace/stream/a.hpp>\n', 'sibling'),
             ('libtri/src/b.cpp', head('libtri') + '#include "../../tools/src/units.hpp"\n', 'outside its library'),
             ('libtri/include/terrace/tri/a.hpp', head('libtri') + '#include <CGAL/Gmpq.h>\n', 'which only'),
@@ -95,6 +96,12 @@ class CheckLayout(unittest.TestCase):
             with self.subTest(path=path, expected=expected):
                 found = self.breaches(lambda root: write(root, path, text))
                 self.assertTrue(any(path in b and expected in b for b in found), found)
+
+    def test_a_folder_of_many_sources_is_found(self):
+        def fill(root):
+            for number in range(41):
+                write(root, f'libtri/src/b/{number}.cpp', head('libtri'))
+        self.assertEqual(self.breaches(fill), ['libtri/src/b: has 41 sources, more than 40'])
 
     def test_tests_may_compare_with_what_is_gpl(self):
         gpl = '// SPDX-License-Identifier: GPL-3.0-or-later\n'

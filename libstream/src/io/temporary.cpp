@@ -13,7 +13,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "store/manifest.hpp"
 #include "terrace/stream/atomic_file.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/file_lock.hpp"
@@ -85,8 +84,14 @@ FileLock lock_of_dead(const fs::path& temporary) {
   }
 }
 
+/// Whether a folder is still a whole store: its manifest is the first file to go.
+bool has_manifest(const fs::path& folder) {
+  std::error_code ignored;
+  return fs::is_regular_file(folder / kManifestName, ignored);
+}
+
 bool put_back(const fs::path& replaced, const fs::path& target) {
-  if (!nothing_at(target) || !store::looks_like_store(replaced)) return false;
+  if (!nothing_at(target) || !has_manifest(replaced)) return false;
   return rename_exclusively(replaced, target) == 0;
 }
 
@@ -120,7 +125,7 @@ void sweep_temporaries(const fs::path& target) {
     const fs::path replaced = with_ending(temporary, kReplacedEnding);
     put_back(replaced, target);
     // Unless nothing else bears the name and putting it back has failed.
-    if (!nothing_at(target) || !store::looks_like_store(replaced)) remove_store_folder(replaced);
+    if (!nothing_at(target) || !has_manifest(replaced)) remove_store_folder(replaced);
     // A file goes with its lock.
     std::error_code ignored;
     if (fs::is_directory(fs::symlink_status(temporary, ignored))) remove_store_folder(temporary);
@@ -152,7 +157,7 @@ int rename_exclusively(const fs::path& from, const fs::path& to) {
 
 void remove_store_folder(const fs::path& folder) noexcept {
   std::error_code ignored;
-  fs::remove(folder / store::kManifestName, ignored);
+  fs::remove(folder / kManifestName, ignored);
   fs::remove_all(folder, ignored);
 }
 

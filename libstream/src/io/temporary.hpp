@@ -11,6 +11,8 @@
 
 namespace terrace::stream {
 
+/// The file that makes a folder a store: written last, removed first.
+inline constexpr const char* kManifestName = "manifest.json";
 inline constexpr const char* kLockEnding = ".lock";
 inline constexpr const char* kReplacedEnding = "-old";
 

@@ -13,6 +13,7 @@
 #include <terrace/tri/multiresolution.hpp>
 
 #include "earth/ground.hpp"
+#include "mesh/mesh_heights.hpp"
 #include "terrace/terrain/error.hpp"
 #include "terrace/terrain/store_source.hpp"
 

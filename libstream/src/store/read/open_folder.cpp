@@ -16,7 +16,7 @@ namespace terrace::stream {
 
 Store Store::open(const std::filesystem::path& path) {
   std::error_code error;
-  if (!std::filesystem::is_regular_file(path / store::kManifestName, error) && !recover(path)) {
+  if (!std::filesystem::is_regular_file(path / kManifestName, error) && !recover(path)) {
     throw Error({.file = path.string(),
                  .where = {},
                  .cause = "there is no store here",
