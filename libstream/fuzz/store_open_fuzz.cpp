@@ -4,11 +4,13 @@
 // of the name, the name, four bytes for the number of bytes, the bytes.
 #include <cmath>
 #include <cstdlib>
+#include <optional>
 #include <string_view>
 
 #include "../tests/store_mending.hpp"
 #include "fuzz_points.hpp"
 #include "terrace/stream/store.hpp"
+#include "terrace/stream/store_query.hpp"
 
 namespace {
 
@@ -122,6 +124,22 @@ void read_all(const Store& store) {
       }
     }
   }
+  // Queries end, whatever the hierarchy says, and find all points of a sound store.
+  std::optional<std::uint64_t> counted;
+  try {
+    StoreQuery query(store);
+    const std::uint64_t found = query.in_box(store.bounds()).size();
+    counted = query.count(store.bounds());
+    require(!(query.estimate(store.bounds()) < 0), "an estimate");
+    require(
+        query.nearest(store.bounds().min, 3).size() == std::min<std::uint64_t>(3, store.points()) ||
+            found != store.points(),
+        "nearest points");
+    require(query.within(store.bounds().max, 1).size() <= store.points(), "points within");
+    if (found != store.points()) whole = false;
+  } catch (const Error&) {
+    whole = false;
+  }
   std::size_t problems = 0;
   const bool good = store.verify([&problems](const Problem& problem) {
     require(!problem.file.empty() && !problem.what.empty(), "a problem says where and what");
@@ -129,6 +147,7 @@ void read_all(const Store& store) {
   });
   require(good == (problems == 0), "problems are told");
   require(!good || whole, "what is sound can be read");
+  require(!good || counted == store.points(), "what is sound is counted");
 }
 
 }  // namespace

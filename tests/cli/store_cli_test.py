@@ -175,26 +175,26 @@ class StoreTest(unittest.TestCase):
         everything = [tuple(map(float, line.split()))
                       for line in self.run_ok('points', self.store, '-o', '-').splitlines()]
 
-        def near(*options):
-            rows = self.run_ok('points', self.store, '-o', '-', *options).splitlines()
-            return [tuple(map(float, row.split())) for row in rows]
+        def numbers(*args):
+            return [tuple(map(float, row.split())) for row in self.run_ok(*args).splitlines()]
 
         flat = sorted(math.hypot(p[0] - x, p[1] - y) for p in everything)
-        found = near('--near', f'{x},{y}', '-k', 20)
+        found = numbers('points', self.store, '-o', '-', '--near', f'{x},{y}', '-k', 20)
         self.assertEqual([row[3] for row in found], sorted(row[3] for row in found))
         scale = found[-1][3] / flat[19]
         self.assertAlmostEqual(scale, 1, delta=2e-3)  # metres on the ground, not of the projection
         for row, distance in zip(found, flat):
             self.assertIn(row[:3], everything)
             self.assertAlmostEqual(row[3], scale * distance, delta=1e-6)
-        within = near('--near', f'{x},{y}', '--within', 100)
+        within = numbers('points', self.store, '-o', '-', '--near', f'{x},{y}', '--within', 100)
         self.assertEqual(len(within), sum(scale * distance <= 100 for distance in flat))
         z = everything[0][2]
-        deep = near('--near', f'{x},{y},{z}', '-k', 3)
+        deep = numbers('points', self.store, '-o', '-', '--near', f'{x},{y},{z}', '-k', 3)
         self.assertAlmostEqual(deep[0][3], min(
             math.hypot(scale * math.hypot(p[0] - x, p[1] - y), p[2] - z) for p in everything),
             delta=1e-6)
-        self.assertEqual(near('--near', f'{x},{y}', '-k', 0), [])
+        self.assertEqual(
+            numbers('points', self.store, '-o', '-', '--near', f'{x},{y}', '-k', 0), [])
         for wrong in (['--near', f'{x},{y}'], ['--near', f'{x}', '-k', 2],
                       ['--near', f'{x},{y}', '-k', 2, '--within', 3],
                       ['--near', f'{x},{y}', '--within', -1], ['-k', 2], ['--within', 2],

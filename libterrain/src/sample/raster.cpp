@@ -118,7 +118,9 @@ class RasterRun {
     writer.commit();
     outcome_.columns = grid_.columns;
     outcome_.rows = grid_.rows;
-    if (request_.value != RasterValue::height) outcome_.assumption = shader_.assumption();
+    if (request_.value != RasterValue::height && !shader_.assumption().empty()) {
+      context_.say(shader_.assumption());
+    }
     return outcome_;
   }
 

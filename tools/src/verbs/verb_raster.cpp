@@ -69,7 +69,6 @@ class RasterCommand final : public Command {
     request.output = output_;
     request.replace = may_replace(output_, common.force);
     const RasterOutcome outcome = write_raster(store, request, common.context());
-    if (!outcome.assumption.empty()) common.say(outcome.assumption);
 
     Summary summary;
     summary.json = {{"columns", outcome.columns},

@@ -128,9 +128,13 @@ class StoreQuery {
   };
 
   void fill(Node& node, ClusterId id);
+  /// Each cluster has one head, so no walk looks into more of them than there are: in a damaged
+  /// store it could go on nearly for ever. Throws: Error.
+  void check_looked(std::uint64_t clusters) const;
 
   const Store& store_;
-  Node root_, passing_;  ///< passing: what is not kept
+  std::uint64_t clusters_ = 0;  ///< of all levels
+  Node root_, passing_;         ///< passing: what is not kept
   Cache leaves_, inner_;
   ClusterPoints points_;
   std::vector<std::vector<std::uint64_t>> wanted_;  ///< per level, ordinals on the way down
@@ -158,6 +162,8 @@ void StoreQuery::descend(unsigned level, const Wants& wants, const Visit& visit)
   for (unsigned at = store_.top(); at-- > level;) {
     // In order of ordinals: so are the bytes in the file.
     std::sort(wanted_[at].begin(), wanted_[at].end());
+    // Nothing is there twice, unless the store is damaged.
+    wanted_[at].erase(std::unique(wanted_[at].begin(), wanted_[at].end()), wanted_[at].end());
     for (const std::uint64_t ordinal : wanted_[at]) deliver(node(cluster_id(at, ordinal)));
   }
 }
@@ -182,7 +188,8 @@ void StoreQuery::best_first(unsigned level, const Least& least, const Visit& vis
   };
   if (level > store_.top()) return;
   look_into(root_);
-  while (!open_.empty()) {
+  for (std::uint64_t looked = 0; !open_.empty(); ++looked) {
+    check_looked(looked);
     std::pop_heap(open_.begin(), open_.end(), later);
     const Open next = open_.back();
     open_.pop_back();
@@ -201,7 +208,8 @@ void StoreQuery::cut(const Box3& box, const Take& take, const Opens& opens) {
     return;
   }
   crossing_.assign(1, root_.id);
-  while (!crossing_.empty()) {
+  for (std::uint64_t looked = 0; !crossing_.empty(); ++looked) {
+    check_looked(looked);
     const Node& at = node(crossing_.back());
     crossing_.pop_back();
     for (std::size_t i = 0; i < at.positions.size(); ++i) {

@@ -6,6 +6,8 @@
 #include <iterator>
 #include <utility>
 
+#include "terrace/stream/error.hpp"
+
 namespace terrace::stream {
 namespace {
 
@@ -93,7 +95,16 @@ StoreQuery::StoreQuery(const Store& store, std::uint64_t leaf_bytes)
       leaves_{.most_bytes = leaf_bytes},
       inner_{.most_bytes = kInnerBytes},
       wanted_(store.top() + 1) {
+  for (const LevelInfo& level : store.levels()) clusters_ += level.clusters;
   fill(root_, store.root());
+}
+
+void StoreQuery::check_looked(std::uint64_t clusters) const {
+  if (clusters <= clusters_) return;
+  throw Error({.file = store_.path().string(),
+               .where = {},
+               .cause = "the hierarchy is damaged: clusters are headed by several points",
+               .remedy = "restore the files or build the store anew"});
 }
 
 void StoreQuery::fill(Node& node, ClusterId id) {

@@ -29,7 +29,6 @@ struct RasterRequest {
 
 struct RasterOutcome {
   std::uint64_t columns = 0, rows = 0, cells_with_data = 0;
-  std::string assumption;  ///< of units; empty if none
 };
 
 /// Writes a tiled GeoTIFF, PixelIsArea: the value of a cell is that of the surface in its centre.
@@ -47,7 +46,8 @@ struct RasterOutcome {
 /// hillshade 1 to 255 (0: nodata) under a light from 315 degrees, 45 degrees high.
 ///
 /// Tiles come in the order of a quadtree, so that a store of points is triangulated little more
-/// than once. Memory: some tiles at a time within the context's bound. Reports "cells". Throws:
+/// than once. Memory: some tiles at a time within the context's bound. Reports "cells"; notes an
+/// assumption about units that slopes rest on. Throws:
 /// stream::Error if the region does not meet the store; UsageError for a grid of more than 2^31
 /// columns or rows.
 RasterOutcome write_raster(const stream::Store& store, const RasterRequest& request,

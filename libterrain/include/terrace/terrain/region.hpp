@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
@@ -17,7 +18,7 @@ using Point2 = std::array<double, 2>;
 using Polygon = std::vector<std::vector<Point2>>;
 
 /// How a box lies to a region.
-enum class Overlap {
+enum class Overlap : std::uint8_t {
   none,   ///< no common point
   part,   ///< some points of the box are inside, others need not be
   whole,  ///< every point of the box is inside

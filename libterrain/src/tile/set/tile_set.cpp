@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tile/set/tile_set.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -17,6 +15,7 @@
 
 #include "base/units.hpp"
 #include "terrace/terrain/error.hpp"
+#include "terrace/terrain/tiles.hpp"
 #include "tile/make/tile_source.hpp"
 #include "tile/set/tile_file.hpp"
 #include "tile/set/tile_inputs.hpp"

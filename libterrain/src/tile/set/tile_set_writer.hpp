@@ -8,10 +8,25 @@
 #include <vector>
 
 #include "terrace/terrain/context.hpp"
+#include "terrace/terrain/tiles.hpp"
+#include "tile/make/tile_mesher.hpp"
 #include "tile/set/tile_journal.hpp"
-#include "tile/set/tile_set.hpp"
 
 namespace terrace::terrain {
+
+/// A request, and what it becomes with the store at hand.
+struct TileSetOptions {
+  const TilesRequest& request;
+  std::string folder;  ///< where links lead
+  unsigned last_zoom = 0;
+  std::string source_options;  ///< those that the surface depends on
+
+  [[nodiscard]] TileMeshOptions mesh() const {
+    return {request.quality, request.normals, request.water};
+  }
+  /// The bound of a zoom, metres.
+  [[nodiscard]] double max_error(unsigned zoom) const;
+};
 
 /// Writes the tiles of one folder, zoom by zoom. What is there, whole and made from the same is
 /// kept; before anything changes, `layer.json` goes: until the set is whole again it is none.
