@@ -82,8 +82,8 @@ double > Assignment assign_pairs(std::size_t rows, std::size_t columns, Cost&& c
 /// labels of the longer side are not above 0, and 0 for what stayed over, and that the cost is the
 /// sum of the chosen entries.
 /// Returns: the largest amount by which one of these is broken, in the unit of the costs.
-/// Throws: std::invalid_argument if `assignment` is none at all: sizes that do not fit, a column
-/// twice or out of range, a row without a column that could have one (the row is named).
+/// Throws: std::invalid_argument if `assignment` is not valid: sizes that do not match, a column
+/// twice or out of range, a row left without a column though one is free (the row is named).
 /// Cost: O(rows * columns).
 double check(const Assignment& assignment, std::span<const double> costs, std::size_t rows,
              std::size_t columns);

@@ -34,7 +34,7 @@ struct MatchingTree {
   std::vector<MatchingTreeRow> rows;
   /// For each row's node, the weighted mean of all points below it.
   std::vector<Point> positions;
-  /// The last row's node; 0 where there is one point; kNobody where there is none, and if stopped.
+  /// The last row's node; 0 for a single point; kNobody without points, and if stopped.
   std::uint32_t root = kNobody;
 };
 

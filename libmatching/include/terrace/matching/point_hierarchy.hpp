@@ -52,10 +52,10 @@ class PointHierarchy {
   PointHierarchy(std::span<const TreeChildren> rows, std::span<const Point> points,
                  const HierarchyOptions& options = kPointLeaves);
 
-  /// The nearest point; none where there are no points.
+  /// The nearest point; nullopt without points.
   /// Throws: std::invalid_argument for a query that is not finite or farther off than 2^400 times
   /// the largest coordinate.
-  /// Cost: O(log n) for points and queries that are not spiteful; O(k) among k equal points.
+  /// Cost: O(log n) for non-adversarial points and queries; O(k) among k equal points.
   [[nodiscard]] std::optional<Neighbour> nearest(const Point& query) const;
 
   /// The k nearest, nearest first; fewer if there are not so many. Throws and costs as above.

@@ -47,8 +47,8 @@ struct PointMatching {
 ///
 /// Method: the blossom algorithm on candidate edges, then pricing: absent pairs that are nearer
 /// than their duals allow are found through a tree of boxes with the largest dual in each, blossom
-/// by blossom, added, and the matching mended; until there is none. So the result is optimal on the
-/// complete graph, for distances rounded to multiples of 2^-48 (fewer bits only where the duals
+/// by blossom, added, and the matching repaired, until none is left. So the result is optimal on
+/// the complete graph, for distances rounded to multiples of 2^-48 (fewer bits only where the duals
 /// would not fit) of the longest candidate edge.
 ///
 /// Returns: the same for the same input, options and metric.

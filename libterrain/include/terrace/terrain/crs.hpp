@@ -58,7 +58,7 @@ class CoordinateSystem {
   /// operations. Throws: UsageError, naming the code or text and the remedy.
   static CoordinateSystem parse(const std::string& text,
                                 const std::optional<DatumShift>& shift = std::nullopt);
-  /// What a source or a store records. Nothing if it says nothing of a CRS.
+  /// What a source or a store records. nullopt if it does not name a CRS.
   /// file: named in errors. Throws: stream::Error for one that is unknown, incomplete, or says two
   /// things that contradict each other.
   static std::optional<CoordinateSystem> of(const stream::Crs& crs, const std::string& file);
@@ -79,8 +79,8 @@ class CoordinateSystem {
   /// The same with the GeoKeys that a system without an EPSG code needs in a GeoTIFF.
   [[nodiscard]] stream::Crs crs_with_keys() const;
 
-  /// What the user should know of it: "EPSG:... to WGS 84 by \"...\" within 2 m"; empty if nothing
-  /// is done or nothing can be.
+  /// What the user should know of it: "EPSG:... to WGS 84 by \"...\" within 2 m"; empty if no
+  /// conversion is needed or possible.
   [[nodiscard]] std::string wgs84_note() const;
   /// Whether longitudes and latitudes of WGS 84 can be had.
   [[nodiscard]] bool reaches_wgs84() const;
@@ -148,7 +148,7 @@ CoordinateSystem system_of(const stream::Store& store);
 
 /// From a store's CRS to another, named as for CoordinateSystem::parse, by the operation that is
 /// best where the store lies. shift: of the one whose datum does not count as WGS 84; of the named
-/// one if neither does. Throws: UsageError for a CRS that is none, stream::Error if the store has
+/// one if neither does. Throws: UsageError for an unknown CRS, stream::Error if the store has
 /// no CRS, or if nothing leads from one datum to the other.
 Transformation transformation_to(const stream::Store& store, const std::string& named,
                                  const std::optional<DatumShift>& shift = std::nullopt);

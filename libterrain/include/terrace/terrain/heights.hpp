@@ -15,7 +15,7 @@
 
 namespace terrace::terrain {
 
-/// The surface at a place. NaN: there is none.
+/// The surface at a place; NaN where there is no surface.
 struct SurfacePoint {
   double height = std::numeric_limits<double>::quiet_NaN();
   /// Height gained per column and per row, or per unit of x and of y.
@@ -26,7 +26,7 @@ struct SurfacePoint {
 struct SamplerOptions {
   tri::Interpolation method = tri::Interpolation::kLinear;
   unsigned level = 0;  ///< the points of this level and above
-  /// Metres on the ground: triangles with a longer side are no surface. Not for rasters at level 0.
+  /// Metres on the ground: triangles with a longer side do not count. Not for rasters at level 0.
   std::optional<double> max_edge{};
 };
 
@@ -40,23 +40,21 @@ struct SamplerOptions {
 /// - nearest: the sample whose cell holds the place, up to half a cell around the lattice; of two
 ///   the one of the larger column and row. The gradient is the linear surface's at that sample.
 /// Stores of points, and the other levels of rasters: the Delaunay triangulation in stored x,y of
-/// the level's points, exactly (see PointWindow, also for points at equal x,y):
+/// the level's points, exactly; the first of several points at one x,y counts, higher levels first:
 /// - linear: on its triangles. On edges and points, where triangles differ, the gradient is the
-/// mean
-///   of those that meet there. Nothing outside the hull.
-/// - natural: Sibson's natural neighbours among all points of the level, and its gradient. Nothing
+///   mean of those that meet there. NaN outside the hull.
+/// - natural: Sibson's natural neighbours among all points of the level, and its gradient. NaN
 ///   outside the hull.
-/// - nearest: the nearest point, of several the lexicographically smallest; everywhere. The
-/// gradient
+/// - nearest: the nearest point, the lexicographically smallest on ties; everywhere. The gradient
 ///   is the linear surface's at that point.
-/// With SamplerOptions::max_edge there is nothing, whatever the method, where the linear surface
-/// has nothing: in triangles that have a longer side, but for their shorter sides and corners.
+/// With SamplerOptions::max_edge every method gives NaN inside triangles that have a longer side,
+/// but not on their shorter sides and corners.
 ///
 /// Places are sorted by windows of the store within a call, so give many at once; each window is
 /// read once: about 25 ns per sample of a raster at level 0; elsewhere windows are as large as
-/// threads and memory allow (natural: 16,384 points), about 0.4 us per point (see
-/// PointWindow::load()), and then about 1 us per place (nearest: some). Results depend on neither
-/// threads, memory, nor the order of the places.
+/// threads and memory allow (natural: 16,384 points), about 0.4 us per point,
+/// and then about 1 us per place (nearest: more). Results depend on neither threads, memory, nor
+/// the order of the places.
 class HeightSampler {
  public:
   virtual ~HeightSampler() = default;

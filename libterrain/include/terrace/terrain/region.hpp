@@ -36,13 +36,13 @@ class Region {
  public:
   /// text: "minx,miny,maxx,maxy", "minx,miny,minz,maxx,maxy,maxz", or the name of a GeoJSON file
   /// (Polygon, MultiPolygon, GeometryCollection, Feature or FeatureCollection of these).
-  /// Throws: UsageError for numbers that are no box, stream::Error for a file that is no region or
-  /// has a polygon that is not valid, as of_polygons().
+  /// Throws: UsageError for numbers that are not a box, stream::Error for a file that is not a
+  /// region or has an invalid polygon, as of_polygons().
   static Region parse(const std::string& text);
 
   static Region of_box(const stream::Box3& box);
   /// The union of polygons, each with heights from `low` to `high`.
-  /// Throws: stream::Error if there is none, or for one that is not valid (a ring that crosses or
+  /// Throws: stream::Error without polygons, or for an invalid one (a ring that crosses or
   /// touches itself along a line, has fewer than three corners, no area or a coordinate that is not
   /// finite; a hole outside; holes that cross), naming polygon, ring and place.
   static Region of_polygons(std::vector<Polygon> polygons, double low, double high);
