@@ -260,12 +260,12 @@ TYPED_TEST(Delaunay3Test, EveryPathOfTheScanLeavesTheSameTetrahedra) {
     SCOPED_TRACE(name(kind));
     const auto points = make_points3<TypeParam>(kind, 200, 12);
     std::vector<Delaunay3<TypeParam>> triangulations;
-    for (const auto path :
-         {spatial::ScanPath::kPortable, spatial::ScanPath::kAvx2, spatial::ScanPath::kAvx512}) {
-      if (!spatial::supported(path)) continue;
+    for (const auto set :
+         {InstructionSet::kPortable, InstructionSet::kAvx2, InstructionSet::kAvx512}) {
+      if (!supported(set)) continue;
       auto& triangulation = triangulations.emplace_back();
       triangulation.build(points);
-      Delaunay3Access::mesh(triangulation).hole.scan = spatial::scan_function(path);
+      Delaunay3Access::mesh(triangulation).hole.scan = spatial::scan_function(set);
       std::mt19937_64 random(1);
       std::vector<VertexId> going;
       for (const VertexId v : triangulation.all_vertices())

@@ -145,12 +145,12 @@ template <class T>
 void expect_same_on_every_processor(const GridWindow<T>& window, const Tangle& any) {
   for (const double tolerance : {0.0, 0.3}) {
     const GridTinCheck expected = tin::check_grid_tin_by(window, any.points, any.triangles,
-                                                         tolerance, tin::GridPath::kPortable);
+                                                         tolerance, InstructionSet::kPortable);
     EXPECT_GT(expected.covered, 0U);
-    for (const tin::GridPath path : {tin::GridPath::kAvx2, tin::GridPath::kAvx512}) {
-      if (!tin::supported(path)) continue;
+    for (const InstructionSet set : {InstructionSet::kAvx2, InstructionSet::kAvx512}) {
+      if (!supported(set)) continue;
       const GridTinCheck check =
-          tin::check_grid_tin_by(window, any.points, any.triangles, tolerance, path);
+          tin::check_grid_tin_by(window, any.points, any.triangles, tolerance, set);
       EXPECT_EQ(check.max_error, expected.max_error);
       EXPECT_EQ(check.rms_error, expected.rms_error);
       EXPECT_EQ(check.covered, expected.covered);
@@ -187,11 +187,11 @@ TEST(GridTinCheck, MisuseIsRefused) {
 
 // The tests of all paths pass over what the machine lacks: here is where they say so.
 TEST(InstructionSets, Avx2IsTested) {
-  if (!supported(tin::GridPath::kAvx2)) GTEST_SKIP() << "the processor lacks AVX2";
+  if (!supported(InstructionSet::kAvx2)) GTEST_SKIP() << "the processor lacks AVX2";
 }
 
 TEST(InstructionSets, Avx512IsTested) {
-  if (!supported(tin::GridPath::kAvx512)) GTEST_SKIP() << "the processor lacks AVX-512";
+  if (!supported(InstructionSet::kAvx512)) GTEST_SKIP() << "the processor lacks AVX-512";
 }
 
 }  // namespace

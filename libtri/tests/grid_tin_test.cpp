@@ -97,10 +97,10 @@ TEST(GridTin, SameBytesOnEveryProcessor) {
         const auto all_paths = [&](const auto& any) {
           const GridSides sides = settle_sides(any.window(), options.max_error);
           const GridTin expected =
-              tin::make_grid_tin(any.window(), sides, options, tin::GridPath::kPortable);
-          for (const tin::GridPath path : {tin::GridPath::kAvx2, tin::GridPath::kAvx512}) {
-            if (!tin::supported(path)) continue;
-            const GridTin found = tin::make_grid_tin(any.window(), sides, options, path);
+              tin::make_grid_tin(any.window(), sides, options, InstructionSet::kPortable);
+          for (const InstructionSet set : {InstructionSet::kAvx2, InstructionSet::kAvx512}) {
+            if (!supported(set)) continue;
+            const GridTin found = tin::make_grid_tin(any.window(), sides, options, set);
             EXPECT_EQ(found.vertices, expected.vertices);
             EXPECT_EQ(found.triangles, expected.triangles);
           }

@@ -25,7 +25,6 @@ using planar::DoubleKernel;
 using point_tin_oracle::check_delaunay;
 using point_tin_oracle::kQualities;
 using point_tin_oracle::rough;
-using tin::rows::RowPath;
 
 constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 
@@ -295,18 +294,18 @@ TEST(PointRows, AllPathsGiveTheSame) {
       ASSERT_TRUE(tin::rows::padded_samples(grid.rows(), frame));
       ASSERT_TRUE(tin::rows::padded_samples(turned, frame));
       const PointTinOptions options = options_of(1.0, TinQuality::kRemoval);
-      const auto of_rows = [&](RowPath path) {
-        return tin::rows::make_tin(grid.rows(), frame, options, path);
+      const auto of_rows = [&](InstructionSet set) {
+        return tin::rows::make_tin(grid.rows(), frame, options, set);
       };
-      const auto of_turned = [&](RowPath path) {
-        return tin::rows::make_tin(turned, frame, options, path);
+      const auto of_turned = [&](InstructionSet set) {
+        return tin::rows::make_tin(turned, frame, options, set);
       };
-      EXPECT_GT(of_rows(RowPath::kPortable).triangles.size(), 100u);
-      EXPECT_GT(of_turned(RowPath::kPortable).triangles.size(), 100u);
-      for (const RowPath path : {RowPath::kAvx2, RowPath::kAvx512}) {
-        if (!tin::rows::supported(path)) continue;
-        expect_same(of_rows(RowPath::kPortable), of_rows(path));
-        expect_same(of_turned(RowPath::kPortable), of_turned(path));
+      EXPECT_GT(of_rows(InstructionSet::kPortable).triangles.size(), 100u);
+      EXPECT_GT(of_turned(InstructionSet::kPortable).triangles.size(), 100u);
+      for (const InstructionSet set : {InstructionSet::kAvx2, InstructionSet::kAvx512}) {
+        if (!supported(set)) continue;
+        expect_same(of_rows(InstructionSet::kPortable), of_rows(set));
+        expect_same(of_turned(InstructionSet::kPortable), of_turned(set));
       }
     }
   }

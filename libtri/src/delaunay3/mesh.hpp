@@ -141,7 +141,7 @@ struct Hole {
   std::vector<double> x, y, z;
   std::vector<double> power, volume;
   std::vector<std::uint32_t> near;
-  ScanFunction scan = best_scan_function();
+  ScanFunction scan = scan_function(best_instruction_set());
 
   [[nodiscard]] std::size_t bytes() const {
     return (vertex.capacity() + incident.capacity() + slots.capacity() + near.capacity() +

@@ -6,8 +6,8 @@
 
 #include "mesh.hpp"
 
-/// Insertion of a vertex into a Delaunay triangulation: the triangles whose circles contain it make
-/// way for triangles of the vertex and the sides of the hole (A. Bowyer, D. F. Watson, 1981).
+/// Insertion of a vertex into a Delaunay triangulation: the triangles whose circles contain it are
+/// replaced by triangles of the vertex and the sides of the hole (A. Bowyer, D. F. Watson, 1981).
 
 namespace terrace::tri::tin {
 
@@ -36,9 +36,9 @@ class Cavity {
     }
   }
 
-  /// Puts the triangles of `vertex` and the sides of the hole in the place of those removed.
-  /// `flat(a, b)`: for a side of the hull, whether the vertex lies on it; such a side is cut into
-  /// two. The new triangles have the vertex as corner 0, `place` and `error` are 0.
+  /// Fills the hole with the triangles of `vertex` and its sides. `flat(a, b)`: for a side of the
+  /// hull, whether the vertex lies on it; such a side is cut into two. The new triangles have the
+  /// vertex as corner 0; their `place` and `error` are 0.
   template <class Flat>
   void fill(Triangles& triangles, std::uint32_t vertex, const Flat& flat) {
     bool open = false;
@@ -67,12 +67,12 @@ class Cavity {
     }
   }
 
-  /// The triangles that fill() made; all slots of removed ones are among them.
+  /// The triangles that fill() made; they reuse all slots of those removed.
   const std::vector<std::uint32_t>& created() const { return created_; }
 
  private:
   struct Edge {
-    std::uint32_t a, b;   ///< of the hole, counter-clockwise
+    std::uint32_t a, b;   ///< along the hole, counter-clockwise
     std::uint32_t outer;  ///< the triangle beyond, or kNone
     unsigned back;        ///< its side towards the hole
   };

@@ -10,18 +10,16 @@
 
 #include "mesh.hpp"
 
-/// Which triangle of those with too great an error is next. Entries of triangles that have changed
-/// stay in the queues and are recognised when their turn comes.
+/// Queues of the triangles with too great an error. Entries of triangles that have changed since
+/// stay in the queue and are skipped when their turn comes.
 
 namespace terrace::tri::tin {
 
-/// About the greatest error first: 4 buckets for each power of two, of which the last in is the
-/// first out. As good as the exact order in what comes out, and several times as fast.
+/// Approximately the greatest error first: 4 buckets for each power of two, last in, first out. The
+/// meshes are as good as with the exact order, and it is several times as fast.
 class ErrorBuckets {
  public:
-  static constexpr bool kExact = false;
-
-  /// Errors below `least` are put on a level with it.
+  /// Errors below `least` share its bucket.
   explicit ErrorBuckets(float least) : base_(octave_quarter(least)) {
     buckets_.resize(octave_quarter(kHighest) - base_ + 1);
   }
@@ -32,14 +30,14 @@ class ErrorBuckets {
     top_ = std::max(top_, bucket + 1);
   }
 
-  /// The next triangle, or kNone.
+  /// The next triangle; kNone if there is none.
   std::uint32_t pop(const Triangles& triangles) {
     return pop(triangles, 1, [](const Triangle&) { return 0; });
   }
 
-  /// The same; a bucket that comes to its turn is put in order of places first, so that triangles
-  /// near each other in the plane are also near each other in time and memory. `tile_of(triangle)`
-  /// is a number below `tiles`.
+  /// The same, but each bucket is sorted by tiles when its turn comes, so that triangles near each
+  /// other in the plane are also near each other in time and memory. `tile_of(triangle)` is a
+  /// number below `tiles`.
   template <class TileOf>
   std::uint32_t pop(const Triangles& triangles, std::size_t tiles, const TileOf& tile_of) {
     for (; top_ > 0; --top_) {
@@ -100,11 +98,9 @@ class ErrorBuckets {
   std::vector<std::vector<std::uint32_t>> buckets_;
 };
 
-/// Exactly the greatest error first; of equal ones the smallest number.
+/// Exactly the greatest error first; of equal errors the smallest number first.
 class ErrorHeap {
  public:
-  static constexpr bool kExact = true;
-
   explicit ErrorHeap(float) {}
 
   void push(float error, std::uint32_t triangle) {
@@ -114,10 +110,6 @@ class ErrorHeap {
 
   template <class TileOf>
   std::uint32_t pop(const Triangles& triangles, std::size_t, const TileOf&) {
-    return pop(triangles);
-  }
-
-  std::uint32_t pop(const Triangles& triangles) {
     while (!heap_.empty()) {
       const auto [error, inverted] = heap_.front();
       std::pop_heap(heap_.begin(), heap_.end());

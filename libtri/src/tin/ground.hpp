@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <numeric>
 
-/// Predicates on the lattice with the distances that it has on the ground, exact.
+/// Exact predicates on a lattice, in the metric of the ground.
 
 namespace terrace::tri::tin {
 
@@ -17,10 +17,49 @@ std::int64_t turn(const P& a, const P& b, const P& c) {
          static_cast<std::int64_t>(b.y - a.y) * (c.x - a.x);
 }
 
+/// Calls visit(y, first x, last x) for each row of a counter-clockwise triangle, sides included,
+/// until it returns false.
+template <class P, class Visit>
+bool visit_rows(const P& a, const P& b, const P& c, const Visit& visit) {
+  const auto floor_divide = [](std::int64_t n, std::int64_t d) {
+    return n / d - (n % d < 0 ? 1 : 0);
+  };
+  const P* const corner[4] = {&a, &b, &c, &a};
+  const std::int32_t top = std::min({a.y, b.y, c.y}), bottom = std::max({a.y, b.y, c.y});
+  for (std::int32_t y = top; y <= bottom; ++y) {
+    std::int64_t first = std::min({a.x, b.x, c.x}), last = std::max({a.x, b.x, c.x});
+    for (int i = 0; i < 3; ++i) {
+      const P &p = *corner[i], &q = *corner[i + 1];
+      // Left of pq: along_x (x - p.x) + along_y (y - p.y) >= 0.
+      const std::int64_t along_x = p.y - q.y, along_y = q.x - p.x;
+      const std::int64_t rest = along_y * (y - p.y);
+      if (along_x > 0) first = std::max(first, p.x - floor_divide(rest, along_x));
+      if (along_x < 0) last = std::min(last, p.x + floor_divide(rest, -along_x));
+    }
+    if (first <= last &&
+        !visit(y, static_cast<std::int32_t>(first), static_cast<std::int32_t>(last)))
+      return false;
+  }
+  return true;
+}
+
+/// The tangent of an angle of at most 30 degrees, to 1e-9. By the first terms of the series, as
+/// results must not depend on a library's tangent.
+inline double tangent_of(double degrees) {
+  constexpr double kRadians = 0.017453292519943295;
+  const double a = degrees * kRadians;
+  const double s = a * a;
+  const double sine = a * (1 - s / 6 * (1 - s / 20 * (1 - s / 42 * (1 - s / 72))));
+  const double cosine = 1 - s / 2 * (1 - s / 12 * (1 - s / 30 * (1 - s / 56)));
+  return sine / cosine;
+}
+
 class Ground {
  public:
-  /// Steps on the ground of a column and a row; `extent`: the greatest difference of coordinates.
-  Ground(double column_step, double row_step, std::int64_t extent) {
+  /// Steps on the ground of a column and a row, the greatest difference of coordinates, and the
+  /// tangent of the smallest angle that is wide().
+  Ground(double column_step, double row_step, std::int64_t extent, double tangent)
+      : tangent_(tangent) {
     const double x = std::fabs(column_step), y = std::fabs(row_step);
     const double ratio = std::min(x, y) / std::max(x, y);
     const auto smaller = std::max<std::int64_t>(1, std::llround(1024 * ratio * ratio));
@@ -39,14 +78,13 @@ class Ground {
   }
 
   /// Whether the counter-clockwise a, b, c, of twice the area `twice` on the lattice, have no angle
-  /// of less than 5 degrees.
+  /// below the smallest one.
   template <class P>
   bool wide(const P& a, const P& b, const P& c, std::int64_t twice) const {
     const std::int64_t ab = square(a, b), bc = square(b, c), ca = square(c, a);
-    // The greatest scalar product of two sides is the one opposite to the shortest side.
+    // Twice the scalar product at the smallest angle, which is opposite to the shortest side.
     const std::int64_t most = ab + bc + ca - 2 * std::min({ab, bc, ca});
-    constexpr double kTangent = 0.08748866352592401;  // of 5 degrees
-    return 2 * area_ * static_cast<double>(twice) >= kTangent * static_cast<double>(most);
+    return 2 * area_ * static_cast<double>(twice) >= tangent_ * static_cast<double>(most);
   }
 
   template <class P>
@@ -73,7 +111,8 @@ class Ground {
 
   std::int64_t x_, y_;  ///< squares of the steps, in proportion
   double area_;         ///< of a cell, in the same unit
-  bool narrow_;         ///< 64 bits suffice
+  double tangent_;
+  bool narrow_;  ///< 64 bits suffice
 };
 
 }  // namespace terrace::tri::tin

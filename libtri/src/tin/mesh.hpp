@@ -2,12 +2,13 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
-/// What TINs of rasters and of points share: triangles that know their neighbours, of vertices that
-/// are numbers only. Nothing here computes with coordinates.
+/// Triangles that know their neighbours, without coordinates: shared by all TINs.
 
 namespace terrace::tri::tin {
 
@@ -18,12 +19,31 @@ struct Triangle {
   std::array<std::uint32_t, 3> corner;  ///< counter-clockwise; corner[0] == kNone: no triangle
   std::array<std::uint32_t, 3> next;    ///< the triangle across side i, or kNone
   std::uint32_t place;                  ///< the sample or point where the error is greatest
-  float error;                          ///< > 0: waits for `place` to be inserted
+  float error;                          ///< > 0 while it waits for `place` to be inserted
 
   bool live() const { return corner[0] != kNone; }
 };
 
 using Triangles = std::vector<Triangle>;
+
+/// An error as Triangle::error: at least as great, above 0, finite.
+inline float rounded_up(double error) {
+  constexpr float kHighest = std::numeric_limits<float>::max();
+  if (!(error < double{kHighest})) return kHighest;
+  const auto rounded = static_cast<float>(error);
+  return rounded < error || rounded == 0 ? std::nextafter(rounded, kHighest) : rounded;
+}
+
+/// Triangle::place of a sample in rows and columns, at most 65,535 of each.
+inline constexpr std::uint32_t place_at(std::int32_t column, std::int32_t row) {
+  return static_cast<std::uint32_t>(row) << 16 | static_cast<std::uint32_t>(column);
+}
+inline constexpr std::int32_t column_of(std::uint32_t place) {
+  return static_cast<std::int32_t>(place & 0xFFFF);
+}
+inline constexpr std::int32_t row_of(std::uint32_t place) {
+  return static_cast<std::int32_t>(place >> 16);
+}
 
 inline constexpr unsigned after(unsigned side) { return side == 2 ? 0 : side + 1; }
 inline constexpr unsigned before(unsigned side) { return side == 0 ? 2 : side - 1; }

@@ -10,10 +10,10 @@
 namespace terrace::tri {
 namespace {
 
-/// Which samples of a line must be vertices: the ends, and where data is missing nearby. Data ends
-/// at a vertex, and a sample with data but a neighbour without, on the line or beside it, is a
-/// vertex. So all samples inside a longer segment with data are
-/// surrounded by data, and the triangles on it can be.
+/// Which samples of a line must be vertices: the ends, the samples on both sides of where data
+/// begins or ends, and samples with data that have a neighbour without, on the line or beside it.
+/// So all samples inside a longer segment with data are surrounded by data, and triangles on the
+/// segment can have data too.
 template <class T>
 std::vector<std::uint8_t> needed_on(std::span<const T> line, std::span<const T> beside,
                                     std::span<const T> other_beside) {
@@ -47,7 +47,7 @@ void simplify(std::span<const T> line, std::size_t a, std::size_t b, double limi
     const auto start = static_cast<double>(line[from]);
     const double rise = static_cast<double>(line[to]) - start;
     const auto length = static_cast<double>(to - from);
-    double most = std::max(limit, 0x1p-50 * std::fabs(rise));  // rounding is no error
+    double most = std::max(limit, 0x1p-50 * std::fabs(rise));  // ignores rounding
     std::size_t worst = from;
     for (std::size_t i = from + 1; i < to; ++i) {
       const double error = std::fabs(static_cast<double>(line[i]) - start -

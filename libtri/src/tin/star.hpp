@@ -8,11 +8,11 @@
 
 #include "mesh.hpp"
 
-/// The triangles around a vertex and what may take their place.
+/// The triangles around a vertex, and those that may replace them.
 
 namespace terrace::tri::tin {
 
-/// Larger stars are left alone: filling one takes time in proportion to the third power.
+/// Larger stars are left alone, as filling one takes time proportional to the third power.
 inline constexpr std::size_t kMaxRing = 16;
 
 /// How a polygon is cut into triangles: the triangle on the chord from i to j (i < j, the polygon's
@@ -23,13 +23,14 @@ struct PolygonFill {
 };
 
 /// Among the ways to cut a counter-clockwise polygon of `size` corners into triangles, finds
-/// the one whose worst triangle is the least bad. `worst(i, m, j, limit)`, for corners i < m < j:
-/// what the triangle costs, or anything above `limit`, if it is more than that or not
-/// counter-clockwise or not wanted. False: there is none of at most `limit`. Dynamic programming,
-/// O(size^3) calls at most: G. T. Klincsek, "Minimal triangulations of polygonal domains", 1980.
+/// the one whose worst triangle costs least. `worst(i, m, j, limit)`, for corners i < m < j, is the
+/// cost of a triangle, or any number above `limit` if it costs more than that, is not
+/// counter-clockwise or is not wanted. False if each way costs more than `limit`. Dynamic
+/// programming, at most O(size^3) calls: G. T. Klincsek, "Minimal triangulations of polygonal
+/// domains", 1980.
 ///
-/// Triangles that are all counter-clockwise do not overlap, as the polygon winds round each point
-/// once only.
+/// Triangles that are all counter-clockwise do not overlap, as the polygon winds around each point
+/// only once.
 template <class Cost, class Worst>
 bool fill_least_worst(std::size_t size, Cost limit, const Worst& worst, PolygonFill& fill) {
   constexpr Cost kNever = std::numeric_limits<Cost>::infinity();
@@ -56,15 +57,15 @@ bool fill_least_worst(std::size_t size, Cost limit, const Worst& worst, PolygonF
   return cost[0][size - 1] <= limit;
 }
 
-/// Any way to cut such a polygon into triangles for which fits(i, m, j), counter-clockwise among
-/// them. A few more triangles remain in the end than with fill_least_worst(), but the calls are far
-/// fewer, as only parts beside a triangle that fits are looked at.
+/// Any way to cut such a polygon into triangles for which fits(i, m, j), which must imply
+/// counter-clockwise. Slightly more triangles remain in the end than with fill_least_worst(), but
+/// calls are far fewer, as only parts beside a triangle that fits are looked at.
 template <class Fits>
 class AnyFill {
  public:
   AnyFill(const Fits& fits, PolygonFill& fill) : fits_(fits), fill_(fill) {}
 
-  /// Looks for a polygon of `size` corners; false: there is none.
+  /// For a polygon of `size` corners; false if there is no such way.
   bool find(std::size_t size) {
     found_.fill(0);
     failed_.fill(0);
@@ -98,8 +99,8 @@ class AnyFill {
 
 /// The Delaunay triangles of a polygon that is the star of a vertex of a Delaunay triangulation.
 /// `left(i, m, j)`: whether the corners turn left; `inside(i, m, j, p)`: whether corner p lies
-/// strictly in the circle of those three. In other triangulations it may find none (false) or one
-/// that is not Delaunay. O(size^2).
+/// strictly in the circle of those three. In other triangulations it may fail (false) or find
+/// triangles that are not Delaunay. O(size^2).
 template <class Left, class Inside>
 bool fill_delaunay(std::size_t size, const Left& left, const Inside& inside, PolygonFill& fill) {
   std::array<std::array<std::uint8_t, 2>, kMaxRing> stack;
@@ -122,7 +123,7 @@ bool fill_delaunay(std::size_t size, const Left& left, const Inside& inside, Pol
 /// A vertex's triangles in counter-clockwise order.
 class Star {
  public:
-  /// False: the vertex lies on the hull or has more than kMaxRing neighbours.
+  /// False if the vertex lies on the hull or has more than kMaxRing neighbours.
   bool gather(const Triangles& triangles, std::uint32_t vertex, std::uint32_t first) {
     size_ = 0;
     std::uint32_t t = first;
@@ -152,7 +153,7 @@ class Star {
     return all_of(fill, 0, size_ - 1, visit);
   }
 
-  /// Puts the triangles of a fill in the place of the vertex's. Two slots are empty afterwards.
+  /// Replaces the vertex's triangles by those of a fill. Two slots are empty afterwards.
   /// `triangle_of` has a triangle of each vertex and is kept up to date.
   void replace(Triangles& triangles, const PolygonFill& fill,
                std::vector<std::uint32_t>& triangle_of, std::uint32_t vertex) {

@@ -19,7 +19,7 @@ namespace terrace::tri {
 
 using Point2 = std::array<double, 2>;
 
-/// Anything with a member height(VertexId), such as MultiresolutionModel.
+/// Anything with a member function height(VertexId), such as MultiresolutionModel.
 template <class T>
 concept HasHeights = requires(const T& t, VertexId vertex) {
   { t.height(vertex) } -> std::convertible_to<double>;
@@ -29,9 +29,9 @@ concept HasHeights = requires(const T& t, VertexId vertex) {
 template <class T>
 concept HeightFunction = std::is_invocable_r_v<double, const T&, VertexId>;
 
-/// The height of a vertex, from an array indexed by slot(vertex), from a function, or from an
-/// object with a member height(VertexId). It refers to what it was made from, as a std::span does,
-/// so it is for parameters. With several threads the function is called from all of them at once.
+/// The heights of vertices: an array indexed by slot(vertex), a function, or an object with a
+/// member function height(VertexId). Like std::span it refers to what it was made from, so use it
+/// for parameters only. With several threads the function is called concurrently.
 class Heights {
  public:
   template <class T>
@@ -64,13 +64,14 @@ class Heights {
 };
 
 enum class Interpolation : std::uint8_t {
-  /// The nearest vertex, of several the lexicographically smallest; also outside the hull.
+  /// The nearest vertex, also outside the hull; of equally near ones the lexicographically
+  /// smallest.
   kNearest,
   /// Barycentric coordinates in the triangle.
   kLinear,
   /// R. Sibson, "A vector identity for the Dirichlet tessellation",
   /// doi:10.1017/S0305004100056589: the areas that the query's Voronoi cell would take from the
-  /// cells of its neighbours. Continuous, smooth but at vertices, and the same for any
+  /// cells of its neighbours. Continuous, smooth except at vertices, and the same for any
   /// triangulation of cocircular points.
   kNaturalNeighbour,
 };
@@ -80,25 +81,25 @@ struct VertexWeight {
   double weight = 0;
 };
 
-/// The weights of the vertices that make the value at a query: they are >= 0, their sum is 1, and
-/// (but for kNearest) the weighted mean of the vertices is the query. No weights where there is no
-/// value: outside the hull (kLinear, kNaturalNeighbour), and in an empty triangulation. The hull
-/// belongs to the inside, decided exactly; while all points are on one line it is the segment
-/// between the outermost. On a vertex only that vertex has a weight, on a hull edge its two ends.
+/// The weights of the vertices that interpolate at a query: they are >= 0, their sum is 1, and
+/// (except with kNearest) the weighted mean of the vertices is the query. There are no weights
+/// outside the hull (kLinear, kNaturalNeighbour) and in an empty triangulation. The hull counts as
+/// inside, decided exactly; if all points are on one line, it is the segment between the outermost.
+/// On a vertex only that vertex has a weight, on a hull edge only its two ends.
 ///
-/// Which triangles a query concerns is decided exactly. The weights are computed with doubles and
-/// judged by an estimate of their error; where it is above 1e-11 (needles, queries next to the
-/// hull, coordinates near the ends of the range) again with rational numbers, some hundred times
-/// slower.
+/// The triangles that a query concerns are found exactly. The weights are computed with doubles;
+/// where the estimated error is above 1e-11 (needles, queries next to the hull, coordinates near
+/// the ends of the range) they are computed again with rational numbers, about a hundred times as
+/// slow.
 ///
-/// Replaces `weights`. hint: a vertex near the query, for the walk. Throws std::invalid_argument
-/// for a query that is not finite.
+/// Replaces the contents of `weights`. hint: a vertex near the query, where the walk starts. Throws
+/// std::invalid_argument for a query that is not finite.
 template <class Coord>
 void weights_at(const Delaunay2<Coord>& triangulation, const Point2& query, Interpolation method,
                 std::vector<VertexWeight>& weights, VertexId hint = kNoVertex);
 
-/// Heights at many queries, in their order; NaN where there is no value or a vertex that has a
-/// weight has the height NaN. Queries are sorted along a Hilbert curve inside, so give many at
+/// Heights at many queries, in their order; NaN where there are no weights or a vertex with a
+/// weight has the height NaN. Queries are sorted along a Hilbert curve internally, so pass many at
 /// once: about 0.4 us each on one core. threads: 0 for one per core; the bytes of the result do not
 /// depend on it. Memory: 16 bytes per query, for at most 2^24 queries at a time.
 ///
@@ -109,24 +110,24 @@ std::vector<double> heights_at(const Delaunay2<Coord>& triangulation, const Heig
                                std::span<const Point2> queries, Interpolation method,
                                unsigned threads = 0);
 
-/// Height gained per unit of length going east and north. NaN: no value.
+/// Height gained per unit of length to the east and to the north. NaN where it is undefined.
 struct Gradient {
   double x = std::numeric_limits<double>::quiet_NaN();
   double y = std::numeric_limits<double>::quiet_NaN();
 };
 
 enum class GradientFrom : std::uint8_t {
-  /// The gradient of the triangle. On edges and vertices, where triangles differ: the mean of those
-  /// that meet there, weighted by area.
+  /// The gradient of the triangle. On edges and vertices, where triangles differ, it is the mean of
+  /// those that meet there, weighted by area.
   kTriangles,
-  /// The derivative of natural neighbour interpolation. On a vertex, where it has none: the mean
-  /// over the vertex's Voronoi cell by the same formula, which is exact for planes. On hull edges
-  /// and hull vertices, whose cells are unbounded: as kTriangles.
+  /// The derivative of natural neighbour interpolation. On a vertex, where there is none, it is the
+  /// mean over the vertex's Voronoi cell by the same formula, which is exact for planes. On hull
+  /// edges and hull vertices, whose cells are unbounded, it is that of kTriangles.
   kNaturalNeighbours,
 };
 
-/// Gradients at many queries; all else as heights_at(). There is none outside the hull, and none
-/// while all points are on one line.
+/// Gradients at many queries, otherwise as heights_at(). They are undefined outside the hull, and
+/// everywhere if all points are on one line.
 template <class Coord>
 std::vector<Gradient> gradients_at(const Delaunay2<Coord>& triangulation, const Heights& heights,
                                    std::span<const Point2> queries, GradientFrom from,
@@ -136,8 +137,8 @@ std::vector<Gradient> gradients_at(const Delaunay2<Coord>& triangulation, const 
 /// must have the same unit.
 [[nodiscard]] double slope_degrees(const Gradient& gradient);
 
-/// The direction in which the surface falls most, in degrees clockwise from north (+y): 90 is east
-/// (+x). 0 <= aspect < 360; NaN where it is level.
+/// The direction of steepest descent, in degrees clockwise from north (+y): 90 is east (+x).
+/// 0 <= aspect < 360; NaN where the surface is level.
 [[nodiscard]] double aspect_degrees(const Gradient& gradient);
 
 #define TERRACE_TRI_DECLARE(Coord)                                                                \

@@ -10,24 +10,23 @@
 
 #include "terrace/tri/grid_tin.hpp"
 
-/// Error-bounded triangulated surfaces (TINs) of irregular points: few vertices, and the surface is
-/// vertically within a given error of every sample.
+/// Error-bounded triangulated surfaces (TINs) of irregular points: few vertices, vertically within
+/// a given error of every sample.
 ///
-/// Greedy insertion (M. Garland, P. Heckbert, "Fast polygonal approximation of terrains and height
-/// fields", CMU-CS-95-181) with lists of samples per triangle; then vertices are removed again
-/// while every sample stays within the error.
+/// Greedy insertion (M. Garland, P. S. Heckbert, "Fast polygonal approximation of terrains and
+/// height fields", CMU-CS-95-181) with a list of samples per triangle; then vertices are removed
+/// again as long as every sample stays within the error.
 
 namespace terrace::tri {
 
-/// Which of several samples at one x,y counts: one height stands for them and it alone is measured,
-/// unless all count.
+/// Which of several samples at the same x, y counts. Only its height is measured, except with kAll.
 enum class PointDuplicates : std::uint8_t {
   kFirst,
   kMin,
   kMax,
   kMean,
-  kAll,    ///< the lowest and the highest are measured, so the surface is as close to all others
-  kError,  ///< std::invalid_argument names the first that has the place of an earlier one
+  kAll,    ///< the lowest and the highest are measured, which bounds the error of all others
+  kError,  ///< throws std::invalid_argument naming the first sample at the place of an earlier one
 };
 
 /// Vertices on a lattice: at whole x and y, with heights origin + k * step, k whole.
@@ -37,114 +36,116 @@ struct TinLattice {
 };
 
 struct PointTinOptions {
-  /// In the unit of heights, >= 0. 0 keeps every sample that is not exactly on the surface.
+  /// The bound, >= 0, in the unit of heights. 0 keeps every sample that is not exactly on the
+  /// surface.
   double max_error = 0;
   TinQuality quality = TinQuality::kRemoval;
   PointDuplicates duplicates = PointDuplicates::kFirst;
-  /// At most this many vertices, those of the frame (or the hull's corners) included and never
-  /// dropped; 0: no limit. Where it is reached first, max_error is not kept and
-  /// PointTin::errors tells what was reached.
+  /// At most this many vertices, including those of the frame (or the hull's corners), which are
+  /// never dropped; 0: no limit. If it is reached first, max_error is exceeded and PointTin::errors
+  /// tells by how much.
   std::size_t max_points = 0;
-  /// Removal makes no triangle with a smaller angle (in the plane), unless it is Delaunay. 0 to 30.
+  /// Removal makes no triangle with a smaller angle in the plane, unless it is Delaunay. 0 to 30.
   double min_angle_degrees = 5;
-  /// Vertices stand at their sample's place rounded to whole numbers (halves up) and at its height
-  /// rounded to the lattice; of samples rounded to one place the first one taken stands. Errors are
-  /// measured at the samples' true places. Needs a frame with whole x, y below 2^30, >= 0.
+  /// Rounds a vertex's place to whole numbers (halves up) and its height to the lattice. If several
+  /// samples round to one place, the first one inserted is the vertex. Errors are measured at the
+  /// samples' true places. Requires a frame with whole x, y in [0, 2^30).
   std::optional<TinLattice> lattice;
 };
 
-/// What PointTin::sample says of a vertex of the frame.
+/// PointTin::sample of a vertex of the frame.
 inline constexpr std::uint32_t kNoSample = 0xFFFFFFFFu;
 
 /// Vertical distances of samples from a surface.
 struct TinErrors {
-  std::size_t covered = 0;    ///< samples inside the surface's triangles, borders included
-  std::size_t uncovered = 0;  ///< the others: not measured
+  std::size_t covered = 0;    ///< samples in the surface's triangles, borders included
+  std::size_t uncovered = 0;  ///< all other samples, which are not measured
   double largest = 0;
   double rms = 0;
-  std::uint32_t largest_at = kNoSample;  ///< a sample with that error
+  std::uint32_t largest_at = kNoSample;  ///< a sample with the largest error
 };
 
 struct PointTin {
-  std::vector<Point3> vertices;  ///< the frame's first, in its order
-  /// The sample that a vertex was taken from, in parallel to `vertices`.
+  std::vector<Point3> vertices;  ///< the frame's come first, in its order
+  /// The sample that each vertex was made from, parallel to `vertices`.
   std::vector<std::uint32_t> sample;
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< vertices, counter-clockwise
-  /// Measured at every sample in the finished surface, after duplicates were merged; with kAll at
-  /// the lowest and the highest sample of a place.
-  /// errors.largest <= max_error, unless max_points was reached or samples are `stuck`.
+  /// Measured at every sample after duplicates were merged; with kAll at the lowest and the highest
+  /// sample of each place. errors.largest <= max_error, unless max_points was reached or samples
+  /// are `stuck`.
   TinErrors errors;
   std::size_t duplicates = 0;  ///< samples that share a place with an earlier one
   double duplicate_range = 0;  ///< the largest difference of heights at one place
-  /// Samples beyond max_error that cannot become vertices: they lie on the frame's sides, which are
-  /// kept, or their place on the lattice is taken or on a side, or the place has a vertex already
-  /// (kAll, where samples of one place differ by more than max_error).
+  /// Samples beyond max_error that cannot become vertices: they lie on a side of the frame, their
+  /// place on the lattice is taken or on a side, or their place has a vertex already (with kAll,
+  /// where samples of one place differ by more than max_error).
   std::size_t stuck = 0;
-  std::size_t inserted = 0;  ///< vertices of the greedy surface beside the frame's or the corners
-  std::size_t removed = 0;   ///< of these, removed again
+  std::size_t inserted = 0;  ///< vertices inserted, without the frame's or the hull's corners
+  std::size_t removed = 0;   ///< inserted vertices that were removed again
 };
 
 /// The surface of samples x[i], y[i], z[i].
 ///
-/// `frame`: the region, a convex polygon, counter-clockwise, strictly around an area, of at least 3
-/// vertices; several on one straight side are allowed. Its vertices and sides are kept exactly as
-/// given. Samples inside and on the sides are covered; those outside, be it by a hair, are counted
+/// `frame`: the region, a convex, counter-clockwise polygon of positive area with at least 3
+/// vertices, of which several may lie on one straight side. Its vertices and sides are kept exactly
+/// as given. Samples inside and on the sides are covered; those outside, however close, are counted
 /// as uncovered and have no influence. Without a frame the region is the samples' convex hull: its
 /// corners are vertices, so that every sample is covered; other samples on the hull's boundary
-/// become vertices only where the error asks for it. Samples that are all on one line (or fewer
-/// than 3) have no surface: no vertex, all uncovered.
+/// become vertices only where the error requires it. Fewer than 3 samples, or samples that are all
+/// on one line, have no surface: the result has no vertices and all samples are uncovered.
 ///
-/// Depends on the arguments alone: the same bytes on every machine; the order of samples at
-/// different places hardly matters. One thread. About n log n for n samples: on a processor of 2024
-/// 0.2 us per sample and 1.3 us per vertex made on the way, removal as much again; 36 bytes per
-/// sample, and about 100 per vertex made on the way, the result included.
+/// The result depends only on the arguments: the same bytes on every machine. The order of samples
+/// at different places hardly matters. One thread. Time about n log n for n samples: on a processor
+/// of 2024, 0.2 us per sample and 1.3 us per vertex inserted, and as much again for removal.
+/// Memory: 36 bytes per sample and about 100 per vertex inserted, including the result.
 ///
-/// max_points: greedy insertion stops there; for the other qualities the bound that leaves nearly
-/// as many is searched for, which takes up to 8 times as long.
+/// With max_points greedy insertion stops there; the other qualities search for the bound that
+/// leaves nearly as many, which takes up to 8 times as long.
 ///
-/// Throws std::invalid_argument naming the index of a coordinate or height that is not finite or of
-/// a size above 1e100, of a frame vertex where the polygon is not convex, of a duplicate with
-/// kError; for options out of range or arrays of different lengths; std::length_error for more than
-/// 2^29 samples.
+/// Throws std::invalid_argument naming the index of a coordinate or height that is not finite or
+/// above 1e100 in absolute value, of a frame vertex where the polygon is not convex, or of a
+/// duplicate with kError; also for options out of range and arrays of different lengths. Throws
+/// std::length_error for more than 2^29 samples.
 [[nodiscard]] PointTin point_tin(std::span<const double> x, std::span<const double> y,
                                  std::span<const double> z, std::span<const Point3> frame,
                                  const PointTinOptions& options);
 
 /// Samples in rows and columns: number row * x.size() + column is at x[column], y[row].
 struct SampleRows {
-  std::span<const double> x;  ///< of the columns
-  std::span<const double> y;  ///< of the rows
+  std::span<const double> x;  ///< one for each column
+  std::span<const double> y;  ///< one for each row
   std::span<const double> z;  ///< row by row; NaN: there is no such sample
 };
 
-/// Samples that stand about in rows and columns, as those of a raster in another projection: number
+/// Samples on an approximately regular grid, such as a raster in another projection: number
 /// row * columns + column is at x, y of that number.
 struct SampleGrid {
   std::size_t columns = 0;
-  std::span<const double> x;  ///< row by row, as y and z
+  std::span<const double> x;  ///< row by row, as are y and z
   std::span<const double> y;
   std::span<const double> z;  ///< NaN: there is no such sample
 };
 
-/// The same of samples in rows and columns, with the same promises, but not the same surface.
+/// The surface of samples in rows and columns: the same guarantees, but not the same surface.
 ///
-/// Faster, up to 10 times where few samples become vertices, if the frame is an upright rectangle
-/// with coordinates below 2^20, the options have a lattice and no max_points, there are at most
-/// 65,535 columns and rows, and x and y of SampleRows ascend at equal distances (but for a
-/// thousandth), or places of SampleGrid are an affine image of columns and rows but for 4 of their
-/// distances; the less they are off the faster. On a processor of 2024 with AVX-512: 0.02 us per
-/// sample and 1 us per vertex made on the way, removal two thirds as much again; SampleGrid takes
-/// up to a third longer. 16 bytes per sample (SampleGrid: 32) and 200 per vertex made on the way.
-/// Else it calls the other.
+/// Up to 10 times as fast where few samples become vertices, if the frame is an upright rectangle
+/// with coordinates below 2^20, the options have a lattice and no max_points, and there are at most
+/// 65,535 columns and rows. The x and y of SampleRows must ascend at equal spacing (to within a
+/// thousandth of it); the places of SampleGrid must be within 4 spacings of an affine image of
+/// columns and rows, and the closer they are the faster it is. Otherwise this calls the function
+/// above. On a processor of 2024 with AVX-512: 0.02 us per sample and 1 us per vertex inserted, two
+/// thirds as much again for removal, and up to a third more for SampleGrid. Memory: 16 bytes per
+/// sample (SampleGrid: 32) and 200 per vertex inserted.
 [[nodiscard]] PointTin point_tin(const SampleRows& samples, std::span<const Point3> frame,
                                  const PointTinOptions& options);
 [[nodiscard]] PointTin point_tin(const SampleGrid& samples, std::span<const Point3> frame,
                                  const PointTinOptions& options);
 
-/// Measures samples against any surface whose triangles do not overlap: independent of how it was
-/// made. Samples of equal place are each measured. Finds every sample's triangle with exact
-/// predicates by way of a raster of boxes; heights in double. O(n + triangles) for well-shaped
-/// surfaces. Throws std::invalid_argument for a triangle naming a vertex that is not there.
+/// Measures samples against any surface whose triangles do not overlap, however it was made.
+/// Samples at the same place are each measured. Each sample's triangle is found by a raster of
+/// cells and exact predicates; heights are computed in extended precision. O(n + triangles) for
+/// well-shaped surfaces. Throws std::invalid_argument for arrays of different lengths and for a
+/// triangle with a vertex that does not exist.
 [[nodiscard]] TinErrors measure_surface(std::span<const double> x, std::span<const double> y,
                                         std::span<const double> z, std::span<const Point3> vertices,
                                         std::span<const std::array<std::uint32_t, 3>> triangles);
@@ -152,25 +153,25 @@ struct SampleGrid {
 struct LineVertex {
   double t = 0;
   double height = 0;
-  std::uint32_t sample = 0;  ///< that it was taken from
+  std::uint32_t sample = 0;  ///< the sample that it was made from
 };
 
 struct SimplifiedLine {
   std::vector<LineVertex> vertices;  ///< ascending in t; the first and the last are the ends
-  double largest_error = 0;          ///< over all samples; above max_error only on a lattice
+  double largest_error = 0;          ///< over all samples; exceeds max_error only on a lattice
 };
 
-/// The chain of few vertices through samples along a line that is within max_error of each of them:
-/// the ends, and then always the sample of greatest error (of equal ones the first). Depends on
-/// these samples alone, so both sides of a border get the same.
+/// A chain of few vertices within max_error of each sample along a line: the ends, and then
+/// repeatedly the sample of greatest error (the first of equal ones). It depends only on these
+/// samples, so both sides of a border get the same chain.
 ///
-/// t: places along the line, ascending; of equal ones the first stands for all. On a lattice
-/// vertices stand at rounded t and heights, as in point_tin(); errors are measured at the true
-/// places, and where a place on the lattice is taken the error may stay above max_error.
+/// t: places along the line, ascending; of samples at one place the first counts. On a lattice t
+/// and heights of vertices are rounded, as in point_tin(); errors are measured at the true places,
+/// and where a place on the lattice is taken the error may stay above max_error.
 ///
 /// Throws std::invalid_argument naming the index of a t that descends or of a value that is not
-/// finite, for max_error < 0 or arrays of different lengths. No sample: no vertex. O(n log n)
-/// usually, O(n^2) at worst.
+/// finite; also for max_error < 0 and arrays of different lengths. Without samples there are no
+/// vertices. Usually O(n log n), at worst O(n^2).
 [[nodiscard]] SimplifiedLine simplify_line(std::span<const double> t,
                                            std::span<const double> heights, double max_error,
                                            const std::optional<TinLattice>& lattice = {});

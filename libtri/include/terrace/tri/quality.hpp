@@ -9,35 +9,33 @@
 #include "terrace/tri/delaunay2.hpp"
 #include "terrace/tri/interpolation.hpp"
 
-/// Measures of a triangulation and of the surface on it. Angles, aspects and edges are those in the
-/// plane, where the triangulation is Delaunay. Coordinates are taken as doubles; sizes whose
+/// Quality measures of a triangulation and of the surface on it. Angles, aspects and edges are
+/// those in the plane, where the triangulation is Delaunay. Computed in double: lengths whose
 /// squares overflow give infinities.
 
 namespace terrace::tri {
 
 struct TriangleQuality {
   double min_angle_degrees = 0;  ///< 0 to 60
-  /// Longest edge over 2 sqrt(3) times the radius of the inscribed circle: 1 for an equilateral
-  /// triangle, else more.
+  /// The longest edge over 2 sqrt(3) times the radius of the inscribed circle: 1 for an equilateral
+  /// triangle, larger for all others.
   double aspect = 1;
-  std::array<double, 3> edges{};  ///< lengths, edge i opposite to corner i
-  double area = 0;
-  /// Area of the sloping triangle. NaN, as the volumes are, where a height is NaN.
-  double surface_area = 0;
-  /// Between the surface and the datum height, where it is above; where it is below, >= 0 too.
-  double volume_above = 0;
-  double volume_below = 0;
+  std::array<double, 3> edges{};  ///< lengths; edge i is opposite to corner i
+  double area = 0;                ///< in the plane
+  double surface_area = 0;        ///< of the sloping triangle; NaN if a height is NaN
+  double volume_above = 0;        ///< below the surface and above the datum; NaN if a height is NaN
+  double volume_below = 0;        ///< above the surface and below the datum, >= 0; NaN likewise
 };
 
-/// Requires a living triangle.
+/// Requires a triangle of the triangulation. datum: the height that volumes refer to.
 template <class Coord>
 TriangleQuality triangle_quality(const Delaunay2<Coord>& triangulation, const Heights& heights,
                                  TriangleId triangle, double datum = 0);
 
+/// Without triangles all numbers are 0.
 struct MeshQuality {
   std::size_t triangles = 0;
-  double min_angle_degrees =
-      0;  ///< the smallest; 0 where there is no triangle, as all that follows
+  double min_angle_degrees = 0;
   double mean_min_angle_degrees = 0;
   double max_aspect = 0;
   double mean_aspect = 0;
@@ -46,7 +44,7 @@ struct MeshQuality {
   double min_edge = 0;
   double max_edge = 0;
   double mean_edge = 0;
-  /// Numbers of edges in equal parts of min_edge .. max_edge.
+  /// Numbers of edges in equal intervals from min_edge to max_edge.
   std::vector<std::size_t> edge_histogram;
 
   double area = 0;
@@ -64,18 +62,18 @@ MeshQuality mesh_quality(const Delaunay2<Coord>& triangulation, const Heights& h
                          double datum = 0, std::size_t histogram_bins = 16);
 
 struct VerticalDistances {
-  std::size_t count = 0;  ///< points over the surface
-  std::size_t outside =
-      0;           ///< points beyond the hull, or where a height is NaN: in no figure below
-  double max = 0;  ///< of absolute values, as mean
-  double mean = 0;
+  std::size_t count = 0;  ///< points measured
+  /// Points that are not measured: outside the hull, or where a height is NaN.
+  std::size_t outside = 0;
+  double max = 0;   ///< of the distances' absolute values
+  double mean = 0;  ///< of the distances' absolute values
   double rms = 0;
-  double bias = 0;        ///< the mean of point - surface
-  std::size_t worst = 0;  ///< the index of the point with the distance `max`, the first of several
+  double bias = 0;        ///< mean of point - surface
+  std::size_t worst = 0;  ///< index of the first point at the distance `max`
 };
 
-/// How far points that are not in the triangulation lie above or below its surface. threads and
-/// errors as heights_at(); the result does not depend on the number of threads.
+/// How far points that are not in the triangulation lie above or below its surface. Threads and
+/// errors are those of heights_at(); the result does not depend on the number of threads.
 template <class Coord>
 VerticalDistances vertical_distances(const Delaunay2<Coord>& triangulation, const Heights& heights,
                                      std::span<const Point3> points,

@@ -25,34 +25,13 @@ std::size_t scan_portable(const ScanVertices& vertices, const ScanFacet& facet,
 }
 
 #ifdef TERRACE_TRI_X86
-
-bool supported(ScanPath path) {
-  if (path == ScanPath::kAvx2) return __builtin_cpu_supports("avx2") != 0;
-  if (path == ScanPath::kAvx512)
-    return __builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512dq") != 0;
-  return true;
+ScanFunction scan_function(InstructionSet set) {
+  return set == InstructionSet::kAvx512 ? scan_avx512
+         : set == InstructionSet::kAvx2 ? scan_avx2
+                                        : scan_portable;
 }
-
-ScanFunction scan_function(ScanPath path) {
-  return path == ScanPath::kAvx512 ? scan_avx512
-         : path == ScanPath::kAvx2 ? scan_avx2
-                                   : scan_portable;
-}
-
 #else
-
-bool supported(ScanPath path) { return path == ScanPath::kPortable; }
-
-ScanFunction scan_function(ScanPath) { return scan_portable; }
-
+ScanFunction scan_function(InstructionSet) { return scan_portable; }
 #endif
-
-ScanFunction best_scan_function() {
-  static const ScanFunction best =
-      scan_function(supported(ScanPath::kAvx512) ? ScanPath::kAvx512
-                    : supported(ScanPath::kAvx2) ? ScanPath::kAvx2
-                                                 : ScanPath::kPortable);
-  return best;
-}
 
 }  // namespace terrace::tri::spatial

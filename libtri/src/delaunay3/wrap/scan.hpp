@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "instruction_set.hpp"
+
 /// The inner loop of filling a hole: what a facet makes of every vertex, in double.
 
 namespace terrace::tri::spatial {
@@ -37,11 +39,8 @@ inline constexpr std::size_t kScanPadding = 8;
 using ScanFunction = std::size_t (*)(const ScanVertices& vertices, const ScanFacet& facet,
                                      std::uint32_t* near);
 
-/// The same for several processors: what they list may differ where bounds of errors are met.
-enum class ScanPath : std::uint8_t { kPortable, kAvx2, kAvx512 };
-bool supported(ScanPath path);
-ScanFunction scan_function(ScanPath path);  ///< of a supported path
-ScanFunction best_scan_function();
+/// Requires a supported set. What they list may differ where bounds of errors are met.
+ScanFunction scan_function(InstructionSet set);
 
 std::size_t scan_portable(const ScanVertices& vertices, const ScanFacet& facet,
                           std::uint32_t* near);

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "portable_math.hpp"
-#include "samples.hpp"
 #include "tin/grid/make.hpp"
 #include "window.hpp"
 
@@ -19,13 +18,13 @@ namespace {
 template <class T>
 class Checker {
  public:
-  Checker(const GridWindow<T>& window, double tolerance, tin::GridPath path)
+  Checker(const GridWindow<T>& window, double tolerance, InstructionSet set)
       : columns_(window.columns),
         rows_(window.rows),
         heights_(window.heights.data()),
         flags_(window.heights.size() + tin::kCheckLanes, 0),
         window_{heights_, flags_.data(), window.columns, window.rows, tolerance},
-        check_samples_(tin::check_samples<T>(path)) {}
+        scan_(tin::scans(set).check<T>()) {}
 
   /// Returns twice the area, as the points are given.
   double visit(const Point3& a, Point3 b, Point3 c) {
@@ -40,7 +39,7 @@ class Checker {
             window_.tolerance * portable::length((*corner[i + 1])[0] - (*corner[i])[0],
                                                  (*corner[i + 1])[1] - (*corner[i])[1]);
     }
-    if (check_samples_(window_, triangle, sums_)) count_missing(a, b, c);
+    if (scan_(window_, triangle, sums_)) count_missing(a, b, c);
     return area;
   }
 
@@ -80,7 +79,7 @@ class Checker {
     return turn(a, b, p) >= 0 && turn(b, c, p) >= 0 && turn(c, a, p) >= 0;
   }
 
-  /// Those in a triangle, without tolerance.
+  /// Counts samples without data in a triangle, without tolerance.
   void count_missing(const Point3& a, const Point3& b, const Point3& c) {
     const auto begin = [](double least) { return std::max(0.0, std::ceil(least)); };
     const auto end = [](double most, std::size_t count) {
@@ -107,9 +106,9 @@ class Checker {
 
   std::size_t columns_, rows_;
   const T* heights_;
-  std::vector<std::uint8_t> flags_;  ///< of samples in a triangle
+  std::vector<std::uint8_t> flags_;  ///< 1 for samples in a triangle
   tin::CheckWindow<T> window_;
-  tin::CheckSamples<T> check_samples_;
+  tin::CheckScan<T> scan_;
   tin::CheckSums sums_;
   GridTinCheck check_;
 };
@@ -138,12 +137,12 @@ namespace tin {
 template <class T>
 GridTinCheck check_grid_tin_by(const GridWindow<T>& window, std::span<const Point3> points,
                                std::span<const std::array<std::uint32_t, 3>> triangles,
-                               double tolerance, GridPath path) {
+                               double tolerance, InstructionSet set) {
   check_shape(window, "check_grid_tin");
   if (!(tolerance >= 0 && tolerance <= 1))
     throw std::invalid_argument("check_grid_tin: tolerance must be in [0, 1]");
   check_input(points, triangles, window.columns, window.rows);
-  Checker<T> checker(window, tolerance, path);
+  Checker<T> checker(window, tolerance, set);
   bool first_left = false;
   for (std::size_t i = 0; i < triangles.size(); ++i) {
     const auto& [a, b, c] = triangles[i];
@@ -156,10 +155,10 @@ GridTinCheck check_grid_tin_by(const GridWindow<T>& window, std::span<const Poin
 
 template GridTinCheck check_grid_tin_by(const GridWindow<float>&, std::span<const Point3>,
                                         std::span<const std::array<std::uint32_t, 3>>, double,
-                                        GridPath);
+                                        InstructionSet);
 template GridTinCheck check_grid_tin_by(const GridWindow<double>&, std::span<const Point3>,
                                         std::span<const std::array<std::uint32_t, 3>>, double,
-                                        GridPath);
+                                        InstructionSet);
 
 }  // namespace tin
 
@@ -167,7 +166,7 @@ template <class T>
 GridTinCheck check_grid_tin(const GridWindow<T>& window, std::span<const Point3> points,
                             std::span<const std::array<std::uint32_t, 3>> triangles,
                             double tolerance) {
-  return tin::check_grid_tin_by(window, points, triangles, tolerance, tin::best_grid_path());
+  return tin::check_grid_tin_by(window, points, triangles, tolerance, best_instruction_set());
 }
 
 template GridTinCheck check_grid_tin(const GridWindow<float>&, std::span<const Point3>,

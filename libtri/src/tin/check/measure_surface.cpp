@@ -47,7 +47,7 @@ class Raster {
       });
   }
 
-  /// A triangle that contains the place, nullptr: none.
+  /// A triangle that contains the place; nullptr if there is none.
   [[nodiscard]] const Corners* find(double x, double y) const {
     if (!(x >= low_[0] && x <= high_[0] && y >= low_[1] && y <= high_[1])) return nullptr;
     const std::size_t cell = cell_of(y, 1) * side_ + cell_of(x, 0);
@@ -90,10 +90,10 @@ class Raster {
     }
   }
 
-  /// The columns that a triangle reaches in a row of cells, and a little more.
+  /// The columns that a triangle reaches in a row of cells, slightly too many.
   [[nodiscard]] std::array<std::size_t, 2> columns_in(const Corners& corners,
                                                       std::size_t row) const {
-    // A band that is a little wider than the row.
+    // A band slightly wider than the row.
     const double height = (high_[1] - low_[1]) / static_cast<double>(side_);
     const double bottom = low_[1] + (static_cast<double>(row) - 0.01) * height;
     const double top = bottom + 1.02 * height;
@@ -128,8 +128,7 @@ class Raster {
   std::vector<std::uint32_t> entries_;
 };
 
-/// By the areas of the three parts, in long double: another formula than the one that surfaces are
-/// made with.
+/// By the areas of the three parts, in long double: not by the formula that surfaces are made with.
 double height_at(const Point3& a, const Point3& b, const Point3& c, double x, double y) {
   using Long = long double;
   const auto part = [x, y](const Point3& p, const Point3& q) {

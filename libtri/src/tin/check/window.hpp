@@ -8,7 +8,7 @@
 
 namespace terrace::tri::tin {
 
-/// Throws if the number of heights is not that of the window's samples, or 0.
+/// Throws std::invalid_argument if the window is empty or has another number of heights.
 template <class T>
 void check_shape(const GridWindow<T>& window, const char* function) {
   const std::size_t samples = static_cast<std::size_t>(window.columns) * window.rows;

@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "rows.hpp"
-
 namespace terrace::tri::tin {
 
 template <class T>
@@ -65,7 +63,8 @@ std::uint32_t GridGaps::cure(const GridSamples<T>& samples, const Ground& ground
     for (std::int32_t x = first; x <= last; ++x) {
       const std::uint8_t flags = flags_[index(x, y)];
       if ((flags & kVertex) != 0) continue;
-      // Data that is missing beside data; else the shore, then inner samples.
+      // If all corners have data: samples without data, preferably next to data. Otherwise: samples
+      // with data, preferably on the shore.
       const bool missing = (flags & kMissing) != 0;
       const int rank = whole                   ? (flags & kCoastal) != 0 ? 2
                                                  : missing               ? 1
@@ -79,15 +78,15 @@ std::uint32_t GridGaps::cure(const GridSamples<T>& samples, const Ground& ground
       if (rank == best_rank && depth <= best_depth) continue;
       best_rank = rank;
       best_depth = depth;
-      best = static_cast<std::uint32_t>(y) << 16 | static_cast<std::uint32_t>(x);
+      best = place_at(x, y);
     }
     return true;
   });
   return best != kNone || whole ? best : beside_inner(samples, ground, corners);
 }
 
-/// A triangle that has no samples but its corners and those on a side of the window: a neighbour
-/// of one of these that is inner, as near as possible to a corner without data.
+/// For a triangle whose only samples are its corners and samples on a side of the window: a
+/// neighbour of an inner one of these, as near as possible to a corner without data.
 template <class T>
 std::uint32_t GridGaps::beside_inner(const GridSamples<T>& samples, const Ground& ground,
                                      const GridCorner<T>* const (&corners)[3]) const {
@@ -100,7 +99,7 @@ std::uint32_t GridGaps::beside_inner(const GridSamples<T>& samples, const Ground
       const std::int64_t square = ground.square(GridCorner<T>{x, y, T{}}, *outer);
       if (best != kNone && square >= best_square) continue;
       best_square = square;
-      best = static_cast<std::uint32_t>(y) << 16 | static_cast<std::uint32_t>(x);
+      best = place_at(x, y);
     }
   };
   visit_rows(*corners[0], *corners[1], *corners[2],

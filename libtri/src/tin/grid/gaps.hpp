@@ -8,14 +8,14 @@
 #include "tin/ground.hpp"
 #include "tin/mesh.hpp"
 
-/// Where a window lacks data. The whole window is triangulated, samples without data too, until no
-/// triangle is mixed; then those that have a corner without data are left out. A triangle is mixed
-/// if
+/// Where a window lacks data. The whole window is triangulated, including samples without data,
+/// until no triangle is mixed; then triangles that have a corner without data are left out. A
+/// triangle is mixed if
 /// - its corners have data, but not all samples in it do, or
-/// - a corner has no data, but it contains an *inner* sample, one whose 8 neighbours have data,
-///   perhaps as a corner.
-/// So each inner sample lies in triangles with data only. The other samples with data, the *shore*,
-/// are where the border may run.
+/// - a corner has no data, but it contains (perhaps as a corner) an *inner* sample, one with data
+///   whose 8 neighbours have data too.
+/// So each inner sample lies only in triangles with data. The other samples with data, the *shore*,
+/// are where the boundary may run.
 
 namespace terrace::tri::tin {
 
@@ -25,16 +25,16 @@ class GridGaps {
   template <class T>
   GridGaps(const GridSamples<T>& samples, std::int32_t columns, std::int32_t rows);
 
-  /// Marks a sample as a vertex.
-  void take(std::int32_t x, std::int32_t y) { flags_[index(x, y)] |= kVertex; }
+  /// Marks a sample as a vertex; samples are named by place_at().
+  void take(std::uint32_t place) { flags_[index(place)] |= kVertex; }
+  bool taken(std::uint32_t place) const { return (flags_[index(place)] & kVertex) != 0; }
 
   /// For a triangle with at least one corner without data.
   template <class T>
   bool mixed(const GridCorner<T>& a, const GridCorner<T>& b, const GridCorner<T>& c) const;
 
-  /// Which sample (row << 16 | column) to insert so that a mixed triangle goes, or kNone if there
-  /// is none in the samples' range: of several the one deepest in the triangle, on the shore or
-  /// next to it if possible.
+  /// The sample to insert so that a mixed triangle goes: the one deepest inside it, on the shore or
+  /// next to it if possible. kNone if the samples' range has none.
   template <class T>
   std::uint32_t cure(const GridSamples<T>& samples, const Ground& ground, const GridCorner<T>& a,
                      const GridCorner<T>& b, const GridCorner<T>& c) const;
@@ -45,13 +45,14 @@ class GridGaps {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(columns_) +
            static_cast<std::size_t>(x);
   }
+  std::size_t index(std::uint32_t place) const { return index(column_of(place), row_of(place)); }
   template <class T>
   std::uint32_t beside_inner(const GridSamples<T>& samples, const Ground& ground,
                              const GridCorner<T>* const (&corners)[3]) const;
 
   std::int32_t columns_;
   std::vector<std::uint8_t> flags_;
-  std::vector<std::uint16_t> inner_before_;  ///< inner samples on the left, columns + 1 per row
+  std::vector<std::uint16_t> inner_before_;  ///< inner samples to the left, columns + 1 per row
 };
 
 }  // namespace terrace::tri::tin

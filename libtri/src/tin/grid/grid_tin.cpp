@@ -5,11 +5,13 @@
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "make.hpp"
-#include "surface.hpp"
+#include "samples.hpp"
 #include "tin/check/window.hpp"
-#include "tin/error_queue.hpp"
+#include "tin/lattice_surface.hpp"
 
 namespace terrace::tri::tin {
 namespace {
@@ -33,12 +35,12 @@ void check_side(const std::vector<std::uint32_t>& side, std::uint32_t count, con
                                 std::to_string(count - 1));
 }
 
-/// What the range of heights says about the type to compute in.
+/// The range of heights, which decides about the type to compute in.
 struct Range {
   double least = std::numeric_limits<double>::infinity();
   double greatest = -least;
   std::size_t data = 0;
-  bool floats = true;  ///< all heights are
+  bool floats = true;  ///< all heights are floats of moderate size
 };
 
 template <class T>
@@ -89,28 +91,50 @@ void measure(const GridWindow<T>& window, bool wanted, std::size_t data, GridTin
   tin.check = check_grid_tin<T>(window, points, tin.triangles);
 }
 
+/// The vertices on the sides of the window, its corners first.
+template <class T>
+std::vector<GridCorner<T>> frame_of(RasterSamples<T>& samples, const GridSides& sides) {
+  const std::int32_t right = samples.columns() - 1, last = samples.rows() - 1;
+  std::vector<GridCorner<T>> frame{samples.take(place_at(0, 0)), samples.take(place_at(right, 0)),
+                                   samples.take(place_at(right, last)),
+                                   samples.take(place_at(0, last))};
+  const auto along = [&](const std::vector<std::uint32_t>& side, const auto& place_of) {
+    for (std::size_t i = 1; i + 1 < side.size(); ++i)
+      frame.push_back(samples.take(place_of(static_cast<std::int32_t>(side[i]))));
+  };
+  along(sides.first_row, [&](std::int32_t x) { return place_at(x, 0); });
+  along(sides.last_column, [&](std::int32_t y) { return place_at(right, y); });
+  along(sides.last_row, [&](std::int32_t x) { return place_at(x, last); });
+  along(sides.first_column, [&](std::int32_t y) { return place_at(0, y); });
+  return frame;
+}
+
+/// With triangles counter-clockwise on the ground.
+template <class T>
+GridTin result_of(const LatticeSurface<RasterSamples<T>>& surface, const GridTinOptions& options) {
+  GridTin tin;
+  surface.publish(tin);
+  if ((options.column_step < 0) != (options.row_step < 0))
+    for (auto& triangle : tin.triangles) std::swap(triangle[1], triangle[2]);
+  return tin;
+}
+
 template <class Real, class T>
 GridTin make(const GridWindow<T>& window, const GridSides& sides, const GridTinOptions& options,
-             GridPath path) {
-  GridSurface<Real> surface(window, options, true, path);
-  surface.insert_sides(sides);
-  surface.template refine<ErrorBuckets>(std::numeric_limits<std::size_t>::max());
-  if (options.quality != TinQuality::kGreedy) {
-    surface.arrange();
-    surface.remove();
-  }
-  if (options.quality == TinQuality::kFitted) {
-    surface.fit();
-    surface.remove();
-  }
-  return surface.result();
+             InstructionSet set) {
+  RasterSamples<Real> samples(window, options, true, set);
+  samples.judge_coarsely_first();
+  std::vector<GridCorner<Real>> frame = frame_of(samples, sides);
+  LatticeSurface surface(std::move(samples), std::move(frame));
+  surface.make(options.quality, 0);
+  return result_of(surface, options);
 }
 
 }  // namespace
 
 template <class T>
 GridTin make_grid_tin(const GridWindow<T>& window, const GridSides& sides,
-                      const GridTinOptions& options, GridPath path) {
+                      const GridTinOptions& options, InstructionSet set) {
   const Range range = check_window(window);
   check_options(options);
   check_side(sides.first_row, window.columns, "first_row");
@@ -119,16 +143,16 @@ GridTin make_grid_tin(const GridWindow<T>& window, const GridSides& sides,
   check_side(sides.last_column, window.rows, "last_column");
   GridTin tin;
   if (window.columns > 1 && window.rows > 1 && range.data > 0)
-    tin = floats_suffice(range, options.max_error) ? make<float>(window, sides, options, path)
-                                                   : make<double>(window, sides, options, path);
+    tin = floats_suffice(range, options.max_error) ? make<float>(window, sides, options, set)
+                                                   : make<double>(window, sides, options, set);
   measure(window, options.measure, range.data, tin);
   return tin;
 }
 
 template GridTin make_grid_tin(const GridWindow<float>&, const GridSides&, const GridTinOptions&,
-                               GridPath);
+                               InstructionSet);
 template GridTin make_grid_tin(const GridWindow<double>&, const GridSides&, const GridTinOptions&,
-                               GridPath);
+                               InstructionSet);
 
 }  // namespace terrace::tri::tin
 
@@ -137,7 +161,7 @@ namespace terrace::tri {
 template <class T>
 GridTin grid_tin(const GridWindow<T>& window, const GridSides& sides,
                  const GridTinOptions& options) {
-  return tin::make_grid_tin(window, sides, options, tin::best_grid_path());
+  return tin::make_grid_tin(window, sides, options, best_instruction_set());
 }
 
 template <class T>
@@ -148,9 +172,11 @@ GridTin grid_tin_of_points(const GridWindow<T>& window, std::size_t max_points,
   if (max_points < 4) throw std::invalid_argument("grid_tin_of_points: max_points is less than 4");
   GridTin result;
   if (window.columns > 1 && window.rows > 1 && range.data > 0) {
-    tin::GridSurface<double> surface(window, options, false, tin::best_grid_path());
+    tin::RasterSamples<double> samples(window, options, false, best_instruction_set());
+    auto frame = tin::frame_of(samples, {});
+    tin::LatticeSurface<tin::RasterSamples<double>> surface(std::move(samples), std::move(frame));
     surface.refine<tin::ErrorHeap>(max_points);
-    result = surface.result();
+    result = tin::result_of(surface, options);
   }
   tin::measure(window, options.measure, range.data, result);
   return result;

@@ -4,20 +4,15 @@
 
 #include "removal.hpp"
 #include "tin/lattice.hpp"
+#include "tin/scan_results.hpp"
 
 namespace terrace::tri::tin::points {
 namespace {
 
-/// The heights of a vertex that keep samples within the bound.
-struct Interval {
-  double low = -HUGE_VAL;
-  double high = HUGE_VAL;
-};
-
-/// Narrows it by a sample in the triangle of the vertex v and a, b.
+/// Narrows by what v may rise for a sample in the triangle v, a, b.
 void narrow(Interval& interval, const Vertex& v, const Vertex& a, const Vertex& b,
             const Sample& sample, double bound) {
-  // Below this weight the vertex has no say.
+  // Samples where the vertex has less weight are ignored.
   constexpr double kLeast = 1e-9;
   const auto part = [&](const Vertex& p, const Vertex& q) {
     const double area = (p.x - sample.x) * (q.y - sample.y) - (p.y - sample.y) * (q.x - sample.x);

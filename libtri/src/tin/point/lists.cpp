@@ -3,16 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace terrace::tri::tin::points {
-
-float rounded_up(double error) {
-  constexpr float kHighest = std::numeric_limits<float>::max();
-  if (!(error < double{kHighest})) return kHighest;
-  const auto rounded = static_cast<float>(error);
-  return rounded < error || rounded == 0 ? std::nextafter(rounded, kHighest) : rounded;
-}
 
 Measured list_samples(Mesh& mesh, std::uint32_t step, double bound) {
   Pool<Sample>& samples = *mesh.samples;

@@ -3,16 +3,9 @@
 
 #include <cmath>
 
-namespace terrace::tri::tin::points {
+#include "tin/ground.hpp"
 
-double tangent_of(double degrees) {
-  constexpr double kRadians = 0.017453292519943295;
-  const double a = degrees * kRadians;
-  const double s = a * a;
-  const double sine = a * (1 - s / 6 * (1 - s / 20 * (1 - s / 42 * (1 - s / 72))));
-  const double cosine = 1 - s / 2 * (1 - s / 12 * (1 - s / 30 * (1 - s / 56)));
-  return sine / cosine;
-}
+namespace terrace::tri::tin::points {
 
 namespace {
 

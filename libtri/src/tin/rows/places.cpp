@@ -15,9 +15,9 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
-/// Places of columns and rows are off equal distances by less than that.
+/// How far columns and rows may be off equal spacing, in spacings.
 constexpr double kRegular = 1e-3;
-/// Samples that are farther off a lattice would make scans slow.
+/// Samples farther off a lattice would make scans slow.
 constexpr double kFarthestOff = 4.0;
 
 struct Region {
@@ -32,13 +32,12 @@ struct Region {
       }
     }
   }
-  /// NaN is not.
   [[nodiscard]] bool contains(double x, double y) const {
     return x >= low[0] && x <= high[0] && y >= low[1] && y <= high[1];
   }
 };
 
-/// Ascending at equal distances, nearly.
+/// Whether places ascend at approximately equal spacing.
 bool regular(std::span<const double> places) {
   if (places.empty() || places.size() > kMostRows || !std::isfinite(places.front())) return false;
   if (places.size() == 1) return true;
@@ -51,7 +50,7 @@ bool regular(std::span<const double> places) {
   return true;
 }
 
-/// With what scans want before and after.
+/// Adds what scans require before and after the places.
 std::vector<double> padded(std::span<const double> places) {
   std::vector<double> all{-kInfinity};
   all.reserve(places.size() + 1 + kRowPad);
@@ -79,7 +78,7 @@ std::vector<double> padded_rows(std::span<const double> from, std::size_t column
   return to;
 }
 
-/// Heights, without those outside the frame. `place_of(row, column)`.
+/// Copies the heights of samples inside the frame. `place_of(row, column)` is x and y.
 template <class PlaceOf>
 void copy_heights(std::span<const double> from, std::size_t columns, const Region& region,
                   const PlaceOf& place_of, PaddedSamples& out) {
@@ -100,7 +99,7 @@ void copy_heights(std::span<const double> from, std::size_t columns, const Regio
   }
 }
 
-/// The affine map of columns and rows to places nearest to that of some of the samples, and back.
+/// Finds the affine map between places and columns and rows by least squares over some samples.
 bool find_lattice(const SampleGrid& samples, std::size_t rows, RowSamples& layout) {
   constexpr std::size_t kEach = 8;
   const auto along = [](std::size_t i, std::size_t count) { return i * (count - 1) / (kEach - 1); };
@@ -110,7 +109,7 @@ bool find_lattice(const SampleGrid& samples, std::size_t rows, RowSamples& layou
   double columns_squared = 0, rows_squared = 0;
   for (std::size_t j = 0; j < kEach; ++j) {
     for (std::size_t i = 0; i < kEach; ++i) {
-      // Mirrored, so that the places are even about the middle though whole.
+      // Mirrored, so that rounding keeps the chosen samples symmetric about the middle.
       const std::size_t column = i < kEach / 2
                                      ? along(i, samples.columns)
                                      : samples.columns - 1 - along(kEach - 1 - i, samples.columns);
@@ -145,7 +144,8 @@ bool find_lattice(const SampleGrid& samples, std::size_t rows, RowSamples& layou
   return true;
 }
 
-/// How far samples are off, columns or rows; infinite where one has a height and no place.
+/// How far samples are off the lattice, in columns or rows; infinite if one has a height but no
+/// place.
 double off_lattice(const SampleGrid& samples, const RowSamples& layout) {
   double off = 0.0;
   for (std::size_t i = 0; i < samples.z.size(); ++i) {
@@ -177,7 +177,7 @@ bool is_rectangle(std::span<const Point3> frame) {
   }
   const double width = high[0] - low[0], height = high[1] - low[1];
   if (!(width > 0.0 && height > 0.0)) return false;
-  // Places along the sides, from the south-west corner on.
+  // Distances along the sides, from the south-west corner.
   const double whole = 2.0 * (width + height);
   const auto along = [&](const Point3& p) {
     if (p[1] == low[1]) return p[0] - low[0];
@@ -242,7 +242,7 @@ std::optional<PaddedSamples> padded_samples(const SampleGrid& samples,
   layout.columns = static_cast<std::int32_t>(columns);
   layout.rows = static_cast<std::int32_t>(rows);
   if (!find_lattice(samples, rows, layout)) return std::nullopt;
-  // A little more, for what is rounded.
+  // Slightly more, for rounding.
   layout.off = off_lattice(samples, layout) + 1e-6;
   if (!(layout.off <= kFarthestOff)) return std::nullopt;
   copy_heights(

@@ -12,25 +12,25 @@
 
 namespace terrace::tri::tin::rows {
 
-/// Coordinates of frames are below this: predicates are exact in 128 bits.
+/// Coordinates of frames are below this, so that predicates are exact in 128 bits.
 inline constexpr double kFarthest = 0x1p20;
-/// Columns and rows are at most as many: both fit into Triangle::place.
+/// The most columns or rows that fit into Triangle::place.
 inline constexpr std::size_t kMostRows = 65535;
 
 /// Whether the frame is an upright rectangle with whole coordinates from 0 to kFarthest, its
 /// vertices counter-clockwise along the sides, the corners among them.
 bool is_rectangle(std::span<const Point3> frame);
 
-/// Samples as scans want them; what lies outside the frame is no sample.
+/// Samples with the padding that scans require. Samples outside the frame are left out.
 struct PaddedSamples {
   std::vector<double> x, y, z;
-  std::size_t known = 0;  ///< samples, those outside the frame too
+  std::size_t known = 0;  ///< number of samples, including those outside the frame
   RowSamples layout{};    ///< without the arrays
 
   [[nodiscard]] RowSamples view() const;
 };
 
-/// Nothing, if they do not stand as a RowSurface needs it. frame: see is_rectangle(). Throws as
+/// nullopt if the places are not regular enough for scans. frame: see is_rectangle(). Throws as
 /// point_tin() does for heights.
 std::optional<PaddedSamples> padded_samples(const SampleRows& samples,
                                             std::span<const Point3> frame);

@@ -9,12 +9,13 @@
 #include <utility>
 #include <vector>
 
-#include "surface.hpp"
+#include "samples.hpp"
+#include "tin/lattice_surface.hpp"
 
 namespace terrace::tri {
 namespace {
 
-/// Whether a RowSurface does what is asked for.
+/// Whether a LatticeSurface can serve these options.
 bool has_surface(std::span<const Point3> frame, const PointTinOptions& options) {
   return options.lattice && options.max_points == 0 && tin::rows::is_rectangle(frame);
 }
@@ -63,7 +64,7 @@ namespace tin::rows {
 
 template <class Samples>
 PointTin make_tin(const Samples& samples, std::span<const Point3> frame,
-                  const PointTinOptions& options, RowPath path) {
+                  const PointTinOptions& options, InstructionSet set) {
   points::check_options(options, frame);
   check_sizes(samples);
   if (samples.z.size() > std::size_t{1} << 29)
@@ -71,34 +72,35 @@ PointTin make_tin(const Samples& samples, std::span<const Point3> frame,
   if (!has_surface(frame, options)) return tin_of_points(samples, frame, options);
   std::optional<PaddedSamples> padded = padded_samples(samples, frame);
   if (!padded) return tin_of_points(samples, frame, options);
-  RowSurface surface(*std::move(padded), frame, options, path);
-  surface.refine();
-  if (options.quality != TinQuality::kGreedy) {
-    surface.arrange();
-    surface.remove();
-  }
-  if (options.quality == TinQuality::kFitted) {
-    surface.fit();
-    surface.remove();
-  }
-  return surface.result();
+  std::vector<PlacedSamples::Vertex> vertices;
+  for (const Point3& p : frame)
+    vertices.push_back(
+        {static_cast<std::int32_t>(p[0]), static_cast<std::int32_t>(p[1]), p[2], kNone});
+  LatticeSurface surface(PlacedSamples(*std::move(padded), options, set), std::move(vertices));
+  surface.make(options.quality, frame.size());
+  PointTin tin;
+  surface.samples().measure(surface.vertices(), surface.triangles(), tin);
+  surface.publish(tin);
+  tin.inserted = surface.vertices().size() - frame.size();
+  tin.removed = surface.vertices().size() - tin.vertices.size();
+  return tin;
 }
 
 template PointTin make_tin(const SampleRows&, std::span<const Point3>, const PointTinOptions&,
-                           RowPath);
+                           InstructionSet);
 template PointTin make_tin(const SampleGrid&, std::span<const Point3>, const PointTinOptions&,
-                           RowPath);
+                           InstructionSet);
 
 }  // namespace tin::rows
 
 PointTin point_tin(const SampleRows& samples, std::span<const Point3> frame,
                    const PointTinOptions& options) {
-  return tin::rows::make_tin(samples, frame, options, tin::rows::best_row_path());
+  return tin::rows::make_tin(samples, frame, options, best_instruction_set());
 }
 
 PointTin point_tin(const SampleGrid& samples, std::span<const Point3> frame,
                    const PointTinOptions& options) {
-  return tin::rows::make_tin(samples, frame, options, tin::rows::best_row_path());
+  return tin::rows::make_tin(samples, frame, options, best_instruction_set());
 }
 
 }  // namespace terrace::tri

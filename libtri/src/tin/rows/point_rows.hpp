@@ -3,8 +3,8 @@
 
 #include <span>
 
-#include "scan.hpp"
 #include "terrace/tri/point_tin.hpp"
+#include "tin/scan.hpp"
 
 namespace terrace::tri::tin {
 
@@ -20,7 +20,7 @@ namespace rows {
 /// point_tin() of SampleRows or SampleGrid, with a given instruction set.
 template <class Samples>
 PointTin make_tin(const Samples& samples, std::span<const Point3> frame,
-                  const PointTinOptions& options, RowPath path);
+                  const PointTinOptions& options, InstructionSet set);
 
 }  // namespace rows
 }  // namespace terrace::tri::tin

@@ -4,87 +4,54 @@
 #include <cstddef>
 #include <cstdint>
 
-/// The inner loop of TINs of samples in rows and columns whose vertices stand beside the samples.
+#include "tin/scan_results.hpp"
+
+/// The inner loops of TINs of samples in rows and columns whose vertices stand beside the samples.
 
 namespace terrace::tri::tin::rows {
 
-/// A vertex.
 struct RowCorner {
   double x, y, z;
 };
 
-/// Samples by rows: after each row are at least kRowPad numbers, and a row after the last. NaN: no
-/// sample.
+/// Samples row by row, with at least kRowPad values after each row and one more row after the last.
+/// NaN: no sample.
 struct RowSamples {
-  /// Upright: the places of columns and rows, ascending; x[-1] and y[-1] are -infinity, and after
-  /// the last are at least kRowPad places at infinity. Else of all samples, as the heights.
+  /// Upright: the places of columns and rows, ascending; x[-1] and y[-1] are -infinity, and at
+  /// least kRowPad places at infinity follow the last. Otherwise those of all samples, laid out as
+  /// z.
   const double* x;
   const double* y;
   const double* z;
-  std::size_t stride;  ///< from row to row
+  std::size_t stride;  ///< values from row to row
   std::int32_t columns, rows;
   bool upright;
-  bool mirrored;  ///< rows are to the right of columns
-  /// About the column of a place: column_0 + column_x * x + column_y * y. The row likewise.
+  bool mirrored;  ///< columns and rows form a left-handed system
+  /// The approximate column of a place is column_0 + column_x * x + column_y * y. The row likewise.
   double column_0, column_x, column_y;
   double row_0, row_x, row_y;
-  double off;  ///< of columns and rows that are found so, at most
+  double off;  ///< the largest error of such a column or row
 };
 inline constexpr std::size_t kRowPad = 8;
 
-struct RowWorst {
-  double error;
-  std::uint32_t place;  ///< row << 16 | column
-};
-
-/// An interval of numbers.
-struct RowInterval {
-  double low, high;
-};
-
-/// Errors are those of a triangle's plane at the samples in it, sides included. Next to a side,
-/// where rounding decides, samples count to the triangles on both sides of it. What rounding may do
-/// to an error is on the safe side. One set of functions for each instruction set; all give the
-/// same results, bit by bit.
+/// Errors are those of a triangle's plane at the samples in it, sides included. Samples so close to
+/// a side that rounding decides belong to the triangles on both sides of it. Rounding errors are
+/// added, never ignored.
 struct RowScan {
-  /// The sample with the greatest error of those that may be above `bound`; of equal ones the first
-  /// in its row, of the first row. Error 0: there is none.
-  RowWorst worst(const RowSamples& samples, const RowCorner& a, const RowCorner& b,
-                 const RowCorner& c, double bound) const {
-    return worst_[samples.upright](samples, a, b, c, bound);
-  }
+  /// The sample with the greatest error that may be above `bound`; of equal ones the first in the
+  /// first row. Error 0 if there is none.
+  WorstSample<double> (*worst)(const RowSamples& samples, const RowCorner& a, const RowCorner& b,
+                               const RowCorner& c, double bound);
   /// Whether all errors are certainly at most `bound`.
-  bool within(const RowSamples& samples, const RowCorner& a, const RowCorner& b, const RowCorner& c,
-              double bound) const {
-    return within_[samples.upright](samples, a, b, c, bound);
-  }
-  /// Raises each sample's number in `errors`, an array like that of the heights, to its error.
-  void measure(const RowSamples& samples, const RowCorner& a, const RowCorner& b,
-               const RowCorner& c, double* errors) const {
-    measure_[samples.upright](samples, a, b, c, errors);
-  }
-  /// Narrows `rises` to what corner a may rise by (or sink, below 0) so that no error is above
-  /// `bound`, nearly.
-  void narrow(const RowSamples& samples, const RowCorner& a, const RowCorner& b, const RowCorner& c,
-              double bound, RowInterval& rises) const {
-    narrow_[samples.upright](samples, a, b, c, bound, rises);
-  }
-
-  RowWorst (*worst_[2])(const RowSamples&, const RowCorner&, const RowCorner&, const RowCorner&,
-                        double);
-  bool (*within_[2])(const RowSamples&, const RowCorner&, const RowCorner&, const RowCorner&,
-                     double);
-  void (*measure_[2])(const RowSamples&, const RowCorner&, const RowCorner&, const RowCorner&,
-                      double*);
-  void (*narrow_[2])(const RowSamples&, const RowCorner&, const RowCorner&, const RowCorner&,
-                     double, RowInterval&);
+  bool (*within)(const RowSamples& samples, const RowCorner& a, const RowCorner& b,
+                 const RowCorner& c, double bound);
+  /// Raises each sample's entry in `errors`, laid out as the heights, to its error.
+  void (*measure)(const RowSamples& samples, const RowCorner& a, const RowCorner& b,
+                  const RowCorner& c, double* errors);
+  /// Narrows `rises` to what corner a may rise by so that, up to rounding, no error is above
+  /// `bound`.
+  void (*narrow)(const RowSamples& samples, const RowCorner& a, const RowCorner& b,
+                 const RowCorner& c, double bound, Interval& rises);
 };
-
-enum class RowPath : std::uint8_t { kPortable, kAvx2, kAvx512 };
-bool supported(RowPath path);
-const RowScan& row_scan(RowPath path);  ///< of a supported path
-RowPath best_row_path();
-
-extern const RowScan kRowScanPortable, kRowScanAvx2, kRowScanAvx512;
 
 }  // namespace terrace::tri::tin::rows

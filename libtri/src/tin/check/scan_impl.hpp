@@ -1,53 +1,38 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Included once for each instruction set. What is here must not be shared between objects, so
-// nothing has a name outside its object, and no function of another header is called.
-#include "samples.hpp"
+// The rules of scan_lanes.hpp hold here.
+#include "scan.hpp"
+#include "tin/scan_lanes.hpp"
 
 namespace terrace::tri::tin {
 namespace {
 
-using Reals = double __attribute__((vector_size(64)));
-using Ints = std::int64_t __attribute__((vector_size(64)));
 using Bytes = std::uint8_t __attribute__((vector_size(8)));
 
-constexpr Reals kLane = {0, 1, 2, 3, 4, 5, 6, 7};
+constexpr Reals8 kLane = {0, 1, 2, 3, 4, 5, 6, 7};
 
-[[gnu::always_inline]] inline Reals load(const float* from) {
+[[gnu::always_inline]] inline Reals8 load(const float* from) {
   float __attribute__((vector_size(32))) lanes;
   __builtin_memcpy(&lanes, from, sizeof lanes);
-  return __builtin_convertvector(lanes, Reals);
+  return __builtin_convertvector(lanes, Reals8);
 }
-[[gnu::always_inline]] inline Reals load(const double* from) {
-  Reals lanes;
-  __builtin_memcpy(&lanes, from, sizeof lanes);
-  return lanes;
-}
+[[gnu::always_inline]] inline Reals8 load(const double* from) { return Lanes<double>::load(from); }
 
-/// The least whole number that is not below a number of at least 0.
+/// Rounds a number of at least 0 up.
 [[gnu::always_inline]] inline std::int64_t up(double value) {
   const auto down = static_cast<std::int64_t>(value);
   return static_cast<double>(down) < value ? down + 1 : down;
 }
 
-template <class V>
-[[gnu::always_inline]] inline V least(V a, V b) {
-  return b < a ? b : a;
-}
-template <class V>
-[[gnu::always_inline]] inline V greatest(V a, V b) {
-  return b > a ? b : a;
-}
-
-/// Samples against one triangle.
+/// Adds the samples in one triangle to the sums.
 template <class T>
 struct Taker {
   const CheckWindow<T>& window;
   double base, slope_x;
-  Reals most, squares;
-  Ints covered;
-  Ints missing = {};
+  Reals8 most, squares;
+  Ints8 covered;
+  Ints8 missing = {};
 
   [[gnu::always_inline]] Taker(const CheckWindow<T>& samples, const CheckTriangle& triangle,
                                double slope, const CheckSums& sums)
@@ -57,11 +42,11 @@ struct Taker {
     __builtin_memcpy(&covered, sums.covered, sizeof covered);
   }
 
-  /// A block of samples from number `at` on, of which those inside count; its columns relative to
-  /// the first corner, and what the plane rises along the row.
-  [[gnu::always_inline]] void take(std::int64_t at, Ints inside, Reals across, double rise_y) {
+  /// Adds the samples of a block, from number `at` on, that are inside. `across`: its columns
+  /// relative to the first corner; `rise_y`: how far the plane rises from that corner to the row.
+  [[gnu::always_inline]] void take(std::int64_t at, Ints8 inside, Reals8 across, double rise_y) {
     const std::int64_t left = window.columns * window.rows - at;
-    Reals height;
+    Reals8 height;
     if (left >= kCheckLanes) {
       height = load(window.heights + at);
     } else {
@@ -69,18 +54,18 @@ struct Taker {
       for (std::int64_t i = 0; i < left; ++i) last[i] = window.heights[at + i];
       height = load(last);
     }
-    const Ints with_data = (Ints)(height - height == 0.0);
+    const Ints8 with_data = (Ints8)(height - height == 0.0);
     missing |= inside & ~with_data;
-    const Ints ok = inside & with_data;
-    // Relative to a corner, so that nothing is lost where heights are large.
-    const Reals difference = (height - base) - (rise_y + slope_x * across);
-    const Reals error = (Reals)((Ints)difference & ok & std::int64_t{0x7FFFFFFFFFFFFFFF});
+    const Ints8 ok = inside & with_data;
+    // Relative to a corner, which keeps precision where heights are large.
+    const Reals8 difference = (height - base) - (rise_y + slope_x * across);
+    const Reals8 error = (Reals8)((Ints8)Lanes<double>::absolute(difference) & ok);
     most = error > most ? error : most;
     Bytes flags;
     __builtin_memcpy(&flags, window.flags + at, sizeof flags);
-    const Ints known = __builtin_convertvector(flags, Ints);
-    const Ints first = ok & (Ints)(known == 0);
-    squares += (Reals)((Ints)(error * error) & first);
+    const Ints8 known = __builtin_convertvector(flags, Ints8);
+    const Ints8 first = ok & (Ints8)(known == 0);
+    squares += (Reals8)((Ints8)(error * error) & first);
     covered -= first;
     flags = __builtin_convertvector(known | (ok & 1), Bytes);
     __builtin_memcpy(window.flags + at, &flags, sizeof flags);
@@ -97,8 +82,7 @@ struct Taker {
 };
 
 template <class T>
-[[gnu::always_inline]] inline bool check(const CheckWindow<T>& window,
-                                         const CheckTriangle& triangle, CheckSums& sums) {
+bool check_in(const CheckWindow<T>& window, const CheckTriangle& triangle, CheckSums& sums) {
   const double *const a = triangle.a, *const b = triangle.b, *const c = triangle.c;
   const double* const corner[4] = {a, b, c, a};
   const double bz = b[2] - a[2], cz = c[2] - a[2];
@@ -121,23 +105,23 @@ template <class T>
     along_x[i] = corner[i][1] - corner[i + 1][1];
     along_y[i] = corner[i + 1][0] - corner[i][0];
   }
-  // Up to this width divisions would take longer than the blocks that lie outside.
+  // For narrower boxes divisions would take longer than the blocks outside the triangle.
   if (right - left < 8 * kCheckLanes) {
     for (std::int64_t x = first; static_cast<double>(x) <= right; x += kCheckLanes) {
-      const Reals columns = static_cast<double>(x) + kLane;
-      const Reals across = columns - a[0];
-      const Reals before_right = right - columns;
-      Reals edge[3];
+      const Reals8 columns = static_cast<double>(x) + kLane;
+      const Reals8 across = columns - a[0];
+      const Reals8 before_right = right - columns;
+      Reals8 edge[3];
       for (int i = 0; i < 3; ++i)
         edge[i] = along_x[i] * (columns - corner[i][0]) + triangle.margin[i];
       for (std::int64_t row = top; row <= bottom; ++row) {
         const auto y = static_cast<double>(row);
-        Reals inside = before_right;
+        Reals8 inside = before_right;
         for (int i = 0; i < 3; ++i) {
-          const Reals of_edge = edge[i] + along_y[i] * (y - corner[i][1]);
+          const Reals8 of_edge = edge[i] + along_y[i] * (y - corner[i][1]);
           inside = of_edge < inside ? of_edge : inside;
         }
-        taker.take(row * window.columns + x, (Ints)(inside >= 0.0), across, slope_y * (y - a[1]));
+        taker.take(row * window.columns + x, (Ints8)(inside >= 0.0), across, slope_y * (y - a[1]));
       }
     }
     return taker.finish(sums);
@@ -159,8 +143,8 @@ template <class T>
     const auto last = static_cast<std::int64_t>(to);
     const double rise_y = slope_y * (y - a[1]);
     for (std::int64_t x = up(from); x <= last; x += kCheckLanes) {
-      const Reals columns = static_cast<double>(x) + kLane;
-      taker.take(row * window.columns + x, (Ints)(columns <= static_cast<double>(last)),
+      const Reals8 columns = static_cast<double>(x) + kLane;
+      taker.take(row * window.columns + x, (Ints8)(columns <= static_cast<double>(last)),
                  columns - a[0], rise_y);
     }
   }

@@ -1,17 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <cstddef>
-#include <cstdint>
-
 #include <immintrin.h>
 
+#include "scan_lanes.hpp"
+
+namespace terrace::tri::tin {
 namespace {
 
-using Ints16 = std::int32_t __attribute__((vector_size(64)));
-using Ints8 = std::int64_t __attribute__((vector_size(64)));
-using Reals16 = float __attribute__((vector_size(64)));
-using Reals8 = double __attribute__((vector_size(64)));
-
-// Masks of lanes; as grid_scan_masks.hpp, in registers of their own.
+// Masks of lanes as in scan_masks.hpp, in registers of their own.
 
 [[gnu::always_inline]] inline __mmask16 not_negative(Ints16 lanes) {
   return static_cast<__mmask16>(~_mm512_movepi32_mask((__m512i)lanes));
@@ -31,11 +26,19 @@ using Reals8 = double __attribute__((vector_size(64)));
 [[gnu::always_inline]] inline __mmask8 more(Ints8 a, Ints8 b) {
   return _mm512_cmpgt_epi64_mask((__m512i)a, (__m512i)b);
 }
-[[gnu::always_inline]] inline __mmask16 either(__mmask16 a, __mmask16 b) {
-  return static_cast<__mmask16>(a | b);
+[[gnu::always_inline]] inline __mmask8 at_least(Reals8 a, Reals8 b) {
+  return _mm512_cmp_pd_mask((__m512d)a, (__m512d)b, _CMP_GE_OQ);
 }
-[[gnu::always_inline]] inline __mmask8 either(__mmask8 a, __mmask8 b) {
-  return static_cast<__mmask8>(a | b);
+[[gnu::always_inline]] inline __mmask8 above(Reals8 a, Reals8 b) {
+  return _mm512_cmp_pd_mask((__m512d)a, (__m512d)b, _CMP_GT_OQ);
+}
+template <class Mask>
+[[gnu::always_inline]] inline Mask either(Mask a, Mask b) {
+  return static_cast<Mask>(a | b);
+}
+template <class Mask>
+[[gnu::always_inline]] inline Mask both(Mask a, Mask b) {
+  return static_cast<Mask>(a & b);
 }
 [[gnu::always_inline]] inline Ints16 chosen(__mmask16 mask, Ints16 a, Ints16 b) {
   return (Ints16)_mm512_mask_mov_epi32((__m512i)b, mask, (__m512i)a);
@@ -43,13 +46,8 @@ using Reals8 = double __attribute__((vector_size(64)));
 [[gnu::always_inline]] inline Ints8 chosen(__mmask8 mask, Ints8 a, Ints8 b) {
   return (Ints8)_mm512_mask_mov_epi64((__m512i)b, mask, (__m512i)a);
 }
-[[gnu::always_inline]] inline unsigned bits_of(__mmask16 mask) { return mask; }
-[[gnu::always_inline]] inline unsigned bits_of(__mmask8 mask) { return mask; }
-[[gnu::always_inline]] inline __mmask16 both(__mmask16 a, __mmask16 b) {
-  return static_cast<__mmask16>(a & b);
-}
-[[gnu::always_inline]] inline __mmask8 both(__mmask8 a, __mmask8 b) {
-  return static_cast<__mmask8>(a & b);
+[[gnu::always_inline]] inline Reals8 chosen(__mmask8 mask, Reals8 a, Reals8 b) {
+  return (Reals8)_mm512_mask_mov_pd((__m512d)b, mask, (__m512d)a);
 }
 [[gnu::always_inline]] inline Reals16 kept(Reals16 lanes, __mmask16 mask) {
   return (Reals16)_mm512_maskz_mov_ps(mask, (__m512)lanes);
@@ -69,16 +67,18 @@ using Reals8 = double __attribute__((vector_size(64)));
 [[gnu::always_inline]] inline unsigned equal(Ints8 a, Ints8 b) {
   return _mm512_cmpeq_epi64_mask((__m512i)a, (__m512i)b);
 }
+template <class Mask>
+[[gnu::always_inline]] inline unsigned bits_of(Mask mask) {
+  return mask;
+}
 
 }  // namespace
+}  // namespace terrace::tri::tin
 
 #include "scan_impl.hpp"
 
 namespace terrace::tri::tin {
 
-const GridScan<float> kGridScanFloatAvx512{worst_in<float, 1>, worst_in<float, kGridCoarse>,
-                                           within_in<float>};
-const GridScan<double> kGridScanDoubleAvx512{worst_in<double, 1>, worst_in<double, kGridCoarse>,
-                                             within_in<double>};
+constinit const Scans kScansAvx512 = all_scans();
 
 }  // namespace terrace::tri::tin

@@ -1,24 +1,48 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Vectors of heights, and how blocks of samples are loaded into them. The rules of
-// grid_scan_impl.hpp hold here.
-#include "scan.hpp"
+#include <cstddef>
+#include <cstdint>
+
+// Vectors of 64 bytes. This file, scan_masks.hpp and the scans (*/scan_impl.hpp) are compiled once
+// for each instruction set. Nothing in them may be shared between objects, or the linker might keep
+// the version for newer processors only: everything is in anonymous namespaces, and no function of
+// another header is called.
 
 namespace terrace::tri::tin {
 namespace {
 
+using Reals16 = float __attribute__((vector_size(64)));
+using Ints16 = std::int32_t __attribute__((vector_size(64)));
+using Reals8 = double __attribute__((vector_size(64)));
+using Ints8 = std::int64_t __attribute__((vector_size(64)));
+
+template <class V>
+[[gnu::always_inline]] inline V least(V a, V b) {
+  return b < a ? b : a;
+}
+template <class V>
+[[gnu::always_inline]] inline V greatest(V a, V b) {
+  return b > a ? b : a;
+}
+
 template <class T>
-struct Kernel;
+struct Lanes;
 
 template <>
-struct Kernel<float> {
+struct Lanes<float> {
   static constexpr int kLanes = 16;
   using Int = std::int32_t;
-  using Reals = float __attribute__((vector_size(64)));
-  using Ints = std::int32_t __attribute__((vector_size(64)));
+  using Reals = Reals16;
+  using Ints = Ints16;
   using Quarter = float __attribute__((vector_size(16)));
   using Half = float __attribute__((vector_size(32)));
+  static constexpr Ints kLane = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+  static constexpr float kRounding = 0x1p-24F;
+
+  [[gnu::always_inline]] static Reals absolute(Reals lanes) {
+    return (Reals)((Ints)lanes & 0x7FFFFFFF);
+  }
   [[gnu::always_inline]] static Int greatest_lane(Ints lanes) {
     using IntQuarter = std::int32_t __attribute__((vector_size(16)));
     using IntHalf = std::int32_t __attribute__((vector_size(32)));
@@ -32,22 +56,19 @@ struct Kernel<float> {
     four = swapped > four ? swapped : four;
     return four[1] > four[0] ? four[1] : four[0];
   }
-  static constexpr Ints kLane = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
-  static constexpr Int kSignless = 0x7FFFFFFF;
-  static constexpr float kRounding = 0x1p-24F;
-
   [[gnu::always_inline]] static Reals load(const float* from) {
     Reals lanes;
     __builtin_memcpy(&lanes, from, sizeof lanes);
     return lanes;
   }
-  [[gnu::always_inline]] static Reals load_pair(const float* from, std::size_t stride) {
+  [[gnu::always_inline]] static Reals load_halves(const float* first, const float* second) {
     Half a, b;
-    __builtin_memcpy(&a, from, sizeof a);
-    __builtin_memcpy(&b, from + stride, sizeof b);
+    __builtin_memcpy(&a, first, sizeof a);
+    __builtin_memcpy(&b, second, sizeof b);
     return __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
   }
-  [[gnu::always_inline]] static Reals load_four(const float* from, std::size_t stride) {
+  /// A quarter from each of four rows.
+  [[gnu::always_inline]] static Reals load_quarters(const float* from, std::size_t stride) {
     Quarter a, b, c, d;
     __builtin_memcpy(&a, from, sizeof a);
     __builtin_memcpy(&b, from + stride, sizeof b);
@@ -60,30 +81,32 @@ struct Kernel<float> {
 };
 
 template <>
-struct Kernel<double> {
+struct Lanes<double> {
   static constexpr int kLanes = 8;
   using Int = std::int64_t;
-  using Reals = double __attribute__((vector_size(64)));
-  using Ints = std::int64_t __attribute__((vector_size(64)));
+  using Reals = Reals8;
+  using Ints = Ints8;
   using Half = double __attribute__((vector_size(32)));
-  [[gnu::always_inline]] static Int greatest_lane(Ints lanes) {
-    Int greatest = lanes[0];
-    for (int i = 1; i < kLanes; ++i) greatest = lanes[i] > greatest ? lanes[i] : greatest;
-    return greatest;
-  }
   static constexpr Ints kLane = {0, 1, 2, 3, 4, 5, 6, 7};
-  static constexpr Int kSignless = 0x7FFFFFFFFFFFFFFF;
   static constexpr double kRounding = 0x1p-53;
 
+  [[gnu::always_inline]] static Reals absolute(Reals lanes) {
+    return (Reals)((Ints)lanes & 0x7FFFFFFFFFFFFFFF);
+  }
+  [[gnu::always_inline]] static Int greatest_lane(Ints lanes) {
+    Int most = lanes[0];
+    for (int i = 1; i < kLanes; ++i) most = lanes[i] > most ? lanes[i] : most;
+    return most;
+  }
   [[gnu::always_inline]] static Reals load(const double* from) {
     Reals lanes;
     __builtin_memcpy(&lanes, from, sizeof lanes);
     return lanes;
   }
-  [[gnu::always_inline]] static Reals load_pair(const double* from, std::size_t stride) {
+  [[gnu::always_inline]] static Reals load_halves(const double* first, const double* second) {
     Half a, b;
-    __builtin_memcpy(&a, from, sizeof a);
-    __builtin_memcpy(&b, from + stride, sizeof b);
+    __builtin_memcpy(&a, first, sizeof a);
+    __builtin_memcpy(&b, second, sizeof b);
     return __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7);
   }
 };

@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <cstddef>
-#include <cstdint>
-
 #include <immintrin.h>
 
-namespace {
+#include "scan_lanes.hpp"
 
-using Ints16 = std::int32_t __attribute__((vector_size(64)));
-using Ints8 = std::int64_t __attribute__((vector_size(64)));
+namespace terrace::tri::tin {
+namespace {
 
 /// A bit for each lane that is true.
 [[gnu::always_inline]] inline unsigned bits_of(Ints16 mask) {
@@ -22,14 +19,12 @@ using Ints8 = std::int64_t __attribute__((vector_size(64)));
 }
 
 }  // namespace
+}  // namespace terrace::tri::tin
 
 #include "scan_masks.hpp"
 
 namespace terrace::tri::tin {
 
-const GridScan<float> kGridScanFloatAvx2{worst_in<float, 1>, worst_in<float, kGridCoarse>,
-                                         within_in<float>};
-const GridScan<double> kGridScanDoubleAvx2{worst_in<double, 1>, worst_in<double, kGridCoarse>,
-                                           within_in<double>};
+constinit const Scans kScansAvx2 = all_scans();
 
 }  // namespace terrace::tri::tin

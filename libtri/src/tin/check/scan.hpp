@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+/// The inner loop of checking TINs of rasters: the samples in a triangle against its plane.
+
+namespace terrace::tri::tin {
+
+inline constexpr int kCheckLanes = 8;
+
+template <class T>
+struct CheckWindow {
+  const T* heights;
+  /// One per sample and kCheckLanes more: 1 once the sample was in a triangle.
+  std::uint8_t* flags;
+  std::int64_t columns, rows;
+  double tolerance;
+};
+
+/// One per lane, so that the order of summation is the same for all instruction sets.
+struct CheckSums {
+  double most[kCheckLanes] = {};
+  double squares[kCheckLanes] = {};
+  std::int64_t covered[kCheckLanes] = {};
+};
+
+/// A triangle that is counter-clockwise (columns to the right, rows upwards).
+struct CheckTriangle {
+  const double *a, *b, *c;  ///< column, row, height
+  double area;              ///< twice
+  double margin[3];         ///< of sides ab, bc, ca: the tolerance times their length
+};
+
+/// Adds the samples with data that are in a triangle, on its sides or outside it by no more than
+/// the tolerance. True if there are also samples without data.
+template <class T>
+using CheckScan = bool (*)(const CheckWindow<T>& window, const CheckTriangle& triangle,
+                           CheckSums& sums);
+
+}  // namespace terrace::tri::tin

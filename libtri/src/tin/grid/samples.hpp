@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "gaps.hpp"
+#include "scan.hpp"
+#include "terrace/tri/grid_tin.hpp"
+#include "tin/ground.hpp"
+#include "tin/mesh.hpp"
+#include "tin/scan.hpp"
+#include "tin/scan_results.hpp"
+
+namespace terrace::tri::tin {
+
+/// The samples of a window for a LatticeSurface, whose coordinates are columns and rows. Errors are
+/// computed in T.
+template <class T>
+class RasterSamples {
+ public:
+  using Vertex = GridCorner<T>;
+  using Sample = GridCorner<T>;
+  static constexpr bool kBeside = false;
+  static constexpr bool kThinDelaunay = false;
+
+  /// `sides_fixed`: samples on the window's sides are not judged.
+  template <class Height>
+  RasterSamples(const GridWindow<Height>& window, const GridTinOptions& options, bool sides_fixed,
+                InstructionSet set);
+  RasterSamples(RasterSamples&&) = default;
+
+  /// From now on a sample of every kGridCoarse-th column and row that is beyond the bound is bad
+  /// enough for large triangles.
+  void judge_coarsely_first();
+
+  std::int32_t columns() const { return columns_; }
+  std::int32_t rows() const { return rows_; }
+  const Ground& ground() const { return ground_; }
+  float least_error() const { return static_cast<float>(bound_); }
+
+  void judge(Triangle& triangle, const Vertex& a, const Vertex& b, const Vertex& c) const;
+  bool open(std::uint32_t place) const;
+  Vertex take(std::uint32_t place);
+  void give_up(std::uint32_t) {}
+  void restore() {}
+  std::uint32_t place_of(const Vertex& vertex) const;
+  Sample sample_of(const Vertex& vertex) const;
+  bool within(const Vertex& a, const Vertex& b, const Vertex& c) const;
+  bool fits(const Vertex& a, const Vertex& b, const Vertex& c, const Sample& removed) const;
+  void narrow(const Vertex& v, const Vertex& b, const Vertex& c, Interval& rises) const;
+  bool raise(Vertex& v, const Interval& rises) const;
+  bool covers(const Vertex& a, const Vertex& b, const Vertex& c) const;
+  void publish(const Vertex& vertex, GridTin& tin) const;
+
+ private:
+  WorstSample<T> worst(const Vertex& a, const Vertex& b, const Vertex& c) const;
+  /// The worst sample, or one that is bad enough.
+  WorstSample<T> worst_to_insert(const Vertex& a, const Vertex& b, const Vertex& c) const;
+
+  std::int32_t columns_, rows_;
+  double bound_;
+  T scan_bound_;  ///< bound_, rounded down
+  Ground ground_;
+  const GridScan<T>& scan_;
+  std::vector<T> heights_, coarse_heights_;
+  GridSamples<T> samples_;
+  GridSamples<T> coarse_{};  ///< those of every kGridCoarse-th column and row
+  std::optional<GridGaps> gaps_;
+};
+
+}  // namespace terrace::tri::tin
