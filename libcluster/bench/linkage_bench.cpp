@@ -51,7 +51,7 @@ void complete(benchmark::State& state, Input input, MatrixEntry entry) {
     const Dendrogram dendrogram = complete_linkage(points, options);
     benchmark::DoNotOptimize(dendrogram.merges.data());
   }
-  // Of the process so far: of this benchmark only if it is the first.
+  // The peak of the process so far: that of this benchmark only if it is the first.
   state.counters["peak_MiB"] = status_mebibytes("VmHWM") - before;
 }
 

@@ -171,7 +171,7 @@ class Scene {
   bool triangles() { return load(), !mesh_.triangles.empty(); }
   const Queries& queries() { return load(), queries_; }
   const std::vector<Point3>& points() { return load(), mesh_.corners; }
-  /// Of the balls around points: less than half their distance in a full cube.
+  /// Radius of the balls around points: less than half their distance in a full cube.
   double radius() {
     load();
     return queries_.size / std::sqrt(3.0) * 0.3 / std::cbrt(static_cast<double>(points().size()));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reading and writing files of points, warm: survey coordinates (millimetres in a UTM zone), and
-// the same with three more columns. Items are points.
+// Reading and writing files of points, warm: survey coordinates (millimetres in a UTM zone), the
+// same with three more columns, and with those of LAS's point format 6. Items are points.
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>
@@ -20,14 +20,28 @@ std::size_t point_count() {
   return std::getenv("TERRACE_BENCH_SMALL") != nullptr ? 20'000 : 2'000'000;
 }
 
+enum class Columns : std::uint8_t { none, three, laser };
+
 /// Points of a survey in blocks of 10,000, the last shorter.
 class Survey {
  public:
-  explicit Survey(bool columns) : random_(1) {
-    if (!columns) return;
-    header_.attributes = {{.name = "intensity", .type = ScalarType::u16},
-                          {.name = "class", .type = ScalarType::u8},
-                          {.name = "confidence", .type = ScalarType::f32}};
+  explicit Survey(Columns columns) : random_(1) {
+    header_.lattice = Lattice{.scale = {0.001, 0.001, 0.001}, .offset = {691'000, 5'338'000, 0}};
+    if (columns == Columns::three) {
+      header_.attributes = {{.name = "intensity", .type = ScalarType::u16},
+                            {.name = "class", .type = ScalarType::u8},
+                            {.name = "confidence", .type = ScalarType::f32}};
+    } else if (columns == Columns::laser) {
+      for (const char* name : {"return_number", "number_of_returns", "synthetic", "key_point",
+                               "withheld", "overlap", "scanner_channel", "scan_direction_flag",
+                               "edge_of_flight_line", "classification", "user_data"}) {
+        header_.attributes.push_back({.name = name, .type = ScalarType::u8});
+      }
+      header_.attributes.push_back({.name = "scan_angle", .type = ScalarType::i16, .scale = 0.006});
+      header_.attributes.push_back({.name = "intensity", .type = ScalarType::u16});
+      header_.attributes.push_back({.name = "point_source_id", .type = ScalarType::u16});
+      header_.attributes.push_back({.name = "gps_time", .type = ScalarType::f64});
+    }
   }
   [[nodiscard]] const PointHeader& header() const { return header_; }
 
@@ -51,9 +65,13 @@ class Survey {
     for (std::size_t i = 0; i < count; ++i) {
       for (const Channel& channel : header_.attributes) {
         const float confidence = static_cast<float>(random_() % 1000) / 1000.0f;
-        const std::uint64_t bits = random_();
+        const double time = 0.25 * static_cast<double>(random_() % 1'000'000);
+        // Bit fields of LAS hold 1 as well.
+        const std::uint64_t bits = random_() & (channel.type == ScalarType::u8 ? 1U : ~0ULL);
         const auto bytes = channel.type == ScalarType::f32
                                ? std::as_bytes(std::span(&confidence, 1))
+                           : channel.type == ScalarType::f64
+                               ? std::as_bytes(std::span(&time, 1))
                                : std::as_bytes(std::span(&bits, 1)).first(size_of(channel.type));
         block_.payload.insert(block_.payload.end(), bytes.begin(), bytes.end());
       }
@@ -72,7 +90,7 @@ std::string scratch_file() {
          ("terrace-bench-" + std::to_string(getpid()) + ".points");
 }
 
-void read(benchmark::State& state, const std::string& format, bool columns) {
+void read(benchmark::State& state, const std::string& format, Columns columns) {
   const std::string path = scratch_file();
   Survey(columns).write(path, format);
   for (auto _ : state) {
@@ -89,7 +107,7 @@ void read(benchmark::State& state, const std::string& format, bool columns) {
 }
 
 /// Without the syncs, which would measure the disk: the file is given up after its last point.
-void write(benchmark::State& state, const std::string& format, bool columns) {
+void write(benchmark::State& state, const std::string& format, Columns columns) {
   const std::string path = scratch_file();
   Survey survey(columns);
   const PointBlock block = survey.make(10'000);
@@ -102,9 +120,11 @@ void write(benchmark::State& state, const std::string& format, bool columns) {
 }
 
 void register_all() {
-  for (const bool columns : {false, true}) {
-    for (const std::string format : {"xyz", "csv", "ply", "ply-ascii"}) {
-      const std::string of = format + (columns ? "/3_columns_more" : "");
+  for (const Columns columns : {Columns::none, Columns::three, Columns::laser}) {
+    for (const std::string format : {"xyz", "csv", "ply", "ply-ascii", "las", "laz"}) {
+      const std::string of = format + (columns == Columns::none    ? ""
+                                       : columns == Columns::three ? "/3_columns_more"
+                                                                   : "/las_format_6");
       benchmark::RegisterBenchmark(("read/" + of).c_str(), read, format, columns)
           ->Unit(benchmark::kMillisecond);
       benchmark::RegisterBenchmark(("write/" + of).c_str(), write, format, columns)

@@ -86,4 +86,22 @@ inline Reading read_through(const std::string& file, const SourceOptions& option
   return reading;
 }
 
+/// Reads cells of a raster and holds the reader to its promises. A few blocks will do: sparse and
+/// packed files can be sound and very large.
+inline void read_cells(PointSource& source, std::size_t block_points) {
+  const SourceInfo& info = source.info();
+  PointBlock block;
+  std::uint64_t points = 0;
+  for (int i = 0; i < 200 && source.next(block); ++i) {
+    require(!block.empty() && block.size() <= block_points, "size of a block");
+    points += block.size();
+    for (const Point3& p : block.positions) {
+      require(p[0] >= 0 && p[0] < static_cast<double>(info.columns) && p[1] >= 0 &&
+                  p[1] < static_cast<double>(info.rows) && p[2] - p[2] == 0.0,
+              "cells of the raster, with data");
+    }
+  }
+  require(points <= *info.points, "no more points than promised");
+}
+
 }  // namespace terrace::stream

@@ -46,6 +46,16 @@ double to_double(ScalarType type, const std::byte* bytes) {
   });
 }
 
+std::optional<Lattice> lattice_of(const Placement& placement) {
+  for (const Channel& channel : placement.coordinates) {
+    if (channel.type > ScalarType::u32) return std::nullopt;
+  }
+  const std::array<double, 6>& xy = placement.world.xy;
+  if (xy[1] != 0.0 || xy[3] != 0.0) return std::nullopt;
+  const Channel& z = placement.coordinates[2];
+  return Lattice{.scale = {xy[0], xy[4], z.scale}, .offset = {xy[2], xy[5], z.offset}};
+}
+
 Box3 world_box(const Placement& placement, const Box3& stored) {
   Box3 box;
   if (stored.empty()) return box;

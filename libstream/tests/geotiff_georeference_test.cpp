@@ -176,7 +176,7 @@ TEST(GeoReference, RealFilesLieWhereGdalPutsThem) {
   for (const auto& entry : std::filesystem::recursive_directory_iterator(*folder / "dem")) {
     const std::string path = entry.path().string();
     if (entry.path().extension() != ".tif" || path.find("hostile") != path.npos) continue;
-    // Of the many encodings of one place a few will do: gdalinfo takes its time.
+    // A few of the many encodings of one place will do: gdalinfo takes its time.
     const std::string name = entry.path().filename().string();
     const bool alike = path.find("/encodings/") != path.npos || name.starts_with("float") ||
                        name.starts_with("uint") || name.starts_with("int") ||

@@ -27,7 +27,7 @@ struct WholeRaster {
     std::memcpy(&value, samples.data() + cell * sizeof(T), sizeof(T));
     return value;
   }
-  /// Of any type, as a double.
+  /// A sample of any type as a double.
   [[nodiscard]] double value(std::size_t cell) const {
     switch (info.sample.type) {
       case ScalarType::i8:

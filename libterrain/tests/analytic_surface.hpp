@@ -88,7 +88,7 @@ class AnalyticSurface final : public TileSurface {
     }
   }
 
-  /// Of all samples: the function between them is known by nothing else.
+  /// A number of all samples: nothing tells what lies between them.
   std::uint64_t digest(const GeographicBox& /*box*/) override {
     Digest digest;
     for (const double height : samples_) digest.add(height);

@@ -94,7 +94,7 @@ class RasterDigest : public ::testing::TestWithParam<Frame> {
     }
   }
 
-  /// Of any size, in and around the raster, now and then far from it or all around the globe.
+  /// A box of any size in and around the raster, now and then far from it or all around the globe.
   GeographicBox box(const GeographicBox& bounds) {
     const double wide = bounds.east - bounds.west > 300.0 ? 4.0 : bounds.east - bounds.west;
     const double high = std::min(bounds.north - bounds.south, 4.0);
@@ -165,7 +165,7 @@ TEST_P(RasterDigest, EqualOnesGiveEqualAnswers) {
   const auto after = tiled("after");
   int equal = 0, changed = 0, needless = 0;
   for (int round = 0; round < 500; ++round) {
-    const GeographicBox asked = box(before->raster.bounds);
+    const GeographicBox asked = box(before->raster.places.bounds());
     SCOPED_TRACE(testing::Message() << "round " << round << ": " << asked.west << "," << asked.south
                                     << " " << asked.east << "," << asked.north);
     const bool same = before->surface.digest(asked) == after->surface.digest(asked);
@@ -182,14 +182,14 @@ TEST_P(RasterDigest, ClustersDoNotMatterButForTheFill) {
   const auto one = tiled("one"), other = tiled("other", 700);
   one->raster.flat_fill = other->raster.flat_fill = 12.0;
   for (int round = 0; round < 100; ++round) {
-    const GeographicBox asked = box(one->raster.bounds);
+    const GeographicBox asked = box(one->raster.places.bounds());
     EXPECT_EQ(one->surface.digest(asked), other->surface.digest(asked));
   }
 }
 
 TEST_P(RasterDigest, OptionsOfTheSurfaceCount) {
   const auto one = tiled("one");
-  const GeographicBox all = one->raster.bounds;
+  const GeographicBox all = one->raster.places.bounds();
   const std::uint64_t plain = one->surface.digest(all);
   one->raster.flat_fill = 12.0;
   const std::uint64_t flat = one->surface.digest(all);
@@ -210,7 +210,7 @@ TEST_P(RasterDigest, MasksAreThoseOfTheirPlaces) {
     one->raster.water_height = height;
     int cells = 0, wet = 0, other = 0;
     for (int round = 0; round < 40; ++round) {
-      const GeographicBox asked = box(one->raster.bounds);
+      const GeographicBox asked = box(one->raster.places.bounds());
       constexpr std::size_t kSide = 48;
       std::vector<double> longitude, latitude;
       for (std::size_t i = 0; i < kSide * kSide; ++i) {

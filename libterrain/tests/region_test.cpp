@@ -213,6 +213,7 @@ struct StepsAt {
   [[nodiscard]] stream::Point3 at(const Step& p) const { return {(*this)(p)[0], (*this)(p)[1], 0}; }
 };
 constexpr StepsAt kFrames[] = {{0, 0.5}, {-7340032.25, 0.0625}, {0x1p52, 1}, {0, 0x1p-60}};
+constexpr int kShare = TERRACE_TEST_SHARE;
 constexpr double kAnyHeight = std::numeric_limits<double>::infinity();
 
 class RandomPlaces {
@@ -282,7 +283,7 @@ void expect_boxes_and_triangles(const Region& region, const std::vector<Ring>& r
 TEST(Region, OneRingIsWhatTheIntegersSay) {
   int taken = 0, refused = 0;
   std::array<int, 3> seen{};
-  for (std::uint64_t seed = 1; seed <= 600; ++seed) {
+  for (std::uint64_t seed = 1; seed <= 600 / kShare; ++seed) {
     SCOPED_TRACE(seed);
     RandomPlaces random(seed);
     const StepsAt& frame = kFrames[seed % std::size(kFrames)];
@@ -299,8 +300,8 @@ TEST(Region, OneRingIsWhatTheIntegersSay) {
     expect_boxes_and_triangles(region, rings, frame, random, seen);
     if (HasFatalFailure()) return;
   }
-  EXPECT_GT(taken, 100);
-  EXPECT_GT(refused, 100);
+  EXPECT_GT(taken, 100 / kShare);
+  EXPECT_GT(refused, 100 / kShare);
   for (const int count : seen) EXPECT_GT(count, 30);
 }
 
@@ -308,7 +309,7 @@ TEST(Region, OneRingIsWhatTheIntegersSay) {
 TEST(Region, HolesAndOverlapsAreWhatTheIntegersSay) {
   int holes = 0, pairs = 0;
   std::array<int, 3> seen{};
-  for (std::uint64_t seed = 1; seed <= 500; ++seed) {
+  for (std::uint64_t seed = 1; seed <= 500 / kShare; ++seed) {
     SCOPED_TRACE(seed);
     RandomPlaces random(seed);
     const StepsAt& frame = kFrames[seed % std::size(kFrames)];
@@ -330,7 +331,7 @@ TEST(Region, HolesAndOverlapsAreWhatTheIntegersSay) {
     }
     if (HasFatalFailure()) return;
   }
-  EXPECT_GT(holes, 30);
+  EXPECT_GT(holes, 30 / kShare);
   EXPECT_EQ(holes, pairs);
   for (const int count : seen) EXPECT_GT(count, 30);
 }
@@ -422,7 +423,7 @@ TEST(Region, BoxesTouchTheTrianglesThatTheirPolygonsDo) {
   RandomPlaces random(5);
   const StepsAt& frame = kFrames[0];
   int touching = 0;
-  for (int i = 0; i < 5000; ++i) {
+  for (int i = 0; i < 5000 / kShare; ++i) {
     SCOPED_TRACE(i);
     const Step low{6 + random.below(4), 6 + random.below(4)};
     const Step high{low.x + 1 + random.below(5), low.y + 1 + random.below(5)};
@@ -434,8 +435,8 @@ TEST(Region, BoxesTouchTheTrianglesThatTheirPolygonsDo) {
     EXPECT_EQ(box.touches(triangle), polygon.touches(triangle));
     touching += box.touches(triangle) ? 1 : 0;
   }
-  EXPECT_GT(touching, 1000);
-  EXPECT_LT(touching, 4000);
+  EXPECT_GT(touching, 1000 / kShare);
+  EXPECT_LT(touching, 4000 / kShare);
 }
 
 TEST(Region, TakesRingsHoweverTheyAreWritten) {

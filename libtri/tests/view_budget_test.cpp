@@ -52,7 +52,7 @@ TEST(ViewBudget, MemoryIsNeverExceeded) {
           ASSERT_LE(control.cached_bytes(), options.max_cached_bytes);
         }
       }
-      // Of the blocked clusters that the cache could hold: none has room, and for the first one
+      // None of the blocked clusters that the cache could hold has room, and for the first one
       // not enough is less important.
       const auto demands = all_demands(tree, world.source, view, options);
       const ClusterSet open = expanded_set(control);

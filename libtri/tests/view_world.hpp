@@ -122,7 +122,7 @@ inline Demands own_demands(const View& view, const ViewOptions& options,
   return result;
 }
 
-/// Of all clusters, each no greater than that of the cluster above.
+/// How much each cluster is in demand: never more than the cluster above.
 inline std::map<ClusterId, Demands> all_demands(const WholeTree& tree, MemorySource& source,
                                                 const View& view, const ViewOptions& options) {
   std::map<ClusterId, Demands> result;

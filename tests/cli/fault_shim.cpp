@@ -185,7 +185,7 @@ int fsync(int fd) {
   return result;
 }
 
-/// Of all file systems' bytes: the test's folder is on one.
+/// Taken to sync all file systems: the test's folder is on one of them.
 int syncfs(int fd) {
   step("sync");
   const std::lock_guard lock(mutex);

@@ -17,7 +17,7 @@ SIBLINGS = {'terrain': ['stream', 'cluster', 'tri']}
 TERRAIN_ROOMS = {'base': 0, 'earth': 1, 'build': 2, 'surface': 2, 'view': 2, 'sample': 3, 'contour': 3,
                  'mesh': 3, 'tile': 3}
 # The same in libstream; a room in a room (`store/read`) belongs to it.
-STREAM_ROOMS = {'io': 0, 'raster': 1, 'store': 1, 'format': 2}
+STREAM_ROOMS = {'io': 0, 'laz': 0, 'raster': 1, 'store': 1, 'format': 2}
 # So many sources a newcomer can overlook.
 MOST_SOURCES = 40
 LICENCES = {
@@ -43,7 +43,7 @@ RESTRICTED = [
     (r'CGAL/|boost/|gmp(xx)?\.h|mpfr\.h', IN_CGAL),
     (r'GeographicLib/|proj(_experimental)?\.h', ['libterrain/src/earth', 'libterrain/tests']),
     (r'geos(_c)?\.h|geos/', ['libterrain/src/base']),
-    (r'tiff(io|io\.hxx|conf|vers)?\.h|png\.h|zlib\.h|zstd\.h|libdeflate\.h', IN_STREAM),
+    (r'tiff(io|io\.hxx|conf|vers)?\.h|png\.h|zip\.h|zlib\.h|zstd\.h|libdeflate\.h', IN_STREAM),
     (r'lemon/', ['libmatching/src', 'libmatching/tests', 'libmatching/bench']),
     (r'cuda_runtime|cuda\.h|cuda_(device|rounds)',
      ['libcluster/src', 'libcluster/tests', 'libcluster/bench']),

@@ -22,8 +22,8 @@
 #include "../../libterrain/tests/temporary_folder.hpp"
 #include "base/orientation.hpp"
 #include "mesh/bounded/streaming_hull.hpp"
-#include "mesh/mesh_file.hpp"
 #include "random.hpp"
+#include "terrace/stream/mesh_reader.hpp"
 #include "terrace/terrain/bounded_mesh.hpp"
 #include "terrace/terrain/build.hpp"
 #include "terrace/terrain/region.hpp"
@@ -193,7 +193,7 @@ class PointMesh : public testing::Test {
 inline terrain::BoundedMeshResult PointMesh::mesh_and_check(
     const stream::Store& store, const Cloud& cloud, const terrain::BoundedMeshOptions& options) {
   const terrain::BoundedMeshResult result = write_bounded_mesh(store, options, common());
-  const terrain::TriangleMesh mesh = terrain::read_mesh_file(options.path)->mesh;
+  const terrain::TriangleMesh mesh = terrain::triangle_mesh_of(*stream::read_mesh(options.path));
   EXPECT_EQ(result.vertices, mesh.positions.size());
   EXPECT_EQ(result.triangles, mesh.triangles.size());
   EXPECT_EQ(result.samples, cloud.size());

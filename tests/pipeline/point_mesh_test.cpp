@@ -22,8 +22,8 @@
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/point_tin.hpp>
 
-#include "mesh/mesh_file.hpp"
 #include "point_mesh_case.hpp"
+#include "terrace/stream/mesh_reader.hpp"
 #include "terrace/terrain/bounded_mesh.hpp"
 #include "terrace/terrain/region.hpp"
 
@@ -165,7 +165,8 @@ TEST_F(PointMesh, KeepsAllSamplesOfAPlaceWithinTheBound) {
         EXPECT_EQ(result.samples, cloud.size());
         EXPECT_EQ(result.uncovered, 0U);
         EXPECT_EQ(result.duplicates, 2 * places);
-        const terrain::TriangleMesh mesh = terrain::read_mesh_file(wanted.path)->mesh;
+        const terrain::TriangleMesh mesh =
+            terrain::triangle_mesh_of(*stream::read_mesh(wanted.path));
         const tri::TinErrors errors = tri::measure_surface(x, y, z, mesh.positions, mesh.triangles);
         EXPECT_EQ(errors.covered, cloud.size());
         EXPECT_LE(errors.largest, 1.0 + 1e-9);
@@ -219,7 +220,7 @@ TEST_F(PointMesh, TakesOneHeightPerPlaceAsAsked) {
     EXPECT_EQ(result.samples, cloud.size());
     EXPECT_EQ(result.duplicates, 2 * places.size());
     EXPECT_LE(result.max_error, 1e-12);
-    const terrain::TriangleMesh mesh = terrain::read_mesh_file(wanted.path)->mesh;
+    const terrain::TriangleMesh mesh = terrain::triangle_mesh_of(*stream::read_mesh(wanted.path));
     std::vector<double> x, y, z;
     for (const stream::Point3& p : places) {
       x.push_back(p[0]);
@@ -305,7 +306,8 @@ TEST_F(PointMesh, OfALaserScan) {
     const auto result = write_bounded_mesh(store, wanted, common(2));
     EXPECT_EQ(result.samples, scan.size());
     EXPECT_EQ(result.duplicates, scan.size() - cloud.size());
-    const auto errors = check_surface(cloud, terrain::read_mesh_file(wanted.path)->mesh);
+    const auto errors =
+        check_surface(cloud, terrain::triangle_mesh_of(*stream::read_mesh(wanted.path)));
     EXPECT_LE(errors.largest, max_error * (1 + 1e-9));
     EXPECT_NEAR(errors.largest, result.max_error, 1e-9);
     auto whole = wanted;

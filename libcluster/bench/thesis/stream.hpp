@@ -42,9 +42,9 @@ class StreamClustering {
   /// Throws: std::runtime_error if the clustering does not reduce a level, or has lost weight.
   void finish();
 
-  /// Spent in the search alone.
+  /// Time of the search alone.
   [[nodiscard]] double seconds() const { return seconds_; }
-  /// Of all blocks of level 0, in their order.
+  /// The sum over all blocks of level 0, in their order.
   [[nodiscard]] double cost() const { return cost_; }
   /// Points that came to each level; [0] is the input.
   [[nodiscard]] std::vector<std::uint64_t> level_points() const;

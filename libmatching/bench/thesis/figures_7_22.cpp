@@ -26,7 +26,7 @@ double correlation_of_neighbours(const std::vector<double>& costs, double mean) 
 SearchRun search(const Setting& setting, const std::string& set, std::size_t points,
                  std::uint64_t iterations, std::uint64_t set_seed) {
   const std::vector<Point3> places = uniform_points(points, set_seed);
-  // Of a hundred points an iteration is shorter than the start of a thread.
+  // With a hundred points an iteration is shorter than the start of a thread.
   const HalvingOptions options{.method = Halving::monte_carlo,
                                .iterations = iterations,
                                .threads = points < 300 ? 1 : setting.threads};

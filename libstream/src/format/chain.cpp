@@ -18,6 +18,7 @@ std::string list_of(const std::vector<Channel>& channels) {
   for (const Channel& channel : channels) {
     if (!out.empty()) out += ", ";
     out.append(name_of(channel.type)).append(" ").append(channel.name);
+    if (!channel.unit.empty()) out.append(" (").append(channel.unit).append(")");
   }
   return out.empty() ? "none" : out;
 }
@@ -50,7 +51,7 @@ class Chain final : public PointSource {
     for (std::size_t i = 0; i < files.size(); ++i) {
       Part& part = parts_[i];
       part.file = files[i];
-      auto source = open_one_(part.file, options_);
+      auto source = open_one_(part.file, options_, i == 0 ? nullptr : &info_);
       const SourceInfo& info = source->info();
       if (i == 0) {
         info_ = info;
@@ -83,13 +84,14 @@ class Chain final : public PointSource {
     for (; turn_ < parts_.size(); ++turn_) {
       Part& part = parts_[turn_];
       if (!part.source) {
-        part.source = open_one_(part.file, options_);
+        part.source = open_one_(part.file, options_, turn_ == 0 ? nullptr : &info_);
         check_agreement(info_, part.source->info());
       }
       if (part.source->next(block)) {
         delivered_ += block.size();
         return true;
       }
+      withheld_ += part.source->progress().withheld;
       done_bytes_ += part.bytes;
       part.source.reset();
     }
@@ -98,11 +100,14 @@ class Chain final : public PointSource {
   }
 
   Progress progress() const override {
-    Progress progress{.points = delivered_, .nodata = 0, .fraction = 0.0};
+    Progress progress{.points = delivered_, .withheld = withheld_};
     if (turn_ == parts_.size()) {
       progress.fraction = 1.0;
-    } else if (sizes_known_ && total_bytes_ > 0) {
-      const Part& part = parts_[turn_];
+      return progress;
+    }
+    const Part& part = parts_[turn_];
+    if (part.source) progress.withheld += part.source->progress().withheld;
+    if (sizes_known_ && total_bytes_ > 0) {
       const double inside = part.source ? part.source->progress().fraction : 0.0;
       progress.fraction =
           (static_cast<double>(done_bytes_) + inside * static_cast<double>(part.bytes)) /
@@ -123,7 +128,7 @@ class Chain final : public PointSource {
   SourceInfo info_;
   std::vector<Part> parts_;
   std::size_t turn_ = 0;
-  std::uint64_t delivered_ = 0, done_bytes_ = 0, total_bytes_ = 0;
+  std::uint64_t delivered_ = 0, withheld_ = 0, done_bytes_ = 0, total_bytes_ = 0;
   bool sizes_known_ = true;
 };
 
@@ -131,7 +136,7 @@ class Chain final : public PointSource {
 
 std::unique_ptr<PointSource> open_in_turn(std::span<const std::string> files,
                                           const SourceOptions& options, OpenOne open_one) {
-  if (files.size() == 1) return open_one(files.front(), options);
+  if (files.size() == 1) return open_one(files.front(), options, nullptr);
   return std::make_unique<Chain>(files, options, open_one);
 }
 

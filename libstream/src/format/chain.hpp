@@ -9,9 +9,10 @@
 
 namespace terrace::stream {
 
-/// Opens one file of a format.
+/// Opens one file of a format. first: what the first of several files says; null for itself.
 using OpenOne = std::unique_ptr<PointSource> (*)(const std::string& file,
-                                                 const SourceOptions& options);
+                                                 const SourceOptions& options,
+                                                 const SourceInfo* first);
 
 /// Several files, one after the other, as one source; a single one as it is. Looks at the head of
 /// each at once and opens it (again) when its turn comes, pipes only once.

@@ -22,7 +22,6 @@ struct KnownFormat {
   Mark first, second{};      ///< both, if there are two; of the first with text, it may be indented
 };
 
-constexpr std::string_view kPdal = "convert it, e.g. 'pdal translate FILE out.ply'";
 constexpr std::string_view kRaster = "convert it, e.g. 'gdal_translate FILE out.tif'";
 constexpr std::string_view kMesh =
     "convert it, e.g. 'assimp export FILE out.ply', or with MeshLab, to PLY";
@@ -32,9 +31,6 @@ constexpr std::string_view kVector =
 // What tells more comes first.
 constexpr KnownFormat kRows[] = {
     // Points.
-    {{"COPC (a cloud-optimised LAZ file)", kPdal}, "", {0, "LASF"}, {377, "copc"}},
-    {{"LAS", kPdal}, ".las", {0, "LASF"}},
-    {{"LAZ (compressed LAS)", kPdal}, ".laz", {0, {}}},
     {{"E57", "convert it, e.g. with CloudCompare or 'pdal translate FILE out.ply', to PLY"},
      ".e57",
      {0, "ASTM-E57"}},
@@ -43,13 +39,8 @@ constexpr KnownFormat kRows[] = {
      ".pcd",
      {0, "# .PCD"}},
     // Rasters.
-    {{"an ESRI ASCII grid", kRaster}, "", {0, "ncols", true}},
     {{"an ESRI binary grid", kRaster}, ".adf", {0, "HDR1.2\0\0"sv}},
-    {{"SRTM .hgt (a grid without a header)",
-      "convert it, e.g. 'gdal_translate FILE out.tif'; its name must be that of its tile, as "
-      "N46E008.hgt"},
-     ".hgt",
-     {}},
+    {{"the header of a binary grid", "name the .bil or .flt beside it"}, ".hdr", {}},
     {{"HDF5 or NetCDF 4",
       "convert a variable of it ('gdalinfo FILE' lists them), e.g. 'gdal_translate "
       "NETCDF:FILE:VARIABLE out.tif'"},
@@ -66,16 +57,10 @@ constexpr KnownFormat kRows[] = {
     {{"JPEG 2000", kRaster}, "", {0, "\xff\x4f\xff\x51"sv}},
     {{"an ERDAS Imagine raster", kRaster}, ".img", {0, "EHFA_HEADER_TAG"}},
     {{"DTED", kRaster}, ".dt0 .dt1 .dt2", {0, "UHL1"}},
-    {{"USGS DEM", kRaster}, ".dem", {}},
     {{"a Surfer grid", kRaster}, "", {0, "DSBB"}},
     {{"a Surfer grid", kRaster}, "", {0, "DSRB"}},
     {{"a Surfer grid", kRaster}, ".grd", {0, "DSAA"}},
     {{"a virtual raster of GDAL", kRaster}, ".vrt", {0, "<VRTDataset"}},
-    {{"a PNG picture",
-      "heights in colours must be turned into numbers, e.g. by gdal_calc.py, in a "
-      "GeoTIFF"},
-     ".png",
-     {0, "\x89PNG\r\n"sv}},
     {{"a JPEG picture", "its numbers are colours, not heights: look for the GeoTIFF"},
      ".jpg .jpeg",
      {0, "\xff\xd8\xff"sv}},
@@ -151,12 +136,6 @@ const ForeignFormat* foreign_format_of_content(std::string_view head) {
   for (const KnownFormat& row : kRows) {
     if (!shows(row.first, row.first.at == 0 ? text : head)) continue;
     if (!row.second.bytes.empty() && !shows(row.second, head)) continue;
-    // The type of point of LAS has its highest bits set where points are compressed.
-    constexpr std::size_t kPointType = 104;
-    if (row.format.name == "LAS" && head.size() > kPointType &&
-        (static_cast<unsigned char>(head[kPointType]) & 0xC0U) != 0) {
-      return foreign_format_of_ending(".laz");
-    }
     return &row.format;
   }
   return nullptr;

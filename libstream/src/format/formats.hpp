@@ -9,8 +9,20 @@ namespace terrace::stream {
 
 /// GeoTIFF; several files are a mosaic.
 const Format& geotiff_format();
+/// ASPRS LAS 1.0 to 1.4.
+const Format& las_format();
 /// The Stanford polygon format: ASCII, binary little-endian and big-endian.
 const Format& ply_format();
+/// Tiles of SRTM without a header, also in .zip and .gz.
+const Format& hgt_format();
+/// ESRI's ASCII grids.
+const Format& ascii_grid_format();
+/// ESRI's binary grids with a header file: .flt, .bil, .bip, .bsq.
+const Format& binary_grid_format();
+/// Digital elevation models of the USGS, in ASCII.
+const Format& usgs_dem_format();
+/// PNG: grey height maps, and colours that mean heights.
+const Format& png_format();
 /// Text of one point per line: XYZ, CSV and their like.
 const Format& xyz_format();
 

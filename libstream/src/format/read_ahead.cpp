@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <cassert>
 #include <condition_variable>
 #include <deque>
 #include <exception>
@@ -37,6 +38,10 @@ class ReadAhead final : public PointSource {
 
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
   [[nodiscard]] std::uint64_t reading_bytes() const override { return source_->reading_bytes(); }
+  void refine(double cell_aspect, std::uint64_t memory_bytes) override {
+    assert(!started_);
+    source_->refine(cell_aspect, memory_bytes);
+  }
 
   bool next(PointBlock& block) override {
     block.clear();

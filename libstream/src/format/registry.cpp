@@ -8,7 +8,9 @@
 
 #include "format/foreign_format.hpp"
 #include "format/formats.hpp"
+#include "format/selection.hpp"
 #include "io/peek.hpp"
+#include "io/text.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/input.hpp"
 #include "terrace/stream/source.hpp"
@@ -27,12 +29,24 @@ std::string known_formats() {
   return out;
 }
 
-std::string ending_of(const std::string& file) {
-  std::string ending = std::filesystem::path(file).extension().string();
-  for (char& c : ending) {
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+std::string ending_of(const std::filesystem::path& file) {
+  return lower_case(file.extension().string());
+}
+
+/// The format that an ending tells; nullptr if none.
+const Format* format_of_ending(const std::string& ending) {
+  for (const Format& format : formats()) {
+    const auto& known = format.endings;
+    if (std::find(known.begin(), known.end(), ending) != known.end()) return &format;
   }
-  return ending;
+  return nullptr;
+}
+
+/// The format that reads packed files itself and whose name this has: ".hgt.zip".
+const Format* packed_format_of(const std::string& file) {
+  const std::string ending = ending_of(file);
+  if (ending != ".zip" && ending != ".gz") return nullptr;
+  return format_of_ending(ending_of(std::filesystem::path(file).stem()) + ending);
 }
 
 [[noreturn]] void refuse(const std::string& file, const ForeignFormat& format) {
@@ -44,7 +58,7 @@ std::string ending_of(const std::string& file) {
 
 /// By name, else by content, else by ending. A file whose ending is known but whose content is not
 /// goes to the ending's reader, which can say best what is wrong with it. Formats that are known
-/// and not read are refused by content first too, as some of them look like text.
+/// and not read are refused before the last of formats(), text, is asked, as some look like it.
 const Format& format_of(const std::string& file, const SourceOptions& options) {
   if (!options.format.empty()) {
     for (const Format& format : formats()) {
@@ -56,17 +70,18 @@ const Format& format_of(const std::string& file, const SourceOptions& options) {
                  .remedy = "known are " + known_formats()});
   }
   const std::vector<char> head = peek_head(file, kHeadBytes, options.stop);
+  const auto bytes = std::as_bytes(std::span(head));
+  const std::span<const Format> telling = formats().first(formats().size() - 1);
+  for (const Format& format : telling) {
+    if (format.recognise(bytes)) return format;
+  }
+  if (const Format* const packed = packed_format_of(file)) return *packed;
   if (const auto* foreign = foreign_format_of_content({head.data(), head.size()})) {
     refuse(file, *foreign);
   }
-  for (const Format& format : formats()) {
-    if (format.recognise(std::as_bytes(std::span(head)))) return format;
-  }
+  if (formats().back().recognise(bytes)) return formats().back();
   const std::string ending = ending_of(file);
-  for (const Format& format : formats()) {
-    const auto& known = format.endings;
-    if (std::find(known.begin(), known.end(), ending) != known.end()) return format;
-  }
+  if (const Format* const format = format_of_ending(ending)) return *format;
   const ForeignFormat* const foreign = foreign_format_of_ending(ending);
   if (foreign != nullptr && !head.empty()) refuse(file, *foreign);
   throw Error(
@@ -111,14 +126,22 @@ std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
                  .cause = "is named twice",
                  .remedy = "it can be read only once"});
   }
-  return format.open(files, options);
+  if (options.heights_of_colour != HeightsOfColour::none && format.name != png_format().name) {
+    throw Error({.file = files.front(),
+                 .where = {},
+                 .cause = "is " + format.name + ", whose heights are no colours",
+                 .remedy = "leave `heights_of_colour` out"});
+  }
+  return selection_of(format.open(files, options), options);
 }
 
 }  // namespace
 
 std::span<const Format> formats() {
   // The most telling content first: text is whatever looks like a table of numbers.
-  static const std::array<Format, 3> all{geotiff_format(), ply_format(), xyz_format()};
+  static const std::array<Format, 9> all{geotiff_format(), las_format(),         ply_format(),
+                                         hgt_format(),     ascii_grid_format(),  usgs_dem_format(),
+                                         png_format(),     binary_grid_format(), xyz_format()};
   return all;
 }
 

@@ -12,12 +12,14 @@
 namespace terrace::stream {
 namespace {
 
-constexpr std::array<WriterFormat, 4> kPointFormats{{{"xyz", ".xyz", ".txt", true},
+constexpr std::array<WriterFormat, 6> kPointFormats{{{"xyz", ".xyz", ".txt", true},
                                                      {"csv", ".csv", "", true},
                                                      {"ply", ".ply", "", false},
-                                                     {"ply-ascii", "", "", false}}};
-constexpr std::array kPointOpeners{&open_xyz_writer, &open_csv_writer, &open_ply_writer,
-                                   &open_ply_ascii_writer};
+                                                     {"ply-ascii", "", "", false},
+                                                     {"las", ".las", "", false},
+                                                     {"laz", ".laz", "", false}}};
+constexpr std::array kPointOpeners{&open_xyz_writer,       &open_csv_writer, &open_ply_writer,
+                                   &open_ply_ascii_writer, &open_las_writer, &open_laz_writer};
 
 constexpr std::array<WriterFormat, 4> kMeshFormats{{{"obj", ".obj", "", true},
                                                     {"ply", ".ply", "", false},

@@ -36,6 +36,10 @@ std::unique_ptr<PointWriter> open_ply_writer(const std::string& path, const Poin
 std::unique_ptr<PointWriter> open_ply_ascii_writer(const std::string& path,
                                                    const PointHeader& header,
                                                    const WriterOptions& options);
+std::unique_ptr<PointWriter> open_las_writer(const std::string& path, const PointHeader& header,
+                                             const WriterOptions& options);
+std::unique_ptr<PointWriter> open_laz_writer(const std::string& path, const PointHeader& header,
+                                             const WriterOptions& options);
 
 std::unique_ptr<MeshWriter> open_ply_mesh_writer(const std::string& path, const MeshHeader& header,
                                                  const WriterOptions& options);

@@ -17,4 +17,15 @@ void append_little_endian(std::string& out, T value) {
   out.append(bytes, sizeof(T));
 }
 
+/// A number that lies little-endian at `at`, which need not be aligned.
+template <class T>
+T load_little_endian(const char* at) {
+  char bytes[sizeof(T)];
+  std::memcpy(bytes, at, sizeof(T));
+  if constexpr (std::endian::native == std::endian::big) std::reverse(bytes, bytes + sizeof(T));
+  T value;
+  std::memcpy(&value, bytes, sizeof(T));
+  return value;
+}
+
 }  // namespace terrace::stream

@@ -5,6 +5,13 @@
 
 namespace terrace::stream {
 
+std::string lower_case(std::string text) {
+  for (char& c : text) {
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  }
+  return text;
+}
+
 std::string_view trim(std::string_view line) {
   line = trim_left(line);
   while (!line.empty() && is_blank(line.back())) line.remove_suffix(1);

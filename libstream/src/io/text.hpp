@@ -10,6 +10,11 @@ namespace terrace::stream {
 /// A blank inside a line.
 inline bool is_blank(char c) { return c == ' ' || c == '\t'; }
 
+/// A blank, or what ends a line.
+inline bool is_white_space(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
+/// ASCII letters in lower case.
+std::string lower_case(std::string text);
+
 /// `line` from its first character that is no blank.
 inline std::string_view trim_left(std::string_view line) {
   while (!line.empty() && is_blank(line.front())) line.remove_prefix(1);

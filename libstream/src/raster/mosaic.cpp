@@ -157,6 +157,8 @@ class Mosaic final : public Raster {
 
   [[nodiscard]] const RasterInfo& info() const override { return info_; }
 
+  void set_open_bytes(std::uint64_t bytes) override { open_bytes_ = bytes; }
+
   bool read_over(const CellWindow& window, const CellBuffer& out) override {
     bool any = false;
     const auto left = static_cast<std::int64_t>(window.column);

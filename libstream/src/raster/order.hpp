@@ -11,8 +11,8 @@ namespace terrace::stream {
 
 /// What the window of a raster may take of a source's memory. The order of the points depends on it
 /// and must not depend on how much memory there is: it ends at that of 64 MiB.
-inline std::uint64_t window_bytes(const SourceOptions& options) {
-  return std::min<std::uint64_t>(options.memory_bytes, 64u << 20) / 4 * 3;
+inline std::uint64_t window_bytes(std::uint64_t memory_bytes) {
+  return std::min<std::uint64_t>(memory_bytes, 64u << 20) / 4 * 3;
 }
 
 /// A number of columns and rows.

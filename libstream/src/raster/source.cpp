@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <cstring>
 #include <utility>
@@ -15,8 +16,7 @@ namespace {
 constexpr std::uint64_t kMostTiles = 1u << 18;
 constexpr std::size_t kMostBlockPoints = std::size_t{1} << 40;
 
-double aspect_of(const WorldTransform& world, double wanted) {
-  if (wanted > 0) return wanted;
+double transform_aspect(const WorldTransform& world) {
   const auto& m = world.xy;
   const double width = std::sqrt(m[0] * m[0] + m[3] * m[3]);
   const double height = std::sqrt(m[1] * m[1] + m[4] * m[4]);
@@ -55,14 +55,15 @@ class RasterSource final : public PointSource {
   RasterSource(std::unique_ptr<Raster> raster, const SourceOptions& options)
       : raster_(std::move(raster)),
         info_(source_info(raster_->info(), options)),
-        block_points_(std::clamp<std::size_t>(options.block_points, 1, kMostBlockPoints)),
-        aspect_(aspect_of(info_.world, options.cell_aspect)) {
-    const std::size_t cell_bytes = size_of(raster_->info().sample.type) + 1;
-    const std::uint64_t cells =
-        std::min(window_bytes(options) / cell_bytes, kMostTiles * block_points_ / 2);
-    window_size_ = window_size(raster_->info(), cells, block_points_, aspect_);
-    reading_bytes_ =
-        window_size_.columns * window_size_.rows * cell_bytes + raster_->info().held_bytes;
+        block_points_(std::clamp<std::size_t>(options.block_points, 1, kMostBlockPoints)) {
+    lay_out(transform_aspect(info_.world), window_bytes(options.memory_bytes));
+  }
+
+  void refine(double cell_aspect, std::uint64_t memory_bytes) override {
+    assert(cell_aspect > 0 && row_ == 0 && column_ == 0);
+    const std::uint64_t window = window_bytes(memory_bytes);
+    lay_out(cell_aspect, window);
+    raster_->set_open_bytes(memory_bytes - window);
   }
 
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
@@ -79,6 +80,15 @@ class RasterSource final : public PointSource {
   }
 
  private:
+  void lay_out(double cell_aspect, std::uint64_t bytes) {
+    aspect_ = cell_aspect;
+    const std::size_t cell_bytes = size_of(raster_->info().sample.type) + 1;
+    const std::uint64_t cells = std::min(bytes / cell_bytes, kMostTiles * block_points_ / 2);
+    window_size_ = window_size(raster_->info(), cells, block_points_, aspect_);
+    reading_bytes_ =
+        window_size_.columns * window_size_.rows * cell_bytes + raster_->info().held_bytes;
+  }
+
   /// Reads the next window; false after the last. One without valid cells leaves no tiles.
   bool next_window() {
     if (row_ >= info_.rows) return false;
@@ -178,7 +188,7 @@ class RasterSource final : public PointSource {
   std::unique_ptr<Raster> raster_;
   SourceInfo info_;
   std::size_t block_points_;
-  double aspect_;
+  double aspect_ = 1;
   GridSize window_size_;
   std::uint64_t reading_bytes_ = 0;
 

@@ -157,13 +157,16 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   source_options.block_points = request.block_points;
   source_options.memory_bytes = std::max(kSourceMemory, memory_bytes);
   source_options.band = request.band;
+  source_options.selection = request.selection;
+  source_options.heights_of_colour = request.heights_of_colour;
   source_options.crs = request.crs;
   source_options.blocks_ahead = kBlocksAhead;
+  source_options.threads = std::max(1U, context.threads);
   std::stop_source reading;
   const auto stop_reading = [&reading] { reading.request_stop(); };
   const std::stop_callback on_stop(context.stop, stop_reading);
   source_options.stop = reading.get_token();
-  auto source = stream::open_source(request.inputs, source_options);
+  const auto source = stream::open_source(request.inputs, source_options);
   const stream::SourceInfo& info = source->info();
   const SourceCrs crs = crs_of_source(info, request.datum_shift);
   stream::Placement placement = info;
@@ -176,10 +179,8 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
       threads_within_memory(request, context, memory_bytes, payload_bytes, source_bytes);
   if (info.grid) {
     // Tiles are to be square on the ground: only now is it known what a cell measures there.
-    source_options.cell_aspect = cell_aspect(ground, info);
-    source_options.memory_bytes =
-        memory_bytes - memory_beside_source(request, payload_bytes, threads);
-    source = stream::open_source(request.inputs, source_options);
+    source->refine(cell_aspect(ground, info),
+                   memory_bytes - memory_beside_source(request, payload_bytes, threads));
   }
 
   const stream::StoreSchema schema = schema_of(source->info(), crs, request);
@@ -221,22 +222,32 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   }
   so_far = source->progress();
   if (so_far.points == 0) {
-    throw stream::Error({.file = request.inputs.front(),
-                         .where = {},
-                         .cause = "there is not one point with data in it" +
-                                  (so_far.nodata == 0 ? std::string()
-                                                      : " (" + std::to_string(so_far.nodata) +
-                                                            " cells, all nodata)"),
-                         .remedy = "check the file and its nodata value"});
+    throw stream::Error(
+        {.file = request.inputs.front(),
+         .where = {},
+         .cause =
+             so_far.excluded > 0
+                 ? "none of its " + std::to_string(so_far.excluded) + " points meets the condition"
+                 : "there is not one point with data in it" +
+                       (so_far.nodata == 0
+                            ? std::string()
+                            : " (" + std::to_string(so_far.nodata) + " cells, all nodata)"),
+         .remedy =
+             so_far.excluded > 0 ? "give another `where`" : "check the file and its nodata value"});
   }
   writer.set_nodata(so_far.nodata);
   const cluster::HierarchyResult result = builder.finish();
   outcome.points = result.points;
   outcome.nodata = so_far.nodata;
+  outcome.excluded = so_far.excluded;
   outcome.store_bytes = sink.store_bytes();
   outcome.top = result.top;
   outcome.level_points = result.level_points;
   outcome.level_clusters = result.level_clusters;
+  if (so_far.withheld > 0) {
+    context.say(std::to_string(so_far.withheld) +
+                " points are marked as withheld in their file; they are kept, with the mark");
+  }
   if (!crs.note.empty()) context.say(crs.note);
   if (!ground.assumption().empty()) context.say(ground.assumption());
   return outcome;

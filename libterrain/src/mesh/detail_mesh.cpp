@@ -225,32 +225,43 @@ TriangleMesh detail_mesh(const stream::Store& given, const Detail& detail,
 }
 
 TriangleMesh detail_points(const stream::Store& store, const Detail& detail) {
+  constexpr std::size_t kBlock = 65536;
   const stream::Placement& placement = store.schema();
   const bool coarse = detail.level > 0;
   TriangleMesh cloud;
-  for_each_wanted(
+  stream::PointBlock block;
+  stream::Schema columns = store.schema();
+  // Levels are the store's, and numbers of points those of the file that it was built from.
+  for (stream::Channel& attribute : columns.attributes) {
+    if (attribute.name == "level" || attribute.name == "representative") attribute.name.clear();
+  }
+  const std::size_t record_bytes = columns.payload_size();
+  const auto flush = [&] {
+    append_points(cloud, columns, block);
+    block.clear();
+  };
+  for_each_wanted_point(
       store, detail,
-      [&](stream::ClusterId id, const stream::ClusterRecord& record,
-          const stream::ClusterPoints& points) {
+      [&](stream::ClusterId id, const stream::ClusterPoints& points, std::size_t i,
+          const stream::Point3& place) {
         const unsigned level = stream::level_of(id);
-        const bool whole = !detail.region || detail.region->overlap(world_box(
-                                                 placement, record.summary.box)) == Overlap::whole;
-        for (std::size_t i = 0; i < points.size(); ++i) {
-          const stream::Point3 place = world_point(placement, points.positions[i]);
-          if (!whole && !detail.region->contains(place)) continue;
-          cloud.positions.push_back(place);
-          cloud.levels.push_back(static_cast<std::uint8_t>(level));
-          if (!coarse) continue;
-          unsigned left_out = level;
-          for (; left_out > 0; --left_out) {
-            const unsigned below = left_out - 1;
-            const stream::ClusterId headed =
-                stream::cluster_id(below, points.children[i * level + below]);
-            if (!detail.wants(below, world_box(placement, store.record(headed).summary.box))) break;
-          }
-          cloud.left_out.push_back(static_cast<std::uint8_t>(left_out));
+        block.positions.push_back(place);
+        const auto record = points.payload.begin() + static_cast<std::ptrdiff_t>(i * record_bytes);
+        block.payload.insert(block.payload.end(), record,
+                             record + static_cast<std::ptrdiff_t>(record_bytes));
+        if (block.size() == kBlock) flush();
+        cloud.levels.push_back(static_cast<std::uint8_t>(level));
+        if (!coarse) return;
+        unsigned left_out = level;
+        for (; left_out > 0; --left_out) {
+          const unsigned below = left_out - 1;
+          const stream::ClusterId headed =
+              stream::cluster_id(below, points.children[i * level + below]);
+          if (!detail.wants(below, world_box(placement, store.record(headed).summary.box))) break;
         }
+        cloud.left_out.push_back(static_cast<std::uint8_t>(left_out));
       });
+  flush();
   return cloud;
 }
 

@@ -7,6 +7,7 @@
 
 #include "base/file_marks.hpp"
 #include "terrace/stream/atomic_file.hpp"
+#include "terrace/stream/error.hpp"
 
 namespace terrace::terrain {
 namespace {

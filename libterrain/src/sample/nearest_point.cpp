@@ -39,7 +39,7 @@ Point2 NearestPoint::operator()(const Point2& place) {
   query_.best_first(
       level_,
       [&place](const stream::Box3& box) {
-        // Of one place: the point that heads it, whatever is in it.
+        // All its points lie at one place, and so does its head, which is known.
         if (box.min[0] == box.max[0] && box.min[1] == box.max[1]) {
           return std::numeric_limits<double>::infinity();
         }

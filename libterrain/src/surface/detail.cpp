@@ -116,6 +116,31 @@ void for_each_wanted(const stream::Store& store, const Detail& detail,
   Descent(store, detail, visit).run(detail.finest());
 }
 
+void for_each_wanted_point(const stream::Store& store, const Detail& detail,
+                           const std::function<void(stream::ClusterId, const stream::ClusterPoints&,
+                                                    std::size_t, const stream::Point3&)>& visit) {
+  const stream::Placement& placement = store.schema();
+  const auto inside = [&](const stream::Point3& place) {
+    return detail.region->contains(place) ||
+           std::any_of(detail.focuses.begin(), detail.focuses.end(),
+                       [&](const FinerRegion& focus) { return focus.region.contains(place); });
+  };
+  std::vector<std::uint8_t> matches;
+  const auto visit_cluster = [&](stream::ClusterId id, const stream::ClusterRecord& record,
+                                 const stream::ClusterPoints& points) {
+    const bool whole = !detail.region || detail.region->overlap(world_box(
+                                             placement, record.summary.box)) == Overlap::whole;
+    matches.assign(points.size(), 1);
+    if (detail.where) detail.where->test(points.positions, points.payload, matches);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (matches[i] == 0) continue;
+      const stream::Point3 place = world_point(placement, points.positions[i]);
+      if (whole || inside(place)) visit(id, points, i, place);
+    }
+  };
+  for_each_wanted(store, detail, visit_cluster);
+}
+
 void for_each_wanted_record(
     const stream::Store& store, const Detail& detail,
     const std::function<void(stream::ClusterId, const stream::ClusterRecord&)>& visit) {

@@ -269,6 +269,18 @@ CLI::Option* add_output(CLI::App& app, std::string& target, const std::string& d
   return app.add_option("-o,--output", target, description)->required()->type_name("FILE");
 }
 
+CLI::Option* add_heights_of_colour(CLI::App& app, stream::HeightsOfColour& target) {
+  return app
+      .add_option_function<std::string>(
+          "--rgb",
+          [&target](const std::string& name) {
+            target = name == "mapbox" ? stream::HeightsOfColour::mapbox
+                                      : stream::HeightsOfColour::terrarium;
+          },
+          "how the colours of a PNG mean heights: mapbox or terrarium")
+      ->check(CLI::IsMember({"mapbox", "terrarium"}));
+}
+
 int run_command_line(int argc, const char* const* argv) {
   install_signal_handlers();
   try {

@@ -11,6 +11,7 @@
 
 #include "cli/progress.hpp"
 #include "cli/summary.hpp"
+#include "terrace/stream/source.hpp"
 #include "terrace/terrain/context.hpp"
 
 namespace CLI {
@@ -97,6 +98,9 @@ std::uint64_t count_of_option(const std::string& name, const std::string& text);
 
 /// The option -o, --output: required, kept in `target`.
 CLI::Option* add_output(CLI::App& app, std::string& target, const std::string& description);
+
+/// The option --rgb, kept in `target`.
+CLI::Option* add_heights_of_colour(CLI::App& app, stream::HeightsOfColour& target);
 
 /// Runs the command line and returns the exit code. Never throws.
 int run_command_line(int argc, const char* const* argv);

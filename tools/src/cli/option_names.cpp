@@ -10,7 +10,7 @@ namespace terrace::tools {
 namespace {
 
 /// Parameter and option. tests/layout checks that all parameters that libterrain names are here.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 26> kOptions{{
+constexpr std::array<std::pair<std::string_view, std::string_view>, 28> kOptions{{
     {"block_points", "--block"},
     {"cell", "--cell"},
     {"crs", "--crs"},
@@ -18,6 +18,7 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 26> kOptions
     {"facility_cost", "--facility-cost"},
     {"fill", "--fill"},
     {"geoid", "--geoid"},
+    {"heights_of_colour", "--rgb"},
     {"interval", "--interval"},
     {"level", "--level"},
     {"max_edge", "--max-edge"},
@@ -35,6 +36,7 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 26> kOptions
     {"to_crs", "--to-crs"},
     {"vertical", "--vertical"},
     {"water", "--water"},
+    {"where", "--where"},
     {"within", "--within"},
     {"zoom", "--zoom"},
 }};

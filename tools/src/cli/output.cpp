@@ -15,6 +15,7 @@
 
 #include "base/units.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/terrain/crs.hpp"
 
 namespace terrace::tools {
 namespace {
@@ -66,6 +67,13 @@ bool is_our_ply(std::ifstream& file) {
     if (*line == "end_header") return false;
   }
   return false;
+}
+
+bool is_our_las(std::ifstream& file) {
+  constexpr std::size_t kSoftware = 58, kBytes = 32;
+  Bytes name = read_at(file, kSoftware, kBytes);
+  name.resize(std::min(name.find('\0'), name.size()));
+  return name == "terrace";
 }
 
 bool is_our_glb(std::ifstream& file) {
@@ -212,6 +220,7 @@ bool written_by_terrace(const std::string& path) {
     if (head.starts_with(mark)) return true;
   }
   if (head.starts_with("ply\n")) return is_our_ply(file);
+  if (head.starts_with("LASF")) return is_our_las(file);
   if (head.starts_with("glTF")) return is_our_glb(file);
   if (head.starts_with("\x89PNG\r\n\x1a\n")) return is_our_png(file);
   const bool big_endian = head.starts_with("MM");
@@ -220,6 +229,22 @@ bool written_by_terrace(const std::string& path) {
     return is_our_tiff(file, big_endian, version == 43);
   }
   return is_our_table(file);
+}
+
+stream::Crs crs_to_write(const stream::Crs& recorded) {
+  try {
+    const auto system = CoordinateSystem::of(recorded, {});
+    return system ? system->crs_with_wkt1() : recorded;
+  } catch (const stream::Error&) {
+    return recorded;
+  }
+}
+
+void tell_rounding(const stream::PointWriter& writer, Summary& summary) {
+  if (writer.rounding() == 0.0) return;
+  summary.json["rounding"] = writer.rounding();
+  summary.text += "coordinates were rounded by up to " + readable_number(writer.rounding()) +
+                  " to fit the format\n";
 }
 
 bool may_replace(const std::string& path, bool force) {

@@ -5,6 +5,8 @@
 #include <string_view>
 
 #include "base/file_marks.hpp"
+#include "cli/summary.hpp"
+#include "terrace/stream/point_writer.hpp"
 
 namespace terrace::tools {
 
@@ -17,10 +19,18 @@ inline constexpr std::string_view kDendrogramHead = "a,b,height,size";
 
 /// True if the regular file at `path` is empty or terrace wrote it, which its format says at the
 /// place that the format has for that: a comment of the header (PLY, OBJ, VTK), the generator (GLB,
-/// GeoJSON), the tag Software (TIFF, PNG), the first bytes (overlays), the names of the columns
-/// (CSV). Tables of numbers without such names, and points as CSV, have no place for a mark: they
-/// count as ours if every number and separator in them stands exactly as terrace writes it.
+/// GeoJSON, LAS), the tag Software (TIFF, PNG), the first bytes (overlays), the names of the
+/// columns (CSV). Tables of numbers without such names, and points as CSV, have no place for a
+/// mark: they count as ours if every number and separator in them stands exactly as terrace writes
+/// it.
 bool written_by_terrace(const std::string& path);
+
+/// A CRS for the header of points: with WKT 1, which LAS asks for. What is wrong with a CRS keeps
+/// no points from being written: it stays as it is recorded.
+stream::Crs crs_to_write(const stream::Crs& recorded);
+
+/// Says in the summary of a verb if coordinates were moved to fit the file's format.
+void tell_rounding(const stream::PointWriter& writer, Summary& summary);
 
 /// Whether the output `path` may be written, to be asked before the work begins. Returns the
 /// writers' `replace`: true if a file is there, or where a link leads, and --force says to replace

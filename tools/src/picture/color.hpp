@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
-#include "mesh/scene.hpp"
-
 namespace terrace::tools {
 
-using namespace terrain;
+/// Red, green and blue of 255.
+using Rgb = std::array<std::uint8_t, 3>;
 
 /// Hypsometric tint: deep to high land as green, straw, brown, grey, white. share: 0 lowest, 1
 /// highest; clamped.

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "picture/canvas.hpp"
+#include "picture/color.hpp"
 
 namespace terrace::cluster {
 struct Dendrogram;

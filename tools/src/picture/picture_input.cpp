@@ -13,10 +13,10 @@
 #include "cli/detail_options.hpp"
 #include "cli/interrupt.hpp"
 #include "earth/ground.hpp"
-#include "mesh/mesh_file.hpp"
 #include "picture/height_grid.hpp"
 #include "scan/surface_run.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/stream/mesh_reader.hpp"
 #include "terrace/stream/source.hpp"
 #include "terrace/terrain/detail.hpp"
 #include "terrace/terrain/detail_mesh.hpp"
@@ -45,23 +45,25 @@ void put_on_ground(PictureInput& input, const stream::Placement& placement, cons
 
 /// A mesh file says little of its CRS. x and y that could be degrees, beside heights that could not
 /// be any, are taken for longitude and latitude.
-bool looks_geographic(const MeshFile& file) {
-  if (file.comments.find("EPSG:4326") != std::string::npos) return true;
+bool looks_geographic(const stream::MeshFile& file) {
+  for (const std::string& comment : file.info.comments) {
+    if (comment.find("EPSG:4326") != std::string::npos) return true;
+  }
   stream::Box3 box;
-  for (const stream::Point3& p : file.mesh.positions) box.include(p);
+  for (const stream::Point3& p : file.vertices.positions) box.include(p);
   if (box.empty()) return false;
   const double extent = std::max(box.max[0] - box.min[0], box.max[1] - box.min[1]);
   return box.min[0] >= -360 && box.max[0] <= 360 && box.min[1] >= -90 && box.max[1] <= 90 &&
          box.max[2] - box.min[2] > 5 * extent;
 }
 
-PictureInput from_mesh(MeshFile file) {
+PictureInput from_mesh(stream::MeshFile file) {
   PictureInput input;
   stream::Placement placement;
   const bool geographic = looks_geographic(file);
   placement.crs.geographic = geographic;
   placement.crs.horizontal_unit = geographic ? "degree" : "metre";
-  input.mesh = std::move(file.mesh);
+  input.mesh = triangle_mesh_of(std::move(file));
   put_on_ground(input, placement, Ground(placement));
   if (geographic) input.guess = "x and y are taken for longitude and latitude";
   return input;
@@ -70,64 +72,11 @@ PictureInput from_mesh(MeshFile file) {
 /// Bytes that a point of a cloud takes until it is drawn.
 constexpr std::uint64_t kPictureBytesPerPoint = 100;
 
-/// The number of the attribute with one of these names.
-std::optional<std::size_t> attribute(const stream::SourceInfo& info,
-                                     std::initializer_list<const char*> names) {
-  for (std::size_t i = 0; i < info.attributes.size(); ++i) {
-    for (const char* name : names) {
-      if (info.attributes[i].name == name) return i;
-    }
-  }
-  return std::nullopt;
-}
-
-/// Appends the block's points with those attributes that a picture can show.
-void append_cloud(const stream::SourceInfo& info, const stream::PointBlock& block,
-                  TriangleMesh& cloud) {
-  const std::size_t before = cloud.positions.size();
-  cloud.positions.insert(cloud.positions.end(), block.positions.begin(), block.positions.end());
-  const auto red = attribute(info, {"red"}), green = attribute(info, {"green"}),
-             blue = attribute(info, {"blue"});
-  const auto nx = attribute(info, {"nx"}), ny = attribute(info, {"ny"}),
-             nz = attribute(info, {"nz"});
-  const auto group = attribute(info, {"class", "classification", "cluster"});
-  const auto level = attribute(info, {"level"});
-  const auto representative = attribute(info, {"representative"});
-  for (std::size_t i = 0; i < block.size(); ++i) {
-    const std::byte* const record = block.payload.data() + i * info.payload_size();
-    const auto value = [&](std::size_t column) {
-      return stream::to_double(info.attributes[column].type,
-                               record + info.attribute_offset(column));
-    };
-    if (red && green && blue) {
-      const auto byte = [&](std::size_t column) {
-        // 16-bit colours are told by their type; what is stored as a float is 0 to 255.
-        const bool wide = info.attributes[column].type == stream::ScalarType::u16;
-        return static_cast<std::uint8_t>(
-            std::clamp(wide ? value(column) / 257 : value(column), 0.0, 255.0));
-      };
-      cloud.colours.push_back({byte(*red), byte(*green), byte(*blue)});
-    }
-    if (nx && ny && nz) {
-      cloud.normals.push_back({static_cast<float>(value(*nx)), static_cast<float>(value(*ny)),
-                               static_cast<float>(value(*nz))});
-    }
-    if (group) cloud.classes.push_back(static_cast<std::int32_t>(value(*group)));
-    // The column holds the number of the point that represents this one's cluster.
-    if (representative && value(*representative) == static_cast<double>(before + i)) {
-      cloud.representatives.push_back(static_cast<std::uint32_t>(before + i));
-    }
-    if (level) {
-      cloud.levels.push_back(static_cast<std::uint8_t>(std::clamp(value(*level), 0.0, 255.0)));
-    }
-  }
-}
-
-PictureInput from_source(const std::string& path, std::uint64_t most_cells,
-                         const CommonOptions& common) {
+PictureInput from_source(const std::string& path, stream::HeightsOfColour colours,
+                         std::uint64_t most_cells, const CommonOptions& common) {
   const std::array<std::string, 1> files{path};
   const std::unique_ptr<stream::PointSource> source =
-      stream::open_source(files, {.stop = stop_token()});
+      stream::open_source(files, {.heights_of_colour = colours, .stop = stop_token()});
   const stream::SourceInfo& info = source->info();
   const std::uint64_t memory = common.memory_or(0);
 
@@ -141,7 +90,7 @@ PictureInput from_source(const std::string& path, std::uint64_t most_cells,
     if (grid) {
       for (const stream::Point3& p : block.positions) grid->add(p);
     } else {
-      append_cloud(info, block, input.mesh);
+      append_points(input.mesh, info, block);
       if (input.mesh.positions.size() > memory / kPictureBytesPerPoint) {
         throw stream::Error(
             {.file = path,
@@ -253,19 +202,28 @@ void define_picture_input(CLI::App& app, PictureSelection& selection) {
                  "store: BOX:L, all points of level L inside the box; repeatable (the rest: top)")
       ->allow_extra_args(false)
       ->type_name("BOX:L");
+  add_heights_of_colour(app, selection.colours);
 }
 
 PictureInput read_picture_input(const std::string& path, const PictureSelection& selection,
                                 const ImageSize& size, const CommonOptions& common) {
   const std::uint64_t most_cells = 2 * size.width * size.height;
+  const auto no_colours = [&] {
+    if (selection.colours == stream::HeightsOfColour::none) return;
+    throw UsageError("'" + path + "' is no PNG: --rgb does not apply");
+  };
   if (std::filesystem::is_directory(path) || stream::Store::recover(path)) {
+    no_colours();
     return from_store(path, selection, most_cells, common);
   }
   if (!selection.level.empty() || !selection.region.empty() || !selection.focuses.empty()) {
     throw UsageError("'" + path + "' is no store: --level, --region and --focus do not apply");
   }
-  if (std::optional<MeshFile> file = read_mesh_file(path)) return from_mesh(std::move(*file));
-  return from_source(path, most_cells, common);
+  if (auto file = stream::read_mesh(path, {.stop = stop_token()})) {
+    no_colours();
+    return from_mesh(std::move(*file));
+  }
+  return from_source(path, selection.colours, most_cells, common);
 }
 
 }  // namespace terrace::tools

@@ -17,10 +17,11 @@ struct PictureSelection {
   std::string level;   ///< empty: what a picture can show
   std::string region;  ///< empty: everywhere
   std::vector<std::string> focuses;
+  stream::HeightsOfColour colours = stream::HeightsOfColour::none;
   bool triangles = false;  ///< triangles are wanted, not points or cells
 };
 
-/// Adds --level, --region and --focus.
+/// Adds --level, --region, --focus and --rgb.
 void define_picture_input(CLI::App& app, PictureSelection& selection);
 
 /// What is to be drawn, on the ground.

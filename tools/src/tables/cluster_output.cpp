@@ -43,9 +43,13 @@ void write_clustered(const std::string& path, const std::string& format, const P
   }
   attributes.push_back({.name = "cluster", .type = stream::ScalarType::i32});
   attributes.push_back({.name = "representative", .type = stream::ScalarType::i32});
-  const auto writer = stream::open_point_writer(
-      path, {.attributes = std::move(attributes), .comments = {kWriterMark}},
-      {.format = format, .replace = replace, .stop = stop_token()});
+  const auto writer =
+      stream::open_point_writer(path,
+                                {.attributes = std::move(attributes),
+                                 .comments = {kWriterMark},
+                                 .crs = crs_to_write(table.info.crs),
+                                 .lattice = lattice_of(table.info)},
+                                {.format = format, .replace = replace, .stop = stop_token()});
   constexpr std::size_t kBlock = 65536;
   const std::size_t record_bytes = table.info.payload_size();
   stream::PointBlock block;

@@ -35,8 +35,8 @@ std::vector<double> PointTable::column(const std::string& name) const {
 }
 
 std::uint64_t reading_within_memory(const stream::PointSource& source, std::uint64_t memory_bytes) {
-  // The program itself and the blocks that are read ahead.
-  constexpr std::uint64_t kBeside = std::uint64_t{24} << 20;
+  // The program itself, what PROJ reads to tell the CRS, and the blocks that are read ahead.
+  constexpr std::uint64_t kBeside = std::uint64_t{32} << 20;
   const std::uint64_t reading = source.reading_bytes();
   if (reading == 0 || kBeside + reading <= memory_bytes) return reading;
   throw stream::Error(

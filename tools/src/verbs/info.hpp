@@ -12,7 +12,8 @@ namespace terrace::tools {
 using namespace terrain;
 
 /// What a file of points or cells holds: told by streaming it once. Throws: stream::Error.
-Summary info_of_file(const std::string& path, const CommonOptions& common);
+Summary info_of_file(const std::string& path, stream::HeightsOfColour colours,
+                     const CommonOptions& common);
 
 /// What a store holds; reads manifest and indices. Throws: stream::Error.
 Summary info_of_store(const std::string& path, const CommonOptions& common);

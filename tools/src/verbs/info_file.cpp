@@ -35,7 +35,7 @@ class Sum {
 };
 
 struct Contents {
-  std::uint64_t points = 0, nodata = 0;
+  std::uint64_t points = 0, nodata = 0, withheld = 0;
   stream::Box3 stored, world;
   double mean = 0;  ///< stored coordinate 2
 };
@@ -61,6 +61,7 @@ Contents stream_through(stream::PointSource& source, const CommonOptions& common
     meter.update(progress.points, progress.fraction);
   }
   contents.nodata = source.progress().nodata;
+  contents.withheld = source.progress().withheld;
   if (upright) contents.world = world_box(placement, contents.stored);
   if (contents.points > 0) contents.mean = heights.value() / static_cast<double>(contents.points);
   return contents;
@@ -78,10 +79,14 @@ std::uint64_t bytes_of(const std::vector<std::string>& files) {
 
 }  // namespace
 
-Summary info_of_file(const std::string& path, const CommonOptions& common) {
+Summary info_of_file(const std::string& path, stream::HeightsOfColour colours,
+                     const CommonOptions& common) {
   const std::array<std::string, 1> files{path};
   const std::unique_ptr<stream::PointSource> source =
-      stream::open_source(files, {.stop = stop_token(), .blocks_ahead = 8});
+      stream::open_source(files, {.heights_of_colour = colours,
+                                  .stop = stop_token(),
+                                  .blocks_ahead = 8,
+                                  .threads = common.threads});
   const Contents contents = stream_through(*source, common);
   const stream::SourceInfo& info = source->info();
   SourceCrs crs;
@@ -102,6 +107,7 @@ Summary info_of_file(const std::string& path, const CommonOptions& common) {
   json["version"] = nullptr;
   json["points"] = contents.points;
   json["nodata"] = contents.nodata;
+  if (contents.withheld > 0) json["withheld"] = contents.withheld;
   json["levels"] = nlohmann::ordered_json::array();
   json["bounds"] = json_of(contents.world);
   json["crs"] = json_of(crs.crs);
@@ -113,6 +119,8 @@ Summary info_of_file(const std::string& path, const CommonOptions& common) {
     json["transform"] = info.world.xy;
     json["nodata_value"] =
         info.nodata ? nlohmann::ordered_json(*info.nodata) : nlohmann::ordered_json(nullptr);
+  } else if (info.world != stream::WorldTransform{}) {
+    json["transform"] = info.world.xy;
   }
   json["height"] = nullptr;
   if (contents.points > 0) {
@@ -140,6 +148,9 @@ Summary info_of_file(const std::string& path, const CommonOptions& common) {
             (info.nodata ? ", value " + number_text(*info.nodata) : std::string()) + '\n';
   }
   text += "points:    " + with_commas(contents.points) + '\n';
+  if (contents.withheld > 0) {
+    text += "withheld:  " + with_commas(contents.withheld) + " of them\n";
+  }
   text += "crs:       " + printable_line(text_of(crs.crs, contents.world)) + '\n';
   if (!crs.note.empty()) text += "note:      " + printable_line(with_option_names(crs.note)) + '\n';
   if (crs.heights != Heights::unknown) text += "vertical:  " + name_of(crs.heights) + '\n';

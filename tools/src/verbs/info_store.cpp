@@ -74,6 +74,8 @@ Summary info_of_store(const std::string& path, const CommonOptions& common) {
     json["columns"] = schema.columns;
     json["rows"] = schema.rows;
     json["transform"] = schema.world.xy;
+  } else if (schema.world != stream::WorldTransform{}) {
+    json["transform"] = schema.world.xy;
   }
   json["height"] = {{"min", bounds.min[2]}, {"max", bounds.max[2]}, {"mean", mean}};
   json["channels"] = nlohmann::ordered_json::array();

@@ -13,6 +13,7 @@
 
 #include "base/units.hpp"
 #include "cli/interrupt.hpp"
+#include "cli/selection_options.hpp"
 #include "terrace/terrain/build.hpp"
 #include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/error.hpp"
@@ -43,7 +44,9 @@ class BuildCommand final : public Command {
                    "the CRS's datum to WGS 84");
     app.add_option("--vertical", request_.vertical, "what heights refer to")
         ->check(CLI::IsMember({"ellipsoidal", "orthometric"}));
+    selection_.define(app);
     app.add_option("--band", request_.band, "of rasters, from 1")->check(CLI::Range(1, 65535));
+    add_heights_of_colour(app, request_.heights_of_colour);
     app.add_option("--block", block_, "most points clustered together")->capture_default_str();
     add_number(app, "--facility-cost", request_.facility_cost,
                "times the diagonal of a block: larger makes larger clusters", kFactor);
@@ -72,6 +75,7 @@ class BuildCommand final : public Command {
     }
     request_.block_points = block_;
     request_.metric = MetricChoice::parse(metric_);
+    request_.selection = selection_.selection();
     request_.seed = common.seed;
     if (output_ == "-") throw UsageError("a store is a folder: it cannot go to standard output");
     std::error_code ignored;
@@ -91,18 +95,19 @@ class BuildCommand final : public Command {
     const double seconds = watch.seconds();
     const double rate = static_cast<double>(outcome.points) / seconds;
     Summary summary;
-    summary.json = {{"points", outcome.points},
-                    {"nodata", outcome.nodata},
-                    {"seconds", seconds},
-                    {"points_per_second", rate},
-                    {"peak_rss_bytes", peak_rss_bytes()},
-                    {"store_bytes", outcome.store_bytes},
-                    {"levels", outcome.top + 1}};
-    summary.text = with_commas(outcome.points) + " points (" + with_commas(outcome.nodata) +
-                   " cells without data left out) in " + readable_seconds(seconds) + ", " +
-                   readable_rate(rate) + "\n" + output_ + ": " + std::to_string(outcome.top + 1) +
-                   " levels, " + readable_bytes(outcome.store_bytes) + ", peak memory " +
-                   readable_bytes(peak_rss_bytes()) + "\n";
+    summary.json = {{"points", outcome.points},           {"nodata", outcome.nodata},
+                    {"excluded", outcome.excluded},       {"seconds", seconds},
+                    {"points_per_second", rate},          {"peak_rss_bytes", peak_rss_bytes()},
+                    {"store_bytes", outcome.store_bytes}, {"levels", outcome.top + 1}};
+    summary.text =
+        with_commas(outcome.points) + " points (" + with_commas(outcome.nodata) +
+        " cells without data left out" +
+        (outcome.excluded > 0
+             ? ", " + with_commas(outcome.excluded) + " points that do not meet --where too"
+             : "") +
+        ") in " + readable_seconds(seconds) + ", " + readable_rate(rate) + "\n" + output_ + ": " +
+        std::to_string(outcome.top + 1) + " levels, " + readable_bytes(outcome.store_bytes) +
+        ", peak memory " + readable_bytes(peak_rss_bytes()) + "\n";
     return summary;
   }
 
@@ -111,8 +116,11 @@ class BuildCommand final : public Command {
     if (std::find(request_.inputs.begin(), request_.inputs.end(), "-") != request_.inputs.end()) {
       throw UsageError("--dry-run reads its input before the build does: name files, not -");
     }
-    const auto source = stream::open_source(
-        request_.inputs, {.format = request_.input_format, .stop = stop_token()});
+    const auto source =
+        stream::open_source(request_.inputs, {.format = request_.input_format,
+                                              .heights_of_colour = request_.heights_of_colour,
+                                              .stop = stop_token(),
+                                              .selection = request_.selection});
     const stream::SourceInfo& info = source->info();
     request_.most_points = kTrialPoints;
     const Stopwatch watch;
@@ -150,6 +158,7 @@ class BuildCommand final : public Command {
   }
 
   BuildRequest request_;
+  SelectionOptions selection_;
   std::string output_, crs_, shift_, effort_ = "default", metric_ = "euclidean";
   std::uint64_t block_ = 10000;
   bool dry_run_ = false;

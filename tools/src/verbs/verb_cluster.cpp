@@ -46,7 +46,8 @@ class ClusterCommand final : public Command {
     app.add_option("--dendrogram", dendrogram_,
                    "single, complete: the whole tree as rows a,b,height,size (SciPy's)")
         ->type_name("FILE.csv");
-    app.add_option("--format", format_, "Of the output: xyz, csv, ply, ply-ascii (else its ending)")
+    app.add_option("--format", format_,
+                   "Of the output: xyz, csv, ply, ply-ascii, las, laz (else its ending)")
         ->type_name("NAME");
     app.add_option("--input-format", input_format_, "Of the input (else its content, its ending)")
         ->type_name("NAME");

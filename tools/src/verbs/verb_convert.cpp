@@ -2,6 +2,7 @@
 // convert: a stream of points from one format to another.
 #include <array>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include <CLI/CLI.hpp>
@@ -9,7 +10,10 @@
 #include "base/units.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/output.hpp"
+#include "cli/selection_options.hpp"
+#include "earth/source_crs.hpp"
 #include "tables/point_table.hpp"
+#include "terrace/stream/error.hpp"
 #include "terrace/stream/point_writer.hpp"
 #include "terrace/stream/source.hpp"
 #include "verbs/verbs.hpp"
@@ -26,23 +30,36 @@ class ConvertCommand : public Command {
         ->required()
         ->type_name("FILE");
     add_output(app, output_, "The file to write; - is standard output");
-    app.add_option("--format", format_, "Of the output: xyz, csv, ply, ply-ascii (else its ending)")
+    app.add_option("--format", format_,
+                   "Of the output: xyz, csv, ply, ply-ascii, las, laz (else its ending)")
         ->type_name("NAME");
     app.add_option("--input-format", input_format_, "Of the input (else its content, its ending)")
         ->type_name("NAME");
+    selection_.define(app);
+    add_heights_of_colour(app, colours_);
   }
 
   Summary run(const CommonOptions& common) override {
     const Stopwatch watch;
     const bool replace = may_replace(output_, common.force);
     const std::array<std::string, 1> files{input_};
-    const std::unique_ptr<stream::PointSource> source = stream::open_source(
-        files, {.format = input_format_, .stop = stop_token(), .blocks_ahead = 8});
+    const std::unique_ptr<stream::PointSource> source =
+        stream::open_source(files, {.format = input_format_,
+                                    .heights_of_colour = colours_,
+                                    .stop = stop_token(),
+                                    .blocks_ahead = 8,
+                                    .threads = common.threads,
+                                    .selection = selection_.selection()});
     reading_within_memory(*source, common.memory_or(0));
     const stream::SourceInfo& info = source->info();
-    const auto writer = stream::open_point_writer(
-        output_, {.attributes = info.attributes, .comments = {kWriterMark}},
-        {.format = format_, .replace = replace, .stop = stop_token()});
+    const auto writer =
+        stream::open_point_writer(output_,
+                                  {.attributes = info.attributes,
+                                   .comments = {kWriterMark},
+                                   .crs = crs_of(info),
+                                   .lattice = lattice_of(info),
+                                   .bounds = bounds_of(info)},
+                                  {.format = format_, .replace = replace, .stop = stop_token()});
     {
       ProgressMeter meter(common.progress, "points");
       stream::PointBlock block;
@@ -59,15 +76,34 @@ class ConvertCommand : public Command {
     Summary summary;
     summary.json = {{"points", writer->points()},
                     {"nodata", source->progress().nodata},
+                    {"excluded", source->progress().excluded},
                     {"seconds", watch.seconds()},
                     {"peak_rss_bytes", peak_rss_bytes()}};
-    summary.text = output_ + ": " + with_commas(writer->points()) + " points, " +
-                   readable_seconds(watch.seconds()) + '\n';
+    const std::uint64_t excluded = source->progress().excluded;
+    summary.text = output_ + ": " + with_commas(writer->points()) + " points" +
+                   (excluded > 0 ? " (" + with_commas(excluded) + " do not meet --where)" : "") +
+                   ", " + readable_seconds(watch.seconds()) + '\n';
+    tell_rounding(*writer, summary);
     return summary;
   }
 
  private:
+  /// The CRS of the file, or of the .prj beside it.
+  static stream::Crs crs_of(const stream::SourceInfo& info) {
+    try {
+      return crs_to_write(crs_of_source(info).crs);
+    } catch (const stream::Error&) {
+      return info.crs;
+    }
+  }
+  static std::optional<stream::Box3> bounds_of(const stream::SourceInfo& info) {
+    if (!info.bounds) return std::nullopt;
+    return world_box(info, *info.bounds);
+  }
+
   std::string input_, output_, format_, input_format_;
+  SelectionOptions selection_;
+  stream::HeightsOfColour colours_ = stream::HeightsOfColour::none;
 };
 
 }  // namespace

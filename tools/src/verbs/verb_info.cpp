@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <terrace/stream/store.hpp>
 
+#include "terrace/terrain/error.hpp"
 #include "verbs/info.hpp"
 #include "verbs/verbs.hpp"
 
@@ -17,15 +18,20 @@ class InfoCommand : public Command {
     app.add_option("input", input_, "Store, or file of points or cells; - is standard input")
         ->required()
         ->type_name("STORE|FILE");
+    add_heights_of_colour(app, colours_);
   }
 
   Summary run(const CommonOptions& common) override {
     const bool store = std::filesystem::is_directory(input_) || stream::Store::recover(input_);
-    return store ? info_of_store(input_, common) : info_of_file(input_, common);
+    if (store && colours_ != stream::HeightsOfColour::none) {
+      throw UsageError("'" + input_ + "' is a store: --rgb does not apply");
+    }
+    return store ? info_of_store(input_, common) : info_of_file(input_, colours_, common);
   }
 
  private:
   std::string input_;
+  stream::HeightsOfColour colours_ = stream::HeightsOfColour::none;
 };
 
 }  // namespace

@@ -19,6 +19,7 @@
 #include "cli/detail_options.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/output.hpp"
+#include "cli/selection_options.hpp"
 #include "cli/smooth_option.hpp"
 #include "terrace/terrain/bounded_mesh.hpp"
 #include "terrace/terrain/detail.hpp"
@@ -100,6 +101,7 @@ class MeshCommand final : public Command {
                    "(holes), flat (at the lowest height), interpolate")
         ->capture_default_str()
         ->type_name("NAME");
+    add_where(app, where_);
     not_yet(app, {"--base"});
     crs_.define(app);
   }
@@ -143,6 +145,7 @@ class MeshCommand final : public Command {
           "--to-crs: between other coordinates the triangles would be other surfaces, and the "
           "bound would not hold; write the mesh in the store's CRS");
     }
+    if (!where_.empty()) options.where.emplace(where_, store.schema());
     options.writer = {
         .format = format_, .replace = may_replace(output_, common.force), .stop = stop_token()};
     keep_freed_memory();
@@ -195,8 +198,9 @@ class MeshCommand final : public Command {
 
   Summary multiresolution(const CommonOptions& common) const {
     const Stopwatch watch;
-    if (quality_ != "removal" || !duplicates_.empty() || fill_ != "none") {
-      throw UsageError("--quality, --duplicates and --fill belong to --max-error and --max-points");
+    if (quality_ != "removal" || !duplicates_.empty() || fill_ != "none" || !where_.empty()) {
+      throw UsageError(
+          "--quality, --duplicates, --fill and --where belong to --max-error and --max-points");
     }
     DetailMeshOptions options{{.smoothing = parse_smoothing(smooth_)},
                               MetricChoice::parse(metric_)};
@@ -240,7 +244,7 @@ class MeshCommand final : public Command {
   }
 
   std::string store_, output_, format_, level_, region_, smooth_, metric_ = "euclidean";
-  std::string overlay_, save_overlay_;
+  std::string overlay_, save_overlay_, where_;
   std::string max_points_, quality_ = "removal", duplicates_, fill_ = "none";
   std::optional<double> max_error_;
   std::vector<std::string> focuses_;

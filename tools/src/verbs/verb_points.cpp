@@ -19,6 +19,7 @@
 #include "cli/detail_options.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/output.hpp"
+#include "cli/selection_options.hpp"
 #include "terrace/terrain/detail.hpp"
 #include "terrace/terrain/detail_mesh.hpp"
 #include "terrace/terrain/error.hpp"
@@ -30,44 +31,28 @@ namespace terrace::tools {
 using namespace terrain;
 namespace {
 
-/// Points inside the wanted part, on their way to the writer. A point comes back if its level is
-/// wanted where it lies: with a region, only what is inside it or inside a focus. An overlay's
-/// heights come in place of the store's, which say what is inside.
+/// Points on their way to the writer. An overlay's heights come in place of the store's, which say
+/// what is inside a region.
 class PointOutput {
  public:
-  PointOutput(const stream::Store& store, const Detail& detail, PlaceConversion places,
-              stream::Overlay* overlay, stream::PointWriter& writer)
-      : schema_(store.schema()),
-        detail_(detail),
+  PointOutput(const stream::Store& store, PlaceConversion places, stream::Overlay* overlay,
+              stream::PointWriter& writer)
+      : payload_(store.schema().payload_size()),
         places_(std::move(places)),
         overlay_(overlay),
         writer_(writer) {}
 
-  void add(stream::ClusterId id, const stream::ClusterRecord& record,
-           const stream::ClusterPoints& points) {
-    check_interrupt();
-    std::span<const stream::OverlayValue> heights;
-    if (overlay_ != nullptr) heights = overlay_->find(id);
-    std::size_t next = 0;
-    const std::size_t payload = schema_.payload_size();
-    const bool whole = !detail_.region || detail_.region->overlap(world_box(
-                                              schema_, record.summary.box)) == Overlap::whole;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      stream::Point3 p = world_point(schema_, points.positions[i]);
-      while (next < heights.size() && heights[next].index < i) ++next;
-      if (!whole && !inside(p)) continue;
-      if (next < heights.size() && heights[next].index == i) {
-        p[2] = heights[next].value;
-        ++replaced_;
-      }
-      block_.positions.push_back(p);
-      const std::byte* values = points.payload.data() + i * payload;
-      block_.payload.insert(block_.payload.end(), values, values + payload);
-    }
+  void add(stream::ClusterId id, const stream::ClusterPoints& points, std::size_t i,
+           stream::Point3 place) {
+    if (overlay_ != nullptr && replace_height(id, i, place[2])) ++replaced_;
+    block_.positions.push_back(place);
+    const std::byte* values = points.payload.data() + i * payload_;
+    block_.payload.insert(block_.payload.end(), values, values + payload_);
     if (block_.size() >= kPointsPerBlock) flush();
   }
 
   void flush() {
+    check_interrupt();
     places_(block_.positions);
     if (!block_.empty()) writer_.append(block_);
     block_.clear();
@@ -79,20 +64,25 @@ class PointOutput {
  private:
   static constexpr std::size_t kPointsPerBlock = 65536;
 
-  [[nodiscard]] bool inside(const stream::Point3& p) const {
-    if (detail_.region->contains(p)) return true;
-    for (const FinerRegion& focus : detail_.focuses) {
-      if (focus.region.contains(p)) return true;
+  /// The points of a cluster come one after another in their order.
+  bool replace_height(stream::ClusterId id, std::size_t i, double& height) {
+    if (id != cluster_) {
+      cluster_ = id;
+      heights_ = overlay_->find(id);
     }
-    return false;
+    while (!heights_.empty() && heights_.front().index < i) heights_ = heights_.subspan(1);
+    if (heights_.empty() || heights_.front().index != i) return false;
+    height = heights_.front().value;
+    return true;
   }
 
-  const stream::StoreSchema& schema_;
-  const Detail& detail_;
+  std::size_t payload_;
   PlaceConversion places_;
   stream::Overlay* overlay_;
   stream::PointWriter& writer_;
   stream::PointBlock block_;
+  std::optional<stream::ClusterId> cluster_;
+  std::span<const stream::OverlayValue> heights_;  ///< of `cluster_`, those still to come
   std::uint64_t replaced_ = 0;
 };
 
@@ -130,8 +120,10 @@ class PointsCommand final : public Command {
  public:
   void define(CLI::App& app) override {
     app.add_option("STORE", store_, "where the points come from")->required();
-    add_output(app, output_, "the file to write: .xyz, .csv, .ply; - is standard output");
-    app.add_option("--format", format_, "xyz, csv, ply, ply-ascii; else by the file's ending");
+    add_output(app, output_,
+               "the file to write: .xyz, .csv, .ply, .las, .laz; - is standard output");
+    app.add_option("--format", format_,
+                   "xyz, csv, ply, ply-ascii, las, laz; else by the file's ending");
     app.add_option("--level", level_, "points of this level and above: a number or top")
         ->default_str("0; with --focus top");
     app.add_option(
@@ -149,6 +141,7 @@ class PointsCommand final : public Command {
     app.add_option("--within", radius_, "with --near: all points up to this distance, in metres")
         ->needs("--near")
         ->excludes("-k");
+    add_where(app, where_);
     app.add_option("--overlay", overlay_,
                    "a file of mesh --save-overlay: its heights in place of the store's")
         ->type_name("FILE")
@@ -160,20 +153,23 @@ class PointsCommand final : public Command {
   Summary run(const CommonOptions& common) override {
     const Stopwatch watch;
     const stream::Store store = open_store(store_);
-    const Detail detail =
-        parse_detail(store, level_, region_, focuses_, crs_.regions(store, common));
+    Detail detail = parse_detail(store, level_, region_, focuses_, crs_.regions(store, common));
+    if (!where_.empty()) detail.where.emplace(where_, store.schema());
+    if (!near_.empty() && detail.where) {
+      throw UsageError("--near finds the nearest of all points: without --where");
+    }
     if (!near_.empty()) return near(store, detail.level, watch, common);
     std::optional<stream::Overlay> overlay;
     if (!overlay_.empty()) overlay.emplace(open_height_overlay(overlay_, store));
+    const std::optional<Transformation> to = crs_.to(store, common);
     const auto writer = stream::open_point_writer(
-        output_, {.attributes = store.schema().attributes, .comments = {kWriterMark}},
+        output_, header(store, store.schema().attributes, to),
         {.format = format_, .replace = may_replace(output_, common.force), .stop = stop_token()});
-    PointOutput output(store, detail, crs_.places(store, common), overlay ? &*overlay : nullptr,
-                       *writer);
-    for_each_wanted(
+    PointOutput output(store, places(to), overlay ? &*overlay : nullptr, *writer);
+    for_each_wanted_point(
         store, detail,
-        [&output](stream::ClusterId id, const stream::ClusterRecord& record,
-                  const stream::ClusterPoints& points) { output.add(id, record, points); });
+        [&output](stream::ClusterId id, const stream::ClusterPoints& points, std::size_t i,
+                  const stream::Point3& place) { output.add(id, points, i, place); });
     output.flush();
     const std::uint64_t points = writer->points();
     writer->finish();
@@ -185,6 +181,7 @@ class PointsCommand final : public Command {
                     {"peak_rss_bytes", peak_rss_bytes()}};
     summary.text = output_ + ": " + with_commas(points) + " points in " +
                    readable_seconds(watch.seconds()) + "\n";
+    tell_rounding(*writer, summary);
     if (overlay) {
       summary.json["overlay_values"] = output.replaced();
       summary.text += with_commas(output.replaced()) + " heights from " + overlay_ + "\n";
@@ -193,6 +190,25 @@ class PointsCommand final : public Command {
   }
 
  private:
+  static PlaceConversion places(const std::optional<Transformation>& to) {
+    return to ? PlaceConversion(*to) : PlaceConversion();
+  }
+  /// In another CRS the points have neither the store's lattice nor its bounds.
+  static stream::PointHeader header(const stream::Store& store,
+                                    std::vector<stream::Channel> attributes,
+                                    const std::optional<Transformation>& to) {
+    stream::PointHeader wanted{.attributes = std::move(attributes),
+                               .comments = {kWriterMark},
+                               .crs = crs_to_write(store.schema().crs)};
+    if (to) {
+      wanted.crs = to->to().crs_with_wkt1();
+    } else {
+      wanted.lattice = lattice_of(store.schema());
+      wanted.bounds = world_box(store.schema(), store.bounds());
+    }
+    return wanted;
+  }
+
   Summary near(const stream::Store& store, unsigned level, const Stopwatch& watch,
                const CommonOptions& common) const {
     const std::vector<double> v = parse_numbers(near_, "--near");
@@ -206,10 +222,11 @@ class PointsCommand final : public Command {
                : points_within(query, place, *radius_, level);
     std::vector<stream::Channel> attributes = store.schema().attributes;
     attributes.push_back({.name = "distance", .unit = "metre"});
+    const std::optional<Transformation> to = crs_.to(store, common);
     const auto writer = stream::open_point_writer(
-        output_, {.attributes = std::move(attributes), .comments = {kWriterMark}},
+        output_, header(store, std::move(attributes), to),
         {.format = format_, .replace = may_replace(output_, common.force), .stop = stop_token()});
-    write_found(store, found, crs_.places(store, common), *writer);
+    write_found(store, found, places(to), *writer);
     writer->finish();
     Summary summary;
     summary.json = {{"vertices", found.size()},
@@ -224,10 +241,11 @@ class PointsCommand final : public Command {
                       readable_number(found.back().distance) + " m away";
     }
     summary.text += ", in " + readable_seconds(watch.seconds()) + "\n";
+    tell_rounding(*writer, summary);
     return summary;
   }
 
-  std::string store_, output_, format_, level_, region_, overlay_, near_;
+  std::string store_, output_, format_, level_, region_, overlay_, near_, where_;
   std::optional<std::size_t> count_;
   std::optional<double> radius_;
   std::vector<std::string> focuses_;

@@ -14,7 +14,6 @@
 #include "cli/interrupt.hpp"
 #include "cli/output.hpp"
 #include "earth/ground.hpp"
-#include "mesh/mesh_file.hpp"
 #include "picture/camera.hpp"
 #include "picture/color.hpp"
 #include "picture/draw.hpp"
@@ -207,6 +206,22 @@ class RenderCommand : public Command {
     return summary;
   }
 
+  static std::vector<Rgb> rgb_of(const TriangleMesh& mesh) {
+    std::uint16_t brightest = 0;
+    for (const auto& colour : mesh.colours) {
+      brightest = std::max({brightest, colour[0], colour[1], colour[2]});
+    }
+    // Else all would be black.
+    const int full = brightest <= 255 ? 1 : 257;
+    std::vector<Rgb> colours;
+    colours.reserve(mesh.colours.size());
+    for (const auto& colour : mesh.colours) {
+      Rgb& rgb = colours.emplace_back();
+      for (std::size_t k = 0; k < 3; ++k) rgb[k] = static_cast<std::uint8_t>(colour[k] / full);
+    }
+    return colours;
+  }
+
   /// One colour per vertex. heights: in the source's own unit.
   [[nodiscard]] std::vector<Rgb> colours_of(const TriangleMesh& mesh,
                                             const std::vector<double>& heights,
@@ -224,7 +239,7 @@ class RenderCommand : public Command {
     std::vector<Rgb> colours(mesh.positions.size(), Rgb{205, 205, 200});
     if (by == "rgb") {
       if (mesh.colours.empty()) lacks("colours");
-      return mesh.colours;
+      return rgb_of(mesh);
     }
     if (by == "level" && mesh.levels.empty()) lacks("levels");
     if ((by == "class" || by == "cluster") && mesh.classes.empty()) lacks(by);

@@ -68,9 +68,8 @@ using CostRow = std::function<void(std::size_t row, std::span<double> costs)>;
 Assignment assign_rows(std::size_t rows, std::size_t columns, const CostRow& fill_row);
 
 /// The same with costs from a function of row and column.
-template <class Cost>
-requires std::convertible_to < std::invoke_result_t<Cost&, std::size_t, std::size_t>,
-double > Assignment assign_pairs(std::size_t rows, std::size_t columns, Cost&& cost) {
+template <std::invocable<std::size_t, std::size_t> Cost>
+Assignment assign_pairs(std::size_t rows, std::size_t columns, Cost&& cost) {
   return assign_rows(rows, columns, [&cost](std::size_t row, std::span<double> costs) {
     for (std::size_t j = 0; j < costs.size(); ++j) costs[j] = cost(row, j);
   });

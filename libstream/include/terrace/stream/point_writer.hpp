@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <stop_token>
 #include <string>
 #include <vector>
@@ -18,6 +19,12 @@ struct PointHeader {
   /// (float64).
   std::vector<Channel> attributes{};
   std::vector<std::string> comments{};  ///< written where the format has comments (PLY)
+  /// The CRS of the coordinates; its WKT is written where the format has a place for it (LAS).
+  Crs crs{};
+  /// For formats whose coordinates are integers (LAS): the lattice to write them on. Without one
+  /// the writer takes a power of ten that suits the first points and the bounds.
+  std::optional<Lattice> lattice{};
+  std::optional<Box3> bounds{};  ///< of the points, if known beforehand
 };
 
 /// Stored coordinates to the coordinates of the CRS: WorldTransform, then scale and offset of the
@@ -38,11 +45,15 @@ class PointWriter {
   virtual void finish() = 0;
   /// Points appended so far.
   [[nodiscard]] virtual std::uint64_t points() const = 0;
+  /// How far a coordinate was moved to fit the integers of the format, at most; 0 where none was
+  /// moved by more than doubles lose on the way.
+  [[nodiscard]] virtual double rounding() const { return 0.0; }
 };
 
 struct WriterOptions {
   /// Name of a format; empty: by the file's ending. Points: "xyz" (x y z and attributes, separated
-  /// by blanks), "csv" (with a header line), "ply" (binary, little-endian), "ply-ascii".
+  /// by blanks), "csv" (with a header line), "ply" (binary, little-endian), "ply-ascii", "las" and
+  /// "laz" (LAS 1.4).
   /// Meshes: "ply", "ply-ascii", "obj", "glb".
   std::string format{};
   bool replace = false;    ///< an existing file is replaced instead of refused

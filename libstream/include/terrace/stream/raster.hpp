@@ -59,6 +59,8 @@ class Raster {
   /// (down, or to the right in the same rows) are cheap; others may decode blocks again. Throws:
   /// Error naming file and block.
   virtual bool read_over(const CellWindow& window, const CellBuffer& out) = 0;
+  /// Sets how many bytes the open members of a mosaic may hold from now on (see open_mosaic).
+  virtual void set_open_bytes(std::uint64_t /*bytes*/) {}
 };
 
 struct RasterOptions {
@@ -68,6 +70,7 @@ struct RasterOptions {
   std::uint64_t memory_bytes = 64u << 20;
   /// Bytes of decoded blocks, of those that a window has used in part, to keep for the next one.
   std::uint64_t cache_bytes = 16u << 20;
+  HeightsOfColour heights_of_colour = HeightsOfColour::none;  ///< see SourceOptions
 };
 
 /// Opens a GeoTIFF: strips and tiles, classic and BigTIFF, every codec of the libtiff at hand,

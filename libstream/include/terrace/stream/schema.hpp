@@ -85,6 +85,17 @@ struct Placement {
   Crs crs;
 };
 
+/// A lattice of coordinates in the CRS: integers k stand for k * scale + offset.
+struct Lattice {
+  Point3 scale{1, 1, 1};
+  Point3 offset{0, 0, 0};
+
+  friend bool operator==(const Lattice&, const Lattice&) = default;
+};
+/// The lattice on which stored integers of up to 32 bits lie; nullopt for other types and a rotated
+/// transform.
+[[nodiscard]] std::optional<Lattice> lattice_of(const Placement& placement);
+
 /// Coordinates of the CRS for a point in stored coordinates.
 [[nodiscard]] inline Point3 world_point(const Placement& placement, const Point3& stored) {
   const std::array<double, 6>& xy = placement.world.xy;

@@ -45,7 +45,10 @@ struct PointBlock {
 struct Progress {
   std::uint64_t points = 0;
   std::uint64_t nodata = 0;  ///< cells without data, left out
-  double fraction = 0.0;     ///< of the work, 0 to 1; 0 if unknown
+  /// Points among them that their file marks as withheld (LAS): they are delivered like all others.
+  std::uint64_t withheld = 0;
+  std::uint64_t excluded = 0;  ///< points that did not meet Selection::where
+  double fraction = 0.0;       ///< of the work, 0 to 1; 0 if unknown
 };
 
 /// A stream of points, pulled block by block. Bounded memory; never seeks backwards through what it
@@ -60,25 +63,44 @@ class PointSource {
   /// Throws: Error on bad data, naming file, place, cause and remedy; Stopped.
   virtual bool next(PointBlock& block) = 0;
   [[nodiscard]] virtual Progress progress() const = 0;
+  /// What only info() lets a caller know of a raster: the ground's height / width of a cell, so
+  /// that tiles are square on the ground (until then as the transform says), and
+  /// SourceOptions::memory_bytes anew. Before the first next(). Without effect on other sources.
+  virtual void refine(double /*cell_aspect*/, std::uint64_t /*memory_bytes*/) {}
   /// What reading takes at least, in bytes: of a raster the window and what its file holds, which
   /// its layout decides. 0 where nothing but the blocks counts.
   [[nodiscard]] virtual std::uint64_t reading_bytes() const { return 0; }
 };
 
+/// What of a source is wanted.
+struct Selection {
+  /// Points that do not meet this condition (see Where) are left out; empty: none is.
+  std::string where{};
+  /// Names of the attributes to go on with, in the order of the file; nullopt: all. Conditions see
+  /// all of them.
+  std::optional<std::vector<std::string>> keep{};
+  std::vector<std::string> drop{};  ///< names of attributes to leave out
+};
+
+/// How the colours of a PNG mean heights in metres, where R, G, B are 0 to 255:
+/// mapbox -10000 + (R * 65536 + G * 256 + B) / 10, terrarium R * 256 + G + B / 256 - 32768.
+enum class HeightsOfColour : std::uint8_t { none, mapbox, terrarium };
+
 /// What a caller may ask of any source.
 struct SourceOptions {
   std::string format{};  ///< name of a registered format; empty: by content, then ending
-  std::size_t block_points = 10000;        ///< most points per block
-  std::uint64_t memory_bytes = 64u << 20;  ///< what the source may hold, roughly
-  int band = 1;                            ///< of rasters, counted from 1
-  double cell_aspect = 0.0;  ///< ground height/width of a raster's cell, so that tiles are
-                             ///< square on the ground; 0: as the transform says
-  std::optional<Crs> crs{};  ///< replaces what the file says
+  std::size_t block_points = 10000;                           ///< most points per block
+  std::uint64_t memory_bytes = 64u << 20;                     ///< what the source may hold, roughly
+  int band = 1;                                               ///< of rasters, counted from 1
+  HeightsOfColour heights_of_colour = HeightsOfColour::none;  ///< of PNG pictures in colours
+  std::optional<Crs> crs{};                                   ///< replaces what the file says
   /// Ends whatever waits for a pipe, in opening the source and in next(), with Stopped.
   std::stop_token stop{};
   /// Above 0: blocks are read on a thread of their own, at most so many ahead, from the first
   /// next() on (see read_ahead()). The source's destructor waits for no pipe.
   std::size_t blocks_ahead = 0;
+  unsigned threads = 1;  ///< that decode at once, of formats of which parts can be (LAZ)
+  Selection selection{};
 };
 
 /// Opens one file, or several as one source: rasters form a mosaic (same CRS, cell size and phase;

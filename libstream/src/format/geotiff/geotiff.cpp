@@ -12,8 +12,8 @@
 #include "format/geotiff/keys.hpp"
 #include "format/geotiff/layout.hpp"
 #include "format/geotiff/tags.hpp"
+#include "format/raster_points.hpp"
 #include "raster/nodata.hpp"
-#include "raster/order.hpp"
 #include "terrace/stream/raster.hpp"
 
 namespace terrace::stream {
@@ -89,18 +89,7 @@ bool looks_like_tiff(std::span<const std::byte> head) {
 
 std::unique_ptr<PointSource> open_points(std::span<const std::string> files,
                                          const SourceOptions& options) {
-  RasterOptions raster{.band = options.band, .memory_bytes = options.memory_bytes};
-  const std::uint64_t window = window_bytes(options);
-  raster.cache_bytes = window / 6;
-  if (files.size() == 1) return points_of(open_geotiff(files.front(), raster), options);
-  constexpr std::size_t kOpenAtOnce = 32;
-  raster.cache_bytes /= kOpenAtOnce / 4;  // few of them meet in one window
-  const RasterOpener opener = [raster](const std::string& file) {
-    return open_geotiff(file, raster);
-  };
-  return points_of(open_mosaic({files.begin(), files.end()}, opener, options.crs.has_value(),
-                               kOpenAtOnce, options.memory_bytes - window),
-                   options);
+  return open_raster_points(files, options, &open_geotiff);
 }
 
 }  // namespace

@@ -3,9 +3,11 @@
 #include <array>
 #include <bit>
 #include <cassert>
+#include <cmath>
 #include <cstdint>
 #include <cstdlib>
 #include <limits>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -14,6 +16,8 @@
 
 #include "format/chain.hpp"
 #include "format/formats.hpp"
+#include "format/mesh_formats.hpp"
+#include "format/packed_column.hpp"
 #include "format/ply/decode.hpp"
 #include "format/ply/header.hpp"
 #include "io/line_reader.hpp"
@@ -84,6 +88,38 @@ class PlySource final : public PointSource {
     check_finite(block);
     delivered_ += wanted;
     return wanted > 0;
+  }
+
+  /// The polygons and strips behind the vertices, which have all been read, as triangles.
+  std::vector<TriangleIndices> triangles() {
+    std::vector<TriangleIndices> triangles;
+    bool is_behind = false;
+    for (const PlyElement& element : header_.elements) {
+      const PlyProperty* const corners = corners_of(element);
+      if (element.name == "vertex") {
+        is_behind = true;
+      } else if (corners == nullptr) {
+        if (is_behind) skip_element(element);
+      } else if (!is_behind) {
+        fail("header", "the element " + in_quotes(element.name) + " stands before the vertices",
+             "write the file anew, vertices first");
+      } else {
+        for (std::uint64_t i = 0; i < element.count; ++i) {
+          read_corners(element, *corners, i);
+          if (element.name == "tristrips") {
+            add_strips(triangles);
+          } else {
+            add_fan(triangles);
+          }
+        }
+      }
+    }
+    return triangles;
+  }
+
+  [[nodiscard]] bool has_faces() const {
+    return std::any_of(header_.elements.begin(), header_.elements.end(),
+                       [](const PlyElement& e) { return e.count > 0 && corners_of(e) != nullptr; });
   }
 
   Progress progress() const override {
@@ -254,6 +290,85 @@ class PlySource final : public PointSource {
     if (!line.empty()) fail_line("more values than the vertex has properties");
   }
 
+  /// The list of vertices of an element's items; null if it is no list of faces or strips.
+  static const PlyProperty* corners_of(const PlyElement& element) {
+    if (element.name != "face" && element.name != "tristrips") return nullptr;
+    for (const PlyProperty& p : element.properties) {
+      if (p.list && (p.name == "vertex_indices" || p.name == "vertex_index")) return &p;
+    }
+    return nullptr;
+  }
+
+  /// Reads an item of faces or strips, and of it `wanted` into corners_.
+  void read_corners(const PlyElement& element, const PlyProperty& wanted, std::uint64_t item) {
+    const bool is_ascii = header_.encoding == PlyEncoding::ascii;
+    std::string_view line;
+    while (is_ascii && line.empty()) {
+      if (!lines_.next(line)) fail_end(element.name, item);
+      line = trim_left(line);
+    }
+    std::array<std::byte, 8> raw{};
+    const auto next = [&](ScalarType type, const PlyProperty& property) {
+      if (is_ascii) {
+        read_word(line, type, property, raw.data());
+      } else if (!read_scalar(type, raw.data())) {
+        fail_end(element.name, item);
+      }
+    };
+    for (const PlyProperty& property : element.properties) {
+      next(property.list ? property.count_type : property.type, property);
+      if (!property.list) continue;
+      const std::int64_t length = to_integer(raw.data(), property.count_type);
+      if (length < 0) {
+        fail(element.name + " " + std::to_string(item),
+             "list " + in_quotes(property.name) + " has the length " + std::to_string(length),
+             "the file is damaged");
+      }
+      const bool is_wanted = &property == &wanted;
+      if (is_wanted) corners_.clear();
+      for (std::int64_t k = 0; k < length; ++k) {
+        next(property.type, property);
+        if (is_wanted) corners_.push_back(corner(property.type, raw.data(), element, item));
+      }
+    }
+    if (!line.empty()) fail_line("more values than the " + element.name + " has properties");
+  }
+
+  /// The number of a vertex; negative ones end a strip.
+  std::int64_t corner(ScalarType type, const std::byte* raw, const PlyElement& element,
+                      std::uint64_t item) const {
+    const double number = to_double(type, raw);
+    if (number == std::trunc(number) && number < static_cast<double>(count_) &&
+        (number >= 0.0 || element.name == "tristrips") &&
+        number < std::numeric_limits<std::uint32_t>::max()) {
+      return number < 0.0 ? -1 : static_cast<std::int64_t>(number);
+    }
+    fail(element.name + " " + std::to_string(item), "names a vertex that is not there",
+         "the file is damaged");
+  }
+
+  void add_triangle(std::vector<TriangleIndices>& triangles, std::size_t a, std::size_t b,
+                    std::size_t c) const {
+    triangles.push_back({static_cast<std::uint32_t>(corners_[a]),
+                         static_cast<std::uint32_t>(corners_[b]),
+                         static_cast<std::uint32_t>(corners_[c])});
+  }
+  void add_fan(std::vector<TriangleIndices>& triangles) const {
+    for (std::size_t k = 2; k < corners_.size(); ++k) add_triangle(triangles, 0, k - 1, k);
+  }
+  /// Every other triangle of a strip turns the other way.
+  void add_strips(std::vector<TriangleIndices>& triangles) const {
+    std::size_t start = 0;
+    for (std::size_t k = 0; k < corners_.size(); ++k) {
+      if (corners_[k] < 0) {
+        start = k + 1;
+      } else if (k >= start + 2) {
+        const std::size_t odd = (k - start) % 2;
+        add_triangle(triangles, k - 2 + odd, k - 1 - odd, k);
+      }
+    }
+  }
+
   [[noreturn]] void fail_line(std::string cause) const {
     fail("line " + std::to_string(header_.lines + lines_.number()), std::move(cause),
          "the file is damaged or its header is wrong");
@@ -308,6 +423,7 @@ class PlySource final : public PointSource {
   std::uint64_t count_ = 0, delivered_ = 0;
   std::size_t stride_ = 0, record_bytes_ = 0;
   bool has_lists_ = false, swap_ = false;
+  std::vector<std::int64_t> corners_;  ///< of one face
 };
 
 bool recognise_ply(std::span<const std::byte> head) {
@@ -315,7 +431,8 @@ bool recognise_ply(std::span<const std::byte> head) {
   return text.starts_with("ply\n") || text.starts_with("ply\r") || text.starts_with("ply ");
 }
 
-std::unique_ptr<PointSource> open_one_ply(const std::string& file, const SourceOptions& options) {
+std::unique_ptr<PointSource> open_one_ply(const std::string& file, const SourceOptions& options,
+                                          const SourceInfo* /*first*/) {
   assert(options.block_points > 0);
   return std::make_unique<PlySource>(file, options);
 }
@@ -326,6 +443,20 @@ std::unique_ptr<PointSource> open_ply(std::span<const std::string> files,
 }
 
 }  // namespace
+
+std::optional<MeshFile> read_ply_mesh(const std::string& file, const SourceOptions& options) {
+  PlySource source(file, options);
+  if (!source.has_faces()) return std::nullopt;
+  MeshFile mesh;
+  mesh.info = source.info();
+  for (PointBlock block; source.next(block);) {
+    PointBlock& all = mesh.vertices;
+    all.positions.insert(all.positions.end(), block.positions.begin(), block.positions.end());
+    all.payload.insert(all.payload.end(), block.payload.begin(), block.payload.end());
+  }
+  mesh.triangles = source.triangles();
+  return mesh;
+}
 
 const Format& ply_format() {
   static const Format format{.name = "ply",

@@ -202,7 +202,8 @@ bool recognise_xyz(std::span<const std::byte> head) {
   return false;
 }
 
-std::unique_ptr<PointSource> open_one_xyz(const std::string& file, const SourceOptions& options) {
+std::unique_ptr<PointSource> open_one_xyz(const std::string& file, const SourceOptions& options,
+                                          const SourceInfo* /*first*/) {
   assert(options.block_points > 0);
   return std::make_unique<XyzSource>(file, options);
 }

@@ -23,6 +23,7 @@ struct BuildRequest {
   std::filesystem::path store{};  ///< the folder to create
   bool replace = false;
   std::string input_format{};        ///< empty: told by content
+  stream::Selection selection{};     ///< of points and attributes
   std::optional<stream::Crs> crs{};  ///< replaces the source's
   /// To WGS 84, for a CRS of another datum (see DatumShift).
   std::optional<std::array<double, 7>> datum_shift{};
@@ -34,6 +35,7 @@ struct BuildRequest {
   double z_weight = 1.0;
   MetricChoice metric{};  ///< on the ground
   int band = 1;
+  stream::HeightsOfColour heights_of_colour = stream::HeightsOfColour::none;  ///< of PNG
   std::uint64_t seed = 1;
   /// A trial run that stops after about this many points and leaves no store; 0: read everything.
   std::uint64_t most_points = 0;
@@ -42,6 +44,7 @@ struct BuildRequest {
 struct BuildOutcome {
   std::uint64_t points = 0;
   std::uint64_t nodata = 0;
+  std::uint64_t excluded = 0;  ///< points that did not meet the condition of the selection
   std::uint64_t store_bytes = 0;
   unsigned top = 0;
   std::vector<std::uint64_t> level_points, level_clusters;

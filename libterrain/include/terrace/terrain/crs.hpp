@@ -78,6 +78,8 @@ class CoordinateSystem {
   [[nodiscard]] stream::Crs crs() const;
   /// The same with the GeoKeys that a system without an EPSG code needs in a GeoTIFF.
   [[nodiscard]] stream::Crs crs_with_keys() const;
+  /// The same with WKT 1 (OGC 01-009), which LAS asks for; with WKT 2 where that cannot say it.
+  [[nodiscard]] stream::Crs crs_with_wkt1() const;
 
   /// What the user should know of it: "EPSG:... to WGS 84 by \"...\" within 2 m"; empty if no
   /// conversion is needed or possible.

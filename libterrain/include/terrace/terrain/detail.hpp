@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include <terrace/stream/store.hpp>
+#include <terrace/stream/where.hpp>
 
 #include "terrace/terrain/region.hpp"
 
@@ -24,6 +26,8 @@ struct Detail {
   unsigned level = 0;
   std::optional<Region> region;
   std::vector<FinerRegion> focuses;
+  /// Only points that meet this condition are wanted; clusters are, whatever they hold.
+  std::optional<stream::Where> where{};
   /// In units of the CRS: what lies so far outside polygons, but in the box around them, is wanted
   /// as well.
   double margin = 0;
@@ -50,5 +54,12 @@ void for_each_wanted(const stream::Store& store, const Detail& detail,
 void for_each_wanted_record(
     const stream::Store& store, const Detail& detail,
     const std::function<void(stream::ClusterId, const stream::ClusterRecord&)>& visit);
+
+/// Visits every point of the wanted clusters that meets the condition of `detail` and, where there
+/// is a region, lies in it or in a focus, in the order of for_each_wanted(): its cluster, its place
+/// among the points of that, and where it lies in the CRS of the store.
+void for_each_wanted_point(const stream::Store& store, const Detail& detail,
+                           const std::function<void(stream::ClusterId, const stream::ClusterPoints&,
+                                                    std::size_t, const stream::Point3&)>& visit);
 
 }  // namespace terrace::terrain

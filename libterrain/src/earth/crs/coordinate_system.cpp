@@ -184,6 +184,13 @@ stream::Crs CoordinateSystem::crs_with_keys() const {
   return record;
 }
 
+stream::Crs CoordinateSystem::crs_with_wkt1() const {
+  stream::Crs record = crs();
+  const std::string old = wkt1_of(definition());
+  if (!old.empty()) record.wkt = old;
+  return record;
+}
+
 const DatumChange& CoordinateSystem::to_wgs84() const {
   std::call_once(wgs84_->once,
                  [this] { wgs84_->change = change_between(definition(), wgs84(), area_); });

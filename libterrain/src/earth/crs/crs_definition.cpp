@@ -124,6 +124,13 @@ std::string wkt_of(const CrsDefinition& definition) {
          text + "," + definition.height_wkt + "]";
 }
 
+std::string wkt1_of(const CrsDefinition& definition) {
+  const ProjObject crs = proj_crs_of_text(wkt_of(definition));
+  if (crs == nullptr) return {};
+  const std::array<const char*, 2> options{"MULTILINE=NO", nullptr};
+  return text_of(proj_as_wkt(proj_context(), crs.get(), PJ_WKT1_GDAL, options.data()));
+}
+
 std::string proj_pipeline_of(const CrsDefinition& definition) {
   PJ_CONTEXT* const context = proj_context();
   proj_complaint();

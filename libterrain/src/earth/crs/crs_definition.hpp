@@ -82,6 +82,8 @@ void set_vertical_epsg(CrsDefinition& definition, int code);
 void forget_heights(CrsDefinition& definition);
 /// The system as WKT 2 (ISO 19162:2019), with a shift as a bound CRS.
 std::string wkt_of(const CrsDefinition& definition);
+/// The same as WKT 1, as GDAL writes it; empty where that cannot say it.
+std::string wkt1_of(const CrsDefinition& definition);
 
 /// What a source or a store says, whichever way; nothing if it says nothing of a CRS.
 /// Throws: CrsError.

@@ -107,6 +107,13 @@ std::string file_text(const std::string& name) {
 }  // namespace
 
 void set_vertical_epsg(CrsDefinition& definition, int code) {
+  // GeoTIFF 1.0 numbered the heights of Newlyn, NGVD 29, NAVD 88, the Yellow Sea, the Baltic and
+  // the Caspian by their datums: laser scans name them so to this day.
+  constexpr std::array<int, 6> kOfDatums{5701, 5702, 5703, 5736, 5705, 5706};
+  constexpr int kFirstDatum = 5101;
+  if (code >= kFirstDatum && code < kFirstDatum + static_cast<int>(kOfDatums.size())) {
+    code = kOfDatums[static_cast<std::size_t>(code - kFirstDatum)];
+  }
   // GeoTIFF 1.0 numbered heights above ellipsoids so; 5030 is WGS 84's.
   constexpr int kFirstEllipsoid = 5001, kLastEllipsoid = 5033;
   if (code >= kFirstEllipsoid && code <= kLastEllipsoid) {

@@ -60,8 +60,12 @@ BoundedMeshResult mesh_by(Mesher mesher, const BoundedMeshOptions& options,
 BoundedMeshResult write_bounded_mesh(const stream::Store& store, const BoundedMeshOptions& options,
                                      const Context& context) {
   const stream::Store source = store.with_stop(context.stop);
-  if (store.schema().grid)
+  if (store.schema().grid) {
+    if (options.where) {
+      throw UsageError("`where` is for irregular points: a raster is meshed with all its samples");
+    }
     return mesh_by(RasterMesher(source, options, context), options, context.stop);
+  }
   if (options.fill != Fill::none) {
     throw UsageError("`fill` is for rasters: irregular points have no cells without data");
   }

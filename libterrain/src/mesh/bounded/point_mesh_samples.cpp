@@ -60,7 +60,7 @@ void SharedPlaces::add(const MeshSamples& samples) {
   }
 }
 
-PointMeshSamples::PointMeshSamples(const stream::Store& store, const std::optional<Region>& region,
+PointMeshSamples::PointMeshSamples(const stream::Store& store, const Detail& detail,
                                    const PointMeshCuts& cuts, const std::string& path)
     : cuts_(cuts),
       file_(place_for(path), true),
@@ -69,20 +69,11 @@ PointMeshSamples::PointMeshSamples(const stream::Store& store, const std::option
       counts_(cuts.cells.size(), 0),
       waiting_(cuts.cells.size()),
       chunks_(cuts.cells.size()) {
-  const stream::Placement& placement = store.schema();
-  Detail detail;
-  detail.region = region;
-  for_each_wanted(store, detail,
-                  [&](stream::ClusterId, const stream::ClusterRecord& record,
-                      const stream::ClusterPoints& cluster) {
-                    const bool whole =
-                        !region ||
-                        region->overlap(world_box(placement, record.summary.box)) == Overlap::whole;
-                    for (const stream::Point3& stored : cluster.positions) {
-                      const stream::Point3 p = world_point(placement, stored);
-                      if (whole || region->contains(p)) deal(cuts.cell_of({p[0], p[1]}), p);
-                    }
-                  });
+  for_each_wanted_point(
+      store, detail,
+      [&](stream::ClusterId, const stream::ClusterPoints&, std::size_t, const stream::Point3& p) {
+        deal(cuts.cell_of({p[0], p[1]}), p);
+      });
   // What is left takes no more than its room; nothing is buffered any more.
   for (std::vector<stream::Point3>& rest : waiting_) rest.shrink_to_fit();
   file_.read_at(0, {});

@@ -14,7 +14,7 @@
 #include <terrace/tri/point_tin.hpp>
 
 #include "mesh/bounded/point_mesh_cuts.hpp"
-#include "terrace/terrain/region.hpp"
+#include "terrace/terrain/detail.hpp"
 
 namespace terrace::terrain {
 
@@ -55,8 +55,8 @@ class PointMeshSamples {
  public:
   /// One pass over the store. path: of the mesh. Throws: stream::Error on a damaged store, or if
   /// the disk is full or the like. Memory: 16 MiB, and 4 bytes per 40 samples or more.
-  PointMeshSamples(const stream::Store& store, const std::optional<Region>& region,
-                   const PointMeshCuts& cuts, const std::string& path);
+  PointMeshSamples(const stream::Store& store, const Detail& detail, const PointMeshCuts& cuts,
+                   const std::string& path);
 
   [[nodiscard]] std::size_t count(std::uint32_t first_cell, std::uint32_t cells) const;
   /// Appends the samples of some cells that lie in the box, by cells, of each in the order of the

@@ -24,11 +24,7 @@ void thin_out(std::vector<Point2>& places) {
 
 }  // namespace
 
-PointMeshScan scan_point_mesh(const stream::Store& store, const std::optional<Region>& region,
-                              std::size_t few) {
-  const stream::Placement& placement = store.schema();
-  Detail detail;
-  detail.region = region;
+PointMeshScan scan_point_mesh(const stream::Store& store, const Detail& detail, std::size_t few) {
   PointMeshScan scan;
   scan.whole.emplace();
   StreamingHull hull;
@@ -55,17 +51,9 @@ PointMeshScan scan_point_mesh(const stream::Store& store, const std::optional<Re
       scan.whole->add(p);
     }
   };
-  for_each_wanted(store, detail,
-                  [&](stream::ClusterId, const stream::ClusterRecord& record,
-                      const stream::ClusterPoints& cluster) {
-                    const bool whole =
-                        !region ||
-                        region->overlap(world_box(placement, record.summary.box)) == Overlap::whole;
-                    for (const stream::Point3& stored : cluster.positions) {
-                      const stream::Point3 p = world_point(placement, stored);
-                      if (whole || region->contains(p)) add(p);
-                    }
-                  });
+  for_each_wanted_point(store, detail,
+                        [&](stream::ClusterId, const stream::ClusterPoints&, std::size_t,
+                            const stream::Point3& p) { add(p); });
   if (scan.whole) {
     scan.some = {};
   } else {

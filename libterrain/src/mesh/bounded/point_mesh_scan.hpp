@@ -9,7 +9,7 @@
 #include <terrace/stream/store.hpp>
 
 #include "mesh/bounded/point_mesh_samples.hpp"
-#include "terrace/terrain/region.hpp"
+#include "terrace/terrain/detail.hpp"
 
 namespace terrace::terrain {
 
@@ -26,7 +26,6 @@ struct PointMeshScan {
 /// Reads all samples once, in the order of the store. few: how many at most are kept. Memory: of
 /// `few` samples, of up to a million places, and of the hull.
 /// Throws: stream::Error on a damaged store.
-PointMeshScan scan_point_mesh(const stream::Store& store, const std::optional<Region>& region,
-                              std::size_t few);
+PointMeshScan scan_point_mesh(const stream::Store& store, const Detail& detail, std::size_t few);
 
 }  // namespace terrace::terrain

@@ -46,11 +46,14 @@ PointMesher::PointMesher(const stream::Store& store, const BoundedMeshOptions& o
       bounds_(world_box(placement_, store.bounds())),
       rounding_(options.path, bounds_, options.writer) {
   const Stopwatch reading;
-  scan_ = scan_point_mesh(store, options.region, options.window_points);
+  Detail detail;
+  detail.region = options.region;
+  detail.where = options.where;
+  scan_ = scan_point_mesh(store, detail, options.window_points);
   if (!scan_.whole && scan_.hull.size() >= 3) {
     cuts_ = cut_for_point_mesh(std::move(scan_.some), scan_.period, options.window_points);
     scan_.some = {};
-    samples_.emplace(store, options.region, cuts_, options.path);
+    samples_.emplace(store, detail, cuts_, options.path);
     std::uint64_t most = 0;
     for (std::uint32_t i = 0; i < cuts_.cells.size(); ++i) {
       most = std::max<std::uint64_t>(most, samples_->count(i, 1));

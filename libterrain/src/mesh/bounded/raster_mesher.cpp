@@ -49,7 +49,7 @@ RasterMesher::RasterMesher(const stream::Store& store, const BoundedMeshOptions&
                                     : "the raster is one line of samples: it has no triangles");
   }
   threads_ = threads_within_memory();
-  if (options.fill == Fill::interpolate) fill_ = std::make_shared<RasterFill>(store);
+  if (options.fill == Fill::interpolate) fill_ = std::make_shared<StoreFill>(store);
 }
 
 double RasterMesher::metres_vertical() const {

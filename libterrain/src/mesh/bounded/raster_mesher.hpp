@@ -11,7 +11,7 @@
 
 #include "mesh/bounded/mesh_spool.hpp"
 #include "mesh/bounded/window_tin.hpp"
-#include "surface/raster_fill.hpp"
+#include "surface/store_fill.hpp"
 #include "surface/store_window.hpp"
 #include "terrace/terrain/bounded_mesh.hpp"
 
@@ -59,7 +59,7 @@ class RasterMesher {
   stream::Box3 bounds_;
   stream::MeshRounding rounding_;
   unsigned threads_ = 1;
-  std::shared_ptr<const RasterFill> fill_;
+  std::shared_ptr<const StoreFill> fill_;
 };
 
 }  // namespace terrace::terrain

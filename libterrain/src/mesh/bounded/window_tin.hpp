@@ -11,7 +11,6 @@
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/grid_tin.hpp>
 
-#include "surface/raster_fill.hpp"
 #include "surface/store_window.hpp"
 #include "terrace/terrain/region.hpp"
 

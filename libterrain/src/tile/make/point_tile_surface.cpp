@@ -39,12 +39,8 @@ StoredBox box_around(std::span<const Point2> stored, std::span<const std::uint32
 TiledCloud::TiledCloud(const stream::Store& tiled, CoordinateSystem system,
                        EllipsoidalHeights heights, std::uint64_t bytes, std::uint64_t whole_bytes,
                        unsigned threads)
-    : store(tiled),
-      places(tiled, std::move(system)),
-      vertical(std::move(heights)),
-      fill(tiled),
-      spacing(cloud_spacing(tiled, places)),
-      window_bytes(bytes) {
+    : TiledStore(tiled, std::move(system), std::move(heights)), window_bytes(bytes) {
+  spacing = cloud_spacing(tiled, places);
   constexpr std::uint64_t kMostTriangulated = std::uint64_t{1} << 29;
   const std::uint64_t most =
       whole_bytes / (PointWindow::kBytesPerPoint + CloudSamples::kBytesPerPoint);
@@ -252,12 +248,11 @@ void PointTileSurface::heights(std::span<const double> longitude, std::span<cons
   std::vector<Point2> stored = places;
   cloud_.places.to_stored(stored);
   surface_heights(stored, out);
-  const stream::Channel& channel = cloud_.store.schema().coordinates[2];
   for (std::size_t i = 0; i < places.size(); ++i) {
     // The line of 180 degrees has two numbers, and tiles on both sides of it.
     if (places[i][0] == 180.0) places[i][0] = -180.0;
     if (std::isnan(out[i]) && !cloud_.flat_fill) {
-      out[i] = cloud_.fill.height(stored[i][0], stored[i][1]) * channel.scale + channel.offset;
+      out[i] = cloud_.fill.height(stored[i][0], stored[i][1]);
     }
   }
   cloud_.vertical.convert(places, out);
@@ -287,11 +282,7 @@ std::uint64_t PointTileSurface::digest(const GeographicBox& /*box*/) {
   Digest digest;
   digest.add(std::uint64_t{cloud_.store.checksum()});
   digest.add(cloud_.store.points());
-  cloud_.vertical.add_to(digest);
-  for (const std::optional<double>& option : {cloud_.flat_fill, cloud_.water_height}) {
-    digest.add(std::uint64_t{option.has_value()});
-    digest.add(option.value_or(0.0));
-  }
+  cloud_.add_to(digest);
   return digest.value();
 }
 

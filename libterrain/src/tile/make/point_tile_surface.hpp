@@ -12,27 +12,17 @@
 #include <terrace/stream/store.hpp>
 
 #include "earth/geoid_heights.hpp"
-#include "surface/point_fill.hpp"
 #include "surface/point_window.hpp"
 #include "surface/store_window.hpp"
 #include "terrace/terrain/crs.hpp"
 #include "tile/make/cloud_samples.hpp"
-#include "tile/make/stored_places.hpp"
 #include "tile/make/tile_surface.hpp"
+#include "tile/make/tiled_store.hpp"
 
 namespace terrace::terrain {
 
 /// What all threads know of a store of irregular points that is tiled.
-struct TiledCloud {
-  stream::Store store;
-  StoredPlaces places;
-  EllipsoidalHeights vertical;
-  PointFill fill;
-  double spacing = 0.0;
-  /// Heights beyond the points' hull: nothing takes those around, else this height in metres.
-  std::optional<double> flat_fill{};
-  /// Where the surface has this height (in the store's unit) is water.
-  std::optional<double> water_height{};
+struct TiledCloud : TiledStore {
   /// Memory that a thread may use for the triangles of a part.
   std::uint64_t window_bytes = 0;
   /// All triangles and samples, if they fit into memory; else each thread makes and reads those of

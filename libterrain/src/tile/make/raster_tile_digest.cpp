@@ -28,14 +28,17 @@ void add_raster(const TiledRaster& raster, Digest& digest) {
   digest.add(std::uint64_t{static_cast<std::uint8_t>(height.type)});
   digest.add(height.scale);
   digest.add(height.offset);
-  const stream::Crs crs = raster.crs.crs();
+  const stream::Crs crs = raster.places.crs().crs();
   digest.add(static_cast<std::uint64_t>(crs.epsg));
   digest.add(crs.wkt);
-  raster.vertical.add_to(digest);
-  for (const std::optional<double>& option : {raster.flat_fill, raster.water_height}) {
-    digest.add(std::uint64_t{option.has_value()});
-    digest.add(option.value_or(0.0));
-  }
+  raster.add_to(digest);
+}
+
+/// The samples of a window that is not empty.
+StoredBox box_of(const LatticeWindow& window) {
+  return {{static_cast<double>(window.column), static_cast<double>(window.row)},
+          {static_cast<double>(window.column + window.columns - 1),
+           static_cast<double>(window.row + window.rows - 1)}};
 }
 
 /// Adds the samples of a window, and the fill where it is used.
@@ -43,7 +46,7 @@ void add_window(const TiledRaster& raster, const LatticeWindow& window, Digest& 
   digest.add(raster.blocks.digest(window));
   if (raster.flat_fill) return;
   raster.blocks.for_each_incomplete(
-      window, [&](const LatticeWindow& block) { digest.add(raster.fill.digest(block)); });
+      window, [&](const LatticeWindow& block) { digest.add(raster.fill.digest(box_of(block))); });
   // What hangs over the raster's borders.
   const stream::StoreSchema& schema = raster.store.schema();
   const auto columns = static_cast<std::int64_t>(schema.columns);
@@ -55,7 +58,7 @@ void add_window(const TiledRaster& raster, const LatticeWindow& window, Digest& 
         LatticeWindow{columns, window.row, right, window.rows},
         LatticeWindow{window.column, window.row, window.columns, -window.row},
         LatticeWindow{window.column, rows, window.columns, bottom}}) {
-    if (strip.columns > 0 && strip.rows > 0) digest.add(raster.fill.digest(strip));
+    if (strip.columns > 0 && strip.rows > 0) digest.add(raster.fill.digest(box_of(strip)));
   }
 }
 
@@ -91,12 +94,12 @@ std::vector<Point2> places_of(const TiledRaster& raster, const GeographicBox& bo
     for (unsigned i = 0; i <= steps; ++i) {
       double longitude = box.west + (box.east - box.west) * i / steps;
       // A raster in degrees may be in any turn; projections take the first.
-      if (!raster.crs.is_geographic()) longitude = std::remainder(longitude, 360.0);
+      if (!raster.places.crs().is_geographic()) longitude = std::remainder(longitude, 360.0);
       const double latitude = box.south + (box.north - box.south) * j / steps;
       places.push_back({longitude, std::clamp(latitude, -90.0, 90.0)});
     }
   }
-  raster.crs.from_geographic(places);
+  raster.places.crs().from_geographic(places);
   const bool good = std::all_of(places.begin(), places.end(), [](const Point2& p) {
     return std::isfinite(p[0]) && std::isfinite(p[1]);
   });
@@ -106,16 +109,16 @@ std::vector<Point2> places_of(const TiledRaster& raster, const GeographicBox& bo
 /// In degrees a place is asked in the turn that is nearest to the raster's own longitudes.
 void add_in_all_turns(const TiledRaster& raster, const stream::Box3& box, double margin,
                       Digest& digest) {
-  const double width = raster.last_longitude - raster.first_longitude;
-  const double beside = std::max(0.0, 360.0 - width) / 2.0 + 1e-6;
+  const auto [first, last] = raster.places.longitudes();
+  const double beside = std::max(0.0, 360.0 - (last - first)) / 2.0 + 1e-6;
   for (int turn = -2; turn <= 2; ++turn) {
-    const double west = std::max(box.min[0] + 360.0 * turn, raster.first_longitude - beside);
-    const double east = std::min(box.max[0] + 360.0 * turn, raster.last_longitude + beside);
+    const double west = std::max(box.min[0] + 360.0 * turn, first - beside);
+    const double east = std::min(box.max[0] + 360.0 * turn, last + beside);
     if (west > east) continue;
     stream::Box3 around;
     for (const double x : {west, east}) {
       for (const double y : {box.min[1], box.max[1]}) {
-        const Point2 place = stored_place(raster.placement, {x, y});
+        const Point2 place = stored_place(raster.store.schema(), {x, y});
         around.include(stream::Point3{place[0], place[1], 0.0});
       }
     }
@@ -128,10 +131,10 @@ void add_in_all_turns(const TiledRaster& raster, const stream::Box3& box, double
 std::uint64_t digest_of(const TiledRaster& raster, const GeographicBox& box) {
   Digest digest;
   add_raster(raster, digest);
-  const CrsDefinition& crs = raster.crs.definition();
-  const bool geographic = raster.crs.is_geographic();
-  const bool straight = geographic && raster.crs.counts_as_wgs84();
-  const GeographicBox& all = raster.bounds;
+  const CrsDefinition& crs = raster.places.crs().definition();
+  const bool geographic = raster.places.crs().is_geographic();
+  const bool straight = geographic && raster.places.crs().counts_as_wgs84();
+  const GeographicBox& all = raster.places.bounds();
   const bool inside = box.west >= all.west && box.east <= all.east && box.south >= all.south &&
                       box.north <= all.north;
   const bool smooth =
@@ -144,7 +147,7 @@ std::uint64_t digest_of(const TiledRaster& raster, const GeographicBox& box) {
     return digest.value();
   }
   if (!geographic) {
-    for (Point2& p : places) p = stored_place(raster.placement, p);
+    for (Point2& p : places) p = stored_place(raster.store.schema(), p);
   }
   stream::Box3 around;
   for (const Point2& p : places) around.include(stream::Point3{p[0], p[1], 0.0});

@@ -50,7 +50,7 @@ void take(std::span<const double> places, const Part& part, std::vector<double>&
 }  // namespace
 
 bool RasterTileSurface::grid(const GeographicBox& box, SurfaceGrid& out) {
-  const LatticeWindow window = window_around(raster_, box);
+  const LatticeWindow window = raster_.window_around(box);
   out.columns = static_cast<std::size_t>(window.columns);
   out.longitude.resize(window.size());
   out.latitude.resize(window.size());
@@ -62,7 +62,7 @@ bool RasterTileSurface::grid(const GeographicBox& box, SurfaceGrid& out) {
                            static_cast<std::size_t>(window.rows), out.longitude, out.latitude);
   const double metres = raster_.vertical.metres_per_unit();
   for (std::size_t i = 0; i < out.height.size(); ++i) {
-    const double longitude = wrapped(out.longitude[i]), latitude = out.latitude[i];
+    const double longitude = wrapped_longitude(out.longitude[i]), latitude = out.latitude[i];
     out.longitude[i] = longitude;
     // Comparisons that NaN fails: it is outside.
     const bool inside = longitude >= box.west && longitude <= box.east && latitude >= box.south &&
@@ -97,7 +97,7 @@ void RasterTileSurface::samples(const GeographicBox& box, SurfaceSamples& out) {
 bool RasterTileSurface::rows(const GeographicBox& box, SurfaceRows& out) {
   if (!raster_.upright) return false;
   out = {};
-  const LatticeWindow window = window_around(raster_, box);
+  const LatticeWindow window = raster_.window_around(box);
   if (window.size() == 0) return true;
   const auto columns = static_cast<std::size_t>(window.columns);
   const auto rows = static_cast<std::size_t>(window.rows);
@@ -106,7 +106,7 @@ bool RasterTileSurface::rows(const GeographicBox& box, SurfaceRows& out) {
                            std::span(other).first(columns));
   raster_.geography.window(window.column, window.row, 1, rows, std::span(other).first(rows),
                            latitude);
-  for (double& place : longitude) place = wrapped(place);
+  for (double& place : longitude) place = wrapped_longitude(place);
   const auto across = part_between(longitude, box.west, box.east);
   const auto down = part_between(latitude, box.south, box.north);
   if (!across || !down) return false;

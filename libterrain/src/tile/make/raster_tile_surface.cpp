@@ -27,7 +27,7 @@ RasterTileSurface::View RasterTileSurface::view(const LatticeWindow& window) {
 }
 
 void RasterTileSurface::expect(const GeographicBox& box) {
-  LatticeWindow window = window_around(raster_, box);
+  LatticeWindow window = raster_.window_around(box);
   if (window.size() == 0) return;
   // What lies around places on the box's sides, outside the raster too.
   window = {window.column - 2, window.row - 2, window.columns + 4, window.rows + 4};
@@ -35,7 +35,7 @@ void RasterTileSurface::expect(const GeographicBox& box) {
 }
 
 std::optional<HeightRange> RasterTileSurface::range(const GeographicBox& box) {
-  const LatticeWindow window = window_around(raster_, box);
+  const LatticeWindow window = raster_.window_around(box);
   if (window.size() == 0) return std::nullopt;
   const auto range = raster_.blocks.range(window);
   if (!range) return std::nullopt;
@@ -56,17 +56,14 @@ std::optional<HeightRange> RasterTileSurface::range(const GeographicBox& box) {
   if (const auto block = raster_.blocks.some_block_within(window)) {
     std::array<Point2, 4> corners;
     for (unsigned k = 0; k < 4; ++k) {
-      corners[k] =
-          world_place(raster_.placement,
-                      static_cast<double>(block->column + ((k & 1) != 0 ? block->columns - 1 : 0)),
-                      static_cast<double>(block->row + ((k & 2) != 0 ? block->rows - 1 : 0)));
+      corners[k] = {static_cast<double>(block->column + ((k & 1) != 0 ? block->columns - 1 : 0)),
+                    static_cast<double>(block->row + ((k & 2) != 0 ? block->rows - 1 : 0))};
     }
-    raster_.crs.to_geographic(corners);
-    const double margin = raster_.crs.is_geographic() ? 0.0 : raster_.spacing;
+    raster_.places.to_geographic(corners);
+    const double margin = raster_.places.crs().is_geographic() ? 0.0 : raster_.spacing;
     out.certain = std::all_of(corners.begin(), corners.end(), [&](const Point2& p) {
-      const double longitude = wrapped(p[0]);
-      return longitude >= box.west + margin && longitude <= box.east - margin &&
-             p[1] >= box.south + margin && p[1] <= box.north - margin;
+      return p[0] >= box.west + margin && p[0] <= box.east - margin && p[1] >= box.south + margin &&
+             p[1] <= box.north - margin;
     });
   }
   return out;
@@ -78,18 +75,11 @@ void RasterTileSurface::visit_places(std::span<const double> longitude,
   constexpr std::int64_t kBlock = 128;           // places are taken block by block of the lattice
   constexpr std::int64_t kMostInWindow = 32768;  // of a window that is read for a run of them
   std::vector<Point2> places(longitude.size());
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    // One of the two numbers that the line of 180 degrees has: tiles on both sides ask for it.
-    const double turned = wrapped(longitude[i]);
-    places[i] = {turned == 180.0 ? -180.0 : turned, std::clamp(latitude[i], -90.0, 90.0)};
-  }
-  find_on_lattice(raster_, places);
-  const stream::StoreSchema& schema = raster_.store.schema();
-  const double last_column = static_cast<double>(schema.columns - 1);
-  const double last_row = static_cast<double>(schema.rows - 1);
+  for (std::size_t i = 0; i < places.size(); ++i) places[i] = {longitude[i], latitude[i]};
+  raster_.places.to_stored(places);
+  const auto [last_column, last_row] = raster_.places.stored_bounds().max;
+  // What is far off is asked at the raster's border: it is filled there.
   for (Point2& p : places) {
-    // What has no place, or one far off, is asked at the raster's border: it is filled there.
-    if (!std::isfinite(p[0]) || !std::isfinite(p[1])) p = {-1.0, -1.0};
     p = {std::clamp(p[0], -1.0, last_column + 1.0), std::clamp(p[1], -1.0, last_row + 1.0)};
   }
   std::vector<std::uint32_t> order(places.size());

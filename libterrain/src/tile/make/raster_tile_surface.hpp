@@ -21,7 +21,7 @@ class RasterTileSurface final : public TileSurface {
  public:
   explicit RasterTileSurface(const TiledRaster& raster);
 
-  [[nodiscard]] GeographicBox bounds() const override { return raster_.bounds; }
+  [[nodiscard]] GeographicBox bounds() const override { return raster_.places.bounds(); }
   [[nodiscard]] double spacing() const override { return raster_.spacing; }
   void expect(const GeographicBox& box) override;
   void samples(const GeographicBox& box, SurfaceSamples& out) override;

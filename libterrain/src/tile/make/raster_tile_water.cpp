@@ -47,8 +47,6 @@ class WaterMask {
   void fill_exactly(const WaterPart& part);
 
  private:
-  /// On the lattice; what has no place is none.
-  void place(std::span<Point2> places) const;
   /// Whether all cells whose places lie between these are the same; sets them then.
   bool is_uniform(const WaterPart& part, std::span<const Point2> nodes);
   /// The samples nearest to the places of a part, row by row.
@@ -67,15 +65,6 @@ class WaterMask {
   std::size_t columns_;
   std::span<std::uint8_t> out_;
 };
-
-template <class View>
-void WaterMask<View>::place(std::span<Point2> places) const {
-  for (Point2& p : places) {
-    const double turned = wrapped(p[0]);
-    p = {turned == 180.0 ? -180.0 : turned, std::clamp(p[1], -90.0, 90.0)};
-  }
-  find_on_lattice(raster_, places);
-}
 
 template <class View>
 bool WaterMask<View>::is_uniform(const WaterPart& part, std::span<const Point2> nodes) {
@@ -167,8 +156,7 @@ void WaterMask<View>::look(const WaterPart& part, std::span<Point2> places) {
   const double right = static_cast<double>(schema.columns);
   const double bottom = static_cast<double>(schema.rows);
   for (Point2& p : places) {
-    // What has no place, or one far off, is asked at the raster's border, where nothing is.
-    if (!std::isfinite(p[0]) || !std::isfinite(p[1])) p = {-1.0, -1.0};
+    // What is far off is asked at the raster's border, where nothing is.
     p = {std::clamp(std::floor(p[0] + 0.5), -1.0, right),
          std::clamp(std::floor(p[1] + 0.5), -1.0, bottom)};
   }
@@ -184,7 +172,7 @@ void WaterMask<View>::fill_exactly(const WaterPart& part) {
       places.push_back({longitude_[row * columns_ + column], latitude_[row * columns_ + column]});
     }
   }
-  place(places);
+  raster_.places.to_stored(places);
   look(part, places);
 }
 
@@ -204,7 +192,7 @@ void WaterMask<View>::fill(const WaterPart& part) {
   for (std::size_t k = 0; k < 4; ++k) {
     places[9 + k] = {west + worst((k & 1) != 0) * width, north + worst((k & 2) != 0) * height};
   }
-  place(places);
+  raster_.places.to_stored(places);
   std::array<double, 9> x{}, y{};
   for (std::size_t k = 0; k < 9; ++k) {
     x[k] = places[k][0];

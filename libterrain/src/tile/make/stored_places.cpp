@@ -20,11 +20,11 @@ constexpr double kFarPlace = std::numeric_limits<double>::infinity();
 /// of datum in between: much more than it is.
 constexpr double kMarginMetres = 0.02;
 constexpr double kMarginDegrees = 2e-7;
-/// Steps across a box in which its image is looked at, and across a small one around its border.
+/// Steps across a box in which its image is looked at.
 constexpr unsigned kPlaceSteps = 24;
-constexpr unsigned kSmallSteps = 8;
-/// What bulges between the places looked at goes with the square of the steps' length: twice that.
-constexpr double share_of(unsigned steps) { return 2.0 / (steps * steps); }
+/// Across boxes up to this size (degrees) fewer will do: second differences tell how much bulges.
+constexpr double kSmall = 1.0;
+constexpr unsigned kSmallSteps = 6;
 constexpr unsigned kBoundsSteps = 64;
 
 void include(StoredBox& box, const Point2& p) {
@@ -40,6 +40,50 @@ Point2 between(const Point2& low, const Point2& high, unsigned i, unsigned j, un
   return {low[0] + (high[0] - low[0]) * i / steps, low[1] + (high[1] - low[1]) * j / steps};
 }
 
+/// Places of a box, by rows, a number of steps apart each way.
+struct PlaceGrid {
+  Point2 low, high;
+  std::array<unsigned, 2> steps;
+
+  [[nodiscard]] std::vector<Point2> places() const {
+    std::vector<Point2> places;
+    for (unsigned j = 0; j <= steps[1]; ++j) {
+      for (unsigned i = 0; i <= steps[0]; ++i) {
+        places.push_back({low[0] + (high[0] - low[0]) * i / steps[0],
+                          low[1] + (high[1] - low[1]) * j / steps[1]});
+      }
+    }
+    return places;
+  }
+  /// The largest of a coordinate of what became of the places; infinite where one has none. Between
+  /// places a quadratic function is an eighth of it off a straight line.
+  [[nodiscard]] double second_difference(std::span<const Point2> made, std::size_t axis) const {
+    double largest = 0.0;
+    const auto look = [&](std::size_t at, std::size_t step) {
+      const double own =
+          std::abs(made[at - step][axis] - 2.0 * made[at][axis] + made[at + step][axis]);
+      largest = own <= largest ? largest : own;
+      if (std::isnan(own)) largest = kFarPlace;
+    };
+    for (std::size_t j = 0; j <= steps[1]; ++j) {
+      for (std::size_t i = 0; i <= steps[0]; ++i) {
+        const std::size_t at = j * (steps[0] + 1) + i;
+        if (i > 0 && i < steps[0]) look(at, 1);
+        if (j > 0 && j < steps[1]) look(at, steps[0] + 1);
+      }
+    }
+    return largest;
+  }
+};
+
+/// Bounds of the points; of a raster all of its lattice, for it is filled where it has no data.
+StoredBox stored_box(const stream::Store& store) {
+  const stream::StoreSchema& schema = store.schema();
+  if (!schema.grid) return flat(store.bounds());
+  return {{0.0, 0.0},
+          {static_cast<double>(schema.columns - 1), static_cast<double>(schema.rows - 1)}};
+}
+
 }  // namespace
 
 double wrapped_longitude(double longitude) {
@@ -48,9 +92,7 @@ double wrapped_longitude(double longitude) {
 }
 
 StoredPlaces::StoredPlaces(const stream::Store& store, CoordinateSystem system)
-    : crs_(std::move(system)), placement_(store.schema()) {
-  const stream::Box3& box = store.bounds();
-  stored_ = {{box.min[0], box.min[1]}, {box.max[0], box.max[1]}};
+    : crs_(std::move(system)), placement_(store.schema()), stored_(stored_box(store)) {
   const bool degrees = crs_.is_geographic();
   const double margin = degrees ? kMarginDegrees : kMarginMetres / crs_.metres_per_unit();
   const std::array<double, 6>& xy = placement_.world.xy;
@@ -150,10 +192,9 @@ std::vector<StoredBox> StoredPlaces::windows(const GeographicBox& box) const {
   const Point2 high{std::min(box.east, bounds_.east), std::min(box.north, bounds_.north)};
   std::vector<StoredBox> windows;
   if (!(low[0] <= high[0] && low[1] <= high[1])) return windows;
-  const auto add = [&](StoredBox around, double share) {
+  const auto add = [&](StoredBox around, const Point2& bulge) {
     for (std::size_t axis = 0; axis < 2; ++axis) {
-      // What bulges between the places looked at.
-      const double margin = margin_[axis] + share * (around.max[axis] - around.min[axis]);
+      const double margin = margin_[axis] + bulge[axis];
       around.min[axis] = std::max(around.min[axis] - margin, stored_.min[axis]);
       around.max[axis] = std::min(around.max[axis] + margin, stored_.max[axis]);
       if (!(around.min[axis] <= around.max[axis])) return;
@@ -171,24 +212,35 @@ std::vector<StoredBox> StoredPlaces::windows(const GeographicBox& box) const {
       for (const Point2& p : places) {
         include(around, stored_place(placement_, {p[0] + turn_ * turn, p[1]}));
       }
-      add(around, 0.0);
+      add(around, {0.0, 0.0});
     }
     return windows;
   }
-  // The outline of what is small says all: at a pole, too, it is a narrow wedge.
-  const bool small = high[0] - low[0] < 2.0 && high[1] - low[1] < 2.0;
-  const unsigned steps = small ? kSmallSteps : kPlaceSteps;
-  std::vector<Point2> places;
-  for (unsigned j = 0; j <= steps; ++j) {
-    const unsigned skip = small && j != 0 && j != steps ? steps : 1;
-    for (unsigned i = 0; i <= steps; i += skip) places.push_back(between(low, high, i, j, steps));
-  }
+  const Point2 size{high[0] - low[0], high[1] - low[1]};
+  const double longest = std::max(size[0], size[1]);
+  const bool small = longest <= kSmall;
+  // Steps of about one length, and two at least, between which there is a second difference.
+  const auto steps = [&](double length) {
+    if (length == 0.0) return 1U;
+    const double share = std::ceil((small ? kSmallSteps : kPlaceSteps) * length / longest);
+    return std::max(2U, static_cast<unsigned>(share));
+  };
+  const PlaceGrid grid{low, high, {steps(size[0]), steps(size[1])}};
+  std::vector<Point2> places = grid.places();
   crs_.from_geographic(places);
   StoredBox around = nothing();
-  for (const Point2& p : places) {
-    if (std::isfinite(p[0]) && std::isfinite(p[1])) include(around, stored_place(placement_, p));
+  for (Point2& p : places) {
+    p = stored_place(placement_, p);
+    if (std::isfinite(p[0]) && std::isfinite(p[1])) include(around, p);
   }
-  add(around, small ? share_of(kSmallSteps) : 1.0 / kPlaceSteps);
+  if (!(around.min[0] <= around.max[0])) return windows;
+  // What bulges between the places looked at.
+  Point2 bulge;
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    bulge[axis] = small ? 2.0 * grid.second_difference(places, axis)
+                        : (around.max[axis] - around.min[axis]) / kPlaceSteps;
+  }
+  add(around, bulge);
   return windows;
 }
 

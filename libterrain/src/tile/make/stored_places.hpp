@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <span>
+#include <string>
 #include <vector>
 
 #include <terrace/stream/store.hpp>
@@ -15,17 +17,22 @@ namespace terrace::terrain {
 /// Longitudes in [-180, 180], whatever turn they were in.
 double wrapped_longitude(double longitude);
 
-/// Where a store of points lies on the globe. Const members may be called by several threads at
-/// once.
+/// Where a store lies on the globe: its points, or the whole lattice of a raster. Const members may
+/// be called by several threads at once.
 class StoredPlaces {
  public:
   /// Throws: stream::Error if no place of the store can be told on the globe.
   StoredPlaces(const stream::Store& store, CoordinateSystem system);
 
-  /// Around all points of the store, a little larger where it is projected.
-  [[nodiscard]] const GeographicBox& bounds() const { return bounds_; }
-  /// The bounds of all points, in stored coordinates.
+  [[nodiscard]] const CoordinateSystem& crs() const { return crs_; }
+  /// The bounds of all points, or of the lattice, in stored coordinates.
   [[nodiscard]] const StoredBox& stored_bounds() const { return stored_; }
+  /// Around all of them on the globe, a little larger where the store is projected.
+  [[nodiscard]] const GeographicBox& bounds() const { return bounds_; }
+  /// West and east end of a store in degrees, in its own unit and turn: may go beyond 180 degrees.
+  [[nodiscard]] std::array<double, 2> longitudes() const {
+    return {first_longitude_, last_longitude_};
+  }
 
   /// The boxes of stored coordinates outside of which no point of a geographic box lies: none if it
   /// does not meet bounds(). Two, apart from each other, where a store in degrees goes around the

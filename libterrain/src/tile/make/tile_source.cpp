@@ -84,10 +84,13 @@ std::unique_ptr<TileSource> open_tile_source(const stream::Store& given,
   if (!heights.note().empty()) context.say(heights.note());
   if (!system.wgs84_note().empty()) context.say(system.wgs84_note());
   const std::optional<double> flat = flat_height(store, request, heights.metres_per_unit());
+  const auto with_options = [&](TiledStore& tiled) {
+    tiled.flat_fill = flat;
+    tiled.water_height = request.water_height;
+  };
   if (store.schema().grid) {
     auto raster = std::make_unique<TiledRaster>(store, system, std::move(heights));
-    raster->flat_fill = flat;
-    raster->water_height = request.water_height;
+    with_options(*raster);
     return std::make_unique<SourceOf<TiledRaster, RasterTileSurface>>(std::move(raster),
                                                                       resources.threads);
   }
@@ -95,8 +98,7 @@ std::unique_ptr<TileSource> open_tile_source(const stream::Store& given,
       std::max(kLeastWindowBytes, resources.memory_bytes / resources.threads / 2);
   auto cloud = std::make_unique<TiledCloud>(store, system, std::move(heights), window,
                                             resources.memory_bytes / 2, resources.threads);
-  cloud->flat_fill = flat;
-  cloud->water_height = request.water_height;
+  with_options(*cloud);
   return std::make_unique<SourceOf<TiledCloud, PointTileSurface>>(std::move(cloud),
                                                                   resources.threads);
 }

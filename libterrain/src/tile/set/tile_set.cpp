@@ -16,6 +16,7 @@
 #include "base/units.hpp"
 #include "terrace/terrain/error.hpp"
 #include "terrace/terrain/tiles.hpp"
+#include "tile/format/tile_layer.hpp"
 #include "tile/make/tile_source.hpp"
 #include "tile/set/tile_file.hpp"
 #include "tile/set/tile_inputs.hpp"
@@ -63,7 +64,7 @@ std::string fingerprint_of(const stream::Store& store, const TileSetOptions& opt
   return text;
 }
 
-/// A finished set is gone on with only to mend it.
+/// A folder that holds a finished set may only be written again with the same inputs and options.
 void refuse_another(const std::string& layer_path, const std::string& fingerprint) {
   if (!fs::exists(layer_path) || read_layer(layer_path).fingerprint == fingerprint) return;
   throw stream::Error(

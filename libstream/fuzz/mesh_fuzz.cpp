@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fuzz_points.hpp"
+#include "terrace/stream/mesh_reader.hpp"
+
+/// Mesh files, PLY and OBJ: refused, or triangles of vertices that are there, with a whole record
+/// for each vertex, and no more of them than the file can hold.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace terrace::stream;
+  const MemoryFile file(data, size);
+  for (const char* format : {"ply", "obj"}) {
+    try {
+      const auto mesh = read_mesh(file.name(), {.format = format});
+      if (!mesh) continue;
+      const std::size_t vertices = mesh->vertices.size();
+      require(mesh->vertices.payload.size() == vertices * mesh->info.payload_size(), "records");
+      for (const TriangleIndices& triangle : mesh->triangles) {
+        for (const std::uint32_t v : triangle) require(v < vertices, "corners are vertices");
+      }
+      require(vertices <= size && mesh->triangles.size() <= size, "no more than the file can hold");
+    } catch (const Error& error) {
+      require(!error.parts().cause.empty(), "a cause");
+    }
+  }
+  return 0;
+}

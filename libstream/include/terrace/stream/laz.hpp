@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+/// The codec of LAZ: LAS point records, packed as LAS stores them, to chunks of LASzip's coding and
+/// back, bit for bit. It knows bytes only; headers and files are the reader's and writer's.
+///
+/// A LAZ file (point format byte + 128) has a LASzip VLR among its VLRs. Where the records of a LAS
+/// file begin there are, but for Compressor::pointwise, 8 bytes with the chunk table's position in
+/// the file (int64), then the chunks without gaps, then the table. A position of -1 stands for the
+/// last 8 bytes of the file, which then have it; the field's own position means that the writer
+/// stopped before it wrote a table.
+///
+/// Source: M. Isenburg, LASzip: lossless compression of LiDAR data, PE&RS 79(2), 2013; A. Said,
+/// Introduction to arithmetic coding, HPL-2004-76.
+
+namespace terrace::stream::laz {
+
+/// Thrown for bytes that LASzip cannot have written.
+class Corrupt : public std::runtime_error {
+ public:
+  Corrupt(const std::string& cause, std::uint64_t offset)
+      : std::runtime_error(cause), offset_(offset) {}
+
+  /// Where in the bytes given (a chunk, a table, a VLR's payload) this was noticed.
+  [[nodiscard]] std::uint64_t offset() const noexcept { return offset_; }
+
+ private:
+  std::uint64_t offset_;
+};
+
+enum class Compressor : std::uint16_t {
+  none = 0,               ///< records as in LAS
+  pointwise = 1,          ///< all points in one chunk, no chunk table
+  pointwise_chunked = 2,  ///< point formats 0 to 5
+  layered = 3,            ///< point formats 6 to 10: each attribute is a byte string of its own
+};
+
+/// A part of the point record that is coded by itself.
+enum class ItemType : std::uint16_t {
+  byte = 0,
+  point10 = 6,
+  gps_time11 = 7,
+  rgb12 = 8,
+  wave_packet13 = 9,
+  point14 = 10,
+  rgb14 = 11,
+  rgb_nir14 = 12,
+  wave_packet14 = 13,
+  byte14 = 14,
+};
+
+struct Item {
+  ItemType type = ItemType::byte;
+  std::uint16_t size = 0;  ///< bytes of the record
+  std::uint16_t version = 0;
+
+  friend bool operator==(const Item&, const Item&) = default;
+};
+
+/// The LASzip VLR: how the points of a file are coded.
+struct Vlr {
+  static constexpr std::string_view kUserId = "laszip encoded";
+  static constexpr std::uint16_t kRecordId = 22204;
+  /// As chunk_size: the table has the points of each chunk.
+  static constexpr std::uint32_t kVariable = 0xffffffff;
+  /// In options: format 6 to 10 kept as format 1 to 5 with extra bytes.
+  static constexpr std::uint32_t kCompatibility = 1;
+
+  Compressor compressor = Compressor::layered;
+  std::uint32_t options = 0;
+  std::uint32_t chunk_size = 50'000;  ///< points per chunk, the last one aside
+  std::vector<Item> items;            ///< in the order of the record
+
+  /// How LASzip codes a point format by default. Throws: std::invalid_argument unless point_format
+  /// <= 10 and record_length is from the format's to 65,535 (more than the format's: extra bytes).
+  static Vlr of(unsigned point_format, std::size_t record_length,
+                std::uint32_t chunk_size = 50'000);
+  /// Reads a VLR's payload (what follows its header of 54 bytes). Throws: Corrupt unless it is one
+  /// that this codec knows and its items are those of the LAS header's point format (0 to 10, bits
+  /// 6 and 7 removed) and record length.
+  static Vlr parse(std::span<const std::byte> payload, unsigned point_format,
+                   std::size_t record_length);
+
+  /// The payload.
+  [[nodiscard]] std::vector<std::byte> serialise() const;
+  [[nodiscard]] std::size_t record_length() const;
+};
+
+/// A run of points that is coded independently of others.
+struct Chunk {
+  std::uint64_t offset = 0;  ///< of its first byte, from the first chunk's
+  std::uint64_t bytes = 0;
+  std::uint64_t points = 0;
+
+  friend bool operator==(const Chunk&, const Chunk&) = default;
+};
+
+/// Reads a chunk table from the bytes at its position (more may follow it). points: how many the
+/// LAS header says; bytes: how many lie between the first chunk and the table. Entries without
+/// points, which some writers append, are left out. Memory: 24 bytes per chunk.
+/// Throws: Corrupt, also unless the chunks add up to exactly these points and bytes.
+std::vector<Chunk> read_chunk_table(std::span<const std::byte> table, const Vlr& vlr,
+                                    std::uint64_t points, std::uint64_t bytes);
+
+/// The bytes of a chunk table. With vlr.chunk_size other than kVariable all chunks but the last
+/// must have so many points. Throws: std::invalid_argument if they do not, or for more than 2^32 -
+/// 1 chunks, or points or bytes in one.
+std::vector<std::byte> write_chunk_table(std::span<const Chunk> chunks, const Vlr& vlr);
+
+/// How many bytes of its beginning layered_chunk() needs. Layered chunks tell their own size, so
+/// they can be read without a table.
+std::size_t layered_head_size(const Vlr& vlr);
+
+/// The points and bytes of the layered chunk that begins with `head`; its offset is 0. The numbers
+/// are not checked against anything. Throws: Corrupt if `head` is too short.
+Chunk layered_chunk(const Vlr& vlr, std::span<const std::byte> head);
+
+/// Attributes of layered chunks, as bits of a mask. X, Y, the returns and the scanner channel are
+/// always decoded; an attribute left out has the value of the chunk's first point in all records.
+/// Chunks that are not layered are decoded whole.
+enum Attributes : std::uint32_t {
+  kZ = 1u << 0,
+  kClassification = 1u << 1,
+  kFlags = 1u << 2,  ///< classification flags, scan direction, edge of flight line
+  kIntensity = 1u << 3,
+  kScanAngle = 1u << 4,
+  kUserData = 1u << 5,
+  kPointSource = 1u << 6,
+  kGpsTime = 1u << 7,
+  kRgb = 1u << 8,
+  kNir = 1u << 9,
+  kWavePacket = 1u << 10,
+  kExtraByte0 = 1u << 16,  ///< shifted left by i: extra byte i; the last bit for all from 15 on
+  kAllAttributes = 0xffffffff,
+};
+
+/// Decodes chunks one after the other, in any order; each thread takes its own. Time O(points).
+/// Memory: the models that a chunk uses, 0.2 to 2.5 MiB and 1 to 5 KiB per extra byte.
+class Decoder {
+ public:
+  /// Throws: std::invalid_argument for Compressor::none and for items that Vlr::parse() refuses.
+  explicit Decoder(const Vlr& vlr, std::uint32_t attributes = kAllAttributes);
+  ~Decoder();
+  Decoder(Decoder&&) noexcept;
+  Decoder& operator=(Decoder&&) noexcept;
+
+  /// Decodes a whole chunk of records.size() / record_length points. Throws: Corrupt, also unless
+  /// the chunk's last byte is used up by its last point; `records` then hold anything.
+  void decode_chunk(std::span<const std::byte> chunk, std::span<std::byte> records);
+
+  /// How far a step has come.
+  struct Step {
+    std::size_t bytes = 0;   ///< used up, not to be given again
+    std::size_t points = 0;  ///< decoded
+  };
+  /// Begins a chunk of so many points, to be decoded by step(): a chunk of which not all points are
+  /// wanted at once, or whose end is not known, as when it comes from a pipe.
+  void start(std::uint64_t points);
+  /// Decodes as many of the chunk's points as are left, `records` has room for and `bytes` suffice
+  /// for. bytes: what follows what was used up before; of a layered chunk all of it, where it
+  /// was at the first step, until its last point uses it up. `last`: there are no more; without it
+  /// pointwise chunks leave a point to the next step if fewer than 512 bytes + 4 per extra byte are
+  /// left. Throws: Corrupt, with the offset in the chunk.
+  Step step(std::span<const std::byte> bytes, bool last, std::span<std::byte> records);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Encodes chunks; each thread takes its own. Memory as for decoding, and of a layered chunk the
+/// coded bytes once more.
+class Encoder {
+ public:
+  /// Throws: std::invalid_argument as Decoder does.
+  explicit Encoder(const Vlr& vlr);
+  ~Encoder();
+  Encoder(Encoder&&) noexcept;
+  Encoder& operator=(Encoder&&) noexcept;
+
+  /// Appends the chunk of `records`, one point or more, to `out`. The bytes are those that LASzip
+  /// writes. Throws: std::invalid_argument if the bytes of records are no multiple of the record
+  /// length, 0, or more than 2^32 - 1 points.
+  void encode_chunk(std::span<const std::byte> records, std::vector<std::byte>& out);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace terrace::stream::laz

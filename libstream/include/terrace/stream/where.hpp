@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "terrace/stream/schema.hpp"
+
+namespace terrace::stream {
+
+/// A condition on points, such as `classification == 2 && return_number == last`.
+///
+/// Operands are numbers, attributes by name (in double quotes where the name is no plain word), x,
+/// y and z in the CRS, `first` (1) and `last` (the attribute number_of_returns). Operators are, the
+/// tightest first: - and !; * and /; + and -; <, <=, > and >=; == and !=; &&; ||; with parentheses
+/// as usual, and `not`, `and`, `or` as words. All is computed in doubles, attributes with their
+/// scale and offset; comparisons give 1 or 0, and a point meets the condition if its value is a
+/// number other than 0.
+///
+/// Const members may be called by several threads at once.
+class Where {
+ public:
+  /// text: up to 4096 characters. Throws: Error that names the character for what is no condition
+  /// on points of this schema.
+  Where(const std::string& text, const Schema& schema);
+
+  [[nodiscard]] const std::string& text() const { return text_; }
+
+  /// Sets matches[i] to 1 for points that meet the condition, else to 0. positions: in stored
+  /// coordinates; records: packed, one for each. About 1 ns per operand and point.
+  void test(std::span<const Point3> positions, std::span<const std::byte> records,
+            std::span<std::uint8_t> matches) const;
+
+ private:
+  enum class Operation : std::uint8_t;
+  struct Step {
+    Operation operation{};
+    double number = 0.0;    ///< of a constant
+    std::size_t index = 0;  ///< of an axis or an attribute
+  };
+  class Parser;
+
+  std::string text_;
+  Schema schema_;
+  std::vector<Step> steps_;  ///< in postfix order
+  std::size_t depth_ = 0;    ///< operands at most at a time
+};
+
+}  // namespace terrace::stream

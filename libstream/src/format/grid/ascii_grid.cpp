@@ -1,0 +1,334 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "format/grid/ascii_grid.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+#include <span>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "format/formats.hpp"
+#include "format/grid/grid_header.hpp"
+#include "format/grid/plain_grid.hpp"
+#include "format/raster_points.hpp"
+#include "io/number.hpp"
+#include "io/spool.hpp"
+#include "io/text.hpp"
+#include "raster/nodata.hpp"
+#include "terrace/stream/error.hpp"
+#include "terrace/stream/input.hpp"
+
+namespace terrace::stream {
+namespace {
+
+constexpr std::string_view kFormat = "ascii-grid";
+constexpr std::array<std::string_view, 9> kKeys{
+    "ncols", "nrows", "xllcorner", "xllcenter", "yllcorner", "yllcenter", "cellsize", "dx", "dy"};
+
+bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
+
+bool is_key(std::string_view word) {
+  return std::any_of(kKeys.begin(), kKeys.end(), [&](std::string_view key) {
+    return std::equal(word.begin(), word.end(), key.begin(), key.end(),
+                      [](char a, char b) { return (a >= 'A' && a <= 'Z' ? a + 32 : a) == b; });
+  });
+}
+
+/// The words of a text between white space, whatever the lengths of its lines.
+class Words {
+ public:
+  explicit Words(Input& input) : input_(input) {}
+
+  /// The next word, valid until the next call; empty at the end. Throws: Error if it is longer than
+  /// any number.
+  std::string_view next() {
+    for (;;) {
+      while (at_ != end_ && is_white_space(*at_)) ++at_;
+      const char* const begin = at_;
+      while (at_ != end_ && !is_white_space(*at_)) ++at_;
+      // A word at the end of the window may go on behind it.
+      if (at_ != end_ || ended_) return {begin, static_cast<std::size_t>(at_ - begin)};
+      at_ = begin;
+      more();
+    }
+  }
+
+ private:
+  static constexpr std::size_t kLongest = 1024;
+
+  void more() {
+    const auto left = static_cast<std::size_t>(end_ - at_);
+    if (left > kLongest) {
+      throw Error({.file = input_.name(),
+                   .where = "byte " + std::to_string(input_.offset()),
+                   .cause = "a word of more than 1,024 characters is no number",
+                   .remedy = "this is no ASCII grid, or it is damaged"});
+    }
+    input_.consume(static_cast<std::size_t>(at_ - begin_));
+    const std::string_view window = input_.fill(left + 1);
+    ended_ = window.size() == left;
+    begin_ = at_ = window.data();
+    end_ = at_ + window.size();
+  }
+
+  Input& input_;
+  const char* begin_ = nullptr;  // of the window
+  const char* at_ = nullptr;
+  const char* end_ = nullptr;
+  bool ended_ = false;
+};
+
+/// A number with a decimal point or, as some countries write it, a comma.
+const char* parse_sample(std::string_view word, double& value) {
+  const char* const end = word.data() + word.size();
+  const char* const rest = parse_real(word.data(), end, value);
+  if (rest == end || word.size() > 64 || word.find(',') == std::string_view::npos) return rest;
+  char copy[64];
+  std::replace_copy(word.begin(), word.end(), copy, ',', '.');
+  const char* const copied = parse_real(copy, copy + word.size(), value);
+  return copied == nullptr ? nullptr : word.data() + (copied - copy);
+}
+
+/// An ASCII grid that is being read.
+class AsciiReader {
+ public:
+  AsciiReader(const std::string& file, const std::stop_token& stop)
+      : input_(file, stop), stop_(stop), words_(input_), header_(input_.name()) {
+    constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+    word_ = words_.next();
+    if (word_.starts_with(kByteOrderMark)) word_.remove_prefix(kByteOrderMark.size());
+    for (std::string key; is_keyword(word_); word_ = words_.next()) {
+      key = word_;
+      header_.set(key, words_.next());
+    }
+    columns_ = header_.count("ncols");
+    rows_ = header_.count("nrows");
+    if (header_.has("byteorder")) {
+      header_.fail({}, "is the header of a binary grid", "name the .flt or .bil beside it");
+    }
+    if (!header_.has("cellsize") && !(header_.has("dx") && header_.has("dy"))) {
+      header_.fail("cellsize", "is missing");
+    }
+    static_cast<void>(grid(ScalarType::f64));  // checks columns and rows
+    // Each number has a digit and something between it and the next.
+    if (input_.size() && columns_ * rows_ > *input_.size() / 2 + 1) {
+      header_.fail({},
+                   "promises " + std::to_string(columns_) + " x " + std::to_string(rows_) +
+                       " numbers, more than fit into " + std::to_string(*input_.size()) + " bytes",
+                   "fetch the file again; it is cut short");
+    }
+  }
+
+  /// A description whose file is `file`, as the caller named it.
+  [[nodiscard]] PlainGrid grid(ScalarType type) const {
+    PlainGrid grid = plain_grid(std::string(kFormat), input_.name(), columns_, rows_, type);
+    grid.info.nodata = nodata().value;
+    grid.info.world = header_.world(rows_, grid.info.comments);
+    return grid;
+  }
+  [[nodiscard]] NodataRule nodata() const {
+    NodataRule rule = NodataRule::parse(header_.text("nodata_value"), ScalarType::f64);
+    // The lowest float stands for no data where programs compute with floats; with how many digits
+    // it is written may differ between head and cells.
+    constexpr double kNoHeight = 1e38;
+    if (rule.value && *rule.value < -kNoHeight) rule.high = -kNoHeight;
+    if (rule.value && *rule.value > kNoHeight) rule.low = kNoHeight;
+    return rule;
+  }
+  [[nodiscard]] const std::string& name() const { return input_.name(); }
+
+  /// Gives each number to take(double) until that returns false.
+  template <class Take>
+  void read(Take&& take) {
+    const std::uint64_t cells = columns_ * rows_;
+    for (std::uint64_t cell = 0; cell < cells; ++cell, word_ = words_.next()) {
+      if (cell % kCheckEvery == 0 && stop_.stop_requested()) throw Stopped();
+      double value = 0;
+      if (word_.empty()) {
+        header_.fail({},
+                     "holds " + std::to_string(cell) + " numbers where " +
+                         std::to_string(columns_) + " x " + std::to_string(rows_) + " are due",
+                     "fetch the file again; it is cut short");
+      }
+      if (parse_sample(word_, value) != word_.data() + word_.size()) {
+        header_.fail("row " + std::to_string(cell / columns_) + ", column " +
+                         std::to_string(cell % columns_),
+                     in_quotes(word_) + " is no number", "correct it");
+      }
+      if (!take(value)) return;
+    }
+    if (!word_.empty()) {
+      header_.fail({},
+                   "holds more numbers than the " + std::to_string(columns_) + " x " +
+                       std::to_string(rows_) + " that its head promises",
+                   "correct the head");
+    }
+  }
+
+ private:
+  static bool is_keyword(std::string_view word) {
+    double number = 0;  // "nan" and "inf" are numbers
+    return !word.empty() && is_letter(word.front()) &&
+           parse_sample(word, number) != word.data() + word.size();
+  }
+
+  static constexpr std::uint64_t kCheckEvery = 1u << 16;
+
+  Input input_;
+  std::stop_token stop_;
+  Words words_;
+  GridHeader header_;
+  std::string_view word_;
+  std::uint64_t columns_ = 0, rows_ = 0;
+};
+
+bool cell_has_data(double value, const NodataRule& nodata) {
+  return std::isfinite(value) && (value < nodata.low || value > nodata.high);
+}
+
+bool is_exact_float(double value) {
+  return std::abs(value) <= std::numeric_limits<float>::max() &&
+         static_cast<double>(static_cast<float>(value)) == value;
+}
+
+/// Samples on their way to a temporary file, as floats as long as these do; NaN where there is no
+/// data.
+class SampleSpool {
+ public:
+  SampleSpool(const std::string& name, ScalarType type)
+      : spool_(std::make_unique<Spool>(name)), type_(type) {}
+
+  void add_void() {
+    type_ == ScalarType::f32 ? put(std::numeric_limits<float>::quiet_NaN())
+                             : put(std::numeric_limits<double>::quiet_NaN());
+  }
+  void add(double value) {
+    if (type_ == ScalarType::f32 && !is_exact_float(value)) widen();
+    type_ == ScalarType::f32 ? put(static_cast<float>(value)) : put(value);
+  }
+  [[nodiscard]] ScalarType type() const { return type_; }
+  std::unique_ptr<ByteSource> take() {
+    flush();
+    return std::move(spool_);
+  }
+
+ private:
+  static constexpr std::size_t kPieceBytes = 64u << 10;
+
+  template <class T>
+  void put(T value) {
+    std::memcpy(piece_.data() + filled_, &value, sizeof value);
+    filled_ += sizeof value;
+    if (filled_ == piece_.size()) flush();
+  }
+  void flush() {
+    spool_->append({piece_.data(), filled_});
+    filled_ = 0;
+  }
+  void widen() {
+    flush();
+    const std::unique_ptr<Spool> floats =
+        std::exchange(spool_, std::make_unique<Spool>(spool_->name()));
+    type_ = ScalarType::f64;
+    std::vector<float> some(kPieceBytes / sizeof(float));
+    for (std::uint64_t at = 0; at < floats->size();) {
+      const auto bytes =
+          static_cast<std::size_t>(std::min<std::uint64_t>(kPieceBytes, floats->size() - at));
+      floats->read(at, std::as_writable_bytes(std::span(some)).first(bytes));
+      for (std::size_t i = 0; i < bytes / sizeof(float); ++i) put(static_cast<double>(some[i]));
+      at += bytes;
+    }
+  }
+
+  std::unique_ptr<Spool> spool_;
+  ScalarType type_;
+  std::vector<std::byte> piece_ = std::vector<std::byte>(kPieceBytes);
+  std::size_t filled_ = 0;
+};
+
+/// All samples; the type is what they came to.
+std::pair<std::unique_ptr<ByteSource>, ScalarType> spooled_samples(AsciiReader& reader,
+                                                                   ScalarType type) {
+  SampleSpool samples(reader.name(), type);
+  const NodataRule nodata = reader.nodata();
+  reader.read([&](double value) {
+    cell_has_data(value, nodata) ? samples.add(value) : samples.add_void();
+    return true;
+  });
+  std::unique_ptr<ByteSource> bytes = samples.take();
+  return {std::move(bytes), samples.type()};
+}
+
+bool recognise_ascii_grid(std::span<const std::byte> head) {
+  std::string_view text(reinterpret_cast<const char*>(head.data()), head.size());
+  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+  while (!text.empty() && is_white_space(text.front())) text.remove_prefix(1);
+  return is_key(text.substr(
+      0, static_cast<std::size_t>(std::find_if(text.begin(), text.end(), is_white_space) -
+                                  text.begin())));
+}
+
+std::unique_ptr<PointSource> open_ascii_points(std::span<const std::string> files,
+                                               const SourceOptions& options) {
+  // The rasters of a mosaic have one type.
+  std::optional<ScalarType> type;
+  if (files.size() > 1) {
+    const bool wide = std::any_of(files.begin(), files.end(), [&](const std::string& file) {
+      return type_of_ascii_grid(file, options.stop) == ScalarType::f64;
+    });
+    type = wide ? ScalarType::f64 : ScalarType::f32;
+  }
+  return open_raster_points(
+      files, options,
+      [stop = options.stop, type](const std::string& file, const RasterOptions& raster) {
+        check_band(file, raster.band, 1);
+        return open_ascii_grid(file, stop, type);
+      });
+}
+
+}  // namespace
+
+std::unique_ptr<Raster> open_ascii_grid(const std::string& file, const std::stop_token& stop,
+                                        std::optional<ScalarType> known) {
+  AsciiReader reader(file, stop);
+  if (known) {
+    PlainGrid grid = reader.grid(*known);
+    grid.info.files = {file};
+    return open_packed_grid(std::move(grid), [file, stop, type = *known] {
+      AsciiReader again(file, stop);
+      return spooled_samples(again, type).first;
+    });
+  }
+  auto [bytes, type] = spooled_samples(reader, ScalarType::f32);
+  PlainGrid grid = reader.grid(type);
+  grid.info.files = {file};
+  return open_plain_grid(std::move(grid), std::move(bytes));
+}
+
+ScalarType type_of_ascii_grid(const std::string& file, const std::stop_token& stop) {
+  AsciiReader reader(file, stop);
+  const NodataRule nodata = reader.nodata();
+  ScalarType type = ScalarType::f32;
+  reader.read([&](double value) {
+    if (cell_has_data(value, nodata) && !is_exact_float(value)) type = ScalarType::f64;
+    return type == ScalarType::f32;
+  });
+  return type;
+}
+
+const Format& ascii_grid_format() {
+  static const Format format{.name = std::string(kFormat),
+                             .endings = {".asc", ".agr"},
+                             .streams = true,
+                             .recognise = &recognise_ascii_grid,
+                             .open = &open_ascii_points};
+  return format;
+}
+
+}  // namespace terrace::stream

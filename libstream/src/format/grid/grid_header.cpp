@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "format/grid/grid_header.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "io/number.hpp"
+#include "io/text.hpp"
+#include "terrace/stream/error.hpp"
+
+namespace terrace::stream {
+
+void GridHeader::set(std::string_view key, std::string_view value) {
+  values_.emplace(lower_case(std::string(key)), value);
+}
+
+std::string GridHeader::text(const std::string& key) const {
+  const auto found = values_.find(key);
+  return found == values_.end() ? std::string() : found->second;
+}
+
+std::optional<double> GridHeader::number(const std::string& key) const {
+  std::string digits = text(key);
+  if (digits.empty()) return std::nullopt;
+  std::replace(digits.begin(), digits.end(), ',', '.');
+  double value = 0;
+  const char* const end = digits.data() + digits.size();
+  if (parse_real(digits.data(), end, value) != end || !std::isfinite(value)) {
+    fail(key, "is " + in_quotes(text(key)) + ", no number");
+  }
+  return value;
+}
+
+std::uint64_t GridHeader::count(const std::string& key,
+                                std::optional<std::uint64_t> otherwise) const {
+  const std::optional<double> value = number(key);
+  if (!value && otherwise) return *otherwise;
+  if (!value) fail(key, "is missing");
+  if (!(*value >= 0 && *value < 0x1p53) || *value != std::floor(*value)) {
+    fail(key, "is " + in_quotes(text(key)) + ", no number of things");
+  }
+  return static_cast<std::uint64_t>(*value);
+}
+
+WorldTransform GridHeader::world(std::uint64_t rows, std::vector<std::string>& comments) const {
+  const auto first_of = [&](std::initializer_list<const char*> keys) {
+    std::optional<double> value;
+    for (const char* key : keys) {
+      if (!value) value = number(key);
+    }
+    return value;
+  };
+  const double width = first_of({"xdim", "dx", "cellsize"}).value_or(1);
+  const double height = first_of({"ydim", "dy", "cellsize"}).value_or(1);
+  if (!(width > 0 && height > 0)) fail("cellsize", "is not above zero");
+  const double below = static_cast<double>(rows - 1) * height;
+  std::optional<double> x = first_of({"ulxmap", "xllcenter"}), y = number("ulymap");
+  if (const auto corner = number("xllcorner"); corner && !x) x = *corner + width / 2;
+  if (const auto center = number("yllcenter"); center && !y) y = *center + below;
+  if (const auto corner = number("yllcorner"); corner && !y) y = *corner + below + height / 2;
+  if (x.has_value() != y.has_value()) {
+    fail(x ? "yllcorner" : "xllcorner", "is missing, although the other is there");
+  }
+  if (!x) {
+    comments.emplace_back("no georeferencing: a plain grid with cells of 1 x 1, y = -row");
+    return {{1, 0, 0, 0, -1, 0}};
+  }
+  if (!std::isfinite(*x) || !std::isfinite(*y)) fail("cellsize", "is too large");
+  return {{width, 0, *x, 0, -height, *y}};
+}
+
+void GridHeader::fail(const std::string& key, const std::string& cause,
+                      const std::string& remedy) const {
+  throw Error({.file = file_, .where = key, .cause = cause, .remedy = remedy});
+}
+
+}  // namespace terrace::stream

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "terrace/stream/schema.hpp"
+
+namespace terrace::stream {
+
+/// The keys and values at the head of ESRI's grids, or in a file beside them. Keys are in lower
+/// case.
+class GridHeader {
+ public:
+  /// file: for messages.
+  explicit GridHeader(std::string file) : file_(std::move(file)) {}
+
+  /// The first value of a key counts.
+  void set(std::string_view key, std::string_view value);
+
+  [[nodiscard]] bool has(const std::string& key) const { return values_.contains(key); }
+  /// Empty if there is none.
+  [[nodiscard]] std::string text(const std::string& key) const;
+  /// A comma may stand for the decimal point. Throws: Error if the value is no finite number.
+  [[nodiscard]] std::optional<double> number(const std::string& key) const;
+  /// Throws: Error if the value is no whole number below 2^53, or missing without `otherwise`.
+  [[nodiscard]] std::uint64_t count(const std::string& key,
+                                    std::optional<std::uint64_t> otherwise = {}) const;
+  /// To the centres of cells, from the lower left corner (xllcorner), the lower left cell
+  /// (xllcenter) or the upper left cell (ulxmap). Without any of them a plain grid, which a comment
+  /// tells. Throws: Error if only x or only y is placed, or cells have no size.
+  [[nodiscard]] WorldTransform world(std::uint64_t rows, std::vector<std::string>& comments) const;
+
+  [[noreturn]] void fail(const std::string& key, const std::string& cause,
+                         const std::string& remedy = "correct the header") const;
+
+ private:
+  std::string file_;
+  std::map<std::string, std::string> values_;
+};
+
+}  // namespace terrace::stream

@@ -1,0 +1,328 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "format/grid/height_map.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <csetjmp>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <exception>
+#include <filesystem>
+#include <limits>
+#include <optional>
+#include <span>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include <png.h>
+
+#include "format/formats.hpp"
+#include "format/grid/plain_grid.hpp"
+#include "format/raster_points.hpp"
+#include "io/line_reader.hpp"
+#include "io/number.hpp"
+#include "io/spool.hpp"
+#include "io/text.hpp"
+#include "terrace/stream/error.hpp"
+#include "terrace/stream/input.hpp"
+
+namespace terrace::stream {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// No sample that is made of colours has this value: they have 24 bits.
+constexpr std::uint32_t kNoColour = std::numeric_limits<std::uint32_t>::max();
+
+/// What libpng says and does. It is C and leaves by longjmp: exceptions must not pass through it,
+/// so those of the functions that it calls wait here.
+struct PngReading {
+  const ByteSource* bytes = nullptr;
+  std::uint64_t at = 0;
+  std::exception_ptr error{};
+  char message[128] = "";
+};
+
+void on_png_read(png_structp png, png_bytep out, std::size_t count) {
+  auto* reading = static_cast<PngReading*>(png_get_io_ptr(png));
+  try {
+    if (count <= reading->bytes->size() - reading->at) {
+      reading->bytes->read(reading->at, std::as_writable_bytes(std::span(out, count)));
+      reading->at += count;
+      return;
+    }
+  } catch (...) {
+    reading->error = std::current_exception();
+  }
+  png_error(png, "it ends too early");  // does not return
+}
+
+[[noreturn]] void on_png_error(png_structp png, png_const_charp message) {
+  auto* reading = static_cast<PngReading*>(png_get_error_ptr(png));
+  std::size_t i = 0;
+  for (; message[i] != '\0' && i + 1 < sizeof reading->message; ++i)
+    reading->message[i] = message[i];
+  reading->message[i] = '\0';
+  png_longjmp(png, 1);
+}
+
+void on_png_warning(png_structp, png_const_charp) {}
+
+/// What the image holds.
+struct PngHead {
+  std::uint32_t columns = 0, rows = 0;
+  int bits = 0, colour_type = 0, passes = 1;
+  std::optional<unsigned> transparent_grey{};
+};
+
+/// Decoded rows on their way to a temporary file.
+class RowSpool {
+ public:
+  RowSpool(const std::string& file, std::uint64_t row_bytes, PngReading& reading)
+      : spool_(std::make_unique<Spool>(file)), row_(row_bytes), reading_(reading) {}
+
+  [[nodiscard]] std::span<unsigned char> row() { return row_; }
+  /// What earlier passes of an interlaced image left of a row. False if it fails, with the error
+  /// kept for when libpng has returned; so put().
+  bool fetch(std::uint32_t row) noexcept {
+    return guarded(
+        [&] { spool_->read(row * row_.size(), std::as_writable_bytes(std::span(row_))); });
+  }
+  bool put(std::uint32_t row) noexcept {
+    return guarded([&] { spool_->write(row * row_.size(), std::as_bytes(std::span(row_))); });
+  }
+  std::unique_ptr<Spool> take() { return std::move(spool_); }
+
+ private:
+  template <class Work>
+  bool guarded(Work&& work) noexcept {
+    try {
+      work();
+      return true;
+    } catch (...) {
+      reading_.error = std::current_exception();
+      return false;
+    }
+  }
+
+  std::unique_ptr<Spool> spool_;
+  std::vector<unsigned char> row_;
+  PngReading& reading_;
+};
+
+/// Reads the head, and the rows too if there is a spool for them: grey as it is, colours as RGBA of
+/// 8 bits. False if libpng failed. Has no objects with destructors: it may be left by longjmp.
+bool read_image(PngReading& reading, PngHead& image, RowSpool* spool) {
+  png_structp png =
+      png_create_read_struct(PNG_LIBPNG_VER_STRING, &reading, &on_png_error, &on_png_warning);
+  png_infop info = png == nullptr ? nullptr : png_create_info_struct(png);
+  if (info == nullptr || setjmp(png_jmpbuf(png)) != 0) {
+    png_destroy_read_struct(&png, &info, nullptr);
+    return false;
+  }
+  png_set_read_fn(png, &reading, &on_png_read);
+  // Sizes are judged by the caller. What is not needed is not kept: comments, colour profiles.
+  png_set_user_limits(png, PNG_UINT_31_MAX, PNG_UINT_31_MAX);
+  png_set_chunk_malloc_max(png, 1u << 20);
+  png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
+  png_set_crc_action(png, PNG_CRC_ERROR_QUIT, PNG_CRC_WARN_DISCARD);
+  png_read_info(png, info);
+  image.columns = png_get_image_width(png, info);
+  image.rows = png_get_image_height(png, info);
+  image.bits = png_get_bit_depth(png, info);
+  image.colour_type = png_get_color_type(png, info);
+  png_color_16p grey = nullptr;
+  if (image.colour_type == PNG_COLOR_TYPE_GRAY &&
+      png_get_tRNS(png, info, nullptr, nullptr, &grey) == PNG_INFO_tRNS && grey != nullptr) {
+    image.transparent_grey = grey->gray;
+  }
+  if (spool != nullptr) {
+    if (image.bits < 8) png_set_packing(png);
+    if (image.bits == 16 && std::endian::native == std::endian::little) png_set_swap(png);
+    if (image.colour_type != PNG_COLOR_TYPE_GRAY) {
+      png_set_palette_to_rgb(png);
+      if (png_get_valid(png, info, PNG_INFO_tRNS) != 0) png_set_tRNS_to_alpha(png);
+      png_set_add_alpha(png, 0xFF, PNG_FILLER_AFTER);
+    }
+    image.passes = png_set_interlace_handling(png);
+    png_read_update_info(png, info);
+    if (png_get_rowbytes(png, info) != spool->row().size()) {
+      png_error(png, "rows of another length");
+    }
+    for (int pass = 0; pass < image.passes; ++pass) {
+      for (std::uint32_t row = 0; row < image.rows; ++row) {
+        if (pass > 0 && !spool->fetch(row)) png_error(png, "no temporary file");
+        png_read_row(png, spool->row().data(), nullptr);
+        if (!spool->put(row)) png_error(png, "no temporary file");
+      }
+    }
+    png_read_end(png, nullptr);
+  }
+  png_destroy_read_struct(&png, &info, nullptr);
+  return true;
+}
+
+[[noreturn]] void complain(const std::string& file, const PngReading& reading) {
+  if (reading.error) std::rethrow_exception(reading.error);
+  refuse_grid(file, {},
+              std::string("cannot be read as PNG: ") +
+                  (reading.message[0] == '\0' ? "out of memory" : reading.message));
+}
+
+std::unique_ptr<Spool> decode_rows(const std::string& file, std::uint64_t row_bytes) {
+  const std::unique_ptr<ByteSource> bytes = open_file(file);
+  PngReading reading{.bytes = bytes.get()};
+  PngHead image;
+  RowSpool spool(file, row_bytes, reading);
+  if (!read_image(reading, image, &spool)) complain(file, reading);
+  return spool.take();
+}
+
+/// Colours as the 24-bit numbers that heights are steps of.
+std::unique_ptr<Spool> decode_colours(const std::string& file, std::uint32_t columns,
+                                      std::uint32_t rows) {
+  const std::uint64_t row_bytes = std::uint64_t{columns} * sizeof(std::uint32_t);
+  std::unique_ptr<Spool> spool = decode_rows(file, row_bytes);
+  std::vector<unsigned char> colours(row_bytes);
+  std::vector<std::uint32_t> samples(columns);
+  for (std::uint32_t row = 0; row < rows; ++row) {
+    spool->read(row * row_bytes, std::as_writable_bytes(std::span(colours)));
+    for (std::size_t i = 0; i < columns; ++i) {
+      const unsigned char* const rgba = colours.data() + 4 * i;
+      const auto number = static_cast<std::uint32_t>(rgba[0] << 16 | rgba[1] << 8 | rgba[2]);
+      samples[i] = rgba[3] == 0 ? kNoColour : number;
+    }
+    spool->write(row * row_bytes, std::as_bytes(std::span(samples)));
+  }
+  return spool;
+}
+
+/// The six numbers of a world file lead from column and row to the centre of a cell.
+std::optional<WorldTransform> world_of(const std::string& file) {
+  for (const char* ending : {".pgw", ".pngw", ".wld", ".PGW", ".PNGW", ".WLD"}) {
+    const fs::path path = fs::path(file).replace_extension(ending);
+    std::error_code ignored;
+    if (!fs::is_regular_file(path, ignored)) continue;
+    Input input(path.string());
+    LineReader lines(input);
+    std::array<double, 6> numbers{};
+    std::string_view line;
+    for (double& number : numbers) {
+      const bool more = lines.next(line);
+      line = more ? trim(line) : std::string_view();
+      if (line.empty() ||
+          parse_real(line.data(), line.data() + line.size(), number) != line.data() + line.size() ||
+          !std::isfinite(number)) {
+        throw Error({.file = path.string(),
+                     .where = "line " + std::to_string(lines.number()),
+                     .cause = "a world file has six numbers, one a line",
+                     .remedy = "correct it"});
+      }
+    }
+    const auto [a, d, b, e, c, f] = numbers;
+    const double area = a * e - b * d;
+    if (!std::isfinite(area) || area == 0) {
+      refuse_grid(path.string(), {}, "does not map cells to distinct places", "correct it");
+    }
+    return WorldTransform{{a, b, c, d, e, f}};
+  }
+  return std::nullopt;
+}
+
+/// Refuses what is larger than the file can hold, and rows that do not fit memory.
+void check_size(const std::string& file, const PngHead& image, std::uint64_t packed,
+                std::uint64_t row_bytes, std::uint64_t memory_bytes) {
+  const std::uint64_t bits =
+      static_cast<unsigned>(image.bits) * (image.colour_type == PNG_COLOR_TYPE_RGB         ? 3U
+                                           : image.colour_type == PNG_COLOR_TYPE_RGB_ALPHA ? 4U
+                                                                                           : 1U);
+  const std::uint64_t stored = image.columns * bits / 8 + 1;
+  if (image.rows > packed * kDeflateGrowth / stored) {
+    refuse_grid(file, {},
+                "claims " + std::to_string(image.columns) + " x " + std::to_string(image.rows) +
+                    " pixels, which cannot be packed in " + std::to_string(packed) + " bytes");
+  }
+  // libpng holds two rows beside ours.
+  if (row_bytes > memory_bytes / 4) {
+    refuse_grid(file, {},
+                "its rows need " + std::to_string((row_bytes >> 18) + 1) + " MiB, the limit is " +
+                    std::to_string(memory_bytes >> 20) + " MiB",
+                "allow more memory, or convert it: gdal_translate -co TILED=YES FILE out.tif");
+  }
+}
+
+bool recognise_png(std::span<const std::byte> head) {
+  return head.size() >= 8 && std::memcmp(head.data(), "\x89PNG\r\n\x1a\n", 8) == 0;
+}
+
+std::unique_ptr<PointSource> open_png_points(std::span<const std::string> files,
+                                             const SourceOptions& options) {
+  return open_raster_points(files, options, &open_height_map);
+}
+
+}  // namespace
+
+std::unique_ptr<Raster> open_height_map(const std::string& file, const RasterOptions& options) {
+  check_band(file, options.band, 1);
+  const std::unique_ptr<ByteSource> bytes = open_file(file);
+  PngReading reading{.bytes = bytes.get()};
+  PngHead image;
+  if (!read_image(reading, image, nullptr)) complain(file, reading);
+
+  const bool grey = image.colour_type == PNG_COLOR_TYPE_GRAY;
+  const HeightsOfColour colours = options.heights_of_colour;
+  if (!grey && colours == HeightsOfColour::none) {
+    refuse_grid(
+        file, {}, "is a picture in colours, not of heights",
+        "say how they mean heights, `heights_of_colour` mapbox or terrarium, or look for the "
+        "GeoTIFF");
+  }
+  if (colours != HeightsOfColour::none &&
+      (grey || image.bits == 16 || image.colour_type == PNG_COLOR_TYPE_GRAY_ALPHA)) {
+    refuse_grid(file, {}, "has no colours of 8 bits", "leave `heights_of_colour` out");
+  }
+  const ScalarType type = !grey              ? ScalarType::u32
+                          : image.bits == 16 ? ScalarType::u16
+                                             : ScalarType::u8;
+  std::string nodata;
+  if (!grey) nodata = std::to_string(kNoColour);
+  if (image.transparent_grey) nodata = std::to_string(*image.transparent_grey);
+  PlainGrid grid = plain_grid("png", file, image.columns, image.rows, type, nodata);
+  check_size(file, image, bytes->size(), grid.row_bytes, options.memory_bytes);
+  constexpr std::uint64_t kOfInflate = 512u << 10;
+  grid.info.held_bytes = kOfInflate + 3 * grid.row_bytes;
+  if (const auto world = world_of(file)) {
+    grid.info.world = *world;
+  } else {
+    grid.info.world.xy = {1, 0, 0, 0, -1, 0};
+    grid.info.comments.emplace_back(
+        "no georeferencing: a plain grid with cells of 1 x 1, y = -row");
+  }
+  if (grey) {
+    return open_packed_grid(std::move(grid),
+                            [file, row = grid.row_bytes] { return decode_rows(file, row); });
+  }
+  grid.info.sample.unit = grid.info.crs.vertical_unit = "metre";
+  if (colours == HeightsOfColour::mapbox) {
+    grid.info.sample.scale = 0.1;
+    grid.info.sample.offset = -10000;
+  } else {
+    grid.info.sample.scale = 1.0 / 256;
+    grid.info.sample.offset = -32768;
+  }
+  return open_packed_grid(std::move(grid), [file, columns = image.columns, rows = image.rows] {
+    return decode_colours(file, columns, rows);
+  });
+}
+
+const Format& png_format() {
+  static const Format format{
+      .name = "png", .endings = {".png"}, .recognise = &recognise_png, .open = &open_png_points};
+  return format;
+}
+
+}  // namespace terrace::stream

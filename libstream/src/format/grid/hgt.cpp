@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "format/grid/hgt.hpp"
+
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "format/formats.hpp"
+#include "format/grid/plain_grid.hpp"
+#include "format/grid/unpack.hpp"
+#include "format/raster_points.hpp"
+
+namespace terrace::stream {
+namespace {
+
+constexpr std::string_view kEnding = ".hgt";
+
+/// The south-west corner, in degrees.
+struct Corner {
+  int longitude = 0, latitude = 0;
+};
+
+/// "N46E008" at the head of a file's name, in any case.
+std::optional<Corner> corner_of(const std::string& path) {
+  const std::string name = std::filesystem::path(path).filename().string();
+  if (name.size() < 7) return std::nullopt;
+  const auto upper = [&](std::size_t i) {
+    return name[i] >= 'a' && name[i] <= 'z' ? static_cast<char>(name[i] - 32) : name[i];
+  };
+  const auto number = [&](std::size_t begin, std::size_t end) {
+    int value = 0;
+    for (std::size_t i = begin; i < end; ++i) {
+      if (name[i] < '0' || name[i] > '9') return 1000;
+      value = value * 10 + (name[i] - '0');
+    }
+    return value;
+  };
+  const char north = upper(0), east = upper(3);
+  const int latitude = number(1, 3), longitude = number(4, 7);
+  const bool longer = name.size() > 7 && name[7] >= '0' && name[7] <= '9';
+  if ((north != 'N' && north != 'S') || (east != 'E' && east != 'W') || latitude > 90 ||
+      longitude > 180 || longer) {
+    return std::nullopt;
+  }
+  return Corner{.longitude = east == 'E' ? longitude : -longitude,
+                .latitude = north == 'N' ? latitude : -latitude};
+}
+
+/// Columns and rows of so many bytes: a square, but for the tiles of the far north and south, which
+/// have half the columns.
+std::pair<std::uint64_t, std::uint64_t> size_of_tile(const std::string& file, std::uint64_t bytes) {
+  constexpr std::uint64_t kHalfColumns = 1801, kFullRows = 3601;
+  if (bytes == 2 * kHalfColumns * kFullRows) return {kHalfColumns, kFullRows};
+  const auto side =
+      static_cast<std::uint64_t>(std::lround(std::sqrt(static_cast<double>(bytes) / 2)));
+  if (side < 2 || side > (1u << 20) || bytes != 2 * side * side) {
+    refuse_grid(file, {},
+                "has " + std::to_string(bytes) + " bytes, which are no square of 16-bit samples",
+                "fetch the file again; it is cut short, or no tile of SRTM");
+  }
+  return {side, side};
+}
+
+PlainGrid describe_tile(const std::string& file, const Corner& corner, std::uint64_t bytes) {
+  const auto [columns, rows] = size_of_tile(file, bytes);
+  PlainGrid grid = plain_grid("hgt", file, columns, rows, ScalarType::i16, "-32768");
+  grid.order = std::endian::big;
+  // Samples lie on the lines of the grid: the outer ones are shared with the neighbours.
+  grid.info.world.xy = {
+      1 / static_cast<double>(columns - 1),  0,
+      static_cast<double>(corner.longitude), 0,
+      -1 / static_cast<double>(rows - 1),    static_cast<double>(corner.latitude + 1)};
+  grid.info.sample.unit = "metre";
+  grid.info.crs.epsg = 4326;
+  grid.info.crs.vertical_epsg = 5773;  // EGM96
+  grid.info.crs.name = "WGS 84";
+  grid.info.crs.geographic = true;
+  grid.info.crs.horizontal_unit = "degree";
+  grid.info.crs.vertical_unit = "metre";
+  return grid;
+}
+
+enum class Packing { none, zip, gzip };
+
+Packing packing_of(const ByteSource& bytes) {
+  std::array<std::byte, 4> head{};
+  if (bytes.size() < head.size()) return Packing::none;
+  bytes.read(0, head);
+  // No tile begins so: these would be heights above 8 km, or below the sea.
+  if (std::memcmp(head.data(), "PK\3\4", 4) == 0) return Packing::zip;
+  if (std::memcmp(head.data(), "\x1f\x8b\x08", 3) == 0) return Packing::gzip;
+  return Packing::none;
+}
+
+/// True for a zip archive whose first file is a tile.
+bool recognise_hgt(std::span<const std::byte> head) {
+  constexpr std::size_t kNameLength = 26, kName = 30;  // in the header before a packed file
+  if (head.size() < kName || std::memcmp(head.data(), "PK\3\4", 4) != 0) return false;
+  const std::size_t length = std::to_integer<std::size_t>(head[kNameLength]) |
+                             std::to_integer<std::size_t>(head[kNameLength + 1]) << 8;
+  if (length < kEnding.size() || length > head.size() - kName) return false;
+  const std::string_view name(reinterpret_cast<const char*>(head.data()) + kName, length);
+  const std::string_view ending = name.substr(length - kEnding.size());
+  return ending == kEnding || ending == ".HGT";
+}
+
+std::unique_ptr<PointSource> open_hgt_points(std::span<const std::string> files,
+                                             const SourceOptions& options) {
+  return open_raster_points(files, options, &open_hgt);
+}
+
+}  // namespace
+
+std::unique_ptr<Raster> open_hgt(const std::string& file, const RasterOptions& options) {
+  check_band(file, options.band, 1);
+  std::unique_ptr<ByteSource> bytes = open_file(file);
+  const Packing packing = packing_of(*bytes);
+  PackedFile packed{.size = bytes->size()};
+  if (packing == Packing::zip) packed = find_in_zip(file, kEnding);
+  if (packing == Packing::gzip) packed = find_in_gzip(file);
+  std::optional<Corner> corner = corner_of(packed.name);
+  if (!corner) corner = corner_of(file);
+  if (!corner) {
+    refuse_grid(file, {}, "its name does not tell its place",
+                "name it by its south-west corner, as N46E008.hgt");
+  }
+  PlainGrid grid = describe_tile(file, *corner, packed.size);
+  constexpr std::uint64_t kUnpacking = 1u << 20;
+  if (packing != Packing::none) grid.info.held_bytes = kUnpacking;
+  switch (packing) {
+    case Packing::zip:
+      return open_packed_grid(std::move(grid),
+                              [file, packed] { return unpack_from_zip(file, packed); });
+    case Packing::gzip:
+      return open_packed_grid(std::move(grid),
+                              [file, packed] { return unpack_gzip(file, packed); });
+    case Packing::none:
+      break;
+  }
+  return open_plain_grid(std::move(grid), std::move(bytes));
+}
+
+const Format& hgt_format() {
+  static const Format format{.name = "hgt",
+                             .endings = {".hgt", ".hgt.zip", ".hgt.gz"},
+                             .recognise = &recognise_hgt,
+                             .open = &open_hgt_points};
+  return format;
+}
+
+}  // namespace terrace::stream

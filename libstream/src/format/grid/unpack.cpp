@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "format/grid/unpack.hpp"
+
+#include <algorithm>
+#include <array>
+#include <new>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <zip.h>
+#include <zlib.h>
+
+#include "format/grid/plain_grid.hpp"
+#include "io/spool.hpp"
+#include "io/text.hpp"
+
+namespace terrace::stream {
+namespace {
+
+constexpr std::size_t kUnpackBytes = 256u << 10;
+/// Other methods of zip archives may make more of flat ground; no elevation grid needs it.
+void check_growth(const std::string& file, const std::string& where, std::uint64_t packed,
+                  std::uint64_t unpacked) {
+  if (unpacked / kDeflateGrowth <= packed) return;
+  refuse_grid(file, where,
+              "states " + std::to_string(unpacked) + " bytes, which cannot be packed in " +
+                  std::to_string(packed));
+}
+
+/// What is unpacked so far: never more than stated.
+class Unpacked {
+ public:
+  Unpacked(const std::string& file, const PackedFile& packed)
+      : file_(file), packed_(packed), spool_(std::make_unique<Spool>(file)) {}
+
+  void append(std::span<const std::byte> bytes) {
+    if (bytes.size() > packed_.size - spool_->size()) differs("more");
+    spool_->append(bytes);
+  }
+  std::unique_ptr<ByteSource> take() {
+    if (spool_->size() != packed_.size) differs("fewer");
+    return std::move(spool_);
+  }
+
+ private:
+  [[noreturn]] void differs(const char* how) const {
+    refuse_grid(file_, packed_.name,
+                "unpacks to " + std::string(how) + " than the " + std::to_string(packed_.size) +
+                    " bytes that it states");
+  }
+
+  const std::string& file_;
+  const PackedFile& packed_;
+  std::unique_ptr<Spool> spool_;
+};
+
+class ZipArchive {
+ public:
+  explicit ZipArchive(const std::string& file) {
+    int error = 0;
+    archive_ = zip_open(file.c_str(), ZIP_RDONLY, &error);
+    if (archive_ == nullptr) {
+      zip_error_t reason;
+      zip_error_init_with_code(&reason, error);
+      const std::string text = zip_error_strerror(&reason);
+      zip_error_fini(&reason);
+      refuse_grid(file, "zip", text);
+    }
+  }
+  ~ZipArchive() { zip_discard(archive_); }
+  ZipArchive(const ZipArchive&) = delete;
+  ZipArchive& operator=(const ZipArchive&) = delete;
+
+  [[nodiscard]] zip_t* get() const { return archive_; }
+  [[nodiscard]] std::uint64_t files() const {
+    return static_cast<std::uint64_t>(std::max<zip_int64_t>(0, zip_get_num_entries(archive_, 0)));
+  }
+
+ private:
+  zip_t* archive_ = nullptr;
+};
+
+}  // namespace
+
+PackedFile find_in_zip(const std::string& file, std::string_view ending) {
+  const ZipArchive archive(file);
+  std::optional<PackedFile> found;
+  for (std::uint64_t number = 0; number < archive.files(); ++number) {
+    zip_stat_t status;
+    if (zip_stat_index(archive.get(), number, 0, &status) != 0) continue;
+    constexpr zip_uint64_t kNeeded = ZIP_STAT_NAME | ZIP_STAT_SIZE | ZIP_STAT_COMP_SIZE;
+    if ((status.valid & kNeeded) != kNeeded || !lower_case(status.name).ends_with(ending)) continue;
+    // What a Macintosh packs beside each file.
+    if (std::string_view(status.name).starts_with("__MACOSX/")) continue;
+    if (found) {
+      refuse_grid(file, {}, "holds more than one " + std::string(ending) + " file",
+                  "unpack it and name the files");
+    }
+    check_growth(file, status.name, status.comp_size, status.size);
+    found = {.name = status.name, .size = status.size, .number = number};
+  }
+  if (!found) {
+    refuse_grid(file, {}, "holds no " + std::string(ending) + " file", "unpack it: 'unzip FILE'");
+  }
+  return *found;
+}
+
+std::unique_ptr<ByteSource> unpack_from_zip(const std::string& file, const PackedFile& packed) {
+  const ZipArchive archive(file);
+  zip_file_t* const member = zip_fopen_index(archive.get(), packed.number, 0);
+  if (member == nullptr) {
+    refuse_grid(file, packed.name, zip_strerror(archive.get()), "unpack it yourself");
+  }
+  struct Close {
+    void operator()(zip_file_t* open) const { zip_fclose(open); }
+  };
+  const std::unique_ptr<zip_file_t, Close> close(member);
+  Unpacked unpacked(file, packed);
+  std::vector<std::byte> piece(kUnpackBytes);
+  for (;;) {
+    const zip_int64_t got = zip_fread(member, piece.data(), piece.size());
+    if (got < 0) {
+      refuse_grid(file, packed.name, zip_error_strerror(zip_file_get_error(member)));
+    }
+    if (got == 0) return unpacked.take();
+    unpacked.append({piece.data(), static_cast<std::size_t>(got)});
+  }
+}
+
+PackedFile find_in_gzip(const std::string& file) {
+  const std::unique_ptr<ByteSource> bytes = open_file(file);
+  constexpr std::uint64_t kLeast = 18;  // a header of 10 bytes and a trailer of 8
+  if (bytes->size() < kLeast) refuse_grid(file, "gzip", "is cut short");
+  std::array<std::byte, 4> trailer{};
+  bytes->read(bytes->size() - trailer.size(), trailer);
+  PackedFile packed;
+  for (std::size_t i = 0; i < trailer.size(); ++i) {
+    packed.size |= std::to_integer<std::uint64_t>(trailer[i]) << (8 * i);
+  }
+  check_growth(file, "gzip", bytes->size(), packed.size);
+  return packed;
+}
+
+std::unique_ptr<ByteSource> unpack_gzip(const std::string& file, const PackedFile& packed) {
+  const std::unique_ptr<ByteSource> bytes = open_file(file);
+  z_stream stream{};
+  constexpr int kGzip = 16 + MAX_WBITS;
+  if (inflateInit2(&stream, kGzip) != Z_OK) throw std::bad_alloc();
+  struct End {
+    void operator()(z_stream* open) const { inflateEnd(open); }
+  };
+  const std::unique_ptr<z_stream, End> end(&stream);
+  Unpacked unpacked(file, packed);
+  std::vector<std::byte> in(kUnpackBytes), out(kUnpackBytes);
+  int state = Z_OK;
+  for (std::uint64_t at = 0; state != Z_STREAM_END;) {
+    if (stream.avail_in == 0) {
+      const auto more =
+          static_cast<std::size_t>(std::min<std::uint64_t>(in.size(), bytes->size() - at));
+      if (more == 0) refuse_grid(file, "gzip", "is cut short");
+      bytes->read(at, {in.data(), more});
+      at += more;
+      stream.next_in = reinterpret_cast<Bytef*>(in.data());
+      stream.avail_in = static_cast<uInt>(more);
+    }
+    stream.next_out = reinterpret_cast<Bytef*>(out.data());
+    stream.avail_out = static_cast<uInt>(out.size());
+    state = inflate(&stream, Z_NO_FLUSH);
+    if (state != Z_OK && state != Z_STREAM_END && state != Z_BUF_ERROR) {
+      refuse_grid(file, "gzip",
+                  "is damaged: " + std::string(stream.msg == nullptr ? "zlib" : stream.msg));
+    }
+    unpacked.append({out.data(), out.size() - stream.avail_out});
+  }
+  return unpacked.take();
+}
+
+}  // namespace terrace::stream

@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "format/las/fields.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <string_view>
+#include <utility>
+
+#include "io/bytes.hpp"
+#include "io/number.hpp"
+
+namespace terrace::stream {
+namespace {
+
+constexpr std::array<std::size_t, kLastLasPointFormat + 1> kRecordBytes{20, 28, 26, 34, 57, 63,
+                                                                        30, 36, 38, 59, 67};
+
+/// Collects fields that follow one another.
+struct FieldList {
+  std::vector<LasField> fields{};
+  std::size_t offset = 12;  ///< behind the coordinates
+
+  void add(Channel channel) {
+    const std::size_t bytes = size_of(channel.type);
+    fields.push_back({.channel = std::move(channel), .offset = offset});
+    offset += bytes;
+  }
+  void add(const char* name, ScalarType type) { add(Channel{.name = name, .type = type}); }
+  /// Parts of the byte here, from its lowest bit on.
+  void add_bits(std::initializer_list<std::pair<const char*, unsigned>> parts) {
+    unsigned shift = 0;
+    for (const auto& [name, bits] : parts) {
+      fields.push_back({.channel = {.name = name, .type = ScalarType::u8},
+                        .offset = offset,
+                        .shift = shift,
+                        .bits = bits});
+      shift += bits;
+    }
+    ++offset;
+  }
+};
+
+/// The types of the specification's table of extra bytes, from 1 on.
+constexpr std::array kExtraTypes{ScalarType::u8,  ScalarType::i8,  ScalarType::u16, ScalarType::i16,
+                                 ScalarType::u32, ScalarType::i32, ScalarType::u64, ScalarType::i64,
+                                 ScalarType::f32, ScalarType::f64};
+
+/// Text that may stand in a header: no control characters.
+std::string plain_text(std::string_view text) {
+  std::string out(text.substr(0, text.find('\0')));
+  for (char& c : out) {
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '_';
+  }
+  return out;
+}
+
+}  // namespace
+
+std::size_t las_record_bytes(unsigned point_format) { return kRecordBytes[point_format]; }
+
+std::vector<LasField> las_fields(unsigned point_format, bool adjusted_time) {
+  const unsigned f = point_format;
+  const bool legacy = f < 6;
+  FieldList list;
+  list.add("intensity", ScalarType::u16);
+  if (legacy) {
+    list.add_bits({{"return_number", 3},
+                   {"number_of_returns", 3},
+                   {"scan_direction_flag", 1},
+                   {"edge_of_flight_line", 1}});
+    list.add_bits({{"classification", 5}, {"synthetic", 1}, {"key_point", 1}, {"withheld", 1}});
+    list.add(Channel{.name = "scan_angle_rank", .type = ScalarType::i8, .unit = "degree"});
+    list.add("user_data", ScalarType::u8);
+  } else {
+    list.add_bits({{"return_number", 4}, {"number_of_returns", 4}});
+    list.add_bits({{"synthetic", 1},
+                   {"key_point", 1},
+                   {"withheld", 1},
+                   {"overlap", 1},
+                   {"scanner_channel", 2},
+                   {"scan_direction_flag", 1},
+                   {"edge_of_flight_line", 1}});
+    list.add("classification", ScalarType::u8);
+    list.add("user_data", ScalarType::u8);
+    list.add(
+        Channel{.name = "scan_angle", .type = ScalarType::i16, .scale = 0.006, .unit = "degree"});
+  }
+  list.add("point_source_id", ScalarType::u16);
+  if (f != 0 && f != 2) {
+    list.add(Channel{.name = "gps_time",
+                     .type = ScalarType::f64,
+                     .unit = adjusted_time ? kAdjustedGpsTime : kGpsWeekTime});
+  }
+  if (f == 2 || f == 3 || f == 5 || f == 7 || f == 8 || f == 10) {
+    for (const char* name : {"red", "green", "blue"}) list.add(name, ScalarType::u16);
+  }
+  if (f == 8 || f == 10) list.add("nir", ScalarType::u16);
+  if (f == 4 || f == 5 || f == 9 || f == 10) {
+    list.add("wavepacket_index", ScalarType::u8);
+    list.add("wavepacket_offset", ScalarType::u64);
+    list.add("wavepacket_size", ScalarType::u32);
+    for (const char* name : {"return_point_wave_location", "x_t", "y_t", "z_t"}) {
+      list.add(name, ScalarType::f32);
+    }
+  }
+  return list.fields;
+}
+
+std::vector<LasField> las_extra_fields(const std::string& descriptions, std::size_t first,
+                                       std::size_t record_bytes, std::span<const LasField> taken,
+                                       std::vector<std::string>& comments) {
+  FieldList list{.fields = {}, .offset = first};
+  const auto add = [&](Channel channel) {
+    const auto is_taken = [&](std::string_view name) {
+      const auto has = [&](const LasField& field) { return field.channel.name == name; };
+      return name.empty() || std::any_of(taken.begin(), taken.end(), has) ||
+             std::any_of(list.fields.begin(), list.fields.end(), has);
+    };
+    const std::string wanted = channel.name.empty() ? "extra" : channel.name;
+    channel.name = wanted;
+    for (int n = 2; is_taken(channel.name); ++n) channel.name = wanted + "_" + std::to_string(n);
+    list.add(std::move(channel));
+  };
+  for (std::size_t at = 0; at + kLasExtraBytesDescription <= descriptions.size();
+       at += kLasExtraBytesDescription) {
+    const char* const row = descriptions.data() + at;
+    const std::size_t type = static_cast<unsigned char>(row[2]);
+    const unsigned options = static_cast<unsigned char>(row[3]);
+    const std::string name = plain_text({row + 4, 32});
+    // Types above 10 are the deprecated arrays of two or three; type 0 is bytes without a meaning.
+    const bool opaque = type == 0 || type > 3 * kExtraTypes.size();
+    const std::size_t count = opaque ? options : 1 + (type - 1) / kExtraTypes.size();
+    const ScalarType scalar =
+        opaque ? ScalarType::u8 : kExtraTypes[(type - 1) % kExtraTypes.size()];
+    if (count * size_of(scalar) > record_bytes - list.offset) {
+      comments.push_back("extra bytes " + name + " do not fit the records");
+      break;
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      Channel channel{.name = opaque || count > 1 ? name + "_" + std::to_string(i) : name,
+                      .type = scalar};
+      if (!opaque && (options & 8U) != 0) {
+        channel.scale = load_little_endian<double>(row + 112 + 8 * i);
+      }
+      if (!opaque && (options & 16U) != 0) {
+        channel.offset = load_little_endian<double>(row + 136 + 8 * i);
+      }
+      if (!std::isfinite(channel.scale) || channel.scale == 0 || !std::isfinite(channel.offset)) {
+        comments.push_back("extra bytes " + name + ": an impossible scale or offset is left out");
+        channel.scale = 1.0;
+        channel.offset = 0.0;
+      }
+      if (!opaque && (options & 1U) != 0) {
+        // Widened to eight bytes, as an integer of the same sign or a double.
+        std::string value;
+        const char* const no_data = row + 40 + 8 * i;
+        if (scalar == ScalarType::f32 || scalar == ScalarType::f64) {
+          append_number(value, load_little_endian<double>(no_data));
+        } else if (scalar == ScalarType::u64) {
+          append_number(value, load_little_endian<std::uint64_t>(no_data));
+        } else {
+          append_number(value, load_little_endian<std::int64_t>(no_data));
+        }
+        comments.push_back("extra bytes " + name + ": " + value + " stands for no data");
+      }
+      add(std::move(channel));
+    }
+  }
+  const std::size_t left = record_bytes - list.offset;
+  for (std::size_t i = 0; i < left; ++i) {
+    add({.name = "extra_" + std::to_string(i), .type = ScalarType::u8});
+  }
+  return list.fields;
+}
+
+}  // namespace terrace::stream

@@ -1,0 +1,283 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "format/las/header.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include "format/geotiff/keys.hpp"
+#include "format/geotiff/tags.hpp"
+#include "format/las/fields.hpp"
+#include "io/bytes.hpp"
+#include "io/peek.hpp"
+#include "terrace/stream/byte_source.hpp"
+#include "terrace/stream/error.hpp"
+#include "terrace/stream/laz.hpp"
+
+namespace terrace::stream {
+namespace {
+
+constexpr char kBadHeader[] = "the file is damaged or its header is wrong";
+/// Reserved bytes and the user's name, alike in VLRs and EVLRs.
+constexpr std::size_t kUserBytes = 16;
+/// WKT of a file is a few kilobytes, a hundred where a vertical grid is part of it.
+constexpr std::uint64_t kMostEvlrBytes = 1u << 20;
+constexpr std::uint64_t kMostEvlrs = 1u << 16;
+
+[[noreturn]] void fail(const Input& input, std::string where, std::string cause,
+                       std::string remedy = kBadHeader) {
+  throw Error({.file = input.name(),
+               .where = std::move(where),
+               .cause = std::move(cause),
+               .remedy = std::move(remedy)});
+}
+
+std::string text_of_field(const char* at, std::size_t bytes) {
+  const std::string_view field(at, bytes);
+  return std::string(field.substr(0, field.find('\0')));
+}
+
+/// Whether a record tells something that is used here.
+bool is_used(const LasVlr& record) {
+  if (record.is(kLasSpec, kLasExtraBytes) || record.is(laz::Vlr::kUserId, laz::Vlr::kRecordId))
+    return true;
+  // libLAS wrote WKT under its own name.
+  if (record.is("liblas", kLasWkt)) return true;
+  return record.user == kLasProjection &&
+         (record.id == kLasWkt || record.id == kGeoKeyDirectory || record.id == kGeoDoubleParams ||
+          record.id == kGeoAsciiParams);
+}
+
+/// The records between the header and the points. Their number is not relied on: writers have
+/// miscounted them.
+void read_vlrs(Input& input, std::uint32_t count, LasHeader& header,
+               std::vector<std::string>& comments) {
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const std::uint64_t left = header.points_offset - input.offset();
+    if (left < kLasVlrHeaderBytes) {
+      comments.push_back("the header counts " + std::to_string(count) + " VLRs, but there are " +
+                         std::to_string(i));
+      return;
+    }
+    const std::string_view head = input.fill(kLasVlrHeaderBytes);
+    if (head.size() < kLasVlrHeaderBytes) fail(input, "VLR " + std::to_string(i), "the file ends");
+    LasVlr record{.user = text_of_field(head.data() + 2, kUserBytes),
+                  .id = load_little_endian<std::uint16_t>(head.data() + 18),
+                  .data = {}};
+    const std::size_t bytes = load_little_endian<std::uint16_t>(head.data() + 20);
+    if (bytes > left - kLasVlrHeaderBytes) {
+      comments.push_back("VLR " + std::to_string(i) +
+                         " reaches into the points: it and the rest are left out");
+      return;
+    }
+    input.consume(kLasVlrHeaderBytes);
+    if (!is_used(record)) {
+      if (!input.skip(bytes)) fail(input, "VLR " + std::to_string(i), "the file ends");
+      continue;
+    }
+    const std::string_view data = input.fill(bytes);
+    if (data.size() < bytes) fail(input, "VLR " + std::to_string(i), "the file ends");
+    record.data = data.substr(0, bytes);
+    input.consume(bytes);
+    header.vlrs.push_back(std::move(record));
+  }
+}
+
+void read_evlrs(const ByteSource& file, std::uint64_t at, std::uint32_t count, LasHeader& header,
+                std::vector<std::string>& comments) {
+  std::array<char, kLasEvlrHeaderBytes> head{};
+  for (std::uint32_t i = 0; i < count; ++i) {
+    if (at > file.size() || file.size() - at < kLasEvlrHeaderBytes || i == kMostEvlrs) {
+      comments.push_back("the header counts " + std::to_string(count) + " EVLRs, " +
+                         std::to_string(i) + " are read");
+      return;
+    }
+    file.read(at, std::as_writable_bytes(std::span(head)));
+    at += kLasEvlrHeaderBytes;
+    LasVlr record{.user = text_of_field(head.data() + 2, kUserBytes),
+                  .id = load_little_endian<std::uint16_t>(head.data() + 18),
+                  .data = {}};
+    const auto bytes = load_little_endian<std::uint64_t>(head.data() + 20);
+    if (bytes > file.size() - at) {
+      comments.push_back("EVLR " + std::to_string(i) + " is cut off");
+      return;
+    }
+    if (is_used(record) && bytes <= kMostEvlrBytes) {
+      record.data.resize(bytes);
+      file.read(at, std::as_writable_bytes(std::span(record.data)));
+      header.vlrs.push_back(std::move(record));
+    }
+    at += bytes;
+  }
+}
+
+/// Shorts, doubles, ...: a record's data as an array.
+template <class T>
+std::vector<T> array_of(const std::string& data) {
+  std::vector<T> values(data.size() / sizeof(T));
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    values[i] = load_little_endian<T>(data.data() + i * sizeof(T));
+  }
+  return values;
+}
+
+const LasVlr* find_record(const LasHeader& header, std::uint16_t id) {
+  for (const LasVlr& record : header.vlrs) {
+    if (record.id == id && (record.user == kLasProjection || record.user == "liblas")) {
+      return &record;
+    }
+  }
+  return nullptr;
+}
+
+std::string wkt_of_records(const LasHeader& header, std::vector<std::string>& comments) {
+  const LasVlr* const record = find_record(header, kLasWkt);
+  if (record == nullptr) return {};
+  std::string wkt = record->data.substr(0, record->data.find('\0'));
+  while (!wkt.empty() && static_cast<unsigned char>(wkt.back()) <= ' ') wkt.pop_back();
+  if (wkt.empty() || wkt.find('[') != wkt.npos) return wkt;
+  comments.emplace_back("the WKT record does not contain WKT and is ignored");
+  return {};
+}
+
+Crs crs_of_key_records(const LasHeader& header, std::vector<std::string>& comments) {
+  const auto data = [&](std::uint32_t id) {
+    const LasVlr* const record = find_record(header, static_cast<std::uint16_t>(id));
+    return record == nullptr ? std::string() : record->data;
+  };
+  const GeoKeys keys(array_of<std::uint16_t>(data(kGeoKeyDirectory)),
+                     array_of<double>(data(kGeoDoubleParams)), data(kGeoAsciiParams));
+  comments.insert(comments.end(), keys.faults().begin(), keys.faults().end());
+  return crs_of(keys);
+}
+
+/// Whether keys name a system at all.
+bool names_something(const Crs& crs) {
+  return crs.epsg != 0 || crs.vertical_epsg != 0 || !crs.geo_keys.empty() || !crs.name.empty();
+}
+
+}  // namespace
+
+LasHeader read_las_header(Input& input, const std::string& file,
+                          std::vector<std::string>& comments) {
+  constexpr std::size_t kFirstBytes = 227;  // of LAS 1.0 to 1.2, the beginning of all
+  std::string_view head = input.fill(kFirstBytes);
+  if (!head.starts_with("LASF")) {
+    fail(input, "header", "does not begin with 'LASF'", "this is no LAS file");
+  }
+  if (head.size() < kFirstBytes) fail(input, "header", "the file ends in its header");
+  LasHeader header;
+  const auto major = static_cast<unsigned char>(head[24]);
+  header.minor = static_cast<unsigned char>(head[25]);
+  if (major != 1 || header.minor > 4) {
+    fail(input, "header",
+         "is LAS " + std::to_string(major) + "." + std::to_string(header.minor) +
+             "; versions 1.0 to 1.4 are read",
+         "convert it, e.g. 'pdal translate FILE out.las'");
+  }
+  const std::size_t header_bytes = load_little_endian<std::uint16_t>(head.data() + 94);
+  const std::size_t least = header.minor == 4   ? kLas14HeaderBytes
+                            : header.minor == 3 ? std::size_t{235}
+                                                : kFirstBytes;
+  if (header_bytes < least) {
+    fail(input, "header",
+         "says that it has " + std::to_string(header_bytes) + " bytes; LAS 1." +
+             std::to_string(header.minor) + " has " + std::to_string(least));
+  }
+  head = input.fill(header_bytes);
+  if (head.size() < header_bytes) fail(input, "header", "the file ends in its header");
+  const char* const at = head.data();
+
+  const unsigned encoding = load_little_endian<std::uint16_t>(at + 6);
+  header.adjusted_time = (encoding & 1U) != 0;
+  header.wkt = (encoding & 16U) != 0;
+  header.points_offset = load_little_endian<std::uint32_t>(at + 96);
+  const auto vlrs = load_little_endian<std::uint32_t>(at + 100);
+  const auto type = static_cast<unsigned char>(at[104]);
+  header.compressed = (type & 0xC0U) != 0;
+  header.point_format = type & 0x3FU;
+  header.record_bytes = load_little_endian<std::uint16_t>(at + 105);
+  header.points = load_little_endian<std::uint32_t>(at + 107);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    header.scale[axis] = load_little_endian<double>(at + 131 + 8 * axis);
+    header.offset[axis] = load_little_endian<double>(at + 155 + 8 * axis);
+  }
+  std::uint64_t evlr_offset = 0;
+  std::uint32_t evlrs = 0;
+  if (header.minor == 4) {
+    evlr_offset = load_little_endian<std::uint64_t>(at + 235);
+    evlrs = load_little_endian<std::uint32_t>(at + 243);
+    const auto points = load_little_endian<std::uint64_t>(at + 247);
+    if (header.points != 0 && points != 0 && points != header.points) {
+      comments.push_back("the header counts " + std::to_string(points) + " points and, for old " +
+                         "readers, " + std::to_string(header.points) + ": the former is taken");
+    }
+    if (points != 0) header.points = points;
+  }
+  input.consume(header_bytes);
+
+  if (header.point_format > kLastLasPointFormat) {
+    fail(input, "header",
+         "point format " + std::to_string(header.point_format) + " is not known; 0 to 10 are");
+  }
+  const std::size_t record = las_record_bytes(header.point_format);
+  if (header.record_bytes < record) {
+    fail(input, "header",
+         "records of point format " + std::to_string(header.point_format) + " take " +
+             std::to_string(record) + " bytes, not " + std::to_string(header.record_bytes));
+  }
+  if (header.points_offset < header_bytes) {
+    fail(input, "header", "the points begin inside of the header");
+  }
+  // The product of two is the determinant of the transform.
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (!(header.scale[axis] > 0) || !std::isfinite(header.scale[axis]) ||
+        !std::isfinite(header.offset[axis]) || header.scale[0] * header.scale[1] == 0 ||
+        !std::isfinite(header.scale[0] * header.scale[1])) {
+      fail(input, "header", "the scale is not positive, or scale or offset are not finite");
+    }
+  }
+  if (header.scale[0] != header.scale[1]) {
+    comments.emplace_back(
+        "x and y have steps of different sizes; triangulations are Delaunay in steps");
+  }
+  if (const auto size = input.size(); size && !header.compressed) {
+    const std::uint64_t left = *size - std::min(*size, header.points_offset);
+    if (header.points > left / header.record_bytes) {
+      fail(input, "byte " + std::to_string(header.points_offset),
+           "the header promises " + std::to_string(header.points) + " points of " +
+               std::to_string(header.record_bytes) + " bytes, but only " + std::to_string(left) +
+               " bytes are left",
+           "the file is cut off or its header is wrong");
+    }
+  }
+  read_vlrs(input, vlrs, header, comments);
+  if (evlrs > 0 && is_rereadable(file)) {
+    read_evlrs(*open_file(file), evlr_offset, evlrs, header, comments);
+  } else {
+    header.unread_evlrs = evlrs > 0;
+  }
+  if (!input.skip(header.points_offset - input.offset())) {
+    fail(input, "byte " + std::to_string(input.offset()), "the file ends before its points");
+  }
+  return header;
+}
+
+Crs las_crs(const LasHeader& header, const std::string& name, std::vector<std::string>& comments) {
+  Crs by_wkt;
+  by_wkt.wkt = wkt_of_records(header, comments);
+  if (header.wkt && by_wkt.wkt.empty() && header.unread_evlrs) {
+    throw Error({.file = name,
+                 .where = {},
+                 .cause = "its coordinate reference system stands behind the points, where it "
+                          "cannot be read from a pipe",
+                 .remedy = "name the file, or the system: `crs` EPSG:n"});
+  }
+  if (header.wkt && !by_wkt.wkt.empty()) return by_wkt;
+  Crs by_keys = crs_of_key_records(header, comments);
+  return names_something(by_keys) ? by_keys : by_wkt;
+}
+
+}  // namespace terrace::stream

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "format/las/lattice.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+
+namespace terrace::stream {
+namespace {
+
+constexpr int kMostDecimals = 9;
+constexpr std::array<double, kMostDecimals + 1> kPowers{1e0, 1e1, 1e2, 1e3, 1e4,
+                                                        1e5, 1e6, 1e7, 1e8, 1e9};
+/// A step less than what 32 bits reach, so that rounding stays inside.
+constexpr double kReach = std::numeric_limits<std::int32_t>::max() - 1.0;
+
+/// The fewest decimals that give every coordinate of the axis back.
+int decimals_of(std::span<const Point3> points, std::size_t axis, int decimals) {
+  for (const Point3& p : points) {
+    while (decimals < kMostDecimals &&
+           std::nearbyint(p[axis] * kPowers[static_cast<std::size_t>(decimals)]) /
+                   kPowers[static_cast<std::size_t>(decimals)] !=
+               p[axis]) {
+      ++decimals;
+    }
+  }
+  return decimals;
+}
+
+}  // namespace
+
+Lattice decimal_lattice(std::span<const Point3> points, const std::optional<Box3>& bounds) {
+  Box3 box;
+  for (const Point3& p : points) box.include(p);
+  double grown = 1;
+  if (bounds) {
+    box.include(*bounds);
+  } else {
+    grown = 1000;
+  }
+  Lattice lattice;
+  if (box.empty()) return lattice;
+  std::array<double, 3> reach{};  // from the offset, which is a whole number
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    lattice.offset[axis] = std::nearbyint(0.5 * box.min[axis] + 0.5 * box.max[axis]);
+    reach[axis] = (0.5 * box.max[axis] - 0.5 * box.min[axis]) * grown + 1;
+  }
+  reach[0] = reach[1] = std::max(reach[0], reach[1]);
+  const int planar = decimals_of(points, 1, decimals_of(points, 0, 0));
+  const std::array<int, 3> wanted{planar, planar, decimals_of(points, 2, 0)};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    int decimals = wanted[axis];
+    while (decimals > 0 && reach[axis] * kPowers[static_cast<std::size_t>(decimals)] > kReach) {
+      --decimals;
+    }
+    double step = 1 / kPowers[static_cast<std::size_t>(decimals)];
+    while (reach[axis] / step > kReach) step *= 10;
+    lattice.scale[axis] = step;
+  }
+  return lattice;
+}
+
+}  // namespace terrace::stream

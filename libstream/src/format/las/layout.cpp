@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "format/las/layout.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <string_view>
+
+#include "io/bytes.hpp"
+#include "terrace/stream/error.hpp"
+
+namespace terrace::stream {
+namespace {
+
+constexpr std::size_t kMostRecordBytes = 65535, kMostVlrBytes = 65535;
+constexpr std::size_t kExtraNameBytes = 32;
+
+bool has(std::span<const Channel> attributes, std::string_view name) {
+  return std::any_of(attributes.begin(), attributes.end(),
+                     [name](const Channel& channel) { return channel.name == name; });
+}
+
+unsigned point_format_of(std::span<const Channel> attributes) {
+  const bool colour = has(attributes, "red") && has(attributes, "green") && has(attributes, "blue");
+  const bool newer = has(attributes, "scan_angle") || has(attributes, "overlap") ||
+                     has(attributes, "scanner_channel") || has(attributes, "nir");
+  if (has(attributes, "scan_angle_rank") && !newer) {
+    return (has(attributes, "gps_time") ? 1U : 0U) + (colour ? 2U : 0U);
+  }
+  return !colour ? 6 : has(attributes, "nir") ? 8 : 7;
+}
+
+/// The number of a type in the specification's table of extra bytes.
+char extra_type(ScalarType type) {
+  constexpr std::array<char, 10> kNumbers{2, 1, 4, 3, 6, 5, 8, 7, 9, 10};
+  return kNumbers[static_cast<std::size_t>(type)];
+}
+
+void describe(const Channel& channel, std::string& descriptions) {
+  std::string row(kLasExtraBytesDescription, '\0');
+  row[2] = extra_type(channel.type);
+  std::copy_n(channel.name.begin(), std::min(channel.name.size(), kExtraNameBytes),
+              row.begin() + 4);
+  const auto put = [&row](std::size_t at, double value) {
+    std::string bytes;
+    append_little_endian(bytes, value);
+    row.replace(at, bytes.size(), bytes);
+  };
+  if (channel.scale != 1.0 || channel.offset != 0.0) {
+    row[3] = 8 + 16;
+    put(112, channel.scale);
+    put(136, channel.offset);
+  }
+  descriptions += row;
+}
+
+}  // namespace
+
+LasLayout las_layout(std::span<const Channel> attributes, const std::string& file) {
+  LasLayout layout{.point_format = point_format_of(attributes)};
+  layout.record_bytes = las_record_bytes(layout.point_format);
+  std::vector<LasField> standard = las_fields(layout.point_format);
+  std::vector<std::string> names;
+  for (const LasField& field : standard) names.push_back(field.channel.name);
+  for (const Channel& channel : attributes) {
+    const auto field = std::find_if(standard.begin(), standard.end(), [&](const LasField& each) {
+      return each.channel.name == channel.name;
+    });
+    if (field != standard.end()) {
+      layout.fields.push_back(*field);
+      standard.erase(field);  // A second attribute of the name goes to extra bytes.
+      continue;
+    }
+    LasField extra{.channel = channel, .offset = layout.record_bytes};
+    // A name may fill its place; the number that makes it distinct takes the end of it.
+    std::string name = channel.name.empty() ? "extra" : channel.name.substr(0, kExtraNameBytes);
+    for (int n = 2; std::find(names.begin(), names.end(), name) != names.end(); ++n) {
+      const std::string number = "_" + std::to_string(n);
+      name = channel.name.substr(0, kExtraNameBytes - number.size()) + number;
+    }
+    names.push_back(name);
+    extra.channel.name = name;
+    layout.record_bytes += size_of(channel.type);
+    describe(extra.channel, layout.extra_bytes);
+    layout.fields.push_back(std::move(extra));
+  }
+  if (layout.record_bytes > kMostRecordBytes || layout.extra_bytes.size() > kMostVlrBytes) {
+    throw Error(
+        {.file = file,
+         .where = {},
+         .cause = std::to_string(attributes.size()) + " attributes are more than LAS has room for",
+         .remedy = "write PLY"});
+  }
+  return layout;
+}
+
+}  // namespace terrace::stream

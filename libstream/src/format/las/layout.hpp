@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "format/las/fields.hpp"
+#include "terrace/stream/schema.hpp"
+
+namespace terrace::stream {
+
+/// How the attributes of a stream lie in the point records of a file.
+struct LasLayout {
+  unsigned point_format = 6;
+  std::size_t record_bytes = 0;
+  std::vector<LasField> fields{};  ///< of each attribute in its order, as the file has it
+  std::string extra_bytes{};       ///< data of the VLR that describes the extra bytes
+};
+
+/// Attributes go to the field of their name; what has none goes to extra bytes. The point format is
+/// the smallest of 6, 7 and 8, or, where angles are ranks of LAS 1.0 to 1.3, of 0 to 3: either way
+/// records that were read come out as they were. Wave packets are extra bytes too, because the
+/// waveforms do not travel. Throws: Error naming `file` for more attributes than fit.
+LasLayout las_layout(std::span<const Channel> attributes, const std::string& file);
+
+}  // namespace terrace::stream

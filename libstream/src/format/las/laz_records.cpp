@@ -1,0 +1,382 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "format/las/laz_records.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <condition_variable>
+#include <cstring>
+#include <exception>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <system_error>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "io/bytes.hpp"
+#include "io/peek.hpp"
+#include "terrace/stream/byte_source.hpp"
+#include "terrace/stream/error.hpp"
+#include "terrace/stream/laz.hpp"
+
+namespace terrace::stream {
+namespace {
+
+/// The position of the chunk table, which precedes the first chunk.
+constexpr std::size_t kPositionBytes = sizeof(std::int64_t);
+
+[[noreturn]] void fail_at(const std::string& file, std::string where, std::string cause) {
+  throw Error({.file = file,
+               .where = std::move(where),
+               .cause = std::move(cause),
+               .remedy = "the file is damaged: get it anew"});
+}
+[[noreturn]] void fail_chunk(const std::string& file, std::uint64_t chunk, std::uint64_t byte,
+                             const std::string& cause) {
+  fail_at(file, "chunk " + std::to_string(chunk) + ", byte " + std::to_string(byte), cause);
+}
+
+/// What is known of a file's chunks before they are read.
+struct LazLayout {
+  laz::Vlr vlr;
+  std::vector<laz::Chunk> chunks{};  ///< empty without a table
+  std::uint64_t first = 0;           ///< byte of the first chunk
+};
+
+laz::Vlr laz_vlr(const LasHeader& header, const std::string& name) {
+  for (const LasVlr& record : header.vlrs) {
+    if (!record.is(laz::Vlr::kUserId, laz::Vlr::kRecordId)) continue;
+    try {
+      return laz::Vlr::parse(std::as_bytes(std::span(record.data)), header.point_format,
+                             header.record_bytes);
+    } catch (const laz::Corrupt& error) {
+      fail_at(name, "header", error.what());
+    }
+  }
+  fail_at(name, "header", "its points are compressed, but the VLR that tells how is missing");
+}
+
+/// The chunks as the file's table lists them; empty if its writer left the table out.
+std::vector<laz::Chunk> read_table(const ByteSource& file, const LazLayout& layout,
+                                   std::uint64_t points) {
+  constexpr std::size_t kHeadBytes = 8;
+  const auto number_at = [&file](std::uint64_t at) {
+    char bytes[kPositionBytes];
+    file.read(at, std::as_writable_bytes(std::span(bytes)));
+    return load_little_endian<std::uint64_t>(bytes);
+  };
+  const std::uint64_t position_at = layout.first - kPositionBytes;
+  if (file.size() < layout.first) {
+    fail_chunk(file.name(), 0, file.size(), "the file ends before its points");
+  }
+  std::uint64_t at = number_at(position_at);
+  if (at == ~std::uint64_t{0}) at = number_at(file.size() - kPositionBytes);
+  if (at == position_at) return {};
+  if (at < layout.first || at > file.size() || file.size() - at < kHeadBytes) {
+    fail_at(file.name(), "byte " + std::to_string(position_at),
+            "the chunk table lies outside of the file");
+  }
+  // An entry takes 12 bytes at the most; what else the file has may follow the table.
+  const std::uint64_t chunks = number_at(at) >> 32;
+  std::vector<std::byte> table(std::min(kHeadBytes + 64 + 12 * chunks, file.size() - at));
+  file.read(at, table);
+  try {
+    return laz::read_chunk_table(table, layout.vlr, points, at - layout.first);
+  } catch (const laz::Corrupt& error) {
+    fail_at(file.name(), "byte " + std::to_string(at + error.offset()), error.what());
+  }
+}
+
+/// One chunk after the other, through a window of the input.
+class LazInTurn final : public RecordReader {
+ public:
+  LazInTurn(Input& input, LazLayout layout, std::uint64_t points)
+      : input_(&input),
+        layout_(std::move(layout)),
+        record_bytes_(layout_.vlr.record_length()),
+        left_(points),
+        decoder_(layout_.vlr),
+        records_(std::max<std::size_t>(1, kPieceBytes / record_bytes_) * record_bytes_) {}
+
+  std::string_view read(std::uint64_t wanted) override {
+    if (chunk_left_ == 0) begin_chunk();
+    const auto records = static_cast<std::size_t>(
+        std::min<std::uint64_t>({wanted, chunk_left_, records_.size() / record_bytes_}));
+    const std::span<std::byte> room = std::span(records_).first(records * record_bytes_);
+    laz::Decoder::Step step;
+    for (std::size_t need = kWindowBytes; step.points == 0; need *= 2) {
+      step = decode(need, room);
+    }
+    chunk_left_ -= step.points;
+    left_ -= step.points;
+    if (chunk_left_ == 0) end_chunk();
+    return {reinterpret_cast<const char*>(records_.data()), step.points * record_bytes_};
+  }
+
+  std::uint64_t held_bytes() const override {
+    if (layout_.vlr.compressor != laz::Compressor::layered) return 0;
+    std::uint64_t largest = 0;
+    for (const laz::Chunk& chunk : layout_.chunks) largest = std::max(largest, chunk.bytes);
+    return largest;
+  }
+
+ private:
+  static constexpr std::size_t kPieceBytes = 64u << 10, kWindowBytes = 64u << 10;
+
+  void begin_chunk() {
+    begin_ = input_->offset();
+    chunk_bytes_.reset();
+    chunk_left_ = left_;
+    if (!layout_.chunks.empty()) {
+      chunk_left_ = layout_.chunks[number_].points;
+      chunk_bytes_ = layout_.chunks[number_].bytes;
+    } else if (layout_.vlr.compressor == laz::Compressor::layered) {
+      const std::size_t bytes = laz::layered_head_size(layout_.vlr);
+      const std::string_view window = input_->fill(bytes);
+      try {
+        const laz::Chunk chunk = laz::layered_chunk(layout_.vlr, std::as_bytes(std::span(window)));
+        if (chunk.points == 0 || chunk.points > left_) {
+          throw laz::Corrupt("the chunk has " + std::to_string(chunk.points) + " points", 0);
+        }
+        chunk_left_ = chunk.points;
+        chunk_bytes_ = chunk.bytes;
+      } catch (const laz::Corrupt& error) {
+        fail(error);
+      }
+    } else if (layout_.vlr.compressor == laz::Compressor::pointwise_chunked) {
+      chunk_left_ = std::min<std::uint64_t>(left_, layout_.vlr.chunk_size);
+    }
+    if (chunk_left_ == 0) fail(laz::Corrupt("the chunks end before the points", 0));
+    decoder_.start(chunk_left_);
+  }
+
+  /// Decodes from a window of `need` bytes or what there is of the chunk.
+  laz::Decoder::Step decode(std::size_t need, std::span<std::byte> room) {
+    std::uint64_t most = need;
+    if (chunk_bytes_) most = std::min(most, *chunk_bytes_ - (input_->offset() - begin_));
+    std::string_view window = input_->fill(static_cast<std::size_t>(most));
+    const bool ended = window.size() < most;
+    if (chunk_bytes_) window = window.substr(0, static_cast<std::size_t>(most));
+    const bool last =
+        ended || (chunk_bytes_ && input_->offset() - begin_ + window.size() == *chunk_bytes_);
+    try {
+      const auto step = decoder_.step(std::as_bytes(std::span(window)), last, room);
+      if (step.points == 0 && last) {
+        throw laz::Corrupt("the chunk ends before its points",
+                           input_->offset() - begin_ + window.size());
+      }
+      input_->consume(step.bytes);
+      return step;
+    } catch (const laz::Corrupt& error) {
+      fail(error);
+    }
+  }
+
+  void end_chunk() {
+    const std::uint64_t used = input_->offset() - begin_;
+    if (chunk_bytes_ && used != *chunk_bytes_) {
+      fail(laz::Corrupt("coded bytes are left over", used));
+    }
+    ++number_;
+  }
+
+  [[noreturn]] void fail(const laz::Corrupt& error) const {
+    fail_chunk(input_->name(), number_, begin_ + error.offset(), error.what());
+  }
+
+  Input* input_;
+  LazLayout layout_;
+  std::size_t record_bytes_;
+  std::uint64_t left_;
+  laz::Decoder decoder_;
+  std::vector<std::byte> records_;
+  std::uint64_t number_ = 0, begin_ = 0;      ///< of the chunk
+  std::uint64_t chunk_left_ = 0;              ///< points of it
+  std::optional<std::uint64_t> chunk_bytes_;  ///< of it, if known
+};
+
+/// Chunks decoded by several threads, a few ahead of the one that is being read.
+class LazAhead final : public RecordReader {
+ public:
+  /// Takes `slots` times a chunk's bytes and records, and a decoder's models per thread.
+  LazAhead(std::unique_ptr<ByteSource> file, LazLayout layout, unsigned threads, std::size_t slots)
+      : file_(std::move(file)),
+        layout_(std::move(layout)),
+        record_bytes_(layout_.vlr.record_length()),
+        wanted_threads_(threads),
+        slots_(slots) {}
+  ~LazAhead() override {
+    {
+      const std::lock_guard lock(mutex_);
+      stop_ = true;
+    }
+    room_.notify_all();
+    for (std::thread& thread : threads_) thread.join();
+  }
+  LazAhead(const LazAhead&) = delete;
+  LazAhead& operator=(const LazAhead&) = delete;
+
+  std::string_view read(std::uint64_t wanted) override {
+    if (!started_) start();
+    Slot* slot = &slots_[reading_ % slots_.size()];
+    if (at_ == slot->records.size() && at_ > 0) {
+      release(*slot);
+      slot = &slots_[reading_ % slots_.size()];
+    }
+    if (at_ == 0) wait_for(*slot);
+    const std::size_t bytes = static_cast<std::size_t>(
+        std::min<std::uint64_t>(wanted, (slot->records.size() - at_) / record_bytes_) *
+        record_bytes_);
+    const std::string_view found(reinterpret_cast<const char*>(slot->records.data()) + at_, bytes);
+    at_ += bytes;
+    return found;
+  }
+
+ private:
+  struct Slot {
+    std::vector<std::byte> coded, records;
+    std::exception_ptr error;
+    bool ready = false;
+  };
+
+  /// Only when records are asked for: files are opened to be looked at, too.
+  void start() {
+    started_ = true;
+    try {
+      for (unsigned i = 0; i < wanted_threads_; ++i) threads_.emplace_back([this] { run(); });
+    } catch (const std::system_error&) {
+      // The system grants no more threads; without any the caller decodes.
+      if (threads_.empty()) own_.emplace(layout_.vlr);
+    }
+  }
+
+  void release(Slot& slot) {
+    {
+      const std::lock_guard lock(mutex_);
+      slot.ready = false;
+      ++reading_;
+    }
+    at_ = 0;
+    room_.notify_all();
+  }
+
+  void wait_for(Slot& slot) {
+    if (own_) {
+      decode(reading_, slot, *own_);
+    } else {
+      std::unique_lock lock(mutex_);
+      news_.wait(lock, [&slot] { return slot.ready; });
+    }
+    if (slot.error) std::rethrow_exception(slot.error);
+  }
+
+  void run() {
+    std::optional<laz::Decoder> decoder;
+    for (;;) {
+      std::size_t chunk = 0;
+      {
+        std::unique_lock lock(mutex_);
+        room_.wait(lock, [this] {
+          return stop_ || (next_ < layout_.chunks.size() && next_ < reading_ + slots_.size());
+        });
+        if (stop_) return;
+        chunk = next_++;
+      }
+      Slot& slot = slots_[chunk % slots_.size()];
+      try {
+        if (!decoder) decoder.emplace(layout_.vlr);
+        decode(chunk, slot, *decoder);
+      } catch (...) {
+        slot.error = std::current_exception();
+      }
+      {
+        const std::lock_guard lock(mutex_);
+        slot.ready = true;
+      }
+      news_.notify_one();
+    }
+  }
+
+  void decode(std::size_t number, Slot& slot, laz::Decoder& decoder) const {
+    const laz::Chunk& chunk = layout_.chunks[number];
+    slot.coded.resize(chunk.bytes);
+    slot.records.resize(chunk.points * record_bytes_);
+    file_->read(layout_.first + chunk.offset, slot.coded);
+    try {
+      decoder.decode_chunk(slot.coded, slot.records);
+    } catch (const laz::Corrupt& error) {
+      fail_chunk(file_->name(), number, layout_.first + chunk.offset + error.offset(),
+                 error.what());
+    }
+  }
+
+  std::unique_ptr<ByteSource> file_;
+  LazLayout layout_;
+  std::size_t record_bytes_;
+  unsigned wanted_threads_;
+  bool started_ = false;
+  std::vector<Slot> slots_;
+  std::optional<laz::Decoder> own_;
+  std::size_t at_ = 0;  ///< bytes of the chunk being read
+
+  std::mutex mutex_;
+  std::condition_variable news_, room_;
+  std::size_t reading_ = 0, next_ = 0;  ///< chunks
+  bool stop_ = false;
+  std::vector<std::thread> threads_;
+};
+
+/// How many chunks may be in memory at once.
+std::size_t slots_within(std::uint64_t memory_bytes, const LazLayout& layout, unsigned threads) {
+  constexpr std::uint64_t kDecoderBytes = 4u << 20, kMostBytes = 64u << 20;
+  memory_bytes = std::min(memory_bytes, kMostBytes);
+  std::uint64_t largest = 1;
+  for (const laz::Chunk& chunk : layout.chunks) {
+    largest = std::max(largest, chunk.bytes + chunk.points * layout.vlr.record_length());
+  }
+  const std::uint64_t room = memory_bytes / (largest + kDecoderBytes);
+  return static_cast<std::size_t>(std::min<std::uint64_t>(room, threads + 2));
+}
+
+}  // namespace
+
+std::unique_ptr<RecordReader> open_laz_records(Input& input, const std::string& file,
+                                               const LasHeader& header,
+                                               const SourceOptions& options) {
+  LazLayout layout{.vlr = laz_vlr(header, input.name()), .first = header.points_offset};
+  if (layout.vlr.compressor == laz::Compressor::none) {
+    return std::make_unique<PlainRecords>(input, header.record_bytes);
+  }
+  const bool has_table = layout.vlr.compressor != laz::Compressor::pointwise;
+  if (header.points == 0) return std::make_unique<LazInTurn>(input, std::move(layout), 0);
+  if (has_table) {
+    layout.first += kPositionBytes;
+    if (is_rereadable(file)) {
+      auto bytes = open_file(file);
+      layout.chunks = read_table(*bytes, layout, header.points);
+      const std::size_t slots = slots_within(options.memory_bytes, layout, options.threads);
+      if (options.threads > 1 && slots > 1 && layout.chunks.size() > 1) {
+        const auto threads = static_cast<unsigned>(
+            std::min<std::size_t>({options.threads, slots, layout.chunks.size()}));
+        return std::make_unique<LazAhead>(std::move(bytes), std::move(layout), threads, slots);
+      }
+    }
+    const bool told_by_table = layout.vlr.chunk_size == laz::Vlr::kVariable &&
+                               layout.vlr.compressor != laz::Compressor::layered;
+    if (layout.chunks.empty() && told_by_table) {
+      throw Error({.file = input.name(),
+                   .where = {},
+                   .cause = "its chunks are told by a table behind the points, where it cannot be "
+                            "read from a pipe",
+                   .remedy = "name the file"});
+    }
+    if (!input.skip(kPositionBytes)) {
+      fail_chunk(input.name(), 0, input.offset(), "the file ends before its points");
+    }
+  }
+  return std::make_unique<LazInTurn>(input, std::move(layout), header.points);
+}
+
+}  // namespace terrace::stream

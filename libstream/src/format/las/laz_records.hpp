@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "format/las/header.hpp"
+#include "format/las/record_reader.hpp"
+#include "terrace/stream/input.hpp"
+#include "terrace/stream/source.hpp"
+
+namespace terrace::stream {
+
+/// The records of a LAZ file. input: at the first byte behind the header and VLRs. Chunks of a file
+/// with a chunk table are decoded by options.threads at once, ahead of what is read; from a pipe,
+/// without a table, and where chunks are too large for that, one after the other.
+/// Throws: Error naming chunk and byte for damage, and if the layout cannot be read from a pipe.
+std::unique_ptr<RecordReader> open_laz_records(Input& input, const std::string& file,
+                                               const LasHeader& header,
+                                               const SourceOptions& options);
+
+}  // namespace terrace::stream

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "format/las/record_reader.hpp"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "terrace/stream/error.hpp"
+
+namespace terrace::stream {
+
+std::string_view PlainRecords::read(std::uint64_t wanted) {
+  /// Most bytes at once: they are walked through once per field, so they stay in a near cache.
+  constexpr std::size_t kPieceBytes = 64u << 10;
+  input_->consume(std::exchange(used_, 0));
+  const auto records =
+      std::min<std::uint64_t>(wanted, std::max<std::size_t>(1, kPieceBytes / record_bytes_));
+  used_ = static_cast<std::size_t>(records) * record_bytes_;
+  const std::string_view window = input_->fill(used_);
+  if (window.size() < used_) {
+    throw Error({.file = input_->name(),
+                 .where = "byte " + std::to_string(input_->offset() + window.size()),
+                 .cause = "the file ends before the points that its header promises",
+                 .remedy = "the file is cut off or its header is wrong"});
+  }
+  return window.substr(0, used_);
+}
+
+}  // namespace terrace::stream

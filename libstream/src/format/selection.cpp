@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "format/selection.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "io/text.hpp"
+#include "terrace/stream/error.hpp"
+#include "terrace/stream/where.hpp"
+
+namespace terrace::stream {
+namespace {
+
+class SelectedSource final : public PointSource {
+ public:
+  SelectedSource(std::unique_ptr<PointSource> source, const SourceOptions& options)
+      : source_(std::move(source)), block_points_(options.block_points) {
+    const SourceInfo& all = source_->info();
+    const Selection& wanted = options.selection;
+    info_ = all;
+    if (!wanted.where.empty()) {
+      where_.emplace(wanted.where, all);
+      if (!all.grid) info_.points.reset();
+      for (std::size_t i = 0; i < all.attributes.size(); ++i) {
+        if (all.attributes[i].name == "withheld" && size_of(all.attributes[i].type) == 1) {
+          withheld_attribute_ = i;
+        }
+      }
+    }
+    check_names(wanted.drop);
+    if (wanted.keep) check_names(*wanted.keep);
+    const auto has = [](const std::vector<std::string>& names, const std::string& name) {
+      return std::find(names.begin(), names.end(), name) != names.end();
+    };
+    info_.attributes.clear();
+    for (std::size_t i = 0; i < all.attributes.size(); ++i) {
+      const Channel& attribute = all.attributes[i];
+      if ((wanted.keep && !has(*wanted.keep, attribute.name)) || has(wanted.drop, attribute.name)) {
+        continue;
+      }
+      info_.attributes.push_back(attribute);
+      const std::size_t from = all.attribute_offset(i), bytes = size_of(attribute.type);
+      if (!pieces_.empty() && pieces_.back().from + pieces_.back().bytes == from) {
+        pieces_.back().bytes += bytes;
+      } else {
+        pieces_.push_back({from, bytes});
+      }
+    }
+  }
+
+  const SourceInfo& info() const override { return info_; }
+  void refine(double cell_aspect, std::uint64_t memory_bytes) override {
+    source_->refine(cell_aspect, memory_bytes);
+  }
+  std::uint64_t reading_bytes() const override { return source_->reading_bytes(); }
+
+  bool next(PointBlock& block) override {
+    block.clear();
+    // What was left over last time.
+    std::swap(block, rest_);
+    rest_.clear();
+    while (block.size() < block_points_ && source_->next(read_)) {
+      append(block);
+      if (info_.grid && !block.empty()) break;
+    }
+    if (block.size() > block_points_) {
+      const auto record = info_.payload_size();
+      const auto points = static_cast<std::ptrdiff_t>(block_points_);
+      const auto bytes = static_cast<std::ptrdiff_t>(block_points_ * record);
+      rest_.positions.assign(block.positions.begin() + points, block.positions.end());
+      rest_.payload.assign(block.payload.begin() + bytes, block.payload.end());
+      block.positions.resize(block_points_);
+      block.payload.resize(block_points_ * record);
+    }
+    delivered_ += block.size();
+    return !block.empty();
+  }
+
+  Progress progress() const override {
+    Progress progress = source_->progress();
+    progress.points = delivered_;
+    if (where_) {
+      progress.withheld = withheld_;
+      progress.excluded = excluded_;
+    }
+    return progress;
+  }
+
+ private:
+  /// Bytes of a record that are kept.
+  struct Piece {
+    std::size_t from = 0, bytes = 0;
+  };
+
+  void check_names(const std::vector<std::string>& names) const {
+    const SourceInfo& all = source_->info();
+    for (const std::string& name : names) {
+      const bool known = std::any_of(all.attributes.begin(), all.attributes.end(),
+                                     [&](const Channel& c) { return c.name == name; });
+      if (known) continue;
+      std::string list;
+      for (const Channel& attribute : all.attributes) {
+        if (!list.empty()) list += ", ";
+        list += attribute.name;
+      }
+      throw Error({.file = all.files.empty() ? std::string() : all.files.front(),
+                   .where = {},
+                   .cause = "its points have no attribute " + in_quotes(name),
+                   .remedy = list.empty() ? "they have none" : "known are " + list});
+    }
+  }
+
+  /// Appends what counts of the block that was read last.
+  void append(PointBlock& block) {
+    const std::size_t from_bytes = source_->info().payload_size(), to_bytes = info_.payload_size();
+    matches_.assign(read_.size(), 1);
+    if (where_) where_->test(read_.positions, read_.payload, matches_);
+    const std::size_t before = block.payload.size();
+    block.payload.resize(before + read_.size() * to_bytes);
+    std::byte* to = block.payload.data() + before;
+    for (std::size_t i = 0; i < read_.size(); ++i) {
+      if (matches_[i] == 0) {
+        ++excluded_;
+        continue;
+      }
+      const std::byte* const record = read_.payload.data() + i * from_bytes;
+      if (withheld_attribute_) {
+        withheld_ +=
+            record[source_->info().attribute_offset(*withheld_attribute_)] != std::byte{0} ? 1 : 0;
+      }
+      block.positions.push_back(read_.positions[i]);
+      for (const Piece& piece : pieces_) {
+        std::memcpy(to, record + piece.from, piece.bytes);
+        to += piece.bytes;
+      }
+    }
+    block.payload.resize(block.size() * to_bytes);
+  }
+
+  std::unique_ptr<PointSource> source_;
+  std::size_t block_points_;
+  SourceInfo info_;
+  std::optional<Where> where_;
+  std::vector<Piece> pieces_;
+  std::optional<std::size_t> withheld_attribute_;
+  PointBlock read_, rest_;
+  std::vector<std::uint8_t> matches_;
+  std::uint64_t delivered_ = 0, excluded_ = 0, withheld_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<PointSource> selection_of(std::unique_ptr<PointSource> source,
+                                          const SourceOptions& options) {
+  const Selection& wanted = options.selection;
+  if (wanted.where.empty() && !wanted.keep && wanted.drop.empty()) return source;
+  return std::make_unique<SelectedSource>(std::move(source), options);
+}
+
+}  // namespace terrace::stream

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/spool.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <cerrno>
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include "io/file_size_signal.hpp"
+#include "terrace/stream/error.hpp"
+
+namespace terrace::stream {
+namespace {
+
+constexpr const char* kRemedy = "make room, or name another folder for temporary files: TMPDIR";
+
+/// A file that never had a name, or whose name is gone at once where the file system knows no such.
+int open_nameless() {
+  std::error_code error;
+  std::filesystem::path folder = std::filesystem::temp_directory_path(error);
+  if (error) folder = "/tmp";
+  const int nameless = ::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC | O_EXCL, 0600);
+  if (nameless >= 0) return nameless;
+  std::string name = (folder / "terrace-XXXXXX").string();
+  const int named = ::mkostemp(name.data(), O_CLOEXEC);
+  if (named >= 0) ::unlink(name.c_str());
+  return named;
+}
+
+}  // namespace
+
+Spool::Spool(std::string name) : name_(std::move(name)), descriptor_(open_nameless()) {
+  if (descriptor_ < 0) throw system_error(name_, "cannot open a temporary file", errno, kRemedy);
+}
+
+Spool::~Spool() { ::close(descriptor_); }
+
+void Spool::write(std::uint64_t offset, std::span<const std::byte> bytes) {
+  const FileSizeSignalBlock no_signal;
+  for (std::size_t done = 0; done < bytes.size();) {
+    const ssize_t put = ::pwrite(descriptor_, bytes.data() + done, bytes.size() - done,
+                                 static_cast<off_t>(offset + done));
+    if (put < 0 && errno == EINTR) continue;
+    if (put < 0) throw system_error(name_, "cannot write a temporary file", errno, kRemedy);
+    done += static_cast<std::size_t>(put);
+  }
+  size_ = std::max(size_, offset + bytes.size());
+}
+
+void Spool::read(std::uint64_t offset, std::span<std::byte> out) const {
+  assert(offset + out.size() <= size_);
+  for (std::size_t done = 0; done < out.size();) {
+    const ssize_t got = ::pread(descriptor_, out.data() + done, out.size() - done,
+                                static_cast<off_t>(offset + done));
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) throw system_error(name_, "cannot read a temporary file", got < 0 ? errno : EIO);
+    done += static_cast<std::size_t>(got);
+  }
+}
+
+}  // namespace terrace::stream

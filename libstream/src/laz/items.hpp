@@ -1,0 +1,317 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "laz/bytes.hpp"
+#include "laz/coder.hpp"
+#include "laz/integer_coder.hpp"
+
+/// What pointwise and layered chunks code alike. Each function codes a part of a record by the
+/// models of its struct. Values to encode are parameters, which decoding ignores; both directions
+/// return the value.
+
+namespace terrace::stream::laz {
+
+/// A value of the record to encode; 0 in decoding.
+template <class Coder, class T>
+TERRACE_LAZ_INLINE T given(typename Coder::Record at) {
+  if constexpr (Coder::kDecoding) {
+    return T{};
+  } else {
+    return load<T>(at);
+  }
+}
+
+/// Stores a decoded value.
+template <class Coder, class T>
+TERRACE_LAZ_INLINE void put(typename Coder::Record at, T value) {
+  if constexpr (Coder::kDecoding) store(at, value);
+}
+
+TERRACE_LAZ_INLINE std::uint8_t low_byte(unsigned value) {
+  return static_cast<std::uint8_t>(value);
+}
+
+/// LASzip's running median of differences: five sorted values, of which the highest and lowest take
+/// turns in making room for a new one.
+struct Median5 {
+  std::array<std::int32_t, 5> sorted;
+  bool drop_highest;
+
+  void begin() {
+    sorted = {};
+    drop_highest = true;
+  }
+  [[nodiscard]] std::int32_t value() const { return sorted[2]; }
+  TERRACE_LAZ_INLINE void add(std::int32_t x) {
+    const std::int32_t* kept = sorted.data() + (drop_highest ? 0 : 1);
+    const std::int32_t a = kept[0], b = kept[1], c = kept[2], d = kept[3];
+    drop_highest = drop_highest ? x < sorted[2] : x <= sorted[2];
+    sorted = {std::min(a, x), std::max(a, std::min(b, x)), std::max(b, std::min(c, x)),
+              std::max(c, std::min(d, x)), std::max(d, x)};
+  }
+};
+
+/// The contexts of a correction of Y by the magnitude k of X's; of Z by the mean of both.
+TERRACE_LAZ_INLINE unsigned y_context(unsigned k, bool single) {
+  return (single ? 1 : 0) + (k < 20 ? k & ~1u : 20);
+}
+TERRACE_LAZ_INLINE unsigned z_context(unsigned k, bool single) {
+  return (single ? 1 : 0) + (k < 18 ? k & ~1u : 18);
+}
+
+/// Codes a coordinate by the median of the steps before.
+template <class Coder, class Models, class Median>
+TERRACE_LAZ_INLINE void code_step(Coder& coder, Models& models, Median& steps, unsigned context,
+                                  const std::uint8_t* last, typename Coder::Record now) {
+  const auto before = load<std::uint32_t>(last);
+  const std::uint32_t ahead = given<Coder, std::uint32_t>(now) - before;
+  const std::int32_t step =
+      models.code(coder, steps.value(), static_cast<std::int32_t>(ahead), context);
+  put<Coder>(now, before + static_cast<std::uint32_t>(step));
+  steps.add(step);
+}
+
+/// GPS times, as the 64-bit patterns of the doubles: up to four sequences that take turns, each of
+/// which goes on by multiples of a difference. Layered chunks have no symbol for an unchanged time.
+template <bool kLayered>
+struct GpsTime {
+  static constexpr unsigned kUnchanged = kLayered ? 0 : 1;  ///< how many symbols mean that
+  static constexpr int kMostMultiple = 500, kLeastMultiple = -10;
+  static constexpr unsigned kMultiples = kMostMultiple - kLeastMultiple + 1;
+  /// Behind the multiples and "unchanged": a time in full, then the sequences 1 to 3 further on.
+  static constexpr unsigned kFull = kMultiples + kUnchanged;
+
+  SymbolModel<5 + kUnchanged> first;  ///< where a sequence has no difference yet
+  SymbolModel<515 + kUnchanged> multiple;
+  IntegerModels<32, 9> integers;
+  std::array<std::uint64_t, 4> time;
+  std::array<std::int32_t, 4> difference;
+  std::array<unsigned, 4> extremes;  ///< in a row, differences out of the range of multiples
+  unsigned current, newest;
+
+  void begin(std::uint64_t time_of_first) {
+    time = {time_of_first, 0, 0, 0};
+    difference = {};
+    extremes = {};
+    current = newest = 0;
+  }
+
+  template <class Coder>
+  TERRACE_LAZ_INLINE std::uint64_t code(Coder& coder, std::uint64_t value) {
+    // How many sequences further on the one is that `value` continues; 4: in none of them.
+    unsigned turns = 0;
+    if constexpr (!Coder::kDecoding) {
+      while (turns < 4 && !fits(value - time[(current + turns) & 3])) ++turns;
+    }
+    for (bool turned = false;; turned = true) {
+      coder.reserve();
+      const std::int32_t step = difference[current];
+      const auto ahead = static_cast<std::int32_t>(value - time[current]);
+      const bool same = kUnchanged > 0 && value == time[current];
+      unsigned further = 0;
+      if (step == 0) {
+        const unsigned chosen = turns == 4  ? kUnchanged + 1
+                                : turns > 0 ? kUnchanged + 1 + turns
+                                : same      ? 0
+                                            : kUnchanged;
+        const unsigned symbol = coder.symbol(first, chosen);
+        if (symbol < kUnchanged) return time[current];
+        if (symbol == kUnchanged) {
+          difference[current] = integers.code(coder, 0, ahead, 0);
+          extremes[current] = 0;
+          return advance(difference[current]);
+        }
+        further = symbol - kUnchanged - 1;
+      } else {
+        unsigned chosen = 0;
+        if constexpr (!Coder::kDecoding) {
+          chosen = turns == 4  ? kFull
+                   : turns > 0 ? kFull + turns
+                   : same      ? kMultiples
+                               : multiple_symbol(ahead, step);
+        }
+        const unsigned symbol = coder.symbol(multiple, chosen);
+        if (symbol < kMultiples) return code_multiple(coder, symbol, step, ahead);
+        if (symbol < kFull) return time[current];
+        further = symbol - kFull;
+      }
+      if (further == 0) return code_full(coder, value);
+      if constexpr (Coder::kDecoding) {
+        if (turned) coder.refuse();
+      }
+      current = (current + further) & 3;
+      turns = 0;
+    }
+  }
+
+ private:
+  static bool fits(std::uint64_t difference) {
+    const auto value = static_cast<std::int64_t>(difference);
+    return value == static_cast<std::int32_t>(value);
+  }
+  std::uint64_t advance(std::int32_t by) {
+    return time[current] += static_cast<std::uint64_t>(static_cast<std::int64_t>(by));
+  }
+  /// The nearest multiple; rounded as LASzip does, so that the bytes are the same.
+  static unsigned multiple_symbol(std::int32_t ahead, std::int32_t step) {
+    const double ratio = static_cast<float>(ahead) / static_cast<float>(step);
+    const double bounded = std::clamp(ratio, kLeastMultiple - 1.0, kMostMultiple + 1.0);
+    const int nearest = static_cast<int>(bounded >= 0 ? bounded + 0.5 : bounded - 0.5);
+    const int symbol = std::clamp(nearest, kLeastMultiple, kMostMultiple);
+    return static_cast<unsigned>(symbol >= 0 ? symbol : kMostMultiple - symbol);
+  }
+  template <class Coder>
+  TERRACE_LAZ_INLINE std::uint64_t code_multiple(Coder& coder, unsigned symbol, std::int32_t step,
+                                                 std::int32_t ahead) {
+    const int times = symbol <= kMostMultiple ? static_cast<int>(symbol)
+                                              : kMostMultiple - static_cast<int>(symbol);
+    const unsigned context = times == 1                ? 1
+                             : times == 0              ? 7
+                             : times == kMostMultiple  ? 4
+                             : times == kLeastMultiple ? 6
+                             : times < 0               ? 5
+                             : times < 10              ? 2
+                                                       : 3;
+    const auto predicted = static_cast<std::int32_t>(static_cast<std::uint32_t>(times) *
+                                                     static_cast<std::uint32_t>(step));
+    const std::int32_t coded = integers.code(coder, predicted, ahead, context);
+    if (times == 1) {
+      extremes[current] = 0;
+    } else if (times == 0 || times == kMostMultiple || times == kLeastMultiple) {
+      if (++extremes[current] > 3) {
+        difference[current] = coded;
+        extremes[current] = 0;
+      }
+    }
+    return advance(coded);
+  }
+  template <class Coder>
+  TERRACE_LAZ_INLINE std::uint64_t code_full(Coder& coder, std::uint64_t value) {
+    const auto upper = static_cast<std::int32_t>(time[current] >> 32);
+    const std::uint64_t high = static_cast<std::uint32_t>(
+        integers.code(coder, upper, static_cast<std::int32_t>(value >> 32), 8));
+    newest = (newest + 1) & 3;
+    current = newest;
+    time[current] = high << 32 | coder.raw(32, static_cast<std::uint32_t>(value));
+    difference[current] = 0;
+    extremes[current] = 0;
+    return time[current];
+  }
+};
+
+/// Colours, byte by byte: red after the point before, green after red's change, blue after both.
+struct Rgb {
+  using Value = std::array<std::uint16_t, 3>;
+
+  SymbolModel<128> changed;  ///< low and high bytes of red, green, blue; not grey
+  std::array<SymbolModel<256>, 6> changes;
+
+  template <class Coder>
+  TERRACE_LAZ_INLINE Value code(Coder& coder, const Value& last, const Value& value) {
+    constexpr unsigned kColoured = 64;
+    coder.reserve();
+    unsigned mask = 0;
+    if constexpr (!Coder::kDecoding) {
+      for (unsigned i = 0; i < 3; ++i) {
+        const unsigned differs = last[i] ^ value[i];
+        mask |= ((differs & 0xff) != 0 ? 1u : 0u) << (2 * i);
+        mask |= (differs > 0xff ? 2u : 0u) << (2 * i);
+      }
+      if (value[0] != value[1] || value[0] != value[2]) mask |= kColoured;
+    }
+    mask = coder.symbol(changed, mask);
+    const int last_low[3] = {last[0] & 0xff, last[1] & 0xff, last[2] & 0xff};
+    const int last_high[3] = {last[0] >> 8, last[1] >> 8, last[2] >> 8};
+    const int red_low = code_byte(coder, mask, 0, last_low[0], 0, value[0] & 0xff);
+    const int red_high = code_byte(coder, mask, 1, last_high[0], 0, value[0] >> 8);
+    const std::uint16_t red = joined(red_high, red_low);
+    if ((mask & kColoured) == 0) return {red, red, red};
+    const int low = red_low - last_low[0], high = red_high - last_high[0];
+    const int green_low = code_byte(coder, mask, 2, last_low[1], low, value[1] & 0xff);
+    const int blue_low = code_byte(coder, mask, 4, last_low[2], (low + green_low - last_low[1]) / 2,
+                                   value[2] & 0xff);
+    const int green_high = code_byte(coder, mask, 3, last_high[1], high, value[1] >> 8);
+    const int blue_high = code_byte(coder, mask, 5, last_high[2],
+                                    (high + green_high - last_high[1]) / 2, value[2] >> 8);
+    return {red, joined(green_high, green_low), joined(blue_high, blue_low)};
+  }
+
+ private:
+  TERRACE_LAZ_INLINE static std::uint16_t joined(int high, int low) {
+    return static_cast<std::uint16_t>(high << 8 | low);
+  }
+  /// Codes a byte whose bit in the mask is set, as the change of `before` beyond `moved`.
+  template <class Coder>
+  TERRACE_LAZ_INLINE int code_byte(Coder& coder, unsigned mask, unsigned bit, int before, int moved,
+                                   int byte) {
+    if ((mask >> bit & 1) == 0) return before;
+    const int predicted = std::clamp(before + moved, 0, 255);
+    const unsigned change =
+        coder.symbol(changes[bit], low_byte(static_cast<unsigned>(byte - predicted)));
+    return (predicted + static_cast<int>(change)) & 0xff;
+  }
+};
+
+/// Wave packets: index, place and size in the file of waveforms, and where the return is in them.
+struct WavePacket {
+  static constexpr std::size_t kSize = 29;
+
+  SymbolModel<256> index;
+  std::array<SymbolModel<4>, 4> ways;  ///< by the way of the point before
+  IntegerModels<32, 1> offset_change, packet_size, return_place;
+  IntegerModels<32, 3> direction;
+  std::int32_t last_change;
+  unsigned way;
+
+  void begin() {
+    last_change = 0;
+    way = 0;
+  }
+
+  template <class Coder>
+  TERRACE_LAZ_INLINE void code(Coder& coder, const std::uint8_t* last, typename Coder::Record now) {
+    coder.reserve();
+    put<Coder>(now, low_byte(coder.symbol(index, given<Coder, std::uint8_t>(now))));
+    const auto before = load<std::uint64_t>(last + 1);
+    const auto size = load<std::uint32_t>(last + 9);
+    const auto offset = given<Coder, std::uint64_t>(now + 1);
+    const auto change = static_cast<std::int64_t>(offset - before);
+    const auto change32 = static_cast<std::int32_t>(change);
+    unsigned chosen = 0;
+    if constexpr (!Coder::kDecoding) {
+      chosen = change == 0 ? 0 : change != change32 ? 3 : change == size ? 1 : 2;
+    }
+    way = coder.symbol(ways[way], chosen);
+    std::uint64_t coded = before;
+    if (way == 1) {
+      coded += size;
+    } else if (way == 2) {
+      last_change = offset_change.code(coder, last_change, change32, 0);
+      coded += static_cast<std::uint64_t>(static_cast<std::int64_t>(last_change));
+    } else if (way == 3) {
+      const std::uint32_t low = coder.raw(32, static_cast<std::uint32_t>(offset));
+      coded = low | std::uint64_t{coder.raw(32, static_cast<std::uint32_t>(offset >> 32))} << 32;
+    }
+    put<Coder>(now + 1, coded);
+    code_part(coder, packet_size, last + 9, now + 9, 0);
+    code_part(coder, return_place, last + 13, now + 13, 0);
+    for (unsigned i = 0; i < 3; ++i) {
+      code_part(coder, direction, last + 17 + 4 * i, now + 17 + 4 * i, i);
+    }
+  }
+
+ private:
+  template <class Coder, class Models>
+  TERRACE_LAZ_INLINE static void code_part(Coder& coder, Models& models, const std::uint8_t* last,
+                                           typename Coder::Record now, unsigned context) {
+    put<Coder>(now, models.code(coder, load<std::int32_t>(last), given<Coder, std::int32_t>(now),
+                                context));
+  }
+};
+
+}  // namespace terrace::stream::laz

@@ -1,0 +1,557 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <span>
+#include <vector>
+
+#include "laz/items.hpp"
+#include "laz/layout.hpp"
+#include "terrace/stream/laz.hpp"
+
+/// Layered chunks, point formats 6 to 10: each attribute has a stream of its own, so that it can be
+/// skipped. What the others depend on is in the first layer: returns, scanner channel, and which of
+/// them change. Points go in runs of a few hundred through one layer after the other.
+
+namespace terrace::stream::laz {
+
+/// Numbers for each number of returns n and return r, LASzip's tables: by the byte that holds them,
+/// n * 16 + r.
+struct Returns14 {
+  std::array<std::uint8_t, 256> map, level;
+
+  static constexpr Returns14 make() {
+    constexpr const char* kMap[16] = {
+        "0123453445555555", "1013333333333333", "2124444444433333", "3345444444444444",
+        "4344544444444444", "5344454444444444", "3344445444444444", "4344444544444444",
+        "4344444454444444", "5344444445444444", "5344444444544444", "5334444444455444",
+        "5334444444455544", "5334444444445554", "5334444444444555", "5334444444444455"};
+    Returns14 tables{};
+    for (int n = 0; n < 16; ++n) {
+      for (int r = 0; r < 16; ++r) {
+        const auto at = static_cast<std::size_t>(n * 16 + r);
+        tables.map[at] = static_cast<std::uint8_t>(kMap[n][r] - '0');
+        tables.level[at] = static_cast<std::uint8_t>(std::min(7, n > r ? n - r : r - n));
+      }
+    }
+    return tables;
+  }
+};
+inline constexpr Returns14 kReturns14 = Returns14::make();
+
+/// The layers of a chunk, in the order of their bytes.
+enum Layer : std::size_t {
+  kXyLayer,
+  kZLayer,
+  kClassificationLayer,
+  kFlagsLayer,
+  kIntensityLayer,
+  kScanAngleLayer,
+  kUserDataLayer,
+  kSourceLayer,
+  kTimeLayer,
+  kItemLayers,  ///< from here on those of the items behind the point
+};
+
+inline std::size_t layer_count(const RecordLayout& layout) {
+  return kItemLayers + (layout.rgb != 0 ? 1 : 0) + (layout.nir != 0 ? 1 : 0) +
+         (layout.wave_packet != 0 ? 1 : 0) + layout.extra_bytes;
+}
+
+/// Models of the points of one scanner channel.
+struct Channel14 {
+  std::array<SymbolModel<128>, 8> changed;
+  SymbolModel<3> channel;
+  std::array<SymbolModel<16>, 16> return_count, return_number;
+  SymbolModel<13> return_step;
+  IntegerModels<32, 2> x;
+  IntegerModels<32, 22> y;
+  std::array<Median5, 12> x_steps, y_steps;
+  bool time_changed;
+
+  IntegerModels<32, 20> z;
+  std::array<std::int32_t, 8> last_z;
+  std::array<SymbolModel<256>, 64> classification, user_data;
+  std::array<SymbolModel<64>, 64> flags;
+  IntegerModels<16, 4> intensity;
+  std::array<std::uint16_t, 8> last_intensity;
+  IntegerModels<16, 2> scan_angle;
+  IntegerModels<16, 1> source;
+  GpsTime<true> time;
+
+  // The items behind the point; a point's channel is not always the one whose models they use.
+  Rgb rgb;
+  Rgb::Value last_rgb;
+  SymbolModel<4> nir_changed;
+  std::array<SymbolModel<256>, 2> nir;
+  std::uint16_t last_nir;
+  WavePacket wave_packet;
+  std::array<std::uint8_t, WavePacket::kSize> last_wave_packet;
+};
+
+/// Models and state of layered chunks in either direction.
+template <class Coder>
+class Layered {
+ public:
+  using Record = typename Coder::Record;
+
+  explicit Layered(const RecordLayout& layout)
+      : coders(layer_count(layout)),
+        layout_(layout),
+        channels_(make_zeroed<Channel14>(kChannels)),
+        extra_(make_zeroed<SymbolModel<256>>(kChannels * layout.extra_bytes)),
+        last_extra_(kChannels * layout.extra_bytes),
+        last_(kChannels * layout.length) {}
+
+  struct LayerCoder {
+    Coder coder;
+    /// Decoding: whether the layer is there and wanted. Encoding: whether it has to be there.
+    bool used = false;
+  };
+  std::vector<LayerCoder> coders;
+
+  /// Begins a chunk with its first record; the layers' coders are the caller's to begin.
+  void begin(const std::uint8_t* first) {
+    known_.fill(false);
+    current_ = channel_of(first);
+    for (std::size_t i = 0; i < kChannels; ++i)
+      predecessors_[i] = last_.data() + i * layout_.length;
+    std::memcpy(last_.data() + current_ * layout_.length, first, layout_.length);
+    begin_channel(current_);
+    Channel14& channel = channels_[current_];
+    begin_z(channel, first);
+    begin_intensity(channel, first);
+    channel.time.begin(load<std::uint64_t>(first + kTime));
+
+    item_known_.fill(false);
+    item_current_ = current_;
+    item_known_[current_] = true;
+    if (layout_.rgb != 0) channel.last_rgb = load<Rgb::Value>(first + layout_.rgb);
+    if (layout_.nir != 0) channel.last_nir = load<std::uint16_t>(first + layout_.nir);
+    if (layout_.wave_packet != 0) {
+      std::memcpy(channel.last_wave_packet.data(), first + layout_.wave_packet, WavePacket::kSize);
+      channel.wave_packet.begin();
+    }
+    std::copy_n(first + layout_.extra, layout_.extra_bytes, last_extra(current_));
+    if constexpr (!Coder::kDecoding) {
+      for (LayerCoder& layer : coders) layer.used = false;
+      coders[kXyLayer].used = coders[kZLayer].used = true;
+    }
+  }
+
+  /// Codes the next `count` records.
+  void code(Record records, std::size_t count) {
+    for (; count > 0;) {
+      const std::size_t run = std::min(count, run_.size());
+      code_run(records, run);
+      records += run * layout_.length;
+      count -= run;
+    }
+    // The caller's records may not live until the next call.
+    for (std::size_t i = 0; i < kChannels; ++i) {
+      std::uint8_t* kept = last_.data() + i * layout_.length;
+      if (known_[i] && predecessors_[i] != kept)
+        std::memcpy(kept, predecessors_[i], layout_.length);
+      predecessors_[i] = kept;
+    }
+  }
+
+ private:
+  static constexpr std::size_t kChannels = 4;
+  /// Offsets in the record.
+  static constexpr std::size_t kX = 0, kY = 4, kZ = 8, kIntensity = 12, kReturns = 14, kFlags = 15,
+                               kClassification = 16, kUserData = 17, kScanAngle = 18, kSource = 20,
+                               kTime = 22, kSize = 30;
+
+  /// What the layers behind the first need to know of a point.
+  struct Point {
+    const std::uint8_t* last;  ///< the record that it is predicted from
+    std::uint8_t channel;
+    bool new_channel;    ///< begins with the values of `last`
+    std::uint8_t level;  ///< of Z
+    std::uint8_t z_context;
+    std::uint8_t place;  ///< 2 for a first return, + 1 for a last
+    bool time_changed, angle_changed, source_changed;
+    /// Channels whose models, and whose last value, the items behind the point use; and the one
+    /// that the last value is copied from to the former first.
+    std::uint8_t item_models, item_last, item_origin;
+  };
+
+  static std::uint8_t channel_of(const std::uint8_t* record) { return record[kFlags] >> 4 & 3; }
+  std::uint8_t* last_extra(std::size_t channel) {
+    return last_extra_.data() + channel * layout_.extra_bytes;
+  }
+
+  /// The first layer's part of a new channel; the others begin theirs when they get there.
+  void begin_channel(unsigned channel) {
+    known_[channel] = true;
+    Channel14& models = channels_[channel];
+    for (Median5& steps : models.x_steps) steps.begin();
+    for (Median5& steps : models.y_steps) steps.begin();
+    models.time_changed = false;
+  }
+  static void begin_z(Channel14& models, const std::uint8_t* origin) {
+    models.last_z.fill(load<std::int32_t>(origin + kZ));
+  }
+  static void begin_intensity(Channel14& models, const std::uint8_t* origin) {
+    models.last_intensity.fill(load<std::uint16_t>(origin + kIntensity));
+  }
+
+  void code_run(Record records, std::size_t count) {
+    code_xy(records, count);
+    if (coded(kZLayer)) code_z(records, count);
+    if (coded(kClassificationLayer)) code_classification(records, count);
+    if (coded(kFlagsLayer)) code_flags(records, count);
+    if (coded(kIntensityLayer)) code_intensity(records, count);
+    if (coded(kScanAngleLayer)) code_scan_angle(records, count);
+    if (coded(kUserDataLayer)) code_user_data(records, count);
+    if (coded(kSourceLayer)) code_source(records, count);
+    if (coded(kTimeLayer)) code_time(records, count);
+    std::size_t layer = kItemLayers;
+    if (layout_.rgb != 0) {
+      if (coded(layer)) code_rgb(records, count, layer);
+      ++layer;
+    }
+    if (layout_.nir != 0) {
+      if (coded(layer)) code_nir(records, count, layer);
+      ++layer;
+    }
+    if (layout_.wave_packet != 0) {
+      if (coded(layer)) code_wave_packet(records, count, layer);
+      ++layer;
+    }
+    for (std::size_t i = 0; i < layout_.extra_bytes; ++i, ++layer) {
+      if (coded(layer)) code_extra_byte(records, count, layer, i);
+    }
+  }
+
+  [[nodiscard]] bool coded(std::size_t layer) const {
+    return !Coder::kDecoding || coders[layer].used;
+  }
+
+  /// Codes a layer: calls code_one(coder, point, record) for each point, which returns whether the
+  /// value changed.
+  template <class CodeOne>
+  TERRACE_LAZ_INLINE void for_each(Record records, std::size_t count, std::size_t layer,
+                                   const CodeOne& code_one) {
+    Coder coder = coders[layer].coder;
+    bool changed = false;
+    for (std::size_t i = 0; i < count; ++i) {
+      coder.reserve();
+      changed |= code_one(coder, run_[i], records + i * layout_.length);
+    }
+    coders[layer].coder = coder;
+    if constexpr (!Coder::kDecoding) coders[layer].used |= changed;
+  }
+
+  void code_xy(Record records, std::size_t count) {
+    enum : unsigned {
+      kReturnBits = 3,  // 1: next number, 2: the one before, 3: another
+      kReturnCountBit = 4,
+      kScanAngleBit = 8,
+      kTimeBit = 16,
+      kSourceBit = 32,
+      kChannelBit = 64
+    };
+    Coder coder = coders[kXyLayer].coder;
+    for (std::size_t i = 0; i < count; ++i) {
+      const Record now = records + i * layout_.length;
+      Point& point = run_[i];
+      const std::uint8_t* last = predecessors_[current_];
+      Channel14* models = &channels_[current_];
+      coder.reserve();
+      unsigned mask = 0;
+      unsigned given_returns = 0;
+      if constexpr (!Coder::kDecoding) {
+        const unsigned channel = channel_of(now);
+        if (channel != current_) mask |= kChannelBit;
+        const std::uint8_t* before = known_[channel] ? predecessors_[channel] : last;
+        given_returns = now[kReturns];
+        const unsigned step = (given_returns - before[kReturns]) & 15;
+        mask |= step == 0 ? 0 : step == 1 ? 1 : step == 15 ? 2 : 3;
+        if (given_returns >> 4 != before[kReturns] >> 4) mask |= kReturnCountBit;
+        const auto differs = [&](std::size_t at, std::size_t size) {
+          return std::memcmp(now + at, before + at, size) != 0;
+        };
+        if (differs(kScanAngle, 2)) mask |= kScanAngleBit;
+        if (differs(kTime, 8)) mask |= kTimeBit;
+        if (differs(kSource, 2)) mask |= kSourceBit;
+      }
+      {
+        const unsigned number = last[kReturns] & 15, of = last[kReturns] >> 4;
+        const unsigned context =
+            (number == 1 ? 1 : 0) + (number >= of ? 2 : 0) + (models->time_changed ? 4 : 0);
+        mask = coder.symbol(models->changed[context], mask);
+      }
+      point.new_channel = false;
+      if ((mask & kChannelBit) != 0) {
+        const unsigned further = given_channel(now) - current_ - 1;
+        current_ = (current_ + coder.symbol(models->channel, further & 3) + 1) & 3;
+        models = &channels_[current_];
+        if (!known_[current_]) {
+          point.new_channel = true;
+          predecessors_[current_] = last;
+          begin_channel(current_);
+        }
+        last = predecessors_[current_];
+      }
+      if constexpr (Coder::kDecoding) {
+        std::memcpy(now, last, kSize);
+        if (layout_.length > kSize) std::memcpy(now + kSize, last + kSize, layout_.length - kSize);
+      }
+      const bool time_changed = (mask & kTimeBit) != 0;
+      unsigned returns = last[kReturns] >> 4, number = last[kReturns] & 15;
+      if ((mask & kReturnCountBit) != 0) {
+        returns = coder.symbol(models->return_count[returns], given_returns >> 4);
+      }
+      switch (mask & kReturnBits) {
+        case 0:
+          break;
+        case 1:
+          number = (number + 1) & 15;
+          break;
+        case 2:
+          number = (number + 15) & 15;
+          break;
+        default:
+          if (time_changed) {
+            number = coder.symbol(models->return_number[number], given_returns & 15);
+          } else {
+            const unsigned step = (given_returns - number) & 15;
+            number = (number + coder.symbol(models->return_step, step - 2) + 2) & 15;
+          }
+      }
+      const unsigned both = returns << 4 | number;
+      const bool single = returns == 1;
+      put<Coder>(now + kReturns, low_byte(both));
+      put<Coder>(now + kFlags, low_byte((last[kFlags] & 0xcfu) | current_ << 4));
+      const unsigned steps = 2u * kReturns14.map[both] + (time_changed ? 1 : 0);
+      code_step(coder, models->x, models->x_steps[steps], single ? 1 : 0, last + kX, now + kX);
+      code_step(coder, models->y, models->y_steps[steps], y_context(models->x.magnitude, single),
+                last + kY, now + kY);
+      models->time_changed = time_changed;
+
+      point.last = last;
+      point.channel = static_cast<std::uint8_t>(current_);
+      point.level = kReturns14.level[both];
+      point.z_context =
+          low_byte(z_context((models->x.magnitude + models->y.magnitude) / 2, single));
+      point.place = low_byte((number == 1 ? 2u : 0u) + (number >= returns ? 1u : 0u));
+      point.time_changed = time_changed;
+      point.angle_changed = (mask & kScanAngleBit) != 0;
+      point.source_changed = (mask & kSourceBit) != 0;
+      place_items(point, (mask & kChannelBit) != 0);
+      predecessors_[current_] = now;
+    }
+    coders[kXyLayer].coder = coder;
+  }
+
+  static unsigned given_channel(Record now) {
+    if constexpr (Coder::kDecoding) {
+      return 0;
+    } else {
+      return channel_of(now);
+    }
+  }
+
+  /// Which channel's models and last values the items behind the point use. Version 3 has
+  /// two errors of the original software: where the channel does not change it uses channel 0's
+  /// models, and where it changes it reads and replaces the last value of the channel before.
+  void place_items(Point& point, bool channel_changed) {
+    const bool mended = layout_.version >= 4;
+    const auto wanted = static_cast<std::uint8_t>(mended || channel_changed ? current_ : 0);
+    point.item_models = point.item_last = point.item_origin = wanted;
+    if (wanted == item_current_) return;
+    const auto before = static_cast<std::uint8_t>(item_current_);
+    if (!item_known_[wanted]) {
+      point.item_origin = before;
+    } else if (!mended) {
+      point.item_last = before;
+    }
+    item_known_[wanted] = true;
+    item_current_ = wanted;
+  }
+
+  void code_z(Record records, std::size_t count) {
+    for_each(records, count, kZLayer,
+             [this](Coder& coder, const Point& point, Record now) TERRACE_LAZ_INLINE_LAMBDA {
+               Channel14& models = channels_[point.channel];
+               if (point.new_channel) begin_z(models, point.last);
+               std::int32_t& z = models.last_z[point.level];
+               z = models.z.code(coder, z, given<Coder, std::int32_t>(now + kZ), point.z_context);
+               put<Coder>(now + kZ, z);
+               return true;
+             });
+  }
+  void code_classification(Record records, std::size_t count) {
+    for_each(records, count, kClassificationLayer,
+             [this](Coder& coder, const Point& point, Record now) TERRACE_LAZ_INLINE_LAMBDA {
+               const std::uint8_t before = point.last[kClassification];
+               auto& model = channels_[point.channel]
+                                 .classification[2u * (before & 31) + (point.place == 3 ? 1 : 0)];
+               const unsigned value =
+                   coder.symbol(model, given<Coder, std::uint8_t>(now + kClassification));
+               put<Coder>(now + kClassification, low_byte(value));
+               return value != before;
+             });
+  }
+  void code_flags(Record records, std::size_t count) {
+    // Classification flags, scan direction, edge of flight line, without the channel between them.
+    const auto joined = [](unsigned byte) { return (byte & 15) | (byte >> 2 & 0x30); };
+    for_each(
+        records, count, kFlagsLayer,
+        [this, joined](Coder& coder, const Point& point, Record now) TERRACE_LAZ_INLINE_LAMBDA {
+          const unsigned before = joined(point.last[kFlags]);
+          const unsigned flags = coder.symbol(channels_[point.channel].flags[before],
+                                              joined(given<Coder, std::uint8_t>(now + kFlags)));
+          put<Coder>(now + kFlags,
+                     low_byte((flags & 15) | (flags & 0x30) << 2 | (now[kFlags] & 0x30u)));
+          return flags != before;
+        });
+  }
+  void code_intensity(Record records, std::size_t count) {
+    for_each(records, count, kIntensityLayer,
+             [this](Coder& coder, const Point& point, Record now) TERRACE_LAZ_INLINE_LAMBDA {
+               Channel14& models = channels_[point.channel];
+               if (point.new_channel) begin_intensity(models, point.last);
+               std::uint16_t& intensity =
+                   models.last_intensity[2u * point.place + (point.time_changed ? 1 : 0)];
+               const std::uint16_t before = intensity;
+               intensity = static_cast<std::uint16_t>(models.intensity.code(
+                   coder, before, given<Coder, std::uint16_t>(now + kIntensity), point.place));
+               put<Coder>(now + kIntensity, intensity);
+               return intensity != before;
+             });
+  }
+  void code_scan_angle(Record records, std::size_t count) {
+    for_each(records, count, kScanAngleLayer,
+             [this](Coder& coder, const Point& point, Record now) TERRACE_LAZ_INLINE_LAMBDA {
+               auto angle = load<std::uint16_t>(point.last + kScanAngle);
+               if (point.angle_changed) {
+                 angle = static_cast<std::uint16_t>(channels_[point.channel].scan_angle.code(
+                     coder, load<std::int16_t>(point.last + kScanAngle),
+                     given<Coder, std::int16_t>(now + kScanAngle), point.time_changed ? 1 : 0));
+               }
+               put<Coder>(now + kScanAngle, angle);
+               return point.angle_changed;
+             });
+  }
+  void code_user_data(Record records, std::size_t count) {
+    for_each(records, count, kUserDataLayer,
+             [this](Coder& coder, const Point& point, Record now) TERRACE_LAZ_INLINE_LAMBDA {
+               const std::uint8_t before = point.last[kUserData];
+               const unsigned value = coder.symbol(channels_[point.channel].user_data[before >> 2],
+                                                   given<Coder, std::uint8_t>(now + kUserData));
+               put<Coder>(now + kUserData, low_byte(value));
+               return value != before;
+             });
+  }
+  void code_source(Record records, std::size_t count) {
+    for_each(records, count, kSourceLayer,
+             [this](Coder& coder, const Point& point, Record now) TERRACE_LAZ_INLINE_LAMBDA {
+               auto source = load<std::uint16_t>(point.last + kSource);
+               if (point.source_changed) {
+                 source = static_cast<std::uint16_t>(channels_[point.channel].source.code(
+                     coder, source, given<Coder, std::uint16_t>(now + kSource), 0));
+               }
+               put<Coder>(now + kSource, source);
+               return point.source_changed;
+             });
+  }
+  void code_time(Record records, std::size_t count) {
+    for_each(records, count, kTimeLayer,
+             [this](Coder& coder, const Point& point, Record now) TERRACE_LAZ_INLINE_LAMBDA {
+               GpsTime<true>& models = channels_[point.channel].time;
+               if (point.new_channel) models.begin(load<std::uint64_t>(point.last + kTime));
+               auto time = load<std::uint64_t>(point.last + kTime);
+               if (point.time_changed) {
+                 time = models.code(coder, given<Coder, std::uint64_t>(now + kTime));
+               }
+               put<Coder>(now + kTime, time);
+               return point.time_changed;
+             });
+  }
+
+  void code_rgb(Record records, std::size_t count, std::size_t layer) {
+    for_each(records, count, layer,
+             [this](Coder& coder, const Point& point, Record now) TERRACE_LAZ_INLINE_LAMBDA {
+               Channel14& models = channels_[point.item_models];
+               models.last_rgb = channels_[point.item_origin].last_rgb;
+               Rgb::Value& last = channels_[point.item_last].last_rgb;
+               const Rgb::Value value =
+                   models.rgb.code(coder, last, given<Coder, Rgb::Value>(now + layout_.rgb));
+               put<Coder>(now + layout_.rgb, value);
+               const bool changed = value != last;
+               last = value;
+               return changed;
+             });
+  }
+  void code_nir(Record records, std::size_t count, std::size_t layer) {
+    for_each(records, count, layer,
+             [this](Coder& coder, const Point& point, Record now) TERRACE_LAZ_INLINE_LAMBDA {
+               Channel14& models = channels_[point.item_models];
+               models.last_nir = channels_[point.item_origin].last_nir;
+               std::uint16_t& last = channels_[point.item_last].last_nir;
+               const unsigned before = last, value = given<Coder, std::uint16_t>(now + layout_.nir);
+               const unsigned differs = before ^ value;
+               unsigned mask = ((differs & 0xff) != 0 ? 1u : 0u) | (differs > 0xff ? 2u : 0u);
+               mask = coder.symbol(models.nir_changed, mask);
+               unsigned low = before, high = before >> 8;
+               if ((mask & 1) != 0) low += coder.symbol(models.nir[0], low_byte(value - before));
+               if ((mask & 2) != 0) {
+                 high += coder.symbol(models.nir[1], low_byte((value >> 8) - high));
+               }
+               last = static_cast<std::uint16_t>(low_byte(low) | low_byte(high) << 8);
+               put<Coder>(now + layout_.nir, last);
+               return mask != 0;
+             });
+  }
+  void code_wave_packet(Record records, std::size_t count, std::size_t layer) {
+    for_each(records, count, layer,
+             [this](Coder& coder, const Point& point, Record now) TERRACE_LAZ_INLINE_LAMBDA {
+               Channel14& models = channels_[point.item_models];
+               if (point.item_origin != point.item_models) {
+                 models.last_wave_packet = channels_[point.item_origin].last_wave_packet;
+                 models.wave_packet.begin();
+               }
+               auto& last = channels_[point.item_last].last_wave_packet;
+               models.wave_packet.code(coder, last.data(), now + layout_.wave_packet);
+               const bool changed =
+                   std::memcmp(last.data(), now + layout_.wave_packet, last.size()) != 0;
+               std::memcpy(last.data(), now + layout_.wave_packet, last.size());
+               return changed;
+             });
+  }
+  void code_extra_byte(Record records, std::size_t count, std::size_t layer, std::size_t index) {
+    const std::size_t at = layout_.extra + index;
+    for_each(records, count, layer,
+             [this, at, index](Coder& coder, const Point& point, Record now)
+                 TERRACE_LAZ_INLINE_LAMBDA {
+                   last_extra(point.item_models)[index] = last_extra(point.item_origin)[index];
+                   std::uint8_t& last = last_extra(point.item_last)[index];
+                   const unsigned change = given<Coder, std::uint8_t>(now + at) - last;
+                   const unsigned coded = coder.symbol(
+                       extra_[point.item_models * layout_.extra_bytes + index], low_byte(change));
+                   last = low_byte(last + coded);
+                   put<Coder>(now + at, last);
+                   return coded != 0;
+                 });
+  }
+
+  RecordLayout layout_;
+  Zeroed<Channel14> channels_;
+  Zeroed<SymbolModel<256>> extra_;        ///< by channel and byte
+  std::vector<std::uint8_t> last_extra_;  ///< likewise
+  std::vector<std::uint8_t> last_;        ///< by channel: records kept from call to call
+  std::array<const std::uint8_t*, kChannels> predecessors_{};  ///< the last record of each
+  std::array<bool, kChannels> known_{}, item_known_{};
+  unsigned current_ = 0, item_current_ = 0;
+  std::array<Point, 256> run_{};
+};
+
+}  // namespace terrace::stream::laz

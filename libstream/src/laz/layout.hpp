@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+
+#include "terrace/stream/laz.hpp"
+
+namespace terrace::stream::laz {
+
+/// Where the items are in a record: offsets in bytes, 0 for what it does not have.
+struct RecordLayout {
+  std::size_t length = 0;
+  std::size_t gps_time = 0;  ///< of formats 0 to 5; in those from 6 on it is a part of the point
+  std::size_t rgb = 0;
+  std::size_t nir = 0;
+  std::size_t wave_packet = 0;
+  std::size_t extra = 0, extra_bytes = 0;
+  unsigned version = 0;  ///< of the items
+};
+
+/// Throws: std::invalid_argument for items that are not a point format's.
+RecordLayout layout_of(const Vlr& vlr);
+
+}  // namespace terrace::stream::laz

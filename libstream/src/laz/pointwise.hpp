@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "laz/items.hpp"
+#include "laz/layout.hpp"
+
+/// Pointwise chunks, point formats 0 to 5: the first record as it is, then one stream with all
+/// items of all further points. This is version 2 of the items, which LASzip has written since
+/// 2011.
+
+namespace terrace::stream::laz {
+
+/// Numbers for each number of returns n and return r, LASzip's tables: by the lower 6 bits of the
+/// byte that holds them, n * 8 + r.
+struct Returns10 {
+  std::array<std::uint8_t, 64> map, level;
+
+  static constexpr Returns10 make() {
+    constexpr const char* kMap[8] = {"FEDCBA98", "E0136AA9", "D1247BBA", "C3458CCB",
+                                     "B6789DDC", "AABCDEED", "9ABCDEFE", "89ABCDEF"};
+    Returns10 tables{};
+    for (int n = 0; n < 8; ++n) {
+      for (int r = 0; r < 8; ++r) {
+        const auto at = static_cast<std::size_t>(n * 8 + r);
+        const char digit = kMap[n][r];
+        tables.map[at] = static_cast<std::uint8_t>(digit <= '9' ? digit - '0' : digit - 'A' + 10);
+        tables.level[at] = static_cast<std::uint8_t>(n > r ? n - r : r - n);
+      }
+    }
+    return tables;
+  }
+};
+inline constexpr Returns10 kReturns10 = Returns10::make();
+
+/// The 20 bytes that all records of formats 0 to 5 begin with. What both versions code.
+struct Point10 {
+  /// Offsets in the record.
+  static constexpr std::size_t kX = 0, kY = 4, kZ = 8, kIntensity = 12, kReturns = 14,
+                               kClassification = 15, kScanAngle = 16, kUserData = 17, kSource = 18;
+
+  SymbolModel<64> changed;  ///< a bit for each of what can be left out
+  /// By the byte of the point before.
+  std::array<SymbolModel<256>, 256> returns, classification, user_data;
+  IntegerModels<16, 1> source;
+
+  /// Codes the byte at `at` if it changed.
+  template <class Coder, class Models>
+  TERRACE_LAZ_INLINE static unsigned code_byte(Coder& coder, bool changed, Models& models,
+                                               std::size_t at, const std::uint8_t* last,
+                                               typename Coder::Record now) {
+    unsigned byte = last[at];
+    if (changed) byte = coder.symbol(models[byte], given<Coder, std::uint8_t>(now + at));
+    put<Coder>(now + at, low_byte(byte));
+    return byte;
+  }
+  /// Codes the 16 bits at `at` if they changed.
+  template <class Coder, class Models>
+  TERRACE_LAZ_INLINE static void code_short(Coder& coder, bool changed, Models& models,
+                                            std::size_t at, const std::uint8_t* last,
+                                            typename Coder::Record now) {
+    auto value = load<std::uint16_t>(last + at);
+    if (changed) {
+      value = static_cast<std::uint16_t>(
+          models.code(coder, value, given<Coder, std::uint16_t>(now + at), 0));
+    }
+    put<Coder>(now + at, value);
+  }
+};
+
+struct Point10V2 : Point10 {
+  std::array<SymbolModel<256>, 2> scan_angle;  ///< by scan direction
+  IntegerModels<16, 4> intensity;
+  IntegerModels<32, 2> x;
+  IntegerModels<32, 22> y;
+  IntegerModels<32, 20> z;
+  std::array<Median5, 16> x_steps, y_steps;
+  std::array<std::uint16_t, 16> last_intensity;
+  std::array<std::int32_t, 8> last_z;
+
+  void begin() {
+    for (Median5& steps : x_steps) steps.begin();
+    for (Median5& steps : y_steps) steps.begin();
+    last_intensity = {};
+    last_z = {};
+  }
+
+  template <class Coder>
+  TERRACE_LAZ_INLINE void code(Coder& coder, const std::uint8_t* last, typename Coder::Record now) {
+    enum : unsigned {
+      kSourceBit = 1,
+      kUserDataBit = 2,
+      kScanAngleBit = 4,
+      kClassificationBit = 8,
+      kIntensityBit = 16,
+      kReturnsBit = 32
+    };
+    coder.reserve();
+    unsigned mask = 0;
+    if constexpr (!Coder::kDecoding) {
+      const auto differs = [&](std::size_t at, unsigned bit) {
+        return now[at] != last[at] ? bit : 0;
+      };
+      mask = differs(kReturns, kReturnsBit) | differs(kClassification, kClassificationBit) |
+             differs(kScanAngle, kScanAngleBit) | differs(kUserData, kUserDataBit) |
+             differs(kSource, kSourceBit) | differs(kSource + 1, kSourceBit);
+      const std::uint16_t before = last_intensity[kReturns10.map[now[kReturns] & 63]];
+      if (load<std::uint16_t>(now + kIntensity) != before) mask |= kIntensityBit;
+    }
+    mask = coder.symbol(changed, mask);
+
+    const unsigned bits = code_byte(coder, (mask & kReturnsBit) != 0, returns, kReturns, last, now);
+    const unsigned map = kReturns10.map[bits & 63], level = kReturns10.level[bits & 63];
+    const bool single = (bits >> 3 & 7) == 1;
+    if ((mask & kIntensityBit) != 0) {
+      last_intensity[map] = static_cast<std::uint16_t>(
+          intensity.code(coder, last_intensity[map], given<Coder, std::uint16_t>(now + kIntensity),
+                         std::min(map, 3u)));
+    }
+    put<Coder>(now + kIntensity, last_intensity[map]);
+    code_byte(coder, (mask & kClassificationBit) != 0, classification, kClassification, last, now);
+    unsigned angle = last[kScanAngle];
+    if ((mask & kScanAngleBit) != 0) {
+      const unsigned change = given<Coder, std::uint8_t>(now + kScanAngle) - angle;
+      angle += coder.symbol(scan_angle[bits >> 6 & 1], low_byte(change));
+    }
+    put<Coder>(now + kScanAngle, low_byte(angle));
+    code_byte(coder, (mask & kUserDataBit) != 0, user_data, kUserData, last, now);
+    code_short(coder, (mask & kSourceBit) != 0, source, kSource, last, now);
+
+    code_step(coder, x, x_steps[map], single ? 1 : 0, last + kX, now + kX);
+    code_step(coder, y, y_steps[map], y_context(x.magnitude, single), last + kY, now + kY);
+    last_z[level] = z.code(coder, last_z[level], given<Coder, std::int32_t>(now + kZ),
+                           z_context((x.magnitude + y.magnitude) / 2, single));
+    put<Coder>(now + kZ, last_z[level]);
+  }
+};
+
+/// Models of a chunk of any of the formats; extra bytes have theirs beside.
+struct PointwiseV2 {
+  Point10V2 point;
+  GpsTime<false> gps_time;
+  Rgb rgb;
+  WavePacket wave_packet;
+
+  /// `first`: the chunk's first record.
+  void begin(const RecordLayout& layout, const std::uint8_t* first) {
+    point.begin();
+    if (layout.gps_time != 0) gps_time.begin(load<std::uint64_t>(first + layout.gps_time));
+    wave_packet.begin();
+  }
+
+  /// Codes a record after the one before.
+  template <class Coder>
+  TERRACE_LAZ_INLINE void code(Coder& coder, const RecordLayout& layout, SymbolModel<256>* extra,
+                               const std::uint8_t* last, typename Coder::Record now) {
+    point.code(coder, last, now);
+    if (const std::size_t at = layout.gps_time; at != 0) {
+      put<Coder>(now + at, gps_time.code(coder, given<Coder, std::uint64_t>(now + at)));
+    }
+    if (const std::size_t at = layout.rgb; at != 0) {
+      put<Coder>(now + at,
+                 rgb.code(coder, load<Rgb::Value>(last + at), given<Coder, Rgb::Value>(now + at)));
+    }
+    if (const std::size_t at = layout.wave_packet; at != 0) {
+      wave_packet.code(coder, last + at, now + at);
+    }
+    for (std::size_t i = 0; i < layout.extra_bytes; ++i) {
+      const std::size_t at = layout.extra + i;
+      if (i % 16 == 0) coder.reserve();
+      const unsigned change = given<Coder, std::uint8_t>(now + at) - last[at];
+      put<Coder>(now + at, low_byte(last[at] + coder.symbol(extra[i], low_byte(change))));
+    }
+  }
+};
+
+}  // namespace terrace::stream::laz

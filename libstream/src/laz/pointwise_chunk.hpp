@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <vector>
+
+#include "laz/layout.hpp"
+#include "laz/models.hpp"
+#include "laz/pointwise.hpp"
+#include "laz/pointwise_v1.hpp"
+
+namespace terrace::stream::laz {
+
+/// Models and state of pointwise chunks in either direction and version.
+template <class Coder>
+class Pointwise {
+ public:
+  using Record = typename Coder::Record;
+
+  explicit Pointwise(const RecordLayout& layout) : layout_(layout), last_(layout.length) {
+    if (layout.version == 1) {
+      v1_ = make_zeroed<PointwiseV1>(1);
+      extra_v1_ = make_zeroed<SymbolModel<9>>(layout.extra_bytes);
+    } else {
+      v2_ = make_zeroed<PointwiseV2>(1);
+      extra_v2_ = make_zeroed<SymbolModel<256>>(layout.extra_bytes);
+    }
+  }
+
+  Coder coder;
+
+  /// Bytes that a record takes at most.
+  [[nodiscard]] std::size_t most_bytes() const { return 512 + 4 * layout_.extra_bytes; }
+
+  /// Begins a chunk with its first record; the coder is the caller's to begin.
+  void begin(const std::uint8_t* first) {
+    std::memcpy(last_.data(), first, last_.size());
+    if (v1_ != nullptr) v1_[0].begin(layout_, first);
+    if (v2_ != nullptr) v2_[0].begin(layout_, first);
+  }
+
+  /// Codes the next `count` records; if `open`, only while there are most_bytes() to decode from.
+  /// Returns how many it coded.
+  std::size_t code(Record records, std::size_t count, bool open) {
+    return v2_ != nullptr ? code(v2_[0], extra_v2_.get(), records, count, open)
+                          : code(v1_[0], extra_v1_.get(), records, count, open);
+  }
+
+ private:
+  template <class Models, class Extra>
+  std::size_t code(Models& models, Extra* extra, Record records, std::size_t count, bool open) {
+    const RecordLayout layout = layout_;
+    Coder local = coder;
+    const std::uint8_t* last = last_.data();
+    std::size_t done = 0;
+    for (; done < count; ++done) {
+      if constexpr (Coder::kDecoding) {
+        if (open && !local.has(most_bytes())) break;
+      }
+      models.code(local, layout, extra, last, records);
+      last = records;
+      records += layout.length;
+    }
+    // The caller's records may not live until the next call.
+    if (done > 0) std::memcpy(last_.data(), last, last_.size());
+    coder = local;
+    return done;
+  }
+
+  RecordLayout layout_;
+  Zeroed<PointwiseV1> v1_;
+  Zeroed<SymbolModel<9>> extra_v1_;
+  Zeroed<PointwiseV2> v2_;
+  Zeroed<SymbolModel<256>> extra_v2_;
+  std::vector<std::uint8_t> last_;  ///< the record coded last
+};
+
+}  // namespace terrace::stream::laz

@@ -1,0 +1,326 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/stream/where.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cctype>
+#include <cstring>
+#include <optional>
+#include <string_view>
+#include <utility>
+
+#include "io/number.hpp"
+#include "io/text.hpp"
+#include "terrace/stream/error.hpp"
+#include "with_type.hpp"
+
+namespace terrace::stream {
+
+enum class Where::Operation : std::uint8_t {
+  constant,
+  axis,
+  attribute,
+  negate,
+  invert,
+  multiply,
+  divide,
+  add,
+  subtract,
+  less,
+  less_equal,
+  greater,
+  greater_equal,
+  equal,
+  not_equal,
+  both,
+  either,
+};
+
+/// By precedence climbing: operands and operators come out in postfix order.
+class Where::Parser {
+ public:
+  Parser(Where& where, const Schema& schema)
+      : where_(&where), schema_(&schema), text_(where.text_) {}
+
+  void parse() {
+    constexpr std::size_t kMostCharacters = 4096;
+    if (text_.size() > kMostCharacters) {
+      fail("is longer than " + std::to_string(kMostCharacters) + " characters");
+    }
+    expression(0);
+    if (at_ < text_.size()) {
+      fail("an operator is expected, not " + in_quotes(text_.substr(at_)),
+           text_[at_] == '=' ? "for equality write ==" : "");
+    }
+  }
+
+ private:
+  struct Binary {
+    std::string_view sign;
+    Operation operation;
+    unsigned precedence;
+  };
+  // Longer signs stand before those that they begin with.
+  static constexpr std::array<Binary, 14> kBinary{{{"||", Operation::either, 1},
+                                                   {"or", Operation::either, 1},
+                                                   {"&&", Operation::both, 2},
+                                                   {"and", Operation::both, 2},
+                                                   {"==", Operation::equal, 3},
+                                                   {"!=", Operation::not_equal, 3},
+                                                   {"<=", Operation::less_equal, 4},
+                                                   {">=", Operation::greater_equal, 4},
+                                                   {"<", Operation::less, 4},
+                                                   {">", Operation::greater, 4},
+                                                   {"+", Operation::add, 5},
+                                                   {"-", Operation::subtract, 5},
+                                                   {"*", Operation::multiply, 6},
+                                                   {"/", Operation::divide, 6}}};
+  static constexpr unsigned kMostNested = 64;
+
+  [[noreturn]] void fail(std::string cause, std::string remedy = {}) const {
+    throw Error({.file = "the condition " + in_quotes(text_),
+                 .where = "character " + std::to_string(at_ + 1),
+                 .cause = std::move(cause),
+                 .remedy = std::move(remedy)});
+  }
+
+  static bool is_letter(char c) {
+    return std::isalpha(static_cast<unsigned char>(c)) != 0 || c == '_';
+  }
+  static bool is_in_word(char c) {
+    return is_letter(c) || std::isdigit(static_cast<unsigned char>(c)) != 0;
+  }
+
+  void skip_blanks() {
+    while (at_ < text_.size() && std::isspace(static_cast<unsigned char>(text_[at_])) != 0) ++at_;
+  }
+  /// Moves past a sign or word that stands here.
+  bool take(std::string_view sign) {
+    skip_blanks();
+    if (!text_.substr(at_).starts_with(sign)) return false;
+    const std::size_t end = at_ + sign.size();
+    if (is_letter(sign.front()) && end < text_.size() && is_in_word(text_[end])) return false;
+    at_ = end;
+    return true;
+  }
+
+  void emit(const Step& step, int operands) {
+    where_->steps_.push_back(step);
+    held_ = static_cast<std::size_t>(static_cast<int>(held_) + 1 - operands);
+    where_->depth_ = std::max(where_->depth_, held_);
+  }
+
+  void expression(unsigned least) {
+    operand();
+    unsigned compared = 0;
+    while (true) {
+      const std::size_t before = at_;
+      const auto* const found = std::find_if(kBinary.begin(), kBinary.end(),
+                                             [&](const Binary& b) { return take(b.sign); });
+      if (found == kBinary.end()) return;
+      if (found->precedence < least) {
+        at_ = before;
+        return;
+      }
+      if (found->precedence == compared) {
+        fail("comparisons do not follow one another", "join two with &&: a < b && b < c");
+      }
+      if (found->precedence == 3 || found->precedence == 4) compared = found->precedence;
+      expression(found->precedence + 1);
+      emit({.operation = found->operation}, 2);
+    }
+  }
+
+  void operand() {
+    if (++nested_ > kMostNested) fail("is nested too deeply", "write it with fewer parentheses");
+    skip_blanks();
+    if (at_ == text_.size()) fail("ends where a number or a name is expected");
+    if (take("-")) {
+      operand();
+      emit({.operation = Operation::negate}, 1);
+    } else if (take("!") || take("not")) {
+      operand();
+      emit({.operation = Operation::invert}, 1);
+    } else if (take("(")) {
+      expression(0);
+      if (!take(")")) fail("a ')' is missing");
+    } else if (text_[at_] == '"' || is_letter(text_[at_])) {
+      name();
+    } else {
+      number();
+    }
+    --nested_;
+  }
+
+  void number() {
+    const char* const begin = text_.data() + at_;
+    double value = 0.0;
+    const char* const rest = parse_real(begin, text_.data() + text_.size(), value);
+    if (rest == nullptr || *begin == '+') {
+      fail("a number or a name is expected, not " + in_quotes(text_.substr(at_)),
+           text_[at_] == '=' ? "for equality write ==" : "");
+    }
+    at_ += static_cast<std::size_t>(rest - begin);
+    emit({.operation = Operation::constant, .number = value}, 0);
+  }
+
+  void name() {
+    const std::size_t begin = at_;
+    std::string_view word;
+    if (text_[at_] == '"') {
+      const std::size_t end = text_.find('"', at_ + 1);
+      if (end == text_.npos) fail("the name has no second quotation mark");
+      word = text_.substr(at_ + 1, end - at_ - 1);
+      at_ = end + 1;
+    } else {
+      while (at_ < text_.size() && is_in_word(text_[at_])) ++at_;
+      word = text_.substr(begin, at_ - begin);
+    }
+    if (const auto attribute = attribute_named(word)) {
+      return emit({.operation = Operation::attribute, .index = *attribute}, 0);
+    }
+    if (word == "x" || word == "y" || word == "z") {
+      return emit({.operation = Operation::axis, .index = static_cast<std::size_t>(word[0] - 'x')},
+                  0);
+    }
+    if (word == "first") return emit({.operation = Operation::constant, .number = 1.0}, 0);
+    if (word == "last") {
+      if (const auto returns = attribute_named("number_of_returns")) {
+        return emit({.operation = Operation::attribute, .index = *returns}, 0);
+      }
+    }
+    at_ = begin;
+    std::string known = "x, y, z";
+    for (const Channel& attribute : schema_->attributes) known += ", " + attribute.name;
+    fail("the points have no " + in_quotes(word), "known are " + known);
+  }
+
+  [[nodiscard]] std::optional<std::size_t> attribute_named(std::string_view word) const {
+    for (std::size_t i = 0; i < schema_->attributes.size(); ++i) {
+      if (schema_->attributes[i].name == word) return i;
+    }
+    return std::nullopt;
+  }
+
+  Where* where_;
+  const Schema* schema_;
+  std::string_view text_;
+  std::size_t at_ = 0, held_ = 0;
+  unsigned nested_ = 0;
+};
+
+namespace {
+
+/// Points that are computed together: the operands stay in the first cache.
+constexpr std::size_t kLanes = 256;
+using Lanes = std::array<double, kLanes>;
+
+bool holds(double value) { return value < 0.0 || value > 0.0; }
+
+/// The values of an attribute of `count` records from `first` on.
+void load(const Channel& channel, const std::byte* first, std::size_t stride, std::size_t count,
+          Lanes& out) {
+  with_type(channel.type, [&](auto tag) {
+    for (std::size_t i = 0; i < count; ++i) {
+      decltype(tag) value;
+      std::memcpy(&value, first + i * stride, sizeof value);
+      out[i] = static_cast<double>(value);
+    }
+  });
+  if (channel.scale == 1.0 && channel.offset == 0.0) return;
+  for (std::size_t i = 0; i < count; ++i) out[i] = out[i] * channel.scale + channel.offset;
+}
+
+template <class Function>
+void combine(Lanes& a, const Lanes& b, const Function& function) {
+  for (std::size_t i = 0; i < kLanes; ++i) a[i] = static_cast<double>(function(a[i], b[i]));
+}
+
+}  // namespace
+
+Where::Where(const std::string& text, const Schema& schema) : text_(text), schema_(schema) {
+  Parser(*this, schema_).parse();
+}
+
+void Where::test(std::span<const Point3> positions, std::span<const std::byte> records,
+                 std::span<std::uint8_t> matches) const {
+  assert(matches.size() == positions.size());
+  const std::size_t stride = schema_.payload_size();
+  assert(records.size() == positions.size() * stride);
+  std::vector<Lanes> stack(depth_);
+  for (std::size_t begin = 0; begin < positions.size(); begin += kLanes) {
+    const std::size_t count = std::min(kLanes, positions.size() - begin);
+    std::size_t held = 0;
+    for (const Step& step : steps_) {
+      switch (step.operation) {
+        case Operation::constant:
+          stack[held++].fill(step.number);
+          continue;
+        case Operation::axis:
+          for (std::size_t i = 0; i < count; ++i) {
+            stack[held][i] = world_point(schema_, positions[begin + i])[step.index];
+          }
+          ++held;
+          continue;
+        case Operation::attribute:
+          load(schema_.attributes[step.index],
+               records.data() + begin * stride + schema_.attribute_offset(step.index), stride,
+               count, stack[held++]);
+          continue;
+        case Operation::negate:
+          for (double& value : stack[held - 1]) value = -value;
+          continue;
+        case Operation::invert:
+          for (double& value : stack[held - 1]) value = holds(value) ? 0.0 : 1.0;
+          continue;
+        default:
+          break;
+      }
+      Lanes& a = stack[held - 2];
+      const Lanes& b = stack[held - 1];
+      --held;
+      switch (step.operation) {
+        case Operation::multiply:
+          combine(a, b, [](double p, double q) { return p * q; });
+          break;
+        case Operation::divide:
+          combine(a, b, [](double p, double q) { return p / q; });
+          break;
+        case Operation::add:
+          combine(a, b, [](double p, double q) { return p + q; });
+          break;
+        case Operation::subtract:
+          combine(a, b, [](double p, double q) { return p - q; });
+          break;
+        case Operation::less:
+          combine(a, b, [](double p, double q) { return p < q; });
+          break;
+        case Operation::less_equal:
+          combine(a, b, [](double p, double q) { return p <= q; });
+          break;
+        case Operation::greater:
+          combine(a, b, [](double p, double q) { return p > q; });
+          break;
+        case Operation::greater_equal:
+          combine(a, b, [](double p, double q) { return p >= q; });
+          break;
+        case Operation::equal:
+          combine(a, b, [](double p, double q) { return p == q; });
+          break;
+        case Operation::not_equal:
+          combine(a, b, [](double p, double q) { return p != q; });
+          break;
+        case Operation::both:
+          combine(a, b, [](double p, double q) { return holds(p) && holds(q); });
+          break;
+        default:
+          combine(a, b, [](double p, double q) { return holds(p) || holds(q); });
+          break;
+      }
+    }
+    for (std::size_t i = 0; i < count; ++i) matches[begin + i] = holds(stack[0][i]) ? 1 : 0;
+  }
+}
+
+}  // namespace terrace::stream

@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "las_files.hpp"
+#include "point_files.hpp"
+#include "terrace/stream/point_writer.hpp"
+
+namespace terrace::stream {
+namespace {
+
+class Las : public ::testing::Test {
+ protected:
+  [[nodiscard]] std::string put_file(const std::string& name, const LasParts& parts) const {
+    return write_text(folder_.path() / name, parts.bytes());
+  }
+  [[nodiscard]] std::string refusal(const LasParts& parts) const { return refusal(parts.bytes()); }
+  [[nodiscard]] std::string refusal(const std::string& bytes) const {
+    return error_of([&] { read_file(write_text(folder_.path() / "bad.las", bytes)); });
+  }
+  [[nodiscard]] std::string copy_of(const AllPoints& all,
+                                    const std::string& name = "copy.las") const {
+    const std::string path = folder_.path() / name;
+    const auto writer = open_point_writer(
+        path,
+        {.attributes = all.info.attributes, .crs = all.info.crs, .lattice = lattice_of(all.info)},
+        {.replace = true});
+    AllPoints world = all;
+    to_world(all.info, world.points);
+    writer->append(world.points);
+    writer->finish();
+    EXPECT_EQ(writer->rounding(), 0.0);
+    return path;
+  }
+
+  TempFolder folder_;
+};
+
+/// One record of format 3: 7, -8, 9; intensity 0x1234; return 2 of 3, edge; class 17 withheld; ...
+std::string record_of_format_3() {
+  std::string record(34, '\0');
+  put(record, 0, std::int32_t{7});
+  put(record, 4, std::int32_t{-8});
+  put(record, 8, std::int32_t{9});
+  put(record, 12, std::uint16_t{0x1234});
+  record[14] = static_cast<char>(2 | 3 << 3 | 1 << 7);
+  record[15] = static_cast<char>(17 | 1 << 7);
+  record[16] = -15;
+  record[17] = static_cast<char>(200);
+  put(record, 18, std::uint16_t{40000});
+  put(record, 20, 1234.5);
+  put(record, 28, std::uint16_t{65535});
+  put(record, 30, std::uint16_t{256});
+  put(record, 32, std::uint16_t{1});
+  return record;
+}
+
+TEST_F(Las, FieldsAreAttributesOfTheirTypes) {
+  const LasParts parts{.point_format = 3,
+                       .record_bytes = 34,
+                       .points = 1,
+                       .records = record_of_format_3(),
+                       .scale = {0.5, 0.25, 2},
+                       .offset = {100, 200, 300}};
+  const AllPoints all = read_file(put_file("a.las", parts));
+  EXPECT_EQ(all.info.format, "las");
+  EXPECT_EQ(all.info.points, 1U);
+  EXPECT_FALSE(all.info.grid);
+  ASSERT_EQ(all.points.size(), 1U);
+  // As stored; the placement leads to the CRS.
+  EXPECT_EQ(all.points.positions[0], (Point3{7, -8, 9}));
+  EXPECT_EQ(world_point(all.info, all.points.positions[0]), (Point3{103.5, 198, 318}));
+  const std::vector<std::pair<std::string, double>> wanted{{"intensity", 0x1234},
+                                                           {"return_number", 2},
+                                                           {"number_of_returns", 3},
+                                                           {"scan_direction_flag", 0},
+                                                           {"edge_of_flight_line", 1},
+                                                           {"classification", 17},
+                                                           {"synthetic", 0},
+                                                           {"key_point", 0},
+                                                           {"withheld", 1},
+                                                           {"scan_angle_rank", -15},
+                                                           {"user_data", 200},
+                                                           {"point_source_id", 40000},
+                                                           {"gps_time", 1234.5},
+                                                           {"red", 65535},
+                                                           {"green", 256},
+                                                           {"blue", 1}};
+  ASSERT_EQ(all.info.attributes.size(), wanted.size());
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    const Channel& channel = all.info.attributes[i];
+    EXPECT_EQ(channel.name, wanted[i].first);
+    EXPECT_EQ(to_double(channel.type, all.points.payload.data() + all.info.attribute_offset(i)),
+              wanted[i].second)
+        << channel.name;
+  }
+  EXPECT_EQ(records_of(copy_of(all)), parts.records);
+}
+
+TEST_F(Las, AnyRecordsOfAnyFormatComeBack) {
+  constexpr std::size_t kBytes[] = {20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67};
+  std::mt19937_64 random(1);
+  for (unsigned format = 0; format <= 10; ++format) {
+    for (const std::size_t extra : {std::size_t{0}, std::size_t{3}}) {
+      LasParts parts{.point_format = format,
+                     .minor = 4,
+                     .record_bytes = kBytes[format] + extra,
+                     .points = 777};
+      parts.records.resize(parts.points * parts.record_bytes);
+      for (char& byte : parts.records) byte = static_cast<char>(random());
+      const AllPoints all = read_file(put_file("any.las", parts), {.block_points = 100});
+      EXPECT_EQ(all.largest_block, 100U);
+      const std::string copy = copy_of(all);
+      EXPECT_EQ(records_of(copy), parts.records) << format << " + " << extra;
+      const AllPoints again = read_file(copy);
+      EXPECT_EQ(again.points.payload, all.points.payload);
+      EXPECT_EQ(lattice_of(again.info), lattice_of(all.info));
+    }
+  }
+}
+
+TEST_F(Las, KeysOfGeoTiffNameTheCrs) {
+  LasParts parts;
+  std::string keys(24, '\0');
+  const std::uint16_t shorts[] = {1, 1, 0, 2, 1024, 0, 1, 1, 3072, 0, 1, 32633};
+  std::memcpy(keys.data(), shorts, sizeof shorts);
+  parts.add_vlr("LASF_Projection", 34735, keys);
+  parts.add_vlr("LASF_Projection", 2112, std::string("PROJCS[\"x\"]\0", 12));
+  EXPECT_EQ(read_file(put_file("keys.las", parts)).info.crs.epsg, 32633);
+  parts.encoding = 16;
+  const Crs crs = read_file(put_file("wkt.las", parts)).info.crs;
+  EXPECT_EQ(crs.epsg, 0);
+  EXPECT_EQ(crs.wkt, "PROJCS[\"x\"]");
+  Crs given;
+  given.epsg = 4326;
+  EXPECT_EQ(read_file(put_file("wkt.las", parts), {.crs = given}).info.crs, given);
+}
+
+TEST_F(Las, LatticesOfSeveralFilesMeet) {
+  LasParts first{.points = 1, .records = std::string(28, '\0')}, second = first;
+  second.offset = {1.25, -3, 0};
+  const AllPoints both = read_all({put_file("1.las", first), put_file("2.las", second)});
+  EXPECT_EQ(both.points.positions, (std::vector<Point3>{{0, 0, 0}, {125, -300, 0}}));
+  second.offset = {1.255, 0, 0};
+  EXPECT_NE(error_of([&] {
+              read_all({put_file("1.las", first), put_file("2.las", second)});
+            }).find("another lattice"),
+            std::string::npos);
+}
+
+TEST_F(Las, DecimalsAreAsFineAsThePointsAsk) {
+  const auto written = [&](std::vector<Point3> points, std::optional<Box3> bounds = {}) {
+    const std::string path = folder_.path() / "decimals.las";
+    const auto writer = open_point_writer(path, {.bounds = bounds}, {.replace = true});
+    writer->append({.positions = points, .payload = {}});
+    writer->finish();
+    const AllPoints all = read_file(path);
+    const Lattice lattice = *lattice_of(all.info);
+    double largest = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const Point3 world = world_point(all.info, all.points.positions[i]);
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        largest = std::max(largest, std::abs(world[axis] - points[i][axis]));
+        EXPECT_LE(largest, lattice.scale[axis] * 0.5000001);
+      }
+    }
+    EXPECT_EQ(writer->rounding() > 0, largest > 1e-9);
+    return lattice.scale;
+  };
+  EXPECT_EQ(written({{691000.25, 5338000.125, 7}}), (Point3{0.001, 0.001, 1}));
+  EXPECT_EQ(written({{-0.0946899, 0.0329874, 1.5}, {0.06, 0.18, 0}}), (Point3{1e-7, 1e-7, 0.1}));
+  // A third has as many as 32 bits reach, all over the bounds.
+  Box3 bounds{.min = {0, 0, 0}, .max = {1e6, 1e6, 1}};
+  EXPECT_EQ(written({{1 / 3.0, 0, 0}}, bounds), (Point3{0.001, 0.001, 1}));
+  bounds.max[1] = 1e12;
+  EXPECT_EQ(written({{1 / 3.0, 0, 0}}, bounds), (Point3{1000, 1000, 1}));
+}
+
+TEST_F(Las, DamageIsOneLine) {
+  const std::string good = LasParts{.points = 2, .records = std::string(56, '\0')}.bytes();
+  EXPECT_EQ(refusal(good), "");
+  EXPECT_NE(refusal(good.substr(0, 200)).find("ends in its header"), std::string::npos);
+  EXPECT_NE(refusal(good.substr(0, good.size() - 1)).find("promises 2 points of 28 bytes"),
+            std::string::npos);
+  EXPECT_NE(refusal(LasParts{.point_format = 11}).find("point format 11"), std::string::npos);
+  EXPECT_NE(refusal(LasParts{.record_bytes = 20}).find("take 28 bytes, not 20"), std::string::npos);
+  EXPECT_NE(refusal(LasParts{.scale = {0, 1, 1}}).find("scale"), std::string::npos);
+  EXPECT_NE(refusal(LasParts{.offset = {0, 0, NAN}}).find("finite"), std::string::npos);
+  EXPECT_NE(refusal(LasParts{.minor = 4, .points = ~std::uint64_t{0}}).find("promises"),
+            std::string::npos);
+}
+
+TEST_F(Las, CompressedFilesOfSeveralChunksComeBack) {
+  std::mt19937_64 random(2);
+  for (const unsigned format : {3U, 7U}) {
+    LasParts parts{.point_format = format,
+                   .minor = 4,
+                   .record_bytes = format == 3 ? std::size_t{35} : std::size_t{37},
+                   .points = 120000};
+    parts.records.resize(parts.points * parts.record_bytes);
+    for (char& byte : parts.records) byte = static_cast<char>(random() % 7);
+    const AllPoints all = read_file(put_file("a.las", parts));
+    const std::string laz = copy_of(all, "copy.laz");
+    for (const unsigned threads : {1U, 2U, 5U}) {
+      const AllPoints again = read_file(laz, {.threads = threads});
+      EXPECT_EQ(again.info.format, "laz");
+      EXPECT_TRUE(same_bits(again.points.positions, all.points.positions));
+      EXPECT_EQ(again.points.payload, all.points.payload);
+    }
+    // What is wrong is found in its chunk, by any number of threads.
+    std::string bytes = read_text(laz);
+    const std::string good = bytes;
+    bytes[bytes.size() * 3 / 4] ^= 0x55;
+    write_text(laz, bytes);
+    for (const unsigned threads : {1U, 2U}) {
+      const std::string error = error_of([&] { read_file(laz, {.threads = threads}); });
+      EXPECT_NE(error.find("chunk "), std::string::npos) << error;
+      EXPECT_NE(error.find("byte "), std::string::npos) << error;
+    }
+    write_text(laz, good.substr(0, good.size() / 2));
+    EXPECT_NE(error_of([&] { read_file(laz); }).find("chunk table"), std::string::npos);
+  }
+}
+
+TEST_F(Las, WhatDoesNotFitIsRefused) {
+  const std::string path = folder_.path() / "out.las";
+  const auto error = [&](const PointHeader& header, const PointBlock& block) {
+    return error_of([&] { open_point_writer(path, header, {})->append(block); });
+  };
+  const Lattice fine{.scale = {1e-9, 1, 1}};
+  EXPECT_NE(
+      error({.lattice = fine}, {.positions = {{3, 0, 0}}, .payload = {}}).find("out of reach"),
+      std::string::npos);
+  EXPECT_NE(error({}, {.positions = {{NAN, 0, 0}}, .payload = {}}).find("out of reach"),
+            std::string::npos);
+  PointBlock block{.positions = {{0, 0, 0}}, .payload = {}};
+  append_values(block.payload, 32.0);
+  const PointHeader classes{.attributes = {{.name = "classification", .type = ScalarType::f64},
+                                           {.name = "scan_angle_rank", .type = ScalarType::i8}}};
+  append_values(block.payload, std::int8_t{0});
+  EXPECT_NE(error(classes, block).find("classification"), std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(path));
+}
+
+}  // namespace
+}  // namespace terrace::stream

@@ -1,0 +1,30 @@
+#!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
+# laz_perf_test.sh BUILD WRITE_FILES [FILE.laz...]: npm's laz-perf decodes what this library encodes.
+# It is installed below BUILD, unless it is there; exits with 77 where it cannot be had. With files:
+# how fast it decodes these.
+set -eu
+source=$(cd "${0%/*}" && pwd)
+skip() {
+  echo "laz-perf is not asked: $*"
+  exit 77
+}
+for program in node npm; do
+  command -v "$program" > /dev/null || skip "$program is not installed"
+done
+packages=$1/laz_perf
+write_files=$2
+shift 2
+mkdir -p "$packages"
+if ! cmp -s "$source/package-lock.json" "$packages/node_modules/.installed"; then
+  cp "$source/package.json" "$source/package-lock.json" "$packages"
+  npm ci --prefix "$packages" --ignore-scripts --no-audit --no-fund --prefer-offline \
+    --fetch-retries=1 --fetch-retry-mintimeout=1000 --fetch-timeout=30000 > "$packages/npm.log" 2>&1 ||
+    skip "the package of npm cannot be installed here: $packages/npm.log"
+  cp "$source/package-lock.json" "$packages/node_modules/.installed"
+fi
+if [ $# -eq 0 ]; then
+  "$write_files" "$packages"
+  set -- "$packages"/*.laz
+fi
+exec node "$source/laz_perf.mjs" "$packages" "$@"

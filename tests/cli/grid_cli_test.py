@@ -1,0 +1,240 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Elevation grids of every format from the command line: what is told of them, and what is built.
+
+TERRACE=path/to/terrace grid_cli_test.py
+"""
+
+import array
+import json
+import os
+import shutil
+import struct
+import subprocess
+import sys
+import tempfile
+import unittest
+import zipfile
+import zlib
+
+TERRACE = os.environ.get('TERRACE', 'terrace')
+# WGS 84 / UTM zone 32N as programs of ESRI write it.
+PRJ = ('PROJCS["WGS_1984_UTM_Zone_32N",GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984",SPHEROID["WGS_1984",'
+       '6378137.0,298.257223563]],PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]],'
+       'PROJECTION["Transverse_Mercator"],PARAMETER["False_Easting",500000.0],'
+       'PARAMETER["False_Northing",0.0],PARAMETER["Central_Meridian",9.0],'
+       'PARAMETER["Scale_Factor",0.9996],PARAMETER["Latitude_Of_Origin",0.0],UNIT["Meter",1.0]]')
+
+
+def height(column, row):
+    return (37 * column + 11 * row * row) % 500
+
+
+def png(path, columns, rows, bits, colour, lines):
+    def chunk(kind, body):
+        return struct.pack('>I', len(body)) + kind + body + struct.pack('>I', zlib.crc32(kind + body))
+    with open(path, 'wb') as file:
+        file.write(b'\x89PNG\r\n\x1a\n' +
+                   chunk(b'IHDR', struct.pack('>IIBBBBB', columns, rows, bits, colour, 0, 0, 0)) +
+                   chunk(b'IDAT', zlib.compress(b''.join(b'\0' + line for line in lines))) +
+                   chunk(b'IEND', b''))
+
+
+class GridTest(unittest.TestCase):
+    columns, rows = 40, 30
+
+    def setUp(self):
+        self.folder = tempfile.mkdtemp(prefix='terrace-grids-')
+        self.addCleanup(shutil.rmtree, self.folder)
+
+    def path(self, name):
+        return os.path.join(self.folder, name)
+
+    def terrace(self, *args, **kwargs):
+        return subprocess.run([TERRACE, *map(str, args)], capture_output=True, timeout=120, **kwargs)
+
+    def json_of(self, *args, **kwargs):
+        result = self.terrace(*args, '--json', **kwargs)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return json.loads(result.stdout)
+
+    def heights(self, kind='h'):
+        return array.array(kind, [height(c, r) for r in range(self.rows) for c in range(self.columns)])
+
+    def ascii_grid(self, x=500000, y=5200000, cell=25):
+        with open(self.path('a.asc'), 'w') as file:
+            file.write(f'ncols {self.columns}\nnrows {self.rows}\nxllcorner {x}\nyllcorner {y}\n'
+                       f'cellsize {cell}\nnodata_value 0\n')
+            file.write(' '.join(map(str, self.heights())) + '\n')
+        return self.path('a.asc')
+
+    def check(self, path, form, *options, world=True, nodata=True):
+        """info and build of a file that holds the heights."""
+        info = self.json_of('info', path, *options)
+        self.assertEqual(info['format'], form)
+        values = list(self.heights())
+        self.assertEqual(info['points'], sum(v != 0 for v in values) if nodata else len(values))
+        self.assertAlmostEqual(info['height']['max'], max(values), 9)
+        self.assertEqual((info['columns'], info['rows']), (self.columns, self.rows))
+        if world:
+            for found, due in zip(info['transform'], [25, 0, 500012.5, 0, -25, 5200737.5]):
+                self.assertAlmostEqual(found, due, 6)
+        store = path + '.terrace'
+        built = self.json_of('build', path, '-o', store, *options)
+        self.assertEqual(built['points'], info['points'])
+        stored = self.json_of('info', store)
+        self.assertEqual(stored['height']['max'], info['height']['max'])
+        return info, stored
+
+    def test_ascii_grids(self):
+        path = self.ascii_grid()
+        with open(self.path('a.prj'), 'w') as file:
+            file.write(PRJ)
+        info, stored = self.check(path, 'ascii-grid')
+        self.assertEqual(info['crs']['epsg'], 32632)
+        self.assertEqual(stored['crs']['epsg'], 32632)
+
+    def test_ascii_grids_from_pipes_give_the_same_store(self):
+        # In degrees: the cells are not square on the ground, which orders the points.
+        path = self.ascii_grid(8, 60, 0.01)
+        self.json_of('build', path, '-o', self.path('file.terrace'), '--crs', 'EPSG:4326')
+        with open(path, 'rb') as file:
+            text = file.read()
+        self.json_of('build', '-', '-o', self.path('pipe.terrace'), '--crs', 'EPSG:4326', input=text)
+        for name in sorted(os.listdir(self.path('file.terrace'))):
+            with open(self.path(f'file.terrace/{name}'), 'rb') as a, \
+                    open(self.path(f'pipe.terrace/{name}'), 'rb') as b:
+                if name != 'manifest.json':
+                    self.assertEqual(a.read(), b.read(), name)
+        self.assertEqual(self.json_of('info', '-', input=text)['format'], 'ascii-grid')
+
+    def test_binary_grids(self):
+        for name, kind, header in (
+                ('a.flt', 'f', 'xllcorner 500000\nyllcorner 5200000\ncellsize 25\nNODATA_value 0\n'
+                               f'byteorder {"LSBFIRST" if sys.byteorder == "little" else "MSBFIRST"}\n'),
+                ('b.bil', 'h', 'nbits 16\npixeltype signedint\nulxmap 500012.5\nulymap 5200737.5\n'
+                               'xdim 25\nydim 25\nnodata 0\n')):
+            with open(self.path(name), 'wb') as file:
+                file.write(self.heights(kind).tobytes())
+            with open(os.path.splitext(self.path(name))[0] + '.hdr', 'w') as file:
+                file.write(f'ncols {self.columns}\nnrows {self.rows}\n{header}')
+            self.check(self.path(name), 'binary-grid')
+
+    def test_height_maps(self):
+        samples = self.heights('H')
+        if sys.byteorder == 'little':
+            samples.byteswap()
+        lines = [samples[r * self.columns:(r + 1) * self.columns].tobytes() for r in range(self.rows)]
+        png(self.path('a.png'), self.columns, self.rows, 16, 0, lines)
+        self.check(self.path('a.png'), 'png', world=False, nodata=False)
+        with open(self.path('a.pgw'), 'w') as file:
+            file.write('25\n0\n0\n-25\n500012.5\n5200737.5\n')
+        shutil.rmtree(self.path('a.png.terrace'))
+        self.check(self.path('a.png'), 'png', nodata=False)
+
+    def test_colours_that_mean_heights(self):
+        for name, number in (('mapbox', lambda z: (z + 10000) * 10),
+                             ('terrarium', lambda z: (z + 32768) * 256)):
+            path = self.path(name + '.png')
+            lines = [b''.join(number(height(c, r)).to_bytes(3, 'big') for c in range(self.columns))
+                     for r in range(self.rows)]
+            png(path, self.columns, self.rows, 8, 2, lines)
+            result = self.terrace('info', path)
+            self.assertEqual(result.returncode, 1)
+            self.assertEqual(result.stderr.count(b'\n'), 1)
+            self.assertIn(b'--rgb', result.stderr)
+            self.check(path, 'png', '--rgb', name, world=False, nodata=False)
+            out = self.path(name + '.xyz')
+            self.json_of('convert', path, '-o', out, '--rgb', name)
+            with open(out) as file:
+                points = {tuple(map(float, line.split()[:2])): float(line.split()[2]) for line in file}
+            for c in range(self.columns):
+                for r in range(self.rows):
+                    self.assertAlmostEqual(points[c, -r], height(c, r), 9)
+            self.json_of('render', path, '-o', self.path(name + '-picture.png'), '--rgb', name,
+                         '--size', '64x64')
+        grid = self.ascii_grid()
+        for args in (('info', grid, '--rgb', 'mapbox'),
+                     ('build', grid, '-o', self.path('x.terrace'), '--rgb', 'mapbox')):
+            result = self.terrace(*args)
+            self.assertEqual(result.returncode, 1)
+            self.assertIn(b'--rgb', result.stderr)
+        self.assertEqual(self.terrace('info', path, '--rgb', 'cmyk').returncode, 2)
+        store = path + '.terrace'
+        for args in (('info', store), ('render', store, '-o', self.path('b.png'))):
+            self.assertEqual(self.terrace(*args, '--rgb', 'mapbox').returncode, 2)
+
+    def test_tiles_of_srtm_in_archives(self):
+        side = 121
+        tiles = []
+        for latitude in (46, 47):
+            # Rows from the north; neighbours share one.
+            rows = range((47 - latitude) * (side - 1), (47 - latitude) * (side - 1) + side)
+            samples = array.array('h', [height(c, r) for r in rows for c in range(side)])
+            samples[5] = -32768
+            if sys.byteorder == 'little':
+                samples.byteswap()
+            tiles.append(self.path(f'N{latitude}E008.SRTMGL1.hgt.zip'))
+            with zipfile.ZipFile(tiles[-1], 'w', zipfile.ZIP_DEFLATED) as archive:
+                archive.writestr(f'N{latitude}E008.hgt', samples.tobytes())
+        info = self.json_of('info', tiles[0])
+        self.assertEqual(info['format'], 'hgt')
+        self.assertEqual(info['crs']['epsg'], 4326)
+        self.assertEqual(info['vertical'], 'orthometric')
+        self.assertEqual(info['nodata'], 1)
+        built = self.json_of('build', *tiles, '-o', self.path('both.terrace'))
+        # Of the shared row the other tile has the sample that one lacks.
+        self.assertEqual((built['points'], built['nodata']), (side * (2 * side - 1) - 1, 1))
+        stored = self.json_of('info', self.path('both.terrace'))
+        self.assertEqual((stored['columns'], stored['rows']), (side, 2 * side - 1))
+        self.assertEqual(stored['bounds']['min'][:2], [8.0, 46.0])
+        self.assertEqual([round(v, 9) for v in stored['bounds']['max'][:2]], [9.0, 48.0])
+
+    def test_dems_of_the_usgs(self):
+        def real(value):
+            return f'{value:24.15E}'.replace('E', 'D')
+        record = bytearray(b' ' * 1024)
+
+        def put(at, text):
+            record[at:at + len(text)] = text.encode()
+        west, south = 500000, 5200000
+        north, east = south + 25 * (self.rows - 1), west + 25 * (self.columns - 1)
+        put(144, f'{1:6}{1:6}{1:6}{32:6}')
+        put(528, f'{2:6}{2:6}{4:6}')
+        for i, value in enumerate((west, south, west, north, east, north, east, south)):
+            put(546 + 24 * i, real(value))
+        put(816, f'{25:12.6E}{25:12.6E}{1:12.6E}')
+        put(852, f'{1:6}{self.columns:6}')
+        put(888, ' 1 3')
+        text = bytes(record)
+        for c in range(self.columns):
+            profile = f'{1:6}{c + 1:6}{self.rows:6}{1:6}' + ''.join(map(real, (west + 25 * c, south, 0, 0, 999)))
+            profile += ''.join(f'{height(c, r) or -32767:6}' for r in reversed(range(self.rows)))
+            text += profile.ljust(1024).encode()
+        with open(self.path('a.dem'), 'wb') as file:
+            file.write(text)
+        info = self.json_of('info', self.path('a.dem'))
+        self.assertEqual((info['format'], info['crs']['epsg']), ('usgs-dem', 32632))
+        self.assertEqual(info['transform'], [25, 0, west, 0, -25, north])
+        self.assertEqual(info['points'], sum(v != 0 for v in self.heights()))
+        self.json_of('build', self.path('a.dem'), '-o', self.path('a.terrace'))
+        self.json_of('build', '-', '-o', self.path('b.terrace'), input=text)
+
+    def test_grids_that_promise_too_much_end_in_one_line(self):
+        cases = {'a.asc': b'ncols 1000000000\nnrows 1000000000\ncellsize 1\n1 2 3\n',
+                 'b.asc': b'ncols 3\nnrows 3\ncellsize 1\n1 2 3\n',
+                 'N46E008.hgt': bytes(1000), 'N46E008.hgt.gz': b'\x1f\x8b\x08\0' + bytes(30),
+                 'c.flt': bytes(100), 'd.png': b'\x89PNG\r\n\x1a\n' + bytes(40)}
+        for name, content in cases.items():
+            with open(self.path(name), 'wb') as file:
+                file.write(content)
+            for args in (('info', self.path(name)),
+                         ('build', self.path(name), '-o', self.path('x.terrace'))):
+                result = self.terrace(*args)
+                self.assertEqual(result.returncode, 1, name)
+                self.assertEqual(result.stderr.count(b'\n'), 1, result.stderr)
+                self.assertIn(name.encode(), result.stderr)
+
+
+if __name__ == '__main__':
+    unittest.main()

@@ -1,0 +1,464 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Laser scans: LAS and LAZ through `info`, `convert`, `build`, `points` and back, record by record.
+
+TERRACE=path/to/terrace las_cli_test.py [CLASS...]
+"""
+
+import csv
+import json
+import os
+import random
+import struct
+import subprocess
+import tempfile
+import time
+import unittest
+
+import small_las
+from small_las import Las, evlr, extra_bytes, geo_keys, las, random_records, unpack_record, vlr, wkt
+
+TERRACE = os.environ.get('TERRACE', 'terrace')
+DATA = os.environ.get('TERRACE_DATA', '')
+UTM = {1024: 1, 3072: 32632, 3076: 9001}
+UTM_WKT = ('PROJCS["WGS 84 / UTM zone 33N",GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,'
+           '298.257223563]],PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]],PROJECTION['
+           '"Transverse_Mercator"],PARAMETER["latitude_of_origin",0],PARAMETER["central_meridian",15],'
+           'PARAMETER["scale_factor",0.9996],PARAMETER["false_easting",500000],PARAMETER['
+           '"false_northing",0],UNIT["metre",1],AUTHORITY["EPSG","32633"]]')
+
+
+def terrace(*args, **more):
+    return subprocess.run([TERRACE, *map(str, args)], capture_output=True, timeout=120, **more)
+
+
+class LasCase(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = folder.name
+
+    def path(self, name):
+        return os.path.join(self.folder, name)
+
+    def put(self, name, data):
+        with open(self.path(name), 'wb') as file:
+            file.write(data)
+        return self.path(name)
+
+    def run_ok(self, *args, **more):
+        result = terrace(*args, **more)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return result.stdout
+
+    def info(self, *args):
+        return json.loads(self.run_ok('info', *args, '--json'))
+
+    def refused(self, *args, **more):
+        """The one line of an error."""
+        result = terrace(*args, **more)
+        self.assertEqual(result.returncode, 1, result.stderr)
+        lines = result.stderr.decode().splitlines()
+        self.assertEqual(len(lines), 1, lines)
+        return lines[0]
+
+    def through_store(self, *files):
+        self.run_ok('build', *files, '-o', self.path('s.st'), '--force', '-q')
+        self.run_ok('points', self.path('s.st'), '-o', self.path('back.las'), '--force', '-q')
+        return Las(self.path('back.las'))
+
+
+class LasFormatTest(LasCase):
+    """Every point format, made here."""
+
+    def test_every_point_format_comes_out_as_it_was(self):
+        for point_format in range(11):
+            records = random_records(point_format, 3000)
+            path = self.put('in.las', las(point_format, records, scale=(0.01, 0.25, 0.001),
+                                          offset=(500000, 5200000, 100), vlrs=[geo_keys(UTM)]))
+            with self.subTest(point_format=point_format):
+                self.run_ok('convert', path, '-o', self.path('out.csv'), '--force')
+                with open(self.path('out.csv'), newline='') as file:
+                    rows = list(csv.DictReader(file))
+                self.assertEqual(list(rows[0])[3:], small_las.names_of(point_format))
+                for record, row in zip(records, rows, strict=True):
+                    values = unpack_record(point_format, record)
+                    x, y, z = (values.pop(axis) for axis in 'XYZ')
+                    self.assertEqual([float(row[axis]) for axis in 'xyz'],
+                                     [x * 0.01 + 500000, y * 0.25 + 5200000, z * 0.001 + 100])
+                    for name, value in values.items():
+                        wanted = value * 0.006 if name == 'scan_angle' else value
+                        self.assertEqual(type(wanted)(row[name]), wanted)
+                # Waveforms stay behind, so their packets' fields become extra bytes.
+                plain = {4: 1, 5: 3, 9: 6, 10: 8}.get(point_format, point_format)
+                self.run_ok('convert', path, '-o', self.path('out.laz'), '--force')
+                self.assertEqual(self.info(self.path('out.laz'))['format'], 'laz')
+                self.run_ok('convert', self.path('out.laz'), '-o', self.path('out.las'), '--force')
+                for copy in (Las(self.path('out.las')), self.through_store(path)):
+                    self.assertEqual(copy.minor, 4)
+                    self.assertEqual(copy.point_format, plain)
+                    self.assertEqual(copy.software, b'terrace')
+                    self.assertEqual((copy.scale, copy.offset),
+                                     ((0.01, 0.25, 0.001), (500000, 5200000, 100)))
+                    self.assertEqual(sorted(copy.records), sorted(records))
+                    text = copy.vlrs['LASF_Projection', 2112].decode()
+                    self.assertTrue(text.startswith('PROJCS['), text)
+                    self.assertIn('"32632"]]', text)
+                    self.assertEqual(copy.encoding & 16, 16)
+                    for axis, name in enumerate('XYZ'):
+                        steps = [unpack_record(point_format, record)[name] for record in records]
+                        self.assertEqual(copy.min[axis], min(steps) * copy.scale[axis] + copy.offset[axis])
+                        self.assertEqual(copy.max[axis], max(steps) * copy.scale[axis] + copy.offset[axis])
+                    returns = [unpack_record(point_format, record)['return_number'] for record in records]
+                    self.assertEqual(list(copy.returns), [returns.count(n) for n in range(1, 16)])
+                    self.assertEqual(copy.old_count, 3000 if plain < 6 else 0)
+
+    def test_extra_bytes_are_attributes_of_their_type(self):
+        rows = [('count', 1, 0, 0, 0), ('height', 4, 8 + 16, 0.25, -10), ('double', 10, 0, 0, 0),
+                ('big', 7, 0, 0, 0), ('pair', 16, 0, 0, 0), ('opaque', 0, 2, 0, 0)]
+        records = [record + struct.pack('<BhdQiibbB', 7 + i, -3 * i, i / 7, 2**64 - 1 - i, i, -i, 1, 2, 200)
+                   for i, record in enumerate(random_records(6, 50))]
+        path = self.put('extra.las', las(6, records, vlrs=[extra_bytes(rows[:3]), vlr(b'other', 4, b'x'),
+                                                           extra_bytes(rows[3:])]))
+        self.run_ok('convert', path, '-o', self.path('out.csv'))
+        with open(self.path('out.csv'), newline='') as file:
+            table = list(csv.DictReader(file))
+        for i, row in enumerate(table):
+            self.assertEqual(int(row['count']), 7 + i)
+            self.assertEqual(float(row['height']), -0.75 * i - 10)
+            self.assertEqual(float(row['double']), i / 7)
+            self.assertEqual(int(row['big']), 2**64 - 1 - i)
+            # A pair is type 16 of LAS 1.4's deprecated ones: two of type 6.
+            self.assertEqual((int(row['pair_0']), int(row['pair_1'])), (i, -i))
+            self.assertEqual((int(row['opaque_0']), int(row['opaque_1']), int(row['extra_0'])), (1, 2, 200))
+        copy = self.through_store(path)
+        self.assertEqual(sorted(copy.records), sorted(records))
+        names = [row[4:36].rstrip(b'\0').decode() for row in
+                 map(bytes, zip(*[iter(copy.vlrs['LASF_Spec', 4])] * 192))]
+        self.assertEqual(names, ['count', 'height', 'double', 'big', 'pair_0', 'pair_1', 'opaque_0', 'opaque_1',
+                                 'extra_0'])
+        self.assertEqual(struct.unpack_from('<d16xd', copy.vlrs['LASF_Spec', 4], 192 + 112), (0.25, -10))
+
+    def test_time_of_the_week_stays_apart_from_adjusted_time(self):
+        records = random_records(6, 20)
+        week, adjusted = (self.put(f'{bit}.las', las(6, records, encoding=bit)) for bit in (0, 1))
+        self.assertEqual(self.through_store(week).encoding & 1, 0)
+        self.assertEqual(self.through_store(adjusted).encoding & 1, 1)
+        self.assertIn('GPS week', self.refused('build', week, adjusted, '-o', self.path('two.st')))
+
+    def test_withheld_points_are_kept_and_counted(self):
+        records = random_records(1, 200)
+        withheld = sum(unpack_record(1, record)['withheld'] for record in records)
+        path = self.put('w.las', las(1, records))
+        self.assertEqual(self.info(path)['withheld'], withheld)
+        self.assertIn(f'withheld:  {withheld} of them', self.run_ok('info', path).decode())
+        result = terrace('build', path, '-o', self.path('w.st'))
+        self.assertIn(f'{withheld} points are marked as withheld', result.stderr.decode())
+        self.assertEqual(self.info(self.path('w.st'))['points'], 200)
+
+    def test_the_wkt_bit_decides_between_keys_and_wkt(self):
+        records = random_records(1, 20)
+        for bit, code in ((0, 32632), (16, 32633)):
+            path = self.put('two.las', las(1, records, encoding=bit, vlrs=[geo_keys(UTM), wkt(UTM_WKT)]))
+            self.assertEqual(self.info(path)['crs']['epsg'], code)
+        only = self.put('only.las', las(1, records, vlrs=[wkt(UTM_WKT)]))
+        self.assertEqual(self.info(only)['crs']['epsg'], 32633)
+
+    def test_wkt_behind_the_points_is_read_and_in_a_pipe_asked_for(self):
+        records = random_records(6, 20)
+        data = las(6, records, encoding=16, evlrs=[
+            evlr(b'other', 1, bytes(1000)), evlr(b'LASF_Projection', 2112, UTM_WKT.encode())])
+        path = self.put('evlr.las', data)
+        self.assertEqual(self.info(path)['crs']['epsg'], 32633)
+        error = self.refused('build', '-', '-o', self.path('p.st'), input=data)
+        self.assertIn('behind the points', error)
+        self.assertIn('--crs EPSG:n', error)
+        self.run_ok('build', '-', '-o', self.path('p.st'), '--crs', 'EPSG:32633', input=data)
+        self.assertEqual(self.info(self.path('p.st'))['points'], 20)
+
+    def test_a_pipe_gives_what_the_file_gives(self):
+        data = las(3, random_records(3, 30000), vlrs=[geo_keys(UTM)])
+        self.run_ok('build', self.put('a.las', data), '-o', self.path('a.st'))
+        self.run_ok('build', '-', '-o', self.path('b.st'), input=data)
+        for name in os.listdir(self.path('a.st')):
+            with open(os.path.join(self.path('a.st'), name), 'rb') as a, \
+                    open(os.path.join(self.path('b.st'), name), 'rb') as b:
+                self.assertEqual(a.read(), b.read(), name)
+
+
+class LasSurveyTest(LasCase):
+    """Several files, and other formats to LAS."""
+
+    def test_files_with_other_offsets_come_onto_the_first_ones_lattice(self):
+        first, second = random_records(1, 2000), random_records(1, 2000, seed=2)
+        a = self.put('a.las', las(1, first, offset=(500000, 5200000, 0)))
+        b = self.put('b.las', las(1, second, offset=(500012.34, 5199000, -7)))
+        copy = self.through_store(a, b)
+        self.assertEqual(copy.offset, (500000, 5200000, 0))
+
+        def moved(record):
+            x, y, z = struct.unpack_from('<iii', record)
+            return struct.pack('<iii', x + 1234, y - 100000, z - 700) + record[12:]
+        self.assertEqual(sorted(copy.records), sorted(first + [moved(record) for record in second]))
+
+    def test_files_whose_lattices_do_not_meet_are_refused(self):
+        records = random_records(1, 50)
+        first = self.put('a.las', las(1, records))
+        for name, more in (('b.las', {'offset': (0, 0.005, 0)}), ('c.las', {'scale': (0.01, 0.01, 0.001)})):
+            error = self.refused('build', first, self.put(name, las(1, records, **more)), '-o', self.path('x.st'))
+            self.assertIn(name, error)
+            self.assertIn('another lattice', error)
+        far = self.put('far.las', las(1, records, offset=(3e7, 0, 0)))
+        self.assertIn('out of reach', self.refused('build', first, far, '-o', self.path('x.st')))
+        self.assertFalse(os.path.exists(self.path('x.st')))
+
+    def test_text_becomes_las_with_as_many_decimals_as_it_has(self):
+        with open(self.path('p.csv'), 'w') as file:
+            file.write('x,y,z,intensity,red,green,blue,classification,quality\n')
+            for i in range(100):
+                file.write(f'{691000 + i / 1000:.3f},5338000.25,{i / 10:.1f},{i},{i},{2 * i},{3 * i},2,{i / 3}\n')
+        self.run_ok('convert', self.path('p.csv'), '-o', self.path('p.las'))
+        copy = Las(self.path('p.las'))
+        self.assertEqual((copy.point_format, copy.record_bytes), (7, 36 + 8))
+        self.assertEqual(copy.scale, (0.001, 0.001, 0.1))
+        for i, record in enumerate(copy.records):
+            values = unpack_record(7, record)
+            self.assertAlmostEqual(values['X'] * 0.001 + copy.offset[0], 691000 + i / 1000, places=9)
+            self.assertEqual([values[name] for name in ('intensity', 'red', 'green', 'blue', 'classification')],
+                             [i, i, 2 * i, 3 * i, 2])
+            # What nothing is said of is a single return.
+            self.assertEqual((values['return_number'], values['number_of_returns']), (1, 1))
+            self.assertEqual(struct.unpack_from('<d', record, 36), (i / 3,))
+
+    def test_rounding_is_told(self):
+        with open(self.path('p.xyz'), 'w') as file:
+            file.writelines(f'{i / 7} {1e6 + i * 3000 + 1 / 3} 0\n' for i in range(1000))
+        result = terrace('convert', self.path('p.xyz'), '-o', self.path('p.las'), '--json')
+        copy = Las(self.path('p.las'))
+        rounding = json.loads(result.stdout)['rounding']
+        self.assertLessEqual(rounding, copy.scale[0] / 2 * (1 + 1e-6))
+        self.assertGreater(rounding, 0)
+        self.run_ok('convert', self.path('p.las'), '-o', self.path('q.las'))
+        with open(self.path('p.las'), 'rb') as a, open(self.path('q.las'), 'rb') as b:
+            self.assertEqual(a.read(), b.read())
+
+    def test_values_that_a_field_cannot_have_are_refused(self):
+        with open(self.path('p.csv'), 'w') as file:
+            file.write('x,y,z,intensity\n1,2,3,4\n1,2,3,70000\n')
+        error = self.refused('convert', self.path('p.csv'), '-o', self.path('p.las'))
+        self.assertIn('point 1', error)
+        self.assertIn('intensity', error)
+        self.assertFalse(os.path.exists(self.path('p.las')))
+
+    def test_force_replaces_only_what_terrace_wrote(self):
+        records = random_records(1, 50)
+        a = self.put('a.las', las(1, records))
+        self.run_ok('convert', a, '-o', self.path('b.las'))
+        self.run_ok('convert', a, '-o', self.path('b.las'), '--force')
+        self.refused('convert', self.path('b.las'), '-o', a, '--force')
+
+    def test_other_verbs_write_las_too(self):
+        records = random_records(1, 500)
+        a = self.put('a.las', las(1, records, vlrs=[geo_keys(UTM)], offset=(500000, 5200000, 0)))
+        self.run_ok('cluster', a, '-o', self.path('c.las'))
+        self.assertEqual(len(Las(self.path('c.las')).records), 500)
+        self.run_ok('build', a, '-o', self.path('a.st'))
+        self.run_ok('points', self.path('a.st'), '-o', self.path('near.las'), '--near', '500000,5200000', '-k', 9)
+        near = Las(self.path('near.las'))
+        self.assertEqual(near.record_bytes, 28 + 8)
+        self.assertTrue({record[:28] for record in near.records} <= set(records))
+        self.run_ok('points', self.path('a.st'), '-o', self.path('geo.las'), '--to-crs', 'EPSG:4326')
+        geo = Las(self.path('geo.las'))
+        self.assertLess(abs(geo.min[0] - 9), 0.1)
+        self.assertIn('4326', geo.vlrs['LASF_Projection', 2112].decode())
+        self.assertLessEqual(geo.scale[0], 1e-7)
+
+
+class LasTwinTest(LasCase):
+    """A store of whole steps and one of the same places as doubles are the same terrain."""
+
+    @staticmethod
+    def triangles(file):
+        """Those of an OBJ file, whatever the order of points and corners; places to a micrometre."""
+        places, found = [], []
+        for line in file:
+            kind, *words = line.split()
+            if kind == b'v':
+                places.append(tuple(round(float(word), 6) for word in words))
+            elif kind == b'f':
+                corners = [places[int(word) - 1] for word in words]
+                least = corners.index(min(corners))
+                found.append(corners[least:] + corners[:least])
+        return sorted(found)
+
+    def test_what_is_made_of_a_lattice_is_what_is_made_of_its_places(self):
+        source = random.Random(7)
+        places = {(source.randrange(1600), source.randrange(1200)) for _ in range(3000)}
+        points = [(x, y, (x * x // 900 + 3 * y) // 8) for x, y in sorted(places)]
+        self.put('a.las', las(0, [struct.pack('<iii8x', x, y, z - 400) for x, y, z in points],
+                              scale=(0.25,) * 3, offset=(690000, 5190000, 100), vlrs=[geo_keys(UTM)]))
+        with open(self.path('b.xyz'), 'w') as file:
+            file.writelines(f'{690000 + x / 4} {5190000 + y / 4} {z / 4}\n' for x, y, z in points)
+        with open(self.path('ask.csv'), 'w') as file:
+            file.write('x,y\n')
+            file.writelines(f'{690000 + 7.3 * i},{5190000 + 5.1 * i}\n' for i in range(55))
+        with open(self.path('metric.json'), 'w') as file:
+            json.dump({'regions': [{'box': [690050, 5190050, 690200, 5190200], 'semi_axes': [6, 2],
+                                    'angle': 40}]}, file)
+        self.run_ok('build', self.path('a.las'), '-o', self.path('a.st'), '--block', 400)
+        self.run_ok('build', self.path('b.xyz'), '-o', self.path('b.st'), '--block', 400, '--crs', 'EPSG:32632')
+        box = '690100,5190050,690250,5190200'
+        for verb, ending, *options in (
+                ('mesh', 'obj', '--region', box), ('mesh', 'obj', '--max-error', 5, '--quality', 'fitted'),
+                ('mesh', 'obj', '--max-points', 200), ('mesh', 'obj', '--smooth', 'bilateral:3'),
+                ('mesh', 'obj', '--metric', 'elliptical:' + self.path('metric.json')),
+                ('sample', 'csv', '--points', self.path('ask.csv'), '--method', 'natural', '--max-edge', 40),
+                ('sample', 'csv', '--points', self.path('ask.csv'), '--method', 'nearest'),
+                ('contour', 'json', '--interval', 20), ('raster', 'tif', '--value', 'slope'),
+                ('raster', 'tif', '--to-crs', 'EPSG:4326', '--cell', 0.0001)):
+            with self.subTest(verb=verb, options=options):
+                texts = []
+                for store in ('a.st', 'b.st'):
+                    out = self.path(f'out.{ending}')
+                    self.run_ok(verb, self.path(store), *options, '-o', out, '--force')
+                    with open(out, 'rb') as file:
+                        texts.append(self.triangles(file) if ending == 'obj' else file.read())
+                self.assertEqual(*texts)
+        for options in (('--region', box), ('--near', '690200,5190100', '--within', 20)):
+            found = []
+            for store in ('a.st', 'b.st'):
+                text = self.run_ok('points', self.path(store), '-o', '-', '--format', 'xyz', *options).decode()
+                found.append(sorted(line.split()[:3] for line in text.splitlines()))
+            self.assertEqual(*found)
+            self.assertGreater(len(found[0]), 10)
+
+
+class LasHostileTest(LasCase):
+    """One line, at once and in little memory."""
+
+    def refused_at_once(self, data, *parts):
+        path = self.put('h.las', data)
+        started = time.monotonic()
+        for error in (self.refused('info', path), self.refused('info', '-', input=data)):
+            for part in parts:
+                self.assertIn(part, error)
+        self.assertLess(time.monotonic() - started, 4)
+
+    def test_headers_that_promise_what_is_not_there(self):
+        records = random_records(1, 10)
+        good = las(1, records)
+        self.refused_at_once(good[:100], 'ends in its header')
+        self.refused_at_once(good[:-1], 'byte')
+        self.refused_at_once(las(1, records, points=2**32 - 1), 'byte')
+        self.refused_at_once(las(6, random_records(6, 1), points=2**63), 'byte')
+        self.refused_at_once(las(1, records, record_bytes=27), 'take 28 bytes, not 27')
+        self.refused_at_once(las(1, [bytes(65535)] * 2), '65507 extra bytes')
+        self.refused_at_once(las(1, records, scale=(0.01, 0, 0.01)), 'not positive')
+        self.refused_at_once(las(1, records, offset=(0, float('nan'), 0)), 'not finite')
+        self.refused_at_once(good[:104] + b'\x0b' + good[105:], 'point format 11')
+        self.refused_at_once(good[:25] + b'\x05' + good[26:], 'LAS 1.5', '1.0 to 1.4')
+        self.refused_at_once(good[:94] + b'\x10\x00' + good[96:], '16 bytes')
+        self.refused_at_once(good[:96] + b'\xff\xff\xff\xff' + good[100:], 'byte')
+        self.refused_at_once(good[:96] + b'\x00\x00\x00\x00' + good[100:], 'begin inside')
+
+    def test_a_damaged_chunk_is_named(self):
+        records = random_records(6, 120000)
+        self.run_ok('convert', self.put('a.las', las(6, records)), '-o', self.path('a.laz'))
+        with open(self.path('a.laz'), 'rb') as file:
+            good = file.read()
+        first, = struct.unpack_from('<I', good, 96)
+        table, = struct.unpack_from('<Q', good, first)
+        middle = (first + table) // 2
+        damaged = good[:middle] + bytes(64) + good[middle + 64:]
+        for threads in (1, 2):
+            self.put('b.laz', damaged)
+            error = self.refused('build', self.path('b.laz'), '-o', self.path('b.st'), '--threads', threads)
+            self.assertRegex(error, r'b\.laz: chunk 1, byte [0-9]+: ')
+            self.assertFalse(os.path.exists(self.path('b.st')))
+        self.assertIn('chunk 1', self.refused('info', '-', input=damaged))
+        self.refused_at_once(good[:middle], 'a')
+        lost = self.put('l.laz', good[:first] + struct.pack('<Q', 2**62) + good[first + 8:])
+        self.assertIn('chunk table lies outside', self.refused('info', lost))
+        self.refused_at_once(good[:247] + struct.pack('<Q', 2**60) + good[255:], 'chunk')
+        # Without a table, as when the writer was a pipe, the chunks tell their sizes.
+        streamed = good[:first] + struct.pack('<Q', first) + good[first + 8:]
+        self.assertEqual(self.info(self.put('s.laz', streamed))['points'], 120000)
+        for data in (good, streamed, good[:first] + b'\xff' * 8 + good[first + 8:] + struct.pack('<Q', table)):
+            self.run_ok('convert', '-', '-o', self.path('p.las'), '--force', input=data)
+            self.assertEqual(Las(self.path('p.las')).records, records)
+
+    def test_records_that_are_miscounted_do_not_matter(self):
+        records = random_records(1, 10)
+        good = las(1, records, vlrs=[geo_keys(UTM)])
+        for count in (0, 2, 2**32 - 1):
+            path = self.put('c.las', good[:100] + struct.pack('<I', count) + good[104:])
+            self.assertEqual(self.info(path)['points'], 10)
+
+
+@unittest.skipUnless(DATA, 'no TERRACE_DATA')
+class LasDataTest(LasCase):
+    """Surveys of others."""
+
+    def test_surveys_come_out_of_a_store_record_by_record(self):
+        for name in ('1.2-with-color.las', '4_6_crop.las', 'autzen_trim_7.las', 'extrabytes.las',
+                     'coromandel_points_test.las', 'hexbin-crop.las', 'laspy_simple1_3.las', 'mvk-thin.las'):
+            with self.subTest(name=name):
+                path = os.path.join(DATA, 'lidar', name)
+                options = ['--crs', 'EPSG:2903'] if name in ('4_6_crop.las', 'mvk-thin.las',
+                                                              'laspy_simple1_3.las') else []
+                before = Las(path)
+                self.run_ok('build', path, '-o', self.path('s.st'), '--force', '-q', *options)
+                self.run_ok('points', self.path('s.st'), '-o', self.path('b.las'), '--force', '-q')
+                after = Las(self.path('b.las'))
+                self.assertEqual((after.scale, after.offset), (before.scale, before.offset))
+                self.assertEqual(sorted(after.records), sorted(before.records))
+
+    def test_colour_and_intensity_come_out_in_ply_and_csv(self):
+        path = os.path.join(DATA, 'lidar', '1.2-with-color.las')
+        self.run_ok('build', path, '-o', self.path('s.st'))
+        self.run_ok('points', self.path('s.st'), '-o', self.path('p.csv'))
+        self.run_ok('points', self.path('s.st'), '-o', self.path('p.ply'))
+        self.run_ok('convert', self.path('p.ply'), '-o', self.path('q.csv'))
+        before = Las(path)
+        wanted = []
+        for record in before.records:
+            values = unpack_record(3, record)
+            wanted.append([*(values[axis] * s + o for axis, s, o in zip('XYZ', before.scale, before.offset)),
+                           *(values[name] for name in ('intensity', 'red', 'green', 'blue', 'gps_time'))])
+        for name in ('p.csv', 'q.csv'):
+            with open(self.path(name), newline='') as file:
+                found = [[float(row[column]) for column in ('x', 'y', 'z', 'intensity', 'red', 'green', 'blue',
+                                                            'gps_time')] for row in csv.DictReader(file)]
+            self.assertEqual(sorted(found), sorted(wanted))
+
+    def test_laz_and_las_of_the_same_points_make_the_same_store(self):
+        for kind, crs in (('las', 'EPSG:2994'), ('laz', 'EPSG:2994')):
+            self.run_ok('build', os.path.join(DATA, 'lidar', f'autzen_trim.{kind}'), '-o', self.path(kind),
+                        '--crs', crs, '--threads', 2)
+        for name in os.listdir(self.path('las')):
+            if name != 'manifest.json':  # which names the format
+                with open(os.path.join(self.path('las'), name), 'rb') as a, \
+                        open(os.path.join(self.path('laz'), name), 'rb') as b:
+                    self.assertEqual(a.read(), b.read())
+
+    def test_cloud_optimised_files_are_read_as_laz(self):
+        copc = os.path.join(DATA, 'lidar', '1.2-with-color.copc.laz')
+        self.assertEqual(self.info(copc)['points'], 1065)
+        self.run_ok('build', copc, '-o', self.path('c.st'))
+        self.run_ok('points', self.path('c.st'), '-o', self.path('c.laz'))
+        self.assertEqual(self.info(self.path('c.laz'))['points'], 1065)
+
+    def test_damaged_files_end_at_once(self):
+        folder = os.path.join(DATA, 'lidar', 'hostile')
+        for name in sorted(os.listdir(folder)):
+            with self.subTest(name=name):
+                started = time.monotonic()
+                result = terrace('info', os.path.join(folder, name))
+                self.assertLess(time.monotonic() - started, 2)
+                self.assertIn(result.returncode, (0, 1))
+                if result.returncode == 1:
+                    self.assertEqual(result.stderr.count(b'\n'), 1)
+
+
+if __name__ == '__main__':
+    unittest.main()

@@ -1,0 +1,134 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""--where, --keep and --drop: what comes out is what Python's own filter leaves.
+
+TERRACE=path/to/terrace selection_cli_test.py
+"""
+
+import csv
+import json
+import os
+import random
+import subprocess
+import tempfile
+import unittest
+
+TERRACE = os.environ.get('TERRACE', 'terrace')
+NAMES = ['x', 'y', 'z', 'classification', 'return_number', 'number_of_returns', 'red', 'green']
+
+
+def last_on_the_ground(p):
+    return p['classification'] == 2 and p['return_number'] == p['number_of_returns']
+
+
+LAST_ON_THE_GROUND = 'classification == 2 && return_number == last'
+
+
+class SelectionTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(folder.cleanup)
+        cls.folder = folder.name
+        seed = 7
+        print('seed', seed)
+        rng = random.Random(seed)
+        cls.points = []
+        for _ in range(20000):
+            returns = rng.randint(1, 4)
+            cls.points.append(dict(zip(NAMES, [
+                rng.randrange(100000) / 100, rng.randrange(100000) / 100, rng.randrange(3000) / 100,
+                rng.choice([1, 2, 2, 5]), rng.randint(1, returns), returns,
+                rng.randrange(256), rng.randrange(256)])))
+        cls.file = cls.path('all.csv')
+        with open(cls.file, 'w', newline='', encoding='ascii') as file:
+            writer = csv.writer(file)
+            writer.writerow(NAMES)
+            writer.writerows(p.values() for p in cls.points)
+        cls.run_ok('build', cls.file, '-o', cls.path('all.st'), '--block', '1000', '-q')
+
+    @classmethod
+    def path(cls, name):
+        return os.path.join(cls.folder, name)
+
+    @staticmethod
+    def terrace(*args):
+        return subprocess.run([TERRACE, *map(str, args)], capture_output=True, text=True, timeout=120)
+
+    @classmethod
+    def run_ok(cls, *args):
+        result = cls.terrace(*args)
+        if result.returncode != 0:
+            raise AssertionError(result.stderr)
+        return result.stdout
+
+    def rows(self, name):
+        with open(self.path(name), newline='', encoding='ascii') as file:
+            reader = csv.DictReader(file)
+            return reader.fieldnames, sorted(tuple(map(float, row.values())) for row in reader)
+
+    def expect(self, name, wanted, columns):
+        names, rows = self.rows(name)
+        self.assertEqual(names, columns)
+        self.assertEqual(rows, sorted(tuple(float(p[c]) for c in columns)
+                                      for p in self.points if wanted(p)))
+
+    def test_build_takes_the_points_and_attributes_that_are_wanted(self):
+        summary = json.loads(self.run_ok(
+            'build', self.file, '-o', self.path('ground.st'), '--block', '1000', '--json',
+            '--where', LAST_ON_THE_GROUND, '--keep', 'classification,red'))
+        ground = sum(map(last_on_the_ground, self.points))
+        self.assertEqual((summary['points'], summary['excluded']), (ground, 20000 - ground))
+        self.run_ok('points', self.path('ground.st'), '-o', self.path('ground.csv'), '-q')
+        self.expect('ground.csv', last_on_the_ground, ['x', 'y', 'z', 'classification', 'red'])
+        self.run_ok('build', self.file, '-o', self.path('bare.st'), '--drop', 'red,green', '-q')
+        self.run_ok('points', self.path('bare.st'), '-o', self.path('bare.csv'), '-q')
+        self.expect('bare.csv', lambda p: True, NAMES[:-2])
+
+    def test_convert_too(self):
+        summary = json.loads(self.run_ok(
+            'convert', self.file, '-o', self.path('c.csv'), '--json',
+            '--where', 'not (z < 12.5 or x >= 300) and red > 1.5 * green', '--keep', 'red,green',
+            '--drop', 'green'))
+        wanted = lambda p: not (p['z'] < 12.5 or p['x'] >= 300) and p['red'] > 1.5 * p['green']
+        self.expect('c.csv', wanted, ['x', 'y', 'z', 'red'])
+        self.assertEqual(summary['excluded'], 20000 - sum(map(wanted, self.points)))
+        self.run_ok('convert', self.file, '-o', self.path('none.csv'), '--keep', 'none', '-q')
+        self.expect('none.csv', lambda p: True, ['x', 'y', 'z'])
+
+    def test_points_of_a_store(self):
+        self.run_ok('points', self.path('all.st'), '-o', self.path('p.csv'), '-q',
+                    '--where', 'classification != 2', '--region', '100,100,400,500.5')
+        self.expect('p.csv', lambda p: p['classification'] != 2 and 100 <= p['x'] <= 400 and
+                    100 <= p['y'] <= 500.5, NAMES)
+
+    def test_mesh_of_a_part_is_that_of_a_store_of_the_part(self):
+        """Law: what does not meet the condition has no influence at all."""
+        self.run_ok('build', self.file, '-o', self.path('part.st'), '-q', '--where', 'return_number == first')
+        found = [json.loads(self.run_ok('mesh', self.path(store), '-o', self.path(name), '--max-error', '2',
+                                        '--duplicates', 'mean', '--json', *more))
+                 for store, name, more in (('part.st', 'part.ply', []),
+                                           ('all.st', 'where.ply', ['--where', 'return_number == first']))]
+        self.assertEqual(found[0]['samples'], sum(p['return_number'] == 1 for p in self.points))
+        for key in ('samples', 'max_error', 'duplicates'):
+            self.assertEqual(found[0][key], found[1][key], key)
+
+    def test_says_what_is_wrong(self):
+        for args, code, text in (
+                (['build', self.file, '-o', self.path('e.st'), '--where', 'klass == 2'], 1, "no 'klass'; known are x, y, z, classification"),
+                (['build', self.file, '-o', self.path('e.st'), '--where', 'classification = 2'], 1, 'for equality write =='),
+                (['build', self.file, '-o', self.path('e.st'), '--where', 'z > 1000'], 1, 'none of its 20000 points meets the condition; give another --where'),
+                (['build', self.file, '-o', self.path('e.st'), '--keep', 'blue'], 1, "no attribute 'blue'"),
+                (['convert', self.file, '-o', self.path('e.csv'), '--drop', 'red,,green'], 2, 'a name is empty'),
+                (['mesh', self.path('all.st'), '-o', self.path('e.ply'), '--where', 'z > 1'], 2, '--max-error'),
+                (['points', self.path('all.st'), '-o', self.path('e.csv'), '--near', '1,2', '-k', '3', '--where', 'z > 1'], 2, 'without --where')):
+            with self.subTest(args=args):
+                result = self.terrace(*args)
+                self.assertEqual(result.returncode, code, result.stderr)
+                self.assertIn(text, result.stderr)
+                self.assertEqual(len(result.stderr.splitlines()), 1)
+        self.assertFalse(os.path.exists(self.path('e.st')))
+
+
+if __name__ == '__main__':
+    unittest.main()
