@@ -49,10 +49,10 @@ class PlainRaster final : public Raster {
             piece_);
         if (grid_.order != std::endian::native) {
           const PackedColumn swapped{.rows = reinterpret_cast<const char*>(piece_.data()),
-                                    .stride = size_,
-                                    .count = samples,
-                                    .type = grid_.info.sample.type,
-                                    .swap = true};
+                                     .stride = size_,
+                                     .count = samples,
+                                     .type = grid_.info.sample.type,
+                                     .swap = true};
           decode_values(swapped, piece_.data(), size_);
         }
         const std::size_t cell = row * out.stride + column;
