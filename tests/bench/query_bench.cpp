@@ -20,13 +20,13 @@
 #include "cli/choices.hpp"
 #include "cli/cli.hpp"
 #include "sample/place_file.hpp"
-#include "sample/raster_run.hpp"
 #include "sample/sample_run.hpp"
 #include "surface/store_window.hpp"
 #include "terrace/terrain/build.hpp"
 #include "terrace/terrain/detail.hpp"
 #include "terrace/terrain/detail_mesh.hpp"
 #include "terrace/terrain/heights.hpp"
+#include "terrace/terrain/raster.hpp"
 
 namespace {
 
@@ -125,11 +125,11 @@ void sample_lines(benchmark::State& state) {
   const Store& source = store();
   static const terrace::tests::TemporaryFolder folder;
   const std::string name = (folder.path() / "places.csv").string();
-  const terrace::terrain::Placement placement = terrace::terrain::source.schema();
+  const terrace::stream::Placement placement = source.schema();
   std::ofstream file(name);
   file.precision(12);
   for (const auto& [column, row] : random_places()) {
-    const terrace::stream::Point3 p = terrace::terrain::world_point(placement, {column, row, 0});
+    const terrace::stream::Point3 p = terrace::stream::world_point(placement, {column, row, 0});
     file << p[0] << ',' << p[1] << '\n';
   }
   file.close();
@@ -146,8 +146,7 @@ BENCHMARK(sample_lines)->Unit(benchmark::kMillisecond);
 
 /// A square anywhere within the bounds that covers this share of their area, in the store's CRS.
 terrace::terrain::Region random_square(double share, std::uint64_t seed) {
-  const terrace::stream::Box3 all =
-      terrace::terrain::world_box(terrace::terrain::store().schema(), store().bounds());
+  const terrace::stream::Box3 all = terrace::stream::world_box(store().schema(), store().bounds());
   std::string text[2];
   for (std::size_t axis = 0; axis < 2; ++axis) {
     const double side = std::sqrt(share) * (all.max[axis] - all.min[axis]);
@@ -166,7 +165,7 @@ terrace::terrain::Region random_square(double share, std::uint64_t seed) {
 /// often keeps it.
 void region(benchmark::State& state) {
   const Store& source = store();
-  const terrace::terrain::Placement placement = terrace::terrain::source.schema();
+  const terrace::stream::Placement placement = source.schema();
   const double share = static_cast<double>(state.range(0)) / 10000;
   const std::uint64_t squares = small() ? 2 : share < 0.005 ? 200 : share < 0.05 ? 40 : 10;
   std::uint64_t inside = 0, delivered = 0, clusters = 0, bytes = 0, reads = 0;
@@ -184,7 +183,7 @@ void region(benchmark::State& state) {
               delivered += points.size();
             }
             for (const auto& p : points.positions) {
-              inside += detail.region->contains(terrace::terrain::world_point(placement, p));
+              inside += detail.region->contains(terrace::stream::world_point(placement, p));
             }
           });
       ++reads;
@@ -203,8 +202,7 @@ BENCHMARK(region)->Arg(1)->Arg(100)->Arg(1000)->Unit(benchmark::kMillisecond);
 
 /// An outline of 100,000 corners around most of the store, jagged at every scale as a coast is.
 terrace::terrain::Region coast() {
-  const terrace::stream::Box3 all =
-      terrace::terrain::world_box(terrace::terrain::store().schema(), store().bounds());
+  const terrace::stream::Box3 all = terrace::stream::world_box(store().schema(), store().bounds());
   const std::size_t corners = small() ? 2000 : 100000;
   std::vector<terrace::terrain::Point2> ring(corners);
   for (std::size_t i = 0; i < corners; ++i) {

@@ -41,7 +41,7 @@ int measure(const std::string& file, std::size_t block_points, double facility_c
   source_options.block_points = block_points;
   const std::array files{file};
   const auto source = terrace::stream::open_source(files, source_options);
-  const terrace::terrain::Ground ground(terrace::terrain::source->info());
+  const terrace::terrain::Ground ground(source->info());
 
   NullSink sink;
   terrace::cluster::HierarchyOptions options;

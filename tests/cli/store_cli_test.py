@@ -12,6 +12,7 @@ import math
 import os
 import random
 import shutil
+import struct
 import subprocess
 import tempfile
 import unittest
@@ -64,7 +65,8 @@ class StoreTest(unittest.TestCase):
         store = self.path('keys.terrace')
         summary = json.loads(self.run_ok('build', self.dem, '-o', store, '--json', '--memory', '200M'))
         self.assertEqual(set(summary), {'points', 'nodata', 'excluded', 'seconds', 'points_per_second',
-                                        'peak_rss_bytes', 'store_bytes', 'levels'})
+                                        'peak_rss_bytes', 'store_bytes', 'levels', 'reordered',
+                                        'spread', 'temporary_bytes'})
         self.assertEqual(summary['points'], SIZE * SIZE)
         self.assertLessEqual(summary['peak_rss_bytes'], 200 << 20)
         self.assertEqual(summary['store_bytes'],
@@ -387,6 +389,61 @@ class BuildOptionTest(unittest.TestCase):
     def somewhere(seed, count):
         generator = random.Random(seed)
         return [tuple(generator.uniform(0, 100) for _ in range(3)) for _ in range(count)]
+
+    def shuffled(self, count):
+        """A binary PLY of places of a grid in random order, numbered."""
+        side = math.isqrt(count)
+        numbers = list(range(side * side))
+        random.Random(count).shuffle(numbers)
+        with open(self.path('shuffled.ply'), 'wb') as file:
+            file.write(b'ply\nformat binary_little_endian 1.0\nelement vertex %d\n'
+                       b'property int x\nproperty int y\nproperty float z\nproperty uint number\n'
+                       b'end_header\n' % len(numbers))
+            pack = struct.Struct('<iifI').pack
+            file.writelines(pack(n % side, n // side, n % 7, n) for n in numbers)
+        return self.path('shuffled.ply'), side
+
+    def test_points_without_order_are_put_in_order(self):
+        cloud, side = self.shuffled(640000)
+        stores, summaries = {}, {}
+        for order in ('auto', 'stream', 'spatial'):
+            stores[order] = self.path(f'{order}.terrace')
+            result = terrace('build', cloud, '-o', stores[order], '--order', order, '--json',
+                             '--memory', '200M', '--threads', 1 + len(summaries))
+            self.assertEqual(result.returncode, 0, result.stderr)
+            summary = summaries[order] = json.loads(result.stdout)
+            self.assertEqual(summary['points'], side * side)
+            self.assertLess(summary['peak_rss_bytes'], 200 << 20)
+            self.assertEqual(summary['reordered'], order != 'stream')
+            self.assertEqual('put in spatial order' in result.stderr, order != 'stream')
+            self.assertEqual(terrace('verify', stores[order]).returncode, 0)
+        self.assertEqual(summaries['stream']['temporary_bytes'], 0)
+        self.assertGreater(summaries['auto']['spread'], 2)
+        self.assertLessEqual(summaries['auto']['temporary_bytes'], 1.2 * 16 * side * side)
+        self.assertLess(summaries['auto']['store_bytes'], summaries['stream']['store_bytes'])
+        for name in os.listdir(stores['auto']):
+            with open(os.path.join(stores['auto'], name), 'rb') as one, \
+                    open(os.path.join(stores['spatial'], name), 'rb') as other:
+                self.assertEqual(one.read(), other.read(), name)
+        # Every point with its number, from a pipe as from the file.
+        with open(cloud, 'rb') as file:
+            piped = self.path('piped.terrace')
+            result = subprocess.run([TERRACE, 'build', '-', '-o', piped], stdin=file,
+                                    capture_output=True, timeout=120)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        result = terrace('points', piped, '-o', '-', '--format', 'xyz')
+        rows = sorted((tuple(map(float, line.split())) for line in result.stdout.splitlines()
+                       if not line.startswith('#')), key=lambda row: row[3])
+        self.assertEqual(rows, [(n % side, n // side, n % 7, n) for n in range(side * side)])
+
+    def test_a_trial_tells_the_temporary_disk(self):
+        cloud, side = self.shuffled(640000)
+        result = terrace('build', cloud, '-o', self.path('no.terrace'), '--dry-run', '--json')
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertGreater(json.loads(result.stdout)['temporary_bytes'], 10 * side * side)
+        result = terrace('build', cloud, '-o', self.path('no.terrace'), '--dry-run', '--json',
+                         '--order', 'stream')
+        self.assertEqual(json.loads(result.stdout)['temporary_bytes'], 0)
 
     def test_more_effort_finds_cheaper_clusters(self):
         cost = dict.fromkeys(('fast', 'default', 'fine', 'full'), 0.0)

@@ -17,7 +17,7 @@ SIBLINGS = {'terrain': ['stream', 'cluster', 'tri']}
 TERRAIN_ROOMS = {'base': 0, 'earth': 1, 'build': 2, 'surface': 2, 'view': 2, 'sample': 3, 'contour': 3,
                  'mesh': 3, 'tile': 3}
 # The same in libstream; a room in a room (`store/read`) belongs to it.
-STREAM_ROOMS = {'io': 0, 'laz': 0, 'raster': 1, 'store': 1, 'format': 2}
+STREAM_ROOMS = {'io': 0, 'laz': 0, 'order': 1, 'raster': 1, 'store': 1, 'format': 2}
 # So many sources a newcomer can overlook.
 MOST_SOURCES = 40
 LICENCES = {

@@ -17,13 +17,13 @@
 namespace terrace::stream {
 namespace {
 
-constexpr const char* kRemedy = "make room, or name another folder for temporary files: TMPDIR";
-
 /// A file that never had a name, or whose name is gone at once where the file system knows no such.
-int open_nameless() {
-  std::error_code error;
-  std::filesystem::path folder = std::filesystem::temp_directory_path(error);
-  if (error) folder = "/tmp";
+int open_nameless(std::filesystem::path folder) {
+  if (folder.empty()) {
+    std::error_code error;
+    folder = std::filesystem::temp_directory_path(error);
+    if (error) folder = "/tmp";
+  }
   const int nameless = ::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC | O_EXCL, 0600);
   if (nameless >= 0) return nameless;
   std::string name = (folder / "terrace-XXXXXX").string();
@@ -34,8 +34,12 @@ int open_nameless() {
 
 }  // namespace
 
-Spool::Spool(std::string name) : name_(std::move(name)), descriptor_(open_nameless()) {
-  if (descriptor_ < 0) throw system_error(name_, "cannot open a temporary file", errno, kRemedy);
+Spool::Spool(std::string name, const std::filesystem::path& folder)
+    : name_(std::move(name)),
+      remedy_(folder.empty() ? "make room, or name another folder for temporary files: TMPDIR"
+                             : "make room in " + folder.string()),
+      descriptor_(open_nameless(folder)) {
+  if (descriptor_ < 0) throw system_error(name_, "cannot open a temporary file", errno, remedy_);
 }
 
 Spool::~Spool() { ::close(descriptor_); }
@@ -46,7 +50,7 @@ void Spool::write(std::uint64_t offset, std::span<const std::byte> bytes) {
     const ssize_t put = ::pwrite(descriptor_, bytes.data() + done, bytes.size() - done,
                                  static_cast<off_t>(offset + done));
     if (put < 0 && errno == EINTR) continue;
-    if (put < 0) throw system_error(name_, "cannot write a temporary file", errno, kRemedy);
+    if (put < 0) throw system_error(name_, "cannot write a temporary file", errno, remedy_);
     done += static_cast<std::size_t>(put);
   }
   size_ = std::max(size_, offset + bytes.size());

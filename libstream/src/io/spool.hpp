@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <span>
 #include <string>
 
@@ -10,13 +11,14 @@
 
 namespace terrace::stream {
 
-/// A temporary file without a name, in $TMPDIR or /tmp: what it takes is free again as soon as the
-/// object goes, however the process ends. Holds what can only be read front to back (packed files,
-/// text, pipes) where it is needed at any place.
+/// A temporary file without a name: what it takes is free again as soon as the object goes, however
+/// the process ends. Holds what can only be read front to back (packed files, text, pipes) where it
+/// is needed at any place.
 class Spool final : public ByteSource {
  public:
-  /// name: of what is spooled, for messages. Throws: Error if no file can be made.
-  explicit Spool(std::string name);
+  /// name: of what is spooled, for messages. folder: where; empty: $TMPDIR or /tmp.
+  /// Throws: Error if no file can be made.
+  explicit Spool(std::string name, const std::filesystem::path& folder = {});
   ~Spool() override;
   Spool(const Spool&) = delete;
   Spool& operator=(const Spool&) = delete;
@@ -31,7 +33,7 @@ class Spool final : public ByteSource {
   void read(std::uint64_t offset, std::span<std::byte> out) const override;
 
  private:
-  std::string name_;
+  std::string name_, remedy_;
   int descriptor_;
   std::uint64_t size_ = 0;
 };

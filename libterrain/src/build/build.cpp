@@ -5,12 +5,16 @@
 #include <array>
 #include <cmath>
 #include <memory>
+#include <mutex>
+#include <optional>
 #include <stop_token>
+#include <string>
 #include <utility>
 
 #include <terrace/cluster/hierarchy.hpp>
 #include <terrace/stream/error.hpp>
 #include <terrace/stream/raster.hpp>
+#include <terrace/stream/spatial_order.hpp>
 #include <terrace/stream/store.hpp>
 
 #include "base/progress_report.hpp"
@@ -137,6 +141,52 @@ void set_metric(const BuildRequest& request, const stream::SourceInfo& info, con
   };
 }
 
+/// The first points of a source.
+class FirstPoints final : public stream::PointSource {
+ public:
+  FirstPoints(std::unique_ptr<stream::PointSource> source, std::uint64_t most)
+      : source_(std::move(source)), most_(most) {}
+
+  [[nodiscard]] const stream::SourceInfo& info() const override { return source_->info(); }
+  [[nodiscard]] stream::Progress progress() const override { return source_->progress(); }
+  [[nodiscard]] std::uint64_t reading_bytes() const override { return source_->reading_bytes(); }
+  void refine(double cell_aspect, std::uint64_t memory_bytes) override {
+    source_->refine(cell_aspect, memory_bytes);
+  }
+  bool next(stream::PointBlock& block) override {
+    block.clear();
+    return source_->progress().points < most_ && source_->next(block);
+  }
+
+ private:
+  std::unique_ptr<stream::PointSource> source_;
+  std::uint64_t most_;
+};
+
+/// Lengths of the stored coordinates' units on the ground, heights weighted.
+std::array<double, 3> unit_lengths(const GroundMap& map) {
+  const auto length = [&map](std::size_t axis) {
+    return std::hypot(map[axis], map[3 + axis], map[6 + axis]);
+  };
+  return {length(0), length(1), length(2)};
+}
+
+/// What the user should know of the order in which the points came.
+void tell_order(const stream::OrderedSource::Report& order, const std::filesystem::path& folder,
+                const Context& context) {
+  if (!order.reordered) return;
+  std::string line = "the points were put in spatial order";
+  if (order.spread > 0) {
+    line += ": as they came, blocks were " + readable_number(order.spread, 2) +
+            " times as wide as need be";
+  }
+  if (order.temporary_bytes > 0) {
+    line += "; this took " + readable_bytes(order.temporary_bytes) + " of disk for a while in " +
+            folder.string();
+  }
+  context.say(line);
+}
+
 }  // namespace
 
 std::optional<cluster::Effort> effort_of(const std::string& name) {
@@ -166,7 +216,10 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   const auto stop_reading = [&reading] { reading.request_stop(); };
   const std::stop_callback on_stop(context.stop, stop_reading);
   source_options.stop = reading.get_token();
-  const auto source = stream::open_source(request.inputs, source_options);
+  std::unique_ptr<stream::PointSource> source = stream::open_source(request.inputs, source_options);
+  if (request.most_points > 0) {
+    source = std::make_unique<FirstPoints>(std::move(source), request.most_points);
+  }
   const stream::SourceInfo& info = source->info();
   const SourceCrs crs = crs_of_source(info, request.datum_shift);
   stream::Placement placement = info;
@@ -183,7 +236,36 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
                    memory_bytes - memory_beside_source(request, payload_bytes, threads));
   }
 
-  const stream::StoreSchema schema = schema_of(source->info(), crs, request);
+  const ProgressReport report(context, "points");
+  std::optional<ProgressReport> reading_report;
+  std::mutex reporting;
+  const auto set_aside = [&](const stream::Progress& progress) {
+    const std::lock_guard lock(reporting);
+    if (!reading_report) reading_report.emplace(context, "records");
+    reading_report->update(progress.points, progress.fraction);
+  };
+  const std::filesystem::path folder = std::filesystem::absolute(request.store).parent_path();
+  // Goes before what its thread calls.
+  std::unique_ptr<stream::PointSource> points = std::move(source);
+  stream::OrderedSource* in_order = nullptr;
+  if (!info.grid) {
+    auto ordered = stream::in_spatial_order(
+        std::move(points),
+        {.order = request.order,
+         .block_points = request.block_points,
+         .unit_lengths =
+             [&ground](const stream::Box3& box) { return unit_lengths(ground.map(box)); },
+         .folder = folder,
+         .stop = reading.get_token(),
+         .reading = set_aside});
+    in_order = ordered.get();
+    points = std::move(ordered);
+    if (request.order != stream::Order::stream) {
+      points = stream::read_ahead(std::move(points), kBlocksAhead, reading, reading.get_token());
+    }
+  }
+
+  const stream::StoreSchema schema = schema_of(info, crs, request);
   stream::StoreWriter writer(request.store, schema, request.replace);
   StoreSink sink(writer, request.most_points == 0);
   cluster::HierarchyOptions options;
@@ -196,7 +278,7 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   options.ground = [&ground](const cluster::Bounds& bounds) {
     return ground.map({bounds.min, bounds.max});
   };
-  set_metric(request, source->info(), ground, options);
+  set_metric(request, info, ground, options);
   // A full disk is told at once, even if the input's producer idles.
   options.on_failure = stop_reading;
   cluster::HierarchyBuilder builder(options, sink);
@@ -206,21 +288,21 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   // The reading ends for two reasons: the context's, or a failure that push() tells.
   const auto next = [&] {
     try {
-      return source->next(block);
+      return points->next(block);
     } catch (const stream::Stopped&) {
       if (!context.stop.stop_requested()) builder.push({});
       throw;
     }
   };
-  const ProgressReport report(context, "points");
   while (next()) {
     builder.push(block.positions, block.payload);
-    so_far = source->progress();
+    so_far = points->progress();
     if (context.stop.stop_requested()) throw stream::Stopped();
+    const std::lock_guard lock(reporting);
+    reading_report.reset();
     report.update(so_far.points, so_far.fraction);
-    if (request.most_points != 0 && so_far.points >= request.most_points) break;
   }
-  so_far = source->progress();
+  so_far = points->progress();
   if (so_far.points == 0) {
     throw stream::Error(
         {.file = request.inputs.front(),
@@ -241,6 +323,7 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   outcome.nodata = so_far.nodata;
   outcome.excluded = so_far.excluded;
   outcome.store_bytes = sink.store_bytes();
+  if (in_order != nullptr) outcome.order = in_order->report();
   outcome.top = result.top;
   outcome.level_points = result.level_points;
   outcome.level_clusters = result.level_clusters;
@@ -248,6 +331,7 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
     context.say(std::to_string(so_far.withheld) +
                 " points are marked as withheld in their file; they are kept, with the mark");
   }
+  tell_order(outcome.order, folder, context);
   if (!crs.note.empty()) context.say(crs.note);
   if (!ground.assumption().empty()) context.say(ground.assumption());
   return outcome;

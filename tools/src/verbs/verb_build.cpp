@@ -60,8 +60,13 @@ class BuildCommand final : public Command {
            "euclidean, squared, minkowski:P or elliptical:FILE (JSON: boxes with semi-axes)")
         ->capture_default_str()
         ->type_name("METRIC");
+    app.add_option("--order", order_,
+                   "of points: stream as they come, spatial such that near ones follow one another "
+                   "(through a temporary file beside the store), auto if they do not already")
+        ->check(CLI::IsMember({"auto", "stream", "spatial"}))
+        ->capture_default_str();
     app.add_flag("--dry-run", dry_run_, "only tell points, disk and time, from a trial");
-    not_yet(app, {"--order", "--resume", "--append"});
+    not_yet(app, {"--resume", "--append"});
   }
 
   Summary run(const CommonOptions& common) override {
@@ -77,6 +82,9 @@ class BuildCommand final : public Command {
     request_.metric = MetricChoice::parse(metric_);
     request_.selection = selection_.selection();
     request_.seed = common.seed;
+    request_.order = order_ == "stream"    ? stream::Order::stream
+                     : order_ == "spatial" ? stream::Order::spatial
+                                           : stream::Order::automatic;
     if (output_ == "-") throw UsageError("a store is a folder: it cannot go to standard output");
     std::error_code ignored;
     if (!common.force && std::filesystem::exists(request_.store, ignored)) {
@@ -95,10 +103,17 @@ class BuildCommand final : public Command {
     const double seconds = watch.seconds();
     const double rate = static_cast<double>(outcome.points) / seconds;
     Summary summary;
-    summary.json = {{"points", outcome.points},           {"nodata", outcome.nodata},
-                    {"excluded", outcome.excluded},       {"seconds", seconds},
-                    {"points_per_second", rate},          {"peak_rss_bytes", peak_rss_bytes()},
-                    {"store_bytes", outcome.store_bytes}, {"levels", outcome.top + 1}};
+    summary.json = {{"points", outcome.points},
+                    {"nodata", outcome.nodata},
+                    {"excluded", outcome.excluded},
+                    {"seconds", seconds},
+                    {"points_per_second", rate},
+                    {"peak_rss_bytes", peak_rss_bytes()},
+                    {"store_bytes", outcome.store_bytes},
+                    {"levels", outcome.top + 1},
+                    {"reordered", outcome.order.reordered},
+                    {"spread", outcome.order.spread},
+                    {"temporary_bytes", outcome.order.temporary_bytes}};
     summary.text =
         with_commas(outcome.points) + " points (" + with_commas(outcome.nodata) +
         " cells without data left out" +
@@ -141,25 +156,33 @@ class BuildCommand final : public Command {
     const double scale = points / static_cast<double>(trial.points);
     Summary summary;
     if (points < 0) {
-      summary.json = {{"points", nullptr}, {"store_bytes", nullptr}, {"seconds", nullptr}};
+      summary.json = {{"points", nullptr},
+                      {"store_bytes", nullptr},
+                      {"seconds", nullptr},
+                      {"temporary_bytes", nullptr}};
       summary.text =
           "the number of points is not known before the end of the input; a million take " +
           readable_seconds(seconds) + " and " + readable_bytes(trial.store_bytes) + "\n";
     } else {
       const auto bytes = static_cast<std::uint64_t>(static_cast<double>(trial.store_bytes) * scale);
+      const auto temporary =
+          static_cast<std::uint64_t>(static_cast<double>(trial.order.temporary_bytes) * scale);
       summary.json = {{"points", static_cast<std::uint64_t>(points)},
                       {"store_bytes", bytes},
-                      {"seconds", seconds * scale}};
+                      {"seconds", seconds * scale},
+                      {"temporary_bytes", temporary}};
       summary.text = "about " + with_commas(static_cast<std::uint64_t>(points)) + " points, " +
-                     readable_bytes(bytes) + " of disk, " + readable_seconds(seconds * scale) +
-                     "; nothing was written\n";
+                     readable_bytes(bytes) + " of disk" +
+                     (temporary > 0 ? " and " + readable_bytes(temporary) + " more while it runs"
+                                    : std::string()) +
+                     ", " + readable_seconds(seconds * scale) + "; nothing was written\n";
     }
     return summary;
   }
 
   BuildRequest request_;
   SelectionOptions selection_;
-  std::string output_, crs_, shift_, effort_ = "default", metric_ = "euclidean";
+  std::string output_, crs_, shift_, effort_ = "default", metric_ = "euclidean", order_ = "auto";
   std::uint64_t block_ = 10000;
   bool dry_run_ = false;
 };

@@ -10,6 +10,7 @@
 
 #include <terrace/cluster/block.hpp>
 #include <terrace/stream/source.hpp>
+#include <terrace/stream/spatial_order.hpp>
 
 #include "terrace/terrain/context.hpp"
 #include "terrace/terrain/metric_choice.hpp"
@@ -37,6 +38,9 @@ struct BuildRequest {
   int band = 1;
   stream::HeightsOfColour heights_of_colour = stream::HeightsOfColour::none;  ///< of PNG
   std::uint64_t seed = 1;
+  /// Of points that are no cells of a raster: see stream::in_spatial_order(). Its temporary file
+  /// lies in the folder in which the store is to stand.
+  stream::Order order = stream::Order::automatic;
   /// A trial run that stops after about this many points and leaves no store; 0: read everything.
   std::uint64_t most_points = 0;
 };
@@ -46,6 +50,7 @@ struct BuildOutcome {
   std::uint64_t nodata = 0;
   std::uint64_t excluded = 0;  ///< points that did not meet the condition of the selection
   std::uint64_t store_bytes = 0;
+  stream::OrderedSource::Report order{};  ///< how the points came, and what it took to order them
   unsigned top = 0;
   std::vector<std::uint64_t> level_points, level_clusters;
 };

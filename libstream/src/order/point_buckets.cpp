@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "order/point_buckets.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <cstring>
+
+#include "with_type.hpp"
+
+namespace terrace::stream {
+namespace {
+
+/// Of 256 buckets these are 8 MiB in memory, and few enough writes.
+constexpr std::size_t kChunkBytes = 32u << 10;
+
+}  // namespace
+
+PackedPoints::PackedPoints(const Schema& schema) {
+  std::size_t bytes = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    types_[axis] = schema.coordinates[axis].type;
+    offsets_[axis] = bytes;
+    bytes += size_of(types_[axis]);
+  }
+  payload_offset_ = bytes;
+  record_bytes_ = bytes + schema.payload_size();
+}
+
+void PackedPoints::pack(const PointBlock& block, std::vector<std::byte>& records) const {
+  records.resize(block.size() * record_bytes_);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    with_type(types_[axis], [&](auto type) {
+      using T = decltype(type);
+      std::byte* to = records.data() + offsets_[axis];
+      for (const Point3& p : block.positions) {
+        const T value = static_cast<T>(p[axis]);
+        assert(static_cast<double>(value) == p[axis]);
+        std::memcpy(to, &value, sizeof value);
+        to += record_bytes_;
+      }
+    });
+  }
+  const std::size_t payload = payload_bytes();
+  if (payload == 0) return;
+  for (std::size_t i = 0; i < block.size(); ++i) {
+    std::memcpy(records.data() + i * record_bytes_ + payload_offset_,
+                block.payload.data() + i * payload, payload);
+  }
+}
+
+void PackedPoints::unpack(std::span<const std::byte> records,
+                          std::vector<NumberedPoint>& points) const {
+  points.resize(records.size() / record_bytes_);
+  for (std::size_t i = 0; i < points.size(); ++i) points[i].number = i;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    with_type(types_[axis], [&](auto type) {
+      const std::byte* from = records.data() + offsets_[axis];
+      for (NumberedPoint& point : points) {
+        std::memcpy(&type, from, sizeof type);
+        point.place[axis] = static_cast<double>(type);
+        from += record_bytes_;
+      }
+    });
+  }
+}
+
+void Bucket::append(Bucket&& next) {
+  chunks.insert(chunks.end(), next.chunks.begin(), next.chunks.end());
+  tail.insert(tail.end(), next.tail.begin(), next.tail.end());
+  next = {};
+}
+
+BucketFile::BucketFile(const std::string& name, const std::filesystem::path& folder,
+                       std::size_t record_bytes)
+    : record_bytes_(record_bytes),
+      chunk_bytes_(std::max<std::size_t>(kChunkBytes / record_bytes, 1) * record_bytes),
+      file_(name, folder) {}
+
+void BucketFile::append(Bucket& bucket, std::span<const std::byte> record) {
+  if (bucket.tail.capacity() < chunk_bytes_) bucket.tail.reserve(chunk_bytes_);
+  bucket.tail.insert(bucket.tail.end(), record.begin(), record.end());
+  if (bucket.tail.size() < chunk_bytes_) return;
+  std::uint32_t chunk = chunks_;
+  if (free_.empty()) {
+    ++chunks_;
+  } else {
+    chunk = free_.back();
+    free_.pop_back();
+  }
+  file_.write(std::uint64_t{chunk} * chunk_bytes_, bucket.tail);
+  bucket.chunks.push_back(chunk);
+  bucket.tail.clear();
+}
+
+std::uint64_t BucketFile::records(const Bucket& bucket) const {
+  return (bucket.chunks.size() * chunk_bytes_ + bucket.tail.size()) / record_bytes_;
+}
+
+void BucketFile::take(Bucket& bucket, std::uint64_t most, std::vector<std::byte>& out) {
+  const std::uint64_t at_once = std::max<std::uint64_t>(most * record_bytes_ / chunk_bytes_, 1);
+  const std::size_t chunks = std::min<std::uint64_t>(bucket.chunks.size(), at_once);
+  out.resize(chunks * chunk_bytes_);
+  for (std::size_t i = 0; i < chunks; ++i) {
+    file_.read(std::uint64_t{bucket.chunks[i]} * chunk_bytes_,
+               std::span(out).subspan(i * chunk_bytes_, chunk_bytes_));
+  }
+  const auto taken = bucket.chunks.begin() + static_cast<std::ptrdiff_t>(chunks);
+  free_.insert(free_.end(), bucket.chunks.begin(), taken);
+  bucket.chunks.erase(bucket.chunks.begin(), taken);
+  if (bucket.chunks.empty() && (out.size() + bucket.tail.size()) / record_bytes_ <= most) {
+    out.insert(out.end(), bucket.tail.begin(), bucket.tail.end());
+    bucket.tail = {};
+  }
+}
+
+void BucketFile::sample(const Bucket& bucket, std::uint64_t most,
+                        std::vector<std::byte>& out) const {
+  const std::uint64_t at_once = std::max<std::uint64_t>(most * record_bytes_ / chunk_bytes_, 1);
+  const std::size_t count = std::min<std::uint64_t>(bucket.chunks.size(), at_once);
+  out.resize(count * chunk_bytes_);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::uint32_t chunk = bucket.chunks[i * bucket.chunks.size() / count];
+    file_.read(std::uint64_t{chunk} * chunk_bytes_,
+               std::span(out).subspan(i * chunk_bytes_, chunk_bytes_));
+  }
+}
+
+}  // namespace terrace::stream

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "io/spool.hpp"
+#include "order/kd_cut.hpp"
+#include "terrace/stream/point.hpp"
+#include "terrace/stream/schema.hpp"
+#include "terrace/stream/source.hpp"
+
+namespace terrace::stream {
+
+/// Points as records of their stored types: the coordinates, then the attributes.
+class PackedPoints {
+ public:
+  explicit PackedPoints(const Schema& schema);
+
+  [[nodiscard]] std::size_t record_bytes() const { return record_bytes_; }
+  [[nodiscard]] std::size_t payload_bytes() const { return record_bytes_ - payload_offset_; }
+  [[nodiscard]] const std::byte* payload(const std::byte* record) const {
+    return record + payload_offset_;
+  }
+  /// Replaces what is in `records` by those of the block.
+  void pack(const PointBlock& block, std::vector<std::byte>& records) const;
+  /// Replaces what is in `points` by the places in the records, numbered from 0.
+  void unpack(std::span<const std::byte> records, std::vector<NumberedPoint>& points) const;
+
+ private:
+  std::array<ScalarType, 3> types_;
+  std::array<std::size_t, 3> offsets_{};
+  std::size_t payload_offset_, record_bytes_;
+};
+
+/// Records that belong together, in the order in which they came: full chunks in a file, the rest
+/// in memory.
+struct Bucket {
+  std::vector<std::uint32_t> chunks;
+  std::vector<std::byte> tail;
+
+  void append(Bucket&& next);
+};
+
+/// Buckets of records in one temporary file, in chunks whose place is used again once they have
+/// been read.
+class BucketFile {
+ public:
+  /// name: of what is set aside, for messages.
+  BucketFile(const std::string& name, const std::filesystem::path& folder,
+             std::size_t record_bytes);
+
+  /// Throws: Error, if the disk is full above all.
+  void append(Bucket& bucket, std::span<const std::byte> record);
+  [[nodiscard]] std::uint64_t records(const Bucket& bucket) const;
+  /// Moves the first records of the bucket, whole chunks and at most about so many, to `out`.
+  void take(Bucket& bucket, std::uint64_t most, std::vector<std::byte>& out);
+  /// Copies records of chunks throughout the bucket, at most so many, to `out`.
+  void sample(const Bucket& bucket, std::uint64_t most, std::vector<std::byte>& out) const;
+  /// What the file takes.
+  [[nodiscard]] std::uint64_t bytes() const { return file_.size(); }
+
+ private:
+  std::size_t record_bytes_, chunk_bytes_;
+  Spool file_;
+  std::uint32_t chunks_ = 0;         ///< in the file
+  std::vector<std::uint32_t> free_;  ///< of them
+};
+
+}  // namespace terrace::stream

@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/stream/spatial_order.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <functional>
+#include <memory>
+#include <random>
+#include <stop_token>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "temp_folder.hpp"
+#include "terrace/stream/error.hpp"
+
+namespace terrace::stream {
+namespace {
+
+constexpr std::size_t kBlock = 1000;
+
+/// Points on a surface, each with its number as an attribute.
+class MadePoints final : public PointSource {
+ public:
+  using Place = std::function<Point3(std::uint64_t)>;
+
+  MadePoints(std::uint64_t count, Place place, ScalarType type = ScalarType::f64)
+      : count_(count), place_(std::move(place)) {
+    info_.format = "made";
+    for (Channel& channel : info_.coordinates) channel.type = type;
+    info_.attributes = {{.name = "mark", .type = ScalarType::u8},
+                        {.name = "number", .type = ScalarType::u64}};
+  }
+  const SourceInfo& info() const override { return info_; }
+  Progress progress() const override { return {.points = next_}; }
+  bool next(PointBlock& block) override {
+    block.clear();
+    for (std::size_t i = 0; i < 777 && next_ < count_; ++i, ++next_) {
+      block.positions.push_back(place_(next_));
+      std::array<std::byte, 9> record{std::byte{7}};
+      std::memcpy(record.data() + 1, &next_, sizeof next_);
+      block.payload.insert(block.payload.end(), record.begin(), record.end());
+    }
+    return !block.empty();
+  }
+
+ private:
+  SourceInfo info_;
+  std::uint64_t count_, next_ = 0;
+  Place place_;
+};
+
+Point3 on_surface(double x, double y) { return {x, y, std::floor(20 * std::sin(x / 90))}; }
+
+/// `count` places in rows of `width`.
+MadePoints::Place rows(std::uint64_t width) {
+  return [width](std::uint64_t i) {
+    return on_surface(static_cast<double>(i % width), static_cast<double>(i / width));
+  };
+}
+
+/// A square of `side` squared places, all over it again and again.
+MadePoints::Place shuffled(std::uint64_t side) {
+  return [side](std::uint64_t i) {
+    // Odd steps visit every place of a power of two.
+    const std::uint64_t place = (i * 0x9E3779B97F4A7C15u) % (side * side);
+    return on_surface(static_cast<double>(place % side), static_cast<double>(place / side));
+  };
+}
+
+/// Squares of `side` squared places one after another, along rows of squares.
+MadePoints::Place squares(std::uint64_t side) {
+  return [side](std::uint64_t i) {
+    const std::uint64_t square = i / (side * side), in = i % (side * side);
+    return on_surface(static_cast<double>(square % 40 * side + in % side),
+                      static_cast<double>(square / 40 * side + in / side));
+  };
+}
+
+struct Read {
+  std::vector<PointBlock> blocks;
+  OrderedSource::Report report;
+
+  /// Mean width of the blocks in the plane.
+  [[nodiscard]] double width() const {
+    double widths = 0;
+    for (const PointBlock& block : blocks) {
+      Box3 box;
+      for (const Point3& p : block.positions) box.include(p);
+      widths += box.max[0] - box.min[0] + box.max[1] - box.min[1];
+    }
+    return widths / static_cast<double>(blocks.size());
+  }
+};
+
+Read read(std::uint64_t count, const MadePoints::Place& place, Order order,
+          ScalarType type = ScalarType::f64) {
+  const auto source = in_spatial_order(std::make_unique<MadePoints>(count, place, type),
+                                       {.order = order, .block_points = kBlock});
+  Read read;
+  PointBlock block;
+  while (source->next(block)) {
+    read.blocks.push_back(block);
+    EXPECT_LE(block.size(), kBlock);
+  }
+  EXPECT_FALSE(source->next(block));
+  EXPECT_EQ(source->progress().points, count);
+  read.report = source->report();
+  return read;
+}
+
+/// Every point came once, at its place, with its record.
+void expect_all(const Read& read, std::uint64_t count, const MadePoints::Place& place) {
+  std::vector<bool> met(count);
+  std::uint64_t points = 0;
+  for (const PointBlock& block : read.blocks) {
+    ASSERT_EQ(block.payload.size(), 9 * block.size());
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      std::uint64_t number = 0;
+      std::memcpy(&number, block.payload.data() + 9 * i + 1, sizeof number);
+      ASSERT_LT(number, count);
+      ASSERT_EQ(block.payload[9 * i], std::byte{7});
+      ASSERT_FALSE(met[number]);
+      ASSERT_EQ(block.positions[i], place(number));
+      met[number] = true;
+      ++points;
+    }
+  }
+  EXPECT_EQ(points, count);
+}
+
+bool same(const Read& a, const Read& b) {
+  return a.blocks.size() == b.blocks.size() &&
+         std::equal(a.blocks.begin(), a.blocks.end(), b.blocks.begin(),
+                    [](const PointBlock& one, const PointBlock& other) {
+                      return one.positions == other.positions && one.payload == other.payload;
+                    });
+}
+
+TEST(SpatialOrderTest, ShuffledPointsComeInCompactBlocks) {
+  constexpr std::uint64_t kSide = 1024, kCount = kSide * kSide;
+  for (const ScalarType type : {ScalarType::f64, ScalarType::i32, ScalarType::i16}) {
+    const Read ordered = read(kCount, shuffled(kSide), Order::automatic, type);
+    expect_all(ordered, kCount, shuffled(kSide));
+    EXPECT_TRUE(ordered.report.reordered);
+    EXPECT_GT(ordered.report.spread, 10);
+    // As little wider than a square of so many places as pieces of a k-d tree are.
+    EXPECT_LT(ordered.width(), 1.3 * 2 * std::sqrt(kBlock));
+    const std::uint64_t record = 3 * size_of(type) + 9;
+    EXPECT_LE(ordered.report.temporary_bytes, kCount * record);
+    EXPECT_GT(ordered.report.temporary_bytes, kCount * record / 2);
+    EXPECT_TRUE(same(ordered, read(kCount, shuffled(kSide), Order::spatial, type)));
+  }
+}
+
+TEST(SpatialOrderTest, PointsThatFitInAWindowTakeNoDisk) {
+  for (const std::uint64_t count : {0u, 1u, 999u, 1000u, 1001u, 100000u}) {
+    const Read ordered = read(count, shuffled(1024), Order::spatial);
+    expect_all(ordered, count, shuffled(1024));
+    EXPECT_EQ(ordered.report.temporary_bytes, 0u);
+    EXPECT_EQ(ordered.blocks.size(), (count + kBlock - 1) / kBlock);
+  }
+}
+
+TEST(SpatialOrderTest, CompactStreamsPassAsTheyAre) {
+  constexpr std::uint64_t kCount = 1u << 20;
+  for (const Order order : {Order::automatic, Order::stream}) {
+    const Read passed = read(kCount, squares(32), order);
+    expect_all(passed, kCount, squares(32));
+    EXPECT_FALSE(passed.report.reordered);
+    EXPECT_EQ(passed.report.temporary_bytes, 0u);
+    EXPECT_LT(passed.report.spread, 2);
+    EXPECT_EQ(passed.blocks.front().size(), 777u);
+  }
+}
+
+TEST(SpatialOrderTest, AStreamThatIsToPassIsNotJudged) {
+  const Read passed = read(50000, shuffled(1024), Order::stream);
+  expect_all(passed, 50000, shuffled(1024));
+  EXPECT_FALSE(passed.report.reordered);
+  EXPECT_EQ(passed.report.spread, 0);
+}
+
+TEST(SpatialOrderTest, WideScanLinesAreReordered) {
+  constexpr std::uint64_t kCount = 1u << 20;
+  const Read ordered = read(kCount, rows(4096), Order::automatic);
+  expect_all(ordered, kCount, rows(4096));
+  EXPECT_TRUE(ordered.report.reordered);
+  EXPECT_LT(ordered.width(), 1.3 * 2 * std::sqrt(kBlock));
+}
+
+// The first planes know only where the stream began: nearly all that follows goes to one bucket.
+TEST(SpatialOrderTest, BucketsThatGrewLargeAreDivided) {
+  constexpr std::uint64_t kCount = 2u << 20;
+  const auto place = [](std::uint64_t i) {
+    Point3 p = rows(1 << 14)(i);
+    p[1] = p[1] * p[1];
+    return p;
+  };
+  const Read ordered = read(kCount, place, Order::spatial);
+  expect_all(ordered, kCount, place);
+  const std::uint64_t records = kCount * (3 * 8 + 9);
+  EXPECT_LE(ordered.report.temporary_bytes, records + records / 5);
+}
+
+TEST(SpatialOrderTest, AStreamThatLosesItsOrderIsPutInOrderFromThere) {
+  constexpr std::uint64_t kOrdered = 1u << 20, kCount = 2u << 20;
+  const auto place = [](std::uint64_t i) {
+    return i < kOrdered ? squares(32)(i) : shuffled(1024)(i);
+  };
+  const Read ordered = read(kCount, place, Order::automatic);
+  expect_all(ordered, kCount, place);
+  EXPECT_TRUE(ordered.report.reordered);
+  EXPECT_EQ(ordered.blocks.front().size(), 777u);
+  EXPECT_LT(ordered.report.temporary_bytes, kOrdered * (3 * 8 + 9));
+}
+
+TEST(SpatialOrderTest, PlacesThatNoPlaneParts) {
+  constexpr std::uint64_t kCount = 700000;
+  const auto duplicates = [](std::uint64_t) { return Point3{1, 2, 3}; };
+  expect_all(read(kCount, duplicates, Order::spatial), kCount, duplicates);
+  const auto mostly = [](std::uint64_t i) {
+    return i % 1000 == 0 ? on_surface(static_cast<double>(i), 5) : Point3{1, 2, 3};
+  };
+  expect_all(read(kCount, mostly, Order::spatial), kCount, mostly);
+  const auto line = [](std::uint64_t i) { return Point3{static_cast<double>(i % 3), 0, 0}; };
+  expect_all(read(kCount, line, Order::spatial), kCount, line);
+}
+
+TEST(SpatialOrderTest, HeightsInMetresDoNotHideDegrees) {
+  constexpr std::uint64_t kCount = 1u << 19;
+  const auto place = [](std::uint64_t i) {
+    Point3 p = shuffled(1024)(i);
+    return Point3{p[0] * 1e-5, p[1] * 1e-5, static_cast<double>(i * 7919 % 100)};
+  };
+  const auto source = in_spatial_order(std::make_unique<MadePoints>(kCount, place),
+                                       {.block_points = kBlock, .unit_lengths = [](const Box3&) {
+                                          return std::array<double, 3>{1e5, 1e5, 1};
+                                        }});
+  Read ordered;
+  for (PointBlock block; source->next(block);) ordered.blocks.push_back(block);
+  expect_all(ordered, kCount, place);
+  EXPECT_LT(ordered.width(), 0.01 * 20);
+}
+
+TEST(SpatialOrderTest, AStopEndsTheReading) {
+  std::stop_source stop;
+  const auto source = in_spatial_order(
+      std::make_unique<MadePoints>(1u << 20, shuffled(1024)),
+      {.block_points = kBlock, .stop = stop.get_token(), .reading = [&](const Progress& progress) {
+         if (progress.points > 400000) stop.request_stop();
+       }});
+  PointBlock block;
+  EXPECT_THROW(source->next(block), Stopped);
+}
+
+TEST(SpatialOrderTest, AFolderThatIsNotThereIsNamed) {
+  const TempFolder folder;
+  const auto source = in_spatial_order(std::make_unique<MadePoints>(1u << 20, shuffled(1024)),
+                                       {.block_points = kBlock, .folder = folder.path() / "none"});
+  PointBlock block;
+  try {
+    source->next(block);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("none"), std::string::npos) << error.what();
+  }
+}
+
+}  // namespace
+}  // namespace terrace::stream
