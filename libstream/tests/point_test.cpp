@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include "terrace/stream/schema.hpp"
+
 namespace terrace::stream {
 namespace {
 
@@ -32,6 +34,14 @@ TEST(Box3, IgnoresNaN) {
   box.include(Point3{nan, nan, nan});
   EXPECT_EQ(box, (Box3{{0, 0, 0}, {1, 1, 1}}));
   EXPECT_FALSE(box.contains({nan, 0.5, 0.5}));
+}
+
+// Under the sanitizers: no place in no records.
+TEST(Schema, ViewsRecordsThatAreNotThere) {
+  Schema schema;
+  schema.attributes = {{.name = "a", .type = ScalarType::f64},
+                       {.name = "b", .type = ScalarType::u8}};
+  EXPECT_EQ(schema.view<std::uint8_t>({}, 1).size(), 0u);
 }
 
 }  // namespace

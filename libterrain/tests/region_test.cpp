@@ -302,7 +302,7 @@ TEST(Region, OneRingIsWhatTheIntegersSay) {
   }
   EXPECT_GT(taken, 100 / kShare);
   EXPECT_GT(refused, 100 / kShare);
-  for (const int count : seen) EXPECT_GT(count, 30);
+  for (const int count : seen) EXPECT_GT(count, 30 / kShare);
 }
 
 // Polygons with holes, and several that overlap; which are valid is left to GEOS here.
@@ -333,7 +333,7 @@ TEST(Region, HolesAndOverlapsAreWhatTheIntegersSay) {
   }
   EXPECT_GT(holes, 30 / kShare);
   EXPECT_EQ(holes, pairs);
-  for (const int count : seen) EXPECT_GT(count, 30);
+  for (const int count : seen) EXPECT_GT(count, 30 / kShare);
 }
 
 /// A closed outline that turns once and goes in and out; every corner at another angle.

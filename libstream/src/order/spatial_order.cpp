@@ -102,21 +102,30 @@ class SpatialSource final : public OrderedSource {
       report_.reordered = true;
       state_ = State::gathering;
       if (!more) load_window();
+    } else {
+      leave_window();
     }
   }
 
   /// Looks at blocks on their way: what follows a window that is not compact is put in order.
   void judge(const PointBlock& block) {
-    passed_ += block.size();
-    const bool judged = passed_ / kWindowPoints % kJudgedWindows == 0;
-    if (judged) add_places(block);
+    if (unjudged_ > 0) {
+      unjudged_ -= std::min<std::uint64_t>(unjudged_, block.size());
+      return;
+    }
+    add_places(block);
     if (places_.size() < kWindowPoints) return;
     if (spread() > kWidest) {
       report_.reordered = true;
       state_ = State::gathering;
     } else {
-      places_.clear();
+      leave_window();
     }
+  }
+
+  void leave_window() {
+    places_.clear();
+    unjudged_ = (kJudgedWindows - 1) * kWindowPoints;
   }
 
   void add_places(const PointBlock& block) {
@@ -286,7 +295,7 @@ class SpatialSource final : public OrderedSource {
   SpatialOrderOptions options_;
   State state_;
   std::deque<PointBlock> window_;  ///< what was held back to be judged
-  std::uint64_t passed_ = 0;       ///< points after that
+  std::uint64_t unjudged_ = 0;     ///< points that pass before the next window
   std::array<double, 3> lengths_{1, 1, 1};
 
   std::optional<PackedPoints> packed_;

@@ -116,7 +116,7 @@ class AttributeView {
  public:
   /// records: whole records of record_bytes each, the attribute `offset` bytes into them.
   AttributeView(std::span<const std::byte> records, std::size_t record_bytes, std::size_t offset)
-      : first_(records.data() + offset),
+      : first_(records.empty() ? nullptr : records.data() + offset),
         stride_(record_bytes),
         size_(records.size() / record_bytes) {
     assert(records.size() % record_bytes == 0 && offset + sizeof(T) <= record_bytes);
