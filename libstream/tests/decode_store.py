@@ -90,7 +90,9 @@ class Bytes:
 
 
 class Tables:
-    def __init__(self, data, contexts):
+    def __init__(self, data, schema, version):
+        columns = len(schema) + (3 if version > 1 else 0)
+        contexts = 148 + 10 * columns
         source = Bytes(data + struct.pack("<I", zlib.crc32(data)), "tables")
         given = source.number(8)
         self.coefficients = {}
@@ -103,6 +105,10 @@ class Tables:
                 self.coefficients[pattern] = {0: 256, 1: 256, 2: -256}
             elif pattern:
                 self.coefficients[pattern] = {neighbours[0]: 256}
+        self.kinds = [source.number(1) for _ in range(columns)] if version > 1 else None
+        integers = [not channel['type'].startswith('float') for channel in schema]
+        for k, kind in enumerate(self.kinds or []):
+            require(kind < 2 or kind == 2 and 0 < k < len(schema) and integers[k] and integers[k - 1], "kind")
         self.symbols = []  # per context: the (symbol, start, frequency) of every slot
         for _ in range(contexts):
             slots, symbol = [], 0
@@ -252,12 +258,56 @@ def attribute(source, context, count, kind):
     for _ in range(count):
         difference, c = source.number(context + 1 if c is None else context + 2 + step_of(c))
         value = signed(value + unzigzag(difference))
-        if form is not None:
-            values.append(real(form, value))
+        values.append(value)
+    return typed(kind, form, values)
+
+
+def column(source, number, count, floating, before):
+    """The number form (None but for floats) and the integers of a column of version 2."""
+    c, kind = 148 + 10 * number, source.tables.kinds[number]
+    head = source.symbol(c)
+    form = head % 22 if floating else None
+    head = head // 22 if floating else head
+    require(head < 3, "head")
+    first, last = source.number(c + 1)
+    values, divisor = [signed(unzigzag(first))], 1
+    if head == 2:
+        divisor = source.number(c + 1)[0]
+        require(divisor > 1, "divisor")
+    recent, place, last = [0, 1, -1], 0, 0 if kind == 1 else last
+    for k in range(1, count):
+        if head == 0:
+            values.append(values[0])
+            continue
+        if kind == 1:
+            place = source.symbol(c + 2 + place)
+            require(place < 4, "place")
+            if place == 3:
+                number, last = source.number(c + 6 + step_of(last) // 2)
+                recent.append(unzigzag(number))
+            difference = recent.pop(place)
+            recent = [difference] + recent[:2]
         else:
-            bits = int(kind.lstrip("uint"))
-            values.append(value % (1 << bits) if kind.startswith("u") else signed(value, bits))
-    return values
+            number, last = source.number(c + 2 + step_of(last))
+            difference = unzigzag(number)
+        expected = before[k] - before[k - 1] if kind == 2 else 0
+        values.append(signed(values[-1] + expected + difference * divisor))
+    return form, values
+
+
+def typed(kind, form, values):
+    if form is not None:
+        return [real(form, value) for value in values]
+    bits = int(kind.lstrip("uint"))
+    return [value % (1 << bits) if kind.startswith("u") else signed(value, bits) for value in values]
+
+
+def columns(source, count, schema):
+    out, before = [], None
+    for a, channel in enumerate(schema):
+        form, before = column(source, a, count, channel["type"].startswith("float"), before)
+        out.append(typed(channel["type"], form, before))
+    return out
 
 
 def ordinals(source, nearest, count):
@@ -275,7 +325,7 @@ class Cluster:
     """`points` (three doubles), `attributes` (a column each), `children` (per level below, from the next), the place of
     the representative (None in the root)."""
 
-    def __init__(self, data, entry, tables, schema, level, root):
+    def __init__(self, data, entry, tables, schema, level, root, grid):
         require(crc16(data) == entry["checksum"], "cluster checksum")
         source = Symbols(data, tables)
         count = entry["points"]
@@ -291,6 +341,10 @@ class Cluster:
         if form & 1:
             places = []
             split(source, (0, 0, 0), size, count, places)
+        elif not grid:
+            require(tables.kinds is not None, "columns in version 1")
+            distances = [column(source, len(schema) + axis, count, False, None)[1] for axis in range(3)]
+            places = [tuple(value % WORD for value in place) for place in zip(*distances)]
         else:
             cells = rows(source, size)
             places = [(c, r, h) for (c, r), h in zip(cells, heights(source, size[2], cells))]
@@ -298,7 +352,10 @@ class Cluster:
         require(all(0 <= p[axis] < size[axis] for p in places for axis in range(3)), "a point outside of its box")
         forms = (entry["forms"] // 484, entry["forms"] // 22 % 22, entry["forms"] % 22)
         self.points = [tuple(real(f, signed(a + k)) for f, a, k in zip(forms, low, p)) for p in places]
-        self.attributes = [attribute(source, 148 + 10 * a, count, channel["type"]) for a, channel in enumerate(schema)]
+        if tables.kinds is None:
+            self.attributes = [attribute(source, 148 + 10 * a, count, channel["type"]) for a, channel in enumerate(schema)]
+        else:
+            self.attributes = columns(source, count, schema)
         self.children = [ordinals(source, below == level - 1, count) for below in reversed(range(level))]
         upper = source.raw(16) if count >= 65536 else 0
         place = upper << 16 | source.end()
@@ -310,7 +367,8 @@ class Cluster:
 
 
 class Level:
-    def __init__(self, folder, number, levels, schema):
+    def __init__(self, folder, number, levels, manifest):
+        schema, grid = manifest["attributes"], manifest["kind"] == "grid"
         segment, = levels[number]["segments"]
         self.entries, files = [], {}
         for part in ("data", "index"):
@@ -326,7 +384,7 @@ class Level:
         sets = []
         for _ in range(directory.number(4)):
             first = directory.varint()
-            sets.append((first, Tables(directory.take(directory.varint()), 148 + 10 * len(schema))))
+            sets.append((first, Tables(directory.take(directory.varint()), schema, manifest["version"])))
         directory.done()
         for page in range(pages):
             self.entries += self.page(index[offsets[page]:offsets[page + 1]], min(128, clusters - 128 * page))
@@ -335,7 +393,7 @@ class Level:
             tables = [each for first, each in sets if first <= ordinal]
             body = data[entry["offset"]:entry["offset"] + entry["bytes"]]
             root = number == len(levels) - 1
-            self.clusters.append(Cluster(body, entry, tables[-1], schema, number, root) if entry["points"] else None)
+            self.clusters.append(Cluster(body, entry, tables[-1], schema, number, root, grid) if entry["points"] else None)
 
     @staticmethod
     def page(data, count):
@@ -368,13 +426,13 @@ class Store:
         folder = pathlib.Path(folder)
         text = (folder / "manifest.json").read_bytes()
         self.manifest = json.loads(text)
-        require(self.manifest["format"] == "terrace-store" and self.manifest["version"] == 1, "not a store of version 1")
+        require(self.manifest["format"] == "terrace-store" and self.manifest["version"] in (1, 2), "not a store")
         self.checksum = self.manifest["checksum"]
         require(text[-12:] == b"%s\"\n}\n" % self.checksum.encode(), "end of the manifest")
         self.checksum = int(self.checksum, 16)
         require(zlib.crc32(text[:-12] + b"00000000\"\n}\n") == self.checksum, "manifest checksum")
         levels = self.manifest["levels"]
-        self.levels = [Level(folder, k, levels, self.manifest["attributes"]) for k in range(len(levels))]
+        self.levels = [Level(folder, k, levels, self.manifest) for k in range(len(levels))]
 
     def points(self):
         """Of every point the level and the ordinal of the cluster that it is a member of, coordinates, attributes."""

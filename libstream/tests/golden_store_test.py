@@ -34,6 +34,10 @@ class GoldenStoreTest(unittest.TestCase):
     def test_a_cloud_with_attributes_of_every_type(self):
         self.check_points('cloud')
 
+    def test_version_2(self):
+        self.check_points('cloud2')
+        self.check_points('survey')
+
     def test_a_store_without_points(self):
         self.check_points('empty')
 
@@ -43,7 +47,7 @@ class GoldenStoreTest(unittest.TestCase):
 
     def test_points_head_their_clusters(self):
         """A point of highest level h heads a cluster on every level below, as its representative."""
-        for name in ('grid', 'cloud', 'int64', 'uint64'):
+        for name in ('grid', 'cloud', 'cloud2', 'survey', 'int64', 'uint64'):
             levels = decode_store.Store(STORES / name).levels
             headed = [set() for _ in levels]
             for number, level in enumerate(levels):

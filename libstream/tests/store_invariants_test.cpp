@@ -9,6 +9,7 @@
 
 #include <gtest/gtest.h>
 
+#include "store/codec/column_codec.hpp"
 #include "store/codec/form.hpp"
 #include "store/read/cluster_decoder.hpp"
 #include "store_inputs.hpp"
@@ -477,23 +478,27 @@ TEST(StoreInvariants, PagesWithBitsThatMeanNothingAreNotRead) {
 }
 
 /// Tables in which every symbol has its bits, so that any cluster can be written.
-const store::Tables& even_tables(unsigned contexts) {
-  static store::Tables tables;
+store::Tables even_tables(const store::Layout& layout, store::ColumnKind kind) {
+  store::Tables tables;
+  if (layout.version > 1) tables.kinds.assign(layout.columns(), kind);
   std::array<std::uint32_t, store::kSymbols> counts{};
   for (unsigned s = 0; s < 40; ++s) counts[s] = 40;
-  tables.frequencies.assign(contexts, store::normalised(counts));
+  tables.frequencies.assign(layout.contexts(), store::normalised(counts));
   return tables;
 }
 
 /// What the decoder says of a cluster of `points` points in the box (0, 0, 0) to (7, 7, 7).
 std::string decoding(bool grid, std::uint32_t points, std::uint32_t last,
                      const std::function<void(store::SymbolEncoder&)>& write,
-                     const std::function<void(store::Bytes&)>& change = {}) {
+                     const std::function<void(store::Bytes&)>& change = {},
+                     int version = store::kVersion,
+                     store::ColumnKind kind = store::ColumnKind::plain) {
   StoreSchema schema;
   schema.grid = grid;
-  const store::Layout layout(schema, 0);
-  const store::EncodingTables encoding(even_tables(layout.contexts()));
-  const store::DecodingTables decoding(even_tables(layout.contexts()));
+  const store::Layout layout(schema, 0, version);
+  const store::Tables tables = even_tables(layout, kind);
+  const store::EncodingTables encoding(tables);
+  const store::DecodingTables decoding(tables);
   store::SymbolEncoder encoder(encoding.tables);
   encoder.start();
   write(encoder);
@@ -555,7 +560,7 @@ TEST(StoreInvariants, ClustersThatBreakTheirRulesAreNotRead) {
             "a cluster has an unknown form");
   EXPECT_EQ(decoding(false, 1, 0, [&](auto& coder) { own_box(coder, 4, 4); }),
             "a cluster's own box is not inside of its index entry's");
-  EXPECT_EQ(decoding(false, 1, 0, flat_run), "a cluster's box does not suit its form");
+  EXPECT_EQ(decoding(false, 1, 0, flat_run, {}, 1), "a cluster's box does not suit its form");
   EXPECT_EQ(decoding(true, 1, 0, [&](auto& coder) { run(coder, 8, 1); }),
             "a run lies outside of its cluster");
   EXPECT_EQ(decoding(true, 1, 0, [&](auto& coder) { run(coder, 2, 2); }),
@@ -592,13 +597,89 @@ TEST(StoreInvariants, ClustersThatBreakTheirRulesAreNotRead) {
   EXPECT_EQ(decoding(false, (1u << 20) + 1, 0, same_place), "a cluster has too many points");
 }
 
+TEST(StoreInvariants, ColumnsThatBreakTheirRulesAreNotRead) {
+  using store::ColumnKind;
+  using store::SymbolEncoder;
+  constexpr unsigned kAxis = store::context::kAttribute, kNext = store::context::kPerAttribute;
+  const auto number = [](SymbolEncoder& coder, unsigned where, std::uint64_t value) {
+    store::code_number(coder, where, value);
+  };
+  // The places of two points: `first` writes the column of x, y and z are 5 for both.
+  const auto places = [number](const std::function<void(SymbolEncoder&)>& first) {
+    return [first, number](SymbolEncoder& coder) {
+      coder.symbol(store::context::kForm, 0);
+      first(coder);
+      for (unsigned axis = 1; axis < 3; ++axis) {
+        coder.symbol(kAxis + kNext * axis, 0);
+        number(coder, kAxis + kNext * axis + 1, 10);
+      }
+    };
+  };
+  const auto column = [number](unsigned head, const std::vector<std::uint64_t>& numbers) {
+    return [head, numbers, number](SymbolEncoder& coder) {
+      coder.symbol(kAxis, head);
+      for (std::size_t i = 0; i < numbers.size(); ++i) {
+        // The first value and the divisor, then a difference after that first value's class.
+        const bool last = head != 0 && i + 1 == numbers.size();
+        const unsigned step = store::difference_step(store::class_of(numbers[0]));
+        number(coder, last ? kAxis + 2 + step : kAxis + 1, numbers[i]);
+      }
+    };
+  };
+  EXPECT_EQ(decoding(false, 2, 0, places(column(0, {14}))), "read");
+  EXPECT_EQ(decoding(false, 2, 0, places(column(1, {4, 10}))), "read");
+  EXPECT_EQ(decoding(false, 2, 0, places(column(2, {4, 5, 2}))), "read");
+
+  const char* const outside = "a point lies outside of its cluster's box";
+  EXPECT_EQ(decoding(false, 2, 0, places(column(0, {16}))), outside);
+  EXPECT_EQ(decoding(false, 2, 0, places(column(0, {1}))), outside);
+  EXPECT_EQ(decoding(false, 2, 0, places(column(1, {4, 12}))), outside);
+  EXPECT_EQ(decoding(false, 2, 0, places(column(2, {4, 6, 2}))), outside);
+  EXPECT_EQ(decoding(false, 2, 0, places(column(3, {4, 10}))), "a column has an unknown head");
+  EXPECT_EQ(decoding(false, 2, 0, places(column(2, {4, 1, 2}))),
+            "a column has differences that are multiples of nothing");
+  const auto recent = [number](unsigned place) {
+    return [place, number](SymbolEncoder& coder) {
+      coder.symbol(kAxis, 1);
+      number(coder, kAxis + 1, 4);
+      coder.symbol(kAxis + 2, place);
+    };
+  };
+  EXPECT_EQ(decoding(false, 2, 0, places(recent(1)), {}, store::kVersion, ColumnKind::recent),
+            "read");
+  EXPECT_EQ(decoding(false, 2, 0, places(recent(4)), {}, store::kVersion, ColumnKind::recent),
+            "a column has an unknown difference");
+}
+
+TEST(StoreInvariants, KindsOfColumnsThatDoNotExistAreNotRead) {
+  StoreSchema schema;
+  schema.attributes = {{.name = "a", .type = ScalarType::u8},
+                       {.name = "b", .type = ScalarType::f32},
+                       {.name = "c", .type = ScalarType::u16},
+                       {.name = "d", .type = ScalarType::i64}};
+  const store::Layout layout(schema, 0, store::kVersion);
+  for (std::size_t column = 0; column < layout.columns(); ++column) {
+    store::Tables tables = even_tables(layout, store::ColumnKind::plain);
+    tables.kinds[column] = store::ColumnKind::beside;
+    store::Bytes bytes;
+    tables.write(bytes);
+    if (column == 3) {
+      EXPECT_EQ(store::Tables::read(bytes, layout).kinds, tables.kinds);
+    } else {
+      EXPECT_THROW(store::Tables::read(bytes, layout), store::Damage) << column;
+    }
+    bytes[8 + column] = 3;
+    EXPECT_THROW(store::Tables::read(bytes, layout), store::Damage) << column;
+  }
+}
+
 /// Clusters that would take much memory are neither written nor read, however few bytes they are.
 TEST(StoreInvariants, ClustersOfManyBytesAreNotWritten) {
   StoreSchema schema = testing::cloud_schema();
   for (int i = 0; i < 4096; ++i) {
     schema.attributes.push_back(testing::channel(std::to_string(i)));
   }
-  const std::uint64_t most = store::Layout(schema, 0).most_points();
+  const std::uint64_t most = store::Layout(schema, 0, store::kVersion).most_points();
   EXPECT_LE(most * schema.payload_size(), std::uint64_t{1} << 28);
   const TemporaryFolder folder;
   StoreWriter writer(folder.path() / "s", schema);

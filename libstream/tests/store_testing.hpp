@@ -178,7 +178,8 @@ inline std::vector<Block> grid_blocks(ScalarType type, Relief relief, int width,
   return blocks;
 }
 
-enum class Numbers { decimals, floats, doubles, extremes, mixed };
+/// `lines`: decimals, one point near the one before.
+enum class Numbers { decimals, floats, doubles, extremes, mixed, lines };
 
 inline std::vector<Block> cloud_blocks(Numbers numbers, std::size_t points,
                                        std::size_t block_points, std::uint64_t seed) {
@@ -203,7 +204,13 @@ inline std::vector<Block> cloud_blocks(Numbers numbers, std::size_t points,
       }
     };
     for (std::size_t i = 0; i < std::min(block_points, points - start); ++i) {
-      block.positions.push_back({number(), number(), number()});
+      if (numbers == Numbers::lines) {
+        const auto along = static_cast<double>(i % 50), across = static_cast<double>(i / 50);
+        block.positions.push_back(
+            {(origin + along) / 100, across / 8, std::floor(9 * uniform(random)) / 10});
+      } else {
+        block.positions.push_back({number(), number(), number()});
+      }
     }
     blocks.push_back(std::move(block));
   }

@@ -7,12 +7,12 @@
 #include <vector>
 
 #include "io/temporary.hpp"
+#include "store/codec/layout.hpp"
 #include "terrace/stream/byte_source.hpp"
 #include "terrace/stream/store.hpp"
 
 namespace terrace::stream::store {
 
-inline constexpr int kVersion = 1;
 inline constexpr std::uint64_t kMostManifestBytes = 64u << 20;
 inline constexpr std::size_t kMostAttributes = 4096;
 /// So many points, cells without data, columns and rows are possible: sums and products of them,

@@ -2,14 +2,17 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
+#include <numeric>
 
 #include "store/codec/coding.hpp"
 #include "store/codec/numbers.hpp"
 
 /// What travels with the points of a cluster, in the order in which their positions are coded:
 /// attributes, column by column, and on levels above 0 the ordinals of the clusters that each point
-/// heads. Every value is coded as the difference to the one before.
+/// heads. Every value is coded as a difference to the one before. So are, of points that come in
+/// the order in which they were read, the coordinates.
 
 namespace terrace::stream::store {
 
@@ -36,10 +39,10 @@ unsigned code_difference(Coder& coder, unsigned context, std::int64_t previous,
   return number_class;
 }
 
-/// One attribute. `form` is coded for floating point only.
+/// One attribute of a store of version 1. `form` is coded for floating point only.
 template <class Coder>
-void code_column(Coder& coder, unsigned attribute, bool floating, NumberForm& form,
-                 std::int64_t* values, std::uint32_t n) {
+void code_old_column(Coder& coder, unsigned attribute, bool floating, NumberForm& form,
+                     std::int64_t* values, std::uint32_t n) {
   const unsigned first = context::kAttribute + context::kPerAttribute * attribute;
   if (floating) {
     unsigned symbol = form;
@@ -52,6 +55,134 @@ void code_column(Coder& coder, unsigned attribute, bool floating, NumberForm& fo
   for (std::uint32_t i = 0; i < n; ++i) {
     context = first + 2 + difference_step(code_difference(coder, context, previous, values[i]));
     previous = values[i];
+  }
+}
+
+/// Differences that came last, the latest first: pulses of a scanner are a few intervals apart.
+class RecentDifferences {
+ public:
+  static constexpr unsigned kCount = 3;
+
+  [[nodiscard]] std::int64_t operator[](unsigned i) const { return recent_[i]; }
+  /// Its place among them; kCount if it is none of them.
+  [[nodiscard]] unsigned find(std::int64_t difference) const {
+    unsigned i = 0;
+    while (i < kCount && recent_[i] != difference) ++i;
+    return i;
+  }
+  /// Moves the difference that lies at `place`, or a new one (kCount), to the front.
+  void move_to_front(unsigned place, std::int64_t difference) {
+    for (unsigned i = std::min(place, kCount - 1); i > 0; --i) recent_[i] = recent_[i - 1];
+    recent_[0] = difference;
+  }
+
+ private:
+  std::array<std::int64_t, kCount> recent_{0, 1, -1};
+};
+
+constexpr std::int64_t wrapped_sum(std::int64_t a, std::int64_t b) {
+  return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) + static_cast<std::uint64_t>(b));
+}
+constexpr std::int64_t wrapped_difference(std::int64_t a, std::int64_t b) {
+  return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) - static_cast<std::uint64_t>(b));
+}
+
+constexpr std::int64_t wrapped_product(std::int64_t a, std::int64_t b) {
+  return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) * static_cast<std::uint64_t>(b));
+}
+
+template <class Coder>
+unsigned code_signed(Coder& coder, unsigned context, std::int64_t& value) {
+  std::uint64_t number = 0;
+  if constexpr (!Coder::kDecoding) number = zigzag(value);
+  const unsigned number_class = code_number(coder, context, number);
+  if constexpr (Coder::kDecoding) value = unzigzag(number);
+  return number_class;
+}
+
+/// What all differences are multiples of: 1 if of nothing more, 0 if they are all 0. Colours of 8
+/// bits in fields of 16 are multiples of 256 or 257.
+inline std::uint64_t common_divisor(const std::int64_t* differences, std::uint32_t n) {
+  std::uint64_t divisor = 0;
+  for (std::uint32_t i = 0; i < n && divisor != 1; ++i) {
+    const auto bits = static_cast<std::uint64_t>(differences[i]);
+    const std::uint64_t magnitude = differences[i] < 0 ? -bits : bits;
+    if (divisor == 0 || magnitude % divisor != 0) divisor = std::gcd(divisor, magnitude);
+  }
+  return divisor >> 63 != 0 ? 1 : divisor;
+}
+
+/// A column of values: the first, then differences as `kind` says, divided by what is common to
+/// them.
+/// number: of the column, attributes first, then the axes. form: coded where it is not null.
+/// beside: the column before, for ColumnKind::beside alone. scratch: room for n differences.
+template <class Coder>
+void code_column(Coder& coder, unsigned number, ColumnKind kind, NumberForm* form,
+                 const std::int64_t* beside, std::int64_t* values, std::int64_t* scratch,
+                 std::uint32_t n) {
+  enum : unsigned { kOneValue, kSeveral, kMultiples, kHeads };
+  const unsigned first = context::kAttribute + context::kPerAttribute * number;
+  const unsigned forms = form != nullptr ? kNumberForms : 1;
+  const auto expected = [=](std::uint32_t i) {
+    return kind == ColumnKind::beside ? wrapped_difference(beside[i], beside[i - 1]) : 0;
+  };
+  unsigned head = kSeveral;
+  std::uint64_t divisor = 1;
+  if constexpr (!Coder::kDecoding) {
+    bool several = false;
+    for (std::uint32_t i = 1; i < n; ++i) {
+      several |= values[i] != values[0];
+      scratch[i] = wrapped_difference(wrapped_difference(values[i], values[i - 1]), expected(i));
+    }
+    if (several) divisor = std::max<std::uint64_t>(common_divisor(scratch + 1, n - 1), 1);
+    head = !several ? kOneValue : divisor > 1 ? kMultiples : kSeveral;
+    head = head * forms + (form != nullptr ? *form : 0);
+  }
+  code_symbol(coder, first, head);
+  if constexpr (Coder::kDecoding) {
+    if (head >= kHeads * forms) throw Damage("a column has an unknown head");
+    if (form != nullptr) *form = static_cast<NumberForm>(head % forms);
+  }
+  unsigned number_class = code_signed(coder, first + 1, values[0]);
+  if (head / forms == kOneValue) {
+    if constexpr (Coder::kDecoding) std::fill_n(values + 1, n - 1, values[0]);
+    return;
+  }
+  if (head / forms == kMultiples) {
+    code_number(coder, first + 1, divisor);
+    if (divisor < 2) throw Damage("a column has differences that are multiples of nothing");
+  }
+  const auto by = static_cast<std::int64_t>(divisor);
+  std::int64_t difference = 0;
+  const auto set = [&](std::uint32_t i) {
+    values[i] =
+        wrapped_sum(wrapped_sum(values[i - 1], expected(i)), wrapped_product(difference, by));
+  };
+  if (kind == ColumnKind::recent) {
+    RecentDifferences recent;
+    unsigned place = 0, step = 0;
+    for (std::uint32_t i = 1; i < n; ++i) {
+      const unsigned context = first + 2 + place;
+      if constexpr (!Coder::kDecoding) {
+        difference = scratch[i] / by;
+        place = recent.find(difference);
+      }
+      code_symbol(coder, context, place);
+      if (place > RecentDifferences::kCount) throw Damage("a column has an unknown difference");
+      if (place == RecentDifferences::kCount) {
+        step = difference_step(code_signed(coder, first + 6 + step / 2, difference));
+      } else {
+        difference = recent[place];
+      }
+      recent.move_to_front(place, difference);
+      if constexpr (Coder::kDecoding) set(i);
+    }
+    return;
+  }
+  for (std::uint32_t i = 1; i < n; ++i) {
+    if constexpr (!Coder::kDecoding) difference = by == 1 ? scratch[i] : scratch[i] / by;
+    number_class = code_signed(coder, first + 2 + difference_step(number_class), difference);
+    if constexpr (Coder::kDecoding) set(i);
   }
 }
 

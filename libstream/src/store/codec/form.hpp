@@ -10,7 +10,8 @@
 
 namespace terrace::stream::store {
 
-inline constexpr unsigned kSplitForm = 1;   ///< positions by SplitCodec, else by GridCodec
+/// Positions by SplitCodec, else in a grid by GridCodec, of other points as three columns.
+inline constexpr unsigned kSplitForm = 1;
 inline constexpr unsigned kOwnBoxForm = 2;  ///< a smaller box than the entry's follows
 
 /// The box as insets from `outer` on both sides of each axis. Both lie in one frame.

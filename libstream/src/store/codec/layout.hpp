@@ -22,15 +22,26 @@ inline constexpr std::uint32_t kFewestClusterBytes = 4;
 /// More bytes than this no cluster has: every point at its raw size, and as much again.
 inline constexpr std::uint32_t kMostBytes = 1u << 31;
 
+/// Stores of this version and earlier are read. A raster without further attributes is written as
+/// version 1, which says it all.
+inline constexpr int kVersion = 2;
+inline int version_to_write(const Schema& schema) {
+  return schema.grid && schema.attributes.empty() ? 1 : kVersion;
+}
+
 /// What the clusters of one level have in common.
 struct Layout {
+  int version = kVersion;
   bool grid = false;
   unsigned level = 0;
   std::vector<ScalarType> attributes;
   std::size_t payload_size = 0;
 
-  Layout(const Schema& schema, unsigned of_level)
-      : grid(schema.grid), level(of_level), payload_size(schema.payload_size()) {
+  Layout(const Schema& schema, unsigned of_level, int of_version)
+      : version(of_version),
+        grid(schema.grid),
+        level(of_level),
+        payload_size(schema.payload_size()) {
     for (const Channel& channel : schema.attributes) attributes.push_back(channel.type);
   }
   /// Most points in a cluster: their coordinates, attributes and children fit kMostDecodedBytes.
@@ -38,8 +49,18 @@ struct Layout {
     const std::uint64_t bytes = sizeof(Point3) + payload_size + sizeof(std::uint64_t) * level;
     return std::min<std::uint64_t>(kMostPoints, kMostDecodedBytes / bytes);
   }
+  /// Attributes and, from version 2 on, the three axes: what may be coded as a column.
+  [[nodiscard]] unsigned columns() const {
+    return static_cast<unsigned>(attributes.size()) + (version > 1 ? 3 : 0);
+  }
   [[nodiscard]] unsigned contexts() const {
-    return context::kAttribute + context::kPerAttribute * static_cast<unsigned>(attributes.size());
+    return context::kAttribute + context::kPerAttribute * columns();
+  }
+  /// Whether the column may be coded beside the one before: attributes of integers.
+  [[nodiscard]] bool may_lie_beside(unsigned column) const {
+    const auto integer = [](ScalarType t) { return t != ScalarType::f32 && t != ScalarType::f64; };
+    return column > 0 && column < attributes.size() && integer(attributes[column]) &&
+           integer(attributes[column - 1]);
   }
 };
 

@@ -102,6 +102,8 @@ class SymbolEncoder {
 
   /// In counting: occurrences by context and symbol.
   std::vector<std::array<std::uint32_t, kSymbols>>& counts() { return counts_; }
+  /// In counting: raw bits, those of classes included.
+  [[nodiscard]] std::uint64_t raw_bits() const { return raw_bits_; }
 
   void start() {
     used_ = 0;
@@ -122,7 +124,11 @@ class SymbolEncoder {
     symbols_[used_++] = context << 8 | coded;
   }
   TERRACE_STORE_INLINE void raw(std::uint64_t value, unsigned bits) {
-    if (bits > 0 && !tables_.empty()) bits_.put(value, bits);
+    if (tables_.empty()) {
+      raw_bits_ += bits;
+    } else if (bits > 0) {
+      bits_.put(value, bits);
+    }
   }
   /// Appends the byte string. `last` (< 2^16) is what the decoder finds in its final state.
   void finish(Bytes& out, std::uint32_t last);
@@ -134,6 +140,7 @@ class SymbolEncoder {
   std::vector<std::uint16_t> words_;
   BitWriter bits_;
   std::vector<std::array<std::uint32_t, kSymbols>> counts_;
+  std::uint64_t raw_bits_ = 0;
 };
 
 /// Bytes that must be readable before and behind a cluster's byte string.

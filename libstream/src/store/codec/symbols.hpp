@@ -42,6 +42,11 @@ inline constexpr std::array<ClassRange, kSymbols> kClassRange = [] {
   return table;
 }();
 
+/// How the differences of a column are coded: as they are; as one of those that came last, else as
+/// they are; less that of the column before (colours change together).
+enum class ColumnKind : std::uint8_t { plain, recent, beside };
+inline constexpr unsigned kColumnKinds = 3;
+
 /// Contexts: each has a table of frequencies of its own. Attribute contexts follow the fixed ones.
 namespace context {
 inline constexpr unsigned kForm = 0;        ///< grid or k-d, own box or not
@@ -58,7 +63,9 @@ inline constexpr unsigned kSplitWide = kSplit + kSplitDirect - 2;
 inline constexpr unsigned kHeight = kSplitWide + 24;
 inline constexpr unsigned kHeightSteps = 32;
 inline constexpr unsigned kAttribute = kHeight + 2 * kHeightSteps;
-inline constexpr unsigned kPerAttribute = 10;  ///< number form, first value, eight by magnitude
+/// Head (number form, several values or one), first value, eight by magnitude; of
+/// ColumnKind::recent four by place and four by magnitude.
+inline constexpr unsigned kPerAttribute = 10;
 }  // namespace context
 
 }  // namespace terrace::stream::store

@@ -2,6 +2,7 @@
 #include "store/codec/tables.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cassert>
 
 namespace terrace::stream::store {
@@ -13,7 +14,37 @@ Frequencies escape_only() {
   return frequencies;
 }
 
+/// log2(x) with so many bits of fraction, by squaring: the same on every machine.
+constexpr unsigned kFraction = 16;
+std::uint64_t logarithm(std::uint64_t x) {
+  const auto exponent = static_cast<unsigned>(std::bit_width(x)) - 1;
+  std::uint64_t mantissa = exponent > 31 ? x >> (exponent - 31) : x << (31 - exponent);
+  std::uint64_t result = exponent;
+  for (unsigned i = 0; i < kFraction; ++i) {
+    mantissa = mantissa * mantissa >> 31;
+    const bool carry = mantissa >> 32 != 0;
+    mantissa >>= carry ? 1 : 0;
+    result = result << 1 | (carry ? 1 : 0);
+  }
+  return result;
+}
+
 }  // namespace
+
+std::uint64_t entropy_of(const std::array<std::uint32_t, kSymbols>& counts) {
+  std::uint64_t total = 0, known = 0;
+  for (const std::uint64_t count : counts) {
+    total += count;
+    if (count > 0) known += count * logarithm(count);
+  }
+  return total == 0 ? 0 : (total * logarithm(total) - known) >> kFraction;
+}
+
+std::uint64_t open_bits_of(const std::array<std::uint32_t, kSymbols>& counts) {
+  std::uint64_t bits = 0;
+  for (unsigned s = 0; s < kSymbols; ++s) bits += std::uint64_t{counts[s]} * kClassRange[s].bits;
+  return bits;
+}
 
 Frequencies normalised(const std::array<std::uint32_t, kSymbols>& counts) {
   std::uint64_t total = 0, once = 0;
@@ -53,6 +84,7 @@ Frequencies normalised(const std::array<std::uint32_t, kSymbols>& counts) {
 
 void Tables::write(Bytes& out) const {
   predictor.write(out);
+  for (const ColumnKind kind : kinds) out.push_back(static_cast<std::uint8_t>(kind));
   for (const Frequencies& context : frequencies) {
     const auto used = std::count_if(context.begin(), context.begin() + kClasses,
                                     [](std::uint16_t f) { return f != 0; });
@@ -67,10 +99,19 @@ void Tables::write(Bytes& out) const {
   }
 }
 
-Tables Tables::read(ByteView bytes, unsigned contexts) {
+Tables Tables::read(ByteView bytes, const Layout& layout) {
   ByteReader in(bytes);
   Tables tables;
   tables.predictor = Predictor::read(in);
+  for (unsigned c = 0; layout.version > 1 && c < layout.columns(); ++c) {
+    const unsigned kind = in.get<std::uint8_t>();
+    if (kind >= kColumnKinds) throw Damage("a table names a kind of columns that does not exist");
+    tables.kinds.push_back(static_cast<ColumnKind>(kind));
+    if (tables.kinds[c] == ColumnKind::beside && !layout.may_lie_beside(c)) {
+      throw Damage("a table has a column beside one that is not of integers");
+    }
+  }
+  const unsigned contexts = layout.contexts();
   tables.frequencies.reserve(contexts);
   for (unsigned c = 0; c < contexts; ++c) {
     Frequencies frequencies{};
@@ -95,14 +136,14 @@ Tables Tables::read(ByteView bytes, unsigned contexts) {
   return tables;
 }
 
-EncodingTables::EncodingTables(const Tables& from) : predictor(from.predictor) {
+EncodingTables::EncodingTables(const Tables& from) : predictor(from.predictor), kinds(from.kinds) {
   tables.reserve(from.frequencies.size());
   for (const Frequencies& frequencies : from.frequencies) {
     tables.push_back(encode_table(frequencies));
   }
 }
 
-DecodingTables::DecodingTables(const Tables& from) : predictor(from.predictor) {
+DecodingTables::DecodingTables(const Tables& from) : predictor(from.predictor), kinds(from.kinds) {
   static const DecodeTable unseen = [] {
     DecodeTable table;
     fill_decode_table(escape_only(), table);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
 
 #include "store/codec/column_codec.hpp"
 #include "store/codec/form.hpp"
@@ -73,7 +74,7 @@ void ClusterDecoder::decode(const Layout& layout, const DecodingTables& tables, 
   }
   if (n > layout.most_points()) throw Damage("a cluster has too many points");
   SymbolDecoder coder(tables.tables, bytes);
-  positions(coder, layout, tables.predictor, entry);
+  positions(coder, layout, tables, entry);
 
   payload_.resize(n * layout.payload_size);
   std::size_t offset = 0;
@@ -81,8 +82,14 @@ void ClusterDecoder::decode(const Layout& layout, const DecodingTables& tables, 
     const ScalarType type = layout.attributes[a];
     const bool floating = type == ScalarType::f32 || type == ScalarType::f64;
     NumberForm form = kIntegerForm;
+    std::swap(column_, beside_);
     column_.resize(n);
-    code_column(coder, a, floating, form, column_.data(), n);
+    if (layout.version > 1) {
+      code_column(coder, a, tables.kinds[a], floating ? &form : nullptr, beside_.data(),
+                  column_.data(), nullptr, n);
+    } else {
+      code_old_column(coder, a, floating, form, column_.data(), n);
+    }
     scatter(type, form, column_, layout.payload_size, payload_.data() + offset);
     offset += size_of(type);
   }
@@ -125,7 +132,7 @@ void ClusterDecoder::decode(const Layout& layout, const DecodingTables& tables, 
 }
 
 void ClusterDecoder::positions(SymbolDecoder& coder, const Layout& layout,
-                               const Predictor& predictor, const Entry& entry) {
+                               const DecodingTables& tables, const Entry& entry) {
   const std::uint32_t n = entry.points;
   const unsigned form = coder.symbol(context::kForm);
   if (form > (kSplitForm | kOwnBoxForm)) throw Damage("a cluster has an unknown form");
@@ -140,15 +147,31 @@ void ClusterDecoder::positions(SymbolDecoder& coder, const Layout& layout,
                 {relative_[0].data(), relative_[1].data(), relative_[2].data()}, nullptr, n);
     return;
   }
+  if (!layout.grid && layout.version > 1) return sequence(coder, layout, tables, n);
   if (!layout.grid || !GridCodec::fits(box_.size[0], box_.size[1], n)) {
     throw Damage("a cluster's box does not suit its form");
   }
   grid_.positions(coder, static_cast<std::uint32_t>(box_.size[0]),
                   static_cast<std::uint32_t>(box_.size[1]), n, relative_[0].data(),
                   relative_[1].data());
-  grid_.heights(coder, predictor, box_.size[2], relative_[2].data());
+  grid_.heights(coder, tables.predictor, box_.size[2], relative_[2].data());
   const std::uint64_t highest = *std::max_element(relative_[2].begin(), relative_[2].begin() + n);
   if (highest >= box_.size[2]) throw Damage("a height lies outside of its cluster's box");
+}
+
+void ClusterDecoder::sequence(SymbolDecoder& coder, const Layout& layout,
+                              const DecodingTables& tables, std::uint32_t n) {
+  column_.resize(n);
+  for (unsigned axis = 0; axis < 3; ++axis) {
+    const auto number = static_cast<unsigned>(layout.attributes.size()) + axis;
+    code_column(coder, number, tables.kinds[number], nullptr, nullptr, column_.data(), nullptr, n);
+    std::uint64_t highest = 0;
+    for (std::uint32_t i = 0; i < n; ++i) {
+      relative_[axis][i] = static_cast<std::uint64_t>(column_[i]);
+      highest = std::max(highest, relative_[axis][i]);
+    }
+    if (highest >= box_.size[axis]) throw Damage("a point lies outside of its cluster's box");
+  }
 }
 
 void ClusterDecoder::deliver(const Entry& entry, std::uint32_t representative,

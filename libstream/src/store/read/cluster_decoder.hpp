@@ -23,8 +23,10 @@ class ClusterDecoder {
   [[nodiscard]] std::uint32_t representative() const { return representative_; }
 
  private:
-  void positions(SymbolDecoder& coder, const Layout& layout, const Predictor& predictor,
+  void positions(SymbolDecoder& coder, const Layout& layout, const DecodingTables& tables,
                  const Entry& entry);
+  void sequence(SymbolDecoder& coder, const Layout& layout, const DecodingTables& tables,
+                std::uint32_t n);
   void deliver(const Entry& entry, std::uint32_t representative, ClusterPoints& out) const;
 
   std::uint32_t representative_ = 0;
@@ -32,7 +34,7 @@ class ClusterDecoder {
   std::array<std::vector<std::uint64_t>, 3> relative_;
   GridCodec grid_;
   SplitCodec split_;
-  std::vector<std::int64_t> column_;
+  std::vector<std::int64_t> column_, beside_;
   std::vector<std::byte> payload_;
   std::vector<std::int64_t> children_;
 };

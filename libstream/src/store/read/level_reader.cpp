@@ -39,7 +39,7 @@ std::unique_ptr<ByteSource> open_listed(const OpenByName& files, const FileEntry
 }  // namespace
 
 LevelReader::LevelReader(const OpenByName& files, const Manifest& manifest, unsigned level)
-    : layout_(manifest.schema, level),
+    : layout_(manifest.schema, level, manifest.version),
       clusters_(manifest.levels[level].clusters),
       pages_(clusters_ / kPageClusters + (clusters_ % kPageClusters != 0)),
       most_points_(std::min(layout_.most_points(), manifest.levels[level].points)),
@@ -65,7 +65,7 @@ LevelReader::LevelReader(const OpenByName& files, const Manifest& manifest, unsi
 void LevelReader::read_directory(std::uint64_t size) {
   const std::uint64_t start = index_->size() - size;
   const std::uint64_t most_tables = 1 + clusters_ / kFewestClustersOfTables;
-  if (size > 8 * (pages_ + 1) + 8 + most_tables * (20 + Tables::most_bytes(layout_.contexts()))) {
+  if (size > 8 * (pages_ + 1) + 8 + most_tables * (20 + Tables::most_bytes(layout_))) {
     throw damaged_file(*index_, start, "the directory is too large for the level's clusters");
   }
   tail_.resize(size);
@@ -182,7 +182,7 @@ std::shared_ptr<const DecodingTables> LevelReader::tables(std::uint64_t ordinal)
   return tables_cache_.get(static_cast<std::uint64_t>(next - 1 - tables_at_.begin()), [&] {
     try {
       return std::make_shared<const DecodingTables>(
-          Tables::read(ByteView(tail_).subspan(at.offset, at.size), layout_.contexts()));
+          Tables::read(ByteView(tail_).subspan(at.offset, at.size), layout_));
     } catch (const Damage& damage) {
       throw damaged_file(*index_, index_->size() - tail_.size() + at.offset, damage.what());
     }

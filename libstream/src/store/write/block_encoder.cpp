@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <utility>
 
 #include "store/codec/column_codec.hpp"
 #include "store/codec/form.hpp"
@@ -248,36 +249,52 @@ Entry BlockEncoder::enter(std::size_t cluster) {
 
 /// Codes the head and the places of the points; on a grid hands over to `heights`. Sets order_.
 template <class Use>
-void BlockEncoder::positions(SymbolEncoder& coder, Use&& heights) {
+void BlockEncoder::positions(SymbolEncoder& coder, const Columns& columns, Use&& heights) {
   const auto n = static_cast<std::uint32_t>(members_.size());
   const auto& size = coded_box_.size;
   bool grid = layout_->grid && layout_->level == 0 && GridCodec::fits(size[0], size[1], n);
   grid =
       grid && grid_.place(static_cast<std::uint32_t>(size[0]), static_cast<std::uint32_t>(size[1]),
                           relative_[0].data(), relative_[1].data(), relative_[2].data(), n);
-  coder.symbol(context::kForm, (grid ? 0 : kSplitForm) | (own_box_ ? kOwnBoxForm : 0));
+  const bool sequence = columns.sequence && n > 1;
+  coder.symbol(context::kForm, (grid || sequence ? 0 : kSplitForm) | (own_box_ ? kOwnBoxForm : 0));
   if (own_box_) code_box(coder, entry_box_, coded_box_);
   order_.resize(n);
+  scratch_.resize(n);
   if (grid) {
     grid_.positions(coder, static_cast<std::uint32_t>(size[0]), static_cast<std::uint32_t>(size[1]),
                     n, nullptr, nullptr);
     heights();
     for (std::uint32_t i = 0; i < n; ++i) order_[i] = grid_.point(i);
+  } else if (sequence) {
+    column_.resize(n);
+    for (unsigned axis = 0; axis < 3; ++axis) {
+      for (std::uint32_t i = 0; i < n; ++i) {
+        column_[i] = static_cast<std::int64_t>(relative_[axis][i]);
+      }
+      const auto number = static_cast<unsigned>(layout_->attributes.size()) + axis;
+      code_column(coder, number, columns.kinds[number], nullptr, nullptr, column_.data(),
+                  scratch_.data(), n);
+    }
+    for (std::uint32_t i = 0; i < n; ++i) order_[i] = i;
   } else {
     split_.code(coder, {{0, 0, 0}, size},
                 {relative_[0].data(), relative_[1].data(), relative_[2].data()}, order_.data(), n);
   }
 }
 
-void BlockEncoder::encode_cluster(SymbolEncoder& coder, const Predictor& predictor) {
+void BlockEncoder::encode_cluster(SymbolEncoder& coder, const Predictor& predictor,
+                                  const Columns& columns) {
   const auto n = static_cast<std::uint32_t>(members_.size());
-  positions(coder, [&] { grid_.heights(coder, predictor, coded_box_.size[2], nullptr); });
+  positions(coder, columns, [&] { grid_.heights(coder, predictor, coded_box_.size[2], nullptr); });
 
   for (unsigned a = 0; a < layout_->attributes.size(); ++a) {
+    std::swap(column_, beside_);
     column_.resize(n);
     for (std::uint32_t i = 0; i < n; ++i) column_[i] = attributes_[a][members_[order_[i]]];
-    NumberForm form = attribute_forms_[a];
-    code_column(coder, a, is_floating(layout_->attributes[a]), form, column_.data(), n);
+    NumberForm* const form = is_floating(layout_->attributes[a]) ? &attribute_forms_[a] : nullptr;
+    code_column(coder, a, columns.kinds[a], form, beside_.data(), column_.data(), scratch_.data(),
+                n);
   }
   if (const unsigned level = layout_->level; level > 0) {
     column_.resize(std::size_t{n} * level);
@@ -294,27 +311,31 @@ void BlockEncoder::encode_cluster(SymbolEncoder& coder, const Predictor& predict
 void BlockEncoder::fit(PredictorFit& sums) {
   SymbolEncoder coder({});
   for (std::size_t c = 0; c < block_->representatives.size(); ++c) {
-    if (enter(c).points > 0) positions(coder, [&] { grid_.fit(sums); });
+    if (enter(c).points > 0) positions(coder, {}, [&] { grid_.fit(sums); });
   }
 }
 
-void BlockEncoder::count(const Predictor& predictor, Counts& counts) {
+std::uint64_t BlockEncoder::count(const Predictor& predictor, const Columns& columns,
+                                  Counts& counts) {
   SymbolEncoder coder({});
   coder.counts() = std::move(counts);
   for (std::size_t c = 0; c < block_->representatives.size(); ++c) {
-    if (enter(c).points > 0) encode_cluster(coder, predictor);
+    if (enter(c).points > 0) encode_cluster(coder, predictor, columns);
   }
   counts = std::move(coder.counts());
+  return coder.raw_bits();
 }
 
-void BlockEncoder::encode(const EncodingTables& tables, Bytes& bytes, std::vector<Entry>& entries) {
+void BlockEncoder::encode(const EncodingTables& tables, bool sequence, Bytes& bytes,
+                          std::vector<Entry>& entries) {
   SymbolEncoder coder(tables.tables);
+  const Columns columns{sequence, tables.kinds};
   for (std::size_t c = 0; c < block_->representatives.size(); ++c) {
     Entry entry = enter(c);
     if (entry.points > 0) {
       const std::size_t start = bytes.size();
       coder.start();
-      encode_cluster(coder, tables.predictor);
+      encode_cluster(coder, tables.predictor, columns);
       std::uint32_t at = 0;
       if (representative_ != UINT32_MAX) {
         at = static_cast<std::uint32_t>(std::find(order_.begin(), order_.end(), representative_) -

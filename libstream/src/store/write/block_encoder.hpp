@@ -11,6 +11,12 @@
 
 namespace terrace::stream::store {
 
+/// How clusters of points that lie on no grid are coded.
+struct Columns {
+  bool sequence = false;  ///< points in their order, coordinates as columns; else SplitCodec's
+  std::span<const ColumnKind> kinds;
+};
+
 /// Encodes the clusters of a block, each into a byte string of its own. Keeps its memory between
 /// blocks. One object per thread.
 class BlockEncoder {
@@ -21,19 +27,20 @@ class BlockEncoder {
 
   /// Training: the loaded block enters the least squares ...
   void fit(PredictorFit& sums);
-  /// ... and its symbols, under that predictor, are counted.
-  void count(const Predictor& predictor, Counts& counts);
+  /// ... and its symbols are counted. Returns the raw bits beside them.
+  std::uint64_t count(const Predictor& predictor, const Columns& columns, Counts& counts);
 
   /// Appends the clusters' bytes and entries.
-  void encode(const EncodingTables& tables, Bytes& bytes, std::vector<Entry>& entries);
+  void encode(const EncodingTables& tables, bool sequence, Bytes& bytes,
+              std::vector<Entry>& entries);
 
  private:
   void load_axis(std::size_t axis);
   void load_attributes();
   Entry enter(std::size_t cluster);
   template <class Use>
-  void positions(SymbolEncoder& coder, Use&& heights);
-  void encode_cluster(SymbolEncoder& coder, const Predictor& predictor);
+  void positions(SymbolEncoder& coder, const Columns& columns, Use&& heights);
+  void encode_cluster(SymbolEncoder& coder, const Predictor& predictor, const Columns& columns);
 
   const Layout* layout_ = nullptr;
   const ClusteredBlock* block_ = nullptr;
@@ -53,7 +60,7 @@ class BlockEncoder {
   std::vector<std::uint32_t> order_;                    ///< of coding, as numbers within members_
   GridCodec grid_;
   SplitCodec split_;
-  std::vector<std::int64_t> column_;
+  std::vector<std::int64_t> column_, beside_, scratch_;
   std::vector<double> doubles_;
 };
 

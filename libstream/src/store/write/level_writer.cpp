@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "store/write/level_writer.hpp"
 
+#include <array>
 #include <utility>
 
 #include "store/read/index_page.hpp"
 
 namespace terrace::stream::store {
 namespace {
+
+/// Of those held back, so many at most tell how columns are best coded.
+constexpr std::size_t kTrialBlocks = 8;
 
 std::string file_name(unsigned level, const char* what) {
   return "level-" + std::to_string(level) + ".0." + what;
@@ -45,10 +49,70 @@ std::uint64_t LevelWriter::append(PreparedBlock block, bool root) {
     block.entries.clear();
     const ClusteredBlock view = block.raw->view();
     encoder_.load(layout_, view);
-    encoder_.encode(tables_->encoding, block.bytes, block.entries);
+    encoder_.encode(tables_->encoding, tables_->sequence, block.bytes, block.entries);
   }
   write(block);
   return ordinal;
+}
+
+std::uint64_t LevelWriter::Trial::bits() const {
+  std::uint64_t bits = raw_bits;
+  for (const auto& context : counts) bits += entropy_of(context);
+  return bits;
+}
+
+std::uint64_t LevelWriter::Trial::bits_of_column(unsigned column) const {
+  std::uint64_t bits = 0;
+  for (unsigned c = 0; c < context::kPerAttribute; ++c) {
+    const auto& counted = counts[context::kAttribute + context::kPerAttribute * column + c];
+    bits += entropy_of(counted) + open_bits_of(counted);
+  }
+  return bits;
+}
+
+LevelWriter::Trial LevelWriter::trial(const Predictor& predictor, bool sequence, ColumnKind kind) {
+  std::vector<ColumnKind> kinds(layout_.columns(), kind);
+  for (unsigned c = 0; c < kinds.size(); ++c) {
+    if (kind == ColumnKind::beside && !layout_.may_lie_beside(c)) kinds[c] = ColumnKind::plain;
+  }
+  Trial trial;
+  const std::size_t step = (held_.size() + kTrialBlocks - 1) / kTrialBlocks;
+  for (std::size_t b = 0; b < held_.size(); b += step) {
+    const ClusteredBlock view = held_[b].view();
+    encoder_.load(layout_, view);
+    trial.raw_bits += encoder_.count(predictor, {sequence, kinds}, trial.counts);
+  }
+  trial.counts.resize(layout_.contexts());
+  return trial;
+}
+
+/// The kind of each column that takes the fewest bits; the first time also the order of points.
+std::vector<ColumnKind> LevelWriter::choose_columns(const Predictor& predictor) {
+  std::vector<ColumnKind> kinds(layout_.columns(), ColumnKind::plain);
+  if (layout_.version == 1) {
+    sequence_ = false;
+    return kinds;
+  }
+  if (!sequence_) {
+    sequence_ = !layout_.grid && trial(predictor, true, ColumnKind::plain).bits() <
+                                     trial(predictor, false, ColumnKind::plain).bits();
+  }
+  std::array<Trial, kColumnKinds> trials;
+  for (unsigned kind = 0; kind < kColumnKinds; ++kind) {
+    trials[kind] = trial(predictor, *sequence_, static_cast<ColumnKind>(kind));
+  }
+  for (unsigned c = 0; c < kinds.size(); ++c) {
+    std::uint64_t least = trials[0].bits_of_column(c);
+    for (unsigned kind = 1; kind < kColumnKinds; ++kind) {
+      const bool possible =
+          static_cast<ColumnKind>(kind) != ColumnKind::beside || layout_.may_lie_beside(c);
+      const std::uint64_t bits = trials[kind].bits_of_column(c);
+      if (!possible || bits >= least) continue;
+      least = bits;
+      kinds[c] = static_cast<ColumnKind>(kind);
+    }
+  }
+  return kinds;
 }
 
 void LevelWriter::train() {
@@ -64,11 +128,12 @@ void LevelWriter::train() {
     }
     tables.predictor = sums.fit();
   }
+  tables.kinds = choose_columns(tables.predictor);
   Counts counts;
   for (std::size_t b = 0; b < held_.size(); b += many ? 2 : 1) {
     const ClusteredBlock view = held_[b].view();
     encoder_.load(layout_, view);
-    encoder_.count(tables.predictor, counts);
+    encoder_.count(tables.predictor, {*sequence_, tables.kinds}, counts);
   }
   counts.resize(layout_.contexts());
   for (const auto& context : counts) tables.frequencies.push_back(normalised(context));
@@ -79,7 +144,7 @@ void LevelWriter::train() {
   put_varint(table_bytes_, bytes.size());
   table_bytes_.insert(table_bytes_.end(), bytes.begin(), bytes.end());
   ++table_count_;
-  tables_ = std::make_shared<const SharedTables>(std::move(tables));
+  tables_ = std::make_shared<const SharedTables>(std::move(tables), *sequence_);
 
   PreparedBlock prepared;
   for (const RawBlock& block : held_) {
@@ -87,7 +152,7 @@ void LevelWriter::train() {
     prepared.bytes.clear();
     prepared.entries.clear();
     encoder_.load(layout_, view);
-    encoder_.encode(tables_->encoding, prepared.bytes, prepared.entries);
+    encoder_.encode(tables_->encoding, tables_->sequence, prepared.bytes, prepared.entries);
     write(prepared);
   }
   held_.clear();

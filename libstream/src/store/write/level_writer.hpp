@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "store/manifest.hpp"
@@ -20,9 +21,11 @@ inline constexpr std::size_t kTrainingBlocks = 64;
 
 /// Tables in both shapes: a block that was encoded with those of an earlier segment is decoded.
 struct SharedTables {
-  explicit SharedTables(Tables made) : tables(std::move(made)), encoding(tables) {}
+  SharedTables(Tables made, bool in_sequence)
+      : tables(std::move(made)), encoding(tables), sequence(in_sequence) {}
   Tables tables;
   EncodingTables encoding;
+  bool sequence;  ///< see Columns
 };
 using SharedTablesPtr = std::shared_ptr<const SharedTables>;
 
@@ -58,6 +61,16 @@ class LevelWriter {
   [[nodiscard]] bool at_segment_start() const { return blocks_ % kSegmentBlocks == 0; }
 
  private:
+  /// What was held back, encoded to be counted.
+  struct Trial {
+    Counts counts;
+    std::uint64_t raw_bits = 0;
+
+    [[nodiscard]] std::uint64_t bits() const;
+    [[nodiscard]] std::uint64_t bits_of_column(unsigned column) const;
+  };
+  Trial trial(const Predictor& predictor, bool sequence, ColumnKind kind);
+  std::vector<ColumnKind> choose_columns(const Predictor& predictor);
   void train();
   void write(const PreparedBlock& block);
   void write_full_page();
@@ -65,6 +78,9 @@ class LevelWriter {
   Layout layout_;
   OutputFile data_, index_;
   std::vector<RawBlock> held_;
+  /// Whether points are coded in the order in which they come. One choice for the whole level: a
+  /// block that was encoded with the tables of the segment before has no other order any more.
+  std::optional<bool> sequence_;
   SharedTablesPtr tables_;
   BlockEncoder encoder_;
   std::uint64_t blocks_ = 0, clusters_ = 0, points_ = 0;

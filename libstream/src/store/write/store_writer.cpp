@@ -87,10 +87,11 @@ StoreWriter::EncodedPtr StoreWriter::Impl::encode(const ClusteredBlock& block) {
   encoded->points = block.positions.size();
   if (block.level == 0) encoded->sum_up(block.positions);
   if (const SharedTablesPtr shared = tables(block.level)) {
-    const Layout layout(schema, block.level);
+    const Layout layout(schema, block.level, version_to_write(schema));
     auto encoder = borrow();
     encoder->load(layout, block);
-    encoder->encode(shared->encoding, encoded->block.bytes, encoded->block.entries);
+    encoder->encode(shared->encoding, shared->sequence, encoded->block.bytes,
+                    encoded->block.entries);
     encoded->block.tables = shared;
     encoded->block.summaries.assign(block.summaries.begin(), block.summaries.end());
     give_back(std::move(encoder));
@@ -112,7 +113,8 @@ std::uint64_t StoreWriter::Impl::append(EncodedPtr encoded, bool root) {
   const unsigned level = encoded->level;
   while (levels.size() <= level) {
     levels.push_back(std::make_unique<LevelWriter>(
-        staging.folder(), Layout(schema, static_cast<unsigned>(levels.size()))));
+        staging.folder(),
+        Layout(schema, static_cast<unsigned>(levels.size()), version_to_write(schema))));
   }
   if (level == 0) {
     points += encoded->points;
@@ -189,6 +191,7 @@ std::uint64_t StoreWriter::finish(const ClusteredBlock& root, bool publish) {
   w.broken = true;
 
   Manifest manifest;
+  manifest.version = version_to_write(w.schema);
   manifest.points = w.points;
   manifest.bounds = w.bounds;
   manifest.mean_height = w.points == 0 ? 0.0 : w.height_sum / static_cast<double>(w.points);
