@@ -6,6 +6,7 @@
 #include <cassert>
 #include <cctype>
 #include <cstring>
+#include <initializer_list>
 #include <optional>
 #include <string_view>
 #include <utility>
@@ -237,6 +238,28 @@ void combine(Lanes& a, const Lanes& b, const Function& function) {
   for (std::size_t i = 0; i < kLanes; ++i) a[i] = static_cast<double>(function(a[i], b[i]));
 }
 
+/// Interval arithmetic. Every operation of doubles is monotonic in each operand, rounding included,
+/// so its ends lie at those of the operands; where one is no number anything is possible.
+ValueRange hull(std::initializer_list<double> ends, bool nan) {
+  ValueRange range{std::min(ends), std::max(ends), nan};
+  for (const double end : ends) {
+    if (!(end - end == 0.0)) return {};
+  }
+  return range;
+}
+constexpr ValueRange truth(bool may_be_false, bool may_be_true) {
+  return {may_be_false ? 0.0 : 1.0, may_be_true ? 1.0 : 0.0, false};
+}
+bool may_hold(const ValueRange& v) { return v.low != 0.0 || v.high != 0.0; }
+bool may_fail(const ValueRange& v) { return v.nan || (v.low <= 0.0 && v.high >= 0.0); }
+bool is_one(const ValueRange& v) { return !v.nan && v.low == v.high; }
+
+/// `sure` pairs compare as wanted and `never` ones do not, unless there is a NaN, of which nothing
+/// is less, equal or greater.
+ValueRange comparison(const ValueRange& a, const ValueRange& b, bool sure, bool never) {
+  return truth(!sure || a.nan || b.nan, !never);
+}
+
 }  // namespace
 
 Where::Where(const std::string& text, const Schema& schema) : text_(text), schema_(schema) {
@@ -321,6 +344,81 @@ void Where::test(std::span<const Point3> positions, std::span<const std::byte> r
     }
     for (std::size_t i = 0; i < count; ++i) matches[begin + i] = holds(stack[0][i]) ? 1 : 0;
   }
+}
+
+bool Where::possible(const Box3& box, std::span<const ValueRange> attributes) const {
+  assert(attributes.empty() || attributes.size() == schema_.attributes.size());
+  std::vector<ValueRange> stack;
+  for (const Step& step : steps_) {
+    switch (step.operation) {
+      case Operation::constant:
+        stack.push_back({step.number, step.number, false});
+        continue;
+      case Operation::axis:
+        stack.push_back(hull({box.min[step.index], box.max[step.index]}, false));
+        continue;
+      case Operation::attribute:
+        stack.push_back(attributes.empty() ? ValueRange{} : attributes[step.index]);
+        continue;
+      case Operation::negate:
+        stack.back() = {-stack.back().high, -stack.back().low, stack.back().nan};
+        continue;
+      case Operation::invert:
+        stack.back() = truth(may_hold(stack.back()), may_fail(stack.back()));
+        continue;
+      default:
+        break;
+    }
+    const ValueRange b = stack.back();
+    stack.pop_back();
+    const ValueRange a = stack.back();
+    const bool nan = a.nan || b.nan;
+    switch (step.operation) {
+      case Operation::multiply:
+        stack.back() = hull({a.low * b.low, a.low * b.high, a.high * b.low, a.high * b.high}, nan);
+        break;
+      case Operation::divide:
+        stack.back() =
+            b.low <= 0.0 && b.high >= 0.0
+                ? ValueRange{}
+                : hull({a.low / b.low, a.low / b.high, a.high / b.low, a.high / b.high}, nan);
+        break;
+      case Operation::add:
+        stack.back() = hull({a.low + b.low, a.high + b.high}, nan);
+        break;
+      case Operation::subtract:
+        stack.back() = hull({a.low - b.high, a.high - b.low}, nan);
+        break;
+      case Operation::less:
+        stack.back() = comparison(a, b, a.high < b.low, a.low >= b.high);
+        break;
+      case Operation::less_equal:
+        stack.back() = comparison(a, b, a.high <= b.low, a.low > b.high);
+        break;
+      case Operation::greater:
+        stack.back() = comparison(a, b, a.low > b.high, a.high <= b.low);
+        break;
+      case Operation::greater_equal:
+        stack.back() = comparison(a, b, a.low >= b.high, a.high < b.low);
+        break;
+      case Operation::equal:
+        stack.back() = comparison(a, b, is_one(a) && is_one(b) && a.low == b.low,
+                                  a.high < b.low || a.low > b.high);
+        break;
+      case Operation::not_equal: {
+        const bool apart = a.high < b.low || a.low > b.high;
+        stack.back() = truth(!apart, !(is_one(a) && is_one(b) && a.low == b.low));
+        break;
+      }
+      case Operation::both:
+        stack.back() = truth(may_fail(a) || may_fail(b), may_hold(a) && may_hold(b));
+        break;
+      default:
+        stack.back() = truth(may_fail(a) && may_fail(b), may_hold(a) || may_hold(b));
+        break;
+    }
+  }
+  return may_hold(stack.back());
 }
 
 }  // namespace terrace::stream

@@ -321,6 +321,14 @@ def ordinals(source, nearest, count):
     return values
 
 
+def key(kind, value):
+    """The order of an attribute's values as unsigned numbers."""
+    if kind.startswith("float"):
+        bits = int.from_bytes(struct.pack("<d", value), "little")
+        return bits + (1 << 63) if bits >> 63 == 0 else bits ^ (WORD - 1)
+    return value if kind == "uint64" else value + (1 << 63)
+
+
 class Cluster:
     """`points` (three doubles), `attributes` (a column each), `children` (per level below, from the next), the place of
     the representative (None in the root)."""
@@ -356,6 +364,8 @@ class Cluster:
             self.attributes = [attribute(source, 148 + 10 * a, count, channel["type"]) for a, channel in enumerate(schema)]
         else:
             self.attributes = columns(source, count, schema)
+        for (lowest, highest), channel, values in zip(entry["ranges"], schema, self.attributes):
+            require(all(lowest <= key(channel["type"], value) <= highest for value in values), "range")
         self.children = [ordinals(source, below == level - 1, count) for below in reversed(range(level))]
         upper = source.raw(16) if count >= 65536 else 0
         place = upper << 16 | source.end()
@@ -387,7 +397,8 @@ class Level:
             sets.append((first, Tables(directory.take(directory.varint()), schema, manifest["version"])))
         directory.done()
         for page in range(pages):
-            self.entries += self.page(index[offsets[page]:offsets[page + 1]], min(128, clusters - 128 * page))
+            ranges = len(schema) if manifest["version"] > 1 else 0
+            self.entries += self.page(index[offsets[page]:offsets[page + 1]], min(128, clusters - 128 * page), ranges)
         self.clusters = []
         for ordinal, entry in enumerate(self.entries):
             tables = [each for first, each in sets if first <= ordinal]
@@ -396,11 +407,11 @@ class Level:
             self.clusters.append(Cluster(body, entry, tables[-1], schema, number, root, grid) if entry["points"] else None)
 
     @staticmethod
-    def page(data, count):
+    def page(data, count, ranges):
         source = Bytes(data, "page checksum")
         offset = source.varint()
         columns = []
-        for column in range(12):
+        for column in range(12 + 2 * ranges):
             base = source.signed_varint() if column in (3, 4, 5) else source.varint()
             columns.append((base, source.number(1), source.number(1)))
         bits = source.take((count * sum(width for _, width, _ in columns) + 7) // 8)
@@ -408,15 +419,17 @@ class Level:
         bits, rows = int.from_bytes(bits, "little"), [[] for _ in range(count)]
         for base, width, shift in columns:
             for row in rows:
-                row.append((base + ((bits & ((1 << width) - 1)) << shift)) % WORD)
+                row.append(base + ((bits & ((1 << width) - 1)) << shift))
                 bits >>= width
         require(bits == 0, "page padding")
         entries = []
         for row in rows:
+            keys = [min(key, WORD - 1) for key in row[12:]]
+            row = [value % WORD for value in row[:12]]
             entries.append({"offset": offset, "bytes": row[0], "points": row[1], "forms": row[2],
                             "low": [signed(low) for low in row[3:6]], "size": row[6:9],
                             "error": struct.unpack("<d", (row[9] << 47).to_bytes(8, "little"))[0],
-                            "descendants": row[10], "checksum": row[11]})
+                            "descendants": row[10], "checksum": row[11], "ranges": list(zip(keys[::2], keys[1::2]))})
             offset += row[0]
         return entries
 

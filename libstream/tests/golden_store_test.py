@@ -35,7 +35,6 @@ class GoldenStoreTest(unittest.TestCase):
         self.check_points('cloud')
 
     def test_version_2(self):
-        self.check_points('cloud2')
         self.check_points('survey')
 
     def test_a_store_without_points(self):
@@ -47,7 +46,7 @@ class GoldenStoreTest(unittest.TestCase):
 
     def test_points_head_their_clusters(self):
         """A point of highest level h heads a cluster on every level below, as its representative."""
-        for name in ('grid', 'cloud', 'cloud2', 'survey', 'int64', 'uint64'):
+        for name in ('grid', 'cloud', 'survey', 'int64', 'uint64'):
             levels = decode_store.Store(STORES / name).levels
             headed = [set() for _ in levels]
             for number, level in enumerate(levels):

@@ -55,6 +55,7 @@ struct LevelBytes {
   std::string& data;
   std::string& index;
   std::size_t clusters = 0, directory_bytes = 0;
+  std::size_t attributes = 0;  ///< that the index has ranges of
 
   [[nodiscard]] std::size_t pages() const { return (clusters + 127) / 128; }
   [[nodiscard]] std::size_t directory() const { return index.size() - directory_bytes; }
@@ -77,20 +78,21 @@ struct LevelBytes {
   }
 };
 
-/// The checksum column of a page is 16 bits wide in whatever the library writes: the last column.
+/// The checksum column of a page, the twelfth, is 16 bits wide in whatever the library writes.
 inline void mend_cluster_checksums(LevelBytes& level, std::size_t page) {
   const std::size_t begin = level.page_offset(page), end = level.page_offset(page + 1);
   const std::size_t count = level.clusters_of(page);
   store::Bytes checksums;
   try {
-    const store::IndexPage entries(level.page_bytes(page), static_cast<std::uint32_t>(count));
+    const store::IndexPage entries(level.page_bytes(page), static_cast<std::uint32_t>(count),
+                                   level.attributes);
     for (std::uint32_t i = 0; i < count; ++i) {
       const std::uint64_t from = entries.offset(i), to = entries.offset(i + 1);
       const bool there = from <= to && to <= level.data.size();
       const auto* const bytes = reinterpret_cast<const std::uint8_t*>(level.data.data());
       store::put(checksums, there ? store::crc16({bytes + from, to - from}) : std::uint16_t{0});
     }
-    // Where the columns begin, and how many bits lie before the last one.
+    // Where the columns begin, and how many bits lie before the checksums.
     store::ByteReader in(
         {reinterpret_cast<const std::uint8_t*>(level.index.data()) + begin, end - begin});
     in.varint();
@@ -101,6 +103,10 @@ inline void mend_cluster_checksums(LevelBytes& level, std::size_t page) {
       bits += std::size_t{packed} % 256 * count;
       base = in.varint();
       packed = in.get<std::uint16_t>();
+    }
+    for (std::size_t end_of_range = 0; end_of_range < 2 * level.attributes; ++end_of_range) {
+      in.varint();
+      in.get<std::uint16_t>();
     }
     if (base != 0 || packed != 16) return;
     std::string& index = level.index;
@@ -121,6 +127,9 @@ inline void mend_cluster_checksums(LevelBytes& level, std::size_t page) {
 inline void for_each_level(StoreFiles& files, nlohmann::ordered_json& manifest,
                            const std::function<void(LevelBytes&, nlohmann::ordered_json&)>& use) {
   if (!manifest.contains("levels") || !manifest["levels"].is_array()) return;
+  const auto version = manifest.find("version"), known = manifest.find("attributes");
+  const std::size_t attributes =
+      version != manifest.end() && *version == 2 && known != manifest.end() ? known->size() : 0;
   for (auto& level : manifest["levels"]) {
     try {
       auto& segment = level.at("segments").at(0);
@@ -128,7 +137,7 @@ inline void for_each_level(StoreFiles& files, nlohmann::ordered_json& manifest,
       const auto index = files.find(segment.at("index").at("file").get<std::string>());
       if (data == files.end() || index == files.end() || data == index) continue;
       LevelBytes bytes{data->second, index->second, level.at("clusters").get<std::size_t>(),
-                       segment.at("directory_bytes").get<std::size_t>()};
+                       segment.at("directory_bytes").get<std::size_t>(), attributes};
       if (bytes.directory_bytes < 4 || bytes.directory_bytes > bytes.index.size()) continue;
       use(bytes, segment);
     } catch (const nlohmann::json::exception&) {
@@ -181,13 +190,20 @@ inline void edit_page(StoreFiles& files, unsigned level, std::size_t page,
   for_each_level(files, manifest, [&](LevelBytes& bytes, nlohmann::ordered_json&) {
     if (number++ != level) return;
     const store::IndexPage old(bytes.page_bytes(page),
-                               static_cast<std::uint32_t>(bytes.clusters_of(page)));
+                               static_cast<std::uint32_t>(bytes.clusters_of(page)),
+                               bytes.attributes);
     std::vector<store::Entry> entries;
-    for (std::uint32_t i = 0; i < old.clusters(); ++i) entries.push_back(old.entry(i));
+    std::vector<store::KeyRange> ranges;
+    for (std::uint32_t i = 0; i < old.clusters(); ++i) {
+      entries.push_back(old.entry(i));
+      for (std::size_t a = 0; a < bytes.attributes; ++a) ranges.push_back(old.range(i, a));
+    }
     std::uint64_t offset = old.offset(0);
     edit(entries, offset);
+    ranges.resize(entries.size() * bytes.attributes);
     store::Bytes fresh;
-    store::write_page(entries, offset, fresh);
+    const std::vector<ScalarType> types(bytes.attributes, ScalarType::i64);
+    store::write_page(entries, types, ranges, offset, fresh);
     const std::size_t begin = bytes.page_offset(page), end = bytes.page_offset(page + 1);
     for (std::size_t p = page + 1; p <= bytes.pages(); ++p) {
       const std::uint64_t moved = bytes.page_offset(p) - (end - begin) + fresh.size();

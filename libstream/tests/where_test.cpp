@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "terrace/stream/where.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
@@ -166,6 +167,42 @@ TEST(Where, RandomConditionsMeanWhatTheyMean) {
   }
   EXPECT_GT(met, all / 10);
   EXPECT_LT(met, all - all / 10);
+}
+
+// Law: where a point meets the condition, its box and the ranges of its attributes say it is
+// possible; and often they say that it is not.
+TEST(Where, RangesTellWhatIsPossible) {
+  std::size_t told = 0, none = 0;
+  for (std::uint64_t seed = 1; seed <= 3000; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Cloud cloud(1 + seed % 5, seed);
+    RandomExpressions expressions(cloud, seed);
+    const Expression expression = expressions.make(static_cast<unsigned>(seed % 5));
+    SCOPED_TRACE(expression.text);
+    const std::vector<std::uint8_t> matches = cloud.matches(expression.text);
+    const bool any = std::find(matches.begin(), matches.end(), 1) != matches.end();
+    Box3 box;
+    std::vector<ValueRange> ranges(cloud.schema.attributes.size(), {INFINITY, -INFINITY, false});
+    for (std::size_t i = 0; i < matches.size(); ++i) {
+      box.include(world_point(cloud.schema, cloud.positions[i]));
+      for (std::size_t a = 0; a < ranges.size(); ++a) {
+        const double value = cloud.attribute(i, a);
+        if (std::isnan(value)) {
+          ranges[a] = {};
+        } else if (!ranges[a].nan) {
+          ranges[a] = {std::min(ranges[a].low, value), std::max(ranges[a].high, value), false};
+        }
+      }
+    }
+    const Where where(expression.text, cloud.schema);
+    const bool possible = where.possible(box, ranges);
+    ASSERT_TRUE(possible || !any);
+    ASSERT_TRUE(where.possible(box, {}) || !possible);
+    none += any ? 0 : 1;
+    told += possible ? 0 : 1;
+  }
+  EXPECT_GT(none, 500u);
+  EXPECT_GT(told, none / 2);
 }
 
 TEST(Where, ConditionsOfTheUsualKind) {

@@ -9,11 +9,12 @@
 #include <gtest/gtest.h>
 #include <terrace/stream/store.hpp>
 
+#include "temporary_folder.hpp"
 #include "terrace/terrain/build.hpp"
+#include "terrace/terrain/detail.hpp"
 
 namespace terrace::terrain {
 
-using namespace terrain;
 namespace {
 
 namespace fs = std::filesystem;
@@ -51,6 +52,53 @@ TEST(StoreBuild, ChecksumIsTheSameWithEveryCompiler) {
   EXPECT_EQ(outcome.points, 4008u);
   EXPECT_EQ(stream::Store::open(request.store).checksum(), 0x4f6de04fu);
   fs::remove_all(folder);
+}
+
+// By the ranges of their attributes; what comes is what the condition takes of all points.
+TEST(StoreBuild, ClustersThatCannotMeetAConditionAreNotRead) {
+  const tests::TemporaryFolder folder;
+  const fs::path points = folder.path() / "points.csv";
+  {
+    std::ofstream file(points);
+    file << "x,y,z,class\n";
+    // Strips of a class each.
+    for (int i = 0; i < 20000; ++i) {
+      const int x = i * 7919 % 10007, y = i * 104729 % 10009;
+      file << x / 10 << '.' << x % 10 << ',' << y / 10 << '.' << y % 10 << ',' << i % 97 << ','
+           << x / 1000 << '\n';
+    }
+  }
+  BuildRequest request;
+  request.inputs = {points.string()};
+  request.store = folder.path() / "store";
+  request.block_points = 2000;
+  build_store(request);
+  const stream::Store store = stream::Store::open(request.store);
+  Detail detail;
+  const auto visit = [&](std::uint64_t& clusters, std::uint64_t& met) {
+    for_each_wanted(store, detail,
+                    [&](stream::ClusterId id, const stream::ClusterRecord&,
+                        const stream::ClusterPoints&) { clusters += stream::level_of(id) == 0; });
+    for_each_wanted_point(store, detail,
+                          [&](stream::ClusterId, const stream::ClusterPoints& of, std::size_t i,
+                              const stream::Point3&) {
+                            const auto classes = store.schema().view<double>(of.payload, 0);
+                            met += classes[i] == 3.0 ? 1 : 0;
+                          });
+  };
+  std::uint64_t all = 0, expected = 0, read = 0, met = 0;
+  visit(all, expected);
+  detail.where.emplace("class == 3", store.schema());
+  visit(read, met);
+  EXPECT_EQ(met, expected);
+  EXPECT_GT(met, 1000u);
+  EXPECT_LT(read, all / 3);
+  EXPECT_GT(read, 0u);
+  detail.where.emplace("x < -1 || class > 42", store.schema());
+  read = met = 0;
+  visit(read, met);
+  EXPECT_EQ(read, 0u);
+  EXPECT_EQ(met, 0u);
 }
 
 }  // namespace

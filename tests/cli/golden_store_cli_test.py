@@ -74,7 +74,6 @@ class GoldenStoreTest(unittest.TestCase):
         self.check('cloud', 3)
 
     def test_version_2(self):
-        self.check('cloud2', 3)
         self.check('survey', 2)
 
     def test_a_store_without_points(self):

@@ -3,9 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <string>
+#include <type_traits>
 
 #include "store/codec/bytes.hpp"
+#include "with_type.hpp"
 
 namespace terrace::stream::store {
 namespace {
@@ -35,6 +38,20 @@ struct LevelSums {
   // heads a cluster is the cluster's representative, value by value.
   std::uint64_t representatives = 0, heads = 0;
 };
+
+/// The key of the value that lies at `bytes`.
+std::uint64_t key_of(ScalarType type, const std::byte* bytes) {
+  return with_type(type, [bytes](auto value) {
+    std::memcpy(&value, bytes, sizeof value);
+    if constexpr (std::is_floating_point_v<decltype(value)>) {
+      return attribute_key(static_cast<double>(value));
+    } else if constexpr (std::is_same_v<decltype(value), std::uint64_t>) {
+      return value;
+    } else {
+      return attribute_key(static_cast<std::int64_t>(value));
+    }
+  });
+}
 
 /// Whether `outer` holds all of `inner`, which is of a cluster with points.
 bool holds(const Box3& outer, const Box3& inner) {
@@ -148,9 +165,33 @@ class Verification {
         const Entry entry = level.entry(ordinal, offset);
         level.read(ordinal, space_, points_);
         check_cluster(l, ordinal, record_of(entry, l, offset, level.top()));
+        check_ranges(l, ordinal, offset);
       } catch (const Error& error) {
         problem(level.data().name(), page->offset(i), error.what());
       }
+    }
+  }
+
+  void check_ranges(unsigned l, std::uint64_t ordinal, std::uint64_t offset) {
+    const LevelReader& level = *levels_[l];
+    level.ranges(ordinal, ranges_);
+    const std::size_t stride = level.layout().payload_size;
+    std::size_t at = 0;
+    for (std::size_t a = 0; a < ranges_.size(); ++a) {
+      const ScalarType type = level.layout().attributes[a];
+      const auto inside = [&](const std::byte* record) {
+        const std::uint64_t key = key_of(type, record + at);
+        return ranges_[a].low <= key && key <= ranges_[a].high;
+      };
+      bool all = !points_.has_representative || inside(points_.representative_payload.data());
+      for (std::size_t i = 0; i < points_.size(); ++i) {
+        all &= inside(points_.payload.data() + i * stride);
+      }
+      if (!all) {
+        cluster_problem(l, ordinal, offset,
+                        "values of attribute " + std::to_string(a) + " lie outside of their range");
+      }
+      at += size_of(type);
     }
   }
 
@@ -268,6 +309,7 @@ class Verification {
   std::vector<LevelSums> sums_;
   ReadSpace space_;
   ClusterPoints points_;
+  std::vector<KeyRange> ranges_;
   Box3 bounds_;
   double height_sum_ = 0.0;
   std::uint64_t looked_into_ = 0, most_looked_into_ = 0;

@@ -50,22 +50,40 @@ class Descent {
         finest_(detail.finest()),
         heads_(store.top()) {}
 
-  /// The root and the wanted clusters down to `lowest`.
+  /// The root and the wanted clusters down to `lowest`; of level 0 those of which points may meet
+  /// the condition.
   void run(unsigned lowest) {
     stream::ClusterPoints points;
     store_.read(store_.root(), points);
     deliver(store_.root(), store_.record(store_.root()), points);
     for (unsigned level = store_.top(); level-- > lowest;) {
-      if (whole(level)) {
+      if (whole(level) && (level > 0 || !detail_.where)) {
         store_.for_each(level, [this](stream::ClusterId id, const stream::ClusterRecord& record,
                                       const stream::ClusterPoints& p) { deliver(id, record, p); });
         continue;
       }
-      for_each_head(level, [&](stream::ClusterId id, const stream::ClusterRecord& record) {
+      const auto read = [&](stream::ClusterId id, const stream::ClusterRecord& record) {
+        if (!possible(id, record)) return;
         store_.read(id, points);
         deliver(id, record, points);
-      });
+      };
+      if (!whole(level)) {
+        for_each_head(level, read);
+        continue;
+      }
+      for (std::uint64_t c = 0; c < store_.levels()[level].clusters; ++c) {
+        const stream::ClusterId id = stream::cluster_id(level, c);
+        read(id, store_.record(id));
+      }
     }
+  }
+
+  /// Whether points of a cluster of level 0 may meet the condition. What lies above is read for
+  /// what it heads, whatever its points are.
+  [[nodiscard]] bool possible(stream::ClusterId id, const stream::ClusterRecord& record) const {
+    return !detail_.where || stream::level_of(id) > 0 ||
+           detail_.where->possible(world_box(placement_, record.summary.box),
+                                   store_.attribute_ranges(id));
   }
 
   /// A level that is wanted everywhere needs no list of its clusters.

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -109,6 +110,13 @@ struct Lattice {
 /// Stored x, y (column and row of a raster) of a place in the CRS: world_point() back.
 [[nodiscard]] std::array<double, 2> stored_place(const Placement& placement,
                                                  const std::array<double, 2>& world);
+
+/// What the values of an attribute of some points lie in, scale and offset applied.
+struct ValueRange {
+  double low = -std::numeric_limits<double>::infinity();
+  double high = std::numeric_limits<double>::infinity();
+  bool nan = true;  ///< some may be no numbers
+};
 
 /// One attribute of packed records, read as values of type T.
 template <class T>

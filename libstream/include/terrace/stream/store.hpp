@@ -194,6 +194,11 @@ class Store {
 
   /// Throws: Error on a bad page or an ordinal that is not there.
   [[nodiscard]] ClusterRecord record(ClusterId id) const;
+  /// One for each attribute: what the values of the cluster's points, representative included, lie
+  /// in, without reading them. It may be wider, by a 32nd of what the clusters around reach. Empty
+  /// if the store does not tell (version 1). Throws: Error on a bad page or an ordinal that is not
+  /// there.
+  [[nodiscard]] std::vector<ValueRange> attribute_ranges(ClusterId id) const;
   /// Throws: Error on damage (checksum, counts), never a wrong point.
   void read(ClusterId id, ClusterPoints& out) const;
   /// Every cluster of `level` in order of ordinals; reads sequentially.

@@ -34,6 +34,10 @@ class Where {
   void test(std::span<const Point3> positions, std::span<const std::byte> records,
             std::span<std::uint8_t> matches) const;
 
+  /// Whether points in `box` (in the CRS) with attributes in these ranges may meet the condition;
+  /// false means that none does. attributes: one for each, or none, of which nothing is known then.
+  [[nodiscard]] bool possible(const Box3& box, std::span<const ValueRange> attributes) const;
+
  private:
   enum class Operation : std::uint8_t;
   struct Step {

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -75,6 +77,39 @@ struct Entry {
   std::uint64_t descendants = 0;               ///< levels above 0
   std::uint16_t checksum = 0;                  ///< CRC-16 of the bytes
 };
+
+/// The least and the greatest value of an attribute in a cluster, as unsigned integers in the order
+/// of the values (see attribute_key).
+struct KeyRange {
+  std::uint64_t low = UINT64_MAX, high = 0;
+};
+
+constexpr std::uint64_t attribute_key(std::int64_t value) {
+  return static_cast<std::uint64_t>(value) ^ std::uint64_t{1} << 63;
+}
+/// NaN lies beyond infinity of its sign.
+constexpr std::uint64_t attribute_key(double value) {
+  const auto bits = std::bit_cast<std::uint64_t>(value);
+  return bits >> 63 != 0 ? ~bits : bits | std::uint64_t{1} << 63;
+}
+constexpr double double_of_key(std::uint64_t key) {
+  return std::bit_cast<double>(key >> 63 != 0 ? key ^ std::uint64_t{1} << 63 : ~key);
+}
+
+/// The range in the attribute's own numbers: as a reader of the points computes them, so that
+/// rounding leaves none outside.
+inline ValueRange value_range(const Channel& channel, const KeyRange& keys) {
+  const bool floating = channel.type == ScalarType::f32 || channel.type == ScalarType::f64;
+  const auto value = [&](std::uint64_t key) {
+    if (floating) return double_of_key(key);
+    if (channel.type == ScalarType::u64) return static_cast<double>(key);
+    return static_cast<double>(static_cast<std::int64_t>(key ^ std::uint64_t{1} << 63));
+  };
+  const double ends[] = {value(keys.low) * channel.scale + channel.offset,
+                         value(keys.high) * channel.scale + channel.offset};
+  if (!(std::isfinite(ends[0]) && std::isfinite(ends[1]))) return {};
+  return {std::min(ends[0], ends[1]), std::max(ends[0], ends[1]), false};
+}
 
 /// An error as 16 bits, never rounded down: the upper bits of the double (5 of the mantissa).
 inline constexpr unsigned kErrorShift = 47;

@@ -80,14 +80,15 @@ void LevelReader::read_directory(std::uint64_t size) {
     std::uint64_t previous = 0;
     for (std::uint64_t p = 0; p < pages_; ++p) {
       directory_.push_back(in.get<std::uint64_t>());
-      if (directory_.back() < previous || directory_.back() - previous > kMostPageBytes ||
-          directory_.back() > start || (p == 0 && directory_[0] != 0)) {
+      if (directory_.back() < previous ||
+          directory_.back() - previous > most_page_bytes(ranges()) || directory_.back() > start ||
+          (p == 0 && directory_[0] != 0)) {
         throw Damage("the pages of the directory do not follow one another");
       }
       previous = directory_.back();
     }
     directory_.push_back(in.get<std::uint64_t>());
-    if (directory_.back() != start || start - previous > kMostPageBytes) {
+    if (directory_.back() != start || start - previous > most_page_bytes(ranges())) {
       throw Damage("the pages do not end where the directory begins");
     }
     const auto count = in.get<std::uint32_t>();
@@ -116,8 +117,10 @@ std::shared_ptr<const IndexPage> LevelReader::read_page(std::uint64_t number) co
   index_->read(start, std::as_writable_bytes(std::span(bytes)));
   try {
     return std::make_shared<const IndexPage>(
-        std::move(bytes), static_cast<std::uint32_t>(std::min<std::uint64_t>(
-                              kPageClusters, clusters_ - number * kPageClusters)));
+        std::move(bytes),
+        static_cast<std::uint32_t>(
+            std::min<std::uint64_t>(kPageClusters, clusters_ - number * kPageClusters)),
+        ranges());
   } catch (const Damage& damage) {
     throw damaged_file(*index_, start, damage.what());
   }
@@ -142,6 +145,14 @@ Entry LevelReader::entry(std::uint64_t ordinal, std::uint64_t& offset) const {
     return entry(*page, i);
   } catch (const Damage& damage) {
     throw damaged_file(*index_, directory_[ordinal / kPageClusters], damage.what());
+  }
+}
+
+void LevelReader::ranges(std::uint64_t ordinal, std::vector<KeyRange>& out) const {
+  const auto page = this->page(ordinal / kPageClusters);
+  out.clear();
+  for (std::size_t a = 0; a < ranges(); ++a) {
+    out.push_back(page->range(static_cast<std::uint32_t>(ordinal % kPageClusters), a));
   }
 }
 

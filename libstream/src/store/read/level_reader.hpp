@@ -71,6 +71,12 @@ class LevelReader {
   [[nodiscard]] Entry entry(std::uint64_t ordinal, std::uint64_t& offset) const;
   /// The entry of the i-th cluster of `page`, checked against the manifest. Throws: Damage.
   [[nodiscard]] Entry entry(const IndexPage& page, std::uint32_t i) const;
+  /// Attributes whose ranges the index has: none in version 1.
+  [[nodiscard]] std::size_t ranges() const {
+    return layout_.version > 1 ? layout_.attributes.size() : 0;
+  }
+  /// The ranges of a cluster that exists. Throws: Error.
+  void ranges(std::uint64_t ordinal, std::vector<KeyRange>& out) const;
   /// Throws: Error.
   void read(std::uint64_t ordinal, ReadSpace& space, ClusterPoints& out) const;
   /// `bytes`: of the cluster, padded. Its points lie in the entry's box and in the bounds of the

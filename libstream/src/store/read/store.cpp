@@ -102,6 +102,20 @@ ClusterRecord Store::record(ClusterId id) const {
   return record_of(entry, level_of(id), offset, level.top());
 }
 
+std::vector<ValueRange> Store::attribute_ranges(ClusterId id) const {
+  check_stop();
+  const LevelReader& level = impl_->level(level_of(id));
+  std::uint64_t offset = 0;
+  static_cast<void>(level.entry(ordinal_of(id), offset));
+  std::vector<KeyRange> keys;
+  level.ranges(ordinal_of(id), keys);
+  std::vector<ValueRange> ranges;
+  for (std::size_t a = 0; a < keys.size(); ++a) {
+    ranges.push_back(value_range(schema().attributes[a], keys[a]));
+  }
+  return ranges;
+}
+
 void Store::read(ClusterId id, ClusterPoints& out) const {
   check_stop();
   const LevelReader& level = impl_->level(level_of(id));

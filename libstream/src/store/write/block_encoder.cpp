@@ -247,6 +247,30 @@ Entry BlockEncoder::enter(std::size_t cluster) {
   return entry;
 }
 
+/// Of the present cluster's points.
+KeyRange BlockEncoder::range_of(std::size_t attribute) const {
+  if (members_.empty()) return {0, UINT64_MAX};
+  const std::vector<std::int64_t>& values = attributes_[attribute];
+  const ScalarType type = layout_->attributes[attribute];
+  if (type == ScalarType::u64) {
+    KeyRange range;
+    for (const std::uint32_t member : members_) {
+      const auto value = static_cast<std::uint64_t>(values[member]);
+      range = {std::min(range.low, value), std::max(range.high, value)};
+    }
+    return range;
+  }
+  std::int64_t low = INT64_MAX, high = INT64_MIN;
+  for (const std::uint32_t member : members_) {
+    low = std::min(low, values[member]);
+    high = std::max(high, values[member]);
+  }
+  if (!is_floating(type)) return {attribute_key(low), attribute_key(high)};
+  // Number forms keep the order, and NaN at its ends.
+  const NumberForm form = attribute_forms_[attribute];
+  return {attribute_key(to_double(low, form)), attribute_key(to_double(high, form))};
+}
+
 /// Codes the head and the places of the points; on a grid hands over to `heights`. Sets order_.
 template <class Use>
 void BlockEncoder::positions(SymbolEncoder& coder, const Columns& columns, Use&& heights) {
@@ -327,7 +351,7 @@ std::uint64_t BlockEncoder::count(const Predictor& predictor, const Columns& col
 }
 
 void BlockEncoder::encode(const EncodingTables& tables, bool sequence, Bytes& bytes,
-                          std::vector<Entry>& entries) {
+                          std::vector<Entry>& entries, std::vector<KeyRange>& ranges) {
   SymbolEncoder coder(tables.tables);
   const Columns columns{sequence, tables.kinds};
   for (std::size_t c = 0; c < block_->representatives.size(); ++c) {
@@ -348,6 +372,9 @@ void BlockEncoder::encode(const EncodingTables& tables, bool sequence, Bytes& by
       entry.checksum = crc16({bytes.data() + start, entry.bytes});
     }
     entries.push_back(entry);
+    for (std::size_t a = 0; layout_->version > 1 && a < attributes_.size(); ++a) {
+      ranges.push_back(range_of(a));
+    }
   }
 }
 

@@ -30,14 +30,15 @@ class BlockEncoder {
   /// ... and its symbols are counted. Returns the raw bits beside them.
   std::uint64_t count(const Predictor& predictor, const Columns& columns, Counts& counts);
 
-  /// Appends the clusters' bytes and entries.
+  /// Appends the clusters' bytes, entries and, attribute by attribute, ranges.
   void encode(const EncodingTables& tables, bool sequence, Bytes& bytes,
-              std::vector<Entry>& entries);
+              std::vector<Entry>& entries, std::vector<KeyRange>& ranges);
 
  private:
   void load_axis(std::size_t axis);
   void load_attributes();
   Entry enter(std::size_t cluster);
+  [[nodiscard]] KeyRange range_of(std::size_t attribute) const;
   template <class Use>
   void positions(SymbolEncoder& coder, const Columns& columns, Use&& heights);
   void encode_cluster(SymbolEncoder& coder, const Predictor& predictor, const Columns& columns);

@@ -47,9 +47,10 @@ std::uint64_t LevelWriter::append(PreparedBlock block, bool root) {
   if (block.raw != nullptr) {
     block.bytes.clear();
     block.entries.clear();
+    block.ranges.clear();
     const ClusteredBlock view = block.raw->view();
     encoder_.load(layout_, view);
-    encoder_.encode(tables_->encoding, tables_->sequence, block.bytes, block.entries);
+    encoder_.encode(tables_->encoding, tables_->sequence, block.bytes, block.entries, block.ranges);
   }
   write(block);
   return ordinal;
@@ -151,8 +152,10 @@ void LevelWriter::train() {
     const ClusteredBlock view = block.view();
     prepared.bytes.clear();
     prepared.entries.clear();
+    prepared.ranges.clear();
     encoder_.load(layout_, view);
-    encoder_.encode(tables_->encoding, tables_->sequence, prepared.bytes, prepared.entries);
+    encoder_.encode(tables_->encoding, tables_->sequence, prepared.bytes, prepared.entries,
+                    prepared.ranges);
     write(prepared);
   }
   held_.clear();
@@ -161,8 +164,13 @@ void LevelWriter::train() {
 
 void LevelWriter::write(const PreparedBlock& block) {
   data_.write(block.bytes);
-  for (const Entry& entry : block.entries) {
+  const std::size_t attributes = layout_.version > 1 ? layout_.attributes.size() : 0;
+  for (std::size_t i = 0; i < block.entries.size(); ++i) {
+    const Entry& entry = block.entries[i];
     page_.push_back(entry);
+    const auto ranges = block.ranges.begin() + static_cast<std::ptrdiff_t>(i * attributes);
+    page_ranges_.insert(page_ranges_.end(), ranges,
+                        ranges + static_cast<std::ptrdiff_t>(attributes));
     data_end_ += entry.bytes;
     points_ += entry.points;
     if (page_.size() == kPageClusters) write_full_page();
@@ -172,9 +180,12 @@ void LevelWriter::write(const PreparedBlock& block) {
 void LevelWriter::write_full_page() {
   put(directory_, index_.size());
   Bytes bytes;
-  write_page(page_, page_offset_, bytes);
+  write_page(page_,
+             layout_.version > 1 ? std::span(layout_.attributes) : std::span<const ScalarType>(),
+             page_ranges_, page_offset_, bytes);
   index_.write(bytes);
   page_.clear();
+  page_ranges_.clear();
   page_offset_ = data_end_;
 }
 

@@ -37,6 +37,7 @@ struct PreparedBlock {
   SharedTablesPtr tables;
   Bytes bytes;
   std::vector<Entry> entries;
+  std::vector<KeyRange> ranges;
   std::vector<ClusterSummary> summaries;
 };
 
@@ -86,6 +87,7 @@ class LevelWriter {
   std::uint64_t blocks_ = 0, clusters_ = 0, points_ = 0;
   std::uint64_t segment_start_ = 0;  ///< ordinal of the present segment's first cluster
   std::vector<Entry> page_;
+  std::vector<KeyRange> page_ranges_;
   std::uint64_t page_offset_ = 0, data_end_ = 0;
   Bytes directory_, table_bytes_;
   std::uint32_t table_count_ = 0;

@@ -91,7 +91,7 @@ StoreWriter::EncodedPtr StoreWriter::Impl::encode(const ClusteredBlock& block) {
     auto encoder = borrow();
     encoder->load(layout, block);
     encoder->encode(shared->encoding, shared->sequence, encoded->block.bytes,
-                    encoded->block.entries);
+                    encoded->block.entries, encoded->block.ranges);
     encoded->block.tables = shared;
     encoded->block.summaries.assign(block.summaries.begin(), block.summaries.end());
     give_back(std::move(encoder));

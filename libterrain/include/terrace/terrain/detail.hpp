@@ -26,7 +26,7 @@ struct Detail {
   unsigned level = 0;
   std::optional<Region> region;
   std::vector<FinerRegion> focuses;
-  /// Only points that meet this condition are wanted; clusters are, whatever they hold.
+  /// Only points that meet this condition are wanted.
   std::optional<stream::Where> where{};
   /// In units of the CRS: what lies so far outside polygons, but in the box around them, is wanted
   /// as well.
@@ -42,7 +42,8 @@ struct Detail {
 };
 
 /// Visits every cluster that `detail` wants, the root first, then level by level downward; within a
-/// level in order of ordinals. A wanted cluster's parent is always wanted as well.
+/// level in order of ordinals. A wanted cluster's parent is always wanted as well. Clusters of
+/// level 0 of which no point can meet the condition, by the ranges of its attributes, are left out.
 /// Memory: the ordinals of the wanted clusters of two levels where only a part is wanted; constant
 /// where a whole level is.
 /// Throws: stream::Error on a damaged store.
