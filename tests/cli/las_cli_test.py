@@ -490,6 +490,32 @@ class LasDataTest(LasCase):
         self.assertEqual(summary['points'] + summary['excluded'], 518862)
         self.assertLess(summary['points'], len(wanted))
 
+    def test_cloud_optimised_files_among_others(self):
+        """From a pipe and beside LAZ, where all share what is left out."""
+        copc = os.path.join(DATA, 'lidar', '1.2-with-color.copc.laz')
+        box = '636000,849500,637800,852000'
+        with open(copc, 'rb') as pipe:
+            data = pipe.read()
+        summaries = [json.loads(self.run_ok('convert', name, '-o', self.path('o.las'), '--force', '--json',
+                                            '--region', box, **more))
+                     for name, more in ((copc, {}), ('-', {'input': data}))]
+        inside, outside = summaries[0]['points'], summaries[0]['excluded']
+        self.assertEqual((summaries[1]['points'], summaries[1]['excluded']), (inside, outside))
+        self.assertEqual(inside + outside, 1065)
+        self.assertGreater(min(inside, outside), 100)
+        self.run_ok('convert', copc, '-o', self.path('plain.laz'))
+        both = json.loads(self.run_ok('build', copc, self.path('plain.laz'), '-o', self.path('both.st'), '--json',
+                                      '--region', box, '--crs', 'EPSG:2994'))
+        self.assertEqual((both['points'], both['excluded']), (2 * inside, 2 * outside))
+        self.assertIn('no octree', self.refused('convert', '-', '-o', self.path('p.las'), '--resolution', '1',
+                                                 input=data))
+        self.assertIn('plain.laz', self.refused('build', copc, self.path('plain.laz'), '-o', self.path('r.st'),
+                                                 '--resolution', '1', '--crs', 'EPSG:2994'))
+        # The header's box says that there is nothing to read.
+        away = json.loads(self.run_ok('convert', self.path('plain.laz'), '-o', self.path('none.csv'), '--json',
+                                      '--region', '0,0,1,1'))
+        self.assertEqual((away['points'], away['excluded']), (0, 1065))
+
     def test_damaged_files_end_at_once(self):
         folder = os.path.join(DATA, 'lidar', 'hostile')
         for name in sorted(os.listdir(folder)):

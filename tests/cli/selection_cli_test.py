@@ -108,6 +108,19 @@ class SelectionTest(unittest.TestCase):
         self.run_ok('points', self.path('r.st'), '-o', self.path('r2.csv'), '-q')
         self.expect('r2.csv', wanted, NAMES[:-1])
 
+    def test_region_of_a_raster_takes_the_cells_whose_centres_are_inside(self):
+        with open(self.path('r.asc'), 'w', encoding='ascii') as file:
+            file.write('ncols 40\nnrows 30\nxllcorner 0\nyllcorner 0\ncellsize 10\nNODATA_value -9\n')
+            for row in range(30):
+                file.write(' '.join(str(-9 if row == 20 else row * 40 + column) for column in range(40)) + '\n')
+        centres = [(column * 10 + 5, 295 - row * 10, row * 40 + column)
+                   for row in range(30) if row != 20 for column in range(40)]
+        wanted = sorted(c for c in centres if 95 <= c[0] <= 201 and 50 <= c[1] <= 165)
+        summary = json.loads(self.run_ok('convert', self.path('r.asc'), '-o', self.path('cells.csv'), '--json',
+                                         '--region', '95,50,201,165'))
+        self.assertEqual(self.rows('cells.csv')[1], wanted)
+        self.assertEqual((summary['nodata'], summary['excluded']), (40, len(centres) - len(wanted)))
+
     def test_points_of_a_store(self):
         self.run_ok('points', self.path('all.st'), '-o', self.path('p.csv'), '-q',
                     '--where', 'classification != 2', '--region', '100,100,400,500.5')
