@@ -2,6 +2,8 @@
 #include "format/las/laz_records.hpp"
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <string_view>
