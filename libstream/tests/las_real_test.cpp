@@ -126,8 +126,15 @@ TEST(LasReal, CompressedRecordsAreThoseLaszipDecodes) {
   while (table >> name >> std::dec >> points >> std::hex >> hash) {
     SCOPED_TRACE(name);
     ++seen;
-    EXPECT_EQ(fnv1a(records_through(folder / name, temp, 1)), hash);
-    EXPECT_EQ(fnv1a(records_through(folder / name, temp, 3)), hash);
+    std::filesystem::path file = folder / name;
+    if (name.ends_with(".copc.laz")) {
+      // Without the mark of COPC, which is read by its octree, it comes in the order of the file.
+      std::string bytes = read_text(file);
+      bytes.replace(377, 4, "none");
+      file = write_text(temp.path() / "plain.laz", bytes);
+    }
+    EXPECT_EQ(fnv1a(records_through(file, temp, 1)), hash);
+    EXPECT_EQ(fnv1a(records_through(file, temp, 3)), hash);
     // Compressed here, and as it comes from a pipe.
     const std::string laz = temp.path() / "copy.laz";
     copy_points(temp.path() / "copy.las", laz);

@@ -441,12 +441,80 @@ class LasDataTest(LasCase):
                         open(os.path.join(self.path('laz'), name), 'rb') as b:
                     self.assertEqual(a.read(), b.read())
 
-    def test_cloud_optimised_files_are_read_as_laz(self):
+    def test_cloud_optimised_files_are_read(self):
         copc = os.path.join(DATA, 'lidar', '1.2-with-color.copc.laz')
-        self.assertEqual(self.info(copc)['points'], 1065)
+        info = self.info(copc)
+        self.assertEqual((info['points'], info['format']), (1065, 'copc'))
         self.run_ok('build', copc, '-o', self.path('c.st'))
         self.run_ok('points', self.path('c.st'), '-o', self.path('c.laz'))
         self.assertEqual(self.info(self.path('c.laz'))['points'], 1065)
+
+    def test_region_and_resolution_of_cloud_optimised_files(self):
+        """The counts of the nodes are those that Python reads from the hierarchy."""
+        copc = os.path.join(DATA, 'lidar', 'lone-star.copc.laz')
+        with open(copc, 'rb') as file:
+            data = file.read()
+        spacing, offset, size = struct.unpack_from('<dQQ', data, 375 + 54 + 32)
+        pages, nodes = [(offset, size)], []
+        while pages:
+            offset, size = pages.pop()
+            for depth, _, _, _, at, count, points in struct.iter_unpack('<iiiiQii', data[offset:offset + size]):
+                if points == -1:
+                    pages.append((at, count))
+                elif points > 0:
+                    nodes.append((depth, points))
+        depths = max(depth for depth, _ in nodes) + 1
+        self.assertEqual(self.info(copc)['octree'], {'spacing': spacing, 'depths': depths, 'nodes': len(nodes)})
+        self.assertIn(b'octree: ', self.run_ok('info', copc))
+        for deepest in range(depths):
+            wanted = sum(points for depth, points in nodes if depth <= deepest)
+            summary = json.loads(self.run_ok('convert', copc, '-o', self.path('r.las'), '--force', '--json',
+                                             '--resolution', spacing / 2 ** deepest))
+            self.assertEqual((summary['points'], summary['excluded']), (wanted, 518862 - wanted))
+
+        box = (515375.0, 4918350.0, 515385.5, 4918360.25)
+        self.run_ok('convert', copc, '-o', self.path('all.csv'), '--keep', 'none')
+        with open(self.path('all.csv'), newline='', encoding='ascii') as file:
+            wanted = sorted(row for row in ([float(v) for v in row.values()] for row in csv.DictReader(file))
+                            if box[0] <= row[0] <= box[2] and box[1] <= row[1] <= box[3])
+        region = ','.join(map(str, box))
+        summary = json.loads(self.run_ok('convert', copc, '-o', self.path('part.csv'), '--keep', 'none', '--json',
+                                         '--region', region))
+        self.assertEqual(summary['excluded'], 518862 - len(wanted))
+        with open(self.path('part.csv'), newline='', encoding='ascii') as file:
+            found = sorted([float(v) for v in row.values()] for row in csv.DictReader(file))
+        self.assertGreater(len(found), 1000)
+        self.assertEqual(found, wanted)
+        summary = json.loads(self.run_ok('build', copc, '-o', self.path('part.st'), '--json', '--region', region,
+                                         '--resolution', spacing, '--crs', 'EPSG:32612'))
+        self.assertEqual(summary['points'] + summary['excluded'], 518862)
+        self.assertLess(summary['points'], len(wanted))
+
+    def test_cloud_optimised_files_among_others(self):
+        """From a pipe and beside LAZ, where all share what is left out."""
+        copc = os.path.join(DATA, 'lidar', '1.2-with-color.copc.laz')
+        box = '636000,849500,637800,852000'
+        with open(copc, 'rb') as pipe:
+            data = pipe.read()
+        summaries = [json.loads(self.run_ok('convert', name, '-o', self.path('o.las'), '--force', '--json',
+                                            '--region', box, **more))
+                     for name, more in ((copc, {}), ('-', {'input': data}))]
+        inside, outside = summaries[0]['points'], summaries[0]['excluded']
+        self.assertEqual((summaries[1]['points'], summaries[1]['excluded']), (inside, outside))
+        self.assertEqual(inside + outside, 1065)
+        self.assertGreater(min(inside, outside), 100)
+        self.run_ok('convert', copc, '-o', self.path('plain.laz'))
+        both = json.loads(self.run_ok('build', copc, self.path('plain.laz'), '-o', self.path('both.st'), '--json',
+                                      '--region', box, '--crs', 'EPSG:2994'))
+        self.assertEqual((both['points'], both['excluded']), (2 * inside, 2 * outside))
+        self.assertIn('no octree', self.refused('convert', '-', '-o', self.path('p.las'), '--resolution', '1',
+                                                 input=data))
+        self.assertIn('plain.laz', self.refused('build', copc, self.path('plain.laz'), '-o', self.path('r.st'),
+                                                 '--resolution', '1', '--crs', 'EPSG:2994'))
+        # The header's box says that there is nothing to read.
+        away = json.loads(self.run_ok('convert', self.path('plain.laz'), '-o', self.path('none.csv'), '--json',
+                                      '--region', '0,0,1,1'))
+        self.assertEqual((away['points'], away['excluded']), (0, 1065))
 
     def test_damaged_files_end_at_once(self):
         folder = os.path.join(DATA, 'lidar', 'hostile')

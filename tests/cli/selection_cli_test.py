@@ -96,6 +96,31 @@ class SelectionTest(unittest.TestCase):
         self.run_ok('convert', self.file, '-o', self.path('none.csv'), '--keep', 'none', '-q')
         self.expect('none.csv', lambda p: True, ['x', 'y', 'z'])
 
+    def test_region_of_what_is_read(self):
+        wanted = lambda p: 100 <= p['x'] <= 400 and 100 <= p['y'] <= 500.5 and 5 <= p['z'] <= 25
+        summary = json.loads(self.run_ok('convert', self.file, '-o', self.path('r.csv'), '--json',
+                                         '--region', '100,100,5,400,500.5,25'))
+        self.expect('r.csv', wanted, NAMES)
+        self.assertEqual(summary['excluded'], 20000 - sum(map(wanted, self.points)))
+        wanted = lambda p: 100 <= p['x'] <= 400 and 100 <= p['y'] <= 500.5 and p['red'] > 100
+        self.run_ok('build', self.file, '-o', self.path('r.st'), '-q', '--region', '100,100,400,500.5',
+                    '--where', 'red > 100', '--drop', 'green')
+        self.run_ok('points', self.path('r.st'), '-o', self.path('r2.csv'), '-q')
+        self.expect('r2.csv', wanted, NAMES[:-1])
+
+    def test_region_of_a_raster_takes_the_cells_whose_centres_are_inside(self):
+        with open(self.path('r.asc'), 'w', encoding='ascii') as file:
+            file.write('ncols 40\nnrows 30\nxllcorner 0\nyllcorner 0\ncellsize 10\nNODATA_value -9\n')
+            for row in range(30):
+                file.write(' '.join(str(-9 if row == 20 else row * 40 + column) for column in range(40)) + '\n')
+        centres = [(column * 10 + 5, 295 - row * 10, row * 40 + column)
+                   for row in range(30) if row != 20 for column in range(40)]
+        wanted = sorted(c for c in centres if 95 <= c[0] <= 201 and 50 <= c[1] <= 165)
+        summary = json.loads(self.run_ok('convert', self.path('r.asc'), '-o', self.path('cells.csv'), '--json',
+                                         '--region', '95,50,201,165'))
+        self.assertEqual(self.rows('cells.csv')[1], wanted)
+        self.assertEqual((summary['nodata'], summary['excluded']), (40, len(centres) - len(wanted)))
+
     def test_points_of_a_store(self):
         self.run_ok('points', self.path('all.st'), '-o', self.path('p.csv'), '-q',
                     '--where', 'classification != 2', '--region', '100,100,400,500.5')
@@ -117,9 +142,13 @@ class SelectionTest(unittest.TestCase):
         for args, code, text in (
                 (['build', self.file, '-o', self.path('e.st'), '--where', 'klass == 2'], 1, "no 'klass'; known are x, y, z, classification"),
                 (['build', self.file, '-o', self.path('e.st'), '--where', 'classification = 2'], 1, 'for equality write =='),
-                (['build', self.file, '-o', self.path('e.st'), '--where', 'z > 1000'], 1, 'none of its 20000 points meets the condition; give another --where'),
+                (['build', self.file, '-o', self.path('e.st'), '--where', 'z > 1000'], 1, 'none of its 20000 points is selected; give another --where or --region'),
                 (['build', self.file, '-o', self.path('e.st'), '--keep', 'blue'], 1, "no attribute 'blue'"),
                 (['convert', self.file, '-o', self.path('e.csv'), '--drop', 'red,,green'], 2, 'a name is empty'),
+                (['build', self.file, '-o', self.path('e.st'), '--region', '-9,-9,-8,-8'], 1, 'none of its 20000 points is selected'),
+                (['build', self.file, '-o', self.path('e.st'), '--region', '1,2,3'], 2, 'minx,miny,maxx,maxy'),
+                (['convert', self.file, '-o', self.path('e.csv'), '--resolution', '1'], 1, 'has no octree'),
+                (['convert', self.file, '-o', self.path('e.csv'), '--resolution', '0'], 2, '--resolution'),
                 (['mesh', self.path('all.st'), '-o', self.path('e.ply'), '--where', 'z > 1'], 2, '--max-error'),
                 (['points', self.path('all.st'), '-o', self.path('e.csv'), '--near', '1,2', '-k', '3', '--where', 'z > 1'], 2, 'without --where')):
             with self.subTest(args=args):

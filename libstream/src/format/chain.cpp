@@ -56,6 +56,7 @@ class Chain final : public PointSource {
       if (i == 0) {
         info_ = info;
         info_.bounds.reset();
+        info_.octree.reset();
       } else {
         check_agreement(info_, info);
         info_.files.push_back(part.file);
@@ -91,7 +92,9 @@ class Chain final : public PointSource {
         delivered_ += block.size();
         return true;
       }
-      withheld_ += part.source->progress().withheld;
+      const Progress progress = part.source->progress();
+      withheld_ += progress.withheld;
+      excluded_ += progress.excluded;
       done_bytes_ += part.bytes;
       part.source.reset();
     }
@@ -100,13 +103,17 @@ class Chain final : public PointSource {
   }
 
   Progress progress() const override {
-    Progress progress{.points = delivered_, .withheld = withheld_};
+    Progress progress{.points = delivered_, .withheld = withheld_, .excluded = excluded_};
     if (turn_ == parts_.size()) {
       progress.fraction = 1.0;
       return progress;
     }
     const Part& part = parts_[turn_];
-    if (part.source) progress.withheld += part.source->progress().withheld;
+    if (part.source) {
+      const Progress inside = part.source->progress();
+      progress.withheld += inside.withheld;
+      progress.excluded += inside.excluded;
+    }
     if (sizes_known_ && total_bytes_ > 0) {
       const double inside = part.source ? part.source->progress().fraction : 0.0;
       progress.fraction =
@@ -128,7 +135,7 @@ class Chain final : public PointSource {
   SourceInfo info_;
   std::vector<Part> parts_;
   std::size_t turn_ = 0;
-  std::uint64_t delivered_ = 0, withheld_ = 0, done_bytes_ = 0, total_bytes_ = 0;
+  std::uint64_t delivered_ = 0, withheld_ = 0, excluded_ = 0, done_bytes_ = 0, total_bytes_ = 0;
   bool sizes_known_ = true;
 };
 

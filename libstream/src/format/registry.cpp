@@ -132,6 +132,12 @@ std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
                  .cause = "is " + format.name + ", whose heights are no colours",
                  .remedy = "leave `heights_of_colour` out"});
   }
+  if (options.selection.resolution > 0 && format.name != las_format().name) {
+    throw Error({.file = files.front(),
+                 .where = {},
+                 .cause = "is " + format.name + ", which has no octree to read to a resolution",
+                 .remedy = "name a COPC file, or leave `resolution` out"});
+  }
   return selection_of(format.open(files, options), options);
 }
 

@@ -24,8 +24,9 @@ class SelectedSource final : public PointSource {
     const SourceInfo& all = source_->info();
     const Selection& wanted = options.selection;
     info_ = all;
-    if (!wanted.where.empty()) {
-      where_.emplace(wanted.where, all);
+    region_ = wanted.region;
+    if (!wanted.where.empty()) where_.emplace(wanted.where, all);
+    if (where_ || region_) {
       if (!all.grid) info_.points.reset();
       for (std::size_t i = 0; i < all.attributes.size(); ++i) {
         if (all.attributes[i].name == "withheld" && size_of(all.attributes[i].type) == 1) {
@@ -85,9 +86,9 @@ class SelectedSource final : public PointSource {
   Progress progress() const override {
     Progress progress = source_->progress();
     progress.points = delivered_;
-    if (where_) {
+    if (where_ || region_) {
       progress.withheld = withheld_;
-      progress.excluded = excluded_;
+      progress.excluded += excluded_;
     }
     return progress;
   }
@@ -121,6 +122,11 @@ class SelectedSource final : public PointSource {
     const std::size_t from_bytes = source_->info().payload_size(), to_bytes = info_.payload_size();
     matches_.assign(read_.size(), 1);
     if (where_) where_->test(read_.positions, read_.payload, matches_);
+    if (region_) {
+      for (std::size_t i = 0; i < read_.size(); ++i) {
+        if (!region_->contains(world_point(source_->info(), read_.positions[i]))) matches_[i] = 0;
+      }
+    }
     const std::size_t before = block.payload.size();
     block.payload.resize(before + read_.size() * to_bytes);
     std::byte* to = block.payload.data() + before;
@@ -147,6 +153,7 @@ class SelectedSource final : public PointSource {
   std::size_t block_points_;
   SourceInfo info_;
   std::optional<Where> where_;
+  std::optional<Box3> region_;
   std::vector<Piece> pieces_;
   std::optional<std::size_t> withheld_attribute_;
   PointBlock read_, rest_;
@@ -159,7 +166,7 @@ class SelectedSource final : public PointSource {
 std::unique_ptr<PointSource> selection_of(std::unique_ptr<PointSource> source,
                                           const SourceOptions& options) {
   const Selection& wanted = options.selection;
-  if (wanted.where.empty() && !wanted.keep && wanted.drop.empty()) return source;
+  if (wanted.where.empty() && !wanted.keep && wanted.drop.empty() && !wanted.region) return source;
   return std::make_unique<SelectedSource>(std::move(source), options);
 }
 

@@ -307,15 +307,14 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
     throw stream::Error(
         {.file = request.inputs.front(),
          .where = {},
-         .cause =
-             so_far.excluded > 0
-                 ? "none of its " + std::to_string(so_far.excluded) + " points meets the condition"
-                 : "there is not one point with data in it" +
-                       (so_far.nodata == 0
-                            ? std::string()
-                            : " (" + std::to_string(so_far.nodata) + " cells, all nodata)"),
-         .remedy =
-             so_far.excluded > 0 ? "give another `where`" : "check the file and its nodata value"});
+         .cause = so_far.excluded > 0
+                      ? "none of its " + std::to_string(so_far.excluded) + " points is selected"
+                      : "there is not one point with data in it" +
+                            (so_far.nodata == 0
+                                 ? std::string()
+                                 : " (" + std::to_string(so_far.nodata) + " cells, all nodata)"),
+         .remedy = so_far.excluded > 0 ? "give another `where` or `region`"
+                                       : "check the file and its nodata value"});
   }
   writer.set_nodata(so_far.nodata);
   const cluster::HierarchyResult result = builder.finish();

@@ -10,7 +10,7 @@ namespace terrace::tools {
 namespace {
 
 /// Parameter and option. tests/layout checks that all parameters that libterrain names are here.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 28> kOptions{{
+constexpr std::array<std::pair<std::string_view, std::string_view>, 29> kOptions{{
     {"block_points", "--block"},
     {"cell", "--cell"},
     {"crs", "--crs"},
@@ -30,6 +30,7 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 28> kOptions
     {"near", "--near"},
     {"region", "--region"},
     {"replace", "--force"},
+    {"resolution", "--resolution"},
     {"resume", "--resume"},
     {"shift", "--towgs84"},
     {"threads", "--threads"},

@@ -108,6 +108,11 @@ Summary info_of_file(const std::string& path, stream::HeightsOfColour colours,
   json["points"] = contents.points;
   json["nodata"] = contents.nodata;
   if (contents.withheld > 0) json["withheld"] = contents.withheld;
+  if (info.octree) {
+    json["octree"] = {{"spacing", info.octree->spacing},
+                      {"depths", info.octree->depths},
+                      {"nodes", info.octree->nodes}};
+  }
   json["levels"] = nlohmann::ordered_json::array();
   json["bounds"] = json_of(contents.world);
   json["crs"] = json_of(crs.crs);
@@ -148,6 +153,11 @@ Summary info_of_file(const std::string& path, stream::HeightsOfColour colours,
             (info.nodata ? ", value " + number_text(*info.nodata) : std::string()) + '\n';
   }
   text += "points:    " + with_commas(contents.points) + '\n';
+  if (info.octree) {
+    text += "octree:    " + with_commas(info.octree->nodes) + " nodes of " +
+            std::to_string(info.octree->depths) + " depths, the root's points " +
+            readable_number(info.octree->spacing, 6) + " apart\n";
+  }
   if (contents.withheld > 0) {
     text += "withheld:  " + with_commas(contents.withheld) + " of them\n";
   }

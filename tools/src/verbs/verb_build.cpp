@@ -118,7 +118,7 @@ class BuildCommand final : public Command {
         with_commas(outcome.points) + " points (" + with_commas(outcome.nodata) +
         " cells without data left out" +
         (outcome.excluded > 0
-             ? ", " + with_commas(outcome.excluded) + " points that do not meet --where too"
+             ? ", " + with_commas(outcome.excluded) + " points that were not selected too"
              : "") +
         ") in " + readable_seconds(seconds) + ", " + readable_rate(rate) + "\n" + output_ + ": " +
         std::to_string(outcome.top + 1) + " levels, " + readable_bytes(outcome.store_bytes) +

@@ -81,7 +81,7 @@ class ConvertCommand : public Command {
                     {"peak_rss_bytes", peak_rss_bytes()}};
     const std::uint64_t excluded = source->progress().excluded;
     summary.text = output_ + ": " + with_commas(writer->points()) + " points" +
-                   (excluded > 0 ? " (" + with_commas(excluded) + " do not meet --where)" : "") +
+                   (excluded > 0 ? " (" + with_commas(excluded) + " were not selected)" : "") +
                    ", " + readable_seconds(watch.seconds()) + '\n';
     tell_rounding(*writer, summary);
     return summary;

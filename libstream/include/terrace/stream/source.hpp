@@ -15,6 +15,13 @@
 
 namespace terrace::stream {
 
+/// The octree in which a file's points lie (COPC): its nodes down to a depth are a thinned cloud.
+struct OctreeInfo {
+  double spacing = 0.0;     ///< distance of the root's points, in the CRS; halves with each depth
+  unsigned depths = 0;      ///< depths that have points among the nodes to be read; the root's is 0
+  std::uint64_t nodes = 0;  ///< with points, to be read
+};
+
 /// What is known of a source before its first point.
 struct SourceInfo : Schema {
   std::string format;                   ///< "geotiff", "xyz", "ply", ...
@@ -22,6 +29,7 @@ struct SourceInfo : Schema {
   std::optional<Box3> bounds;           ///< in stored coordinates, if known beforehand
   std::optional<std::uint64_t> points;  ///< number of points if known; for rasters an upper bound
   std::optional<double> nodata;         ///< of the (first) raster, raw units
+  std::optional<OctreeInfo> octree;     ///< of a single file whose points lie in one
   std::vector<std::string> comments;
 };
 
@@ -47,8 +55,9 @@ struct Progress {
   std::uint64_t nodata = 0;  ///< cells without data, left out
   /// Points among them that their file marks as withheld (LAS): they are delivered like all others.
   std::uint64_t withheld = 0;
-  std::uint64_t excluded = 0;  ///< points that did not meet Selection::where
-  double fraction = 0.0;       ///< of the work, 0 to 1; 0 if unknown
+  /// Points left out by Selection::where, region and resolution, whether they were read or not.
+  std::uint64_t excluded = 0;
+  double fraction = 0.0;  ///< of the work, 0 to 1; 0 if unknown
 };
 
 /// A stream of points, pulled block by block. Bounded memory; never seeks backwards through what it
@@ -80,6 +89,12 @@ struct Selection {
   /// all of them.
   std::optional<std::vector<std::string>> keep{};
   std::vector<std::string> drop{};  ///< names of attributes to leave out
+  /// Points outside of this box, in the source's CRS, are left out; without heights its z are
+  /// infinite. COPC, and LAS whose header lies outside, are read only as far as needed.
+  std::optional<Box3> region{};
+  /// Above 0: points of an octree's nodes down to the first depth whose spacing is at most this, in
+  /// units of the CRS. Formats without an octree are refused.
+  double resolution = 0.0;
 };
 
 /// How the colours of a PNG mean heights in metres, where R, G, B are 0 to 255:

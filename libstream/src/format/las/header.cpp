@@ -7,6 +7,7 @@
 #include <span>
 #include <utility>
 
+#include "format/copc/octree.hpp"
 #include "format/geotiff/keys.hpp"
 #include "format/geotiff/tags.hpp"
 #include "format/las/fields.hpp"
@@ -41,6 +42,7 @@ std::string text_of_field(const char* at, std::size_t bytes) {
 
 /// Whether a record tells something that is used here.
 bool is_used(const LasVlr& record) {
+  if (record.is(kCopcUser, kCopcInfo)) return true;
   if (record.is(kLasSpec, kLasExtraBytes) || record.is(laz::Vlr::kUserId, laz::Vlr::kRecordId))
     return true;
   // libLAS wrote WKT under its own name.
@@ -203,6 +205,8 @@ LasHeader read_las_header(Input& input, const std::string& file,
   for (std::size_t axis = 0; axis < 3; ++axis) {
     header.scale[axis] = load_little_endian<double>(at + 131 + 8 * axis);
     header.offset[axis] = load_little_endian<double>(at + 155 + 8 * axis);
+    header.bounds.max[axis] = load_little_endian<double>(at + 179 + 16 * axis);
+    header.bounds.min[axis] = load_little_endian<double>(at + 187 + 16 * axis);
   }
   std::uint64_t evlr_offset = 0;
   std::uint32_t evlrs = 0;

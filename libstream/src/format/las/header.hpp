@@ -44,6 +44,7 @@ struct LasHeader {
   std::size_t record_bytes = 0;
   std::uint64_t points = 0, points_offset = 0;
   std::array<double, 3> scale{}, offset{};
+  Box3 bounds;               ///< in the CRS, as the writer says
   std::vector<LasVlr> vlrs;  ///< those that are used here, EVLRs too where they can be reached
   /// There are EVLRs, but the input is a pipe.
   bool unread_evlrs = false;

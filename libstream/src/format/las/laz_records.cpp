@@ -2,19 +2,15 @@
 #include "format/las/laz_records.hpp"
 
 #include <algorithm>
-#include <cassert>
-#include <condition_variable>
-#include <cstring>
-#include <exception>
-#include <mutex>
+#include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <string_view>
-#include <system_error>
-#include <thread>
 #include <utility>
 #include <vector>
 
+#include "format/las/laz_chunks.hpp"
 #include "io/bytes.hpp"
 #include "io/peek.hpp"
 #include "terrace/stream/byte_source.hpp"
@@ -27,24 +23,6 @@ namespace {
 /// The position of the chunk table, which precedes the first chunk.
 constexpr std::size_t kPositionBytes = sizeof(std::int64_t);
 
-[[noreturn]] void fail_at(const std::string& file, std::string where, std::string cause) {
-  throw Error({.file = file,
-               .where = std::move(where),
-               .cause = std::move(cause),
-               .remedy = "the file is damaged: get it anew"});
-}
-[[noreturn]] void fail_chunk(const std::string& file, std::uint64_t chunk, std::uint64_t byte,
-                             const std::string& cause) {
-  fail_at(file, "chunk " + std::to_string(chunk) + ", byte " + std::to_string(byte), cause);
-}
-
-/// What is known of a file's chunks before they are read.
-struct LazLayout {
-  laz::Vlr vlr;
-  std::vector<laz::Chunk> chunks{};  ///< empty without a table
-  std::uint64_t first = 0;           ///< byte of the first chunk
-};
-
 laz::Vlr laz_vlr(const LasHeader& header, const std::string& name) {
   for (const LasVlr& record : header.vlrs) {
     if (!record.is(laz::Vlr::kUserId, laz::Vlr::kRecordId)) continue;
@@ -52,10 +30,10 @@ laz::Vlr laz_vlr(const LasHeader& header, const std::string& name) {
       return laz::Vlr::parse(std::as_bytes(std::span(record.data)), header.point_format,
                              header.record_bytes);
     } catch (const laz::Corrupt& error) {
-      fail_at(name, "header", error.what());
+      fail_laz(name, "header", error.what());
     }
   }
-  fail_at(name, "header", "its points are compressed, but the VLR that tells how is missing");
+  fail_laz(name, "header", "its points are compressed, but the VLR that tells how is missing");
 }
 
 /// The chunks as the file's table lists them; empty if its writer left the table out.
@@ -75,8 +53,8 @@ std::vector<laz::Chunk> read_table(const ByteSource& file, const LazLayout& layo
   if (at == ~std::uint64_t{0}) at = number_at(file.size() - kPositionBytes);
   if (at == position_at) return {};
   if (at < layout.first || at > file.size() || file.size() - at < kHeadBytes) {
-    fail_at(file.name(), "byte " + std::to_string(position_at),
-            "the chunk table lies outside of the file");
+    fail_laz(file.name(), "byte " + std::to_string(position_at),
+             "the chunk table lies outside of the file");
   }
   // An entry takes 12 bytes at the most; what else the file has may follow the table.
   const std::uint64_t chunks = number_at(at) >> 32;
@@ -85,7 +63,7 @@ std::vector<laz::Chunk> read_table(const ByteSource& file, const LazLayout& layo
   try {
     return laz::read_chunk_table(table, layout.vlr, points, at - layout.first);
   } catch (const laz::Corrupt& error) {
-    fail_at(file.name(), "byte " + std::to_string(at + error.offset()), error.what());
+    fail_laz(file.name(), "byte " + std::to_string(at + error.offset()), error.what());
   }
 }
 
@@ -197,149 +175,6 @@ class LazInTurn final : public RecordReader {
   std::optional<std::uint64_t> chunk_bytes_;  ///< of it, if known
 };
 
-/// Chunks decoded by several threads, a few ahead of the one that is being read.
-class LazAhead final : public RecordReader {
- public:
-  /// Takes `slots` times a chunk's bytes and records, and a decoder's models per thread.
-  LazAhead(std::unique_ptr<ByteSource> file, LazLayout layout, unsigned threads, std::size_t slots)
-      : file_(std::move(file)),
-        layout_(std::move(layout)),
-        record_bytes_(layout_.vlr.record_length()),
-        wanted_threads_(threads),
-        slots_(slots) {}
-  ~LazAhead() override {
-    {
-      const std::lock_guard lock(mutex_);
-      stop_ = true;
-    }
-    room_.notify_all();
-    for (std::thread& thread : threads_) thread.join();
-  }
-  LazAhead(const LazAhead&) = delete;
-  LazAhead& operator=(const LazAhead&) = delete;
-
-  std::string_view read(std::uint64_t wanted) override {
-    if (!started_) start();
-    Slot* slot = &slots_[reading_ % slots_.size()];
-    if (at_ == slot->records.size() && at_ > 0) {
-      release(*slot);
-      slot = &slots_[reading_ % slots_.size()];
-    }
-    if (at_ == 0) wait_for(*slot);
-    const std::size_t bytes = static_cast<std::size_t>(
-        std::min<std::uint64_t>(wanted, (slot->records.size() - at_) / record_bytes_) *
-        record_bytes_);
-    const std::string_view found(reinterpret_cast<const char*>(slot->records.data()) + at_, bytes);
-    at_ += bytes;
-    return found;
-  }
-
- private:
-  struct Slot {
-    std::vector<std::byte> coded, records;
-    std::exception_ptr error;
-    bool ready = false;
-  };
-
-  /// Only when records are asked for: files are opened to be looked at, too.
-  void start() {
-    started_ = true;
-    try {
-      for (unsigned i = 0; i < wanted_threads_; ++i) threads_.emplace_back([this] { run(); });
-    } catch (const std::system_error&) {
-      // The system grants no more threads; without any the caller decodes.
-      if (threads_.empty()) own_.emplace(layout_.vlr);
-    }
-  }
-
-  void release(Slot& slot) {
-    {
-      const std::lock_guard lock(mutex_);
-      slot.ready = false;
-      ++reading_;
-    }
-    at_ = 0;
-    room_.notify_all();
-  }
-
-  void wait_for(Slot& slot) {
-    if (own_) {
-      decode(reading_, slot, *own_);
-    } else {
-      std::unique_lock lock(mutex_);
-      news_.wait(lock, [&slot] { return slot.ready; });
-    }
-    if (slot.error) std::rethrow_exception(slot.error);
-  }
-
-  void run() {
-    std::optional<laz::Decoder> decoder;
-    for (;;) {
-      std::size_t chunk = 0;
-      {
-        std::unique_lock lock(mutex_);
-        room_.wait(lock, [this] {
-          return stop_ || (next_ < layout_.chunks.size() && next_ < reading_ + slots_.size());
-        });
-        if (stop_) return;
-        chunk = next_++;
-      }
-      Slot& slot = slots_[chunk % slots_.size()];
-      try {
-        if (!decoder) decoder.emplace(layout_.vlr);
-        decode(chunk, slot, *decoder);
-      } catch (...) {
-        slot.error = std::current_exception();
-      }
-      {
-        const std::lock_guard lock(mutex_);
-        slot.ready = true;
-      }
-      news_.notify_one();
-    }
-  }
-
-  void decode(std::size_t number, Slot& slot, laz::Decoder& decoder) const {
-    const laz::Chunk& chunk = layout_.chunks[number];
-    slot.coded.resize(chunk.bytes);
-    slot.records.resize(chunk.points * record_bytes_);
-    file_->read(layout_.first + chunk.offset, slot.coded);
-    try {
-      decoder.decode_chunk(slot.coded, slot.records);
-    } catch (const laz::Corrupt& error) {
-      fail_chunk(file_->name(), number, layout_.first + chunk.offset + error.offset(),
-                 error.what());
-    }
-  }
-
-  std::unique_ptr<ByteSource> file_;
-  LazLayout layout_;
-  std::size_t record_bytes_;
-  unsigned wanted_threads_;
-  bool started_ = false;
-  std::vector<Slot> slots_;
-  std::optional<laz::Decoder> own_;
-  std::size_t at_ = 0;  ///< bytes of the chunk being read
-
-  std::mutex mutex_;
-  std::condition_variable news_, room_;
-  std::size_t reading_ = 0, next_ = 0;  ///< chunks
-  bool stop_ = false;
-  std::vector<std::thread> threads_;
-};
-
-/// How many chunks may be in memory at once.
-std::size_t slots_within(std::uint64_t memory_bytes, const LazLayout& layout, unsigned threads) {
-  constexpr std::uint64_t kDecoderBytes = 4u << 20, kMostBytes = 64u << 20;
-  memory_bytes = std::min(memory_bytes, kMostBytes);
-  std::uint64_t largest = 1;
-  for (const laz::Chunk& chunk : layout.chunks) {
-    largest = std::max(largest, chunk.bytes + chunk.points * layout.vlr.record_length());
-  }
-  const std::uint64_t room = memory_bytes / (largest + kDecoderBytes);
-  return static_cast<std::size_t>(std::min<std::uint64_t>(room, threads + 2));
-}
-
 }  // namespace
 
 std::unique_ptr<RecordReader> open_laz_records(Input& input, const std::string& file,
@@ -356,12 +191,7 @@ std::unique_ptr<RecordReader> open_laz_records(Input& input, const std::string& 
     if (is_rereadable(file)) {
       auto bytes = open_file(file);
       layout.chunks = read_table(*bytes, layout, header.points);
-      const std::size_t slots = slots_within(options.memory_bytes, layout, options.threads);
-      if (options.threads > 1 && slots > 1 && layout.chunks.size() > 1) {
-        const auto threads = static_cast<unsigned>(
-            std::min<std::size_t>({options.threads, slots, layout.chunks.size()}));
-        return std::make_unique<LazAhead>(std::move(bytes), std::move(layout), threads, slots);
-      }
+      if (auto reader = chunks_ahead(bytes, layout, options)) return reader;
     }
     const bool told_by_table = layout.vlr.chunk_size == laz::Vlr::kVariable &&
                                layout.vlr.compressor != laz::Compressor::layered;
@@ -377,6 +207,20 @@ std::unique_ptr<RecordReader> open_laz_records(Input& input, const std::string& 
     }
   }
   return std::make_unique<LazInTurn>(input, std::move(layout), header.points);
+}
+
+std::unique_ptr<RecordReader> open_laz_nodes(std::unique_ptr<ByteSource> file,
+                                             const LasHeader& header, const CopcOctree& octree,
+                                             const SourceOptions& options) {
+  LazLayout layout{.vlr = laz_vlr(header, file->name())};
+  if (layout.vlr.compressor != laz::Compressor::layered) {
+    fail_laz(file->name(), "header", "its points are not coded in layers, as those of COPC are");
+  }
+  for (const CopcNode& node : octree.nodes) {
+    layout.chunks.push_back({.offset = node.offset, .bytes = node.bytes, .points = node.points});
+  }
+  if (auto reader = chunks_ahead(file, layout, options)) return reader;
+  return chunks_one_by_one(std::move(file), std::move(layout));
 }
 
 }  // namespace terrace::stream

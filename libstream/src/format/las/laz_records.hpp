@@ -5,8 +5,10 @@
 #include <memory>
 #include <string>
 
+#include "format/copc/octree.hpp"
 #include "format/las/header.hpp"
 #include "format/las/record_reader.hpp"
+#include "terrace/stream/byte_source.hpp"
 #include "terrace/stream/input.hpp"
 #include "terrace/stream/source.hpp"
 
@@ -19,5 +21,10 @@ namespace terrace::stream {
 std::unique_ptr<RecordReader> open_laz_records(Input& input, const std::string& file,
                                                const LasHeader& header,
                                                const SourceOptions& options);
+
+/// The records of the octree's nodes, in its order. Throws: Error as open_laz_records().
+std::unique_ptr<RecordReader> open_laz_nodes(std::unique_ptr<ByteSource> file,
+                                             const LasHeader& header, const CopcOctree& octree,
+                                             const SourceOptions& options);
 
 }  // namespace terrace::stream

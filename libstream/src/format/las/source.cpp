@@ -15,12 +15,15 @@
 #include <vector>
 
 #include "format/chain.hpp"
+#include "format/copc/octree.hpp"
 #include "format/formats.hpp"
 #include "format/las/fields.hpp"
 #include "format/las/header.hpp"
 #include "format/las/laz_records.hpp"
 #include "format/las/record_reader.hpp"
 #include "format/packed_column.hpp"
+#include "io/peek.hpp"
+#include "terrace/stream/byte_source.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/input.hpp"
 
@@ -39,7 +42,6 @@ class LasSource final : public PointSource {
         block_points_(options.block_points) {
     info_.format = header_.compressed ? "laz" : "las";
     info_.files = {file};
-    info_.points = header_.points;
     if (options.crs) {
       info_.crs = *options.crs;
     } else {
@@ -55,18 +57,14 @@ class LasSource final : public PointSource {
     info_.coordinates[2].offset = header_.offset[2];
     make_fields();
     if (first != nullptr) move_onto(*first);
-    if (header_.compressed) {
-      records_ = open_laz_records(input_, file, header_, options);
-    } else {
-      records_ = std::make_unique<PlainRecords>(input_, header_.record_bytes);
-    }
+    open_records(file, options);
   }
 
   const SourceInfo& info() const override { return info_; }
 
   bool next(PointBlock& block) override {
     const auto wanted = static_cast<std::size_t>(
-        std::min<std::uint64_t>(block_points_, header_.points - delivered_));
+        std::min<std::uint64_t>(block_points_, wanted_points_ - delivered_));
     block.positions.resize(wanted);
     block.payload.resize(wanted * payload_bytes_);
     for (std::size_t done = 0; done < wanted;) done += unpack(block, done, wanted - done);
@@ -80,9 +78,10 @@ class LasSource final : public PointSource {
     return {.points = delivered_,
             .nodata = 0,
             .withheld = withheld_,
-            .fraction = header_.points == 0 ? 1.0
+            .excluded = header_.points - wanted_points_,
+            .fraction = wanted_points_ == 0 ? 1.0
                                             : static_cast<double>(delivered_) /
-                                                  static_cast<double>(header_.points)};
+                                                  static_cast<double>(wanted_points_)};
   }
 
   std::uint64_t reading_bytes() const override { return records_->held_bytes(); }
@@ -93,6 +92,67 @@ class LasSource final : public PointSource {
                  .where = std::move(where),
                  .cause = std::move(cause),
                  .remedy = std::move(remedy)});
+  }
+
+  /// Those that the selection needs, as far as the file can tell.
+  void open_records(const std::string& file, const SourceOptions& options) {
+    const Selection& wanted = options.selection;
+    wanted_points_ = header_.points;
+    open_nodes(file, options);
+    if (!info_.octree) {
+      if (wanted.resolution > 0) {
+        fail("", "its points lie in no octree that could be read down to a resolution",
+             "name a COPC file, not piped, or leave `resolution` out");
+      }
+      if (wanted.region && lies_outside(*wanted.region)) wanted_points_ = 0;
+      if (header_.compressed) {
+        records_ = open_laz_records(input_, file, header_, options);
+      } else {
+        records_ = std::make_unique<PlainRecords>(input_, header_.record_bytes);
+      }
+    }
+    info_.points = wanted_points_;
+  }
+
+  /// COPC, unless it comes from a pipe, is read node by node. Where its hierarchy is damaged, as by
+  /// programs that copy its VLRs to files of other points, it is a LAZ file like others.
+  void open_nodes(const std::string& file, const SourceOptions& options) {
+    const bool is_copc = header_.compressed && header_.minor == 4 && !header_.vlrs.empty() &&
+                         header_.vlrs.front().is(kCopcUser, kCopcInfo);
+    if (!is_copc || !is_rereadable(file)) return;
+    try {
+      std::unique_ptr<ByteSource> bytes = open_file(file);
+      CopcOctree octree = read_copc_octree(*bytes, header_.vlrs.front().data, header_.points_offset,
+                                           header_.points);
+      octree.keep(options.selection.region, options.selection.resolution, header_.scale);
+      OctreeInfo facts{.spacing = octree.spacing, .nodes = octree.nodes.size()};
+      std::uint64_t points = 0;
+      for (const CopcNode& node : octree.nodes) {
+        points += node.points;
+        facts.depths = std::max(facts.depths, node.depth + 1);
+      }
+      records_ = open_laz_nodes(std::move(bytes), header_, octree, options);
+      wanted_points_ = points;
+      info_.octree = facts;
+      info_.format = "copc";
+    } catch (const Error& error) {
+      if (options.selection.resolution > 0) throw;
+      info_.comments.push_back("read in the order of the file: " + error.parts().cause);
+    }
+  }
+
+  /// Whether the header says that no point is in the region. Its box is not relied on where it is
+  /// empty, as writers leave it at 0; steps of the lattice make up for its rounding.
+  [[nodiscard]] bool lies_outside(const Box3& region) const {
+    const Box3& box = header_.bounds;
+    if (box.empty() || box.min == box.max) return false;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (box.min[axis] - header_.scale[axis] > region.max[axis] ||
+          box.max[axis] + header_.scale[axis] < region.min[axis]) {
+        return true;
+      }
+    }
+    return false;
   }
 
   void make_fields() {
@@ -203,7 +263,7 @@ class LasSource final : public PointSource {
   std::size_t payload_bytes_ = 0;
   std::unique_ptr<RecordReader> records_;
   std::size_t withheld_attribute_ = 0;
-  std::uint64_t delivered_ = 0, withheld_ = 0;
+  std::uint64_t wanted_points_ = 0, delivered_ = 0, withheld_ = 0;
   bool moved_ = false;
   Point3 shift_{};  ///< in steps of the lattice
 };

@@ -48,7 +48,7 @@ struct BuildRequest {
 struct BuildOutcome {
   std::uint64_t points = 0;
   std::uint64_t nodata = 0;
-  std::uint64_t excluded = 0;  ///< points that did not meet the condition of the selection
+  std::uint64_t excluded = 0;  ///< points that the selection left out
   std::uint64_t store_bytes = 0;
   stream::OrderedSource::Report order{};  ///< how the points came, and what it took to order them
   unsigned top = 0;

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "format/copc/octree.hpp"
+#include "fuzz_points.hpp"
+
+/// Any bytes are an octree or refused: 8 with the points that a header promises, the info VLR, and
+/// then the file that its page lies in.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace terrace::stream;
+  constexpr std::size_t kPointsBytes = 8, kInfoBytes = 160;
+  if (size < kPointsBytes + kInfoBytes) return 0;
+  std::uint64_t points = 0;
+  std::copy_n(data, kPointsBytes, reinterpret_cast<std::uint8_t*>(&points));
+  const std::string_view info(reinterpret_cast<const char*>(data) + kPointsBytes, kInfoBytes);
+  const auto* const begin = reinterpret_cast<const std::byte*>(data) + kPointsBytes + kInfoBytes;
+  std::vector<std::byte> bytes(begin, reinterpret_cast<const std::byte*>(data) + size);
+  const std::uint64_t file_bytes = bytes.size();
+  const auto file = bytes_in_memory("input", std::move(bytes));
+  try {
+    CopcOctree octree = read_copc_octree(*file, info, 0, points);
+    std::uint64_t found = 0, coded = 0;
+    for (const CopcNode& node : octree.nodes) {
+      found += node.points;
+      coded += node.bytes;
+      require(node.offset + node.bytes <= file_bytes, "nodes that lie in the file");
+    }
+    require(found == points, "the points of the header");
+    require(coded <= file_bytes, "nodes that share no bytes");
+    const std::size_t nodes = octree.nodes.size();
+    octree.keep({}, 0, {});
+    require(octree.nodes.size() == nodes, "all nodes without a wish");
+    octree.keep(Box3{{-1, -1, -1}, {1, 1, 1}}, octree.spacing, {});
+    require(octree.nodes.size() <= 1, "the root alone at its own spacing");
+  } catch (const Error&) {
+    // Refused, in words.
+  }
+  return 0;
+}

@@ -1,0 +1,266 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <limits>
+#include <random>
+#include <set>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "format/copc/octree.hpp"
+#include "las_files.hpp"
+#include "point_files.hpp"
+
+namespace terrace::stream {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+/// Where pages begin in the files made here, and the first chunk.
+constexpr std::uint64_t kFirstChunk = 100, kFirstPage = 1000;
+
+struct Entry {
+  std::int32_t depth = 0, x = 0, y = 0, z = 0;
+  std::uint64_t offset = 0;
+  std::int32_t bytes = 0, points = 0;
+};
+
+std::string page_of(const std::vector<Entry>& entries) {
+  std::string page(entries.size() * 32, '\0');
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    const Entry& e = entries[i];
+    const std::array<std::int32_t, 4> key{e.depth, e.x, e.y, e.z};
+    std::memcpy(page.data() + 32 * i, key.data(), 16);
+    put(page, 32 * i + 16, e.offset);
+    put(page, 32 * i + 24, e.bytes);
+    put(page, 32 * i + 28, e.points);
+  }
+  return page;
+}
+
+std::string info_of(std::uint64_t page_bytes, double half_size = 8, double spacing = 1) {
+  std::string info(160, '\0');
+  put(info, 24, half_size);
+  put(info, 32, spacing);
+  put(info, 40, kFirstPage);
+  put(info, 48, page_bytes);
+  return info;
+}
+
+/// The octree of a file that has these pages, one behind the other.
+CopcOctree octree_of(const std::vector<std::vector<Entry>>& pages, std::uint64_t points,
+                     const std::string& info = {}) {
+  std::string file(kFirstPage, '\0');
+  for (const std::vector<Entry>& page : pages) file += page_of(page);
+  std::vector<std::byte> bytes(file.size());
+  std::memcpy(bytes.data(), file.data(), file.size());
+  const auto source = bytes_in_memory("made", std::move(bytes));
+  return read_copc_octree(*source, info.empty() ? info_of(pages.front().size() * 32) : info,
+                          kFirstChunk, points);
+}
+
+std::string refusal_of(const std::vector<std::vector<Entry>>& pages, std::uint64_t points,
+                       const std::string& info = {}) {
+  return error_of([&] { static_cast<void>(octree_of(pages, points, info)); });
+}
+
+TEST(CopcOctree, NodesComeDepthFirstInMortonOrder) {
+  // The second page begins behind the four entries of the first.
+  const CopcOctree octree = octree_of({{{1, 1, 0, 0, 120, 10, 3},
+                                        {0, 0, 0, 0, 110, 10, 2},
+                                        {1, 0, 0, 1, 0, 0, 0},
+                                        {1, 0, 1, 0, kFirstPage + 128, 64, -1}},
+                                       {{1, 0, 1, 0, 130, 10, 4}, {2, 3, 1, 0, 140, 10, 5}}},
+                                      14);
+  std::vector<std::uint64_t> points;
+  for (const CopcNode& node : octree.nodes) points.push_back(node.points);
+  EXPECT_EQ(points, (std::vector<std::uint64_t>{2, 3, 5, 4}));
+  const Box3 box = octree.box(octree.nodes[2]);
+  EXPECT_EQ(box.min, (Point3{4, -4, -8}));
+  EXPECT_EQ(box.max, (Point3{8, 0, -4}));
+}
+
+TEST(CopcOctree, KeepsWhatMeetsTheRegionDownToTheResolution) {
+  const auto kept = [](const std::optional<Box3>& region, double resolution) {
+    CopcOctree octree = octree_of({{{0, 0, 0, 0, 110, 10, 1},
+                                    {1, 0, 0, 0, 120, 10, 2},
+                                    {1, 1, 1, 1, 130, 10, 4},
+                                    {2, 3, 3, 3, 140, 10, 8}}},
+                                  15);
+    octree.keep(region, resolution, {0.01, 0.01, 0.01});
+    std::uint64_t points = 0;
+    for (const CopcNode& node : octree.nodes) points += node.points;
+    return points;
+  };
+  EXPECT_EQ(kept({}, 0), 15u);
+  EXPECT_EQ(kept({}, 2), 1u);
+  EXPECT_EQ(kept({}, 1), 1u);
+  EXPECT_EQ(kept({}, 0.9), 7u);
+  EXPECT_EQ(kept({}, 0.3), 15u);
+  EXPECT_EQ(kept({}, 0.01), 15u);
+  EXPECT_EQ(kept(Box3{{5, 5, -kInfinity}, {6, 6, kInfinity}}, 0), 13u);
+  EXPECT_EQ(kept(Box3{{5, 5, -7}, {6, 6, -6}}, 0), 1u);
+  EXPECT_EQ(kept(Box3{{5, 5, -kInfinity}, {6, 6, kInfinity}}, 0.5), 5u);
+  // A cube's points may be rounded across its sides.
+  EXPECT_EQ(kept(Box3{{-1, -1, -1}, {-0.005, -0.005, -0.005}}, 0), 7u);
+  EXPECT_EQ(kept(Box3{{9, 9, 9}, {10, 10, 10}}, 0), 0u);
+}
+
+TEST(CopcOctree, RefusesWhatCannotBe) {
+  const Entry root{0, 0, 0, 0, 110, 10, 1};
+  const auto has = [](const std::string& text, std::string_view part) {
+    return text.find(part) != text.npos;
+  };
+  EXPECT_EQ(refusal_of({{root}}, 1), "");
+  EXPECT_PRED2(has, refusal_of({{root}}, 2), "have 1 points, but the header promises 2");
+  EXPECT_PRED2(has, refusal_of({{root, {0, 0, 0, 0, 120, 10, 1}}}, 2), "is there twice");
+  EXPECT_PRED2(has, refusal_of({{root, {1, 0, 0, 0, 119, 10, 1}}}, 2), "share points");
+  EXPECT_PRED2(has, refusal_of({{{-1, 0, 0, 0, 110, 10, 1}}}, 1), "has depth -1");
+  EXPECT_PRED2(has, refusal_of({{{31, 0, 0, 0, 110, 10, 1}}}, 1), "has depth 31");
+  EXPECT_PRED2(has, refusal_of({{{1, 2, 0, 0, 110, 10, 1}}}, 1), "outside of its root");
+  EXPECT_PRED2(has, refusal_of({{{1, 0, -1, 0, 110, 10, 1}}}, 1), "outside of its root");
+  EXPECT_PRED2(has, refusal_of({{{0, 0, 0, 0, 110, -10, 1}}}, 1), "negative size");
+  EXPECT_PRED2(has, refusal_of({{{0, 0, 0, 0, 110, 10, -2}}}, 1), "negative size");
+  EXPECT_PRED2(has, refusal_of({{{0, 0, 0, 0, 99, 10, 1}}}, 1), "do not lie in the file");
+  EXPECT_PRED2(has, refusal_of({{{0, 0, 0, 0, 1030, 10, 1}}}, 1), "do not lie in the file");
+  EXPECT_PRED2(has, refusal_of({{{0, 0, 0, 0, ~0ULL, 10, 1}}}, 1), "do not lie in the file");
+  EXPECT_PRED2(has, refusal_of({{{0, 0, 0, 0, 110, 0, 1}}}, 1), "do not lie in the file");
+  // Pages: outside, in a circle, overlapping until they are more than the file, of parts of
+  // entries.
+  EXPECT_PRED2(has, refusal_of({{{1, 0, 0, 0, 2000, 32, -1}}}, 1), "does not lie in the file");
+  EXPECT_PRED2(has, refusal_of({{{1, 0, 0, 0, kFirstPage, 32, -1}}}, 1), "referred to twice");
+  EXPECT_PRED2(has, refusal_of({{{1, 0, 0, 0, 0, 992, -1}, {1, 0, 0, 1, 8, 992, -1}}}, 1),
+               "referred to twice");
+  EXPECT_PRED2(has, refusal_of({{{1, 0, 0, 0, 0, 31, -1}}}, 1), "does not lie in the file");
+  EXPECT_PRED2(has, refusal_of({{root}}, 1, info_of(64)), "does not lie in the file");
+  EXPECT_PRED2(has, refusal_of({{root}}, 1, info_of(32, 0)), "not a positive number");
+  EXPECT_PRED2(has, refusal_of({{root}}, 1, info_of(32, 1, -1)), "not a positive number");
+  EXPECT_PRED2(has, refusal_of({{root}}, 1, info_of(32).substr(1)), "cut off");
+}
+
+using Record = std::pair<Point3, std::string>;
+
+std::multiset<Record> records(const AllPoints& all, const Box3& region) {
+  std::multiset<Record> found;
+  const std::size_t bytes = all.info.payload_size();
+  for (std::size_t i = 0; i < all.points.size(); ++i) {
+    const Point3 at = world_point(all.info, all.points.positions[i]);
+    if (!region.contains(at)) continue;
+    found.emplace(
+        at,
+        std::string(reinterpret_cast<const char*>(all.points.payload.data()) + i * bytes, bytes));
+  }
+  return found;
+}
+
+constexpr Box3 kEverywhere{{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}};
+
+class CopcFiles : public ::testing::TestWithParam<const char*> {};
+
+/// The oracle is the same file with another name in place of the VLR's: a LAZ file like others.
+TEST_P(CopcFiles, PointsOfARegionAreThoseOfTheWholeFile) {
+  const char* const data = std::getenv("TERRACE_DATA");
+  if (data == nullptr) GTEST_SKIP() << "no TERRACE_DATA";
+  const std::filesystem::path file = std::filesystem::path(data) / "lidar" / GetParam();
+  const TempFolder folder;
+  std::string bytes = read_text(file);
+  ASSERT_EQ(bytes.substr(377, 4), "copc");
+  bytes[377] = 'x';
+  const std::string plain = write_text(folder.path() / "plain.laz", bytes);
+  const AllPoints all = read_file(plain);
+  EXPECT_EQ(all.info.format, "laz");
+  EXPECT_FALSE(all.info.octree);
+
+  const AllPoints by_nodes = read_file(file);
+  EXPECT_EQ(by_nodes.info.format, "copc");
+  EXPECT_TRUE(by_nodes.info.octree);
+  EXPECT_EQ(by_nodes.info.points, all.points.size());
+  EXPECT_TRUE(records(by_nodes, kEverywhere) == records(all, kEverywhere));
+
+  Box3 bounds;
+  for (const Point3& p : all.points.positions) bounds.include(world_point(all.info, p));
+  std::mt19937_64 random(11);
+  std::uniform_real_distribution<double> part(-0.1, 1.1);
+  for (int round = 0; round < 8; ++round) {
+    Box3 region = kEverywhere;
+    for (std::size_t axis = 0; axis < (round % 2 == 0 ? 2u : 3u); ++axis) {
+      const double side = bounds.max[axis] - bounds.min[axis];
+      const double a = bounds.min[axis] + part(random) * side;
+      const double b = bounds.min[axis] + part(random) * side;
+      region.min[axis] = std::min(a, b);
+      region.max[axis] = std::max(a, b);
+    }
+    const std::multiset<Record> expected = records(all, region);
+    for (const std::string& name : {file.string(), plain}) {
+      for (const unsigned threads : {1u, 3u}) {
+        SourceOptions options{.threads = threads};
+        options.selection.region = region;
+        const auto source = open_source(std::span(&name, 1), options);
+        EXPECT_TRUE(records(read_all(*source), kEverywhere) == expected);
+        EXPECT_EQ(source->progress().excluded, all.points.size() - expected.size());
+      }
+    }
+  }
+  // As it has no octree.
+  SourceOptions coarse;
+  coarse.selection.resolution = 1;
+  EXPECT_NE(error_of([&] { read_file(plain, coarse); }).find("name a COPC file"),
+            std::string::npos);
+}
+
+TEST_P(CopcFiles, CoarserResolutionsAreParts) {
+  const char* const data = std::getenv("TERRACE_DATA");
+  if (data == nullptr) GTEST_SKIP() << "no TERRACE_DATA";
+  const std::filesystem::path file = std::filesystem::path(data) / "lidar" / GetParam();
+  const AllPoints all = read_file(file);
+  std::multiset<Record> finer = records(all, kEverywhere);
+  double spacing = all.info.octree->spacing;
+  std::vector<double> spacings;
+  for (unsigned depth = 0; depth < all.info.octree->depths; ++depth, spacing /= 2) {
+    spacings.push_back(spacing);
+  }
+  for (auto step = spacings.rbegin(); step != spacings.rend(); ++step) {
+    SourceOptions options;
+    options.selection.resolution = *step;
+    const AllPoints coarse = read_file(file, options);
+    const std::multiset<Record> found = records(coarse, kEverywhere);
+    EXPECT_EQ(coarse.info.octree->depths, spacings.rend() - step);
+    EXPECT_TRUE(std::includes(finer.begin(), finer.end(), found.begin(), found.end()));
+    EXPECT_TRUE(step == spacings.rbegin() ? found.size() == finer.size()
+                                          : found.size() < finer.size());
+    finer = found;
+  }
+}
+
+/// What copies a COPC file's VLRs beside other points leaves a hierarchy that tells nothing.
+TEST_P(CopcFiles, WithoutItsHierarchyItIsLaz) {
+  const char* const data = std::getenv("TERRACE_DATA");
+  if (data == nullptr) GTEST_SKIP() << "no TERRACE_DATA";
+  const std::filesystem::path file = std::filesystem::path(data) / "lidar" / GetParam();
+  const TempFolder folder;
+  std::string bytes = read_text(file);
+  put(bytes, 375 + 54 + 40, ~std::uint64_t{0});
+  const std::string damaged = write_text(folder.path() / "damaged.laz", bytes);
+  const AllPoints found = read_file(damaged);
+  EXPECT_EQ(found.info.format, "laz");
+  ASSERT_FALSE(found.info.comments.empty());
+  EXPECT_NE(found.info.comments.back().find("in the order of the file"), std::string::npos);
+  EXPECT_TRUE(records(found, kEverywhere) == records(read_file(file), kEverywhere));
+  SourceOptions coarse;
+  coarse.selection.resolution = 1;
+  EXPECT_NE(error_of([&] { read_file(damaged, coarse); }).find("hierarchy"), std::string::npos);
+}
+
+INSTANTIATE_TEST_SUITE_P(Lidar, CopcFiles,
+                         ::testing::Values("1.2-with-color.copc.laz", "lasrs_autzen.copc.laz",
+                                           "lone-star.copc.laz"));
+
+}  // namespace
+}  // namespace terrace::stream
