@@ -26,16 +26,16 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// Where pages begin in the files made here, and the first chunk.
 constexpr std::uint64_t kFirstChunk = 100, kFirstPage = 1000;
 
-struct Entry {
+struct HierarchyEntry {
   std::int32_t depth = 0, x = 0, y = 0, z = 0;
   std::uint64_t offset = 0;
   std::int32_t bytes = 0, points = 0;
 };
 
-std::string page_of(const std::vector<Entry>& entries) {
+std::string page_of(const std::vector<HierarchyEntry>& entries) {
   std::string page(entries.size() * 32, '\0');
   for (std::size_t i = 0; i < entries.size(); ++i) {
-    const Entry& e = entries[i];
+    const HierarchyEntry& e = entries[i];
     const std::array<std::int32_t, 4> key{e.depth, e.x, e.y, e.z};
     std::memcpy(page.data() + 32 * i, key.data(), 16);
     put(page, 32 * i + 16, e.offset);
@@ -55,10 +55,10 @@ std::string info_of(std::uint64_t page_bytes, double half_size = 8, double spaci
 }
 
 /// The octree of a file that has these pages, one behind the other.
-CopcOctree octree_of(const std::vector<std::vector<Entry>>& pages, std::uint64_t points,
+CopcOctree octree_of(const std::vector<std::vector<HierarchyEntry>>& pages, std::uint64_t points,
                      const std::string& info = {}) {
   std::string file(kFirstPage, '\0');
-  for (const std::vector<Entry>& page : pages) file += page_of(page);
+  for (const std::vector<HierarchyEntry>& page : pages) file += page_of(page);
   std::vector<std::byte> bytes(file.size());
   std::memcpy(bytes.data(), file.data(), file.size());
   const auto source = bytes_in_memory("made", std::move(bytes));
@@ -66,7 +66,7 @@ CopcOctree octree_of(const std::vector<std::vector<Entry>>& pages, std::uint64_t
                           kFirstChunk, points);
 }
 
-std::string refusal_of(const std::vector<std::vector<Entry>>& pages, std::uint64_t points,
+std::string refusal_of(const std::vector<std::vector<HierarchyEntry>>& pages, std::uint64_t points,
                        const std::string& info = {}) {
   return error_of([&] { static_cast<void>(octree_of(pages, points, info)); });
 }
@@ -114,7 +114,7 @@ TEST(CopcOctree, KeepsWhatMeetsTheRegionDownToTheResolution) {
 }
 
 TEST(CopcOctree, RefusesWhatCannotBe) {
-  const Entry root{0, 0, 0, 0, 110, 10, 1};
+  const HierarchyEntry root{0, 0, 0, 0, 110, 10, 1};
   const auto has = [](const std::string& text, std::string_view part) {
     return text.find(part) != text.npos;
   };
