@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cstdlib>
+#include <filesystem>
 #include <limits>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <fcntl.h>
@@ -57,6 +59,56 @@ TEST_F(Source, TellsFormatsByContentBeforeEnding) {
   EXPECT_NE(refusal({put("c.csv", "hello, world\n")}).find("no points"), std::string::npos);
 }
 
+TEST_F(Source, FoldersListsAndPatternsStandForFiles) {
+  namespace fs = std::filesystem;
+  fs::create_directories(folder_.path() / "survey" / "b");
+  const std::string one = put("survey/1.xyz", "1 0 0\n"), two = put("survey/b/2.csv", "2 0 0\n"),
+                    three = put("survey/z.XYZ", "3 0 0\n");
+  put("survey/.hidden.xyz", "9 0 0\n");
+  put("survey/notes.md", "none of ours");
+  const std::string survey = (folder_.path() / "survey").string();
+  const auto heads = [](const std::vector<std::string>& names, const SourceOptions& options = {}) {
+    std::string out;
+    for (const Point3& p : read_all(names, options).points.positions) {
+      out += std::to_string(static_cast<int>(p[0]));
+    }
+    return out;
+  };
+  EXPECT_EQ(heads({survey}), "123");
+  EXPECT_EQ(read_all({survey}).info.files, (std::vector<std::string>{one, two, three}));
+  EXPECT_EQ(heads({survey + "/*.[xX]*"}), "13");
+  EXPECT_EQ(heads({survey + "/?.xyz", two}), "12");
+  const std::string list =
+      put("survey/list.lst", "# of a survey\n\n  z.XYZ \r\nb\n" + one + "\n1*.xyz");
+  // The last line names a file for the second time.
+  EXPECT_EQ(heads({"@" + put("survey/short.lst", "# of a survey\n\n  z.XYZ \r\nb\n" + one)}),
+            "321");
+  EXPECT_EQ(heads({"@" + list}), "3211");
+
+  // A name that is there is that file, whatever it looks like.
+  put("survey/[1].xyz", "7 0 0\n");
+  EXPECT_EQ(heads({survey + "/[1].xyz"}), "7");
+  fs::remove(survey + "/[1].xyz");
+
+  put("survey/cloud.ply", kPly);
+  EXPECT_NE(refusal({survey}).find("is ply, but"), std::string::npos) << refusal({survey});
+  EXPECT_EQ(heads({survey}, {.format = "xyz"}), "123");
+  EXPECT_EQ(heads({survey}, {.format = "ply"}), "7");
+
+  for (const auto& [name, words] : std::vector<std::pair<std::string, std::string>>{
+           {survey + "/*.las", "no file has such a name"},
+           {(folder_.path() / "survey" / "none.xyz").string(), "none.xyz"},
+           {"@" + put("empty.lst", "# nothing\n"), "names no file"},
+           {"@" + put("wrong.lst", "survey\nsurvey/none.xyz\n"), "line 2"},
+           {"@" + put("nested.lst", "@other.lst\n"), "lists do not name lists"},
+           {"@" + (folder_.path() / "none.lst").string(), "none.lst"}}) {
+    EXPECT_NE(refusal({name}).find(words), std::string::npos) << refusal({name});
+  }
+  fs::create_directory(folder_.path() / "void");
+  EXPECT_NE(refusal({(folder_.path() / "void").string()}).find("folder without a file"),
+            std::string::npos);
+}
+
 TEST_F(Source, RefusesWhatItDoesNotKnow) {
   const std::string prose = put("readme", "This is a text of 3 lines\nwith 1 2 3\nin it\n");
   EXPECT_NE(refusal({prose}).find("neither content nor name"), std::string::npos);
@@ -66,7 +118,7 @@ TEST_F(Source, RefusesWhatItDoesNotKnow) {
             std::string::npos);
   EXPECT_NE(refusal({(folder_.path() / "none.xyz").string()}).find("No such file"),
             std::string::npos);
-  EXPECT_NE(refusal({folder_.path().string()}).find("is a folder"), std::string::npos);
+  EXPECT_NE(refusal({folder_.path().string()}).find("e.csv: the file is empty"), std::string::npos);
 }
 
 TEST_F(Source, NamesFormatsThatItDoesNotReadAndWhatToDo) {

@@ -73,6 +73,29 @@ class SelectionTest(unittest.TestCase):
         self.assertEqual(rows, sorted(tuple(float(p[c]) for c in columns)
                                       for p in self.points if wanted(p)))
 
+    def test_build_takes_folders_lists_and_patterns(self):
+        folder = self.path('parts')
+        os.makedirs(os.path.join(folder, 'more'))
+        with open(self.file, encoding='ascii') as file:
+            head, *lines = file.readlines()
+        for name, part in (('1.csv', lines[:9000]), ('more/2.csv', lines[9000:])):
+            with open(os.path.join(folder, name), 'w', encoding='ascii') as file:
+                file.writelines([head, *part])
+        with open(self.path('parts.lst'), 'w', encoding='ascii') as file:
+            file.write('# of the survey\nparts/1.csv\nparts/more\n')
+        for number, names in enumerate(([folder], ['@' + self.path('parts.lst')],
+                                        [folder + '/*.csv', folder + '/more/?.csv'])):
+            store = self.path(f'parts{number}.st')
+            self.run_ok('build', *names, '-o', store, '--block', '1000', '-q')
+            self.assertEqual(json.loads(self.run_ok('verify', store, '--json'))['points'], 20000)
+            for name in os.listdir(store):
+                with open(os.path.join(store, name), 'rb') as one, \
+                        open(self.path(f'all.st/{name}'), 'rb') as other:
+                    self.assertEqual(one.read(), other.read(), name)
+        result = self.terrace('build', folder + '/*.las', '-o', self.path('none.st'))
+        self.assertEqual(result.returncode, 1)
+        self.assertIn('no file has such a name', result.stderr)
+
     def test_build_takes_the_points_and_attributes_that_are_wanted(self):
         summary = json.loads(self.run_ok(
             'build', self.file, '-o', self.path('ground.st'), '--block', '1000', '--json',

@@ -8,6 +8,7 @@
 
 #include "format/foreign_format.hpp"
 #include "format/formats.hpp"
+#include "format/input_files.hpp"
 #include "format/selection.hpp"
 #include "io/peek.hpp"
 #include "io/text.hpp"
@@ -111,7 +112,7 @@ std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
       throw Error({.file = file,
                    .where = {},
                    .cause = "is " + other.name + ", but " + files.front() + " is " + format.name,
-                   .remedy = "name files of one format"});
+                   .remedy = "name files of one format, of a folder by that format"});
     }
     if (!format.streams && !is_rereadable(file)) {
       throw Error({.file = file == kStandardStream ? "standard input" : file,
@@ -151,8 +152,14 @@ std::span<const Format> formats() {
   return all;
 }
 
-std::unique_ptr<PointSource> open_source(std::span<const std::string> files,
+const Format* format_of_name(const std::string& file) {
+  const Format* const packed = packed_format_of(file);
+  return packed != nullptr ? packed : format_of_ending(ending_of(file));
+}
+
+std::unique_ptr<PointSource> open_source(std::span<const std::string> names,
                                          const SourceOptions& options) {
+  const std::vector<std::string> files = input_files(names, options.format);
   if (options.blocks_ahead == 0) return open_here(files, options);
   // The reading ends with the source too, not by the caller's stop alone.
   std::stop_source reading;

@@ -30,8 +30,10 @@ constexpr std::uint64_t kTrialPoints = 1'000'000;
 class BuildCommand final : public Command {
  public:
   void define(CLI::App& app) override {
-    app.add_option("INPUT", request_.inputs,
-                   "rasters (several form a mosaic) or point files; - is standard input")
+    app.add_option(
+           "INPUT", request_.inputs,
+           "rasters (several form a mosaic) or point files; a folder of them, @FILE with a name a "
+           "line, or a pattern in quotes; - is standard input")
         ->required();
     add_output(app, output_, "the store to write");
     app.add_option("--input-format", request_.input_format, "instead of telling it by content");

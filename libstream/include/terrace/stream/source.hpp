@@ -120,9 +120,12 @@ struct SourceOptions {
 
 /// Opens one file, or several as one source: rasters form a mosaic (same CRS, cell size and phase;
 /// where they overlap the last named valid sample wins), other formats follow one another and must
-/// agree in channels and CRS. "-" is standard input (formats that stream only).
-/// Throws: Error, Stopped.
-std::unique_ptr<PointSource> open_source(std::span<const std::string> files,
+/// agree in channels and CRS. "-" is standard input (formats that stream only). A folder stands for
+/// all files below whose names end as those of a format (SourceOptions::format, if given), in the
+/// order of their paths; "@LIST" for the names on the lines of LIST, from its folder on, blank
+/// lines and those that begin with # left out; a name with *, ? or [...] that no file has for those
+/// of that pattern. Throws: Error, Stopped.
+std::unique_ptr<PointSource> open_source(std::span<const std::string> names,
                                          const SourceOptions& options = {});
 
 /// The same stream, read on a thread of its own, at most `blocks` blocks ahead. An Error thrown

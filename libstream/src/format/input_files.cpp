@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "format/input_files.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <filesystem>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include <glob.h>
+
+#include "io/line_reader.hpp"
+#include "io/text.hpp"
+#include "terrace/stream/error.hpp"
+#include "terrace/stream/input.hpp"
+
+namespace terrace::stream {
+namespace {
+
+namespace fs = std::filesystem;
+
+[[noreturn]] void fail(const std::string& name, std::string where, std::string cause,
+                       std::string remedy) {
+  throw Error({.file = name,
+               .where = std::move(where),
+               .cause = std::move(cause),
+               .remedy = std::move(remedy)});
+}
+
+bool exists(const std::string& name) {
+  std::error_code ignored;
+  return fs::exists(fs::symlink_status(name, ignored));
+}
+
+/// All files below whose names tell a format, in the order of their paths.
+void add_folder(const std::string& folder, const std::string& format,
+                std::vector<std::string>& files) {
+  const std::size_t before = files.size();
+  std::error_code error;
+  fs::recursive_directory_iterator at(folder, error);
+  for (; !error && at != fs::recursive_directory_iterator(); at.increment(error)) {
+    const Format* const told = format_of_name(at->path().string());
+    std::error_code ignored;
+    const bool hidden = at->path().filename().string().front() == '.';
+    if (hidden || told == nullptr || (!format.empty() && told->name != format) ||
+        !at->is_regular_file(ignored)) {
+      continue;
+    }
+    files.push_back(at->path().string());
+  }
+  if (error) fail(folder, {}, "cannot be listed: " + error.message(), {});
+  if (files.size() == before) {
+    fail(folder, {}, "is a folder without a file that can be read",
+         "name one with files that end in .las, .tif and the like");
+  }
+  std::sort(files.begin() + static_cast<std::ptrdiff_t>(before), files.end());
+}
+
+/// What the shell would make of a pattern that it has been kept from.
+void add_pattern(const std::string& pattern, std::vector<std::string>& files) {
+  ::glob_t found{};
+  const int result = ::glob(pattern.c_str(), GLOB_ERR, nullptr, &found);
+  for (std::size_t i = 0; i < found.gl_pathc; ++i) files.emplace_back(found.gl_pathv[i]);
+  ::globfree(&found);
+  if (result == GLOB_NOMATCH) fail(pattern, {}, "no file has such a name", "check the pattern");
+  if (result != 0) fail(pattern, {}, "the folders of the pattern cannot be listed", {});
+}
+
+class Names {
+ public:
+  Names(const std::string& format, std::vector<std::string>& files)
+      : format_(format), files_(files) {}
+
+  void add(const std::string& name) {
+    std::error_code ignored;
+    if (name == kStandardStream) {
+      files_.push_back(name);
+    } else if (exists(name)) {
+      if (fs::is_directory(name, ignored)) {
+        add_folder(name, format_, files_);
+      } else {
+        files_.push_back(name);
+      }
+    } else if (name.size() > 1 && name.front() == '@') {
+      add_list(name.substr(1));
+    } else if (name.find_first_of("*?[") != name.npos) {
+      add_pattern(name, files_);
+    } else {
+      files_.push_back(name);  // whoever opens it says best what is wrong
+    }
+  }
+
+ private:
+  /// A name a line, from the list's folder on.
+  void add_list(const std::string& list) {
+    Input input(list);
+    LineReader lines(input);
+    const std::size_t before = files_.size();
+    for (std::string_view line; lines.next(line);) {
+      const std::string_view name = trim(line);
+      if (name.empty() || name.front() == '#') continue;
+      const std::string file = (fs::path(list).parent_path() / name).string();
+      if (name.front() == '@') {
+        fail(list, "line " + std::to_string(lines.number()), "lists do not name lists",
+             "name them on the command line");
+      }
+      if (file.find_first_of("*?[") == file.npos && !exists(file)) {
+        fail(list, "line " + std::to_string(lines.number()), "there is no file " + in_quotes(file),
+             "correct the list");
+      }
+      add(file);
+    }
+    if (files_.size() == before) fail(list, {}, "names no file", "write a name on each line");
+  }
+
+  const std::string& format_;
+  std::vector<std::string>& files_;
+};
+
+}  // namespace
+
+std::vector<std::string> input_files(std::span<const std::string> names,
+                                     const std::string& format) {
+  std::vector<std::string> files;
+  Names adder(format, files);
+  for (const std::string& name : names) adder.add(name);
+  return files;
+}
+
+}  // namespace terrace::stream

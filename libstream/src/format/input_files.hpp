@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "terrace/stream/source.hpp"
+
+namespace terrace::stream {
+
+/// The format that the name of a file tells; nullptr if none.
+const Format* format_of_name(const std::string& file);
+
+/// The files that open_source() means by these names: folders, lists and patterns by what they
+/// stand for. format: as SourceOptions has it. Throws: Error for one that stands for nothing.
+std::vector<std::string> input_files(std::span<const std::string> names, const std::string& format);
+
+}  // namespace terrace::stream
