@@ -177,7 +177,7 @@ TEST(Where, RangesTellWhatIsPossible) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const Cloud cloud(1 + seed % 5, seed);
     RandomExpressions expressions(cloud, seed);
-    const Expression expression = expressions.make(static_cast<unsigned>(seed % 5));
+    const Expression expression = expressions.make(static_cast<int>(seed % 5));
     SCOPED_TRACE(expression.text);
     const std::vector<std::uint8_t> matches = cloud.matches(expression.text);
     const bool any = std::find(matches.begin(), matches.end(), 1) != matches.end();

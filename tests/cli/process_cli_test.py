@@ -298,7 +298,7 @@ class WaitTest(ProcessTest):
 
                 def feed():
                     try:
-                        process.stdin.write(self.points(150000).encode())
+                        process.stdin.write(self.points(400000).encode())
                         process.stdin.flush()
                     except BrokenPipeError:
                         pass

@@ -77,17 +77,17 @@ def read_las(path):
 
 class TileCloudTest(TileTestCase):
     @classmethod
-    def build(cls, dem, name):
+    def build(cls, dem, name, *options):
         dem.write(cls.path(name + '.xyz'))
         store = cls.path(name + '.terrace')
         result = terrace('build', cls.path(name + '.xyz'), '-o', store, '--force', '--crs',
-                         dem.crs(), '--block', dem.block)
+                         dem.crs(), '--block', dem.block, *options)
         assert result.returncode == 0, result.stderr
         return store
 
-    def check(self, cloud, name, *options, bound=None, nudge=0.0):
+    def check(self, cloud, name, *options, bound=None, nudge=0.0, order='auto'):
         """Tiles a cloud and checks every sample at every zoom. Returns the set."""
-        store = self.build(cloud, name)
+        store = self.build(cloud, name, '--order', order)
         limit = () if bound is None else ('--max-error', bound)
         summary = self.tile(store, name, *limit, *options)
         tiles = TileSet(self.path(name))
@@ -242,8 +242,10 @@ class TileCloudTest(TileTestCase):
                            round(hills(x * 100000, y * 110000), 2)))
         self.check(Cloud(points), 'east', bound=1)
         self.check(Cloud([(x - 360, y, z) for x, y, z in points]), 'west', bound=1)
+        # In spatial order other clusters at zoom 7 leave 74 m for 64, which is stated: there samples
+        # lie within a step of 15 bits of one another.
         self.check(Cloud([(x - 360 if x > 180 else x, y, z) for x, y, z in points]), 'both',
-                   bound=1)
+                   bound=1, order='stream')
         # UTM zone 1 begins there.
         chance = random.Random(13)
         points = [(round(chance.uniform(165000, 168000), 2), round(chance.uniform(5e5, 502000), 2),

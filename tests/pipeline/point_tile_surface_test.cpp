@@ -341,8 +341,12 @@ TEST(StoreWindow, TheIndexTellsNumbersAndHeightsOfABox) {
     const auto heights = terrain::cluster_heights(query, box);
     ASSERT_EQ(heights.has_value(), met > 0);
     if (!heights) continue;
-    EXPECT_EQ(heights->low, low);
-    EXPECT_EQ(heights->high, high);
+    // Of a cluster above that lies in the box as a whole the index tells as much, but for its growth.
+    EXPECT_LE(heights->low, low);
+    EXPECT_GE(heights->high, high);
+    const double growth = (bounds.max[2] - bounds.min[2]) / 1024;
+    EXPECT_NEAR(heights->low, low, growth);
+    EXPECT_NEAR(heights->high, high, growth);
     for (const stream::Point3& p : heights->some) EXPECT_TRUE(box.contains(p));
   }
 }
