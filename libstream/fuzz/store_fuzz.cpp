@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <cstdlib>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "store/manifest.hpp"
 #include "store/read/cluster_decoder.hpp"
@@ -20,10 +22,13 @@ void require(bool condition) {
   if (!condition) std::abort();
 }
 
-StoreSchema schema_for(bool grid) {
+StoreSchema schema_for(bool grid, int version) {
   StoreSchema schema;
   schema.grid = grid;
-  for (const ScalarType type : {ScalarType::u8, ScalarType::f32, ScalarType::f64}) {
+  std::vector<ScalarType> types{ScalarType::u8, ScalarType::f32, ScalarType::f64};
+  // A column may lie beside one of integers.
+  if (version > 1) types.insert(types.begin(), {ScalarType::u64, ScalarType::i16});
+  for (const ScalarType type : types) {
     schema.attributes.push_back({std::string(name_of(type)), type, 1.0, 0.0, {}});
   }
   return schema;
@@ -31,17 +36,32 @@ StoreSchema schema_for(bool grid) {
 
 /// Frequencies in which everything is likely, so that bytes reach far into the decoder. The levels
 /// have the same contexts.
-Tables even_tables(unsigned contexts) {
+Tables even_tables(const Layout& layout, ColumnKind kind) {
   Tables tables;
+  for (unsigned c = 0; layout.version > 1 && c < layout.columns(); ++c) {
+    const bool possible = kind != ColumnKind::beside || layout.may_lie_beside(c);
+    tables.kinds.push_back(possible ? kind : ColumnKind::plain);
+  }
   std::array<std::uint32_t, kSymbols> counts{};
   for (unsigned s = 0; s < 40; ++s) counts[s] = 40 - s;
-  tables.frequencies.assign(contexts, normalised(counts));
+  tables.frequencies.assign(layout.contexts(), normalised(counts));
   return tables;
 }
 
-void decode_cluster(ByteReader in, bool grid, unsigned level) {
-  const Layout layout(schema_for(grid), level);
-  static const DecodingTables tables(even_tables(layout.contexts()));
+const DecodingTables& tables_of(int version, ColumnKind kind) {
+  const auto made = [](int of_version, ColumnKind of_kind) {
+    return even_tables(Layout(schema_for(false, of_version), 0, of_version), of_kind);
+  };
+  static const DecodingTables old(made(1, ColumnKind::plain)), plain(made(2, ColumnKind::plain)),
+      recent(made(2, ColumnKind::recent)), beside(made(2, ColumnKind::beside));
+  if (version == 1) return old;
+  return kind == ColumnKind::plain ? plain : kind == ColumnKind::recent ? recent : beside;
+}
+
+void decode_cluster(ByteReader in, bool grid, unsigned level, int version = 1,
+                    ColumnKind kind = ColumnKind::plain) {
+  const Layout layout(schema_for(grid, version), level, version);
+  const DecodingTables& tables = tables_of(version, kind);
   Entry entry;
   entry.points = in.get<std::uint16_t>() % 4096u;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -64,23 +84,27 @@ void decode_cluster(ByteReader in, bool grid, unsigned level) {
   require(points.children.size() == points.size() * level);
 }
 
-void read_page(ByteReader in) {
+void read_page(ByteReader in, std::size_t attributes) {
   const std::uint32_t clusters = 1 + in.get<std::uint8_t>() % kPageClusters;
   const ByteView rest = in.take(in.left());
   Bytes bytes(rest.begin(), rest.end());
   put(bytes, crc32(bytes));  // nobody guesses a checksum: the parser behind it is the target
-  const IndexPage page(std::move(bytes), clusters);
-  for (std::uint32_t i = 0; i < clusters; ++i) static_cast<void>(page.entry(i));
+  const IndexPage page(std::move(bytes), clusters, attributes);
+  for (std::uint32_t i = 0; i < clusters; ++i) {
+    for (std::size_t a = 0; a < attributes; ++a) static_cast<void>(page.range(i, a));
+    static_cast<void>(page.entry(i));
+  }
   static_cast<void>(page.end());
 }
 
-void read_tables(ByteReader in) {
-  const Layout layout(schema_for(true), 0);
-  const Tables tables = Tables::read(in.take(in.left()), layout.contexts());
+void read_tables(ByteReader in, int version) {
+  const Layout layout(schema_for(true, version), 0, version);
+  const Tables tables = Tables::read(in.take(in.left()), layout);
   const DecodingTables decoding(tables);
   Bytes again;
   tables.write(again);
-  const Tables second = Tables::read(again, layout.contexts());
+  const Tables second = Tables::read(again, layout);
+  require(second.kinds == tables.kinds);
   require(second.frequencies == tables.frequencies);
   require(second.predictor.coefficients == tables.predictor.coefficients);
 }
@@ -100,7 +124,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (size < 1) return 0;
   try {
     const ByteReader rest({data + 1, size - 1});
-    switch (data[0] % 6) {
+    switch (data[0] % 11) {
       case 0:
         decode_cluster(rest, true, 0);
         break;
@@ -111,10 +135,25 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         decode_cluster(rest, true, 2);
         break;
       case 3:
-        read_page(rest);
+        read_page(rest, 0);
         break;
       case 4:
-        read_tables(rest);
+        read_tables(rest, 1);
+        break;
+      case 6:
+        decode_cluster(rest, false, 0, 2, ColumnKind::plain);
+        break;
+      case 7:
+        decode_cluster(rest, false, 1, 2, ColumnKind::recent);
+        break;
+      case 8:
+        decode_cluster(rest, false, 0, 2, ColumnKind::beside);
+        break;
+      case 9:
+        read_page(rest, 3);
+        break;
+      case 10:
+        read_tables(rest, 2);
         break;
       default: {
         std::string text(reinterpret_cast<const char*>(data + 1), size - 1);
