@@ -33,6 +33,12 @@ HierarchyOptions checked(HierarchyOptions options) {
   if (!options.channels.weights.empty() && !options.channels.read) {
     throw std::invalid_argument("channels have weights but no function that reads them");
   }
+  if (!(options.outlier_price > 0.0)) {
+    throw std::invalid_argument("outlier_price must be positive");
+  }
+  if (std::isfinite(options.outlier_price) && !options.mark_outlier) {
+    throw std::invalid_argument("there is an outlier_price but no function that marks outliers");
+  }
   options.threads = std::clamp(options.threads, 1u, kMostBlocksAtOnce);
   return options;
 }
@@ -112,6 +118,7 @@ void HierarchyEngine::commit(HierarchyBlock& block) {
   if (levels_.size() <= block.level + 1) {
     levels_.emplace_back().level = block.level + 1;
   }
+  outliers_ += block.outliers;
   Level& level = levels_[block.level];
   Level& above = levels_[block.level + 1];
   for (std::size_t c = 0; c < block.summaries.size(); ++c) {
@@ -138,6 +145,7 @@ HierarchyResult HierarchyEngine::finish() {
   HierarchyResult result;
   result.points = base_.points;
   result.top = top;
+  result.outliers = outliers_;
   for (const Level& level : levels_) {
     result.level_points.push_back(level.points);
     result.level_clusters.push_back(level.clusters);
