@@ -110,6 +110,18 @@ TEST(HierarchyOutliers, SteerNoCluster) {
   EXPECT_NE(steered.representatives(0), with.representatives(0));
 }
 
+TEST(HierarchyOutliers, OfASingleBlockAreMarkedToo) {
+  std::mt19937_64 random(76);
+  std::vector<Point3> points = inputs::cube(500, random);
+  points[123] = {50, 50, 50};
+  HierarchyOptions options;
+  options.outlier_price = 0.1;
+  const Built built(points, options);
+  EXPECT_EQ(built.outliers, (std::set<std::uint64_t>{123}));
+  EXPECT_EQ(built.result.top, 0u);
+  laws::check_hierarchy(built.sink, built.result, points, options.block_size, kIdentityMap);
+}
+
 TEST(HierarchyOutliers, LawsHoldForEveryInputPriceAndStrategy) {
   for (const laws::OwnedProblem& input : laws::problems(300, 8)) {
     for (const FacilityStrategy strategy : searches()) {
@@ -204,13 +216,13 @@ TEST(HierarchyOutliers, CostBesideTheSearchWithThePrice) {
       const RecordedBlock& block = built.sink.levels[0][0];
       // In one unit for both.
       const double unit = 10.0;
-      double sum = unit * options.block.facility_cost *
-                   static_cast<double>(block.representatives.size());
+      double sum =
+          unit * options.block.facility_cost * static_cast<double>(block.representatives.size());
       for (std::size_t c = 0; c < block.representatives.size(); ++c) {
         for (const std::uint32_t i : block.members(c)) {
-          sum += std::min(unit * price,
-                          distance(Euclidean{}, block.positions[block.representatives[c]],
-                                   block.positions[i]));
+          sum += std::min(
+              unit * price,
+              distance(Euclidean{}, block.positions[block.representatives[c]], block.positions[i]));
         }
       }
       return sum;
@@ -259,9 +271,8 @@ TEST(HierarchyStrategy, WhatABlockDoesNotAdmitIsRefused) {
   };
   HierarchyOptions options;
   options.strategy = FacilityStrategy::kd_tree;
-  options.metric = CustomMetric{[](const Point3& a, const Point3& b) {
-    return distance(Euclidean{}, a, b);
-  }};
+  options.metric =
+      CustomMetric{[](const Point3& a, const Point3& b) { return distance(Euclidean{}, a, b); }};
   EXPECT_NE(message(options).find("kd-tree"), std::string::npos);
   options = {};
   options.outlier_price = 0.0;

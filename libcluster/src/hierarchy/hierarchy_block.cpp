@@ -151,6 +151,14 @@ void BlockProcessor::read_channels(const HierarchyBlock& block) {
   }
 }
 
+// In a block of fewer points they lie farther apart, relative to its diagonal: on a surface as the
+// root of their number.
+double BlockProcessor::outlier_price(const HierarchyBlock& block) const {
+  if (block.level > 0) return std::numeric_limits<double>::infinity();
+  return options_.outlier_price *
+         std::sqrt(static_cast<double>(options_.block_size) / static_cast<double>(block.size()));
+}
+
 void BlockProcessor::cluster(HierarchyBlock& block, std::span<const Point3> ground) {
   weights_.clear();
   if (block.level > 0) normalised_weights(block.heads, weights_);
@@ -161,13 +169,12 @@ void BlockProcessor::cluster(HierarchyBlock& block, std::span<const Point3> grou
   const std::size_t most = (block.size() + 1) / 2;
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
     if (metric_cluster_) {
-      const double never = std::numeric_limits<double>::infinity();
       metric_cluster_->run({.points = ground,
                             .weights = weights_,
                             .metric = metric_,
                             .channels = {channels_, options_.channels.weights},
                             .facility_cost = options.facility_cost,
-                            .outlier_price = block.level == 0 ? options_.outlier_price : never},
+                            .outlier_price = outlier_price(block)},
                            options_.strategy, options, block.clustering);
     } else {
       cluster_(ground, weights_, options, block.clustering);

@@ -66,6 +66,7 @@ class BlockProcessor {
  private:
   void cluster(HierarchyBlock& block, std::span<const Point3> ground);
   void read_channels(const HierarchyBlock& block);
+  [[nodiscard]] double outlier_price(const HierarchyBlock& block) const;
   void place_outliers(HierarchyBlock& block, std::span<const Point3> ground);
 
   const HierarchyOptions& options_;

@@ -143,9 +143,9 @@ HierarchyResult HierarchyEngine::finish() {
   deliver_root(levels_[top]);
 
   HierarchyResult result;
+  result.outliers = outliers_;
   result.points = base_.points;
   result.top = top;
-  result.outliers = outliers_;
   for (const Level& level : levels_) {
     result.level_points.push_back(level.points);
     result.level_clusters.push_back(level.clusters);
@@ -156,6 +156,10 @@ HierarchyResult HierarchyEngine::finish() {
 void HierarchyEngine::deliver_root(Level& level) {
   if (!level.open) level.open = pipeline_.take(level.level);  // no points at all
   HierarchyBlock& block = *level.open;
+  if (block.level == 0 && block.size() > 0 && std::isfinite(options_.outlier_price)) {
+    processors_.front().process(block);  // only for the marks: nothing else is kept of it
+    outliers_ += block.outliers;
+  }
   block.clustering.facilities.assign(1, kNoRepresentative);
   block.first = {0, static_cast<std::uint32_t>(block.size())};
   block.order.resize(block.size());

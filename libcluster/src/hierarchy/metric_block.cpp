@@ -79,10 +79,9 @@ void MetricBlockClusterer::run_once(const FacilityPoints& problem, FacilityStrat
   const Effort effort = problem.points.size() < kFullSearchBelow
                             ? std::max(options.effort, Effort::fine)
                             : options.effort;
-  FacilitySolution solution = solve(problem, {.strategy = strategy,
-                                              .effort = effort,
-                                              .seed = options.seed,
-                                              .assign_nearest = true});
+  FacilitySolution solution =
+      solve(problem,
+            {.strategy = strategy, .effort = effort, .seed = options.seed, .assign_nearest = true});
   result.facilities = std::move(solution.facilities);
   result.assignment = std::move(solution.assignment);
   result.facility_cost = result.connection_cost = 0.0;

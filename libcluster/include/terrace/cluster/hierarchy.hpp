@@ -109,8 +109,9 @@ struct HierarchyOptions {
   /// is that of `block`, in blocks of fewer than 2500 points Effort::fine at least; clusters are in
   /// the order of their representatives.
   FacilityStrategy strategy = FacilityStrategy::automatic;
-  /// What leaving out a point of level 0 costs, times the diagonal as the facility cost; infinite:
-  /// no point is left out. Outliers are found and taken out until none is left, the diagonal being
+  /// What leaving out a point of level 0 costs, times the diagonal as the facility cost, and in
+  /// blocks of n < block_size points (the last one, tiles) times sqrt(block_size / n); infinite: no
+  /// point is left out. Outliers are found and taken out until none is left, the diagonal being
   /// that of the points which remain, so they steer neither places nor sizes of clusters. Then each
   /// becomes a member of the cluster whose representative is nearest (its box, error and count
   /// include it) and `mark_outlier` is called on its payload. Their representatives are ordinary
