@@ -92,7 +92,6 @@ constexpr KnownFormat kRows[] = {
     {{"VTK", "convert it, e.g. with ParaView, to PLY"}, ".vtk .vtp .vtu", {0, "# vtk DataFile"}},
     {{"Wavefront OBJ (a mesh)", kMesh}, ".obj", {}},
     // What may hold any of them.
-    {{"compressed by gzip", "unpack it: 'gzip -dk FILE'"}, ".gz", {0, "\x1f\x8b"sv}},
     {{"compressed by bzip2", "unpack it: 'bzip2 -dk FILE'"}, ".bz2", {0, "BZh"}},
     {{"compressed by xz", "unpack it: 'xz -dk FILE'"},
      ".xz",

@@ -197,6 +197,7 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   source_options.band = request.band;
   source_options.selection = request.selection;
   source_options.heights_of_colour = request.heights_of_colour;
+  source_options.cell = request.cell.value_or(0);
   source_options.crs = request.crs;
   source_options.blocks_ahead = kBlocksAhead;
   source_options.threads = std::max(1U, context.threads);
@@ -315,6 +316,10 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   if (so_far.withheld > 0) {
     context.say(std::to_string(so_far.withheld) +
                 " points are marked as withheld in their file; they are kept, with the mark");
+  }
+  if (info.spooled_bytes > 0) {
+    context.say("the input cannot be read from a pipe or out of gzip: " +
+                readable_bytes(info.spooled_bytes) + " were set aside in a temporary file");
   }
   tell_order(outcome.order, folder, context);
   if (!crs.note.empty()) context.say(crs.note);

@@ -52,6 +52,7 @@ class BuildCommand final : public Command {
     selection_.define(app);
     app.add_option("--band", request_.band, "of rasters, from 1")->check(CLI::Range(1, 65535));
     add_heights_of_colour(app, request_.heights_of_colour);
+    add_cell_of_source(app, request_.cell);
     app.add_option("--block", block_, "most points clustered together")->capture_default_str();
     add_number(app, "--facility-cost", request_.facility_cost,
                "times the diagonal of a block: larger makes larger clusters", kFactor);
@@ -160,6 +161,7 @@ class BuildCommand final : public Command {
     const auto source =
         stream::open_source(request_.inputs, {.format = request_.input_format,
                                               .heights_of_colour = request_.heights_of_colour,
+                                              .cell = request_.cell.value_or(0),
                                               .stop = stop_token(),
                                               .selection = request_.selection});
     const stream::SourceInfo& info = source->info();

@@ -119,7 +119,7 @@ class LasSource final : public PointSource {
   void open_nodes(const std::string& file, const SourceOptions& options) {
     const bool is_copc = header_.compressed && header_.minor == 4 && !header_.vlrs.empty() &&
                          header_.vlrs.front().is(kCopcUser, kCopcInfo);
-    if (!is_copc || !is_rereadable(file)) return;
+    if (!is_copc || !is_seekable(file)) return;
     try {
       std::unique_ptr<ByteSource> bytes = open_file(file);
       CopcOctree octree = read_copc_octree(*bytes, header_.vlrs.front().data, header_.points_offset,

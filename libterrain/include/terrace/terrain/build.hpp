@@ -50,6 +50,7 @@ struct BuildRequest {
   cluster::FacilityStrategy strategy = cluster::FacilityStrategy::automatic;
   int band = 1;
   stream::HeightsOfColour heights_of_colour = stream::HeightsOfColour::none;  ///< of PNG
+  std::optional<double> cell{};  ///< side of the cells of rasters without georeferencing
   std::uint64_t seed = 1;
   /// Of points that are no cells of a raster: see stream::in_spatial_order(). Its temporary file
   /// lies in the folder in which the store is to stand.
