@@ -84,13 +84,7 @@ constexpr KnownFormat kRows[] = {
     {{"glTF", kMesh}, ".glb", {0, "glTF"}},
     {{"glTF", kMesh}, ".gltf", {}},
     {{"JSON (GeoJSON?)", kVector}, ".json .geojson", {}},
-    {{"STL", kMesh}, ".stl", {0, "solid "}},
-    {{"OFF", kMesh}, ".off", {0, "OFF\n"}},
-    {{"OFF", kMesh}, "", {0, "OFF\r"}},
-    {{"OFF", kMesh}, "", {0, "COFF"}},
-    {{"OFF", kMesh}, "", {0, "NOFF"}},
     {{"VTK", "convert it, e.g. with ParaView, to PLY"}, ".vtk .vtp .vtu", {0, "# vtk DataFile"}},
-    {{"Wavefront OBJ (a mesh)", kMesh}, ".obj", {}},
     // What may hold any of them.
     {{"compressed by bzip2", "unpack it: 'bzip2 -dk FILE'"}, ".bz2", {0, "BZh"}},
     {{"compressed by xz", "unpack it: 'xz -dk FILE'"},

@@ -10,6 +10,7 @@
 
 #include <glob.h>
 
+#include "format/formats.hpp"
 #include "io/line_reader.hpp"
 #include "io/text.hpp"
 #include "terrace/stream/error.hpp"

@@ -164,9 +164,10 @@ std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
 
 std::span<const Format> formats() {
   // The most telling content first: text is whatever looks like a table of numbers.
-  static const std::array<Format, 9> all{geotiff_format(), las_format(),         ply_format(),
-                                         hgt_format(),     ascii_grid_format(),  usgs_dem_format(),
-                                         png_format(),     binary_grid_format(), xyz_format()};
+  static const std::array<Format, 12> all{geotiff_format(), las_format(),         ply_format(),
+                                          hgt_format(),     ascii_grid_format(),  usgs_dem_format(),
+                                          png_format(),     binary_grid_format(), obj_format(),
+                                          off_format(),     stl_format(),         xyz_format()};
   return all;
 }
 
