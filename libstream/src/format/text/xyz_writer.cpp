@@ -34,12 +34,12 @@ class CoordinateText {
  public:
   CoordinateText() = default;
   CoordinateText(double scale, double offset) : scale_(scale), offset_(offset), decimals_(0) {
-    const auto has_decimals = [&](double value) {
-      const double power = std::pow(10.0, decimals_), scaled = value * power;
-      return std::abs(scaled - std::round(scaled)) <= 1e-6 * scale * power;
+    double power = 1.0;
+    const auto is_whole = [&](double value) {
+      return std::abs(value * power - std::round(value * power)) <= 1e-6 * scale * power;
     };
-    while (decimals_ <= kMostDecimals && !(has_decimals(scale) && has_decimals(offset))) {
-      ++decimals_;
+    for (; decimals_ <= kMostDecimals && !(is_whole(scale) && is_whole(offset)); ++decimals_) {
+      power *= 10.0;
     }
   }
 
