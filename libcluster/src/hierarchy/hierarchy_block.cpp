@@ -175,7 +175,12 @@ void BlockProcessor::cluster(HierarchyBlock& block, std::span<const Point3> grou
                             .channels = {channels_, options_.channels.weights},
                             .facility_cost = options.facility_cost,
                             .outlier_price = outlier_price(block)},
-                           options_.strategy, options, block.clustering);
+                           {.strategy = options_.strategy,
+                            .effort = options.effort,
+                            .seed = options.seed,
+                            .threads = options_.search_threads,
+                            .batch = options_.batch},
+                           block.clustering);
     } else {
       cluster_(ground, weights_, options, block.clustering);
     }

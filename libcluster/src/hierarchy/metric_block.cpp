@@ -40,9 +40,9 @@ bool drop_outliers(const BlockClustering& clustering, std::size_t channel_count,
 
 }  // namespace
 
-void MetricBlockClusterer::run(const FacilityPoints& problem, FacilityStrategy strategy,
-                               const BlockOptions& options, BlockClustering& result) {
-  run_once(problem, strategy, options, result);
+void MetricBlockClusterer::run(const FacilityPoints& problem, const FacilityOptions& options,
+                               BlockClustering& result) {
+  run_once(problem, options, result);
   if (std::isinf(problem.outlier_price)) return;
   assert(problem.weights.empty());
 
@@ -57,7 +57,7 @@ void MetricBlockClusterer::run(const FacilityPoints& problem, FacilityStrategy s
     rest.points = points_;
     rest.channels.values = channels_;
     if (round + 1 == kRounds) rest.outlier_price = std::numeric_limits<double>::infinity();
-    run_once(rest, strategy, options, result);
+    run_once(rest, options, result);
   }
   if (numbers_.size() == count) return;
 
@@ -68,20 +68,21 @@ void MetricBlockClusterer::run(const FacilityPoints& problem, FacilityStrategy s
   result.assignment = std::move(assignment);
 }
 
-void MetricBlockClusterer::run_once(const FacilityPoints& problem, FacilityStrategy strategy,
-                                    const BlockOptions& options, BlockClustering& result) {
-  if (strategy == FacilityStrategy::automatic && problem.channels.size() == 0 &&
+void MetricBlockClusterer::run_once(const FacilityPoints& problem, const FacilityOptions& options,
+                                    BlockClustering& result) {
+  const bool automatic = options.strategy == FacilityStrategy::automatic;
+  if (automatic && problem.channels.size() == 0 &&
       linear_map(problem.metric, bounds_of(problem.points))) {
     run_linear(clusterer_, problem, options.effort, options.seed, result);
     leave_out(problem, result);
     return;
   }
-  const Effort effort = problem.points.size() < kFullSearchBelow
-                            ? std::max(options.effort, Effort::fine)
-                            : options.effort;
-  FacilitySolution solution =
-      solve(problem,
-            {.strategy = strategy, .effort = effort, .seed = options.seed, .assign_nearest = true});
+  FacilityOptions search = options;
+  search.assign_nearest = true;
+  if (automatic && problem.points.size() < kFullSearchBelow) {
+    search.effort = std::max(options.effort, Effort::fine);
+  }
+  FacilitySolution solution = solve(problem, search);
   result.facilities = std::move(solution.facilities);
   result.assignment = std::move(solution.assignment);
   result.facility_cost = result.connection_cost = 0.0;

@@ -22,12 +22,11 @@ class MetricBlockClusterer {
   /// not left out. Weights must be empty if it has an outlier price.
   /// assignment is kOutlier for points left out. The costs in `result` are not filled in.
   /// Throws: std::invalid_argument as solve().
-  void run(const FacilityPoints& problem, FacilityStrategy strategy, const BlockOptions& options,
-           BlockClustering& result);
+  void run(const FacilityPoints& problem, const FacilityOptions& options, BlockClustering& result);
 
  private:
-  void run_once(const FacilityPoints& problem, FacilityStrategy strategy,
-                const BlockOptions& options, BlockClustering& result);
+  void run_once(const FacilityPoints& problem, const FacilityOptions& options,
+                BlockClustering& result);
 
   BlockClusterer clusterer_;
   std::vector<Point3> points_;  // those that have not been left out

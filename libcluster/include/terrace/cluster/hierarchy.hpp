@@ -106,9 +106,12 @@ struct HierarchyOptions {
   /// box of the block (Euclidean, elliptical, a field with one region there) and there are no
   /// channels, otherwise by the local search that solve() of facility_location.hpp chooses. Any
   /// other: solve() with that strategy. A local search is ten to a hundred times slower. Its effort
-  /// is that of `block`, in blocks of fewer than 2500 points Effort::fine at least; clusters are in
-  /// the order of their representatives.
+  /// is that of `block`, with `automatic` in blocks of fewer than 2500 points Effort::fine at
+  /// least; clusters are in the order of their representatives.
   FacilityStrategy strategy = FacilityStrategy::automatic;
+  /// As FacilityOptions has them: threads that work on one block, and candidates judged at once.
+  unsigned search_threads = 1;
+  std::size_t batch = 1;
   /// What leaving out a point of level 0 costs, times the diagonal as the facility cost, and in
   /// blocks of n < block_size points (the last one, tiles) times sqrt(block_size / n); infinite: no
   /// point is left out. Outliers are found and taken out until none is left, the diagonal being
