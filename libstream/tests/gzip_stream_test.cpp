@@ -137,6 +137,8 @@ TEST_F(GzipInput, IsReadLikeWhatIsInIt) {
   EXPECT_EQ(input.offset(), 500'000U);
   EXPECT_EQ(input.fill(1'000'000), text.substr(500'000));
   EXPECT_FALSE(input.skip(400'001));
+  Input as_it_is(file, {}, 1000, Input::Packed::as_it_is);
+  EXPECT_EQ(as_it_is.fill(1'000'000), packed(text));
   const std::vector<char> head = peek_head(file, 100, {});
   EXPECT_EQ(std::string(head.begin(), head.end()), text.substr(0, 100));
 }

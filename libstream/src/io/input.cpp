@@ -117,7 +117,8 @@ class Input::Descriptor {
   std::optional<StopWaiter> waiter_;  ///< of all but regular files, which never keep one waiting
 };
 
-Input::Input(const std::string& file, const std::stop_token& stop, std::size_t at_once) {
+Input::Input(const std::string& file, const std::stop_token& stop, std::size_t at_once,
+             Packed packed) {
   const auto kept = heads().find(file);
   if (kept != heads().end()) {
     *this = std::move(*kept->second);
@@ -129,7 +130,9 @@ Input::Input(const std::string& file, const std::stop_token& stop, std::size_t a
   descriptor_ = std::make_unique<Descriptor>(file, stop);
   size_ = descriptor_->size();
   buffer_.resize(at_once);
-  if (!size_) return;  // a pipe is not looked at before it is read: it may have no writer yet
+  looked_at_ = packed == Packed::as_it_is;
+  if (looked_at_ || !size_)
+    return;  // a pipe is not looked at before it is read: it may have no writer yet
   looked_at_ = true;
   if (descriptor_->begins_as_gzip()) {
     size_.reset();

@@ -18,17 +18,20 @@ inline constexpr std::string_view kStandardStream = "-";
 class GzipStream;
 
 /// The bytes of a file, a pipe or standard input ("-") from first to last, through a window that
-/// moves forward. Holds the window, never the file. What begins as gzip is unpacked on the way:
-/// windows and offsets are of the unpacked bytes.
+/// moves forward. Holds the window, never the file. What begins as gzip is unpacked on the way,
+/// unless it is `as_it_is`: windows and offsets are of the unpacked bytes.
 ///
 /// Whatever waits for a pipe (its first writer, more bytes) ends with Stopped as soon as `stop` is
 /// asked for, by whichever thread.
 class Input {
  public:
+  /// as_it_is: for bytes that may begin like gzip by chance.
+  enum class Packed : std::uint8_t { unpacked, as_it_is };
+
   /// at_once: bytes that are asked for at a time. Does not wait for the first writer of a pipe.
   /// Throws: Error if the file cannot be opened.
   explicit Input(const std::string& file, const std::stop_token& stop = {},
-                 std::size_t at_once = std::size_t{256} << 10);
+                 std::size_t at_once = std::size_t{256} << 10, Packed packed = Packed::unpacked);
   ~Input();
   Input(const Input&) = delete;
   Input& operator=(const Input&) = delete;
