@@ -15,7 +15,7 @@
 
 #include <gtest/gtest.h>
 
-#include "format/copc/octree.hpp"
+#include "format/copc/hierarchy.hpp"
 #include "las_files.hpp"
 #include "point_files.hpp"
 
@@ -55,15 +55,15 @@ std::string info_of(std::uint64_t page_bytes, double half_size = 8, double spaci
 }
 
 /// The octree of a file that has these pages, one behind the other.
-CopcOctree octree_of(const std::vector<std::vector<HierarchyEntry>>& pages, std::uint64_t points,
-                     const std::string& info = {}) {
+Octree octree_of(const std::vector<std::vector<HierarchyEntry>>& pages, std::uint64_t points,
+                 const std::string& info = {}) {
   std::string file(kFirstPage, '\0');
   for (const std::vector<HierarchyEntry>& page : pages) file += page_of(page);
   std::vector<std::byte> bytes(file.size());
   std::memcpy(bytes.data(), file.data(), file.size());
   const auto source = bytes_in_memory("made", std::move(bytes));
-  return read_copc_octree(*source, info.empty() ? info_of(pages.front().size() * 32) : info,
-                          kFirstChunk, points);
+  return read_copc_hierarchy(*source, info.empty() ? info_of(pages.front().size() * 32) : info,
+                             kFirstChunk, points);
 }
 
 std::string refusal_of(const std::vector<std::vector<HierarchyEntry>>& pages, std::uint64_t points,
@@ -73,14 +73,14 @@ std::string refusal_of(const std::vector<std::vector<HierarchyEntry>>& pages, st
 
 TEST(CopcOctree, NodesComeDepthFirstInMortonOrder) {
   // The second page begins behind the four entries of the first.
-  const CopcOctree octree = octree_of({{{1, 1, 0, 0, 120, 10, 3},
-                                        {0, 0, 0, 0, 110, 10, 2},
-                                        {1, 0, 0, 1, 0, 0, 0},
-                                        {1, 0, 1, 0, kFirstPage + 128, 64, -1}},
-                                       {{1, 0, 1, 0, 130, 10, 4}, {2, 3, 1, 0, 140, 10, 5}}},
-                                      14);
+  const Octree octree = octree_of({{{1, 1, 0, 0, 120, 10, 3},
+                                    {0, 0, 0, 0, 110, 10, 2},
+                                    {1, 0, 0, 1, 0, 0, 0},
+                                    {1, 0, 1, 0, kFirstPage + 128, 64, -1}},
+                                   {{1, 0, 1, 0, 130, 10, 4}, {2, 3, 1, 0, 140, 10, 5}}},
+                                  14);
   std::vector<std::uint64_t> points;
-  for (const CopcNode& node : octree.nodes) points.push_back(node.points);
+  for (const OctreeNode& node : octree.nodes) points.push_back(node.points);
   EXPECT_EQ(points, (std::vector<std::uint64_t>{2, 3, 5, 4}));
   const Box3 box = octree.box(octree.nodes[2]);
   EXPECT_EQ(box.min, (Point3{4, -4, -8}));
@@ -89,14 +89,14 @@ TEST(CopcOctree, NodesComeDepthFirstInMortonOrder) {
 
 TEST(CopcOctree, KeepsWhatMeetsTheRegionDownToTheResolution) {
   const auto kept = [](const std::optional<Box3>& region, double resolution) {
-    CopcOctree octree = octree_of({{{0, 0, 0, 0, 110, 10, 1},
-                                    {1, 0, 0, 0, 120, 10, 2},
-                                    {1, 1, 1, 1, 130, 10, 4},
-                                    {2, 3, 3, 3, 140, 10, 8}}},
-                                  15);
+    Octree octree = octree_of({{{0, 0, 0, 0, 110, 10, 1},
+                                {1, 0, 0, 0, 120, 10, 2},
+                                {1, 1, 1, 1, 130, 10, 4},
+                                {2, 3, 3, 3, 140, 10, 8}}},
+                              15);
     octree.keep(region, resolution, {0.01, 0.01, 0.01});
     std::uint64_t points = 0;
-    for (const CopcNode& node : octree.nodes) points += node.points;
+    for (const OctreeNode& node : octree.nodes) points += node.points;
     return points;
   };
   EXPECT_EQ(kept({}, 0), 15u);
