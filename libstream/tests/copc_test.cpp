@@ -17,12 +17,12 @@
 
 #include "format/copc/hierarchy.hpp"
 #include "las_files.hpp"
+#include "octree_testing.hpp"
 #include "point_files.hpp"
 
 namespace terrace::stream {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// Where pages begin in the files made here, and the first chunk.
 constexpr std::uint64_t kFirstChunk = 100, kFirstPage = 1000;
 
@@ -145,23 +145,6 @@ TEST(CopcOctree, RefusesWhatCannotBe) {
   EXPECT_PRED2(has, refusal_of({{root}}, 1, info_of(32).substr(1)), "cut off");
 }
 
-using Record = std::pair<Point3, std::string>;
-
-std::multiset<Record> records(const AllPoints& all, const Box3& region) {
-  std::multiset<Record> found;
-  const std::size_t bytes = all.info.payload_size();
-  for (std::size_t i = 0; i < all.points.size(); ++i) {
-    const Point3 at = world_point(all.info, all.points.positions[i]);
-    if (!region.contains(at)) continue;
-    found.emplace(
-        at,
-        std::string(reinterpret_cast<const char*>(all.points.payload.data()) + i * bytes, bytes));
-  }
-  return found;
-}
-
-constexpr Box3 kEverywhere{{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}};
-
 class CopcFiles : public ::testing::TestWithParam<const char*> {};
 
 /// The oracle is the same file with another name in place of the VLR's: a LAZ file like others.
@@ -184,30 +167,7 @@ TEST_P(CopcFiles, PointsOfARegionAreThoseOfTheWholeFile) {
   EXPECT_EQ(by_nodes.info.points, all.points.size());
   EXPECT_TRUE(records(by_nodes, kEverywhere) == records(all, kEverywhere));
 
-  Box3 bounds;
-  for (const Point3& p : all.points.positions) bounds.include(world_point(all.info, p));
-  std::mt19937_64 random(11);
-  std::uniform_real_distribution<double> part(-0.1, 1.1);
-  for (int round = 0; round < 8; ++round) {
-    Box3 region = kEverywhere;
-    for (std::size_t axis = 0; axis < (round % 2 == 0 ? 2u : 3u); ++axis) {
-      const double side = bounds.max[axis] - bounds.min[axis];
-      const double a = bounds.min[axis] + part(random) * side;
-      const double b = bounds.min[axis] + part(random) * side;
-      region.min[axis] = std::min(a, b);
-      region.max[axis] = std::max(a, b);
-    }
-    const std::multiset<Record> expected = records(all, region);
-    for (const std::string& name : {file.string(), plain}) {
-      for (const unsigned threads : {1u, 3u}) {
-        SourceOptions options{.threads = threads};
-        options.selection.region = region;
-        const auto source = open_source(std::span(&name, 1), options);
-        EXPECT_TRUE(records(read_all(*source), kEverywhere) == expected);
-        EXPECT_EQ(source->progress().excluded, all.points.size() - expected.size());
-      }
-    }
-  }
+  expect_parts_of_regions({file.string(), plain}, all);
   // As it has no octree.
   SourceOptions coarse;
   coarse.selection.resolution = 1;
@@ -218,25 +178,7 @@ TEST_P(CopcFiles, PointsOfARegionAreThoseOfTheWholeFile) {
 TEST_P(CopcFiles, CoarserResolutionsAreParts) {
   const char* const data = std::getenv("TERRACE_DATA");
   if (data == nullptr) GTEST_SKIP() << "no TERRACE_DATA";
-  const std::filesystem::path file = std::filesystem::path(data) / "lidar" / GetParam();
-  const AllPoints all = read_file(file);
-  std::multiset<Record> finer = records(all, kEverywhere);
-  double spacing = all.info.octree->spacing;
-  std::vector<double> spacings;
-  for (unsigned depth = 0; depth < all.info.octree->depths; ++depth, spacing /= 2) {
-    spacings.push_back(spacing);
-  }
-  for (auto step = spacings.rbegin(); step != spacings.rend(); ++step) {
-    SourceOptions options;
-    options.selection.resolution = *step;
-    const AllPoints coarse = read_file(file, options);
-    const std::multiset<Record> found = records(coarse, kEverywhere);
-    EXPECT_EQ(coarse.info.octree->depths, spacings.rend() - step);
-    EXPECT_TRUE(std::includes(finer.begin(), finer.end(), found.begin(), found.end()));
-    EXPECT_TRUE(step == spacings.rbegin() ? found.size() == finer.size()
-                                          : found.size() < finer.size());
-    finer = found;
-  }
+  expect_coarser_parts((std::filesystem::path(data) / "lidar" / GetParam()).string());
 }
 
 /// What copies a COPC file's VLRs beside other points leaves a hierarchy that tells nothing.

@@ -9,6 +9,7 @@ import csv
 import json
 import os
 import random
+import shutil
 import struct
 import subprocess
 import tempfile
@@ -489,6 +490,38 @@ class LasDataTest(LasCase):
                                          '--resolution', spacing, '--crs', 'EPSG:32612'))
         self.assertEqual(summary['points'] + summary['excluded'], 518862)
         self.assertLess(summary['points'], len(wanted))
+
+    def test_entwine_folders(self):
+        """A folder of EPT is one input; its nodes are counted by Python."""
+        folder = os.path.join(DATA, 'lidar', 'ept-lone-star')
+        nodes = {}
+        for name in os.listdir(os.path.join(folder, 'ept-hierarchy')):
+            with open(os.path.join(folder, 'ept-hierarchy', name), encoding='utf-8') as file:
+                nodes.update((node, points) for node, points in json.load(file).items() if points >= 0)
+        spacing = 44 / 128
+        for name in (folder, os.path.join(folder, 'ept.json')):
+            info = self.info(name)
+            self.assertEqual((info['format'], info['points'], info['crs']['epsg']), ('ept', sum(nodes.values()), 26912))
+            self.assertEqual(info['octree'], {'spacing': spacing, 'depths': 4, 'nodes': len(nodes)})
+        for deepest in range(4):
+            wanted = sum(points for node, points in nodes.items() if int(node[0]) <= deepest)
+            summary = json.loads(self.run_ok('convert', folder, '-o', self.path('r.las'), '--force', '--json',
+                                             '--resolution', spacing / 2 ** deepest, '--threads', 1 + deepest % 2))
+            self.assertEqual((summary['points'], summary['excluded']), (wanted, 518862 - wanted))
+        box = '515375,4918350,515385.5,4918360.25'
+        copc = os.path.join(DATA, 'lidar', 'lone-star.copc.laz')
+        parts = [json.loads(self.run_ok('build', name, '-o', self.path(f'part{i}.st'), '--json', '--region', box,
+                                        '--crs', 'EPSG:26912'))
+                 for i, name in enumerate((folder, copc))]
+        self.assertGreater(parts[0]['points'], 1000)
+        self.assertEqual(parts[0]['points'], parts[1]['points'])
+        # A damaged one ends at once.
+        shutil.copytree(folder, self.path('damaged'))
+        os.truncate(os.path.join(self.path('damaged'), 'ept-data', '2-2-2-1.laz'), 1000)
+        self.assertIn('2-2-2-1.laz', self.refused('build', self.path('damaged'), '-o', self.path('d.st')))
+        with open(os.path.join(self.path('damaged'), 'ept.json'), 'w', encoding='ascii') as file:
+            file.write('{' * 100000)
+        self.assertIn('ept.json', self.refused('info', self.path('damaged')))
 
     def test_cloud_optimised_files_among_others(self):
         """From a pipe and beside LAZ, where all share what is left out."""

@@ -11,6 +11,8 @@ namespace terrace::stream {
 const Format& geotiff_format();
 /// ASPRS LAS 1.0 to 1.4.
 const Format& las_format();
+/// Entwine Point Tile: a folder with an octree of files.
+const Format& ept_format();
 /// The Stanford polygon format: ASCII, binary little-endian and big-endian.
 const Format& ply_format();
 /// Tiles of SRTM without a header, also in .zip and .gz.

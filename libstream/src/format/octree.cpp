@@ -8,7 +8,7 @@ namespace terrace::stream {
 
 std::string name_of(const OctreeNode& node) {
   std::string name = std::to_string(node.depth);
-  for (const std::uint32_t place : node.place) name += "-" + std::to_string(place);
+  for (const std::uint32_t place : node.place) name.append("-").append(std::to_string(place));
   return name;
 }
 

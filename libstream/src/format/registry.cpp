@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "format/ept/metadata.hpp"
 #include "format/foreign_format.hpp"
 #include "format/formats.hpp"
 #include "format/input_files.hpp"
@@ -43,8 +44,10 @@ const Format* format_of_ending(const std::string& ending) {
   return nullptr;
 }
 
-/// The format that reads packed files itself and whose name this has: ".hgt.zip".
-const Format* packed_format_of(const std::string& file) {
+/// The format that a whole name tells: "ept.json", or that of a packed file which its format reads
+/// itself: ".hgt.zip".
+const Format* format_of_whole_name(const std::string& file) {
+  if (std::filesystem::path(file).filename() == kEptName) return &ept_format();
   const std::string ending = ending_of(file);
   if (ending != ".zip" && ending != ".gz") return nullptr;
   return format_of_ending(ending_of(std::filesystem::path(file).stem()) + ending);
@@ -76,7 +79,7 @@ const Format& format_of(const std::string& file, const SourceOptions& options) {
   for (const Format& format : telling) {
     if (format.recognise(bytes)) return format;
   }
-  if (const Format* const packed = packed_format_of(file)) return *packed;
+  if (const Format* const told = format_of_whole_name(file)) return *told;
   if (const auto* foreign = foreign_format_of_content({head.data(), head.size()})) {
     refuse(file, *foreign);
   }
@@ -133,11 +136,12 @@ std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
                  .cause = "is " + format.name + ", whose heights are no colours",
                  .remedy = "leave `heights_of_colour` out"});
   }
-  if (options.selection.resolution > 0 && format.name != las_format().name) {
+  if (options.selection.resolution > 0 && format.name != las_format().name &&
+      format.name != ept_format().name) {
     throw Error({.file = files.front(),
                  .where = {},
                  .cause = "is " + format.name + ", which has no octree to read to a resolution",
-                 .remedy = "name a COPC file, or leave `resolution` out"});
+                 .remedy = "name a COPC file or EPT, or leave `resolution` out"});
   }
   return selection_of(format.open(files, options), options);
 }
@@ -146,15 +150,15 @@ std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
 
 std::span<const Format> formats() {
   // The most telling content first: text is whatever looks like a table of numbers.
-  static const std::array<Format, 9> all{geotiff_format(), las_format(),         ply_format(),
-                                         hgt_format(),     ascii_grid_format(),  usgs_dem_format(),
-                                         png_format(),     binary_grid_format(), xyz_format()};
+  static const std::array<Format, 10> all{
+      geotiff_format(),    las_format(),      ept_format(), ply_format(),         hgt_format(),
+      ascii_grid_format(), usgs_dem_format(), png_format(), binary_grid_format(), xyz_format()};
   return all;
 }
 
 const Format* format_of_name(const std::string& file) {
-  const Format* const packed = packed_format_of(file);
-  return packed != nullptr ? packed : format_of_ending(ending_of(file));
+  const Format* const told = format_of_whole_name(file);
+  return told != nullptr ? told : format_of_ending(ending_of(file));
 }
 
 std::unique_ptr<PointSource> open_source(std::span<const std::string> names,

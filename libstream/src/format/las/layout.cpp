@@ -75,7 +75,7 @@ LasLayout las_layout(std::span<const Channel> attributes, const std::string& fil
     // A name may fill its place; the number that makes it distinct takes the end of it.
     std::string name = channel.name.empty() ? "extra" : channel.name.substr(0, kExtraNameBytes);
     for (int n = 2; std::find(names.begin(), names.end(), name) != names.end(); ++n) {
-      const std::string number = "_" + std::to_string(n);
+      const std::string number = std::string("_").append(std::to_string(n));
       name = channel.name.substr(0, kExtraNameBytes - number.size()) + number;
     }
     names.push_back(name);

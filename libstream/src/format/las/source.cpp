@@ -57,7 +57,7 @@ class LasOpener {
       throw Error({.file = stream_.input->name(),
                    .where = {},
                    .cause = "its points lie in no octree that could be read down to a resolution",
-                   .remedy = "name a COPC file, not piped, or leave `resolution` out"});
+                   .remedy = "name a COPC file, not piped, or EPT, or leave `resolution` out"});
     }
     if (wanted.region && lies_outside(*wanted.region)) stream_.info.points = 0;
     if (header_.compressed) {
