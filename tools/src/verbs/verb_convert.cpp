@@ -31,7 +31,7 @@ class ConvertCommand : public Command {
         ->type_name("FILE");
     add_output(app, output_, "The file to write; - is standard output");
     app.add_option("--format", format_,
-                   "Of the output: xyz, csv, ply, ply-ascii, las, laz (else its ending)")
+                   "Of the output: xyz, csv, ply, ply-ascii, las, laz, copc (else its ending)")
         ->type_name("NAME");
     app.add_option("--input-format", input_format_, "Of the input (else its content, its ending)")
         ->type_name("NAME");

@@ -121,9 +121,9 @@ class PointsCommand final : public Command {
   void define(CLI::App& app) override {
     app.add_option("STORE", store_, "where the points come from")->required();
     add_output(app, output_,
-               "the file to write: .xyz, .csv, .ply, .las, .laz; - is standard output");
+               "the file to write: .xyz, .csv, .ply, .las, .laz, .copc.laz; - is standard output");
     app.add_option("--format", format_,
-                   "xyz, csv, ply, ply-ascii, las, laz; else by the file's ending");
+                   "xyz, csv, ply, ply-ascii, las, laz, copc; else by the file's ending");
     app.add_option("--level", level_, "points of this level and above: a number or top")
         ->default_str("0; with --focus top");
     app.add_option(

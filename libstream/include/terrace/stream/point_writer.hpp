@@ -53,7 +53,7 @@ class PointWriter {
 struct WriterOptions {
   /// Name of a format; empty: by the file's ending. Points: "xyz" (x y z and attributes, separated
   /// by blanks), "csv" (with a header line), "ply" (binary, little-endian), "ply-ascii", "las" and
-  /// "laz" (LAS 1.4).
+  /// "laz" (LAS 1.4), and "copc" (".copc.laz"; in finish(), through a temporary file beside it).
   /// Meshes: "ply", "ply-ascii", "obj", "glb".
   std::string format{};
   bool replace = false;    ///< an existing file is replaced instead of refused
