@@ -52,14 +52,14 @@ class ConvertCommand : public Command {
                                     .selection = selection_.selection()});
     reading_within_memory(*source, common.memory_or(0));
     const stream::SourceInfo& info = source->info();
-    const auto writer =
-        stream::open_point_writer(output_,
-                                  {.attributes = info.attributes,
-                                   .comments = {kWriterMark},
-                                   .crs = crs_of(info),
-                                   .lattice = lattice_of(info),
-                                   .bounds = bounds_of(info)},
-                                  {.format = format_, .replace = replace, .stop = stop_token()});
+    const auto writer = stream::open_point_writer(
+        output_,
+        {.attributes = info.attributes,
+         .comments = {kWriterMark},
+         .crs = crs_of(info),
+         .lattice = lattice_of(info),
+         .bounds = bounds_of(info)},
+        {.format = format_, .replace = replace, .stop = stop_token(), .threads = common.threads});
     {
       ProgressMeter meter(common.progress, "points");
       stream::PointBlock block;

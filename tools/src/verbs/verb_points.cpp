@@ -162,9 +162,12 @@ class PointsCommand final : public Command {
     std::optional<stream::Overlay> overlay;
     if (!overlay_.empty()) overlay.emplace(open_height_overlay(overlay_, store));
     const std::optional<Transformation> to = crs_.to(store, common);
-    const auto writer = stream::open_point_writer(
-        output_, header(store, store.schema().attributes, to),
-        {.format = format_, .replace = may_replace(output_, common.force), .stop = stop_token()});
+    const auto writer =
+        stream::open_point_writer(output_, header(store, store.schema().attributes, to),
+                                  {.format = format_,
+                                   .replace = may_replace(output_, common.force),
+                                   .stop = stop_token(),
+                                   .threads = common.threads});
     PointOutput output(store, places(to), overlay ? &*overlay : nullptr, *writer);
     for_each_wanted_point(
         store, detail,
@@ -223,9 +226,11 @@ class PointsCommand final : public Command {
     std::vector<stream::Channel> attributes = store.schema().attributes;
     attributes.push_back({.name = "distance", .unit = "metre"});
     const std::optional<Transformation> to = crs_.to(store, common);
-    const auto writer = stream::open_point_writer(
-        output_, header(store, std::move(attributes), to),
-        {.format = format_, .replace = may_replace(output_, common.force), .stop = stop_token()});
+    const auto writer = stream::open_point_writer(output_, header(store, std::move(attributes), to),
+                                                  {.format = format_,
+                                                   .replace = may_replace(output_, common.force),
+                                                   .stop = stop_token(),
+                                                   .threads = common.threads});
     write_found(store, found, places(to), *writer);
     writer->finish();
     Summary summary;

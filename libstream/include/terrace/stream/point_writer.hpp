@@ -56,8 +56,11 @@ struct WriterOptions {
   /// "laz" (LAS 1.4), and "copc" (".copc.laz"; in finish(), through a temporary file beside it).
   /// Meshes: "ply", "ply-ascii", "obj", "glb".
   std::string format{};
-  bool replace = false;    ///< an existing file is replaced instead of refused
-  std::stop_token stop{};  ///< ends a wait for the reader of standard output, with Stopped
+  bool replace = false;  ///< an existing file is replaced instead of refused
+  /// Ends a wait for the reader of standard output, and PointWriter::finish() of "copc", with
+  /// Stopped.
+  std::stop_token stop{};
+  unsigned threads = 1;  ///< that encode at once, of "laz" and "copc"; the bytes are the same
 };
 
 /// A writer for `path`; "-" is standard output, for "xyz" (also if no format is named) and "csv".

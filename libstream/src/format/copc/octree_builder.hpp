@@ -30,7 +30,7 @@ class OctreeBuilder {
  public:
   static constexpr unsigned kSpan = 128;
   /// Nodes with at most so many points below and in them are leaves.
-  static constexpr std::size_t kLeafPoints = std::size_t{1} << 14;
+  static constexpr std::size_t kLeafPoints = std::size_t{1} << 15;
 
   /// Takes a node and its records, in the order in which they were added; there may be none.
   /// Children come before their parents.

@@ -15,6 +15,7 @@
 #include "format/copc/hierarchy.hpp"
 #include "format/copc/octree_builder.hpp"
 #include "format/las/header.hpp"
+#include "format/las/laz_encoders.hpp"
 #include "format/las/record_encoder.hpp"
 #include "format/writers.hpp"
 #include "io/bytes.hpp"
@@ -67,8 +68,9 @@ class CopcWriter final : public PointWriter {
         records_(path, header, LasFormats::newer),
         vlr_(laz::Vlr::of(records_.layout().point_format, records_.layout().record_bytes,
                           laz::Vlr::kVariable)),
-        encoder_(vlr_),
-        builder_(path, folder_of(path), records_.layout().record_bytes) {
+        builder_(path, folder_of(path), records_.layout().record_bytes),
+        encoders_(vlr_, options.threads,
+                  [this](std::span<const std::byte> coded) { write_chunk(coded); }) {
     std::string vlrs;
     append_vlr(vlrs, kCopcUser, kCopcInfo, std::string(kCopcInfoBytes, '\0'));
     append_vlr(vlrs, laz::Vlr::kUserId, laz::Vlr::kRecordId, text_of_bytes(vlr_.serialise()));
@@ -91,26 +93,27 @@ class CopcWriter final : public PointWriter {
   }
 
   void finish() override {
-    Octree octree = cube_around(records_);
-    builder_.build(octree, records_.lattice(),
+    octree_ = cube_around(records_);
+    builder_.build(octree_, records_.lattice(),
                    [&](const OctreeNode& node, std::span<const std::byte> records) {
                      if (stop_.stop_requested()) throw Stopped();
-                     octree.nodes.push_back(node);
-                     write_chunk(octree.nodes.back(), records);
+                     octree_.nodes.push_back(node);
+                     if (!records.empty()) encoders_.encode(records);
                    });
+    encoders_.finish();
     std::string position;
     append_little_endian(position, sink_.size());
     sink_.write(laz::write_chunk_table(chunks_, vlr_));
     sink_.write_at(file_.points_offset, position);
 
-    octree.arrange();
+    octree_.arrange();
     file_.evlr_offset = sink_.size();
     file_.evlrs = 1;
-    const std::string page = hierarchy(octree);
+    const std::string page = hierarchy();
     sink_.write(evlr_head(kCopcUser, kCopcHierarchy, page.size()));
     const std::uint64_t page_at = sink_.size();
     sink_.write(page);
-    sink_.write_at(kLas14HeaderBytes + kLasVlrHeaderBytes, info(octree, page_at, page.size()));
+    sink_.write_at(kLas14HeaderBytes + kLasVlrHeaderBytes, info(page_at, page.size()));
     file_.compressed = true;
     sink_.write_at(0, las_header_text(records_, file_));
     sink_.commit();
@@ -123,11 +126,11 @@ class CopcWriter final : public PointWriter {
   /// GPS time in the point formats 6 to 8.
   static constexpr std::size_t kGpsTimeAt = 22;
 
-  void write_chunk(OctreeNode& node, std::span<const std::byte> records) {
-    if (records.empty()) return;
-    coded_.clear();
-    encoder_.encode_chunk(records, coded_);
-    if (coded_.size() > std::numeric_limits<std::int32_t>::max()) {
+  /// The chunk of the next node that has points.
+  void write_chunk(std::span<const std::byte> coded) {
+    while (octree_.nodes[written_].points == 0) ++written_;
+    OctreeNode& node = octree_.nodes[written_++];
+    if (coded.size() > std::numeric_limits<std::int32_t>::max()) {
       throw Error({.file = path_,
                    .where = {},
                    .cause = std::to_string(node.points) +
@@ -135,15 +138,15 @@ class CopcWriter final : public PointWriter {
                    .remedy = "leave them out, or write LAZ"});
     }
     node.offset = sink_.size();
-    node.bytes = coded_.size();
+    node.bytes = coded.size();
     chunks_.push_back({.offset = 0, .bytes = node.bytes, .points = node.points});
-    sink_.write(coded_);
+    sink_.write(coded);
   }
 
   /// One page of all nodes. Those without points are there for their children.
-  static std::string hierarchy(const Octree& octree) {
+  [[nodiscard]] std::string hierarchy() const {
     std::string page;
-    for (const OctreeNode& node : octree.nodes) {
+    for (const OctreeNode& node : octree_.nodes) {
       append_little_endian(page, static_cast<std::int32_t>(node.depth));
       for (const std::uint32_t place : node.place) {
         append_little_endian(page, static_cast<std::int32_t>(place));
@@ -155,12 +158,11 @@ class CopcWriter final : public PointWriter {
     return page;
   }
 
-  [[nodiscard]] std::string info(const Octree& octree, std::uint64_t page_at,
-                                 std::uint64_t page_bytes) const {
+  [[nodiscard]] std::string info(std::uint64_t page_at, std::uint64_t page_bytes) const {
     std::string info;
-    for (const double centre : octree.centre) append_little_endian(info, centre);
-    append_little_endian(info, octree.half_size);
-    append_little_endian(info, octree.spacing);
+    for (const double centre : octree_.centre) append_little_endian(info, centre);
+    append_little_endian(info, octree_.half_size);
+    append_little_endian(info, octree_.spacing);
     append_little_endian(info, page_at);
     append_little_endian(info, page_bytes);
     const bool timed = first_time_ <= last_time_;
@@ -176,12 +178,13 @@ class CopcWriter final : public PointWriter {
   LasRecords records_;
   LasFile file_;
   laz::Vlr vlr_;
-  laz::Encoder encoder_;
   OctreeBuilder builder_;
+  Octree octree_;            ///< nodes as they come from the builder
+  std::size_t written_ = 0;  ///< of them
   std::vector<laz::Chunk> chunks_;
-  std::vector<std::byte> coded_;
   double first_time_ = std::numeric_limits<double>::infinity();
   double last_time_ = -std::numeric_limits<double>::infinity();
+  LazEncoders encoders_;  ///< last: it hands on to the others
 };
 
 }  // namespace

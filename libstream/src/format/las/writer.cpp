@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "format/las/header.hpp"
+#include "format/las/laz_encoders.hpp"
 #include "format/las/record_encoder.hpp"
 #include "format/writers.hpp"
 #include "io/bytes.hpp"
@@ -18,45 +19,53 @@
 namespace terrace::stream {
 namespace {
 
-/// The chunks of LAZ, encoded as their points come.
+/// The chunks of LAZ, on their way from records to a sink.
 class LazChunks {
  public:
-  explicit LazChunks(const laz::Vlr& vlr) : vlr_(vlr), encoder_(vlr) {}
+  LazChunks(const laz::Vlr& vlr, unsigned threads, Sink& sink)
+      : vlr_(vlr),
+        sink_(sink),
+        encoders_(vlr, threads, [this](std::span<const std::byte> coded) { write(coded); }) {}
 
-  /// Appends the records, and to `out` the chunks that they fill.
-  void append(std::string_view records, std::vector<std::byte>& out) {
+  /// Takes records, and writes the chunks that they fill.
+  void append(std::string_view records) {
     const std::size_t whole = vlr_.chunk_size * vlr_.record_length();
     while (!records.empty()) {
       const std::string_view part = records.substr(0, whole - pending_.size());
       pending_ += part;
       records.remove_prefix(part.size());
-      if (pending_.size() == whole) encode(out);
+      if (pending_.size() == whole) encode();
     }
   }
-  /// Appends the last chunk and the table, and returns the table's place from the first chunk on.
-  std::uint64_t finish(std::vector<std::byte>& out) {
-    if (!pending_.empty()) encode(out);
-    const std::vector<std::byte> table = laz::write_chunk_table(chunks_, vlr_);
-    out.insert(out.end(), table.begin(), table.end());
+  /// Writes the last chunk and the table, and returns the table's place from the first chunk on.
+  std::uint64_t finish() {
+    if (!pending_.empty()) encode();
+    encoders_.finish();
+    sink_.write(laz::write_chunk_table(chunks_, vlr_));
     return bytes_;
   }
 
  private:
-  void encode(std::vector<std::byte>& out) {
-    const std::size_t before = out.size();
-    encoder_.encode_chunk(std::as_bytes(std::span(pending_)), out);
-    chunks_.push_back({.offset = bytes_,
-                       .bytes = out.size() - before,
-                       .points = pending_.size() / vlr_.record_length()});
-    bytes_ += chunks_.back().bytes;
+  void encode() {
+    chunks_.push_back({.offset = 0, .bytes = 0, .points = pending_.size() / vlr_.record_length()});
+    encoders_.encode(std::as_bytes(std::span(pending_)));
     pending_.clear();
+  }
+  void write(std::span<const std::byte> coded) {
+    chunks_[written_].offset = bytes_;
+    chunks_[written_].bytes = coded.size();
+    ++written_;
+    bytes_ += coded.size();
+    sink_.write(coded);
   }
 
   laz::Vlr vlr_;
-  laz::Encoder encoder_;
+  Sink& sink_;
   std::vector<laz::Chunk> chunks_;
-  std::string pending_;  ///< records of the next chunk
+  std::size_t written_ = 0;  ///< of the chunks
+  std::string pending_;      ///< records of the next chunk
   std::uint64_t bytes_ = 0;
+  LazEncoders encoders_;
 };
 
 class LasWriter final : public PointWriter {
@@ -75,7 +84,7 @@ class LasWriter final : public PointWriter {
       append_vlr(vlrs, laz::Vlr::kUserId, laz::Vlr::kRecordId,
                  {reinterpret_cast<const char*>(data.data()), data.size()});
       ++file_.vlrs;
-      chunks_.emplace(vlr);
+      chunks_.emplace(vlr, options.threads, sink_);
     }
     file_.points_offset = kLas14HeaderBytes + vlrs.size();
     sink_.write(std::string(kLas14HeaderBytes, '\0') + vlrs);
@@ -85,9 +94,7 @@ class LasWriter final : public PointWriter {
   void append(const PointBlock& block) override {
     const std::string_view records = records_.pack(block);
     if (chunks_) {
-      coded_.clear();
-      chunks_->append(records, coded_);
-      sink_.write(coded_);
+      chunks_->append(records);
     } else {
       sink_.write(records);
     }
@@ -95,11 +102,9 @@ class LasWriter final : public PointWriter {
 
   void finish() override {
     if (chunks_) {
-      coded_.clear();
       const std::uint64_t first = file_.points_offset + sizeof(std::uint64_t);
       std::string position;
-      append_little_endian(position, first + chunks_->finish(coded_));
-      sink_.write(coded_);
+      append_little_endian(position, first + chunks_->finish());
       sink_.write_at(file_.points_offset, position);
     }
     sink_.write_at(0, las_header_text(records_, file_));
@@ -114,7 +119,6 @@ class LasWriter final : public PointWriter {
   LasRecords records_;
   LasFile file_;
   std::optional<LazChunks> chunks_;  ///< of LAZ
-  std::vector<std::byte> coded_;
 };
 
 }  // namespace
