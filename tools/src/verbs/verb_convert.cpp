@@ -41,7 +41,7 @@ class ConvertCommand : public Command {
 
   Summary run(const CommonOptions& common) override {
     const Stopwatch watch;
-    const bool replace = may_replace(output_, common.force);
+    const stream::WriterOptions writing = point_writer_options(output_, format_, common);
     const std::array<std::string, 1> files{input_};
     const std::unique_ptr<stream::PointSource> source =
         stream::open_source(files, {.format = input_format_,
@@ -52,14 +52,13 @@ class ConvertCommand : public Command {
                                     .selection = selection_.selection()});
     reading_within_memory(*source, common.memory_or(0));
     const stream::SourceInfo& info = source->info();
-    const auto writer = stream::open_point_writer(
-        output_,
-        {.attributes = info.attributes,
-         .comments = {kWriterMark},
-         .crs = crs_of(info),
-         .lattice = lattice_of(info),
-         .bounds = bounds_of(info)},
-        {.format = format_, .replace = replace, .stop = stop_token(), .threads = common.threads});
+    const auto writer = stream::open_point_writer(output_,
+                                                  {.attributes = info.attributes,
+                                                   .comments = {kWriterMark},
+                                                   .crs = crs_of(info),
+                                                   .lattice = lattice_of(info),
+                                                   .bounds = bounds_of(info)},
+                                                  writing);
     {
       ProgressMeter meter(common.progress, "points");
       stream::PointBlock block;

@@ -164,10 +164,7 @@ class PointsCommand final : public Command {
     const std::optional<Transformation> to = crs_.to(store, common);
     const auto writer =
         stream::open_point_writer(output_, header(store, store.schema().attributes, to),
-                                  {.format = format_,
-                                   .replace = may_replace(output_, common.force),
-                                   .stop = stop_token(),
-                                   .threads = common.threads});
+                                  point_writer_options(output_, format_, common));
     PointOutput output(store, places(to), overlay ? &*overlay : nullptr, *writer);
     for_each_wanted_point(
         store, detail,
@@ -227,10 +224,7 @@ class PointsCommand final : public Command {
     attributes.push_back({.name = "distance", .unit = "metre"});
     const std::optional<Transformation> to = crs_.to(store, common);
     const auto writer = stream::open_point_writer(output_, header(store, std::move(attributes), to),
-                                                  {.format = format_,
-                                                   .replace = may_replace(output_, common.force),
-                                                   .stop = stop_token(),
-                                                   .threads = common.threads});
+                                                  point_writer_options(output_, format_, common));
     write_found(store, found, places(to), *writer);
     writer->finish();
     Summary summary;

@@ -60,6 +60,9 @@ struct WriterOptions {
   /// Ends a wait for the reader of standard output, and PointWriter::finish() of "copc", with
   /// Stopped.
   std::stop_token stop{};
+  /// What "copc" may hold, roughly: 40 MiB at least; more than 128 MiB are not needed. The bytes of
+  /// the file do not depend on it.
+  std::uint64_t memory_bytes = 128u << 20;
   unsigned threads = 1;  ///< that encode at once, of "laz" and "copc"; the bytes are the same
 };
 

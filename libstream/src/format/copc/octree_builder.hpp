@@ -25,7 +25,7 @@ namespace terrace::stream {
 /// that is as even as the points allow. Which of a cell's points it is, a hash of the coordinates
 /// says: the octree depends on the points and their order, not on what fits into memory.
 ///
-/// Time O(points * depth); memory some 2^19 records, and 8 MiB for each factor of 512 beyond.
+/// Time O(points * depth); memory some at_once records, and 16 MiB for each factor of 512 beyond.
 class OctreeBuilder {
  public:
   static constexpr unsigned kSpan = 128;
@@ -39,7 +39,7 @@ class OctreeBuilder {
   /// Records begin with x, y and z as int32. name, folder: of the temporary file.
   /// at_once: the records in memory, of which results do not depend.
   OctreeBuilder(const std::string& name, const std::filesystem::path& folder,
-                std::size_t record_bytes, std::size_t at_once = std::size_t{1} << 19);
+                std::size_t record_bytes, std::size_t at_once);
 
   /// Throws: Error, if the disk is full above all.
   void add(std::span<const std::byte> records);

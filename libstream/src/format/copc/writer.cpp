@@ -59,6 +59,15 @@ Octree cube_around(const LasRecords& records) {
   return octree;
 }
 
+/// How many records the builder may have in memory.
+std::size_t records_within(std::uint64_t memory_bytes, std::size_t record_bytes) {
+  // Beginnings of buckets; nodes on their way up and to the encoders.
+  constexpr std::uint64_t kBeside = 36u << 20;
+  constexpr std::uint64_t kLeast = 1u << 15, kMost = 1u << 19, kBesideRecord = 56;
+  const std::uint64_t room = memory_bytes - std::min(memory_bytes, kBeside);
+  return static_cast<std::size_t>(std::clamp(room / (record_bytes + kBesideRecord), kLeast, kMost));
+}
+
 class CopcWriter final : public PointWriter {
  public:
   CopcWriter(const std::string& path, const PointHeader& header, const WriterOptions& options)
@@ -68,7 +77,8 @@ class CopcWriter final : public PointWriter {
         records_(path, header, LasFormats::newer),
         vlr_(laz::Vlr::of(records_.layout().point_format, records_.layout().record_bytes,
                           laz::Vlr::kVariable)),
-        builder_(path, folder_of(path), records_.layout().record_bytes),
+        builder_(path, folder_of(path), records_.layout().record_bytes,
+                 records_within(options.memory_bytes, records_.layout().record_bytes)),
         encoders_(vlr_, options.threads,
                   [this](std::span<const std::byte> coded) { write_chunk(coded); }) {
     std::string vlrs;
