@@ -6,9 +6,9 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <initializer_list>
 #include <map>
 #include <random>
-#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -382,7 +382,7 @@ TEST(Ept, LoneStarInAllThreeForms) {
   expect_coarser_parts((folder / "ept.json").string());
 
   const auto values_of = [](const AllPoints& points, std::initializer_list<const char*> names) {
-    std::multiset<std::vector<double>> found;
+    std::vector<std::vector<double>> found;
     std::vector<std::pair<ScalarType, std::size_t>> columns;
     for (const char* const name : names) {
       const auto& attributes = points.info.attributes;
@@ -402,8 +402,9 @@ TEST(Ept, LoneStarInAllThreeForms) {
       for (const auto& [type, offset] : columns) {
         values.push_back(to_double(type, points.points.payload.data() + i * bytes + offset));
       }
-      found.insert(values);
+      found.push_back(values);
     }
+    std::sort(found.begin(), found.end());
     return found;
   };
   const auto shared = {"intensity", "return_number", "classification", "gps_time"};
@@ -422,9 +423,7 @@ TEST(Ept, LoneStarInAllThreeForms) {
     const AllPoints other = read_file(file, {.threads = 2});
     EXPECT_EQ(other.info.attributes.size(), 11u);
     EXPECT_TRUE(values_of(other, most) == values_of(all, most));
-    EXPECT_TRUE(records(other) == records(read_file(file)));
-    expect_coarser_parts(file);
-    expect_parts_of_regions({file}, other);
+    EXPECT_TRUE(other.points.payload == read_file(file).points.payload);
   }
 }
 

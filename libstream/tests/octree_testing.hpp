@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <limits>
 #include <random>
-#include <set>
 #include <span>
 #include <string>
 #include <utility>
@@ -27,16 +26,17 @@ inline constexpr Box3 kEverywhere{{-kInfinity, -kInfinity, -kInfinity},
 /// A place in the CRS and the packed attributes.
 using Record = std::pair<Point3, std::string>;
 
-inline std::multiset<Record> records(const AllPoints& all, const Box3& region = kEverywhere) {
-  std::multiset<Record> found;
+/// Those inside of a region, sorted: equal for the same points in any order.
+inline std::vector<Record> records(const AllPoints& all, const Box3& region = kEverywhere) {
+  std::vector<Record> found;
   const std::size_t bytes = all.info.payload_size();
   for (std::size_t i = 0; i < all.points.size(); ++i) {
     const Point3 at = world_point(all.info, all.points.positions[i]);
     if (!region.contains(at)) continue;
-    found.emplace(
-        at,
-        std::string(reinterpret_cast<const char*>(all.points.payload.data()) + i * bytes, bytes));
+    const auto* const payload = reinterpret_cast<const char*>(all.points.payload.data());
+    found.emplace_back(at, std::string(payload + i * bytes, bytes));
   }
+  std::sort(found.begin(), found.end());
   return found;
 }
 
@@ -55,7 +55,7 @@ inline void expect_parts_of_regions(const std::vector<std::string>& files, const
       region.min[axis] = std::min(a, b);
       region.max[axis] = std::max(a, b);
     }
-    const std::multiset<Record> expected = records(all, region);
+    const std::vector<Record> expected = records(all, region);
     for (const std::string& name : files) {
       for (const unsigned threads : {1u, 3u}) {
         SourceOptions options{.threads = threads};
@@ -72,7 +72,7 @@ inline void expect_parts_of_regions(const std::vector<std::string>& files, const
 inline void expect_coarser_parts(const std::string& file) {
   const AllPoints all = read_file(file);
   ASSERT_TRUE(all.info.octree);
-  std::multiset<Record> finer = records(all);
+  std::vector<Record> finer = records(all);
   double spacing = all.info.octree->spacing;
   std::vector<double> spacings;
   for (unsigned depth = 0; depth < all.info.octree->depths; ++depth, spacing /= 2) {
@@ -82,7 +82,7 @@ inline void expect_coarser_parts(const std::string& file) {
     SourceOptions options;
     options.selection.resolution = *step;
     const AllPoints coarse = read_file(file, options);
-    const std::multiset<Record> found = records(coarse);
+    const std::vector<Record> found = records(coarse);
     EXPECT_EQ(coarse.info.octree->depths, spacings.rend() - step);
     EXPECT_TRUE(std::includes(finer.begin(), finer.end(), found.begin(), found.end()));
     EXPECT_TRUE(step == spacings.rbegin() ? found.size() == finer.size()
