@@ -2,12 +2,12 @@
 #include "fuzz_points.hpp"
 #include "terrace/stream/mesh_reader.hpp"
 
-/// Mesh files, PLY and OBJ: refused, or triangles of vertices that are there, with a whole record
-/// for each vertex, and no more of them than the file can hold.
+/// Mesh files, PLY, OBJ, OFF and STL: refused, or triangles of vertices that are there, with a
+/// whole record for each vertex, and no more of them than the file can hold.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace terrace::stream;
   const MemoryFile file(data, size);
-  for (const char* format : {"ply", "obj"}) {
+  for (const char* format : {"ply", "obj", "off", "stl"}) {
     try {
       const auto mesh = read_mesh(file.name(), {.format = format});
       if (!mesh) continue;

@@ -137,9 +137,6 @@ TEST_F(Source, NamesFormatsThatItDoesNotReadAndWhatToDo) {
       {geopackage, "GeoPackage", "gdal_translate"},
       {"\n<!DOCTYPE HTML>", "HTML", "download"},
       {"glTF\2\0\0\0"s, "glTF", "PLY"},
-      {"solid cube\nfacet normal 0 0 1\n", "is STL", "PLY"},
-      {"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n", "is OFF", "PLY"},
-      {"\x1f\x8b\x08\0"s, "gzip", "gzip -dk"},
       {"\xfd"
        "7zXZ\0"s,
        "by xz", "xz -dk"},
@@ -158,12 +155,11 @@ TEST_F(Source, NamesFormatsThatItDoesNotReadAndWhatToDo) {
   }
   const std::string binary("\1\2\3\4\0\0", 6);
   for (const auto& [file, name] :
-       std::vector<std::pair<std::string, std::string>>{{"b.stl", "is STL"},
+       std::vector<std::pair<std::string, std::string>>{{"b.stl", "too short for STL"},
                                                         {"c.laz", "LASF"},
                                                         {"d.img", "ERDAS"},
                                                         {"e.gltf", "glTF"},
-                                                        {"f.geojson", "GeoJSON"},
-                                                        {"g.obj", "OBJ"}}) {
+                                                        {"f.geojson", "GeoJSON"}}) {
     const std::string text = refusal({put(file, binary)});
     EXPECT_NE(text.find(name), std::string::npos) << text;
   }

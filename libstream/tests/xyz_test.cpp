@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
+#include <cstdint>
+#include <fstream>
 #include <limits>
+#include <random>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -204,6 +208,61 @@ TEST_F(Xyz, WritesWhatItReadsBitForBit) {
         }
       }
     }
+  }
+}
+
+// Every step of a lattice comes out with its decimals, whatever the sum was rounded to.
+TEST_F(Xyz, WritesTheDecimalsOfALattice) {
+  std::mt19937_64 random(41);
+  for (const auto& [scale, offset, decimals] :
+       std::vector<std::tuple<double, double, int>>{{0.01, 0.0, 2},
+                                                    {0.001, 500000.0, 3},
+                                                    {0.01, -0.125, 3},
+                                                    {1e-7, 180.0, 7},
+                                                    {0.25, 1e6, 2}}) {
+    SCOPED_TRACE(std::to_string(scale) + ", " + std::to_string(offset));
+    const std::string path = (folder_.path() / "lattice.xyz").string();
+    const auto writer = open_point_writer(
+        path, {.lattice = Lattice{{scale, scale, scale}, {offset, offset, offset}}},
+        {.format = "xyz", .replace = true});
+    PointBlock block;
+    std::vector<std::int64_t> steps;
+    for (int i = 0; i < 900; ++i) {
+      steps.push_back(static_cast<std::int32_t>(random()) >> (random() % 20));
+      const double value = static_cast<double>(steps.back()) * scale + offset;
+      if (i % 3 == 0) block.positions.emplace_back();
+      block.positions.back()[static_cast<std::size_t>(i) % 3] = value;
+    }
+    writer->append(block);
+    writer->finish();
+    std::ifstream file(path);
+    std::string word;
+    for (const std::int64_t step : steps) {
+      ASSERT_TRUE(file >> word);
+      const std::size_t dot = word.find('.');
+      if (dot != std::string::npos && word.find('e') == std::string::npos) {
+        EXPECT_LE(word.size() - dot - 1, static_cast<std::size_t>(decimals)) << word;
+      }
+      EXPECT_EQ(std::llround((std::stod(word) - offset) / scale), step) << word;
+    }
+  }
+}
+
+// What is on no lattice of decimals, or off its steps, keeps every bit.
+TEST_F(Xyz, WritesOtherPlacesBitForBit) {
+  std::mt19937_64 random(42);
+  for (const double scale : {1.0 / 3600, 0.01}) {
+    const std::string path = (folder_.path() / "free.xyz").string();
+    const auto writer = open_point_writer(path, {.lattice = Lattice{{scale, scale, scale}, {}}},
+                                          {.format = "xyz", .replace = true});
+    PointBlock block;
+    for (int i = 0; i < 300; ++i) {
+      const auto off = [&] { return (static_cast<double>(random() % 100000) + 0.3) * scale; };
+      block.positions.push_back({off(), off(), off()});
+    }
+    writer->append(block);
+    writer->finish();
+    EXPECT_EQ(read_file(path).points.positions, block.positions);
   }
 }
 

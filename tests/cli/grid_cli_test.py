@@ -6,6 +6,7 @@ TERRACE=path/to/terrace grid_cli_test.py
 """
 
 import array
+import gzip
 import json
 import os
 import shutil
@@ -131,6 +132,67 @@ class GridTest(unittest.TestCase):
             file.write('25\n0\n0\n-25\n500012.5\n5200737.5\n')
         shutil.rmtree(self.path('a.png.terrace'))
         self.check(self.path('a.png'), 'png', nodata=False)
+
+    def same_store(self, one, other):
+        for name in sorted(os.listdir(self.path(one))):
+            with open(self.path(f'{one}/{name}'), 'rb') as a, open(self.path(f'{other}/{name}'), 'rb') as b:
+                if name != 'manifest.json':
+                    self.assertEqual(a.read(), b.read(), name)
+
+    def test_cells_of_maps_that_do_not_say_it(self):
+        samples = self.heights('H')
+        if sys.byteorder == 'little':
+            samples.byteswap()
+        lines = [samples[r * self.columns:(r + 1) * self.columns].tobytes() for r in range(self.rows)]
+        png(self.path('a.png'), self.columns, self.rows, 16, 0, lines)
+        summary = self.json_of('build', self.path('a.png'), '-o', self.path('a.terrace'), '--cell', 25)
+        self.assertEqual(summary['points'], self.columns * self.rows)
+        self.assertEqual(self.json_of('info', self.path('a.terrace'))['transform'], [25, 0, 0, 0, -25, 0])
+        self.json_of('convert', self.path('a.png'), '-o', self.path('a.csv'), '--cell', 0.5)
+        with open(self.path('a.csv')) as file:
+            rows = [tuple(map(float, line.split(',')[:2])) for line in file.readlines()[1:]]
+        self.assertEqual((min(rows)[0], max(rows)[0]), (0, 0.5 * (self.columns - 1)))
+        self.assertEqual(min(y for _, y in rows), -0.5 * (self.rows - 1))
+        # Through a pipe it has no world file, and is set aside on disk.
+        with open(self.path('a.png'), 'rb') as file:
+            result = self.terrace('build', '-', '-o', self.path('pipe.terrace'), '--cell', 25, input=file.read())
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn(b'were set aside in a temporary file', result.stderr)
+        self.same_store('a.terrace', 'pipe.terrace')
+        with open(self.path('a.pgw'), 'w') as file:
+            file.write('25\n0\n0\n-25\n500012.5\n5200737.5\n')
+        for name in ('a.png', 'a.csv'):
+            result = self.terrace('build', self.path(name), '-o', self.path('no.terrace'), '--cell', 25)
+            self.assertEqual(result.returncode, 1)
+            self.assertIn(b'leave --cell out', result.stderr)
+
+    def test_what_gzip_holds_and_what_pipes_bring(self):
+        self.json_of('build', self.ascii_grid(), '-o', self.path('plain.terrace'))
+        self.json_of('raster', self.path('plain.terrace'), '-o', self.path('a.tif'), '--cell', 25)
+        for name in ('a.asc', 'a.tif'):
+            with open(self.path(name), 'rb') as file:
+                content = file.read()
+            with gzip.open(self.path(name + '.gz'), 'wb') as file:
+                file.write(content)
+            self.json_of('build', self.path(name), '-o', self.path('file.terrace'), '--force')
+            self.json_of('build', self.path(name + '.gz'), '-o', self.path('gzip.terrace'), '--force')
+            self.same_store('file.terrace', 'gzip.terrace')
+            for given in (content, gzip.compress(content)):
+                self.json_of('build', '-', '-o', self.path('pipe.terrace'), '--force', input=given)
+                self.same_store('file.terrace', 'pipe.terrace')
+        # What is cut off is named as the user does, not as its copy.
+        result = self.terrace('build', '-', '-o', self.path('no.terrace'), input=content[:len(content) // 2])
+        self.assertEqual(result.returncode, 1)
+        self.assertTrue(result.stderr.startswith(b'terrace: standard input: '), result.stderr)
+        self.assertFalse(os.path.exists(self.path('no.terrace')))
+        result = self.terrace('build', '-', '-o', self.path('no.terrace'), input=b'\x1f\x8b' + b'z' * 100)
+        self.assertEqual(result.returncode, 1)
+        self.assertIn(b'damaged gzip', result.stderr)
+        # Tiles of SRTM are known by their names.
+        result = self.terrace('build', '-', '-o', self.path('no.terrace'), '--input-format', 'hgt',
+                              input=bytes(2 * 1201 * 1201))
+        self.assertEqual(result.returncode, 1)
+        self.assertIn(b'hgt cannot be read from a pipe', result.stderr)
 
     def test_colours_that_mean_heights(self):
         for name, number in (('mapbox', lambda z: (z + 10000) * 10),

@@ -50,8 +50,7 @@ BlockSizeRun run_once(std::uint64_t points, std::size_t block, Effort effort,
     options.block = block;
     options.effort = effort;
     options.strategy = strategy;
-    StreamClustering stream(
-        options, [&](const StreamBlock& b) { result.costs.push_back(b.solution.cost()); });
+    StreamClustering stream(options, [&](const StreamBlock& b) { result.costs.push_back(b.cost); });
     run(*set, {&stream, 1});
     result.seconds = stream.seconds();
     result.level_points = stream.level_points();

@@ -59,14 +59,16 @@ struct Histogram {
   std::uint64_t clusters = 0;
 
   void add(const StreamBlock& block) {
-    const auto& [points, solution] = block;
-    const double fc = solution.opening_cost / static_cast<double>(solution.facilities.size());
-    clusters += solution.facilities.size();
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      const Point3& f = points[solution.facilities[solution.assignment[i]]];
-      const double share = distance(Euclidean{}, f, points[i]) / fc;
-      far += share > 0.25;
-      ++counts[std::min(kBins - 1, static_cast<std::size_t>(share * static_cast<double>(kBins)))];
+    const FinishedBlock& b = block.block;
+    clusters += b.representatives.size();
+    for (std::size_t c = 0; c < b.representatives.size(); ++c) {
+      const Point3& f = b.positions[b.representatives[c]];
+      for (std::uint32_t k = b.first[c]; k < b.first[c + 1]; ++k) {
+        const double share =
+            distance(Euclidean{}, f, b.positions[b.order[k]]) / block.facility_cost;
+        far += share > 0.25;
+        ++counts[std::min(kBins - 1, static_cast<std::size_t>(share * static_cast<double>(kBins)))];
+      }
     }
   }
 };

@@ -4,94 +4,92 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <stdexcept>
-#include <string>
 #include <utility>
 
 namespace terrace::cluster::thesis {
+namespace {
+
+class Timed {
+ public:
+  explicit Timed(double& seconds) : seconds_(seconds) {}
+  ~Timed() {
+    seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  }
+  Timed(const Timed&) = delete;
+  Timed& operator=(const Timed&) = delete;
+
+ private:
+  double& seconds_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace
+
+/// Adds up what the blocks of level 0 cost, and drops them.
+class StreamClustering::Weighing final : public HierarchySink {
+ public:
+  Weighing(double facility_cost, OnBlock on_block)
+      : facility_cost_(facility_cost), on_block_(std::move(on_block)) {}
+
+  std::unique_ptr<Prepared> prepare(const FinishedBlock& block) override {
+    if (block.level > 0) return nullptr;
+    StreamBlock weighed{.block = block};
+    weighed.facility_cost = facility_cost_ * diagonal(Euclidean{}, bounds_of(block.positions));
+    for (std::size_t c = 0; c < block.representatives.size(); ++c) {
+      const Point3& facility = block.positions[block.representatives[c]];
+      for (std::uint32_t k = block.first[c]; k < block.first[c + 1]; ++k) {
+        weighed.cost += distance(Euclidean{}, facility, block.positions[block.order[k]]);
+      }
+    }
+    weighed.cost += weighed.facility_cost * static_cast<double>(block.representatives.size());
+    cost += weighed.cost;
+    if (on_block_) on_block_(weighed);
+    return nullptr;
+  }
+  void commit(unsigned /*level*/, std::unique_ptr<Prepared> /*prepared*/) override {}
+  void root(const FinishedBlock& /*block*/) override {}
+
+  double cost = 0.0;
+
+ private:
+  double facility_cost_;
+  OnBlock on_block_;
+};
 
 StreamClustering::StreamClustering(const StreamOptions& options, OnBlock on_block)
-    : options_(options), on_block_(std::move(on_block)), levels_(1) {}
+    : block_(options.block),
+      sink_(std::make_unique<Weighing>(options.facility_cost, std::move(on_block))) {
+  HierarchyOptions hierarchy;
+  hierarchy.block_size = options.block;
+  hierarchy.block.facility_cost = options.facility_cost;
+  hierarchy.block.effort = options.effort;
+  hierarchy.strategy =
+      options.strategy == FacilityStrategy::fast ? FacilityStrategy::automatic : options.strategy;
+  hierarchy.search_threads = options.threads;
+  hierarchy.batch = options.batch;
+  builder_ = std::make_unique<HierarchyBuilder>(std::move(hierarchy), *sink_);
+}
+
+StreamClustering::~StreamClustering() = default;
+StreamClustering::StreamClustering(StreamClustering&&) noexcept = default;
 
 void StreamClustering::push(std::span<const Point3> points) {
-  for (const Point3& p : points) add(0, p, 1.0);
+  const Timed timed(seconds_);
+  // Full blocks, as the thesis has them: what does not fit the present one would begin another.
+  while (!points.empty()) {
+    const std::size_t count = std::min(points.size(), block_ - held_);
+    builder_->push(points.first(count));
+    points = points.subspan(count);
+    held_ = (held_ + count) % block_;
+  }
 }
 
 void StreamClustering::finish() {
-  for (std::size_t level = 0; level < levels_.size(); ++level) {
-    if (level > 0 && levels_[level].all <= options_.block) {  // the top
-      double weight = 0.0;
-      for (const double w : levels_[level].weights) weight += w;
-      if (weight != static_cast<double>(levels_[0].all)) {
-        throw std::runtime_error("the top weighs " + std::to_string(weight) + ", the input " +
-                                 std::to_string(levels_[0].all));
-      }
-      return;
-    }
-    if (level > 0 && levels_[level].all >= levels_[level - 1].all) {
-      throw std::runtime_error("level " + std::to_string(level) + " is not smaller than the one " +
-                               "below: the facility cost is too low for this stream");
-    }
-    if (!levels_[level].points.empty()) cluster(level);
-  }
+  const Timed timed(seconds_);
+  result_ = builder_->finish();
 }
 
-std::vector<std::uint64_t> StreamClustering::level_points() const {
-  std::vector<std::uint64_t> counts;
-  for (const Level& level : levels_) counts.push_back(level.all);
-  return counts;
-}
-
-void StreamClustering::add(std::size_t level, const Point3& point, double weight) {
-  if (level == levels_.size()) levels_.emplace_back();
-  // A full block waits for the next point: if none comes, the level may be the top.
-  if (levels_[level].points.size() == options_.block) cluster(level);
-  Level& to = levels_[level];
-  if (to.points.capacity() == 0) {
-    to.points.reserve(options_.block);
-    to.weights.reserve(options_.block);
-  }
-  to.points.push_back(point);
-  to.weights.push_back(weight);
-  ++to.all;
-}
-
-void StreamClustering::cluster(std::size_t level) {
-  FacilityPoints problem{.points = levels_[level].points, .facility_cost = options_.facility_cost};
-  if (level > 0) {  // below all weights are 1
-    weights_ = levels_[level].weights;
-    double sum = 0.0;
-    for (const double w : weights_) sum += w;
-    for (double& w : weights_) w *= static_cast<double>(weights_.size()) / sum;
-    problem.weights = weights_;
-  }
-  FacilityOptions search;
-  search.strategy = options_.strategy;
-  search.effort = options_.effort;
-  search.seed = (levels_[level].blocks++ << 8) + level + 1;
-  search.batch = options_.batch;
-  search.threads = options_.threads;
-
-  const auto start = std::chrono::steady_clock::now();
-  const FacilitySolution solution = solve(problem, search);
-  seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-
-  if (level == 0) {
-    cost_ += solution.cost();
-    if (on_block_) on_block_({problem.points, solution});
-  }
-  std::vector<double> weights(solution.facilities.size(), 0.0);
-  for (std::size_t i = 0; i < solution.assignment.size(); ++i) {
-    weights[solution.assignment[i]] += levels_[level].weights[i];
-  }
-  for (std::size_t k = 0; k < weights.size(); ++k) {
-    // By value: going up may move the levels.
-    const Point3 facility = levels_[level].points[solution.facilities[k]];
-    add(level + 1, facility, weights[k]);
-  }
-  levels_[level].points.clear();
-  levels_[level].weights.clear();
-}
+double StreamClustering::cost() const { return sink_->cost; }
 
 void run(PointSet& set, std::span<StreamClustering> streams) {
   std::array<Point3, 500> buffer;  // not on the heap: it is no part of anybody's memory

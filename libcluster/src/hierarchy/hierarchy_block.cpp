@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -60,6 +61,7 @@ void pair_up(std::size_t points, BlockClustering& clustering) {
 void HierarchyBlock::reset(unsigned new_level) {
   level = new_level;
   number = 0;
+  outliers = 0;
   positions.clear();
   payload.clear();
   children.clear();
@@ -92,8 +94,9 @@ std::uint64_t block_seed(std::uint64_t seed, unsigned level, std::uint64_t block
 BlockProcessor::BlockProcessor(const HierarchyOptions& options, ClusterFunction cluster)
     : options_(options), cluster_(std::move(cluster)), metric_(options.metric) {
   if (options.metric_of || !std::holds_alternative<Euclidean>(options.metric) ||
-      !options.channels.weights.empty()) {
-    metric_cluster_.emplace(options.channels.weights, options.simd);
+      !options.channels.weights.empty() || options.strategy != FacilityStrategy::automatic ||
+      std::isfinite(options.outlier_price)) {
+    metric_cluster_.emplace(options.simd);
   }
 }
 
@@ -148,6 +151,14 @@ void BlockProcessor::read_channels(const HierarchyBlock& block) {
   }
 }
 
+// In a block of fewer points they lie farther apart, relative to its diagonal: on a surface as the
+// root of their number.
+double BlockProcessor::outlier_price(const HierarchyBlock& block) const {
+  if (block.level > 0) return std::numeric_limits<double>::infinity();
+  return options_.outlier_price *
+         std::sqrt(static_cast<double>(options_.block_size) / static_cast<double>(block.size()));
+}
+
 void BlockProcessor::cluster(HierarchyBlock& block, std::span<const Point3> ground) {
   weights_.clear();
   if (block.level > 0) normalised_weights(block.heads, weights_);
@@ -158,15 +169,48 @@ void BlockProcessor::cluster(HierarchyBlock& block, std::span<const Point3> grou
   const std::size_t most = (block.size() + 1) / 2;
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
     if (metric_cluster_) {
-      metric_cluster_->run(metric_, ground, weights_, channels_, options, block.clustering);
+      metric_cluster_->run({.points = ground,
+                            .weights = weights_,
+                            .metric = metric_,
+                            .channels = {channels_, options_.channels.weights},
+                            .facility_cost = options.facility_cost,
+                            .outlier_price = outlier_price(block)},
+                           {.strategy = options_.strategy,
+                            .effort = options.effort,
+                            .seed = options.seed,
+                            .threads = options_.search_threads,
+                            .batch = options_.batch},
+                           block.clustering);
     } else {
       cluster_(ground, weights_, options, block.clustering);
     }
     assert(block.clustering.assignment.size() == block.size());
-    if (block.clustering.facilities.size() <= most) return;
+    if (block.clustering.facilities.size() <= most) {
+      if (std::isfinite(options_.outlier_price)) place_outliers(block, ground);
+      return;
+    }
     options.facility_cost = std::max(4.0 * options.facility_cost, kLeastRaisedCost);
   }
   pair_up(block.size(), block.clustering);
+}
+
+// What was left out joins the nearest representative, as a member with a mark.
+void BlockProcessor::place_outliers(HierarchyBlock& block, std::span<const Point3> ground) {
+  BlockClustering& clustering = block.clustering;
+  for (std::size_t i = 0; i < block.size(); ++i) {
+    if (clustering.assignment[i] != kOutlier) continue;
+    ++block.outliers;
+    options_.mark_outlier(
+        std::span(block.payload).subspan(i * options_.payload_size, options_.payload_size));
+    double least = std::numeric_limits<double>::infinity();
+    clustering.assignment[i] = 0;
+    for (std::uint32_t c = 0; c < clustering.facilities.size(); ++c) {
+      const double d = distance(metric_, ground[clustering.facilities[c]], ground[i]);
+      if (!(d < least)) continue;
+      least = d;
+      clustering.assignment[i] = c;
+    }
+  }
 }
 
 }  // namespace terrace::cluster

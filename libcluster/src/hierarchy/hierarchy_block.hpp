@@ -22,6 +22,7 @@ namespace terrace::cluster {
 struct HierarchyBlock {
   unsigned level = 0;
   std::uint64_t number = 0;
+  std::uint64_t outliers = 0;
   std::vector<Point3> positions;
   std::vector<std::byte> payload;
   std::vector<std::uint64_t> children;  ///< `level` per point
@@ -65,11 +66,13 @@ class BlockProcessor {
  private:
   void cluster(HierarchyBlock& block, std::span<const Point3> ground);
   void read_channels(const HierarchyBlock& block);
+  [[nodiscard]] double outlier_price(const HierarchyBlock& block) const;
+  void place_outliers(HierarchyBlock& block, std::span<const Point3> ground);
 
   const HierarchyOptions& options_;
   ClusterFunction cluster_;
   Metric metric_;                                       // of the block in work
-  std::optional<MetricBlockClusterer> metric_cluster_;  // unless distances are Euclidean
+  std::optional<MetricBlockClusterer> metric_cluster_;  // unless all is as BlockClusterer has it
   std::vector<Point3> ground_;
   std::vector<double> weights_, channels_;
 };

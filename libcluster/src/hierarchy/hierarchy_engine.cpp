@@ -33,6 +33,12 @@ HierarchyOptions checked(HierarchyOptions options) {
   if (!options.channels.weights.empty() && !options.channels.read) {
     throw std::invalid_argument("channels have weights but no function that reads them");
   }
+  if (!(options.outlier_price > 0.0)) {
+    throw std::invalid_argument("outlier_price must be positive");
+  }
+  if (std::isfinite(options.outlier_price) && !options.mark_outlier) {
+    throw std::invalid_argument("there is an outlier_price but no function that marks outliers");
+  }
   options.threads = std::clamp(options.threads, 1u, kMostBlocksAtOnce);
   return options;
 }
@@ -112,6 +118,7 @@ void HierarchyEngine::commit(HierarchyBlock& block) {
   if (levels_.size() <= block.level + 1) {
     levels_.emplace_back().level = block.level + 1;
   }
+  outliers_ += block.outliers;
   Level& level = levels_[block.level];
   Level& above = levels_[block.level + 1];
   for (std::size_t c = 0; c < block.summaries.size(); ++c) {
@@ -136,6 +143,7 @@ HierarchyResult HierarchyEngine::finish() {
   deliver_root(levels_[top]);
 
   HierarchyResult result;
+  result.outliers = outliers_;
   result.points = base_.points;
   result.top = top;
   for (const Level& level : levels_) {
@@ -148,6 +156,10 @@ HierarchyResult HierarchyEngine::finish() {
 void HierarchyEngine::deliver_root(Level& level) {
   if (!level.open) level.open = pipeline_.take(level.level);  // no points at all
   HierarchyBlock& block = *level.open;
+  if (block.level == 0 && block.size() > 0 && std::isfinite(options_.outlier_price)) {
+    processors_.front().process(block);  // only for the marks: nothing else is kept of it
+    outliers_ += block.outliers;
+  }
   block.clustering.facilities.assign(1, kNoRepresentative);
   block.first = {0, static_cast<std::uint32_t>(block.size())};
   block.order.resize(block.size());

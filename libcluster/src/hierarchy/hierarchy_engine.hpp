@@ -55,6 +55,7 @@ class HierarchyEngine {
   // whoever commits. A deque, so that adding a level leaves `base_` where it is.
   std::deque<Level> levels_;
   Level& base_;
+  std::uint64_t outliers_ = 0;  // in committed blocks
   bool ended_ = false;
   BlockPipeline pipeline_;  // last: its threads use all of the above
 };

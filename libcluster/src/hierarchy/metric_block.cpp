@@ -2,33 +2,87 @@
 #include "hierarchy/metric_block.hpp"
 
 #include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <limits>
+#include <numeric>
 #include <utility>
 
 #include "block/linear_block.hpp"
 #include "facility/points/search_frame.hpp"
-#include "terrace/cluster/facility_location.hpp"
+#include "hierarchy/outliers.hpp"
 
 namespace terrace::cluster {
+namespace {
 
-MetricBlockClusterer::MetricBlockClusterer(std::vector<double> channel_weights, SimdPath path)
-    : channel_weights_(std::move(channel_weights)), clusterer_(path) {}
+// Each round takes points out of the block; nearly all blocks are done after two.
+constexpr int kRounds = 16;
 
-void MetricBlockClusterer::run(const Metric& metric, std::span<const Point3> points,
-                               std::span<const double> weights, std::span<const double> channels,
-                               const BlockOptions& options, BlockClustering& result) {
-  const FacilityPoints problem{.points = points,
-                               .weights = weights,
-                               .metric = metric,
-                               .channels = {channels, channel_weights_},
-                               .facility_cost = options.facility_cost};
-  if (channel_weights_.empty() && linear_map(metric, bounds_of(points))) {
+// Drops the points that the clustering leaves out. False if there were none.
+bool drop_outliers(const BlockClustering& clustering, std::size_t channel_count,
+                   std::vector<Point3>& points, std::vector<double>& channels,
+                   std::vector<std::uint32_t>& numbers) {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (clustering.assignment[i] == kOutlier) continue;
+    points[kept] = points[i];
+    numbers[kept] = numbers[i];
+    std::copy_n(channels.begin() + static_cast<std::ptrdiff_t>(i * channel_count), channel_count,
+                channels.begin() + static_cast<std::ptrdiff_t>(kept * channel_count));
+    ++kept;
+  }
+  const bool dropped = kept < points.size();
+  points.resize(kept);
+  numbers.resize(kept);
+  channels.resize(kept * channel_count);
+  return dropped;
+}
+
+}  // namespace
+
+void MetricBlockClusterer::run(const FacilityPoints& problem, const FacilityOptions& options,
+                               BlockClustering& result) {
+  run_once(problem, options, result);
+  if (std::isinf(problem.outlier_price)) return;
+  assert(problem.weights.empty());
+
+  const std::size_t count = problem.points.size();
+  points_.assign(problem.points.begin(), problem.points.end());
+  channels_.assign(problem.channels.values.begin(), problem.channels.values.end());
+  numbers_.resize(count);
+  std::iota(numbers_.begin(), numbers_.end(), 0u);
+  for (int round = 1; round < kRounds; ++round) {
+    if (!drop_outliers(result, problem.channels.size(), points_, channels_, numbers_)) break;
+    FacilityPoints rest = problem;
+    rest.points = points_;
+    rest.channels.values = channels_;
+    if (round + 1 == kRounds) rest.outlier_price = std::numeric_limits<double>::infinity();
+    run_once(rest, options, result);
+  }
+  if (numbers_.size() == count) return;
+
+  // Back to the numbers of the block.
+  for (std::uint32_t& facility : result.facilities) facility = numbers_[facility];
+  std::vector<std::uint32_t> assignment(count, kOutlier);
+  for (std::size_t i = 0; i < numbers_.size(); ++i) assignment[numbers_[i]] = result.assignment[i];
+  result.assignment = std::move(assignment);
+}
+
+void MetricBlockClusterer::run_once(const FacilityPoints& problem, const FacilityOptions& options,
+                                    BlockClustering& result) {
+  const bool automatic = options.strategy == FacilityStrategy::automatic;
+  if (automatic && problem.channels.size() == 0 &&
+      linear_map(problem.metric, bounds_of(problem.points))) {
     run_linear(clusterer_, problem, options.effort, options.seed, result);
+    leave_out(problem, result);
     return;
   }
-  const Effort effort =
-      points.size() < kFullSearchBelow ? std::max(options.effort, Effort::fine) : options.effort;
-  FacilitySolution solution =
-      solve(problem, {.effort = effort, .seed = options.seed, .assign_nearest = true});
+  FacilityOptions search = options;
+  search.assign_nearest = true;
+  if (automatic && problem.points.size() < kFullSearchBelow) {
+    search.effort = std::max(options.effort, Effort::fine);
+  }
+  FacilitySolution solution = solve(problem, search);
   result.facilities = std::move(solution.facilities);
   result.assignment = std::move(solution.assignment);
   result.facility_cost = result.connection_cost = 0.0;

@@ -1,28 +1,37 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
 #include "terrace/cluster/block.hpp"
+#include "terrace/cluster/facility_location.hpp"
 #include "terrace/cluster/metric.hpp"
 
 namespace terrace::cluster {
 
-/// Clusters the blocks of a hierarchy under any metric and with channels: as BlockClusterer where
-/// that is possible, else by local search. One object per thread.
+/// Clusters the blocks of a hierarchy under any metric, with channels and outliers: as
+/// BlockClusterer where that is possible and no other strategy is asked for, else by solve(). One
+/// object per thread.
 class MetricBlockClusterer {
  public:
-  MetricBlockClusterer(std::vector<double> channel_weights, SimdPath path);
+  explicit MetricBlockClusterer(SimdPath path) : clusterer_(path) {}
 
-  /// points: on the ground. channels: row by row. The costs in `result` are not filled in.
-  /// Throws: std::invalid_argument on a distance of a custom metric that is negative or not finite.
-  void run(const Metric& metric, std::span<const Point3> points, std::span<const double> weights,
-           std::span<const double> channels, const BlockOptions& options, BlockClustering& result);
+  /// problem: points on the ground; its costs are multiples of the diagonal of the points that are
+  /// not left out. Weights must be empty if it has an outlier price.
+  /// assignment is kOutlier for points left out. The costs in `result` are not filled in.
+  /// Throws: std::invalid_argument as solve().
+  void run(const FacilityPoints& problem, const FacilityOptions& options, BlockClustering& result);
 
  private:
-  std::vector<double> channel_weights_;
+  void run_once(const FacilityPoints& problem, const FacilityOptions& options,
+                BlockClustering& result);
+
   BlockClusterer clusterer_;
+  std::vector<Point3> points_;  // those that have not been left out
+  std::vector<double> channels_;
+  std::vector<std::uint32_t> numbers_;  // of points_ in the block
 };
 
 }  // namespace terrace::cluster

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <string>
+
 #include "terrace/stream/source.hpp"
 
 /// The registry's entries, each from the file of its format.
@@ -15,6 +17,10 @@ const Format& las_format();
 const Format& ept_format();
 /// The Stanford polygon format: ASCII, binary little-endian and big-endian.
 const Format& ply_format();
+/// The vertices of Wavefront's OBJ, of Geomview's OFF, and the corners of STL: see mesh/points.cpp.
+const Format& obj_format();
+const Format& off_format();
+const Format& stl_format();
 /// Tiles of SRTM without a header, also in .zip and .gz.
 const Format& hgt_format();
 /// ESRI's ASCII grids.
@@ -27,5 +33,8 @@ const Format& usgs_dem_format();
 const Format& png_format();
 /// Text of one point per line: XYZ, CSV and their like.
 const Format& xyz_format();
+
+/// The format that an ending tells, that of ".csv.gz" being ".csv"; nullptr if none.
+const Format* format_of_name(const std::string& file);
 
 }  // namespace terrace::stream

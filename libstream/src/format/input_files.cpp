@@ -11,6 +11,7 @@
 #include <glob.h>
 
 #include "format/ept/metadata.hpp"
+#include "format/formats.hpp"
 #include "io/line_reader.hpp"
 #include "io/text.hpp"
 #include "terrace/stream/error.hpp"

@@ -9,9 +9,6 @@
 
 namespace terrace::stream {
 
-/// The format that the name of a file tells; nullptr if none.
-const Format* format_of_name(const std::string& file);
-
 /// The files that open_source() means by these names: folders, lists and patterns by what they
 /// stand for, folders of EPT by their ept.json. format: as SourceOptions has it. Throws: Error for
 /// one that stands for nothing.

@@ -1,29 +1,104 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "terrace/stream/mesh_reader.hpp"
 
+#include <array>
+#include <cstddef>
+#include <map>
+#include <memory>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "format/formats.hpp"
+#include "format/mesh/parser.hpp"
 #include "format/mesh_formats.hpp"
 #include "io/peek.hpp"
+#include "terrace/stream/error.hpp"
+#include "terrace/stream/input.hpp"
 
 namespace terrace::stream {
+namespace {
+
+struct SimpleFormat {
+  const Format& (*format)();
+  std::unique_ptr<MeshParser> (*parser)(Input& input, bool faces);
+};
+constexpr std::array<SimpleFormat, 3> kSimpleFormats{
+    {{&obj_format, &obj_parser}, {&off_format, &off_parser}, {&stl_format, &stl_parser}}};
+
+/// Gives vertices at one place one number.
+class Welder {
+ public:
+  explicit Welder(MeshFile& mesh) : mesh_(&mesh) {}
+  std::uint32_t number_of(const Point3& place) {
+    std::vector<Point3>& all = mesh_->vertices.positions;
+    const auto [at, is_new] = numbers_.emplace(place, static_cast<std::uint32_t>(all.size()));
+    if (is_new) all.push_back(place);
+    return at->second;
+  }
+
+ private:
+  MeshFile* mesh_;
+  std::map<Point3, std::uint32_t> numbers_;
+};
+
+MeshFile read_simple(const std::string& file, const SourceOptions& options,
+                     const SimpleFormat& kind) {
+  Input input(file, options.stop);
+  const auto parser = kind.parser(input, true);
+  MeshFile mesh;
+  Welder welder(mesh);
+  std::vector<std::uint32_t> numbers;  // of the vertices of a soup that are not in a face yet
+  for (;;) {
+    const MeshParser::Item item = parser->next();
+    if (item == MeshParser::Item::end) break;
+    if (item == MeshParser::Item::vertex) {
+      if (parser->is_soup()) {
+        numbers.push_back(welder.number_of(parser->vertex()));
+      } else {
+        mesh.vertices.positions.push_back(parser->vertex());
+      }
+      continue;
+    }
+    const std::vector<std::uint32_t>& face = parser->is_soup() ? numbers : parser->face();
+    for (std::size_t k = 2; k < face.size(); ++k) {
+      mesh.triangles.push_back({face[0], face[k - 1], face[k]});
+    }
+    numbers.clear();
+  }
+  mesh.info.format = kind.format().name;
+  mesh.info.files = {file};
+  mesh.info.comments = parser->comments();
+  mesh.info.points = mesh.vertices.size();
+  constexpr std::array kNames{"x", "y", "z"};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    mesh.info.coordinates[axis] = {.name = kNames[axis], .type = parser->type()};
+  }
+  if (options.crs) mesh.info.crs = *options.crs;
+  return mesh;
+}
+
+}  // namespace
 
 std::optional<MeshFile> read_mesh(const std::string& file, const SourceOptions& options) {
-  const std::string& format = options.format;
-  if (format == "obj" || (format.empty() && file.ends_with(".obj"))) {
-    return read_obj_mesh(file, options);
+  // What a pipe has given would be missing where the file is read as a cloud, unless its format is
+  // told by name.
+  std::vector<char> head;
+  if (options.format.empty() && is_rereadable(file)) head = peek_head(file, 4096, options.stop);
+  const auto is_in = [&](const Format& format) {
+    if (!options.format.empty()) return options.format == format.name;
+    if (!head.empty() && format.recognise(std::as_bytes(std::span(head)))) return true;
+    const Format* const told = format_of_name(file);
+    return told != nullptr && told->name == format.name && format.name != ply_format().name;
+  };
+  if (is_in(ply_format())) return read_ply_mesh(file, options);
+  for (const SimpleFormat& kind : kSimpleFormats) {
+    if (!is_in(kind.format())) continue;
+    MeshFile mesh = read_simple(file, options, kind);
+    if (mesh.triangles.empty()) return std::nullopt;
+    return mesh;
   }
-  if (format.empty()) {
-    // What a pipe has given would be missing where the file is read as a cloud.
-    if (!is_rereadable(file)) return std::nullopt;
-    const std::vector<char> head = peek_head(file, 4, options.stop);
-    if (!ply_format().recognise(std::as_bytes(std::span(head)))) return std::nullopt;
-  } else if (format != "ply") {
-    return std::nullopt;
-  }
-  return read_ply_mesh(file, options);
+  return std::nullopt;
 }
 
 }  // namespace terrace::stream

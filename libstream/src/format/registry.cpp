@@ -11,6 +11,7 @@
 #include "format/formats.hpp"
 #include "format/input_files.hpp"
 #include "format/selection.hpp"
+#include "format/spooled_source.hpp"
 #include "io/peek.hpp"
 #include "io/text.hpp"
 #include "terrace/stream/error.hpp"
@@ -44,13 +45,23 @@ const Format* format_of_ending(const std::string& ending) {
   return nullptr;
 }
 
-/// The format that a whole name tells: "ept.json", or that of a packed file which its format reads
-/// itself: ".hgt.zip".
-const Format* format_of_whole_name(const std::string& file) {
-  if (std::filesystem::path(file).filename() == kEptName) return &ept_format();
+/// The format that reads packed files itself and whose name this has: ".hgt.zip".
+const Format* packed_format_of(const std::string& file) {
   const std::string ending = ending_of(file);
   if (ending != ".zip" && ending != ".gz") return nullptr;
   return format_of_ending(ending_of(std::filesystem::path(file).stem()) + ending);
+}
+
+bool is_ept_name(const std::string& file) {
+  return std::filesystem::path(file).filename() == kEptName;
+}
+
+/// By the ending, that of ".csv.gz" being ".csv".
+const Format* format_of_file_name(const std::string& file) {
+  if (is_ept_name(file)) return &ept_format();
+  if (const Format* const packed = packed_format_of(file)) return packed;
+  const std::string ending = ending_of(file);
+  return format_of_ending(ending == ".gz" ? ending_of(std::filesystem::path(file).stem()) : ending);
 }
 
 [[noreturn]] void refuse(const std::string& file, const ForeignFormat& format) {
@@ -79,14 +90,14 @@ const Format& format_of(const std::string& file, const SourceOptions& options) {
   for (const Format& format : telling) {
     if (format.recognise(bytes)) return format;
   }
-  if (const Format* const told = format_of_whole_name(file)) return *told;
+  if (is_ept_name(file)) return ept_format();
+  if (const Format* const packed = packed_format_of(file)) return *packed;
   if (const auto* foreign = foreign_format_of_content({head.data(), head.size()})) {
     refuse(file, *foreign);
   }
   if (formats().back().recognise(bytes)) return formats().back();
-  const std::string ending = ending_of(file);
-  if (const Format* const format = format_of_ending(ending)) return *format;
-  const ForeignFormat* const foreign = foreign_format_of_ending(ending);
+  if (const Format* const format = format_of_file_name(file)) return *format;
+  const ForeignFormat* const foreign = foreign_format_of_ending(ending_of(file));
   if (foreign != nullptr && !head.empty()) refuse(file, *foreign);
   throw Error(
       {.file = file,
@@ -109,6 +120,7 @@ std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
   assert(!files.empty() && options.block_points > 0);
   const HeadScope scope;
   const Format& format = format_of(files.front(), options);
+  bool spooled = false;
   for (const std::string& file : files) {
     const Format& other = format_of(file, options);
     if (&other != &format) {
@@ -117,12 +129,14 @@ std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
                    .cause = "is " + other.name + ", but " + files.front() + " is " + format.name,
                    .remedy = "name files of one format, of a folder by that format"});
     }
-    if (!format.streams && !is_rereadable(file)) {
+    if (is_seekable(file) || packed_format_of(file) == &format) continue;
+    if (!format.streams && !format.self_contained) {
       throw Error({.file = file == kStandardStream ? "standard input" : file,
                    .where = {},
-                   .cause = format.name + " cannot be read from a pipe",
-                   .remedy = "name a file"});
+                   .cause = format.name + " cannot be read from a pipe or out of gzip",
+                   .remedy = "name a file, unpacked"});
     }
+    spooled = spooled || !format.streams;
   }
   if (std::count(files.begin(), files.end(), kStandardStream) > 1) {
     throw Error({.file = "standard input",
@@ -136,6 +150,13 @@ std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
                  .cause = "is " + format.name + ", whose heights are no colours",
                  .remedy = "leave `heights_of_colour` out"});
   }
+  if (options.cell > 0 && (format.name == las_format().name || format.name == ply_format().name ||
+                           format.name == xyz_format().name)) {
+    throw Error({.file = files.front(),
+                 .where = {},
+                 .cause = "is " + format.name + ", whose points are no cells",
+                 .remedy = "leave `cell` out"});
+  }
   if (options.selection.resolution > 0 && format.name != las_format().name &&
       format.name != ept_format().name) {
     throw Error({.file = files.front(),
@@ -143,23 +164,22 @@ std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
                  .cause = "is " + format.name + ", which has no octree to read to a resolution",
                  .remedy = "name a COPC file or EPT, or leave `resolution` out"});
   }
-  return selection_of(format.open(files, options), options);
+  return selection_of(spooled ? open_spooled(format, files, options) : format.open(files, options),
+                      options);
 }
 
 }  // namespace
 
 std::span<const Format> formats() {
   // The most telling content first: text is whatever looks like a table of numbers.
-  static const std::array<Format, 10> all{
+  static const std::array<Format, 13> all{
       geotiff_format(),    las_format(),      ept_format(), ply_format(),         hgt_format(),
-      ascii_grid_format(), usgs_dem_format(), png_format(), binary_grid_format(), xyz_format()};
+      ascii_grid_format(), usgs_dem_format(), png_format(), binary_grid_format(), obj_format(),
+      off_format(),        stl_format(),      xyz_format()};
   return all;
 }
 
-const Format* format_of_name(const std::string& file) {
-  const Format* const told = format_of_whole_name(file);
-  return told != nullptr ? told : format_of_ending(ending_of(file));
-}
+const Format* format_of_name(const std::string& file) { return format_of_file_name(file); }
 
 std::unique_ptr<PointSource> open_source(std::span<const std::string> names,
                                          const SourceOptions& options) {

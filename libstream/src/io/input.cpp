@@ -6,6 +6,7 @@
 #include <cerrno>
 #include <cstring>
 #include <map>
+#include <span>
 #include <utility>
 
 #include <fcntl.h>
@@ -13,9 +14,12 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "io/gzip_stream.hpp"
 #include "io/peek.hpp"
 #include "io/stop_waiter.hpp"
+#include "terrace/stream/byte_source.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/stream/gzip.hpp"
 
 namespace terrace::stream {
 namespace {
@@ -25,6 +29,9 @@ std::map<std::string, std::unique_ptr<Input>>& heads() {
   thread_local std::map<std::string, std::unique_ptr<Input>> kept;
   return kept;
 }
+
+/// Of a pipe, to tell whether it is packed.
+constexpr std::size_t kLookBytes = 4096;
 
 std::string shown(const std::string& file) {
   return file == kStandardStream ? "standard input" : file;
@@ -91,6 +98,12 @@ class Input::Descriptor {
       if (errno != EINTR && errno != EAGAIN) throw system_error(name, "cannot read", errno);
     }
   }
+  /// Of a regular file; what is to be read next stays where it is.
+  [[nodiscard]] bool begins_as_gzip() const {
+    std::byte head[2];
+    const off_t at = ::lseek(fd_, 0, SEEK_CUR);
+    return at >= 0 && ::pread(fd_, head, sizeof head, at) == sizeof head && is_gzip(head);
+  }
   [[nodiscard]] bool skip(std::uint64_t count) const {
     return ::lseek(fd_, static_cast<off_t>(count), SEEK_CUR) >= 0;
   }
@@ -116,13 +129,41 @@ Input::Input(const std::string& file, const std::stop_token& stop, std::size_t a
   descriptor_ = std::make_unique<Descriptor>(file, stop);
   size_ = descriptor_->size();
   buffer_.resize(at_once);
+  if (!size_) return;  // a pipe is not looked at before it is read: it may have no writer yet
+  looked_at_ = true;
+  if (descriptor_->begins_as_gzip()) {
+    size_.reset();
+    gzip_ = std::make_unique<GzipStream>(name_);
+  }
 }
 
 Input::~Input() = default;
 Input& Input::operator=(Input&&) noexcept = default;
 
 bool Input::read_more() {
-  const std::size_t got = descriptor_->read(buffer_.data() + end_, buffer_.size() - end_, name_);
+  const auto read = [this](char* to, std::size_t most) {
+    return descriptor_->read(to, most, name_);
+  };
+  if (!looked_at_) {
+    looked_at_ = true;
+    std::vector<char> head(kLookBytes);
+    std::size_t size = 0;
+    for (std::size_t got = 1; size < 2 && got > 0; size += got) {
+      got = read(head.data() + size, head.size() - size);
+    }
+    if (is_gzip(std::as_bytes(std::span(head).first(size)))) {
+      gzip_ = std::make_unique<GzipStream>(name_, std::string_view(head.data(), size));
+    } else {
+      if (buffer_.size() - end_ < size) buffer_.resize(end_ + size);
+      std::copy_n(head.begin(), size, buffer_.begin() + static_cast<std::ptrdiff_t>(end_));
+      end_ += size;
+      ended_ = size == 0;
+      return !ended_;
+    }
+  }
+  char* const to = buffer_.data() + end_;
+  const std::size_t room = buffer_.size() - end_;
+  const std::size_t got = gzip_ ? gzip_->read(to, room, read) : read(to, room);
   end_ += got;
   ended_ = got == 0;
   return !ended_;
@@ -170,6 +211,15 @@ bool Input::skip(std::uint64_t count) {
 bool is_rereadable(const std::string& file) {
   struct stat status {};
   return file != kStandardStream && ::stat(file.c_str(), &status) == 0 && S_ISREG(status.st_mode);
+}
+
+bool is_seekable(const std::string& file) {
+  if (!is_rereadable(file)) return false;
+  std::vector<std::byte> head(2);
+  const auto bytes = open_file(file);
+  if (bytes->size() < head.size()) return true;
+  bytes->read(0, head);
+  return !is_gzip(head);
 }
 
 std::vector<char> peek_head(const std::string& file, std::size_t most,

@@ -29,6 +29,8 @@ class Spool final : public ByteSource {
   void write(std::uint64_t offset, std::span<const std::byte> bytes);
 
   [[nodiscard]] const std::string& name() const override { return name_; }
+  /// A name by which this process can open it, for what takes names only.
+  [[nodiscard]] std::string path() const { return "/proc/self/fd/" + std::to_string(descriptor_); }
   [[nodiscard]] std::uint64_t size() const override { return size_; }
   void read(std::uint64_t offset, std::span<std::byte> out) const override;
 

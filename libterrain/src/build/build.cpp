@@ -19,6 +19,7 @@
 
 #include "base/progress_report.hpp"
 #include "base/units.hpp"
+#include "build/clustering.hpp"
 #include "earth/crs/crs_definition.hpp"
 #include "earth/ground.hpp"
 #include "earth/source_crs.hpp"
@@ -36,6 +37,7 @@ constexpr std::array<std::pair<const char*, cluster::Effort>, 4> kEfforts{
 stream::StoreSchema schema_of(const stream::SourceInfo& info, const SourceCrs& crs,
                               const BuildRequest& request) {
   stream::StoreSchema schema{info};
+  add_outlier_mark(request, schema.attributes);
   schema.crs = crs.crs;
   schema.vertical = request.vertical.empty() ? name_of(crs.heights) : request.vertical;
   if (schema.vertical != name_of(crs.heights)) {
@@ -56,6 +58,15 @@ stream::StoreSchema schema_of(const stream::SourceInfo& info, const SourceCrs& c
                        {"seed", std::to_string(request.seed)}};
   if (request.metric.kind != MetricChoice::Kind::euclidean) {
     schema.parameters.emplace_back("metric", request.metric.canonical());
+  }
+  if (request.strategy != cluster::FacilityStrategy::automatic) {
+    schema.parameters.emplace_back("strategy", cluster::name_of(request.strategy));
+  }
+  for (const auto& [name, weight] : request.channels) {
+    schema.parameters.emplace_back("channel " + name, number_text(weight));
+  }
+  if (std::isfinite(request.outlier_price)) {
+    schema.parameters.emplace_back("outlier_price", number_text(request.outlier_price));
   }
   return schema;
 }
@@ -116,29 +127,6 @@ double cell_aspect(const Ground& ground, const stream::SourceInfo& info) {
     return std::sqrt(map[axis] * map[axis] + map[3 + axis] * map[3 + axis]);
   };
   return length(1) / length(0);
-}
-
-/// Regions are boxes in the CRS; the ground's frame may differ from block to block.
-void set_metric(const BuildRequest& request, const stream::SourceInfo& info, const Ground& ground,
-                cluster::HierarchyOptions& options) {
-  const MetricChoice& choice = request.metric;
-  if (!choice.has_boxes()) {
-    options.metric = choice.on_ground({0, 0, 0}, cluster::kIdentityMap);
-    return;
-  }
-  // From the CRS by way of stored coordinates, which are columns and rows for a raster.
-  const std::array<double, 6>& xy = info.world.xy;
-  const stream::Channel& height = info.coordinates[2];
-  options.metric_of = [&choice, &ground, xy, height](const cluster::Bounds& bounds) {
-    const GroundMap map = ground.map({bounds.min, bounds.max});
-    const double area = xy[0] * xy[4] - xy[1] * xy[3];
-    const auto across = [&](double a, double b) { return (a * xy[4] - b * xy[3]) / area; };
-    const auto along = [&](double a, double b) { return (b * xy[0] - a * xy[1]) / area; };
-    return choice.on_ground({xy[2], xy[5], height.offset},
-                            {across(map[0], map[1]), along(map[0], map[1]), 0,  //
-                             across(map[3], map[4]), along(map[3], map[4]), 0,  //
-                             0, 0, map[8] / height.scale});
-  };
 }
 
 /// The first points of a source.
@@ -209,6 +197,7 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   source_options.band = request.band;
   source_options.selection = request.selection;
   source_options.heights_of_colour = request.heights_of_colour;
+  source_options.cell = request.cell.value_or(0);
   source_options.crs = request.crs;
   source_options.blocks_ahead = kBlocksAhead;
   source_options.threads = std::max(1U, context.threads);
@@ -227,7 +216,8 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   const Ground ground(placement, request.z_weight);
   BuildOutcome outcome;
   const std::uint64_t source_bytes = std::max(kSourceMemory, source->reading_bytes());
-  const std::size_t payload_bytes = info.payload_size();
+  const stream::StoreSchema schema = schema_of(info, crs, request);
+  const std::size_t payload_bytes = schema.payload_size();
   const unsigned threads =
       threads_within_memory(request, context, memory_bytes, payload_bytes, source_bytes);
   if (info.grid) {
@@ -265,25 +255,16 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
     }
   }
 
-  const stream::StoreSchema schema = schema_of(info, crs, request);
   stream::StoreWriter writer(request.store, schema, request.replace);
   StoreSink sink(writer, request.most_points == 0);
-  cluster::HierarchyOptions options;
-  options.block_size = request.block_points;
-  options.block.facility_cost = request.facility_cost;
-  options.block.effort = request.effort;
-  options.block.seed = request.seed;
-  options.payload_size = schema.payload_size();
+  cluster::HierarchyOptions options = clustering_of(request, schema, ground);
   options.threads = threads;
-  options.ground = [&ground](const cluster::Bounds& bounds) {
-    return ground.map({bounds.min, bounds.max});
-  };
-  set_metric(request, info, ground, options);
   // A full disk is told at once, even if the input's producer idles.
   options.on_failure = stop_reading;
   cluster::HierarchyBuilder builder(options, sink);
 
   stream::PointBlock block;
+  std::vector<std::byte> marked;
   stream::Progress so_far;
   // The reading ends for two reasons: the context's, or a failure that push() tells.
   const auto next = [&] {
@@ -295,7 +276,12 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
     }
   };
   while (next()) {
-    builder.push(block.positions, block.payload);
+    if (payload_bytes > info.payload_size()) {  // room for the mark
+      append_zero_byte(block.payload, info.payload_size(), block.positions.size(), marked);
+      builder.push(block.positions, marked);
+    } else {
+      builder.push(block.positions, block.payload);
+    }
     so_far = points->progress();
     if (context.stop.stop_requested()) throw stream::Stopped();
     const std::lock_guard lock(reporting);
@@ -319,6 +305,7 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   writer.set_nodata(so_far.nodata);
   const cluster::HierarchyResult result = builder.finish();
   outcome.points = result.points;
+  outcome.outliers = result.outliers;
   outcome.nodata = so_far.nodata;
   outcome.excluded = so_far.excluded;
   outcome.store_bytes = sink.store_bytes();
@@ -329,6 +316,10 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   if (so_far.withheld > 0) {
     context.say(std::to_string(so_far.withheld) +
                 " points are marked as withheld in their file; they are kept, with the mark");
+  }
+  if (info.spooled_bytes > 0) {
+    context.say("the input cannot be read from a pipe or out of gzip: " +
+                readable_bytes(info.spooled_bytes) + " were set aside in a temporary file");
   }
   tell_order(outcome.order, folder, context);
   if (!crs.note.empty()) context.say(crs.note);

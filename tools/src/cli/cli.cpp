@@ -281,6 +281,13 @@ CLI::Option* add_heights_of_colour(CLI::App& app, stream::HeightsOfColour& targe
       ->check(CLI::IsMember({"mapbox", "terrarium"}));
 }
 
+CLI::Option* add_cell_of_source(CLI::App& app, std::optional<double>& target) {
+  return add_number(app, "--cell", target,
+                    "side of the cells of rasters without georeferencing (PNG): the centre of the "
+                    "first is 0,0, rows go down",
+                    kAboveZero);
+}
+
 int run_command_line(int argc, const char* const* argv) {
   install_signal_handlers();
   try {

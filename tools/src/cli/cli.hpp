@@ -101,6 +101,8 @@ CLI::Option* add_output(CLI::App& app, std::string& target, const std::string& d
 
 /// The option --rgb, kept in `target`.
 CLI::Option* add_heights_of_colour(CLI::App& app, stream::HeightsOfColour& target);
+/// --cell, the size of cells of rasters that do not say it.
+CLI::Option* add_cell_of_source(CLI::App& app, std::optional<double>& target);
 
 /// Runs the command line and returns the exit code. Never throws.
 int run_command_line(int argc, const char* const* argv);

@@ -10,10 +10,12 @@ namespace terrace::tools {
 namespace {
 
 /// Parameter and option. tests/layout checks that all parameters that libterrain names are here.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 29> kOptions{{
+constexpr std::array<std::pair<std::string_view, std::string_view>, 32> kOptions{{
     {"block_points", "--block"},
     {"cell", "--cell"},
+    {"channel", "--channel"},
     {"crs", "--crs"},
+    {"drop", "--drop"},
     {"duplicates", "--duplicates"},
     {"facility_cost", "--facility-cost"},
     {"fill", "--fill"},
@@ -28,6 +30,7 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 29> kOptions
     {"metadata", "--metadata"},
     {"metric", "--metric"},
     {"near", "--near"},
+    {"outlier_price", "--outlier-price"},
     {"region", "--region"},
     {"replace", "--force"},
     {"resolution", "--resolution"},

@@ -3,27 +3,17 @@
 
 #include <cstddef>
 
-#include "base/units.hpp"
-#include "terrace/terrain/error.hpp"
+#include "cli/clustering_options.hpp"
 
 namespace terrace::tools {
-
-using namespace terrain;
 
 ChannelTable read_channels(const PointTable& table, const std::vector<std::string>& options) {
   ChannelTable channels;
   std::vector<std::vector<double>> columns;
   for (const std::string& text : options) {
-    const std::size_t colon = text.rfind(':');
-    if (colon == std::string::npos || colon == 0) {
-      throw UsageError("--channel " + text + ": write NAME:WEIGHT, as in intensity:0.5");
-    }
-    channels.weights.push_back(
-        parse_number(text.substr(colon + 1), "the weight of --channel " + text));
-    if (!(channels.weights.back() >= 0)) {
-      throw UsageError("--channel " + text + ": the weight must not be negative");
-    }
-    columns.push_back(table.column(text.substr(0, colon)));
+    const auto& [name, weight] = channel_of(text);
+    columns.push_back(table.column(name));
+    channels.weights.push_back(weight);
   }
   channels.values.resize(table.size() * columns.size());
   for (std::size_t c = 0; c < columns.size(); ++c) {

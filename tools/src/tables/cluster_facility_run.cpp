@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <utility>
 
 #include <terrace/cluster/facility_location.hpp>
 
 #include "base/units.hpp"
+#include "cli/clustering_options.hpp"
 #include "tables/cluster_methods.hpp"
 
 namespace terrace::tools {
@@ -18,15 +18,6 @@ using cluster::FacilitySolution;
 using cluster::FacilityStrategy;
 
 namespace {
-
-constexpr std::array<std::pair<const char*, FacilityStrategy>, 7> kStrategies{
-    {{"automatic", FacilityStrategy::automatic},
-     {"fast", FacilityStrategy::fast},
-     {"full-scan", FacilityStrategy::full_scan},
-     {"quadtree", FacilityStrategy::quadtree},
-     {"octree", FacilityStrategy::octree},
-     {"kd-tree", FacilityStrategy::kd_tree},
-     {"facilities", FacilityStrategy::facilities}}};
 
 /// Steps towards the lower bound: as many as were asked for, else what takes seconds, as a step
 /// looks at some clusters' worth of points around each point.
@@ -56,9 +47,7 @@ double bound_of(const ClusterRequest& request, const FacilityPoints& problem,
 ClusterOutcome cluster_by_facilities(const ClusterRequest& request, const FacilityPoints& problem,
                                      const ClusterProgress& progress) {
   cluster::FacilityOptions options;
-  for (const auto& [name, strategy] : kStrategies) {
-    if (request.strategy == name) options.strategy = strategy;
-  }
+  options.strategy = strategy_of(request.strategy);
   // In this command `fast` means as much as `default`: on one block it would save milliseconds.
   options.effort = std::max(request.effort, cluster::Effort::standard);
   if (request.iterations == "tenth") {

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -12,6 +14,7 @@
 #include <terrace/stream/error.hpp>
 
 #include "base/units.hpp"
+#include "cli/clustering_options.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/selection_options.hpp"
 #include "terrace/terrain/build.hpp"
@@ -49,6 +52,7 @@ class BuildCommand final : public Command {
     selection_.define(app);
     app.add_option("--band", request_.band, "of rasters, from 1")->check(CLI::Range(1, 65535));
     add_heights_of_colour(app, request_.heights_of_colour);
+    add_cell_of_source(app, request_.cell);
     app.add_option("--block", block_, "most points clustered together")->capture_default_str();
     add_number(app, "--facility-cost", request_.facility_cost,
                "times the diagonal of a block: larger makes larger clusters", kFactor);
@@ -62,6 +66,19 @@ class BuildCommand final : public Command {
            "euclidean, squared, minkowski:P or elliptical:FILE (JSON: boxes with semi-axes)")
         ->capture_default_str()
         ->type_name("METRIC");
+    app.add_option("--channel", channels_,
+                   "ATTRIBUTE:WEIGHT, repeatable: the attribute counts in distances, a unit of it "
+                   "as many metres; much slower")
+        ->type_name("NAME:W");
+    add_number(app, "--outlier-price", outlier_price_,
+               "times the diagonal of a block: points that it costs less to leave out steer no "
+               "cluster; they are kept with outlier = 1",
+               kFactor);
+    app.add_option("--strategy", strategy_,
+                   "how clusters are searched: automatic, or a local search of the thesis, slower")
+        ->check(CLI::IsMember(names_of_strategies()))
+        ->type_name("NAME")
+        ->capture_default_str();
     app.add_option("--order", order_,
                    "of points: stream as they come, spatial such that near ones follow one another "
                    "(through a temporary file beside the store), auto if they do not already")
@@ -82,6 +99,9 @@ class BuildCommand final : public Command {
     }
     request_.block_points = block_;
     request_.metric = MetricChoice::parse(metric_);
+    request_.strategy = strategy_of(strategy_);
+    if (outlier_price_) request_.outlier_price = *outlier_price_;
+    for (const std::string& channel : channels_) request_.channels.push_back(channel_of(channel));
     request_.selection = selection_.selection();
     request_.seed = common.seed;
     request_.order = order_ == "stream"    ? stream::Order::stream
@@ -108,6 +128,7 @@ class BuildCommand final : public Command {
     summary.json = {{"points", outcome.points},
                     {"nodata", outcome.nodata},
                     {"excluded", outcome.excluded},
+                    {"outliers", outcome.outliers},
                     {"seconds", seconds},
                     {"points_per_second", rate},
                     {"peak_rss_bytes", peak_rss_bytes()},
@@ -116,15 +137,19 @@ class BuildCommand final : public Command {
                     {"reordered", outcome.order.reordered},
                     {"spread", outcome.order.spread},
                     {"temporary_bytes", outcome.order.temporary_bytes}};
-    summary.text =
-        with_commas(outcome.points) + " points (" + with_commas(outcome.nodata) +
-        " cells without data left out" +
-        (outcome.excluded > 0
-             ? ", " + with_commas(outcome.excluded) + " points that were not selected too"
-             : "") +
-        ") in " + readable_seconds(seconds) + ", " + readable_rate(rate) + "\n" + output_ + ": " +
-        std::to_string(outcome.top + 1) + " levels, " + readable_bytes(outcome.store_bytes) +
-        ", peak memory " + readable_bytes(peak_rss_bytes()) + "\n";
+    const std::string outliers =
+        std::isfinite(request_.outlier_price)
+            ? with_commas(outcome.outliers) + " of them are marked: outlier = 1\n"
+            : std::string();
+    summary.text = with_commas(outcome.points) + " points (" + with_commas(outcome.nodata) +
+                   " cells without data left out" +
+                   (outcome.excluded > 0 ? ", " + with_commas(outcome.excluded) +
+                                               " points that were not selected too"
+                                         : "") +
+                   ") in " + readable_seconds(seconds) + ", " + readable_rate(rate) + "\n" +
+                   outliers + output_ + ": " + std::to_string(outcome.top + 1) + " levels, " +
+                   readable_bytes(outcome.store_bytes) + ", peak memory " +
+                   readable_bytes(peak_rss_bytes()) + "\n";
     return summary;
   }
 
@@ -136,6 +161,7 @@ class BuildCommand final : public Command {
     const auto source =
         stream::open_source(request_.inputs, {.format = request_.input_format,
                                               .heights_of_colour = request_.heights_of_colour,
+                                              .cell = request_.cell.value_or(0),
                                               .stop = stop_token(),
                                               .selection = request_.selection});
     const stream::SourceInfo& info = source->info();
@@ -184,7 +210,10 @@ class BuildCommand final : public Command {
 
   BuildRequest request_;
   SelectionOptions selection_;
-  std::string output_, crs_, shift_, effort_ = "default", metric_ = "euclidean", order_ = "auto";
+  std::string output_, crs_, shift_, effort_ = "default", metric_ = "euclidean", order_ = "auto",
+                                     strategy_ = "automatic";
+  std::vector<std::string> channels_;
+  std::optional<double> outlier_price_;
   std::uint64_t block_ = 10000;
   bool dry_run_ = false;
 };

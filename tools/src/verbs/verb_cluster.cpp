@@ -10,6 +10,7 @@
 #include <CLI/CLI.hpp>
 
 #include "base/units.hpp"
+#include "cli/clustering_options.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/library_call.hpp"
 #include "cli/output.hpp"
@@ -68,8 +69,7 @@ class ClusterCommand final : public Command {
         ->type_name("PRICE");
     app.add_option("--strategy", request_.strategy,
                    "facility: automatic, fast, full-scan, quadtree, octree, kd-tree or facilities")
-        ->check(CLI::IsMember(
-            {"automatic", "fast", "full-scan", "quadtree", "octree", "kd-tree", "facilities"}))
+        ->check(CLI::IsMember(names_of_strategies()))
         ->capture_default_str()
         ->type_name("NAME");
     app.add_option("--iterations", request_.iterations,

@@ -37,6 +37,7 @@ class ConvertCommand : public Command {
         ->type_name("NAME");
     selection_.define(app);
     add_heights_of_colour(app, colours_);
+    add_cell_of_source(app, cell_);
   }
 
   Summary run(const CommonOptions& common) override {
@@ -46,6 +47,7 @@ class ConvertCommand : public Command {
     const std::unique_ptr<stream::PointSource> source =
         stream::open_source(files, {.format = input_format_,
                                     .heights_of_colour = colours_,
+                                    .cell = cell_.value_or(0),
                                     .stop = stop_token(),
                                     .blocks_ahead = 8,
                                     .threads = common.threads,
@@ -103,6 +105,7 @@ class ConvertCommand : public Command {
   std::string input_, output_, format_, input_format_;
   SelectionOptions selection_;
   stream::HeightsOfColour colours_ = stream::HeightsOfColour::none;
+  std::optional<double> cell_;
 };
 
 }  // namespace

@@ -59,7 +59,8 @@ class RenderCommand : public Command {
  public:
   void define(CLI::App& app) override {
     app.add_option("input", input_,
-                   "Store, raster, mesh (PLY, OBJ), cloud of points, dendrogram (CSV), or pairs or "
+                   "Store, raster, mesh (PLY, OBJ, OFF, STL), cloud of points, dendrogram (CSV), "
+                   "or pairs or "
                    "tree of 'match' (CSV)")
         ->required()
         ->type_name("FILE");

@@ -5,11 +5,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <span>
 #include <vector>
 
 #include "terrace/cluster/block.hpp"
+#include "terrace/cluster/facility_location.hpp"
 #include "terrace/cluster/metric.hpp"
 #include "terrace/cluster/point.hpp"
 
@@ -97,14 +99,28 @@ struct HierarchyOptions {
   /// of a block's points, rounded up, become representatives; otherwise the levels might never end.
   /// Where the facility cost is too low for that, it is raised for that block.
   BlockOptions block;
-  /// Distances on the ground, after `ground`; the boxes of a field are in that frame. Where the
-  /// metric is linear in the box of a block (Euclidean, elliptical, a field with one region there)
-  /// and there are no channels, the block is clustered as by BlockClusterer. Otherwise it is
-  /// clustered by the local search of solve() in facility_location.hpp, of the effort that `block`
-  /// says, blocks of fewer than 2500 points with Effort::fine at least; clusters are then in the
-  /// order of their representatives. That is ten to a hundred times slower. Summary::error stays a
-  /// ground distance, the Euclidean one.
+  /// Distances on the ground, after `ground`; the boxes of a field are in that frame.
+  /// Summary::error stays a ground distance, the Euclidean one.
   Metric metric = Euclidean{};
+  /// How blocks are clustered. automatic: as by BlockClusterer where the metric is linear in the
+  /// box of the block (Euclidean, elliptical, a field with one region there) and there are no
+  /// channels, otherwise by the local search that solve() of facility_location.hpp chooses. Any
+  /// other: solve() with that strategy. A local search is ten to a hundred times slower. Its effort
+  /// is that of `block`, with `automatic` in blocks of fewer than 2500 points Effort::fine at
+  /// least; clusters are in the order of their representatives.
+  FacilityStrategy strategy = FacilityStrategy::automatic;
+  /// As FacilityOptions has them: threads that work on one block, and candidates judged at once.
+  unsigned search_threads = 1;
+  std::size_t batch = 1;
+  /// What leaving out a point of level 0 costs, times the diagonal as the facility cost, and in
+  /// blocks of n < block_size points (the last one, tiles) times sqrt(block_size / n); infinite: no
+  /// point is left out. Outliers are found and taken out until none is left, the diagonal being
+  /// that of the points which remain, so they steer neither places nor sizes of clusters. Then each
+  /// becomes a member of the cluster whose representative is nearest (its box, error and count
+  /// include it) and `mark_outlier` is called on its payload. Their representatives are ordinary
+  /// points: above level 0 nothing is left out. (thesis 7.1.3, figure 7.3)
+  double outlier_price = std::numeric_limits<double>::infinity();
+  std::function<void(std::span<std::byte> payload)> mark_outlier;  ///< from any thread
   /// In place of `metric`: the metric for a block with these bounds. A field needs it where
   /// `ground` depends on the block, as does the frame of the boxes then. Called from any thread.
   std::function<Metric(const Bounds&)> metric_of;
@@ -128,6 +144,7 @@ struct HierarchyResult {
   /// Per level, 0 to top: the number of points whose highest level is this or above, and of
   /// clusters. The root counts as one cluster.
   std::vector<std::uint64_t> level_points, level_clusters;
+  std::uint64_t outliers = 0;
 };
 
 /// Builds the hierarchy. Memory: a few blocks per thread and one per level. The result depends on
@@ -135,8 +152,9 @@ struct HierarchyResult {
 class HierarchyBuilder {
  public:
   /// The sink must outlive the builder.
-  /// Throws: std::invalid_argument if block_size, facility_cost, the metric or a channel's weight
-  /// is out of range, channels have no function, or the SIMD path is not available.
+  /// Throws: std::invalid_argument if block_size, facility_cost, outlier_price, the metric or a
+  /// channel's weight is out of range, channels or outliers have no function, or the SIMD path is
+  /// not available.
   HierarchyBuilder(HierarchyOptions options, HierarchySink& sink);
   /// Stops without finishing: waits for the blocks that are being clustered; then the sink gets no
   /// more calls.
@@ -151,9 +169,9 @@ class HierarchyBuilder {
   /// Throws: std::invalid_argument on a coordinate that is not finite, naming its index in the
   /// batch, and on a payload of another size than payload_size bytes per point (the builder is
   /// unchanged); what the sink or `ground` threw, and std::invalid_argument on a ground map that is
-  /// not finite, is zero, or makes distances beyond 1e150, on a channel that is not finite and on a
-  /// custom distance that is negative or not finite (the builder has ended then, and takes no
-  /// more calls: they throw std::logic_error).
+  /// not finite, is zero, or makes distances beyond 1e150, on a channel that is not finite, on a
+  /// custom distance that is negative or not finite and on a strategy that a block does not admit
+  /// (the builder has ended then, and takes no more calls: they throw std::logic_error).
   void push(std::span<const Point3> positions, std::span<const std::byte> payload = {});
 
   /// Clusters what is left, from level 0 upward; the top is the first level that fits one block.

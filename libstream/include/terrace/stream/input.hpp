@@ -15,8 +15,11 @@ namespace terrace::stream {
 /// The name that stands for standard input, and for standard output where one is written.
 inline constexpr std::string_view kStandardStream = "-";
 
+class GzipStream;
+
 /// The bytes of a file, a pipe or standard input ("-") from first to last, through a window that
-/// moves forward. Holds the window, never the file.
+/// moves forward. Holds the window, never the file. What begins as gzip is unpacked on the way:
+/// windows and offsets are of the unpacked bytes.
 ///
 /// Whatever waits for a pipe (its first writer, more bytes) ends with Stopped as soon as `stop` is
 /// asked for, by whichever thread.
@@ -43,7 +46,7 @@ class Input {
 
   /// Bytes consumed so far.
   [[nodiscard]] std::uint64_t offset() const { return offset_; }
-  /// Size of a regular file; nothing for pipes.
+  /// Size of a regular file; nothing for pipes and gzip.
   [[nodiscard]] std::optional<std::uint64_t> size() const { return size_; }
   /// As the caller named it, "standard input" for "-".
   [[nodiscard]] const std::string& name() const { return name_; }
@@ -57,6 +60,8 @@ class Input {
 
   std::string name_;
   std::unique_ptr<Descriptor> descriptor_;
+  std::unique_ptr<GzipStream> gzip_;
+  bool looked_at_ = false;  ///< for gzip
   bool ended_ = false;
   std::optional<std::uint64_t> size_;
   std::uint64_t offset_ = 0;

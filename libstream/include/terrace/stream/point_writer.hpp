@@ -21,8 +21,9 @@ struct PointHeader {
   std::vector<std::string> comments{};  ///< written where the format has comments (PLY)
   /// The CRS of the coordinates; its WKT is written where the format has a place for it (LAS).
   Crs crs{};
-  /// For formats whose coordinates are integers (LAS): the lattice to write them on. Without one
-  /// the writer takes a power of ten that suits the first points and the bounds.
+  /// What coordinates are rounded sums of: text has its decimals (849393.95, not
+  /// 849393.9500000001), formats whose coordinates are integers (LAS) are written on it. Without
+  /// one those take a power of ten that suits the first points and the bounds.
   std::optional<Lattice> lattice{};
   std::optional<Box3> bounds{};  ///< of the points, if known beforehand
 };

@@ -31,6 +31,8 @@ struct SourceInfo : Schema {
   std::optional<double> nodata;         ///< of the (first) raster, raw units
   std::optional<OctreeInfo> octree;     ///< of a single input whose points lie in one
   std::vector<std::string> comments;
+  /// Bytes of temporary files that hold what came through pipes or gzip and is read at any place.
+  std::uint64_t spooled_bytes = 0;
 };
 
 /// A block of points in *stored coordinates* (see WorldTransform). Every coordinate type but 64-bit
@@ -108,7 +110,8 @@ struct SourceOptions {
   std::uint64_t memory_bytes = 64u << 20;                     ///< what the source may hold, roughly
   int band = 1;                                               ///< of rasters, counted from 1
   HeightsOfColour heights_of_colour = HeightsOfColour::none;  ///< of PNG pictures in colours
-  std::optional<Crs> crs{};                                   ///< replaces what the file says
+  double cell = 0.0;         ///< above 0: side of the cells of rasters without georeferencing
+  std::optional<Crs> crs{};  ///< replaces what the file says
   /// Ends whatever waits for a pipe, in opening the source and in next(), with Stopped.
   std::stop_token stop{};
   /// Above 0: blocks are read on a thread of their own, at most so many ahead, from the first
@@ -143,6 +146,8 @@ struct Format {
   std::string name;
   std::vector<std::string> endings;  ///< lower case, with the dot: ".tif"
   bool streams = false;              ///< can be read from a pipe, front to back
+  /// What does not stream can be read from a copy: neither its name nor files beside it matter.
+  bool self_contained = false;
   bool (*recognise)(std::span<const std::byte> head) = nullptr;
   std::unique_ptr<PointSource> (*open)(std::span<const std::string> files,
                                        const SourceOptions& options) = nullptr;

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "format/geotiff/tags.hpp"
+#include "raster/plain_world.hpp"
 
 namespace terrace::stream {
 namespace {
@@ -84,8 +85,8 @@ WorldTransform geotiff_transform(const GeoTiffHandle& handle, const GeoKeys& key
                     " ground control points instead of a transformation",
                 "rectify it first: gdalwarp");
   }
-  comments.emplace_back("no georeferencing: a plain grid with cells of 1 x 1, y = -row");
-  return {{1, 0, 0, 0, -1, 0}};
+  comments.push_back(kNoGeoreferencing);
+  return kPlainWorld;
 }
 
 BandMetadata band_metadata(const std::string& xml, unsigned band) {

@@ -101,6 +101,7 @@ std::unique_ptr<Raster> open_geotiff(const std::string& file, const RasterOption
 const Format& geotiff_format() {
   static const Format format{.name = "geotiff",
                              .endings = {".tif", ".tiff", ".gtiff", ".btf", ".tf8"},
+                             .self_contained = true,
                              .recognise = looks_like_tiff,
                              .open = open_points};
   return format;

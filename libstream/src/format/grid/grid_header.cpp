@@ -6,6 +6,7 @@
 
 #include "io/number.hpp"
 #include "io/text.hpp"
+#include "raster/plain_world.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::stream {
@@ -62,8 +63,8 @@ WorldTransform GridHeader::world(std::uint64_t rows, std::vector<std::string>& c
     fail(x ? "yllcorner" : "xllcorner", "is missing, although the other is there");
   }
   if (!x) {
-    comments.emplace_back("no georeferencing: a plain grid with cells of 1 x 1, y = -row");
-    return {{1, 0, 0, 0, -1, 0}};
+    comments.push_back(kNoGeoreferencing);
+    return kPlainWorld;
   }
   if (!std::isfinite(*x) || !std::isfinite(*y)) fail("cellsize", "is too large");
   return {{width, 0, *x, 0, -height, *y}};

@@ -27,6 +27,7 @@
 #include "io/number.hpp"
 #include "io/spool.hpp"
 #include "io/text.hpp"
+#include "raster/plain_world.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/input.hpp"
 
@@ -298,9 +299,8 @@ std::unique_ptr<Raster> open_height_map(const std::string& file, const RasterOpt
   if (const auto world = world_of(file)) {
     grid.info.world = *world;
   } else {
-    grid.info.world.xy = {1, 0, 0, 0, -1, 0};
-    grid.info.comments.emplace_back(
-        "no georeferencing: a plain grid with cells of 1 x 1, y = -row");
+    grid.info.world = kPlainWorld;
+    grid.info.comments.push_back(kNoGeoreferencing);
   }
   if (grey) {
     return open_packed_grid(std::move(grid),
@@ -320,8 +320,12 @@ std::unique_ptr<Raster> open_height_map(const std::string& file, const RasterOpt
 }
 
 const Format& png_format() {
-  static const Format format{
-      .name = "png", .endings = {".png"}, .recognise = &recognise_png, .open = &open_png_points};
+  // What a world file would say, `cell` and `crs` can.
+  static const Format format{.name = "png",
+                             .endings = {".png"},
+                             .self_contained = true,
+                             .recognise = &recognise_png,
+                             .open = &open_png_points};
   return format;
 }
 

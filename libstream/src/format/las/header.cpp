@@ -258,7 +258,7 @@ LasHeader read_las_header(Input& input, const std::string& file,
     }
   }
   read_vlrs(input, vlrs, header, comments);
-  if (evlrs > 0 && is_rereadable(file)) {
+  if (evlrs > 0 && is_seekable(file)) {
     read_evlrs(*open_file(file), evlr_offset, evlrs, header, comments);
   } else {
     header.unread_evlrs = evlrs > 0;

@@ -188,7 +188,7 @@ std::unique_ptr<RecordReader> open_laz_records(Input& input, const std::string& 
   if (header.points == 0) return std::make_unique<LazInTurn>(input, std::move(layout), 0);
   if (has_table) {
     layout.first += kPositionBytes;
-    if (is_rereadable(file)) {
+    if (is_seekable(file)) {
       auto bytes = open_file(file);
       layout.chunks = read_table(*bytes, layout, header.points);
       if (options.threads > 1) {

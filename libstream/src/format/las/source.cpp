@@ -72,7 +72,7 @@ class LasOpener {
   void open_nodes() {
     const bool is_copc = header_.compressed && header_.minor == 4 && !header_.vlrs.empty() &&
                          header_.vlrs.front().is(kCopcUser, kCopcInfo);
-    if (!is_copc || !is_rereadable(file_)) return;
+    if (!is_copc || !is_seekable(file_)) return;
     const Selection& wanted = options_.selection;
     try {
       std::unique_ptr<ByteSource> bytes = open_file(file_);

@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstddef>
 #include <string>
 #include <string_view>
+#include <system_error>
 
 #include "format/output_columns.hpp"
 #include "format/writers.hpp"
@@ -23,13 +28,59 @@ std::string csv_field(const std::string& name) {
   return out + "\"";
 }
 
+/// Writes a coordinate. Those of a lattice in decimal steps (LAS) are k * scale + offset, rounded:
+/// 849393.9500000001 where 849393.95 is meant. The decimals of the lattice are written then.
+class CoordinateText {
+ public:
+  CoordinateText() = default;
+  CoordinateText(double scale, double offset) : scale_(scale), offset_(offset), decimals_(0) {
+    double power = 1.0;
+    const auto is_whole = [&](double value) {
+      return std::abs(value * power - std::round(value * power)) <= 1e-6 * scale * power;
+    };
+    for (; decimals_ <= kMostDecimals && !(is_whole(scale) && is_whole(offset)); ++decimals_) {
+      power *= 10.0;
+    }
+  }
+
+  void append(std::string& text, double value) const {
+    const std::size_t begin = text.size();
+    append_number(text, value);
+    if (text.size() - begin < kLongText || decimals_ > kMostDecimals) return;
+    char digits[kMaxNumber];
+    auto [end, error] =
+        std::to_chars(digits, digits + sizeof digits, value, std::chars_format::fixed, decimals_);
+    double meant = 0.0;
+    if (error != std::errc{} || parse_real(digits, end, meant) != end) return;
+    while (decimals_ > 0 && end[-1] == '0') --end;
+    if (end[-1] == '.') --end;
+    const double step = (value - offset_) / scale_;
+    const bool same = std::round(step) == std::round((meant - offset_) / scale_) &&
+                      std::abs(step - std::round(step)) < 1e-3;
+    if (same && static_cast<std::size_t>(end - digits) < text.size() - begin) {
+      text.replace(begin, std::string::npos, std::string_view(digits, end));
+    }
+  }
+
+ private:
+  static constexpr int kMostDecimals = 9;
+  static constexpr std::size_t kLongText = 15;  // shorter ones are no rounded sums
+
+  double scale_ = 1.0, offset_ = 0.0;
+  int decimals_ = kMostDecimals + 1;  ///< of the lattice; more: none
+};
+
 class XyzWriter final : public PointWriter {
  public:
   XyzWriter(const std::string& path, const PointHeader& header, const WriterOptions& options,
             char separator)
       : sink_(path, options.replace, options.stop),
         columns_(header.attributes),
-        separator_(separator) {}
+        separator_(separator) {
+    for (std::size_t axis = 0; header.lattice && axis < 3; ++axis) {
+      coordinates_[axis] = {header.lattice->scale[axis], header.lattice->offset[axis]};
+    }
+  }
 
   void write_header() {
     text_ = "x,y,z";
@@ -46,11 +97,11 @@ class XyzWriter final : public PointWriter {
     columns_.check(block);
     for (std::size_t i = 0; i < block.size(); ++i) {
       const Point3& p = block.positions[i];
-      append_number(text_, p[0]);
+      coordinates_[0].append(text_, p[0]);
       text_ += separator_;
-      append_number(text_, p[1]);
+      coordinates_[1].append(text_, p[1]);
       text_ += separator_;
-      append_number(text_, p[2]);
+      coordinates_[2].append(text_, p[2]);
       if (columns_.size() != 0) columns_.append_text(text_, block, i, separator_);
       text_ += '\n';
       if (text_.size() >= kTextBytes) flush();
@@ -72,6 +123,7 @@ class XyzWriter final : public PointWriter {
   Sink sink_;
   OutputColumns columns_;
   char separator_;
+  std::array<CoordinateText, 3> coordinates_;
   std::string text_;
   std::uint64_t points_ = 0;
 };

@@ -4,11 +4,14 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <terrace/cluster/block.hpp>
+#include <terrace/cluster/facility_location.hpp>
 #include <terrace/stream/source.hpp>
 #include <terrace/stream/spatial_order.hpp>
 
@@ -35,8 +38,19 @@ struct BuildRequest {
   cluster::Effort effort = cluster::Effort::standard;
   double z_weight = 1.0;
   MetricChoice metric{};  ///< on the ground
+  /// Attributes that count in distances as further axes: metres on the ground that a unit of the
+  /// attribute (scale and offset applied) is worth. Blocks are then clustered by a local search,
+  /// ten to a hundred times slower.
+  std::vector<std::pair<std::string, double>> channels{};
+  /// What leaving a point out of the clustering costs, times the diagonal of its block; infinite:
+  /// none is left out. Outliers stay in the store, as members of the nearest cluster, with 1 in a
+  /// further attribute "outlier"; see cluster::HierarchyOptions::outlier_price.
+  double outlier_price = std::numeric_limits<double>::infinity();
+  /// How facilities are searched: automatic, or a local search of the thesis (7.3.2).
+  cluster::FacilityStrategy strategy = cluster::FacilityStrategy::automatic;
   int band = 1;
   stream::HeightsOfColour heights_of_colour = stream::HeightsOfColour::none;  ///< of PNG
+  std::optional<double> cell{};  ///< side of the cells of rasters without georeferencing
   std::uint64_t seed = 1;
   /// Of points that are no cells of a raster: see stream::in_spatial_order(). Its temporary file
   /// lies in the folder in which the store is to stand.
@@ -49,6 +63,7 @@ struct BuildOutcome {
   std::uint64_t points = 0;
   std::uint64_t nodata = 0;
   std::uint64_t excluded = 0;  ///< points that the selection left out
+  std::uint64_t outliers = 0;  ///< points marked as outliers
   std::uint64_t store_bytes = 0;
   stream::OrderedSource::Report order{};  ///< how the points came, and what it took to order them
   unsigned top = 0;

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "terrace/stream/input.hpp"
+#include "terrace/stream/schema.hpp"
+
+/// Meshes of the simple formats, read front to back: OBJ, OFF and STL. Each has one parser, for
+/// read_mesh() as for the points of its vertices.
+
+namespace terrace::stream {
+
+/// Vertices and faces in the order of the file. Holds a line or a face, never the mesh.
+class MeshParser {
+ public:
+  enum class Item : std::uint8_t { end, vertex, face };
+
+  virtual ~MeshParser() = default;
+  /// What comes next; vertex() or face() tells it. Throws: Error naming file and place, Stopped.
+  virtual Item next() = 0;
+
+  [[nodiscard]] const Point3& vertex() const { return vertex_; }
+  /// Three corners or more: numbers of vertices, from 0, all of which have come before.
+  [[nodiscard]] const std::vector<std::uint32_t>& face() const { return face_; }
+  /// True if each face has vertices of its own, so that those at one place are one (STL).
+  [[nodiscard]] virtual bool is_soup() const { return false; }
+  /// How many vertices there are, if the file says so in front of them.
+  [[nodiscard]] virtual std::optional<std::uint64_t> vertices() const { return std::nullopt; }
+  [[nodiscard]] virtual ScalarType type() const { return ScalarType::f64; }
+  /// So far.
+  [[nodiscard]] const std::vector<std::string>& comments() const { return comments_; }
+
+ protected:
+  Point3 vertex_{};
+  std::vector<std::uint32_t> face_;
+  std::vector<std::string> comments_;
+};
+
+/// The next coordinates of a line, moving past them; false unless there are three finite numbers.
+bool read_vertex(std::string_view& text, Point3& vertex);
+
+/// input: at its first byte; must outlive the parser. faces: false leaves them out, unread.
+std::unique_ptr<MeshParser> obj_parser(Input& input, bool faces);
+std::unique_ptr<MeshParser> off_parser(Input& input, bool faces);
+std::unique_ptr<MeshParser> stl_parser(Input& input, bool faces);
+
+/// As Format::recognise.
+bool recognise_obj(std::span<const std::byte> head);
+bool recognise_off(std::span<const std::byte> head);
+/// The text form alone: the other has no mark.
+bool recognise_stl(std::span<const std::byte> head);
+
+}  // namespace terrace::stream

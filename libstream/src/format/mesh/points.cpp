@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "format/chain.hpp"
+#include "format/formats.hpp"
+#include "format/mesh/parser.hpp"
+#include "terrace/stream/input.hpp"
+#include "terrace/stream/source.hpp"
+
+/// The vertices of meshes as points.
+
+namespace terrace::stream {
+namespace {
+
+using MakeParser = std::unique_ptr<MeshParser> (*)(Input& input, bool faces);
+
+class MeshPoints final : public PointSource {
+ public:
+  MeshPoints(const std::string& file, const SourceOptions& options, const char* format,
+             MakeParser make)
+      : input_(file, options.stop),
+        parser_(make(input_, false)),
+        block_points_(options.block_points) {
+    info_.format = format;
+    info_.files = {file};
+    info_.points = parser_->vertices();
+    constexpr std::array kNames{"x", "y", "z"};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      info_.coordinates[axis] = {.name = kNames[axis], .type = parser_->type()};
+    }
+    if (options.crs) info_.crs = *options.crs;
+  }
+
+  const SourceInfo& info() const override { return info_; }
+
+  bool next(PointBlock& block) override {
+    block.clear();
+    while (block.size() < block_points_ && parser_->next() == MeshParser::Item::vertex) {
+      block.positions.push_back(parser_->vertex());
+    }
+    delivered_ += block.size();
+    return !block.empty();
+  }
+
+  Progress progress() const override {
+    Progress progress{.points = delivered_};
+    if (input_.size() && *input_.size() > 0) {
+      progress.fraction =
+          std::min(1.0, static_cast<double>(input_.offset()) / static_cast<double>(*input_.size()));
+    }
+    return progress;
+  }
+
+ private:
+  Input input_;
+  std::unique_ptr<MeshParser> parser_;
+  std::size_t block_points_;
+  SourceInfo info_;
+  std::uint64_t delivered_ = 0;
+};
+
+std::unique_ptr<PointSource> open_one_obj(const std::string& file, const SourceOptions& options,
+                                          const SourceInfo* /*first*/) {
+  return std::make_unique<MeshPoints>(file, options, "obj", &obj_parser);
+}
+std::unique_ptr<PointSource> open_one_off(const std::string& file, const SourceOptions& options,
+                                          const SourceInfo* /*first*/) {
+  return std::make_unique<MeshPoints>(file, options, "off", &off_parser);
+}
+std::unique_ptr<PointSource> open_one_stl(const std::string& file, const SourceOptions& options,
+                                          const SourceInfo* /*first*/) {
+  return std::make_unique<MeshPoints>(file, options, "stl", &stl_parser);
+}
+
+std::unique_ptr<PointSource> open_obj(std::span<const std::string> files,
+                                      const SourceOptions& options) {
+  return open_in_turn(files, options, &open_one_obj);
+}
+std::unique_ptr<PointSource> open_off(std::span<const std::string> files,
+                                      const SourceOptions& options) {
+  return open_in_turn(files, options, &open_one_off);
+}
+std::unique_ptr<PointSource> open_stl(std::span<const std::string> files,
+                                      const SourceOptions& options) {
+  return open_in_turn(files, options, &open_one_stl);
+}
+
+}  // namespace
+
+const Format& obj_format() {
+  static const Format format{.name = "obj",
+                             .endings = {".obj"},
+                             .streams = true,
+                             .recognise = &recognise_obj,
+                             .open = &open_obj};
+  return format;
+}
+
+const Format& off_format() {
+  static const Format format{.name = "off",
+                             .endings = {".off", ".coff", ".noff"},
+                             .streams = true,
+                             .recognise = &recognise_off,
+                             .open = &open_off};
+  return format;
+}
+
+const Format& stl_format() {
+  static const Format format{.name = "stl",
+                             .endings = {".stl"},
+                             .streams = true,
+                             .recognise = &recognise_stl,
+                             .open = &open_stl};
+  return format;
+}
+
+}  // namespace terrace::stream

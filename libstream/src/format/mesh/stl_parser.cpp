@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include "format/mesh/parser.hpp"
+#include "io/bytes.hpp"
+#include "io/line_reader.hpp"
+#include "io/text.hpp"
+#include "terrace/stream/error.hpp"
+
+namespace terrace::stream {
+namespace {
+
+constexpr std::string_view kStlRemedy = "the file is damaged; write it anew";
+
+/// What both forms share: three vertices, then the face of them.
+class StlParser : public MeshParser {
+ public:
+  explicit StlParser(bool faces) : wants_faces_(faces) {}
+
+  bool is_soup() const final { return true; }
+
+  Item next() final {
+    if (corner_ < 3) {
+      if (!read_corner()) return Item::end;
+      ++corner_;
+      if (corner_ == 3 && !wants_faces_) begin_face();
+      return Item::vertex;
+    }
+    constexpr std::uint64_t kMost = std::numeric_limits<std::uint32_t>::max() / 3;
+    if (faces_ == kMost) fail("has more triangles than can be numbered", "read it as points");
+    const auto first = static_cast<std::uint32_t>(3 * faces_);
+    face_ = {first, first + 1, first + 2};
+    begin_face();
+    return Item::face;
+  }
+
+ protected:
+  /// The next corner to vertex_; false behind the last.
+  virtual bool read_corner() = 0;
+  [[noreturn]] virtual void fail(std::string cause, std::string_view remedy = kStlRemedy) const = 0;
+
+  std::uint64_t faces_ = 0;  ///< that are done
+  unsigned corner_ = 0;      ///< of the face in work, that have been read
+
+ private:
+  void begin_face() {
+    corner_ = 0;
+    ++faces_;
+  }
+
+  bool wants_faces_;
+};
+
+/// Lines "vertex x y z", three between "outer loop" and "endloop"; "endsolid" ends a part.
+class StlText final : public StlParser {
+ public:
+  StlText(Input& input, bool faces) : StlParser(faces), input_(&input), lines_(input) {}
+
+ protected:
+  bool read_corner() override {
+    std::string_view line;
+    while (lines_.next(line)) {
+      line = trim_left(line);
+      if (line.starts_with("vertex") || line.starts_with("VERTEX")) {
+        line.remove_prefix(6);
+        if (!in_loop_) fail("a vertex outside of a loop");
+        if (!read_vertex(line, vertex_)) fail("a vertex without three coordinates");
+        if (corner_ == 2) in_loop_ = false;
+        return true;
+      }
+      if (line.starts_with("outer") || line.starts_with("OUTER")) {
+        if (corner_ != 0) fail("a loop of fewer than three vertices");
+        in_loop_ = true;
+      } else if (line.starts_with("endloop") || line.starts_with("ENDLOOP")) {
+        if (corner_ != 0) fail("a loop of fewer than three vertices");
+        in_loop_ = false;
+      } else if (line.starts_with("endsolid") || line.starts_with("ENDSOLID")) {
+        ended_ = true;
+      } else if (line.starts_with("solid") || line.starts_with("SOLID")) {
+        ended_ = false;
+      }
+    }
+    if (corner_ != 0 || !ended_) fail("ends within a part", "the file is cut off: get it anew");
+    lines_.release();
+    return false;
+  }
+
+  [[noreturn]] void fail(std::string cause, std::string_view remedy = kStlRemedy) const override {
+    throw Error({.file = input_->name(),
+                 .where = "line " + std::to_string(lines_.number()),
+                 .cause = std::move(cause),
+                 .remedy = std::string(remedy)});
+  }
+
+ private:
+  Input* input_;
+  LineReader lines_;
+  bool in_loop_ = false, ended_ = false;
+};
+
+/// 80 bytes of anything, the number of triangles, then 50 bytes for each: a normal, three corners,
+/// all 32-bit floats, and two bytes that are left out.
+class StlBinary final : public StlParser {
+ public:
+  StlBinary(Input& input, bool faces) : StlParser(faces), input_(&input) {
+    const std::string_view head = input.fill(kHeadBytes);
+    if (head.size() < kHeadBytes) fail("is too short for STL");
+    count_ = load_little_endian<std::uint32_t>(head.data() + 80);
+    if (input.size() && (*input.size() - kHeadBytes) / kFaceBytes < count_) {
+      fail("promises " + std::to_string(count_) + " triangles and has bytes for " +
+           std::to_string((*input.size() - kHeadBytes) / kFaceBytes));
+    }
+    input.consume(kHeadBytes);
+  }
+
+  std::optional<std::uint64_t> vertices() const override { return 3 * std::uint64_t{count_}; }
+  ScalarType type() const override { return ScalarType::f32; }
+
+ protected:
+  bool read_corner() override {
+    if (corner_ == 0) {
+      if (faces_ == count_) return false;
+      if (faces_ > 0) input_->consume(kFaceBytes);
+      if (input_->fill(kFaceBytes).size() < kFaceBytes) {
+        fail("ends after " + std::to_string(faces_) + " of " + std::to_string(count_) +
+             " triangles");
+      }
+    }
+    const char* at = input_->window().data() + kNormalBytes + std::size_t{12} * corner_;
+    for (double& value : vertex_) {
+      value = std::bit_cast<float>(load_little_endian<std::uint32_t>(at));
+      if (!std::isfinite(value)) {
+        fail("triangle " + std::to_string(faces_) + " has a corner that is not finite");
+      }
+      at += 4;
+    }
+    return true;
+  }
+
+  [[noreturn]] void fail(std::string cause, std::string_view remedy = kStlRemedy) const override {
+    throw Error({.file = input_->name(),
+                 .where = "byte " + std::to_string(input_->offset()),
+                 .cause = std::move(cause),
+                 .remedy = std::string(remedy)});
+  }
+
+ private:
+  static constexpr std::size_t kHeadBytes = 84, kFaceBytes = 50, kNormalBytes = 12;
+
+  Input* input_;
+  std::uint32_t count_ = 0;
+};
+
+}  // namespace
+
+bool recognise_stl(std::span<const std::byte> bytes) {
+  const std::string_view head(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  if (!head.starts_with("solid") && !head.starts_with("SOLID")) return false;
+  // Some write "solid" into the free bytes of the binary form; what follows those is no text.
+  return std::all_of(head.begin(), head.end(), [](char c) {
+    const auto byte = static_cast<unsigned char>(c);
+    return byte >= 0x20 || c == '\n' || c == '\r' || c == '\t';
+  });
+}
+
+std::unique_ptr<MeshParser> stl_parser(Input& input, bool faces) {
+  constexpr std::size_t kHeadBytes = 512;
+  const std::string_view head = input.fill(kHeadBytes).substr(0, kHeadBytes);
+  if (recognise_stl(std::as_bytes(std::span(head)))) {
+    return std::make_unique<StlText>(input, faces);
+  }
+  return std::make_unique<StlBinary>(input, faces);
+}
+
+}  // namespace terrace::stream

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "terrace/stream/schema.hpp"
+
+/// Where a raster lies that does not say it.
+
+namespace terrace::stream {
+
+/// Cells of 1 x 1, y = -row.
+inline constexpr WorldTransform kPlainWorld{{1, 0, 0, 0, -1, 0}};
+/// The comment that goes with it.
+inline const std::string kNoGeoreferencing =
+    "no georeferencing: a plain grid with cells of 1 x 1, y = -row";
+
+}  // namespace terrace::stream

@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <random>
+#include <set>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "point_files.hpp"
+#include "temp_folder.hpp"
+#include "terrace/stream/error.hpp"
+#include "terrace/stream/gzip.hpp"
+#include "terrace/stream/mesh_reader.hpp"
+#include "terrace/stream/source.hpp"
+
+/// OBJ, OFF and STL: their vertices as points, and as meshes. One random mesh is written in all of
+/// them by this test.
+
+namespace terrace::stream {
+namespace {
+
+struct SmallMesh {
+  std::vector<Point3> vertices;
+  std::vector<std::array<std::uint32_t, 3>> faces;
+};
+
+SmallMesh random_mesh(std::mt19937_64& random) {
+  SmallMesh mesh;
+  const std::size_t count = 3 + random() % 60;
+  for (std::size_t i = 0; i < count; ++i) {
+    // Floats, which all of the formats hold; every vertex at a place of its own.
+    const auto coordinate = [&] {
+      return static_cast<double>(static_cast<float>(random() % 100000) / 7);
+    };
+    mesh.vertices.push_back({coordinate(), coordinate(), static_cast<double>(i)});
+  }
+  for (std::size_t i = 0; i < random() % 100; ++i) {
+    const auto first = static_cast<std::uint32_t>(random() % (count - 2));
+    mesh.faces.push_back({first, first + 1, first + 2});
+  }
+  return mesh;
+}
+
+std::string number(double value) {
+  std::string text(40, '\0');
+  text.resize(static_cast<std::size_t>(std::snprintf(text.data(), text.size(), "%.17g", value)));
+  return text;
+}
+
+std::string place(const Point3& p) {
+  return number(p[0]) + " " + number(p[1]) + " " + number(p[2]);
+}
+
+std::string obj_of(const SmallMesh& mesh) {
+  std::string text = "# made by a test\nmtllib none.mtl\no thing\n";
+  for (const Point3& p : mesh.vertices) text += "v " + place(p) + "\nvn 0 0 1\n";
+  for (const auto& f : mesh.faces) {
+    text += "f";
+    for (const std::uint32_t v : f) text += " " + std::to_string(v + 1) + "//1";
+    text += "\n";
+  }
+  return text;
+}
+
+std::string off_of(const SmallMesh& mesh, bool colours) {
+  std::string text = colours ? "COFF # colours\n\n" : "OFF\n";
+  text += std::to_string(mesh.vertices.size()) + " " + std::to_string(mesh.faces.size()) + " 0\n";
+  for (const Point3& p : mesh.vertices) text += place(p) + (colours ? " 1 0.5 0 1\r\n" : "\n");
+  for (const auto& f : mesh.faces) {
+    text += "3";
+    for (const std::uint32_t v : f) text += " " + std::to_string(v);
+    text += colours ? " 255 0 0\n" : "\n";
+  }
+  return text;
+}
+
+std::string stl_text_of(const SmallMesh& mesh) {
+  std::string text = "solid thing\n";
+  for (const auto& f : mesh.faces) {
+    text += "  facet normal 0 0 1\n    outer loop\n";
+    for (const std::uint32_t v : f) text += "      vertex " + place(mesh.vertices[v]) + "\n";
+    text += "    endloop\n  endfacet\n";
+  }
+  return text + "endsolid thing\n";
+}
+
+template <class T>
+void append(std::string& bytes, T value) {
+  auto number = std::bit_cast<std::array<char, sizeof(T)>>(value);
+  if constexpr (std::endian::native == std::endian::big) std::reverse(number.begin(), number.end());
+  bytes.append(number.data(), number.size());
+}
+
+std::string stl_binary_of(const SmallMesh& mesh) {
+  std::string bytes = "solid is what some write here";
+  bytes.resize(80, ' ');
+  append(bytes, static_cast<std::uint32_t>(mesh.faces.size()));
+  for (const auto& f : mesh.faces) {
+    for (int i = 0; i < 3; ++i) append(bytes, 0.5F);
+    for (const std::uint32_t v : f) {
+      for (const double x : mesh.vertices[v]) append(bytes, static_cast<float>(x));
+    }
+    append(bytes, std::uint16_t{7});
+  }
+  return bytes;
+}
+
+std::vector<Point3> corners_of(const SmallMesh& mesh) {
+  std::vector<Point3> corners;
+  for (const auto& f : mesh.faces) {
+    for (const std::uint32_t v : f) corners.push_back(mesh.vertices[v]);
+  }
+  return corners;
+}
+
+class MeshFormats : public ::testing::Test {
+ protected:
+  std::string put(const std::string& name, const std::string& content) const {
+    const std::string path = (folder_.path() / name).string();
+    std::ofstream(path, std::ios::binary) << content;
+    return path;
+  }
+  TempFolder folder_;
+};
+
+TEST_F(MeshFormats, VerticesAreThePointsOfTheFile) {
+  std::mt19937_64 random(31);
+  for (int round = 0; round < 40; ++round) {
+    SCOPED_TRACE("seed 31, round " + std::to_string(round));
+    const SmallMesh mesh = random_mesh(random);
+    const std::vector<Point3> corners = corners_of(mesh);
+    struct Case {
+      std::string name, content, format;
+      const std::vector<Point3>* points;
+      ScalarType type = ScalarType::f64;
+    };
+    const std::vector<Case> cases{{"a.obj", obj_of(mesh), "obj", &mesh.vertices},
+                                  {"a.off", off_of(mesh, false), "off", &mesh.vertices},
+                                  {"c.off", off_of(mesh, true), "off", &mesh.vertices},
+                                  {"named_otherwise", obj_of(mesh), "obj", &mesh.vertices},
+                                  {"named.xyz", off_of(mesh, true), "off", &mesh.vertices},
+                                  {"a.stl", stl_text_of(mesh), "stl", &corners},
+                                  {"named.ply", stl_text_of(mesh), "stl", &corners},
+                                  {"b.stl", stl_binary_of(mesh), "stl", &corners, ScalarType::f32}};
+    for (const Case& c : cases) {
+      SCOPED_TRACE(c.name);
+      for (const bool packed : {false, true}) {
+        std::string content = c.content;
+        if (packed) {
+          const auto bytes = gzip(std::as_bytes(std::span(c.content)));
+          content.assign(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+        }
+        const std::string file = put(c.name + (packed ? ".gz" : ""), content);
+        const AllPoints points = read_all({file}, {.block_points = 1 + random() % 50});
+        EXPECT_EQ(points.info.format, c.format);
+        EXPECT_EQ(points.info.coordinates[0].type, c.type);
+        EXPECT_EQ(points.points.positions, *c.points);
+        const bool counted = c.format == "off";
+        EXPECT_EQ(points.info.points == c.points->size(), counted || points.info.points);
+      }
+    }
+  }
+}
+
+TEST_F(MeshFormats, FacesAreTheSameInAll) {
+  std::mt19937_64 random(32);
+  for (int round = 0; round < 40; ++round) {
+    SCOPED_TRACE("seed 32, round " + std::to_string(round));
+    SmallMesh mesh = random_mesh(random);
+    if (mesh.faces.empty()) mesh.faces.push_back({2, 1, 0});
+    const std::vector<Point3> corners = corners_of(mesh);
+    for (const auto& [name, content] :
+         std::vector<std::pair<std::string, std::string>>{{"a.obj", obj_of(mesh)},
+                                                          {"a.off", off_of(mesh, round % 2 == 0)},
+                                                          {"a.stl", stl_text_of(mesh)},
+                                                          {"b.stl", stl_binary_of(mesh)}}) {
+      SCOPED_TRACE(name);
+      const auto file = read_mesh(put(name, content));
+      ASSERT_TRUE(file);
+      ASSERT_EQ(file->triangles.size(), mesh.faces.size());
+      std::vector<Point3> found;
+      for (const TriangleIndices& t : file->triangles) {
+        for (const std::uint32_t v : t) found.push_back(file->vertices.positions.at(v));
+      }
+      EXPECT_EQ(found, corners);
+      // Corners at one place are one vertex.
+      const std::set<Point3> places(corners.begin(), corners.end());
+      const bool soup = name.ends_with("stl");
+      EXPECT_EQ(file->vertices.size(), soup ? places.size() : mesh.vertices.size());
+    }
+  }
+}
+
+TEST_F(MeshFormats, DamageIsNamed) {
+  std::mt19937_64 random(33);
+  SmallMesh mesh = random_mesh(random);
+  mesh.faces.push_back({0, 1, 2});
+  const std::string binary = stl_binary_of(mesh);
+  std::string large = binary;
+  large.replace(80, 4, "\xff\xff\xff\xff", 4);
+  const auto message = [](const auto& work) -> std::string {
+    try {
+      work();
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  for (const auto& [name, content, words] : std::vector<std::array<std::string, 3>>{
+           {"a.off", "OFF\n3 0 0\n0 0 0\n1 1 1\n", "ends after 2 of 3 vertices"},
+           {"b.off", "OFF\n9999999999999 0 0\n0 0 0\n", "ends after 1 of 9999999999999"},
+           {"c.off", "OFF\n", "counts"},
+           {"d.off", "OFF BINARY\nxyz", "binary form"},
+           {"e.off", "OFF\n1 0 0\n1 2\n", "three coordinates"},
+           {"f.off", "OFF\n1 0 0\n1 2 inf\n", "three coordinates"},
+           {"g.off", "OFF\n-1 0 0\n", "how many vertices"},
+           {"h.obj", "v 1 2\n", "line 1"},
+           {"i.stl", binary.substr(0, binary.size() - 1), "promises"},
+           {"j.stl", large, "promises 4294967295 triangles"},
+           {"k.stl", "short", "too short"},
+           {"l.stl",
+            "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nendloop\n",
+            "fewer than three"},
+           {"m.stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n", "ends within"},
+           {"n.stl", "solid a\nvertex 0 0 0\n", "outside of a loop"}}) {
+    SCOPED_TRACE(name);
+    const std::string file = put(name, content);
+    const std::string found = message([&] { read_all({file}); });
+    EXPECT_NE(found.find(words), std::string::npos) << found;
+    EXPECT_NE(found.find(name), std::string::npos) << found;
+  }
+  for (const auto& [name, content] : std::vector<std::pair<std::string, std::string>>{
+           {"p.off", "OFF\n1 1 0\n0 0 0\n3 0 0 1\n"},
+           {"q.off", "OFF\n1 1 0\n0 0 0\n99999999999 0\n"},
+           {"r.off", "OFF\n1 2 0\n0 0 0\n1 0\n"},
+           {"s.obj", "v 0 0 0\nf 1 1 2\n"}}) {
+    EXPECT_NE(message([&] { (void)read_mesh(put(name, content)); }), "") << name;
+  }
+}
+
+// Facts of real files, where they are.
+TEST(MeshFormatsReal, HaveTheFactsOfTheirReadme) {
+  const char* data = std::getenv("TERRACE_DATA");
+  if (data == nullptr) GTEST_SKIP() << "TERRACE_DATA is not set";
+  const std::string scan = std::string(data) + "/scan/";
+  EXPECT_EQ(read_all({scan + "cow.obj"}).points.size(), 2903U);
+  EXPECT_EQ(read_all({scan + "cow.off"}).points.size(), 2762U);
+  const auto cow = read_mesh(scan + "cow.off");
+  ASSERT_TRUE(cow);
+  EXPECT_EQ(cow->triangles.size(), 5520U);
+  // Packed, as the archive of scans has it.
+  EXPECT_GT(read_all({scan + "dragon_vrip_res3.ply.gz"}).points.size(), 10'000U);
+}
+
+}  // namespace
+}  // namespace terrace::stream

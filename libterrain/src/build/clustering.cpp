@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "build/clustering.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+
+#include <terrace/stream/error.hpp>
+
+namespace terrace::terrain {
+namespace {
+
+// Regions are boxes in the CRS; the ground's frame may differ from block to block.
+void set_metric(const BuildRequest& request, const stream::Placement& info, const Ground& ground,
+                cluster::HierarchyOptions& options) {
+  const MetricChoice& choice = request.metric;
+  if (!choice.has_boxes()) {
+    options.metric = choice.on_ground({0, 0, 0}, cluster::kIdentityMap);
+    return;
+  }
+  // From the CRS by way of stored coordinates, which are columns and rows for a raster.
+  const std::array<double, 6>& xy = info.world.xy;
+  const stream::Channel& height = info.coordinates[2];
+  options.metric_of = [&choice, &ground, xy, height](const cluster::Bounds& bounds) {
+    const GroundMap map = ground.map({bounds.min, bounds.max});
+    const double area = xy[0] * xy[4] - xy[1] * xy[3];
+    const auto across = [&](double a, double b) { return (a * xy[4] - b * xy[3]) / area; };
+    const auto along = [&](double a, double b) { return (b * xy[0] - a * xy[1]) / area; };
+    return choice.on_ground({xy[2], xy[5], height.offset},
+                            {across(map[0], map[1]), along(map[0], map[1]), 0,  //
+                             across(map[3], map[4]), along(map[3], map[4]), 0,  //
+                             0, 0, map[8] / height.scale});
+  };
+}
+
+// An attribute as an axis of distances.
+struct AttributeAxis {
+  stream::Channel channel;
+  std::size_t offset = 0;  // in a record
+};
+
+AttributeAxis axis_of(const std::string& name, const BuildRequest& request,
+                      const stream::Schema& schema) {
+  std::string known;
+  for (std::size_t i = 0; i < schema.attributes.size(); ++i) {
+    const stream::Channel& attribute = schema.attributes[i];
+    if (attribute.name == name) return {attribute, schema.attribute_offset(i)};
+    known += (known.empty() ? "" : ", ") + attribute.name;
+  }
+  throw stream::Error({.file = request.inputs.front(),
+                       .where = {},
+                       .cause = "its points have no attribute \"" + name + "\"",
+                       .remedy = known.empty() ? "they have no attributes: leave out `channel`"
+                                               : "`channel` takes one of these: " + known});
+}
+
+void set_channels(const BuildRequest& request, const stream::Schema& schema,
+                  cluster::HierarchyOptions& options) {
+  std::vector<AttributeAxis> axes;
+  for (const auto& [name, weight] : request.channels) {
+    axes.push_back(axis_of(name, request, schema));
+    options.channels.weights.push_back(weight);
+  }
+  if (axes.empty()) return;
+  options.channels.read = [axes, file = request.inputs.front()](std::span<const std::byte> record,
+                                                                std::span<double> values) {
+    for (std::size_t i = 0; i < axes.size(); ++i) {
+      const stream::Channel& channel = axes[i].channel;
+      values[i] = stream::to_double(channel.type, record.data() + axes[i].offset) * channel.scale +
+                  channel.offset;
+      if (std::isfinite(values[i])) continue;
+      throw stream::Error({.file = file,
+                           .where = {},
+                           .cause = "\"" + channel.name + "\" of a point is no finite number",
+                           .remedy = "leave such points out by a condition of `where`, or the "
+                                     "attribute out of `channel`"});
+    }
+  };
+}
+
+}  // namespace
+
+void add_outlier_mark(const BuildRequest& request, std::vector<stream::Channel>& attributes) {
+  if (std::isinf(request.outlier_price)) return;
+  const auto same = [](const stream::Channel& channel) { return channel.name == kOutlierName; };
+  if (std::any_of(attributes.begin(), attributes.end(), same)) {
+    throw stream::Error({.file = request.inputs.front(),
+                         .where = {},
+                         .cause = std::string("its points have an attribute \"") + kOutlierName +
+                                  "\" already, the name that `outlier_price` marks outliers by",
+                         .remedy = std::string("leave it out: `drop` ") + kOutlierName});
+  }
+  attributes.push_back({kOutlierName, stream::ScalarType::u8});
+}
+
+void append_zero_byte(std::span<const std::byte> records, std::size_t record_bytes,
+                      std::size_t count, std::vector<std::byte>& result) {
+  result.resize(count * (record_bytes + 1));
+  for (std::size_t i = 0; i < count; ++i) {
+    std::byte* to = result.data() + i * (record_bytes + 1);
+    if (record_bytes > 0) std::memcpy(to, records.data() + i * record_bytes, record_bytes);
+    to[record_bytes] = std::byte{0};
+  }
+}
+
+cluster::HierarchyOptions clustering_of(const BuildRequest& request, const stream::Schema& schema,
+                                        const Ground& ground) {
+  cluster::HierarchyOptions options;
+  options.block_size = request.block_points;
+  options.block.facility_cost = request.facility_cost;
+  options.block.effort = request.effort;
+  options.block.seed = request.seed;
+  options.strategy = request.strategy;
+  options.payload_size = schema.payload_size();
+  options.ground = [&ground](const cluster::Bounds& bounds) {
+    return ground.map({bounds.min, bounds.max});
+  };
+  set_metric(request, schema, ground, options);
+  set_channels(request, schema, options);
+  options.outlier_price = request.outlier_price;
+  options.mark_outlier = [](std::span<std::byte> record) { record.back() = std::byte{1}; };
+  return options;
+}
+
+}  // namespace terrace::terrain
