@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Reading and writing files of points, warm: survey coordinates (millimetres in a UTM zone), the
 // same with three more columns, and with those of LAS's point format 6. Items are points.
+#include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>
 #include <random>
 #include <string>
+#include <vector>
 
 #include <benchmark/benchmark.h>
 #include <unistd.h>
@@ -119,7 +122,30 @@ void write(benchmark::State& state, const std::string& format, Columns columns) 
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(point_count()));
 }
 
+/// COPC of a hilly survey, syncs included: its work begins after the last point.
+void write_octree(benchmark::State& state) {
+  const std::string path = scratch_file();
+  Survey survey(Columns::laser);
+  std::vector<PointBlock> blocks;
+  for (std::size_t done = 0; done < point_count(); done += blocks.back().size()) {
+    blocks.push_back(survey.make(10'000));
+    for (Point3& p : blocks.back().positions) {
+      p[2] = 300 + 0.001 * std::round(1000 * (90 * std::sin(p[0] / 300) + 0.02 * p[2]));
+    }
+  }
+  for (auto _ : state) {
+    const auto writer =
+        open_point_writer(path, survey.header(), {.format = "copc", .replace = true});
+    for (const PointBlock& block : blocks) writer->append(block);
+    writer->finish();
+  }
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(point_count()));
+  std::filesystem::remove(path);
+}
+
 void register_all() {
+  benchmark::RegisterBenchmark("write/copc/las_format_6", write_octree)
+      ->Unit(benchmark::kMillisecond);
   for (const Columns columns : {Columns::none, Columns::three, Columns::laser}) {
     for (const std::string format : {"xyz", "csv", "ply", "ply-ascii", "las", "laz"}) {
       const std::string of = format + (columns == Columns::none    ? ""

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "format/copc/octree.hpp"
+#include "format/copc/hierarchy.hpp"
 #include "fuzz_points.hpp"
 
 /// Any bytes are an octree or refused: 8 with the points that a header promises, the info VLR, and
@@ -24,9 +24,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::uint64_t file_bytes = bytes.size();
   const auto file = bytes_in_memory("input", std::move(bytes));
   try {
-    CopcOctree octree = read_copc_octree(*file, info, 0, points);
+    Octree octree = read_copc_hierarchy(*file, info, 0, points);
     std::uint64_t found = 0, coded = 0;
-    for (const CopcNode& node : octree.nodes) {
+    for (const OctreeNode& node : octree.nodes) {
       found += node.points;
       coded += node.bytes;
       require(node.offset + node.bytes <= file_bytes, "nodes that lie in the file");

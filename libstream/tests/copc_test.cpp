@@ -1,28 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <limits>
-#include <random>
-#include <set>
+#include <optional>
 #include <span>
 #include <string>
-#include <utility>
+#include <string_view>
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include "format/copc/octree.hpp"
+#include "format/copc/hierarchy.hpp"
 #include "las_files.hpp"
+#include "octree_testing.hpp"
 #include "point_files.hpp"
 
 namespace terrace::stream {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// Where pages begin in the files made here, and the first chunk.
 constexpr std::uint64_t kFirstChunk = 100, kFirstPage = 1000;
 
@@ -55,15 +52,15 @@ std::string info_of(std::uint64_t page_bytes, double half_size = 8, double spaci
 }
 
 /// The octree of a file that has these pages, one behind the other.
-CopcOctree octree_of(const std::vector<std::vector<HierarchyEntry>>& pages, std::uint64_t points,
-                     const std::string& info = {}) {
+Octree octree_of(const std::vector<std::vector<HierarchyEntry>>& pages, std::uint64_t points,
+                 const std::string& info = {}) {
   std::string file(kFirstPage, '\0');
   for (const std::vector<HierarchyEntry>& page : pages) file += page_of(page);
   std::vector<std::byte> bytes(file.size());
   std::memcpy(bytes.data(), file.data(), file.size());
   const auto source = bytes_in_memory("made", std::move(bytes));
-  return read_copc_octree(*source, info.empty() ? info_of(pages.front().size() * 32) : info,
-                          kFirstChunk, points);
+  return read_copc_hierarchy(*source, info.empty() ? info_of(pages.front().size() * 32) : info,
+                             kFirstChunk, points);
 }
 
 std::string refusal_of(const std::vector<std::vector<HierarchyEntry>>& pages, std::uint64_t points,
@@ -73,14 +70,14 @@ std::string refusal_of(const std::vector<std::vector<HierarchyEntry>>& pages, st
 
 TEST(CopcOctree, NodesComeDepthFirstInMortonOrder) {
   // The second page begins behind the four entries of the first.
-  const CopcOctree octree = octree_of({{{1, 1, 0, 0, 120, 10, 3},
-                                        {0, 0, 0, 0, 110, 10, 2},
-                                        {1, 0, 0, 1, 0, 0, 0},
-                                        {1, 0, 1, 0, kFirstPage + 128, 64, -1}},
-                                       {{1, 0, 1, 0, 130, 10, 4}, {2, 3, 1, 0, 140, 10, 5}}},
-                                      14);
+  const Octree octree = octree_of({{{1, 1, 0, 0, 120, 10, 3},
+                                    {0, 0, 0, 0, 110, 10, 2},
+                                    {1, 0, 0, 1, 0, 0, 0},
+                                    {1, 0, 1, 0, kFirstPage + 128, 64, -1}},
+                                   {{1, 0, 1, 0, 130, 10, 4}, {2, 3, 1, 0, 140, 10, 5}}},
+                                  14);
   std::vector<std::uint64_t> points;
-  for (const CopcNode& node : octree.nodes) points.push_back(node.points);
+  for (const OctreeNode& node : octree.nodes) points.push_back(node.points);
   EXPECT_EQ(points, (std::vector<std::uint64_t>{2, 3, 5, 4}));
   const Box3 box = octree.box(octree.nodes[2]);
   EXPECT_EQ(box.min, (Point3{4, -4, -8}));
@@ -89,14 +86,14 @@ TEST(CopcOctree, NodesComeDepthFirstInMortonOrder) {
 
 TEST(CopcOctree, KeepsWhatMeetsTheRegionDownToTheResolution) {
   const auto kept = [](const std::optional<Box3>& region, double resolution) {
-    CopcOctree octree = octree_of({{{0, 0, 0, 0, 110, 10, 1},
-                                    {1, 0, 0, 0, 120, 10, 2},
-                                    {1, 1, 1, 1, 130, 10, 4},
-                                    {2, 3, 3, 3, 140, 10, 8}}},
-                                  15);
+    Octree octree = octree_of({{{0, 0, 0, 0, 110, 10, 1},
+                                {1, 0, 0, 0, 120, 10, 2},
+                                {1, 1, 1, 1, 130, 10, 4},
+                                {2, 3, 3, 3, 140, 10, 8}}},
+                              15);
     octree.keep(region, resolution, {0.01, 0.01, 0.01});
     std::uint64_t points = 0;
-    for (const CopcNode& node : octree.nodes) points += node.points;
+    for (const OctreeNode& node : octree.nodes) points += node.points;
     return points;
   };
   EXPECT_EQ(kept({}, 0), 15u);
@@ -145,23 +142,6 @@ TEST(CopcOctree, RefusesWhatCannotBe) {
   EXPECT_PRED2(has, refusal_of({{root}}, 1, info_of(32).substr(1)), "cut off");
 }
 
-using Record = std::pair<Point3, std::string>;
-
-std::multiset<Record> records(const AllPoints& all, const Box3& region) {
-  std::multiset<Record> found;
-  const std::size_t bytes = all.info.payload_size();
-  for (std::size_t i = 0; i < all.points.size(); ++i) {
-    const Point3 at = world_point(all.info, all.points.positions[i]);
-    if (!region.contains(at)) continue;
-    found.emplace(
-        at,
-        std::string(reinterpret_cast<const char*>(all.points.payload.data()) + i * bytes, bytes));
-  }
-  return found;
-}
-
-constexpr Box3 kEverywhere{{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}};
-
 class CopcFiles : public ::testing::TestWithParam<const char*> {};
 
 /// The oracle is the same file with another name in place of the VLR's: a LAZ file like others.
@@ -184,30 +164,7 @@ TEST_P(CopcFiles, PointsOfARegionAreThoseOfTheWholeFile) {
   EXPECT_EQ(by_nodes.info.points, all.points.size());
   EXPECT_TRUE(records(by_nodes, kEverywhere) == records(all, kEverywhere));
 
-  Box3 bounds;
-  for (const Point3& p : all.points.positions) bounds.include(world_point(all.info, p));
-  std::mt19937_64 random(11);
-  std::uniform_real_distribution<double> part(-0.1, 1.1);
-  for (int round = 0; round < 8; ++round) {
-    Box3 region = kEverywhere;
-    for (std::size_t axis = 0; axis < (round % 2 == 0 ? 2u : 3u); ++axis) {
-      const double side = bounds.max[axis] - bounds.min[axis];
-      const double a = bounds.min[axis] + part(random) * side;
-      const double b = bounds.min[axis] + part(random) * side;
-      region.min[axis] = std::min(a, b);
-      region.max[axis] = std::max(a, b);
-    }
-    const std::multiset<Record> expected = records(all, region);
-    for (const std::string& name : {file.string(), plain}) {
-      for (const unsigned threads : {1u, 3u}) {
-        SourceOptions options{.threads = threads};
-        options.selection.region = region;
-        const auto source = open_source(std::span(&name, 1), options);
-        EXPECT_TRUE(records(read_all(*source), kEverywhere) == expected);
-        EXPECT_EQ(source->progress().excluded, all.points.size() - expected.size());
-      }
-    }
-  }
+  expect_parts_of_regions({file.string(), plain}, all);
   // As it has no octree.
   SourceOptions coarse;
   coarse.selection.resolution = 1;
@@ -218,25 +175,7 @@ TEST_P(CopcFiles, PointsOfARegionAreThoseOfTheWholeFile) {
 TEST_P(CopcFiles, CoarserResolutionsAreParts) {
   const char* const data = std::getenv("TERRACE_DATA");
   if (data == nullptr) GTEST_SKIP() << "no TERRACE_DATA";
-  const std::filesystem::path file = std::filesystem::path(data) / "lidar" / GetParam();
-  const AllPoints all = read_file(file);
-  std::multiset<Record> finer = records(all, kEverywhere);
-  double spacing = all.info.octree->spacing;
-  std::vector<double> spacings;
-  for (unsigned depth = 0; depth < all.info.octree->depths; ++depth, spacing /= 2) {
-    spacings.push_back(spacing);
-  }
-  for (auto step = spacings.rbegin(); step != spacings.rend(); ++step) {
-    SourceOptions options;
-    options.selection.resolution = *step;
-    const AllPoints coarse = read_file(file, options);
-    const std::multiset<Record> found = records(coarse, kEverywhere);
-    EXPECT_EQ(coarse.info.octree->depths, spacings.rend() - step);
-    EXPECT_TRUE(std::includes(finer.begin(), finer.end(), found.begin(), found.end()));
-    EXPECT_TRUE(step == spacings.rbegin() ? found.size() == finer.size()
-                                          : found.size() < finer.size());
-    finer = found;
-  }
+  expect_coarser_parts((std::filesystem::path(data) / "lidar" / GetParam()).string());
 }
 
 /// What copies a COPC file's VLRs beside other points leaves a hierarchy that tells nothing.

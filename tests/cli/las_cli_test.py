@@ -9,6 +9,7 @@ import csv
 import json
 import os
 import random
+import shutil
 import struct
 import subprocess
 import tempfile
@@ -184,6 +185,44 @@ class LasFormatTest(LasCase):
             with open(os.path.join(self.path('a.st'), name), 'rb') as a, \
                     open(os.path.join(self.path('b.st'), name), 'rb') as b:
                 self.assertEqual(a.read(), b.read(), name)
+
+
+class LasOctreeTest(LasCase):
+    """COPC as output, made here."""
+
+    def test_records_come_back_in_any_order(self):
+        for point_format in (6, 7, 8):
+            records = random_records(point_format, 50000)
+            path = self.put('in.las', las(point_format, records, scale=(0.01, 0.01, 0.001), vlrs=[wkt(UTM_WKT)]))
+            with self.subTest(point_format=point_format):
+                self.run_ok('convert', path, '-o', self.path('out.copc.laz'), '--force')
+                info = self.info(self.path('out.copc.laz'))
+                self.assertEqual((info['format'], info['points'], info['crs']['epsg']), ('copc', 50000, 32633))
+                self.assertGreater(info['octree']['nodes'], 4)
+                self.run_ok('convert', self.path('out.copc.laz'), '-o', self.path('back.las'), '--force')
+                back = Las(self.path('back.las'))
+                self.assertEqual((back.point_format, back.scale), (point_format, (0.01, 0.01, 0.001)))
+                self.assertEqual(sorted(back.records), sorted(records))
+                coarse = json.loads(self.run_ok('convert', self.path('out.copc.laz'), '-o', self.path('coarse.las'),
+                                                '--force', '--json', '--resolution', info['octree']['spacing']))
+                self.assertLess(coarse['points'], 50000)
+
+    def test_points_of_a_store(self):
+        """By its ending or its name; the same bytes each time, for any number of threads and memory."""
+        self.run_ok('synth', 'surface', '--points', 50000, '-o', self.path('s.ply'))
+        self.run_ok('build', self.path('s.ply'), '-o', self.path('s.st'))
+        self.run_ok('points', self.path('s.st'), '-o', self.path('a.copc.laz'), '--threads', 1)
+        self.run_ok('points', self.path('s.st'), '-o', self.path('b.laz'), '--format', 'copc', '--threads', 3)
+        with open(self.path('a.copc.laz'), 'rb') as a, open(self.path('b.laz'), 'rb') as b:
+            self.assertEqual(a.read(), b.read())
+        self.assertEqual(self.info(self.path('b.laz'))['format'], 'copc')
+        self.assertEqual(self.info(self.path('b.laz'))['points'], 50000)
+        # What another program wrote is not replaced, and nothing goes to a pipe.
+        with open(self.path('b.laz'), 'r+b') as file:
+            file.seek(58)
+            file.write(b'other')
+        self.refused('points', self.path('s.st'), '-o', self.path('b.laz'), '--format', 'copc', '--force')
+        self.assertIn('pipe', self.refused('points', self.path('s.st'), '-o', '-', '--format', 'copc'))
 
 
 class LasSurveyTest(LasCase):
@@ -493,6 +532,38 @@ class LasDataTest(LasCase):
         self.assertEqual(summary['points'] + summary['excluded'], 518862)
         self.assertLess(summary['points'], len(wanted))
 
+    def test_entwine_folders(self):
+        """A folder of EPT is one input; its nodes are counted by Python."""
+        folder = os.path.join(DATA, 'lidar', 'ept-lone-star')
+        nodes = {}
+        for name in os.listdir(os.path.join(folder, 'ept-hierarchy')):
+            with open(os.path.join(folder, 'ept-hierarchy', name), encoding='utf-8') as file:
+                nodes.update((node, points) for node, points in json.load(file).items() if points >= 0)
+        spacing = 44 / 128
+        for name in (folder, os.path.join(folder, 'ept.json')):
+            info = self.info(name)
+            self.assertEqual((info['format'], info['points'], info['crs']['epsg']), ('ept', sum(nodes.values()), 26912))
+            self.assertEqual(info['octree'], {'spacing': spacing, 'depths': 4, 'nodes': len(nodes)})
+        for deepest in range(4):
+            wanted = sum(points for node, points in nodes.items() if int(node[0]) <= deepest)
+            summary = json.loads(self.run_ok('convert', folder, '-o', self.path('r.las'), '--force', '--json',
+                                             '--resolution', spacing / 2 ** deepest, '--threads', 1 + deepest % 2))
+            self.assertEqual((summary['points'], summary['excluded']), (wanted, 518862 - wanted))
+        box = '515375,4918350,515385.5,4918360.25'
+        copc = os.path.join(DATA, 'lidar', 'lone-star.copc.laz')
+        parts = [json.loads(self.run_ok('build', name, '-o', self.path(f'part{i}.st'), '--json', '--region', box,
+                                        '--crs', 'EPSG:26912'))
+                 for i, name in enumerate((folder, copc))]
+        self.assertGreater(parts[0]['points'], 1000)
+        self.assertEqual(parts[0]['points'], parts[1]['points'])
+        # A damaged one ends at once.
+        shutil.copytree(folder, self.path('damaged'))
+        os.truncate(os.path.join(self.path('damaged'), 'ept-data', '2-2-2-1.laz'), 1000)
+        self.assertIn('2-2-2-1.laz', self.refused('build', self.path('damaged'), '-o', self.path('d.st')))
+        with open(os.path.join(self.path('damaged'), 'ept.json'), 'w', encoding='ascii') as file:
+            file.write('{' * 100000)
+        self.assertIn('ept.json', self.refused('info', self.path('damaged')))
+
     def test_cloud_optimised_files_among_others(self):
         """From a pipe and beside LAZ, where all share what is left out."""
         copc = os.path.join(DATA, 'lidar', '1.2-with-color.copc.laz')
@@ -518,6 +589,17 @@ class LasDataTest(LasCase):
         away = json.loads(self.run_ok('convert', self.path('plain.laz'), '-o', self.path('none.csv'), '--json',
                                       '--region', '0,0,1,1'))
         self.assertEqual((away['points'], away['excluded']), (0, 1065))
+
+    def test_copies_with_an_octree(self):
+        """The records are those of the scan, in whatever order, and each depth has more of them."""
+        copc = os.path.join(DATA, 'lidar', 'lone-star.copc.laz')
+        self.run_ok('convert', copc, '-o', self.path('all.las'))
+        self.run_ok('convert', self.path('all.las'), '-o', self.path('made.copc.laz'))
+        info = self.info(self.path('made.copc.laz'))
+        self.assertEqual((info['format'], info['points']), ('copc', 518862))
+        self.run_ok('convert', self.path('made.copc.laz'), '-o', self.path('back.las'))
+        self.assertEqual(sorted(Las(self.path('back.las')).records), sorted(Las(self.path('all.las')).records))
+        self.assertLess(os.path.getsize(self.path('made.copc.laz')), 1.2 * os.path.getsize(copc))
 
     def test_damaged_files_end_at_once(self):
         folder = os.path.join(DATA, 'lidar', 'hostile')

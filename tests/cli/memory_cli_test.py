@@ -5,6 +5,7 @@
 TERRACE=path/to/terrace memory_cli_test.py
 """
 
+import filecmp
 import json
 import os
 import re
@@ -239,6 +240,15 @@ class StoreMemoryTest(MemoryCase):
         text = self.path('converted.xyz')
         needs = self.needed(24, text, 'convert', self.dem)
         self.within(needs, 'convert', self.dem, '-o', text)
+
+    def test_an_octree(self):
+        """A million points: 30 MB as records, and as much again to put them in order."""
+        points = self.path('many.las')
+        code, _, err, _ = run('synth', 'surface', '--points', 1000000, '-o', points)
+        self.assertEqual(code, 0, err)
+        self.within(72, 'convert', points, '-o', self.path('tight.copc.laz'), '--threads', 2)
+        self.within(256, 'convert', points, '-o', self.path('wide.copc.laz'), '--threads', 2)
+        self.assertTrue(filecmp.cmp(self.path('tight.copc.laz'), self.path('wide.copc.laz'), shallow=False))
 
     def test_raster(self):
         self.within(64, 'raster', self.store, '-o', self.path('all.tif'), '--threads', 2)

@@ -13,6 +13,8 @@ namespace terrace::stream {
 const Format& geotiff_format();
 /// ASPRS LAS 1.0 to 1.4.
 const Format& las_format();
+/// Entwine Point Tile: a folder with an octree of files.
+const Format& ept_format();
 /// The Stanford polygon format: ASCII, binary little-endian and big-endian.
 const Format& ply_format();
 /// The vertices of Wavefront's OBJ, of Geomview's OFF, and the corners of STL: see mesh/points.cpp.

@@ -10,6 +10,7 @@
 
 #include <glob.h>
 
+#include "format/ept/metadata.hpp"
 #include "format/formats.hpp"
 #include "io/line_reader.hpp"
 #include "io/text.hpp"
@@ -41,8 +42,14 @@ void add_folder(const std::string& folder, const std::string& format,
   std::error_code error;
   fs::recursive_directory_iterator at(folder, error);
   for (; !error && at != fs::recursive_directory_iterator(); at.increment(error)) {
-    const Format* const told = format_of_name(at->path().string());
     std::error_code ignored;
+    // One input, whose own files are no others.
+    if (at->is_directory(ignored) && fs::exists(at->path() / kEptName, ignored)) {
+      at.disable_recursion_pending();
+      if (format.empty() || format == "ept") files.push_back((at->path() / kEptName).string());
+      continue;
+    }
+    const Format* const told = format_of_name(at->path().string());
     const bool hidden = at->path().filename().string().front() == '.';
     if (hidden || told == nullptr || (!format.empty() && told->name != format) ||
         !at->is_regular_file(ignored)) {
@@ -78,7 +85,9 @@ class Names {
     if (name == kStandardStream) {
       files_.push_back(name);
     } else if (exists(name)) {
-      if (fs::is_directory(name, ignored)) {
+      if (fs::is_directory(name, ignored) && fs::exists(fs::path(name) / kEptName, ignored)) {
+        files_.push_back((fs::path(name) / kEptName).string());
+      } else if (fs::is_directory(name, ignored)) {
         add_folder(name, format_, files_);
       } else {
         files_.push_back(name);

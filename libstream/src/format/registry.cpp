@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "format/ept/metadata.hpp"
 #include "format/foreign_format.hpp"
 #include "format/formats.hpp"
 #include "format/input_files.hpp"
@@ -51,8 +52,13 @@ const Format* packed_format_of(const std::string& file) {
   return format_of_ending(ending_of(std::filesystem::path(file).stem()) + ending);
 }
 
+bool is_ept_name(const std::string& file) {
+  return std::filesystem::path(file).filename() == kEptName;
+}
+
 /// By the ending, that of ".csv.gz" being ".csv".
 const Format* format_of_file_name(const std::string& file) {
+  if (is_ept_name(file)) return &ept_format();
   if (const Format* const packed = packed_format_of(file)) return packed;
   const std::string ending = ending_of(file);
   return format_of_ending(ending == ".gz" ? ending_of(std::filesystem::path(file).stem()) : ending);
@@ -84,6 +90,7 @@ const Format& format_of(const std::string& file, const SourceOptions& options) {
   for (const Format& format : telling) {
     if (format.recognise(bytes)) return format;
   }
+  if (is_ept_name(file)) return ept_format();
   if (const Format* const packed = packed_format_of(file)) return *packed;
   if (const auto* foreign = foreign_format_of_content({head.data(), head.size()})) {
     refuse(file, *foreign);
@@ -150,11 +157,12 @@ std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
                  .cause = "is " + format.name + ", whose points are no cells",
                  .remedy = "leave `cell` out"});
   }
-  if (options.selection.resolution > 0 && format.name != las_format().name) {
+  if (options.selection.resolution > 0 && format.name != las_format().name &&
+      format.name != ept_format().name) {
     throw Error({.file = files.front(),
                  .where = {},
                  .cause = "is " + format.name + ", which has no octree to read to a resolution",
-                 .remedy = "name a COPC file, or leave `resolution` out"});
+                 .remedy = "name a COPC file or EPT, or leave `resolution` out"});
   }
   return selection_of(spooled ? open_spooled(format, files, options) : format.open(files, options),
                       options);
@@ -164,10 +172,10 @@ std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
 
 std::span<const Format> formats() {
   // The most telling content first: text is whatever looks like a table of numbers.
-  static const std::array<Format, 12> all{geotiff_format(), las_format(),         ply_format(),
-                                          hgt_format(),     ascii_grid_format(),  usgs_dem_format(),
-                                          png_format(),     binary_grid_format(), obj_format(),
-                                          off_format(),     stl_format(),         xyz_format()};
+  static const std::array<Format, 13> all{
+      geotiff_format(),    las_format(),      ept_format(), ply_format(),         hgt_format(),
+      ascii_grid_format(), usgs_dem_format(), png_format(), binary_grid_format(), obj_format(),
+      off_format(),        stl_format(),      xyz_format()};
   return all;
 }
 

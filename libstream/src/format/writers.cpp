@@ -6,20 +6,24 @@
 #include <cmath>
 #include <filesystem>
 
+#include "io/text.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/input.hpp"
 
 namespace terrace::stream {
 namespace {
 
-constexpr std::array<WriterFormat, 6> kPointFormats{{{"xyz", ".xyz", ".txt", true},
+// Endings that end as others do come before them.
+constexpr std::array<WriterFormat, 7> kPointFormats{{{"xyz", ".xyz", ".txt", true},
                                                      {"csv", ".csv", "", true},
                                                      {"ply", ".ply", "", false},
                                                      {"ply-ascii", "", "", false},
                                                      {"las", ".las", "", false},
+                                                     {"copc", ".copc.laz", "", false},
                                                      {"laz", ".laz", "", false}}};
 constexpr std::array kPointOpeners{&open_xyz_writer,       &open_csv_writer, &open_ply_writer,
-                                   &open_ply_ascii_writer, &open_las_writer, &open_laz_writer};
+                                   &open_ply_ascii_writer, &open_las_writer, &open_copc_writer,
+                                   &open_laz_writer};
 
 constexpr std::array<WriterFormat, 4> kMeshFormats{{{"obj", ".obj", "", true},
                                                     {"ply", ".ply", "", false},
@@ -40,12 +44,9 @@ std::string known(std::span<const WriterFormat> table) {
   return out;
 }
 
-std::string lower_ending(const std::string& path) {
-  std::string ending = std::filesystem::path(path).extension().string();
-  for (char& c : ending) {
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  }
-  return ending;
+/// Whether a file's name, in lower case, has that ending and more.
+bool has_ending(const std::string& name, std::string_view ending) {
+  return !ending.empty() && name.size() > ending.size() && name.ends_with(ending);
 }
 
 }  // namespace
@@ -53,14 +54,14 @@ std::string lower_ending(const std::string& path) {
 std::size_t choose_format(std::span<const WriterFormat> table, const std::string& path,
                           const WriterOptions& options) {
   const bool to_stdout = path == kStandardStream;
-  const std::string ending = lower_ending(path);
+  const std::string name = lower_case(std::filesystem::path(path).filename().string());
   for (std::size_t i = 0; i < table.size(); ++i) {
     const WriterFormat& row = table[i];
     if (!options.format.empty()) {
       if (row.name != options.format) continue;
     } else if (to_stdout) {
       if (!row.streams) continue;
-    } else if (ending.empty() || (row.ending != ending && row.second_ending != ending)) {
+    } else if (!has_ending(name, row.ending) && !has_ending(name, row.second_ending)) {
       continue;
     }
     if (to_stdout && !row.streams) {

@@ -38,6 +38,8 @@ std::unique_ptr<PointWriter> open_ply_ascii_writer(const std::string& path,
                                                    const WriterOptions& options);
 std::unique_ptr<PointWriter> open_las_writer(const std::string& path, const PointHeader& header,
                                              const WriterOptions& options);
+std::unique_ptr<PointWriter> open_copc_writer(const std::string& path, const PointHeader& header,
+                                              const WriterOptions& options);
 std::unique_ptr<PointWriter> open_laz_writer(const std::string& path, const PointHeader& header,
                                              const WriterOptions& options);
 

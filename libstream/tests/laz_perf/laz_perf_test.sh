@@ -1,8 +1,8 @@
 #!/bin/sh
 # SPDX-License-Identifier: Apache-2.0
-# laz_perf_test.sh BUILD WRITE_FILES [FILE.laz...]: npm's laz-perf decodes what this library encodes.
-# It is installed below BUILD, unless it is there; exits with 77 where it cannot be had. With files:
-# how fast it decodes these.
+# laz_perf_test.sh BUILD WRITE_FILES [FILE.laz...]: npm's laz-perf decodes what this library encodes, and
+# npm's copc reads what it writes as COPC. They are installed below BUILD, unless they are there; exits
+# with 77 where they cannot be had. With files: how fast laz-perf decodes these.
 set -eu
 source=$(cd "${0%/*}" && pwd)
 skip() {
@@ -20,11 +20,13 @@ if ! cmp -s "$source/package-lock.json" "$packages/node_modules/.installed"; the
   cp "$source/package.json" "$source/package-lock.json" "$packages"
   npm ci --prefix "$packages" --ignore-scripts --no-audit --no-fund --prefer-offline \
     --fetch-retries=1 --fetch-retry-mintimeout=1000 --fetch-timeout=30000 > "$packages/npm.log" 2>&1 ||
-    skip "the package of npm cannot be installed here: $packages/npm.log"
+    skip "the packages of npm cannot be installed here: $packages/npm.log"
   cp "$source/package-lock.json" "$packages/node_modules/.installed"
 fi
 if [ $# -eq 0 ]; then
-  "$write_files" "$packages"
-  set -- "$packages"/*.laz
+  mkdir -p "$packages/files" "$packages/octrees"
+  "$write_files" "$packages/files" "$packages/octrees"
+  node "$source/copc.mjs" "$packages" "$packages"/octrees/*.copc.laz
+  set -- "$packages"/files/*.laz
 fi
 exec node "$source/laz_perf.mjs" "$packages" "$@"

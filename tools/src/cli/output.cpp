@@ -14,6 +14,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/units.hpp"
+#include "cli/interrupt.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/crs.hpp"
 
@@ -264,6 +265,18 @@ bool may_replace(const std::string& path, bool force) {
            "remove it yourself or name another output");
   }
   return true;
+}
+
+stream::WriterOptions point_writer_options(const std::string& path, const std::string& format,
+                                           const CommonOptions& common) {
+  // The program itself, what PROJ reads, and the blocks on their way.
+  constexpr std::uint64_t kBeside = std::uint64_t{32} << 20;
+  const std::uint64_t memory = common.memory_or(0);
+  return {.format = format,
+          .replace = may_replace(path, common.force),
+          .stop = stop_token(),
+          .memory_bytes = memory - std::min(memory, kBeside),
+          .threads = common.threads};
 }
 
 }  // namespace terrace::tools

@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "base/file_marks.hpp"
+#include "cli/cli.hpp"
 #include "cli/summary.hpp"
 #include "terrace/stream/point_writer.hpp"
 
@@ -37,5 +38,10 @@ void tell_rounding(const stream::PointWriter& writer, Summary& summary);
 /// it. Throws: stream::Error if something is there and `force` is false, or if it is no file of
 /// ours.
 bool may_replace(const std::string& path, bool force);
+
+/// For a file of points at `path`, which may be written: as may_replace(). format: as the user
+/// named it, or empty.
+stream::WriterOptions point_writer_options(const std::string& path, const std::string& format,
+                                           const CommonOptions& common);
 
 }  // namespace terrace::tools

@@ -48,7 +48,7 @@ class ClusterCommand final : public Command {
                    "single, complete: the whole tree as rows a,b,height,size (SciPy's)")
         ->type_name("FILE.csv");
     app.add_option("--format", format_,
-                   "Of the output: xyz, csv, ply, ply-ascii, las, laz (else its ending)")
+                   "Of the output: xyz, csv, ply, ply-ascii, las, laz, copc (else its ending)")
         ->type_name("NAME");
     app.add_option("--input-format", input_format_, "Of the input (else its content, its ending)")
         ->type_name("NAME");

@@ -31,7 +31,7 @@ class ConvertCommand : public Command {
         ->type_name("FILE");
     add_output(app, output_, "The file to write; - is standard output");
     app.add_option("--format", format_,
-                   "Of the output: xyz, csv, ply, ply-ascii, las, laz (else its ending)")
+                   "Of the output: xyz, csv, ply, ply-ascii, las, laz, copc (else its ending)")
         ->type_name("NAME");
     app.add_option("--input-format", input_format_, "Of the input (else its content, its ending)")
         ->type_name("NAME");
@@ -42,7 +42,7 @@ class ConvertCommand : public Command {
 
   Summary run(const CommonOptions& common) override {
     const Stopwatch watch;
-    const bool replace = may_replace(output_, common.force);
+    const stream::WriterOptions writing = point_writer_options(output_, format_, common);
     const std::array<std::string, 1> files{input_};
     const std::unique_ptr<stream::PointSource> source =
         stream::open_source(files, {.format = input_format_,
@@ -54,14 +54,13 @@ class ConvertCommand : public Command {
                                     .selection = selection_.selection()});
     reading_within_memory(*source, common.memory_or(0));
     const stream::SourceInfo& info = source->info();
-    const auto writer =
-        stream::open_point_writer(output_,
-                                  {.attributes = info.attributes,
-                                   .comments = {kWriterMark},
-                                   .crs = crs_of(info),
-                                   .lattice = lattice_of(info),
-                                   .bounds = bounds_of(info)},
-                                  {.format = format_, .replace = replace, .stop = stop_token()});
+    const auto writer = stream::open_point_writer(output_,
+                                                  {.attributes = info.attributes,
+                                                   .comments = {kWriterMark},
+                                                   .crs = crs_of(info),
+                                                   .lattice = lattice_of(info),
+                                                   .bounds = bounds_of(info)},
+                                                  writing);
     {
       ProgressMeter meter(common.progress, "points");
       stream::PointBlock block;

@@ -22,7 +22,9 @@ class InfoCommand : public Command {
   }
 
   Summary run(const CommonOptions& common) override {
-    const bool store = std::filesystem::is_directory(input_) || stream::Store::recover(input_);
+    const bool ept = std::filesystem::exists(std::filesystem::path(input_) / "ept.json");
+    const bool store =
+        !ept && (std::filesystem::is_directory(input_) || stream::Store::recover(input_));
     if (store && colours_ != stream::HeightsOfColour::none) {
       throw UsageError("'" + input_ + "' is a store: --rgb does not apply");
     }

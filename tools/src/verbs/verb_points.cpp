@@ -121,9 +121,9 @@ class PointsCommand final : public Command {
   void define(CLI::App& app) override {
     app.add_option("STORE", store_, "where the points come from")->required();
     add_output(app, output_,
-               "the file to write: .xyz, .csv, .ply, .las, .laz; - is standard output");
+               "the file to write: .xyz, .csv, .ply, .las, .laz, .copc.laz; - is standard output");
     app.add_option("--format", format_,
-                   "xyz, csv, ply, ply-ascii, las, laz; else by the file's ending");
+                   "xyz, csv, ply, ply-ascii, las, laz, copc; else by the file's ending");
     app.add_option("--level", level_, "points of this level and above: a number or top")
         ->default_str("0; with --focus top");
     app.add_option(
@@ -162,9 +162,9 @@ class PointsCommand final : public Command {
     std::optional<stream::Overlay> overlay;
     if (!overlay_.empty()) overlay.emplace(open_height_overlay(overlay_, store));
     const std::optional<Transformation> to = crs_.to(store, common);
-    const auto writer = stream::open_point_writer(
-        output_, header(store, store.schema().attributes, to),
-        {.format = format_, .replace = may_replace(output_, common.force), .stop = stop_token()});
+    const auto writer =
+        stream::open_point_writer(output_, header(store, store.schema().attributes, to),
+                                  point_writer_options(output_, format_, common));
     PointOutput output(store, places(to), overlay ? &*overlay : nullptr, *writer);
     for_each_wanted_point(
         store, detail,
@@ -223,9 +223,8 @@ class PointsCommand final : public Command {
     std::vector<stream::Channel> attributes = store.schema().attributes;
     attributes.push_back({.name = "distance", .unit = "metre"});
     const std::optional<Transformation> to = crs_.to(store, common);
-    const auto writer = stream::open_point_writer(
-        output_, header(store, std::move(attributes), to),
-        {.format = format_, .replace = may_replace(output_, common.force), .stop = stop_token()});
+    const auto writer = stream::open_point_writer(output_, header(store, std::move(attributes), to),
+                                                  point_writer_options(output_, format_, common));
     write_found(store, found, places(to), *writer);
     writer->finish();
     Summary summary;

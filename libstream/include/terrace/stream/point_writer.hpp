@@ -54,11 +54,17 @@ class PointWriter {
 struct WriterOptions {
   /// Name of a format; empty: by the file's ending. Points: "xyz" (x y z and attributes, separated
   /// by blanks), "csv" (with a header line), "ply" (binary, little-endian), "ply-ascii", "las" and
-  /// "laz" (LAS 1.4).
+  /// "laz" (LAS 1.4), and "copc" (".copc.laz"; in finish(), through a temporary file beside it).
   /// Meshes: "ply", "ply-ascii", "obj", "glb".
   std::string format{};
-  bool replace = false;    ///< an existing file is replaced instead of refused
-  std::stop_token stop{};  ///< ends a wait for the reader of standard output, with Stopped
+  bool replace = false;  ///< an existing file is replaced instead of refused
+  /// Ends a wait for the reader of standard output, and PointWriter::finish() of "copc", with
+  /// Stopped.
+  std::stop_token stop{};
+  /// What "copc" may hold, roughly: 40 MiB at least; more than 128 MiB are not needed. The bytes of
+  /// the file do not depend on it.
+  std::uint64_t memory_bytes = 128u << 20;
+  unsigned threads = 1;  ///< that encode at once, of "laz" and "copc"; the bytes are the same
 };
 
 /// A writer for `path`; "-" is standard output, for "xyz" (also if no format is named) and "csv".

@@ -15,7 +15,7 @@
 
 namespace terrace::stream {
 
-/// The octree in which a file's points lie (COPC): its nodes down to a depth are a thinned cloud.
+/// The octree in which points lie (COPC, EPT): its nodes down to a depth are a thinned cloud.
 struct OctreeInfo {
   double spacing = 0.0;     ///< distance of the root's points, in the CRS; halves with each depth
   unsigned depths = 0;      ///< depths that have points among the nodes to be read; the root's is 0
@@ -29,7 +29,7 @@ struct SourceInfo : Schema {
   std::optional<Box3> bounds;           ///< in stored coordinates, if known beforehand
   std::optional<std::uint64_t> points;  ///< number of points if known; for rasters an upper bound
   std::optional<double> nodata;         ///< of the (first) raster, raw units
-  std::optional<OctreeInfo> octree;     ///< of a single file whose points lie in one
+  std::optional<OctreeInfo> octree;     ///< of a single input whose points lie in one
   std::vector<std::string> comments;
   /// Bytes of temporary files that hold what came through pipes or gzip and is read at any place.
   std::uint64_t spooled_bytes = 0;
@@ -92,7 +92,7 @@ struct Selection {
   std::optional<std::vector<std::string>> keep{};
   std::vector<std::string> drop{};  ///< names of attributes to leave out
   /// Points outside of this box, in the source's CRS, are left out; without heights its z are
-  /// infinite. COPC, and LAS whose header lies outside, are read only as far as needed.
+  /// infinite. COPC, EPT and LAS whose header lies outside are read only as far as needed.
   std::optional<Box3> region{};
   /// Above 0: points of an octree's nodes down to the first depth whose spacing is at most this, in
   /// units of the CRS. Formats without an octree are refused.
@@ -117,7 +117,7 @@ struct SourceOptions {
   /// Above 0: blocks are read on a thread of their own, at most so many ahead, from the first
   /// next() on (see read_ahead()). The source's destructor waits for no pipe.
   std::size_t blocks_ahead = 0;
-  unsigned threads = 1;  ///< that decode at once, of formats of which parts can be (LAZ)
+  unsigned threads = 1;  ///< that decode at once, of formats of which parts can be (LAZ, EPT)
   Selection selection{};
 };
 
@@ -125,9 +125,9 @@ struct SourceOptions {
 /// where they overlap the last named valid sample wins), other formats follow one another and must
 /// agree in channels and CRS. "-" is standard input (formats that stream only). A folder stands for
 /// all files below whose names end as those of a format (SourceOptions::format, if given), in the
-/// order of their paths; "@LIST" for the names on the lines of LIST, from its folder on, blank
-/// lines and those that begin with # left out; a name with *, ? or [...] that no file has for those
-/// of that pattern. Throws: Error, Stopped.
+/// order of their paths, and if it has an ept.json for that; "@LIST" for the names on the lines of
+/// LIST, from its folder on, blank lines and those that begin with # left out; a name with *, ? or
+/// [...] that no file has for those of that pattern. Throws: Error, Stopped.
 std::unique_ptr<PointSource> open_source(std::span<const std::string> names,
                                          const SourceOptions& options = {});
 

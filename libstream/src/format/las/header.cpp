@@ -7,7 +7,7 @@
 #include <span>
 #include <utility>
 
-#include "format/copc/octree.hpp"
+#include "format/copc/hierarchy.hpp"
 #include "format/geotiff/keys.hpp"
 #include "format/geotiff/tags.hpp"
 #include "format/las/fields.hpp"

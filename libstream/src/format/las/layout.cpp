@@ -20,11 +20,11 @@ bool has(std::span<const Channel> attributes, std::string_view name) {
                      [name](const Channel& channel) { return channel.name == name; });
 }
 
-unsigned point_format_of(std::span<const Channel> attributes) {
+unsigned point_format_of(std::span<const Channel> attributes, LasFormats formats) {
   const bool colour = has(attributes, "red") && has(attributes, "green") && has(attributes, "blue");
   const bool newer = has(attributes, "scan_angle") || has(attributes, "overlap") ||
                      has(attributes, "scanner_channel") || has(attributes, "nir");
-  if (has(attributes, "scan_angle_rank") && !newer) {
+  if (formats == LasFormats::all && has(attributes, "scan_angle_rank") && !newer) {
     return (has(attributes, "gps_time") ? 1U : 0U) + (colour ? 2U : 0U);
   }
   return !colour ? 6 : has(attributes, "nir") ? 8 : 7;
@@ -56,15 +56,19 @@ void describe(const Channel& channel, std::string& descriptions) {
 
 }  // namespace
 
-LasLayout las_layout(std::span<const Channel> attributes, const std::string& file) {
-  LasLayout layout{.point_format = point_format_of(attributes)};
+LasLayout las_layout(std::span<const Channel> attributes, const std::string& file,
+                     LasFormats formats) {
+  LasLayout layout{.point_format = point_format_of(attributes, formats)};
   layout.record_bytes = las_record_bytes(layout.point_format);
   std::vector<LasField> standard = las_fields(layout.point_format);
   std::vector<std::string> names;
   for (const LasField& field : standard) names.push_back(field.channel.name);
   for (const Channel& channel : attributes) {
+    const bool is_angle = formats == LasFormats::newer && channel.name == "scan_angle_rank" &&
+                          !has(attributes, "scan_angle");
+    const std::string_view wanted = is_angle ? std::string_view("scan_angle") : channel.name;
     const auto field = std::find_if(standard.begin(), standard.end(), [&](const LasField& each) {
-      return each.channel.name == channel.name;
+      return each.channel.name == wanted;
     });
     if (field != standard.end()) {
       layout.fields.push_back(*field);
@@ -75,7 +79,7 @@ LasLayout las_layout(std::span<const Channel> attributes, const std::string& fil
     // A name may fill its place; the number that makes it distinct takes the end of it.
     std::string name = channel.name.empty() ? "extra" : channel.name.substr(0, kExtraNameBytes);
     for (int n = 2; std::find(names.begin(), names.end(), name) != names.end(); ++n) {
-      const std::string number = "_" + std::to_string(n);
+      const std::string number = std::string("_").append(std::to_string(n));
       name = channel.name.substr(0, kExtraNameBytes - number.size()) + number;
     }
     names.push_back(name);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <string>
 #include <vector>
@@ -19,10 +20,15 @@ struct LasLayout {
   std::string extra_bytes{};       ///< data of the VLR that describes the extra bytes
 };
 
+/// The point formats to choose from.
+enum class LasFormats : std::uint8_t { all, newer };
+
 /// Attributes go to the field of their name; what has none goes to extra bytes. The point format is
 /// the smallest of 6, 7 and 8, or, where angles are ranks of LAS 1.0 to 1.3, of 0 to 3: either way
-/// records that were read come out as they were. Wave packets are extra bytes too, because the
-/// waveforms do not travel. Throws: Error naming `file` for more attributes than fit.
-LasLayout las_layout(std::span<const Channel> attributes, const std::string& file);
+/// records that were read come out as they were. Where only newer ones will do, ranks become scan
+/// angles. Wave packets are extra bytes too, because the waveforms do not travel.
+/// Throws: Error naming `file` for more attributes than fit.
+LasLayout las_layout(std::span<const Channel> attributes, const std::string& file,
+                     LasFormats formats = LasFormats::all);
 
 }  // namespace terrace::stream

@@ -6,10 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "format/las/record_reader.hpp"
+#include "format/record_parts.hpp"
 #include "terrace/stream/byte_source.hpp"
 #include "terrace/stream/laz.hpp"
-#include "terrace/stream/source.hpp"
 
 /// Chunks of LAZ that are read from wherever they lie in a file.
 
@@ -27,12 +26,7 @@ struct LazLayout {
 [[noreturn]] void fail_chunk(const std::string& file, std::uint64_t chunk, std::uint64_t byte,
                              const std::string& cause);
 
-/// The layout's chunks, in its order, decoded by up to options.threads threads, a few ahead of the
-/// one that is being read and within options.memory_bytes. Null, and the arguments as they were, if
-/// there is nothing to gain from several threads or no memory for them.
-std::unique_ptr<RecordReader> chunks_ahead(std::unique_ptr<ByteSource>& file, LazLayout& layout,
-                                           const SourceOptions& options);
-/// The same by the caller's thread, of layered chunks. Holds the coded bytes of one chunk.
-std::unique_ptr<RecordReader> chunks_one_by_one(std::unique_ptr<ByteSource> file, LazLayout layout);
+/// The layout's chunks. A reader holds the coded bytes of one chunk and a decoder's models.
+RecordParts laz_parts(std::unique_ptr<ByteSource> file, LazLayout layout);
 
 }  // namespace terrace::stream

@@ -191,7 +191,9 @@ std::unique_ptr<RecordReader> open_laz_records(Input& input, const std::string& 
     if (is_seekable(file)) {
       auto bytes = open_file(file);
       layout.chunks = read_table(*bytes, layout, header.points);
-      if (auto reader = chunks_ahead(bytes, layout, options)) return reader;
+      if (options.threads > 1) {
+        if (auto reader = parts_ahead(laz_parts(std::move(bytes), layout), options)) return reader;
+      }
     }
     const bool told_by_table = layout.vlr.chunk_size == laz::Vlr::kVariable &&
                                layout.vlr.compressor != laz::Compressor::layered;
@@ -210,17 +212,18 @@ std::unique_ptr<RecordReader> open_laz_records(Input& input, const std::string& 
 }
 
 std::unique_ptr<RecordReader> open_laz_nodes(std::unique_ptr<ByteSource> file,
-                                             const LasHeader& header, const CopcOctree& octree,
+                                             const LasHeader& header, const Octree& octree,
                                              const SourceOptions& options) {
   LazLayout layout{.vlr = laz_vlr(header, file->name())};
   if (layout.vlr.compressor != laz::Compressor::layered) {
     fail_laz(file->name(), "header", "its points are not coded in layers, as those of COPC are");
   }
-  for (const CopcNode& node : octree.nodes) {
+  for (const OctreeNode& node : octree.nodes) {
     layout.chunks.push_back({.offset = node.offset, .bytes = node.bytes, .points = node.points});
   }
-  if (auto reader = chunks_ahead(file, layout, options)) return reader;
-  return chunks_one_by_one(std::move(file), std::move(layout));
+  RecordParts parts = laz_parts(std::move(file), std::move(layout));
+  if (auto reader = parts_ahead(parts, options)) return reader;
+  return parts_in_turn(std::move(parts));
 }
 
 }  // namespace terrace::stream

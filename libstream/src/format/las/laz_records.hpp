@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "format/copc/octree.hpp"
+#include "format/copc/hierarchy.hpp"
 #include "format/las/header.hpp"
 #include "format/las/record_reader.hpp"
 #include "terrace/stream/byte_source.hpp"
@@ -24,7 +24,7 @@ std::unique_ptr<RecordReader> open_laz_records(Input& input, const std::string& 
 
 /// The records of the octree's nodes, in its order. Throws: Error as open_laz_records().
 std::unique_ptr<RecordReader> open_laz_nodes(std::unique_ptr<ByteSource> file,
-                                             const LasHeader& header, const CopcOctree& octree,
+                                             const LasHeader& header, const Octree& octree,
                                              const SourceOptions& options);
 
 }  // namespace terrace::stream

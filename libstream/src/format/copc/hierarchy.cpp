@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "format/copc/octree.hpp"
+#include "format/copc/hierarchy.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -14,10 +14,6 @@
 
 namespace terrace::stream {
 namespace {
-
-constexpr std::size_t kInfoBytes = 160, kEntryBytes = 32;
-/// Places of deeper nodes do not fit the format's signed 32 bits.
-constexpr unsigned kDeepest = 30;
 
 [[noreturn]] void fail(const ByteSource& file, std::uint64_t byte, std::string cause) {
   throw Error({.file = file.name(),
@@ -36,14 +32,14 @@ class HierarchyReader {
   HierarchyReader(const ByteSource& file, std::uint64_t first_chunk)
       : file_(file), first_chunk_(first_chunk) {}
 
-  std::vector<CopcNode> read(const Page& root) {
+  std::vector<OctreeNode> read(const Page& root) {
     add_page(root, root.offset);
     while (!pages_.empty()) {
       const Page page = pages_.back();
       pages_.pop_back();
       std::string bytes(page.bytes, '\0');
       file_.read(page.offset, std::as_writable_bytes(std::span(bytes)));
-      for (std::size_t at = 0; at < bytes.size(); at += kEntryBytes) {
+      for (std::size_t at = 0; at < bytes.size(); at += kCopcEntryBytes) {
         read_entry(bytes.data() + at, page.offset + at);
       }
     }
@@ -53,7 +49,7 @@ class HierarchyReader {
  private:
   /// from: where the page is referred to. As no page is read twice, references in a circle end.
   void add_page(const Page& page, std::uint64_t from) {
-    if (page.bytes % kEntryBytes != 0 || page.bytes == 0 || page.offset > file_.size() ||
+    if (page.bytes % kCopcEntryBytes != 0 || page.bytes == 0 || page.offset > file_.size() ||
         page.bytes > file_.size() - page.offset) {
       fail(file_, from, "a page of the COPC hierarchy does not lie in the file");
     }
@@ -67,10 +63,10 @@ class HierarchyReader {
 
   void read_entry(const char* at, std::uint64_t byte) {
     const auto depth = load_little_endian<std::int32_t>(at);
-    CopcNode node{.offset = load_little_endian<std::uint64_t>(at + 16)};
+    OctreeNode node{.offset = load_little_endian<std::uint64_t>(at + 16)};
     const auto bytes = load_little_endian<std::int32_t>(at + 24);
     const auto points = load_little_endian<std::int32_t>(at + 28);
-    if (depth < 0 || depth > static_cast<std::int32_t>(kDeepest)) {
+    if (depth < 0 || depth > static_cast<std::int32_t>(kDeepestNode)) {
       fail(file_, byte, "a node of the COPC hierarchy has depth " + std::to_string(depth));
     }
     node.depth = static_cast<unsigned>(depth);
@@ -103,83 +99,32 @@ class HierarchyReader {
   std::vector<Page> pages_;
   std::set<std::uint64_t> seen_;  ///< offsets of pages
   std::uint64_t page_bytes_ = 0;
-  std::vector<CopcNode> nodes_;
+  std::vector<OctreeNode> nodes_;
 };
 
-/// Parents before children, and nodes beside each other in Morton order.
-bool before(const CopcNode& a, const CopcNode& b) {
-  // The axis whose places differ in the highest bit decides; of equal ones the first, z.
-  std::uint32_t most = 0;
-  bool less = false;
-  for (const std::size_t axis : {std::size_t{2}, std::size_t{1}, std::size_t{0}}) {
-    const std::uint32_t p = a.place[axis] << (kDeepest - a.depth);
-    const std::uint32_t q = b.place[axis] << (kDeepest - b.depth);
-    const std::uint32_t differ = p ^ q;
-    if (most < differ && most < (differ ^ most)) {
-      most = differ;
-      less = p < q;
-    }
-  }
-  return most == 0 ? a.depth < b.depth : less;
-}
-
 /// No two nodes may share a key or a byte, so that no point comes twice.
-void check_disjoint(const ByteSource& file, std::vector<CopcNode>& nodes) {
+void check_disjoint(const ByteSource& file, Octree& octree) {
+  std::vector<OctreeNode>& nodes = octree.nodes;
   std::sort(nodes.begin(), nodes.end(),
-            [](const CopcNode& a, const CopcNode& b) { return a.offset < b.offset; });
+            [](const OctreeNode& a, const OctreeNode& b) { return a.offset < b.offset; });
   for (std::size_t i = 1; i < nodes.size(); ++i) {
     if (nodes[i].offset - nodes[i - 1].offset < nodes[i - 1].bytes) {
       fail(file, nodes[i].offset, "two nodes of the COPC hierarchy share points");
     }
   }
-  std::sort(nodes.begin(), nodes.end(), before);
-  for (std::size_t i = 1; i < nodes.size(); ++i) {
-    if (!before(nodes[i - 1], nodes[i])) {
-      fail(file, nodes[i].offset, "a node of the COPC hierarchy is there twice");
-    }
+  if (const OctreeNode* const twice = octree.arrange()) {
+    fail(file, twice->offset, "a node of the COPC hierarchy is there twice");
   }
 }
 
 }  // namespace
 
-Box3 CopcOctree::box(const CopcNode& node) const {
-  const double side = std::ldexp(2 * half_size, -static_cast<int>(node.depth));
-  Box3 box;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    box.min[axis] = centre[axis] - half_size + side * node.place[axis];
-    box.max[axis] = box.min[axis] + side;
-  }
-  return box;
-}
-
-void CopcOctree::keep(const std::optional<Box3>& region, double resolution, const Point3& margin) {
-  unsigned deepest = kDeepest;
-  if (resolution > 0) {
-    deepest = 0;
-    while (deepest < kDeepest && std::ldexp(spacing, -static_cast<int>(deepest)) > resolution) {
-      ++deepest;
-    }
-  }
-  std::erase_if(nodes, [&](const CopcNode& node) {
-    if (node.depth > deepest) return true;
-    if (!region) return false;
-    const Box3 cube = box(node);
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      if (cube.min[axis] - margin[axis] > region->max[axis] ||
-          cube.max[axis] + margin[axis] < region->min[axis]) {
-        return true;
-      }
-    }
-    return false;
-  });
-}
-
-CopcOctree read_copc_octree(const ByteSource& file, std::string_view info,
-                            std::uint64_t first_chunk, std::uint64_t points) {
+Octree read_copc_hierarchy(const ByteSource& file, std::string_view info, std::uint64_t first_chunk,
+                           std::uint64_t points) {
   // It follows the header of LAS 1.4 and its own.
   constexpr std::uint64_t kInfoAt = 375 + 54;
-  if (info.size() < kInfoBytes) fail(file, kInfoAt, "the COPC info is cut off");
-  CopcOctree octree;
+  if (info.size() < kCopcInfoBytes) fail(file, kInfoAt, "the COPC info is cut off");
+  Octree octree;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     octree.centre[axis] = load_little_endian<double>(info.data() + 8 * axis);
   }
@@ -195,10 +140,8 @@ CopcOctree read_copc_octree(const ByteSource& file, std::string_view info,
                   .bytes = load_little_endian<std::uint64_t>(info.data() + 48)};
   // A file without points has an empty page.
   if (points > 0 || root.bytes > 0) octree.nodes = HierarchyReader(file, first_chunk).read(root);
-  check_disjoint(file, octree.nodes);
-  std::uint64_t found = 0;
-  for (const CopcNode& node : octree.nodes) found += node.points;
-  if (found != points) {
+  check_disjoint(file, octree);
+  if (const std::uint64_t found = octree.points(); found != points) {
     fail(file, root.offset,
          "the nodes of the COPC hierarchy have " + std::to_string(found) +
              " points, but the header promises " + std::to_string(points));

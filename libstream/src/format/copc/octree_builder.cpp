@@ -1,0 +1,280 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "format/copc/octree_builder.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <cstring>
+#include <tuple>
+#include <utility>
+
+#include "terrace/stream/error.hpp"
+
+namespace terrace::stream {
+namespace {
+
+/// Cells of the finest lattice along a side, and of a node, as powers of two.
+constexpr unsigned kCellBits = 30, kSpanBits = 7;
+static_assert(OctreeBuilder::kSpan == 1U << kSpanBits);
+constexpr unsigned kDeepestLeaf = kCellBits - kSpanBits;
+/// Points that a child gives to its parent at most: eight times as many fit into memory. Surfaces
+/// have fewer; only clouds that fill space reach it.
+constexpr std::size_t kMostPromoted = std::size_t{1} << 15;
+/// Points of a leaf that cannot be parted.
+constexpr std::uint64_t kMostTogether = 1U << 24;
+/// Depths that are distributed at once, to 512 buckets.
+constexpr unsigned kDepthsAtOnce = 3;
+constexpr std::size_t kChildren = 8;
+
+/// Which child of a node of that depth a cell lies in.
+std::size_t child_of(const std::array<std::uint32_t, 3>& cell, unsigned depth) {
+  const unsigned shift = kCellBits - 1 - depth;
+  return ((cell[0] >> shift) & 1U) | ((cell[1] >> shift) & 1U) << 1U |
+         ((cell[2] >> shift) & 1U) << 2U;
+}
+
+OctreeNode child(const OctreeNode& node, std::size_t number) {
+  OctreeNode child{.depth = node.depth + 1};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    child.place[axis] = 2 * node.place[axis] + static_cast<std::uint32_t>((number >> axis) & 1U);
+  }
+  return child;
+}
+
+/// A number without relation to the coordinates (the finaliser of MurmurHash3 by A. Appleby).
+std::uint64_t hash_of(const std::array<std::int32_t, 3>& place) {
+  std::uint64_t hash = 0;
+  for (const std::int32_t coordinate : place) {
+    hash = (hash ^ static_cast<std::uint32_t>(coordinate)) * 0x9e3779b97f4a7c15U;
+    hash = (hash ^ (hash >> 33U)) * 0xff51afd7ed558ccdU;
+    hash = (hash ^ (hash >> 33U)) * 0xc4ceb9fe1a85ec53U;
+    hash ^= hash >> 33U;
+  }
+  return hash;
+}
+
+}  // namespace
+
+/// A point on its way.
+struct OctreeBuilder::Item {
+  std::array<std::uint32_t, 3> cell{};
+  std::uint32_t index = 0;  ///< of its record among those that it is with
+  std::uint64_t rank = 0;   ///< of a cell's points the least goes up
+  std::uint64_t number = 0;
+
+  [[nodiscard]] bool goes_before(const Item& other) const {
+    return std::tie(rank, number) < std::tie(other.rank, other.number);
+  }
+};
+
+/// The points that a node has before its parent takes some of them.
+struct OctreeBuilder::NodePoints {
+  OctreeNode node{};
+  std::vector<Item> items{};  ///< in Morton order
+  std::vector<std::byte> records{};
+
+  /// Copies the item's record from where it is among others.
+  void add(Item item, const std::byte* others, std::size_t bytes) {
+    const std::byte* const record = others + std::size_t{item.index} * bytes;
+    item.index = static_cast<std::uint32_t>(items.size());
+    items.push_back(item);
+    records.insert(records.end(), record, record + bytes);
+  }
+};
+
+OctreeBuilder::OctreeBuilder(const std::string& name, const std::filesystem::path& folder,
+                             std::size_t record_bytes, std::size_t at_once)
+    : name_(name),
+      record_bytes_(record_bytes),
+      numbered_bytes_(record_bytes + sizeof(std::uint64_t)),
+      at_once_(std::max(at_once, kLeafPoints)),
+      file_(name, folder, numbered_bytes_),
+      numbered_(numbered_bytes_) {}
+
+void OctreeBuilder::add(std::span<const std::byte> records) {
+  assert(records.size() % record_bytes_ == 0);
+  for (; !records.empty(); records = records.subspan(record_bytes_)) {
+    std::copy_n(records.begin(), record_bytes_, numbered_.begin());
+    std::memcpy(numbered_.data() + record_bytes_, &points_, sizeof points_);
+    file_.append(all_, numbered_);
+    ++points_;
+  }
+}
+
+void OctreeBuilder::build(const Octree& octree, const Lattice& lattice, const Write& write) {
+  lattice_ = lattice;
+  const Box3 cube = octree.box(OctreeNode{});
+  corner_ = cube.min;
+  side_ = 2 * octree.half_size;
+  write_ = &write;
+  if (points_ == 0) return;
+  NodePoints root = build(OctreeNode{}, std::move(all_));
+  this->write(root);
+}
+
+std::array<std::uint32_t, 3> OctreeBuilder::cell_of(const std::byte* record) const {
+  constexpr double kCells = 1U << kCellBits;
+  std::array<std::uint32_t, 3> cell{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::int32_t step = 0;
+    std::memcpy(&step, record + axis * sizeof step, sizeof step);
+    const double place = step * lattice_.scale[axis] + lattice_.offset[axis];
+    const double at = std::floor((place - corner_[axis]) / side_ * kCells);
+    cell[axis] = static_cast<std::uint32_t>(std::clamp(at, 0.0, kCells - 1));
+  }
+  return cell;
+}
+
+OctreeBuilder::NodePoints OctreeBuilder::build(const OctreeNode& node, Bucket bucket) {
+  if (file_.records(bucket) <= at_once_ || node.depth == kDeepestLeaf) {
+    return build_in_memory(node, std::move(bucket));
+  }
+  const unsigned depths = std::min(kDepthsAtOnce, kDeepestLeaf - node.depth);
+  std::vector<Bucket> buckets(std::size_t{1} << (3 * depths));
+  std::vector<std::byte> records;
+  while (file_.records(bucket) > 0) {
+    file_.take(bucket, at_once_ / 8, records);
+    for (std::size_t at = 0; at < records.size(); at += numbered_bytes_) {
+      const auto cell = cell_of(records.data() + at);
+      std::size_t place = 0;
+      for (unsigned depth = node.depth; depth < node.depth + depths; ++depth) {
+        place = place * kChildren + child_of(cell, depth);
+      }
+      file_.append(buckets[place], std::span(records).subspan(at, numbered_bytes_));
+    }
+  }
+  return visit(node, buckets);
+}
+
+/// The buckets are those of the node's descendants of some depth, in Morton order.
+OctreeBuilder::NodePoints OctreeBuilder::visit(const OctreeNode& node, std::span<Bucket> buckets) {
+  if (buckets.size() == 1) return build(node, std::move(buckets.front()));
+  const auto records = [this](std::span<const Bucket> some) {
+    std::uint64_t sum = 0;
+    for (const Bucket& bucket : some) sum += file_.records(bucket);
+    return sum;
+  };
+  if (records(buckets) <= at_once_) {
+    Bucket all;
+    for (Bucket& bucket : buckets) all.append(std::move(bucket));
+    return build_in_memory(node, std::move(all));
+  }
+  NodePoints points{.node = node};
+  const std::size_t each = buckets.size() / kChildren;
+  for (std::size_t i = 0; i < kChildren; ++i) {
+    const std::span<Bucket> some = buckets.subspan(i * each, each);
+    if (records(some) > 0) promote(visit(child(node, i), some), points);
+  }
+  return points;
+}
+
+OctreeBuilder::NodePoints OctreeBuilder::build_in_memory(const OctreeNode& node, Bucket bucket) {
+  const std::uint64_t count = file_.records(bucket);
+  if (count > std::max<std::uint64_t>(at_once_, kMostTogether)) {
+    throw Error({.file = name_,
+                 .where = {},
+                 .cause = std::to_string(count) + " points lie in one place, more than a node of "
+                                                  "COPC can have",
+                 .remedy = "leave them out, or write LAZ"});
+  }
+  std::vector<std::byte> records;
+  file_.take(bucket, count, records);
+  assert(records.size() == count * numbered_bytes_);
+  std::vector<Item> items(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::byte* const record = records.data() + i * numbered_bytes_;
+    std::array<std::int32_t, 3> place{};
+    std::memcpy(place.data(), record, sizeof place);
+    items[i] = {
+        .cell = cell_of(record), .index = static_cast<std::uint32_t>(i), .rank = hash_of(place)};
+    std::memcpy(&items[i].number, record + record_bytes_, sizeof items[i].number);
+  }
+  std::sort(items.begin(), items.end(), [](const Item& a, const Item& b) {
+    // The axis whose cells differ in the highest bit decides; of equal ones the first, z.
+    std::uint32_t most = 0;
+    bool less = a.number < b.number;
+    for (const std::size_t axis : {std::size_t{2}, std::size_t{1}, std::size_t{0}}) {
+      const std::uint32_t differ = a.cell[axis] ^ b.cell[axis];
+      if (most < differ && most < (differ ^ most)) {
+        most = differ;
+        less = a.cell[axis] < b.cell[axis];
+      }
+    }
+    return less;
+  });
+  return subtree(node, items, records.data());
+}
+
+OctreeBuilder::NodePoints OctreeBuilder::subtree(const OctreeNode& node,
+                                                 std::span<const Item> items,
+                                                 const std::byte* records) {
+  NodePoints points{.node = node};
+  if (items.size() <= kLeafPoints || node.depth == kDeepestLeaf) {
+    points.items.reserve(items.size());
+    points.records.reserve(items.size() * numbered_bytes_);
+    for (const Item& item : items) points.add(item, records, numbered_bytes_);
+    return points;
+  }
+  for (std::size_t i = 0; i < kChildren; ++i) {
+    const auto end = std::partition_point(items.begin(), items.end(), [&](const Item& item) {
+      return child_of(item.cell, node.depth) <= i;
+    });
+    const auto count = static_cast<std::size_t>(end - items.begin());
+    if (count > 0) promote(subtree(child(node, i), items.first(count), records), points);
+    items = items.subspan(count);
+  }
+  return points;
+}
+
+/// Moves one point of each of the parent's cells up, and writes what is left of the child.
+void OctreeBuilder::promote(NodePoints child, NodePoints& parent) {
+  const unsigned shift = kCellBits - kSpanBits - parent.node.depth;
+  std::vector<Item>& items = child.items;
+  const auto same_cell = [shift](const Item& a, const Item& b) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if ((a.cell[axis] >> shift) != (b.cell[axis] >> shift)) return false;
+    }
+    return true;
+  };
+  std::vector<std::size_t> chosen;
+  for (std::size_t i = 0; i < items.size(); ++i) {
+    if (i == 0 || !same_cell(items[i - 1], items[i])) {
+      chosen.push_back(i);
+    } else if (items[i].goes_before(items[chosen.back()])) {
+      chosen.back() = i;
+    }
+  }
+  if (chosen.size() > kMostPromoted) {
+    const auto end = chosen.begin() + static_cast<std::ptrdiff_t>(kMostPromoted);
+    std::nth_element(chosen.begin(), end, chosen.end(),
+                     [&](std::size_t a, std::size_t b) { return items[a].goes_before(items[b]); });
+    chosen.erase(end, chosen.end());
+    std::sort(chosen.begin(), chosen.end());
+  }
+  std::size_t kept = 0, next = 0;
+  for (std::size_t i = 0; i < items.size(); ++i) {
+    if (next < chosen.size() && chosen[next] == i) {
+      parent.add(items[i], child.records.data(), numbered_bytes_);
+      ++next;
+    } else {
+      items[kept++] = items[i];
+    }
+  }
+  items.resize(kept);
+  write(child);
+}
+
+void OctreeBuilder::write(NodePoints& node) {
+  std::sort(node.items.begin(), node.items.end(),
+            [](const Item& a, const Item& b) { return a.number < b.number; });
+  out_.clear();
+  for (const Item& item : node.items) {
+    const auto record =
+        node.records.begin() + static_cast<std::ptrdiff_t>(item.index * numbered_bytes_);
+    out_.insert(out_.end(), record, record + static_cast<std::ptrdiff_t>(record_bytes_));
+  }
+  node.node.points = node.items.size();
+  (*write_)(node.node, out_);
+}
+
+}  // namespace terrace::stream

@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <span>
+#include <stop_token>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "format/copc/hierarchy.hpp"
+#include "format/copc/octree_builder.hpp"
+#include "format/las/header.hpp"
+#include "format/las/laz_encoders.hpp"
+#include "format/las/record_encoder.hpp"
+#include "format/writers.hpp"
+#include "io/bytes.hpp"
+#include "io/temporary.hpp"
+#include "terrace/stream/error.hpp"
+#include "terrace/stream/laz.hpp"
+#include "terrace/stream/sink.hpp"
+
+namespace terrace::stream {
+namespace {
+
+std::string_view text_of_bytes(std::span<const std::byte> bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+/// The least cube around points in steps of a lattice, at their lowest corner.
+Octree cube_around(const LasRecords& records) {
+  const Lattice lattice = records.lattice();
+  Box3 box;
+  for (const auto& corner : {records.least(), records.most()}) {
+    if (records.points() == 0) continue;
+    Point3 place{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      place[axis] = corner[axis] * lattice.scale[axis] + lattice.offset[axis];
+    }
+    box.include(place);
+  }
+  if (box.empty()) box.include(lattice.offset);
+  Octree octree;
+  double side = lattice.scale[0];
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    // A little more than the points, as sums of its numbers are rounded.
+    const double rounding = 0x1p-50 * (std::abs(box.min[axis]) + std::abs(box.max[axis]));
+    side = std::max(side, box.max[axis] - box.min[axis] + 4 * rounding);
+  }
+  octree.half_size = 0.5 * side;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    octree.centre[axis] = box.min[axis] + octree.half_size;
+  }
+  octree.spacing = side / OctreeBuilder::kSpan;
+  return octree;
+}
+
+/// How many records the builder may have in memory.
+std::size_t records_within(std::uint64_t memory_bytes, std::size_t record_bytes) {
+  // Beginnings of buckets; nodes on their way up and to the encoders.
+  constexpr std::uint64_t kBeside = 36u << 20;
+  constexpr std::uint64_t kLeast = 1u << 15, kMost = 1u << 19, kBesideRecord = 56;
+  const std::uint64_t room = memory_bytes - std::min(memory_bytes, kBeside);
+  return static_cast<std::size_t>(std::clamp(room / (record_bytes + kBesideRecord), kLeast, kMost));
+}
+
+class CopcWriter final : public PointWriter {
+ public:
+  CopcWriter(const std::string& path, const PointHeader& header, const WriterOptions& options)
+      : path_(path),
+        sink_(path, options.replace, options.stop),
+        stop_(options.stop),
+        records_(path, header, LasFormats::newer),
+        vlr_(laz::Vlr::of(records_.layout().point_format, records_.layout().record_bytes,
+                          laz::Vlr::kVariable)),
+        builder_(path, folder_of(path), records_.layout().record_bytes,
+                 records_within(options.memory_bytes, records_.layout().record_bytes)),
+        encoders_(vlr_, options.threads,
+                  [this](std::span<const std::byte> coded) { write_chunk(coded); }) {
+    std::string vlrs;
+    append_vlr(vlrs, kCopcUser, kCopcInfo, std::string(kCopcInfoBytes, '\0'));
+    append_vlr(vlrs, laz::Vlr::kUserId, laz::Vlr::kRecordId, text_of_bytes(vlr_.serialise()));
+    file_.vlrs = 2;
+    append_vlrs(vlrs, header.crs, records_.layout(), path, file_);
+    file_.points_offset = kLas14HeaderBytes + vlrs.size();
+    sink_.write(std::string(kLas14HeaderBytes, '\0') + vlrs +
+                std::string(sizeof(std::uint64_t), '\0'));
+  }
+
+  void append(const PointBlock& block) override {
+    const std::string_view records = records_.pack(block);
+    builder_.add(std::as_bytes(std::span(records)));
+    const std::size_t bytes = records_.layout().record_bytes;
+    for (std::size_t at = kGpsTimeAt; at < records.size(); at += bytes) {
+      const auto time = load_little_endian<double>(records.data() + at);
+      first_time_ = std::min(first_time_, time);
+      last_time_ = std::max(last_time_, time);
+    }
+  }
+
+  void finish() override {
+    octree_ = cube_around(records_);
+    builder_.build(octree_, records_.lattice(),
+                   [&](const OctreeNode& node, std::span<const std::byte> records) {
+                     if (stop_.stop_requested()) throw Stopped();
+                     octree_.nodes.push_back(node);
+                     if (!records.empty()) encoders_.encode(records);
+                   });
+    encoders_.finish();
+    std::string position;
+    append_little_endian(position, sink_.size());
+    sink_.write(laz::write_chunk_table(chunks_, vlr_));
+    sink_.write_at(file_.points_offset, position);
+
+    octree_.arrange();
+    file_.evlr_offset = sink_.size();
+    file_.evlrs = 1;
+    const std::string page = hierarchy();
+    sink_.write(evlr_head(kCopcUser, kCopcHierarchy, page.size()));
+    const std::uint64_t page_at = sink_.size();
+    sink_.write(page);
+    sink_.write_at(kLas14HeaderBytes + kLasVlrHeaderBytes, info(page_at, page.size()));
+    file_.compressed = true;
+    sink_.write_at(0, las_header_text(records_, file_));
+    sink_.commit();
+  }
+
+  std::uint64_t points() const override { return records_.points(); }
+  double rounding() const override { return records_.rounding(); }
+
+ private:
+  /// GPS time in the point formats 6 to 8.
+  static constexpr std::size_t kGpsTimeAt = 22;
+
+  /// The chunk of the next node that has points.
+  void write_chunk(std::span<const std::byte> coded) {
+    while (octree_.nodes[written_].points == 0) ++written_;
+    OctreeNode& node = octree_.nodes[written_++];
+    if (coded.size() > std::numeric_limits<std::int32_t>::max()) {
+      throw Error({.file = path_,
+                   .where = {},
+                   .cause = std::to_string(node.points) +
+                            " points in one place are more bytes than a node of COPC can have",
+                   .remedy = "leave them out, or write LAZ"});
+    }
+    node.offset = sink_.size();
+    node.bytes = coded.size();
+    chunks_.push_back({.offset = 0, .bytes = node.bytes, .points = node.points});
+    sink_.write(coded);
+  }
+
+  /// One page of all nodes. Those without points are there for their children.
+  [[nodiscard]] std::string hierarchy() const {
+    std::string page;
+    for (const OctreeNode& node : octree_.nodes) {
+      append_little_endian(page, static_cast<std::int32_t>(node.depth));
+      for (const std::uint32_t place : node.place) {
+        append_little_endian(page, static_cast<std::int32_t>(place));
+      }
+      append_little_endian(page, node.offset);
+      append_little_endian(page, static_cast<std::int32_t>(node.bytes));
+      append_little_endian(page, static_cast<std::int32_t>(node.points));
+    }
+    return page;
+  }
+
+  [[nodiscard]] std::string info(std::uint64_t page_at, std::uint64_t page_bytes) const {
+    std::string info;
+    for (const double centre : octree_.centre) append_little_endian(info, centre);
+    append_little_endian(info, octree_.half_size);
+    append_little_endian(info, octree_.spacing);
+    append_little_endian(info, page_at);
+    append_little_endian(info, page_bytes);
+    const bool timed = first_time_ <= last_time_;
+    append_little_endian(info, timed ? first_time_ : 0.0);
+    append_little_endian(info, timed ? last_time_ : 0.0);
+    info.resize(kCopcInfoBytes, '\0');
+    return info;
+  }
+
+  std::string path_;
+  Sink sink_;
+  std::stop_token stop_;
+  LasRecords records_;
+  LasFile file_;
+  laz::Vlr vlr_;
+  OctreeBuilder builder_;
+  Octree octree_;            ///< nodes as they come from the builder
+  std::size_t written_ = 0;  ///< of them
+  std::vector<laz::Chunk> chunks_;
+  double first_time_ = std::numeric_limits<double>::infinity();
+  double last_time_ = -std::numeric_limits<double>::infinity();
+  LazEncoders encoders_;  ///< last: it hands on to the others
+};
+
+}  // namespace
+
+std::unique_ptr<PointWriter> open_copc_writer(const std::string& path, const PointHeader& header,
+                                              const WriterOptions& options) {
+  return std::make_unique<CopcWriter>(path, header, options);
+}
+
+}  // namespace terrace::stream

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "format/ept/hierarchy.hpp"
+
+#include <charconv>
+#include <cstddef>
+#include <fstream>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "format/ept/metadata.hpp"
+#include "io/text.hpp"
+#include "terrace/stream/byte_source.hpp"
+
+namespace terrace::stream {
+namespace {
+
+/// "D-X-Y-Z"; nullopt unless it names a node of an octree.
+std::optional<OctreeNode> node_of(std::string_view name) {
+  OctreeNode node;
+  const auto read = [&](std::uint32_t& value) {
+    const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), value);
+    if (error != std::errc()) return false;
+    name.remove_prefix(static_cast<std::size_t>(end - name.data()));
+    return true;
+  };
+  std::uint32_t depth = 0;
+  if (!read(depth) || depth > kDeepestNode) return {};
+  node.depth = depth;
+  for (std::uint32_t& place : node.place) {
+    if (!name.starts_with('-')) return {};
+    name.remove_prefix(1);
+    if (!read(place) || (place >> depth) != 0) return {};
+  }
+  if (!name.empty()) return {};
+  return node;
+}
+
+/// What is known of the hierarchy so far.
+struct EptReading {
+  std::uint64_t points = 0;  ///< promised
+  std::uint64_t found = 0;
+  std::vector<OctreeNode> nodes{};
+  std::vector<std::string> pending{};  ///< names of files to be read
+  std::set<std::string> seen{};        ///< names of files
+};
+
+/// Takes the entries of one file as they are parsed: an object of names and numbers.
+class EntryTaker final : public nlohmann::json_sax<nlohmann::json> {
+ public:
+  EntryTaker(const std::string& file, EptReading& reading) : file_(file), reading_(reading) {}
+
+  bool key(string_t& name) override {
+    name_ = name;
+    return true;
+  }
+  bool number_unsigned(number_unsigned_t value) override {
+    OctreeNode node = place();
+    if (value == 0) return true;
+    // What is too much is so at once, whatever the sum would wrap to.
+    if (value > reading_.points - reading_.found) {
+      fail_ept(
+          file_, "node " + name_,
+          "the nodes have more points than ept.json promises: " + std::to_string(reading_.points));
+    }
+    node.points = value;
+    reading_.found += value;
+    reading_.nodes.push_back(node);
+    return true;
+  }
+  bool number_integer(number_integer_t value) override {
+    const std::string name = name_of(place());
+    if (value != -1) fail_ept(file_, "node " + name_, "has " + std::to_string(value) + " points");
+    if (!reading_.seen.insert(name).second) {
+      fail_ept(file_, "node " + name_, "its part of the hierarchy is referred to twice");
+    }
+    reading_.pending.push_back(name);
+    return true;
+  }
+  bool start_object(std::size_t) override { return depth_++ == 0 || refuse(); }
+  bool end_object() override { return true; }
+  bool null() override { return refuse(); }
+  bool boolean(bool) override { return refuse(); }
+  bool number_float(number_float_t, const string_t&) override { return refuse(); }
+  bool string(string_t&) override { return refuse(); }
+  bool binary(binary_t&) override { return refuse(); }
+  bool start_array(std::size_t) override { return refuse(); }
+  bool end_array() override { return refuse(); }
+  bool parse_error(std::size_t byte, const std::string&,
+                   const nlohmann::detail::exception&) override {
+    fail_ept(file_, "byte " + std::to_string(byte), "it is not JSON");
+  }
+
+ private:
+  [[noreturn]] bool refuse() const {
+    fail_ept(file_, name_.empty() ? std::string() : "node " + in_quotes(name_),
+             "it does not hold the numbers of points of nodes");
+  }
+  [[nodiscard]] OctreeNode place() const {
+    if (depth_ == 0) refuse();
+    const std::optional<OctreeNode> node = node_of(name_);
+    if (!node) fail_ept(file_, {}, in_quotes(name_) + " is not a node of an octree");
+    return *node;
+  }
+
+  const std::string& file_;
+  EptReading& reading_;
+  std::string name_;
+  int depth_ = 0;
+};
+
+}  // namespace
+
+std::vector<OctreeNode> read_ept_hierarchy(const std::filesystem::path& folder,
+                                           std::uint64_t points) {
+  const std::string root = name_of(OctreeNode{});
+  /// Three million nodes in one file; Entwine begins another after a few depths.
+  constexpr std::uint64_t kMostBytes = 64u << 20;
+  EptReading reading{.points = points};
+  reading.seen.insert(root);
+  reading.pending.push_back(root);
+  while (!reading.pending.empty()) {
+    const std::string file =
+        (folder / "ept-hierarchy" / (reading.pending.back() + ".json")).string();
+    reading.pending.pop_back();
+    if (open_file(file)->size() > kMostBytes) fail_ept(file, {}, "is too large for a hierarchy");
+    std::ifstream bytes(file, std::ios::binary);
+    EntryTaker taker(file, reading);
+    nlohmann::json::sax_parse(bytes, &taker);
+  }
+  if (reading.found != points) {
+    fail_ept((folder / "ept-hierarchy").string(), {},
+             "its nodes have " + std::to_string(reading.found) + " points, but ept.json promises " +
+                 std::to_string(points));
+  }
+  return std::move(reading.nodes);
+}
+
+}  // namespace terrace::stream

@@ -1,0 +1,278 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "format/ept/metadata.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "io/text.hpp"
+#include "terrace/stream/byte_source.hpp"
+#include "terrace/stream/error.hpp"
+
+namespace terrace::stream {
+namespace {
+
+struct KnownDimension {
+  std::string_view ept, name;
+};
+// PDAL's names, which Entwine has too, and laspy's, which are those of LAS here.
+constexpr std::array<KnownDimension, 19> kKnown{{{"Intensity", "intensity"},
+                                                 {"ReturnNumber", "return_number"},
+                                                 {"NumberOfReturns", "number_of_returns"},
+                                                 {"ScanDirectionFlag", "scan_direction_flag"},
+                                                 {"EdgeOfFlightLine", "edge_of_flight_line"},
+                                                 {"Classification", "classification"},
+                                                 {"Synthetic", "synthetic"},
+                                                 {"KeyPoint", "key_point"},
+                                                 {"Withheld", "withheld"},
+                                                 {"Overlap", "overlap"},
+                                                 {"ScanChannel", "scanner_channel"},
+                                                 {"ScanAngleRank", "scan_angle_rank"},
+                                                 {"UserData", "user_data"},
+                                                 {"PointSourceId", "point_source_id"},
+                                                 {"GpsTime", "gps_time"},
+                                                 {"Red", "red"},
+                                                 {"Green", "green"},
+                                                 {"Blue", "blue"},
+                                                 {"Infrared", "nir"}}};
+
+/// A dimension of the schema.
+struct Dimension {
+  std::string name;
+  Channel channel;
+};
+
+class EptMetadataReader {
+ public:
+  explicit EptMetadataReader(const std::string& file) : file_(file) {}
+
+  EptMetadata read() {
+    const nlohmann::json json = parse();
+    if (!json.is_object()) fail({}, "it does not hold an object");
+    const std::string version = text(json, "version", "1.0.0");
+    if (!version.starts_with("1.")) fail("version", "is " + in_quotes(version) + ", not 1");
+    const std::string hierarchy = text(json, "hierarchyType", "json");
+    if (hierarchy != "json") fail("hierarchyType", in_quotes(hierarchy) + " is not known");
+    EptMetadata metadata;
+    const std::string data = text(json, "dataType", {});
+    if (data == "laszip") {
+      metadata.data = EptData::laszip;
+    } else if (data == "binary") {
+      metadata.data = EptData::binary;
+    } else if (data == "zstandard") {
+      metadata.data = EptData::zstandard;
+    } else {
+      fail("dataType", in_quotes(data) + " is not known; laszip, binary and zstandard are");
+    }
+    const nlohmann::json& points = member(json, "points");
+    if (!points.is_number_unsigned()) fail("points", "is not a number of points");
+    metadata.points = metadata.stream.points = points.get<std::uint64_t>();
+    read_cube(json, metadata.octree);
+    read_schema(member(json, "schema"), metadata.stream);
+    if (const auto srs = json.find("srs"); srs != json.end()) read_srs(*srs, metadata.crs);
+    return metadata;
+  }
+
+ private:
+  using Json = nlohmann::json;
+
+  /// A schema takes a hundred bytes a dimension, WKT a few kilobytes.
+  static constexpr std::uint64_t kMostBytes = 8u << 20;
+  static constexpr int kDeepestJson = 16;
+  static constexpr std::size_t kMostRecordBytes = 65535;
+
+  [[noreturn]] void fail(std::string where, std::string cause) const {
+    fail_ept(file_, std::move(where), std::move(cause));
+  }
+
+  [[nodiscard]] Json parse() const {
+    const std::unique_ptr<ByteSource> bytes = open_file(file_);
+    if (bytes->size() > kMostBytes) fail({}, "is too large for the description of a data set");
+    std::string all(bytes->size(), '\0');
+    bytes->read(0, std::as_writable_bytes(std::span(all)));
+    try {
+      return Json::parse(all, [this](int depth, Json::parse_event_t, const Json&) {
+        if (depth > kDeepestJson) fail({}, "its JSON is nested too deeply");
+        return true;
+      });
+    } catch (const Json::parse_error& error) {
+      fail("byte " + std::to_string(error.byte), "it is not JSON");
+    }
+  }
+
+  [[nodiscard]] const Json& member(const Json& json, const char* name) const {
+    const auto found = json.find(name);
+    if (found == json.end()) fail(name, "is missing");
+    return *found;
+  }
+
+  [[nodiscard]] std::string text(const Json& json, const char* name,
+                                 const std::optional<std::string>& without) const {
+    if (without && !json.contains(name)) return *without;
+    const Json& value = member(json, name);
+    if (!value.is_string()) fail(name, "is not text");
+    return value.get<std::string>();
+  }
+
+  [[nodiscard]] double number(const Json& json, const char* name, double without) const {
+    const auto found = json.find(name);
+    if (found == json.end()) return without;
+    if (!found->is_number() || !std::isfinite(found->get<double>())) fail(name, "is not a number");
+    return found->get<double>();
+  }
+
+  void read_cube(const Json& json, Octree& octree) const {
+    const Json& bounds = member(json, "bounds");
+    if (!bounds.is_array() || bounds.size() != 6) fail("bounds", "are not six numbers");
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (!bounds[axis].is_number() || !bounds[axis + 3].is_number()) {
+        fail("bounds", "are not six numbers");
+      }
+      const double low = bounds[axis].get<double>(), high = bounds[axis + 3].get<double>();
+      const double half = 0.5 * high - 0.5 * low;
+      octree.centre[axis] = 0.5 * high + 0.5 * low;
+      if (!std::isfinite(octree.centre[axis]) || !(half > 0) || !std::isfinite(2 * half)) {
+        fail("bounds", "do not enclose a cube");
+      }
+      // Sides of a cube far from zero may differ by rounding.
+      const double rounding = 0x1p-40 * (std::abs(low) + std::abs(high));
+      if (axis == 0) octree.half_size = half;
+      if (std::abs(half - octree.half_size) > rounding) fail("bounds", "do not enclose a cube");
+    }
+    const Json& span = member(json, "span");
+    if (!span.is_number_unsigned() || span.get<std::uint64_t>() == 0 ||
+        span.get<std::uint64_t>() > (1u << kDeepestNode)) {
+      fail("span", "is not a number of cells");
+    }
+    octree.spacing = 2 * octree.half_size / static_cast<double>(span.get<std::uint64_t>());
+    if (!(octree.spacing > 0)) fail("span", "is not a number of cells");
+  }
+
+  [[nodiscard]] ScalarType type_of(const Json& json, const std::string& where) const {
+    const std::string type = text(json, "type", {});
+    const Json& size = member(json, "size");
+    const std::uint64_t bytes = size.is_number_unsigned() ? size.get<std::uint64_t>() : 0;
+    const bool is_float = type == "float" || type == "floating";
+    constexpr std::array kSigned{ScalarType::i8, ScalarType::i16, ScalarType::i32, ScalarType::i64};
+    constexpr std::array kUnsigned{ScalarType::u8, ScalarType::u16, ScalarType::u32,
+                                   ScalarType::u64};
+    for (std::size_t i = 0; i < kSigned.size(); ++i) {
+      if (bytes != std::uint64_t{1} << i) continue;
+      if (type == "signed") return kSigned[i];
+      if (type == "unsigned") return kUnsigned[i];
+      if (is_float && bytes >= 4) return bytes == 4 ? ScalarType::f32 : ScalarType::f64;
+    }
+    fail(where, in_quotes(type) + " of " + size.dump() + " bytes is not a type");
+  }
+
+  [[nodiscard]] Dimension dimension(const Json& json, const std::string& where) const {
+    if (!json.is_object()) fail(where, "is not an object");
+    Dimension dimension{.name = text(json, "name", {}), .channel = {}};
+    Channel& channel = dimension.channel;
+    channel.name = dimension.name;
+    for (char& c : channel.name) {
+      if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '_';
+    }
+    channel.type = type_of(json, where);
+    channel.scale = number(json, "scale", 1.0);
+    channel.offset = number(json, "offset", 0.0);
+    if (channel.scale == 0) fail(where, "has the scale 0");
+    for (const KnownDimension& known : kKnown) {
+      if (dimension.name == known.ept) channel.name = known.name;
+    }
+    if (channel.name == "scan_angle_rank") {
+      channel.unit = "degree";
+      // Ranks are whole degrees; angles of LAS 1.4 are not.
+      if (channel.type != ScalarType::i8) channel.name = "scan_angle_degrees";
+    }
+    return dimension;
+  }
+
+  void read_schema(const Json& schema, RecordStream& stream) const {
+    if (!schema.is_array()) fail("schema", "is not a list of dimensions");
+    SourceInfo& info = stream.info;
+    std::array<bool, 3> found{};
+    for (std::size_t i = 0; i < schema.size(); ++i) {
+      const std::string where = "dimension " + std::to_string(i) + " of the schema";
+      const auto [name, channel] = dimension(schema[i], where);
+      const std::size_t offset = stream.record_bytes;
+      stream.record_bytes += size_of(channel.type);
+      if (stream.record_bytes > kMostRecordBytes) fail("schema", "has too many dimensions");
+      if (name.size() == 1 && name[0] >= 'X' && name[0] <= 'Z') {
+        const auto axis = static_cast<std::size_t>(name[0] - 'X');
+        if (found[axis]) fail(where, "is " + name + " once more");
+        found[axis] = true;
+        stream.coordinate_offsets[axis] = offset;
+        place(channel, axis, info);
+        continue;
+      }
+      for (const LasField& field : stream.fields) {
+        if (field.channel.name == channel.name) fail(where, "is " + name + " once more");
+      }
+      if (channel.name.empty()) fail(where, "has no name");
+      stream.fields.push_back({.channel = channel, .offset = offset});
+      info.attributes.push_back(channel);
+    }
+    if (!found[0] || !found[1] || !found[2]) fail("schema", "lacks X, Y or Z");
+    if (info.world.xy[0] * info.world.xy[4] == 0 ||
+        !std::isfinite(info.world.xy[0] * info.world.xy[4])) {
+      fail("schema", "the scales of X and Y are too small or too large");
+    }
+  }
+
+  static void place(const Channel& channel, std::size_t axis, SourceInfo& info) {
+    info.coordinates[axis] = {.name = std::string(1, static_cast<char>('x' + axis)),
+                              .type = channel.type};
+    if (axis == 2) {
+      info.coordinates[2].scale = channel.scale;
+      info.coordinates[2].offset = channel.offset;
+    } else {
+      info.world.xy[axis == 0 ? 0 : 4] = channel.scale;
+      info.world.xy[axis == 0 ? 2 : 5] = channel.offset;
+    }
+  }
+
+  void read_srs(const Json& srs, Crs& crs) const {
+    if (!srs.is_object()) fail("srs", "is not an object");
+    crs.wkt = text(srs, "wkt", "");
+    const auto code = [&](const char* name) {
+      const std::string digits = text(srs, name, "");
+      int value = 0;
+      const auto [end, error] =
+          std::from_chars(digits.data(), digits.data() + digits.size(), value);
+      if (!digits.empty() &&
+          (error != std::errc() || end != digits.data() + digits.size() || value <= 0)) {
+        fail("srs", in_quotes(digits) + " is not the code of a reference system");
+      }
+      return value;
+    };
+    if (text(srs, "authority", "") != "EPSG") return;
+    if (crs.wkt.empty()) crs.epsg = code("horizontal");
+    crs.vertical_epsg = code("vertical");
+  }
+
+  const std::string& file_;
+};
+
+}  // namespace
+
+void fail_ept(const std::string& file, std::string where, std::string cause) {
+  throw Error({.file = file,
+               .where = std::move(where),
+               .cause = std::move(cause),
+               .remedy = "the data set is damaged or not EPT 1.0: get it anew"});
+}
+
+EptMetadata read_ept_metadata(const std::string& file) { return EptMetadataReader(file).read(); }
+
+}  // namespace terrace::stream

@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "format/ept/nodes.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <zstd.h>
+
+#include "format/las/laz_records.hpp"
+#include "format/las/record_reader.hpp"
+#include "terrace/stream/input.hpp"
+
+namespace terrace::stream {
+namespace {
+
+[[noreturn]] void fail_count(const std::string& file, std::uint64_t points,
+                             const std::string& found) {
+  fail_ept(file, {},
+           "the hierarchy counts " + std::to_string(points) + " points, the file " + found);
+}
+
+/// Records that zstandard has compressed, in one frame or several.
+class ZstdRecords final : public RecordReader {
+ public:
+  ZstdRecords(Input& input, std::size_t record_bytes, std::uint64_t points)
+      : input_(&input), record_bytes_(record_bytes), points_(points), left_(points) {
+    if (stream_ == nullptr) throw std::bad_alloc();
+    // What levels beyond 19 ask for; a damaged frame may ask for any.
+    constexpr int kLargestWindow = 25;
+    ZSTD_DCtx_setParameter(stream_.get(), ZSTD_d_windowLogMax, kLargestWindow);
+  }
+
+  std::string_view read(std::uint64_t wanted) override {
+    constexpr std::size_t kPieceBytes = 64u << 10;
+    const std::uint64_t records = std::min<std::uint64_t>(
+        {wanted, left_, std::max<std::size_t>(1, kPieceBytes / record_bytes_)});
+    records_.resize(static_cast<std::size_t>(records) * record_bytes_);
+    if (decode(records_) < records_.size()) {
+      fail_count(input_->name(), points_, "ends before");
+    }
+    left_ -= records;
+    std::byte more{};
+    if (left_ == 0 && decode({&more, 1}) > 0) fail_count(input_->name(), points_, "has more");
+    return {reinterpret_cast<const char*>(records_.data()), records_.size()};
+  }
+
+ private:
+  struct Free {
+    void operator()(ZSTD_DStream* stream) const { ZSTD_freeDStream(stream); }
+  };
+
+  /// How many of the bytes are there.
+  std::size_t decode(std::span<std::byte> room) {
+    constexpr std::size_t kWindowBytes = 128u << 10;
+    ZSTD_outBuffer out{.dst = room.data(), .size = room.size(), .pos = 0};
+    while (out.pos < out.size) {
+      const std::string_view window = input_->fill(kWindowBytes);
+      ZSTD_inBuffer in{.src = window.data(), .size = window.size(), .pos = 0};
+      const std::size_t before = out.pos;
+      const std::size_t result = ZSTD_decompressStream(stream_.get(), &out, &in);
+      if (ZSTD_isError(result) != 0) {
+        fail_ept(input_->name(), "byte " + std::to_string(input_->offset()),
+                 std::string("zstandard: ") + ZSTD_getErrorName(result));
+      }
+      input_->consume(in.pos);
+      if (in.pos == 0 && out.pos == before) {
+        if (result > 0 && !ended_) fail_ept(input_->name(), {}, "is cut off");
+        break;
+      }
+      ended_ = result == 0;
+    }
+    return out.pos;
+  }
+
+  Input* input_;
+  std::size_t record_bytes_;
+  std::uint64_t points_, left_;
+  std::unique_ptr<ZSTD_DStream, Free> stream_{ZSTD_createDStream()};
+  std::vector<std::byte> records_;
+  bool ended_ = true;  ///< a frame, and no other has begun
+};
+
+/// What all nodes share.
+struct EptNodes {
+  std::filesystem::path folder;
+  EptData data = EptData::binary;
+  std::size_t record_bytes = 0;
+  std::vector<OctreeNode> nodes;
+  LasHeader first;
+};
+
+class NodeReader final : public PartReader {
+ public:
+  explicit NodeReader(std::shared_ptr<const EptNodes> nodes) : nodes_(std::move(nodes)) {}
+
+  void start(std::size_t part) override {
+    const OctreeNode& node = nodes_->nodes[part];
+    const std::string file = ept_node_file(nodes_->folder, nodes_->data, node).string();
+    records_.reset();
+    input_.emplace(file);
+    switch (nodes_->data) {
+      case EptData::laszip:
+        open_laz(file, node);
+        break;
+      case EptData::binary:
+        check_size(node);
+        records_ = std::make_unique<PlainRecords>(*input_, nodes_->record_bytes);
+        break;
+      case EptData::zstandard:
+        records_ = std::make_unique<ZstdRecords>(*input_, nodes_->record_bytes, node.points);
+        break;
+    }
+  }
+
+  std::size_t read(std::span<std::byte> room) override {
+    const std::string_view rows = records_->read(room.size() / nodes_->record_bytes);
+    std::copy_n(reinterpret_cast<const std::byte*>(rows.data()), rows.size(), room.data());
+    return rows.size();
+  }
+
+ private:
+  void check_size(const OctreeNode& node) const {
+    const std::uint64_t bytes = input_->size().value_or(0), record = nodes_->record_bytes;
+    if (bytes % record != 0 || bytes / record != node.points) {
+      fail_count(input_->name(), node.points,
+                 "has " + std::to_string(bytes) + " bytes in records of " + std::to_string(record));
+    }
+  }
+
+  void open_laz(const std::string& file, const OctreeNode& node) {
+    std::vector<std::string> comments;
+    const LasHeader header = read_las_header(*input_, file, comments);
+    if (header.points != node.points) {
+      fail_count(file, node.points, "has " + std::to_string(header.points));
+    }
+    const LasHeader& first = nodes_->first;
+    if (header.point_format != first.point_format || header.record_bytes != first.record_bytes ||
+        header.scale != first.scale || header.offset != first.offset) {
+      fail_ept(file, "header", "its point format, scale or offset is not that of the other nodes");
+    }
+    if (header.compressed) {
+      records_ = open_laz_records(*input_, file, header, SourceOptions{});
+    } else {
+      records_ = std::make_unique<PlainRecords>(*input_, header.record_bytes);
+    }
+  }
+
+  std::shared_ptr<const EptNodes> nodes_;
+  std::optional<Input> input_;
+  std::unique_ptr<RecordReader> records_;
+};
+
+}  // namespace
+
+std::filesystem::path ept_node_file(const std::filesystem::path& folder, EptData data,
+                                    const OctreeNode& node) {
+  const char* const ending = data == EptData::laszip   ? ".laz"
+                             : data == EptData::binary ? ".bin"
+                                                       : ".zst";
+  return folder / "ept-data" / (name_of(node) + ending);
+}
+
+RecordParts ept_parts(const std::filesystem::path& folder, const EptMetadata& metadata,
+                      const LasHeader& first) {
+  RecordParts parts{.record_bytes = metadata.stream.record_bytes};
+  for (const OctreeNode& node : metadata.octree.nodes) {
+    // Coded points are held as one where LAZ codes them in layers.
+    const bool is_laz = metadata.data == EptData::laszip;
+    parts.parts.push_back(
+        {.points = node.points, .bytes = is_laz ? node.points * parts.record_bytes : 0});
+  }
+  const auto nodes = std::make_shared<const EptNodes>(
+      EptNodes{folder, metadata.data, metadata.stream.record_bytes, metadata.octree.nodes, first});
+  parts.make_reader = [nodes] { return std::make_unique<NodeReader>(nodes); };
+  return parts;
+}
+
+}  // namespace terrace::stream

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+
+#include "format/ept/metadata.hpp"
+#include "format/las/header.hpp"
+#include "format/record_parts.hpp"
+
+namespace terrace::stream {
+
+/// The file of a node's points.
+std::filesystem::path ept_node_file(const std::filesystem::path& folder, EptData data,
+                                    const OctreeNode& node);
+
+/// The nodes of `metadata.octree`, in its order. first: the header of a node of LAZ, with which all
+/// others must agree. A reader holds a window of the node's file and what its decoder needs; it
+/// refuses a file that does not have exactly the points that the hierarchy counts.
+RecordParts ept_parts(const std::filesystem::path& folder, const EptMetadata& metadata,
+                      const LasHeader& first);
+
+}  // namespace terrace::stream

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "format/chain.hpp"
+#include "format/ept/hierarchy.hpp"
+#include "format/ept/metadata.hpp"
+#include "format/ept/nodes.hpp"
+#include "format/formats.hpp"
+#include "format/las/header.hpp"
+#include "format/las/stream.hpp"
+#include "format/record_parts.hpp"
+#include "format/record_source.hpp"
+#include "terrace/stream/input.hpp"
+
+namespace terrace::stream {
+namespace {
+
+/// Takes the records from the header of the node, and the CRS where ept.json has none.
+LasHeader read_node_header(const std::filesystem::path& file, EptMetadata& metadata) {
+  Input input(file.string());
+  std::vector<std::string> comments;
+  LasHeader header = read_las_header(input, file.string(), comments);
+  const std::uint64_t points = metadata.points;
+  metadata.stream = las_stream(header, file.string(), std::move(comments));
+  metadata.stream.points = points;
+  if (metadata.crs == Crs{}) {
+    metadata.crs = las_crs(header, file.string(), metadata.stream.info.comments);
+  }
+  return header;
+}
+
+std::unique_ptr<PointSource> open_one_ept(const std::string& file, const SourceOptions& options,
+                                          const SourceInfo* first) {
+  assert(options.block_points > 0);
+  const std::filesystem::path folder = std::filesystem::path(file).parent_path();
+  EptMetadata metadata = read_ept_metadata(file);
+  Octree& octree = metadata.octree;
+  octree.nodes = read_ept_hierarchy(folder, metadata.points);
+  if (const OctreeNode* const twice = octree.arrange()) {
+    fail_ept((folder / "ept-hierarchy").string(), "node " + name_of(*twice), "is there twice");
+  }
+  LasHeader header;
+  if (metadata.data == EptData::laszip && !octree.nodes.empty()) {
+    header = read_node_header(ept_node_file(folder, metadata.data, octree.nodes.front()), metadata);
+  }
+  RecordStream& stream = metadata.stream;
+  SourceInfo& info = stream.info;
+  info.format = "ept";
+  info.files = {file};
+  info.crs = options.crs ? *options.crs : metadata.crs;
+  // Points may be rounded across the sides of their node.
+  const Point3 step{std::abs(info.world.xy[0]), std::abs(info.world.xy[4]),
+                    std::abs(info.coordinates[2].scale)};
+  octree.keep(options.selection.region, options.selection.resolution, step);
+  info.points = octree.points();
+  info.octree = octree.info();
+  RecordParts parts = ept_parts(folder, metadata, header);
+  stream.records = parts_ahead(parts, options);
+  if (!stream.records) stream.records = parts_in_turn(std::move(parts));
+  if (first != nullptr) move_onto(*first, stream);
+  return source_of_records(std::move(stream), options.block_points);
+}
+
+std::unique_ptr<PointSource> open_ept(std::span<const std::string> files,
+                                      const SourceOptions& options) {
+  return open_in_turn(files, options, &open_one_ept);
+}
+
+/// An object that has what no other JSON has, near its beginning as its names are in order.
+bool recognise_ept(std::span<const std::byte> head) {
+  std::string_view text(reinterpret_cast<const char*>(head.data()), head.size());
+  text.remove_prefix(std::min(text.find_first_not_of(" \t\r\n"), text.size()));
+  return text.starts_with('{') && (text.find("\"boundsConforming\"") != text.npos ||
+                                   text.find("\"hierarchyType\"") != text.npos);
+}
+
+}  // namespace
+
+const Format& ept_format() {
+  static const Format format{.name = "ept",
+                             .endings = {},
+                             .streams = false,
+                             .recognise = &recognise_ept,
+                             .open = &open_ept};
+  return format;
+}
+
+}  // namespace terrace::stream

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <exception>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <thread>
+#include <vector>
+
+#include "terrace/stream/laz.hpp"
+
+namespace terrace::stream {
+
+/// Encodes chunks of LAZ on several threads and hands them on in the order in which they came, on
+/// the caller's. Holds a chunk per thread and one more, their records and coded bytes.
+class LazEncoders {
+ public:
+  using Write = std::function<void(std::span<const std::byte> coded)>;
+
+  LazEncoders(const laz::Vlr& vlr, unsigned threads, Write write);
+  ~LazEncoders();
+  LazEncoders(const LazEncoders&) = delete;
+  LazEncoders& operator=(const LazEncoders&) = delete;
+
+  /// Takes the records of a chunk. Throws: what `write` throws, also for chunks before.
+  void encode(std::span<const std::byte> records);
+  /// Hands on what is left.
+  void finish();
+
+ private:
+  struct Job {
+    std::vector<std::byte> records{}, coded{};
+    std::exception_ptr error{};
+    bool done = false;
+  };
+
+  void start();
+  void run();
+  /// Waits for the oldest job and hands its chunk on.
+  void hand_on();
+
+  laz::Vlr vlr_;
+  unsigned wanted_threads_;
+  Write write_;
+  bool started_ = false;
+  std::unique_ptr<laz::Encoder> own_;  ///< without threads
+  std::vector<std::byte> coded_;       ///< by it
+  std::vector<std::unique_ptr<Job>> free_;
+
+  std::mutex mutex_;
+  std::condition_variable work_, news_;
+  std::deque<std::unique_ptr<Job>> jobs_;  ///< the oldest first
+  std::size_t next_ = 0;                   ///< of the jobs that nobody has begun
+  bool stop_ = false;
+  std::vector<std::thread> threads_;
+};
+
+}  // namespace terrace::stream

@@ -1,0 +1,253 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "format/las/record_encoder.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <type_traits>
+#include <utility>
+
+#include "format/las/header.hpp"
+#include "format/las/lattice.hpp"
+#include "io/bytes.hpp"
+#include "io/number.hpp"
+#include "terrace/stream/error.hpp"
+#include "with_type.hpp"
+
+namespace terrace::stream {
+namespace {
+
+std::string text_of(double value) {
+  std::string text;
+  append_number(text, value);
+  return text;
+}
+
+void append_text_field(std::string& out, std::string_view text, std::size_t bytes) {
+  out.append(text.substr(0, bytes));
+  out.append(bytes - std::min(bytes, text.size()), '\0');
+}
+
+}  // namespace
+
+LasRecords::LasRecords(const std::string& path, const PointHeader& header, LasFormats formats)
+    : path_(path),
+      attributes_(header.attributes),
+      layout_(las_layout(header.attributes, path, formats)),
+      lattice_(header.lattice),
+      bounds_(header.bounds) {
+  for (const Channel& channel : attributes_) payload_bytes_ += size_of(channel.type);
+  if (lattice_) {
+    // Columns of a raster may count against the axis; files with such steps are unusual.
+    for (double& step : lattice_->scale) step = std::abs(step);
+  }
+}
+
+std::string_view LasRecords::pack(const PointBlock& block) {
+  assert(block.payload.size() == block.size() * payload_bytes_);
+  if (!lattice_) lattice_ = decimal_lattice(block.positions, bounds_);
+  records_.assign(block.size() * layout_.record_bytes, '\0');
+  for (std::size_t axis = 0; axis < 3; ++axis) put_coordinate(block, axis);
+  bool has_return = false, has_returns = false;
+  const std::byte* from = block.payload.data();
+  for (std::size_t i = 0; i < attributes_.size(); ++i) {
+    put_attribute(from, block.size(), attributes_[i], layout_.fields[i]);
+    has_return = has_return || layout_.fields[i].channel.name == "return_number";
+    has_returns = has_returns || layout_.fields[i].channel.name == "number_of_returns";
+    from += size_of(attributes_[i].type);
+  }
+  if (!has_return && !has_returns) set_single_returns();
+  count_returns();
+  points_ += block.size();
+  return records_;
+}
+
+void LasRecords::fail(std::string where, std::string cause, std::string remedy) const {
+  throw Error({.file = path_,
+               .where = std::move(where),
+               .cause = std::move(cause),
+               .remedy = std::move(remedy)});
+}
+
+void LasRecords::put_coordinate(const PointBlock& block, std::size_t axis) {
+  const double scale = lattice_->scale[axis], offset = lattice_->offset[axis];
+  constexpr double kLeast = std::numeric_limits<std::int32_t>::min(),
+                   kMost = std::numeric_limits<std::int32_t>::max();
+  char* to = records_.data() + 4 * axis;
+  for (std::size_t i = 0; i < block.size(); ++i, to += layout_.record_bytes) {
+    const double value = block.positions[i][axis];
+    const double step = std::nearbyint((value - offset) / scale);
+    if (!(step >= kLeast && step <= kMost)) {
+      fail("point " + std::to_string(points_ + i),
+           std::string("its ") + "xyz"[axis] + " is out of reach for 32 bits in steps of " +
+               text_of(scale),
+           "write PLY, or fewer points at a time");
+    }
+    const auto stored = static_cast<std::int32_t>(step);
+    std::memcpy(to, &stored, sizeof stored);
+    const double read = step * scale + offset;
+    const double moved = std::abs(read - value);
+    if (moved > 0x1p-50 * (std::abs(value) + std::abs(offset))) {
+      rounding_ = std::max(rounding_, moved);
+    }
+    least_[axis] = std::min(least_[axis], stored);
+    most_[axis] = std::max(most_[axis], stored);
+  }
+}
+
+void LasRecords::put_attribute(const std::byte* from, std::size_t count, const Channel& channel,
+                               const LasField& field) {
+  char* const to = records_.data() + field.offset;
+  const bool same = channel.type == field.channel.type && channel.scale == field.channel.scale &&
+                    channel.offset == field.channel.offset;
+  if (same && field.bits == 0) {
+    with_type(channel.type, [&](auto value) {
+      for (std::size_t i = 0; i < count; ++i) {
+        std::memcpy(&value, from + i * payload_bytes_, sizeof value);
+        std::memcpy(to + i * layout_.record_bytes, &value, sizeof value);
+      }
+    });
+    return;
+  }
+  with_type(field.channel.type, [&](auto value) {
+    using Value = decltype(value);
+    for (std::size_t i = 0; i < count; ++i) {
+      value = converted<Value>(from + i * payload_bytes_, channel, field, points_ + i);
+      char* const at = to + i * layout_.record_bytes;
+      if (field.bits == 0) {
+        std::memcpy(at, &value, sizeof value);
+      } else {
+        *at = static_cast<char>(static_cast<unsigned char>(*at) |
+                                (static_cast<unsigned>(value) << field.shift));
+      }
+    }
+  });
+}
+
+/// A value of another type as the field has it.
+template <class Value>
+Value LasRecords::converted(const std::byte* from, const Channel& channel, const LasField& field,
+                            std::uint64_t point) const {
+  const double real = to_double(channel.type, from) * channel.scale + channel.offset;
+  if constexpr (std::is_floating_point_v<Value>) {
+    return static_cast<Value>(real);
+  } else {
+    const double step = (real - field.channel.offset) / field.channel.scale;
+    const double whole = std::nearbyint(step);
+    // A rank stands for all angles that round to it.
+    const double exact = channel.name == "scan_angle_rank" ? 0.5 : 1e-6;
+    const double most = field.bits == 0 ? static_cast<double>(std::numeric_limits<Value>::max())
+                                        : static_cast<double>((1U << field.bits) - 1);
+    if (!(whole >= static_cast<double>(std::numeric_limits<Value>::min()) && whole <= most &&
+          std::abs(step - whole) <= exact)) {
+      fail("point " + std::to_string(point),
+           text_of(real) + " is no value that the field " + field.channel.name + " of LAS can have",
+           "rename the column: it becomes extra bytes then");
+    }
+    return static_cast<Value>(whole);
+  }
+}
+
+/// What says nothing of returns is the only one.
+void LasRecords::set_single_returns() {
+  for (std::size_t at = 14; at < records_.size(); at += layout_.record_bytes) {
+    records_[at] = legacy() ? '\x09' : '\x11';
+  }
+}
+
+void LasRecords::count_returns() {
+  const unsigned mask = legacy() ? 7U : 15U;
+  for (std::size_t at = 14; at < records_.size(); at += layout_.record_bytes) {
+    const unsigned number = static_cast<unsigned char>(records_[at]) & mask;
+    if (number > 0) ++returns_[number - 1];
+  }
+}
+
+std::string las_header_text(const LasRecords& records, const LasFile& file) {
+  bool adjusted_time = false;
+  for (const Channel& channel : records.attributes()) {
+    adjusted_time =
+        adjusted_time || (channel.name == "gps_time" && channel.unit == kAdjustedGpsTime);
+  }
+  const Lattice lattice = records.lattice();
+  std::string out = "LASF";
+  append_little_endian(out, std::uint16_t{0});
+  append_little_endian(out,
+                       static_cast<std::uint16_t>((adjusted_time ? 1U : 0U) |
+                                                  (file.has_wkt || !records.legacy() ? 16U : 0U)));
+  append_text_field(out, {}, 16);  // GUID
+  out += "\x01\x04";
+  append_text_field(out, "EXTRACTION", 32);
+  append_text_field(out, "terrace", 32);
+  append_text_field(out, {}, 4);  // the day, which would make files differ
+  append_little_endian(out, static_cast<std::uint16_t>(kLas14HeaderBytes));
+  append_little_endian(out, static_cast<std::uint32_t>(file.points_offset));
+  append_little_endian(out, file.vlrs);
+  out += static_cast<char>(records.layout().point_format | (file.compressed ? 0x80U : 0U));
+  append_little_endian(out, static_cast<std::uint16_t>(records.layout().record_bytes));
+  // Programs older than LAS 1.4 read these of the old point formats.
+  const bool old =
+      records.legacy() && records.points() <= std::numeric_limits<std::uint32_t>::max();
+  append_little_endian(out, static_cast<std::uint32_t>(old ? records.points() : 0));
+  for (std::size_t i = 0; i < 5; ++i) {
+    append_little_endian(out, static_cast<std::uint32_t>(old ? records.returns()[i] : 0));
+  }
+  for (const double scale : lattice.scale) append_little_endian(out, scale);
+  for (const double offset : lattice.offset) append_little_endian(out, offset);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (const std::int32_t bound : {records.most()[axis], records.least()[axis]}) {
+      append_little_endian(
+          out, records.points() == 0 ? 0.0 : bound * lattice.scale[axis] + lattice.offset[axis]);
+    }
+  }
+  append_little_endian(out, std::uint64_t{0});  // waveforms
+  append_little_endian(out, file.evlr_offset);
+  append_little_endian(out, file.evlrs);
+  append_little_endian(out, records.points());
+  for (const std::uint64_t count : records.returns()) append_little_endian(out, count);
+  assert(out.size() == kLas14HeaderBytes);
+  return out;
+}
+
+void append_vlr(std::string& out, std::string_view user, std::uint16_t id, std::string_view data) {
+  append_little_endian(out, std::uint16_t{0});
+  append_text_field(out, user, 16);
+  append_little_endian(out, id);
+  append_little_endian(out, static_cast<std::uint16_t>(data.size()));
+  append_text_field(out, {}, 32);
+  out.append(data);
+}
+
+std::string evlr_head(std::string_view user, std::uint16_t id, std::uint64_t bytes) {
+  std::string out;
+  append_little_endian(out, std::uint16_t{0});
+  append_text_field(out, user, 16);
+  append_little_endian(out, id);
+  append_little_endian(out, bytes);
+  append_text_field(out, {}, 32);
+  return out;
+}
+
+void append_vlrs(std::string& out, const Crs& crs, const LasLayout& layout, const std::string& path,
+                 LasFile& file) {
+  if (!crs.wkt.empty()) {
+    const std::string wkt = crs.wkt + '\0';
+    if (wkt.size() > std::numeric_limits<std::uint16_t>::max()) {
+      throw Error({.file = path,
+                   .where = {},
+                   .cause = "the WKT of its coordinate reference system is too long for LAS",
+                   .remedy = "write PLY"});
+    }
+    append_vlr(out, kLasProjection, kLasWkt, wkt);
+    ++file.vlrs;
+    file.has_wkt = true;
+  }
+  if (!layout.extra_bytes.empty()) {
+    append_vlr(out, kLasSpec, kLasExtraBytes, layout.extra_bytes);
+    ++file.vlrs;
+  }
+}
+
+}  // namespace terrace::stream

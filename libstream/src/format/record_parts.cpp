@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "format/record_parts.hpp"
+
+#include <algorithm>
+#include <condition_variable>
+#include <exception>
+#include <mutex>
+#include <string_view>
+#include <system_error>
+#include <thread>
+#include <utility>
+
+namespace terrace::stream {
+namespace {
+
+class PartsInTurn final : public RecordReader {
+ public:
+  explicit PartsInTurn(RecordParts parts)
+      : parts_(std::move(parts)),
+        reader_(parts_.make_reader()),
+        records_(std::max<std::size_t>(1, kPieceBytes / parts_.record_bytes) *
+                 parts_.record_bytes) {}
+
+  std::string_view read(std::uint64_t wanted) override {
+    if (left_ == 0) {
+      reader_->start(number_);
+      left_ = parts_.parts[number_].points;
+    }
+    const auto records = static_cast<std::size_t>(
+        std::min<std::uint64_t>({wanted, left_, records_.size() / parts_.record_bytes}));
+    const std::size_t bytes =
+        reader_->read(std::span(records_).first(records * parts_.record_bytes));
+    left_ -= bytes / parts_.record_bytes;
+    if (left_ == 0) ++number_;
+    return {reinterpret_cast<const char*>(records_.data()), bytes};
+  }
+
+  std::uint64_t held_bytes() const override {
+    std::uint64_t largest = 0;
+    for (const RecordPart& part : parts_.parts) largest = std::max(largest, part.bytes);
+    return largest;
+  }
+
+ private:
+  static constexpr std::size_t kPieceBytes = 64u << 10;
+
+  RecordParts parts_;
+  std::unique_ptr<PartReader> reader_;
+  std::vector<std::byte> records_;
+  std::size_t number_ = 0;  ///< of the part
+  std::uint64_t left_ = 0;  ///< points of it
+};
+
+class PartsAhead final : public RecordReader {
+ public:
+  /// Takes `slots` times a part's bytes and records, and a reader per thread.
+  PartsAhead(RecordParts parts, unsigned threads, std::size_t slots)
+      : parts_(std::move(parts)), wanted_threads_(threads), slots_(slots) {}
+  ~PartsAhead() override {
+    {
+      const std::lock_guard lock(mutex_);
+      stop_ = true;
+    }
+    room_.notify_all();
+    for (std::thread& thread : threads_) thread.join();
+  }
+  PartsAhead(const PartsAhead&) = delete;
+  PartsAhead& operator=(const PartsAhead&) = delete;
+
+  std::string_view read(std::uint64_t wanted) override {
+    if (!started_) start();
+    Slot* slot = &slots_[reading_ % slots_.size()];
+    if (at_ == slot->records.size() && at_ > 0) {
+      release(*slot);
+      slot = &slots_[reading_ % slots_.size()];
+    }
+    if (at_ == 0) wait_for(*slot);
+    const std::size_t bytes = static_cast<std::size_t>(
+        std::min<std::uint64_t>(wanted, (slot->records.size() - at_) / parts_.record_bytes) *
+        parts_.record_bytes);
+    const std::string_view found(reinterpret_cast<const char*>(slot->records.data()) + at_, bytes);
+    at_ += bytes;
+    return found;
+  }
+
+ private:
+  struct Slot {
+    std::vector<std::byte> records;
+    std::exception_ptr error;
+    bool ready = false;
+  };
+
+  /// Only when records are asked for: files are opened to be looked at, too.
+  void start() {
+    started_ = true;
+    try {
+      for (unsigned i = 0; i < wanted_threads_; ++i) threads_.emplace_back([this] { run(); });
+    } catch (const std::system_error&) {
+      // The system grants no more threads; without any the caller reads.
+      if (threads_.empty()) own_ = parts_.make_reader();
+    }
+  }
+
+  void release(Slot& slot) {
+    {
+      const std::lock_guard lock(mutex_);
+      slot.ready = false;
+      ++reading_;
+    }
+    at_ = 0;
+    room_.notify_all();
+  }
+
+  void wait_for(Slot& slot) {
+    if (own_) {
+      read_part(reading_, slot, *own_);
+    } else {
+      std::unique_lock lock(mutex_);
+      news_.wait(lock, [&slot] { return slot.ready; });
+    }
+    if (slot.error) std::rethrow_exception(slot.error);
+  }
+
+  void run() {
+    std::unique_ptr<PartReader> reader;
+    for (;;) {
+      std::size_t part = 0;
+      {
+        std::unique_lock lock(mutex_);
+        room_.wait(lock, [this] {
+          return stop_ || (next_ < parts_.parts.size() && next_ < reading_ + slots_.size());
+        });
+        if (stop_) return;
+        part = next_++;
+      }
+      Slot& slot = slots_[part % slots_.size()];
+      try {
+        if (!reader) reader = parts_.make_reader();
+        read_part(part, slot, *reader);
+      } catch (...) {
+        slot.error = std::current_exception();
+      }
+      {
+        const std::lock_guard lock(mutex_);
+        slot.ready = true;
+      }
+      news_.notify_one();
+    }
+  }
+
+  void read_part(std::size_t number, Slot& slot, PartReader& reader) const {
+    slot.records.resize(parts_.parts[number].points * parts_.record_bytes);
+    reader.start(number);
+    for (std::size_t done = 0; done < slot.records.size();) {
+      done += reader.read(std::span(slot.records).subspan(done));
+    }
+  }
+
+  RecordParts parts_;
+  unsigned wanted_threads_;
+  bool started_ = false;
+  std::vector<Slot> slots_;
+  std::unique_ptr<PartReader> own_;  ///< without threads
+  std::size_t at_ = 0;               ///< bytes of the part being read
+
+  std::mutex mutex_;
+  std::condition_variable news_, room_;
+  std::size_t reading_ = 0, next_ = 0;  ///< parts
+  bool stop_ = false;
+  std::vector<std::thread> threads_;
+};
+
+/// How many parts may be in memory at once.
+std::size_t slots_within(std::uint64_t memory_bytes, const RecordParts& parts, unsigned threads) {
+  constexpr std::uint64_t kReaderBytes = 4u << 20, kMostBytes = 64u << 20;
+  memory_bytes = std::min(memory_bytes, kMostBytes);
+  std::uint64_t largest = 1;
+  for (const RecordPart& part : parts.parts) {
+    if (part.points > kMostBytes / parts.record_bytes) return 0;
+    largest = std::max(largest, part.bytes + part.points * parts.record_bytes);
+  }
+  const std::uint64_t room = memory_bytes / (largest + kReaderBytes);
+  return static_cast<std::size_t>(std::min<std::uint64_t>(room, threads + 2));
+}
+
+}  // namespace
+
+std::unique_ptr<RecordReader> parts_ahead(const RecordParts& parts, const SourceOptions& options) {
+  const std::size_t slots = slots_within(options.memory_bytes, parts, options.threads);
+  if (options.threads <= 1 || slots <= 1 || parts.parts.size() <= 1) return nullptr;
+  const auto threads =
+      static_cast<unsigned>(std::min<std::size_t>({options.threads, slots, parts.parts.size()}));
+  return std::make_unique<PartsAhead>(parts, threads, slots);
+}
+
+std::unique_ptr<RecordReader> parts_in_turn(RecordParts parts) {
+  return std::make_unique<PartsInTurn>(std::move(parts));
+}
+
+}  // namespace terrace::stream

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "format/las/record_reader.hpp"
+#include "terrace/stream/source.hpp"
+
+/// Point records in parts, of which each can be read by itself: chunks of LAZ, nodes of an octree.
+
+namespace terrace::stream {
+
+/// Reads parts, one at a time. Each thread takes its own.
+class PartReader {
+ public:
+  virtual ~PartReader() = default;
+  /// Goes to the first record of a part. Throws: Error.
+  virtual void start(std::size_t part) = 0;
+  /// Reads records of the part to the beginning of `room`: as many as it has room for or fewer, one
+  /// at least. Returns their bytes. Asked only for records that RecordParts promises.
+  /// Throws: Error if they are not there, and with the last one unless the part ends there.
+  virtual std::size_t read(std::span<std::byte> room) = 0;
+};
+
+struct RecordPart {
+  std::uint64_t points = 0;
+  std::uint64_t bytes = 0;  ///< in the file
+};
+
+struct RecordParts {
+  std::size_t record_bytes = 0;
+  std::vector<RecordPart> parts{};
+  /// Called by several threads at once, but only while the RecordReader lives.
+  std::function<std::unique_ptr<PartReader>()> make_reader{};
+};
+
+/// The records of the parts, in their order, read by up to options.threads threads, a few parts
+/// ahead of the one that is asked for and within options.memory_bytes. Null if there is nothing to
+/// gain from several threads or no memory for them.
+std::unique_ptr<RecordReader> parts_ahead(const RecordParts& parts, const SourceOptions& options);
+/// The same by the caller's thread, in small pieces: however many points a part has, its records
+/// are not held at once.
+std::unique_ptr<RecordReader> parts_in_turn(RecordParts parts);
+
+}  // namespace terrace::stream

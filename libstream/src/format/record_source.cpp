@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "format/record_source.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <string_view>
+#include <utility>
+
+#include "format/packed_column.hpp"
+#include "terrace/stream/error.hpp"
+
+namespace terrace::stream {
+namespace {
+
+bool is_wide_integer(ScalarType type) { return type == ScalarType::i64 || type == ScalarType::u64; }
+
+class RecordSource final : public PointSource {
+ public:
+  RecordSource(RecordStream stream, std::size_t block_points)
+      : stream_(std::move(stream)),
+        block_points_(block_points),
+        payload_bytes_(stream_.info.payload_size()),
+        wanted_points_(*stream_.info.points) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      ScalarType& type = stream_.info.coordinates[axis].type;
+      types_[axis] = type;
+      checked_ = checked_ || size_of(type) == 8 || type == ScalarType::f32;
+      // Coordinates are doubles in memory; what these cannot hold is refused.
+      if (is_wide_integer(type)) type = ScalarType::f64;
+    }
+    for (std::size_t i = 0; i < stream_.fields.size(); ++i) {
+      const Channel& channel = stream_.fields[i].channel;
+      if (channel.name == "withheld" && channel.type == ScalarType::u8) withheld_attribute_ = i;
+    }
+  }
+
+  const SourceInfo& info() const override { return stream_.info; }
+
+  bool next(PointBlock& block) override {
+    const auto wanted = static_cast<std::size_t>(
+        std::min<std::uint64_t>(block_points_, wanted_points_ - delivered_));
+    block.positions.resize(wanted);
+    block.payload.resize(wanted * payload_bytes_);
+    for (std::size_t done = 0; done < wanted;) done += unpack(block, done, wanted - done);
+    if (withheld_attribute_) count_withheld(block);
+    if (checked_) check(block);
+    if (stream_.moved) move(block);
+    delivered_ += wanted;
+    return wanted > 0;
+  }
+
+  Progress progress() const override {
+    return {.points = delivered_,
+            .nodata = 0,
+            .withheld = withheld_,
+            .excluded = stream_.points - wanted_points_,
+            .fraction = wanted_points_ == 0 ? 1.0
+                                            : static_cast<double>(delivered_) /
+                                                  static_cast<double>(wanted_points_)};
+  }
+
+  std::uint64_t reading_bytes() const override { return stream_.records->held_bytes(); }
+
+ private:
+  [[noreturn]] void fail(std::size_t point, std::string cause, std::string remedy) const {
+    throw Error({.file = stream_.input ? stream_.input->name() : stream_.info.files.front(),
+                 .where = "point " + std::to_string(delivered_ + point),
+                 .cause = std::move(cause),
+                 .remedy = std::move(remedy)});
+  }
+
+  /// Unpacks some of the next `wanted` records to the points from `done` on; returns how many.
+  std::size_t unpack(PointBlock& block, std::size_t done, std::size_t wanted) {
+    const std::string_view rows = stream_.records->read(wanted);
+    const std::size_t stride = stream_.record_bytes, count = rows.size() / stride;
+    PackedColumn column{.rows = nullptr,
+                        .stride = stride,
+                        .count = count,
+                        .type = ScalarType::i32,
+                        .swap = std::endian::native == std::endian::big};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      column.rows = rows.data() + stream_.coordinate_offsets[axis];
+      column.type = types_[axis];
+      decode_coordinate(column, block.positions.data() + done, axis);
+    }
+    std::byte* to = block.payload.data() + done * payload_bytes_;
+    for (const LasField& field : stream_.fields) {
+      column.rows = rows.data() + field.offset;
+      column.type = field.channel.type;
+      if (field.bits == 0) {
+        decode_values(column, to, payload_bytes_);
+      } else {
+        decode_bits(column, field, to);
+      }
+      to += size_of(field.channel.type);
+    }
+    return count;
+  }
+
+  void decode_bits(const PackedColumn& column, const LasField& field, std::byte* to) const {
+    const unsigned mask = (1U << field.bits) - 1;
+    const char* at = column.rows;
+    for (std::size_t i = 0; i < column.count; ++i, at += column.stride, to += payload_bytes_) {
+      *to = static_cast<std::byte>((static_cast<unsigned char>(*at) >> field.shift) & mask);
+    }
+  }
+
+  void count_withheld(const PointBlock& block) {
+    const auto marks = stream_.info.view<std::uint8_t>(block.payload, *withheld_attribute_);
+    for (std::size_t i = 0; i < marks.size(); ++i) withheld_ += marks[i] != 0 ? 1 : 0;
+  }
+
+  void check(const PointBlock& block) const {
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const double value = block.positions[i][axis];
+        const double most =
+            is_wide_integer(types_[axis]) ? 0x1p53 : std::numeric_limits<double>::max();
+        if (!(std::abs(value) <= most)) {
+          fail(i, std::string("its ") + "xyz"[axis] + " is not a number that can be kept exactly",
+               "the file is damaged: get it anew");
+        }
+      }
+    }
+  }
+
+  void move(PointBlock& block) const {
+    constexpr double kLeast = std::numeric_limits<std::int32_t>::min(),
+                     kMost = std::numeric_limits<std::int32_t>::max();
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        double& value = block.positions[i][axis];
+        value += stream_.shift[axis];
+        if (value < kLeast || value > kMost) {
+          fail(i, "is out of reach for the scale and offset of the first file",
+               "name a file in the middle of all first, or read them on their own");
+        }
+      }
+    }
+  }
+
+  RecordStream stream_;
+  std::size_t block_points_, payload_bytes_;
+  std::array<ScalarType, 3> types_{};  ///< of the coordinates in the records
+  bool checked_ = false;               ///< coordinates could be out of reach
+  std::optional<std::size_t> withheld_attribute_;
+  std::uint64_t wanted_points_ = 0, delivered_ = 0, withheld_ = 0;
+};
+
+}  // namespace
+
+void move_onto(const SourceInfo& first, RecordStream& stream) {
+  const auto refuse = [&](std::string cause, std::string remedy) {
+    throw Error({.file = stream.info.files.front(),
+                 .where = {},
+                 .cause = std::move(cause),
+                 .remedy = std::move(remedy)});
+  };
+  if (first.world == stream.info.world && first.coordinates == stream.info.coordinates) return;
+  const std::optional<Lattice> to = lattice_of(first), from = lattice_of(stream.info);
+  const auto fits = [](const Channel& channel) { return channel.type == ScalarType::i32; };
+  const auto& a = first.coordinates;
+  const auto& b = stream.info.coordinates;
+  if (!to || !from || !std::all_of(a.begin(), a.end(), fits) ||
+      !std::all_of(b.begin(), b.end(), fits)) {
+    refuse("its coordinates are stored in another way than those of " + first.files.front(),
+           "convert one of them, or read them on their own");
+  }
+  // Offsets are doubles, which resolve a millimetre of projected coordinates to a millionth.
+  constexpr double kSameStep = 1e-4;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double steps = (from->offset[axis] - to->offset[axis]) / to->scale[axis];
+    stream.shift[axis] = std::round(steps);
+    if (to->scale[axis] != from->scale[axis] ||
+        !(std::abs(steps - stream.shift[axis]) <= kSameStep)) {
+      refuse(std::string("its ") + "xyz"[axis] + " lies on another lattice than that of " +
+                 first.files.front() + ": its scale or the fraction of its offset differs",
+             "write it anew with that scale and offset, e.g. with las2las -rescale -reoffset");
+    }
+  }
+  stream.moved = true;
+  stream.info.world = first.world;
+  stream.info.coordinates = first.coordinates;
+}
+
+std::unique_ptr<PointSource> source_of_records(RecordStream stream, std::size_t block_points) {
+  return std::make_unique<RecordSource>(std::move(stream), block_points);
+}
+
+}  // namespace terrace::stream
