@@ -27,7 +27,7 @@ namespace {
 namespace fs = std::filesystem;
 using Place = std::array<std::int32_t, 3>;
 
-constexpr std::int32_t kSide = 1 << 16;
+constexpr std::int32_t kCubeSide = 1 << 16;
 
 /// A node and its points, as they were written.
 struct BuiltNode {
@@ -39,7 +39,7 @@ struct BuiltNode {
   }
 };
 
-/// The octree of places in a cube of kSide steps from 0.
+/// The octree of places in a cube of kCubeSide steps from 0.
 std::vector<BuiltNode> built(const std::vector<Place>& places, std::size_t at_once) {
   constexpr std::size_t kRecord = 16;
   OctreeBuilder builder("made", {}, kRecord, at_once);
@@ -48,7 +48,7 @@ std::vector<BuiltNode> built(const std::vector<Place>& places, std::size_t at_on
     append_values(records, places[i][0], places[i][1], places[i][2], static_cast<std::uint32_t>(i));
   }
   builder.add(records);
-  const double half = kSide / 2.0;
+  const double half = kCubeSide / 2.0;
   const Octree octree{.centre = {half, half, half}, .half_size = half, .spacing = 1, .nodes = {}};
   std::vector<BuiltNode> nodes;
   builder.build(octree, Lattice{}, [&](const OctreeNode& node, std::span<const std::byte> bytes) {
@@ -64,8 +64,8 @@ std::vector<BuiltNode> built(const std::vector<Place>& places, std::size_t at_on
 }
 
 Place cell_of(const Place& place, unsigned depth, unsigned bits) {
-  // Cells of that depth: kSide / (2^depth * 2^bits) steps along a side.
-  const double cells = std::ldexp(1.0, static_cast<int>(depth + bits)) / kSide;
+  // Cells of that depth: kCubeSide / (2^depth * 2^bits) steps along a side.
+  const double cells = std::ldexp(1.0, static_cast<int>(depth + bits)) / kCubeSide;
   Place cell{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     cell[axis] = static_cast<std::int32_t>(place[axis] * cells);
@@ -138,8 +138,9 @@ TEST(OctreeBuilder, SurfacesAreEvenAtEachDepth) {
     // Denser in one corner.
     const double x = std::pow(part(random), 2), y = part(random);
     const double z = 0.5 + 0.1 * std::sin(7 * x) * std::cos(5 * y);
-    places.push_back({static_cast<std::int32_t>(x * kSide), static_cast<std::int32_t>(y * kSide),
-                      static_cast<std::int32_t>(z * kSide)});
+    places.push_back({static_cast<std::int32_t>(x * kCubeSide),
+                      static_cast<std::int32_t>(y * kCubeSide),
+                      static_cast<std::int32_t>(z * kCubeSide)});
   }
   const std::vector<BuiltNode> nodes = expect_octree(places);
   EXPECT_GT(nodes.size(), 10u);
@@ -149,7 +150,7 @@ TEST(OctreeBuilder, SurfacesAreEvenAtEachDepth) {
 
 TEST(OctreeBuilder, FewPointsAreOneNode) {
   EXPECT_TRUE(built({}, 1).empty());
-  const std::vector<BuiltNode> nodes = expect_octree({{0, 0, 0}, {0, 0, 0}, {kSide - 1, 5, 7}});
+  const std::vector<BuiltNode> nodes = expect_octree({{0, 0, 0}, {0, 0, 0}, {kCubeSide - 1, 5, 7}});
   ASSERT_EQ(nodes.size(), 1u);
   EXPECT_EQ(nodes[0].points.size(), 3u);
 }
@@ -174,7 +175,7 @@ TEST(OctreeBuilder, NodesOfCloudsThatFillSpaceAreBounded) {
   for (int i = 0; i < 400'000; ++i) {
     Place& place = places.emplace_back();
     for (std::int32_t& coordinate : place) {
-      coordinate = static_cast<std::int32_t>(random() % kSide);
+      coordinate = static_cast<std::int32_t>(random() % kCubeSide);
     }
   }
   const std::vector<BuiltNode> nodes = built(places, std::size_t{1} << 19);

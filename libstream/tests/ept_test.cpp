@@ -110,6 +110,16 @@ TEST(Ept, ReadsWhatItsSchemaSays) {
   expect_coarser_parts(file);
 }
 
+// The intensity comes first, and is the number of points of the node.
+TEST(Ept, RecordsThatBeginLikeGzipAreRecords) {
+  const TempFolder folder;
+  EptParts parts;
+  const std::size_t count = 0x8b1f;
+  parts.add("0-0-0-0.bin", std::vector<std::array<std::int32_t, 3>>(count, {1, 2, 3}));
+  parts.hierarchy["0-0-0-0"] = R"({"0-0-0-0": )" + std::to_string(count) + "}";
+  EXPECT_EQ(read_file(parts.write(folder.path())).points.size(), count);
+}
+
 TEST(Ept, AFolderWithEptJsonIsOneInput) {
   const TempFolder folder;
   const std::string inside = small_parts().write(folder.path() / "all" / "scan");

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <stop_token>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -104,7 +105,9 @@ class NodeReader final : public PartReader {
     const OctreeNode& node = nodes_->nodes[part];
     const std::string file = ept_node_file(nodes_->folder, nodes_->data, node).string();
     records_.reset();
-    input_.emplace(file);
+    constexpr std::size_t kWindowBytes = 256u << 10;
+    // Records of numbers may begin like anything.
+    input_.emplace(file, std::stop_token(), kWindowBytes, Input::Packed::as_it_is);
     switch (nodes_->data) {
       case EptData::laszip:
         open_laz(file, node);
