@@ -70,7 +70,7 @@ class PartsAhead final : public RecordReader {
   std::string_view read(std::uint64_t wanted) override {
     if (!started_) start();
     Slot* slot = &slots_[reading_ % slots_.size()];
-    if (at_ == slot->records.size() && at_ > 0) {
+    if (at_ > 0 && at_ == slot->records.size()) {
       release(*slot);
       slot = &slots_[reading_ % slots_.size()];
     }

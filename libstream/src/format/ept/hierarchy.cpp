@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "format/ept/hierarchy.hpp"
 
+#include <array>
 #include <charconv>
 #include <cstddef>
 #include <fstream>
@@ -41,13 +42,20 @@ std::optional<OctreeNode> node_of(std::string_view name) {
   return node;
 }
 
+/// Depth and place: a file of the hierarchy is named by the node that it begins with.
+using NodeKey = std::array<std::uint32_t, 4>;
+
+NodeKey key_of(const OctreeNode& node) {
+  return {node.depth, node.place[0], node.place[1], node.place[2]};
+}
+
 /// What is known of the hierarchy so far.
 struct EptReading {
   std::uint64_t points = 0;  ///< promised
   std::uint64_t found = 0;
   std::vector<OctreeNode> nodes{};
-  std::vector<std::string> pending{};  ///< names of files to be read
-  std::set<std::string> seen{};        ///< names of files
+  std::vector<NodeKey> pending{};  ///< of files to be read
+  std::set<NodeKey> seen{};        ///< of files
 };
 
 /// Takes the entries of one file as they are parsed: an object of names and numbers.
@@ -74,12 +82,12 @@ class EntryTaker final : public nlohmann::json_sax<nlohmann::json> {
     return true;
   }
   bool number_integer(number_integer_t value) override {
-    const std::string name = name_of(place());
+    const NodeKey key = key_of(place());
     if (value != -1) fail_ept(file_, "node " + name_, "has " + std::to_string(value) + " points");
-    if (!reading_.seen.insert(name).second) {
+    if (!reading_.seen.insert(key).second) {
       fail_ept(file_, "node " + name_, "its part of the hierarchy is referred to twice");
     }
-    reading_.pending.push_back(name);
+    reading_.pending.push_back(key);
     return true;
   }
   bool start_object(std::size_t) override { return depth_++ == 0 || refuse(); }
@@ -118,16 +126,17 @@ class EntryTaker final : public nlohmann::json_sax<nlohmann::json> {
 
 std::vector<OctreeNode> read_ept_hierarchy(const std::filesystem::path& folder,
                                            std::uint64_t points) {
-  const std::string root = name_of(OctreeNode{});
-  /// Three million nodes in one file; Entwine begins another after a few depths.
-  constexpr std::uint64_t kMostBytes = 64u << 20;
+  const NodeKey root = key_of(OctreeNode{});
+  /// Some 800,000 nodes in one file; Entwine begins another after a few depths.
+  constexpr std::uint64_t kMostBytes = 16u << 20;
   EptReading reading{.points = points};
   reading.seen.insert(root);
   reading.pending.push_back(root);
   while (!reading.pending.empty()) {
-    const std::string file =
-        (folder / "ept-hierarchy" / (reading.pending.back() + ".json")).string();
+    const auto [depth, x, y, z] = reading.pending.back();
     reading.pending.pop_back();
+    const std::string name = name_of({.depth = depth, .place = {x, y, z}});
+    const std::string file = (folder / "ept-hierarchy" / (name + ".json")).string();
     if (open_file(file)->size() > kMostBytes) fail_ept(file, {}, "is too large for a hierarchy");
     std::ifstream bytes(file, std::ios::binary);
     EntryTaker taker(file, reading);
