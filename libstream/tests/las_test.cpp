@@ -226,6 +226,72 @@ TEST_F(Las, CompressedFilesOfSeveralChunksComeBack) {
   }
 }
 
+// What is left are whole chunks, the same by any number of threads; the damaged one is named.
+TEST_F(Las, DamagedChunksAreLeftOutWhereThatIsWanted) {
+  std::mt19937_64 random(3);
+  for (const unsigned format : {3U, 7U}) {
+    SCOPED_TRACE(format);
+    LasParts parts{.point_format = format,
+                   .minor = 4,
+                   .record_bytes = format == 3 ? std::size_t{35} : std::size_t{37},
+                   .points = 170000};
+    parts.records.resize(parts.points * parts.record_bytes);
+    for (char& byte : parts.records) byte = static_cast<char>(random() % 7);
+    const AllPoints all = read_file(put_file("a.las", parts));
+    const std::string laz = copy_of(all, "copy.laz");
+    const std::string good = read_text(laz);
+    struct Damage {
+      std::string what;
+      std::uint64_t points;
+    };
+    std::vector<Damage> told;
+    const auto read = [&](const std::string& bytes, unsigned threads) {
+      told.clear();
+      write_text(laz, bytes);
+      const auto source = open_source(
+          std::vector<std::string>{laz},
+          {.threads = threads, .on_damage = [&](const Error& damage, std::uint64_t points) {
+             told.push_back({damage.what(), points});
+           }});
+      AllPoints some = read_all(*source);
+      std::uint64_t lost = 0;
+      for (const Damage& damage : told) lost += damage.points;
+      EXPECT_EQ(source->progress().lost, lost);
+      EXPECT_EQ(some.points.size() + lost, 170000U);
+      return some;
+    };
+    std::string bytes = good;
+    for (std::size_t at = good.size() * 2 / 5; at < good.size() * 2 / 5 + 40; ++at)
+      bytes[at] ^= 0x55;
+    for (const unsigned threads : {1U, 2U, 5U}) {
+      const AllPoints some = read(bytes, threads);
+      ASSERT_EQ(told.size(), 1U);
+      EXPECT_EQ(told[0].points, 50000U);
+      EXPECT_NE(told[0].what.find("chunk 1, byte "), std::string::npos) << told[0].what;
+      std::vector<Point3> rest = all.points.positions;
+      rest.erase(rest.begin() + 50000, rest.begin() + 100000);
+      EXPECT_TRUE(same_bits(some.points.positions, rest));
+    }
+    // Without its table the chunks are found one after the other, up to where the file ends.
+    const AllPoints cut = read(good.substr(0, good.size() / 2), 2);
+    ASSERT_EQ(told.size(), 2U);
+    EXPECT_NE(told[0].what.find("chunk table"), std::string::npos) << told[0].what;
+    EXPECT_GE(cut.points.size(), 50000U);
+    std::vector<Point3> first = all.points.positions;
+    first.resize(cut.points.size());
+    EXPECT_TRUE(same_bits(cut.points.positions, first));
+    // LAS that is cut off has what is there, to the last whole record.
+    const std::string las = read_text((folder_.path() / "a.las").string());
+    const AllPoints records = read(las.substr(0, las.size() - 5 * parts.record_bytes - 3), 1);
+    ASSERT_EQ(told.size(), 1U);
+    EXPECT_EQ(told[0].points, 6U);
+    EXPECT_EQ(records.points.size(), 169994U);
+    // Nothing is told of what is whole.
+    EXPECT_EQ(read(good, 3).points.size(), 170000U);
+    EXPECT_TRUE(told.empty());
+  }
+}
+
 TEST_F(Las, WhatDoesNotFitIsRefused) {
   const std::string path = folder_.path() / "out.las";
   const auto error = [&](const PointHeader& header, const PointBlock& block) {

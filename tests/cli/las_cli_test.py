@@ -414,6 +414,18 @@ class LasHostileTest(LasCase):
             error = self.refused('build', self.path('b.laz'), '-o', self.path('b.st'), '--threads', threads)
             self.assertRegex(error, r'b\.laz: chunk 1, byte [0-9]+: ')
             self.assertFalse(os.path.exists(self.path('b.st')))
+            # The other chunks are kept on request, and what is lost is told.
+            built = terrace('build', self.path('b.laz'), '-o', self.path('b.st'), '--threads', threads, '--skip-damaged',
+                            '--json')
+            self.assertEqual(built.returncode, 0, built.stderr)
+            summary = json.loads(built.stdout)
+            self.assertEqual((summary['points'], summary['lost']), (70000, 50000))
+            self.assertRegex(built.stderr.decode(), r'b\.laz: chunk 1, byte [0-9]+: .* \(50,000 points left out\)')
+            shutil.rmtree(self.path('b.st'))
+            summary = json.loads(self.run_ok('convert', self.path('b.laz'), '-o', self.path('b.las'), '--force',
+                                             '--threads', threads, '--skip-damaged', '--json'))
+            self.assertEqual((summary['points'], summary['lost']), (70000, 50000))
+            self.assertEqual(Las(self.path('b.las')).records, records[:50000] + records[100000:])
         self.assertIn('chunk 1', self.refused('info', '-', input=damaged))
         self.refused_at_once(good[:middle], 'a')
         lost = self.put('l.laz', good[:first] + struct.pack('<Q', 2**62) + good[first + 8:])

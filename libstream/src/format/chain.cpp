@@ -95,6 +95,7 @@ class Chain final : public PointSource {
       const Progress progress = part.source->progress();
       withheld_ += progress.withheld;
       excluded_ += progress.excluded;
+      lost_ += progress.lost;
       done_bytes_ += part.bytes;
       part.source.reset();
     }
@@ -103,7 +104,8 @@ class Chain final : public PointSource {
   }
 
   Progress progress() const override {
-    Progress progress{.points = delivered_, .withheld = withheld_, .excluded = excluded_};
+    Progress progress{
+        .points = delivered_, .withheld = withheld_, .excluded = excluded_, .lost = lost_};
     if (turn_ == parts_.size()) {
       progress.fraction = 1.0;
       return progress;
@@ -113,6 +115,7 @@ class Chain final : public PointSource {
       const Progress inside = part.source->progress();
       progress.withheld += inside.withheld;
       progress.excluded += inside.excluded;
+      progress.lost += inside.lost;
     }
     if (sizes_known_ && total_bytes_ > 0) {
       const double inside = part.source ? part.source->progress().fraction : 0.0;
@@ -135,7 +138,8 @@ class Chain final : public PointSource {
   SourceInfo info_;
   std::vector<Part> parts_;
   std::size_t turn_ = 0;
-  std::uint64_t delivered_ = 0, withheld_ = 0, excluded_ = 0, done_bytes_ = 0, total_bytes_ = 0;
+  std::uint64_t delivered_ = 0, withheld_ = 0, excluded_ = 0, lost_ = 0, done_bytes_ = 0,
+                total_bytes_ = 0;
   bool sizes_known_ = true;
 };
 

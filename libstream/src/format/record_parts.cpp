@@ -53,9 +53,13 @@ class PartsInTurn final : public RecordReader {
 
 class PartsAhead final : public RecordReader {
  public:
-  /// Takes `slots` times a part's bytes and records, and a reader per thread.
-  PartsAhead(RecordParts parts, unsigned threads, std::size_t slots)
-      : parts_(std::move(parts)), wanted_threads_(threads), slots_(slots) {}
+  /// Takes `slots` times a part's bytes and records, and a reader per thread. threads: 0 for the
+  /// caller's alone.
+  PartsAhead(RecordParts parts, unsigned threads, std::size_t slots, OnDamage on_damage)
+      : parts_(std::move(parts)),
+        wanted_threads_(threads),
+        on_damage_(std::move(on_damage)),
+        slots_(slots) {}
   ~PartsAhead() override {
     {
       const std::lock_guard lock(mutex_);
@@ -74,7 +78,13 @@ class PartsAhead final : public RecordReader {
       release(*slot);
       slot = &slots_[reading_ % slots_.size()];
     }
-    if (at_ == 0) wait_for(*slot);
+    while (at_ == 0) {
+      if (reading_ == parts_.parts.size()) return {};
+      wait_for(*slot);
+      if (!slot->error) break;
+      leave_out(*slot);
+      slot = &slots_[reading_ % slots_.size()];
+    }
     const std::size_t bytes = static_cast<std::size_t>(
         std::min<std::uint64_t>(wanted, (slot->records.size() - at_) / parts_.record_bytes) *
         parts_.record_bytes);
@@ -83,6 +93,8 @@ class PartsAhead final : public RecordReader {
     return found;
   }
 
+  std::uint64_t lost() const override { return lost_; }
+
  private:
   struct Slot {
     std::vector<std::byte> records;
@@ -90,15 +102,28 @@ class PartsAhead final : public RecordReader {
     bool ready = false;
   };
 
+  /// Throws what it is, if it is not damage or nobody wants to be told.
+  void leave_out(Slot& slot) {
+    try {
+      std::rethrow_exception(std::exchange(slot.error, nullptr));
+    } catch (const Error& damage) {
+      if (!on_damage_) throw;
+      const std::uint64_t points = parts_.parts[reading_].points;
+      lost_ += points;
+      on_damage_(damage, points);
+    }
+    release(slot);
+  }
+
   /// Only when records are asked for: files are opened to be looked at, too.
   void start() {
     started_ = true;
     try {
       for (unsigned i = 0; i < wanted_threads_; ++i) threads_.emplace_back([this] { run(); });
     } catch (const std::system_error&) {
-      // The system grants no more threads; without any the caller reads.
-      if (threads_.empty()) own_ = parts_.make_reader();
+      // The system grants no more threads.
     }
+    if (threads_.empty()) own_ = parts_.make_reader();  // the caller reads
   }
 
   void release(Slot& slot) {
@@ -113,12 +138,19 @@ class PartsAhead final : public RecordReader {
 
   void wait_for(Slot& slot) {
     if (own_) {
-      read_part(reading_, slot, *own_);
+      fill(reading_, slot, *own_);
     } else {
       std::unique_lock lock(mutex_);
       news_.wait(lock, [&slot] { return slot.ready; });
     }
-    if (slot.error) std::rethrow_exception(slot.error);
+  }
+
+  void fill(std::size_t part, Slot& slot, PartReader& reader) const {
+    try {
+      read_part(part, slot, reader);
+    } catch (...) {
+      slot.error = std::current_exception();
+    }
   }
 
   void run() {
@@ -136,7 +168,7 @@ class PartsAhead final : public RecordReader {
       Slot& slot = slots_[part % slots_.size()];
       try {
         if (!reader) reader = parts_.make_reader();
-        read_part(part, slot, *reader);
+        fill(part, slot, *reader);
       } catch (...) {
         slot.error = std::current_exception();
       }
@@ -158,6 +190,8 @@ class PartsAhead final : public RecordReader {
 
   RecordParts parts_;
   unsigned wanted_threads_;
+  OnDamage on_damage_;
+  std::uint64_t lost_ = 0;
   bool started_ = false;
   std::vector<Slot> slots_;
   std::unique_ptr<PartReader> own_;  ///< without threads
@@ -187,10 +221,13 @@ std::size_t slots_within(std::uint64_t memory_bytes, const RecordParts& parts, u
 
 std::unique_ptr<RecordReader> parts_ahead(const RecordParts& parts, const SourceOptions& options) {
   const std::size_t slots = slots_within(options.memory_bytes, parts, options.threads);
-  if (options.threads <= 1 || slots <= 1 || parts.parts.size() <= 1) return nullptr;
-  const auto threads =
+  auto threads =
       static_cast<unsigned>(std::min<std::size_t>({options.threads, slots, parts.parts.size()}));
-  return std::make_unique<PartsAhead>(parts, threads, slots);
+  if (threads <= 1) threads = 0;
+  // What is damaged is known at the end of a part: it is read whole before any of it is given out.
+  const bool whole = options.on_damage && slots > 0;
+  if (threads == 0 && !whole) return nullptr;
+  return std::make_unique<PartsAhead>(parts, threads, threads == 0 ? 1 : slots, options.on_damage);
 }
 
 std::unique_ptr<RecordReader> parts_in_turn(RecordParts parts) {

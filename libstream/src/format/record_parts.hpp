@@ -41,7 +41,7 @@ struct RecordParts {
 
 /// The records of the parts, in their order, read by up to options.threads threads, a few parts
 /// ahead of the one that is asked for and within options.memory_bytes. Null if there is nothing to
-/// gain from several threads or no memory for them.
+/// gain from several threads and nobody wants to be told of damage, or no memory for them.
 std::unique_ptr<RecordReader> parts_ahead(const RecordParts& parts, const SourceOptions& options);
 /// The same by the caller's thread, in small pieces: however many points a part has, its records
 /// are not held at once.

@@ -40,16 +40,21 @@ class RecordSource final : public PointSource {
   const SourceInfo& info() const override { return stream_.info; }
 
   bool next(PointBlock& block) override {
-    const auto wanted = static_cast<std::size_t>(
-        std::min<std::uint64_t>(block_points_, wanted_points_ - delivered_));
+    const auto wanted = static_cast<std::size_t>(std::min<std::uint64_t>(
+        block_points_, wanted_points_ - delivered_ - stream_.records->lost()));
     block.positions.resize(wanted);
     block.payload.resize(wanted * payload_bytes_);
-    for (std::size_t done = 0; done < wanted;) done += unpack(block, done, wanted - done);
+    std::size_t done = 0;
+    for (std::size_t some = 1; done < wanted && some > 0; done += some) {
+      some = unpack(block, done, wanted - done);
+    }
+    block.positions.resize(done);
+    block.payload.resize(done * payload_bytes_);
     if (withheld_attribute_) count_withheld(block);
     if (checked_) check(block);
     if (stream_.moved) move(block);
-    delivered_ += wanted;
-    return wanted > 0;
+    delivered_ += done;
+    return done > 0;
   }
 
   Progress progress() const override {
@@ -57,9 +62,11 @@ class RecordSource final : public PointSource {
             .nodata = 0,
             .withheld = withheld_,
             .excluded = stream_.points - wanted_points_,
-            .fraction = wanted_points_ == 0 ? 1.0
-                                            : static_cast<double>(delivered_) /
-                                                  static_cast<double>(wanted_points_)};
+            .lost = stream_.records->lost(),
+            .fraction = wanted_points_ == 0
+                            ? 1.0
+                            : static_cast<double>(delivered_ + stream_.records->lost()) /
+                                  static_cast<double>(wanted_points_)};
   }
 
   std::uint64_t reading_bytes() const override { return stream_.records->held_bytes(); }

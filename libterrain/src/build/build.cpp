@@ -17,6 +17,7 @@
 #include <terrace/stream/spatial_order.hpp>
 #include <terrace/stream/store.hpp>
 
+#include "base/damage_report.hpp"
 #include "base/progress_report.hpp"
 #include "base/units.hpp"
 #include "build/clustering.hpp"
@@ -201,6 +202,8 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   source_options.crs = request.crs;
   source_options.blocks_ahead = kBlocksAhead;
   source_options.threads = std::max(1U, context.threads);
+  DamageReport damage;
+  if (request.skip_damaged) source_options.on_damage = damage.taker();
   std::stop_source reading;
   const auto stop_reading = [&reading] { reading.request_stop(); };
   const std::stop_callback on_stop(context.stop, stop_reading);
@@ -308,6 +311,7 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   outcome.outliers = result.outliers;
   outcome.nodata = so_far.nodata;
   outcome.excluded = so_far.excluded;
+  outcome.lost = so_far.lost;
   outcome.store_bytes = sink.store_bytes();
   if (in_order != nullptr) outcome.order = in_order->report();
   outcome.top = result.top;
@@ -321,6 +325,7 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
     context.say("the input cannot be read from a pipe or out of gzip: " +
                 readable_bytes(info.spooled_bytes) + " were set aside in a temporary file");
   }
+  damage.tell(context);
   tell_order(outcome.order, folder, context);
   if (!crs.note.empty()) context.say(crs.note);
   if (!ground.assumption().empty()) context.say(ground.assumption());

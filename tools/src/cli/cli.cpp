@@ -281,6 +281,13 @@ CLI::Option* add_heights_of_colour(CLI::App& app, stream::HeightsOfColour& targe
       ->check(CLI::IsMember({"mapbox", "terrarium"}));
 }
 
+CLI::Option* add_skip_damaged(CLI::App& app, bool& target) {
+  return app.add_flag(
+      "--skip-damaged", target,
+      "leave damaged chunks and nodes of LAZ, COPC and EPT out, and what a LAS that "
+      "is cut off lacks; count the points");
+}
+
 CLI::Option* add_cell_of_source(CLI::App& app, std::optional<double>& target) {
   return add_number(app, "--cell", target,
                     "side of the cells of rasters without georeferencing (PNG): the centre of the "

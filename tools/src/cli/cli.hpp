@@ -101,6 +101,8 @@ CLI::Option* add_output(CLI::App& app, std::string& target, const std::string& d
 
 /// The option --rgb, kept in `target`.
 CLI::Option* add_heights_of_colour(CLI::App& app, stream::HeightsOfColour& target);
+/// --skip-damaged, of laser data.
+CLI::Option* add_skip_damaged(CLI::App& app, bool& target);
 /// --cell, the size of cells of rasters that do not say it.
 CLI::Option* add_cell_of_source(CLI::App& app, std::optional<double>& target);
 

@@ -51,6 +51,7 @@ class BuildCommand final : public Command {
         ->check(CLI::IsMember({"ellipsoidal", "orthometric"}));
     selection_.define(app);
     app.add_option("--band", request_.band, "of rasters, from 1")->check(CLI::Range(1, 65535));
+    add_skip_damaged(app, request_.skip_damaged);
     add_heights_of_colour(app, request_.heights_of_colour);
     add_cell_of_source(app, request_.cell);
     app.add_option("--block", block_, "most points clustered together")->capture_default_str();
@@ -128,6 +129,7 @@ class BuildCommand final : public Command {
     summary.json = {{"points", outcome.points},
                     {"nodata", outcome.nodata},
                     {"excluded", outcome.excluded},
+                    {"lost", outcome.lost},
                     {"outliers", outcome.outliers},
                     {"seconds", seconds},
                     {"points_per_second", rate},

@@ -7,6 +7,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "base/damage_report.hpp"
 #include "base/units.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/output.hpp"
@@ -36,6 +37,7 @@ class ConvertCommand : public Command {
     app.add_option("--input-format", input_format_, "Of the input (else its content, its ending)")
         ->type_name("NAME");
     selection_.define(app);
+    add_skip_damaged(app, skip_damaged_);
     add_heights_of_colour(app, colours_);
     add_cell_of_source(app, cell_);
   }
@@ -44,14 +46,16 @@ class ConvertCommand : public Command {
     const Stopwatch watch;
     const stream::WriterOptions writing = point_writer_options(output_, format_, common);
     const std::array<std::string, 1> files{input_};
-    const std::unique_ptr<stream::PointSource> source =
-        stream::open_source(files, {.format = input_format_,
-                                    .heights_of_colour = colours_,
-                                    .cell = cell_.value_or(0),
-                                    .stop = stop_token(),
-                                    .blocks_ahead = 8,
-                                    .threads = common.threads,
-                                    .selection = selection_.selection()});
+    stream::SourceOptions reading{.format = input_format_,
+                                  .heights_of_colour = colours_,
+                                  .cell = cell_.value_or(0),
+                                  .stop = stop_token(),
+                                  .blocks_ahead = 8,
+                                  .threads = common.threads,
+                                  .selection = selection_.selection()};
+    DamageReport damage;
+    if (skip_damaged_) reading.on_damage = damage.taker();
+    const std::unique_ptr<stream::PointSource> source = stream::open_source(files, reading);
     reading_within_memory(*source, common.memory_or(0));
     const stream::SourceInfo& info = source->info();
     const auto writer = stream::open_point_writer(output_,
@@ -73,11 +77,13 @@ class ConvertCommand : public Command {
       }
     }
     writer->finish();
+    damage.tell(common.context());
 
     Summary summary;
     summary.json = {{"points", writer->points()},
                     {"nodata", source->progress().nodata},
                     {"excluded", source->progress().excluded},
+                    {"lost", source->progress().lost},
                     {"seconds", watch.seconds()},
                     {"peak_rss_bytes", peak_rss_bytes()}};
     const std::uint64_t excluded = source->progress().excluded;
@@ -106,6 +112,7 @@ class ConvertCommand : public Command {
   SelectionOptions selection_;
   stream::HeightsOfColour colours_ = stream::HeightsOfColour::none;
   std::optional<double> cell_;
+  bool skip_damaged_ = false;
 };
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -11,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "terrace/stream/error.hpp"
 #include "terrace/stream/schema.hpp"
 
 namespace terrace::stream {
@@ -59,7 +61,8 @@ struct Progress {
   std::uint64_t withheld = 0;
   /// Points left out by Selection::where, region and resolution, whether they were read or not.
   std::uint64_t excluded = 0;
-  double fraction = 0.0;  ///< of the work, 0 to 1; 0 if unknown
+  std::uint64_t lost = 0;  ///< points of damaged parts, left out (see SourceOptions::on_damage)
+  double fraction = 0.0;   ///< of the work, 0 to 1; 0 if unknown
 };
 
 /// A stream of points, pulled block by block. Bounded memory; never seeks backwards through what it
@@ -103,6 +106,11 @@ struct Selection {
 /// mapbox -10000 + (R * 65536 + G * 256 + B) / 10, terrarium R * 256 + G + B / 256 - 32768.
 enum class HeightsOfColour : std::uint8_t { none, mapbox, terrarium };
 
+/// Is told of a part of a LAS, LAZ, COPC or EPT that is damaged and left out (a chunk, a node, what
+/// a file that is cut off lacks), and of how many points it should have had; 0 where it holds no
+/// points. Called by the thread that reads. Damage of what all points depend on is still thrown.
+using OnDamage = std::function<void(const Error& damage, std::uint64_t points)>;
+
 /// What a caller may ask of any source.
 struct SourceOptions {
   std::string format{};  ///< name of a registered format; empty: by content, then ending
@@ -118,6 +126,7 @@ struct SourceOptions {
   /// next() on (see read_ahead()). The source's destructor waits for no pipe.
   std::size_t blocks_ahead = 0;
   unsigned threads = 1;  ///< that decode at once, of formats of which parts can be (LAZ, EPT)
+  OnDamage on_damage{};  ///< empty: damage is thrown
   Selection selection{};
 };
 

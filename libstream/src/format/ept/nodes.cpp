@@ -114,7 +114,7 @@ class NodeReader final : public PartReader {
         break;
       case EptData::binary:
         check_size(node);
-        records_ = std::make_unique<PlainRecords>(*input_, nodes_->record_bytes);
+        records_ = std::make_unique<PlainRecords>(*input_, nodes_->record_bytes, node.points);
         break;
       case EptData::zstandard:
         records_ = std::make_unique<ZstdRecords>(*input_, nodes_->record_bytes, node.points);
@@ -151,7 +151,7 @@ class NodeReader final : public PartReader {
     if (header.compressed) {
       records_ = open_laz_records(*input_, file, header, SourceOptions{});
     } else {
-      records_ = std::make_unique<PlainRecords>(*input_, header.record_bytes);
+      records_ = std::make_unique<PlainRecords>(*input_, header.record_bytes, header.points);
     }
   }
 

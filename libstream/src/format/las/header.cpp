@@ -162,8 +162,8 @@ bool names_something(const Crs& crs) {
 
 }  // namespace
 
-LasHeader read_las_header(Input& input, const std::string& file,
-                          std::vector<std::string>& comments) {
+LasHeader read_las_header(Input& input, const std::string& file, std::vector<std::string>& comments,
+                          const OnDamage& on_damage) {
   constexpr std::size_t kFirstBytes = 227;  // of LAS 1.0 to 1.2, the beginning of all
   std::string_view head = input.fill(kFirstBytes);
   if (!head.starts_with("LASF")) {
@@ -247,7 +247,7 @@ LasHeader read_las_header(Input& input, const std::string& file,
     comments.emplace_back(
         "x and y have steps of different sizes; triangulations are Delaunay in steps");
   }
-  if (const auto size = input.size(); size && !header.compressed) {
+  if (const auto size = input.size(); size && !header.compressed && !on_damage) {
     const std::uint64_t left = *size - std::min(*size, header.points_offset);
     if (header.points > left / header.record_bytes) {
       fail(input, "byte " + std::to_string(header.points_offset),
@@ -259,7 +259,12 @@ LasHeader read_las_header(Input& input, const std::string& file,
   }
   read_vlrs(input, vlrs, header, comments);
   if (evlrs > 0 && is_seekable(file)) {
-    read_evlrs(*open_file(file), evlr_offset, evlrs, header, comments);
+    try {
+      read_evlrs(*open_file(file), evlr_offset, evlrs, header, comments);
+    } catch (const Error& damage) {
+      if (!on_damage) throw;
+      on_damage(damage, 0);
+    }
   } else {
     header.unread_evlrs = evlrs > 0;
   }

@@ -53,8 +53,8 @@ struct LasHeader {
 /// Reads the header and leaves `input` at the first byte of the points. EVLRs are read from `file`
 /// separately, unless it is a pipe. Faults that do not matter are listed in `comments`.
 /// Throws: Error for whatever is not LAS, and if the points do not fit the rest of a regular file.
-LasHeader read_las_header(Input& input, const std::string& file,
-                          std::vector<std::string>& comments);
+LasHeader read_las_header(Input& input, const std::string& file, std::vector<std::string>& comments,
+                          const OnDamage& on_damage = {});
 
 /// The coordinate reference system that the records name.
 /// Throws: Error if it is out of reach in a pipe.

@@ -70,8 +70,9 @@ std::vector<laz::Chunk> read_table(const ByteSource& file, const LazLayout& layo
 /// One chunk after the other, through a window of the input.
 class LazInTurn final : public RecordReader {
  public:
-  LazInTurn(Input& input, LazLayout layout, std::uint64_t points)
+  LazInTurn(Input& input, LazLayout layout, std::uint64_t points, OnDamage on_damage)
       : input_(&input),
+        on_damage_(std::move(on_damage)),
         layout_(std::move(layout)),
         record_bytes_(layout_.vlr.record_length()),
         left_(points),
@@ -79,6 +80,31 @@ class LazInTurn final : public RecordReader {
         records_(std::max<std::size_t>(1, kPieceBytes / record_bytes_) * record_bytes_) {}
 
   std::string_view read(std::uint64_t wanted) override {
+    if (left_ == 0) return {};
+    try {
+      return read_on(wanted);
+    } catch (const Error& damage) {
+      if (!on_damage_) throw;
+      // Where the next chunk begins is not known.
+      lost_ = std::exchange(left_, 0);
+      on_damage_(damage, lost_);
+      return {};
+    }
+  }
+
+  std::uint64_t lost() const override { return lost_; }
+
+  std::uint64_t held_bytes() const override {
+    if (layout_.vlr.compressor != laz::Compressor::layered) return 0;
+    std::uint64_t largest = 0;
+    for (const laz::Chunk& chunk : layout_.chunks) largest = std::max(largest, chunk.bytes);
+    return largest;
+  }
+
+ private:
+  static constexpr std::size_t kPieceBytes = 64u << 10, kWindowBytes = 64u << 10;
+
+  std::string_view read_on(std::uint64_t wanted) {
     if (chunk_left_ == 0) begin_chunk();
     const auto records = static_cast<std::size_t>(
         std::min<std::uint64_t>({wanted, chunk_left_, records_.size() / record_bytes_}));
@@ -92,16 +118,6 @@ class LazInTurn final : public RecordReader {
     if (chunk_left_ == 0) end_chunk();
     return {reinterpret_cast<const char*>(records_.data()), step.points * record_bytes_};
   }
-
-  std::uint64_t held_bytes() const override {
-    if (layout_.vlr.compressor != laz::Compressor::layered) return 0;
-    std::uint64_t largest = 0;
-    for (const laz::Chunk& chunk : layout_.chunks) largest = std::max(largest, chunk.bytes);
-    return largest;
-  }
-
- private:
-  static constexpr std::size_t kPieceBytes = 64u << 10, kWindowBytes = 64u << 10;
 
   void begin_chunk() {
     begin_ = input_->offset();
@@ -165,9 +181,10 @@ class LazInTurn final : public RecordReader {
   }
 
   Input* input_;
+  OnDamage on_damage_;
   LazLayout layout_;
   std::size_t record_bytes_;
-  std::uint64_t left_;
+  std::uint64_t left_, lost_ = 0;
   laz::Decoder decoder_;
   std::vector<std::byte> records_;
   std::uint64_t number_ = 0, begin_ = 0;      ///< of the chunk
@@ -182,16 +199,24 @@ std::unique_ptr<RecordReader> open_laz_records(Input& input, const std::string& 
                                                const SourceOptions& options) {
   LazLayout layout{.vlr = laz_vlr(header, input.name()), .first = header.points_offset};
   if (layout.vlr.compressor == laz::Compressor::none) {
-    return std::make_unique<PlainRecords>(input, header.record_bytes);
+    return std::make_unique<PlainRecords>(input, header.record_bytes, header.points,
+                                          options.on_damage);
   }
   const bool has_table = layout.vlr.compressor != laz::Compressor::pointwise;
-  if (header.points == 0) return std::make_unique<LazInTurn>(input, std::move(layout), 0);
+  if (header.points == 0) {
+    return std::make_unique<LazInTurn>(input, std::move(layout), 0, options.on_damage);
+  }
   if (has_table) {
     layout.first += kPositionBytes;
     if (is_seekable(file)) {
       auto bytes = open_file(file);
-      layout.chunks = read_table(*bytes, layout, header.points);
-      if (options.threads > 1) {
+      try {
+        layout.chunks = read_table(*bytes, layout, header.points);
+      } catch (const Error& damage) {
+        if (!options.on_damage) throw;
+        options.on_damage(damage, 0);  // most chunks can be found without
+      }
+      if (!layout.chunks.empty() && (options.threads > 1 || options.on_damage)) {
         if (auto reader = parts_ahead(laz_parts(std::move(bytes), layout), options)) return reader;
       }
     }
@@ -208,7 +233,7 @@ std::unique_ptr<RecordReader> open_laz_records(Input& input, const std::string& 
       fail_chunk(input.name(), 0, input.offset(), "the file ends before its points");
     }
   }
-  return std::make_unique<LazInTurn>(input, std::move(layout), header.points);
+  return std::make_unique<LazInTurn>(input, std::move(layout), header.points, options.on_damage);
 }
 
 std::unique_ptr<RecordReader> open_laz_nodes(std::unique_ptr<ByteSource> file,

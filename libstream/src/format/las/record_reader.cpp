@@ -13,16 +13,25 @@ std::string_view PlainRecords::read(std::uint64_t wanted) {
   /// Most bytes at once: they are walked through once per field, so they stay in a near cache.
   constexpr std::size_t kPieceBytes = 64u << 10;
   input_->consume(std::exchange(used_, 0));
-  const auto records =
+  if (left_ == 0) return {};
+  auto records =
       std::min<std::uint64_t>(wanted, std::max<std::size_t>(1, kPieceBytes / record_bytes_));
-  used_ = static_cast<std::size_t>(records) * record_bytes_;
-  const std::string_view window = input_->fill(used_);
-  if (window.size() < used_) {
-    throw Error({.file = input_->name(),
-                 .where = "byte " + std::to_string(input_->offset() + window.size()),
-                 .cause = "the file ends before the points that its header promises",
-                 .remedy = "the file is cut off or its header is wrong"});
+  const std::string_view window = input_->fill(static_cast<std::size_t>(records) * record_bytes_);
+  if (window.size() < records * record_bytes_) {
+    const Error damage({.file = input_->name(),
+                        .where = "byte " + std::to_string(input_->offset() + window.size()),
+                        .cause = "the file ends before the points that its header promises",
+                        .remedy = "the file is cut off or its header is wrong"});
+    if (!on_damage_) throw damage;
+    records = window.size() / record_bytes_;
+    if (records == 0) {
+      lost_ = std::exchange(left_, 0);
+      on_damage_(damage, lost_);
+      return {};
+    }
   }
+  left_ -= records;
+  used_ = static_cast<std::size_t>(records) * record_bytes_;
   return window.substr(0, used_);
 }
 

@@ -33,7 +33,7 @@ class LasOpener {
   RecordStream open(const SourceInfo* first) {
     auto input = std::make_unique<Input>(file_, options_.stop);
     std::vector<std::string> comments;
-    header_ = read_las_header(*input, file_, comments);
+    header_ = read_las_header(*input, file_, comments, options_.on_damage);
     stream_ = las_stream(header_, input->name(), std::move(comments));
     stream_.input = std::move(input);
     SourceInfo& info = stream_.info;
@@ -63,7 +63,8 @@ class LasOpener {
     if (header_.compressed) {
       stream_.records = open_laz_records(*stream_.input, file_, header_, options_);
     } else {
-      stream_.records = std::make_unique<PlainRecords>(*stream_.input, header_.record_bytes);
+      stream_.records = std::make_unique<PlainRecords>(*stream_.input, header_.record_bytes,
+                                                       header_.points, options_.on_damage);
     }
   }
 

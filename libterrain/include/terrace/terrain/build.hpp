@@ -26,8 +26,10 @@ struct BuildRequest {
   std::vector<std::string> inputs{};
   std::filesystem::path store{};  ///< the folder to create
   bool replace = false;
-  std::string input_format{};        ///< empty: told by content
-  stream::Selection selection{};     ///< of points and attributes
+  std::string input_format{};     ///< empty: told by content
+  stream::Selection selection{};  ///< of points and attributes
+  /// Goes on where parts of laser data are damaged: see stream::SourceOptions::on_damage.
+  bool skip_damaged = false;
   std::optional<stream::Crs> crs{};  ///< replaces the source's
   /// To WGS 84, for a CRS of another datum (see DatumShift).
   std::optional<std::array<double, 7>> datum_shift{};
@@ -63,6 +65,7 @@ struct BuildOutcome {
   std::uint64_t points = 0;
   std::uint64_t nodata = 0;
   std::uint64_t excluded = 0;  ///< points that the selection left out
+  std::uint64_t lost = 0;      ///< points in damaged parts, left out
   std::uint64_t outliers = 0;  ///< points marked as outliers
   std::uint64_t store_bytes = 0;
   stream::OrderedSource::Report order{};  ///< how the points came, and what it took to order them
