@@ -1,23 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <cstdlib>
-#include <cstring>
 #include <filesystem>
 #include <initializer_list>
-#include <map>
 #include <random>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
-#include <zstd.h>
 
+#include "ept_parts.hpp"
 #include "octree_testing.hpp"
 #include "point_files.hpp"
 #include "terrace/stream/point_writer.hpp"
@@ -26,64 +23,6 @@ namespace terrace::stream {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::json;
-
-std::string compressed(std::string_view bytes) {
-  std::string out(ZSTD_compressBound(bytes.size()), '\0');
-  out.resize(ZSTD_compress(out.data(), out.size(), bytes.data(), bytes.size(), 3));
-  return out;
-}
-
-/// A data set of 8 x 8 x 8 units with the corner at 0, of records that a test writes itself.
-struct EptParts {
-  Json metadata = {
-      {"version", "1.0.0"},
-      {"hierarchyType", "json"},
-      {"dataType", "binary"},
-      {"bounds", {0, 0, 0, 8, 8, 8}},
-      {"boundsConforming", {0, 0, 0, 8, 8, 8}},
-      {"span", 8},
-      {"points", 0},
-      {"srs", {{"authority", "EPSG"}, {"horizontal", "25832"}, {"vertical", "7837"}}},
-      {"schema",
-       {{{"name", "Intensity"}, {"type", "unsigned"}, {"size", 2}},
-        {{"name", "X"}, {"type", "signed"}, {"size", 4}, {"scale", 0.5}, {"offset", 4}},
-        {{"name", "Y"}, {"type", "signed"}, {"size", 4}, {"scale", 0.5}, {"offset", 4}},
-        {{"name", "Z"}, {"type", "signed"}, {"size", 4}, {"scale", 0.25}},
-        {{"name", "Of its own"}, {"type", "float"}, {"size", 8}}}}};
-  std::map<std::string, std::string> hierarchy{{"0-0-0-0", R"({"0-0-0-0": 0})"}};
-  std::map<std::string, std::string> nodes{};  ///< by file name
-
-  /// Points of a node at a place in stored steps.
-  void add(const std::string& file, const std::vector<std::array<std::int32_t, 3>>& places) {
-    std::vector<std::byte> bytes;
-    for (const auto& p : places) {
-      append_values(bytes, static_cast<std::uint16_t>(places.size()), p[0], p[1], p[2], 0.1 * p[0]);
-    }
-    nodes[file] = {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-    metadata["points"] = metadata["points"].get<int>() + static_cast<int>(places.size());
-  }
-  std::string write(const fs::path& folder) const {
-    fs::create_directories(folder / "ept-data");
-    fs::create_directories(folder / "ept-hierarchy");
-    for (const auto& [name, text] : hierarchy) {
-      write_text(folder / "ept-hierarchy" / (name + ".json"), text);
-    }
-    for (const auto& [name, bytes] : nodes) write_text(folder / "ept-data" / name, bytes);
-    return write_text(folder / "ept.json", metadata.dump());
-  }
-};
-
-/// Three nodes; the last is told by a file of the hierarchy of its own.
-EptParts small_parts() {
-  EptParts parts;
-  parts.add("0-0-0-0.bin", {{-8, -8, 0}, {7, 7, 31}});
-  parts.add("1-0-0-0.bin", {{-7, -7, 1}, {-6, -7, 2}, {-5, -5, 3}});
-  parts.add("2-3-0-0.bin", {{4, -8, 4}});
-  parts.hierarchy["0-0-0-0"] = R"({"0-0-0-0": 2, "1-0-0-0": 3, "1-1-0-0": 0, "2-3-0-0": -1})";
-  parts.hierarchy["2-3-0-0"] = R"({"2-3-0-0": 1})";
-  return parts;
-}
 
 TEST(Ept, ReadsWhatItsSchemaSays) {
   const TempFolder folder;
@@ -170,129 +109,6 @@ TEST(Ept, CoordinatesMayBeOfAnyType) {
       }
     }
   }
-}
-
-TEST(Ept, RefusesWhatCannotBe) {
-  const auto refusal = [](auto change) {
-    EptParts parts = small_parts();
-    change(parts);
-    const TempFolder folder;
-    const std::string file = parts.write(folder.path());
-    return error_of([&] { read_file(file); });
-  };
-  const auto has = [](const std::string& text, std::string_view part) {
-    return text.find(part) != text.npos && text.find('\n') == text.npos;
-  };
-  EXPECT_EQ(refusal([](EptParts&) {}), "");
-  // ept.json
-  const auto with = [&](const char* name, const Json& value) {
-    return refusal([&](EptParts& parts) { parts.metadata[name] = value; });
-  };
-  const auto with_dimension = [&](std::size_t i, const Json& value) {
-    return refusal([&](EptParts& parts) { parts.metadata["schema"][i].update(value); });
-  };
-  EXPECT_PRED2(has, with("version", "2.0.0"), "version");
-  EXPECT_PRED2(has, with("version", 1), "version");
-  EXPECT_PRED2(has, with("dataType", "laz"), "dataType");
-  EXPECT_PRED2(has, with("hierarchyType", "gzip"), "hierarchyType");
-  EXPECT_PRED2(has, with("points", -1), "points");
-  EXPECT_PRED2(has, with("points", 5), "more points than ept.json promises");
-  EXPECT_PRED2(has, with("points", 7), "have 6 points, but ept.json promises 7");
-  EXPECT_PRED2(has, with("span", 0), "span");
-  EXPECT_PRED2(has, with("span", 0.5), "span");
-  EXPECT_PRED2(has, with("bounds", {0, 0, 0, 8, 8}), "bounds");
-  EXPECT_PRED2(has, with("bounds", {0, 0, 0, 8, 8, "8"}), "bounds");
-  EXPECT_PRED2(has, with("bounds", {0, 0, 0, 8, 8, 9}), "bounds");
-  EXPECT_PRED2(has, with("bounds", {8, 0, 0, 0, 8, 8}), "bounds");
-  EXPECT_PRED2(has, with("bounds", {-1.7e308, 0, 0, 1.7e308, 8, 8}), "bounds");
-  EXPECT_PRED2(has, with("schema", Json::object()), "schema");
-  EXPECT_PRED2(has, with("schema", Json::array()), "lacks X, Y or Z");
-  EXPECT_PRED2(has, with("schema", {1}), "is not an object");
-  EXPECT_PRED2(has, with("srs", 1), "srs");
-  EXPECT_PRED2(has, with("srs", {{"authority", "EPSG"}, {"horizontal", "x"}}), "srs");
-  EXPECT_PRED2(has, with_dimension(1, {{"name", "Y"}}), "once more");
-  EXPECT_PRED2(has, with_dimension(4, {{"name", "Intensity"}}), "once more");
-  EXPECT_PRED2(has, with_dimension(4, {{"name", ""}}), "has no name");
-  EXPECT_PRED2(has, with_dimension(4, {{"type", "text"}}), "is not a type");
-  EXPECT_PRED2(has, with_dimension(4, {{"size", 3}}), "is not a type");
-  EXPECT_PRED2(has, with_dimension(4, {{"size", 2}}), "is not a type");
-  EXPECT_PRED2(has, with_dimension(1, {{"scale", 0}}), "scale");
-  EXPECT_PRED2(has, with_dimension(1, {{"scale", 5e-324}}), "scales");
-  EXPECT_PRED2(has, with_dimension(1, {{"scale", "1"}}), "scale");
-  Json deep = 1;
-  for (int i = 0; i < 100; ++i) deep = Json::array({deep});
-  EXPECT_PRED2(has, with("more", deep), "nested too deeply");
-  {
-    const TempFolder folder;
-    const std::string file = small_parts().write(folder.path());
-    write_text(file, "{\"bounds\": ");
-    EXPECT_PRED2(has, error_of([&] { read_file(file); }), "not JSON");
-    write_text(file, "");
-    EXPECT_PRED2(has, error_of([&] { read_file(file); }), "ept.json");
-    write_text(file, "[1, 2, 3]");
-    EXPECT_PRED2(has, error_of([&] { read_file(file); }), "object");
-  }
-  // The hierarchy.
-  const auto with_root = [&](const std::string& text) {
-    return refusal([&](EptParts& parts) { parts.hierarchy["0-0-0-0"] = text; });
-  };
-  EXPECT_PRED2(has, with_root(R"({"0-0-0-0": 2, "0-0-0-0": 3, "2-3-0-0": -1})"), "is there twice");
-  EXPECT_PRED2(has, with_root(R"({"0-0-0-0": -1})"), "referred to twice");
-  EXPECT_PRED2(has, with_root(R"({"2-3-0-0": -1, "02-3-0-0": -1})"), "referred to twice");
-  EXPECT_PRED2(has, with_root(R"({"0-0-0-0": -2})"), "has -2 points");
-  EXPECT_PRED2(has, with_root(R"({"0-0-0-0": 1.5})"), "numbers of points");
-  EXPECT_PRED2(has, with_root(R"({"0-0-0-0": 18446744073709551615})"), "more points");
-  EXPECT_PRED2(has, with_root(R"({"0-0-0-0": {}})"), "numbers of points");
-  EXPECT_PRED2(has, with_root("[1]"), "numbers of points");
-  EXPECT_PRED2(has, with_root("1"), "numbers of points");
-  EXPECT_PRED2(has, with_root("{"), "not JSON");
-  EXPECT_PRED2(has, with_root(""), "not JSON");
-  for (const char* name : {"0", "0-0-0", "0-0-0-0-0", "1-2-0-0", "31-0-0-0", "1-0-0--1", "a-0-0-0",
-                           "../../x", "4294967296-0-0-0", ""}) {
-    EXPECT_PRED2(has, with_root(std::string("{\"") + name + "\": 1}"), "not a node");
-  }
-  EXPECT_PRED2(has, refusal([](EptParts& parts) { parts.hierarchy.erase("2-3-0-0"); }),
-               "2-3-0-0.json");
-  EXPECT_PRED2(has, refusal([](EptParts& parts) {
-                 parts.hierarchy["2-3-0-0"] = R"({"2-3-0-0": 1, "0-0-0-0": -1})";
-               }),
-               "referred to twice");
-  // The nodes, in all three forms.
-  EXPECT_PRED2(has, refusal([](EptParts& parts) { parts.nodes.erase("1-0-0-0.bin"); }),
-               "1-0-0-0.bin");
-  EXPECT_PRED2(has, refusal([](EptParts& parts) { parts.nodes["1-0-0-0.bin"] += "x"; }),
-               "the hierarchy counts 3 points");
-  EXPECT_PRED2(has, refusal([](EptParts& parts) { parts.nodes["1-0-0-0.bin"].resize(44); }),
-               "the hierarchy counts 3 points");
-  const auto with_zstd = [&](auto change) {
-    return refusal([&](EptParts& parts) {
-      parts.metadata["dataType"] = "zstandard";
-      for (const auto& [name, bytes] : std::map(parts.nodes)) {
-        parts.nodes[name.substr(0, name.size() - 3) + "zst"] = compressed(bytes);
-      }
-      change(parts.nodes["1-0-0-0.zst"], parts.nodes["1-0-0-0.bin"]);
-    });
-  };
-  EXPECT_EQ(with_zstd([](std::string&, const std::string&) {}), "");
-  EXPECT_EQ(with_zstd([](std::string& node, const std::string& bytes) {
-              node = compressed(bytes.substr(0, 5)) + compressed(bytes.substr(5));
-            }),
-            "");
-  EXPECT_PRED2(has, with_zstd([](std::string& node, const std::string& bytes) {
-                 node = compressed(bytes + "x");
-               }),
-               "has more");
-  EXPECT_PRED2(has, with_zstd([](std::string& node, const std::string& bytes) {
-                 node = compressed(bytes.substr(1));
-               }),
-               "ends before");
-  EXPECT_PRED2(has, with_zstd([](std::string& node, const std::string&) { node.pop_back(); }),
-               "is cut off");
-  EXPECT_PRED2(has, with_zstd([](std::string& node, const std::string&) { node.clear(); }),
-               "ends before");
-  EXPECT_PRED2(has, with_zstd([](std::string& node, const std::string&) { node[0] ^= 1; }),
-               "zstandard: ");
-  EXPECT_PRED2(has, with("dataType", "laszip"), "0-0-0-0.laz");
 }
 
 /// Of nodes written as LAZ: one of them with a point less, or on another lattice, is refused.
