@@ -243,7 +243,8 @@ TEST_F(MeshFormats, DamageIsNamed) {
            {"q.off", "OFF\n1 1 0\n0 0 0\n99999999999 0\n"},
            {"r.off", "OFF\n1 2 0\n0 0 0\n1 0\n"},
            {"s.obj", "v 0 0 0\nf 1 1 2\n"}}) {
-    EXPECT_NE(message([&] { (void)read_mesh(put(name, content)); }), "") << name;
+    const std::string file = put(name, content);
+    EXPECT_NE(message([&] { (void)read_mesh(file); }), "") << name;
   }
 }
 

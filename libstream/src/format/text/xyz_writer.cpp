@@ -33,10 +33,11 @@ std::string csv_field(const std::string& name) {
 class CoordinateText {
  public:
   CoordinateText() = default;
-  CoordinateText(double scale, double offset) : scale_(scale), offset_(offset), decimals_(0) {
+  CoordinateText(double scale, double offset) : offset_(offset), decimals_(0) {
     double power = 1.0;
     const auto is_whole = [&](double value) {
-      return std::abs(value * power - std::round(value * power)) <= 1e-6 * scale * power;
+      const double scaled = value * power;
+      return std::abs(scaled - std::round(scaled)) <= 0x1p-50 * std::abs(scaled);
     };
     for (; decimals_ <= kMostDecimals && !(is_whole(scale) && is_whole(offset)); ++decimals_) {
       power *= 10.0;
@@ -54,9 +55,8 @@ class CoordinateText {
     if (error != std::errc{} || parse_real(digits, end, meant) != end) return;
     while (decimals_ > 0 && end[-1] == '0') --end;
     if (end[-1] == '.') --end;
-    const double step = (value - offset_) / scale_;
-    const bool same = std::round(step) == std::round((meant - offset_) / scale_) &&
-                      std::abs(step - std::round(step)) < 1e-3;
+    // Equal but for what rounding the product and the sum can do.
+    const bool same = std::abs(value - meant) <= 0x1p-51 * (std::abs(value) + std::abs(offset_));
     if (same && static_cast<std::size_t>(end - digits) < text.size() - begin) {
       text.replace(begin, std::string::npos, std::string_view(digits, end));
     }
@@ -66,7 +66,7 @@ class CoordinateText {
   static constexpr int kMostDecimals = 9;
   static constexpr std::size_t kLongText = 15;  // shorter ones are no rounded sums
 
-  double scale_ = 1.0, offset_ = 0.0;
+  double offset_ = 0.0;
   int decimals_ = kMostDecimals + 1;  ///< of the lattice; more: none
 };
 
