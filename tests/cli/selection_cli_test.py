@@ -92,6 +92,14 @@ class SelectionTest(unittest.TestCase):
                 with open(os.path.join(store, name), 'rb') as one, \
                         open(self.path(f'all.st/{name}'), 'rb') as other:
                     self.assertEqual(one.read(), other.read(), name)
+            # One file of them all, point by point.
+            self.run_ok('convert', *names, '-o', self.path(f'parts{number}.csv'))
+            with open(self.file, encoding='ascii') as one, \
+                    open(self.path(f'parts{number}.csv'), encoding='ascii') as other:
+                first, second = list(csv.reader(one)), list(csv.reader(other))
+                self.assertEqual(first[0], second[0])
+                self.assertEqual([list(map(float, row)) for row in first[1:]],
+                                 [list(map(float, row)) for row in second[1:]])
         result = self.terrace('build', folder + '/*.las', '-o', self.path('none.st'))
         self.assertEqual(result.returncode, 1)
         self.assertIn('no file has such a name', result.stderr)

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // convert: a stream of points from one format to another.
-#include <array>
 #include <memory>
 #include <optional>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
@@ -27,9 +28,11 @@ namespace {
 class ConvertCommand : public Command {
  public:
   void define(CLI::App& app) override {
-    app.add_option("input", input_, "File of points or cells; - is standard input")
-        ->required()
-        ->type_name("FILE");
+    app.add_option(
+           "INPUT", inputs_,
+           "files of points or cells, one after the other (rasters form a mosaic); a folder of "
+           "them, @FILE with a name a line, or a pattern in quotes; - is standard input")
+        ->required();
     add_output(app, output_, "The file to write; - is standard output");
     app.add_option("--format", format_,
                    "Of the output: xyz, csv, ply, ply-ascii, las, laz, copc (else its ending)")
@@ -45,7 +48,6 @@ class ConvertCommand : public Command {
   Summary run(const CommonOptions& common) override {
     const Stopwatch watch;
     const stream::WriterOptions writing = point_writer_options(output_, format_, common);
-    const std::array<std::string, 1> files{input_};
     stream::SourceOptions reading{.format = input_format_,
                                   .heights_of_colour = colours_,
                                   .cell = cell_.value_or(0),
@@ -55,7 +57,7 @@ class ConvertCommand : public Command {
                                   .selection = selection_.selection()};
     DamageReport damage;
     if (skip_damaged_) reading.on_damage = damage.taker();
-    const std::unique_ptr<stream::PointSource> source = stream::open_source(files, reading);
+    const std::unique_ptr<stream::PointSource> source = stream::open_source(inputs_, reading);
     reading_within_memory(*source, common.memory_or(0));
     const stream::SourceInfo& info = source->info();
     const auto writer = stream::open_point_writer(output_,
@@ -108,7 +110,8 @@ class ConvertCommand : public Command {
     return world_box(info, *info.bounds);
   }
 
-  std::string input_, output_, format_, input_format_;
+  std::vector<std::string> inputs_;
+  std::string output_, format_, input_format_;
   SelectionOptions selection_;
   stream::HeightsOfColour colours_ = stream::HeightsOfColour::none;
   std::optional<double> cell_;
