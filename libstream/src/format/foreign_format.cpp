@@ -60,7 +60,6 @@ constexpr KnownFormat kRows[] = {
     {{"a Surfer grid", kRaster}, "", {0, "DSBB"}},
     {{"a Surfer grid", kRaster}, "", {0, "DSRB"}},
     {{"a Surfer grid", kRaster}, ".grd", {0, "DSAA"}},
-    {{"a virtual raster of GDAL", kRaster}, ".vrt", {0, "<VRTDataset"}},
     {{"a JPEG picture", "its numbers are colours, not heights: look for the GeoTIFF"},
      ".jpg .jpeg",
      {0, "\xff\xd8\xff"sv}},

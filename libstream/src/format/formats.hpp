@@ -11,6 +11,8 @@ namespace terrace::stream {
 
 /// GeoTIFF; several files are a mosaic.
 const Format& geotiff_format();
+/// GDAL's virtual rasters that are mosaics of GeoTIFFs.
+const Format& vrt_format();
 /// ASPRS LAS 1.0 to 1.4.
 const Format& las_format();
 /// Entwine Point Tile: a folder with an octree of files.

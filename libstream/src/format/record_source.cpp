@@ -82,6 +82,7 @@ class RecordSource final : public PointSource {
   /// Unpacks some of the next `wanted` records to the points from `done` on; returns how many.
   std::size_t unpack(PointBlock& block, std::size_t done, std::size_t wanted) {
     const std::string_view rows = stream_.records->read(wanted);
+    if (rows.empty()) return 0;
     const std::size_t stride = stream_.record_bytes, count = rows.size() / stride;
     PackedColumn column{.rows = nullptr,
                         .stride = stride,

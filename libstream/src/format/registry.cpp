@@ -172,10 +172,10 @@ std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
 
 std::span<const Format> formats() {
   // The most telling content first: text is whatever looks like a table of numbers.
-  static const std::array<Format, 13> all{
-      geotiff_format(),    las_format(),      ept_format(), ply_format(),         hgt_format(),
-      ascii_grid_format(), usgs_dem_format(), png_format(), binary_grid_format(), obj_format(),
-      off_format(),        stl_format(),      xyz_format()};
+  static const std::array<Format, 14> all{
+      geotiff_format(), vrt_format(),        las_format(),      ept_format(), ply_format(),
+      hgt_format(),     ascii_grid_format(), usgs_dem_format(), png_format(), binary_grid_format(),
+      obj_format(),     off_format(),        stl_format(),      xyz_format()};
   return all;
 }
 

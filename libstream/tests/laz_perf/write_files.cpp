@@ -39,7 +39,7 @@ void write_scan(const std::filesystem::path& file, unsigned format, std::size_t 
     const auto x = static_cast<double>(random() % 100'000), y = static_cast<double>(i % 50'000),
                z = static_cast<double>(random() % 999);
     block.positions.push_back({500'000 + 0.01 * x, 5'000'000 + 0.01 * y, 0.05 * z});
-    append_values(block.payload, static_cast<std::uint16_t>(x),
+    append_values(block.payload, static_cast<std::uint16_t>(x / 2),
                   static_cast<std::int16_t>(x / 10 - 5000), 1e8 + 0.001 * static_cast<double>(i),
                   static_cast<float>(y / 3));
     for (unsigned band = 0; band < bands; ++band) {

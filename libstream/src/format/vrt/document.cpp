@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "format/vrt/document.hpp"
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string_view>
+#include <utility>
+
+#include "format/vrt/xml.hpp"
+#include "io/number.hpp"
+#include "io/text.hpp"
+#include "raster/plain_world.hpp"
+#include "terrace/stream/error.hpp"
+
+namespace terrace::stream {
+namespace {
+
+constexpr std::uint64_t kMostVrtCells = 1u << 30;
+
+class VrtReader {
+ public:
+  VrtReader(const std::string& file, int band) : file_(file), root_(read_xml(file)) {
+    if (root_.name != "VRTDataset") fail("", "is XML, but no VRTDataset");
+    if (const std::string kind = root_.attribute("subClass"); !kind.empty()) {
+      fail("VRTDataset", "is a " + in_quotes(kind) + ", which computes its samples", kAsGeoTiff);
+    }
+    info_.columns = size_of_side("rasterXSize");
+    info_.rows = size_of_side("rasterYSize");
+    read_place();
+    read_band(band);
+  }
+
+  VrtDocument document() && { return {std::move(info_), std::move(sources_), nodata_}; }
+
+ private:
+  static constexpr std::string_view kAsGeoTiff =
+      "make a GeoTIFF of it: gdal_translate FILE out.tif";
+
+  [[noreturn]] void fail(std::string where, std::string cause,
+                         std::string_view remedy = "write it anew: gdalbuildvrt") const {
+    throw Error({.file = file_,
+                 .where = std::move(where),
+                 .cause = std::move(cause),
+                 .remedy = std::string(remedy)});
+  }
+
+  [[nodiscard]] double number(const std::string& text, const std::string& where) const {
+    const std::string_view trimmed = trim(text);
+    double value = 0;
+    if (trimmed.empty() ||
+        parse_real(trimmed.data(), trimmed.data() + trimmed.size(), value) !=
+            trimmed.data() + trimmed.size() ||
+        !std::isfinite(value)) {
+      fail(where, in_quotes(text) + " is no number");
+    }
+    return value;
+  }
+
+  [[nodiscard]] std::uint64_t size_of_side(const char* name) const {
+    const double value = number(root_.attribute(name), name);
+    if (!(value >= 1) || value >= static_cast<double>(kMostVrtCells) ||
+        value != std::floor(value)) {
+      fail(name, "is not a number of cells from 1 to 2^30 - 1");
+    }
+    return static_cast<std::uint64_t>(value);
+  }
+
+  void read_place() {
+    info_.format = "vrt";
+    info_.files = {file_};
+    if (const XmlElement* const srs = root_.child("SRS")) info_.crs.wkt = trim(srs->text);
+    const XmlElement* const transform = root_.child("GeoTransform");
+    if (transform == nullptr) {
+      info_.world = kPlainWorld;
+      info_.comments.push_back(kNoGeoreferencing);
+      return;
+    }
+    const std::vector<std::string_view> words = split_fields(trim(transform->text), ',');
+    if (words.size() != 6) fail("GeoTransform", "has not six numbers");
+    std::array<double, 6> g{};
+    for (std::size_t i = 0; i < 6; ++i) g[i] = number(std::string(words[i]), "GeoTransform");
+    // From the corner of the first cell to its middle.
+    info_.world.xy = {g[1], g[2], g[0] + 0.5 * (g[1] + g[2]),
+                      g[4], g[5], g[3] + 0.5 * (g[4] + g[5])};
+    const double area = g[1] * g[5] - g[2] * g[4];
+    if (!std::isfinite(area) || area == 0) {
+      fail("GeoTransform", "does not map cells to distinct places");
+    }
+  }
+
+  void read_band(int wanted) {
+    if (root_.child("MaskBand") != nullptr) fail("MaskBand", "is not read", kAsGeoTiff);
+    int bands = 0;
+    const XmlElement* band = nullptr;
+    for (const XmlElement& element : root_.children) {
+      if (element.name == "VRTRasterBand" && ++bands == wanted) band = &element;
+    }
+    if (band == nullptr) {
+      fail("", "has " + std::to_string(bands) + " bands, and band " + std::to_string(wanted) +
+                   " is asked for");
+    }
+    if (const std::string kind = band->attribute("subClass"); !kind.empty()) {
+      fail("VRTRasterBand", "is a " + in_quotes(kind) + ", which computes its samples", kAsGeoTiff);
+    }
+    info_.sample.name = "height";
+    info_.sample.type = type_of(band->attribute("dataType"));
+    for (const XmlElement& part : band->children) read_part(part);
+    info_.nodata = nodata_.value;
+  }
+
+  [[nodiscard]] ScalarType type_of(const std::string& name) const {
+    constexpr std::array<std::pair<std::string_view, ScalarType>, 10> kTypes{
+        {{"Byte", ScalarType::u8},
+         {"Int8", ScalarType::i8},
+         {"UInt16", ScalarType::u16},
+         {"Int16", ScalarType::i16},
+         {"UInt32", ScalarType::u32},
+         {"Int32", ScalarType::i32},
+         {"UInt64", ScalarType::u64},
+         {"Int64", ScalarType::i64},
+         {"Float32", ScalarType::f32},
+         {"Float64", ScalarType::f64}}};
+    for (const auto& [known, type] : kTypes) {
+      if (name == known) return type;
+    }
+    if (name.empty()) return ScalarType::u8;  // GDAL's default
+    fail("dataType", in_quotes(name) + " is no type of heights", kAsGeoTiff);
+  }
+
+  void read_part(const XmlElement& part) {
+    if (part.name == "SimpleSource" || part.name == "ComplexSource") {
+      sources_.push_back(source_of(part));
+    } else if (part.name.ends_with("Source") || part.name == "MaskBand") {
+      fail(part.name, "is not read", kAsGeoTiff);
+    } else if (part.name == "NoDataValue") {
+      nodata_ = NodataRule::parse(std::string(trim(part.text)), info_.sample.type);
+    } else if (part.name == "Scale") {
+      info_.sample.scale = number(part.text, "Scale");
+      if (info_.sample.scale == 0) fail("Scale", "is zero");
+    } else if (part.name == "Offset") {
+      info_.sample.offset = number(part.text, "Offset");
+    } else if (part.name == "UnitType") {
+      info_.sample.unit = info_.crs.vertical_unit = trim(part.text);
+    }  // colours, statistics, overviews and the like say nothing of the samples
+  }
+
+  VrtSource source_of(const XmlElement& element) const {
+    VrtSource source;
+    source.simple = true;
+    for (const XmlElement& part : element.children) {
+      if (part.name == "SourceFilename") {
+        source.file = trim(part.text);
+        if (part.attribute("relativeToVRT") == "1") {
+          source.file = (std::filesystem::path(file_).parent_path() / source.file).string();
+        }
+      } else if (part.name == "SourceBand") {
+        const double band = number(part.text, "SourceBand");
+        if (!(band >= 1 && band < 65536)) fail("SourceBand", "is no number of a band");
+        source.band = static_cast<int>(band);
+      } else if (part.name == "NODATA") {
+        source.simple = false;
+        source.nodata = NodataRule::parse(std::string(trim(part.text)), info_.sample.type);
+      } else if ((part.name == "ScaleRatio" && number(part.text, part.name) == 1) ||
+                 (part.name == "ScaleOffset" && number(part.text, part.name) == 0)) {
+        continue;
+      } else if (part.name != "SrcRect" && part.name != "DstRect" &&
+                 part.name != "SourceProperties") {
+        fail(element.name, in_quotes(part.name) + " is not read", kAsGeoTiff);
+      }
+    }
+    if (source.file.empty()) fail(element.name, "names no file");
+    place(element, source);
+    return source;
+  }
+
+  /// Whole cells, as many on either side.
+  void place(const XmlElement& element, VrtSource& source) const {
+    struct Rect {
+      std::array<double, 4> v{};
+    };
+    const auto rect = [&](const char* name) -> std::optional<Rect> {
+      const XmlElement* const found = element.child(name);
+      if (found == nullptr) return std::nullopt;
+      Rect r;
+      constexpr std::array kNames{"xOff", "yOff", "xSize", "ySize"};
+      for (std::size_t i = 0; i < 4; ++i) {
+        const double value = number(found->attribute(kNames[i]), name);
+        r.v[i] = std::round(value);
+        if (std::abs(value - r.v[i]) > 1e-6) {
+          fail(name, "does not lie on whole cells: its source would be resampled",
+               "align the files: gdalbuildvrt -tap -tr, or make a GeoTIFF: gdal_translate");
+        }
+        if (!(r.v[i] >= (i < 2 ? 0 : 1)) || r.v[i] >= static_cast<double>(kMostVrtCells)) {
+          fail(name, "lies outside of the raster", kAsGeoTiff);
+        }
+      }
+      return r;
+    };
+    const auto columns = static_cast<double>(info_.columns), rows = static_cast<double>(info_.rows);
+    const Rect whole{{0, 0, columns, rows}};
+    const Rect from = rect("SrcRect").value_or(whole), to = rect("DstRect").value_or(whole);
+    if (from.v[2] != to.v[2] || from.v[3] != to.v[3]) {
+      fail("DstRect", "is not as large as its SrcRect: its source would be resampled",
+           "align the files: gdalbuildvrt -tap -tr, or make a GeoTIFF: gdal_translate");
+    }
+    if (to.v[0] + to.v[2] > columns || to.v[1] + to.v[3] > rows) {
+      fail("DstRect", "lies outside of the raster", kAsGeoTiff);
+    }
+    const auto cells = [](double value) { return static_cast<std::uint64_t>(value); };
+    source.from_column = cells(from.v[0]);
+    source.from_row = cells(from.v[1]);
+    source.column = cells(to.v[0]);
+    source.row = cells(to.v[1]);
+    source.columns = cells(to.v[2]);
+    source.rows = cells(to.v[3]);
+  }
+
+  const std::string& file_;
+  XmlElement root_;
+  RasterInfo info_;
+  NodataRule nodata_;
+  std::vector<VrtSource> sources_;
+};
+
+}  // namespace
+
+VrtDocument read_vrt(const std::string& file, int band) { return VrtReader(file, band).document(); }
+
+}  // namespace terrace::stream

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "raster/nodata.hpp"
+#include "terrace/stream/raster.hpp"
+
+/// GDAL's virtual rasters (VRT) as far as they are mosaics: files whose cells lie on those of the
+/// whole. What would compute samples (resampling, scaling, masks, pixel functions, warping) is
+/// refused by name.
+
+namespace terrace::stream {
+
+/// A source of the band, and where its cells go.
+struct VrtSource {
+  std::string file{};
+  int band = 1;
+  bool simple = true;  ///< replaces what is below, data or not
+  NodataRule nodata{};
+  std::uint64_t from_column = 0, from_row = 0;  ///< of the source
+  std::uint64_t column = 0, row = 0, columns = 0, rows = 0;
+};
+
+/// One band of a virtual raster.
+struct VrtDocument {
+  RasterInfo info{};
+  std::vector<VrtSource> sources{};  ///< those that cover others last
+  NodataRule nodata{};               ///< of the whole
+};
+
+/// Reads the description; its sources are not opened. band: counted from 1. Throws: Error for what
+/// is no VRT and for what is not read.
+VrtDocument read_vrt(const std::string& file, int band);
+
+}  // namespace terrace::stream

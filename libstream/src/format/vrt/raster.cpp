@@ -1,0 +1,259 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/stream/raster.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <list>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "format/formats.hpp"
+#include "format/raster_points.hpp"
+#include "format/vrt/document.hpp"
+#include "raster/nodata.hpp"
+#include "raster/overlay.hpp"
+#include "terrace/stream/error.hpp"
+
+namespace terrace::stream {
+namespace {
+
+class VrtRaster final : public Raster {
+ public:
+  VrtRaster(const std::string& file, const RasterOptions& options)
+      : options_(options), open_bytes_(options.memory_bytes) {
+    VrtDocument document = read_vrt(file, options.band);
+    info_ = std::move(document.info);
+    sources_ = std::move(document.sources);
+    nodata_ = document.nodata;
+    held_.resize(sources_.size());
+    options_.cache_bytes /= kOpenAtOnce / 4;  // few of them meet in one window
+    for (std::size_t i = 0; i < sources_.size(); ++i) {
+      const std::unique_ptr<Raster> raster = open(sources_[i]);
+      held_[i] = raster->info().held_bytes;
+      direct_ = direct_ && is_direct(sources_[i], raster->info());
+      info_.held_bytes = std::max(info_.held_bytes, held_[i]);
+      if (i == 0 && info_.crs.wkt.empty()) {
+        const std::string unit = info_.crs.vertical_unit;
+        info_.crs = raster->info().crs;
+        if (!unit.empty()) info_.crs.vertical_unit = unit;
+      }
+    }
+    if (!direct_) {
+      constexpr std::uint64_t kWindowColumns = 4096;  // of most windows
+      info_.held_bytes += std::min(info_.columns, kWindowColumns) * kStripRows *
+                          (2 * size_of(info_.sample.type) + 4);
+    }
+  }
+
+  [[nodiscard]] const RasterInfo& info() const override { return info_; }
+  void set_open_bytes(std::uint64_t bytes) override { open_bytes_ = bytes; }
+
+  bool read_over(const CellWindow& window, const CellBuffer& out) override {
+    bool any = false;
+    const std::size_t bytes = size_of(info_.sample.type);
+    if (direct_) {
+      for (std::size_t i = 0; i < sources_.size(); ++i) {
+        const VrtSource& source = sources_[i];
+        const std::optional<Meeting> meeting = meeting_of(source, window);
+        if (!meeting) continue;
+        const std::size_t to = static_cast<std::size_t>(meeting->row) * out.stride +
+                               static_cast<std::size_t>(meeting->column);
+        any |= opened(i).read_over(
+            meeting->inside,
+            {.samples = out.samples + to * bytes, .valid = out.valid + to, .stride = out.stride});
+      }
+      return any;
+    }
+    for (std::uint64_t row = 0; row < window.rows; row += kStripRows) {
+      const CellWindow strip{.column = window.column,
+                             .row = window.row + row,
+                             .columns = window.columns,
+                             .rows = std::min(kStripRows, window.rows - row)};
+      const std::size_t to = static_cast<std::size_t>(row) * out.stride;
+      any |= compose(
+          strip,
+          {.samples = out.samples + to * bytes, .valid = out.valid + to, .stride = out.stride});
+    }
+    return any;
+  }
+
+ private:
+  static constexpr std::size_t kOpenAtOnce = 32;
+  static constexpr std::uint64_t kStripRows = 256;
+
+  /// What a source and a window have in common.
+  struct Meeting {
+    CellWindow inside{};                ///< of the source
+    std::uint64_t column = 0, row = 0;  ///< where that begins in the window
+  };
+  static std::optional<Meeting> meeting_of(const VrtSource& source, const CellWindow& window) {
+    const std::uint64_t l = std::max(window.column, source.column),
+                        t = std::max(window.row, source.row),
+                        r = std::min(window.column + window.columns,
+                                     source.column + source.columns),
+                        b = std::min(window.row + window.rows, source.row + source.rows);
+    if (l >= r || t >= b) return std::nullopt;
+    return Meeting{.inside = {.column = source.from_column + (l - source.column),
+                              .row = source.from_row + (t - source.row),
+                              .columns = r - l,
+                              .rows = b - t},
+                   .column = l - window.column,
+                   .row = t - window.row};
+  }
+
+  struct Open {
+    std::size_t source;
+    std::unique_ptr<Raster> raster;
+  };
+
+  [[nodiscard]] std::unique_ptr<Raster> open(const VrtSource& source) const {
+    RasterOptions options = options_;
+    options.band = source.band;
+    std::unique_ptr<Raster> raster = open_geotiff(source.file, options);
+    const RasterInfo& found = raster->info();
+    const auto refuse = [&](const std::string& cause) {
+      throw Error({.file = info_.files.front(),
+                   .where = source.file,
+                   .cause = cause,
+                   .remedy = "make a GeoTIFF of it: gdal_translate FILE out.tif"});
+    };
+    if (found.sample.type != info_.sample.type) {
+      refuse("its samples are " + std::string(name_of(found.sample.type)) +
+             ", those of the whole " + std::string(name_of(info_.sample.type)));
+    }
+    if (source.from_column + source.columns > found.columns ||
+        source.from_row + source.rows > found.rows) {
+      refuse("has " + std::to_string(found.columns) + " x " + std::to_string(found.rows) +
+             " cells, fewer than are asked of it");
+    }
+    return raster;
+  }
+
+  Raster& opened(std::size_t source) {
+    const auto found =
+        std::find_if(open_.begin(), open_.end(), [&](const Open& o) { return o.source == source; });
+    if (found != open_.end()) {
+      open_.splice(open_.begin(), open_, found);
+      return *open_.front().raster;
+    }
+    while (!open_.empty() &&
+           (open_.size() >= kOpenAtOnce || held_bytes_ + held_[source] > open_bytes_)) {
+      held_bytes_ -= held_[open_.back().source];
+      open_.pop_back();
+    }
+    open_.push_front({source, open(sources_[source])});
+    held_bytes_ += held_[source];
+    return *open_.front().raster;
+  }
+
+  /// What the rule leaves of a row of samples, to mask_.
+  void mask(const std::byte* samples, std::size_t cells, const NodataRule& rule,
+            std::vector<std::uint8_t>& mask) {
+    mask.assign(cells, 0);
+    ignored_.resize(cells * size_of(info_.sample.type));
+    overlay_row(info_.sample.type, {.samples = samples, .step = 1, .cells = cells}, rule,
+                ignored_.data(), mask.data());
+  }
+
+  /// True if of the source only the cells count that its file has data for, each with its value.
+  [[nodiscard]] bool is_direct(const VrtSource& source, const RasterInfo& file) const {
+    const bool whole = nodata_.value == file.nodata || !nodata_.value;
+    if (!source.simple) return source.nodata.value == file.nodata && whole;
+    const bool holes =
+        file.nodata || info_.sample.type == ScalarType::f32 || info_.sample.type == ScalarType::f64;
+    return !holes && whole;
+  }
+
+  /// Lays all sources over one another, then what has data over `out`: a source may take back what
+  /// one before it has given, but not what the caller has.
+  bool compose(const CellWindow& window, const CellBuffer& out) {
+    const std::size_t cells = static_cast<std::size_t>(window.columns * window.rows);
+    const std::size_t bytes = size_of(info_.sample.type);
+    samples_.resize(cells * bytes);
+    valid_.assign(cells, 0);
+    for (std::size_t i = 0; i < sources_.size(); ++i) lay(i, window);
+    bool any = false;
+    for (std::size_t row = 0; row < window.rows; ++row) {
+      for (std::size_t column = 0; column < window.columns; ++column) {
+        const std::size_t at = row * static_cast<std::size_t>(window.columns) + column;
+        if (valid_[at] == 0) continue;
+        const std::size_t to = row * out.stride + column;
+        std::memcpy(out.samples + to * bytes, samples_.data() + at * bytes, bytes);
+        out.valid[to] = 1;
+        any = true;
+      }
+    }
+    return any;
+  }
+
+  /// Lays a source over the window, as GDAL composes bands.
+  void lay(std::size_t number, const CellWindow& window) {
+    const VrtSource& source = sources_[number];
+    const std::optional<Meeting> meeting = meeting_of(source, window);
+    if (!meeting) return;
+    const std::size_t bytes = size_of(info_.sample.type);
+    const auto columns = static_cast<std::size_t>(meeting->inside.columns),
+               rows = static_cast<std::size_t>(meeting->inside.rows);
+    part_.resize(columns * rows * bytes);
+    part_valid_.assign(columns * rows, 0);
+    opened(number).read_over(
+        meeting->inside, {.samples = part_.data(), .valid = part_valid_.data(), .stride = columns});
+    for (std::size_t row = 0; row < rows; ++row) {
+      const std::byte* const samples = part_.data() + row * columns * bytes;
+      const std::uint8_t* const has_data = part_valid_.data() + row * columns;
+      if (!source.simple) mask(samples, columns, source.nodata, opaque_);
+      mask(samples, columns, nodata_, data_);
+      const std::size_t to =
+          static_cast<std::size_t>((meeting->row + row) * window.columns + meeting->column);
+      for (std::size_t i = 0; i < columns; ++i) {
+        if (!source.simple && (has_data[i] == 0 || opaque_[i] == 0)) continue;
+        const bool good = has_data[i] != 0 && data_[i] != 0;
+        valid_[to + i] = good ? 1 : 0;
+        if (good) std::memcpy(samples_.data() + (to + i) * bytes, samples + i * bytes, bytes);
+      }
+    }
+  }
+
+  RasterOptions options_;
+  RasterInfo info_;
+  std::vector<VrtSource> sources_;
+  NodataRule nodata_;
+  std::vector<std::uint64_t> held_;  ///< bytes, by source
+  std::list<Open> open_;             ///< the last used first
+  std::uint64_t open_bytes_, held_bytes_ = 0;
+  bool direct_ = true;  ///< sources lie over one another as they are
+  std::vector<std::byte> samples_, part_, ignored_;
+  std::vector<std::uint8_t> valid_, part_valid_, opaque_, data_;
+};
+
+std::unique_ptr<Raster> open_vrt(const std::string& file, const RasterOptions& options) {
+  return std::make_unique<VrtRaster>(file, options);
+}
+
+bool recognise_vrt(std::span<const std::byte> head) {
+  return std::string_view(reinterpret_cast<const char*>(head.data()), head.size())
+             .substr(0, 512)
+             .find("<VRTDataset") != std::string_view::npos;
+}
+
+std::unique_ptr<PointSource> open_vrt_points(std::span<const std::string> files,
+                                             const SourceOptions& options) {
+  return open_raster_points(files, options, &open_vrt);
+}
+
+}  // namespace
+
+const Format& vrt_format() {
+  static const Format format{
+      .name = "vrt", .endings = {".vrt"}, .recognise = &recognise_vrt, .open = &open_vrt_points};
+  return format;
+}
+
+}  // namespace terrace::stream

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "format/vrt/xml.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <exception>
+#include <memory>
+#include <new>
+#include <span>
+#include <type_traits>
+#include <utility>
+
+#include <expat.h>
+
+#include "terrace/stream/byte_source.hpp"
+#include "terrace/stream/error.hpp"
+
+namespace terrace::stream {
+namespace {
+
+constexpr std::uint64_t kMostBytes = std::uint64_t{256} << 20;
+constexpr std::size_t kDeepest = 32;
+
+/// What the parser has read. Its handlers are C functions: they must not throw.
+struct XmlReading {
+  XML_Parser parser = nullptr;
+  XmlElement root{};
+  std::vector<XmlElement> open{};  ///< those whose end has not come
+  std::string refusal{};
+  std::exception_ptr failure{};
+
+  void stop() const { XML_StopParser(parser, XML_FALSE); }
+
+  template <class Work>
+  static void safely(void* self, const Work& work) {
+    auto& reading = *static_cast<XmlReading*>(self);
+    try {
+      work(reading);
+    } catch (...) {
+      reading.failure = std::current_exception();
+      reading.stop();
+    }
+  }
+};
+
+void on_start(void* self, const XML_Char* name, const XML_Char** attributes) {
+  XmlReading::safely(self, [&](XmlReading& reading) {
+    if (reading.open.size() == kDeepest) {
+      reading.refusal = "its elements are nested too deeply";
+      return reading.stop();
+    }
+    XmlElement element{.name = name};
+    for (; *attributes != nullptr; attributes += 2)
+      element.attributes[attributes[0]] = attributes[1];
+    reading.open.push_back(std::move(element));
+  });
+}
+
+void on_end(void* self, const XML_Char* /*name*/) {
+  XmlReading::safely(self, [](XmlReading& reading) {
+    XmlElement done = std::move(reading.open.back());
+    reading.open.pop_back();
+    if (reading.open.empty()) {
+      reading.root = std::move(done);
+    } else {
+      reading.open.back().children.push_back(std::move(done));
+    }
+  });
+}
+
+void on_text(void* self, const XML_Char* text, int size) {
+  XmlReading::safely(self, [&](XmlReading& reading) {
+    if (!reading.open.empty())
+      reading.open.back().text.append(text, static_cast<std::size_t>(size));
+  });
+}
+
+void on_document_type(void* self, const XML_Char*, const XML_Char*, const XML_Char*, int) {
+  auto& reading = *static_cast<XmlReading*>(self);
+  XmlReading::safely(self, [](XmlReading& r) { r.refusal = "it declares a document type"; });
+  reading.stop();
+}
+
+}  // namespace
+
+const XmlElement* XmlElement::child(std::string_view wanted) const {
+  const auto at = std::find_if(children.begin(), children.end(),
+                               [&](const XmlElement& element) { return element.name == wanted; });
+  return at == children.end() ? nullptr : &*at;
+}
+
+std::string XmlElement::attribute(const std::string& wanted) const {
+  const auto at = attributes.find(wanted);
+  return at == attributes.end() ? std::string() : at->second;
+}
+
+XmlElement read_xml(const std::string& file) {
+  const auto bytes = open_file(file);
+  const std::unique_ptr<std::remove_pointer_t<XML_Parser>, void (*)(XML_Parser)> parser(
+      XML_ParserCreate(nullptr), &XML_ParserFree);
+  if (!parser) throw std::bad_alloc();
+  XmlReading reading{.parser = parser.get()};
+  const auto fail = [&](const std::string& cause) {
+    throw Error({.file = file,
+                 .where = "line " + std::to_string(XML_GetCurrentLineNumber(parser.get())),
+                 .cause = cause,
+                 .remedy = "the file is damaged: write it anew"});
+  };
+  if (bytes->size() > kMostBytes) fail("is too large for a description");
+  XML_SetUserData(parser.get(), &reading);
+  XML_SetElementHandler(parser.get(), &on_start, &on_end);
+  XML_SetCharacterDataHandler(parser.get(), &on_text);
+  XML_SetStartDoctypeDeclHandler(parser.get(), &on_document_type);
+  std::array<char, 64u << 10> piece;
+  for (std::uint64_t at = 0, end = 0; end < bytes->size() || at == 0; at = end) {
+    const auto size =
+        static_cast<std::size_t>(std::min<std::uint64_t>(piece.size(), bytes->size() - at));
+    bytes->read(at, std::as_writable_bytes(std::span(piece).first(size)));
+    end = at + size;
+    const XML_Status status = XML_Parse(parser.get(), piece.data(), static_cast<int>(size),
+                                        end == bytes->size() ? XML_TRUE : XML_FALSE);
+    if (reading.failure) std::rethrow_exception(reading.failure);
+    if (!reading.refusal.empty()) fail(reading.refusal);
+    if (status != XML_STATUS_OK) {
+      fail(std::string("is not XML: ") + XML_ErrorString(XML_GetErrorCode(parser.get())));
+    }
+    if (end == 0) break;
+  }
+  return std::move(reading.root);
+}
+
+}  // namespace terrace::stream

@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cstdint>
+#include <cstdlib>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "gdal_tools.hpp"
+#include "point_files.hpp"
+#include "temp_folder.hpp"
+#include "terrace/stream/error.hpp"
+#include "tiff_writing.hpp"
+
+/// Virtual rasters, against GDAL, which makes GeoTIFFs of them.
+
+namespace terrace::stream {
+namespace {
+
+std::vector<Point3> sorted_cells(AllPoints all) {
+  std::sort(all.points.positions.begin(), all.points.positions.end());
+  return std::move(all.points.positions);
+}
+
+class Vrt : public ::testing::Test {
+ protected:
+  [[nodiscard]] std::string path(const std::string& name) const {
+    return (folder_.path() / name).string();
+  }
+  /// A GeoTIFF of random samples below `most`; nodata: its tag, if not empty.
+  void put_tiff(const std::string& name, std::int64_t column, std::int64_t row,
+                std::uint32_t columns, std::uint32_t rows, const std::string& nodata, int most,
+                std::mt19937_64& random) const {
+    TiffSpec spec;
+    spec.columns = columns;
+    spec.rows = rows;
+    if (random() % 2 == 0) spec.tile_columns = spec.tile_rows = 16;
+    const auto place = placed_at(1000 + 10 * static_cast<double>(column),
+                                 5000 - 10 * static_cast<double>(row), 10);
+    spec.more = [&](TIFF* tiff) {
+      place(tiff);
+      if (!nodata.empty()) TIFFSetField(tiff, 42113, nodata.c_str());
+    };
+    std::vector<std::int16_t> values(std::size_t{columns} * rows);
+    for (std::int16_t& value : values) {
+      value = static_cast<std::int16_t>(random() % static_cast<unsigned>(most));
+    }
+    write_tiff(path(name), spec, as_samples(values));
+  }
+  [[nodiscard]] std::string put_vrt(const std::string& band, const std::string& more = {},
+                                    const std::string& attributes = {}) const {
+    return write_text(path("a.vrt"),
+                      "<VRTDataset rasterXSize=\"20\" rasterYSize=\"10\"" + attributes +
+                          ">\n<GeoTransform> 1.0e3, 10, 0, 5000, 0, -10</GeoTransform>" + more +
+                          "<VRTRasterBand dataType=\"Int16\" band=\"1\">" + band +
+                          "</VRTRasterBand></VRTDataset>\n");
+  }
+  [[nodiscard]] static std::string source(const std::string& more,
+                                          const std::string& name = "a.tif") {
+    return "<SimpleSource><SourceFilename relativeToVRT=\"1\">" + name +
+           "</SourceFilename><SourceBand>1</SourceBand>" + more + "</SimpleSource>";
+  }
+  [[nodiscard]] static std::string rects(const std::string& from, const std::string& to) {
+    return "<SrcRect " + from + "/><DstRect " + to + "/>";
+  }
+  TempFolder folder_;
+};
+
+TEST_F(Vrt, HasTheCellsThatGdalMakesOfIt) {
+  if (!has_gdal()) GTEST_SKIP() << "no GDAL here";
+  for (std::uint64_t seed = 1; seed <= 24 / TERRACE_TEST_SHARE; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937_64 random(seed);
+    const bool own_nodata = random() % 2 == 0;
+    std::string files;
+    const std::size_t count = 1 + random() % 5;
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::string name = "t" + std::to_string(i) + ".tif";
+      put_tiff(name, static_cast<std::int64_t>(random() % 60),
+               static_cast<std::int64_t>(random() % 60),
+               1 + static_cast<std::uint32_t>(random() % 50),
+               1 + static_cast<std::uint32_t>(random() % 50), own_nodata ? "3" : "", 9, random);
+      files += " '" + path(name) + "'";
+    }
+    // Without any, as the files say, one for all, another in the whole, only in the whole.
+    const std::vector<std::string> ways{"", "-srcnodata 4", "-srcnodata 4 -vrtnodata 4",
+                                        "-srcnodata 4 -vrtnodata -7", "-vrtnodata 5"};
+    std::string options = own_nodata ? "" : ways[random() % ways.size()];
+    if (random() % 2 == 0) options += " -te 1100 4600 1550 4950";
+    const std::string vrt = path("a.vrt"), tif = path("whole.tif");
+    ASSERT_EQ(std::system(("gdalbuildvrt -q -overwrite " + options + " '" + vrt + "'" + files +
+                           " >/dev/null 2>&1")
+                              .c_str()),
+              0);
+    ASSERT_EQ(
+        std::system(("gdal_translate -q '" + vrt + "' '" + tif + "' >/dev/null 2>&1").c_str()), 0);
+    const AllPoints wanted = read_file(tif);
+    AllPoints found = read_file(vrt, {.block_points = 1 + random() % 500});
+    EXPECT_EQ(found.info.format, "vrt");
+    EXPECT_EQ(found.info.columns, wanted.info.columns);
+    EXPECT_EQ(found.info.rows, wanted.info.rows);
+    EXPECT_EQ(found.info.world.xy, wanted.info.world.xy);
+    // What no source covers is 0 to GDAL where the whole has no nodata, and nothing here.
+    std::vector<Point3> all = sorted_cells(wanted), some = sorted_cells(std::move(found));
+    if (wanted.info.nodata) {
+      EXPECT_EQ(some, all) << options;
+    } else {
+      std::erase_if(all, [](const Point3& cell) { return cell[2] == 0; });
+      std::erase_if(some, [](const Point3& cell) { return cell[2] == 0; });
+      EXPECT_EQ(some, all) << options;
+    }
+  }
+}
+
+TEST_F(Vrt, MayTakePartsAndHaveScaleAndOffset) {
+  std::mt19937_64 random(7);
+  put_tiff("a.tif", 0, 0, 12, 10, "", 99, random);
+  const std::vector<Point3> whole = sorted_cells(read_file(path("a.tif")));
+  const std::string file = put_vrt(
+      "<NoDataValue>5</NoDataValue><Scale>0.5</Scale><Offset>100</Offset><UnitType>m</UnitType>" +
+      source(rects("xOff='2' yOff='1' xSize='7' ySize='6'",
+                   "xOff='11' yOff='3' xSize='7' ySize='6'")));
+  const AllPoints all = read_file(file);
+  EXPECT_EQ(all.info.coordinates[2].scale, 0.5);
+  EXPECT_EQ(all.info.coordinates[2].offset, 100);
+  EXPECT_EQ(all.info.coordinates[2].unit, "m");
+  EXPECT_EQ(all.info.nodata, 5);
+  std::vector<Point3> wanted;
+  for (const Point3& p : whole) {
+    if (p[0] >= 2 && p[0] < 9 && p[1] >= 1 && p[1] < 7 && p[2] != 5) {
+      wanted.push_back({p[0] + 9, p[1] + 2, p[2]});
+    }
+  }
+  EXPECT_EQ(sorted_cells(all), wanted);
+  EXPECT_EQ(world_point(all.info, {0, 0, 0}), (Point3{1005, 4995, 100}));
+}
+
+TEST_F(Vrt, WhatComputesSamplesIsRefusedByName) {
+  std::mt19937_64 random(8);
+  put_tiff("a.tif", 0, 0, 20, 10, "", 99, random);
+  put_tiff("small.tif", 0, 0, 19, 10, "", 99, random);
+  const std::string all = source("");
+  EXPECT_EQ(read_file(put_vrt(all)).points.size(), 200U);
+  std::string deep;
+  for (int i = 0; i < 40; ++i) deep += "<a>";
+  const auto message = [&](const std::string& band, const std::string& more = {},
+                           const std::string& attributes = {}) {
+    const std::string file = put_vrt(band, more, attributes);
+    return error_of([&] { read_file(file); });
+  };
+  for (const auto& [found, words] : std::vector<std::pair<std::string, std::string>>{
+           {message(all, "", " subClass='VRTWarpedDataset'"), "VRTWarpedDataset"},
+           {message("<KernelFilteredSource/>"), "KernelFilteredSource"},
+           {message("<AveragedSource/>"), "AveragedSource"},
+           {message(all, "<MaskBand/>"), "MaskBand"},
+           {message("<ComplexSource><SourceFilename relativeToVRT='1'>a.tif</SourceFilename>"
+                    "<ScaleRatio>2</ScaleRatio></ComplexSource>"),
+            "ScaleRatio"},
+           {message(source("<LUT>0:1</LUT>")), "LUT"},
+           {message(source(rects("xOff='0' yOff='0' xSize='20' ySize='10'",
+                                 "xOff='0' yOff='0' xSize='10' ySize='5'"))),
+            "resampled"},
+           {message(source(rects("xOff='0.5' yOff='0' xSize='2' ySize='2'",
+                                 "xOff='0' yOff='0' xSize='2' ySize='2'"))),
+            "whole cells"},
+           {message(source(rects("xOff='0' yOff='0' xSize='20' ySize='10'",
+                                 "xOff='1' yOff='0' xSize='20' ySize='10'"))),
+            "outside"},
+           {message(source(rects("xOff='-1' yOff='0' xSize='2' ySize='2'",
+                                 "xOff='1' yOff='0' xSize='2' ySize='2'"))),
+            "outside"},
+           {message(source(rects("xOff='0' yOff='0' xSize='1e300' ySize='2'",
+                                 "xOff='0' yOff='0' xSize='1e300' ySize='2'"))),
+            "outside"},
+           {message(source("", "small.tif")), "19 x 10"},
+           {message(source("", "none.tif")), "none.tif"},
+           {message(source("", "a.vrt")), "a.vrt"},  // itself
+           {message("<SimpleSource/>"), "names no file"},
+           {message(all, "<SRS>" + deep), "nested too deeply"},
+           {message(all, "<unclosed>"), "not XML"},
+           {message(all, "", " rasterXSize='3'"), "not XML"}}) {
+    EXPECT_NE(found.find(words), std::string::npos) << "\"" << found << "\" lacks " << words;
+  }
+  const auto of_text = [&](const std::string& text) {
+    const std::string file = write_text(path("b.vrt"), text);
+    return error_of([&] { read_file(file); });
+  };
+  EXPECT_NE(of_text("<!DOCTYPE a [<!ENTITY x 'y'>]><VRTDataset/>").find("document type"),
+            std::string::npos);
+  EXPECT_NE(of_text("<VRTDataset rasterXSize='0' rasterYSize='1'/>").find("rasterXSize"),
+            std::string::npos);
+  EXPECT_NE(of_text("<VRTDataset rasterXSize='1' rasterYSize='99999999999'/>").find("rasterYSize"),
+            std::string::npos);
+  EXPECT_NE(of_text("<VRTDataset rasterXSize='1' rasterYSize='1'/>").find("0 bands"),
+            std::string::npos);
+  // Damage of any kind is an Error.
+  const std::string good = read_text(put_vrt(all));
+  for (int round = 0; round < 400; ++round) {
+    std::string bad = good;
+    for (int i = 0; i < 3; ++i) bad[random() % bad.size()] = static_cast<char>(random() % 128);
+    of_text(bad);
+  }
+}
+
+}  // namespace
+}  // namespace terrace::stream
