@@ -78,7 +78,8 @@ inline Reading read_through(const std::string& file, const SourceOptions& option
     require(block.empty(), "an empty block at the end");
     require(source->progress().points == reading.points, "progress");
     const auto promised = source->info().points;
-    require(!promised || *promised == reading.points, "as many points as promised");
+    const std::uint64_t lost = source->progress().lost;
+    require(!promised || *promised == reading.points + lost, "as many points as promised");
   } catch (const Error& error) {
     require(!error.parts().cause.empty(), "a cause");
     reading = {.refused = true};

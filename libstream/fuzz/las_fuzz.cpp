@@ -12,5 +12,16 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const Reading threads =
       read_through(file.name(), {.format = "las", .block_points = 500, .threads = 2});
   require(large == threads, "the same points by any number of threads");
+  // What is whole is read the same where damage is left out; of the rest there is as much as can
+  // be.
+  std::uint64_t told = 0;
+  const OnDamage count = [&told](const Error&, std::uint64_t points) { told += points; };
+  const Reading rest =
+      read_through(file.name(), {.format = "las", .block_points = 500, .on_damage = count});
+  require(large.refused || rest == large, "nothing left out of what is whole");
+  told = 0;
+  const Reading by_threads = read_through(
+      file.name(), {.format = "las", .block_points = 500, .threads = 2, .on_damage = count});
+  require(rest == by_threads, "the same rest by any number of threads");
   return 0;
 }
