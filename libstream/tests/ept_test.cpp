@@ -111,7 +111,7 @@ TEST(Ept, CoordinatesMayBeOfAnyType) {
   }
 }
 
-/// Of nodes written as LAZ: one of them with a point less, or on another lattice, is refused.
+/// Nodes written as LAZ must agree: one that lacks a point or is on another lattice is refused.
 TEST(Ept, NodesOfLazAgree) {
   const auto read = [](std::size_t points, double step) {
     const TempFolder folder;

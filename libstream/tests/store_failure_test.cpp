@@ -437,7 +437,7 @@ TEST(StoreWriting, BytesDoNotDependOnWhenBlocksAreEncoded) {
   }
   const auto recorded = testing::recorded_hierarchy(
       blocks, {.block_points = 70, .cluster_points = 16, .scale = {1, 1, 1}});
-  // Of a cloud the rows are coded as columns, which keep the order of the points.
+  // A cloud's rows are coded as columns, which keep the order of the points.
   for (const StoreSchema& schema :
        {testing::grid_schema(ScalarType::i16), testing::cloud_schema()}) {
     const auto expected = files_for_threads(schema, recorded, 1);

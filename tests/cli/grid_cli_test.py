@@ -161,7 +161,9 @@ class GridTest(unittest.TestCase):
         self.same_store('a.terrace', 'pipe.terrace')
         with open(self.path('a.pgw'), 'w') as file:
             file.write('25\n0\n0\n-25\n500012.5\n5200737.5\n')
-        for name in ('a.png', 'a.csv'):
+        with open(self.path('a.obj'), 'w') as file:
+            file.write('v 1 2 3\nv 2 3 4\n')
+        for name in ('a.png', 'a.csv', 'a.obj'):
             result = self.terrace('build', self.path(name), '-o', self.path('no.terrace'), '--cell', 25)
             self.assertEqual(result.returncode, 1)
             self.assertIn(b'leave --cell out', result.stderr)

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The command as a process among others: pipes, closed descriptors, signals, full disks, names that
-a terminal would obey, and what is not to be had.
+a terminal would obey, and resources that the system refuses.
 
 TERRACE=path/to/terrace process_cli_test.py [CLASS...]
 """

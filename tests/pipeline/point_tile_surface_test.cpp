@@ -341,8 +341,8 @@ TEST(StoreWindow, TheIndexTellsNumbersAndHeightsOfABox) {
     const auto heights = terrain::cluster_heights(query, box);
     ASSERT_EQ(heights.has_value(), met > 0);
     if (!heights) continue;
-    // Of a cluster above that lies in the box as a whole the index tells as much, but for its
-    // growth.
+    // For a cluster above level 0 that is wholly inside the box, the index gives the same range,
+    // widened by its growth.
     EXPECT_LE(heights->low, low);
     EXPECT_GE(heights->high, high);
     const double growth = (bounds.max[2] - bounds.min[2]) / 1024;

@@ -66,7 +66,7 @@ MeshFile read_simple(const std::string& file, const SourceOptions& options,
     }
     numbers.clear();
   }
-  mesh.info.format = kind.format().name;
+  mesh.info.format = parser->format();
   mesh.info.files = {file};
   mesh.info.comments = parser->comments();
   mesh.info.points = mesh.vertices.size();

@@ -20,14 +20,13 @@ class WithCells final : public Raster {
  public:
   WithCells(std::unique_ptr<Raster> raster, double cell) : raster_(std::move(raster)) {
     info_ = raster_->info();
-    const auto plain = std::find(info_.comments.begin(), info_.comments.end(), kNoGeoreferencing);
-    if (plain == info_.comments.end()) {
+    if (info_.world != kPlainWorld) {
       throw Error({.file = info_.files.front(),
                    .where = {},
                    .cause = "says itself how large its cells are",
                    .remedy = "leave `cell` out"});
     }
-    info_.comments.erase(plain);
+    std::erase(info_.comments, kNoGeoreferencing);
     for (double& number : info_.world.xy) number *= cell;
   }
 

@@ -4,6 +4,7 @@
 #include <cassert>
 #include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "format/ept/metadata.hpp"
@@ -56,14 +57,6 @@ bool is_ept_name(const std::string& file) {
   return std::filesystem::path(file).filename() == kEptName;
 }
 
-/// By the ending, that of ".csv.gz" being ".csv".
-const Format* format_of_file_name(const std::string& file) {
-  if (is_ept_name(file)) return &ept_format();
-  if (const Format* const packed = packed_format_of(file)) return packed;
-  const std::string ending = ending_of(file);
-  return format_of_ending(ending == ".gz" ? ending_of(std::filesystem::path(file).stem()) : ending);
-}
-
 [[noreturn]] void refuse(const std::string& file, const ForeignFormat& format) {
   throw Error({.file = file == kStandardStream ? "standard input" : file,
                .where = {},
@@ -96,7 +89,7 @@ const Format& format_of(const std::string& file, const SourceOptions& options) {
     refuse(file, *foreign);
   }
   if (formats().back().recognise(bytes)) return formats().back();
-  if (const Format* const format = format_of_file_name(file)) return *format;
+  if (const Format* const format = format_of_name(file)) return *format;
   const ForeignFormat* const foreign = foreign_format_of_ending(ending_of(file));
   if (foreign != nullptr && !head.empty()) refuse(file, *foreign);
   throw Error(
@@ -150,13 +143,6 @@ std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
                  .cause = "is " + format.name + ", whose heights are no colours",
                  .remedy = "leave `heights_of_colour` out"});
   }
-  if (options.cell > 0 && (format.name == las_format().name || format.name == ply_format().name ||
-                           format.name == xyz_format().name)) {
-    throw Error({.file = files.front(),
-                 .where = {},
-                 .cause = "is " + format.name + ", whose points are no cells",
-                 .remedy = "leave `cell` out"});
-  }
   if (options.selection.resolution > 0 && format.name != las_format().name &&
       format.name != ept_format().name) {
     throw Error({.file = files.front(),
@@ -164,8 +150,14 @@ std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
                  .cause = "is " + format.name + ", which has no octree to read to a resolution",
                  .remedy = "name a COPC file or EPT, or leave `resolution` out"});
   }
-  return selection_of(spooled ? open_spooled(format, files, options) : format.open(files, options),
-                      options);
+  auto source = spooled ? open_spooled(format, files, options) : format.open(files, options);
+  if (options.cell > 0 && !source->info().grid) {
+    throw Error({.file = files.front(),
+                 .where = {},
+                 .cause = "is " + format.name + ", whose points are no cells",
+                 .remedy = "leave `cell` out"});
+  }
+  return selection_of(std::move(source), options);
 }
 
 }  // namespace
@@ -179,7 +171,12 @@ std::span<const Format> formats() {
   return all;
 }
 
-const Format* format_of_name(const std::string& file) { return format_of_file_name(file); }
+const Format* format_of_name(const std::string& file) {
+  if (is_ept_name(file)) return &ept_format();
+  if (const Format* const packed = packed_format_of(file)) return packed;
+  const std::string ending = ending_of(file);
+  return format_of_ending(ending == ".gz" ? ending_of(std::filesystem::path(file).stem()) : ending);
+}
 
 std::unique_ptr<PointSource> open_source(std::span<const std::string> names,
                                          const SourceOptions& options) {

@@ -30,9 +30,6 @@ std::map<std::string, std::unique_ptr<Input>>& heads() {
   return kept;
 }
 
-/// Of a pipe, to tell whether it is packed.
-constexpr std::size_t kLookBytes = 4096;
-
 std::string shown(const std::string& file) {
   return file == kStandardStream ? "standard input" : file;
 }
@@ -98,7 +95,7 @@ class Input::Descriptor {
       if (errno != EINTR && errno != EAGAIN) throw system_error(name, "cannot read", errno);
     }
   }
-  /// Of a regular file; what is to be read next stays where it is.
+  /// For regular files only. Does not move the reading position.
   [[nodiscard]] bool begins_as_gzip() const {
     std::byte head[2];
     const off_t at = ::lseek(fd_, 0, SEEK_CUR);
@@ -149,20 +146,18 @@ bool Input::read_more() {
   };
   if (!looked_at_) {
     looked_at_ = true;
-    std::vector<char> head(kLookBytes);
-    std::size_t size = 0;
-    for (std::size_t got = 1; size < 2 && got > 0; size += got) {
-      got = read(head.data() + size, head.size() - size);
+    constexpr std::size_t kMarkBytes = 2;
+    buffer_.resize(std::max(buffer_.size(), kMarkBytes));
+    for (std::size_t got = 1; end_ < kMarkBytes && got > 0; end_ += got) {
+      got = read(buffer_.data() + end_, buffer_.size() - end_);
     }
-    if (is_gzip(std::as_bytes(std::span(head).first(size)))) {
-      gzip_ = std::make_unique<GzipStream>(name_, std::string_view(head.data(), size));
-    } else {
-      if (buffer_.size() - end_ < size) buffer_.resize(end_ + size);
-      std::copy_n(head.begin(), size, buffer_.begin() + static_cast<std::ptrdiff_t>(end_));
-      end_ += size;
-      ended_ = size == 0;
+    const std::string_view head(buffer_.data(), end_);
+    if (!is_gzip(std::as_bytes(std::span(head)))) {
+      ended_ = head.empty();
       return !ended_;
     }
+    gzip_ = std::make_unique<GzipStream>(name_, head);
+    end_ = 0;
   }
   char* const to = buffer_.data() + end_;
   const std::size_t room = buffer_.size() - end_;

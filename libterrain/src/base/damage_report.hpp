@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <mutex>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <terrace/stream/error.hpp>
@@ -15,18 +17,27 @@
 
 namespace terrace::terrain {
 
+/// Says that the input was set aside on disk, if it was.
+inline void tell_spooled(const stream::SourceInfo& info, const Context& context) {
+  if (info.spooled_bytes == 0) return;
+  context.say("the input cannot be read from a pipe or out of gzip: " +
+              readable_bytes(info.spooled_bytes) + " were set aside in a temporary file");
+}
+
 /// Collects what of the input is damaged and left out, to be told at the end.
 class DamageReport {
  public:
   /// For SourceOptions::on_damage; the report must outlive the source.
   [[nodiscard]] auto taker() {
     return [this](const stream::Error& damage, std::uint64_t points) {
-      const std::lock_guard lock(mutex_);
-      ++parts_;
-      if (lines_.size() == kMostLines) return;
       const stream::Error::Parts& parts = damage.parts();
-      lines_.push_back(parts.file + ": " + (parts.where.empty() ? "" : parts.where + ": ") +
-                       parts.cause + " (" + with_commas(points) + " points left out)");
+      std::string line = parts.file + ": " + (parts.where.empty() ? "" : parts.where + ": ") +
+                         parts.cause + " (" + with_commas(points) + " points left out)";
+      const std::lock_guard lock(mutex_);
+      // One of several files is opened twice: to see that they agree, and to be read.
+      if (std::find(lines_.begin(), lines_.end(), line) != lines_.end()) return;
+      ++parts_;
+      if (lines_.size() < kMostLines) lines_.push_back(std::move(line));
     };
   }
 

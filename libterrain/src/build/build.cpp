@@ -321,10 +321,7 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
     context.say(std::to_string(so_far.withheld) +
                 " points are marked as withheld in their file; they are kept, with the mark");
   }
-  if (info.spooled_bytes > 0) {
-    context.say("the input cannot be read from a pipe or out of gzip: " +
-                readable_bytes(info.spooled_bytes) + " were set aside in a temporary file");
-  }
+  tell_spooled(info, context);
   damage.tell(context);
   tell_order(outcome.order, folder, context);
   if (!crs.note.empty()) context.say(crs.note);

@@ -79,6 +79,7 @@ class ConvertCommand : public Command {
       }
     }
     writer->finish();
+    tell_spooled(info, common.context());
     damage.tell(common.context());
 
     Summary summary;

@@ -28,7 +28,7 @@ class LasRecords {
 
   [[nodiscard]] const LasLayout& layout() const { return layout_; }
   [[nodiscard]] const std::vector<Channel>& attributes() const { return attributes_; }
-  /// Of points or, without any, as good as another.
+  /// The one that the records are on; before the first point any will do.
   [[nodiscard]] Lattice lattice() const { return lattice_.value_or(Lattice{}); }
   /// Whether the point format is one of LAS before 1.4.
   [[nodiscard]] bool legacy() const { return layout_.point_format < 6; }

@@ -22,6 +22,8 @@ class ObjParser final : public MeshParser {
  public:
   ObjParser(Input& input, bool faces) : input_(&input), lines_(input), faces_(faces) {}
 
+  const char* format() const override { return "obj"; }
+
   Item next() override {
     std::string_view line;
     while (lines_.next(line)) {

@@ -40,6 +40,7 @@ class OffParser final : public MeshParser {
     }
   }
 
+  const char* format() const override { return "off"; }
   std::optional<std::uint64_t> vertices() const override { return vertices_; }
 
   Item next() override {

@@ -30,6 +30,8 @@ class MeshParser {
   [[nodiscard]] const Point3& vertex() const { return vertex_; }
   /// Three corners or more: numbers of vertices, from 0, all of which have come before.
   [[nodiscard]] const std::vector<std::uint32_t>& face() const { return face_; }
+  /// "obj", "off" or "stl".
+  [[nodiscard]] virtual const char* format() const = 0;
   /// True if each face has vertices of its own, so that those at one place are one (STL).
   [[nodiscard]] virtual bool is_soup() const { return false; }
   /// How many vertices there are, if the file says so in front of them.

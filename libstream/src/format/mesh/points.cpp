@@ -22,12 +22,11 @@ using MakeParser = std::unique_ptr<MeshParser> (*)(Input& input, bool faces);
 
 class MeshPoints final : public PointSource {
  public:
-  MeshPoints(const std::string& file, const SourceOptions& options, const char* format,
-             MakeParser make)
+  MeshPoints(const std::string& file, const SourceOptions& options, MakeParser make)
       : input_(file, options.stop),
         parser_(make(input_, false)),
         block_points_(options.block_points) {
-    info_.format = format;
+    info_.format = parser_->format();
     info_.files = {file};
     info_.points = parser_->vertices();
     constexpr std::array kNames{"x", "y", "z"};
@@ -65,30 +64,16 @@ class MeshPoints final : public PointSource {
   std::uint64_t delivered_ = 0;
 };
 
-std::unique_ptr<PointSource> open_one_obj(const std::string& file, const SourceOptions& options,
-                                          const SourceInfo* /*first*/) {
-  return std::make_unique<MeshPoints>(file, options, "obj", &obj_parser);
-}
-std::unique_ptr<PointSource> open_one_off(const std::string& file, const SourceOptions& options,
-                                          const SourceInfo* /*first*/) {
-  return std::make_unique<MeshPoints>(file, options, "off", &off_parser);
-}
-std::unique_ptr<PointSource> open_one_stl(const std::string& file, const SourceOptions& options,
-                                          const SourceInfo* /*first*/) {
-  return std::make_unique<MeshPoints>(file, options, "stl", &stl_parser);
+template <MakeParser kMake>
+std::unique_ptr<PointSource> open_one_mesh(const std::string& file, const SourceOptions& options,
+                                           const SourceInfo* /*first*/) {
+  return std::make_unique<MeshPoints>(file, options, kMake);
 }
 
-std::unique_ptr<PointSource> open_obj(std::span<const std::string> files,
-                                      const SourceOptions& options) {
-  return open_in_turn(files, options, &open_one_obj);
-}
-std::unique_ptr<PointSource> open_off(std::span<const std::string> files,
-                                      const SourceOptions& options) {
-  return open_in_turn(files, options, &open_one_off);
-}
-std::unique_ptr<PointSource> open_stl(std::span<const std::string> files,
-                                      const SourceOptions& options) {
-  return open_in_turn(files, options, &open_one_stl);
+template <MakeParser kMake>
+std::unique_ptr<PointSource> open_meshes(std::span<const std::string> files,
+                                         const SourceOptions& options) {
+  return open_in_turn(files, options, &open_one_mesh<kMake>);
 }
 
 }  // namespace
@@ -98,7 +83,7 @@ const Format& obj_format() {
                              .endings = {".obj"},
                              .streams = true,
                              .recognise = &recognise_obj,
-                             .open = &open_obj};
+                             .open = &open_meshes<&obj_parser>};
   return format;
 }
 
@@ -107,7 +92,7 @@ const Format& off_format() {
                              .endings = {".off", ".coff", ".noff"},
                              .streams = true,
                              .recognise = &recognise_off,
-                             .open = &open_off};
+                             .open = &open_meshes<&off_parser>};
   return format;
 }
 
@@ -116,7 +101,7 @@ const Format& stl_format() {
                              .endings = {".stl"},
                              .streams = true,
                              .recognise = &recognise_stl,
-                             .open = &open_stl};
+                             .open = &open_meshes<&stl_parser>};
   return format;
 }
 

@@ -23,6 +23,7 @@ class StlParser : public MeshParser {
  public:
   explicit StlParser(bool faces) : wants_faces_(faces) {}
 
+  const char* format() const final { return "stl"; }
   bool is_soup() const final { return true; }
 
   Item next() final {

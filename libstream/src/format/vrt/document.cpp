@@ -149,7 +149,6 @@ class VrtReader {
 
   VrtSource source_of(const XmlElement& element) const {
     VrtSource source;
-    source.simple = true;
     for (const XmlElement& part : element.children) {
       if (part.name == "SourceFilename") {
         source.file = trim(part.text);

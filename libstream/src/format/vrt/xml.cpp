@@ -113,20 +113,20 @@ XmlElement read_xml(const std::string& file) {
   XML_SetCharacterDataHandler(parser.get(), &on_text);
   XML_SetStartDoctypeDeclHandler(parser.get(), &on_document_type);
   std::array<char, 64u << 10> piece;
-  for (std::uint64_t at = 0, end = 0; end < bytes->size() || at == 0; at = end) {
+  std::uint64_t at = 0;
+  do {
     const auto size =
         static_cast<std::size_t>(std::min<std::uint64_t>(piece.size(), bytes->size() - at));
     bytes->read(at, std::as_writable_bytes(std::span(piece).first(size)));
-    end = at + size;
+    at += size;
     const XML_Status status = XML_Parse(parser.get(), piece.data(), static_cast<int>(size),
-                                        end == bytes->size() ? XML_TRUE : XML_FALSE);
+                                        at == bytes->size() ? XML_TRUE : XML_FALSE);
     if (reading.failure) std::rethrow_exception(reading.failure);
     if (!reading.refusal.empty()) fail(reading.refusal);
     if (status != XML_STATUS_OK) {
       fail(std::string("is not XML: ") + XML_ErrorString(XML_GetErrorCode(parser.get())));
     }
-    if (end == 0) break;
-  }
+  } while (at < bytes->size());
   return std::move(reading.root);
 }
 

@@ -54,8 +54,8 @@ struct BuildRequest {
   stream::HeightsOfColour heights_of_colour = stream::HeightsOfColour::none;  ///< of PNG
   std::optional<double> cell{};  ///< side of the cells of rasters without georeferencing
   std::uint64_t seed = 1;
-  /// Of points that are no cells of a raster: see stream::in_spatial_order(). Its temporary file
-  /// lies in the folder in which the store is to stand.
+  /// How points are ordered that are not the cells of a raster: see stream::in_spatial_order().
+  /// The temporary file is beside the store.
   stream::Order order = stream::Order::automatic;
   /// A trial run that stops after about this many points and leaves no store; 0: read everything.
   std::uint64_t most_points = 0;
