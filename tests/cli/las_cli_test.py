@@ -426,6 +426,11 @@ class LasHostileTest(LasCase):
                                              '--threads', threads, '--skip-damaged', '--json'))
             self.assertEqual((summary['points'], summary['lost']), (70000, 50000))
             self.assertEqual(Las(self.path('b.las')).records, records[:50000] + records[100000:])
+        # Of several files each is opened twice; what is damaged about it is told once.
+        self.put('e.laz', good[:first] + struct.pack('<Q', 2**62) + good[first + 8:])
+        result = terrace('convert', self.path('e.laz'), self.path('a.laz'), '-o', self.path('two.las'), '--skip-damaged')
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(result.stderr.count(b'chunk table lies outside'), 1, result.stderr)
         self.assertIn('chunk 1', self.refused('info', '-', input=damaged))
         self.refused_at_once(good[:middle], 'a')
         lost = self.put('l.laz', good[:first] + struct.pack('<Q', 2**62) + good[first + 8:])

@@ -16,10 +16,10 @@
 
 #include "format/chain.hpp"
 #include "format/formats.hpp"
-#include "format/mesh_formats.hpp"
 #include "format/packed_column.hpp"
 #include "format/ply/decode.hpp"
 #include "format/ply/header.hpp"
+#include "format/ply/mesh.hpp"
 #include "io/line_reader.hpp"
 #include "io/text.hpp"
 #include "terrace/stream/error.hpp"

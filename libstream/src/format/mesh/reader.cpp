@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "terrace/stream/mesh_reader.hpp"
-
 #include <array>
 #include <cstddef>
 #include <map>
@@ -11,10 +9,11 @@
 
 #include "format/formats.hpp"
 #include "format/mesh/parser.hpp"
-#include "format/mesh_formats.hpp"
+#include "format/ply/mesh.hpp"
 #include "io/peek.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/input.hpp"
+#include "terrace/stream/mesh_reader.hpp"
 
 namespace terrace::stream {
 namespace {
