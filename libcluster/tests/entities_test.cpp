@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -70,6 +71,46 @@ TEST(Entities, TheReadyDistancesAreMetrics) {
   EXPECT_DOUBLE_EQ(
       triangle_distance({{{0, 0, 0}, {4, 0, 0}, {0, 4, 0}}}, {{{0, 4, 3}, {0, 0, 3}, {4, 0, 3}}}),
       3.0);
+}
+
+// Against both readings of b, in extended precision.
+TEST(Entities, PolylinesKeepTheOrderOfTheirVertices) {
+  std::mt19937_64 random(17);
+  for (int trial = 0; trial < 3000; ++trial) {
+    SCOPED_TRACE(testing::Message() << "trial " << trial);
+    const std::size_t k = 1 + random() % 7;
+    const double scale = trial % 3 == 0 ? 1.0 : trial % 3 == 1 ? 1e150 : 1e-150;
+    std::array<std::vector<Point3>, 3> lines;
+    for (auto& line : lines) {
+      for (std::size_t i = 0; i < k; ++i) line.push_back(random_point(random, scale));
+    }
+    const std::vector<Point3>&a = lines[0], &b = lines[1], &c = lines[2];
+    const auto whole = [&](const auto& at) {
+      long double sum = 0.0L;
+      for (std::size_t i = 0; i < k; ++i) {
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          const long double d = static_cast<long double>(a[i][axis]) - at(i)[axis];
+          sum += d * d;
+        }
+      }
+      return std::sqrt(sum / static_cast<long double>(k));
+    };
+    const auto expected =
+        static_cast<double>(std::min(whole([&](std::size_t i) { return b[i]; }),
+                                     whole([&](std::size_t i) { return b[k - 1 - i]; })));
+    const double ab = polyline_distance(a, b);
+    ASSERT_NEAR(ab, expected, 1e-14 * expected);
+    ASSERT_EQ(polyline_distance(b, a), ab);
+    ASSERT_LE(polyline_distance(a, c), (ab + polyline_distance(b, c)) * (1 + 1e-14));
+    const std::vector<Point3> backward(a.rbegin(), a.rend());
+    ASSERT_EQ(polyline_distance(backward, a), 0.0);
+    ASSERT_NEAR(polyline_distance(backward, b), ab, 1e-14 * ab);
+  }
+  // A triangle's corners may be renumbered, a polyline's vertices not.
+  const Triangle corners{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}};
+  const Triangle turned{{{1, 0, 0}, {0, 1, 0}, {0, 0, 0}}};
+  EXPECT_EQ(triangle_distance(corners, turned), 0.0);
+  EXPECT_GT(polyline_distance(corners, turned), 0.5);
 }
 
 TEST(Entities, PointsByIndexAreThePointsThemselves) {

@@ -1,18 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <array>
+#include <cassert>
 #include <cmath>
-#include <limits>
-#include <numeric>
 
+#include "facility/corner_distance.hpp"
 #include "terrace/cluster/facility_location.hpp"
 
 namespace terrace::cluster {
 namespace {
 
-template <std::size_t kCorners>
-double corner_distance(const std::array<Point3, kCorners>& a,
-                       const std::array<Point3, kCorners>& b) {
+double distance_of(std::span<const Point3> a, std::span<const Point3> b, bool ordered) {
   // Halves, as differences may leave the range of double; relative to the largest, as squares may.
   double largest = 0.0;
   for (const Point3& p : a) {
@@ -23,31 +20,24 @@ double corner_distance(const std::array<Point3, kCorners>& a,
     }
   }
   if (largest == 0.0) return 0.0;
-  std::array<std::array<double, kCorners>, kCorners> squares{};
-  for (std::size_t i = 0; i < kCorners; ++i) {
-    for (std::size_t j = 0; j < kCorners; ++j) {
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        const double d = (0.5 * a[i][axis] - 0.5 * b[j][axis]) / largest;
-        squares[i][j] += d * d;
-      }
-    }
-  }
-  std::array<std::size_t, kCorners> match{};
-  std::iota(match.begin(), match.end(), std::size_t{0});
-  double least = std::numeric_limits<double>::infinity();
-  do {
-    std::array<double, kCorners> terms{};
-    for (std::size_t i = 0; i < kCorners; ++i) terms[i] = squares[i][match[i]];
-    std::sort(terms.begin(), terms.end());  // so that the sum is symmetric to the last bit
-    const double sum = std::accumulate(terms.begin(), terms.end(), 0.0);
-    least = std::min(least, sum);
-  } while (std::next_permutation(match.begin(), match.end()));
-  return 2.0 * (largest * std::sqrt(least / static_cast<double>(kCorners)));
+  return 2.0 * (largest * corner_distance(a.size(), ordered, [&](std::size_t i, std::size_t j) {
+                  double square = 0.0;
+                  for (std::size_t axis = 0; axis < 3; ++axis) {
+                    const double d = (0.5 * a[i][axis] - 0.5 * b[j][axis]) / largest;
+                    square += d * d;
+                  }
+                  return square;
+                }));
 }
 
 }  // namespace
 
-double segment_distance(const Segment& a, const Segment& b) { return corner_distance(a, b); }
-double triangle_distance(const Triangle& a, const Triangle& b) { return corner_distance(a, b); }
+double segment_distance(const Segment& a, const Segment& b) { return distance_of(a, b, false); }
+double triangle_distance(const Triangle& a, const Triangle& b) { return distance_of(a, b, false); }
+
+double polyline_distance(std::span<const Point3> a, std::span<const Point3> b) {
+  assert(!a.empty() && a.size() == b.size());
+  return distance_of(a, b, true);
+}
 
 }  // namespace terrace::cluster

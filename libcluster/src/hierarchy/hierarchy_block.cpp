@@ -109,7 +109,10 @@ void BlockProcessor::process(HierarchyBlock& block) {
     metric_ = options_.metric_of(box);
     check(metric_);
   }
-  if (map == kIdentityMap) {
+  if (options_.corners.count > 1) {
+    read_corners(block, box.min, map);
+    cluster(block, block.positions);
+  } else if (map == kIdentityMap) {
     cluster(block, block.positions);
   } else {
     // The minimum is taken off first, so that large offsets cost no digits in the product; not
@@ -151,6 +154,28 @@ void BlockProcessor::read_channels(const HierarchyBlock& block) {
   }
 }
 
+void BlockProcessor::read_corners(const HierarchyBlock& block, const Point3& origin,
+                                  const GroundMap& map) {
+  const std::size_t count = options_.corners.count;
+  corners_.resize(block.size() * count);
+  for (std::size_t i = 0; i < block.size(); ++i) {
+    const auto corners = std::span(corners_).subspan(i * count, count);
+    corners[0] = block.positions[i];
+    options_.corners.read(
+        std::span(block.payload).subspan(i * options_.payload_size, options_.payload_size),
+        corners.subspan(1));
+  }
+  if (const std::size_t bad = first_not_finite(corners_); bad < corners_.size()) {
+    throw std::invalid_argument("corner " + std::to_string(bad % count) + " of entity " +
+                                std::to_string(bad / count) + " in block " +
+                                std::to_string(block.number) + " of level " +
+                                std::to_string(block.level) + " is not finite");
+  }
+  if (map == kIdentityMap) return;
+  check_ground_map(map, bounds_of(corners_), block.level, block.number);
+  to_ground(corners_, origin, map, corners_);
+}
+
 // In a block of fewer points they lie farther apart, relative to its diagonal: on a surface as the
 // root of their number.
 double BlockProcessor::outlier_price(const HierarchyBlock& block) const {
@@ -167,20 +192,23 @@ void BlockProcessor::cluster(HierarchyBlock& block, std::span<const Point3> grou
   options.seed = block_seed(options_.block.seed, block.level, block.number);
 
   const std::size_t most = (block.size() + 1) / 2;
+  const FacilityOptions search{.strategy = options_.strategy,
+                               .effort = options.effort,
+                               .seed = options.seed,
+                               .threads = options_.search_threads,
+                               .batch = options_.batch};
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
-    if (metric_cluster_) {
+    if (options_.corners.count > 1) {
+      entity_cluster_.run(corners_, options_.corners.count, options_.corners.ordered, weights_,
+                          options.facility_cost, search, block.clustering);
+    } else if (metric_cluster_) {
       metric_cluster_->run({.points = ground,
                             .weights = weights_,
                             .metric = metric_,
                             .channels = {channels_, options_.channels.weights},
                             .facility_cost = options.facility_cost,
                             .outlier_price = outlier_price(block)},
-                           {.strategy = options_.strategy,
-                            .effort = options.effort,
-                            .seed = options.seed,
-                            .threads = options_.search_threads,
-                            .batch = options_.batch},
-                           block.clustering);
+                           search, block.clustering);
     } else {
       cluster_(ground, weights_, options, block.clustering);
     }

@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "hierarchy/entity_block.hpp"
 #include "hierarchy/metric_block.hpp"
 #include "terrace/cluster/block.hpp"
 #include "terrace/cluster/hierarchy.hpp"
@@ -66,6 +67,8 @@ class BlockProcessor {
  private:
   void cluster(HierarchyBlock& block, std::span<const Point3> ground);
   void read_channels(const HierarchyBlock& block);
+  /// Fills corners_ with those of all entities, on the ground.
+  void read_corners(const HierarchyBlock& block, const Point3& origin, const GroundMap& map);
   [[nodiscard]] double outlier_price(const HierarchyBlock& block) const;
   void place_outliers(HierarchyBlock& block, std::span<const Point3> ground);
 
@@ -73,7 +76,8 @@ class BlockProcessor {
   ClusterFunction cluster_;
   Metric metric_;                                       // of the block in work
   std::optional<MetricBlockClusterer> metric_cluster_;  // unless all is as BlockClusterer has it
-  std::vector<Point3> ground_;
+  EntityBlockClusterer entity_cluster_;                 // where points have further corners
+  std::vector<Point3> ground_, corners_;
   std::vector<double> weights_, channels_;
 };
 

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 #include <utility>
+#include <variant>
 
 #include "ground.hpp"
 
@@ -14,6 +15,23 @@ namespace terrace::cluster {
 namespace {
 
 constexpr unsigned kMostBlocksAtOnce = 1024;
+
+void check_corners(const HierarchyOptions& options) {
+  const PayloadCorners& corners = options.corners;
+  if (corners.count == 1) return;
+  if (corners.count == 0 || (corners.count > 3 && !corners.ordered)) {
+    throw std::invalid_argument("entities of " + std::to_string(corners.count) +
+                                " corners: there must be at least 1, and at most 3 unless they "
+                                "are ordered");
+  }
+  if (!corners.read) throw std::invalid_argument("corners have no function that reads them");
+  if (!std::holds_alternative<Euclidean>(options.metric) || options.metric_of ||
+      !options.channels.weights.empty() || std::isfinite(options.outlier_price)) {
+    throw std::invalid_argument(
+        "entities of several corners are clustered by Euclidean distances, without channels and "
+        "outliers");
+  }
+}
 
 HierarchyOptions checked(HierarchyOptions options) {
   if (options.block_size < 2 || options.block_size >= (std::size_t{1} << 24)) {
@@ -39,6 +57,7 @@ HierarchyOptions checked(HierarchyOptions options) {
   if (std::isfinite(options.outlier_price) && !options.mark_outlier) {
     throw std::invalid_argument("there is an outlier_price but no function that marks outliers");
   }
+  check_corners(options);
   options.threads = std::clamp(options.threads, 1u, kMostBlocksAtOnce);
   return options;
 }

@@ -306,15 +306,18 @@ using Segment = std::array<Point3, 2>;
 using Triangle = std::array<Point3, 3>;
 
 /// Distances for entities: how far the corners of one must move to lie on those of the other, root
-/// mean square, under the best of the correspondences (two of a segment, six of a triangle). So
-/// neither direction nor first corner matters, and moving an entity by v is a distance of |v|.
+/// mean square, under the best of the correspondences: two of a segment, six of a triangle; of a
+/// polyline, whose vertices keep their order, forward and backward. So neither direction nor the
+/// first corner of a triangle matters, and moving an entity by v is a distance of |v|.
 ///
-/// These are metrics on unordered corners: for a renumbering g, |a - g b| is the Euclidean distance
-/// of all coordinates, which renumbering both does not change; so with the best g and h
+/// These are metrics on entities without direction: for a renumbering g, |a - g b| is the Euclidean
+/// distance of all coordinates, which renumbering both does not change; so with the best g and h
 /// d(a, c) <= |a - g h c| <= |a - g b| + |g b - g h c| = d(a, b) + d(b, c). Symmetric likewise, and
-/// 0 only for equal sets of corners. Coordinates must be finite; a result beyond double's range is
+/// 0 only for equal entities. Coordinates must be finite; a result beyond double's range is
 /// infinite.
 [[nodiscard]] double segment_distance(const Segment& a, const Segment& b);
 [[nodiscard]] double triangle_distance(const Triangle& a, const Triangle& b);
+/// Both must have the same number of vertices, at least one.
+[[nodiscard]] double polyline_distance(std::span<const Point3> a, std::span<const Point3> b);
 
 }  // namespace terrace::cluster

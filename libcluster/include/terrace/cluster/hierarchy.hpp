@@ -93,6 +93,18 @@ struct PayloadChannels {
   std::function<void(std::span<const std::byte> payload, std::span<double> values)> read;
 };
 
+/// Entities of several corners (segments, triangles, polylines of k vertices) in place of points:
+/// the position of a "point" is its first corner, its payload holds the others. Distances are those
+/// of facility_location.hpp, on the ground. (thesis chapter 9)
+struct PayloadCorners {
+  std::size_t count = 1;  ///< in all, the position included; 1: points
+  /// Polylines: corners keep their order or its reverse. Otherwise any correspondence of corners
+  /// counts; there are at most three then.
+  bool ordered = false;
+  /// Reads the corners of one entity but the first, count - 1. Called from any thread.
+  std::function<void(std::span<const std::byte> payload, std::span<Point3> others)> read;
+};
+
 struct HierarchyOptions {
   std::size_t block_size = 10000;  ///< most points clustered together; 2 to 2^24 - 1
   /// Each block has a seed of its own, mixed from this one, its level and its ordinal. At most half
@@ -124,7 +136,12 @@ struct HierarchyOptions {
   /// In place of `metric`: the metric for a block with these bounds. A field needs it where
   /// `ground` depends on the block, as does the frame of the boxes then. Called from any thread.
   std::function<Metric(const Bounds&)> metric_of;
-  PayloadChannels channels;      ///< empty: position alone
+  PayloadChannels channels;  ///< empty: position alone
+  /// Of more than one: blocks are clustered by the local search for entities (strategies automatic,
+  /// full_scan, facilities), and the facility cost is a multiple of the diagonal of the box of all
+  /// corners. The metric is Euclidean then, without channels and outliers. Summaries are those of
+  /// the positions: what the other corners lie in is the sink's to keep.
+  PayloadCorners corners;
   std::size_t payload_size = 0;  ///< bytes that travel with each point
   /// Threads that work, the caller's included: it clusters blocks while it would have to wait. Any
   /// number gives the same hierarchy; 1 (or 0) does everything in the caller's thread.
@@ -152,9 +169,10 @@ struct HierarchyResult {
 class HierarchyBuilder {
  public:
   /// The sink must outlive the builder.
-  /// Throws: std::invalid_argument if block_size, facility_cost, outlier_price, the metric or a
-  /// channel's weight is out of range, channels or outliers have no function, or the SIMD path is
-  /// not available.
+  /// Throws: std::invalid_argument if block_size, facility_cost, outlier_price, the metric, a
+  /// channel's weight or the number of corners is out of range, channels, corners or outliers have
+  /// no function, corners are given beside another metric, channels or outliers, or the SIMD path
+  /// is not available.
   HierarchyBuilder(HierarchyOptions options, HierarchySink& sink);
   /// Stops without finishing: waits for the blocks that are being clustered; then the sink gets no
   /// more calls.
@@ -169,9 +187,10 @@ class HierarchyBuilder {
   /// Throws: std::invalid_argument on a coordinate that is not finite, naming its index in the
   /// batch, and on a payload of another size than payload_size bytes per point (the builder is
   /// unchanged); what the sink or `ground` threw, and std::invalid_argument on a ground map that is
-  /// not finite, is zero, or makes distances beyond 1e150, on a channel that is not finite, on a
-  /// custom distance that is negative or not finite and on a strategy that a block does not admit
-  /// (the builder has ended then, and takes no more calls: they throw std::logic_error).
+  /// not finite, is zero, or makes distances beyond 1e150, on a channel or corner that is not
+  /// finite, on a custom distance that is negative or not finite and on a strategy that a block
+  /// does not admit (the builder has ended then, and takes no more calls: they throw
+  /// std::logic_error).
   void push(std::span<const Point3> positions, std::span<const std::byte> payload = {});
 
   /// Clusters what is left, from level 0 upward; the top is the first level that fits one block.
