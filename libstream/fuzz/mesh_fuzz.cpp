@@ -1,13 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <vector>
+
 #include "fuzz_points.hpp"
 #include "terrace/stream/mesh_reader.hpp"
 
 /// Mesh files, PLY, OBJ, OFF and STL: refused, or triangles of vertices that are there, with a
-/// whole record for each vertex, and no more of them than the file can hold.
+/// whole record for each vertex, and no more of them than the file can hold. As a stream they are
+/// as many.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace terrace::stream;
   const MemoryFile file(data, size);
   for (const char* format : {"ply", "obj", "off", "stl"}) {
+    try {
+      const auto source = open_source(std::vector{file.name()},
+                                      {.format = format, .entities = Entities::triangles});
+      std::size_t streamed = 0;
+      for (PointBlock block; source->next(block);) {
+        require(block.payload.size() == block.size() * source->info().payload_size(), "records");
+        streamed += block.size();
+      }
+      const auto mesh = read_mesh(file.name(), {.format = format});
+      require(mesh && mesh->triangles.size() == streamed, "as many triangles in a stream");
+    } catch (const Error& error) {
+      require(!error.parts().cause.empty(), "a cause");
+    }
     try {
       const auto mesh = read_mesh(file.name(), {.format = format});
       if (!mesh) continue;

@@ -150,7 +150,16 @@ std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
                  .cause = "is " + format.name + ", which has no octree to read to a resolution",
                  .remedy = "name a COPC file or EPT, or leave `resolution` out"});
   }
-  auto source = spooled ? open_spooled(format, files, options) : format.open(files, options);
+  const bool triangles = options.entities == Entities::triangles;
+  if (triangles && format.open_triangles == nullptr) {
+    throw Error({.file = files.front(),
+                 .where = {},
+                 .cause = "is " + format.name + ", which has no triangles",
+                 .remedy = "name a mesh (OBJ, OFF, PLY, STL), or leave `entities` out"});
+  }
+  auto source = spooled     ? open_spooled(format, files, options)
+                : triangles ? format.open_triangles(files, options)
+                            : format.open(files, options);
   if (options.cell > 0 && !source->info().grid) {
     throw Error({.file = files.front(),
                  .where = {},

@@ -19,6 +19,7 @@
 
 #include "base/damage_report.hpp"
 #include "base/progress_report.hpp"
+#include "base/stored_triangles.hpp"
 #include "base/units.hpp"
 #include "build/clustering.hpp"
 #include "earth/crs/crs_definition.hpp"
@@ -62,6 +63,9 @@ stream::StoreSchema schema_of(const stream::SourceInfo& info, const SourceCrs& c
   }
   if (request.strategy != cluster::FacilityStrategy::automatic) {
     schema.parameters.emplace_back("strategy", cluster::name_of(request.strategy));
+  }
+  if (request.entities == stream::Entities::triangles) {
+    schema.parameters.emplace_back(kEntitiesParameter, kTrianglesValue);
   }
   for (const auto& [name, weight] : request.channels) {
     schema.parameters.emplace_back("channel " + name, number_text(weight));
@@ -193,6 +197,7 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   const std::uint64_t memory_bytes = context.memory_or(kMemory);
   stream::SourceOptions source_options;
   source_options.format = request.input_format;
+  source_options.entities = request.entities;
   source_options.block_points = request.block_points;
   source_options.memory_bytes = std::max(kSourceMemory, memory_bytes);
   source_options.band = request.band;

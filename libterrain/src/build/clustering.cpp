@@ -8,6 +8,9 @@
 
 #include <terrace/stream/error.hpp>
 
+#include "base/stored_triangles.hpp"
+#include "terrace/terrain/error.hpp"
+
 namespace terrace::terrain {
 namespace {
 
@@ -79,6 +82,27 @@ void set_channels(const BuildRequest& request, const stream::Schema& schema,
   };
 }
 
+void set_corners(const BuildRequest& request, const stream::Schema& schema,
+                 cluster::HierarchyOptions& options) {
+  if (request.entities == stream::Entities::points) return;
+  if (request.metric.kind != MetricChoice::Kind::euclidean || !request.channels.empty() ||
+      std::isfinite(request.outlier_price)) {
+    throw UsageError(
+        "`entities` triangles are clustered by Euclidean distances: without `metric`, "
+        "`channel` and `outlier_price`");
+  }
+  using cluster::FacilityStrategy;
+  if (request.strategy != FacilityStrategy::automatic &&
+      request.strategy != FacilityStrategy::full_scan &&
+      request.strategy != FacilityStrategy::facilities) {
+    throw UsageError(std::string("`entities` triangles have no ") +
+                     cluster::name_of(request.strategy) +
+                     " search: theirs are automatic, full scan and facilities");
+  }
+  options.corners.count = 3;
+  options.corners.read = CornerReader(schema, request.inputs.front());
+}
+
 }  // namespace
 
 void add_outlier_mark(const BuildRequest& request, std::vector<stream::Channel>& attributes) {
@@ -118,6 +142,7 @@ cluster::HierarchyOptions clustering_of(const BuildRequest& request, const strea
   };
   set_metric(request, schema, ground, options);
   set_channels(request, schema, options);
+  set_corners(request, schema, options);
   options.outlier_price = request.outlier_price;
   options.mark_outlier = [](std::span<std::byte> record) { record.back() = std::byte{1}; };
   return options;

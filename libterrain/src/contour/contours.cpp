@@ -10,6 +10,7 @@
 #include <terrace/stream/error.hpp>
 
 #include "base/progress_report.hpp"
+#include "base/stored_triangles.hpp"
 #include "base/units.hpp"
 #include "contour/contour_parts.hpp"
 #include "contour/contour_text.hpp"
@@ -63,6 +64,7 @@ bool reaches_into(const StoredBox& box, const Region& region, const GroundSlope&
 ContourOutcome write_contours(const stream::Store& given, const ContourRequest& request,
                               const std::function<void(std::string_view)>& write,
                               const Context& context) {
+  need_points(given, "a contour");
   const stream::Store store = given.with_stop(context.stop);
   const std::uint64_t memory = context.memory_or(0);
   if (request.level > store.top()) {

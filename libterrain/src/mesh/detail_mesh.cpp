@@ -12,7 +12,9 @@
 #include <terrace/tri/metric.hpp>
 #include <terrace/tri/multiresolution.hpp>
 
+#include "base/stored_triangles.hpp"
 #include "earth/ground.hpp"
+#include "mesh/detail_triangles.hpp"
 #include "mesh/mesh_heights.hpp"
 #include "terrace/terrain/error.hpp"
 #include "terrace/terrain/store_source.hpp"
@@ -212,6 +214,14 @@ TriangleMesh detail_mesh(const stream::Store& given, const Detail& detail,
                          const DetailMeshOptions& options, const Context& context) {
   const stream::Store store = given.with_stop(context.stop);
   const MetricChoice::Kind kind = options.metric.kind;
+  if (holds_triangles(store.schema())) {
+    if (kind != MetricChoice::Kind::euclidean || options.heights.any()) {
+      throw UsageError(
+          "the triangles of a store come as they were read: without `metric`, smoothing "
+          "and overlays");
+    }
+    return detail_triangles(store, detail, context.memory_or(0));
+  }
   if (kind != MetricChoice::Kind::euclidean && kind != MetricChoice::Kind::elliptical) {
     throw UsageError("a mesh has the metric euclidean or elliptical:FILE, not " +
                      options.metric.text);

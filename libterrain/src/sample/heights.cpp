@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "base/stored_triangles.hpp"
 #include "sample/samplers.hpp"
 #include "terrace/terrain/error.hpp"
 
@@ -6,6 +7,7 @@ namespace terrace::terrain {
 
 std::unique_ptr<HeightSampler> make_sampler(const stream::Store& given,
                                             const SamplerOptions& options, const Context& context) {
+  need_points(given, "the height of a place");
   const stream::Store store = given.with_stop(context.stop);
   if (options.level > store.top()) {
     throw UsageError("the store has no level " + std::to_string(options.level) +

@@ -12,6 +12,7 @@
 
 #include "base/file_marks.hpp"
 #include "base/fixed_text.hpp"
+#include "base/stored_triangles.hpp"
 #include "base/units.hpp"
 #include "earth/ground.hpp"
 #include "earth/line_distance.hpp"
@@ -209,6 +210,7 @@ class ProfileRun {
 ProfileOutcome write_profile(const stream::Store& store, const ProfileRequest& request,
                              const std::function<void(std::string_view)>& write,
                              const Context& context) {
+  need_points(store, "a profile");
   return ProfileRun(store.with_stop(context.stop), request, write, context).run();
 }
 

@@ -14,6 +14,7 @@
 
 #include "base/parallel.hpp"
 #include "base/progress_report.hpp"
+#include "base/stored_triangles.hpp"
 #include "earth/crs/crs_definition.hpp"
 #include "sample/raster_grid.hpp"
 #include "sample/raster_shader.hpp"
@@ -247,6 +248,7 @@ class RasterRun {
 
 RasterOutcome write_raster(const stream::Store& store, const RasterRequest& request,
                            const Context& context) {
+  need_points(store, "a raster");
   const stream::Store source = store.with_stop(context.stop);
   const ProgressReport report(context, "cells");
   return RasterRun(source, request, context).run(store.schema().coordinates[2], report);

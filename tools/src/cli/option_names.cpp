@@ -10,18 +10,20 @@ namespace terrace::tools {
 namespace {
 
 /// Parameter and option. tests/layout checks that all parameters that libterrain names are here.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 32> kOptions{{
+constexpr std::array<std::pair<std::string_view, std::string_view>, 34> kOptions{{
     {"block_points", "--block"},
     {"cell", "--cell"},
     {"channel", "--channel"},
     {"crs", "--crs"},
     {"drop", "--drop"},
     {"duplicates", "--duplicates"},
+    {"entities", "--entities"},
     {"facility_cost", "--facility-cost"},
     {"fill", "--fill"},
     {"geoid", "--geoid"},
     {"heights_of_colour", "--rgb"},
     {"interval", "--interval"},
+    {"keep", "--keep"},
     {"level", "--level"},
     {"max_edge", "--max-edge"},
     {"max_error", "--max-error"},

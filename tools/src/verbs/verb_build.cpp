@@ -40,6 +40,11 @@ class BuildCommand final : public Command {
         ->required();
     add_output(app, output_, "the store to write");
     app.add_option("--input-format", request_.input_format, "instead of telling it by content");
+    app.add_option("--entities", entities_,
+                   "what is read and clustered: points, or the triangles of a mesh (OBJ, OFF, PLY, "
+                   "STL), which 'terrace mesh' gives back")
+        ->check(CLI::IsMember({"points", "triangles"}))
+        ->capture_default_str();
     app.add_option(
         "--crs", crs_,
         "EPSG:n, EPSG:n+m with the heights' system, or a file with WKT (.prj): in place of "
@@ -93,6 +98,7 @@ class BuildCommand final : public Command {
     request_.store = output_;
     request_.replace = common.force;
     request_.effort = *effort_of(effort_);
+    if (entities_ == "triangles") request_.entities = stream::Entities::triangles;
     if (!crs_.empty()) request_.crs = CoordinateSystem::parse(crs_).crs();
     request_.datum_shift = parse_datum_shift(shift_);
     if (block_ < 2 || block_ > 1'000'000) {
@@ -143,8 +149,8 @@ class BuildCommand final : public Command {
         std::isfinite(request_.outlier_price)
             ? with_commas(outcome.outliers) + " of them are marked: outlier = 1\n"
             : std::string();
-    summary.text = with_commas(outcome.points) + " points (" + with_commas(outcome.nodata) +
-                   " cells without data left out" +
+    summary.text = with_commas(outcome.points) + " " + entities_ + " (" +
+                   with_commas(outcome.nodata) + " cells without data left out" +
                    (outcome.excluded > 0 ? ", " + with_commas(outcome.excluded) +
                                                " points that were not selected too"
                                          : "") +
@@ -162,6 +168,7 @@ class BuildCommand final : public Command {
     }
     const auto source =
         stream::open_source(request_.inputs, {.format = request_.input_format,
+                                              .entities = request_.entities,
                                               .heights_of_colour = request_.heights_of_colour,
                                               .cell = request_.cell.value_or(0),
                                               .stop = stop_token(),
@@ -201,8 +208,8 @@ class BuildCommand final : public Command {
                       {"store_bytes", bytes},
                       {"seconds", seconds * scale},
                       {"temporary_bytes", temporary}};
-      summary.text = "about " + with_commas(static_cast<std::uint64_t>(points)) + " points, " +
-                     readable_bytes(bytes) + " of disk" +
+      summary.text = "about " + with_commas(static_cast<std::uint64_t>(points)) + " " + entities_ +
+                     ", " + readable_bytes(bytes) + " of disk" +
                      (temporary > 0 ? " and " + readable_bytes(temporary) + " more while it runs"
                                     : std::string()) +
                      ", " + readable_seconds(seconds * scale) + "; nothing was written\n";
@@ -213,7 +220,7 @@ class BuildCommand final : public Command {
   BuildRequest request_;
   SelectionOptions selection_;
   std::string output_, crs_, shift_, effort_ = "default", metric_ = "euclidean", order_ = "auto",
-                                     strategy_ = "automatic";
+                                     strategy_ = "automatic", entities_ = "points";
   std::vector<std::string> channels_;
   std::optional<double> outlier_price_;
   std::uint64_t block_ = 10000;

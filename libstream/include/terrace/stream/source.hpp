@@ -111,9 +111,19 @@ enum class HeightsOfColour : std::uint8_t { none, mapbox, terrarium };
 /// points. Called by the thread that reads. Damage of what all points depend on is still thrown.
 using OnDamage = std::function<void(const Error& damage, std::uint64_t points)>;
 
+/// What a source delivers of a file.
+enum class Entities : std::uint8_t {
+  points,
+  /// The triangles of a mesh (OBJ, OFF, PLY, STL), polygons cut into fans, in the order of the
+  /// file. The position is the first corner; "x2", "y2", "z2", "x3", "y3", "z3" are the others, of
+  /// the coordinates' type, to the last bit. Other attributes are left out.
+  triangles,
+};
+
 /// What a caller may ask of any source.
 struct SourceOptions {
   std::string format{};  ///< name of a registered format; empty: by content, then ending
+  Entities entities = Entities::points;
   std::size_t block_points = 10000;                           ///< most points per block
   std::uint64_t memory_bytes = 64u << 20;                     ///< what the source may hold, roughly
   int band = 1;                                               ///< of rasters, counted from 1
@@ -160,6 +170,9 @@ struct Format {
   bool (*recognise)(std::span<const std::byte> head) = nullptr;
   std::unique_ptr<PointSource> (*open)(std::span<const std::string> files,
                                        const SourceOptions& options) = nullptr;
+  /// For Entities::triangles; null where the format has none.
+  std::unique_ptr<PointSource> (*open_triangles)(std::span<const std::string> files,
+                                                 const SourceOptions& options) = nullptr;
 };
 
 /// All readable formats; a new one is one more entry.

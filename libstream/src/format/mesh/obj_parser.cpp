@@ -23,6 +23,7 @@ class ObjParser final : public MeshParser {
   ObjParser(Input& input, bool faces) : input_(&input), lines_(input), faces_(faces) {}
 
   const char* format() const override { return "obj"; }
+  const Input& input() const override { return *input_; }
 
   Item next() override {
     std::string_view line;

@@ -13,8 +13,8 @@
 #include "terrace/stream/input.hpp"
 #include "terrace/stream/schema.hpp"
 
-/// Meshes of the simple formats, read front to back: OBJ, OFF and STL. Each has one parser, for
-/// read_mesh() as for the points of its vertices.
+/// Meshes read front to back: OBJ, OFF and STL have one parser each, for read_mesh(), for the
+/// points of the vertices and for triangles; PLY has one for triangles (in ply/source.cpp).
 
 namespace terrace::stream {
 
@@ -30,8 +30,10 @@ class MeshParser {
   [[nodiscard]] const Point3& vertex() const { return vertex_; }
   /// Three corners or more: numbers of vertices, from 0, all of which have come before.
   [[nodiscard]] const std::vector<std::uint32_t>& face() const { return face_; }
-  /// "obj", "off" or "stl".
+  /// The format's name in the registry.
   [[nodiscard]] virtual const char* format() const = 0;
+  /// What is read, for its name and how far it is.
+  [[nodiscard]] virtual const Input& input() const = 0;
   /// True if each face has vertices of its own, so that those at one place are one (STL).
   [[nodiscard]] virtual bool is_soup() const { return false; }
   /// How many vertices there are, if the file says so in front of them.

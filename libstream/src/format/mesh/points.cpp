@@ -6,14 +6,16 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <utility>
 
 #include "format/chain.hpp"
 #include "format/formats.hpp"
 #include "format/mesh/parser.hpp"
+#include "format/mesh/triangles.hpp"
 #include "terrace/stream/input.hpp"
 #include "terrace/stream/source.hpp"
 
-/// The vertices of meshes as points.
+/// The vertices of meshes as points, and their triangles.
 
 namespace terrace::stream {
 namespace {
@@ -71,6 +73,21 @@ std::unique_ptr<PointSource> open_one_mesh(const std::string& file, const Source
 }
 
 template <MakeParser kMake>
+std::unique_ptr<PointSource> open_one_of_triangles(const std::string& file,
+                                                   const SourceOptions& options,
+                                                   const SourceInfo* /*first*/) {
+  OpenMesh mesh{std::make_unique<Input>(file, options.stop), nullptr};
+  mesh.parser = kMake(*mesh.input, true);
+  return triangles_of(std::move(mesh), options);
+}
+
+template <MakeParser kMake>
+std::unique_ptr<PointSource> open_triangles(std::span<const std::string> files,
+                                            const SourceOptions& options) {
+  return open_in_turn(files, options, &open_one_of_triangles<kMake>);
+}
+
+template <MakeParser kMake>
 std::unique_ptr<PointSource> open_meshes(std::span<const std::string> files,
                                          const SourceOptions& options) {
   return open_in_turn(files, options, &open_one_mesh<kMake>);
@@ -83,7 +100,8 @@ const Format& obj_format() {
                              .endings = {".obj"},
                              .streams = true,
                              .recognise = &recognise_obj,
-                             .open = &open_meshes<&obj_parser>};
+                             .open = &open_meshes<&obj_parser>,
+                             .open_triangles = &open_triangles<&obj_parser>};
   return format;
 }
 
@@ -92,7 +110,8 @@ const Format& off_format() {
                              .endings = {".off", ".coff", ".noff"},
                              .streams = true,
                              .recognise = &recognise_off,
-                             .open = &open_meshes<&off_parser>};
+                             .open = &open_meshes<&off_parser>,
+                             .open_triangles = &open_triangles<&off_parser>};
   return format;
 }
 
@@ -101,7 +120,8 @@ const Format& stl_format() {
                              .endings = {".stl"},
                              .streams = true,
                              .recognise = &recognise_stl,
-                             .open = &open_meshes<&stl_parser>};
+                             .open = &open_meshes<&stl_parser>,
+                             .open_triangles = &open_triangles<&stl_parser>};
   return format;
 }
 

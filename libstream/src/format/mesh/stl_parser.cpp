@@ -63,6 +63,8 @@ class StlText final : public StlParser {
  public:
   StlText(Input& input, bool faces) : StlParser(faces), input_(&input), lines_(input) {}
 
+  const Input& input() const override { return *input_; }
+
  protected:
   bool read_corner() override {
     std::string_view line;
@@ -120,6 +122,7 @@ class StlBinary final : public StlParser {
     input.consume(kHeadBytes);
   }
 
+  const Input& input() const override { return *input_; }
   std::optional<std::uint64_t> vertices() const override { return 3 * std::uint64_t{count_}; }
   ScalarType type() const override { return ScalarType::f32; }
 

@@ -16,6 +16,7 @@
 
 #include "format/chain.hpp"
 #include "format/formats.hpp"
+#include "format/mesh/triangles.hpp"
 #include "format/packed_column.hpp"
 #include "format/ply/decode.hpp"
 #include "format/ply/header.hpp"
@@ -90,37 +91,38 @@ class PlySource final : public PointSource {
     return wanted > 0;
   }
 
-  /// The polygons and strips behind the vertices, which have all been read, as triangles.
-  std::vector<TriangleIndices> triangles() {
-    std::vector<TriangleIndices> triangles;
-    bool is_behind = false;
-    for (const PlyElement& element : header_.elements) {
+  /// Appends the triangles of the next polygon or strip behind the vertices, which have all been
+  /// read. False behind the last.
+  bool next_triangles(std::vector<TriangleIndices>& triangles) {
+    for (; element_ < header_.elements.size(); ++element_, item_ = 0) {
+      const PlyElement& element = header_.elements[element_];
       const PlyProperty* const corners = corners_of(element);
       if (element.name == "vertex") {
-        is_behind = true;
+        is_behind_ = true;
       } else if (corners == nullptr) {
-        if (is_behind) skip_element(element);
-      } else if (!is_behind) {
+        if (is_behind_) skip_element(element);
+      } else if (!is_behind_) {
         fail("header", "the element " + in_quotes(element.name) + " stands before the vertices",
              "write the file anew, vertices first");
-      } else {
-        for (std::uint64_t i = 0; i < element.count; ++i) {
-          read_corners(element, *corners, i);
-          if (element.name == "tristrips") {
-            add_strips(triangles);
-          } else {
-            add_fan(triangles);
-          }
+      } else if (item_ < element.count) {
+        read_corners(element, *corners, item_++);
+        if (element.name == "tristrips") {
+          add_strips(triangles);
+        } else {
+          add_fan(triangles);
         }
+        return true;
       }
     }
-    return triangles;
+    return false;
   }
 
   [[nodiscard]] bool has_faces() const {
     return std::any_of(header_.elements.begin(), header_.elements.end(),
                        [](const PlyElement& e) { return e.count > 0 && corners_of(e) != nullptr; });
   }
+
+  [[nodiscard]] const Input& input() const { return input_; }
 
   Progress progress() const override {
     return {.points = delivered_,
@@ -424,6 +426,54 @@ class PlySource final : public PointSource {
   std::size_t stride_ = 0, record_bytes_ = 0;
   bool has_lists_ = false, swap_ = false;
   std::vector<std::int64_t> corners_;  ///< of one face
+  std::size_t element_ = 0;            ///< whose items are read behind the vertices
+  std::uint64_t item_ = 0;
+  bool is_behind_ = false;  ///< the vertices
+};
+
+/// Vertices without their attributes, then triangles.
+class PlyParser final : public MeshParser {
+ public:
+  PlyParser(const std::string& file, const SourceOptions& options) : source_(file, options) {}
+
+  const char* format() const override { return "ply"; }
+  const Input& input() const override { return source_.input(); }
+  std::optional<std::uint64_t> vertices() const override { return source_.info().points; }
+  ScalarType type() const override {
+    const auto& coordinates = source_.info().coordinates;
+    return std::all_of(coordinates.begin(), coordinates.end(),
+                       [](const Channel& c) { return c.type == ScalarType::f32; })
+               ? ScalarType::f32
+               : ScalarType::f64;
+  }
+
+  Item next() override {
+    if (!vertices_done_) {
+      if (vertex_at_ == block_.size()) {
+        vertex_at_ = 0;
+        vertices_done_ = !source_.next(block_);
+      }
+      if (!vertices_done_) {
+        vertex_ = block_.positions[vertex_at_++];
+        return Item::vertex;
+      }
+    }
+    while (triangle_at_ == triangles_.size()) {
+      triangles_.clear();
+      triangle_at_ = 0;
+      if (!source_.next_triangles(triangles_)) return Item::end;
+    }
+    const TriangleIndices& triangle = triangles_[triangle_at_++];
+    face_.assign(triangle.begin(), triangle.end());
+    return Item::face;
+  }
+
+ private:
+  PlySource source_;
+  PointBlock block_;
+  std::vector<TriangleIndices> triangles_;
+  std::size_t vertex_at_ = 0, triangle_at_ = 0;
+  bool vertices_done_ = false;
 };
 
 bool recognise_ply(std::span<const std::byte> head) {
@@ -442,6 +492,17 @@ std::unique_ptr<PointSource> open_ply(std::span<const std::string> files,
   return open_in_turn(files, options, &open_one_ply);
 }
 
+std::unique_ptr<PointSource> open_one_ply_of_triangles(const std::string& file,
+                                                       const SourceOptions& options,
+                                                       const SourceInfo* /*first*/) {
+  return triangles_of({nullptr, std::make_unique<PlyParser>(file, options)}, options);
+}
+
+std::unique_ptr<PointSource> open_ply_triangles(std::span<const std::string> files,
+                                                const SourceOptions& options) {
+  return open_in_turn(files, options, &open_one_ply_of_triangles);
+}
+
 }  // namespace
 
 std::optional<MeshFile> read_ply_mesh(const std::string& file, const SourceOptions& options) {
@@ -454,7 +515,8 @@ std::optional<MeshFile> read_ply_mesh(const std::string& file, const SourceOptio
     all.positions.insert(all.positions.end(), block.positions.begin(), block.positions.end());
     all.payload.insert(all.payload.end(), block.payload.begin(), block.payload.end());
   }
-  mesh.triangles = source.triangles();
+  while (source.next_triangles(mesh.triangles)) {
+  }
   return mesh;
 }
 
@@ -463,7 +525,8 @@ const Format& ply_format() {
                              .endings = {".ply"},
                              .streams = true,
                              .recognise = &recognise_ply,
-                             .open = &open_ply};
+                             .open = &open_ply,
+                             .open_triangles = &open_ply_triangles};
   return format;
 }
 

@@ -26,7 +26,11 @@ struct BuildRequest {
   std::vector<std::string> inputs{};
   std::filesystem::path store{};  ///< the folder to create
   bool replace = false;
-  std::string input_format{};     ///< empty: told by content
+  std::string input_format{};  ///< empty: told by content
+  /// What the points of the store are. Triangles are clustered by how far corners must move (see
+  /// cluster::triangle_distance); a triangle is where its first corner is; detail_mesh() gives them
+  /// back. Heights, tiles and bounded meshes need points.
+  stream::Entities entities = stream::Entities::points;
   stream::Selection selection{};  ///< of points and attributes
   /// Goes on where parts of laser data are damaged: see stream::SourceOptions::on_damage.
   bool skip_damaged = false;

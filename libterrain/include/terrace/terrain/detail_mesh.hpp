@@ -45,9 +45,14 @@ struct DetailMeshOptions {
 /// above, levels the highest of each vertex's point. With a region, the triangles that reach into
 /// it, whole. The store never changes. One thread.
 ///
+/// Of a store of triangles: those that `detail` wants, as they were read, to the last bit and
+/// turned as they were; equal corners are one vertex. A triangle is where its first corner is, for
+/// regions too. Without options.
+///
 /// Takes half of the available memory unless the context gives another bound. Throws:
 /// stream::Error on a damaged store, or when the points would not fit, saying what they need;
-/// UsageError for a metric that triangles cannot follow, and for boxes on a rotated raster;
+/// UsageError for a metric that triangles cannot follow, for boxes on a rotated raster, and for
+/// options beside a store of triangles;
 /// stream::Stopped.
 [[nodiscard]] TriangleMesh detail_mesh(const stream::Store& store, const Detail& detail,
                                        const DetailMeshOptions& options = {},

@@ -7,6 +7,7 @@
 
 #include <terrace/stream/error.hpp>
 
+#include "base/stored_triangles.hpp"
 #include "mesh/bounded/least_error.hpp"
 #include "mesh/bounded/mesh_spool.hpp"
 #include "mesh/bounded/point_mesher.hpp"
@@ -59,6 +60,7 @@ BoundedMeshResult mesh_by(Mesher mesher, const BoundedMeshOptions& options,
 
 BoundedMeshResult write_bounded_mesh(const stream::Store& store, const BoundedMeshOptions& options,
                                      const Context& context) {
+  need_points(store, "a bounded mesh");
   const stream::Store source = store.with_stop(context.stop);
   if (store.schema().grid) {
     if (options.where) {

@@ -13,6 +13,7 @@
 #include <terrace/stream/error.hpp>
 #include <terrace/stream/file_lock.hpp>
 
+#include "base/stored_triangles.hpp"
 #include "base/units.hpp"
 #include "terrace/terrain/error.hpp"
 #include "terrace/terrain/tiles.hpp"
@@ -192,6 +193,7 @@ double TileSetOptions::max_error(unsigned zoom) const {
 
 TilesOutcome write_tiles(const stream::Store& store, const TilesRequest& request,
                          const Context& context) {
+  need_points(store, "a tile");
   check_request(request);
   const TileResources resources = tile_resources(context, store.path().string());
   const TileFolder folder(request.folder, request.replace, request.resume);

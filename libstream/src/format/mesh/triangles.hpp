@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+
+#include "format/mesh/parser.hpp"
+#include "terrace/stream/input.hpp"
+#include "terrace/stream/source.hpp"
+
+namespace terrace::stream {
+
+/// A mesh that is being read.
+struct OpenMesh {
+  std::unique_ptr<Input> input;  ///< what the parser reads, unless that has its own
+  std::unique_ptr<MeshParser> parser;
+};
+
+/// The triangles of a mesh as SourceOptions::entities has them; polygons are cut into fans.
+/// Memory: 17 MiB; vertices that faces name by number are set aside in a temporary file of 24 bytes
+/// each.
+std::unique_ptr<PointSource> triangles_of(OpenMesh mesh, const SourceOptions& options);
+
+}  // namespace terrace::stream
