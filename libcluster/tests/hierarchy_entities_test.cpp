@@ -39,11 +39,13 @@ struct Entities {
     return positions;
   }
   [[nodiscard]] PayloadCorners reader() const {
-    return {k, ordered, [this](std::span<const std::byte> payload, std::span<Point3> others) {
+    return {k, ordered,
+            [this](std::span<const std::byte> payload, std::span<Point3> corners_of_one) {
               std::uint64_t id = 0;
               std::memcpy(&id, payload.data(), sizeof id);
               const auto all = (*this)[id];
-              std::copy(all.begin() + 1, all.end(), others.begin());
+              EXPECT_EQ(corners_of_one[0], all[0]);
+              std::copy(all.begin(), all.end(), corners_of_one.begin());
             }};
   }
   // The public distances, on the ground.

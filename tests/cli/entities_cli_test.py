@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""build --entities: triangles go into a store and come out again.
+"""build --entities: triangles and lines go into a store and come out again.
 
 TERRACE=path/to/terrace entities_cli_test.py
 """
@@ -30,31 +30,12 @@ def triangles_of(path):
     return vertices, triangles
 
 
-class EntitiesTest(unittest.TestCase):
+class EntitiesCase(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         folder = tempfile.TemporaryDirectory()
         cls.addClassCleanup(folder.cleanup)
         cls.folder = folder.name
-        seed = 5
-        print('seed', seed)
-        rng = random.Random(seed)
-        # Shared vertices, twins, triangles without area and a zero with a sign, in no order.
-        cls.vertices = [(rng.uniform(-1e3, 1e3), rng.uniform(0, 2e3), rng.choice([-0.0, 0.0, rng.random()]))
-                        for _ in range(4000)]
-        near = sorted(range(len(cls.vertices)), key=lambda v: (cls.vertices[v][0] // 100, cls.vertices[v][1]))
-        cls.faces = []
-        for _ in range(9000):
-            at = rng.randrange(len(near) - 3)
-            cls.faces.append([near[at + rng.randrange(4)] for _ in range(3)])
-        cls.faces += cls.faces[:10]
-        cls.file = cls.path('soup.obj')
-        with open(cls.file, 'w', encoding='ascii') as file:
-            file.writelines('v %r %r %r\n' % v for v in cls.vertices)
-            file.writelines('f %d %d %d\n' % tuple(v + 1 for v in f) for f in cls.faces)
-        cls.store = cls.path('soup.st')
-        cls.summary = json.loads(cls.run_ok('build', cls.file, '--entities', 'triangles', '-o', cls.store, '--block', 1000,
-                                            '--crs', 'EPSG:25832', '--json'))
 
     @classmethod
     def path(cls, name):
@@ -83,6 +64,31 @@ class EntitiesTest(unittest.TestCase):
             with open(os.path.join(store, name), 'rb') as file:
                 result[name] = file.read()
         return result
+
+
+class TrianglesTest(EntitiesCase):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        seed = 5
+        print('seed', seed)
+        rng = random.Random(seed)
+        # Shared vertices, twins, triangles without area and a zero with a sign, in no order.
+        cls.vertices = [(rng.uniform(-1e3, 1e3), rng.uniform(0, 2e3), rng.choice([-0.0, 0.0, rng.random()]))
+                        for _ in range(4000)]
+        near = sorted(range(len(cls.vertices)), key=lambda v: (cls.vertices[v][0] // 100, cls.vertices[v][1]))
+        cls.faces = []
+        for _ in range(9000):
+            at = rng.randrange(len(near) - 3)
+            cls.faces.append([near[at + rng.randrange(4)] for _ in range(3)])
+        cls.faces += cls.faces[:10]
+        cls.file = cls.path('soup.obj')
+        with open(cls.file, 'w', encoding='ascii') as file:
+            file.writelines('v %r %r %r\n' % v for v in cls.vertices)
+            file.writelines('f %d %d %d\n' % tuple(v + 1 for v in f) for f in cls.faces)
+        cls.store = cls.path('soup.st')
+        cls.summary = json.loads(cls.run_ok('build', cls.file, '--entities', 'triangles', '-o', cls.store, '--block', 1000,
+                                            '--crs', 'EPSG:25832', '--json'))
 
     def test_all_come_back_to_the_last_bit(self):
         self.assertEqual(self.summary['points'], len(self.faces))
@@ -153,6 +159,119 @@ class EntitiesTest(unittest.TestCase):
         self.expect_error('has no triangles', 'build', table, *triangles)
         self.expect_error('no kd-tree search', 'build', self.file, *triangles, '--strategy', 'kd-tree')
         self.assertFalse(os.path.exists(out))
+
+
+class LinesTest(EntitiesCase):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        seed = 7
+        print('seed', seed)
+        rng = random.Random(seed)
+        cls.lines = []
+        for _ in range(1200):
+            x, y, z = rng.uniform(2.6e6, 2.61e6), rng.uniform(1.2e6, 1.21e6), 100 * rng.random()
+            line, flat = [], rng.random() < 0.5
+            for _ in range(rng.choice([2, 3, 4, 5, 30, 100])):
+                line.append([x, y] if flat else [x, y, z])
+                x, y, z = x + rng.uniform(-50, 50), y + rng.uniform(-50, 50), rng.choice([z, -0.0, z + 1])
+            if len(line) > 3 and rng.random() < 0.3:
+                line.append(line[0])
+            cls.lines.append(line)
+        cls.file = cls.path('lines.geojson')
+        features = [{'type': 'Feature', 'properties': {}, 'geometry': {'type': 'LineString', 'coordinates': line}}
+                    for line in cls.lines]
+        features.insert(5, {'type': 'Feature', 'properties': {}, 'geometry': {'type': 'Point', 'coordinates': [1, 2]}})
+        with open(cls.file, 'w', encoding='ascii') as file:
+            json.dump({'type': 'FeatureCollection', 'crs': {'type': 'name', 'properties': {'name': 'EPSG:2056'}},
+                       'features': features}, file)
+        cls.stores = {}
+        for entities in ('segments', 'polylines'):
+            cls.stores[entities] = cls.path(entities + '.st')
+            cls.run_ok('build', cls.file, '--entities', entities, '-o', cls.stores[entities], '--block', 1000)
+
+    @staticmethod
+    def lines_of(text):
+        """As text, so that a zero has its sign; and the number of each."""
+        features = json.loads(text)['features']
+        return ([repr([list(map(float, p)) for p in feature['geometry']['coordinates']]) for feature in features],
+                [feature['properties']['line'] for feature in features])
+
+    def test_all_come_back_to_the_last_bit(self):
+        for entities, store in self.stores.items():
+            with self.subTest(entities):
+                self.run_ok('verify', store)
+                text = self.run_ok('points', store, '-o', '-', '--format', 'geojson')
+                lines, numbers = self.lines_of(text)
+                self.assertTrue(lines == [repr([list(map(float, p)) for p in line]) for line in self.lines])
+                self.assertEqual(numbers, list(range(len(self.lines))))
+                self.assertIn('EPSG::2056', text)
+        # They can be read again: the same store.
+        again = self.path('again.geojson')
+        self.run_ok('points', self.stores['segments'], '-o', again)
+        self.run_ok('build', again, '--entities', 'segments', '-o', self.path('again.st'), '--block', 1000)
+        first, second = (self.content(s) for s in (self.stores['segments'], self.path('again.st')))
+        self.assertTrue({k: v for k, v in first.items() if k != 'manifest.json'} ==
+                        {k: v for k, v in second.items() if k != 'manifest.json'})
+
+    def test_a_region_has_the_pieces_that_begin_in_it(self):
+        box = (2603000, 1203000, 2607000, 1206000)
+        lines, _ = self.lines_of(self.run_ok('points', self.stores['segments'], '-o', '-', '--format', 'geojson',
+                                             '--region', ','.join(map(str, box))))
+        wanted = []
+        for line in self.lines:
+            run = []
+            for a, b in zip(line, line[1:]):
+                if box[0] <= a[0] <= box[2] and box[1] <= a[1] <= box[3]:
+                    run = run + [b] if run else [a, b]
+                elif run:
+                    wanted.append(repr([list(map(float, p)) for p in run]))
+                    run = []
+            if run:
+                wanted.append(repr([list(map(float, p)) for p in run]))
+        self.assertTrue(lines == wanted)
+        self.assertGreater(len(lines), 50)
+
+    def test_levels_are_parts(self):
+        all_lines = [repr([list(map(float, p)) for p in line])[1:-1] for line in self.lines]
+        lines, numbers = self.lines_of(self.run_ok('points', self.stores['polylines'], '-o', '-', '--format', 'geojson',
+                                                   '--level', 'top'))
+        self.assertGreater(len(lines), 10)
+        for line, number in zip(lines, numbers):
+            self.assertTrue(line[1:-1] in all_lines[number])
+
+    def test_other_coordinates(self):
+        text = self.run_ok('points', self.stores['segments'], '-o', '-', '--format', 'geojson', '--to-crs', 'EPSG:4326')
+        self.assertNotIn('"crs"', text)
+        x, y = json.loads(text)['features'][0]['geometry']['coordinates'][0][:2]
+        self.assertTrue(7 < x < 8 and 46 < y < 47, (x, y))
+
+    def test_threads_and_pipes_change_nothing(self):
+        with open(self.file, encoding='ascii') as file:
+            self.run_ok('build', '-', '--entities', 'polylines', '-o', self.path('pipe.st'), '--block', 1000, '--threads', 1,
+                        stdin=file)
+        self.assertTrue(self.content(self.path('pipe.st')) == self.content(self.stores['polylines']))
+
+    def test_what_is_refused(self):
+        store = self.stores['segments']
+        self.expect_error('holds segments', 'mesh', store, '-o', self.path('x.ply'))
+        self.expect_error('holds segments', 'raster', store, '--cell', 10, '-o', self.path('x.tif'))
+        self.expect_error('GeoJSON is for the lines', 'points', self.path('points.st'), '-o', self.path('x.geojson'))
+        self.expect_error('has no lines', 'build', self.points_file(), '--entities', 'segments', '-o', self.path('no.st'))
+        self.expect_error('has no triangles', 'build', self.file, '--entities', 'triangles', '-o', self.path('no.st'))
+        self.expect_error('--entities polylines', 'build', self.file, '--entities', 'polylines', '-o', self.path('no.st'),
+                          '--channel', 'part:1')
+        self.expect_error('exists already', 'points', store, '-o', self.file)
+
+    def points_file(self):
+        table = self.path('points.xyz')
+        with open(table, 'w', encoding='ascii') as file:
+            file.write('0 0 0\n1 1 1\n')
+        return table
+
+    def setUp(self):
+        if not os.path.exists(self.path('points.st')):
+            self.run_ok('build', self.points_file(), '-o', self.path('points.st'), '--crs', 'EPSG:2056')
 
 
 if __name__ == '__main__':

@@ -163,7 +163,7 @@ void BlockProcessor::read_corners(const HierarchyBlock& block, const Point3& ori
     corners[0] = block.positions[i];
     options_.corners.read(
         std::span(block.payload).subspan(i * options_.payload_size, options_.payload_size),
-        corners.subspan(1));
+        corners);
   }
   if (const std::size_t bad = first_not_finite(corners_); bad < corners_.size()) {
     throw std::invalid_argument("corner " + std::to_string(bad % count) + " of entity " +

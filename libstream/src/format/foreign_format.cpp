@@ -82,7 +82,7 @@ constexpr KnownFormat kRows[] = {
     // Meshes.
     {{"glTF", kMesh}, ".glb", {0, "glTF"}},
     {{"glTF", kMesh}, ".gltf", {}},
-    {{"JSON (GeoJSON?)", kVector}, ".json .geojson", {}},
+    {{"JSON, and no GeoJSON", kVector}, ".json", {}},
     {{"VTK", "convert it, e.g. with ParaView, to PLY"}, ".vtk .vtp .vtu", {0, "# vtk DataFile"}},
     // What may hold any of them.
     {{"compressed by bzip2", "unpack it: 'bzip2 -dk FILE'"}, ".bz2", {0, "BZh"}},

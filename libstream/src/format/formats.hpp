@@ -23,6 +23,8 @@ const Format& ply_format();
 const Format& obj_format();
 const Format& off_format();
 const Format& stl_format();
+/// GeoJSON, also newline-delimited: the positions of its geometries, or its lines.
+const Format& geojson_format();
 /// Tiles of SRTM without a header, also in .zip and .gz.
 const Format& hgt_format();
 /// ESRI's ASCII grids.

@@ -4,6 +4,7 @@
 #include <cassert>
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -23,6 +24,9 @@ namespace terrace::stream {
 namespace {
 
 constexpr std::size_t kHeadBytes = 4096;
+/// In the order of Entities.
+constexpr std::array<std::string_view, 4> kEntityNames{"points", "triangles", "segments",
+                                                       "polylines"};
 
 std::string known_formats() {
   std::string out;
@@ -151,15 +155,15 @@ std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
                  .remedy = "name a COPC file or EPT, or leave `resolution` out"});
   }
   const bool triangles = options.entities == Entities::triangles;
-  if (triangles && format.open_triangles == nullptr) {
-    throw Error({.file = files.front(),
-                 .where = {},
-                 .cause = "is " + format.name + ", which has no triangles",
-                 .remedy = "name a mesh (OBJ, OFF, PLY, STL), or leave `entities` out"});
+  if (options.entities != Entities::points && !(triangles ? format.triangles : format.lines)) {
+    throw Error(
+        {.file = files.front(),
+         .where = {},
+         .cause = "is " + format.name + ", which has no " + (triangles ? "triangles" : "lines"),
+         .remedy = std::string(triangles ? "name a mesh (OBJ, OFF, PLY, STL)" : "name GeoJSON") +
+                   ", or leave `entities` out"});
   }
-  auto source = spooled     ? open_spooled(format, files, options)
-                : triangles ? format.open_triangles(files, options)
-                            : format.open(files, options);
+  auto source = spooled ? open_spooled(format, files, options) : format.open(files, options);
   if (options.cell > 0 && !source->info().grid) {
     throw Error({.file = files.front(),
                  .where = {},
@@ -171,12 +175,23 @@ std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
 
 }  // namespace
 
+std::string_view name_of(Entities entities) {
+  return kEntityNames[static_cast<std::size_t>(entities)];
+}
+
+std::optional<Entities> entities_named(std::string_view name) {
+  const auto found = std::find(kEntityNames.begin(), kEntityNames.end(), name);
+  if (found == kEntityNames.end()) return std::nullopt;
+  return static_cast<Entities>(found - kEntityNames.begin());
+}
+
 std::span<const Format> formats() {
   // The most telling content first: text is whatever looks like a table of numbers.
-  static const std::array<Format, 14> all{
-      geotiff_format(), vrt_format(),        las_format(),      ept_format(), ply_format(),
-      hgt_format(),     ascii_grid_format(), usgs_dem_format(), png_format(), binary_grid_format(),
-      obj_format(),     off_format(),        stl_format(),      xyz_format()};
+  static const std::array<Format, 15> all{geotiff_format(),     vrt_format(),      las_format(),
+                                          ept_format(),         ply_format(),      hgt_format(),
+                                          ascii_grid_format(),  usgs_dem_format(), png_format(),
+                                          binary_grid_format(), obj_format(),      off_format(),
+                                          stl_format(),         geojson_format(),  xyz_format()};
   return all;
 }
 

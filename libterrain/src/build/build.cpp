@@ -19,7 +19,7 @@
 
 #include "base/damage_report.hpp"
 #include "base/progress_report.hpp"
-#include "base/stored_triangles.hpp"
+#include "base/stored_entities.hpp"
 #include "base/units.hpp"
 #include "build/clustering.hpp"
 #include "earth/crs/crs_definition.hpp"
@@ -64,8 +64,8 @@ stream::StoreSchema schema_of(const stream::SourceInfo& info, const SourceCrs& c
   if (request.strategy != cluster::FacilityStrategy::automatic) {
     schema.parameters.emplace_back("strategy", cluster::name_of(request.strategy));
   }
-  if (request.entities == stream::Entities::triangles) {
-    schema.parameters.emplace_back(kEntitiesParameter, kTrianglesValue);
+  if (request.entities != stream::Entities::points) {
+    schema.parameters.emplace_back(kEntitiesParameter, stream::name_of(request.entities));
   }
   for (const auto& [name, weight] : request.channels) {
     schema.parameters.emplace_back("channel " + name, number_text(weight));

@@ -5,10 +5,13 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <span>
+#include <string>
 
 #include <terrace/stream/error.hpp>
+#include <terrace/stream/source.hpp>
 
-#include "base/stored_triangles.hpp"
+#include "base/stored_entities.hpp"
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
@@ -82,25 +85,61 @@ void set_channels(const BuildRequest& request, const stream::Schema& schema,
   };
 }
 
+/// As many places as there are in `places`, the first and last of `vertices` and others at equal
+/// distances along them, so that polylines of different numbers of vertices can be compared.
+void spread_along(std::span<const stream::Point3> vertices, std::span<stream::Point3> places) {
+  std::array<double, stream::kPolylineVertices> along{};
+  const std::size_t last = vertices.size() - 1;
+  for (std::size_t i = 0; i < last; ++i) {
+    double squares = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double step = vertices[i + 1][axis] - vertices[i][axis];
+      squares += step * step;
+    }
+    along[i + 1] = along[i] + std::sqrt(squares);
+  }
+  for (std::size_t k = 0, i = 0; k < places.size(); ++k) {
+    const double at = along[last] * static_cast<double>(k) / static_cast<double>(places.size() - 1);
+    while (i + 1 < last && along[i + 1] < at) ++i;
+    const double length = along[i + 1] - along[i];
+    const double part = length > 0 ? std::min(1.0, (at - along[i]) / length) : 0.0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      places[k][axis] = (1 - part) * vertices[i][axis] + part * vertices[i + 1][axis];
+    }
+  }
+  places.back() = vertices[last];
+}
+
 void set_corners(const BuildRequest& request, const stream::Schema& schema,
                  cluster::HierarchyOptions& options) {
   if (request.entities == stream::Entities::points) return;
+  const std::string entities = "`entities` " + std::string(stream::name_of(request.entities));
   if (request.metric.kind != MetricChoice::Kind::euclidean || !request.channels.empty() ||
       std::isfinite(request.outlier_price)) {
-    throw UsageError(
-        "`entities` triangles are clustered by Euclidean distances: without `metric`, "
-        "`channel` and `outlier_price`");
+    throw UsageError(entities +
+                     " are clustered by Euclidean distances: without `metric`, `channel` and "
+                     "`outlier_price`");
   }
   using cluster::FacilityStrategy;
   if (request.strategy != FacilityStrategy::automatic &&
       request.strategy != FacilityStrategy::full_scan &&
       request.strategy != FacilityStrategy::facilities) {
-    throw UsageError(std::string("`entities` triangles have no ") +
-                     cluster::name_of(request.strategy) +
+    throw UsageError(entities + " have no " + cluster::name_of(request.strategy) +
                      " search: theirs are automatic, full scan and facilities");
   }
-  options.corners.count = 3;
-  options.corners.read = CornerReader(schema, request.inputs.front());
+  const CornerReader read(schema, request.entities, request.inputs.front());
+  options.corners.count = read.most();
+  options.corners.ordered = request.entities == stream::Entities::polylines;
+  if (!options.corners.ordered) {
+    options.corners.read = read;
+    return;
+  }
+  options.corners.read = [read](std::span<const std::byte> record,
+                                std::span<stream::Point3> corners) {
+    std::array<stream::Point3, stream::kPolylineVertices> vertices{corners[0]};
+    const std::size_t count = read(record, vertices);
+    spread_along(std::span(vertices).first(count), corners);
+  };
 }
 
 }  // namespace

@@ -10,7 +10,7 @@
 #include <terrace/stream/error.hpp>
 
 #include "base/progress_report.hpp"
-#include "base/stored_triangles.hpp"
+#include "base/stored_entities.hpp"
 #include "base/units.hpp"
 #include "contour/contour_parts.hpp"
 #include "contour/contour_text.hpp"

@@ -12,10 +12,11 @@
 #include <terrace/tri/metric.hpp>
 #include <terrace/tri/multiresolution.hpp>
 
-#include "base/stored_triangles.hpp"
+#include "base/stored_entities.hpp"
 #include "earth/ground.hpp"
 #include "mesh/detail_triangles.hpp"
 #include "mesh/mesh_heights.hpp"
+#include "terrace/terrain/detail_lines.hpp"
 #include "terrace/terrain/error.hpp"
 #include "terrace/terrain/store_source.hpp"
 
@@ -214,7 +215,8 @@ TriangleMesh detail_mesh(const stream::Store& given, const Detail& detail,
                          const DetailMeshOptions& options, const Context& context) {
   const stream::Store store = given.with_stop(context.stop);
   const MetricChoice::Kind kind = options.metric.kind;
-  if (holds_triangles(store.schema())) {
+  if (holds_lines(store.schema())) need_points(store, "a mesh");
+  if (entities_of(store.schema()) == stream::Entities::triangles) {
     if (kind != MetricChoice::Kind::euclidean || options.heights.any()) {
       throw UsageError(
           "the triangles of a store come as they were read: without `metric`, smoothing "

@@ -5,22 +5,18 @@
 #include <array>
 #include <bit>
 #include <cstddef>
-#include <limits>
 #include <numeric>
 #include <span>
-#include <string>
 #include <utility>
 #include <vector>
 
-#include <terrace/stream/error.hpp>
-
-#include "base/stored_triangles.hpp"
+#include "mesh/wanted_entities.hpp"
 
 namespace terrace::terrain {
 namespace {
 
 /// Three corners, their places in order, and the mesh.
-constexpr std::uint64_t kBytesPerTriangle = 3 * (24 + 4 + 4 + 24) + 12;
+constexpr std::size_t kBytesPerTriangle = 3 * (24 + 4 + 4 + 24) + 12;
 
 /// Makes one vertex of corners that are equal to the last bit, numbered as they first appear.
 TriangleMesh welded(std::vector<stream::Point3> corners) {
@@ -61,35 +57,11 @@ TriangleMesh welded(std::vector<stream::Point3> corners) {
 
 TriangleMesh detail_triangles(const stream::Store& store, const Detail& detail,
                               std::uint64_t memory_bytes) {
-  const CornerReader read_corners(store.schema(), store.path().string());
-  const stream::Placement& placement = store.schema();
-  // Sums would take the sign off a zero.
-  const stream::Channel& z = placement.coordinates[2];
-  const bool as_stored =
-      placement.world == stream::WorldTransform{} && z.scale == 1.0 && z.offset == 0.0;
-  const std::size_t record_bytes = store.schema().payload_size();
-  const std::uint64_t most = std::min<std::uint64_t>(
-      memory_bytes / kBytesPerTriangle, std::numeric_limits<std::uint32_t>::max() / 3 - 1);
   std::vector<stream::Point3> corners;
-  for_each_wanted_point(
-      store, detail,
-      [&](stream::ClusterId, const stream::ClusterPoints& points, std::size_t i,
-          const stream::Point3& place) {
-        if (corners.size() / 3 >= most) {
-          throw stream::Error({.file = store.path().string(),
-                               .where = {},
-                               .cause = "more than the " + std::to_string(most) +
-                                        " triangles that fit into `memory_bytes` " +
-                                        std::to_string(memory_bytes >> 20) + "M are wanted",
-                               .remedy = "take a coarser `level` or a smaller `region`"});
-        }
-        std::array<stream::Point3, 2> others{};
-        read_corners(std::span(points.payload).subspan(i * record_bytes, record_bytes), others);
-        corners.push_back(as_stored ? points.positions[i] : place);
-        for (const stream::Point3& other : others) {
-          corners.push_back(as_stored ? other : world_point(placement, other));
-        }
-      });
+  for_each_wanted_entity(store, detail, memory_bytes, kBytesPerTriangle,
+                         [&](std::span<const std::byte>, std::span<const stream::Point3> triangle) {
+                           corners.insert(corners.end(), triangle.begin(), triangle.end());
+                         });
   return welded(std::move(corners));
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "base/stored_triangles.hpp"
+#include "base/stored_entities.hpp"
 #include "sample/samplers.hpp"
 #include "terrace/terrain/error.hpp"
 

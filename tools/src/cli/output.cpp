@@ -212,12 +212,12 @@ bool is_our_table(std::ifstream& file) {
 bool written_by_terrace(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   if (!file) return false;
-  const Bytes head = read_at(file, 0, kContourHead.size());
+  const Bytes head = read_at(file, 0, kGeoJsonMark.size());
   if (head.empty()) return true;
   const std::string comment = std::string("# ") + kWriterMark + '\n';
   const std::string vtk = std::string("# vtk DataFile Version 3.0\n") + kWriterMark + '\n';
   for (const std::string_view mark : {std::string_view(comment), std::string_view(vtk),
-                                      std::string_view("terrace overlay\n"), kContourHead}) {
+                                      std::string_view("terrace overlay\n"), kGeoJsonMark}) {
     if (head.starts_with(mark)) return true;
   }
   if (head.starts_with("ply\n")) return is_our_ply(file);

@@ -40,10 +40,12 @@ class BuildCommand final : public Command {
         ->required();
     add_output(app, output_, "the store to write");
     app.add_option("--input-format", request_.input_format, "instead of telling it by content");
-    app.add_option("--entities", entities_,
-                   "what is read and clustered: points, or the triangles of a mesh (OBJ, OFF, PLY, "
-                   "STL), which 'terrace mesh' gives back")
-        ->check(CLI::IsMember({"points", "triangles"}))
+    app.add_option(
+           "--entities", entities_,
+           "what is read and clustered: points; the triangles of a mesh (OBJ, OFF, PLY, "
+           "STL), which 'terrace mesh' gives back; the segments of lines (GeoJSON) or their "
+           "polylines of up to 4 vertices, which 'terrace points -o x.geojson' does")
+        ->check(CLI::IsMember({"points", "triangles", "segments", "polylines"}))
         ->capture_default_str();
     app.add_option(
         "--crs", crs_,
@@ -98,7 +100,7 @@ class BuildCommand final : public Command {
     request_.store = output_;
     request_.replace = common.force;
     request_.effort = *effort_of(effort_);
-    if (entities_ == "triangles") request_.entities = stream::Entities::triangles;
+    request_.entities = *stream::entities_named(entities_);  // checked by the option
     if (!crs_.empty()) request_.crs = CoordinateSystem::parse(crs_).crs();
     request_.datum_shift = parse_datum_shift(shift_);
     if (block_ < 2 || block_ > 1'000'000) {

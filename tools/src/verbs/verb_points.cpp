@@ -6,11 +6,13 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 #include <terrace/stream/overlay.hpp>
 #include <terrace/stream/point_writer.hpp>
+#include <terrace/stream/sink.hpp>
 #include <terrace/stream/store.hpp>
 #include <terrace/stream/store_query.hpp>
 
@@ -21,6 +23,7 @@
 #include "cli/output.hpp"
 #include "cli/selection_options.hpp"
 #include "terrace/terrain/detail.hpp"
+#include "terrace/terrain/detail_lines.hpp"
 #include "terrace/terrain/detail_mesh.hpp"
 #include "terrace/terrain/error.hpp"
 #include "terrace/terrain/near_points.hpp"
@@ -121,9 +124,10 @@ class PointsCommand final : public Command {
   void define(CLI::App& app) override {
     app.add_option("STORE", store_, "where the points come from")->required();
     add_output(app, output_,
-               "the file to write: .xyz, .csv, .ply, .las, .laz, .copc.laz; - is standard output");
+               "the file to write: .xyz, .csv, .ply, .las, .laz, .copc.laz, and .geojson for the "
+               "lines of build --entities; - is standard output");
     app.add_option("--format", format_,
-                   "xyz, csv, ply, ply-ascii, las, laz, copc; else by the file's ending");
+                   "xyz, csv, ply, ply-ascii, las, laz, copc, geojson; else by the file's ending");
     app.add_option("--level", level_, "points of this level and above: a number or top")
         ->default_str("0; with --focus top");
     app.add_option(
@@ -159,6 +163,9 @@ class PointsCommand final : public Command {
       throw UsageError("--near finds the nearest of all points: without --where");
     }
     if (!near_.empty()) return near(store, detail.level, watch, common);
+    if (format_ == "geojson" || (format_.empty() && output_.ends_with(".geojson"))) {
+      return lines(store, detail, watch, common);
+    }
     std::optional<stream::Overlay> overlay;
     if (!overlay_.empty()) overlay.emplace(open_height_overlay(overlay_, store));
     const std::optional<Transformation> to = crs_.to(store, common);
@@ -207,6 +214,31 @@ class PointsCommand final : public Command {
       wanted.bounds = world_box(store.schema(), store.bounds());
     }
     return wanted;
+  }
+
+  Summary lines(const stream::Store& store, const Detail& detail, const Stopwatch& watch,
+                const CommonOptions& common) const {
+    if (!holds_lines(store.schema()) || !overlay_.empty()) {
+      throw UsageError(
+          "GeoJSON is for the lines of a store of segments or polylines, without --overlay; name "
+          "another ending, e.g. .csv");
+    }
+    LineSet lines = detail_lines(store, detail, common.context());
+    const std::optional<Transformation> to = crs_.to(store, common);
+    places(to)(lines.vertices);
+    stream::Sink file(output_, may_replace(output_, common.force), stop_token());
+    write_geojson(lines, to ? to->to().crs() : store.schema().crs,
+                  [&](std::string_view text) { file.write(text); });
+    file.commit();
+    Summary summary;
+    summary.json = {{"lines", lines.lines.size()},
+                    {"vertices", lines.vertices.size()},
+                    {"seconds", watch.seconds()},
+                    {"peak_rss_bytes", peak_rss_bytes()}};
+    summary.text = output_ + ": " + with_commas(lines.lines.size()) + " lines of " +
+                   with_commas(lines.vertices.size()) + " vertices in " +
+                   readable_seconds(watch.seconds()) + "\n";
+    return summary;
   }
 
   Summary near(const stream::Store& store, unsigned level, const Stopwatch& watch,

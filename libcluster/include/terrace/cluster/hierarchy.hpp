@@ -101,8 +101,9 @@ struct PayloadCorners {
   /// Polylines: corners keep their order or its reverse. Otherwise any correspondence of corners
   /// counts; there are at most three then.
   bool ordered = false;
-  /// Reads the corners of one entity but the first, count - 1. Called from any thread.
-  std::function<void(std::span<const std::byte> payload, std::span<Point3> others)> read;
+  /// Fills in the corners of one entity, `count` of them, of which the first is there. Called from
+  /// any thread.
+  std::function<void(std::span<const std::byte> payload, std::span<Point3> corners)> read;
 };
 
 struct HierarchyOptions {

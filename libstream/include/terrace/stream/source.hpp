@@ -10,6 +10,7 @@
 #include <span>
 #include <stop_token>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "terrace/stream/error.hpp"
@@ -111,14 +112,29 @@ enum class HeightsOfColour : std::uint8_t { none, mapbox, terrarium };
 /// points. Called by the thread that reads. Damage of what all points depend on is still thrown.
 using OnDamage = std::function<void(const Error& damage, std::uint64_t points)>;
 
-/// What a source delivers of a file.
+/// What a source delivers of a file. Entities of several corners are points as well: the position
+/// is that of the first corner, the attributes are the other corners, of the coordinates' type, to
+/// the last bit. Other attributes are left out.
 enum class Entities : std::uint8_t {
-  points,
+  points,  ///< of meshes and GeoJSON: the vertices
   /// The triangles of a mesh (OBJ, OFF, PLY, STL), polygons cut into fans, in the order of the
-  /// file. The position is the first corner; "x2", "y2", "z2", "x3", "y3", "z3" are the others, of
-  /// the coordinates' type, to the last bit. Other attributes are left out.
+  /// file: "x2", "y2", "z2", "x3", "y3", "z3".
   triangles,
+  /// The segments of lines (GeoJSON, rings of polygons too), in the order of the file: "x2", "y2",
+  /// "z2"; then "line", numbered from 0 over all files, "part", the segment's number in its line,
+  /// "vertices", 2, and "dimensions", 3 if the line has heights, else 2. Points are left out and
+  /// counted as excluded.
+  segments,
+  /// Lines in pieces of at most kPolylineVertices vertices, the last of each being the first of
+  /// the next: "x2" to "z4" and the columns of segments. Corners that a piece lacks are 0.
+  polylines,
 };
+/// Most vertices of an entity of Entities::polylines.
+inline constexpr std::size_t kPolylineVertices = 4;
+/// "points", "triangles", "segments", "polylines".
+std::string_view name_of(Entities entities);
+/// The entities of that name; nullopt if there are none.
+std::optional<Entities> entities_named(std::string_view name);
 
 /// What a caller may ask of any source.
 struct SourceOptions {
@@ -170,9 +186,8 @@ struct Format {
   bool (*recognise)(std::span<const std::byte> head) = nullptr;
   std::unique_ptr<PointSource> (*open)(std::span<const std::string> files,
                                        const SourceOptions& options) = nullptr;
-  /// For Entities::triangles; null where the format has none.
-  std::unique_ptr<PointSource> (*open_triangles)(std::span<const std::string> files,
-                                                 const SourceOptions& options) = nullptr;
+  bool triangles = false;  ///< opens as Entities::triangles too
+  bool lines = false;      ///< opens as Entities::segments and polylines too
 };
 
 /// All readable formats; a new one is one more entry.

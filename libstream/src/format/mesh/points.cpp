@@ -69,22 +69,12 @@ class MeshPoints final : public PointSource {
 template <MakeParser kMake>
 std::unique_ptr<PointSource> open_one_mesh(const std::string& file, const SourceOptions& options,
                                            const SourceInfo* /*first*/) {
-  return std::make_unique<MeshPoints>(file, options, kMake);
-}
-
-template <MakeParser kMake>
-std::unique_ptr<PointSource> open_one_of_triangles(const std::string& file,
-                                                   const SourceOptions& options,
-                                                   const SourceInfo* /*first*/) {
+  if (options.entities == Entities::points) {
+    return std::make_unique<MeshPoints>(file, options, kMake);
+  }
   OpenMesh mesh{std::make_unique<Input>(file, options.stop), nullptr};
   mesh.parser = kMake(*mesh.input, true);
   return triangles_of(std::move(mesh), options);
-}
-
-template <MakeParser kMake>
-std::unique_ptr<PointSource> open_triangles(std::span<const std::string> files,
-                                            const SourceOptions& options) {
-  return open_in_turn(files, options, &open_one_of_triangles<kMake>);
 }
 
 template <MakeParser kMake>
@@ -101,7 +91,7 @@ const Format& obj_format() {
                              .streams = true,
                              .recognise = &recognise_obj,
                              .open = &open_meshes<&obj_parser>,
-                             .open_triangles = &open_triangles<&obj_parser>};
+                             .triangles = true};
   return format;
 }
 
@@ -111,7 +101,7 @@ const Format& off_format() {
                              .streams = true,
                              .recognise = &recognise_off,
                              .open = &open_meshes<&off_parser>,
-                             .open_triangles = &open_triangles<&off_parser>};
+                             .triangles = true};
   return format;
 }
 
@@ -121,7 +111,7 @@ const Format& stl_format() {
                              .streams = true,
                              .recognise = &recognise_stl,
                              .open = &open_meshes<&stl_parser>,
-                             .open_triangles = &open_triangles<&stl_parser>};
+                             .triangles = true};
   return format;
 }
 

@@ -484,23 +484,13 @@ bool recognise_ply(std::span<const std::byte> head) {
 std::unique_ptr<PointSource> open_one_ply(const std::string& file, const SourceOptions& options,
                                           const SourceInfo* /*first*/) {
   assert(options.block_points > 0);
-  return std::make_unique<PlySource>(file, options);
+  if (options.entities == Entities::points) return std::make_unique<PlySource>(file, options);
+  return triangles_of({nullptr, std::make_unique<PlyParser>(file, options)}, options);
 }
 
 std::unique_ptr<PointSource> open_ply(std::span<const std::string> files,
                                       const SourceOptions& options) {
   return open_in_turn(files, options, &open_one_ply);
-}
-
-std::unique_ptr<PointSource> open_one_ply_of_triangles(const std::string& file,
-                                                       const SourceOptions& options,
-                                                       const SourceInfo* /*first*/) {
-  return triangles_of({nullptr, std::make_unique<PlyParser>(file, options)}, options);
-}
-
-std::unique_ptr<PointSource> open_ply_triangles(std::span<const std::string> files,
-                                                const SourceOptions& options) {
-  return open_in_turn(files, options, &open_one_ply_of_triangles);
 }
 
 }  // namespace
@@ -526,7 +516,7 @@ const Format& ply_format() {
                              .streams = true,
                              .recognise = &recognise_ply,
                              .open = &open_ply,
-                             .open_triangles = &open_ply_triangles};
+                             .triangles = true};
   return format;
 }
 

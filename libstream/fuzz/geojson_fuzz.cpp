@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <vector>
+
+#include "fuzz_points.hpp"
+
+/// GeoJSON: refused, or no more positions than the file can hold, with as many in its lines as in
+/// their segments.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace terrace::stream;
+  const MemoryFile file(data, size);
+  std::vector<std::uint64_t> vertices;
+  for (const Entities entities : {Entities::points, Entities::segments, Entities::polylines}) {
+    try {
+      const auto source =
+          open_source(std::vector{file.name()}, {.format = "geojson", .entities = entities});
+      const SourceInfo& info = source->info();
+      std::uint64_t seen = 0;
+      for (PointBlock block; source->next(block);) {
+        require(block.payload.size() == block.size() * info.payload_size(), "records");
+        if (entities == Entities::points) {
+          seen += block.size();
+          continue;
+        }
+        const std::size_t column = info.attributes.size() - 4;
+        const auto part = info.view<std::uint32_t>(block.payload, column + 1);
+        const auto count = info.view<std::uint8_t>(block.payload, column + 2);
+        for (std::size_t i = 0; i < block.size(); ++i) {
+          require(count[i] >= 2 && count[i] <= kPolylineVertices, "vertices of a piece");
+          seen += count[i] - (part[i] == 0 ? 0u : 1u);
+        }
+      }
+      require(seen <= size, "no more than the file can hold");
+      vertices.push_back(seen + source->progress().excluded);
+    } catch (const Error& error) {
+      require(!error.parts().cause.empty(), "a cause");
+    }
+  }
+  require(vertices.size() == 3 || vertices.empty(), "all of them are refused, or none");
+  for (const std::uint64_t count : vertices) require(count == vertices.front(), "as many vertices");
+  return 0;
+}

@@ -1,0 +1,251 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "format/geojson/geometry.hpp"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "io/text.hpp"
+#include "terrace/stream/error.hpp"
+
+namespace terrace::stream {
+namespace {
+
+struct GeometryType {
+  std::string_view name;
+  std::size_t depth;  ///< brackets around a position's numbers
+  bool lines;
+};
+
+constexpr std::array<GeometryType, 6> kGeometryTypes{{{"Point", 1, false},
+                                                      {"MultiPoint", 2, false},
+                                                      {"LineString", 2, true},
+                                                      {"MultiLineString", 3, true},
+                                                      {"Polygon", 3, true},
+                                                      {"MultiPolygon", 4, true}}};
+
+/// Takes positions as they are parsed: of a feature only what its geometry holds is kept.
+class GeometryTaker final : public nlohmann::json_sax<nlohmann::json> {
+ public:
+  GeometryTaker(const std::string& file, std::uint64_t offset, GeoJsonGeometry& geometry)
+      : file_(file), offset_(offset), geometry_(geometry) {}
+
+  bool key(string_t& name) override {
+    if (left_out_ > 0) return true;
+    awaited_ = name == "type"                               ? Awaited::type
+               : name == "coordinates"                      ? Awaited::coordinates
+               : name == "geometry"                         ? Awaited::object
+               : name == "geometries" || name == "features" ? Awaited::list
+                                                            : Awaited::other;
+    if (awaited_ == Awaited::coordinates && std::exchange(objects_.back().has_coordinates, true)) {
+      fail("a geometry has its coordinates twice");
+    }
+    return true;
+  }
+
+  bool start_object(std::size_t) override {
+    if (left_out()) {
+      ++left_out_;
+      return true;
+    }
+    if (depth_ > 0 || !(awaits(Awaited::object) || awaits(Awaited::item))) refuse("an object");
+    if (objects_.size() == kMostObjects) fail("its collections are nested too deeply");
+    objects_.emplace_back();
+    objects_.back().first_run = runs_.size();
+    return true;
+  }
+
+  bool end_object() override {
+    if (left_out_ > 0) {
+      --left_out_;
+      return true;
+    }
+    finish(objects_.back());
+    runs_.resize(objects_.back().first_run);
+    objects_.pop_back();
+    return true;
+  }
+
+  bool start_array(std::size_t) override {
+    if (left_out()) {
+      ++left_out_;
+    } else if (depth_ > 0 || awaits(Awaited::coordinates)) {
+      open_bracket();
+    } else if (awaits(Awaited::list)) {
+      objects_.back().in_list = true;
+    } else {
+      refuse("a list");
+    }
+    return true;
+  }
+
+  bool end_array() override {
+    if (left_out_ > 0) {
+      --left_out_;
+    } else if (depth_ > 0) {
+      close_bracket();
+    } else {
+      objects_.back().in_list = false;
+    }
+    return true;
+  }
+
+  bool number_integer(number_integer_t value) override {
+    return number(static_cast<double>(value));
+  }
+  bool number_unsigned(number_unsigned_t value) override {
+    return number(static_cast<double>(value));
+  }
+  bool number_float(number_float_t value, const string_t&) override { return number(value); }
+
+  bool string(string_t& value) override {
+    if (left_out()) return true;
+    if (depth_ > 0 || !awaits(Awaited::type)) refuse("a string");
+    objects_.back().type = value;
+    return true;
+  }
+  bool null() override {
+    if (!left_out() && (depth_ > 0 || !awaits(Awaited::object))) refuse("null");
+    return true;
+  }
+  bool boolean(bool) override {
+    if (!left_out()) refuse("a truth value");
+    return true;
+  }
+  bool binary(binary_t&) override { return true; }  // no text has it
+  bool parse_error(std::size_t byte, const std::string&,
+                   const nlohmann::detail::exception& error) override {
+    offset_ += byte > 0 ? byte - 1 : 0;
+    fail(std::string("is not JSON (") + error.what() + ')');
+  }
+
+ private:
+  /// What the value that comes next is for; other: nothing that counts.
+  enum class Awaited : std::uint8_t { other, type, coordinates, object, list, item };
+  static constexpr std::size_t kMostObjects = 16, kMostBrackets = 4;
+
+  struct Object {
+    std::string type;
+    bool has_coordinates = false;
+    bool in_list = false;  ///< between the brackets of its list of objects
+    std::size_t position_depth =
+        0;                        ///< brackets around the numbers of its positions; 0: no position
+    std::size_t empty_depth = 0;  ///< brackets around the deepest nothing
+    std::size_t first_run = 0;
+  };
+  struct Bracket {
+    std::size_t numbers = 0;
+    std::size_t first_position = 0;
+    bool brackets = false;        ///< within
+    std::uint8_t dimensions = 2;  ///< of positions directly within
+  };
+
+  [[nodiscard]] bool awaits(Awaited what) const {
+    if (objects_.empty()) return what == Awaited::object;
+    return (objects_.back().in_list ? Awaited::item : awaited_) == what;
+  }
+  [[nodiscard]] bool left_out() const {
+    return left_out_ > 0 || (depth_ == 0 && awaits(Awaited::other));
+  }
+
+  bool number(double value) {
+    if (left_out()) return true;
+    if (depth_ == 0) refuse("a number");
+    Bracket& bracket = brackets_[depth_ - 1];
+    if (bracket.brackets) fail("a position has a list among its numbers");
+    if (bracket.numbers < 3) position_[bracket.numbers] = value;
+    ++bracket.numbers;
+    return true;
+  }
+
+  void open_bracket() {
+    if (depth_ == kMostBrackets) fail("its coordinates are nested too deeply");
+    if (depth_ > 0) {
+      if (brackets_[depth_ - 1].numbers > 0) fail("a position has a list among its numbers");
+      brackets_[depth_ - 1].brackets = true;
+    }
+    brackets_[depth_++] = {.first_position = geometry_.positions.size()};
+  }
+
+  void close_bracket() {
+    const Bracket& bracket = brackets_[depth_ - 1];
+    Object& object = objects_.back();
+    if (bracket.numbers > 0) {
+      if (bracket.numbers == 1) fail("a position has one number");
+      if (object.position_depth != 0 && object.position_depth != depth_) {
+        fail("its positions are nested unevenly");
+      }
+      object.position_depth = depth_;
+      if (bracket.numbers == 2) position_[2] = 0;
+      geometry_.positions.push_back(position_);
+      if (depth_ > 1 && bracket.numbers > 2) brackets_[depth_ - 2].dimensions = 3;
+    } else if (!bracket.brackets) {
+      object.empty_depth = std::max(object.empty_depth, depth_);
+    } else if (object.position_depth == depth_ + 1) {
+      runs_.push_back({.begin = bracket.first_position,
+                       .end = geometry_.positions.size(),
+                       .dimensions = bracket.dimensions});
+    }
+    --depth_;
+  }
+
+  void finish(const Object& object) {
+    const auto* const type =
+        std::find_if(kGeometryTypes.begin(), kGeometryTypes.end(),
+                     [&](const GeometryType& known) { return known.name == object.type; });
+    if (type == kGeometryTypes.end()) {
+      if (object.type != "Feature" && object.type != "FeatureCollection" &&
+          object.type != "GeometryCollection") {
+        fail(object.type.empty() ? "an object has no type"
+                                 : "has an object of the type " + in_quotes(object.type));
+      }
+      if (object.has_coordinates) fail("a " + object.type + " has coordinates");
+      return;
+    }
+    if (!object.has_coordinates) fail("a " + object.type + " has no coordinates");
+    const bool has_nothing_for_a_position = type->depth > 1 && object.empty_depth >= type->depth;
+    if ((object.position_depth != 0 && object.position_depth != type->depth) ||
+        has_nothing_for_a_position) {
+      fail("the coordinates are not those of a " + object.type);
+    }
+    if (!type->lines) return;
+    for (std::size_t i = object.first_run; i < runs_.size(); ++i) {
+      if (runs_[i].end - runs_[i].begin < 2)
+        fail("a line of a " + object.type + " has one position");
+      geometry_.lines.push_back(runs_[i]);
+    }
+  }
+
+  [[noreturn]] void refuse(const std::string& what) const {
+    fail(what + " stands where it means nothing");
+  }
+  [[noreturn]] void fail(const std::string& cause) const {
+    throw Error({.file = file_,
+                 .where = "the feature at byte " + std::to_string(offset_),
+                 .cause = cause,
+                 .remedy = "the file is damaged or no GeoJSON; write it anew, e.g. with ogr2ogr"});
+  }
+
+  const std::string& file_;
+  std::uint64_t offset_;
+  GeoJsonGeometry& geometry_;
+  std::vector<Object> objects_;
+  Awaited awaited_ = Awaited::other;
+  std::size_t left_out_ = 0;  ///< brackets and braces that are open in what does not count
+  std::size_t depth_ = 0;     ///< brackets that are open in coordinates
+  std::array<Bracket, kMostBrackets> brackets_{};
+  Point3 position_{};
+  std::vector<GeoJsonGeometry::Line> runs_;
+};
+
+}  // namespace
+
+void append_geometry(std::string_view item, const std::string& file, std::uint64_t offset,
+                     GeoJsonGeometry& geometry) {
+  GeometryTaker taker(file, offset, geometry);
+  nlohmann::json::sax_parse(item, &taker);
+}
+
+}  // namespace terrace::stream

@@ -1,0 +1,239 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/stream/source.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "format/chain.hpp"
+#include "format/formats.hpp"
+#include "format/geojson/geometry.hpp"
+#include "format/geojson/items.hpp"
+#include "terrace/stream/error.hpp"
+#include "terrace/stream/input.hpp"
+
+/// The positions of GeoJSON as points, and its lines as segments or polylines.
+
+namespace terrace::stream {
+namespace {
+
+constexpr std::array kAxes{"x", "y", "z"};
+
+[[noreturn]] void refuse_lines(const std::string& file) {
+  throw Error({.file = file,
+               .where = {},
+               .cause = "has more than 4,294,967,295 lines",
+               .remedy = "make several stores"});
+}
+
+class GeoJsonSource final : public PointSource {
+ public:
+  GeoJsonSource(const std::string& file, const SourceOptions& options)
+      : input_(file, options.stop),
+        items_(input_, item_bytes(options), !options.crs),
+        block_points_(options.block_points),
+        most_vertices_(vertices_of(options.entities)) {
+    info_.format = "geojson";
+    info_.files = {file};
+    info_.crs = options.crs ? *options.crs : items_.crs();
+    for (std::size_t axis = 0; axis < 3; ++axis) info_.coordinates[axis] = {.name = kAxes[axis]};
+    if (most_vertices_ == 1) return;
+    for (std::size_t vertex = 2; vertex <= most_vertices_; ++vertex) {
+      for (const char* const axis : kAxes) {
+        info_.attributes.push_back({.name = axis + std::to_string(vertex)});
+      }
+    }
+    info_.attributes.push_back({.name = "line", .type = ScalarType::u32});
+    info_.attributes.push_back({.name = "part", .type = ScalarType::u32});
+    info_.attributes.push_back({.name = "vertices", .type = ScalarType::u8});
+    info_.attributes.push_back({.name = "dimensions", .type = ScalarType::u8});
+    record_.resize(info_.payload_size());
+  }
+
+  const SourceInfo& info() const override { return info_; }
+
+  bool next(PointBlock& block) override {
+    block.clear();
+    while (block.size() < block_points_) {
+      if (!has_more()) {
+        if (!read_item()) break;
+      } else if (most_vertices_ == 1) {
+        append_positions(block);
+      } else {
+        append_piece(block);
+      }
+    }
+    progress_.points += block.size();
+    return !block.empty();
+  }
+
+  Progress progress() const override {
+    Progress progress = progress_;
+    if (input_.size() && *input_.size() > 0) {
+      progress.fraction =
+          std::min(1.0, static_cast<double>(input_.offset()) / static_cast<double>(*input_.size()));
+    }
+    return progress;
+  }
+
+ private:
+  /// Of the memory a quarter: what a feature's text holds takes no more again, and vectors grow.
+  static std::size_t item_bytes(const SourceOptions& options) {
+    constexpr std::uint64_t kLeast = 1u << 20;
+    return static_cast<std::size_t>(std::max(kLeast, options.memory_bytes / 4));
+  }
+  static std::size_t vertices_of(Entities entities) {
+    if (entities == Entities::points) return 1;
+    return entities == Entities::segments ? 2 : kPolylineVertices;
+  }
+
+  [[nodiscard]] bool has_more() const {
+    return most_vertices_ == 1 ? vertex_ < geometry_.positions.size()
+                               : line_ < geometry_.lines.size();
+  }
+
+  bool read_item() {
+    const std::optional<std::string_view> item = items_.next();
+    if (!item) return false;
+    geometry_.clear();
+    append_geometry(*item, input_.name(), items_.offset(), geometry_);
+    vertex_ = line_ = 0;
+    if (most_vertices_ == 1) return true;
+    std::uint64_t single = geometry_.positions.size();
+    for (const GeoJsonGeometry::Line& line : geometry_.lines) single -= line.end - line.begin;
+    progress_.excluded += single;
+    begin_line();
+    return true;
+  }
+
+  void append_positions(PointBlock& block) {
+    const std::size_t count =
+        std::min(block_points_ - block.size(), geometry_.positions.size() - vertex_);
+    const auto begin = geometry_.positions.begin() + static_cast<std::ptrdiff_t>(vertex_);
+    block.positions.insert(block.positions.end(), begin,
+                           begin + static_cast<std::ptrdiff_t>(count));
+    vertex_ += count;
+  }
+
+  void begin_line() {
+    part_ = 0;
+    if (line_ < geometry_.lines.size()) vertex_ = geometry_.lines[line_].begin;
+  }
+
+  /// A piece ends with the vertex that the next one begins with.
+  void append_piece(PointBlock& block) {
+    const GeoJsonGeometry::Line& line = geometry_.lines[line_];
+    const std::size_t count = std::min(most_vertices_, line.end - vertex_);
+    block.positions.push_back(geometry_.positions[vertex_]);
+    std::fill(record_.begin(), record_.end(), std::byte{0});
+    std::memcpy(record_.data(), geometry_.positions.data() + vertex_ + 1,
+                (count - 1) * sizeof(Point3));
+    std::byte* const numbers = record_.data() + (most_vertices_ - 1) * sizeof(Point3);
+    std::memcpy(numbers, &lines_, sizeof lines_);
+    std::memcpy(numbers + sizeof lines_, &part_, sizeof part_);
+    numbers[2 * sizeof lines_] = static_cast<std::byte>(count);
+    numbers[2 * sizeof lines_ + 1] = static_cast<std::byte>(line.dimensions);
+    block.payload.insert(block.payload.end(), record_.begin(), record_.end());
+    vertex_ += count - 1;
+    ++part_;
+    if (vertex_ + 1 < line.end) return;
+    ++line_;
+    if (lines_++ == std::numeric_limits<std::uint32_t>::max()) refuse_lines(input_.name());
+    begin_line();
+  }
+
+  Input input_;
+  GeoJsonItems items_;
+  std::size_t block_points_, most_vertices_;
+  SourceInfo info_;
+  GeoJsonGeometry geometry_;  ///< of the feature that is being delivered
+  std::size_t line_ = 0, vertex_ = 0;
+  std::uint32_t lines_ = 0, part_ = 0;  ///< of all lines so far; of the pieces of this one
+  std::vector<std::byte> record_;
+  Progress progress_;
+};
+
+/// Lines of several files, numbered on from file to file: those of each begin with part 0 of line
+/// 0.
+class NumberedOn final : public PointSource {
+ public:
+  explicit NumberedOn(std::unique_ptr<PointSource> files)
+      : files_(std::move(files)),
+        line_at_(files_->info().attribute_offset(files_->info().attributes.size() - 4)) {}
+
+  const SourceInfo& info() const override { return files_->info(); }
+  Progress progress() const override { return files_->progress(); }
+
+  bool next(PointBlock& block) override {
+    if (!files_->next(block)) return false;
+    const std::size_t record = info().payload_size();
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      std::byte* const number = block.payload.data() + i * record + line_at_;
+      std::array<std::uint32_t, 2> line_and_part{};
+      std::memcpy(line_and_part.data(), number, sizeof line_and_part);
+      if (line_and_part == std::array<std::uint32_t, 2>{}) first_ = next_;
+      const std::uint64_t line = first_ + line_and_part[0];
+      if (line > std::numeric_limits<std::uint32_t>::max()) refuse_lines(info().files.front());
+      next_ = line + 1;
+      line_and_part[0] = static_cast<std::uint32_t>(line);
+      std::memcpy(number, line_and_part.data(), sizeof line_and_part[0]);
+    }
+    return true;
+  }
+
+ private:
+  std::unique_ptr<PointSource> files_;
+  std::size_t line_at_;
+  std::uint64_t first_ = 0, next_ = 0;
+};
+
+bool recognise_geojson(std::span<const std::byte> head) {
+  const std::string_view text(reinterpret_cast<const char*>(head.data()), head.size());
+  const std::size_t first = text.find_first_not_of(" \t\r\n\x1E\xEF\xBB\xBF");
+  if (first == std::string_view::npos || text[first] != '{') return false;
+  constexpr std::array kMarks{
+      "\"Feature\"",         "\"FeatureCollection\"", "\"LineString\"",
+      "\"MultiLineString\"", "\"Polygon\"",           "\"MultiPolygon\"",
+      "\"Point\"",           "\"MultiPoint\"",        "\"GeometryCollection\""};
+  return text.find("\"type\"") != std::string_view::npos &&
+         std::any_of(kMarks.begin(), kMarks.end(),
+                     [&](const char* mark) { return text.find(mark) != std::string_view::npos; });
+}
+
+std::unique_ptr<PointSource> open_one_geojson(const std::string& file, const SourceOptions& options,
+                                              const SourceInfo* /*first*/) {
+  assert(options.block_points > 0);
+  return std::make_unique<GeoJsonSource>(file, options);
+}
+
+std::unique_ptr<PointSource> open_geojson(std::span<const std::string> files,
+                                          const SourceOptions& options) {
+  auto source = open_in_turn(files, options, &open_one_geojson);
+  if (files.size() == 1 || options.entities == Entities::points) return source;
+  return std::make_unique<NumberedOn>(std::move(source));
+}
+
+}  // namespace
+
+const Format& geojson_format() {
+  static const Format format{.name = "geojson",
+                             .endings = {".geojson", ".geojsonl", ".geojsons"},
+                             .streams = true,
+                             .recognise = &recognise_geojson,
+                             .open = &open_geojson,
+                             .lines = true};
+  return format;
+}
+
+}  // namespace terrace::stream

@@ -1,0 +1,381 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <cstdio>
+#include <fstream>
+#include <iostream>
+#include <random>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "temp_folder.hpp"
+#include "terrace/stream/error.hpp"
+#include "terrace/stream/source.hpp"
+
+namespace terrace::stream {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// What is in GeoJSON by walking it as a whole.
+struct Walked {
+  std::vector<Point3> positions;
+  std::vector<std::vector<Point3>> lines;
+  std::uint64_t single = 0;  ///< positions in no line
+};
+
+Point3 position_of(const Json& json) {
+  return {json[0].get<double>(), json[1].get<double>(),
+          json.size() > 2 ? json[2].get<double>() : 0};
+}
+
+void walk(const Json& json, Walked& walked) {
+  if (json.is_null()) return;
+  const std::string type = json["type"];
+  for (const char* const list : {"features", "geometries"}) {
+    if (!json.contains(list)) continue;
+    for (const Json& part : json[list]) walk(part, walked);
+  }
+  if (json.contains("geometry")) walk(json["geometry"], walked);
+  if (!json.contains("coordinates")) return;
+  const Json& coordinates = json["coordinates"];
+  const auto points = [&](const Json& list) {
+    for (const Json& position : list) walked.positions.push_back(position_of(position));
+    walked.single += list.size();
+  };
+  const auto line = [&](const Json& list) {
+    if (list.empty()) return;
+    walked.lines.emplace_back();
+    for (const Json& position : list) walked.lines.back().push_back(position_of(position));
+    walked.positions.insert(walked.positions.end(), walked.lines.back().begin(),
+                            walked.lines.back().end());
+  };
+  const auto each = [](const Json& list, const auto& what) {
+    for (const Json& part : list) what(part);
+  };
+  if (type == "Point" && !coordinates.empty()) points(Json::array({coordinates}));
+  if (type == "MultiPoint") points(coordinates);
+  if (type == "LineString") line(coordinates);
+  if (type == "MultiLineString" || type == "Polygon") each(coordinates, line);
+  if (type == "MultiPolygon") {
+    each(coordinates, [&](const Json& polygon) { each(polygon, line); });
+  }
+}
+
+bool same_bits(const std::vector<Point3>& a, const std::vector<Point3>& b) {
+  using Bits = std::array<std::uint64_t, 3>;
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const Point3& p, const Point3& q) {
+    return std::bit_cast<Bits>(p) == std::bit_cast<Bits>(q);
+  });
+}
+
+class GeoJson : public testing::Test {
+ protected:
+  std::string put(const std::string& name, const std::string& content) {
+    std::ofstream(folder_.path() / name, std::ios::binary) << content;
+    return (folder_.path() / name).string();
+  }
+
+  static SourceOptions options(Entities entities, std::size_t block_points = 7) {
+    SourceOptions options;
+    options.entities = entities;
+    options.block_points = block_points;
+    return options;
+  }
+
+  static std::vector<Point3> points_of(const std::vector<std::string>& files) {
+    const auto source = open_source(files, options(Entities::points));
+    EXPECT_TRUE(source->info().attributes.empty());
+    std::vector<Point3> points;
+    for (PointBlock block; source->next(block);) {
+      EXPECT_LE(block.size(), 7u);
+      points.insert(points.end(), block.positions.begin(), block.positions.end());
+    }
+    return points;
+  }
+
+  /// The lines, joined again. Checks the columns on the way.
+  static std::vector<std::vector<Point3>> lines_of(const std::vector<std::string>& files,
+                                                   Entities entities,
+                                                   std::uint64_t* excluded = nullptr) {
+    const auto source = open_source(files, options(entities));
+    const SourceInfo& info = source->info();
+    const std::size_t most = entities == Entities::segments ? 2 : kPolylineVertices;
+    const std::size_t numbers = 3 * (most - 1);
+    EXPECT_EQ(info.attributes.size(), numbers + 4);
+    EXPECT_EQ(info.attributes[numbers].name, "line");
+    EXPECT_EQ(info.attributes[numbers - 1].name, "z" + std::to_string(most));
+    std::vector<std::vector<Point3>> lines;
+    std::uint64_t pieces = 0;
+    for (PointBlock block; source->next(block);) {
+      EXPECT_LE(block.size(), 7u);
+      EXPECT_EQ(block.payload.size(), block.size() * info.payload_size());
+      for (std::size_t i = 0; i < block.size(); ++i, ++pieces) {
+        const auto line = info.view<std::uint32_t>(block.payload, numbers)[i];
+        const auto part = info.view<std::uint32_t>(block.payload, numbers + 1)[i];
+        const auto vertices = info.view<std::uint8_t>(block.payload, numbers + 2)[i];
+        EXPECT_TRUE(vertices >= 2 && vertices <= most);
+        if (part == 0) {
+          EXPECT_EQ(line, lines.size());
+          lines.push_back({block.positions[i]});
+        } else {
+          EXPECT_EQ(line, lines.size() - 1);
+          EXPECT_EQ(block.positions[i], lines.back().back());
+        }
+        for (std::size_t v = 0; v + 1 < most; ++v) {
+          Point3 corner{};
+          for (std::size_t axis = 0; axis < 3; ++axis) {
+            corner[axis] = info.view<double>(block.payload, 3 * v + axis)[i];
+          }
+          if (v + 1 < vertices) {
+            lines.back().push_back(corner);
+          } else {
+            EXPECT_EQ(corner, Point3{});
+          }
+        }
+      }
+    }
+    EXPECT_EQ(source->progress().points, pieces);
+    if (excluded != nullptr) *excluded = source->progress().excluded;
+    return lines;
+  }
+
+  static void expect_as_walked(const std::string& file, const Walked& wanted) {
+    EXPECT_TRUE(same_bits(points_of({file}), wanted.positions));
+    for (const Entities entities : {Entities::segments, Entities::polylines}) {
+      std::uint64_t excluded = 0;
+      const auto lines = lines_of({file}, entities, &excluded);
+      EXPECT_EQ(excluded, wanted.single);
+      ASSERT_EQ(lines.size(), wanted.lines.size());
+      for (std::size_t i = 0; i < lines.size(); ++i) {
+        EXPECT_TRUE(same_bits(lines[i], wanted.lines[i])) << i;
+      }
+    }
+  }
+
+  void expect_error(const std::string& content, const std::string& wanted,
+                    Entities entities = Entities::segments) {
+    const std::string file = put("bad.geojson", content);
+    try {
+      const auto source = open_source(std::vector{file}, options(entities));
+      for (PointBlock block; source->next(block);) {
+      }
+      ADD_FAILURE() << "read: " << content.substr(0, 200);
+    } catch (const Error& error) {
+      EXPECT_NE(std::string(error.what()).find(wanted), std::string::npos) << error.what();
+      EXPECT_NE(std::string(error.what()).find("byte"), std::string::npos) << error.what();
+    }
+  }
+
+  TempFolder folder_;
+};
+
+/// Random geometries of all types, nested, with members that mean nothing here.
+class Maker {
+ public:
+  explicit Maker(std::uint64_t seed) : random_(seed) {}
+
+  Json feature() {
+    Json feature{{"type", "Feature"},
+                 {"properties",
+                  {{"name", "a \"quoted\\\" } ] name \u00e9"},
+                   {"coordinates", {1, {2, 3}}},
+                   {"features", Json::array({Json::object()})},
+                   {"type", "Point"}}}};
+    feature["geometry"] = random_() % 9 == 0 ? Json() : geometry(0);
+    if (random_() % 2 == 0) feature["bbox"] = {1, 2, 3, 4};
+    return feature;
+  }
+
+  Json geometry(int depth) {
+    constexpr std::array kGeometries{
+        "Point",   "MultiPoint",   "LineString",        "MultiLineString",
+        "Polygon", "MultiPolygon", "GeometryCollection"};
+    const std::size_t type = random_() % (depth < 3 ? 7 : 6);
+    Json made{{"type", kGeometries[type]}};
+    if (type == 6) {
+      made["geometries"] = Json::array();
+      for (std::uint64_t i = random_() % 4; i > 0; --i)
+        made["geometries"].push_back(geometry(depth + 1));
+      return made;
+    }
+    made["coordinates"] = coordinates(std::array{1, 2, 2, 3, 3, 4}[type], type >= 2);
+    if (random_() % 2 == 0) {  // members in another order
+      Json turned{{"coordinates", made["coordinates"]}, {"note", nullptr}};
+      turned["type"] = made["type"];
+      return turned;
+    }
+    return made;
+  }
+
+ private:
+  Json coordinates(int depth, bool lines) {
+    if (depth == 1) {
+      Json position{number(), number()};
+      if (random_() % 2 == 0) position.push_back(number());
+      if (random_() % 9 == 0 && position.size() == 3) position.push_back(7);
+      return position;
+    }
+    Json list = Json::array();
+    std::uint64_t count = random_() % (depth == 2 ? 30 : 4);
+    if (lines && depth == 2 && count == 1) count = 2;
+    for (; count > 0; --count) list.push_back(coordinates(depth - 1, lines));
+    return list;
+  }
+
+  Json number() {
+    switch (random_() % 4) {
+      case 0:
+        return static_cast<int>(random_() % 360) - 180;
+      case 1:
+        return -0.0;
+      default:
+        return std::uniform_real_distribution(-180.0, 180.0)(random_);
+    }
+  }
+
+  std::mt19937_64 random_;
+};
+
+TEST_F(GeoJson, GivesWhatAWalkFinds) {
+  constexpr std::uint64_t kSeed = 20261123;
+  std::cout << "seed " << kSeed << '\n';
+  for (std::uint64_t round = 0; round < 60; ++round) {
+    SCOPED_TRACE(round);
+    Maker maker(kSeed + round);
+    Json collection{{"type", "FeatureCollection"}, {"name", "x"}, {"features", Json::array()}};
+    std::string lines, sequence;
+    for (std::uint64_t i = round % 20; i > 0; --i) {
+      collection["features"].push_back(maker.feature());
+      lines += collection["features"].back().dump() + "\r\n";
+      sequence += "\x1E" + collection["features"].back().dump(1) + "\n";
+    }
+    collection["after"] = {1, 2};
+    Walked walked;
+    walk(collection, walked);
+    expect_as_walked(put("a.geojson", collection.dump(round % 2 == 0 ? -1 : 2)), walked);
+    expect_as_walked(put("b.geojson", "\xEF\xBB\xBF" + collection.dump()), walked);
+    if (lines.empty()) continue;
+    expect_as_walked(put("c.geojsonl", lines), walked);
+    expect_as_walked(put("d.geojsons", sequence), walked);
+
+    Walked single;
+    const Json geometry = maker.geometry(0);
+    walk(geometry, single);
+    expect_as_walked(put("e.geojson", geometry.dump()), single);
+  }
+}
+
+TEST_F(GeoJson, ALineOfSeveralPiecesIsWhole) {
+  for (const int count : {2, 3, 4, 5, 7, 8, 1000}) {
+    Json line{{"type", "LineString"}, {"coordinates", Json::array()}};
+    for (int i = 0; i < count; ++i) line["coordinates"].push_back({i, i * i, 0.5});
+    Walked walked;
+    walk(line, walked);
+    expect_as_walked(put("line.geojson", line.dump()), walked);
+  }
+}
+
+TEST_F(GeoJson, LinesOfSeveralFilesAreNumberedOn) {
+  const std::string two =
+      R"({"type":"MultiLineString","coordinates":[[[0,0],[1,1]],[[2,2],[3,3],[4,4]]]})";
+  const std::vector<std::string> files{put("a.geojson", two), put("b.geojson", two),
+                                       put("c.geojson", two)};
+  for (const Entities entities : {Entities::segments, Entities::polylines}) {
+    EXPECT_EQ(lines_of(files, entities).size(), 6u);
+  }
+  EXPECT_EQ(points_of(files).size(), 15u);
+}
+
+TEST_F(GeoJson, SaysWhereItsCoordinatesLie) {
+  const auto crs_of = [&](const std::string& member) {
+    const std::string file =
+        put("crs.geojson", "{" + member + R"("type":"FeatureCollection","features":[]})");
+    return open_source(std::vector{file})->info().crs;
+  };
+  const auto named = [](const std::string& name) {
+    return R"("crs":{"type":"name","properties":{"name":")" + name + R"("}},)";
+  };
+  EXPECT_EQ(crs_of("").epsg, 4326);
+  EXPECT_TRUE(crs_of("").geographic);
+  EXPECT_EQ(crs_of(named("urn:ogc:def:crs:OGC:1.3:CRS84")), crs_of(""));
+  EXPECT_EQ(crs_of(named("EPSG:2056")).epsg, 2056);
+  EXPECT_EQ(crs_of(named("urn:ogc:def:crs:EPSG::25832")).epsg, 25832);
+  EXPECT_EQ(crs_of("\"crs\":null,"), Crs{});
+  EXPECT_EQ(crs_of(named("EPSG:x")).epsg, 0);
+  EXPECT_NE(crs_of(named("my own")).name.find("my own"), std::string::npos);
+
+  const std::string late =
+      R"({"type":"FeatureCollection","features":[],)" + named("EPSG:2056") + R"("a":1})";
+  expect_error(late, "too late");
+  SourceOptions given = options(Entities::points);
+  given.crs.emplace().epsg = 3857;
+  const auto source = open_source(std::vector{put("late.geojson", late)}, given);
+  PointBlock block;
+  EXPECT_FALSE(source->next(block));
+  EXPECT_EQ(source->info().crs.epsg, 3857);
+}
+
+TEST_F(GeoJson, IsRefusedWhereItIsNone) {
+  const auto line = [](const std::string& coordinates) {
+    return R"({"type":"LineString","coordinates":)" + coordinates + "}";
+  };
+  expect_error(line("[[0,0]]"), "has one position");
+  expect_error(line("[[0,0],[1]]"), "has one number");
+  expect_error(line("[[0,0],[]]"), "not those of a LineString");
+  expect_error(line("[[[0,0],[1,1]]]"), "not those of a LineString");
+  expect_error(line("[0,0]"), "not those of a LineString");
+  expect_error(line("[[0,0],[1,1],[[2,2]]]"), "nested unevenly");
+  expect_error(line("[[0,[0]],[1,1]]"), "among its numbers");
+  expect_error(line("[[[0],0],[1,1]]"), "");
+  expect_error(line("[[0,0],[1,\"1\"]]"), "a string");
+  expect_error(line("[[0,0],[1,null]]"), "null");
+  expect_error(line("[[0,0],[1,1e999]]"), "is not JSON");
+  expect_error(line("[[0,0],[1,1]]").substr(0, 40), "ends within an object");
+  expect_error(line("[[0,0],[1,1}]"), "is not JSON");
+  expect_error(line("[[[[[[0,0]]]]]]"), "nested too deeply");
+  expect_error(line("7"), "a number");
+  expect_error(R"({"type":"LineString"})", "has no coordinates");
+  expect_error(R"({"type":"Feature","geometry":{"type":"Arc","coordinates":[]}})",
+               "the type 'Arc'");
+  expect_error(R"({"type":"Feature","geometry":{"coordinates":[]}})", "has no type");
+  expect_error(R"({"type":"Feature","geometry":5})", "a number");
+  expect_error(R"({"type":"Point","features":[]})", "no FeatureCollection");
+  expect_error(R"({"type":"FeatureCollection","features":[{"type":"Feature","geometry":null}})",
+               "comma");
+  expect_error(R"({"type":"FeatureCollection","features":[,]})", "a feature must begin");
+  expect_error(R"({"type":"FeatureCollection","features":[7]})", "a feature must begin");
+  expect_error(R"({"type":"FeatureCollection","features":[],"features":[]})", "second list");
+  expect_error(line("[[0,0],[1,1]]") + "x", "an object must begin");
+  expect_error(
+      R"({"type":"Feature","geometry":{"type":"LineString","coordinates":[],"coordinates":[]}})",
+      "twice");
+  std::string deep = R"("type":"Point","coordinates":[0,0])";
+  for (int i = 0; i < 20; ++i) {
+    deep = R"("type":"GeometryCollection","geometries":[{)" + deep + "}]";
+  }
+  expect_error(R"({"type":"Feature","geometry":{)" + deep + "}}", "nested too deeply");
+
+  // A feature that is longer than memory allows, before it is read as a whole.
+  std::string large = R"({"type":"LineString","coordinates":[[0,0])";
+  for (int i = 0; i < 400'000; ++i) large += ",[1,1]";
+  SourceOptions little = options(Entities::polylines);
+  little.memory_bytes = 1 << 20;
+  const std::string file = put("large.geojson", large + "]}");
+  try {
+    const auto source = open_source(std::vector{file}, little);
+    ADD_FAILURE() << "read";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("memory"), std::string::npos) << error.what();
+  }
+}
+
+}  // namespace
+}  // namespace terrace::stream

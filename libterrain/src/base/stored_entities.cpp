@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "base/stored_entities.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <utility>
+
+#include <terrace/stream/error.hpp>
+
+namespace terrace::terrain {
+
+stream::Entities entities_of(const stream::StoreSchema& schema) {
+  for (const auto& [name, value] : schema.parameters) {
+    if (name != kEntitiesParameter) continue;
+    if (const auto entities = stream::entities_named(value)) return *entities;
+  }
+  return stream::Entities::points;
+}
+
+void need_points(const stream::Store& store, const std::string& what) {
+  const stream::Entities entities = entities_of(store.schema());
+  if (entities == stream::Entities::points) return;
+  throw stream::Error({.file = store.path().string(),
+                       .where = {},
+                       .cause = "holds " + std::string(stream::name_of(entities)) + ", and " +
+                                what + " needs points",
+                       .remedy = "build a store of the vertices: leave `entities` out"});
+}
+
+stream::Point3 exact_world_point(const stream::Placement& placement, const stream::Point3& stored) {
+  const stream::Channel& z = placement.coordinates[2];
+  const bool as_stored =
+      placement.world == stream::WorldTransform{} && z.scale == 1.0 && z.offset == 0.0;
+  return as_stored ? stored : stream::world_point(placement, stored);
+}
+
+CornerReader::CornerReader(const stream::Schema& schema, stream::Entities entities,
+                           std::string file)
+    : file_(std::move(file)) {
+  assert(entities != stream::Entities::points);
+  const std::size_t corners = entities == stream::Entities::triangles  ? 3
+                              : entities == stream::Entities::segments ? 2
+                                                                       : stream::kPolylineVertices;
+  for (std::size_t corner = 2; corner <= corners; ++corner) {
+    for (const char* const axis : {"x", "y", "z"}) {
+      others_.push_back(column(schema, axis + std::to_string(corner)));
+    }
+  }
+  if (entities == stream::Entities::polylines) vertices_ = column(schema, "vertices");
+}
+
+CornerReader::Column CornerReader::column(const stream::Schema& schema,
+                                          const std::string& name) const {
+  const auto found =
+      std::find_if(schema.attributes.begin(), schema.attributes.end(),
+                   [&](const stream::Channel& channel) { return channel.name == name; });
+  if (found == schema.attributes.end()) {
+    throw stream::Error({.file = file_,
+                         .where = {},
+                         .cause = "the column \"" + name + "\", of the corners, is not there",
+                         .remedy = "keep all columns: leave `keep` and `drop` out"});
+  }
+  return {found->type,
+          schema.attribute_offset(static_cast<std::size_t>(found - schema.attributes.begin()))};
+}
+
+std::size_t CornerReader::operator()(std::span<const std::byte> record,
+                                     std::span<stream::Point3> corners) const {
+  assert(corners.size() == most());
+  const auto value = [&](const Column& column) {
+    return stream::to_double(column.type, record.data() + column.offset);
+  };
+  std::size_t count = most();
+  if (vertices_) {
+    const double vertices = value(*vertices_);
+    if (!(vertices >= 2 && vertices <= static_cast<double>(count))) {
+      throw stream::Error({.file = file_,
+                           .where = {},
+                           .cause = "an entity of " + std::to_string(vertices) + " vertices",
+                           .remedy = "the store is damaged; build it again"});
+    }
+    count = static_cast<std::size_t>(vertices);
+  }
+  for (std::size_t i = 0; i < 3 * (count - 1); ++i) corners[1 + i / 3][i % 3] = value(others_[i]);
+  return count;
+}
+
+}  // namespace terrace::terrain

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <terrace/stream/source.hpp>
+#include <terrace/stream/store.hpp>
+
+/// Stores of triangles, segments or polylines: every "point" is the first corner of one, with the
+/// others as attributes.
+
+namespace terrace::terrain {
+
+/// The parameter in a store's manifest that names what it holds, unless that is points.
+inline constexpr std::string_view kEntitiesParameter = "entities";
+
+[[nodiscard]] stream::Entities entities_of(const stream::StoreSchema& schema);
+
+/// Throws: stream::Error if the store holds anything but points; `what` needs them.
+void need_points(const stream::Store& store, const std::string& what);
+
+/// Where things of a store are as they were read to the last bit, zeros with their sign: as it is
+/// where the transform changes nothing, as sums would take the sign off.
+[[nodiscard]] stream::Point3 exact_world_point(const stream::Placement& placement,
+                                               const stream::Point3& stored);
+
+/// Reads the corners of an entity from its record, in stored coordinates.
+class CornerReader {
+ public:
+  /// entities: not points. Throws: stream::Error, about `file`, if the columns are not there.
+  CornerReader(const stream::Schema& schema, stream::Entities entities, std::string file);
+
+  /// Most corners of an entity, at most stream::kPolylineVertices.
+  [[nodiscard]] std::size_t most() const { return others_.size() / 3 + 1; }
+  /// Reads all corners but the first, to corners[1] and on, and returns how many there are with it.
+  /// corners: most() of them. Throws: stream::Error on a number of vertices that no entity has.
+  std::size_t operator()(std::span<const std::byte> record,
+                         std::span<stream::Point3> corners) const;
+
+ private:
+  struct Column {
+    stream::ScalarType type;
+    std::size_t offset;
+  };
+  [[nodiscard]] Column column(const stream::Schema& schema, const std::string& name) const;
+
+  std::string file_;
+  std::vector<Column> others_;  ///< x, y, z of the second corner, of the third, ...
+  std::optional<Column> vertices_;
+};
+
+}  // namespace terrace::terrain

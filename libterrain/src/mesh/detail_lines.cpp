@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/terrain/detail_lines.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <numeric>
+#include <span>
+#include <string>
+#include <tuple>
+
+#include "base/file_marks.hpp"
+#include "base/stored_entities.hpp"
+#include "mesh/wanted_entities.hpp"
+#include "terrace/terrain/error.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+struct Piece {
+  std::uint32_t line = 0, part = 0;
+  std::uint32_t begin = 0;  ///< of the vertices as they were read
+  std::uint8_t count = 0, dimensions = 0;
+};
+
+/// A piece, its place in order, and its vertices twice while they are joined.
+constexpr std::size_t bytes_per_piece(std::size_t most_vertices) {
+  return sizeof(Piece) + sizeof(LineSet::Line) + 2 * most_vertices * sizeof(stream::Point3);
+}
+
+/// Where the columns are that every line has.
+struct LineColumns {
+  std::size_t line, part, dimensions;
+
+  explicit LineColumns(const stream::Store& store)
+      : line(offset(store, "line", stream::ScalarType::u32)),
+        part(offset(store, "part", stream::ScalarType::u32)),
+        dimensions(offset(store, "dimensions", stream::ScalarType::u8)) {}
+
+  static std::size_t offset(const stream::Store& store, std::string_view name,
+                            stream::ScalarType type) {
+    const std::vector<stream::Channel>& attributes = store.schema().attributes;
+    for (std::size_t i = 0; i < attributes.size(); ++i) {
+      if (attributes[i].name == name && attributes[i].type == type) {
+        return store.schema().attribute_offset(i);
+      }
+    }
+    throw stream::Error({.file = store.path().string(),
+                         .where = {},
+                         .cause = "its lines have no column \"" + std::string(name) + "\"",
+                         .remedy = "keep all columns: leave `keep` and `drop` out"});
+  }
+};
+
+void append_number(std::string& text, double value) {
+  if (value == 0 && std::signbit(value)) {
+    text += "-0.0";  // as an integer it would lose its sign
+    return;
+  }
+  char digits[32];
+  text.append(digits, std::to_chars(digits, digits + sizeof digits, value).ptr);
+}
+
+}  // namespace
+
+bool holds_lines(const stream::StoreSchema& schema) {
+  const stream::Entities entities = entities_of(schema);
+  return entities == stream::Entities::segments || entities == stream::Entities::polylines;
+}
+
+LineSet detail_lines(const stream::Store& given, const Detail& detail, const Context& context) {
+  const stream::Store store = given.with_stop(context.stop);
+  if (!holds_lines(store.schema())) throw UsageError(store.path().string() + " holds no lines");
+  const LineColumns columns(store);
+  const bool segments = entities_of(store.schema()) == stream::Entities::segments;
+  std::vector<Piece> pieces;
+  std::vector<stream::Point3> read;
+  for_each_wanted_entity(
+      store, detail, context.memory_or(0),
+      bytes_per_piece(segments ? 2 : stream::kPolylineVertices),
+      [&](std::span<const std::byte> record, std::span<const stream::Point3> vertices) {
+        Piece piece{.begin = static_cast<std::uint32_t>(read.size()),
+                    .count = static_cast<std::uint8_t>(vertices.size()),
+                    .dimensions = static_cast<std::uint8_t>(record[columns.dimensions])};
+        std::memcpy(&piece.line, record.data() + columns.line, sizeof piece.line);
+        std::memcpy(&piece.part, record.data() + columns.part, sizeof piece.part);
+        pieces.push_back(piece);
+        read.insert(read.end(), vertices.begin(), vertices.end());
+      });
+  std::sort(pieces.begin(), pieces.end(), [](const Piece& a, const Piece& b) {
+    return std::tie(a.line, a.part) < std::tie(b.line, b.part);
+  });
+
+  LineSet set;
+  set.vertices.reserve(read.size());
+  for (std::size_t i = 0; i < pieces.size(); ++i) {
+    const Piece& piece = pieces[i];
+    const stream::Point3* const first = read.data() + piece.begin;
+    const bool follows = i > 0 && piece.line == pieces[i - 1].line &&
+                         piece.part == pieces[i - 1].part + 1 && set.vertices.back() == *first;
+    set.vertices.insert(set.vertices.end(), first + (follows ? 1 : 0), first + piece.count);
+    if (!follows) {
+      set.lines.push_back({.begin = set.vertices.size() - piece.count,
+                           .end = 0,
+                           .number = piece.line,
+                           .dimensions = piece.dimensions});
+    }
+    set.lines.back().end = set.vertices.size();
+  }
+  return set;
+}
+
+void write_geojson(const LineSet& lines, const stream::Crs& crs,
+                   const std::function<void(std::string_view)>& write) {
+  constexpr std::size_t kAtOnce = std::size_t{1} << 20;
+  const bool known = crs != stream::Crs{};
+  if (known && crs.epsg == 0) {
+    throw UsageError("GeoJSON names where it lies by an EPSG code, which the CRS of these lines " +
+                     std::string("does not have; with `to_crs` EPSG:4326 it needs none"));
+  }
+  std::string text(kLinesHead);
+  if (!known) {
+    text += R"("crs":null,)";
+  } else if (crs.epsg != 4326) {
+    text += R"("crs":{"type":"name","properties":{"name":"urn:ogc:def:crs:EPSG::)" +
+            std::to_string(crs.epsg) + R"("}},)";
+  }
+  text += "\"features\":[";
+  for (std::size_t i = 0; i < lines.lines.size(); ++i) {
+    const LineSet::Line& line = lines.lines[i];
+    text += i == 0 ? "\n" : ",\n";
+    text += R"({"type":"Feature","properties":{"line":)" + std::to_string(line.number) +
+            R"(},"geometry":{"type":"LineString","coordinates":[)";
+    for (std::size_t v = line.begin; v < line.end; ++v) {
+      text += v == line.begin ? "[" : ",[";
+      for (std::size_t axis = 0; axis < line.dimensions; ++axis) {
+        if (axis > 0) text += ',';
+        append_number(text, lines.vertices[v][axis]);
+      }
+      text += ']';
+      if (text.size() < kAtOnce) continue;
+      write(text);
+      text.clear();
+    }
+    text += "]}}";
+  }
+  text += "\n]}\n";
+  write(text);
+}
+
+}  // namespace terrace::terrain

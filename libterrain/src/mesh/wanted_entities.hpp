@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+
+#include <terrace/stream/store.hpp>
+
+#include "terrace/terrain/detail.hpp"
+
+namespace terrace::terrain {
+
+/// Visits what `detail` wants of a store of entities, clusters in the order of for_each_wanted():
+/// the record of each, and its corners in the CRS, to the last bit where the store's coordinates
+/// are the CRS's. An entity is where its first corner is.
+/// Throws: stream::Error on a damaged store, and when there are more than fit into memory_bytes at
+/// bytes_each.
+void for_each_wanted_entity(
+    const stream::Store& store, const Detail& detail, std::uint64_t memory_bytes,
+    std::size_t bytes_each,
+    const std::function<void(std::span<const std::byte> record,
+                             std::span<const stream::Point3> corners)>& visit);
+
+}  // namespace terrace::terrain
