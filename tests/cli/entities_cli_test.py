@@ -128,6 +128,36 @@ class TrianglesTest(EntitiesCase):
         self.assertTrue(triangles_of(out)[1] == inside)
         self.assertGreater(len(inside), 100)
 
+    def test_a_bounding_volume_hierarchy(self):
+        out = self.path('tree.csv')
+        summary = json.loads(self.run_ok('match', self.file, '--tree', '--entities', 'triangles', '-o', out, '--json',
+                                         '--method', 'monotone', '--iterations', 3))
+        with open(out, encoding='ascii') as file:
+            self.assertEqual(file.readline().strip(), 'a,b,distance,size,level,minx,miny,minz,maxx,maxy,maxz')
+            rows = [line.strip().split(',') for line in file]
+        self.assertEqual((summary['pairs'], len(rows)), (len(self.faces) - 1,) * 2)
+        # Every node is a child once, and its box is that of the triangles below, to the last bit.
+        below = [frozenset([t]) for t in range(len(self.faces))]
+        seen = collections.Counter()
+        for row in rows:
+            a, b = int(row[0]), int(row[1])
+            seen.update((a, b))
+            below.append(below[a] | below[b])
+            corners = [self.vertices[v] for t in below[-1] for v in self.faces[t]]
+            if len(below[-1]) > 64 and len(below[-1]) < len(self.faces):
+                continue
+            box = [low(c[axis] for c in corners) for low in (min, max) for axis in range(3)]
+            self.assertTrue(box == list(map(float, row[5:])))
+            self.assertEqual(int(row[3]), len(below[-1]))
+        self.assertTrue(all(count == 1 for count in seen.values()) and len(seen) == 2 * len(self.faces) - 2)
+        self.assertEqual(len(below[-1]), len(self.faces))
+        self.assertGreater(summary['surface_area_cost'], 1)
+        self.assertGreater(summary['depth'], 10)
+        self.run_ok('match', self.file, '--tree', '--entities', 'triangles', '-o', out, '--force', '--method', 'monotone',
+                    '--iterations', 1)
+        self.expect_error('--entities triangles is for --tree', 'match', self.file, '--entities', 'triangles',
+                          '-o', self.path('x.csv'))
+
     def test_threads_and_pipes_change_nothing(self):
         for name, source, options in (('threads.st', self.file, ['--threads', 1]),
                                       ('pipe.st', '-', ['--input-format', 'obj'])):

@@ -153,7 +153,8 @@ class Table {
       comments_ = true;
       return true;
     }
-    for (const std::string_view head : {kPairsHead, kTreeHead, kDendrogramHead, kProfileHead}) {
+    for (const std::string_view head :
+         {kPairsHead, kTreeHead, kBoxTreeHead, kDendrogramHead, kProfileHead}) {
       if (line == head && !comments_) return ours_ = true;
     }
     for (const char separator : {',', ';', '\t'}) {

@@ -16,6 +16,8 @@ using namespace terrain;
 /// How tables of the command begin: formats without room for a comment.
 inline constexpr std::string_view kPairsHead = "a,b,distance";
 inline constexpr std::string_view kTreeHead = "a,b,distance,size,level";
+inline constexpr std::string_view kBoxTreeHead =
+    "a,b,distance,size,level,minx,miny,minz,maxx,maxy,maxz";
 inline constexpr std::string_view kDendrogramHead = "a,b,height,size";
 
 /// True if the regular file at `path` is empty or terrace wrote it, which its format says at the

@@ -49,10 +49,11 @@ std::uint64_t reading_within_memory(const stream::PointSource& source, std::uint
 }
 
 PointTable read_point_table(const std::string& file, const std::string& format,
-                            std::uint64_t memory_bytes, const CommonOptions& common) {
+                            std::uint64_t memory_bytes, const CommonOptions& common,
+                            stream::Entities entities) {
   const std::array<std::string, 1> files{file};
   const std::unique_ptr<stream::PointSource> source =
-      stream::open_source(files, {.format = format, .stop = stop_token()});
+      stream::open_source(files, {.format = format, .entities = entities, .stop = stop_token()});
   const std::uint64_t reading = reading_within_memory(*source, memory_bytes);
   PointTable table;
   table.info = source->info();

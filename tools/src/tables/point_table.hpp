@@ -35,7 +35,8 @@ std::uint64_t reading_within_memory(const stream::PointSource& source, std::uint
 /// Throws: stream::Error on bad data, on no points, and if the points take more than memory_bytes;
 /// Interrupted.
 PointTable read_point_table(const std::string& file, const std::string& format,
-                            std::uint64_t memory_bytes, const CommonOptions& common);
+                            std::uint64_t memory_bytes, const CommonOptions& common,
+                            stream::Entities entities = stream::Entities::points);
 
 /// Metres on the ground for the points of a table: ground = scale * (position - origin).
 struct GroundFrame {

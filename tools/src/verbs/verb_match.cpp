@@ -1,16 +1,21 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // match: pairs the points of one file at the least total distance, or makes the tree of repeated
-// matching.
+// matching, of triangles with their boxes.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <optional>
+#include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
+#include <terrace/matching/bounding_volume_hierarchy.hpp>
 
 #include "base/portable_math.hpp"
+#include "base/stored_entities.hpp"
 #include "base/units.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/library_call.hpp"
@@ -35,7 +40,8 @@ class MatchCommand final : public Command {
         ->type_name("FILE");
     add_output(app, output_,
                "The pairs, rows a,b,distance: numbers of points in the order of the input, from 0, "
-               "and metres; with --tree rows a,b,distance,size,level; - is standard output");
+               "and metres; with --tree rows a,b,distance,size,level, of triangles with the box of "
+               "what is below: minx,miny,minz,maxx,maxy,maxz; - is standard output");
     app.add_option("--input-format", input_format_, "Of the input (else its content, its ending)")
         ->type_name("NAME");
     app.add_option("--method", method_,
@@ -56,6 +62,11 @@ class MatchCommand final : public Command {
         "--tree", tree_,
         "Match the pairs again, and so on: the binary tree. Row k is node n + k of n points "
         "and joins the nodes a and b; size: points below");
+    app.add_option("--entities", entities_,
+                   "triangles: those of a mesh (OBJ, OFF, PLY, STL) in place of its vertices, by "
+                   "their centroids; with --tree, which is a bounding volume hierarchy then")
+        ->check(CLI::IsMember({"points", "triangles"}))
+        ->capture_default_str();
     app.add_option("--labels", labels_,
                    "One cluster number per line, in the order of the input: match within clusters "
                    "first")
@@ -66,7 +77,12 @@ class MatchCommand final : public Command {
     const Stopwatch watch;
     MatchRequest request = request_of(common);
     const bool replace = may_replace(output_, common.force);
-    const PointTable table = read_point_table(input_, input_format_, common.memory_or(0), common);
+    const bool triangles = entities_ == "triangles";
+    if (triangles && !tree_) throw UsageError("--entities triangles is for --tree");
+    PointTable table = read_point_table(input_, input_format_, common.memory_or(0), common,
+                                        *stream::entities_named(entities_));
+    std::vector<matching::Box<3>> boxes;
+    if (triangles) boxes = to_centroids(table);
     const GroundFrame ground = GroundFrame::of(table, z_weight_);
     if (!ground.assumption.empty()) common.explain(input_ + ": " + ground.assumption);
     std::vector<std::uint32_t> labels;
@@ -84,8 +100,20 @@ class MatchCommand final : public Command {
       TreeOutcome outcome;
       call_library(input_, method_,
                    [&] { outcome = run_matching_tree(request, positions_, progress); });
-      write(rows_of(outcome), replace);
-      return summary_of(outcome, watch);
+      if (!triangles) {
+        write(rows_of(outcome), replace);
+        return summary_of(outcome, watch);
+      }
+      const matching::BoundingVolumeHierarchy<3> hierarchy(
+          matching::tree_children(outcome.tree.rows), boxes);
+      write(rows_of(outcome, std::move(boxes)), replace);
+      Summary summary = summary_of(outcome, watch);
+      summary.json["depth"] = hierarchy.depth();
+      summary.json["surface_area_cost"] = hierarchy.surface_area_cost();
+      summary.text += "as a bounding volume hierarchy: depth " + with_commas(hierarchy.depth()) +
+                      ", surface area cost " + readable_number(hierarchy.surface_area_cost(), 4) +
+                      '\n';
+      return summary;
     }
     MatchOutcome outcome;
     call_library(input_, method_, [&] { outcome = run_matching(request, positions_, progress); });
@@ -131,12 +159,45 @@ class MatchCommand final : public Command {
     return text;
   }
 
-  static std::string rows_of(const TreeOutcome& outcome) {
-    std::string text = std::string(kTreeHead) + '\n';
+  /// The boxes of the triangles that a table has; its positions, first corners, become centroids.
+  [[nodiscard]] std::vector<matching::Box<3>> to_centroids(PointTable& table) const {
+    const CornerReader read(table.info, stream::Entities::triangles, input_);
+    const std::size_t record = table.info.payload_size();
+    std::vector<matching::Box<3>> boxes(table.size());
+    for (std::size_t i = 0; i < boxes.size(); ++i) {
+      std::array<stream::Point3, 3> corners{table.positions[i]};
+      read(std::span(table.payload).subspan(i * record, record), corners);
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const auto [low, high] =
+            std::minmax({corners[0][axis], corners[1][axis], corners[2][axis]});
+        boxes[i].lo[axis] = low;
+        boxes[i].hi[axis] = high;
+        table.positions[i][axis] =
+            corners[0][axis] / 3 + corners[1][axis] / 3 + corners[2][axis] / 3;
+      }
+    }
+    return boxes;
+  }
+
+  /// boxes: of what the tree is over, in the coordinates of the file; none: rows without.
+  static std::string rows_of(const TreeOutcome& outcome, std::vector<matching::Box<3>> boxes = {}) {
+    const bool boxed = !boxes.empty();
+    std::string text = std::string(boxed ? kBoxTreeHead : kTreeHead) + '\n';
     for (const matching::MatchingTreeRow& row : outcome.tree.rows) {
       text += std::to_string(row.a) + ',' + std::to_string(row.b) + ',' +
               number_text(row.distance) + ',' + std::to_string(row.size) + ',' +
-              std::to_string(row.level) + '\n';
+              std::to_string(row.level);
+      if (boxed) {
+        matching::Box<3> box = boxes[row.a];
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          box.lo[axis] = std::min(box.lo[axis], boxes[row.b].lo[axis]);
+          box.hi[axis] = std::max(box.hi[axis], boxes[row.b].hi[axis]);
+        }
+        boxes.push_back(box);
+        for (const double value : box.lo) text += ',' + number_text(value);
+        for (const double value : box.hi) text += ',' + number_text(value);
+      }
+      text += '\n';
     }
     return text;
   }
@@ -208,7 +269,8 @@ class MatchCommand final : public Command {
   }
 
   std::vector<stream::Point3> positions_;
-  std::string input_, output_, input_format_, method_ = "auto", iterations_, labels_;
+  std::string input_, output_, input_format_, method_ = "auto", iterations_, labels_,
+                                              entities_ = "points";
   bool tree_ = false;
   std::optional<double> seconds_;
   double z_weight_ = 1;
