@@ -152,7 +152,7 @@ void GeoJsonItems::leave_list() {
   const Stop stop = scan_object(1, true);
   std::string_view rest = window_.substr(0, stop.at);
   rest.remove_prefix(std::min(rest.find_first_not_of(" \t\r\n,"), rest.size()));
-  take_members("{" + std::string(rest), false);
+  take_members(std::string("{").append(rest), false);
   input_->consume(stop.at);
 }
 
