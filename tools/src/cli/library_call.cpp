@@ -9,8 +9,6 @@
 
 namespace terrace::tools {
 
-using namespace terrain;
-
 void call_library(const std::string& file, const std::string& method,
                   const std::function<void()>& work) {
   try {

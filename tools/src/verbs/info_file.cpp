@@ -10,6 +10,7 @@
 #include "cli/interrupt.hpp"
 #include "cli/option_names.hpp"
 #include "cli/terminal.hpp"
+#include "earth/crs/crs_definition.hpp"
 #include "earth/source_crs.hpp"
 #include "terrace/stream/error.hpp"
 #include "verbs/info.hpp"
