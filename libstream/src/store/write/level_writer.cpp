@@ -24,7 +24,8 @@ LevelWriter::LevelWriter(const std::filesystem::path& folder, Layout layout, uns
     : layout_(std::move(layout)),
       data_(folder / file_name(layout_.level, "clusters")),
       index_(folder / file_name(layout_.level, "index")),
-      encoders_(std::max(1u, threads)) {}
+      threads_(std::max(1u, threads)),
+      encoders_(1) {}
 
 std::uint64_t LevelWriter::append(PreparedBlock block, bool root) {
   if (at_segment_start()) {
@@ -78,13 +79,11 @@ std::uint64_t LevelWriter::Trial::bits_of_column(unsigned column) const {
 LevelWriter::Trial LevelWriter::count(const Predictor& predictor, const Columns& columns,
                                       std::size_t step) {
   std::vector<Trial> parts(encoders_.size());
-  side_by_side(static_cast<unsigned>(encoders_.size()), (held_.size() + step - 1) / step,
-               [&](std::size_t i, std::size_t worker) {
-                 const ClusteredBlock view = held_[i * step].view();
-                 encoders_[worker].load(layout_, view);
-                 parts[worker].raw_bits +=
-                     encoders_[worker].count(predictor, columns, parts[worker].counts);
-               });
+  side_by_side(threads_, (held_.size() + step - 1) / step, [&](std::size_t i, std::size_t worker) {
+    const ClusteredBlock view = held_[i * step].view();
+    encoders_[worker].load(layout_, view);
+    parts[worker].raw_bits += encoders_[worker].count(predictor, columns, parts[worker].counts);
+  });
   Trial all;
   all.counts.resize(layout_.contexts());
   for (const Trial& part : parts) {
@@ -139,6 +138,7 @@ std::vector<ColumnKind> LevelWriter::choose_columns(const Predictor& predictor) 
 }
 
 void LevelWriter::train() {
+  encoders_.resize(threads_);
   // Where there are many blocks, a part of them tells as much: others wait for this.
   const bool many = held_.size() == kTrainingBlocks;
   Tables tables;
@@ -164,15 +164,15 @@ void LevelWriter::train() {
   tables_ = std::make_shared<const SharedTables>(std::move(tables), *sequence_);
 
   std::vector<PreparedBlock> prepared(held_.size());
-  side_by_side(static_cast<unsigned>(encoders_.size()), held_.size(),
-               [&](std::size_t b, std::size_t worker) {
-                 const ClusteredBlock view = held_[b].view();
-                 PreparedBlock& block = prepared[b];
-                 encoders_[worker].load(layout_, view);
-                 encoders_[worker].encode(tables_->encoding, tables_->sequence, block.bytes,
-                                          block.entries, block.ranges);
-               });
+  side_by_side(threads_, held_.size(), [&](std::size_t b, std::size_t worker) {
+    const ClusteredBlock view = held_[b].view();
+    PreparedBlock& block = prepared[b];
+    encoders_[worker].load(layout_, view);
+    encoders_[worker].encode(tables_->encoding, tables_->sequence, block.bytes, block.entries,
+                             block.ranges);
+  });
   for (const PreparedBlock& block : prepared) write(block);
+  encoders_.resize(1);
   held_.clear();
   held_.shrink_to_fit();
 }

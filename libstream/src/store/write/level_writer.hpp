@@ -86,7 +86,8 @@ class LevelWriter {
   /// block that was encoded with the tables of the segment before has no other order any more.
   std::optional<bool> sequence_;
   SharedTablesPtr tables_;
-  std::vector<BlockEncoder> encoders_;  ///< one per thread
+  unsigned threads_;
+  std::vector<BlockEncoder> encoders_;  ///< one; in training one per thread
   std::uint64_t blocks_ = 0, clusters_ = 0, points_ = 0;
   std::uint64_t segment_start_ = 0;  ///< ordinal of the present segment's first cluster
   std::vector<Entry> page_;
