@@ -503,7 +503,7 @@ std::string decoding(bool grid, std::uint32_t points, std::uint32_t last,
   encoder.start();
   write(encoder);
   store::Bytes bytes(store::kPadding);
-  encoder.finish(bytes, last);
+  encoder.finish(last, bytes);
   if (change) change(bytes);
   Entry entry;
   entry.points = points;

@@ -198,7 +198,7 @@ void region(benchmark::State& state) {
   state.counters["bytes"] = static_cast<double>(bytes) / within;
   state.SetItemsProcessed(static_cast<std::int64_t>(inside));
 }
-BENCHMARK(region)->Arg(1)->Arg(100)->Arg(1000)->Unit(benchmark::kMillisecond);
+BENCHMARK(region)->Arg(1)->Arg(6)->Arg(100)->Arg(1000)->Unit(benchmark::kMillisecond);
 
 /// An outline of 100,000 corners around most of the store, jagged at every scale as a coast is.
 terrace::terrain::Region coast() {

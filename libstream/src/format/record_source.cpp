@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <optional>
+#include <span>
 #include <string_view>
 #include <utility>
 
@@ -17,12 +19,119 @@ namespace {
 
 bool is_wide_integer(ScalarType type) { return type == ScalarType::i64 || type == ScalarType::u64; }
 
+/// Brings fields of records into payloads. What lies together in both is moved together, as each
+/// pass over the records costs the same however little it moves.
+class PayloadUnpacker {
+ public:
+  PayloadUnpacker(std::span<const LasField> fields, std::size_t payload_bytes)
+      : payload_bytes_(payload_bytes) {
+    std::size_t to = 0;
+    for (std::size_t i = 0; i < fields.size();) {
+      if (fields[i].bits > 0) {
+        add_bits(fields, i, to);
+      } else {
+        add_values(fields, i, to);
+      }
+    }
+  }
+
+  void unpack(std::string_view rows, std::size_t stride, std::byte* payload) const {
+    PackedColumn column{.rows = nullptr,
+                        .stride = stride,
+                        .count = rows.size() / stride,
+                        .type = ScalarType::u8,
+                        .swap = kForeign};
+    for (const Values& values : values_) {
+      column.rows = rows.data() + values.from;
+      column.type = values.type;
+      decode_values(column, payload + values.to, payload_bytes_);
+    }
+    for (const Bits& bits : bits_) {
+      column.rows = rows.data() + bits.from;
+      bits.unpack(column, bits.parts, payload + bits.to, payload_bytes_);
+    }
+  }
+
+ private:
+  static constexpr bool kForeign = std::endian::native == std::endian::big;
+  using Parts = std::array<std::byte, 8>;
+  using PartsOfBytes = std::array<Parts, 256>;
+  struct Values {
+    std::size_t from = 0, to = 0;
+    ScalarType type = ScalarType::u8;
+  };
+  struct Bits {
+    std::size_t from = 0, to = 0;
+    void (*unpack)(const PackedColumn& bytes, const PartsOfBytes& parts, std::byte* to,
+                   std::size_t to_stride) = nullptr;
+    PartsOfBytes parts{};
+  };
+
+  /// Fields that lie behind one another, as few numbers: the last two may overlap.
+  void add_values(std::span<const LasField> fields, std::size_t& i, std::size_t& to) {
+    const std::size_t first = i, from = fields[i].offset;
+    std::size_t bytes = 0;
+    do {
+      bytes += size_of(fields[i++].channel.type);
+    } while (!kForeign && i < fields.size() && fields[i].bits == 0 &&
+             fields[i].offset == from + bytes);
+    if (kForeign) {
+      values_.push_back({from, to, fields[first].channel.type});
+    } else {
+      const ScalarType type = bytes >= 8   ? ScalarType::u64
+                              : bytes >= 4 ? ScalarType::u32
+                              : bytes >= 2 ? ScalarType::u16
+                                           : ScalarType::u8;
+      const std::size_t width = size_of(type);
+      for (std::size_t at = 0; at < bytes; at += width) {
+        const std::size_t begin = std::min(at, bytes - width);
+        values_.push_back({from + begin, to + begin, type});
+      }
+    }
+    to += bytes;
+  }
+
+  /// Fields that are parts of one byte.
+  void add_bits(std::span<const LasField> fields, std::size_t& i, std::size_t& to) {
+    constexpr std::array<decltype(Bits::unpack), 9> kUnpack{
+        nullptr,         &unpack_bits<1>, &unpack_bits<2>, &unpack_bits<3>, &unpack_bits<4>,
+        &unpack_bits<5>, &unpack_bits<6>, &unpack_bits<7>, &unpack_bits<8>};
+    Bits& bits = bits_.emplace_back();
+    bits.from = fields[i].offset;
+    bits.to = to;
+    std::size_t count = 0;
+    for (; i < fields.size() && fields[i].bits > 0 && fields[i].offset == bits.from &&
+           count < bits.parts[0].size();
+         ++i, ++count) {
+      const unsigned mask = (1U << fields[i].bits) - 1;
+      for (unsigned byte = 0; byte < 256; ++byte) {
+        bits.parts[byte][count] = static_cast<std::byte>((byte >> fields[i].shift) & mask);
+      }
+    }
+    bits.unpack = kUnpack[count];
+    to += count;
+  }
+  template <std::size_t kCount>
+  static void unpack_bits(const PackedColumn& bytes, const PartsOfBytes& parts, std::byte* to,
+                          std::size_t to_stride) {
+    const char* at = bytes.rows;
+    for (std::size_t i = 0; i < bytes.count; ++i, at += bytes.stride, to += to_stride) {
+      std::memcpy(to, parts[static_cast<unsigned char>(*at)].data(), kCount);
+    }
+  }
+
+  std::size_t payload_bytes_;
+  std::vector<Values> values_;
+  std::vector<Bits> bits_;
+};
+
 class RecordSource final : public PointSource {
  public:
   RecordSource(RecordStream stream, std::size_t block_points)
       : stream_(std::move(stream)),
         block_points_(block_points),
         payload_bytes_(stream_.info.payload_size()),
+        payload_(stream_.fields, payload_bytes_),
         wanted_points_(*stream_.info.points) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       ScalarType& type = stream_.info.coordinates[axis].type;
@@ -94,26 +203,8 @@ class RecordSource final : public PointSource {
       column.type = types_[axis];
       decode_coordinate(column, block.positions.data() + done, axis);
     }
-    std::byte* to = block.payload.data() + done * payload_bytes_;
-    for (const LasField& field : stream_.fields) {
-      column.rows = rows.data() + field.offset;
-      column.type = field.channel.type;
-      if (field.bits == 0) {
-        decode_values(column, to, payload_bytes_);
-      } else {
-        decode_bits(column, field, to);
-      }
-      to += size_of(field.channel.type);
-    }
+    payload_.unpack(rows, stride, block.payload.data() + done * payload_bytes_);
     return count;
-  }
-
-  void decode_bits(const PackedColumn& column, const LasField& field, std::byte* to) const {
-    const unsigned mask = (1U << field.bits) - 1;
-    const char* at = column.rows;
-    for (std::size_t i = 0; i < column.count; ++i, at += column.stride, to += payload_bytes_) {
-      *to = static_cast<std::byte>((static_cast<unsigned char>(*at) >> field.shift) & mask);
-    }
   }
 
   void count_withheld(const PointBlock& block) {
@@ -152,6 +243,7 @@ class RecordSource final : public PointSource {
 
   RecordStream stream_;
   std::size_t block_points_, payload_bytes_;
+  PayloadUnpacker payload_;
   std::array<ScalarType, 3> types_{};  ///< of the coordinates in the records
   bool checked_ = false;               ///< coordinates could be out of reach
   std::optional<std::size_t> withheld_attribute_;

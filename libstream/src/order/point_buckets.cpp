@@ -64,6 +64,27 @@ void PackedPoints::unpack(std::span<const std::byte> records,
   }
 }
 
+void PackedPoints::unpack(std::span<const std::byte> records,
+                          std::span<const std::uint32_t> numbers, PointBlock& block) const {
+  block.positions.resize(numbers.size());
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    with_type(types_[axis], [&](auto type) {
+      const std::byte* const from = records.data() + offsets_[axis];
+      for (std::size_t i = 0; i < numbers.size(); ++i) {
+        std::memcpy(&type, from + numbers[i] * record_bytes_, sizeof type);
+        block.positions[i][axis] = static_cast<double>(type);
+      }
+    });
+  }
+  const std::size_t payload = payload_bytes();
+  block.payload.resize(numbers.size() * payload);
+  if (payload == 0) return;
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    std::memcpy(block.payload.data() + i * payload,
+                records.data() + numbers[i] * record_bytes_ + payload_offset_, payload);
+  }
+}
+
 void Bucket::append(Bucket&& next) {
   chunks.insert(chunks.end(), next.chunks.begin(), next.chunks.end());
   tail.insert(tail.end(), next.tail.begin(), next.tail.end());

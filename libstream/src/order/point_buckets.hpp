@@ -23,16 +23,17 @@ class PackedPoints {
   explicit PackedPoints(const Schema& schema);
 
   [[nodiscard]] std::size_t record_bytes() const { return record_bytes_; }
-  [[nodiscard]] std::size_t payload_bytes() const { return record_bytes_ - payload_offset_; }
-  [[nodiscard]] const std::byte* payload(const std::byte* record) const {
-    return record + payload_offset_;
-  }
   /// Replaces what is in `records` by those of the block.
   void pack(const PointBlock& block, std::vector<std::byte>& records) const;
   /// Replaces what is in `points` by the places in the records, numbered from 0.
   void unpack(std::span<const std::byte> records, std::vector<NumberedPoint>& points) const;
+  /// Replaces what is in `block` by some of the records, which `numbers` counts from 0.
+  void unpack(std::span<const std::byte> records, std::span<const std::uint32_t> numbers,
+              PointBlock& block) const;
 
  private:
+  [[nodiscard]] std::size_t payload_bytes() const { return record_bytes_ - payload_offset_; }
+
   std::array<ScalarType, 3> types_;
   std::array<std::size_t, 3> offsets_{};
   std::size_t payload_offset_, record_bytes_;

@@ -18,8 +18,9 @@ namespace {
 
 /// Points that are looked at together.
 constexpr std::size_t kWindowPoints = 1u << 18;
-/// Of the windows of an orderly stream one in so many is judged.
+/// Of the windows of an orderly stream one in so many is judged, by one point in so many.
 constexpr std::size_t kJudgedWindows = 4;
+constexpr std::size_t kJudgedPoints = 4;
 /// Blocks so many times wider than those of a k-d tree are not compact.
 constexpr double kWidest = 2.0;
 /// Buckets are the leaves of a k-d tree of this depth.
@@ -98,7 +99,8 @@ class SpatialSource final : public OrderedSource {
       add_places(block);
       if (!block.empty()) window_.push_back(std::move(block));
     }
-    if (!places_.empty() && (options_.order == Order::spatial || spread() > kWidest)) {
+    if (!places_.empty() &&
+        (options_.order == Order::spatial || spread(options_.block_points) > kWidest)) {
       report_.reordered = true;
       state_ = State::gathering;
       if (!more) load_window();
@@ -113,9 +115,11 @@ class SpatialSource final : public OrderedSource {
       unjudged_ -= std::min<std::uint64_t>(unjudged_, block.size());
       return;
     }
-    add_places(block);
-    if (places_.size() < kWindowPoints) return;
-    if (spread() > kWidest) {
+    for (const Point3& p : block.positions) {
+      if (seen_++ % kJudgedPoints == 0) places_.push_back({p, places_.size()});
+    }
+    if (seen_ < kWindowPoints) return;
+    if (spread(std::max<std::size_t>(options_.block_points / kJudgedPoints, 1)) > kWidest) {
       report_.reordered = true;
       state_ = State::gathering;
     } else {
@@ -125,6 +129,7 @@ class SpatialSource final : public OrderedSource {
 
   void leave_window() {
     places_.clear();
+    seen_ = 0;
     unjudged_ = (kJudgedWindows - 1) * kWindowPoints;
   }
 
@@ -133,8 +138,8 @@ class SpatialSource final : public OrderedSource {
   }
 
   /// Of the window in `places_`, which comes back in another order.
-  double spread() {
-    const std::size_t blocks = blocks_of(places_.size(), options_.block_points);
+  double spread(std::size_t block_points) {
+    const std::size_t blocks = blocks_of(places_.size(), block_points);
     std::vector<std::size_t> begins;
     for (std::size_t b = 0; b <= blocks; ++b) begins.push_back(b * places_.size() / blocks);
     measure_units();
@@ -241,26 +246,25 @@ class SpatialSource final : public OrderedSource {
     }
     const std::size_t begin = pieces_[next_piece_], end = pieces_[next_piece_ + 1];
     ++next_piece_;
-    const std::span<NumberedPoint> piece = std::span(places_).subspan(begin, end - begin);
-    // In the order of the source: neighbours in it are often alike.
-    std::sort(piece.begin(), piece.end(),
-              [](const NumberedPoint& a, const NumberedPoint& b) { return a.number < b.number; });
-    const std::size_t payload = packed_->payload_bytes();
-    block.positions.reserve(piece.size());
-    block.payload.resize(piece.size() * payload);
-    std::byte* to = block.payload.data();
-    for (const NumberedPoint& point : piece) {
-      block.positions.push_back(point.place);
-      const std::byte* const record = records_.data() + point.number * packed_->record_bytes();
-      std::copy_n(packed_->payload(record), payload, to);
-      to += payload;
-    }
+    packed_->unpack(records_, std::span(in_order_).subspan(begin, end - begin), block);
   }
 
   void cut_records() {
     packed_->unpack(records_, places_);
     pieces_ = cut_in_pieces(places_, blocks_of(places_.size(), options_.block_points), lengths_);
     next_piece_ = 0;
+    // Within a piece in the order of the source: neighbours in it are often alike.
+    piece_of_.resize(places_.size());
+    for (std::uint32_t piece = 0; piece + 1 < pieces_.size(); ++piece) {
+      for (std::size_t i = pieces_[piece]; i < pieces_[piece + 1]; ++i) {
+        piece_of_[places_[i].number] = piece;
+      }
+    }
+    std::vector<std::size_t> next(pieces_);
+    in_order_.resize(places_.size());
+    for (std::uint32_t number = 0; number < places_.size(); ++number) {
+      in_order_[next[piece_of_[number]]++] = number;
+    }
   }
 
   /// Puts smaller buckets in place of the next one.
@@ -296,6 +300,7 @@ class SpatialSource final : public OrderedSource {
   State state_;
   std::deque<PointBlock> window_;  ///< what was held back to be judged
   std::uint64_t unjudged_ = 0;     ///< points that pass before the next window
+  std::uint64_t seen_ = 0;         ///< points of the window that is judged
   std::array<double, 3> lengths_{1, 1, 1};
 
   std::optional<PackedPoints> packed_;
@@ -303,9 +308,11 @@ class SpatialSource final : public OrderedSource {
   std::optional<BucketFile> file_;
   std::vector<Pending> pending_;  ///< the next one is the last
 
-  std::vector<std::byte> records_;     ///< that come next
-  std::vector<NumberedPoint> places_;  ///< of the records, in pieces; before, of a window
-  std::vector<std::size_t> pieces_;    ///< where each begins
+  std::vector<std::byte> records_;       ///< that come next
+  std::vector<NumberedPoint> places_;    ///< of the records, in pieces; before, of a window
+  std::vector<std::size_t> pieces_;      ///< where each begins
+  std::vector<std::uint32_t> piece_of_;  ///< by number of the record
+  std::vector<std::uint32_t> in_order_;  ///< records of the pieces
   std::size_t next_piece_ = 0;
 
   std::uint64_t delivered_ = 0, total_ = 0;

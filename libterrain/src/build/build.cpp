@@ -263,7 +263,7 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
     }
   }
 
-  stream::StoreWriter writer(request.store, schema, request.replace);
+  stream::StoreWriter writer(request.store, schema, request.replace, threads);
   StoreSink sink(writer, request.most_points == 0);
   cluster::HierarchyOptions options = clustering_of(request, schema, ground);
   options.threads = threads;

@@ -44,17 +44,18 @@ class OrderedSource : public PointSource {
 
 /// Puts the points of a source in order without ever holding more than a part of them.
 ///
-/// The stream is judged by windows of 262,144 points, the first and every fourth after it: blocks
-/// that are not compact are more than twice as wide as those of a k-d tree over the window. If they
-/// are in the first window, all points are put in order; later, those that follow. They go into 256
-/// buckets, the leaves of a k-d tree over the window, in a temporary file as large as their packed
-/// records; once all are there the buckets come back one after another, each cut by a k-d tree into
-/// blocks. A bucket of more than 262,144 points is first divided in turn, which takes no more disk
-/// as what has been read is written over. Cells of a raster stay as they are.
+/// The stream is judged by windows of 262,144 points, the first and, by every fourth of its points,
+/// every fourth after it: blocks that are not compact are more than twice as wide as those of a k-d
+/// tree over the window. If they are in the first window, all points are put in order; later, those
+/// that follow. They go into 256 buckets, the leaves of a k-d tree over the window, in a temporary
+/// file as large as their packed records; once all are there the buckets come back one after
+/// another, each cut by a k-d tree into blocks. A bucket of more than 262,144 points is first
+/// divided in turn, which takes no more disk as what has been read is written over. Cells of a
+/// raster stay as they are.
 ///
 /// The order depends on nothing but the points, their order and the options. Memory: the window
 /// twice, 8 MiB for the buckets, as much again for each time one had to be divided, and what comes
-/// next, 262,144 points with 32 bytes more each. Cost: O(n log n); points are written and read
+/// next, 262,144 points with 40 bytes more each. Cost: O(n log n); points are written and read
 /// once, twice beyond some 60 million.
 /// Throws in next(): Error (of the source, or of the temporary file: a full disk); Stopped.
 [[nodiscard]] std::unique_ptr<OrderedSource> in_spatial_order(std::unique_ptr<PointSource> source,

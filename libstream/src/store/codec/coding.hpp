@@ -35,21 +35,33 @@ TERRACE_STORE_INLINE unsigned code_number(Coder& coder, unsigned context, std::u
   }
 }
 
-/// A number known to be below `size` (>= 1), every value costing the same but for a bit
-/// (truncated binary).
-template <class Coder>
-TERRACE_STORE_INLINE void code_uniform(Coder& coder, std::uint64_t& value, std::uint64_t size) {
-  const unsigned bits = static_cast<unsigned>(std::bit_width(size)) - 1;
+/// Bits that stand for a number.
+struct RawBits {
+  std::uint64_t value = 0;
+  unsigned bits = 0;
+};
+
+/// A number below `size` (>= 1), every value costing the same but for a bit (truncated binary).
+TERRACE_STORE_INLINE RawBits uniform_bits(std::uint64_t value, std::uint64_t size) {
+  const unsigned bits = static_cast<unsigned>(std::bit_width(size | 1)) - 1;  // size is not 0
   const std::uint64_t power = std::uint64_t{1} << bits;
   const std::uint64_t shorter = power - (size - power);  // this many values take `bits` bits
+  // A branch here would be a coin toss.
+  const std::uint64_t longer = value >= shorter ? 1 : 0;
+  return {value + (shorter & (0 - longer)), bits + static_cast<unsigned>(longer)};
+}
+
+template <class Coder>
+TERRACE_STORE_INLINE void code_uniform(Coder& coder, std::uint64_t& value, std::uint64_t size) {
   if constexpr (Coder::kDecoding) {
+    const unsigned bits = static_cast<unsigned>(std::bit_width(size)) - 1;
+    const std::uint64_t power = std::uint64_t{1} << bits;
+    const std::uint64_t shorter = power - (size - power);
     value = coder.raw(bits);
     if (value >= shorter) value = (value << 1 | coder.raw(1)) - shorter;
-  } else if (value < shorter) {
-    coder.raw(value, bits);
   } else {
-    coder.raw((value + shorter) >> 1, bits);
-    coder.raw((value + shorter) & 1, 1);
+    const RawBits coded = uniform_bits(value, size);
+    coder.raw(coded.value, coded.bits);
   }
 }
 

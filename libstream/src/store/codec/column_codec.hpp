@@ -16,12 +16,19 @@
 
 namespace terrace::stream::store {
 
+/// The last class of each step but the greatest.
+inline constexpr std::array<unsigned, 7> kStepEnds{0, 2, 4, 8, 15, 21, 29};
+inline constexpr std::array<std::uint8_t, kClasses> kDifferenceSteps = [] {
+  std::array<std::uint8_t, kClasses> steps{};
+  for (unsigned c = 0; c < kClasses; ++c) {
+    for (const unsigned end : kStepEnds) {
+      if (c > end) ++steps[c];
+    }
+  }
+  return steps;
+}();
 /// Coarse logarithm of a class, 0 to 7: the context of the next difference.
-constexpr unsigned difference_step(unsigned number_class) {
-  constexpr std::array<std::uint8_t, 16> kSmall{0, 1, 1, 2, 2, 3, 3, 3, 3, 4, 4, 4, 4, 4, 4, 4};
-  if (number_class < 16) return kSmall[number_class];
-  return number_class < 22 ? 5 : number_class < 30 ? 6 : 7;
-}
+constexpr unsigned difference_step(unsigned number_class) { return kDifferenceSteps[number_class]; }
 
 template <class Coder>
 unsigned code_difference(Coder& coder, unsigned context, std::int64_t previous,
@@ -66,13 +73,14 @@ class RecentDifferences {
   [[nodiscard]] std::int64_t operator[](unsigned i) const { return recent_[i]; }
   /// Its place among them; kCount if it is none of them.
   [[nodiscard]] unsigned find(std::int64_t difference) const {
-    unsigned i = 0;
-    while (i < kCount && recent_[i] != difference) ++i;
-    return i;
+    const unsigned last = recent_[2] == difference ? 2 : kCount;
+    const unsigned later = recent_[1] == difference ? 1 : last;
+    return recent_[0] == difference ? 0 : later;
   }
   /// Moves the difference that lies at `place`, or a new one (kCount), to the front.
   void move_to_front(unsigned place, std::int64_t difference) {
-    for (unsigned i = std::min(place, kCount - 1); i > 0; --i) recent_[i] = recent_[i - 1];
+    recent_[2] = place >= 2 ? recent_[1] : recent_[2];
+    recent_[1] = place >= 1 ? recent_[0] : recent_[1];
     recent_[0] = difference;
   }
 
@@ -92,7 +100,7 @@ constexpr std::int64_t wrapped_product(std::int64_t a, std::int64_t b) {
 }
 
 template <class Coder>
-unsigned code_signed(Coder& coder, unsigned context, std::int64_t& value) {
+TERRACE_STORE_INLINE unsigned code_signed(Coder& coder, unsigned context, std::int64_t& value) {
   std::uint64_t number = 0;
   if constexpr (!Coder::kDecoding) number = zigzag(value);
   const unsigned number_class = code_number(coder, context, number);
@@ -112,28 +120,39 @@ inline std::uint64_t common_divisor(const std::int64_t* differences, std::uint32
   return divisor >> 63 != 0 ? 1 : divisor;
 }
 
+/// Fills `differences` from the second on with those of neighbours in the column, less those of the
+/// column before unless that is null. False if all values are one.
+inline bool find_differences(const std::int64_t* values, const std::int64_t* beside,
+                             std::int64_t* differences, std::uint32_t n) {
+  std::uint64_t several = 0;
+  for (std::uint32_t i = 1; i < n; ++i) {
+    several |= static_cast<std::uint64_t>(values[i]) ^ static_cast<std::uint64_t>(values[0]);
+    differences[i] = wrapped_difference(values[i], values[i - 1]);
+  }
+  for (std::uint32_t i = 1; beside != nullptr && i < n; ++i) {
+    differences[i] =
+        wrapped_difference(differences[i], wrapped_difference(beside[i], beside[i - 1]));
+  }
+  return several != 0;
+}
+
 /// A column of values: the first, then differences as `kind` says, divided by what is common to
 /// them.
 /// number: of the column, attributes first, then the axes. form: coded where it is not null.
 /// beside: the column before, for ColumnKind::beside alone. scratch: room for n differences.
 template <class Coder>
-void code_column(Coder& coder, unsigned number, ColumnKind kind, NumberForm* form,
+void code_column(Coder& shared, unsigned number, ColumnKind kind, NumberForm* form,
                  const std::int64_t* beside, std::int64_t* values, std::int64_t* scratch,
                  std::uint32_t n) {
   enum : unsigned { kOneValue, kSeveral, kMultiples, kHeads };
   const unsigned first = context::kAttribute + context::kPerAttribute * number;
   const unsigned forms = form != nullptr ? kNumberForms : 1;
-  const auto expected = [=](std::uint32_t i) {
-    return kind == ColumnKind::beside ? wrapped_difference(beside[i], beside[i - 1]) : 0;
-  };
+  if (kind != ColumnKind::beside) beside = nullptr;
+  typename Coder::Local coder = shared;
   unsigned head = kSeveral;
   std::uint64_t divisor = 1;
   if constexpr (!Coder::kDecoding) {
-    bool several = false;
-    for (std::uint32_t i = 1; i < n; ++i) {
-      several |= values[i] != values[0];
-      scratch[i] = wrapped_difference(wrapped_difference(values[i], values[i - 1]), expected(i));
-    }
+    const bool several = find_differences(values, beside, scratch, n);
     if (several) divisor = std::max<std::uint64_t>(common_divisor(scratch + 1, n - 1), 1);
     head = !several ? kOneValue : divisor > 1 ? kMultiples : kSeveral;
     head = head * forms + (form != nullptr ? *form : 0);
@@ -145,7 +164,10 @@ void code_column(Coder& coder, unsigned number, ColumnKind kind, NumberForm* for
   }
   unsigned number_class = code_signed(coder, first + 1, values[0]);
   if (head / forms == kOneValue) {
-    if constexpr (Coder::kDecoding) std::fill_n(values + 1, n - 1, values[0]);
+    if constexpr (Coder::kDecoding) {
+      std::fill_n(values + 1, n - 1, values[0]);
+      shared = coder;
+    }
     return;
   }
   if (head / forms == kMultiples) {
@@ -153,20 +175,27 @@ void code_column(Coder& coder, unsigned number, ColumnKind kind, NumberForm* for
     if (divisor < 2) throw Damage("a column has differences that are multiples of nothing");
   }
   const auto by = static_cast<std::int64_t>(divisor);
+  if constexpr (!Coder::kDecoding) {
+    for (std::uint32_t i = 1; by != 1 && i < n; ++i) scratch[i] /= by;
+  }
   std::int64_t difference = 0;
-  const auto set = [&](std::uint32_t i) {
-    values[i] =
-        wrapped_sum(wrapped_sum(values[i - 1], expected(i)), wrapped_product(difference, by));
+  const auto begin = [&](std::uint32_t i) {
+    if constexpr (!Coder::kDecoding) difference = scratch[i];
+  };
+  const auto end = [&](std::uint32_t i) {
+    if constexpr (Coder::kDecoding) {
+      const std::int64_t rise =
+          beside != nullptr ? wrapped_difference(beside[i], beside[i - 1]) : 0;
+      values[i] = wrapped_sum(wrapped_sum(values[i - 1], rise), wrapped_product(difference, by));
+    }
   };
   if (kind == ColumnKind::recent) {
     RecentDifferences recent;
     unsigned place = 0, step = 0;
     for (std::uint32_t i = 1; i < n; ++i) {
+      begin(i);
       const unsigned context = first + 2 + place;
-      if constexpr (!Coder::kDecoding) {
-        difference = scratch[i] / by;
-        place = recent.find(difference);
-      }
+      if constexpr (!Coder::kDecoding) place = recent.find(difference);
       code_symbol(coder, context, place);
       if (place > RecentDifferences::kCount) throw Damage("a column has an unknown difference");
       if (place == RecentDifferences::kCount) {
@@ -175,15 +204,16 @@ void code_column(Coder& coder, unsigned number, ColumnKind kind, NumberForm* for
         difference = recent[place];
       }
       recent.move_to_front(place, difference);
-      if constexpr (Coder::kDecoding) set(i);
+      end(i);
     }
-    return;
+  } else {
+    for (std::uint32_t i = 1; i < n; ++i) {
+      begin(i);
+      number_class = code_signed(coder, first + 2 + difference_step(number_class), difference);
+      end(i);
+    }
   }
-  for (std::uint32_t i = 1; i < n; ++i) {
-    if constexpr (!Coder::kDecoding) difference = by == 1 ? scratch[i] : scratch[i] / by;
-    number_class = code_signed(coder, first + 2 + difference_step(number_class), difference);
-    if constexpr (Coder::kDecoding) set(i);
-  }
+  if constexpr (Coder::kDecoding) shared = coder;
 }
 
 /// The ordinals that n points head on `level` levels, nearest level first: values[i + n * j] is

@@ -33,9 +33,8 @@ using Frequencies = std::array<std::uint16_t, kSymbols>;
 
 /// A context's table as the encoder uses it.
 struct EncodeTable {
-  struct Entry {
-    std::uint16_t frequency = 0, start = 0;
-  };
+  /// Frequency, and above its 16 bits the start.
+  using Entry = std::uint32_t;
   std::array<Entry, kSymbols> entries{};
 };
 
@@ -56,91 +55,101 @@ void fill_decode_table(const Frequencies& frequencies, DecodeTable& table);
 class BitWriter {
  public:
   void clear() {
-    words_.clear();
+    used_ = 0;
     hold_ = 0;
     held_ = 0;
   }
   /// Requires value < 2^bits, bits <= 64.
-  void put(std::uint64_t value, unsigned bits) {
-    if (bits > 32) {
-      put(value >> 32, bits - 32);
+  TERRACE_STORE_INLINE void put(std::uint64_t value, unsigned bits) {
+    if (bits > 32) [[unlikely]] {
+      put_short(value >> 32, bits - 32);
       value &= 0xffffffff;
       bits = 32;
     }
-    hold_ = (hold_ << bits) | value;
-    held_ += bits;
-    if (held_ >= 32) {
-      held_ -= 32;
-      words_.push_back(static_cast<std::uint32_t>(hold_ >> held_));
-    }
+    put_short(value, bits);
   }
-  void append_reversed(Bytes& out) const {
-    std::uint64_t rest = hold_;
-    unsigned left = held_;
-    if (left % 8 != 0) {
-      rest <<= 8 - left % 8;
-      left += 8 - left % 8;
-    }
-    for (; left > 0; left -= 8, rest >>= 8) out.push_back(static_cast<std::uint8_t>(rest));
-    for (std::size_t i = words_.size(); i-- > 0;) store::put(out, words_[i]);
-  }
+  void append_reversed(Bytes& out) const;
 
  private:
-  std::vector<std::uint32_t> words_;
+  /// Requires bits <= 32. The next word is written whether it is full or not: a branch upon that is
+  /// close to a coin toss.
+  TERRACE_STORE_INLINE void put_short(std::uint64_t value, unsigned bits) {
+    if (used_ == words_.size()) words_.resize(2 * used_ + 64);
+    hold_ = hold_ << bits | value;
+    held_ += bits;
+    words_[used_] = static_cast<std::uint32_t>(hold_ >> ((held_ - 32) & 63));
+    used_ += held_ >> 5;
+    held_ &= 31;
+  }
+
+  std::vector<std::uint32_t> words_;  ///< the first used_
+  std::size_t used_ = 0;
   std::uint64_t hold_ = 0;  ///< the lower held_ (< 32) bits are still to go
   unsigned held_ = 0;
 };
 
-/// Collects the symbols of one cluster. Without tables it only counts, for training.
+/// Counts the symbols of clusters instead of encoding them, for training.
+class SymbolCounter {
+ public:
+  static constexpr bool kDecoding = false;
+  using Local = SymbolCounter&;
+
+  /// `counts`: occurrences by context and symbol, to be added to.
+  explicit SymbolCounter(std::span<std::array<std::uint32_t, kSymbols>> counts) : counts_(counts) {}
+
+  /// Those of classes included.
+  [[nodiscard]] std::uint64_t raw_bits() const { return raw_bits_; }
+
+  TERRACE_STORE_INLINE void symbol(unsigned context, unsigned symbol) {
+    ++counts_[context][symbol];
+  }
+  TERRACE_STORE_INLINE void raw(std::uint64_t /*value*/, unsigned bits) { raw_bits_ += bits; }
+
+ private:
+  std::span<std::array<std::uint32_t, kSymbols>> counts_;
+  std::uint64_t raw_bits_ = 0;
+};
+
+/// Collects the symbols of one cluster.
 class SymbolEncoder {
  public:
   static constexpr bool kDecoding = false;
   using Local = SymbolEncoder&;
 
-  /// `tables`: one per context; empty to count. They must outlive the encoder.
+  /// `tables`: one per context. They must outlive the encoder.
   explicit SymbolEncoder(std::span<const EncodeTable> tables) : tables_(tables) {}
-
-  /// In counting: occurrences by context and symbol.
-  std::vector<std::array<std::uint32_t, kSymbols>>& counts() { return counts_; }
-  /// In counting: raw bits, those of classes included.
-  [[nodiscard]] std::uint64_t raw_bits() const { return raw_bits_; }
 
   void start() {
     used_ = 0;
     bits_.clear();
   }
   TERRACE_STORE_INLINE void symbol(unsigned context, unsigned symbol) {
-    if (tables_.empty()) {
-      if (context >= counts_.size()) counts_.resize(context + 1);
-      ++counts_[context][symbol];
-      return;
-    }
-    if (used_ == symbols_.size()) symbols_.resize(2 * used_ + 256);
-    std::uint32_t coded = symbol;
-    if (tables_[context].entries[symbol].frequency == 0) [[unlikely]] {
-      coded = kEscape;
+    EncodeTable::Entry entry = tables_[context].entries[symbol];
+    if (entry == 0) [[unlikely]] {
+      entry = tables_[context].entries[kEscape];
       bits_.put(symbol, kEscapeBits);
     }
-    symbols_[used_++] = context << 8 | coded;
+    if (used_ == room_) [[unlikely]]
+      grow();
+    symbols_[used_++] = entry;
   }
-  TERRACE_STORE_INLINE void raw(std::uint64_t value, unsigned bits) {
-    if (tables_.empty()) {
-      raw_bits_ += bits;
-    } else if (bits > 0) {
-      bits_.put(value, bits);
-    }
-  }
+  TERRACE_STORE_INLINE void raw(std::uint64_t value, unsigned bits) { bits_.put(value, bits); }
   /// Appends the byte string. `last` (< 2^16) is what the decoder finds in its final state.
-  void finish(Bytes& out, std::uint32_t last);
+  void finish(std::uint32_t last, Bytes& out);
+  /// The same for two clusters, the first one's string before the other's; returns how many bytes
+  /// are the first one's. Faster than one by one: each step of rANS waits for the one before.
+  static std::size_t finish_both(SymbolEncoder& first, std::uint32_t last_of_first,
+                                 SymbolEncoder& second, std::uint32_t last_of_second, Bytes& out);
 
  private:
+  class Words;
+  void grow();
+
   std::span<const EncodeTable> tables_;
-  std::vector<std::uint32_t> symbols_;  ///< the first used_, as context << 8 | symbol
-  std::size_t used_ = 0;
+  std::vector<EncodeTable::Entry> symbols_;  ///< the first used_
+  std::size_t used_ = 0, room_ = 0;
   std::vector<std::uint16_t> words_;
   BitWriter bits_;
-  std::vector<std::array<std::uint32_t, kSymbols>> counts_;
-  std::uint64_t raw_bits_ = 0;
 };
 
 /// Bytes that must be readable before and behind a cluster's byte string.

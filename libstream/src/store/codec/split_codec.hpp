@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <vector>
 
@@ -21,21 +22,31 @@ struct IntegerBox {
   std::array<std::uint64_t, 3> size{1, 1, 1};  ///< low + size is the first value beyond
 };
 
-class SplitCodec {
+/// Of n points how many lie in the lower half.
+template <class Coder>
+TERRACE_STORE_INLINE void code_split(Coder& coder, std::uint32_t n, std::uint32_t& below) {
+  if (n < context::kSplitDirect) {
+    unsigned symbol = below;
+    code_symbol(coder, context::kSplit + n - 2, symbol);
+    below = symbol;
+  } else {
+    const unsigned width = static_cast<unsigned>(std::bit_width(n));
+    const std::int64_t half = n / 2;
+    std::uint64_t number = zigzag(std::int64_t{below} - half);
+    code_number(coder, context::kSplitWide + std::min(width - 6, 23u), number);
+    const std::uint64_t value = static_cast<std::uint64_t>(half + unzigzag(number));
+    below = value > n ? n + 1 : static_cast<std::uint32_t>(value);
+  }
+}
+
+class SplitDecoder {
  public:
-  /// n points in `box`, coordinate by coordinate in `at`. Decoding fills `at`; encoding fills
-  /// `order` with the numbers of the points in the order of coding (points at one place:
-  /// ascending).
+  /// n points in `box`, coordinate by coordinate, into `at`.
   template <class Coder>
-  void code(Coder& shared, const IntegerBox& box, const std::array<std::uint64_t*, 3>& at,
-            std::uint32_t* order, std::uint32_t n) {
+  void decode(Coder& coder, const IntegerBox& box, const std::array<std::uint64_t*, 3>& at,
+              std::uint32_t n) {
     at_ = at;
-    order_ = order;
-    if constexpr (!Coder::kDecoding) {
-      if (upper_.size() < n) upper_.resize(n);
-      for (std::uint32_t i = 0; i < n; ++i) order[i] = i;
-    }
-    split(shared, box, 0, n);
+    split(coder, box, 0, n);
   }
 
  private:
@@ -46,21 +57,17 @@ class SplitCodec {
       std::size_t axis = box.size[1] > box.size[0] ? 1 : 0;
       if (box.size[2] > box.size[axis]) axis = 2;
       if (box.size[axis] == 1) {
-        if constexpr (Coder::kDecoding) {
-          for (std::size_t a = 0; a < 3; ++a) std::fill_n(at_[a] + first, n, box.low[a]);
-        }
+        for (std::size_t a = 0; a < 3; ++a) std::fill_n(at_[a] + first, n, box.low[a]);
         return;
       }
       const std::uint64_t lower = box.size[axis] - box.size[axis] / 2;
-      const std::uint64_t middle = box.low[axis] + lower;
       std::uint32_t below = 0;
-      if constexpr (!Coder::kDecoding) below = partition(first, n, axis, middle);
-      code_count(coder, n, below);
-
+      code_split(coder, n, below);
+      if (below > n) throw Damage("a part of a cluster has more points than the whole");
       IntegerBox half = box;
       half.size[axis] = lower;
       if (below > 0) split(coder, half, first, below);
-      box.low[axis] = middle;
+      box.low[axis] += lower;
       box.size[axis] -= lower;
       first += below;
       n -= below;
@@ -68,53 +75,258 @@ class SplitCodec {
     if (n == 1) {
       for (std::size_t axis = 0; axis < 3; ++axis) {
         std::uint64_t value = 0;
-        if constexpr (!Coder::kDecoding) value = at_[axis][order_[first]] - box.low[axis];
         if (box.size[axis] > 1) code_uniform(coder, value, box.size[axis]);
-        if constexpr (Coder::kDecoding) at_[axis][first] = box.low[axis] + value;
+        at_[axis][first] = box.low[axis] + value;
       }
     }
   }
 
-  /// Brings the points below `middle` to the front, keeping the order of both parts, and returns
-  /// their number. Writes to both parts and counts in one: a branch here is a coin toss.
-  std::uint32_t partition(std::uint32_t first, std::uint32_t n, std::size_t axis,
-                          std::uint64_t middle) {
-    std::uint32_t* const points = order_ + first;
-    std::uint32_t* const upper = upper_.data();
-    const std::uint64_t* const values = at_[axis];
-    std::uint32_t below = 0;
-    for (std::uint32_t i = 0; i < n; ++i) {
-      const std::uint32_t point = points[i];
-      points[below] = point;
-      upper[i - below] = point;
-      below += values[point] < middle;
-    }
-    std::copy_n(upper, n - below, points + below);
-    return below;
-  }
-
-  template <class Coder>
-  static void code_count(Coder& coder, std::uint32_t n, std::uint32_t& below) {
-    if (n < context::kSplitDirect) {
-      unsigned symbol = below;
-      code_symbol(coder, context::kSplit + n - 2, symbol);
-      below = symbol;
-    } else {
-      const unsigned width = static_cast<unsigned>(std::bit_width(n));
-      const std::int64_t half = n / 2;
-      std::uint64_t number = zigzag(std::int64_t{below} - half);
-      code_number(coder, context::kSplitWide + std::min(width - 6, 23u), number);
-      const std::uint64_t value = static_cast<std::uint64_t>(half + unzigzag(number));
-      below = value > n ? n + 1 : static_cast<std::uint32_t>(value);
-    }
-    if constexpr (Coder::kDecoding) {
-      if (below > n) throw Damage("a part of a cluster has more points than the whole");
-    }
-  }
-
   std::array<std::uint64_t*, 3> at_{};
-  std::uint32_t* order_ = nullptr;
-  std::vector<std::uint32_t> upper_;  ///< of a partition under way
+};
+
+/// A side of a box: its axis and its size less 1.
+struct BoxSide {
+  unsigned axis = 0;
+  std::uint64_t extent = 0;
+};
+
+/// How SplitEncoder keeps points and boxes where 16 bits suffice for each coordinate and the number
+/// of points, as in nearly all clusters: registers hold them.
+struct NarrowPoints {
+  /// Coordinates x, y, z from the highest bits on, then the number.
+  using Point = std::uint64_t;
+  struct Box {
+    Point low = 0, extent = 0;  ///< size less 1
+  };
+  struct Limit {
+    Point field = 0, middle = 0;
+  };
+
+  static bool fit(const std::array<std::uint64_t, 3>& size, std::uint32_t n) {
+    return n <= kField && *std::max_element(size.begin(), size.end()) <= kField + 1;
+  }
+  static Point point(std::uint64_t x, std::uint64_t y, std::uint64_t z, std::uint32_t number) {
+    return x << 48 | y << 32 | z << 16 | number;
+  }
+  static std::uint32_t number(Point point) { return static_cast<std::uint32_t>(point & kField); }
+  static Box box(const std::array<std::uint64_t, 3>& size) {
+    return {0, point(size[0] - 1, size[1] - 1, size[2] - 1, 0)};
+  }
+  // Without branches, which would be coin tosses.
+  TERRACE_STORE_INLINE static BoxSide longest(const Box& box) {
+    // Of equals the first wins.
+    const auto rank = [&](unsigned axis) {
+      return static_cast<std::int64_t>(field(box.extent, axis) << 2 | (2 - axis));
+    };
+    const std::int64_t most = larger(larger(rank(0), rank(1)), rank(2));
+    return {2 - static_cast<unsigned>(most & 3), static_cast<std::uint64_t>(most) >> 2};
+  }
+  TERRACE_STORE_INLINE static Limit limit(const Box& box, const BoxSide& side) {
+    const Point in_place = kField << shift(side.axis);
+    return {in_place, (box.low & in_place) + ((side.extent / 2 + 1) << shift(side.axis))};
+  }
+  TERRACE_STORE_INLINE static bool is_below(Point point, const Limit& limit) {
+    return (point & limit.field) < limit.middle;
+  }
+  TERRACE_STORE_INLINE static Box half(const Box& box, const BoxSide& side, bool upper) {
+    const Point lower = side.extent / 2;  // its size less 1
+    const Point extent = lower - (Point{upper} & ~side.extent);
+    return {box.low + ((lower + 1) * Point{upper} << shift(side.axis)),
+            box.extent - ((side.extent - extent) << shift(side.axis))};
+  }
+  TERRACE_STORE_INLINE static void exchange(Point& a, Point& b, bool whether) {
+    const Point difference = (a ^ b) & (0 - Point{whether});
+    a ^= difference;
+    b ^= difference;
+  }
+  template <class Coder>
+  TERRACE_STORE_INLINE static void place(Coder& coder, const Box& box, Point point) {
+    const Point within = point - box.low;
+    RawBits all;
+    for (unsigned axis = 0; axis < 3; ++axis) {
+      const RawBits coded = uniform_bits(field(within, axis), field(box.extent, axis) + 1);
+      all = {all.value << coded.bits | coded.value, all.bits + coded.bits};
+    }
+    coder.raw(all.value, all.bits);
+  }
+
+ private:
+  static constexpr Point kField = 0xffff;
+
+  TERRACE_STORE_INLINE static std::int64_t larger(std::int64_t a, std::int64_t b) {
+    const std::int64_t difference = a - b;
+    return a - (difference & difference >> 63);
+  }
+  TERRACE_STORE_INLINE static unsigned shift(unsigned axis) { return 48 - 16 * axis; }
+  TERRACE_STORE_INLINE static Point field(Point point, unsigned axis) {
+    return point >> shift(axis) & kField;
+  }
+};
+
+/// The same in words of their own.
+struct WidePoints {
+  struct Point {
+    std::array<std::uint64_t, 3> at;
+    std::uint32_t number;
+    bool operator<(const Point& other) const { return number < other.number; }
+  };
+  struct Box {
+    std::array<std::uint64_t, 3> low{}, extent{};
+  };
+  struct Limit {
+    unsigned axis = 0;
+    std::uint64_t middle = 0;
+  };
+
+  static Point point(std::uint64_t x, std::uint64_t y, std::uint64_t z, std::uint32_t number) {
+    return {{x, y, z}, number};
+  }
+  static std::uint32_t number(const Point& point) { return point.number; }
+  static Box box(const std::array<std::uint64_t, 3>& size) {
+    return {{}, {size[0] - 1, size[1] - 1, size[2] - 1}};
+  }
+  static BoxSide longest(const Box& box) {
+    unsigned axis = box.extent[1] > box.extent[0] ? 1 : 0;
+    if (box.extent[2] > box.extent[axis]) axis = 2;
+    return {axis, box.extent[axis]};
+  }
+  static Limit limit(const Box& box, const BoxSide& side) {
+    return {side.axis, box.low[side.axis] + side.extent / 2 + 1};
+  }
+  static bool is_below(const Point& point, const Limit& limit) {
+    return point.at[limit.axis] < limit.middle;
+  }
+  static Box half(Box box, const BoxSide& side, bool upper) {
+    if (upper) box.low[side.axis] += side.extent / 2 + 1;
+    box.extent[side.axis] = upper ? (side.extent - 1) / 2 : side.extent / 2;
+    return box;
+  }
+  static void exchange(Point& a, Point& b, bool whether) {
+    if (whether) std::swap(a, b);
+  }
+  template <class Coder>
+  static void place(Coder& coder, const Box& box, const Point& point) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const RawBits coded = uniform_bits(point.at[axis] - box.low[axis], box.extent[axis] + 1);
+      coder.raw(coded.value, coded.bits);
+    }
+  }
+};
+
+class SplitEncoder {
+ public:
+  /// n points in a box of these sizes, whose low side is 0; at(axis, i) is a coordinate of point i.
+  /// Fills `order` with the numbers of the points in the order of coding (points at one place:
+  /// ascending).
+  template <class Coder, class At>
+  void encode(Coder& coder, const std::array<std::uint64_t, 3>& size, At&& at, std::uint32_t n,
+              std::uint32_t* order) {
+    if (NarrowPoints::fit(size, n)) {
+      Run<Coder, NarrowPoints>{coder, narrow_}.encode(size, at, n, order);
+    } else {
+      Run<Coder, WidePoints>{coder, wide_}.encode(size, at, n, order);
+    }
+  }
+
+ private:
+  template <class Coder, class Points>
+  struct Run {
+    using Point = typename Points::Point;
+    using Box = typename Points::Box;
+
+    Coder& coder;
+    std::vector<Point>& all;
+
+    template <class At>
+    void encode(const std::array<std::uint64_t, 3>& size, At&& at, std::uint32_t n,
+                std::uint32_t* order) {
+      all.resize(n);
+      for (std::uint32_t i = 0; i < n; ++i) {
+        all[i] = Points::point(at(0, i), at(1, i), at(2, i), i);
+      }
+      split(Points::box(size), all.data(), n);
+      for (std::uint32_t i = 0; i < n; ++i) order[i] = Points::number(all[i]);
+    }
+
+    void split(Box box, Point* points, std::uint32_t n) {
+      // The lower half recursively, the upper one by going round: at most 192 deep.
+      while (n > 3) {
+        const BoxSide side = Points::longest(box);
+        if (side.extent == 0) return std::sort(points, points + n);
+        std::uint32_t below = partition(points, n, Points::limit(box, side));
+        code_split(coder, n, below);
+        if (below > 0) split(Points::half(box, side, false), points, below);
+        box = Points::half(box, side, true);
+        points += below;
+        n -= below;
+      }
+      switch (n) {
+        case 1:
+          return Points::place(coder, box, points[0]);
+        case 2:
+          return split_two(box, points);
+        case 3:
+          return split_three(box, points);
+        default:
+          return;
+      }
+    }
+
+    // Most boxes have two or three points: what is known of them spares branches, which are guessed
+    // wrong half of the time.
+    void split_two(Box box, Point* points) {
+      for (;;) {
+        const BoxSide side = Points::longest(box);
+        if (side.extent == 0) return std::sort(points, points + 2);
+        const typename Points::Limit limit = Points::limit(box, side);
+        const bool first = Points::is_below(points[0], limit),
+                   second = Points::is_below(points[1], limit);
+        coder.symbol(context::kSplit, 0u + first + second);
+        if (first != second) {
+          Points::exchange(points[0], points[1], second);
+          Points::place(coder, Points::half(box, side, false), points[0]);
+          Points::place(coder, Points::half(box, side, true), points[1]);
+          return;
+        }
+        box = Points::half(box, side, !first);
+      }
+    }
+
+    void split_three(Box box, Point* points) {
+      for (;;) {
+        const BoxSide side = Points::longest(box);
+        if (side.extent == 0) return std::sort(points, points + 3);
+        const std::uint32_t below = partition(points, 3, Points::limit(box, side));
+        coder.symbol(context::kSplit + 1, below);
+        if (below == 1) {
+          Points::place(coder, Points::half(box, side, false), points[0]);
+          return split_two(Points::half(box, side, true), points + 1);
+        }
+        if (below == 2) {
+          split_two(Points::half(box, side, false), points);
+          return Points::place(coder, Points::half(box, side, true), points[2]);
+        }
+        box = Points::half(box, side, below == 0);
+      }
+    }
+
+    /// Brings the points below the limit to the front and returns their number. Always swaps: a
+    /// branch here is a coin toss.
+    static std::uint32_t partition(Point* points, std::uint32_t n,
+                                   const typename Points::Limit& limit) {
+      std::uint32_t below = 0;
+      for (std::uint32_t i = 0; i < n; ++i) {
+        const Point point = points[i];
+        points[i] = points[below];
+        points[below] = point;
+        below += Points::is_below(point, limit) ? 1 : 0;
+      }
+      return below;
+    }
+  };
+
+  std::vector<NarrowPoints::Point> narrow_;
+  std::vector<WidePoints::Point> wide_;
 };
 
 }  // namespace terrace::stream::store

@@ -22,9 +22,9 @@ struct ClassRange {
 };
 
 constexpr unsigned class_of(std::uint64_t value) {
-  if (value < 16) return static_cast<unsigned>(value);
-  const unsigned exponent = static_cast<unsigned>(std::bit_width(value)) - 1;
-  return 16 + (exponent - 4) * 2 + static_cast<unsigned>((value >> (exponent - 1)) & 1);
+  const unsigned exponent = static_cast<unsigned>(std::bit_width(value | 8)) - 1;
+  const unsigned large = 2 * exponent + 6 + static_cast<unsigned>(value >> (exponent - 1));
+  return value < 16 ? static_cast<unsigned>(value) : large;
 }
 
 /// By symbol, the escape (0 bits, base 0) included.

@@ -143,8 +143,8 @@ void ClusterDecoder::positions(SymbolDecoder& coder, const Layout& layout,
     if (axis.size() < n) axis.resize(n);
   }
   if (form & kSplitForm) {
-    split_.code(coder, {{0, 0, 0}, box_.size},
-                {relative_[0].data(), relative_[1].data(), relative_[2].data()}, nullptr, n);
+    split_.decode(coder, {{0, 0, 0}, box_.size},
+                  {relative_[0].data(), relative_[1].data(), relative_[2].data()}, n);
     return;
   }
   if (!layout.grid && layout.version > 1) return sequence(coder, layout, tables, n);

@@ -33,7 +33,7 @@ class ClusterDecoder {
   IntegerBox box_;
   std::array<std::vector<std::uint64_t>, 3> relative_;
   GridCodec grid_;
-  SplitCodec split_;
+  SplitDecoder split_;
   std::vector<std::int64_t> column_, beside_;
   std::vector<std::byte> payload_;
   std::vector<std::int64_t> children_;

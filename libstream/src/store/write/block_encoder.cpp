@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <cstring>
+#include <numeric>
 #include <utility>
 
 #include "store/codec/column_codec.hpp"
@@ -26,22 +28,6 @@ unsigned most_shift(NumberForm form) {
 
 bool is_floating(ScalarType type) { return type == ScalarType::f32 || type == ScalarType::f64; }
 
-/// One coordinate of the points as integers, in one pass without branches: what nearly every raster
-/// takes. False if there are others.
-bool load_integers(std::span<const Point3> positions, std::size_t axis,
-                   std::vector<std::int64_t>& out) {
-  out.resize(positions.size());
-  std::uint64_t difference = 0;
-  for (std::size_t i = 0; i < positions.size(); ++i) {
-    const double value = positions[i][axis];
-    const auto k = static_cast<std::int64_t>(std::abs(value) < 0x1p53 ? value : 0.5);
-    difference |=
-        std::bit_cast<std::uint64_t>(static_cast<double>(k)) ^ std::bit_cast<std::uint64_t>(value);
-    out[i] = k;
-  }
-  return difference == 0;
-}
-
 bool is_integer(double value) {
   return std::abs(value) < 0x1p53 &&
          std::bit_cast<std::uint64_t>(static_cast<double>(static_cast<std::int64_t>(value))) ==
@@ -49,40 +35,83 @@ bool is_integer(double value) {
 }
 
 template <class T>
-void gather(std::span<const std::byte> payload, std::size_t stride, std::size_t offset,
-            std::vector<std::int64_t>& out) {
-  const std::size_t n = stride == 0 ? 0 : payload.size() / stride;
-  out.resize(n);
-  for (std::size_t i = 0; i < n; ++i) {
+void gather_integers(const std::byte* payload, std::size_t stride,
+                     std::span<const std::uint32_t> points, std::int64_t* out) {
+  for (std::size_t i = 0; i < points.size(); ++i) {
     T value;
-    std::memcpy(&value, payload.data() + i * stride + offset, sizeof value);
+    std::memcpy(&value, payload + points[i] * stride, sizeof value);
     // The sign of int8 is meant.
     out[i] = static_cast<std::int64_t>(value);  // NOLINT(bugprone-signed-char-misuse)
   }
 }
 
-void gather(ScalarType type, std::span<const std::byte> payload, std::size_t stride,
-            std::size_t offset, std::vector<std::int64_t>& out) {
+/// One attribute of some points: integers, or the bits of floating types.
+void gather_integers(ScalarType type, const std::byte* payload, std::size_t stride,
+                     std::span<const std::uint32_t> points, std::int64_t* out) {
   switch (type) {
     case ScalarType::i8:
-      return gather<std::int8_t>(payload, stride, offset, out);
+      return gather_integers<std::int8_t>(payload, stride, points, out);
     case ScalarType::u8:
-      return gather<std::uint8_t>(payload, stride, offset, out);
+      return gather_integers<std::uint8_t>(payload, stride, points, out);
     case ScalarType::i16:
-      return gather<std::int16_t>(payload, stride, offset, out);
+      return gather_integers<std::int16_t>(payload, stride, points, out);
     case ScalarType::u16:
-      return gather<std::uint16_t>(payload, stride, offset, out);
+      return gather_integers<std::uint16_t>(payload, stride, points, out);
     case ScalarType::i32:
     case ScalarType::f32:
-      return gather<std::int32_t>(payload, stride, offset, out);
+      return gather_integers<std::int32_t>(payload, stride, points, out);
     case ScalarType::u32:
-      return gather<std::uint32_t>(payload, stride, offset, out);
+      return gather_integers<std::uint32_t>(payload, stride, points, out);
     case ScalarType::i64:
     case ScalarType::f64:
-      return gather<std::int64_t>(payload, stride, offset, out);
+      return gather_integers<std::int64_t>(payload, stride, points, out);
     case ScalarType::u64:
-      return gather<std::uint64_t>(payload, stride, offset, out);
+      return gather_integers<std::uint64_t>(payload, stride, points, out);
   }
+}
+
+/// Byte by byte of a record, the bits in which the records of a payload differ.
+void find_differing_bits(std::span<const std::byte> payload, std::size_t stride,
+                         std::vector<std::byte>& differing) {
+  differing.assign(stride, std::byte{0});
+  const std::size_t count = stride == 0 ? 0 : payload.size() / stride;
+  const auto find = [&](std::size_t offset, auto word) {
+    using Word = decltype(word);
+    if (count == 0) return;
+    const std::byte* at = payload.data() + offset;
+    const Word first = load<Word>(reinterpret_cast<const std::uint8_t*>(at));
+    Word bits = 0;
+    for (std::size_t i = 0; i < count; ++i, at += stride) {
+      bits =
+          static_cast<Word>(bits | (load<Word>(reinterpret_cast<const std::uint8_t*>(at)) ^ first));
+    }
+    std::memcpy(differing.data() + offset, &bits, sizeof bits);
+  };
+  std::size_t offset = 0;
+  for (; offset + 8 <= stride; offset += 8) find(offset, std::uint64_t{});
+  if (offset < stride && stride >= 8) return find(stride - 8, std::uint64_t{});
+  for (; offset < stride; ++offset) find(offset, std::uint8_t{});
+}
+
+/// The extent of a column of an attribute, as keys.
+KeyRange range_of(ScalarType type, NumberForm form, std::span<const std::int64_t> values) {
+  if (values.empty()) return {0, UINT64_MAX};
+  if (type == ScalarType::u64) {
+    KeyRange range;
+    for (const std::int64_t number : values) {
+      const auto value = static_cast<std::uint64_t>(number);
+      range = {std::min(range.low, value), std::max(range.high, value)};
+    }
+    return range;
+  }
+  std::int64_t low = INT64_MAX, high = INT64_MIN;
+  for (const std::int64_t value : values) {
+    low = std::min(low, value);
+    high = std::max(high, value);
+  }
+  if (!is_floating(type)) return {attribute_key(low), attribute_key(high)};
+  // Number forms keep the order, and NaN at its ends.
+  return {attribute_key(to_double(low, form)), attribute_key(to_double(high, form))};
 }
 
 }  // namespace
@@ -90,93 +119,149 @@ void gather(ScalarType type, std::span<const std::byte> payload, std::size_t str
 void BlockEncoder::load(const Layout& layout, const ClusteredBlock& block) {
   layout_ = &layout;
   block_ = &block;
-  for (std::size_t axis = 0; axis < 3; ++axis) load_axis(axis);
+  load_axes();
   load_attributes();
 }
 
-void BlockEncoder::load_axis(std::size_t axis) {
-  const std::size_t n = block_->positions.size();
-  std::vector<std::int64_t>& out = axes_[axis];
-  forms_[axis] = kIntegerForm;
-  const auto box_is_integer = [&](const ClusterSummary& summary) {
-    return summary.box.empty() ||
-           (is_integer(summary.box.min[axis]) && is_integer(summary.box.max[axis]));
-  };
-  if (!load_integers(block_->positions, axis, out) ||
-      !std::all_of(block_->summaries.begin(), block_->summaries.end(), box_is_integer)) {
-    doubles_.resize(n);
-    for (std::size_t i = 0; i < n; ++i) {
-      doubles_[i] = block_->positions[i][axis];
-      if (!std::isfinite(doubles_[i])) {
-        throw Error({.file = {},
-                     .where = {},
-                     .cause = "a point has a coordinate that is not finite",
-                     .remedy = "leave such points out"});
-      }
-    }
-    for (const ClusterSummary& summary : block_->summaries) {
-      if (summary.box.empty()) continue;
-      doubles_.push_back(summary.box.min[axis]);
-      doubles_.push_back(summary.box.max[axis]);
-    }
-    forms_[axis] = form_of(doubles_);
-    out.resize(n);
-    for (std::size_t i = 0; i < n; ++i) out[i] = to_integer(doubles_[i], forms_[axis]);
+void BlockEncoder::load_axes() {
+  const std::span<const std::uint32_t> order = block_->order;
+  std::array<std::int64_t*, 3> out{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    axes_[axis].resize(order.size());
+    out[axis] = axes_[axis].data();
   }
-  std::int64_t low = INT64_MAX, high = INT64_MIN;
-  for (const std::int64_t value : out) {
-    low = std::min(low, value);
-    high = std::max(high, value);
+  // As integers without branches: what nearly every raster and laser scan takes.
+  std::array<std::uint64_t, 3> differences{};
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const Point3& position = block_->positions[order[i]];
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double value = position[axis];
+      const auto k = static_cast<std::int64_t>(std::abs(value) < 0x1p53 ? value : 0.5);
+      differences[axis] |= std::bit_cast<std::uint64_t>(static_cast<double>(k)) ^
+                           std::bit_cast<std::uint64_t>(value);
+      out[axis][i] = k;
+    }
+  }
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto box_is_integer = [&](const ClusterSummary& summary) {
+      return summary.box.empty() ||
+             (is_integer(summary.box.min[axis]) && is_integer(summary.box.max[axis]));
+    };
+    forms_[axis] = kIntegerForm;
+    if (differences[axis] != 0 ||
+        !std::all_of(block_->summaries.begin(), block_->summaries.end(), box_is_integer)) {
+      load_decimals(axis);
+    }
+    measure(axis);
+  }
+}
+
+void BlockEncoder::load_decimals(std::size_t axis) {
+  const std::size_t n = block_->order.size();
+  doubles_.resize(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    doubles_[i] = block_->positions[block_->order[i]][axis];
+    if (!std::isfinite(doubles_[i])) {
+      throw Error({.file = {},
+                   .where = {},
+                   .cause = "a point has a coordinate that is not finite",
+                   .remedy = "leave such points out"});
+    }
   }
   for (const ClusterSummary& summary : block_->summaries) {
     if (summary.box.empty()) continue;
-    low = std::min(low, to_integer(summary.box.min[axis], forms_[axis]));
-    high = std::max(high, to_integer(summary.box.max[axis], forms_[axis]));
+    doubles_.push_back(summary.box.min[axis]);
+    doubles_.push_back(summary.box.max[axis]);
   }
-  const auto extent =
-      low > high ? 0 : static_cast<std::uint64_t>(high) - static_cast<std::uint64_t>(low);
+  forms_[axis] = form_of(doubles_);
+  for (std::size_t i = 0; i < n; ++i) axes_[axis][i] = to_integer(doubles_[i], forms_[axis]);
+}
+
+/// Extents of the clusters, and by that of the block the steps of their boxes.
+void BlockEncoder::measure(std::size_t axis) {
+  const std::size_t clusters = block_->representatives.size();
+  const std::int64_t* const values = axes_[axis].data();
+  extents_[axis].resize(clusters);
+  Extent whole;
+  for (std::size_t c = 0; c < clusters; ++c) {
+    Extent extent;
+    for (std::uint32_t i = block_->first[c]; i < block_->first[c + 1]; ++i) {
+      extent.low = std::min(extent.low, values[i]);
+      extent.high = std::max(extent.high, values[i]);
+    }
+    extents_[axis][c] = extent;
+    whole.low = std::min(whole.low, extent.low);
+    whole.high = std::max(whole.high, extent.high);
+  }
+  for (const ClusterSummary& summary : block_->summaries) {
+    if (summary.box.empty()) continue;
+    whole.low = std::min(whole.low, to_integer(summary.box.min[axis], forms_[axis]));
+    whole.high = std::max(whole.high, to_integer(summary.box.max[axis], forms_[axis]));
+  }
+  const auto extent = whole.low > whole.high ? 0
+                                             : static_cast<std::uint64_t>(whole.high) -
+                                                   static_cast<std::uint64_t>(whole.low);
   const auto bits = static_cast<unsigned>(std::bit_width(extent));
   shifts_[axis] = std::min(bits > kBoxBits ? bits - kBoxBits : 0, most_shift(forms_[axis]));
 }
 
 void BlockEncoder::load_attributes() {
-  const std::size_t count = layout_->attributes.size();
-  attributes_.resize(count);
-  attribute_forms_.assign(count, kIntegerForm);
+  attributes_.resize(layout_->attributes.size());
+  find_differing_bits(block_->payload, layout_->payload_size, differing_);
   std::size_t offset = 0;
-  for (std::size_t a = 0; a < count; ++a) {
-    const ScalarType type = layout_->attributes[a];
-    std::vector<std::int64_t>& values = attributes_[a];
-    gather(type, block_->payload, layout_->payload_size, offset, values);
-    offset += size_of(type);
-    if (!is_floating(type)) continue;
-
-    const bool single = type == ScalarType::f32;
-    doubles_.resize(values.size());
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      doubles_[i] = single ? std::bit_cast<float>(static_cast<std::int32_t>(values[i]))
-                           : std::bit_cast<double>(values[i]);
+  for (std::size_t a = 0; a < attributes_.size(); ++a) {
+    Attribute& attribute = attributes_[a];
+    attribute.type = layout_->attributes[a];
+    attribute.offset = offset;
+    attribute.form = kIntegerForm;
+    const std::size_t size = size_of(attribute.type);
+    const auto differing = std::span(differing_).subspan(offset, size);
+    attribute.one_value = std::all_of(differing.begin(), differing.end(),
+                                      [](std::byte bits) { return bits == std::byte{0}; });
+    if (is_floating(attribute.type)) {
+      load_numbers(attribute);
+    } else if (attribute.one_value && !block_->payload.empty()) {
+      constexpr std::array<std::uint32_t, 1> kFirst{0};
+      gather_integers(attribute.type, block_->payload.data() + offset, 0, kFirst, &attribute.value);
     }
-    NumberForm form = form_of(doubles_);
-    if (form == kDoubleBits && single) form = kFloatBits;
-    attribute_forms_[a] = form;
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      // From the bits where the form is bits: arithmetic would not keep a signalling NaN.
-      if (form == kFloatBits && single) {
-        const auto bits = static_cast<std::int32_t>(values[i]);
-        values[i] = bits < 0 ? bits ^ INT32_MAX : bits;
-      } else if (form == kDoubleBits) {
-        values[i] = values[i] < 0 ? values[i] ^ INT64_MAX : values[i];
-      } else {
-        values[i] = to_integer(doubles_[i], form);
-      }
-    }
+    offset += size;
   }
 }
 
+/// Of a floating type: those of all points, or the one.
+void BlockEncoder::load_numbers(Attribute& attribute) {
+  const bool single = attribute.type == ScalarType::f32;
+  std::size_t count = block_->positions.size();
+  if (attribute.one_value) count = std::min<std::size_t>(count, 1);
+  std::vector<std::int64_t>& numbers = attribute.numbers;
+  numbers.resize(count);
+  doubles_.resize(count);
+  const std::byte* at = block_->payload.data() + attribute.offset;
+  for (std::size_t i = 0; i < count; ++i, at += layout_->payload_size) {
+    const auto* const bytes = reinterpret_cast<const std::uint8_t*>(at);
+    numbers[i] = single ? store::load<std::int32_t>(bytes) : store::load<std::int64_t>(bytes);
+    doubles_[i] = single ? store::load<float>(bytes) : store::load<double>(bytes);
+  }
+  NumberForm form = form_of(doubles_);
+  if (form == kDoubleBits && single) form = kFloatBits;
+  attribute.form = form;
+  for (std::size_t i = 0; i < count; ++i) {
+    // From the bits where the form is bits: arithmetic would not keep a signalling NaN.
+    if (form == kFloatBits && single) {
+      const auto bits = static_cast<std::int32_t>(numbers[i]);
+      numbers[i] = bits < 0 ? bits ^ INT32_MAX : bits;
+    } else if (form == kDoubleBits) {
+      numbers[i] = numbers[i] < 0 ? numbers[i] ^ INT64_MAX : numbers[i];
+    } else {
+      numbers[i] = to_integer(doubles_[i], form);
+    }
+  }
+  if (count > 0) attribute.value = numbers[0];
+}
+
 Entry BlockEncoder::enter(std::size_t cluster) {
-  const std::uint32_t first = block_->first[cluster], last = block_->first[cluster + 1];
-  members_ = block_->order.subspan(first, last - first);
+  first_ = block_->first[cluster];
+  members_ = block_->order.subspan(first_, block_->first[cluster + 1] - first_);
   const auto n = static_cast<std::uint32_t>(members_.size());
   if (n > layout_->most_points()) {
     throw Error({.file = {},
@@ -185,14 +270,6 @@ Entry BlockEncoder::enter(std::size_t cluster) {
                           "has at most " + std::to_string(layout_->most_points()) + " in one",
                  .remedy = "make the blocks smaller"});
   }
-  representative_ = UINT32_MAX;
-  const std::uint32_t representative = block_->representatives[cluster];
-  if (representative != UINT32_MAX) {
-    const auto at = std::find(members_.begin(), members_.end(), representative);
-    assert(at != members_.end() && "a representative is a point of its cluster");
-    representative_ = static_cast<std::uint32_t>(at - members_.begin());
-  }
-
   Entry entry;
   entry.points = n;
   entry.forms = forms_;
@@ -201,12 +278,7 @@ Entry BlockEncoder::enter(std::size_t cluster) {
   const ClusterSummary* summary =
       cluster < block_->summaries.size() ? &block_->summaries[cluster] : nullptr;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const std::vector<std::int64_t>& values = axes_[axis];
-    std::int64_t low = INT64_MAX, high = INT64_MIN;
-    for (const std::uint32_t member : members_) {
-      low = std::min(low, values[member]);
-      high = std::max(high, values[member]);
-    }
+    const auto [low, high] = extents_[axis][cluster];
     std::int64_t outer_low = low, outer_high = high;
     if (summary != nullptr && !summary->box.empty()) {
       outer_low = std::min(low, to_integer(summary->box.min[axis], forms_[axis]));
@@ -228,11 +300,7 @@ Entry BlockEncoder::enter(std::size_t cluster) {
   }
   if (!own_box_) coded_box_ = entry_box_;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const std::uint64_t origin = static_cast<std::uint64_t>(entry.low[axis]) + coded_box_.low[axis];
-    relative_[axis].resize(n);
-    for (std::uint32_t i = 0; i < n; ++i) {
-      relative_[axis][i] = static_cast<std::uint64_t>(axes_[axis][members_[i]]) - origin;
-    }
+    origin_[axis] = static_cast<std::uint64_t>(entry.low[axis]) + coded_box_.low[axis];
   }
   if (summary != nullptr) {
     if (!(summary->error >= 0)) {
@@ -247,40 +315,27 @@ Entry BlockEncoder::enter(std::size_t cluster) {
   return entry;
 }
 
-/// Of the present cluster's points.
-KeyRange BlockEncoder::range_of(std::size_t attribute) const {
-  if (members_.empty()) return {0, UINT64_MAX};
-  const std::vector<std::int64_t>& values = attributes_[attribute];
-  const ScalarType type = layout_->attributes[attribute];
-  if (type == ScalarType::u64) {
-    KeyRange range;
-    for (const std::uint32_t member : members_) {
-      const auto value = static_cast<std::uint64_t>(values[member]);
-      range = {std::min(range.low, value), std::max(range.high, value)};
+void BlockEncoder::find_relative() {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    relative_[axis].resize(members_.size());
+    const std::int64_t* const values = axes_[axis].data() + first_;
+    for (std::size_t i = 0; i < members_.size(); ++i) {
+      relative_[axis][i] = static_cast<std::uint64_t>(values[i]) - origin_[axis];
     }
-    return range;
   }
-  std::int64_t low = INT64_MAX, high = INT64_MIN;
-  for (const std::uint32_t member : members_) {
-    low = std::min(low, values[member]);
-    high = std::max(high, values[member]);
-  }
-  if (!is_floating(type)) return {attribute_key(low), attribute_key(high)};
-  // Number forms keep the order, and NaN at its ends.
-  const NumberForm form = attribute_forms_[attribute];
-  return {attribute_key(to_double(low, form)), attribute_key(to_double(high, form))};
 }
 
 /// Codes the head and the places of the points; on a grid hands over to `heights`. Sets order_.
-template <class Use>
-void BlockEncoder::positions(SymbolEncoder& coder, const Columns& columns, Use&& heights) {
+template <class Coder, class Use>
+void BlockEncoder::positions(Coder& coder, const Columns& columns, Use&& heights) {
   const auto n = static_cast<std::uint32_t>(members_.size());
   const auto& size = coded_box_.size;
+  const bool sequence = columns.sequence && n > 1;
   bool grid = layout_->grid && layout_->level == 0 && GridCodec::fits(size[0], size[1], n);
+  if (grid || sequence) find_relative();
   grid =
       grid && grid_.place(static_cast<std::uint32_t>(size[0]), static_cast<std::uint32_t>(size[1]),
                           relative_[0].data(), relative_[1].data(), relative_[2].data(), n);
-  const bool sequence = columns.sequence && n > 1;
   coder.symbol(context::kForm, (grid || sequence ? 0 : kSplitForm) | (own_box_ ? kOwnBoxForm : 0));
   if (own_box_) code_box(coder, entry_box_, coded_box_);
   order_.resize(n);
@@ -291,41 +346,62 @@ void BlockEncoder::positions(SymbolEncoder& coder, const Columns& columns, Use&&
     heights();
     for (std::uint32_t i = 0; i < n; ++i) order_[i] = grid_.point(i);
   } else if (sequence) {
-    column_.resize(n);
     for (unsigned axis = 0; axis < 3; ++axis) {
-      for (std::uint32_t i = 0; i < n; ++i) {
-        column_[i] = static_cast<std::int64_t>(relative_[axis][i]);
-      }
       const auto number = static_cast<unsigned>(layout_->attributes.size()) + axis;
+      column_.assign(relative_[axis].begin(), relative_[axis].end());
       code_column(coder, number, columns.kinds[number], nullptr, nullptr, column_.data(),
                   scratch_.data(), n);
     }
-    for (std::uint32_t i = 0; i < n; ++i) order_[i] = i;
+    std::iota(order_.begin(), order_.end(), 0u);
   } else {
-    split_.code(coder, {{0, 0, 0}, size},
-                {relative_[0].data(), relative_[1].data(), relative_[2].data()}, order_.data(), n);
+    const auto at = [&](std::size_t axis, std::uint32_t i) {
+      return static_cast<std::uint64_t>(axes_[axis][first_ + i]) - origin_[axis];
+    };
+    split_.encode(coder, size, at, n, order_.data());
   }
 }
 
-void BlockEncoder::encode_cluster(SymbolEncoder& coder, const Predictor& predictor,
+/// Brings the values of the present cluster's points into column_, in the order of coding.
+void BlockEncoder::gather(const Attribute& attribute) {
+  column_.resize(coded_.size());
+  if (!is_floating(attribute.type)) {
+    return gather_integers(attribute.type, block_->payload.data() + attribute.offset,
+                           layout_->payload_size, coded_, column_.data());
+  }
+  for (std::size_t i = 0; i < coded_.size(); ++i) column_[i] = attribute.numbers[coded_[i]];
+}
+
+template <class Coder>
+void BlockEncoder::encode_cluster(Coder& coder, const Predictor& predictor,
                                   const Columns& columns) {
   const auto n = static_cast<std::uint32_t>(members_.size());
   positions(coder, columns, [&] { grid_.heights(coder, predictor, coded_box_.size[2], nullptr); });
+  coded_.resize(n);
+  for (std::uint32_t i = 0; i < n; ++i) coded_[i] = members_[order_[i]];
 
-  for (unsigned a = 0; a < layout_->attributes.size(); ++a) {
-    std::swap(column_, beside_);
-    column_.resize(n);
-    for (std::uint32_t i = 0; i < n; ++i) column_[i] = attributes_[a][members_[order_[i]]];
-    NumberForm* const form = is_floating(layout_->attributes[a]) ? &attribute_forms_[a] : nullptr;
-    code_column(coder, a, columns.kinds[a], form, beside_.data(), column_.data(), scratch_.data(),
-                n);
+  bool beside = false;  // whether the column before rises and falls
+  for (unsigned a = 0; a < attributes_.size(); ++a) {
+    Attribute& attribute = attributes_[a];
+    NumberForm* const form = is_floating(attribute.type) ? &attribute.form : nullptr;
+    if (attribute.one_value) {
+      std::int64_t value = attribute.value;
+      ranges_.push_back(range_of(attribute.type, attribute.form, {&value, 1}));
+      code_column(coder, a, columns.kinds[a], form, nullptr, &value, nullptr, 1);
+    } else {
+      std::swap(column_, beside_);
+      gather(attribute);
+      ranges_.push_back(range_of(attribute.type, attribute.form, column_));
+      code_column(coder, a, columns.kinds[a], form, beside ? beside_.data() : nullptr,
+                  column_.data(), scratch_.data(), n);
+    }
+    beside = !attribute.one_value;
   }
   if (const unsigned level = layout_->level; level > 0) {
     column_.resize(std::size_t{n} * level);
     for (std::uint32_t i = 0; i < n; ++i) {
       for (unsigned j = 0; j < level; ++j) {
-        column_[i + std::size_t{n} * j] = static_cast<std::int64_t>(
-            block_->children[std::size_t{members_[order_[i]]} * level + j]);
+        column_[i + std::size_t{n} * j] =
+            static_cast<std::int64_t>(block_->children[std::size_t{coded_[i]} * level + j]);
       }
     }
     code_children(coder, level, column_.data(), n);
@@ -333,7 +409,8 @@ void BlockEncoder::encode_cluster(SymbolEncoder& coder, const Predictor& predict
 }
 
 void BlockEncoder::fit(PredictorFit& sums) {
-  SymbolEncoder coder({});
+  Counts counts(layout_->contexts());
+  SymbolCounter coder(counts);
   for (std::size_t c = 0; c < block_->representatives.size(); ++c) {
     if (enter(c).points > 0) positions(coder, {}, [&] { grid_.fit(sums); });
   }
@@ -341,41 +418,64 @@ void BlockEncoder::fit(PredictorFit& sums) {
 
 std::uint64_t BlockEncoder::count(const Predictor& predictor, const Columns& columns,
                                   Counts& counts) {
-  SymbolEncoder coder({});
-  coder.counts() = std::move(counts);
+  counts.resize(layout_->contexts());
+  SymbolCounter coder(counts);
   for (std::size_t c = 0; c < block_->representatives.size(); ++c) {
+    ranges_.clear();
     if (enter(c).points > 0) encode_cluster(coder, predictor, columns);
   }
-  counts = std::move(coder.counts());
   return coder.raw_bits();
+}
+
+std::uint32_t BlockEncoder::place_of_representative(std::size_t cluster) const {
+  const std::uint32_t point = block_->representatives[cluster];
+  if (point == UINT32_MAX) return 0;
+  const auto found = std::find(coded_.begin(), coded_.end(), point);
+  assert(found != coded_.end() && "a representative is a point of its cluster");
+  return static_cast<std::uint32_t>(found - coded_.begin());
 }
 
 void BlockEncoder::encode(const EncodingTables& tables, bool sequence, Bytes& bytes,
                           std::vector<Entry>& entries, std::vector<KeyRange>& ranges) {
-  SymbolEncoder coder(tables.tables);
   const Columns columns{sequence, tables.kinds};
+  // Two clusters at a time.
+  SymbolEncoder coders[] = {SymbolEncoder(tables.tables), SymbolEncoder(tables.tables)};
+  std::array<std::uint32_t, 2> last{};
+  std::array<std::size_t, 2> entry_of{};
+  unsigned waiting = 0;
+  const auto finish = [&] {
+    std::size_t start = bytes.size(), size = 0;
+    if (waiting == 2)
+      size = SymbolEncoder::finish_both(coders[0], last[0], coders[1], last[1], bytes);
+    if (waiting == 1) coders[0].finish(last[0], bytes);
+    for (unsigned i = 0; i < waiting; ++i) {
+      if (i + 1 == waiting) size = bytes.size() - start;
+      Entry& entry = entries[entry_of[i]];
+      entry.bytes = static_cast<std::uint32_t>(size);
+      entry.checksum = crc16({bytes.data() + start, size});
+      start += size;
+    }
+    waiting = 0;
+  };
   for (std::size_t c = 0; c < block_->representatives.size(); ++c) {
-    Entry entry = enter(c);
-    if (entry.points > 0) {
-      const std::size_t start = bytes.size();
+    entries.push_back(enter(c));
+    ranges_.clear();
+    if (entries.back().points > 0) {
+      SymbolEncoder& coder = coders[waiting];
       coder.start();
       encode_cluster(coder, tables.predictor, columns);
-      std::uint32_t at = 0;
-      if (representative_ != UINT32_MAX) {
-        at = static_cast<std::uint32_t>(std::find(order_.begin(), order_.end(), representative_) -
-                                        order_.begin());
-      }
+      const std::uint32_t at = place_of_representative(c);
       // Most clusters' representatives fit into the coder's free 16 bits.
-      if (entry.points >= kLow) coder.raw(at >> 16, 16);
-      coder.finish(bytes, at & 0xffff);
-      entry.bytes = static_cast<std::uint32_t>(bytes.size() - start);
-      entry.checksum = crc16({bytes.data() + start, entry.bytes});
+      if (entries.back().points >= kLow) coder.raw(at >> 16, 16);
+      last[waiting] = at & 0xffff;
+      entry_of[waiting] = entries.size() - 1;
+      if (++waiting == 2) finish();
+    } else {
+      ranges_.assign(attributes_.size(), {0, UINT64_MAX});
     }
-    entries.push_back(entry);
-    for (std::size_t a = 0; layout_->version > 1 && a < attributes_.size(); ++a) {
-      ranges.push_back(range_of(a));
-    }
+    if (layout_->version > 1) ranges.insert(ranges.end(), ranges_.begin(), ranges_.end());
   }
+  finish();
 }
 
 }  // namespace terrace::stream::store

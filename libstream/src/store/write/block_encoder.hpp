@@ -35,32 +35,57 @@ class BlockEncoder {
               std::vector<Entry>& entries, std::vector<KeyRange>& ranges);
 
  private:
-  void load_axis(std::size_t axis);
+  /// An attribute of the block.
+  struct Attribute {
+    ScalarType type{};
+    std::size_t offset = 0;  ///< in the payload of a point
+    NumberForm form = kIntegerForm;
+    bool one_value = false;  ///< all points of the block have `value`
+    std::int64_t value = 0;
+    std::vector<std::int64_t> numbers;  ///< point by point, of floating types with several values
+  };
+  struct Extent {
+    std::int64_t low = INT64_MAX, high = INT64_MIN;
+  };
+
+  void load_axes();
+  void load_decimals(std::size_t axis);
+  void measure(std::size_t axis);
   void load_attributes();
+  void load_numbers(Attribute& attribute);
   Entry enter(std::size_t cluster);
-  [[nodiscard]] KeyRange range_of(std::size_t attribute) const;
-  template <class Use>
-  void positions(SymbolEncoder& coder, const Columns& columns, Use&& heights);
-  void encode_cluster(SymbolEncoder& coder, const Predictor& predictor, const Columns& columns);
+  void find_relative();
+  /// In the order of coding; 0 without one.
+  [[nodiscard]] std::uint32_t place_of_representative(std::size_t cluster) const;
+  void gather(const Attribute& attribute);
+  template <class Coder, class Use>
+  void positions(Coder& coder, const Columns& columns, Use&& heights);
+  /// Leaves the ranges of the attributes in ranges_.
+  template <class Coder>
+  void encode_cluster(Coder& coder, const Predictor& predictor, const Columns& columns);
 
   const Layout* layout_ = nullptr;
   const ClusteredBlock* block_ = nullptr;
   // The block, as integers.
   std::array<NumberForm, 3> forms_{};
   std::array<unsigned, 3> shifts_{};
-  std::array<std::vector<std::int64_t>, 3> axes_;
-  std::vector<NumberForm> attribute_forms_;
-  std::vector<std::vector<std::int64_t>> attributes_;
+  std::array<std::vector<std::int64_t>, 3> axes_;  ///< in the order of the block: by cluster
+  std::array<std::vector<Extent>, 3> extents_;     ///< of the clusters
+  std::vector<Attribute> attributes_;
+  std::vector<std::byte> differing_;
   // The present cluster.
+  std::uint32_t first_ = 0;  ///< in the order of the block
   std::span<const std::uint32_t> members_;
-  std::uint32_t representative_ = 0;
   IntegerBox coded_box_;  ///< within the entry's box
   IntegerBox entry_box_;
+  std::array<std::uint64_t, 3> origin_{};  ///< of coded_box_
   bool own_box_ = false;
-  std::array<std::vector<std::uint64_t>, 3> relative_;  ///< to coded_box_
+  std::array<std::vector<std::uint64_t>, 3> relative_;  ///< to origin_
   std::vector<std::uint32_t> order_;                    ///< of coding, as numbers within members_
+  std::vector<std::uint32_t> coded_;                    ///< the points in that order
+  std::vector<KeyRange> ranges_;
   GridCodec grid_;
-  SplitCodec split_;
+  SplitEncoder split_;
   std::vector<std::int64_t> column_, beside_, scratch_;
   std::vector<double> doubles_;
 };

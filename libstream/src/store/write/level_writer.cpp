@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "store/write/level_writer.hpp"
 
+#include <algorithm>
 #include <array>
 #include <utility>
 
 #include "store/read/index_page.hpp"
+#include "store/write/side_by_side.hpp"
 
 namespace terrace::stream::store {
 namespace {
@@ -18,10 +20,12 @@ std::string file_name(unsigned level, const char* what) {
 
 }  // namespace
 
-LevelWriter::LevelWriter(const std::filesystem::path& folder, Layout layout)
+LevelWriter::LevelWriter(const std::filesystem::path& folder, Layout layout, unsigned threads)
     : layout_(std::move(layout)),
       data_(folder / file_name(layout_.level, "clusters")),
-      index_(folder / file_name(layout_.level, "index")) {}
+      index_(folder / file_name(layout_.level, "index")),
+      threads_(std::max(1u, threads)),
+      encoders_(1) {}
 
 std::uint64_t LevelWriter::append(PreparedBlock block, bool root) {
   if (at_segment_start()) {
@@ -49,8 +53,9 @@ std::uint64_t LevelWriter::append(PreparedBlock block, bool root) {
     block.entries.clear();
     block.ranges.clear();
     const ClusteredBlock view = block.raw->view();
-    encoder_.load(layout_, view);
-    encoder_.encode(tables_->encoding, tables_->sequence, block.bytes, block.entries, block.ranges);
+    encoders_.front().load(layout_, view);
+    encoders_.front().encode(tables_->encoding, tables_->sequence, block.bytes, block.entries,
+                             block.ranges);
   }
   write(block);
   return ordinal;
@@ -71,20 +76,31 @@ std::uint64_t LevelWriter::Trial::bits_of_column(unsigned column) const {
   return bits;
 }
 
+LevelWriter::Trial LevelWriter::count(const Predictor& predictor, const Columns& columns,
+                                      std::size_t step) {
+  std::vector<Trial> parts(encoders_.size());
+  side_by_side(threads_, (held_.size() + step - 1) / step, [&](std::size_t i, std::size_t worker) {
+    const ClusteredBlock view = held_[i * step].view();
+    encoders_[worker].load(layout_, view);
+    parts[worker].raw_bits += encoders_[worker].count(predictor, columns, parts[worker].counts);
+  });
+  Trial all;
+  all.counts.resize(layout_.contexts());
+  for (const Trial& part : parts) {
+    all.raw_bits += part.raw_bits;
+    for (std::size_t c = 0; c < part.counts.size(); ++c) {
+      for (unsigned s = 0; s < kSymbols; ++s) all.counts[c][s] += part.counts[c][s];
+    }
+  }
+  return all;
+}
+
 LevelWriter::Trial LevelWriter::trial(const Predictor& predictor, bool sequence, ColumnKind kind) {
   std::vector<ColumnKind> kinds(layout_.columns(), kind);
   for (unsigned c = 0; c < kinds.size(); ++c) {
     if (kind == ColumnKind::beside && !layout_.may_lie_beside(c)) kinds[c] = ColumnKind::plain;
   }
-  Trial trial;
-  const std::size_t step = (held_.size() + kTrialBlocks - 1) / kTrialBlocks;
-  for (std::size_t b = 0; b < held_.size(); b += step) {
-    const ClusteredBlock view = held_[b].view();
-    encoder_.load(layout_, view);
-    trial.raw_bits += encoder_.count(predictor, {sequence, kinds}, trial.counts);
-  }
-  trial.counts.resize(layout_.contexts());
-  return trial;
+  return count(predictor, {sequence, kinds}, (held_.size() + kTrialBlocks - 1) / kTrialBlocks);
 }
 
 /// The kind of each column that takes the fewest bits; the first time also the order of points.
@@ -94,12 +110,17 @@ std::vector<ColumnKind> LevelWriter::choose_columns(const Predictor& predictor) 
     sequence_ = false;
     return kinds;
   }
-  if (!sequence_) {
-    sequence_ = !layout_.grid && trial(predictor, true, ColumnKind::plain).bits() <
-                                     trial(predictor, false, ColumnKind::plain).bits();
-  }
   std::array<Trial, kColumnKinds> trials;
-  for (unsigned kind = 0; kind < kColumnKinds; ++kind) {
+  trials[0] = trial(predictor, sequence_.value_or(false), ColumnKind::plain);
+  if (!sequence_) {
+    sequence_ = false;
+    if (!layout_.grid) {
+      Trial in_sequence = trial(predictor, true, ColumnKind::plain);
+      sequence_ = in_sequence.bits() < trials[0].bits();
+      if (*sequence_) trials[0] = std::move(in_sequence);
+    }
+  }
+  for (unsigned kind = 1; kind < kColumnKinds; ++kind) {
     trials[kind] = trial(predictor, *sequence_, static_cast<ColumnKind>(kind));
   }
   for (unsigned c = 0; c < kinds.size(); ++c) {
@@ -117,6 +138,7 @@ std::vector<ColumnKind> LevelWriter::choose_columns(const Predictor& predictor) 
 }
 
 void LevelWriter::train() {
+  encoders_.resize(threads_);
   // Where there are many blocks, a part of them tells as much: others wait for this.
   const bool many = held_.size() == kTrainingBlocks;
   Tables tables;
@@ -124,19 +146,13 @@ void LevelWriter::train() {
     PredictorFit sums;
     for (std::size_t b = 0; b < held_.size(); b += many ? 4 : 1) {
       const ClusteredBlock view = held_[b].view();
-      encoder_.load(layout_, view);
-      encoder_.fit(sums);
+      encoders_.front().load(layout_, view);
+      encoders_.front().fit(sums);
     }
     tables.predictor = sums.fit();
   }
   tables.kinds = choose_columns(tables.predictor);
-  Counts counts;
-  for (std::size_t b = 0; b < held_.size(); b += many ? 2 : 1) {
-    const ClusteredBlock view = held_[b].view();
-    encoder_.load(layout_, view);
-    encoder_.count(tables.predictor, {*sequence_, tables.kinds}, counts);
-  }
-  counts.resize(layout_.contexts());
+  const Counts counts = count(tables.predictor, {*sequence_, tables.kinds}, many ? 2 : 1).counts;
   for (const auto& context : counts) tables.frequencies.push_back(normalised(context));
 
   Bytes bytes;
@@ -147,17 +163,16 @@ void LevelWriter::train() {
   ++table_count_;
   tables_ = std::make_shared<const SharedTables>(std::move(tables), *sequence_);
 
-  PreparedBlock prepared;
-  for (const RawBlock& block : held_) {
-    const ClusteredBlock view = block.view();
-    prepared.bytes.clear();
-    prepared.entries.clear();
-    prepared.ranges.clear();
-    encoder_.load(layout_, view);
-    encoder_.encode(tables_->encoding, tables_->sequence, prepared.bytes, prepared.entries,
-                    prepared.ranges);
-    write(prepared);
-  }
+  std::vector<PreparedBlock> prepared(held_.size());
+  side_by_side(threads_, held_.size(), [&](std::size_t b, std::size_t worker) {
+    const ClusteredBlock view = held_[b].view();
+    PreparedBlock& block = prepared[b];
+    encoders_[worker].load(layout_, view);
+    encoders_[worker].encode(tables_->encoding, tables_->sequence, block.bytes, block.entries,
+                             block.ranges);
+  });
+  for (const PreparedBlock& block : prepared) write(block);
+  encoders_.resize(1);
   held_.clear();
   held_.shrink_to_fit();
 }

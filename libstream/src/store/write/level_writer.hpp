@@ -41,11 +41,12 @@ struct PreparedBlock {
   std::vector<ClusterSummary> summaries;
 };
 
-/// The two files of a level. One thread at a time. The bytes depend on the blocks and their order
-/// alone, not on which of them came encoded.
+/// The two files of a level. One thread at a time, which has `threads` at work while it trains: all
+/// blocks to come wait for that. The bytes depend on the blocks and their order alone, not on which
+/// of them came encoded.
 class LevelWriter {
  public:
-  LevelWriter(const std::filesystem::path& folder, Layout layout);
+  LevelWriter(const std::filesystem::path& folder, Layout layout, unsigned threads);
 
   /// What blocks are to be encoded with just now; null while there are no tables.
   [[nodiscard]] const SharedTablesPtr& tables() const { return tables_; }
@@ -70,6 +71,8 @@ class LevelWriter {
     [[nodiscard]] std::uint64_t bits() const;
     [[nodiscard]] std::uint64_t bits_of_column(unsigned column) const;
   };
+  /// Counts every step-th block held back.
+  Trial count(const Predictor& predictor, const Columns& columns, std::size_t step);
   Trial trial(const Predictor& predictor, bool sequence, ColumnKind kind);
   std::vector<ColumnKind> choose_columns(const Predictor& predictor);
   void train();
@@ -83,7 +86,8 @@ class LevelWriter {
   /// block that was encoded with the tables of the segment before has no other order any more.
   std::optional<bool> sequence_;
   SharedTablesPtr tables_;
-  BlockEncoder encoder_;
+  unsigned threads_;
+  std::vector<BlockEncoder> encoders_;  ///< one; in training one per thread
   std::uint64_t blocks_ = 0, clusters_ = 0, points_ = 0;
   std::uint64_t segment_start_ = 0;  ///< ordinal of the present segment's first cluster
   std::vector<Entry> page_;

@@ -48,7 +48,7 @@ class OutputFile {
   std::filesystem::path path_;
   Descriptor fd_;
   Bytes buffer_;
-  std::uint64_t size_ = 0;
+  std::uint64_t size_ = 0, flushed_ = 0;
   std::uint32_t checksum_ = 0;
 };
 

@@ -40,8 +40,9 @@ class StoreWriter::Encoded {
 void StoreWriter::EncodedDeleter::operator()(Encoded* block) const { delete block; }
 
 struct StoreWriter::Impl {
-  Impl(const std::filesystem::path& path, StoreSchema given, bool replace_old)
-      : schema(std::move(given)), replace(replace_old), staging(path) {}
+  Impl(const std::filesystem::path& path, StoreSchema given, bool replace_old,
+       unsigned for_training)
+      : schema(std::move(given)), replace(replace_old), threads(for_training), staging(path) {}
 
   /// An encoder nobody uses; memory for as many as there are threads.
   std::unique_ptr<BlockEncoder> borrow() {
@@ -64,6 +65,7 @@ struct StoreWriter::Impl {
 
   StoreSchema schema;
   bool replace;
+  unsigned threads;
   Staging staging;
   std::vector<std::unique_ptr<LevelWriter>> levels;
   std::uint64_t points = 0;
@@ -114,7 +116,7 @@ std::uint64_t StoreWriter::Impl::append(EncodedPtr encoded, bool root) {
   while (levels.size() <= level) {
     levels.push_back(std::make_unique<LevelWriter>(
         staging.folder(),
-        Layout(schema, static_cast<unsigned>(levels.size()), version_to_write(schema))));
+        Layout(schema, static_cast<unsigned>(levels.size()), version_to_write(schema)), threads));
   }
   if (level == 0) {
     points += encoded->points;
@@ -133,7 +135,8 @@ std::uint64_t StoreWriter::Impl::append(EncodedPtr encoded, bool root) {
   return ordinal;
 }
 
-StoreWriter::StoreWriter(const std::filesystem::path& path, StoreSchema schema, bool replace) {
+StoreWriter::StoreWriter(const std::filesystem::path& path, StoreSchema schema, bool replace,
+                         unsigned threads) {
   std::error_code error;
   const auto status = std::filesystem::status(path, error);
   if (std::filesystem::exists(status)) {
@@ -156,7 +159,7 @@ StoreWriter::StoreWriter(const std::filesystem::path& path, StoreSchema schema, 
                  .cause = "there are too many attributes",
                  .remedy = {}});
   }
-  impl_ = std::make_unique<Impl>(path, std::move(schema), replace);
+  impl_ = std::make_unique<Impl>(path, std::move(schema), replace, threads);
 }
 
 StoreWriter::~StoreWriter() = default;

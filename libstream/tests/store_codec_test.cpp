@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <numeric>
+#include <random>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "stand_in_hierarchy.hpp"
+#include "store/codec/split_codec.hpp"
+#include "store/codec/tables.hpp"
+#include "store/write/side_by_side.hpp"
+#include "store_inputs.hpp"
+#include "temp_folder.hpp"
+#include "terrace/stream/store.hpp"
+
+namespace terrace::stream::store {
+namespace {
+
+using Random = std::mt19937_64;
+
+/// A number of up to so many bits, each number of bits as likely as any other.
+std::uint64_t any_number(Random& random, unsigned most_bits) {
+  const auto bits = static_cast<unsigned>(random() % (most_bits + 1));
+  return bits == 0 ? 0 : random() >> (64 - bits);
+}
+
+TEST(StoreCodec, NumbersLieInTheirClasses) {
+  Random random(1);
+  for (int i = 0; i < 100000; ++i) {
+    const std::uint64_t number = any_number(random, 64);
+    const unsigned found = class_of(number);
+    ASSERT_LT(found, kClasses);
+    const ClassRange range = kClassRange[found];
+    EXPECT_LE(range.base, number);
+    EXPECT_LT((number - range.base) >> range.bits, 1u) << number;
+  }
+}
+
+/// Tables of contexts that know some symbols, from rare to nearly the only one.
+std::vector<Frequencies> some_frequencies(Random& random, std::size_t contexts) {
+  std::vector<Frequencies> result;
+  for (std::size_t c = 0; c < contexts; ++c) {
+    std::array<std::uint32_t, kSymbols> counts{};
+    for (unsigned s = 0; s < kClasses; ++s) {
+      if (random() % 2 == 0) counts[s] = static_cast<std::uint32_t>(any_number(random, 20));
+    }
+    result.push_back(normalised(counts));
+  }
+  return result;
+}
+
+struct BothTables {
+  explicit BothTables(const std::vector<Frequencies>& frequencies) : decode(frequencies.size()) {
+    for (std::size_t c = 0; c < frequencies.size(); ++c) {
+      encode.push_back(encode_table(frequencies[c]));
+      fill_decode_table(frequencies[c], decode[c]);
+    }
+    for (const DecodeTable& table : decode) pointers.push_back(&table);
+  }
+  std::vector<EncodeTable> encode;
+  std::vector<DecodeTable> decode;
+  std::vector<const DecodeTable*> pointers;
+};
+
+Bytes padded(const Bytes& bytes) {
+  Bytes result(kPadding);
+  result.insert(result.end(), bytes.begin(), bytes.end());
+  result.resize(result.size() + kPadding);
+  return result;
+}
+ByteView inside(const Bytes& bytes) {
+  return ByteView(bytes).subspan(kPadding, bytes.size() - 2 * kPadding);
+}
+
+TEST(StoreCodec, SymbolsOfTwoClustersComeBackTogetherAsAlone) {
+  Random random(2);
+  for (int round = 0; round < 200; ++round) {
+    SCOPED_TRACE(round);
+    const BothTables tables(some_frequencies(random, 5));
+    struct Item {
+      unsigned context, symbol;
+      std::uint64_t value;
+      unsigned bits;
+    };
+    std::array<std::vector<Item>, 2> items;
+    SymbolEncoder coders[] = {SymbolEncoder(tables.encode), SymbolEncoder(tables.encode)};
+    std::array<std::uint32_t, 2> last{};
+    std::array<Bytes, 2> alone;
+    for (std::size_t k = 0; k < 2; ++k) {
+      items[k].resize(1 + random() % 2000);
+      coders[k].start();
+      for (Item& item : items[k]) {
+        item.context = static_cast<unsigned>(random() % tables.encode.size());
+        item.symbol = static_cast<unsigned>(random() % kClasses);
+        item.bits = static_cast<unsigned>(random() % 65);
+        item.value = item.bits == 0 ? 0 : random() >> (64 - item.bits);
+        coders[k].symbol(item.context, item.symbol);
+        coders[k].raw(item.value, item.bits);
+      }
+      last[k] = static_cast<std::uint32_t>(random() % kLow);
+      coders[k].finish(last[k], alone[k]);
+    }
+    Bytes both;
+    const std::size_t first =
+        SymbolEncoder::finish_both(coders[0], last[0], coders[1], last[1], both);
+    ASSERT_EQ(first, alone[0].size());
+    Bytes expected = alone[0];
+    expected.insert(expected.end(), alone[1].begin(), alone[1].end());
+    ASSERT_EQ(both, expected);
+    for (std::size_t k = 0; k < 2; ++k) {
+      const Bytes bytes = padded(alone[k]);
+      SymbolDecoder decoder(tables.pointers, inside(bytes));
+      for (const Item& item : items[k]) {
+        ASSERT_EQ(decoder.symbol(item.context), item.symbol);
+        ASSERT_EQ(decoder.raw(item.bits), item.value);
+      }
+      EXPECT_EQ(decoder.finish(), last[k]);
+    }
+  }
+}
+
+TEST(StoreCodec, PointsInBoxesOfAllSizesComeBack) {
+  Random random(3);
+  for (int round = 0; round < 2000; ++round) {
+    SCOPED_TRACE(round);
+    // Sizes of up to 2^16 are kept in another way than larger ones.
+    std::array<std::uint64_t, 3> size{};
+    const unsigned most_bits = round % 3 == 0 ? 63 : round % 3 == 1 ? 16 : 4;
+    for (std::uint64_t& side : size) {
+      side =
+          round % 5 == 0 ? std::uint64_t{65535} + random() % 3 : 1 + any_number(random, most_bits);
+    }
+    const auto n = static_cast<std::uint32_t>(1 + any_number(random, 9));
+    std::array<std::vector<std::uint64_t>, 3> at;
+    for (std::uint32_t i = 0; i < n; ++i) {
+      const bool twin = i > 0 && random() % 4 == 0;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        // Corners too.
+        const std::uint64_t place = random() % 8 == 0 ? size[axis] - 1 : random() % size[axis];
+        at[axis].push_back(twin ? at[axis][i - 1] : place);
+      }
+    }
+    const BothTables tables(some_frequencies(random, context::kHeight));
+    SymbolEncoder coder(tables.encode);
+    coder.start();
+    std::vector<std::uint32_t> order(n);
+    SplitEncoder().encode(
+        coder, size, [&](std::size_t axis, std::uint32_t i) { return at[axis][i]; }, n,
+        order.data());
+    coder.symbol(0, 0);  // there may have been none
+    Bytes bytes;
+    coder.finish(0, bytes);
+    bytes = padded(bytes);
+
+    std::array<std::vector<std::uint64_t>, 3> decoded;
+    for (std::vector<std::uint64_t>& axis : decoded) axis.resize(n);
+    SymbolDecoder decoder(tables.pointers, inside(bytes));
+    SplitDecoder().decode(decoder, {{0, 0, 0}, size},
+                          {decoded[0].data(), decoded[1].data(), decoded[2].data()}, n);
+    ASSERT_EQ(decoder.symbol(0), 0u);
+    ASSERT_EQ(decoder.finish(), 0u);
+    for (std::uint32_t i = 0; i < n; ++i) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        ASSERT_EQ(decoded[axis][i], at[axis][order[i]]);
+      }
+      const auto place = [&](std::uint32_t k) {
+        return std::tuple(decoded[0][k], decoded[1][k], decoded[2][k]);
+      };
+      if (i > 0 && place(i) == place(i - 1)) {
+        ASSERT_LT(order[i - 1], order[i]);
+      }
+    }
+    std::sort(order.begin(), order.end());
+    for (std::uint32_t i = 0; i < n; ++i) ASSERT_EQ(order[i], i);
+  }
+}
+
+TEST(StoreCodec, WorkSideBySideIsDoneOnceAndFailuresComeOut) {
+  for (const unsigned threads : {1u, 2u, 5u}) {
+    std::vector<std::atomic<int>> done(100);
+    std::atomic<bool> known = true;
+    side_by_side(threads, done.size(), [&](std::size_t i, std::size_t worker) {
+      ++done[i];
+      if (worker >= threads) known = false;
+    });
+    EXPECT_TRUE(known);
+    for (const std::atomic<int>& times : done) EXPECT_EQ(times, 1);
+    EXPECT_THROW(side_by_side(threads, 100,
+                              [&](std::size_t i, std::size_t) {
+                                if (i == 50) throw std::runtime_error("as asked");
+                              }),
+                 std::runtime_error);
+  }
+}
+
+std::string content(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+TEST(StoreCodec, BytesDoNotDependOnThreads) {
+  std::vector<std::vector<Point3>> blocks;
+  for (int b = 0; b < 150; ++b) blocks.push_back(testing::scan_patch(b, 100));
+  testing::StandInHierarchy::Options options;
+  options.cluster_points = 10;
+  const std::vector<testing::OwnedBlock> recorded = testing::recorded_hierarchy(blocks, options);
+  const TempFolder folder;
+  const auto write = [&](const char* name, unsigned threads) {
+    StoreWriter writer(folder.path() / name, {}, false, threads);
+    for (std::size_t b = 0; b + 1 < recorded.size(); ++b) {
+      writer.append(writer.encode(recorded[b].view()));
+    }
+    writer.finish(recorded.back().view());
+  };
+  write("one", 1);
+  write("three", 3);
+  std::size_t files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder.path() / "one")) {
+    const std::filesystem::path name = entry.path().filename();
+    EXPECT_EQ(content(entry.path()), content(folder.path() / "three" / name)) << name;
+    ++files;
+  }
+  EXPECT_GE(files, 5u);
+}
+
+}  // namespace
+}  // namespace terrace::stream::store
