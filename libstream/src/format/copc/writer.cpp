@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -70,8 +71,10 @@ std::size_t records_within(std::uint64_t memory_bytes, std::size_t record_bytes)
 
 class CopcWriter final : public PointWriter {
  public:
-  CopcWriter(const std::string& path, const PointHeader& header, const WriterOptions& options)
+  CopcWriter(const std::string& path, const PointHeader& header, const WriterOptions& options,
+             std::size_t page_nodes)
       : path_(path),
+        page_nodes_(page_nodes),
         sink_(path, options.replace, options.stop),
         stop_(options.stop),
         records_(path, header, LasFormats::newer),
@@ -119,11 +122,13 @@ class CopcWriter final : public PointWriter {
     octree_.arrange();
     file_.evlr_offset = sink_.size();
     file_.evlrs = 1;
-    const std::string page = hierarchy();
-    sink_.write(evlr_head(kCopcUser, kCopcHierarchy, page.size()));
-    const std::uint64_t page_at = sink_.size();
-    sink_.write(page);
-    sink_.write_at(kLas14HeaderBytes + kLasVlrHeaderBytes, info(page_at, page.size()));
+    constexpr std::uint64_t kEvlrHeaderBytes = 60;
+    const std::uint64_t page_at = sink_.size() + kEvlrHeaderBytes;
+    const CopcHierarchy hierarchy = write_copc_hierarchy(octree_, page_at, page_nodes_);
+    sink_.write(evlr_head(kCopcUser, kCopcHierarchy, hierarchy.bytes.size()));
+    assert(sink_.size() == page_at);
+    sink_.write(hierarchy.bytes);
+    sink_.write_at(kLas14HeaderBytes + kLasVlrHeaderBytes, info(page_at, hierarchy.root_bytes));
     file_.compressed = true;
     sink_.write_at(0, las_header_text(records_, file_));
     sink_.commit();
@@ -153,21 +158,6 @@ class CopcWriter final : public PointWriter {
     sink_.write(coded);
   }
 
-  /// One page of all nodes. Those without points are there for their children.
-  [[nodiscard]] std::string hierarchy() const {
-    std::string page;
-    for (const OctreeNode& node : octree_.nodes) {
-      append_little_endian(page, static_cast<std::int32_t>(node.depth));
-      for (const std::uint32_t place : node.place) {
-        append_little_endian(page, static_cast<std::int32_t>(place));
-      }
-      append_little_endian(page, node.offset);
-      append_little_endian(page, static_cast<std::int32_t>(node.bytes));
-      append_little_endian(page, static_cast<std::int32_t>(node.points));
-    }
-    return page;
-  }
-
   [[nodiscard]] std::string info(std::uint64_t page_at, std::uint64_t page_bytes) const {
     std::string info;
     for (const double centre : octree_.centre) append_little_endian(info, centre);
@@ -183,6 +173,7 @@ class CopcWriter final : public PointWriter {
   }
 
   std::string path_;
+  std::size_t page_nodes_;
   Sink sink_;
   std::stop_token stop_;
   LasRecords records_;
@@ -201,7 +192,14 @@ class CopcWriter final : public PointWriter {
 
 std::unique_ptr<PointWriter> open_copc_writer(const std::string& path, const PointHeader& header,
                                               const WriterOptions& options) {
-  return std::make_unique<CopcWriter>(path, header, options);
+  return open_paged_copc_writer(path, header, options, kCopcPageNodes);
+}
+
+std::unique_ptr<PointWriter> open_paged_copc_writer(const std::string& path,
+                                                    const PointHeader& header,
+                                                    const WriterOptions& options,
+                                                    std::size_t page_nodes) {
+  return std::make_unique<CopcWriter>(path, header, options, page_nodes);
 }
 
 }  // namespace terrace::stream
