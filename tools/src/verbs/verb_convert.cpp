@@ -53,8 +53,8 @@ class ConvertCommand : public Command {
                                   .cell = cell_.value_or(0),
                                   .stop = stop_token(),
                                   .blocks_ahead = 8,
-                                  .threads = common.threads,
-                                  .selection = selection_.selection()};
+                                  .threads = common.threads};
+    reading.selection = selection_.selection(inputs_, reading, std::nullopt, common);
     DamageReport damage;
     if (skip_damaged_) reading.on_damage = damage.taker();
     const std::unique_ptr<stream::PointSource> source = stream::open_source(inputs_, reading);
