@@ -60,13 +60,36 @@ Octree cube_around(const LasRecords& records) {
   return octree;
 }
 
-/// How many records the builder may have in memory.
-std::size_t records_within(std::uint64_t memory_bytes, std::size_t record_bytes) {
-  // Beginnings of buckets; nodes on their way up and to the encoders.
-  constexpr std::uint64_t kBeside = 36u << 20;
-  constexpr std::uint64_t kLeast = 1u << 15, kMost = 1u << 19, kBesideRecord = 56;
-  const std::uint64_t room = memory_bytes - std::min(memory_bytes, kBeside);
-  return static_cast<std::size_t>(std::clamp(room / (record_bytes + kBesideRecord), kLeast, kMost));
+/// What the writer's parts may take of its memory. Results do not depend on it.
+struct Shares {
+  unsigned threads = 1;
+  std::size_t at_once = OctreeBuilder::kLeafPoints;  ///< records
+  std::uint64_t together = 0;                        ///< records at one place
+
+  /// The most that is held.
+  [[nodiscard]] std::uint64_t bytes(std::size_t record_bytes) const {
+    // Records and their coded bytes; a thread's, and those that wait.
+    const std::uint64_t node = 8 * OctreeBuilder::kMostPromoted * record_bytes * 8 / 5;
+    return OctreeBuilder::bytes_with(record_bytes, at_once) +
+           (threads > 1 ? threads + 1 : 1) * node;
+  }
+};
+
+Shares shares_within(std::uint64_t memory_bytes, unsigned threads, std::size_t record_bytes) {
+  constexpr std::size_t kMostAtOnce = std::size_t{1} << 19;
+  constexpr std::uint64_t kMostTogether = 1u << 24;
+  Shares shares;
+  for (shares.threads = std::max(1u, threads);
+       shares.threads > 1 && shares.bytes(record_bytes) > memory_bytes; --shares.threads) {
+  }
+  // A record at one place takes as much as one in memory at once, and is encoded with the others.
+  const std::uint64_t fixed = shares.bytes(record_bytes);
+  const std::uint64_t room = memory_bytes - std::min(memory_bytes, fixed);
+  const std::uint64_t each =
+      OctreeBuilder::bytes_with(record_bytes, 1) - OctreeBuilder::bytes_with(record_bytes, 0);
+  shares.together = std::min(kMostTogether, shares.at_once + room / (each + 3 * record_bytes));
+  shares.at_once += std::min(kMostAtOnce - shares.at_once, room / each);
+  return shares;
 }
 
 class CopcWriter final : public PointWriter {
@@ -80,9 +103,9 @@ class CopcWriter final : public PointWriter {
         records_(path, header, LasFormats::newer),
         vlr_(laz::Vlr::of(records_.layout().point_format, records_.layout().record_bytes,
                           laz::Vlr::kVariable)),
-        builder_(path, folder_of(path), records_.layout().record_bytes,
-                 records_within(options.memory_bytes, records_.layout().record_bytes)),
-        encoders_(vlr_, options.threads,
+        shares_(shares_within(options.memory_bytes, options.threads, record_bytes())),
+        builder_(path, folder_of(path), record_bytes(), shares_.at_once, shares_.together),
+        encoders_(vlr_, shares_.threads,
                   [this](std::span<const std::byte> coded) { write_chunk(coded); }) {
     std::string vlrs;
     append_vlr(vlrs, kCopcUser, kCopcInfo, std::string(kCopcInfoBytes, '\0'));
@@ -136,10 +159,13 @@ class CopcWriter final : public PointWriter {
 
   std::uint64_t points() const override { return records_.points(); }
   double rounding() const override { return records_.rounding(); }
+  std::uint64_t writing_bytes() const override { return Shares{}.bytes(record_bytes()); }
 
  private:
   /// GPS time in the point formats 6 to 8.
   static constexpr std::size_t kGpsTimeAt = 22;
+
+  [[nodiscard]] std::size_t record_bytes() const { return records_.layout().record_bytes; }
 
   /// The chunk of the next node that has points.
   void write_chunk(std::span<const std::byte> coded) {
@@ -179,6 +205,7 @@ class CopcWriter final : public PointWriter {
   LasRecords records_;
   LasFile file_;
   laz::Vlr vlr_;
+  Shares shares_;
   OctreeBuilder builder_;
   Octree octree_;            ///< nodes as they come from the builder
   std::size_t written_ = 0;  ///< of them
