@@ -31,7 +31,7 @@ struct GeoTiffOptions {
   Crs crs;                      ///< EPSG codes, else its GeoKeys, and the name as a citation
   std::optional<double> nodata;
   GeoTiffCompression compression = GeoTiffCompression::deflate;
-  int level = 6;             ///< of the compression: 1 to 12 (deflate), 1 to 22 (zstd)
+  int level = 7;             ///< of the compression: 1 to 12 (libdeflate's), 1 to 22 (zstd)
   bool predictor = true;     ///< code differences of neighbours: smaller for terrain
   std::uint32_t tile = 256;  ///< columns and rows of a tile, a multiple of 16
   GeoTiffOverviews overviews = GeoTiffOverviews::none;
