@@ -2,14 +2,24 @@
 #include "fuzz_points.hpp"
 #include "terrace/stream/raster.hpp"
 
-/// Any bytes as a GeoTIFF: an Error, or points within the raster and as many as announced at most.
+/// Any bytes as a GeoTIFF: an Error, or points within the raster and as many as announced at most;
+/// so is a region of it.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace terrace::stream;
   const MemoryFile file(data, size);
   try {
     const RasterOptions raster{.memory_bytes = 4u << 20};
-    const SourceOptions options{.block_points = 1000, .memory_bytes = 4u << 20};
-    read_cells(*points_of(open_geotiff(file.name(), raster), options), options.block_points);
+    SourceOptions options{.block_points = 1000, .memory_bytes = 4u << 20};
+    const auto whole = points_of(open_geotiff(file.name(), raster), options);
+    const SourceInfo& info = whole->info();
+    const auto columns = static_cast<double>(info.columns), rows = static_cast<double>(info.rows);
+    options.selection.region =
+        world_box(info, {{columns / 3, rows / 3, 0}, {columns / 2, rows / 2, 0}});
+    const auto part = points_of(open_geotiff(file.name(), raster), options);
+    const std::uint64_t cells = info.columns * info.rows;
+    require(*part->info().points + part->progress().excluded == cells, "all cells counted");
+    read_cells(*part, options.block_points);
+    read_cells(*whole, options.block_points);
   } catch (const Error& error) {
     require(!error.parts().cause.empty(), "a cause");
   }

@@ -1,18 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <iostream>
 #include <optional>
+#include <random>
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "format/copc/hierarchy.hpp"
+#include "io/bytes.hpp"
 #include "las_files.hpp"
 #include "octree_testing.hpp"
 #include "point_files.hpp"
@@ -66,6 +71,76 @@ Octree octree_of(const std::vector<std::vector<HierarchyEntry>>& pages, std::uin
 std::string refusal_of(const std::vector<std::vector<HierarchyEntry>>& pages, std::uint64_t points,
                        const std::string& info = {}) {
   return error_of([&] { static_cast<void>(octree_of(pages, points, info)); });
+}
+
+/// A node's subtree of random shape, its points one behind the other from `offset` on.
+void grow(std::mt19937_64& random, Octree& octree, const OctreeNode& node, std::uint64_t& offset) {
+  OctreeNode& here = octree.nodes.emplace_back(node);
+  here.points = node.depth == 0 || random() % 8 == 0 ? 0 : 1 + random() % 9;
+  if (here.points > 0) {
+    here.offset = offset;
+    here.bytes = 1 + random() % 30;
+    offset += here.bytes;
+  }
+  for (std::uint32_t child = 0; child < 8 && node.depth < 7; ++child) {
+    if (random() % 100 >= 48 + 20 / (node.depth + 1)) continue;
+    OctreeNode next{.depth = node.depth + 1};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      next.place[axis] = 2 * node.place[axis] + (child >> axis & 1);
+    }
+    grow(random, octree, next, offset);
+  }
+}
+
+TEST(CopcHierarchy, PagesHoldAllNodesAndNoneIsLarge) {
+  constexpr std::uint64_t kSeed = 3;
+  std::cout << "seed " << kSeed << '\n';
+  std::mt19937_64 random(kSeed);
+  std::size_t most_pages = 0;
+  for (int round = 0; round < 40; ++round) {
+    SCOPED_TRACE(round);
+    Octree octree{.centre = {}, .half_size = 8, .spacing = 1, .nodes = {}};
+    std::uint64_t offset = kFirstChunk;
+    grow(random, octree, {}, offset);
+    ASSERT_EQ(octree.arrange(), nullptr);
+    const std::size_t page_nodes = std::size_t{1} << (4 + random() % 8);
+    const CopcHierarchy written = write_copc_hierarchy(octree, offset, page_nodes);
+
+    std::vector<std::byte> bytes(offset);
+    for (const char c : written.bytes) bytes.push_back(static_cast<std::byte>(c));
+    std::string info = info_of(written.root_bytes);
+    put(info, 40, offset);
+    const auto file = bytes_in_memory("made", std::move(bytes));
+    const Octree read = read_copc_hierarchy(*file, info, kFirstChunk, octree.points());
+    std::vector<OctreeNode> with_points = octree.nodes;
+    std::erase_if(with_points, [](const OctreeNode& node) { return node.points == 0; });
+    ASSERT_EQ(read.nodes.size(), with_points.size());
+    for (std::size_t i = 0; i < with_points.size(); ++i) {
+      ASSERT_EQ(name_of(read.nodes[i]), name_of(with_points[i]));
+      ASSERT_EQ(read.nodes[i].offset, with_points[i].offset);
+      ASSERT_EQ(read.nodes[i].bytes, with_points[i].bytes);
+      ASSERT_EQ(read.nodes[i].points, with_points[i].points);
+    }
+    // The pages behind the root's are whole, and follow one another.
+    std::uint64_t next = offset + written.root_bytes;
+    std::size_t pages = 0;
+    for (std::size_t at = 0; at < written.root_bytes; at += 32) {
+      const char* const entry = written.bytes.data() + at;
+      if (load_little_endian<std::int32_t>(entry + 28) != -1) continue;
+      const auto page_bytes = load_little_endian<std::int32_t>(entry + 24);
+      EXPECT_EQ(load_little_endian<std::uint64_t>(entry + 16), next);
+      EXPECT_LE(page_bytes, static_cast<std::int32_t>(32 * page_nodes));
+      EXPECT_EQ(std::string_view(entry, 16),
+                std::string_view(written.bytes).substr(next - offset, 16));
+      next += static_cast<std::uint64_t>(page_bytes);
+      ++pages;
+    }
+    EXPECT_EQ(next, offset + written.bytes.size());
+    EXPECT_EQ(pages == 0, octree.nodes.size() <= page_nodes);
+    EXPECT_EQ(written.bytes.size(), 32 * (octree.nodes.size() + pages));
+    most_pages = std::max(most_pages, pages);
+  }
+  EXPECT_GT(most_pages, 100u);
 }
 
 TEST(CopcOctree, NodesComeDepthFirstInMortonOrder) {

@@ -42,7 +42,7 @@ struct BuiltNode {
 /// The octree of places in a cube of kCubeSide steps from 0.
 std::vector<BuiltNode> built(const std::vector<Place>& places, std::size_t at_once) {
   constexpr std::size_t kRecord = 16;
-  OctreeBuilder builder("made", {}, kRecord, at_once);
+  OctreeBuilder builder("made", {}, kRecord, at_once, std::uint64_t{1} << 24);
   std::vector<std::byte> records;
   for (std::size_t i = 0; i < places.size(); ++i) {
     append_values(records, places[i][0], places[i][1], places[i][2], static_cast<std::uint32_t>(i));
@@ -169,6 +169,23 @@ TEST(OctreeBuilder, PointsInOnePlaceEndAtTheDeepestNode) {
   EXPECT_GT(most, 39'000u);
 }
 
+TEST(OctreeBuilder, MorePointsInOnePlaceThanAreAllowedAreRefused) {
+  constexpr std::uint64_t kMost = 50'000;
+  const auto build = [](std::uint64_t points) {
+    OctreeBuilder builder("made", {}, 12, 1, kMost);
+    builder.add(std::vector<std::byte>(12 * points));
+    const Octree octree{.centre = {1, 1, 1}, .half_size = 1, .spacing = 1, .nodes = {}};
+    std::uint64_t written = 0;
+    builder.build(octree, Lattice{}, [&](const OctreeNode& node, std::span<const std::byte>) {
+      written += node.points;
+    });
+    return written;
+  };
+  EXPECT_EQ(build(kMost), kMost);
+  EXPECT_NE(error_of([&] { build(kMost + 1); }).find("50001 points lie in one place"),
+            std::string::npos);
+}
+
 TEST(OctreeBuilder, NodesOfCloudsThatFillSpaceAreBounded) {
   std::mt19937_64 random(5);
   std::vector<Place> places;
@@ -183,7 +200,7 @@ TEST(OctreeBuilder, NodesOfCloudsThatFillSpaceAreBounded) {
   std::size_t found = 0;
   for (const BuiltNode& node : nodes) found += node.points.size();
   EXPECT_EQ(found, places.size());
-  EXPECT_EQ(nodes.back().points.size(), 8u << 15);
+  EXPECT_EQ(nodes.back().points.size(), 8 * OctreeBuilder::kMostPromoted);
 }
 
 /// All points of a source, written as COPC.

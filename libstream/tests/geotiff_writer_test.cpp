@@ -5,14 +5,23 @@
 #include <cmath>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <iterator>
+#include <numeric>
+#include <optional>
 #include <random>
 #include <span>
+#include <stop_token>
 #include <string>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
+#include <tiffio.h>
 #include <unistd.h>
 
 #include "gdal_tools.hpp"
@@ -43,6 +52,7 @@ TEST(GeoTiffWriter, WhatIsWrittenIsReadBack) {
     options.sample.type = static_cast<ScalarType>(round % 10);
     options.compression = static_cast<GeoTiffCompression>(random() % 3);
     options.predictor = random() % 2 == 0;
+    options.overviews = static_cast<GeoTiffOverviews>(random() % 3);
     options.pixel_is_point = random() % 2 == 0;
     options.world = {{30, 0, 500015, 0, -30, 4000015}};
     if (random() % 4 == 0) options.world = {{30, 1, 500015, -1, 30, 4000015}};
@@ -159,6 +169,221 @@ TEST(GeoTiffWriter, TilesNotWrittenHaveNoData) {
   EXPECT_EQ(whole.valid[31], 0);
 }
 
+/// A level of a GeoTIFF as libtiff reads it; tiles that are left out hold `missing`.
+template <class T>
+struct ReadLevel {
+  std::uint32_t columns = 0, rows = 0;
+  std::vector<T> samples;
+
+  ReadLevel(const fs::path& path, unsigned level, T missing) {
+    TIFFSetWarningHandler(nullptr);  // of tags that libtiff does not know
+    TIFF* const tiff = TIFFOpen(path.c_str(), "r");
+    EXPECT_NE(tiff, nullptr);
+    EXPECT_EQ(TIFFSetDirectory(tiff, static_cast<std::uint16_t>(level)), 1);
+    std::uint32_t side = 0, kind = 0;
+    TIFFGetField(tiff, TIFFTAG_IMAGEWIDTH, &columns);
+    TIFFGetField(tiff, TIFFTAG_IMAGELENGTH, &rows);
+    TIFFGetField(tiff, TIFFTAG_TILEWIDTH, &side);
+    EXPECT_EQ(TIFFGetField(tiff, TIFFTAG_SUBFILETYPE, &kind), level > 0 ? 1 : 0);
+    samples.assign(std::size_t{columns} * rows, missing);
+    std::vector<T> tile(std::size_t{side} * side);
+    for (std::uint32_t top = 0; top < rows; top += side) {
+      for (std::uint32_t left = 0; left < columns; left += side) {
+        const std::uint32_t number = TIFFComputeTile(tiff, left, top, 0, 0);
+        if (TIFFGetStrileByteCount(tiff, number) == 0) continue;
+        EXPECT_EQ(TIFFReadEncodedTile(tiff, number, tile.data(), -1),
+                  static_cast<tmsize_t>(tile.size() * sizeof(T)));
+        for (std::uint32_t r = 0; r < std::min(side, rows - top); ++r) {
+          std::copy_n(tile.begin() + r * side, std::min(side, columns - left),
+                      samples.begin() + std::size_t{top + r} * columns + left);
+        }
+      }
+    }
+    EXPECT_EQ(TIFFLastDirectory(tiff) != 0, columns <= 512 && rows <= 512);
+    TIFFClose(tiff);
+  }
+};
+
+/// Writes samples with overviews, tiles without data left out: in a random order, or the order of a
+/// quadtree, in which some are never told of.
+template <class T>
+void write_with_overviews(const fs::path& path, const GeoTiffOptions& options,
+                          const std::vector<T>& samples, std::mt19937_64& random) {
+  GeoTiffWriter writer(path, options);
+  const std::uint32_t side = options.tile;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> places;
+  for (std::uint32_t down = 0; down * side < options.rows; ++down) {
+    for (std::uint32_t across = 0; across * side < options.columns; ++across) {
+      places.emplace_back(across, down);
+    }
+  }
+  std::shuffle(places.begin(), places.end(), random);
+  for (const auto& [across, down] : places) {
+    // What hangs over the edge is not to be seen.
+    std::vector<T> tile(std::size_t{side} * side, T(99));
+    bool any = false;
+    for (std::uint32_t r = 0; r < std::min(side, options.rows - down * side); ++r) {
+      for (std::uint32_t c = 0; c < std::min(side, options.columns - across * side); ++c) {
+        const T value = samples[std::size_t{down * side + r} * options.columns + across * side + c];
+        tile[std::size_t{r} * side + c] = value;
+        any = any || !options.nodata || value != static_cast<T>(*options.nodata);
+      }
+    }
+    if (any) {
+      writer.write_tile(across, down, std::as_bytes(std::span(tile)));
+    } else if (random() % 2 == 0) {
+      writer.write_tile(across, down, {});
+    }
+  }
+  writer.commit();
+}
+
+std::string bytes_of(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+template <class T>
+void expect_overviews(std::mt19937_64& random, GeoTiffOverviews overviews,
+                      std::optional<double> nodata) {
+  const TempFolder folder;
+  const fs::path path = folder.path() / "x.tif";
+  GeoTiffOptions options;
+  options.columns = 513 + static_cast<std::uint32_t>(random() % 1600);
+  options.rows = 1 + static_cast<std::uint32_t>(random() % 900);
+  if (random() % 2 == 0) std::swap(options.columns, options.rows);
+  options.tile = 32 * (1 + static_cast<std::uint32_t>(random() % 4));
+  options.sample.type = std::is_same_v<T, float>          ? ScalarType::f32
+                        : std::is_same_v<T, std::uint8_t> ? ScalarType::u8
+                                                          : ScalarType::i16;
+  options.nodata = nodata;
+  options.overviews = overviews;
+  options.replace = true;
+  std::vector<T> samples(std::size_t{options.columns} * options.rows);
+  // Data in squares of 100 cells here and there, with holes.
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const std::size_t column = i % options.columns, row = i / options.columns;
+    const bool there =
+        !nodata || (((column / 100 * 7 + row / 100 * 5) % 3 == 0) && random() % 5 != 0);
+    samples[i] = there ? static_cast<T>(1 + random() % 250) : static_cast<T>(*nodata);
+  }
+  write_with_overviews(path, options, samples, random);
+  const std::string first = bytes_of(path);
+  write_with_overviews(path, options, samples, random);
+  EXPECT_EQ(bytes_of(path), first) << "depends on the order of the tiles";
+
+  std::uint32_t columns = options.columns, rows = options.rows;
+  std::vector<T> below = samples;
+  unsigned level = 0;
+  for (;; ++level) {
+    SCOPED_TRACE(level);
+    const ReadLevel<T> read(path, level, static_cast<T>(nodata.value_or(0)));
+    ASSERT_EQ(read.columns, columns);
+    ASSERT_EQ(read.rows, rows);
+    ASSERT_EQ(read.samples, below);
+    if (columns <= 512 && rows <= 512) break;
+    const std::uint32_t half_columns = (columns + 1) / 2, half_rows = (rows + 1) / 2;
+    std::vector<T> half(std::size_t{half_columns} * half_rows);
+    for (std::uint32_t r = 0; r < half_rows; ++r) {
+      for (std::uint32_t c = 0; c < half_columns; ++c) {
+        std::vector<T> some;
+        for (std::uint32_t y = 2 * r; y < std::min(2 * r + 2, rows); ++y) {
+          for (std::uint32_t x = 2 * c; x < std::min(2 * c + 2, columns); ++x) {
+            const T value = below[std::size_t{y} * columns + x];
+            if (!nodata || value != static_cast<T>(*nodata)) some.push_back(value);
+          }
+        }
+        T& cell = half[std::size_t{r} * half_columns + c];
+        if (some.empty()) {
+          cell = static_cast<T>(nodata.value_or(0));
+        } else if (overviews == GeoTiffOverviews::nearest) {
+          cell = some.front();
+        } else {
+          const double mean = std::accumulate(some.begin(), some.end(), 0.0) / double(some.size());
+          cell = static_cast<T>(std::is_integral_v<T> ? std::floor(mean + 0.5) : mean);
+        }
+      }
+    }
+    below = std::move(half);
+    columns = half_columns;
+    rows = half_rows;
+  }
+  EXPECT_GE(level, 1u);
+}
+
+TEST(GeoTiffWriter, OverviewsAreTheMeansOfWhatHasData) {
+  constexpr std::uint64_t kSeed = 5;
+  std::cout << "seed " << kSeed << '\n';
+  std::mt19937_64 random(kSeed);
+  for (int round = 0; round < 6; ++round) {
+    SCOPED_TRACE(round);
+    expect_overviews<float>(random, GeoTiffOverviews::average, -9999);
+    expect_overviews<std::int16_t>(random, GeoTiffOverviews::average, -32768);
+    expect_overviews<std::uint8_t>(random, GeoTiffOverviews::average, 0);
+    expect_overviews<float>(random, GeoTiffOverviews::nearest, -9999);
+    expect_overviews<float>(random, GeoTiffOverviews::average, std::nullopt);
+  }
+}
+
+/// Means of opposite samples are not taken for no data.
+TEST(GeoTiffWriter, OverviewsHaveDataWhereTheMeanIsTheValueOfNone) {
+  const TempFolder folder;
+  const fs::path path = folder.path() / "x.tif";
+  GeoTiffOptions options;
+  options.columns = 514;
+  options.rows = 2;
+  options.sample.type = ScalarType::i16;
+  options.nodata = 0;
+  options.overviews = GeoTiffOverviews::average;
+  std::vector<std::int16_t> samples(1028);
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    samples[i] = static_cast<std::int16_t>(i % 2 == 0 ? 7 : -7);
+  }
+  GeoTiffWriter writer(path, options);
+  writer.write_rows(std::as_bytes(std::span(samples)));
+  writer.commit();
+  const ReadLevel<std::int16_t> read(path, 1, 0);
+  EXPECT_EQ(read.columns, 257u);
+  EXPECT_EQ(std::count(read.samples.begin(), read.samples.end(), 0), 0);
+}
+
+/// GDAL calls it a COG, and reads from its overviews.
+TEST(GeoTiffWriter, GdalFindsTheOverviews) {
+  if (!has_gdal()) GTEST_SKIP() << "needs gdalinfo";
+  const TempFolder folder;
+  const std::string path = (folder.path() / "x.tif").string();
+  GeoTiffOptions options;
+  options.columns = 2100;
+  options.rows = 1300;
+  options.sample.type = ScalarType::f32;
+  options.nodata = -9999;
+  options.overviews = GeoTiffOverviews::average;
+  std::vector<float> samples(std::size_t{2100} * 1300);
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    samples[i] = i % 977 == 0 ? -9999.0f : static_cast<float>(i % 2100 + 2 * (i / 2100));
+  }
+  GeoTiffWriter writer(path, options);
+  writer.write_rows(std::as_bytes(std::span(samples)));
+  writer.commit();
+  const nlohmann::json info = gdalinfo(path);
+  ASSERT_FALSE(info.is_discarded());
+  EXPECT_EQ(info["metadata"]["IMAGE_STRUCTURE"]["LAYOUT"], "COG");
+  const auto& overviews = info["bands"][0]["overviews"];
+  ASSERT_EQ(overviews.size(), 3u);
+  EXPECT_EQ(overviews[0]["size"], (nlohmann::json{1050, 650}));
+  EXPECT_EQ(overviews[2]["size"], (nlohmann::json{263, 163}));
+  EXPECT_EQ(output_of("gdalinfo '" + path + "' 2>&1 >/dev/null | head -3"), "");
+  const std::string half = (folder.path() / "half.tif").string();
+  output_of("gdal_translate -ovr 0 '" + path + "' '" + half + "'");
+  const WholeRaster read = read_whole(*open_geotiff(half));
+  const ReadLevel<float> level(path, 1, -9999);
+  ASSERT_EQ(read.cells(), level.samples.size());
+  for (std::size_t i = 0; i < read.cells(); ++i) {
+    ASSERT_EQ(read.valid[i] != 0, level.samples[i] != -9999.0f) << i;
+    ASSERT_TRUE(read.valid[i] == 0 || read.as<float>(i) == level.samples[i]) << i;
+  }
+}
+
 TEST(GeoTiffWriter, LeavesNothingWithoutCommitAndKeepsWhatIsThere) {
   const TempFolder folder;
   const fs::path path = folder.path() / "x.tif";
@@ -174,7 +399,25 @@ TEST(GeoTiffWriter, LeavesNothingWithoutCommitAndKeepsWhatIsThere) {
   EXPECT_THROW(GeoTiffWriter(path, options), Error);
 }
 
-TEST(GeoTiffWriter, AFileSizeLimitIsAnErrorAndLeavesNothing) {
+TEST(GeoTiffWriter, StopsWhileTilesAreCopied) {
+  const TempFolder folder;
+  std::stop_source stop;
+  GeoTiffOptions options;
+  options.columns = options.rows = 600;
+  options.overviews = GeoTiffOverviews::average;
+  options.stop = stop.get_token();
+  {
+    GeoTiffWriter writer(folder.path() / "x.tif", options);
+    writer.write_rows(std::vector<std::byte>(600 * 600 * 8));
+    stop.request_stop();
+    EXPECT_THROW(writer.commit(), Stopped);
+  }
+  EXPECT_TRUE(fs::is_empty(folder.path()));
+}
+
+class FileSizeLimit : public ::testing::TestWithParam<GeoTiffOverviews> {};
+
+TEST_P(FileSizeLimit, IsAnErrorAndLeavesNothing) {
   const TempFolder folder;
   const pid_t child = fork();
   ASSERT_GE(child, 0);
@@ -186,6 +429,7 @@ TEST(GeoTiffWriter, AFileSizeLimitIsAnErrorAndLeavesNothing) {
       GeoTiffOptions options;
       options.columns = options.rows = 2000;
       options.compression = GeoTiffCompression::none;
+      options.overviews = GetParam();
       GeoTiffWriter writer(folder.path() / "x.tif", options);
       writer.write_rows(std::vector<std::byte>(2000 * 2000 * 8));
       writer.commit();
@@ -200,6 +444,9 @@ TEST(GeoTiffWriter, AFileSizeLimitIsAnErrorAndLeavesNothing) {
   EXPECT_EQ(WEXITSTATUS(status), 0);
   EXPECT_TRUE(fs::is_empty(folder.path()));
 }
+
+INSTANTIATE_TEST_SUITE_P(GeoTiffWriter, FileSizeLimit,
+                         ::testing::Values(GeoTiffOverviews::none, GeoTiffOverviews::average));
 
 /// Sparse, so that the file stays small: what counts is that offsets are 64 bits wide.
 TEST(GeoTiffWriter, IsABigTiffWhereFourGigabytesMightNotDo) {

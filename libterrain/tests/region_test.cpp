@@ -18,6 +18,7 @@
 #include "base/portable_math.hpp"
 #include "temporary_folder.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/stream/source.hpp"
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
@@ -75,6 +76,22 @@ TEST(Region, TakesAllKindsOfGeoJson) {
     EXPECT_TRUE(region.contains({4, 4, 0}));   // a corner
     EXPECT_FALSE(region.contains({4.1, 2, 0}));
   }
+}
+
+TEST(Region, RestrictsWhatASourceDelivers) {
+  stream::Selection selection;
+  region_of(R"({"type":"Polygon","coordinates":[[[0,0],[4,0],[0,4]],[[1,1],[2,1],[1,2]]]})")
+      .restrict(selection);
+  ASSERT_TRUE(selection.region && selection.covers);
+  EXPECT_EQ(selection.region->min[0], 0);
+  EXPECT_EQ(selection.region->max[1], 4);
+  EXPECT_TRUE(selection.region->contains({1, 1, 1e300}));
+  EXPECT_TRUE(selection.covers({2, 2}));       // on the ring
+  EXPECT_FALSE(selection.covers({1.2, 1.2}));  // in the hole
+  EXPECT_FALSE(selection.covers({3, 3}));
+  Region::parse("1,2,3,4").restrict(selection);
+  EXPECT_EQ(selection.region->max[0], 3);
+  EXPECT_FALSE(selection.covers);
 }
 
 TEST(Region, RefusesHostileGeoJson) {

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""--where, --keep and --drop: what comes out is what Python's own filter leaves.
+"""--where, --region, --keep and --drop: what comes out is what Python's own filter leaves.
 
 TERRACE=path/to/terrace selection_cli_test.py
 """
@@ -21,6 +21,10 @@ def last_on_the_ground(p):
     return p['classification'] == 2 and p['return_number'] == p['number_of_returns']
 
 
+UTM_32 = ('PROJCS["WGS 84 / UTM zone 32N",GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],'
+          'PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],'
+          'PARAMETER["latitude_of_origin",0],PARAMETER["central_meridian",9],PARAMETER["scale_factor",0.9996],'
+          'PARAMETER["false_easting",500000],PARAMETER["false_northing",0],UNIT["metre",1]]')
 LAST_ON_THE_GROUND = 'classification == 2 && return_number == last'
 
 
@@ -139,18 +143,97 @@ class SelectionTest(unittest.TestCase):
         self.run_ok('points', self.path('r.st'), '-o', self.path('r2.csv'), '-q')
         self.expect('r2.csv', wanted, NAMES[:-1])
 
-    def test_region_of_a_raster_takes_the_cells_whose_centres_are_inside(self):
-        with open(self.path('r.asc'), 'w', encoding='ascii') as file:
-            file.write('ncols 40\nnrows 30\nxllcorner 0\nyllcorner 0\ncellsize 10\nNODATA_value -9\n')
+    def raster(self, name, side=10, prj=None):
+        """40 x 30 cells from the origin on, one row void. Returns the cells by their centres."""
+        with open(self.path(name), 'w', encoding='ascii') as file:
+            file.write(f'ncols 40\nnrows 30\nxllcorner 0\nyllcorner 0\ncellsize {side}\nNODATA_value -9\n')
             for row in range(30):
                 file.write(' '.join(str(-9 if row == 20 else row * 40 + column) for column in range(40)) + '\n')
-        centres = [(column * 10 + 5, 295 - row * 10, row * 40 + column)
-                   for row in range(30) if row != 20 for column in range(40)]
+        if prj:
+            with open(self.path(os.path.splitext(name)[0] + '.prj'), 'w', encoding='ascii') as file:
+                file.write(prj)
+        return [((column + 0.5) * side, (29.5 - row) * side, row * 40 + column)
+                for row in range(30) if row != 20 for column in range(40)]
+
+    def geojson(self, name, *polygons):
+        with open(self.path(name), 'w', encoding='ascii') as file:
+            json.dump({'type': 'MultiPolygon', 'coordinates': [
+                [ring + ring[:1] for ring in polygon] for polygon in polygons]}, file)
+        return self.path(name)
+
+    def test_region_of_a_raster_takes_the_cells_whose_centres_are_inside(self):
+        centres = self.raster('r.asc')
         wanted = sorted(c for c in centres if 95 <= c[0] <= 201 and 50 <= c[1] <= 165)
         summary = json.loads(self.run_ok('convert', self.path('r.asc'), '-o', self.path('cells.csv'), '--json',
                                          '--region', '95,50,201,165'))
         self.assertEqual(self.rows('cells.csv')[1], wanted)
-        self.assertEqual((summary['nodata'], summary['excluded']), (40, len(centres) - len(wanted)))
+        # Of what is not read it is not known whether it holds data.
+        self.assertEqual(summary['points'] + summary['nodata'] + summary['excluded'], 40 * 30)
+        self.assertTrue(11 <= summary['nodata'] <= 15, summary)
+        # The store of a part is the raster of a part.
+        summary = json.loads(self.run_ok('build', self.path('r.asc'), '-o', self.path('cropped.st'), '--json',
+                                         '--region', '95,50,201,165'))
+        self.assertEqual(summary['points'] + summary['nodata'] + summary['excluded'], 40 * 30)
+        self.run_ok('points', self.path('cropped.st'), '-o', self.path('cropped.csv'), '-q')
+        self.assertEqual(self.rows('cropped.csv')[1], wanted)
+        summary = json.loads(self.run_ok('raster', self.path('cropped.st'), '-o', self.path('cropped.tif'), '--json'))
+        self.assertTrue(11 <= summary['columns'] <= 15 and 12 <= summary['rows'] <= 16, summary)
+        self.assertEqual(summary['cells'] - summary['nodata'], len(wanted))
+        trial = json.loads(self.run_ok('build', self.path('r.asc'), '-o', self.path('trial.st'), '--json',
+                                       '--dry-run', '--region', '95,50,201,165'))
+        self.assertEqual(trial['points'], len(wanted))
+
+    def test_region_of_polygons(self):
+        """Closed, as a region of a store is: what lies on a ring is inside, of a hole's too."""
+        box = lambda x, y, side: [[x, y], [x + side, y], [x + side, y + side], [x, y + side]]
+        # A square with a hole, two triangles that overlap, and a square outside.
+        region = self.geojson('region.geojson', [box(55, 55, 200), box(105, 105, 50)],
+                              [[[205, 205], [395, 205], [205, 395]]], [[[205, 205], [395, 205], [395, 395]]],
+                              [box(5000, 5000, 10)])
+
+        def inside(x, y):
+            return (55 <= x <= 255 and 55 <= y <= 255 and not (105 < x < 155 and 105 < y < 155) or
+                    x >= 205 and y >= 205 and x + y <= 600 or y >= 205 and x <= 395 and y <= x)
+
+        centres = self.raster('polygons.asc')
+        for name, among in (('polygons.asc', [(c, inside(*c[:2])) for c in centres]),
+                            ('all.csv', [(tuple(map(float, p.values())), inside(p['x'], p['y'])) for p in self.points])):
+            with self.subTest(name=name):
+                wanted = sorted(c for c, chosen in among if chosen)
+                self.assertTrue(100 < len(wanted) < len(among) / 2)
+                self.run_ok('convert', self.path(name), '-o', self.path('c.csv'), '--force', '-q', '--region', region)
+                self.assertEqual(self.rows('c.csv')[1], wanted)
+                self.run_ok('build', self.path(name), '-o', self.path('p.st'), '--force', '-q', '--region', region)
+                self.run_ok('points', self.path('p.st'), '-o', self.path('p.csv'), '--force', '-q')
+                self.assertEqual(self.rows('p.csv')[1], wanted)
+                # The same of a store of all of it.
+                self.run_ok('build', self.path(name), '-o', self.path('w.st'), '--force', '-q')
+                self.run_ok('points', self.path('w.st'), '-o', self.path('p.csv'), '--force', '-q', '--region', region)
+                self.assertEqual(self.rows('p.csv')[1], wanted)
+
+    def test_region_in_another_crs(self):
+        """Law: what a region takes of a file it takes of a store of the file."""
+        self.raster('utm.asc', 1000, UTM_32)
+        corners = [[4.52, 0.02], [4.77, 0.05], [4.83, 0.21], [4.6, 0.26]]
+        hole = [[4.6, 0.1], [4.7, 0.12], [4.66, 0.17]]
+        polygon = self.geojson('lonlat.geojson', [corners, hole])
+        self.run_ok('build', self.path('utm.asc'), '-o', self.path('utm.st'), '-q')
+        self.run_ok('convert', self.path('utm.asc'), '-o', self.path('utm.csv'), '-q')
+        for file in ('utm.asc', 'utm.csv'):
+            crs = ['--crs', 'EPSG:32632'] if file == 'utm.csv' else []
+            for region in (polygon, '4.6,0.05,4.7,0.2'):
+                with self.subTest(file=file, region=region):
+                    args = ['--region', region, '--region-crs', 'EPSG:4326', '-q', '--force', '-o']
+                    self.run_ok('points', self.path('utm.st'), *args, self.path('wanted.csv'))
+                    wanted = self.rows('wanted.csv')[1]
+                    self.assertGreater(len(wanted), 100)
+                    self.run_ok('build', self.path(file), *crs, *args, self.path('part.st'))
+                    self.run_ok('points', self.path('part.st'), '-o', self.path('found.csv'), '-q', '--force')
+                    self.assertEqual(self.rows('found.csv')[1], wanted)
+                    if not crs:
+                        self.run_ok('convert', self.path(file), '-o', self.path('found.csv'), '-q', '--force',
+                                    '--region', region, '--region-crs', 'EPSG:4326')
+                        self.assertEqual(self.rows('found.csv')[1], wanted)
 
     def test_points_of_a_store(self):
         self.run_ok('points', self.path('all.st'), '-o', self.path('p.csv'), '-q',
@@ -178,6 +261,10 @@ class SelectionTest(unittest.TestCase):
                 (['convert', self.file, '-o', self.path('e.csv'), '--drop', 'red,,green'], 2, 'a name is empty'),
                 (['build', self.file, '-o', self.path('e.st'), '--region', '-9,-9,-8,-8'], 1, 'none of its 20000 points is selected'),
                 (['build', self.file, '-o', self.path('e.st'), '--region', '1,2,3'], 2, 'minx,miny,maxx,maxy'),
+                (['build', self.file, '-o', self.path('e.st'), '--region', '1,2,3,4', '--region-crs', 'EPSG:4326'], 1, 'has no known CRS'),
+                (['build', '-', '-o', self.path('e.st'), '--region', '1,2,3,4', '--region-crs', 'EPSG:4326'], 2, 'name a file'),
+                (['build', self.file, '-o', self.path('e.st'), '--region-crs', 'EPSG:4326'], 2, '--region'),
+                (['convert', self.file, '-o', self.path('e.csv'), '--region', 'nowhere.geojson'], 1, 'neither a box nor a file'),
                 (['convert', self.file, '-o', self.path('e.csv'), '--resolution', '1'], 1, 'has no octree'),
                 (['convert', self.file, '-o', self.path('e.csv'), '--resolution', '0'], 2, '--resolution'),
                 (['mesh', self.path('all.st'), '-o', self.path('e.ply'), '--where', 'z > 1'], 2, '--max-error'),

@@ -2,9 +2,11 @@
 #include "format/selection.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <functional>
 #include <optional>
 #include <string>
 #include <utility>
@@ -25,6 +27,7 @@ class SelectedSource final : public PointSource {
     const Selection& wanted = options.selection;
     info_ = all;
     region_ = wanted.region;
+    covers_ = wanted.covers;
     if (!wanted.where.empty()) where_.emplace(wanted.where, all);
     if (where_ || region_) {
       if (!all.grid) info_.points.reset();
@@ -124,7 +127,11 @@ class SelectedSource final : public PointSource {
     if (where_) where_->test(read_.positions, read_.payload, matches_);
     if (region_) {
       for (std::size_t i = 0; i < read_.size(); ++i) {
-        if (!region_->contains(world_point(source_->info(), read_.positions[i]))) matches_[i] = 0;
+        if (matches_[i] == 0) continue;
+        const Point3 place = world_point(source_->info(), read_.positions[i]);
+        if (!region_->contains(place) || (covers_ && !covers_({place[0], place[1]}))) {
+          matches_[i] = 0;
+        }
       }
     }
     const std::size_t before = block.payload.size();
@@ -154,6 +161,7 @@ class SelectedSource final : public PointSource {
   SourceInfo info_;
   std::optional<Where> where_;
   std::optional<Box3> region_;
+  std::function<bool(const std::array<double, 2>&)> covers_;
   std::vector<Piece> pieces_;
   std::optional<std::size_t> withheld_attribute_;
   PointBlock read_, rest_;

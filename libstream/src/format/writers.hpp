@@ -40,6 +40,11 @@ std::unique_ptr<PointWriter> open_las_writer(const std::string& path, const Poin
                                              const WriterOptions& options);
 std::unique_ptr<PointWriter> open_copc_writer(const std::string& path, const PointHeader& header,
                                               const WriterOptions& options);
+/// The same with so many nodes in a page of the hierarchy: see write_copc_hierarchy().
+std::unique_ptr<PointWriter> open_paged_copc_writer(const std::string& path,
+                                                    const PointHeader& header,
+                                                    const WriterOptions& options,
+                                                    std::size_t page_nodes);
 std::unique_ptr<PointWriter> open_laz_writer(const std::string& path, const PointHeader& header,
                                              const WriterOptions& options);
 

@@ -139,7 +139,12 @@ class Mosaic final : public Raster {
     std::optional<RasterInfo> first;
     for (const std::string& file : files) {
       const std::unique_ptr<Raster> raster = opener_(file);
-      const RasterInfo& info = raster->info();
+      // A member may be a part of its file.
+      RasterInfo info = raster->info();
+      for (std::string& name : info.files) {
+        if (files_.empty() || files_.back() != name) files_.push_back(std::move(name));
+      }
+      info.files = {file};
       if (!first) {
         first = info;
       } else {
@@ -207,10 +212,9 @@ class Mosaic final : public Raster {
     std::vector<std::string> comments = std::move(info_.comments);
     info_ = first;
     info_.comments = std::move(comments);
-    info_.files.clear();
+    info_.files = std::move(files_);
     for (Member& member : members_) {
       info_.held_bytes = std::max(info_.held_bytes, member.held_bytes);
-      info_.files.push_back(member.file);
       member.column -= left;
       member.row -= top;
     }
@@ -261,6 +265,7 @@ class Mosaic final : public Raster {
   std::size_t open_at_once_;
   std::uint64_t open_bytes_, held_bytes_ = 0;
   RasterInfo info_;
+  std::vector<std::string> files_;  ///< of info_, until it is complete
   std::vector<Member> members_;
   std::list<Open> open_;  // the latest used first
 };

@@ -3,6 +3,8 @@
 #include <cassert>
 #include <cmath>
 #include <cstring>
+#include <limits>
+#include <optional>
 #include <utility>
 
 #include "raster/order.hpp"
@@ -50,17 +52,70 @@ SourceInfo source_info(const RasterInfo& raster, const SourceOptions& options) {
   return info;
 }
 
+/// The cells that may lie in a region, some around its border included; all without a region.
+CellWindow cells_in(const SourceInfo& info, const std::optional<Box3>& region) {
+  const CellWindow all{.column = 0, .row = 0, .columns = info.columns, .rows = info.rows};
+  if (!region) return all;
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  std::array<double, 2> low{kInfinity, kInfinity}, high{-kInfinity, -kInfinity};
+  for (const double x : {region->min[0], region->max[0]}) {
+    for (const double y : {region->min[1], region->max[1]}) {
+      const std::array<double, 2> place = stored_place(info, {x, y});
+      for (std::size_t axis = 0; axis < 2; ++axis) {
+        if (!std::isfinite(place[axis])) return all;
+        low[axis] = std::min(low[axis], place[axis]);
+        high[axis] = std::max(high[axis], place[axis]);
+      }
+    }
+  }
+  // A cell more on each side: places are rounded.
+  const auto cell = [](double place, std::uint64_t count) {
+    return static_cast<std::uint64_t>(std::clamp(place, 0.0, static_cast<double>(count)));
+  };
+  const std::uint64_t left = cell(std::floor(low[0]) - 1, info.columns);
+  const std::uint64_t top = cell(std::floor(low[1]) - 1, info.rows);
+  return {.column = left,
+          .row = top,
+          .columns = cell(std::ceil(high[0]) + 2, info.columns) - left,
+          .rows = cell(std::ceil(high[1]) + 2, info.rows) - top};
+}
+
+std::uint64_t cells_of(const CellWindow& window) { return window.columns * window.rows; }
+
+/// How long a part from cell `from` of a crop on is that is to have `size` cells of it. It ends
+/// with a block of the file where it can, so that blocks are decoded once.
+std::uint64_t part_length(std::uint64_t from, std::uint64_t size, std::uint64_t whole,
+                          std::uint64_t crop_begin, std::uint64_t block) {
+  if (size >= whole - from) return whole - from;
+  const std::uint64_t begin = crop_begin + from;
+  const std::uint64_t end = (begin + size) / block * block;
+  return size < block || end <= begin ? size : end - begin;
+}
+
 class RasterSource final : public PointSource {
  public:
   RasterSource(std::unique_ptr<Raster> raster, const SourceOptions& options)
       : raster_(std::move(raster)),
         info_(source_info(raster_->info(), options)),
+        crop_(cells_in(info_, options.selection.region)),
         block_points_(std::clamp<std::size_t>(options.block_points, 1, kMostBlockPoints)) {
+    progress_.excluded = *info_.points - cells_of(crop_);
+    if (cells_of(crop_) == 0) {
+      row_ = info_.rows;  // there is nothing to read
+    } else {
+      std::array<double, 6>& m = info_.world.xy;
+      const auto column = static_cast<double>(crop_.column), row = static_cast<double>(crop_.row);
+      m[2] += m[0] * column + m[1] * row;
+      m[5] += m[3] * column + m[4] * row;
+      info_.columns = crop_.columns;
+      info_.rows = crop_.rows;
+    }
+    info_.points = cells_of(crop_);
     lay_out(transform_aspect(info_.world), window_bytes(options.memory_bytes));
   }
 
   void refine(double cell_aspect, std::uint64_t memory_bytes) override {
-    assert(cell_aspect > 0 && row_ == 0 && column_ == 0);
+    assert(cell_aspect > 0 && column_ == 0 && (row_ == 0 || info_.points == 0));
     const std::uint64_t window = window_bytes(memory_bytes);
     lay_out(cell_aspect, window);
     raster_->set_open_bytes(memory_bytes - window);
@@ -84,7 +139,10 @@ class RasterSource final : public PointSource {
     aspect_ = cell_aspect;
     const std::size_t cell_bytes = size_of(raster_->info().sample.type) + 1;
     const std::uint64_t cells = std::min(bytes / cell_bytes, kMostTiles * block_points_ / 2);
-    window_size_ = window_size(raster_->info(), cells, block_points_, aspect_);
+    RasterInfo crop = raster_->info();
+    crop.columns = info_.columns;
+    crop.rows = info_.rows;
+    window_size_ = window_size(crop, cells, block_points_, aspect_);
     reading_bytes_ =
         window_size_.columns * window_size_.rows * cell_bytes + raster_->info().held_bytes;
   }
@@ -92,17 +150,20 @@ class RasterSource final : public PointSource {
   /// Reads the next window; false after the last. One without valid cells leaves no tiles.
   bool next_window() {
     if (row_ >= info_.rows) return false;
-    window_ = {.column = column_,
-               .row = row_,
-               .columns = std::min(window_size_.columns, info_.columns - column_),
-               .rows = std::min(window_size_.rows, info_.rows - row_)};
+    const RasterInfo& file = raster_->info();
+    window_ = {
+        .column = column_,
+        .row = row_,
+        .columns = part_length(column_, window_size_.columns, info_.columns, crop_.column,
+                               file.block_columns),
+        .rows = part_length(row_, window_size_.rows, info_.rows, crop_.row, file.block_rows)};
     column_ += window_.columns;
     if (column_ == info_.columns) {
       column_ = 0;
       row_ += window_.rows;
     }
-    const std::size_t cells = window_.columns * window_.rows;
-    const ScalarType type = raster_->info().sample.type;
+    const std::size_t cells = cells_of(window_);
+    const ScalarType type = file.sample.type;
     std::fill_n(valid_.begin(), dirty_cells_, std::uint8_t{0});
     dirty_cells_ = 0;
     if (valid_.size() < cells) {
@@ -112,8 +173,12 @@ class RasterSource final : public PointSource {
     next_tile_ = 0;
     order_.clear();
     dirty_cells_ = cells;  // even if reading throws
+    const CellWindow in_file{.column = crop_.column + window_.column,
+                             .row = crop_.row + window_.row,
+                             .columns = window_.columns,
+                             .rows = window_.rows};
     const bool any = raster_->read_over(
-        window_, {.samples = samples_.data(), .valid = valid_.data(), .stride = window_.columns});
+        in_file, {.samples = samples_.data(), .valid = valid_.data(), .stride = window_.columns});
     if (!any) {
       dirty_cells_ = 0;
       progress_.nodata += cells;
@@ -186,15 +251,16 @@ class RasterSource final : public PointSource {
   }
 
   std::unique_ptr<Raster> raster_;
-  SourceInfo info_;
+  SourceInfo info_;  ///< columns and rows count from the crop's first cell
+  CellWindow crop_;  ///< of the file, around Selection::region
   std::size_t block_points_;
   double aspect_ = 1;
   GridSize window_size_;
   std::uint64_t reading_bytes_ = 0;
 
   std::uint64_t column_ = 0, row_ = 0;  // where the next window begins
-  CellWindow window_;
-  std::vector<std::byte> samples_;  // of the window
+  CellWindow window_;                   // of the crop
+  std::vector<std::byte> samples_;      // of the window
   std::vector<std::uint8_t> valid_;
   std::size_t dirty_cells_ = 0;  // so many at the front of valid_ may not be zero
   GridSize tiles_;

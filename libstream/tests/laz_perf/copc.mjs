@@ -32,7 +32,13 @@ function isInside(record, key, {info, header}) {
 let faults = 0;
 for (const name of files) {
   const copc = await Copc.create(name);
-  const {nodes, pages} = await Copc.loadHierarchyPage(name, copc.info.rootHierarchyPage);
+  const nodes = {}, pages = [copc.info.rootHierarchyPage];
+  for (const page of pages) {  // grows
+    const read = await Copc.loadHierarchyPage(name, page);
+    Object.assign(nodes, read.nodes);
+    pages.push(...Object.values(read.pages));
+  }
+  if ((pages.length > 1) !== name.includes('pages')) ++faults;
   const found = [];
   let outside = 0, depths = 0;
   for (const [key, node] of Object.entries(nodes)) {
@@ -52,10 +58,10 @@ for (const name of files) {
   expected.sort();
   const same = found.length === expected.length && found.every((record, i) => record === expected[i]);
   const {cube, spacing, gpsTimeRange: [first, last]} = copc.info;
-  const good = same && outside === 0 && Object.keys(pages).length === 0 && copc.wkt.startsWith('LOCAL_CS') &&
+  const good = same && outside === 0 && copc.wkt.startsWith('LOCAL_CS') &&
     first === 1e8 && last === 1e8 + 0.001 * (found.length - 1) && Math.abs(spacing * 128 - (cube[3] - cube[0])) < 1e-6;
   if (!good) ++faults;
-  console.log(`${name}: ${found.length} points, ${Object.keys(nodes).length} nodes, ${depths} depths` +
+  console.log(`${name}: ${found.length} points, ${Object.keys(nodes).length} nodes, ${depths} depths, ${pages.length} pages` +
     (good ? '' : `, ${same ? 'the' : 'other'} records, ${outside} outside of their nodes`));
 }
 process.exit(files.length > 0 && faults === 0 ? 0 : 1);

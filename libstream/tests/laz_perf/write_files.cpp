@@ -12,13 +12,16 @@
 
 #include "../laz_testing.hpp"
 #include "../point_files.hpp"
+#include "format/writers.hpp"
 #include "terrace/stream/laz.hpp"
 #include "terrace/stream/point_writer.hpp"
 
 namespace {
 
-/// A wavy surface with the attributes of a point format, to a file of whatever its ending says.
-void write_scan(const std::filesystem::path& file, unsigned format, std::size_t points) {
+/// A wavy surface with the attributes of a point format, to a file of whatever its ending says; or
+/// to COPC with so many nodes in a page.
+void write_scan(const std::filesystem::path& file, unsigned format, std::size_t points,
+                std::size_t page_nodes = 0) {
   using namespace terrace::stream;
   PointHeader header;
   header.attributes = {{.name = "intensity", .type = ScalarType::u16},
@@ -32,7 +35,9 @@ void write_scan(const std::filesystem::path& file, unsigned format, std::size_t 
   }
   header.crs.wkt = "LOCAL_CS[\"made\"]";
   header.lattice = Lattice{.scale = {0.01, 0.01, 0.01}, .offset = {500'000, 5'000'000, 0}};
-  const auto writer = open_point_writer(file.string(), header, {.replace = true});
+  const auto writer =
+      page_nodes > 0 ? open_paged_copc_writer(file.string(), header, {.replace = true}, page_nodes)
+                     : open_point_writer(file.string(), header, {.replace = true});
   std::mt19937_64 random(format);
   PointBlock block;
   for (std::size_t i = 0; i < points; ++i) {
@@ -60,6 +65,9 @@ int main(int argc, char** argv) {
     write_scan(path + ".copc.laz", format, 100'000);
     write_scan(path + ".las", format, 100'000);
   }
+  // Of its few nodes each has a page.
+  write_scan(argv[2] + std::string("/pages.copc.laz"), 6, 100'000, 4);
+  write_scan(argv[2] + std::string("/pages.las"), 6, 100'000);
   const std::filesystem::path folder(argv[1]);
   const auto write = [](const std::filesystem::path& path, std::span<const std::byte> bytes) {
     std::ofstream file(path, std::ios::binary);

@@ -12,6 +12,7 @@
 #include "base/region_shape.hpp"
 #include "base/units.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/stream/source.hpp"
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
@@ -157,6 +158,14 @@ bool Region::contains(const stream::Point3& p) const {
 
 bool Region::covers(const Point2& place) const {
   return contains({place[0], place[1], std::clamp(0.0, box_.min[2], box_.max[2])});
+}
+
+void Region::restrict(stream::Selection& selection) const {
+  selection.region = box_;
+  selection.covers = {};
+  if (shape_) {
+    selection.covers = [shape = shape_](const Point2& place) { return shape->covers(place); };
+  }
 }
 
 Overlap Region::overlap(const stream::Box3& box) const {

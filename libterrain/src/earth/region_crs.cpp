@@ -20,7 +20,7 @@ namespace {
   throw stream::Error({.file = {},
                        .where = "region",
                        .cause = cause + " " + to.title(),
-                       .remedy = "give a smaller region, or one in the store's CRS"});
+                       .remedy = "give a smaller region, or one in the CRS of the data"});
 }
 
 class Outline {

@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <limits>
 #include <utility>
 
 #include "base/units.hpp"
@@ -38,6 +40,19 @@ Transformation transformation_to(const stream::Store& store, const std::string& 
 
 RegionConversion::RegionConversion(const stream::Store& store, Transformation to_regions)
     : to_regions_(std::move(to_regions)), bounds_(world_box(store.schema(), store.bounds())) {}
+
+RegionConversion::RegionConversion(const stream::SourceInfo& source, const CoordinateSystem& system,
+                                   const std::string& named) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  bounds_ = {{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}};
+  CoordinateSystem own = system;
+  if (source.grid) {
+    const auto end = [](std::uint64_t n) { return static_cast<double>(n); };
+    bounds_ = world_box(source, {{0, 0, 0}, {end(source.columns), end(source.rows), 0}});
+    own = own.over(bounds_);
+  }
+  to_regions_.emplace(std::move(own), CoordinateSystem::parse(named));
+}
 
 Region RegionConversion::operator()(Region region) const {
   if (!to_regions_) return region;

@@ -97,7 +97,11 @@ class RasterRun {
     options.crs = crs_;
     options.nodata = nodata_;
     options.tile = kRunTile;
+    options.overviews = request_.value == RasterValue::aspect ? stream::GeoTiffOverviews::nearest
+                                                              : stream::GeoTiffOverviews::average;
+    options.level = 6;  // overviews included as fast as the raster alone at 7, and hardly larger
     options.replace = request_.replace;
+    options.stop = context_.stop;
     stream::GeoTiffWriter writer(request_.output, options);
     const std::int64_t across = (grid_.columns + kRunTile - 1) / kRunTile;
     const std::int64_t down = (grid_.rows + kRunTile - 1) / kRunTile;
@@ -179,10 +183,11 @@ class RasterRun {
       make_tile(i, block[i].column * kRunTile, block[i].row * kRunTile);
     });
     for (std::size_t i = 0; i < block.size(); ++i) {
-      if (counts_[i] == 0) continue;
       outcome_.cells_with_data += counts_[i];
+      const std::span<const std::byte> samples = tiles_[i];
       writer.write_tile(static_cast<std::uint32_t>(block[i].column),
-                        static_cast<std::uint32_t>(block[i].row), tiles_[i]);
+                        static_cast<std::uint32_t>(block[i].row),
+                        counts_[i] == 0 ? samples.first(0) : samples);
     }
   }
 

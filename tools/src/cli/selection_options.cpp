@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/selection_options.hpp"
 
+#include <filesystem>
 #include <sstream>
+#include <system_error>
+#include <utility>
 #include <vector>
 
 #include "cli/cli.hpp"
+#include "earth/source_crs.hpp"
+#include "terrace/stream/error.hpp"
 #include "terrace/terrain/error.hpp"
 #include "terrace/terrain/region.hpp"
 
@@ -35,10 +40,13 @@ void add_where(CLI::App& app, std::string& where) {
 void SelectionOptions::define(CLI::App& app) {
   add_where(app, where_);
   app.add_option(
-         "--region", region_,
-         "only points inside a box in the CRS of the input; of COPC and EPT nothing else is "
-         "read")
-      ->type_name("MINX,MINY[,MINZ],MAXX,MAXY[,MAXZ]");
+      "--region", region_,
+      "only points inside: a box in the CRS of the input, minx,miny[,minz],maxx,maxy[,maxz], or "
+      "a GeoJSON file of polygons; of rasters, COPC and EPT little else is read");
+  app.add_option("--region-crs", region_crs_,
+                 "the CRS of the region (EPSG:n or a WKT file; x,y is lon,lat), if it is not the "
+                 "input's")
+      ->needs("--region");
   add_number(app, "--resolution", resolution_,
              "of COPC and EPT only the points down to this spacing, in units of its CRS",
              kAboveZero);
@@ -46,15 +54,41 @@ void SelectionOptions::define(CLI::App& app) {
   app.add_option("--drop", drop_, "all attributes but these")->type_name("NAME,NAME");
 }
 
-stream::Selection SelectionOptions::selection() const {
+terrain::RegionConversion SelectionOptions::conversion(
+    std::span<const std::string> inputs, const stream::SourceOptions& reading,
+    const std::optional<terrain::DatumShift>& shift) const {
+  for (const std::string& input : inputs) {
+    std::error_code ignored;
+    if (input == "-" || std::filesystem::is_fifo(input, ignored)) {
+      throw terrain::UsageError("--region-crs looks up the CRS of the input before it is read: " +
+                                input + " can be read only once; name a file");
+    }
+  }
+  const auto source = stream::open_source(inputs, reading);
+  const terrain::SourceCrs crs = terrain::crs_of_source(source->info(), shift);
+  if (!crs.system) {
+    throw stream::Error(
+        {.file = inputs.front(),
+         .where = {},
+         .cause = "has no known CRS, into which the region could be converted",
+         .remedy = "leave --region-crs out and give the region in its coordinates"});
+  }
+  return {source->info(), *crs.system, region_crs_};
+}
+
+stream::Selection SelectionOptions::selection(std::span<const std::string> inputs,
+                                              const stream::SourceOptions& reading,
+                                              const std::optional<terrain::DatumShift>& shift,
+                                              const CommonOptions& common) const {
   stream::Selection selection{.where = where_, .resolution = resolution_.value_or(0)};
   if (!region_.empty()) {
-    const terrain::Region region = terrain::Region::parse(region_);
-    if (!region.polygons().empty()) {
-      throw terrain::UsageError("--region of what is read is a box, not a file of polygons: " +
-                                region_);
+    terrain::Region region = terrain::Region::parse(region_);
+    if (!region_crs_.empty()) {
+      const terrain::RegionConversion converted = conversion(inputs, reading, shift);
+      region = converted(std::move(region));
+      if (!converted.note().empty()) common.say(converted.note());
     }
-    selection.region = region.box();
+    region.restrict(selection);
   }
   if (!keep_.empty()) selection.keep = names_in(keep_, "--keep");
   if (!drop_.empty()) selection.drop = names_in(drop_, "--drop");

@@ -2,23 +2,36 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 
 #include <CLI/CLI.hpp>
 #include <terrace/stream/source.hpp>
 
-/// --where, --region, --resolution, --keep and --drop of what reads files.
+#include "terrace/terrain/crs.hpp"
+
+/// --where, --region, --region-crs, --resolution, --keep and --drop of what reads files.
 
 namespace terrace::tools {
+
+struct CommonOptions;
 
 class SelectionOptions {
  public:
   void define(CLI::App& app);
-  /// Throws: UsageError for a list or a region that makes no sense.
-  [[nodiscard]] stream::Selection selection() const;
+  /// inputs: what will be read, by `reading`; opened beforehand if their CRS matters. shift: of it.
+  /// Throws: UsageError for a list or a region that makes no sense; stream::Error.
+  [[nodiscard]] stream::Selection selection(std::span<const std::string> inputs,
+                                            const stream::SourceOptions& reading,
+                                            const std::optional<terrain::DatumShift>& shift,
+                                            const CommonOptions& common) const;
 
  private:
-  std::string where_, region_, keep_, drop_;
+  [[nodiscard]] terrain::RegionConversion conversion(
+      std::span<const std::string> inputs, const stream::SourceOptions& reading,
+      const std::optional<terrain::DatumShift>& shift) const;
+
+  std::string where_, region_, region_crs_, keep_, drop_;
   std::optional<double> resolution_;
 };
 

@@ -34,9 +34,27 @@ std::vector<double> PointTable::column(const std::string& name) const {
                    (known.empty() ? ": they have none but x, y and z" : "; there are: " + known));
 }
 
+namespace {
+
+/// The program itself, what PROJ reads to tell the CRS, and the blocks that are read ahead.
+constexpr std::uint64_t kBeside = std::uint64_t{32} << 20;
+
+}  // namespace
+
+void writing_within_memory(const stream::PointWriter& writer, const std::string& file,
+                           std::uint64_t memory_bytes, std::uint64_t reading) {
+  const std::uint64_t writing = writer.writing_bytes();
+  const std::uint64_t needed = kBeside + reading + writing;
+  if (writing == 0 || needed <= memory_bytes) return;
+  throw stream::Error({.file = file,
+                       .where = {},
+                       .cause = "writing it needs " + std::to_string((needed >> 20) + 1) +
+                                "M of memory, --memory allows " +
+                                std::to_string(memory_bytes >> 20) + "M",
+                       .remedy = "raise --memory, or write another format"});
+}
+
 std::uint64_t reading_within_memory(const stream::PointSource& source, std::uint64_t memory_bytes) {
-  // The program itself, what PROJ reads to tell the CRS, and the blocks that are read ahead.
-  constexpr std::uint64_t kBeside = std::uint64_t{32} << 20;
   const std::uint64_t reading = source.reading_bytes();
   if (reading == 0 || kBeside + reading <= memory_bytes) return reading;
   throw stream::Error(

@@ -8,6 +8,7 @@
 
 #include "cli/cli.hpp"
 #include "earth/ground.hpp"
+#include "terrace/stream/point_writer.hpp"
 #include "terrace/stream/source.hpp"
 
 namespace terrace::tools {
@@ -31,6 +32,11 @@ struct PointTable {
 /// What reading the source takes, which is not left for anything else. Throws: stream::Error if it
 /// is more than memory_bytes, saying what it needs.
 std::uint64_t reading_within_memory(const stream::PointSource& source, std::uint64_t memory_bytes);
+
+/// Beside so many bytes of reading. Throws: stream::Error if writing to `file` would take more than
+/// memory_bytes, saying what it needs.
+void writing_within_memory(const stream::PointWriter& writer, const std::string& file,
+                           std::uint64_t memory_bytes, std::uint64_t reading = 0);
 
 /// Throws: stream::Error on bad data, on no points, and if the points take more than memory_bytes;
 /// Interrupted.

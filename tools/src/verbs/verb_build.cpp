@@ -111,7 +111,8 @@ class BuildCommand final : public Command {
     request_.strategy = strategy_of(strategy_);
     if (outlier_price_) request_.outlier_price = *outlier_price_;
     for (const std::string& channel : channels_) request_.channels.push_back(channel_of(channel));
-    request_.selection = selection_.selection();
+    request_.selection =
+        selection_.selection(request_.inputs, reading(), request_.datum_shift, common);
     request_.seed = common.seed;
     request_.order = order_ == "stream"    ? stream::Order::stream
                      : order_ == "spatial" ? stream::Order::spatial
@@ -163,18 +164,25 @@ class BuildCommand final : public Command {
     return summary;
   }
 
+  /// How files are opened that are looked at beforehand.
+  [[nodiscard]] stream::SourceOptions reading() const {
+    return {.format = request_.input_format,
+            .entities = request_.entities,
+            .band = request_.band,
+            .heights_of_colour = request_.heights_of_colour,
+            .cell = request_.cell.value_or(0),
+            .crs = request_.crs,
+            .stop = stop_token()};
+  }
+
   /// Builds a store of the first points, weighs it and does not keep it.
   Summary estimate(const CommonOptions& common) {
     if (std::find(request_.inputs.begin(), request_.inputs.end(), "-") != request_.inputs.end()) {
       throw UsageError("--dry-run reads its input before the build does: name files, not -");
     }
-    const auto source =
-        stream::open_source(request_.inputs, {.format = request_.input_format,
-                                              .entities = request_.entities,
-                                              .heights_of_colour = request_.heights_of_colour,
-                                              .cell = request_.cell.value_or(0),
-                                              .stop = stop_token(),
-                                              .selection = request_.selection});
+    stream::SourceOptions options = reading();
+    options.selection = request_.selection;
+    const auto source = stream::open_source(request_.inputs, options);
     const stream::SourceInfo& info = source->info();
     request_.most_points = kTrialPoints;
     const Stopwatch watch;

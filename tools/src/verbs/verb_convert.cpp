@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // convert: a stream of points from one format to another.
+#include <algorithm>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
@@ -47,18 +49,20 @@ class ConvertCommand : public Command {
 
   Summary run(const CommonOptions& common) override {
     const Stopwatch watch;
-    const stream::WriterOptions writing = point_writer_options(output_, format_, common);
+    stream::WriterOptions writing = point_writer_options(output_, format_, common);
     stream::SourceOptions reading{.format = input_format_,
                                   .heights_of_colour = colours_,
                                   .cell = cell_.value_or(0),
                                   .stop = stop_token(),
                                   .blocks_ahead = 8,
-                                  .threads = common.threads,
-                                  .selection = selection_.selection()};
+                                  .threads = common.threads};
+    reading.selection = selection_.selection(inputs_, reading, std::nullopt, common);
     DamageReport damage;
     if (skip_damaged_) reading.on_damage = damage.taker();
     const std::unique_ptr<stream::PointSource> source = stream::open_source(inputs_, reading);
-    reading_within_memory(*source, common.memory_or(0));
+    const std::uint64_t memory = common.memory_or(0);
+    const std::uint64_t held = reading_within_memory(*source, memory);
+    writing.memory_bytes -= std::min(writing.memory_bytes, held);
     const stream::SourceInfo& info = source->info();
     const auto writer = stream::open_point_writer(output_,
                                                   {.attributes = info.attributes,
@@ -67,6 +71,7 @@ class ConvertCommand : public Command {
                                                    .lattice = lattice_of(info),
                                                    .bounds = bounds_of(info)},
                                                   writing);
+    writing_within_memory(*writer, output_, memory, held);
     {
       ProgressMeter meter(common.progress, "points");
       stream::PointBlock block;

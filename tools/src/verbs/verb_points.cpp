@@ -22,6 +22,7 @@
 #include "cli/interrupt.hpp"
 #include "cli/output.hpp"
 #include "cli/selection_options.hpp"
+#include "tables/point_table.hpp"
 #include "terrace/terrain/detail.hpp"
 #include "terrace/terrain/detail_lines.hpp"
 #include "terrace/terrain/detail_mesh.hpp"
@@ -172,6 +173,7 @@ class PointsCommand final : public Command {
     const auto writer =
         stream::open_point_writer(output_, header(store, store.schema().attributes, to),
                                   point_writer_options(output_, format_, common));
+    writing_within_memory(*writer, output_, common.memory_or(0));
     PointOutput output(store, places(to), overlay ? &*overlay : nullptr, *writer);
     for_each_wanted_point(
         store, detail,
@@ -257,6 +259,7 @@ class PointsCommand final : public Command {
     const std::optional<Transformation> to = crs_.to(store, common);
     const auto writer = stream::open_point_writer(output_, header(store, std::move(attributes), to),
                                                   point_writer_options(output_, format_, common));
+    writing_within_memory(*writer, output_, common.memory_or(0));
     write_found(store, found, places(to), *writer);
     writer->finish();
     Summary summary;

@@ -26,7 +26,7 @@ class RasterCommand final : public Command {
  public:
   void define(CLI::App& app) override {
     app.add_option("STORE", store_, "where the heights come from")->required();
-    add_output(app, output_, "the GeoTIFF to write");
+    add_output(app, output_, "the Cloud Optimized GeoTIFF to write");
     app.add_option("--value", value_,
                    "height; slope in degrees; aspect in degrees clockwise from north, downhill; "
                    "hillshade, 1 to 255")

@@ -15,6 +15,7 @@
 #include "picture/canvas.hpp"
 #include "synth/synth_cloud.hpp"
 #include "synth/synth_dem.hpp"
+#include "tables/point_table.hpp"
 #include "terrace/stream/point_writer.hpp"
 #include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/error.hpp"
@@ -117,9 +118,10 @@ class SynthCommand : public Command {
                                          : kind_ == "uniform" ? make_uniform(common.seed)
                                                               : make_clusters(points, common.seed);
     const DeliveryOrder order(shuffle_, points, common.seed, common.memory_or(kStreamingMemory));
-    const auto writer = stream::open_point_writer(
-        output_, {.attributes = {}, .comments = {kWriterMark}},
-        {.format = {}, .replace = may_replace(output_, common.force), .stop = stop_token()});
+    const auto writer =
+        stream::open_point_writer(output_, {.attributes = {}, .comments = {kWriterMark}},
+                                  point_writer_options(output_, {}, common));
+    writing_within_memory(*writer, output_, common.memory_or(0));
     {
       ProgressMeter meter(common.progress, "points");
       stream::PointBlock block;

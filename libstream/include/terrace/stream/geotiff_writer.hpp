@@ -7,12 +7,20 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <stop_token>
 
 #include "terrace/stream/source.hpp"
 
 namespace terrace::stream {
 
 enum class GeoTiffCompression { none, deflate, zstd };
+
+/// What a cell of an overview says of the up to four cells below it that have data.
+enum class GeoTiffOverviews {
+  none,     ///< there are no overviews
+  average,  ///< their mean, integers rounded
+  nearest,  ///< the first of them, by rows: for what has no mean, as directions
+};
 
 /// What a GeoTIFF of one band says of itself.
 struct GeoTiffOptions {
@@ -23,18 +31,26 @@ struct GeoTiffOptions {
   Crs crs;                      ///< EPSG codes, else its GeoKeys, and the name as a citation
   std::optional<double> nodata;
   GeoTiffCompression compression = GeoTiffCompression::deflate;
-  int level = 6;             ///< of the compression: 1 to 12 (deflate), 1 to 22 (zstd)
+  int level = 7;             ///< of the compression: 1 to 12 (libdeflate's), 1 to 22 (zstd)
   bool predictor = true;     ///< code differences of neighbours: smaller for terrain
   std::uint32_t tile = 256;  ///< columns and rows of a tile, a multiple of 16
-  bool replace = false;      ///< an existing file
+  GeoTiffOverviews overviews = GeoTiffOverviews::none;
+  bool replace = false;    ///< an existing file
+  std::stop_token stop{};  ///< ends commit() of a file with overviews, with Stopped
 };
 
 /// Writes a tiled GeoTIFF of one band, in rows from the top or in tiles in any order; BigTIFF where
 /// 4 GiB might not do. The file appears whole and synced with `commit()`, or not at all (see
-/// AtomicFile). Holds one row of tiles.
+/// AtomicFile). Holds one row of tiles when it is given rows, and where each tile is.
+///
+/// With overviews it is a Cloud Optimized GeoTIFF (OGC 21-026): overviews of half the columns and
+/// rows each, down to 512 x 512 cells, all directories before the tiles and the smallest overview
+/// first. Tiles wait in a temporary file without a name beside the target, which takes as much disk
+/// again until the file stands. Of overviews their unfinished tiles are held: one for each overview
+/// if tiles come in the order of a quadtree, half a row of them for each if they come by rows.
 class GeoTiffWriter {
  public:
-  /// Throws: Error if the file cannot be made or the compression is not in the system's libtiff.
+  /// Throws: Error if the file cannot be made.
   GeoTiffWriter(const std::filesystem::path& path, const GeoTiffOptions& options);
   ~GeoTiffWriter();
   GeoTiffWriter(GeoTiffWriter&&) noexcept;
@@ -43,8 +59,9 @@ class GeoTiffWriter {
   /// The next rows from the top: native samples, any number of whole rows.
   void write_rows(std::span<const std::byte> samples);
   /// One tile, `options.tile` squared native samples by rows; what hangs over the raster's edge is
-  /// ignored. Tiles never written are left out of the file: readers take them for nodata, or 0. Not
-  /// to be mixed with `write_rows`.
+  /// ignored. Tiles never written are left out of the file: readers take them for nodata, or 0. So
+  /// are those without samples here, of which overviews need not wait for others. Not to be mixed
+  /// with `write_rows`.
   void write_tile(std::uint32_t across, std::uint32_t down, std::span<const std::byte> samples);
   /// Publishes the file. After `write_rows` all rows must have been written.
   void commit();

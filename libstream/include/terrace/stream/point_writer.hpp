@@ -49,6 +49,9 @@ class PointWriter {
   /// How far a coordinate was moved to fit the integers of the format, at most; 0 where none was
   /// moved by more than doubles lose on the way.
   [[nodiscard]] virtual double rounding() const { return 0.0; }
+  /// What writing takes at least, in bytes, whatever WriterOptions::memory_bytes; 0 where nothing
+  /// but the blocks counts.
+  [[nodiscard]] virtual std::uint64_t writing_bytes() const { return 0; }
 };
 
 struct WriterOptions {
@@ -61,8 +64,8 @@ struct WriterOptions {
   /// Ends a wait for the reader of standard output, and PointWriter::finish() of "copc", with
   /// Stopped.
   std::stop_token stop{};
-  /// What "copc" may hold, roughly: 40 MiB at least; more than 128 MiB are not needed. The bytes of
-  /// the file do not depend on it.
+  /// What "copc" may hold: PointWriter::writing_bytes() at least, some 40 MiB; more than 192 MiB
+  /// serve many points at one place alone. The bytes of the file do not depend on it.
   std::uint64_t memory_bytes = 128u << 20;
   unsigned threads = 1;  ///< that encode at once, of "laz" and "copc"; the bytes are the same
 };

@@ -60,7 +60,8 @@ struct Progress {
   std::uint64_t nodata = 0;  ///< cells without data, left out
   /// Points among them that their file marks as withheld (LAS): they are delivered like all others.
   std::uint64_t withheld = 0;
-  /// Points left out by Selection::where, region and resolution, whether they were read or not.
+  /// Points left out by Selection::where, region and resolution, whether they were read or not; of
+  /// rasters cells that were not read, whatever they hold.
   std::uint64_t excluded = 0;
   std::uint64_t lost = 0;  ///< points of damaged parts, left out (see SourceOptions::on_damage)
   double fraction = 0.0;   ///< of the work, 0 to 1; 0 if unknown
@@ -96,8 +97,12 @@ struct Selection {
   std::optional<std::vector<std::string>> keep{};
   std::vector<std::string> drop{};  ///< names of attributes to leave out
   /// Points outside of this box, in the source's CRS, are left out; without heights its z are
-  /// infinite. COPC, EPT and LAS whose header lies outside are read only as far as needed.
+  /// infinite. Rasters, COPC, EPT and LAS whose header lies outside are read only as far as needed;
+  /// a raster's columns and rows count from its first cell near the box.
   std::optional<Box3> region{};
+  /// Of the points in `region` those at whose x, y this is false are left out too; empty: none is.
+  /// Called by the thread that reads.
+  std::function<bool(const std::array<double, 2>& place)> covers{};
   /// Above 0: points of an octree's nodes down to the first depth whose spacing is at most this, in
   /// units of the CRS. Formats without an octree are refused.
   double resolution = 0.0;

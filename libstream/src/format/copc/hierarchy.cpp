@@ -117,7 +117,63 @@ void check_disjoint(const ByteSource& file, Octree& octree) {
   }
 }
 
+void append_entry(std::string& page, const OctreeNode& node, std::uint64_t offset,
+                  std::uint64_t bytes, std::int64_t points) {
+  append_little_endian(page, static_cast<std::int32_t>(node.depth));
+  for (const std::uint32_t place : node.place) {
+    append_little_endian(page, static_cast<std::int32_t>(place));
+  }
+  append_little_endian(page, offset);
+  append_little_endian(page, static_cast<std::int32_t>(bytes));
+  append_little_endian(page, static_cast<std::int32_t>(points));
+}
+
+void append_entry(std::string& page, const OctreeNode& node) {
+  append_entry(page, node, node.offset, node.bytes, static_cast<std::int64_t>(node.points));
+}
+
+/// Of each node the end of its subtree, which begins with it.
+std::vector<std::size_t> subtree_ends(std::span<const OctreeNode> nodes) {
+  std::vector<std::size_t> ends(nodes.size(), nodes.size()), open;
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    for (; !open.empty() && nodes[open.back()].depth >= nodes[i].depth; open.pop_back()) {
+      ends[open.back()] = i;
+    }
+    open.push_back(i);
+  }
+  return ends;
+}
+
 }  // namespace
+
+CopcHierarchy write_copc_hierarchy(const Octree& octree, std::uint64_t at, std::size_t page_nodes) {
+  const std::span<const OctreeNode> nodes = octree.nodes;
+  const std::vector<std::size_t> ends = subtree_ends(nodes);
+  // A page of less is not worth a request.
+  const std::size_t least = nodes.size() <= page_nodes ? nodes.size() + 1 : page_nodes / 16;
+  const auto has_page = [&](std::size_t node) {
+    const std::size_t count = ends[node] - node;
+    return count >= least && count <= page_nodes;
+  };
+  CopcHierarchy hierarchy;
+  for (std::size_t i = 0; i < nodes.size(); i = has_page(i) ? ends[i] : i + 1) {
+    hierarchy.root_bytes += kCopcEntryBytes;
+  }
+  std::string pages;
+  for (std::size_t i = 0; i < nodes.size();) {
+    if (!has_page(i)) {
+      append_entry(hierarchy.bytes, nodes[i++]);
+      continue;
+    }
+    const std::uint64_t begin = pages.size();
+    for (std::size_t j = i; j < ends[i]; ++j) append_entry(pages, nodes[j]);
+    append_entry(hierarchy.bytes, nodes[i], at + hierarchy.root_bytes + begin, pages.size() - begin,
+                 -1);
+    i = ends[i];
+  }
+  hierarchy.bytes += pages;
+  return hierarchy;
+}
 
 Octree read_copc_hierarchy(const ByteSource& file, std::string_view info, std::uint64_t first_chunk,
                            std::uint64_t points) {

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <string_view>
 
 #include "format/octree.hpp"
@@ -25,5 +26,21 @@ inline constexpr std::size_t kCopcInfoBytes = 160, kCopcEntryBytes = 32;
 /// have the same key or bytes, and the nodes have exactly these points.
 Octree read_copc_hierarchy(const ByteSource& file, std::string_view info, std::uint64_t first_chunk,
                            std::uint64_t points);
+
+/// Nodes of a page: its 16 KiB are one request.
+inline constexpr std::size_t kCopcPageNodes = 512;
+
+/// The hierarchy as the payload of its EVLR; the first root_bytes are its root page.
+struct CopcHierarchy {
+  std::string bytes{};
+  std::uint64_t root_bytes = 0;
+};
+
+/// One page of all nodes if they are not more than `page_nodes`. Else the largest subtrees that are
+/// not more have a page each, behind that of the root, but for small ones, which are in it. Nodes
+/// without points are there for their children. octree: with all ancestors of its nodes, in the
+/// order of before(). at: where the payload begins in the file.
+CopcHierarchy write_copc_hierarchy(const Octree& octree, std::uint64_t at,
+                                   std::size_t page_nodes = kCopcPageNodes);
 
 }  // namespace terrace::stream

@@ -17,13 +17,8 @@ namespace {
 constexpr unsigned kCellBits = 30, kSpanBits = 7;
 static_assert(OctreeBuilder::kSpan == 1U << kSpanBits);
 constexpr unsigned kDeepestLeaf = kCellBits - kSpanBits;
-/// Points that a child gives to its parent at most: eight times as many fit into memory. Surfaces
-/// have fewer; only clouds that fill space reach it.
-constexpr std::size_t kMostPromoted = std::size_t{1} << 15;
-/// Points of a leaf that cannot be parted.
-constexpr std::uint64_t kMostTogether = 1U << 24;
-/// Depths that are distributed at once, to 512 buckets.
-constexpr unsigned kDepthsAtOnce = 3;
+/// Depths that are distributed at once, to 64 buckets.
+constexpr unsigned kDepthsAtOnce = 2;
 constexpr std::size_t kChildren = 8;
 
 /// Which child of a node of that depth a cell lies in.
@@ -73,21 +68,31 @@ struct OctreeBuilder::NodePoints {
   std::vector<Item> items{};  ///< in Morton order
   std::vector<std::byte> records{};
 
-  /// Copies the item's record from where it is among others.
-  void add(Item item, const std::byte* others, std::size_t bytes) {
-    const std::byte* const record = others + std::size_t{item.index} * bytes;
+  void add(Item item, std::span<const std::byte> record) {
     item.index = static_cast<std::uint32_t>(items.size());
     items.push_back(item);
-    records.insert(records.end(), record, record + bytes);
+    records.insert(records.end(), record.begin(), record.end());
   }
 };
 
+std::uint64_t OctreeBuilder::bytes_with(std::size_t record_bytes, std::size_t at_once) {
+  // The beginnings of 64 buckets for each factor of 64, of which ten billion points take three or
+  // four.
+  constexpr std::uint64_t kBuckets = 8u << 20;
+  const std::uint64_t kept = record_bytes + sizeof(std::uint64_t) + sizeof(Item);
+  // Of records in memory the nodes on the way up have copies, in vectors that have grown. Beside
+  // them are a node, its child, and what is written of it.
+  return kBuckets + at_once * 3 * kept + kChildren * kMostPromoted * (2 * kept + record_bytes);
+}
+
 OctreeBuilder::OctreeBuilder(const std::string& name, const std::filesystem::path& folder,
-                             std::size_t record_bytes, std::size_t at_once)
+                             std::size_t record_bytes, std::size_t at_once,
+                             std::uint64_t most_together)
     : name_(name),
       record_bytes_(record_bytes),
       numbered_bytes_(record_bytes + sizeof(std::uint64_t)),
       at_once_(std::max(at_once, kLeafPoints)),
+      most_together_(std::max<std::uint64_t>(most_together, at_once_)),
       file_(name, folder, numbered_bytes_),
       numbered_(numbered_bytes_) {}
 
@@ -159,37 +164,50 @@ OctreeBuilder::NodePoints OctreeBuilder::visit(const OctreeNode& node, std::span
     for (Bucket& bucket : buckets) all.append(std::move(bucket));
     return build_in_memory(node, std::move(all));
   }
-  NodePoints points{.node = node};
+  Bucket promoted;
   const std::size_t each = buckets.size() / kChildren;
   for (std::size_t i = 0; i < kChildren; ++i) {
     const std::span<Bucket> some = buckets.subspan(i * each, each);
-    if (records(some) > 0) promote(visit(child(node, i), some), points);
+    if (records(some) == 0) continue;
+    promote(visit(child(node, i), some), [&](const Item&, std::span<const std::byte> record) {
+      file_.append(promoted, record);
+    });
+  }
+  // In Morton order, as the children are.
+  return load(node, std::move(promoted));
+}
+
+OctreeBuilder::NodePoints OctreeBuilder::load(const OctreeNode& node, Bucket bucket) {
+  NodePoints points{.node = node};
+  const std::uint64_t count = file_.records(bucket);
+  file_.take(bucket, count, points.records);
+  assert(points.records.size() == count * numbered_bytes_);
+  points.items.resize(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::byte* const record = points.records.data() + i * numbered_bytes_;
+    Item& item = points.items[i];
+    std::array<std::int32_t, 3> place{};
+    std::memcpy(place.data(), record, sizeof place);
+    item = {
+        .cell = cell_of(record), .index = static_cast<std::uint32_t>(i), .rank = hash_of(place)};
+    std::memcpy(&item.number, record + record_bytes_, sizeof item.number);
   }
   return points;
 }
 
 OctreeBuilder::NodePoints OctreeBuilder::build_in_memory(const OctreeNode& node, Bucket bucket) {
   const std::uint64_t count = file_.records(bucket);
-  if (count > std::max<std::uint64_t>(at_once_, kMostTogether)) {
+  if (count > most_together_) {
     throw Error({.file = name_,
                  .where = {},
-                 .cause = std::to_string(count) + " points lie in one place, more than a node of "
-                                                  "COPC can have",
-                 .remedy = "leave them out, or write LAZ"});
+                 .cause = std::to_string(count) +
+                          " points lie in one place, more than a node of "
+                          "COPC can have in this memory: " +
+                          std::to_string(most_together_),
+                 .remedy = "raise `memory_bytes`, leave them out, or write LAZ"});
   }
-  std::vector<std::byte> records;
-  file_.take(bucket, count, records);
-  assert(records.size() == count * numbered_bytes_);
-  std::vector<Item> items(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::byte* const record = records.data() + i * numbered_bytes_;
-    std::array<std::int32_t, 3> place{};
-    std::memcpy(place.data(), record, sizeof place);
-    items[i] = {
-        .cell = cell_of(record), .index = static_cast<std::uint32_t>(i), .rank = hash_of(place)};
-    std::memcpy(&items[i].number, record + record_bytes_, sizeof items[i].number);
-  }
-  std::sort(items.begin(), items.end(), [](const Item& a, const Item& b) {
+  NodePoints points = load(node, std::move(bucket));
+  std::sort(points.items.begin(), points.items.end(), [](const Item& a, const Item& b) {
     // The axis whose cells differ in the highest bit decides; of equal ones the first, z.
     std::uint32_t most = 0;
     bool less = a.number < b.number;
@@ -202,7 +220,7 @@ OctreeBuilder::NodePoints OctreeBuilder::build_in_memory(const OctreeNode& node,
     }
     return less;
   });
-  return subtree(node, items, records.data());
+  return subtree(node, points.items, points.records.data());
 }
 
 OctreeBuilder::NodePoints OctreeBuilder::subtree(const OctreeNode& node,
@@ -212,7 +230,9 @@ OctreeBuilder::NodePoints OctreeBuilder::subtree(const OctreeNode& node,
   if (items.size() <= kLeafPoints || node.depth == kDeepestLeaf) {
     points.items.reserve(items.size());
     points.records.reserve(items.size() * numbered_bytes_);
-    for (const Item& item : items) points.add(item, records, numbered_bytes_);
+    for (const Item& item : items) {
+      points.add(item, {records + std::size_t{item.index} * numbered_bytes_, numbered_bytes_});
+    }
     return points;
   }
   for (std::size_t i = 0; i < kChildren; ++i) {
@@ -220,15 +240,19 @@ OctreeBuilder::NodePoints OctreeBuilder::subtree(const OctreeNode& node,
       return child_of(item.cell, node.depth) <= i;
     });
     const auto count = static_cast<std::size_t>(end - items.begin());
-    if (count > 0) promote(subtree(child(node, i), items.first(count), records), points);
+    if (count > 0) {
+      promote(subtree(child(node, i), items.first(count), records),
+              [&](Item item, std::span<const std::byte> record) { points.add(item, record); });
+    }
     items = items.subspan(count);
   }
   return points;
 }
 
-/// Moves one point of each of the parent's cells up, and writes what is left of the child.
-void OctreeBuilder::promote(NodePoints child, NodePoints& parent) {
-  const unsigned shift = kCellBits - kSpanBits - parent.node.depth;
+/// Gives one point of each of the parent's cells to it, and writes what is left of the child.
+template <class Add>
+void OctreeBuilder::promote(NodePoints child, const Add& add) {
+  const unsigned shift = kCellBits - kSpanBits - (child.node.depth - 1);
   std::vector<Item>& items = child.items;
   const auto same_cell = [shift](const Item& a, const Item& b) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -254,7 +278,8 @@ void OctreeBuilder::promote(NodePoints child, NodePoints& parent) {
   std::size_t kept = 0, next = 0;
   for (std::size_t i = 0; i < items.size(); ++i) {
     if (next < chosen.size() && chosen[next] == i) {
-      parent.add(items[i], child.records.data(), numbered_bytes_);
+      add(items[i], std::span(child.records)
+                        .subspan(std::size_t{items[i].index} * numbered_bytes_, numbered_bytes_));
       ++next;
     } else {
       items[kept++] = items[i];

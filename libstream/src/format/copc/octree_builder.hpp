@@ -25,26 +25,33 @@ namespace terrace::stream {
 /// that is as even as the points allow. Which of a cell's points it is, a hash of the coordinates
 /// says: the octree depends on the points and their order, not on what fits into memory.
 ///
-/// Time O(points * depth); memory some at_once records, and 16 MiB for each factor of 512 beyond.
+/// Time O(points * depth). Memory: bytes_with().
 class OctreeBuilder {
  public:
   static constexpr unsigned kSpan = 128;
   /// Nodes with at most so many points below and in them are leaves.
   static constexpr std::size_t kLeafPoints = std::size_t{1} << 15;
+  /// Points that a child gives to its parent at most, which so has eight times as many. Surfaces
+  /// have fewer; only clouds that fill space reach it.
+  static constexpr std::size_t kMostPromoted = std::size_t{1} << 14;
+
+  /// The most that is held with so many records in memory at once.
+  static std::uint64_t bytes_with(std::size_t record_bytes, std::size_t at_once);
 
   /// Takes a node and its records, in the order in which they were added; there may be none.
   /// Children come before their parents.
   using Write = std::function<void(const OctreeNode& node, std::span<const std::byte> records)>;
 
   /// Records begin with x, y and z as int32. name, folder: of the temporary file.
-  /// at_once: the records in memory, of which results do not depend.
+  /// at_once: the records in memory, of which results do not depend; kLeafPoints at least.
+  /// most_together: of points that the deepest node cannot part.
   OctreeBuilder(const std::string& name, const std::filesystem::path& folder,
-                std::size_t record_bytes, std::size_t at_once);
+                std::size_t record_bytes, std::size_t at_once, std::uint64_t most_together);
 
   /// Throws: Error, if the disk is full above all.
   void add(std::span<const std::byte> records);
-  /// Once, after all points. The cube of `octree` is to enclose them. Throws: Error for more than
-  /// sixteen million points that the deepest node cannot part; what `write` throws.
+  /// Once, after all points. The cube of `octree` is to enclose them. Throws: Error for more
+  /// points than `most_together` that the deepest node cannot part; what `write` throws.
   void build(const Octree& octree, const Lattice& lattice, const Write& write);
 
  private:
@@ -52,15 +59,19 @@ class OctreeBuilder {
   struct NodePoints;
 
   [[nodiscard]] std::array<std::uint32_t, 3> cell_of(const std::byte* record) const;
+  /// The records of a bucket, taken out of it, and what they are.
+  NodePoints load(const OctreeNode& node, Bucket bucket);
   NodePoints build(const OctreeNode& node, Bucket bucket);
   NodePoints visit(const OctreeNode& node, std::span<Bucket> buckets);
   NodePoints build_in_memory(const OctreeNode& node, Bucket bucket);
   NodePoints subtree(const OctreeNode& node, std::span<const Item> items, const std::byte* records);
-  void promote(NodePoints child, NodePoints& parent);
+  template <class Add>
+  void promote(NodePoints child, const Add& add);
   void write(NodePoints& node);
 
   std::string name_;
   std::size_t record_bytes_, numbered_bytes_, at_once_;
+  std::uint64_t most_together_;
   BucketFile file_;
   Bucket all_;
   std::uint64_t points_ = 0;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -59,27 +60,52 @@ Octree cube_around(const LasRecords& records) {
   return octree;
 }
 
-/// How many records the builder may have in memory.
-std::size_t records_within(std::uint64_t memory_bytes, std::size_t record_bytes) {
-  // Beginnings of buckets; nodes on their way up and to the encoders.
-  constexpr std::uint64_t kBeside = 36u << 20;
-  constexpr std::uint64_t kLeast = 1u << 15, kMost = 1u << 19, kBesideRecord = 56;
-  const std::uint64_t room = memory_bytes - std::min(memory_bytes, kBeside);
-  return static_cast<std::size_t>(std::clamp(room / (record_bytes + kBesideRecord), kLeast, kMost));
+/// What the writer's parts may take of its memory. Results do not depend on it.
+struct Shares {
+  unsigned threads = 1;
+  std::size_t at_once = OctreeBuilder::kLeafPoints;  ///< records
+  std::uint64_t together = 0;                        ///< records at one place
+
+  /// The most that is held.
+  [[nodiscard]] std::uint64_t bytes(std::size_t record_bytes) const {
+    // Records and their coded bytes; a thread's, and those that wait.
+    const std::uint64_t node = 8 * OctreeBuilder::kMostPromoted * record_bytes * 8 / 5;
+    return OctreeBuilder::bytes_with(record_bytes, at_once) +
+           (threads > 1 ? threads + 1 : 1) * node;
+  }
+};
+
+Shares shares_within(std::uint64_t memory_bytes, unsigned threads, std::size_t record_bytes) {
+  constexpr std::size_t kMostAtOnce = std::size_t{1} << 19;
+  constexpr std::uint64_t kMostTogether = 1u << 24;
+  Shares shares;
+  for (shares.threads = std::max(1u, threads);
+       shares.threads > 1 && shares.bytes(record_bytes) > memory_bytes; --shares.threads) {
+  }
+  // A record at one place takes as much as one in memory at once, and is encoded with the others.
+  const std::uint64_t fixed = shares.bytes(record_bytes);
+  const std::uint64_t room = memory_bytes - std::min(memory_bytes, fixed);
+  const std::uint64_t each =
+      OctreeBuilder::bytes_with(record_bytes, 1) - OctreeBuilder::bytes_with(record_bytes, 0);
+  shares.together = std::min(kMostTogether, shares.at_once + room / (each + 3 * record_bytes));
+  shares.at_once += std::min(kMostAtOnce - shares.at_once, room / each);
+  return shares;
 }
 
 class CopcWriter final : public PointWriter {
  public:
-  CopcWriter(const std::string& path, const PointHeader& header, const WriterOptions& options)
+  CopcWriter(const std::string& path, const PointHeader& header, const WriterOptions& options,
+             std::size_t page_nodes)
       : path_(path),
+        page_nodes_(page_nodes),
         sink_(path, options.replace, options.stop),
         stop_(options.stop),
         records_(path, header, LasFormats::newer),
         vlr_(laz::Vlr::of(records_.layout().point_format, records_.layout().record_bytes,
                           laz::Vlr::kVariable)),
-        builder_(path, folder_of(path), records_.layout().record_bytes,
-                 records_within(options.memory_bytes, records_.layout().record_bytes)),
-        encoders_(vlr_, options.threads,
+        shares_(shares_within(options.memory_bytes, options.threads, record_bytes())),
+        builder_(path, folder_of(path), record_bytes(), shares_.at_once, shares_.together),
+        encoders_(vlr_, shares_.threads,
                   [this](std::span<const std::byte> coded) { write_chunk(coded); }) {
     std::string vlrs;
     append_vlr(vlrs, kCopcUser, kCopcInfo, std::string(kCopcInfoBytes, '\0'));
@@ -119,11 +145,13 @@ class CopcWriter final : public PointWriter {
     octree_.arrange();
     file_.evlr_offset = sink_.size();
     file_.evlrs = 1;
-    const std::string page = hierarchy();
-    sink_.write(evlr_head(kCopcUser, kCopcHierarchy, page.size()));
-    const std::uint64_t page_at = sink_.size();
-    sink_.write(page);
-    sink_.write_at(kLas14HeaderBytes + kLasVlrHeaderBytes, info(page_at, page.size()));
+    constexpr std::uint64_t kEvlrHeaderBytes = 60;
+    const std::uint64_t page_at = sink_.size() + kEvlrHeaderBytes;
+    const CopcHierarchy hierarchy = write_copc_hierarchy(octree_, page_at, page_nodes_);
+    sink_.write(evlr_head(kCopcUser, kCopcHierarchy, hierarchy.bytes.size()));
+    assert(sink_.size() == page_at);
+    sink_.write(hierarchy.bytes);
+    sink_.write_at(kLas14HeaderBytes + kLasVlrHeaderBytes, info(page_at, hierarchy.root_bytes));
     file_.compressed = true;
     sink_.write_at(0, las_header_text(records_, file_));
     sink_.commit();
@@ -131,10 +159,13 @@ class CopcWriter final : public PointWriter {
 
   std::uint64_t points() const override { return records_.points(); }
   double rounding() const override { return records_.rounding(); }
+  std::uint64_t writing_bytes() const override { return Shares{}.bytes(record_bytes()); }
 
  private:
   /// GPS time in the point formats 6 to 8.
   static constexpr std::size_t kGpsTimeAt = 22;
+
+  [[nodiscard]] std::size_t record_bytes() const { return records_.layout().record_bytes; }
 
   /// The chunk of the next node that has points.
   void write_chunk(std::span<const std::byte> coded) {
@@ -153,21 +184,6 @@ class CopcWriter final : public PointWriter {
     sink_.write(coded);
   }
 
-  /// One page of all nodes. Those without points are there for their children.
-  [[nodiscard]] std::string hierarchy() const {
-    std::string page;
-    for (const OctreeNode& node : octree_.nodes) {
-      append_little_endian(page, static_cast<std::int32_t>(node.depth));
-      for (const std::uint32_t place : node.place) {
-        append_little_endian(page, static_cast<std::int32_t>(place));
-      }
-      append_little_endian(page, node.offset);
-      append_little_endian(page, static_cast<std::int32_t>(node.bytes));
-      append_little_endian(page, static_cast<std::int32_t>(node.points));
-    }
-    return page;
-  }
-
   [[nodiscard]] std::string info(std::uint64_t page_at, std::uint64_t page_bytes) const {
     std::string info;
     for (const double centre : octree_.centre) append_little_endian(info, centre);
@@ -183,11 +199,13 @@ class CopcWriter final : public PointWriter {
   }
 
   std::string path_;
+  std::size_t page_nodes_;
   Sink sink_;
   std::stop_token stop_;
   LasRecords records_;
   LasFile file_;
   laz::Vlr vlr_;
+  Shares shares_;
   OctreeBuilder builder_;
   Octree octree_;            ///< nodes as they come from the builder
   std::size_t written_ = 0;  ///< of them
@@ -201,7 +219,14 @@ class CopcWriter final : public PointWriter {
 
 std::unique_ptr<PointWriter> open_copc_writer(const std::string& path, const PointHeader& header,
                                               const WriterOptions& options) {
-  return std::make_unique<CopcWriter>(path, header, options);
+  return open_paged_copc_writer(path, header, options, kCopcPageNodes);
+}
+
+std::unique_ptr<PointWriter> open_paged_copc_writer(const std::string& path,
+                                                    const PointHeader& header,
+                                                    const WriterOptions& options,
+                                                    std::size_t page_nodes) {
+  return std::make_unique<CopcWriter>(path, header, options, page_nodes);
 }
 
 }  // namespace terrace::stream

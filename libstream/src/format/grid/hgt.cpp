@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "format/grid/hgt.hpp"
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
@@ -13,12 +14,16 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <unordered_map>
 #include <utility>
+#include <vector>
 
 #include "format/formats.hpp"
 #include "format/grid/plain_grid.hpp"
 #include "format/grid/unpack.hpp"
 #include "format/raster_points.hpp"
+#include "io/bytes.hpp"
+#include "io/text.hpp"
 
 namespace terrace::stream {
 namespace {
@@ -71,15 +76,23 @@ std::pair<std::uint64_t, std::uint64_t> size_of_tile(const std::string& file, st
   return {side, side};
 }
 
-PlainGrid describe_tile(const std::string& file, const Corner& corner, std::uint64_t bytes) {
+/// packed_name: of the tile in its archive; else that of the file tells the place.
+PlainGrid describe_tile(const std::string& file, const std::string& packed_name,
+                        std::uint64_t bytes) {
+  std::optional<Corner> corner = corner_of(packed_name);
+  if (!corner) corner = corner_of(file);
+  if (!corner) {
+    refuse_grid(file, packed_name, "its name does not tell its place",
+                "name it by its south-west corner, as N46E008.hgt");
+  }
   const auto [columns, rows] = size_of_tile(file, bytes);
   PlainGrid grid = plain_grid("hgt", file, columns, rows, ScalarType::i16, "-32768");
   grid.order = std::endian::big;
   // Samples lie on the lines of the grid: the outer ones are shared with the neighbours.
   grid.info.world.xy = {
-      1 / static_cast<double>(columns - 1),  0,
-      static_cast<double>(corner.longitude), 0,
-      -1 / static_cast<double>(rows - 1),    static_cast<double>(corner.latitude + 1)};
+      1 / static_cast<double>(columns - 1),   0,
+      static_cast<double>(corner->longitude), 0,
+      -1 / static_cast<double>(rows - 1),     static_cast<double>(corner->latitude + 1)};
   grid.info.sample.unit = "metre";
   grid.info.crs.epsg = 4326;
   grid.info.crs.vertical_epsg = 5773;  // EGM96
@@ -102,16 +115,53 @@ Packing packing_of(const ByteSource& bytes) {
   return Packing::none;
 }
 
-/// True for a zip archive whose first file is a tile.
+/// True for a zip archive of which a tile is the first file, or behind small ones and folders.
 bool recognise_hgt(std::span<const std::byte> head) {
-  constexpr std::size_t kNameLength = 26, kName = 30;  // in the header before a packed file
-  if (head.size() < kName || std::memcmp(head.data(), "PK\3\4", 4) != 0) return false;
-  const std::size_t length = std::to_integer<std::size_t>(head[kNameLength]) |
-                             std::to_integer<std::size_t>(head[kNameLength + 1]) << 8;
-  if (length < kEnding.size() || length > head.size() - kName) return false;
-  const std::string_view name(reinterpret_cast<const char*>(head.data()) + kName, length);
-  const std::string_view ending = name.substr(length - kEnding.size());
-  return ending == kEnding || ending == ".HGT";
+  // In the header before a packed file.
+  constexpr std::size_t kPackedBytes = 18, kNameLength = 26, kExtraLength = 28, kName = 30;
+  while (head.size() >= kName && std::memcmp(head.data(), "PK\3\4", 4) == 0) {
+    const char* const header = reinterpret_cast<const char*>(head.data());
+    const std::size_t length = load_little_endian<std::uint16_t>(header + kNameLength);
+    if (length > head.size() - kName) return false;
+    if (lower_case(std::string(header + kName, length)).ends_with(kEnding)) return true;
+    // What states its size only behind its bytes ends the search, as no header follows there.
+    const std::uint64_t next = std::uint64_t{kName} + length +
+                               load_little_endian<std::uint16_t>(header + kExtraLength) +
+                               load_little_endian<std::uint32_t>(header + kPackedBytes);
+    head = head.subspan(static_cast<std::size_t>(std::min<std::uint64_t>(next, head.size())));
+  }
+  return false;
+}
+
+PlainGrid describe_packed_tile(const std::string& file, const PackedFile& packed) {
+  constexpr std::uint64_t kUnpacking = 1u << 20;
+  PlainGrid grid = describe_tile(file, packed.name, packed.size);
+  grid.info.held_bytes = kUnpacking;
+  return grid;
+}
+
+/// The tiles of a zip archive: the only one, or a mosaic.
+std::unique_ptr<Raster> open_archive(const std::string& file, std::uint64_t memory_bytes) {
+  const auto archive = std::make_shared<const ZipArchive>(file);
+  const std::vector<PackedFile> tiles = archive->find(kEnding);
+  const auto open_tile = [file, archive](const PackedFile& tile) {
+    return open_packed_grid(describe_packed_tile(file, tile),
+                            [archive, tile] { return archive->unpack(tile); });
+  };
+  if (tiles.size() == 1) return open_tile(tiles.front());
+  std::vector<std::string> names;
+  std::unordered_map<std::string, PackedFile> by_name;
+  for (const PackedFile& tile : tiles) {
+    names.push_back(file + "/" + tile.name);
+    by_name.emplace(names.back(), tile);
+  }
+  constexpr std::size_t kOpenAtOnce = 8;
+  return open_mosaic(
+      names,
+      [by_name = std::move(by_name), open_tile](const std::string& name) {
+        return open_tile(by_name.at(name));
+      },
+      false, kOpenAtOnce, memory_bytes);
 }
 
 std::unique_ptr<PointSource> open_hgt_points(std::span<const std::string> files,
@@ -124,29 +174,18 @@ std::unique_ptr<PointSource> open_hgt_points(std::span<const std::string> files,
 std::unique_ptr<Raster> open_hgt(const std::string& file, const RasterOptions& options) {
   check_band(file, options.band, 1);
   std::unique_ptr<ByteSource> bytes = open_file(file);
-  const Packing packing = packing_of(*bytes);
-  PackedFile packed{.size = bytes->size()};
-  if (packing == Packing::zip) packed = find_in_zip(file, kEnding);
-  if (packing == Packing::gzip) packed = find_in_gzip(file);
-  std::optional<Corner> corner = corner_of(packed.name);
-  if (!corner) corner = corner_of(file);
-  if (!corner) {
-    refuse_grid(file, {}, "its name does not tell its place",
-                "name it by its south-west corner, as N46E008.hgt");
-  }
-  PlainGrid grid = describe_tile(file, *corner, packed.size);
-  constexpr std::uint64_t kUnpacking = 1u << 20;
-  if (packing != Packing::none) grid.info.held_bytes = kUnpacking;
-  switch (packing) {
+  switch (packing_of(*bytes)) {
     case Packing::zip:
-      return open_packed_grid(std::move(grid),
-                              [file, packed] { return unpack_from_zip(file, packed); });
-    case Packing::gzip:
-      return open_packed_grid(std::move(grid),
+      return open_archive(file, options.memory_bytes);
+    case Packing::gzip: {
+      const PackedFile packed = find_in_gzip(file);
+      return open_packed_grid(describe_packed_tile(file, packed),
                               [file, packed] { return unpack_gzip(file, packed); });
+    }
     case Packing::none:
       break;
   }
+  PlainGrid grid = describe_tile(file, {}, bytes->size());
   return open_plain_grid(std::move(grid), std::move(bytes));
 }
 

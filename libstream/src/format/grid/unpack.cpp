@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <new>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -55,73 +54,57 @@ class Unpacked {
   std::unique_ptr<Spool> spool_;
 };
 
-class ZipArchive {
- public:
-  explicit ZipArchive(const std::string& file) {
-    int error = 0;
-    archive_ = zip_open(file.c_str(), ZIP_RDONLY, &error);
-    if (archive_ == nullptr) {
-      zip_error_t reason;
-      zip_error_init_with_code(&reason, error);
-      const std::string text = zip_error_strerror(&reason);
-      zip_error_fini(&reason);
-      refuse_grid(file, "zip", text);
-    }
-  }
-  ~ZipArchive() { zip_discard(archive_); }
-  ZipArchive(const ZipArchive&) = delete;
-  ZipArchive& operator=(const ZipArchive&) = delete;
-
-  [[nodiscard]] zip_t* get() const { return archive_; }
-  [[nodiscard]] std::uint64_t files() const {
-    return static_cast<std::uint64_t>(std::max<zip_int64_t>(0, zip_get_num_entries(archive_, 0)));
-  }
-
- private:
-  zip_t* archive_ = nullptr;
-};
-
 }  // namespace
 
-PackedFile find_in_zip(const std::string& file, std::string_view ending) {
-  const ZipArchive archive(file);
-  std::optional<PackedFile> found;
-  for (std::uint64_t number = 0; number < archive.files(); ++number) {
+ZipArchive::ZipArchive(const std::string& file) : file_(file) {
+  int error = 0;
+  archive_ = zip_open(file.c_str(), ZIP_RDONLY, &error);
+  if (archive_ == nullptr) {
+    zip_error_t reason;
+    zip_error_init_with_code(&reason, error);
+    const std::string text = zip_error_strerror(&reason);
+    zip_error_fini(&reason);
+    refuse_grid(file, "zip", text);
+  }
+}
+
+ZipArchive::~ZipArchive() { zip_discard(archive_); }
+
+std::vector<PackedFile> ZipArchive::find(std::string_view ending) const {
+  std::vector<PackedFile> found;
+  const auto files =
+      static_cast<std::uint64_t>(std::max<zip_int64_t>(0, zip_get_num_entries(archive_, 0)));
+  for (std::uint64_t number = 0; number < files; ++number) {
     zip_stat_t status;
-    if (zip_stat_index(archive.get(), number, 0, &status) != 0) continue;
+    if (zip_stat_index(archive_, number, 0, &status) != 0) continue;
     constexpr zip_uint64_t kNeeded = ZIP_STAT_NAME | ZIP_STAT_SIZE | ZIP_STAT_COMP_SIZE;
     if ((status.valid & kNeeded) != kNeeded || !lower_case(status.name).ends_with(ending)) continue;
     // What a Macintosh packs beside each file.
     if (std::string_view(status.name).starts_with("__MACOSX/")) continue;
-    if (found) {
-      refuse_grid(file, {}, "holds more than one " + std::string(ending) + " file",
-                  "unpack it and name the files");
-    }
-    check_growth(file, status.name, status.comp_size, status.size);
-    found = {.name = status.name, .size = status.size, .number = number};
+    check_growth(file_, status.name, status.comp_size, status.size);
+    found.push_back({.name = status.name, .size = status.size, .number = number});
   }
-  if (!found) {
-    refuse_grid(file, {}, "holds no " + std::string(ending) + " file", "unpack it: 'unzip FILE'");
+  if (found.empty()) {
+    refuse_grid(file_, {}, "holds no " + std::string(ending) + " file", "unpack it: 'unzip FILE'");
   }
-  return *found;
+  return found;
 }
 
-std::unique_ptr<ByteSource> unpack_from_zip(const std::string& file, const PackedFile& packed) {
-  const ZipArchive archive(file);
-  zip_file_t* const member = zip_fopen_index(archive.get(), packed.number, 0);
+std::unique_ptr<ByteSource> ZipArchive::unpack(const PackedFile& packed) const {
+  zip_file_t* const member = zip_fopen_index(archive_, packed.number, 0);
   if (member == nullptr) {
-    refuse_grid(file, packed.name, zip_strerror(archive.get()), "unpack it yourself");
+    refuse_grid(file_, packed.name, zip_strerror(archive_), "unpack it yourself");
   }
   struct Close {
     void operator()(zip_file_t* open) const { zip_fclose(open); }
   };
   const std::unique_ptr<zip_file_t, Close> close(member);
-  Unpacked unpacked(file, packed);
+  Unpacked unpacked(file_, packed);
   std::vector<std::byte> piece(kUnpackBytes);
   for (;;) {
     const zip_int64_t got = zip_fread(member, piece.data(), piece.size());
     if (got < 0) {
-      refuse_grid(file, packed.name, zip_error_strerror(zip_file_get_error(member)));
+      refuse_grid(file_, packed.name, zip_error_strerror(zip_file_get_error(member)));
     }
     if (got == 0) return unpacked.take();
     unpacked.append({piece.data(), static_cast<std::size_t>(got)});

@@ -5,11 +5,14 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "terrace/stream/byte_source.hpp"
 
-/// Single files out of archives. Nothing is unpacked but to its stated size, which the caller may
+/// Files out of archives. Nothing is unpacked but to its stated size, which the caller may
 /// judge beforehand.
+
+struct zip;
 
 namespace terrace::stream {
 
@@ -20,18 +23,32 @@ struct PackedFile {
   std::uint64_t number = 0;  ///< of a zip archive's files
 };
 
-/// The only file of a zip archive whose name has that ending, in any case.
-/// Throws: Error if there is none or more than one, or if it states more bytes than those packed
-/// could ever unpack to.
-PackedFile find_in_zip(const std::string& file, std::string_view ending);
-/// Its bytes, in a temporary file. Throws: Error if they are damaged, encrypted, or not as many as
-/// stated.
-std::unique_ptr<ByteSource> unpack_from_zip(const std::string& file, const PackedFile& packed);
+/// A zip archive, open.
+class ZipArchive {
+ public:
+  /// Throws: Error if it is none.
+  explicit ZipArchive(const std::string& file);
+  ~ZipArchive();
+  ZipArchive(const ZipArchive&) = delete;
+  ZipArchive& operator=(const ZipArchive&) = delete;
+
+  /// The files whose names have that ending, in any case, in the order of the archive.
+  /// Throws: Error if there is none, or if one states more bytes than those packed could ever
+  /// unpack to.
+  [[nodiscard]] std::vector<PackedFile> find(std::string_view ending) const;
+  /// The bytes of one, in a temporary file. Throws: Error if they are damaged, encrypted, or not as
+  /// many as stated.
+  [[nodiscard]] std::unique_ptr<ByteSource> unpack(const PackedFile& packed) const;
+
+ private:
+  std::string file_;
+  zip* archive_ = nullptr;
+};
 
 /// The file in a gzip file of one member. The size that it states is modulo 2^32.
-/// Throws: Error as find_in_zip().
+/// Throws: Error if it states more bytes than those packed could ever unpack to.
 PackedFile find_in_gzip(const std::string& file);
-/// Its bytes. Throws: Error as unpack_from_zip().
+/// Its bytes. Throws: Error as ZipArchive::unpack().
 std::unique_ptr<ByteSource> unpack_gzip(const std::string& file, const PackedFile& packed);
 
 }  // namespace terrace::stream

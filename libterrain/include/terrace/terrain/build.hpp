@@ -31,7 +31,7 @@ struct BuildRequest {
   /// cluster::triangle_distance); a triangle is where its first corner is; detail_mesh() gives them
   /// back. Heights, tiles and bounded meshes need points.
   stream::Entities entities = stream::Entities::points;
-  stream::Selection selection{};  ///< of points and attributes
+  stream::Selection selection{};  ///< of points and attributes; see Region::restrict()
   /// Goes on where parts of laser data are damaged: see stream::SourceOptions::on_damage.
   bool skip_damaged = false;
   std::optional<stream::Crs> crs{};  ///< replaces the source's

@@ -155,15 +155,23 @@ CoordinateSystem system_of(const stream::Store& store);
 Transformation transformation_to(const stream::Store& store, const std::string& named,
                                  const std::optional<DatumShift>& shift = std::nullopt);
 
-/// Regions in another CRS as regions in the store's; made by default, it leaves them as they are.
+/// Regions in another CRS as regions in that of the data; made by default, it leaves them as they
+/// are.
 class RegionConversion {
  public:
   RegionConversion() = default;
   /// to_regions: from the store's CRS to that of the regions.
   RegionConversion(const stream::Store& store, Transformation to_regions);
+  /// Of a source whose CRS is `system`, to regions in the CRS `named` as for
+  /// CoordinateSystem::parse. Throws: UsageError for an unknown CRS, stream::Error if nothing leads
+  /// from one datum to the other.
+  RegionConversion(const stream::SourceInfo& source, const CoordinateSystem& system,
+                   const std::string& named);
   /// Outlines, a box's too, get so many corners that they run within a millionth of their length of
   /// the true curve. Throws: stream::Error if one leaves the places that the other CRS shows.
   [[nodiscard]] Region operator()(Region region) const;
+  /// What the user should know of it; empty: nothing.
+  [[nodiscard]] std::string note() const { return to_regions_ ? to_regions_->note() : ""; }
 
  private:
   std::optional<Transformation> to_regions_;

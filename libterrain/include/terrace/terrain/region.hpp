@@ -9,6 +9,10 @@
 
 #include <terrace/stream/point.hpp>
 
+namespace terrace::stream {
+struct Selection;
+}
+
 namespace terrace::terrain {
 
 using Point2 = std::array<double, 2>;
@@ -54,6 +58,9 @@ class Region {
   [[nodiscard]] bool contains(const stream::Point3& p) const;
   /// Whether the place is inside, whatever its height.
   [[nodiscard]] bool covers(const Point2& place) const;
+  /// Lets a source deliver the points inside and no others. Its box spares reading. Polygons must
+  /// be in the CRS of the source.
+  void restrict(stream::Selection& selection) const;
   /// Box: closed; an empty one overlaps nothing. `part` also of boxes inside that touch a ring.
   [[nodiscard]] Overlap overlap(const stream::Box3& box) const;
   /// Whether the triangle, seen from above, has a point in common with the region, and its range of

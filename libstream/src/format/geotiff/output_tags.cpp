@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "format/geotiff/output_tags.hpp"
+
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <tiff.h>
+
+#include "format/geotiff/tags.hpp"
+
+namespace terrace::stream {
+namespace {
+
+/// The shortest text that reads back as the same number.
+std::string shortest(double value) {
+  if (std::isnan(value)) return "nan";
+  std::array<char, 32> text{};
+  const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
+  return {text.data(), end};
+}
+
+std::string escaped(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    switch (c) {
+      case '<':
+        out += "&lt;";
+        break;
+      case '>':
+        out += "&gt;";
+        break;
+      case '&':
+        out += "&amp;";
+        break;
+      default:
+        out += c;
+    }
+  }
+  return out;
+}
+
+/// Collects GeoKeys; they must be in ascending order.
+class KeyDirectory {
+ public:
+  void add(std::uint16_t key, std::uint16_t value) { entries_.push_back({key, 0, 1, value}); }
+  void add(std::uint16_t key, const std::string& text) {
+    const auto at = static_cast<std::uint16_t>(ascii_.size());
+    constexpr std::size_t kMost = 16384;
+    ascii_ += text.substr(0, kMost) + "|";
+    const auto length = static_cast<std::uint16_t>(ascii_.size() - at);
+    entries_.push_back({key, static_cast<std::uint16_t>(kGeoAsciiParams), length, at});
+  }
+  void add(std::uint16_t key, const std::vector<double>& values) {
+    const auto at = static_cast<std::uint16_t>(doubles_.size());
+    doubles_.insert(doubles_.end(), values.begin(), values.end());
+    entries_.push_back({key, static_cast<std::uint16_t>(kGeoDoubleParams),
+                        static_cast<std::uint16_t>(values.size()), at});
+  }
+  /// As it stands: what measures something is a double, what names something a short.
+  void add(const GeoKey& key) {
+    const bool measures = key.key == 2053 || key.key == 2055 ||
+                          (key.key >= 2057 && key.key <= 2062) ||
+                          (key.key >= 3077 && key.key <= 3096);
+    if (key.values.empty()) {
+      add(key.key, key.text);
+    } else if (measures) {
+      add(key.key, key.values);
+    } else {
+      add(key.key, static_cast<std::uint16_t>(key.values.front()));
+    }
+  }
+  [[nodiscard]] std::vector<std::uint16_t> shorts() const {
+    std::vector<std::uint16_t> all{1, 1, 1, static_cast<std::uint16_t>(entries_.size())};
+    for (const auto& entry : entries_) all.insert(all.end(), entry.begin(), entry.end());
+    return all;
+  }
+  [[nodiscard]] const std::string& ascii() const { return ascii_; }
+  [[nodiscard]] const std::vector<double>& doubles() const { return doubles_; }
+
+ private:
+  std::vector<std::array<std::uint16_t, 4>> entries_;
+  std::vector<double> doubles_;
+  std::string ascii_;
+};
+
+std::uint16_t unit_code(const std::string& unit) {
+  if (unit == "metre") return 9001;
+  if (unit == "foot") return 9002;
+  if (unit == "US survey foot") return 9003;
+  if (unit == "degree") return 9102;
+  return 0;
+}
+
+KeyDirectory keys_of(const GeoTiffOptions& options) {
+  const Crs& crs = options.crs;
+  const auto code = [](int epsg) {
+    return static_cast<std::uint16_t>(epsg > 0 && epsg < kUserDefined ? epsg : 0);
+  };
+  const std::uint16_t epsg = code(crs.epsg), unit = unit_code(crs.horizontal_unit);
+  KeyDirectory keys;
+  const std::span<const GeoKey> own =
+      epsg == 0 ? std::span(crs.geo_keys) : std::span<const GeoKey>();
+  if (epsg != 0) keys.add(kGTModelType, crs.geographic ? kModelGeographic : kModelProjected);
+  for (const GeoKey& key : own) {
+    if (key.key == kGTModelType) keys.add(key);
+  }
+  keys.add(kGTRasterType, options.pixel_is_point ? kPixelIsPoint : kPixelIsArea);
+  if (!crs.name.empty()) keys.add(kGTCitation, crs.name);
+  for (const GeoKey& key : own) {
+    if (key.key > kGTCitation && key.key < kVerticalCrs) keys.add(key);
+  }
+  if (!own.empty() && !crs.geographic && unit != 0) keys.add(kLinearUnit, unit);
+  if (epsg != 0 && crs.geographic) {
+    keys.add(kGeodeticCrs, epsg);
+    keys.add(kAngularUnit, unit != 0 ? unit : std::uint16_t{9102});
+  } else if (epsg != 0) {
+    keys.add(kProjectedCrs, epsg);
+    if (unit != 0) keys.add(kLinearUnit, unit);
+  }
+  if (const std::uint16_t vertical = code(crs.vertical_epsg); vertical != 0) {
+    keys.add(kVerticalCrs, vertical);
+    const std::uint16_t vertical_unit = unit_code(crs.vertical_unit);
+    if (vertical_unit != 0) keys.add(kVerticalUnit, vertical_unit);
+  }
+  return keys;
+}
+
+std::string metadata_of(const Channel& sample) {
+  if (sample.scale == 1 && sample.offset == 0 && sample.unit.empty()) return {};
+  std::string xml = "<GDALMetadata>\n";
+  const auto item = [&](const char* item_name, const char* role, const std::string& value) {
+    xml.append("  <Item name=\"").append(item_name).append("\" sample=\"0\" role=\"");
+    xml.append(role).append("\">").append(value).append("</Item>\n");
+  };
+  if (sample.offset != 0) item("OFFSET", "offset", shortest(sample.offset));
+  if (sample.scale != 1) item("SCALE", "scale", shortest(sample.scale));
+  if (!sample.unit.empty()) item("UNITTYPE", "unittype", escaped(sample.unit));
+  return xml + "</GDALMetadata>\n";
+}
+
+void add_georeference(TiffDirectory& directory, const GeoTiffOptions& options) {
+  auto m = options.world.xy;
+  if (!options.pixel_is_point) {  // to the corner of the cell
+    m[2] -= 0.5 * (m[0] + m[1]);
+    m[5] -= 0.5 * (m[3] + m[4]);
+  }
+  if (m[1] == 0 && m[3] == 0 && m[0] > 0 && m[4] < 0) {
+    directory.add(kModelPixelScale, std::vector<double>{m[0], -m[4], 0});
+    directory.add(kModelTiepoint, std::vector<double>{0, 0, 0, m[2], m[5], 0});
+  } else {
+    directory.add(kModelTransformation, std::vector<double>{m[0], m[1], 0, m[2], m[3], m[4], 0,
+                                                            m[5], 0, 0, 0, 0, 0, 0, 0, 1});
+  }
+  const KeyDirectory keys = keys_of(options);
+  directory.add(kGeoKeyDirectory, keys.shorts());
+  if (!keys.doubles().empty()) directory.add(kGeoDoubleParams, keys.doubles());
+  if (!keys.ascii().empty()) directory.add(kGeoAsciiParams, keys.ascii());
+}
+
+/// As short as it can be, as libtiff writes it.
+void add_length(TiffDirectory& directory, std::uint32_t tag, std::uint32_t length) {
+  if (length <= 0xFFFF) {
+    directory.add(tag, std::vector<std::uint16_t>{static_cast<std::uint16_t>(length)});
+  } else {
+    directory.add(tag, std::vector<std::uint32_t>{length});
+  }
+}
+
+std::uint16_t format_of(ScalarType type) {
+  switch (type) {
+    case ScalarType::f32:
+    case ScalarType::f64:
+      return SAMPLEFORMAT_IEEEFP;
+    case ScalarType::i8:
+    case ScalarType::i16:
+    case ScalarType::i32:
+    case ScalarType::i64:
+      return SAMPLEFORMAT_INT;
+    default:
+      return SAMPLEFORMAT_UINT;
+  }
+}
+
+std::uint16_t code_of(GeoTiffCompression compression) {
+  switch (compression) {
+    case GeoTiffCompression::none:
+      return COMPRESSION_NONE;
+    case GeoTiffCompression::deflate:
+      return COMPRESSION_ADOBE_DEFLATE;
+    default:
+      return COMPRESSION_ZSTD;
+  }
+}
+
+}  // namespace
+
+TiffDirectory tags_of(const GeoTiffOptions& options, unsigned level, std::uint32_t columns,
+                      std::uint32_t rows) {
+  using Shorts = std::vector<std::uint16_t>;
+  const std::uint16_t format = format_of(options.sample.type);
+  TiffDirectory directory;
+  if (level > 0)
+    directory.add(TIFFTAG_SUBFILETYPE, std::vector<std::uint32_t>{FILETYPE_REDUCEDIMAGE});
+  add_length(directory, TIFFTAG_IMAGEWIDTH, columns);
+  add_length(directory, TIFFTAG_IMAGELENGTH, rows);
+  const auto bits = static_cast<std::uint16_t>(8 * size_of(options.sample.type));
+  directory.add(TIFFTAG_BITSPERSAMPLE, Shorts{bits});
+  directory.add(TIFFTAG_COMPRESSION, Shorts{code_of(options.compression)});
+  directory.add(TIFFTAG_PHOTOMETRIC, Shorts{PHOTOMETRIC_MINISBLACK});
+  directory.add(TIFFTAG_SAMPLESPERPIXEL, Shorts{1});
+  directory.add(TIFFTAG_PLANARCONFIG, Shorts{PLANARCONFIG_CONTIG});
+  directory.add(TIFFTAG_SOFTWARE, "terrace");
+  if (options.compression != GeoTiffCompression::none && options.predictor) {
+    const bool floats = format == SAMPLEFORMAT_IEEEFP;
+    directory.add(TIFFTAG_PREDICTOR, Shorts{static_cast<std::uint16_t>(
+                                         floats ? PREDICTOR_FLOATINGPOINT : PREDICTOR_HORIZONTAL)});
+  }
+  add_length(directory, TIFFTAG_TILEWIDTH, options.tile);
+  add_length(directory, TIFFTAG_TILELENGTH, options.tile);
+  directory.add(TIFFTAG_SAMPLEFORMAT, Shorts{format});
+  if (level == 0) {
+    add_georeference(directory, options);
+    const std::string metadata = metadata_of(options.sample);
+    if (!metadata.empty()) directory.add(kGdalMetadata, metadata);
+  }
+  if (options.nodata) directory.add(kGdalNodata, shortest(*options.nodata));
+  return directory;
+}
+
+}  // namespace terrace::stream

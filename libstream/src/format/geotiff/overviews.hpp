@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "terrace/stream/geotiff_writer.hpp"
+
+namespace terrace::stream {
+
+/// The raster, or an overview of it.
+struct GeoTiffLevel {
+  std::uint32_t columns = 0, rows = 0;
+  std::uint32_t across = 0, down = 0;  ///< tiles
+
+  [[nodiscard]] std::size_t tiles() const { return std::size_t{across} * down; }
+};
+
+/// The raster and its overviews, each with half the columns and rows of the one before (rounded
+/// up), down to the first of at most 512 x 512 cells; the raster alone if no overviews are wanted.
+std::vector<GeoTiffLevel> levels_of(const GeoTiffOptions& options);
+
+/// Makes the tiles of overviews out of the raster's, in any order. Holds the overview tiles that
+/// are not complete: one for each level if tiles come in the order of a quadtree, half a row of
+/// them for each level if they come by rows.
+class Overviews {
+ public:
+  /// Takes a tile of a level of 1 or above.
+  using Write = std::function<void(std::size_t level, std::uint32_t across, std::uint32_t down,
+                                   std::span<std::byte> samples)>;
+
+  Overviews(const GeoTiffOptions& options, std::vector<GeoTiffLevel> levels, Write write);
+
+  /// A tile of the raster; without samples: of no data.
+  void add(std::uint32_t across, std::uint32_t down, std::span<const std::byte> samples) {
+    add(0, across, down, samples);
+  }
+  /// The tiles that were not added have no data. Writes what is not complete.
+  void finish();
+
+ private:
+  struct Tile {
+    std::vector<std::byte> samples{};  ///< none: no data so far
+    unsigned children = 0;
+  };
+  using Place = std::pair<std::uint32_t, std::uint32_t>;  ///< across, down
+
+  void add(std::size_t level, std::uint32_t across, std::uint32_t down,
+           std::span<const std::byte> samples);
+  template <class T>
+  void reduce(std::size_t level, std::uint32_t across, std::uint32_t down,
+              std::span<const std::byte> samples, std::vector<std::byte>& parent) const;
+  void complete(std::size_t level, Place place, Tile tile);
+
+  GeoTiffOptions options_;
+  std::vector<GeoTiffLevel> levels_;
+  Write write_;
+  std::vector<std::map<Place, Tile>> open_;  ///< of each level
+};
+
+}  // namespace terrace::stream

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "terrace/stream/geotiff_writer.hpp"
+
+struct libdeflate_compressor;
+
+namespace terrace::stream {
+
+/// Codes the tiles of a GeoTIFF: differences of neighbours, then what is repeated.
+class TileEncoder {
+ public:
+  explicit TileEncoder(const GeoTiffOptions& options);
+  ~TileEncoder();
+  TileEncoder(const TileEncoder&) = delete;
+  TileEncoder& operator=(const TileEncoder&) = delete;
+
+  /// samples: of a whole tile, used up. The result stays until the next call.
+  std::span<const std::byte> encode(std::span<std::byte> samples);
+
+ private:
+  void difference(std::span<std::byte> samples);
+
+  GeoTiffOptions options_;
+  libdeflate_compressor* deflate_ = nullptr;
+  std::vector<std::byte> row_, coded_;
+};
+
+}  // namespace terrace::stream
