@@ -142,7 +142,7 @@ class PointsCommand final : public Command {
         ->excludes("--region")
         ->excludes("--focus");
     app.add_option("-k", count_, "with --near: so many points")
-        ->check(CLI::Range(1U, 4294967295U))
+        ->check(CLI::Range(0U, 4294967295U))
         ->type_name("K")
         ->needs("--near");
     app.add_option("--within", radius_, "with --near: all points up to this distance, in metres")
