@@ -344,7 +344,6 @@ class OptionTest(ProcessTest):
         out = lambda name: ['-o', self.path(name)]
         return {'build': ['build', points, *out('built')], 'info': ['info', points],
                 'verify': ['verify', store], 'points': ['points', store, *out('out.xyz')],
-                'points near': ['points', store, '--near', '5,5', *out('out.xyz')],
                 'mesh': ['mesh', store, *out('out.ply')],
                 'surface': ['surface', store, *out('out.ply')],
                 'tile': ['tile', self.path('raster'), *out('tiles'), '--vertical', 'ignore'],
@@ -403,14 +402,17 @@ class OptionTest(ProcessTest):
             for option in set(self.options_of(command[0])) & counts:
                 tried.add(option)
                 for value in ('0', '-1', '18446744073709551615'):
-                    if (name, value) == ('points near', '0') and option == '-k':
-                        continue  # no points are an answer
                     with self.subTest(name=name, option=option, value=value):
                         given = f'{option}={value}' if option[1] == '-' else option + value
                         result = terrace(*command, given)
                         self.assertEqual(result.returncode, 2, result.stderr)
                         self.assertEqual(result.stderr.count('\n'), 1, result.stderr)
         self.assertEqual(tried, counts)
+        for value in ('-1', '18446744073709551615'):
+            result = terrace('points', self.store(), '-o', self.path('out.xyz'), '--near', '5,5',
+                             '-k' + value)
+            self.assertEqual(result.returncode, 2, result.stderr)
+            self.assertIn('-k: Value', result.stderr)
 
     def test_json_is_refused_where_the_output_wants_standard_output(self):
         for name, command in self.commands().items():
