@@ -196,6 +196,11 @@ TEST_F(Vrt, WhatComputesSamplesIsRefusedByName) {
             std::string::npos);
   EXPECT_NE(of_text("<VRTDataset rasterXSize='1' rasterYSize='1'/>").find("0 bands"),
             std::string::npos);
+  // A dataset's and a band's own kind is told before what their sources are.
+  EXPECT_NE(of_text("<VRTDataset subClass='VRTWarpedDataset' rasterXSize='1' rasterYSize='1'>"
+                    "<VRTRasterBand><SimpleSource/></VRTRasterBand></VRTDataset>")
+                .find("VRTWarpedDataset"),
+            std::string::npos);
   // Damage of any kind is an Error.
   const std::string good = read_text(put_vrt(all));
   for (int round = 0; round < 400; ++round) {
@@ -203,6 +208,38 @@ TEST_F(Vrt, WhatComputesSamplesIsRefusedByName) {
     for (int i = 0; i < 3; ++i) bad[random() % bad.size()] = static_cast<char>(random() % 128);
     of_text(bad);
   }
+}
+
+TEST_F(Vrt, OnlyWhatIsNeededOfADescriptionIsHeld) {
+  std::mt19937_64 random(9);
+  put_tiff("a.tif", 0, 0, 20, 10, "", 99, random);
+  const auto repeated = [](const std::string& text, std::size_t times) {
+    std::string all;
+    for (std::size_t i = 0; i < times; ++i) all += text;
+    return all;
+  };
+  // More than is held, in parts that say nothing of the samples.
+  const std::string filler = repeated("<MDI key='a key'>some value</MDI>", 400'000);
+  for (const std::string& file : {put_vrt(source(""), "<Metadata>" + filler + "</Metadata>"),
+                                  put_vrt("<Metadata>" + filler + "</Metadata>" + source("")),
+                                  put_vrt(filler + source(""))}) {
+    EXPECT_EQ(read_file(file).points.size(), 200U);
+  }
+  // Bands that are not asked for are skipped, with sources of any kind.
+  const std::string other =
+      "<VRTRasterBand>" + repeated("<KernelFilteredSource/>", 400'000) + "</VRTRasterBand>";
+  EXPECT_EQ(read_file(put_vrt(source("") + "</VRTRasterBand>" + other +
+                              "<VRTRasterBand dataType='Int16'>"))
+                .points.size(),
+            200U);
+  const auto message = [&](const std::string& band) {
+    const std::string file = put_vrt(band);
+    return error_of([&] { read_file(file); });
+  };
+  EXPECT_NE(message("<SimpleSource>" + filler + "</SimpleSource>").find("too large for a descr"),
+            std::string::npos);
+  EXPECT_NE(message(source("<a b='" + std::string(5u << 20, 'x') + "'/>")).find("too long"),
+            std::string::npos);
 }
 
 }  // namespace

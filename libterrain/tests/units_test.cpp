@@ -57,6 +57,9 @@ TEST(Readable, IsShort) {
   EXPECT_EQ(with_commas(999), "999");
   EXPECT_EQ(with_commas(1000), "1,000");
   EXPECT_EQ(with_commas(12345678), "12,345,678");
+  EXPECT_EQ(counted(0, "tile"), "0 tiles");
+  EXPECT_EQ(counted(1, "tile"), "1 tile");
+  EXPECT_EQ(counted(1234, "level"), "1,234 levels");
   EXPECT_EQ(readable_bytes(12), "12 bytes");
   EXPECT_EQ(readable_bytes(256u << 20), "256 MiB");
   EXPECT_EQ(readable_bytes((std::uint64_t{3} << 30) + (std::uint64_t{1} << 28)), "3.25 GiB");

@@ -325,7 +325,7 @@ class WaitTest(ProcessTest):
         with open(fifo, 'wb') as producer, open(raster, 'rb') as file:
             producer.write(file.read(1000))
             producer.flush()
-            time.sleep(0.3)
+            wait_until(lambda: unread_bytes(producer) == 0)
             process.send_signal(signal.SIGINT)
             code, error = self.end_of(process)
         self.assertEqual(code, 130, error)
@@ -395,6 +395,25 @@ class OptionTest(ProcessTest):
                               '--max-edge', '--seconds', '--hurst', '--roughness', '--threads',
                               '--memory', '--seed', '-k', '--band', '--block'}, numeric)
 
+    def test_no_count_is_negative_or_zero(self):
+        counts = {'-k', '--band', '--batch', '--block', '--threads'}
+        tried = set()
+        for name, command in self.commands().items():
+            for option in set(self.options_of(command[0])) & counts:
+                tried.add(option)
+                for value in ('0', '-1', '18446744073709551615'):
+                    with self.subTest(name=name, option=option, value=value):
+                        given = f'{option}={value}' if option[1] == '-' else option + value
+                        result = terrace(*command, given)
+                        self.assertEqual(result.returncode, 2, result.stderr)
+                        self.assertEqual(result.stderr.count('\n'), 1, result.stderr)
+        self.assertEqual(tried, counts)
+        for value in ('-1', '18446744073709551615'):
+            result = terrace('points', self.store(), '-o', self.path('out.xyz'), '--near', '5,5',
+                             '-k' + value)
+            self.assertEqual(result.returncode, 2, result.stderr)
+            self.assertIn('-k: Value', result.stderr)
+
     def test_json_is_refused_where_the_output_wants_standard_output(self):
         for name, command in self.commands().items():
             if '-o' not in command:
@@ -433,6 +452,15 @@ class NameTest(ProcessTest):
                 self.assert_plain(result.stderr)
                 if result.stderr:
                     self.assertIn('\\x', result.stderr)
+
+    def test_standard_input_is_named_in_words(self):
+        for text, cause in (('', 'the file is empty'),
+                            ('This is prose.\n', 'neither content nor name tell its format')):
+            with self.subTest(text=text):
+                result = terrace('info', '-', input=text)
+                self.assertEqual(result.returncode, 1)
+                self.assertTrue(result.stderr.startswith(f'terrace: standard input: {cause}; '),
+                                result.stderr)
 
     def test_a_line_end_in_a_name_makes_no_line_of_its_own(self):
         result = terrace('info', self.path('none\nterrace: all is well'))

@@ -490,6 +490,12 @@ class BuildOptionTest(unittest.TestCase):
         result = terrace('build', raster, '-o', self.path('none'), '--band', 4)
         self.assertEqual(result.returncode, 1, result.stderr)
         self.assertIn('band', result.stderr)
+        points = self.path('no-bands.xyz')
+        with open(points, 'w') as file:
+            file.write('1 2 3\n')
+        result = terrace('build', points, '-o', self.path('none'), '--band', 2)
+        self.assertEqual(result.returncode, 1, result.stderr)
+        self.assertIn('leave --band out', result.stderr)
 
     def test_a_format_that_cannot_be_told_can_be_named(self):
         points = self.somewhere(3, 40)

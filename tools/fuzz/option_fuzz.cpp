@@ -5,12 +5,14 @@
 
 #include "base/units.hpp"
 #include "cli/choices.hpp"
+#include "cli/clustering_options.hpp"
 #include "cli/detail_options.hpp"
 #include "cli/line_option.hpp"
 #include "cli/smooth_option.hpp"
 #include "fuzz_target.hpp"
 #include "picture/camera.hpp"
 #include "scan/surface_run.hpp"
+#include "synth/synth_cloud.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/bounded_mesh.hpp"
 #include "terrace/terrain/error.hpp"
@@ -62,6 +64,18 @@ bool parse(std::string_view name, const std::string& value) {
     require(parse_line(file.name()).size() >= 2, "a line has two places");
   } else if (name == "criterion") {
     static_cast<void>(parse_criterion(value));
+  } else if (name == "channel") {
+    const auto [channel, weight] = channel_of(value);
+    require(!channel.empty() && weight >= 0 && std::isfinite(weight), "a channel and its weight");
+  } else if (name == "shuffle") {
+    constexpr std::uint64_t kPoints = 50, kMemory = 1 << 20;
+    const DeliveryOrder order(value, kPoints, /*seed=*/1, kMemory);
+    std::vector<bool> seen(kPoints);
+    for (std::uint64_t i = 0; i < kPoints; ++i) {
+      const std::uint64_t point = order(i);
+      require(point < kPoints && !seen[point], "each point once");
+      seen[point] = true;
+    }
   } else if (name == "tile") {
     const auto tile = parse_tile_path(value);
     if (!tile) return false;
@@ -79,6 +93,7 @@ bool parse(std::string_view name, const std::string& value) {
     const bool any = static_cast<int>(known(parse_fill)) + static_cast<int>(known(parse_quality)) +
                          static_cast<int>(known(parse_duplicates)) +
                          static_cast<int>(known(parse_raster_value)) +
+                         static_cast<int>(known(parse_height_reference)) +
                          static_cast<int>(known(parse_interpolation)) >
                      0;
     return any;

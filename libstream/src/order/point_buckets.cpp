@@ -8,13 +8,6 @@
 #include "with_type.hpp"
 
 namespace terrace::stream {
-namespace {
-
-/// Of 256 buckets these are 8 MiB in memory, and few enough writes.
-constexpr std::size_t kChunkBytes = 32u << 10;
-
-}  // namespace
-
 PackedPoints::PackedPoints(const Schema& schema) {
   std::size_t bytes = 0;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -94,7 +87,7 @@ void Bucket::append(Bucket&& next) {
 BucketFile::BucketFile(const std::string& name, const std::filesystem::path& folder,
                        std::size_t record_bytes)
     : record_bytes_(record_bytes),
-      chunk_bytes_(std::max<std::size_t>(kChunkBytes / record_bytes, 1) * record_bytes),
+      chunk_bytes_(std::max<std::size_t>(kBucketBytes / record_bytes, 1) * record_bytes),
       file_(name, folder) {}
 
 void BucketFile::append(Bucket& bucket, std::span<const std::byte> record) {
@@ -120,6 +113,8 @@ std::uint64_t BucketFile::records(const Bucket& bucket) const {
 void BucketFile::take(Bucket& bucket, std::uint64_t most, std::vector<std::byte>& out) {
   const std::uint64_t at_once = std::max<std::uint64_t>(most * record_bytes_ / chunk_bytes_, 1);
   const std::size_t chunks = std::min<std::uint64_t>(bucket.chunks.size(), at_once);
+  out.clear();
+  out.reserve(chunks * chunk_bytes_ + bucket.tail.size());
   out.resize(chunks * chunk_bytes_);
   for (std::size_t i = 0; i < chunks; ++i) {
     file_.read(std::uint64_t{bucket.chunks[i]} * chunk_bytes_,

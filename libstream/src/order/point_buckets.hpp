@@ -17,6 +17,9 @@
 
 namespace terrace::stream {
 
+/// What a bucket holds in memory at most: of 256 buckets 8 MiB, and few enough writes.
+inline constexpr std::size_t kBucketBytes = 32u << 10;
+
 /// Points as records of their stored types: the coordinates, then the attributes.
 class PackedPoints {
  public:

@@ -46,16 +46,26 @@ double widths_of(std::span<const NumberedPoint> points, std::span<const std::siz
   return widths;
 }
 
+/// What points take that are held back to be judged or come next, and the ends of all buckets.
+std::uint64_t bytes_to_order(const SourceInfo& info) {
+  static_assert(kWindowPoints <= kMostAtOnce);
+  const std::uint64_t point = sizeof(Point3) + info.payload_size() + sizeof(NumberedPoint);
+  return kMostAtOnce * point + (std::uint64_t{kBucketBytes} << kDepth);
+}
+
 class SpatialSource final : public OrderedSource {
  public:
   SpatialSource(std::unique_ptr<PointSource> source, SpatialOrderOptions options)
       : source_(std::move(source)),
         options_(std::move(options)),
         state_(options_.order == Order::stream || source_->info().grid ? State::passing
-                                                                       : State::opening) {}
+                                                                       : State::opening),
+        ordering_bytes_(state_ == State::passing ? 0 : bytes_to_order(source_->info())) {}
 
   [[nodiscard]] const SourceInfo& info() const override { return source_->info(); }
-  [[nodiscard]] std::uint64_t reading_bytes() const override { return source_->reading_bytes(); }
+  [[nodiscard]] std::uint64_t reading_bytes() const override {
+    return source_->reading_bytes() + ordering_bytes_;
+  }
   void refine(double cell_aspect, std::uint64_t memory_bytes) override {
     source_->refine(cell_aspect, memory_bytes);
   }
@@ -298,6 +308,7 @@ class SpatialSource final : public OrderedSource {
   std::unique_ptr<PointSource> source_;
   SpatialOrderOptions options_;
   State state_;
+  std::uint64_t ordering_bytes_;
   std::deque<PointBlock> window_;  ///< what was held back to be judged
   std::uint64_t unjudged_ = 0;     ///< points that pass before the next window
   std::uint64_t seen_ = 0;         ///< points of the window that is judged

@@ -132,6 +132,10 @@ std::string with_commas(std::uint64_t value) {
   return text;
 }
 
+std::string counted(std::uint64_t number, std::string_view noun) {
+  return with_commas(number) + ' ' + std::string(noun) + (number == 1 ? "" : "s");
+}
+
 std::string readable_bytes(std::uint64_t bytes) {
   constexpr std::array<const char*, 5> kUnits{"bytes", "KiB", "MiB", "GiB", "TiB"};
   double value = static_cast<double>(bytes);

@@ -30,6 +30,8 @@ std::vector<double> parse_numbers(std::string_view text, std::string_view what);
 
 /// "12,345,678".
 std::string with_commas(std::uint64_t value);
+/// "1 level", "12,345 tiles": a number and what is counted, with an s unless there is one.
+std::string counted(std::uint64_t number, std::string_view noun);
 /// "3.2 GiB", "640 MiB", "12 bytes".
 std::string readable_bytes(std::uint64_t bytes);
 /// "12.3 M/s", "45 k/s": a rate to read.

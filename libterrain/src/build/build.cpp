@@ -101,7 +101,7 @@ std::uint64_t memory_beside_source(const BuildRequest& request, std::size_t payl
 /// Throws: stream::Error if not even one does.
 unsigned threads_within_memory(const BuildRequest& request, const Context& context,
                                std::uint64_t memory_bytes, std::size_t payload_size,
-                               std::uint64_t source_bytes) {
+                               std::uint64_t source_bytes, const stream::SourceInfo& info) {
   const auto needed = [&](unsigned threads) {
     return source_bytes + memory_beside_source(request, payload_size, threads);
   };
@@ -117,8 +117,10 @@ unsigned threads_within_memory(const BuildRequest& request, const Context& conte
        .cause = "`memory_bytes` " + std::to_string(memory_bytes >> 20) +
                 "M is not enough: the build needs " + in_mebibytes(needed(1)) + ", " +
                 in_mebibytes(source_bytes) + " of it to read the input",
-       .remedy = "raise `memory_bytes`, lower `block_points`, or rewrite large strips and tiles "
-                 "as small tiles: gdal_translate -co TILED=YES"});
+       .remedy = source_bytes > kSourceMemory && info.grid
+                     ? "raise `memory_bytes`, lower `block_points`, or rewrite large strips and "
+                       "tiles as small tiles: gdal_translate -co TILED=YES"
+                     : "raise `memory_bytes`, or lower `block_points`"});
 }
 
 /// Height of a cell over its width on the ground, in the middle of the raster.
@@ -222,18 +224,6 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   stream::Placement placement = info;
   placement.crs = crs.crs;
   const Ground ground(placement, request.z_weight);
-  BuildOutcome outcome;
-  const std::uint64_t source_bytes = std::max(kSourceMemory, source->reading_bytes());
-  const stream::StoreSchema schema = schema_of(info, crs, request);
-  const std::size_t payload_bytes = schema.payload_size();
-  const unsigned threads =
-      threads_within_memory(request, context, memory_bytes, payload_bytes, source_bytes);
-  if (info.grid) {
-    // Tiles are to be square on the ground: only now is it known what a cell measures there.
-    source->refine(cell_aspect(ground, info),
-                   memory_bytes - memory_beside_source(request, payload_bytes, threads));
-  }
-
   const ProgressReport report(context, "points");
   std::optional<ProgressReport> reading_report;
   std::mutex reporting;
@@ -258,9 +248,19 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
          .reading = set_aside});
     in_order = ordered.get();
     points = std::move(ordered);
-    if (request.order != stream::Order::stream) {
-      points = stream::read_ahead(std::move(points), kBlocksAhead, reading, reading.get_token());
-    }
+  }
+  BuildOutcome outcome;
+  const std::uint64_t source_bytes = std::max(kSourceMemory, points->reading_bytes());
+  const stream::StoreSchema schema = schema_of(info, crs, request);
+  const std::size_t payload_bytes = schema.payload_size();
+  const unsigned threads =
+      threads_within_memory(request, context, memory_bytes, payload_bytes, source_bytes, info);
+  if (info.grid) {
+    // Tiles are to be square on the ground: only now is it known what a cell measures there.
+    points->refine(cell_aspect(ground, info),
+                   memory_bytes - memory_beside_source(request, payload_bytes, threads));
+  } else if (request.order != stream::Order::stream) {
+    points = stream::read_ahead(std::move(points), kBlocksAhead, reading, reading.get_token());
   }
 
   stream::StoreWriter writer(request.store, schema, request.replace, threads);
@@ -303,12 +303,14 @@ BuildOutcome build_store(const BuildRequest& request, const Context& context) {
          .where = {},
          .cause = so_far.excluded > 0
                       ? "none of its " + std::to_string(so_far.excluded) + " points is selected"
-                      : "there is not one point with data in it" +
+                      : "there is not one point" + std::string(info.grid ? " with data" : "") +
+                            " in it" +
                             (so_far.nodata == 0
                                  ? std::string()
                                  : " (" + std::to_string(so_far.nodata) + " cells, all nodata)"),
          .remedy = so_far.excluded > 0 ? "give another `where` or `region`"
-                                       : "check the file and its nodata value"});
+                   : info.grid         ? "check the file and its nodata value"
+                                       : "check the file"});
   }
   writer.set_nodata(so_far.nodata);
   const cluster::HierarchyResult result = builder.finish();

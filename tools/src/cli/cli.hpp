@@ -37,6 +37,9 @@ struct CommonOptions {
 
   /// --memory, or else what the verb grants itself: `standard`; 0 means half of what there is.
   [[nodiscard]] std::uint64_t memory_or(std::uint64_t standard) const;
+  /// What a source may hold, one part in `parts` of memory_or(0) without the program itself: 64 MiB
+  /// at least, from where on the order of a raster's cells does not depend on it.
+  [[nodiscard]] std::uint64_t reading_memory(std::uint64_t parts = 1) const;
   /// A message to the user on standard error; not with -q.
   void say(const std::string& line) const;
   /// An explanation; only with -v.

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
 #include <memory>
 #include <optional>
 
@@ -14,6 +15,12 @@ using namespace terrain;
 
 std::uint64_t CommonOptions::memory_or(std::uint64_t standard) const {
   return terrain::Context{.memory_bytes = memory_bytes}.memory_or(standard);
+}
+
+std::uint64_t CommonOptions::reading_memory(std::uint64_t parts) const {
+  constexpr std::uint64_t kLeast = std::uint64_t{64} << 20, kProgram = std::uint64_t{32} << 20;
+  const std::uint64_t memory = memory_or(0);
+  return std::max(kLeast, (memory - std::min(memory, kProgram)) / parts);
 }
 
 void CommonOptions::say(const std::string& line) const {

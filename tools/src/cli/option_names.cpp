@@ -10,7 +10,8 @@ namespace terrace::tools {
 namespace {
 
 /// Parameter and option. tests/layout checks that all parameters that libterrain names are here.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 34> kOptions{{
+constexpr std::array<std::pair<std::string_view, std::string_view>, 35> kOptions{{
+    {"band", "--band"},
     {"block_points", "--block"},
     {"cell", "--cell"},
     {"channel", "--channel"},

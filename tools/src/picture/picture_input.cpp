@@ -76,7 +76,9 @@ PictureInput from_source(const std::string& path, stream::HeightsOfColour colour
                          std::uint64_t most_cells, const CommonOptions& common) {
   const std::array<std::string, 1> files{path};
   const std::unique_ptr<stream::PointSource> source =
-      stream::open_source(files, {.heights_of_colour = colours, .stop = stop_token()});
+      stream::open_source(files, {.memory_bytes = common.reading_memory(),
+                                  .heights_of_colour = colours,
+                                  .stop = stop_token()});
   const stream::SourceInfo& info = source->info();
   const std::uint64_t memory = common.memory_or(0);
 

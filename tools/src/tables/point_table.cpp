@@ -62,8 +62,9 @@ std::uint64_t reading_within_memory(const stream::PointSource& source, std::uint
        .where = {},
        .cause = "reading it needs " + std::to_string(((kBeside + reading) >> 20) + 1) +
                 "M of memory, --memory allows " + std::to_string(memory_bytes >> 20) + "M",
-       .remedy = "raise --memory, or rewrite large strips and tiles as small "
-                 "tiles: gdal_translate -co TILED=YES"});
+       .remedy = source.info().grid ? "raise --memory, or rewrite large strips and tiles as small "
+                                      "tiles: gdal_translate -co TILED=YES"
+                                    : "raise --memory"});
 }
 
 PointTable read_point_table(const std::string& file, const std::string& format,
@@ -71,7 +72,10 @@ PointTable read_point_table(const std::string& file, const std::string& format,
                             stream::Entities entities) {
   const std::array<std::string, 1> files{file};
   const std::unique_ptr<stream::PointSource> source =
-      stream::open_source(files, {.format = format, .entities = entities, .stop = stop_token()});
+      stream::open_source(files, {.format = format,
+                                  .entities = entities,
+                                  .memory_bytes = common.reading_memory(/*parts=*/4),
+                                  .stop = stop_token()});
   const std::uint64_t reading = reading_within_memory(*source, memory_bytes);
   PointTable table;
   table.info = source->info();
@@ -100,7 +104,7 @@ PointTable read_point_table(const std::string& file, const std::string& format,
     throw stream::Error({.file = file,
                          .where = {},
                          .cause = "there is not one point in it",
-                         .remedy = "there is nothing to cluster"});
+                         .remedy = "check the file"});
   }
   return table;
 }

@@ -12,6 +12,7 @@
 #include "cli/terminal.hpp"
 #include "earth/crs/crs_definition.hpp"
 #include "earth/source_crs.hpp"
+#include "tables/point_table.hpp"
 #include "terrace/stream/error.hpp"
 #include "verbs/info.hpp"
 
@@ -84,10 +85,12 @@ Summary info_of_file(const std::string& path, stream::HeightsOfColour colours,
                      const CommonOptions& common) {
   const std::array<std::string, 1> files{path};
   const std::unique_ptr<stream::PointSource> source =
-      stream::open_source(files, {.heights_of_colour = colours,
+      stream::open_source(files, {.memory_bytes = common.reading_memory(),
+                                  .heights_of_colour = colours,
                                   .stop = stop_token(),
                                   .blocks_ahead = 8,
                                   .threads = common.threads});
+  reading_within_memory(*source, common.memory_or(0));
   const Contents contents = stream_through(*source, common);
   const stream::SourceInfo& info = source->info();
   SourceCrs crs;

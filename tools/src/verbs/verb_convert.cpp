@@ -51,6 +51,7 @@ class ConvertCommand : public Command {
     const Stopwatch watch;
     stream::WriterOptions writing = point_writer_options(output_, format_, common);
     stream::SourceOptions reading{.format = input_format_,
+                                  .memory_bytes = common.reading_memory(),
                                   .heights_of_colour = colours_,
                                   .cell = cell_.value_or(0),
                                   .stop = stop_token(),

@@ -248,7 +248,7 @@ class MatchCommand final : public Command {
                     {"levels", levels},
                     {"clusters", outcome.clusters}};
     summary.text = "a tree of " + with_commas(outcome.tree.rows.size()) + " pairs on " +
-                   std::to_string(levels) + " levels, total distance " + readable_number(cost, 6);
+                   counted(levels, "level") + ", total distance " + readable_number(cost, 6);
     finish(summary, watch);
     return summary;
   }

@@ -142,7 +142,10 @@ class PointsCommand final : public Command {
                    "their distance in metres on the ground; without Z heights do not count")
         ->excludes("--region")
         ->excludes("--focus");
-    app.add_option("-k", count_, "with --near: so many points")->needs("--near");
+    app.add_option("-k", count_, "with --near: so many points")
+        ->check(CLI::Range(0U, 4294967295U))
+        ->type_name("K")
+        ->needs("--near");
     app.add_option("--within", radius_, "with --near: all points up to this distance, in metres")
         ->needs("--near")
         ->excludes("-k");

@@ -131,14 +131,14 @@ Summary TileCommand::run(const CommonOptions& common) {
   nlohmann::ordered_json zooms = nlohmann::ordered_json::array();
   for (const TileZoom& zoom : result.zooms) {
     zooms.push_back({{"zoom", zoom.zoom}, {"tiles", zoom.tiles}, {"max_error", zoom.max_error}});
-    summary.text += "zoom " + std::to_string(zoom.zoom) + ": " + with_commas(zoom.tiles) +
-                    " tiles, within " + readable_bound(zoom.max_error) + " m\n";
+    summary.text += "zoom " + std::to_string(zoom.zoom) + ": " + counted(zoom.tiles, "tile") +
+                    ", within " + readable_bound(zoom.max_error) + " m\n";
   }
   summary.json = {{"tiles", result.tiles},      {"bytes", result.bytes},
                   {"made", result.made},        {"kept", result.kept},
                   {"removed", result.removed},  {"zooms", zooms},
                   {"seconds", watch.seconds()}, {"peak_rss_bytes", peak_rss_bytes()}};
-  summary.text += output_ + ": " + with_commas(result.tiles) + " tiles, " +
+  summary.text += output_ + ": " + counted(result.tiles, "tile") + ", " +
                   readable_bytes(result.bytes) + ", in " + readable_seconds(watch.seconds());
   if (result.made < result.tiles) {
     summary.text += "; " + with_commas(result.tiles - result.made) + " were there already";

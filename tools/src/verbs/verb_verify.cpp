@@ -105,7 +105,7 @@ Summary VerifyCommand::tiles(const CommonOptions& common) const {
   nlohmann::ordered_json zooms = nlohmann::ordered_json::array();
   for (const ZoomCheck& zoom : result.zooms) {
     nlohmann::ordered_json line{{"zoom", zoom.zoom}, {"tiles", zoom.tiles}};
-    summary.text += "zoom " + std::to_string(zoom.zoom) + ": " + with_commas(zoom.tiles) + " tiles";
+    summary.text += "zoom " + std::to_string(zoom.zoom) + ": " + counted(zoom.tiles, "tile");
     if (store) {
       line["samples"] = zoom.samples;
       line["covered"] = zoom.samples - zoom.uncovered;
@@ -135,8 +135,8 @@ Summary VerifyCommand::tiles(const CommonOptions& common) const {
                   {"samples", result.samples},
                   {"left_over", result.torn},
                   {"zooms", zooms}};
-  summary.text += std::string(ok ? "sound: " : "damaged: ") + with_commas(result.tiles) +
-                  " tiles, checked in " + readable_seconds(watch.seconds()) + "\n";
+  summary.text += std::string(ok ? "sound: " : "damaged: ") + counted(result.tiles, "tile") +
+                  ", checked in " + readable_seconds(watch.seconds()) + "\n";
   summary.exit_code = ok ? 0 : 1;
   return summary;
 }

@@ -64,15 +64,17 @@ struct WriterOptions {
   /// Ends a wait for the reader of standard output, and PointWriter::finish() of "copc", with
   /// Stopped.
   std::stop_token stop{};
-  /// What "copc" may hold: PointWriter::writing_bytes() at least, some 40 MiB; more than 192 MiB
-  /// serve many points at one place alone. The bytes of the file do not depend on it.
+  /// What "laz" and "copc" may hold. COPC takes PointWriter::writing_bytes() at least, some 40 MiB;
+  /// more than 192 MiB serve many points at one place alone. LAZ takes twice a chunk of 50,000
+  /// records at least, and as much for each thread. The bytes of the file do not depend on it.
   std::uint64_t memory_bytes = 128u << 20;
   unsigned threads = 1;  ///< that encode at once, of "laz" and "copc"; the bytes are the same
 };
 
 /// A writer for `path`; "-" is standard output, for "xyz" (also if no format is named) and "csv".
 /// Numbers in text are the shortest that read back as the same value.
-/// Throws: Error if the format is unknown (names the known ones) or the file cannot be created.
+/// Throws: Error if the format is unknown (names the known ones), if the file cannot be created, or
+/// if memory_bytes is too little for LAZ.
 std::unique_ptr<PointWriter> open_point_writer(const std::string& path, const PointHeader& header,
                                                const WriterOptions& options = {});
 

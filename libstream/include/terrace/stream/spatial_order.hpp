@@ -53,11 +53,11 @@ class OrderedSource : public PointSource {
 /// divided in turn, which takes no more disk as what has been read is written over. Cells of a
 /// raster stay as they are.
 ///
-/// The order depends on nothing but the points, their order and the options. Memory: the window
-/// twice, 8 MiB for the buckets, as much again for each time one had to be divided, and what comes
-/// next, 262,144 points with 40 bytes more each. Cost: O(n log n); points are written and read
-/// once, twice beyond some 60 million.
-/// Throws in next(): Error (of the source, or of the temporary file: a full disk); Stopped.
+/// The order depends on nothing but the points, their order and the options. Memory, which
+/// reading_bytes() states with the source's: 262,144 points, of the window or of what comes next,
+/// with 40 bytes more each, and 8 MiB for the buckets. Cost: O(n log n); points are written and
+/// read once, twice beyond some 60 million. Throws in next(): Error (of the source, or of the
+/// temporary file: a full disk); Stopped.
 [[nodiscard]] std::unique_ptr<OrderedSource> in_spatial_order(std::unique_ptr<PointSource> source,
                                                               SpatialOrderOptions options);
 

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -13,6 +14,7 @@
 #include "format/las/record_encoder.hpp"
 #include "format/writers.hpp"
 #include "io/bytes.hpp"
+#include "terrace/stream/error.hpp"
 #include "terrace/stream/laz.hpp"
 #include "terrace/stream/sink.hpp"
 
@@ -25,7 +27,9 @@ class LazChunks {
   LazChunks(const laz::Vlr& vlr, unsigned threads, Sink& sink)
       : vlr_(vlr),
         sink_(sink),
-        encoders_(vlr, threads, [this](std::span<const std::byte> coded) { write(coded); }) {}
+        encoders_(vlr, threads, [this](std::span<const std::byte> coded) { write(coded); }) {
+    pending_.reserve(vlr_.chunk_size * vlr_.record_length());
+  }
 
   /// Takes records, and writes the chunks that they fill.
   void append(std::string_view records) {
@@ -68,6 +72,25 @@ class LazChunks {
   LazEncoders encoders_;
 };
 
+/// As many threads as were asked for and whose chunks fit: one being filled, and the records and
+/// coded bytes of one per thread and one more.
+/// Throws: Error if the memory does not hold the chunk of one.
+unsigned threads_within(const WriterOptions& options, const laz::Vlr& vlr,
+                        const std::string& path) {
+  const std::uint64_t chunk = vlr.chunk_size * vlr.record_length();
+  const std::uint64_t chunks = options.memory_bytes / chunk;
+  if (chunks < 2) {
+    throw Error({.file = path,
+                 .where = {},
+                 .cause = "writing LAZ of " + std::to_string(vlr.record_length()) +
+                          " bytes a point needs " + std::to_string((2 * chunk >> 20) + 1) +
+                          "M of memory, more than there is for it",
+                 .remedy = "raise `memory_bytes`"});
+  }
+  const std::uint64_t most = chunks < 5 ? 1 : (chunks - 3) / 2;
+  return static_cast<unsigned>(std::min<std::uint64_t>(options.threads, most));
+}
+
 class LasWriter final : public PointWriter {
  public:
   LasWriter(const std::string& path, const PointHeader& header, const WriterOptions& options,
@@ -84,7 +107,7 @@ class LasWriter final : public PointWriter {
       append_vlr(vlrs, laz::Vlr::kUserId, laz::Vlr::kRecordId,
                  {reinterpret_cast<const char*>(data.data()), data.size()});
       ++file_.vlrs;
-      chunks_.emplace(vlr, options.threads, sink_);
+      chunks_.emplace(vlr, threads_within(options, vlr, path), sink_);
     }
     file_.points_offset = kLas14HeaderBytes + vlrs.size();
     sink_.write(std::string(kLas14HeaderBytes, '\0') + vlrs);

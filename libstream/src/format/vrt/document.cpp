@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string_view>
 #include <utility>
 
@@ -22,15 +23,14 @@ constexpr std::uint64_t kMostVrtCells = 1u << 30;
 
 class VrtReader {
  public:
-  VrtReader(const std::string& file, int band) : file_(file), root_(read_xml(file)) {
-    if (root_.name != "VRTDataset") fail("", "is XML, but no VRTDataset");
-    if (const std::string kind = root_.attribute("subClass"); !kind.empty()) {
-      fail("VRTDataset", "is a " + in_quotes(kind) + ", which computes its samples", kAsGeoTiff);
-    }
-    info_.columns = size_of_side("rasterXSize");
-    info_.rows = size_of_side("rasterYSize");
-    read_place();
-    read_band(band);
+  VrtReader(const std::string& file, int band) : file_(file), wanted_(band) {
+    const XmlElement root =
+        read_xml(file, [this](std::span<const XmlElement> open, const XmlElement& done) {
+          return take(open, done);
+        });
+    read_dataset(root);
+    read_place(root);
+    read_band(root);
   }
 
   VrtDocument document() && { return {std::move(info_), std::move(sources_), nodata_}; }
@@ -59,8 +59,40 @@ class VrtReader {
     return value;
   }
 
-  [[nodiscard]] std::uint64_t size_of_side(const char* name) const {
-    const double value = number(root_.attribute(name), name);
+  /// The sources, which there may be very many of, are read as they come; all that says nothing of
+  /// the samples is forgotten.
+  bool take(std::span<const XmlElement> open, const XmlElement& done) {
+    if (open.size() == 1) {
+      if (done.name == kBand) ++bands_;
+      return done.name != kBand && done.name != "SRS" && done.name != "GeoTransform" &&
+             done.name != "MaskBand";
+    }
+    if (open[1].name != kBand || bands_ + 1 != wanted_) return true;
+    if (open.size() > 2) return !open[2].name.ends_with("Source");
+    if (done.name == "SimpleSource" || done.name == "ComplexSource") {
+      if (sources_.empty()) {
+        read_dataset(open[0]);
+        read_kind(open[1]);
+      }
+      sources_.push_back(source_of(done));
+      return true;
+    }
+    return !done.name.ends_with("Source") && done.name != "MaskBand" &&
+           done.name != "NoDataValue" && done.name != "Scale" && done.name != "Offset" &&
+           done.name != "UnitType";
+  }
+
+  void read_dataset(const XmlElement& root) {
+    if (root.name != "VRTDataset") fail("", "is XML, but no VRTDataset");
+    if (const std::string kind = root.attribute("subClass"); !kind.empty()) {
+      fail("VRTDataset", "is a " + in_quotes(kind) + ", which computes its samples", kAsGeoTiff);
+    }
+    info_.columns = size_of_side(root, "rasterXSize");
+    info_.rows = size_of_side(root, "rasterYSize");
+  }
+
+  [[nodiscard]] std::uint64_t size_of_side(const XmlElement& root, const char* name) const {
+    const double value = number(root.attribute(name), name);
     if (!(value >= 1) || value >= static_cast<double>(kMostVrtCells) ||
         value != std::floor(value)) {
       fail(name, "is not a number of cells from 1 to 2^30 - 1");
@@ -68,11 +100,11 @@ class VrtReader {
     return static_cast<std::uint64_t>(value);
   }
 
-  void read_place() {
+  void read_place(const XmlElement& root) {
     info_.format = "vrt";
     info_.files = {file_};
-    if (const XmlElement* const srs = root_.child("SRS")) info_.crs.wkt = trim(srs->text);
-    const XmlElement* const transform = root_.child("GeoTransform");
+    if (const XmlElement* const srs = root.child("SRS")) info_.crs.wkt = trim(srs->text);
+    const XmlElement* const transform = root.child("GeoTransform");
     if (transform == nullptr) {
       info_.world = kPlainWorld;
       info_.comments.push_back(kNoGeoreferencing);
@@ -91,24 +123,27 @@ class VrtReader {
     }
   }
 
-  void read_band(int wanted) {
-    if (root_.child("MaskBand") != nullptr) fail("MaskBand", "is not read", kAsGeoTiff);
-    int bands = 0;
-    const XmlElement* band = nullptr;
-    for (const XmlElement& element : root_.children) {
-      if (element.name == "VRTRasterBand" && ++bands == wanted) band = &element;
-    }
-    if (band == nullptr) {
-      fail("", "has " + std::to_string(bands) + " bands, and band " + std::to_string(wanted) +
+  void read_band(const XmlElement& root) {
+    if (root.child("MaskBand") != nullptr) fail("MaskBand", "is not read", kAsGeoTiff);
+    if (wanted_ > bands_) {
+      fail("", "has " + std::to_string(bands_) + " bands, and band " + std::to_string(wanted_) +
                    " is asked for");
     }
-    if (const std::string kind = band->attribute("subClass"); !kind.empty()) {
+    int number_of_band = 0;
+    for (const XmlElement& element : root.children) {
+      if (element.name != kBand || ++number_of_band != wanted_) continue;
+      read_kind(element);
+      for (const XmlElement& part : element.children) read_part(part);
+    }
+    info_.nodata = nodata_.value;
+  }
+
+  void read_kind(const XmlElement& band) {
+    if (const std::string kind = band.attribute("subClass"); !kind.empty()) {
       fail("VRTRasterBand", "is a " + in_quotes(kind) + ", which computes its samples", kAsGeoTiff);
     }
     info_.sample.name = "height";
-    info_.sample.type = type_of(band->attribute("dataType"));
-    for (const XmlElement& part : band->children) read_part(part);
-    info_.nodata = nodata_.value;
+    info_.sample.type = type_of(band.attribute("dataType"));
   }
 
   [[nodiscard]] ScalarType type_of(const std::string& name) const {
@@ -131,9 +166,7 @@ class VrtReader {
   }
 
   void read_part(const XmlElement& part) {
-    if (part.name == "SimpleSource" || part.name == "ComplexSource") {
-      sources_.push_back(source_of(part));
-    } else if (part.name.ends_with("Source") || part.name == "MaskBand") {
+    if (part.name.ends_with("Source") || part.name == "MaskBand") {
       fail(part.name, "is not read", kAsGeoTiff);
     } else if (part.name == "NoDataValue") {
       nodata_ = NodataRule::parse(std::string(trim(part.text)), info_.sample.type);
@@ -144,7 +177,7 @@ class VrtReader {
       info_.sample.offset = number(part.text, "Offset");
     } else if (part.name == "UnitType") {
       info_.sample.unit = info_.crs.vertical_unit = trim(part.text);
-    }  // colours, statistics, overviews and the like say nothing of the samples
+    }
   }
 
   VrtSource source_of(const XmlElement& element) const {
@@ -217,8 +250,11 @@ class VrtReader {
     source.rows = cells(to.v[3]);
   }
 
+  static constexpr std::string_view kBand = "VRTRasterBand";
+
   const std::string& file_;
-  XmlElement root_;
+  int wanted_;
+  int bands_ = 0;  ///< that have come to their end
   RasterInfo info_;
   NodataRule nodata_;
   std::vector<VrtSource> sources_;

@@ -45,6 +45,9 @@ class VrtRaster final : public Raster {
         if (!unit.empty()) info_.crs.vertical_unit = unit;
       }
     }
+    for (const VrtSource& source : sources_) {
+      info_.held_bytes += sizeof source + source.file.capacity() + sizeof(std::uint64_t);
+    }
     if (!direct_) {
       constexpr std::uint64_t kWindowColumns = 4096;  // of most windows
       info_.held_bytes += std::min(info_.columns, kWindowColumns) * kStripRows *

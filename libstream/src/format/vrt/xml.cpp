@@ -20,17 +20,33 @@ namespace terrace::stream {
 namespace {
 
 constexpr std::uint64_t kMostBytes = std::uint64_t{256} << 20;
+constexpr std::uint64_t kMostTagBytes = std::uint64_t{4} << 20;
+constexpr std::size_t kMostHeldBytes = std::size_t{64} << 20;
 constexpr std::size_t kDeepest = 32;
+
+/// Of a node of a map with two short strings.
+constexpr std::size_t kAttributeBytes = 112;
 
 /// What the parser has read. Its handlers are C functions: they must not throw.
 struct XmlReading {
   XML_Parser parser = nullptr;
+  const TakeElement* take = nullptr;
   XmlElement root{};
-  std::vector<XmlElement> open{};  ///< those whose end has not come
+  std::vector<XmlElement> open{};    ///< those whose end has not come
+  std::vector<std::size_t> bytes{};  ///< what each of them holds, with what is below
+  std::size_t held = 0;              ///< their sum
   std::string refusal{};
   std::exception_ptr failure{};
 
   void stop() const { XML_StopParser(parser, XML_FALSE); }
+  /// So much more is held for the innermost element.
+  void hold(std::size_t more) {
+    bytes.back() += more;
+    held += more;
+    if (held <= kMostHeldBytes) return;
+    refusal = "it is too large for a description";
+    stop();
+  }
 
   template <class Work>
   static void safely(void* self, const Work& work) {
@@ -51,19 +67,30 @@ void on_start(void* self, const XML_Char* name, const XML_Char** attributes) {
       return reading.stop();
     }
     XmlElement element{.name = name};
-    for (; *attributes != nullptr; attributes += 2)
-      element.attributes[attributes[0]] = attributes[1];
+    std::size_t bytes = sizeof element + element.name.size();
+    for (; *attributes != nullptr; attributes += 2) {
+      std::string& value = element.attributes[attributes[0]];
+      value = attributes[1];
+      bytes += kAttributeBytes + value.size();
+    }
     reading.open.push_back(std::move(element));
+    reading.bytes.push_back(0);
+    reading.hold(bytes);
   });
 }
 
 void on_end(void* self, const XML_Char* /*name*/) {
   XmlReading::safely(self, [](XmlReading& reading) {
     XmlElement done = std::move(reading.open.back());
+    const std::size_t bytes = reading.bytes.back();
     reading.open.pop_back();
+    reading.bytes.pop_back();
     if (reading.open.empty()) {
       reading.root = std::move(done);
+    } else if ((*reading.take)(reading.open, done)) {
+      reading.held -= bytes;
     } else {
+      reading.bytes.back() += bytes;
       reading.open.back().children.push_back(std::move(done));
     }
   });
@@ -71,8 +98,9 @@ void on_end(void* self, const XML_Char* /*name*/) {
 
 void on_text(void* self, const XML_Char* text, int size) {
   XmlReading::safely(self, [&](XmlReading& reading) {
-    if (!reading.open.empty())
-      reading.open.back().text.append(text, static_cast<std::size_t>(size));
+    if (reading.open.empty()) return;
+    reading.open.back().text.append(text, static_cast<std::size_t>(size));
+    reading.hold(static_cast<std::size_t>(size));
   });
 }
 
@@ -95,12 +123,12 @@ std::string XmlElement::attribute(const std::string& wanted) const {
   return at == attributes.end() ? std::string() : at->second;
 }
 
-XmlElement read_xml(const std::string& file) {
+XmlElement read_xml(const std::string& file, const TakeElement& take) {
   const auto bytes = open_file(file);
   const std::unique_ptr<std::remove_pointer_t<XML_Parser>, void (*)(XML_Parser)> parser(
       XML_ParserCreate(nullptr), &XML_ParserFree);
   if (!parser) throw std::bad_alloc();
-  XmlReading reading{.parser = parser.get()};
+  XmlReading reading{.parser = parser.get(), .take = &take};
   const auto fail = [&](const std::string& cause) {
     throw Error({.file = file,
                  .where = "line " + std::to_string(XML_GetCurrentLineNumber(parser.get())),
@@ -123,6 +151,10 @@ XmlElement read_xml(const std::string& file) {
                                         at == bytes->size() ? XML_TRUE : XML_FALSE);
     if (reading.failure) std::rethrow_exception(reading.failure);
     if (!reading.refusal.empty()) fail(reading.refusal);
+    const XML_Index begun = XML_GetCurrentByteIndex(parser.get());
+    if (begun >= 0 && at - static_cast<std::uint64_t>(begun) > kMostTagBytes) {
+      fail("has a tag that is too long");
+    }
     if (status != XML_STATUS_OK) {
       fail(std::string("is not XML: ") + XML_ErrorString(XML_GetErrorCode(parser.get())));
     }
