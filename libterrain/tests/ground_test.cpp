@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "base/portable_math.hpp"
+#include "earth/crs/crs_definition.hpp"
 
 namespace terrace::terrain {
 

@@ -7,7 +7,6 @@
 
 namespace terrace::tools {
 
-using namespace terrain;
 namespace {
 
 TEST(Terminal, TextThatATerminalShowsStays) {
