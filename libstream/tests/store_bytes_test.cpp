@@ -5,6 +5,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <libdeflate.h>
 
 #include "store/codec/bytes.hpp"
 
@@ -35,6 +36,22 @@ TEST(Crc16, EqualsTheDefinitionForEveryLength) {
     for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(random());
     EXPECT_EQ(crc16(bytes), crc16_by_bits(bytes));
   }
+}
+
+TEST(Crc32, PortableEqualsTheLibrarysInOneAndInParts) {
+  std::mt19937_64 random(2);
+  for (std::size_t size = 1; size < 300; ++size) {
+    SCOPED_TRACE(size);
+    std::vector<std::uint8_t> bytes(size);
+    for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(random());
+    const auto start = static_cast<std::uint32_t>(random());
+    EXPECT_EQ(portable_crc32(start, bytes.data(), size),
+              libdeflate_crc32(start, bytes.data(), size));
+    const std::size_t cut = random() % size;
+    EXPECT_EQ(portable_crc32(portable_crc32(0, bytes.data(), cut), bytes.data() + cut, size - cut),
+              crc32(bytes));
+  }
+  EXPECT_EQ(portable_crc32(0, "123456789", 9), 0xCBF43926u);
 }
 
 }  // namespace

@@ -4,13 +4,18 @@
 #include <chrono>
 #include <cmath>
 #include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <random>
 #include <set>
 #include <stop_token>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <terrace/stream/error.hpp>
+#include <terrace/stream/given_bytes.hpp>
 
 #include "made_raster.hpp"
 #include "temporary_folder.hpp"
@@ -134,6 +139,63 @@ TEST_F(StoreViews, AFrameOfMetresWhateverTheCrs) {
   EXPECT_NEAR(static_cast<double>(flat.model().point_count()),
               static_cast<double>(geographic.model().point_count()),
               0.1 * static_cast<double>(flat.model().point_count()));
+}
+
+// As in a browser: bytes come when they will, a few of those that are missing after each frame. The
+// end is that of a view of the folder, of triangles and of points alone.
+TEST_F(StoreViews, BytesThatComeInAnyOrderEndAtTheSame) {
+  const stream::Store whole = in_metres();
+  const auto fly = [&](auto shown) {
+    using View = StoreView<decltype(shown)>;
+    for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+      SCOPED_TRACE(seed);
+      std::mt19937_64 random(seed);
+      View expected(whole, {}, View::Reader::in_frame);
+      stream::GivenBytes given(seed == 3 ? 100'000 : 64'000'000);  // 3: some are dropped again
+      for (const auto& entry : std::filesystem::directory_iterator(whole.path())) {
+        given.add_file(entry.path().filename().string(), entry.file_size());
+      }
+      const auto give = [&](const stream::ByteRange& range) {
+        std::vector<std::byte> bytes(range.bytes);
+        stream::open_file(whole.path() / range.file)->read(range.offset, bytes);
+        given.give(range.file, range.offset, bytes);
+      };
+      const auto brought = [&](auto&& make) {
+        for (;;) {
+          try {
+            return make();
+          } catch (const stream::MissingBytes& missing) {
+            for (const stream::ByteRange& range : missing.ranges()) give(range);
+          }
+        }
+      };
+      const stream::Store store =
+          brought([&] { return stream::Store::open("given", given.open()); });
+      const auto view = brought(
+          [&] { return std::make_unique<View>(store, expected.ground(), tri::ViewOptions{}); });
+      EXPECT_EQ(view->model().triangulation().hash(), expected.model().triangulation().hash());
+      for (const double east : {-2000.0, 1500.0, 0.0}) {
+        const tri::View wish = looking_down(east, east / 2, 6.0);
+        ASSERT_TRUE(settle(expected, wish));
+        bool settled = false;
+        for (int frame = 0; frame < 20000 && !settled; ++frame) {
+          view->frame(wish, 0.01);
+          settled = view->settled();
+          const auto missing = view->missing();
+          // Not always the most important one.
+          for (std::size_t i = 0; i < std::min<std::size_t>(missing.size(), 8); ++i) {
+            give(missing[random() % missing.size()]);
+          }
+        }
+        ASSERT_TRUE(settled);
+        EXPECT_TRUE(view->missing().empty());
+        EXPECT_EQ(view->model().triangulation().hash(), expected.model().triangulation().hash());
+        EXPECT_GT(view->model().expanded_count(), 20u);
+      }
+    }
+  };
+  fly(std::int32_t{});
+  fly(tri::PointCloud{});
 }
 
 TEST_F(StoreViews, FaultsOfReadingComeOutOfAFrame) {

@@ -1,8 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# clients_test.sh BUILD: installs the clients below BUILD, unless they are there, and tests in them
-# the tiles and meshes of terrace. TERRACE names the command. Exits with 77 where a client cannot be
-# had.
+# clients_test.sh BUILD TEST: installs the clients below BUILD, unless they are there, and runs in them
+# the test: TEST FOLDER. TERRACE names the command. Exits with 77 where a client cannot be had.
 set -eu
 source=$(cd "${0%/*}" && pwd)
 skip() {
@@ -16,6 +15,9 @@ done
 
 mkdir -p "$1/clients"
 packages=$(cd "$1/clients" && pwd)
+# One at a time.
+exec 9> "$packages/lock"
+flock 9
 cp "$source/package.json" "$source/package-lock.json" "$packages"
 # The list of what is installed is put there last.
 if ! cmp -s "$packages/package-lock.json" "$packages/node_modules/.clients"; then
@@ -31,4 +33,5 @@ if ! cmp -s "$packages/package-lock.json" "$packages/node_modules/.clients"; the
   fi
   cp "$packages/package-lock.json" "$packages/node_modules/.clients"
 fi
-CHROMIUM=$(command -v chromium) exec node "$source/clients_test.mjs" "$packages"
+exec 9>&-
+CHROMIUM=$(command -v chromium) exec node "$2" "$packages"

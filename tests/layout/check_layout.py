@@ -40,7 +40,8 @@ IN_CGAL = ['libtri/src/delaunay2/double_kernel.cpp', 'libtri/src/delaunay2/ellip
            'libtri/src/interpolation', 'libtri/src/shape', 'libtri/tests', 'libtri/bench', 'tools/src/scan', 'tests/bench']
 IN_STREAM = ['libstream/src', 'libstream/tests', 'libstream/bench', 'libstream/fuzz']
 RESTRICTED = [
-    (r'CGAL/|boost/|gmp(xx)?\.h|mpfr\.h', IN_CGAL),
+    (r'CGAL/|gmp(xx)?\.h|mpfr\.h', IN_CGAL),
+    (r'boost/', IN_CGAL + ['tools/src/serve']),
     (r'GeographicLib/|proj(_experimental)?\.h', ['libterrain/src/earth', 'libterrain/tests']),
     (r'geos(_c)?\.h|geos/', ['libterrain/src/base']),
     (r'tiff(io|io\.hxx|conf|vers)?\.h|png\.h|zip\.h|zlib\.h|zstd\.h|libdeflate\.h', IN_STREAM),

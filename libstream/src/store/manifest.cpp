@@ -320,7 +320,7 @@ std::string read_manifest(const ByteSource& file) {
   if (file.size() > kMostManifestBytes) {
     throw Error({.file = file.name(), .where = {}, .cause = "the file is too large", .remedy = {}});
   }
-  std::string text(file.size(), '\0');
+  std::string text(static_cast<std::size_t>(file.size()), '\0');
   file.read(0, std::as_writable_bytes(std::span(text)));
   return text;
 }

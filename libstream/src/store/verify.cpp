@@ -74,7 +74,7 @@ class Verification {
     check_manifest();
     sums_.resize(levels_.size());
     for (std::size_t l = 0; l < levels_.size(); ++l) {
-      sums_[l].headed.resize(levels_[l]->clusters());
+      sums_[l].headed.resize(memory_size(levels_[l]->clusters()));
       most_looked_into_ += levels_.size() * levels_[l]->clusters();
       check_file(levels_[l]->data(), manifest_.levels[l].data.checksum);
       check_file(levels_[l]->index(), manifest_.levels[l].index.checksum);
@@ -117,7 +117,8 @@ class Verification {
       std::uint32_t checksum = 0;
       for (std::uint64_t offset = 0; offset < file.size(); offset += bytes.size()) {
         check_stop();
-        bytes.resize(std::min<std::uint64_t>(bytes.size(), file.size() - offset));
+        bytes.resize(
+            static_cast<std::size_t>(std::min<std::uint64_t>(bytes.size(), file.size() - offset)));
         file.read(offset, std::as_writable_bytes(std::span(bytes)));
         checksum = crc32(checksum, bytes.data(), bytes.size());
       }
@@ -228,12 +229,13 @@ class Verification {
       const std::span<const std::byte> payload(points_.payload.data() + i * stride, stride);
       for (unsigned j = 0; j < l; ++j) {
         const std::uint64_t child = points_.children[i * l + j];
-        if (sums_[j].headed[child]) {
+        std::vector<bool>::reference headed = sums_[j].headed[static_cast<std::size_t>(child)];
+        if (headed) {
           cluster_problem(l, ordinal, record.offset,
                           "cluster " + std::to_string(j) + "/" + std::to_string(child) +
                               " is headed a second time");
         }
-        sums_[j].headed[child] = true;
+        headed = true;
         sums_[j].heads += hash_of(child, points_.positions[i], payload,
                                   std::span(points_.children).subspan(i * l, j));
       }

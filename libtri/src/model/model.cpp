@@ -9,6 +9,7 @@ namespace terrace::tri {
 
 #ifdef TERRACE_TRI_CORE
 template class MultiresolutionModel<Delaunay2<std::int32_t>>;
+template class MultiresolutionModel<PointCloud>;
 #else
 template class MultiresolutionModel<Delaunay2<double>>;
 template class MultiresolutionModel<Delaunay3<std::int32_t>>;

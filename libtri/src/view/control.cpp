@@ -37,6 +37,7 @@ ViewOptions checked(ViewOptions options) {
 }  // namespace detail
 
 template class ViewControl<Delaunay2<std::int32_t>>;
+template class ViewControl<PointCloud>;
 #else
 template class ViewControl<Delaunay2<double>>;
 #endif

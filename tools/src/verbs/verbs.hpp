@@ -16,6 +16,7 @@ std::unique_ptr<Command> make_match();
 std::unique_ptr<Command> make_mesh();
 std::unique_ptr<Command> make_points();
 std::unique_ptr<Command> make_profile();
+std::unique_ptr<Command> make_publish();
 std::unique_ptr<Command> make_raster();
 std::unique_ptr<Command> make_render();
 std::unique_ptr<Command> make_sample();
@@ -23,5 +24,6 @@ std::unique_ptr<Command> make_surface();
 std::unique_ptr<Command> make_synth();
 std::unique_ptr<Command> make_tile();
 std::unique_ptr<Command> make_verify();
+std::unique_ptr<Command> make_view();
 
 }  // namespace terrace::tools

@@ -3,7 +3,9 @@
 
 #include <array>
 
+#ifndef TERRACE_STREAM_PORTABLE_CRC
 #include <libdeflate.h>
+#endif
 
 namespace terrace::stream::store {
 namespace {
@@ -24,10 +26,42 @@ constexpr std::array<Crc16Table, 8> kCrc16Tables = [] {
   return tables;
 }();
 
+/// The same for the CRC-32, which takes the least significant bit first.
+constexpr std::array<std::array<std::uint32_t, 256>, 8> kCrc32Tables = [] {
+  std::array<std::array<std::uint32_t, 256>, 8> tables{};
+  for (std::uint32_t byte = 0; byte < 256; ++byte) {
+    std::uint32_t crc = byte;
+    for (std::size_t k = 0; k < 8; ++k) {
+      for (int bit = 0; bit < 8; ++bit) crc = (crc >> 1) ^ ((crc & 1) != 0 ? 0xEDB88320u : 0u);
+      tables[k][byte] = crc;
+    }
+  }
+  return tables;
+}();
+
 }  // namespace
 
 std::uint32_t crc32(std::uint32_t crc, const void* data, std::size_t size) {
+#ifdef TERRACE_STREAM_PORTABLE_CRC
+  return portable_crc32(crc, data, size);
+#else
   return libdeflate_crc32(crc, data, size);
+#endif
+}
+
+std::uint32_t portable_crc32(std::uint32_t crc, const void* data, std::size_t size) {
+  crc = ~crc;
+  const auto* next = static_cast<const std::uint8_t*>(data);
+  for (; size >= 8; size -= 8, next += 8) {
+    crc ^= load<std::uint32_t>(next);
+    std::uint32_t after = 0;
+    for (std::size_t k = 0; k < 4; ++k) {
+      after ^= kCrc32Tables[7 - k][crc >> (8 * k) & 0xFF] ^ kCrc32Tables[3 - k][next[4 + k]];
+    }
+    crc = after;
+  }
+  for (; size > 0; --size, ++next) crc = (crc >> 8) ^ kCrc32Tables[0][(crc ^ *next) & 0xFF];
+  return ~crc;
 }
 
 std::uint16_t crc16(ByteView bytes) {

@@ -25,8 +25,19 @@ class Damage : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// A number of bytes of a file as one of memory, which is smaller where addresses have 32 bits.
+/// Throws: Damage if it is too large.
+inline std::size_t memory_size(std::uint64_t bytes) {
+  if (bytes > SIZE_MAX / 2)
+    throw Damage("a part of the file is too large for this machine's memory");
+  return static_cast<std::size_t>(bytes);
+}
+
 /// The CRC-32 of zlib, continued from `crc` (0 at first).
 std::uint32_t crc32(std::uint32_t crc, const void* data, std::size_t size);
+/// The same without libdeflate, slower; crc32() is this where TERRACE_STREAM_PORTABLE_CRC is
+/// defined, as for WebAssembly.
+std::uint32_t portable_crc32(std::uint32_t crc, const void* data, std::size_t size);
 inline std::uint32_t crc32(ByteView bytes) { return crc32(0, bytes.data(), bytes.size()); }
 
 /// CRC-16 with the polynomial 0x1021, from 0xFFFF, most significant bit first, inverted at the end

@@ -41,7 +41,7 @@ const std::array<GridCodec::Step, kPatterns> GridCodec::kStep = [] {
 }();
 
 void GridCodec::start(std::uint32_t width, std::uint32_t height) {
-  stride_ = std::ptrdiff_t{width} + kPadX;
+  stride_ = static_cast<std::ptrdiff_t>(width) + kPadX;
   const std::size_t cells = static_cast<std::size_t>(stride_) * (height + kPadY);
   mask_.assign(cells, 0);
   magnitudes_.assign(cells, 0);

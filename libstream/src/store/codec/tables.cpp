@@ -126,7 +126,7 @@ Tables Tables::read(ByteView bytes, const Layout& layout) {
       const std::uint64_t frequency = in.varint();
       if (frequency == 0 || frequency >= left)
         throw Damage("the frequencies of a table do not add up");
-      frequencies[symbol] = static_cast<std::uint16_t>(frequency);
+      frequencies[static_cast<std::size_t>(symbol)] = static_cast<std::uint16_t>(frequency);
       left -= frequency;
     }
     frequencies[kEscape] = static_cast<std::uint16_t>(left);

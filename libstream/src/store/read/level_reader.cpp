@@ -48,7 +48,7 @@ LevelReader::LevelReader(const OpenByName& files, const Manifest& manifest, unsi
       bounds_(manifest.bounds),
       data_(open_listed(files, manifest.levels[level].data)),
       index_(open_listed(files, manifest.levels[level].index)),
-      page_cache_(std::clamp<std::uint64_t>(pages_, 1, kCachedPages)),
+      page_cache_(static_cast<std::size_t>(std::clamp<std::uint64_t>(pages_, 1, kCachedPages))),
       tables_cache_(1) {
   for (unsigned below = 0; below < level; ++below) {
     clusters_below_.push_back(manifest.levels[below].clusters);
@@ -58,19 +58,20 @@ LevelReader::LevelReader(const OpenByName& files, const Manifest& manifest, unsi
     throw damaged_file(*index_, 0, "the index is smaller than its directory");
   read_directory(size);
   const std::uint64_t most_cached = std::min(kCachedTables, kCachedContexts / layout_.contexts());
-  tables_cache_ = SlotCache<DecodingTables>(
-      std::clamp<std::uint64_t>(tables_at_.size(), 1, std::max<std::uint64_t>(1, most_cached)));
+  tables_cache_ = SlotCache<DecodingTables>(static_cast<std::size_t>(
+      std::clamp<std::uint64_t>(tables_at_.size(), 1, std::max<std::uint64_t>(1, most_cached))));
 }
 
-void LevelReader::read_directory(std::uint64_t size) {
-  const std::uint64_t start = index_->size() - size;
+void LevelReader::read_directory(std::uint64_t bytes) {
+  const std::uint64_t start = index_->size() - bytes;
   const std::uint64_t most_tables = 1 + clusters_ / kFewestClustersOfTables;
-  if (size > 8 * (pages_ + 1) + 8 + most_tables * (20 + Tables::most_bytes(layout_))) {
+  if (bytes > 8 * (pages_ + 1) + 8 + most_tables * (20 + Tables::most_bytes(layout_))) {
     throw damaged_file(*index_, start, "the directory is too large for the level's clusters");
   }
-  tail_.resize(size);
-  index_->read(start, std::as_writable_bytes(std::span(tail_)));
   try {
+    const std::size_t size = memory_size(bytes);
+    tail_.resize(size);
+    index_->read(start, std::as_writable_bytes(std::span(tail_)));
     if (size < 4 ||
         crc32(ByteView(tail_).first(size - 4)) != load<std::uint32_t>(tail_.data() + size - 4)) {
       throw Damage("the checksum of the directory is wrong");
@@ -95,7 +96,7 @@ void LevelReader::read_directory(std::uint64_t size) {
     for (std::uint32_t t = 0; t < count; ++t) {
       TablesAt at;
       at.first = in.varint();
-      at.size = in.varint();
+      at.size = memory_size(in.varint());
       at.offset = in.offset();
       in.take(at.size);
       if (tables_at_.empty() ? at.first != 0 : at.first <= tables_at_.back().first) {
@@ -112,8 +113,8 @@ void LevelReader::read_directory(std::uint64_t size) {
 }
 
 std::shared_ptr<const IndexPage> LevelReader::read_page(std::uint64_t number) const {
-  const std::uint64_t start = directory_[number];
-  Bytes bytes(directory_[number + 1] - start);
+  const std::uint64_t start = page_offset(number);
+  Bytes bytes(static_cast<std::size_t>(page_offset(number + 1) - start));
   index_->read(start, std::as_writable_bytes(std::span(bytes)));
   try {
     return std::make_shared<const IndexPage>(
@@ -144,7 +145,7 @@ Entry LevelReader::entry(std::uint64_t ordinal, std::uint64_t& offset) const {
     offset = page->offset(i);
     return entry(*page, i);
   } catch (const Damage& damage) {
-    throw damaged_file(*index_, directory_[ordinal / kPageClusters], damage.what());
+    throw damaged_file(*index_, page_offset(ordinal / kPageClusters), damage.what());
   }
 }
 

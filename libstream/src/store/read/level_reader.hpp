@@ -63,7 +63,9 @@ class LevelReader {
   [[nodiscard]] const ByteSource& data() const { return *data_; }
   [[nodiscard]] const ByteSource& index() const { return *index_; }
   [[nodiscard]] std::uint64_t pages() const { return pages_; }
-  [[nodiscard]] std::uint64_t page_offset(std::uint64_t page) const { return directory_[page]; }
+  [[nodiscard]] std::uint64_t page_offset(std::uint64_t page) const {
+    return directory_[static_cast<std::size_t>(page)];
+  }
 
   /// Throws: Error.
   [[nodiscard]] std::shared_ptr<const IndexPage> page(std::uint64_t number) const;
@@ -90,8 +92,8 @@ class LevelReader {
     for (std::uint64_t number = 0; number < pages_; ++number) {
       const auto page = read_page(number);
       const std::uint64_t begin = page->offset(0);
-      const std::uint64_t size = page->end() - begin;
-      check_range(number * kPageClusters, begin, size);
+      check_range(number * kPageClusters, begin, page->end() - begin);
+      const std::size_t size = memory_size(page->end() - begin);
       bytes.resize(size + 2 * kPadding);
       data_->read(begin, std::as_writable_bytes(std::span(bytes).subspan(kPadding, size)));
       visit(number * kPageClusters, *page, ByteView(bytes));
@@ -107,7 +109,7 @@ class LevelReader {
     std::size_t offset = 0, size = 0;
   };
 
-  void read_directory(std::uint64_t size);
+  void read_directory(std::uint64_t bytes);
   [[nodiscard]] std::shared_ptr<const IndexPage> read_page(std::uint64_t number) const;
   [[nodiscard]] std::shared_ptr<const DecodingTables> tables(std::uint64_t ordinal) const;
   void check_range(std::uint64_t ordinal, std::uint64_t offset, std::uint64_t size) const;

@@ -151,7 +151,8 @@ void Store::for_each(
       } catch (const Damage& damage) {
         throw level.damaged(ordinal, damage.what());
       }
-      level.decode(ordinal, entry, offset, bytes.subspan(kPadding + (offset - start), entry.bytes),
+      level.decode(ordinal, entry, offset,
+                   bytes.subspan(kPadding + static_cast<std::size_t>(offset - start), entry.bytes),
                    decoder, points);
       visited += points.size();
       if (visited > members) throw miscounted();

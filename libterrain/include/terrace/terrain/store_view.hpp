@@ -3,8 +3,11 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 
+#include <terrace/stream/given_bytes.hpp>
 #include <terrace/stream/store.hpp>
+#include <terrace/stream/store_query.hpp>
 #include <terrace/tri/view.hpp>
 
 namespace terrace::terrain {
@@ -12,6 +15,16 @@ namespace terrace::terrain {
 struct ViewTraffic {
   std::uint64_t clusters = 0, points = 0;
   std::uint64_t bytes = 0;  ///< as they are stored
+};
+
+/// What a view makes of a store's points.
+template <class Shown>
+struct ViewTriangulation {
+  using type = tri::Delaunay2<Shown>;
+};
+template <>
+struct ViewTriangulation<tri::PointCloud> {
+  using type = tri::PointCloud;
 };
 
 /// A store under a camera: clusters expand where the camera comes near and collapse where it has
@@ -23,12 +36,13 @@ struct ViewTraffic {
 /// the CRS's scale at the middle. The triangulation itself stays in stored coordinates;
 /// in_view_frame() tells where its vertices are.
 ///
-/// Coord: std::int32_t for rasters, whose triangulation is exact on integers; double for any store.
+/// Shown: std::int32_t for rasters, whose triangulation is exact on integers; double for any store;
+/// tri::PointCloud for the points alone.
 /// Members may be called by one thread at a time.
-template <class Coord>
+template <class Shown>
 class StoreView {
  public:
-  using Control = tri::ViewControl2<Coord>;
+  using Control = tri::ViewControl<typename ViewTriangulation<Shown>::type>;
   using Step = typename Control::Step;
 
   /// Who reads and decodes what a frame lacks.
@@ -38,9 +52,15 @@ class StoreView {
   };
 
   /// Throws: stream::Error if the root is damaged; std::invalid_argument for options out of range.
-  /// Requires a raster if Coord is std::int32_t.
+  /// Requires a raster if Shown is std::int32_t.
   explicit StoreView(const stream::Store& store, const tri::ViewOptions& options = {},
                      Reader reader = Reader::thread);
+  /// For stores of which some bytes may be missing (stream::GivenBytes), read by the calling thread
+  /// within the frame's time. ground: the linear map from stored coordinates to metres, as the
+  /// other constructor finds it and ground() tells. Needs neither threads nor PROJ.
+  /// Throws: as above, and stream::MissingBytes.
+  StoreView(const stream::Store& store, const stream::LinearMap& ground,
+            const tri::ViewOptions& options);
   ~StoreView();
   StoreView(const StoreView&) = delete;
   StoreView& operator=(const StoreView&) = delete;
@@ -51,10 +71,21 @@ class StoreView {
   const Step& frame(const tri::View& view, double seconds);
   /// Whether another frame with the view of the last one would change nothing, now or later.
   [[nodiscard]] bool settled() const;
+  /// The bytes that the last frame lacked for what is wanted, the most important first; a frame
+  /// after they were given goes on. Always empty with a reader of its own. O(1).
+  [[nodiscard]] std::span<const stream::ByteRange> missing() const;
+
+  /// As in tri::ViewControl.
+  void pin(tri::ClusterId cluster, tri::ViewPin how);
+  void unpin(tri::ClusterId cluster);
 
   [[nodiscard]] const Control& control() const;
   [[nodiscard]] const typename Control::Model& model() const { return control().model(); }
 
+  /// From a step in stored coordinates to metres.
+  [[nodiscard]] const stream::LinearMap& ground() const;
+  /// A vertex in stored coordinates.
+  [[nodiscard]] stream::Point3 stored(tri::VertexId vertex) const;
   /// Metres east, north and up of a point in stored coordinates.
   [[nodiscard]] stream::Point3 in_view_frame(const stream::Point3& stored) const;
   [[nodiscard]] stream::Point3 in_view_frame(tri::VertexId vertex) const;
@@ -69,5 +100,6 @@ class StoreView {
 
 extern template class StoreView<std::int32_t>;
 extern template class StoreView<double>;
+extern template class StoreView<tri::PointCloud>;
 
 }  // namespace terrace::terrain

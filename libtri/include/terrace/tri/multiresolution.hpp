@@ -14,6 +14,7 @@
 
 #include "terrace/tri/delaunay2.hpp"
 #include "terrace/tri/delaunay3.hpp"
+#include "terrace/tri/point_cloud.hpp"
 
 /// A triangulation of a hierarchy of clusters whose detail is raised and lowered, and the interface
 /// by which it reads that hierarchy, wherever it is stored.
@@ -146,7 +147,7 @@ struct ModelOptions {
 /// more for points above level 0. With clusters of 140 members about 21 bytes per
 /// vertex.
 ///
-/// Triangulation: Delaunay2 or Delaunay3, in any metric.
+/// Triangulation: Delaunay2 or Delaunay3, in any metric, or PointCloud.
 template <class Triangulation>
 class MultiresolutionModel {
  public:
@@ -249,6 +250,7 @@ template <class Coord, class Metric = Euclidean>
 using Multiresolution3 = MultiresolutionModel<Delaunay3<Coord, Metric>>;
 
 extern template class MultiresolutionModel<Delaunay2<std::int32_t>>;
+extern template class MultiresolutionModel<PointCloud>;
 extern template class MultiresolutionModel<Delaunay2<double>>;
 extern template class MultiresolutionModel<Delaunay3<std::int32_t>>;
 extern template class MultiresolutionModel<Delaunay3<double>>;

@@ -199,7 +199,7 @@ enum class ViewPin : std::uint8_t { expanded, collapsed };
 /// Memory beside the model: 85 bytes per expanded cluster and 65 per cluster that could be expanded
 /// (with outlines 32 more each), and the given clusters that are kept.
 ///
-/// Triangulation: Delaunay2, for points in the plane with heights.
+/// Triangulation: Delaunay2, for points in the plane with heights; PointCloud, for points in space.
 template <class Triangulation>
 class ViewControl {
  public:
@@ -277,6 +277,7 @@ template <class Coord>
 using ViewControl2 = ViewControl<Delaunay2<Coord>>;
 
 extern template class ViewControl<Delaunay2<std::int32_t>>;
+extern template class ViewControl<PointCloud>;
 extern template class ViewControl<Delaunay2<double>>;
 
 }  // namespace terrace::tri

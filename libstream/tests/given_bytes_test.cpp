@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/stream/given_bytes.hpp"
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <random>
+#include <set>
+#include <string>
+#include <utility>
+
+#include <gtest/gtest.h>
+
+#include "terrace/stream/error.hpp"
+#include "terrace/stream/store.hpp"
+
+namespace terrace::stream {
+namespace {
+
+std::vector<std::byte> random_bytes(std::size_t size, std::mt19937_64& random) {
+  std::vector<std::byte> bytes(size);
+  for (std::byte& byte : bytes) byte = static_cast<std::byte>(random());
+  return bytes;
+}
+
+// Against a map of single bytes: what was given is read, in whatever pieces, and nothing else.
+TEST(GivenBytes, ReadsWhatWasGivenInWhateverPieces) {
+  for (std::uint64_t seed = 1; seed <= 50; ++seed) {
+    SCOPED_TRACE(seed);
+    std::mt19937_64 random(seed);
+    const std::size_t size = 1 + random() % 200;
+    const std::vector<std::byte> whole = random_bytes(size, random);
+    GivenBytes given;
+    given.add_file("a", size);
+    const auto source = given.open()("a");
+    ASSERT_EQ(source->size(), size);
+    std::set<std::size_t> there;
+    for (int round = 0; round < 60; ++round) {
+      const std::size_t begin = random() % size, length = random() % (size - begin + 1);
+      if (random() % 2 == 0) {
+        given.give("a", begin, std::span(whole).subspan(begin, length));
+        for (std::size_t i = 0; i < length; ++i) there.insert(begin + i);
+        ASSERT_EQ(given.bytes(), there.size());
+        continue;
+      }
+      bool all = true;
+      for (std::size_t i = 0; i < length; ++i) all &= there.contains(begin + i);
+      std::vector<std::byte> out(length);
+      try {
+        source->read(begin, out);
+        EXPECT_TRUE(all);
+        EXPECT_TRUE(std::equal(out.begin(), out.end(), whole.begin() + static_cast<long>(begin)));
+      } catch (const MissingBytes& missing) {
+        EXPECT_FALSE(all);
+        EXPECT_EQ(missing.ranges(), (std::vector<ByteRange>{{"a", begin, length}}));
+      }
+    }
+  }
+}
+
+TEST(GivenBytes, KeepsToItsBudgetAndDropsWhatWasUnusedLongest) {
+  GivenBytes given(30);
+  given.add_file("a", 100);
+  const std::vector<std::byte> ten(10);
+  const auto source = given.open()("a");
+  std::vector<std::byte> out(10);
+  for (const std::uint64_t at : {0, 20, 40}) given.give("a", at, ten);
+  source->read(0, out);  // now 20 is the oldest
+  given.give("a", 60, ten);
+  EXPECT_EQ(given.bytes(), 30u);
+  EXPECT_NO_THROW(source->read(0, out));
+  EXPECT_THROW(source->read(20, out), MissingBytes);
+  given.give("a", 0, std::vector<std::byte>(100));
+  EXPECT_LE(given.bytes(), 100u);
+  given.forget("a");
+  EXPECT_EQ(given.bytes(), 0u);
+  EXPECT_THROW(source->read(60, out), MissingBytes);
+}
+
+TEST(GivenBytes, RefusesWhatCannotBe) {
+  GivenBytes given;
+  given.add_file("a", 10);
+  EXPECT_NO_THROW(given.add_file("a", 10));
+  EXPECT_THROW(given.add_file("a", 11), Error);
+  EXPECT_THROW(given.give("b", 0, {}), Error);
+  const std::vector<std::byte> two(2);
+  EXPECT_THROW(given.give("a", 9, two), Error);
+  EXPECT_THROW(given.give("a", UINT64_MAX, two), Error);
+  EXPECT_THROW(given.open()("b"), Error);
+}
+
+// A store opens and reads whatever order its bytes come in, each asked for once.
+TEST(GivenBytes, AStoreIsReadByWhatItLacks) {
+  const std::string folder = std::string(TERRACE_TEST_DATA) + "/stores/grid/";
+  const Store whole = Store::open(folder);
+  GivenBytes given;
+  std::map<std::string, std::vector<std::byte>> files;
+  std::vector<std::string> names{"manifest.json"};
+  for (unsigned level = 0; level <= whole.top(); ++level) {
+    names.push_back("level-" + std::to_string(level) + ".0.clusters");
+    names.push_back("level-" + std::to_string(level) + ".0.index");
+  }
+  for (const std::string& name : names) {
+    std::ifstream in(folder + name, std::ios::binary);
+    const std::string text{std::istreambuf_iterator<char>(in), {}};
+    ASSERT_FALSE(text.empty()) << name;
+    auto& bytes = files[name];
+    bytes.resize(text.size());
+    std::transform(text.begin(), text.end(), bytes.begin(),
+                   [](char c) { return static_cast<std::byte>(c); });
+    given.add_file(name, bytes.size());
+  }
+  std::set<std::pair<std::string, std::uint64_t>> asked;
+  const auto brought = [&](auto&& work) {
+    for (int turn = 0; turn < 100; ++turn) {
+      try {
+        return work();
+      } catch (const MissingBytes& missing) {
+        for (const ByteRange& range : missing.ranges()) {
+          EXPECT_TRUE(asked.emplace(range.file, range.offset).second)
+              << range.file << " asked for twice";
+          given.give(range.file, range.offset,
+                     std::span(files[range.file])
+                         .subspan(static_cast<std::size_t>(range.offset),
+                                  static_cast<std::size_t>(range.bytes)));
+        }
+      }
+    }
+    throw std::runtime_error("never done");
+  };
+  const Store store = brought([&] { return Store::open("given", given.open()); });
+  EXPECT_EQ(store.checksum(), whole.checksum());
+  for (unsigned level = 0; level <= store.top(); ++level) {
+    for (std::uint64_t i = 0; i < store.levels()[level].clusters; ++i) {
+      ClusterPoints a, b;
+      whole.read(cluster_id(level, i), a);
+      brought([&] {
+        store.read(cluster_id(level, i), b);
+        return 0;
+      });
+      ASSERT_EQ(a.positions, b.positions);
+    }
+  }
+  EXPECT_GT(asked.size(), 3u);
+}
+
+}  // namespace
+}  // namespace terrace::stream

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "view/cluster_reader.hpp"
+
+#include <chrono>
+#include <utility>
+
+namespace terrace::terrain {
+namespace {
+
+double steady_seconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+/// Share of a frame's time that the calling thread spends reading.
+constexpr double kReadingShare = 0.4;
+/// More missing ranges are not looked for in a frame: requests for these take longer than it does.
+constexpr std::size_t kMostMissing = 512;
+
+class FrameReader final : public ClusterReader {
+ public:
+  explicit FrameReader(FramedSource& source) : source_(source) {}
+
+  void bring(double seconds, const Give& give) override {
+    const tri::StepBudget budget{.seconds = kReadingShare * seconds, .clock = steady_seconds};
+    meter_.start(budget);
+    missing_.clear();
+    for (const tri::ViewRequest& request : wanted_) {
+      const auto members = static_cast<std::size_t>(request.members);
+      if (!meter_.has(members) || missing_.size() >= kMostMissing) break;
+      try {
+        give(source_.load(request));
+        meter_.spend(members);
+      } catch (const stream::MissingBytes& missing) {
+        missing_.insert(missing_.end(), missing.ranges().begin(), missing.ranges().end());
+      }
+    }
+  }
+  void ask(const std::vector<tri::ViewRequest>& wanted, const std::vector<tri::ViewRequest>&,
+           const std::vector<tri::ClusterId>&) override {
+    wanted_ = wanted;
+  }
+  [[nodiscard]] std::span<const stream::ByteRange> missing() const override { return missing_; }
+
+ private:
+  FramedSource& source_;
+  std::vector<tri::ViewRequest> wanted_;  ///< by the step before
+  std::vector<stream::ByteRange> missing_;
+  tri::StepMeter meter_;
+};
+
+}  // namespace
+
+tri::ClusterRecord FramedSource::record(tri::ClusterId id) {
+  try {
+    tri::ClusterRecord record = inner_.record(id);
+    record.box = frame_.box_of(record.box);
+    return record;
+  } catch (const stream::MissingBytes& missing) {
+    // Neighbours are often in the same page of the index.
+    for (const stream::ByteRange& range : missing.ranges()) {
+      if (missing_.empty() || missing_.back() != range) missing_.push_back(range);
+    }
+    return {};
+  }
+}
+
+tri::ClusterMembers FramedSource::read(tri::ClusterId id) {
+  const stream::ClusterRecord record =
+      store_.record(stream::cluster_id(tri::level_of(id), tri::ordinal_of(id)));
+  const tri::ClusterMembers members = inner_.read(id);
+  ++clusters_;
+  points_ += record.points;
+  bytes_ += record.bytes;
+  return members;
+}
+
+tri::GivenCluster FramedSource::whole(const std::function<tri::GivenCluster()>& load) {
+  missing_.clear();
+  tri::GivenCluster cluster = load();
+  if (!missing_.empty()) throw stream::MissingBytes(missing_);
+  return cluster;
+}
+
+tri::GivenCluster FramedSource::load(const tri::ViewRequest& request) {
+  return whole([&] { return tri::load(*this, request); });
+}
+
+tri::GivenCluster FramedSource::load_root() {
+  return whole([&] { return tri::load_root(*this); });
+}
+
+std::vector<std::uint64_t> FramedSource::counts() const {
+  std::vector<std::uint64_t> counts;
+  for (unsigned level = 0; level < top(); ++level) counts.push_back(cluster_count(level));
+  return counts;
+}
+
+std::unique_ptr<ClusterReader> make_frame_reader(FramedSource& source) {
+  return std::make_unique<FrameReader>(source);
+}
+
+}  // namespace terrace::terrain

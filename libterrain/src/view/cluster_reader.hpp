@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include <terrace/stream/given_bytes.hpp>
+#include <terrace/tri/view.hpp>
+
+#include "terrace/terrain/store_source.hpp"
+#include "terrace/terrain/store_view.hpp"
+#include "view/view_frame.hpp"
+
+/// Who reads the clusters of a view: the thread that draws, or one of its own.
+
+namespace terrace::terrain {
+
+/// The clusters of a store, members in stored coordinates, boxes in the view frame.
+class FramedSource final : public tri::ClusterSource {
+ public:
+  FramedSource(const stream::Store& store, const ViewFrame& frame)
+      : store_(store), inner_(store), frame_(frame) {}
+
+  [[nodiscard]] unsigned top() const override { return inner_.top(); }
+  [[nodiscard]] std::uint64_t cluster_count(unsigned level) const override {
+    return inner_.cluster_count(level);
+  }
+  tri::ClusterRecord record(tri::ClusterId id) override;
+  tri::ClusterMembers read(tri::ClusterId id) override;
+
+  /// tri::load() and tri::load_root(). Throws: stream::MissingBytes that names all bytes that are
+  /// missing and can be told, not only the first.
+  tri::GivenCluster load(const tri::ViewRequest& request);
+  tri::GivenCluster load_root();
+
+  /// What was read so far; may be asked while another thread reads.
+  [[nodiscard]] ViewTraffic traffic() const { return {clusters_, points_, bytes_}; }
+  [[nodiscard]] std::vector<std::uint64_t> counts() const;
+
+ private:
+  tri::GivenCluster whole(const std::function<tri::GivenCluster()>& load);
+
+  const stream::Store& store_;
+  StoreSource inner_;
+  const ViewFrame& frame_;
+  std::vector<stream::ByteRange> missing_;  ///< of the records of the cluster being loaded
+  std::atomic<std::uint64_t> clusters_ = 0, points_ = 0, bytes_ = 0;
+};
+
+class ClusterReader {
+ public:
+  using Give = std::function<void(tri::GivenCluster)>;
+
+  virtual ~ClusterReader() = default;
+  /// Before a step: gives what was asked for and is there, for about `seconds`. Throws what reading
+  /// threw.
+  virtual void bring(double seconds, const Give& give) = 0;
+  /// After it: what the step lacks, as in tri::ViewControl::Step.
+  virtual void ask(const std::vector<tri::ViewRequest>& wanted,
+                   const std::vector<tri::ViewRequest>& requests,
+                   const std::vector<tri::ClusterId>& withdrawn) = 0;
+  /// Bytes without which nothing more can be brought, the most important first.
+  [[nodiscard]] virtual std::span<const stream::ByteRange> missing() const { return {}; }
+};
+
+/// The calling thread, within the frame's time. Bytes that are missing are no fault of it.
+std::unique_ptr<ClusterReader> make_frame_reader(FramedSource& source);
+/// A thread of its own.
+std::unique_ptr<ClusterReader> make_reading_thread(FramedSource& source);
+
+}  // namespace terrace::terrain

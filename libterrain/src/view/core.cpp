@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "view/view_impl.hpp"
+
+/// The part of the view that needs neither threads nor PROJ nor CGAL: it compiles for WebAssembly.
+
+namespace terrace::terrain {
+
+template class StoreView<std::int32_t>;
+template class StoreView<tri::PointCloud>;
+
+}  // namespace terrace::terrain

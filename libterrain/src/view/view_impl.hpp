@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cassert>
+#include <chrono>
+#include <memory>
+#include <type_traits>
+#include <utility>
+
+#include "terrace/terrain/store_view.hpp"
+#include "view/cluster_reader.hpp"
+#include "view/view_frame.hpp"
+
+/// The template of store_view.hpp, for those who instantiate it.
+
+namespace terrace::terrain {
+
+template <class Shown>
+struct StoreView<Shown>::Impl {
+  using MakeReader = std::unique_ptr<ClusterReader> (*)(FramedSource&);
+
+  Impl(const stream::Store& given, const stream::LinearMap& ground, const tri::ViewOptions& options,
+       MakeReader make_reader)
+      : store(given),
+        frame(store, ground),
+        source(store, frame),
+        control(source.counts(), source.load_root(), options),
+        reader(make_reader(source)) {
+    assert((!std::is_integral_v<Shown> || store.schema().grid));
+  }
+
+  static double now() {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch())
+        .count();
+  }
+
+  stream::Store store;
+  ViewFrame frame;
+  FramedSource source;
+  Control control;
+  bool settled = false;
+  std::unique_ptr<ClusterReader> reader;
+};
+
+template <class Shown>
+StoreView<Shown>::StoreView(const stream::Store& store, const stream::LinearMap& ground,
+                            const tri::ViewOptions& options)
+    : impl_(std::make_unique<Impl>(store, ground, options, make_frame_reader)) {}
+
+template <class Shown>
+StoreView<Shown>::~StoreView() = default;
+
+template <class Shown>
+const typename StoreView<Shown>::Step& StoreView<Shown>::frame(const tri::View& view,
+                                                               double seconds) {
+  const double begin = Impl::now();
+  impl_->reader->bring(seconds,
+                       [&](tri::GivenCluster cluster) { impl_->control.give(std::move(cluster)); });
+  const double left = seconds - (Impl::now() - begin);
+  const Step& step = impl_->control.step(view, {.seconds = left, .clock = Impl::now});
+  impl_->reader->ask(step.wanted, step.requests, step.withdrawn);
+  impl_->settled = step.settled && step.wanted.empty();
+  return step;
+}
+
+template <class Shown>
+bool StoreView<Shown>::settled() const {
+  return impl_->settled;
+}
+
+template <class Shown>
+std::span<const stream::ByteRange> StoreView<Shown>::missing() const {
+  return impl_->reader->missing();
+}
+
+template <class Shown>
+void StoreView<Shown>::pin(tri::ClusterId cluster, tri::ViewPin how) {
+  impl_->control.pin(cluster, how);
+}
+
+template <class Shown>
+void StoreView<Shown>::unpin(tri::ClusterId cluster) {
+  impl_->control.unpin(cluster);
+}
+
+template <class Shown>
+const typename StoreView<Shown>::Control& StoreView<Shown>::control() const {
+  return impl_->control;
+}
+
+template <class Shown>
+const stream::LinearMap& StoreView<Shown>::ground() const {
+  return impl_->frame.ground();
+}
+
+template <class Shown>
+stream::Point3 StoreView<Shown>::in_view_frame(const stream::Point3& stored) const {
+  return impl_->frame(stored);
+}
+
+template <class Shown>
+stream::Point3 StoreView<Shown>::in_view_frame(tri::VertexId vertex) const {
+  return impl_->frame(stored(vertex));
+}
+
+template <class Shown>
+stream::Point3 StoreView<Shown>::stored(tri::VertexId vertex) const {
+  const auto p = model().triangulation().point(vertex);
+  return {static_cast<double>(p[0]), static_cast<double>(p[1]), model().height(vertex)};
+}
+
+template <class Shown>
+ViewTraffic StoreView<Shown>::traffic() const {
+  return impl_->source.traffic();
+}
+
+}  // namespace terrace::terrain

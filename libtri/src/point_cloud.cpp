@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/tri/point_cloud.hpp"
+
+#include <bit>
+#include <cassert>
+#include <cmath>
+
+#include "check_input.hpp"
+#include "free_slots.hpp"
+
+namespace terrace::tri {
+namespace {
+
+struct Finite {
+  static bool valid(const Point3& p) {
+    return std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]);
+  }
+};
+
+/// The finalizer of SplitMix64 (G. Steele, D. Lea, C. Flood, doi:10.1145/2660193.2660195).
+std::uint64_t mixed(std::uint64_t x) {
+  x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9;
+  x = (x ^ (x >> 27)) * 0x94D049BB133111EB;
+  return x ^ (x >> 31);
+}
+
+}  // namespace
+
+struct PointCloud::Impl {
+  std::vector<Point> points;  // by slot
+  std::vector<bool> living;   // by slot
+  FreeSlots free;
+  std::size_t count = 0;
+  bool journal = false;
+  // Since the last changes were taken: slots touched, what was there, and whether a slot is listed.
+  std::vector<std::uint32_t> touched;
+  std::vector<Point> before;  // of touched, where was_living
+  std::vector<bool> was_living, listed;
+
+  void touch(std::uint32_t slot) {
+    if (!journal) return;
+    if (listed.size() < living.size()) listed.resize(living.size());
+    if (listed[slot]) return;
+    listed[slot] = true;
+    touched.push_back(slot);
+    before.push_back(points[slot]);
+    was_living.push_back(living[slot]);
+  }
+  VertexId add(const Point& point) {
+    std::uint32_t slot = 0;
+    if (free.empty()) {
+      slot = static_cast<std::uint32_t>(points.size());
+      points.push_back({});
+      living.push_back(false);
+    } else {
+      slot = free.take();
+    }
+    touch(slot);
+    points[slot] = point;
+    living[slot] = true;
+    ++count;
+    return VertexId{slot};
+  }
+};
+
+void PointCloud::Changes::clear() {
+  removed_vertices.clear();
+  removed_points.clear();
+  added_vertices.clear();
+}
+
+PointCloud::PointCloud() : impl_(std::make_unique<Impl>()) {}
+PointCloud::~PointCloud() = default;
+PointCloud::PointCloud(PointCloud&&) noexcept = default;
+PointCloud& PointCloud::operator=(PointCloud&&) noexcept = default;
+
+std::vector<VertexId> PointCloud::build(std::span<const Point> points) {
+  std::vector<Insertion> results(points.size());
+  insert(points, results);
+  std::vector<VertexId> vertices;
+  vertices.reserve(points.size());
+  for (const Insertion& result : results) vertices.push_back(result.vertex);
+  return vertices;
+}
+
+void PointCloud::insert(std::span<const Point> points, std::span<Insertion> results, VertexId) {
+  assert(results.empty() || results.size() == points.size());
+  check_points<Finite>(points);
+  check_count(impl_->count, points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const VertexId vertex = impl_->add(points[i]);
+    if (!results.empty()) results[i] = {vertex, true};
+  }
+}
+
+void PointCloud::remove(std::span<const VertexId> vertices) {
+  for (const VertexId vertex : vertices) {
+    assert(alive(vertex));
+    impl_->touch(slot(vertex));
+    impl_->living[slot(vertex)] = false;
+    impl_->free.put(slot(vertex));
+  }
+  impl_->count -= vertices.size();
+}
+
+void PointCloud::reserve(std::size_t vertices) {
+  impl_->points.reserve(vertices);
+  impl_->living.reserve(vertices);
+}
+
+std::size_t PointCloud::vertex_count() const { return impl_->count; }
+Point3 PointCloud::point(VertexId vertex) const { return impl_->points[slot(vertex)]; }
+std::uint32_t PointCloud::vertex_slots() const {
+  return static_cast<std::uint32_t>(impl_->points.size());
+}
+bool PointCloud::alive(VertexId vertex) const {
+  return slot(vertex) < impl_->living.size() && impl_->living[slot(vertex)];
+}
+
+std::uint64_t PointCloud::hash() const {
+  std::uint64_t sum = mixed(impl_->count);
+  for (const VertexId vertex : all_vertices()) {
+    std::uint64_t one = 0;
+    for (const double c : point(vertex)) one = mixed(one ^ std::bit_cast<std::uint64_t>(c + 0.0));
+    sum += one;
+  }
+  return sum;
+}
+
+std::size_t PointCloud::memory_bytes() const {
+  return impl_->points.capacity() * sizeof(Point) + impl_->living.capacity() / 8 +
+         impl_->free.bytes() + impl_->touched.capacity() * sizeof(std::uint32_t) +
+         impl_->before.capacity() * sizeof(Point) +
+         (impl_->was_living.capacity() + impl_->listed.capacity()) / 8;
+}
+
+void PointCloud::start_journal() {
+  Changes dropped;
+  take_changes(dropped);
+  impl_->journal = true;
+}
+
+void PointCloud::take_changes(Changes& changes) {
+  changes.clear();
+  for (std::size_t i = 0; i < impl_->touched.size(); ++i) {
+    const std::uint32_t slot = impl_->touched[i];
+    impl_->listed[slot] = false;
+    const bool living = impl_->living[slot];
+    if (impl_->was_living[i] && living && impl_->before[i] == impl_->points[slot]) continue;
+    if (impl_->was_living[i]) {
+      changes.removed_vertices.push_back(VertexId{slot});
+      changes.removed_points.push_back(impl_->before[i]);
+    }
+    if (living) changes.added_vertices.push_back(VertexId{slot});
+  }
+  impl_->touched.clear();
+  impl_->before.clear();
+  impl_->was_living.clear();
+}
+
+}  // namespace terrace::tri

@@ -1,0 +1,275 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""terrace view and publish: the server against hostile requests by raw sockets, and what is published.
+
+TERRACE=path/to/terrace view_cli_test.py [CLASS...]
+"""
+
+import hashlib
+import json
+import os
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import tempfile
+import time
+import unittest
+
+TERRACE = os.environ.get('TERRACE', 'terrace')
+ALPS = os.path.join(os.path.dirname(__file__), '..', '..', 'libterrain', 'examples', 'alps.tif')
+
+
+def terrace(*args, **kwargs):
+    return subprocess.run([TERRACE, *args], timeout=120, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE, **kwargs)
+
+
+class Stores(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.mkdtemp()
+        cls.store = os.path.join(cls.folder, 'alps.store')
+        done = terrace('build', ALPS, '-o', cls.store, '-q')
+        assert done.returncode == 0, done.stderr
+
+    @classmethod
+    def tearDownClass(cls):
+        shutil.rmtree(cls.folder)
+
+    def path(self, *parts):
+        return os.path.join(self.folder, *parts)
+
+
+class ViewTest(Stores):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.server = subprocess.Popen([TERRACE, 'view', cls.store, '--no-open'], stderr=subprocess.PIPE, text=True)
+        cls.port = int(re.search(r'127\.0\.0\.1:(\d+)', cls.server.stderr.readline()).group(1))
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.server.send_signal(signal.SIGINT)
+        code = cls.server.wait(10)
+        cls.server.stderr.close()
+        super().tearDownClass()
+        assert code == 0, code
+
+    def connect(self):
+        connection = socket.create_connection(('127.0.0.1', self.port), timeout=20)
+        self.addCleanup(connection.close)
+        return connection
+
+    def answer(self, raw):
+        """Sends bytes and returns all that comes until the server closes, or is silent for a while."""
+        connection = self.connect()
+        try:
+            connection.sendall(raw)
+            connection.shutdown(socket.SHUT_WR)
+        except OSError:
+            pass
+        data = b''
+        try:
+            while piece := connection.recv(1 << 16):
+                data += piece
+        except ConnectionResetError:
+            pass
+        return data
+
+    def get(self, path, method='GET', **headers):
+        lines = ''.join(f'{name.replace("_", "-")}: {value}\r\n' for name, value in headers.items())
+        data = self.answer(f'{method} {path} HTTP/1.1\r\nHost: x\r\nConnection: close\r\n{lines}\r\n'.encode())
+        head, _, body = data.partition(b'\r\n\r\n')
+        status, *fields = head.decode().split('\r\n')
+        return int(status.split()[1]), dict(field.split(': ', 1) for field in fields), body
+
+    def data(self):
+        with open(self.path('alps.store', 'level-0.0.clusters'), 'rb') as file:
+            return file.read()
+
+    URL = '/stores/alps/level-0.0.clusters'
+
+    def test_files_and_types(self):
+        for path, kind in [('/', 'text/html; charset=utf-8'), ('/viewer.js', 'text/javascript; charset=utf-8'),
+                           ('/core.wasm', 'application/wasm'), ('/stores.json', 'application/json'),
+                           ('/viewer.css', 'text/css; charset=utf-8'), (self.URL, 'application/octet-stream')]:
+            status, headers, body = self.get(path)
+            self.assertEqual((path, status, headers['Content-Type']), (path, 200, kind))
+            self.assertEqual(int(headers['Content-Length']), len(body))
+            self.assertEqual(headers['Access-Control-Allow-Origin'], '*')
+            self.assertIn('Content-Range', headers['Access-Control-Expose-Headers'])
+            self.assertEqual(self.get(path, 'HEAD')[::2], (200, b''))
+        self.assertEqual(self.get(self.URL)[2], self.data())
+        self.assertEqual(json.loads(self.get('/stores.json')[2])['stores'][0]['name'], 'alps')
+
+    def test_ranges(self):
+        data = self.data()
+        size = len(data)
+        for text, begin, end in [('0-0', 0, 1), ('5-99', 5, 100), (f'{size - 3}-', size - 3, size), ('-7', size - 7, size),
+                                 (f'10-{size + 100}', 10, size), (f'0-{200_000}', 0, 200_001)]:
+            status, headers, body = self.get(self.URL, Range=f'bytes={text}')
+            self.assertEqual((text, status, headers['Content-Range']), (text, 206, f'bytes {begin}-{end - 1}/{size}'))
+            self.assertEqual(body, data[begin:end])
+        status, headers, _ = self.get(self.URL, Range=f'bytes={size}-')
+        self.assertEqual((status, headers['Content-Range']), (416, f'bytes */{size}'))
+        for text in ['bytes=0-1,5-6', 'bytes=9-3', 'lines=0-1', 'bytes=x']:
+            self.assertEqual(self.get(self.URL, Range=text)[0], 200)
+        tag = self.get(self.URL, 'HEAD')[1]['ETag']
+        self.assertEqual(self.get(self.URL, Range='bytes=0-1', If_Range=tag)[0], 206)
+        self.assertEqual(self.get(self.URL, Range='bytes=0-1', If_Range='"x"')[0], 200)
+        self.assertEqual(self.get(self.URL, If_None_Match=tag)[::2], (304, b''))
+
+    def test_no_path_leaves_the_store(self):
+        for path in ['/../../etc/passwd', '/stores/alps/../../../../etc/passwd', '/stores/alps/%2e%2e/%2e%2e/etc/passwd',
+                     '/stores/alps/..%2f..%2fetc%2fpasswd', '//etc/passwd', '/stores/alps/', '/stores/', '/stores/alps',
+                     '/stores/alps/./manifest.json', '/stores/alps/manifest.json/', '/%252e%252e/etc/passwd', '/etc/passwd']:
+            self.assertEqual((path, self.get(path)[0]), (path, 404))
+        for path in ['/%00', '/%zz', 'etc/passwd', '*']:
+            self.assertEqual((path, self.get(path)[0]), (path, 400))
+
+    def test_hostile_requests(self):
+        def status(raw):
+            data = self.answer(raw)
+            return int(data.split()[1]) if data else None
+
+        self.assertEqual(status(b'GET / HTTP/1.1\r\nX: ' + b'a' * 20_000 + b'\r\n\r\n'), 431)
+        self.assertEqual(status(b'GET /' + b'a' * 20_000 + b' HTTP/1.1\r\n\r\n'), 431)
+        self.assertEqual(status(b'\0\1\2\3\r\n\r\n'), 400)
+        self.assertEqual(status(b'GET / HTTP/9.9\r\n\r\n'), 400)
+        self.assertEqual(status(b'GET  HTTP/1.1\r\n\r\n'), 400)
+        self.assertEqual(status(b'\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03' + b'\0' * 200), 400)
+        self.assertEqual(self.get('/', 'POST', Content_Length='5')[0], 413)
+        self.assertEqual(self.get('/', 'DELETE')[0], 405)
+        self.assertEqual(self.get('/', 'OPTIONS')[0], 204)
+        self.assertIsNone(status(b'GET / HT'))
+        # And it still serves.
+        self.assertEqual(self.get('/')[0], 200)
+
+    def test_one_connection_serves_many_requests(self):
+        connection = self.connect()
+        data = self.data()
+        # All at once, and answered in order.
+        connection.sendall(b''.join(f'GET {self.URL} HTTP/1.1\r\nRange: bytes={i}-{i + 9}\r\n\r\n'.encode() for i in range(50)))
+        stream = connection.makefile('rb')
+        for i in range(50):
+            self.assertEqual(stream.readline(), b'HTTP/1.1 206 Partial Content\r\n')
+            while stream.readline() != b'\r\n':
+                pass
+            self.assertEqual(stream.read(10), data[i:i + 10])
+        stream.close()
+
+    def test_slow_clients_do_not_hold_it(self):
+        idle = [self.connect() for _ in range(60)]
+        for i, connection in enumerate(idle):
+            if i % 3 == 0:
+                connection.sendall(b'GET / HT')  # and no more
+            elif i % 3 == 1:
+                connection.sendall(f'GET {self.URL} HTTP/1.1\r\n\r\n'.encode())  # and never reads
+        begin = time.monotonic()
+        self.assertEqual(len(self.get(self.URL)[2]), len(self.data()))
+        self.assertLess(time.monotonic() - begin, 5)
+
+    def test_connections_are_limited(self):
+        crowd = []
+        try:
+            for _ in range(300):
+                crowd.append(socket.create_connection(('127.0.0.1', self.port), timeout=20))
+            crowd[-1].sendall(b'GET / HTTP/1.1\r\n\r\n')
+            self.assertIn(b' 503 ', crowd[-1].recv(100))
+        finally:
+            for connection in crowd:
+                connection.close()
+        for _ in range(100):
+            if self.get('/')[0] == 200:
+                return
+            time.sleep(0.05)
+        self.fail('it does not recover')
+
+
+class ViewErrorTest(Stores):
+    def test_errors(self):
+        self.assertEqual(terrace('view').returncode, 2)
+        self.assertEqual(terrace('view', self.path('nothing')).returncode, 1)
+        self.assertEqual(terrace('view', self.store, '--port', '70000').returncode, 2)
+        with socket.create_server(('127.0.0.1', 0)) as taken:
+            done = terrace('view', self.store, '--no-open', '--port', str(taken.getsockname()[1]))
+            self.assertEqual(done.returncode, 1)
+            self.assertIn('another port', done.stderr)
+
+    def test_links_are_not_served(self):
+        store = self.path('linked.store')
+        shutil.copytree(self.store, store)
+        os.rename(os.path.join(store, 'level-0.0.clusters'), self.path('elsewhere'))
+        os.symlink(self.path('elsewhere'), os.path.join(store, 'level-0.0.clusters'))
+        for verb in [['view', store, '--no-open'], ['publish', store, '-o', self.path('no')]]:
+            done = terrace(*verb)
+            self.assertEqual(done.returncode, 1)
+            self.assertIn('links are not served', done.stderr)
+        self.assertFalse(os.path.exists(self.path('no')))
+
+
+class PublishTest(Stores):
+    def digest(self, *parts):
+        with open(self.path(*parts), 'rb') as file:
+            return hashlib.sha256(file.read()).hexdigest()
+
+    def test_publish(self):
+        done = terrace('publish', self.store, self.store, '-o', self.path('site'), '--json')
+        self.assertEqual(done.returncode, 0, done.stderr)
+        summary = json.loads(done.stdout)
+        files = [os.path.join(folder, name) for folder, _, names in os.walk(self.path('site')) for name in names]
+        self.assertEqual(summary['files'], len(files))
+        self.assertEqual(summary['bytes'], sum(os.path.getsize(file) for file in files))
+        with open(self.path('site', 'stores.json')) as file:
+            self.assertEqual([store['name'] for store in json.load(file)['stores']], ['alps', 'alps-2'])
+        for name in os.listdir(self.store):
+            self.assertEqual(self.digest('site', 'stores', 'alps', name), self.digest('alps.store', name))
+        self.assertEqual(terrace('verify', self.path('site', 'stores', 'alps')).returncode, 0)
+        # The viewer's own files are within their bars.
+        own = ['core.wasm', 'index.html', 'viewer.css', 'viewer.js', 'worker.js']
+        self.assertLess(sum(os.path.getsize(self.path('site', name)) for name in own), 1_000_000)
+        self.assertLess(os.path.getsize(self.path('site', 'stores', 'alps.start')), 300_000)
+        # Nothing else is left beside it.
+        self.assertEqual([name for name in os.listdir(self.folder) if name.startswith('.')], [])
+
+    def test_start_file(self):
+        terrace('publish', self.store, '-o', self.path('started'), '-q')
+        with open(self.path('started', 'stores', 'alps.start'), 'rb') as file:
+            head, _, data = file.read().partition(b'\n')
+        head = json.loads(head)
+        self.assertEqual((head['format'], head['version'], len(head['ground'])), ('terrace-start', 1, 9))
+        for name, offset, size in head['parts']:
+            with open(os.path.join(self.store, name), 'rb') as file:
+                file.seek(offset)
+                self.assertEqual(file.read(size), data[:size])
+            data = data[size:]
+        self.assertEqual(data, b'')
+
+    def test_replacing(self):
+        site = self.path('again')
+        self.assertEqual(terrace('publish', self.store, '-o', site, '-q').returncode, 0)
+        self.assertEqual(terrace('publish', self.store, '-o', site, '-q').returncode, 1)
+        os.utime(os.path.join(site, 'index.html'), (0, 0))
+        self.assertEqual(terrace('publish', self.store, '-o', site, '-q', '--force').returncode, 0)
+        self.assertGreater(os.path.getmtime(os.path.join(site, 'index.html')), 0)
+        other = self.path('foreign')
+        os.mkdir(other)
+        with open(os.path.join(other, 'stores.json'), 'w') as file:
+            file.write('{"text": "terrace-stores"}')
+        done = terrace('publish', self.store, '-o', other, '--force')
+        self.assertEqual(done.returncode, 1)
+        self.assertIn('was not published by terrace', done.stderr)
+        self.assertEqual(os.listdir(other), ['stores.json'])
+        self.assertEqual(terrace('publish', self.store, '-o', self.path('no', 'parent')).returncode, 1)
+
+    def test_a_store_inside_the_folder_it_would_replace(self):
+        site = self.path('own')
+        self.assertEqual(terrace('publish', self.store, '-o', site, '-q').returncode, 0)
+        done = terrace('publish', os.path.join(site, 'stores', 'alps'), '-o', site, '-q', '--force')
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(terrace('verify', os.path.join(site, 'stores', 'alps')).returncode, 0)
+
+
+if __name__ == '__main__':
+    unittest.main()

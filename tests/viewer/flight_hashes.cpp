@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// flight_hashes STORE MAX_POINTS: flies over a store and prints for each stop, as a line of JSON,
+// the camera and the hash of what is shown once the view has settled. The same flight in the
+// browser's core must give the same.
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+
+#include <terrace/stream/store.hpp>
+#include <terrace/terrain/store_view.hpp>
+
+namespace {
+
+using namespace terrace;
+
+template <class Shown>
+int fly(const stream::Store& store, std::size_t max_points) {
+  using View = terrain::StoreView<Shown>;
+  tri::ViewOptions options;
+  options.max_points = max_points;
+  View view(store, options, View::Reader::in_frame);
+  stream::Box3 box;
+  box.include(view.in_view_frame(store.bounds().min));
+  box.include(view.in_view_frame(store.bounds().max));
+  const double size =
+      std::sqrt(std::pow(box.max[0] - box.min[0], 2) + std::pow(box.max[1] - box.min[1], 2));
+  // Shares of the size from the middle, above the highest point; ways to look; pixels of error.
+  struct Stop {
+    double east, north, above;
+    tri::Point3 direction;
+    double error;
+  };
+  const Stop stops[] = {{0, -0.7, 0.5, {0, 1, -0.7}, 16},      {0, -0.2, 0.1, {0, 1, -0.6}, 8},
+                        {0.1, 0, 0.03, {0.4, 1, -0.5}, 4},     {0.15, 0.1, 0.02, {1, 0.2, -0.4}, 2},
+                        {0.2, 0.1, 0.02, {0.1, -1, -0.3}, 2},  {-0.1, -0.1, 0.05, {-1, 0.3, -1}, 3},
+                        {0.05, 0.05, 0.01, {0.2, 0.1, -1}, 1}, {0, 0, 0.8, {0, 0.1, -1}, 12}};
+  for (const Stop& stop : stops) {
+    const tri::Point3 eye{(box.min[0] + box.max[0]) / 2 + stop.east * size,
+                          (box.min[1] + box.max[1]) / 2 + stop.north * size,
+                          box.max[2] + stop.above * size};
+    const double length = std::hypot(stop.direction[0], stop.direction[1], stop.direction[2]);
+    const tri::Point3 way{stop.direction[0] / length, stop.direction[1] / length,
+                          stop.direction[2] / length};
+    tri::View wish;
+    wish.camera = tri::perspective_camera({eye, way, {0, 0, 1}}, 45, 1.5, 800);
+    wish.pixel_error = stop.error;
+    do {
+      view.frame(wish, 0.05);
+    } while (!view.settled());
+    std::printf(
+        "{\"eye\":[%.17g,%.17g,%.17g],\"direction\":[%.17g,%.17g,%.17g],\"error\":%.17g,"
+        "\"points\":%zu,\"expanded\":%zu,\"hash\":\"%016llx\"}\n",
+        eye[0], eye[1], eye[2], way[0], way[1], way[2], stop.error, view.model().point_count(),
+        view.model().expanded_count(),
+        static_cast<unsigned long long>(view.model().triangulation().hash()));
+  }
+  return 0;
+}
+
+}  // namespace
+
+int main(int arguments, char** values) {
+  if (arguments != 3) return 2;
+  try {
+    const stream::Store store = stream::Store::open(std::filesystem::path(values[1]));
+    const std::size_t max_points = std::strtoull(values[2], nullptr, 10);
+    return store.schema().grid ? fly<std::int32_t>(store, max_points)
+                               : fly<tri::PointCloud>(store, max_points);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "flight_hashes: %s\n", error.what());
+    return 1;
+  }
+}

@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// page_test.mjs PACKAGES: the viewer in headless Chromium over published stores and over `terrace view`. TERRACE names
+// the command, FLIGHT_HASHES the native flight, CHROMIUM the browser. Pictures stay in PACKAGES.
+import assert from 'node:assert/strict';
+import {spawn} from 'node:child_process';
+import {join} from 'node:path';
+import {after, before, test} from 'node:test';
+
+import {launch} from '../clients/globe.mjs';
+import {packages} from '../clients/packages.mjs';
+import {serveSite} from './site_server.mjs';
+import {Sites} from './sites.mjs';
+
+const sites = new Sites();
+/// As in viewer.ts.
+const MAX_POINTS = 1_500_000;
+let browser, site;
+
+before(async () => {
+  sites.build();
+  site = await serveSite(sites.site);
+  browser = await launch();
+});
+after(async () => {
+  await browser?.close();
+  await site?.close();
+  sites.remove();
+});
+
+/// A page that must not ask for anything elsewhere; `errors` is what its console complains of.
+async function open(hash = '', {url = site.url, size = {width: 720, height: 450}, dark = false, settle = true} = {}) {
+  const context = await browser.newContext({viewport: size, colorScheme: dark ? 'dark' : 'light'});
+  const page = await context.newPage();
+  const errors = [], outside = [];
+  page.on('console', message => message.type() === 'error' && errors.push(message.text()));
+  page.on('pageerror', error => errors.push(error.message));
+  await context.route('**/*', route => {
+    const {protocol, hostname} = new URL(route.request().url());
+    if (hostname === '127.0.0.1' || protocol === 'data:' || protocol === 'blob:') return route.continue();
+    outside.push(route.request().url());
+    return route.abort();
+  });
+  await page.goto(url + hash);
+  if (settle) await settled(page);
+  return {page, errors, outside, close: () => context.close()};
+}
+const settled = page => page.waitForFunction(() => window.terrace?.settled, null, {timeout: 120_000});
+const state = page => page.evaluate(() => window.terrace.state);
+
+/// Colours of the picture at some places, 0 to 255.
+const pixels = (page, places) => page.evaluate(places => {
+  const canvas = document.getElementById('picture'), gl = canvas.getContext('webgl2');
+  return places.map(([x, y]) => {
+    const pixel = new Uint8Array(4);
+    gl.readPixels(Math.round(x * canvas.width), Math.round((1 - y) * canvas.height), 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+    return Array.from(pixel.slice(0, 3));
+  });
+}, places);
+
+test('a DEM: coarse, then fine, by ranges alone, as the native run', async () => {
+  site.log.length = 0;
+  const {page, errors, outside, close} = await open('#s=alps&q=16');
+  assert.equal(await page.title(), 'alps · terrace');
+  for (const {path, range, status} of site.log) {
+    if (range === null) {
+      assert.match(path, /^\/($|index\.html|viewer\.(js|css)|worker\.js|core\.wasm|stores\.json|stores\/alps\.start)$/);
+    } else {
+      assert.equal(status, 206);
+      assert.match(path, /^\/stores\/alps\/level-/);
+    }
+  }
+  const data = site.log.filter(({path}) => path.startsWith('/stores/')).reduce((sum, {bytes}) => sum + bytes, 0);
+  assert.equal((await state(page)).bytes, data);
+  const flight = sites.flight('alps', MAX_POINTS);
+  for (const stop of flight) {
+    await page.evaluate(({eye, direction, error}) => window.terrace.fly(eye, direction, 1.5, 800, error), stop);
+    await settled(page);
+    assert.equal((await state(page)).points, stop.points);
+    assert.equal(await page.evaluate(() => window.terrace.hash()), stop.hash);
+  }
+  assert.deepEqual(errors, []);
+  assert.deepEqual(outside, []);
+  await close();
+});
+
+test('the picture: land in its colours, sky around it, heights where one clicks, a link that restores it', async () => {
+  const {page, errors, close} = await open('#s=alps&q=16', {size: {width: 960, height: 600}});
+  await page.waitForTimeout(600);
+  const land = await pixels(page, [[0.5, 0.5], [0.45, 0.6], [0.55, 0.4], [0.5, 0.7]]);
+  const [sky] = await pixels(page, [[0.02, 0.5]]);
+  assert.ok(sky.every(c => c > 200), `sky ${sky}`);
+  for (const colour of land) {
+    assert.ok(Math.hypot(...colour.map((c, i) => c - sky[i])) > 60, `land ${colour} like the sky`);
+  }
+  assert.ok(new Set(land.map(String)).size >= 3, 'the land is of one colour');
+  await page.screenshot({path: join(packages, 'viewer-light.png')});
+
+  // The legend's colour of a height is that of the pixel: by level there is no light from the side.
+  await page.mouse.click(480, 330);
+  await page.waitForSelector('#place:not([hidden])');
+  const rows = async () => Object.fromEntries(await page.$$eval(
+      '#place-text dt', dts => dts.map(dt => [dt.textContent, dt.nextElementSibling.textContent])));
+  const first = await rows();
+  assert.ok(Number(first.Longitude) > 8 && Number(first.Longitude) < 9, JSON.stringify(first));
+  assert.ok(Number(first.Latitude) > 46 && Number(first.Latitude) < 47);
+  assert.match(first.Height, /^\d+\.\d\d m$/);
+  const height = parseFloat(first.Height);
+  assert.ok(height >= 187 && height <= 4173);
+  await page.mouse.click(500, 300);
+  await page.waitForFunction(
+      lon => [...document.querySelectorAll('#place-text dt')].some(dt => dt.textContent === 'From the last') &&
+          document.querySelector('#place-text dd').textContent !== lon,
+      first.Longitude);
+
+  await page.mouse.move(480, 300);
+  for (let i = 0; i < 4; ++i) await page.mouse.wheel(0, -240);
+  await page.focus('#picture');
+  await page.keyboard.press('e');
+  await page.keyboard.press('ArrowUp');
+  await page.click('text=Slope');
+  await page.waitForTimeout(700);
+  await settled(page);
+  await page.mouse.click(400, 330);
+  await page.waitForTimeout(200);
+  // By hand: a cluster more, and back.
+  for (let x = 400; (await rows()).Cluster[0] !== '0'; x += 7) {
+    assert.ok(x < 600, 'no point of level 0 is shown');
+    await page.mouse.click(x, 330);
+    await page.waitForTimeout(100);
+  }
+  const before = (await state(page)).points;
+  await page.click('#collapse');
+  await page.waitForFunction(points => window.terrace.settled && window.terrace.state.points < points, before);
+  await page.click('#release');
+  await page.waitForFunction(points => window.terrace.settled && window.terrace.state.points === points, before);
+
+  const link = new URL(page.url()).hash;
+  assert.match(link, /c=slope/);
+  await page.screenshot({path: join(packages, 'viewer-slope.png')});
+  const now = await state(page);
+  const again = await open(link, {size: {width: 960, height: 600}, dark: true});
+  const restored = await state(again.page);
+  assert.ok(Math.abs(restored.camera.distance / now.camera.distance - 1) < 1e-4);
+  assert.ok(Math.abs(restored.camera.azimuth - now.camera.azimuth) < 0.01);
+  await again.page.click('text=Triangles');
+  await again.page.click('text=Level');
+  await again.page.waitForTimeout(800);
+  await again.page.screenshot({path: join(packages, 'viewer-level-dark.png')});
+  assert.deepEqual([...errors, ...again.errors], []);
+  await again.close();
+  await close();
+});
+
+test('a phone and a cloud', async () => {
+  const {page, errors, close} = await open('#s=cloud', {size: {width: 390, height: 760}});
+  assert.equal((await state(page)).triangles, 0);
+  assert.ok((await state(page)).points > 1000);
+  await page.waitForTimeout(600);
+  const spots = await pixels(page, Array.from({length: 60}, (_, i) => [0.3 + 0.4 * (i % 10) / 10, 0.4 + 0.2 * Math.floor(i / 10) / 6]));
+  assert.ok(new Set(spots.map(String)).size > 5, 'no points are drawn');
+  assert.ok(!await page.isVisible('#tools'));
+  await page.click('#menu');
+  assert.ok(await page.isVisible('#tools'));
+  assert.ok(!await page.isVisible('#with-wire'));
+  await page.screenshot({path: join(packages, 'viewer-phone.png')});
+  assert.deepEqual(errors, []);
+  await close();
+});
+
+for (const [fault, expected] of Object.entries({
+       whole: /whole files/, short: /does not answer|bytes came/, missing: /no such file/, replaced: /replaced/, damaged: /checksum|damaged/,
+       error: /HTTP 500/, dead: /does not answer/
+     })) {
+  test(`a server that misbehaves (${fault}): a message, and a retry that helps`, async () => {
+    site.fault = ({range}) => range === null ? null : fault;
+    const {page, close} = await open('#s=alps&q=8', {settle: false});
+    await page.waitForSelector('#message:not([hidden])', {timeout: 60_000});
+    assert.match(await page.textContent('#message-text'), expected);
+    assert.ok(!(await state(page)).settled);
+    if (fault === 'whole') await page.screenshot({path: join(packages, 'viewer-message.png')});
+    site.fault = () => null;
+    await page.click('#retry');
+    await settled(page);
+    assert.ok(!await page.isVisible('#message'));
+    await close();
+  });
+}
+
+test('terrace view serves it', async () => {
+  const server = spawn(process.env.TERRACE, ['view', 'alps.store', 'cloud.store', '--no-open'],
+                       {cwd: sites.folder, stdio: ['ignore', 'ignore', 'pipe']});
+  try {
+    const url = await new Promise(
+        resolve => server.stderr.on('data', data => /http:\S+/.test(data) && resolve(/http:\S+/.exec(data)[0])));
+    const {page, errors, outside, close} = await open('#q=16', {url});
+    assert.equal((await state(page)).store, 'alps');
+    await page.selectOption('#store', 'cloud');
+    await page.waitForFunction(() => window.terrace.settled && window.terrace.state.store === 'cloud');
+    assert.deepEqual([errors, outside], [[], []]);
+    await close();
+  } finally {
+    server.kill('SIGINT');
+  }
+  assert.equal(await new Promise(resolve => server.on('exit', resolve)), 0);
+});

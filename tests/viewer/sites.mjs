@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Published stores for the tests of the viewer, and the hashes of a flight over each.
+import assert from 'node:assert/strict';
+import {execFileSync, spawnSync} from 'node:child_process';
+import {mkdtempSync, rmSync, writeFileSync} from 'node:fs';
+import {tmpdir} from 'node:os';
+import {dirname, join} from 'node:path';
+import {fileURLToPath} from 'node:url';
+
+export const ROOT = join(dirname(fileURLToPath(import.meta.url)), '..', '..');
+export const MAX_POINTS = 300_000;
+
+export class Sites {
+  constructor() {
+    this.folder = mkdtempSync(join(tmpdir(), 'terrace-viewer-'));
+    this.site = join(this.folder, 'site');
+  }
+  terrace(...args) {
+    const {status, stderr, error} = spawnSync(process.env.TERRACE, args, {cwd: this.folder, encoding: 'utf8'});
+    assert.equal(status, 0, `terrace ${args.join(' ')}: ${error ?? stderr}`);
+  }
+  /// A DEM of the Alps, a raster whose points are cocircular wherever one looks, and a cloud.
+  build() {
+    this.terrace('build', join(ROOT, 'libterrain', 'examples', 'alps.tif'), '-o', 'alps.store', '-q');
+    const flat = ['ncols 200', 'nrows 180', 'xllcorner 0', 'yllcorner 0', 'cellsize 30'];
+    for (let row = 0; row < 180; ++row) {
+      flat.push(Array.from({length: 200}, (_, column) => (column * 7 + row * 3) % 5 < 2 ? 10 : 11).join(' '));
+    }
+    writeFileSync(join(this.folder, 'flat.asc'), `${flat.join('\n')}\n`);
+    this.terrace('build', 'flat.asc', '-o', 'flat.store', '--block', '1000', '-q');
+    let cloud = '', state = 12345;
+    const random = () => (state = (state * 1103515245 + 12345) % 2147483648) / 2147483648;
+    for (let i = 0; i < 40_000; ++i) {
+      const x = 100 * random(), y = 80 * random();
+      cloud += `${x} ${y} ${3 * Math.sin(x / 9) + (i % 5 === 0 ? 4 * random() : 0)}\n`;
+    }
+    writeFileSync(join(this.folder, 'cloud.xyz'), cloud);
+    this.terrace('build', 'cloud.xyz', '-o', 'cloud.store', '--block', '2000', '-q');
+    this.terrace('publish', 'alps.store', 'flat.store', 'cloud.store', '-o', 'site', '-q');
+  }
+  flight(name, maxPoints = MAX_POINTS) {
+    const out = execFileSync(process.env.FLIGHT_HASHES, [join(this.folder, `${name}.store`), String(maxPoints)],
+                             {encoding: 'utf8', maxBuffer: 1 << 24});
+    return out.trim().split('\n').map(line => JSON.parse(line));
+  }
+  remove() {
+    rmSync(this.folder, {recursive: true, force: true});
+  }
+}

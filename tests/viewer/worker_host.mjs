@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The viewer's worker as it is shipped, in node: a folder of published files stands for the web server.
+import {closeSync, existsSync, fstatSync, openSync, readFileSync, readSync} from 'node:fs';
+import {join} from 'node:path';
+import vm from 'node:vm';
+
+/// fetch() of the files of a folder under http://folder/, with ranges. `fault(request, response)` may change what
+/// comes; `log` is of all requests.
+export function folderFetch(folder, fault = (_, response) => response) {
+  const log = [];
+  const answer = (url, options = {}) => {
+    const path = join(folder, decodeURIComponent(new URL(url).pathname));
+    const range = options.headers?.Range;
+    const request = {path: new URL(url).pathname, range, cache: options.cache};
+    log.push(request);
+    if (!existsSync(path)) return fault(request, {status: 404, headers: {}, body: Buffer.alloc(0)});
+    if (!range) return fault(request, {status: 200, headers: {}, body: readFileSync(path)});
+    const file = openSync(path, 'r');
+    const {size} = fstatSync(file);
+    const [first, last] = /^bytes=(\d+)-(\d+)$/.exec(range).slice(1).map(Number);
+    const body = Buffer.alloc(Math.max(0, Math.min(last + 1, size) - first));
+    readSync(file, body, 0, body.length, first);
+    closeSync(file);
+    return fault(
+        request,
+        first >= size ? {status: 416, headers: {}, body: Buffer.alloc(0)} :
+                        {status: 206, headers: {'Content-Range': `bytes ${first}-${first + body.length - 1}/${size}`}, body});
+  };
+  const fetch = async (url, options) => {
+    await new Promise(resume => setTimeout(resume, 1));
+    if (options?.signal?.aborted) throw new DOMException('aborted', 'AbortError');
+    const response = answer(url, options);
+    if (response === null) throw new TypeError('fetch failed');
+    const bytes = Uint8Array.from(response.body);
+    return {
+      status: response.status,
+      ok: response.status >= 200 && response.status < 300,
+      headers: new Headers(response.headers),
+      body: null,
+      arrayBuffer: async () => bytes.buffer
+    };
+  };
+  return {fetch, log};
+}
+
+/// Starts `script` (worker.js). What it says goes to `said`.
+export class Worker {
+  constructor(script, fetch, said) {
+    this.self = {
+      postMessage: message => {
+        if (message.type === 'frame') queueMicrotask(() => this.tell({type: 'drawn'}));
+        said(message);
+      }
+    };
+    vm.runInNewContext(readFileSync(script, 'utf8'), {
+      self: this.self,
+      fetch,
+      WebAssembly,
+      TextEncoder,
+      TextDecoder,
+      AbortController,
+      performance,
+      setTimeout: (work, time) => setTimeout(work, time ?? 0),
+      Uint8Array,
+      Uint32Array,
+      Float64Array,
+      DataView,
+      Map,
+      Math
+    });
+  }
+  tell(data) {
+    this.self.onmessage({data});
+  }
+}

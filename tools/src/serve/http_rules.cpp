@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "serve/http_rules.hpp"
+
+#include <algorithm>
+#include <charconv>
+
+namespace terrace::tools {
+namespace {
+
+std::optional<unsigned> hexadecimal_digit(char c) {
+  if (c >= '0' && c <= '9') return static_cast<unsigned>(c - '0');
+  if (c >= 'a' && c <= 'f') return static_cast<unsigned>(c - 'a' + 10);
+  if (c >= 'A' && c <= 'F') return static_cast<unsigned>(c - 'A' + 10);
+  return {};
+}
+
+/// Digits alone; too large ones become the largest.
+std::optional<std::uint64_t> number(std::string_view text) {
+  if (text.empty() || text.find_first_not_of("0123456789") != std::string_view::npos) return {};
+  std::uint64_t value = 0;
+  const auto result = std::from_chars(text.data(), text.data() + text.size(), value);
+  return result.ec == std::errc() ? value : UINT64_MAX;
+}
+
+std::string_view trimmed(std::string_view text) {
+  while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
+  while (!text.empty() && (text.back() == ' ' || text.back() == '\t')) text.remove_suffix(1);
+  return text;
+}
+
+/// Whether a list of entity tags has this one, by the weak comparison.
+bool lists(std::string_view tags, std::string_view tag) {
+  if (trimmed(tags) == "*") return true;
+  while (!tags.empty()) {
+    const std::size_t comma = std::min(tags.find(','), tags.size());
+    std::string_view one = trimmed(tags.substr(0, comma));
+    if (one.starts_with("W/")) one.remove_prefix(2);
+    if (one == tag) return true;
+    tags.remove_prefix(std::min(comma + 1, tags.size()));
+  }
+  return false;
+}
+
+const char* phrase(unsigned status) {
+  switch (status) {
+    case 200:
+      return "OK";
+    case 204:
+      return "No Content";
+    case 206:
+      return "Partial Content";
+    case 304:
+      return "Not Modified";
+    case 400:
+      return "Bad Request";
+    case 404:
+      return "Not Found";
+    case 405:
+      return "Method Not Allowed";
+    case 413:
+      return "Content Too Large";
+    case 416:
+      return "Range Not Satisfiable";
+    case 431:
+      return "Request Header Fields Too Large";
+    default:
+      return "Service Unavailable";
+  }
+}
+
+}  // namespace
+
+std::optional<std::string> decoded_path(std::string_view target) {
+  target = target.substr(0, target.find_first_of("?#"));
+  if (!target.starts_with('/')) return {};
+  std::string path;
+  for (std::size_t i = 1; i < target.size(); ++i) {
+    char c = target[i];
+    if (c == '%') {
+      if (i + 2 >= target.size()) return {};
+      const auto high = hexadecimal_digit(target[i + 1]), low = hexadecimal_digit(target[i + 2]);
+      if (!high || !low) return {};
+      c = static_cast<char>(*high * 16 + *low);
+      i += 2;
+    }
+    if (c == '\0') return {};
+    path += c;
+  }
+  return path;
+}
+
+RangeKind parse_range(std::string_view text, std::uint64_t size, ByteSpan& span) {
+  text = trimmed(text);
+  if (!text.starts_with("bytes=")) return RangeKind::none;
+  text.remove_prefix(6);
+  const std::size_t dash = text.find('-');
+  if (dash == std::string_view::npos || text.find(',') != std::string_view::npos) {
+    return RangeKind::none;
+  }
+  const std::string_view before = trimmed(text.substr(0, dash)),
+                         behind = trimmed(text.substr(dash + 1));
+  if (before.empty()) {
+    const auto last = number(behind);  // so many of the last bytes
+    if (!last) return RangeKind::none;
+    if (*last == 0 || size == 0) return RangeKind::unsatisfiable;
+    span.length = std::min(*last, size);
+    span.first = size - span.length;
+    return RangeKind::single;
+  }
+  const auto first = number(before);
+  const auto last = behind.empty() ? UINT64_MAX : number(behind);
+  if (!first || !last || *last < *first) return RangeKind::none;
+  if (*first >= size) return RangeKind::unsatisfiable;
+  span.first = *first;
+  span.length = std::min(*last, size - 1) - *first + 1;
+  return RangeKind::single;
+}
+
+Answer answer_to(const Request& request, const Site& site) {
+  if (request.method == "OPTIONS") return {.status = 204};
+  if (request.method != "GET" && request.method != "HEAD") {
+    return {.status = 405, .close = true, .reason = "only GET and HEAD"};
+  }
+  auto path = decoded_path(request.target);
+  if (!path) return {.status = 400, .reason = "this is not a path"};
+  if (path->empty()) path = "index.html";
+  const auto at = site.find(*path);
+  if (at == site.end()) return {.status = 404, .reason = "there is nothing here"};
+  const Resource& resource = at->second;
+  const std::uint64_t size = resource.bytes->size();
+  Answer answer{.type = resource.type, .tag = resource.tag, .size = size};
+  if (!request.if_none_match.empty() && lists(request.if_none_match, resource.tag)) {
+    answer.status = 304;
+    return answer;
+  }
+  answer.bytes = resource.bytes;
+  answer.length = size;
+  ByteSpan span;
+  const bool of_this = request.if_range.empty() || trimmed(request.if_range) == resource.tag;
+  const RangeKind kind =
+      request.range.empty() || !of_this ? RangeKind::none : parse_range(request.range, size, span);
+  if (kind == RangeKind::single) {
+    answer.status = 206;
+    answer.first = span.first;
+    answer.length = span.length;
+  } else if (kind == RangeKind::unsatisfiable) {
+    answer.status = 416;
+    answer.bytes = nullptr;
+    answer.reason = "the file ends before";
+  }
+  return answer;
+}
+
+std::string header_of(const Answer& a) {
+  const bool bodiless = a.status == 204 || a.status == 304;
+  const std::string body = a.bytes || bodiless || a.reason.empty() ? "" : a.reason + "\n";
+  std::string text = "HTTP/1.1 " + std::to_string(a.status) + " " + phrase(a.status) + "\r\n";
+  const auto field = [&](std::string_view name, const std::string& value) {
+    text.append(name).append(": ").append(value).append("\r\n");
+  };
+  if (!bodiless) {
+    field("Content-Length", std::to_string(a.bytes ? a.length : body.size()));
+    field("Content-Type", a.bytes ? a.type : "text/plain; charset=utf-8");
+  }
+  if (a.status == 206) {
+    field("Content-Range", "bytes " + std::to_string(a.first) + "-" +
+                               std::to_string(a.first + a.length - 1) + "/" +
+                               std::to_string(a.size));
+  }
+  if (a.status == 416) field("Content-Range", "bytes */" + std::to_string(a.size));
+  if (!a.tag.empty()) field("ETag", a.tag);
+  if (a.status == 405 || a.status == 204) field("Allow", "GET, HEAD, OPTIONS");
+  field("Accept-Ranges", "bytes");
+  field("Cache-Control", "no-cache");
+  field("Access-Control-Allow-Origin", "*");
+  field("Access-Control-Allow-Headers", "Range, If-Range, If-None-Match");
+  field("Access-Control-Expose-Headers", "Content-Range, Content-Length, ETag, Accept-Ranges");
+  field("X-Content-Type-Options", "nosniff");
+  if (a.close) field("Connection", "close");
+  return text + "\r\n" + body;
+}
+
+}  // namespace terrace::tools

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "serve/site.hpp"
+
+/// What to answer to a request, without a socket (RFC 9110).
+
+namespace terrace::tools {
+
+struct Request {
+  std::string_view method, target;
+  std::string_view range{}, if_range{}, if_none_match{};  ///< empty: not given
+};
+
+struct Answer {
+  unsigned status = 200;
+  bool close = false;    ///< the connection ends with it
+  std::string reason{};  ///< of an error, for people; the body if there are no bytes
+  std::string type{}, tag{};
+  std::shared_ptr<const stream::ByteSource> bytes{};  ///< null: none
+  std::uint64_t first = 0, length = 0;                ///< the part of them that is sent
+  std::uint64_t size = 0;                             ///< of all of them; for 206 and 416
+};
+
+/// A path as it was before it was encoded, without the slash at the front; nullopt for what is no
+/// path or has a null byte in it.
+std::optional<std::string> decoded_path(std::string_view target);
+
+struct ByteSpan {
+  std::uint64_t first = 0, length = 0;
+};
+enum class RangeKind : std::uint8_t { none, single, unsatisfiable };
+/// A header Range against a body of `size` bytes. none: not one range of bytes, so it is ignored.
+RangeKind parse_range(std::string_view text, std::uint64_t size, ByteSpan& span);
+
+Answer answer_to(const Request& request, const Site& site);
+/// Status line and header fields, and the reason as the body where there are no bytes.
+std::string header_of(const Answer& answer);
+
+}  // namespace terrace::tools

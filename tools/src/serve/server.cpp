@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "serve/server.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/write.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/http.hpp>
+
+#include "serve/http_rules.hpp"
+#include "terrace/stream/error.hpp"
+
+namespace terrace::tools {
+namespace {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+using asio::ip::tcp;
+using boost::system::error_code;
+
+constexpr std::size_t kPiece = std::size_t{64} * 1024;
+
+/// One connection: a request, its answer, and so on.
+class Session : public std::enable_shared_from_this<Session> {
+ public:
+  Session(tcp::socket socket, const Site& site, const ServerLimits& limits, std::size_t& open)
+      : stream_(std::move(socket)), site_(site), limits_(limits), open_(open) {
+    ++open_;
+  }
+  ~Session() { --open_; }
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
+
+  void start(bool full) {
+    error_code ignored;
+    stream_.socket().set_option(tcp::no_delay(true), ignored);
+    if (full) {
+      answer({.status = 503, .close = true, .reason = "too many connections"}, false);
+    } else {
+      read();
+    }
+  }
+
+ private:
+  void read() {
+    parser_.emplace();
+    parser_->header_limit(static_cast<std::uint32_t>(limits_.header_bytes));
+    parser_->body_limit(0);
+    stream_.expires_after(limits_.request);
+    http::async_read(
+        stream_, buffer_, *parser_,
+        [self = shared_from_this()](error_code error, std::size_t) { self->received(error); });
+  }
+  void received(error_code error) {
+    if (error == http::error::header_limit) {
+      return answer({.status = 431, .close = true, .reason = "the header is too large"}, false);
+    }
+    if (error == http::error::body_limit) {
+      return answer({.status = 413, .close = true, .reason = "a request has no body here"}, false);
+    }
+    if (error) {
+      // Closed, reset or too slow: nobody listens. Anything else is not HTTP.
+      const bool spoken =
+          error.category() == http::make_error_code(http::error::bad_method).category();
+      if (!spoken || error == http::error::end_of_stream || error == http::error::partial_message) {
+        return close();
+      }
+      return answer({.status = 400, .close = true, .reason = "this is not HTTP"}, false);
+    }
+    const auto& request = parser_->get();
+    const auto text = [](beast::string_view view) {
+      return std::string_view(view.data(), view.size());
+    };
+    const auto field = [&](http::field name) { return text(request[name]); };
+    Answer reply = answer_to({.method = text(request.method_string()),
+                              .target = text(request.target()),
+                              .range = field(http::field::range),
+                              .if_range = field(http::field::if_range),
+                              .if_none_match = field(http::field::if_none_match)},
+                             site_);
+    reply.close = reply.close || !request.keep_alive();
+    answer(std::move(reply), request.method() == http::verb::head);
+  }
+  void answer(Answer reply, bool head) {
+    reply_ = std::move(reply);
+    header_ = header_of(reply_);
+    at_ = reply_.first;
+    left_ = head || reply_.bytes == nullptr ? 0 : reply_.length;
+    write(true);
+  }
+  void write(bool with_header) {
+    const std::size_t size = static_cast<std::size_t>(std::min<std::uint64_t>(left_, kPiece));
+    try {
+      piece_.resize(size);
+      if (size > 0) reply_.bytes->read(at_, piece_);
+    } catch (const stream::Error&) {
+      return close();  // the file was cut off: the client sees a short body
+    }
+    at_ += size;
+    left_ -= size;
+    const std::array<asio::const_buffer, 2> buffers{
+        with_header ? asio::buffer(header_) : asio::const_buffer(), asio::buffer(piece_)};
+    stream_.expires_after(limits_.piece);
+    asio::async_write(stream_, buffers, [self = shared_from_this()](error_code error, std::size_t) {
+      if (error) return self->close();
+      if (self->left_ > 0) return self->write(false);
+      if (self->reply_.close) return self->close();
+      self->read();
+    });
+  }
+  void close() {
+    error_code ignored;
+    stream_.socket().shutdown(tcp::socket::shutdown_send, ignored);
+    stream_.close();
+  }
+
+  beast::tcp_stream stream_;
+  const Site& site_;
+  const ServerLimits& limits_;
+  std::size_t& open_;
+  beast::flat_buffer buffer_;
+  std::optional<http::request_parser<http::empty_body>> parser_;
+  Answer reply_;
+  std::string header_;
+  std::vector<std::byte> piece_;
+  std::uint64_t at_ = 0, left_ = 0;
+};
+
+}  // namespace
+
+struct Server::Impl {
+  Impl(const Site& given, const ServerLimits& given_limits) : site(given), limits(given_limits) {}
+
+  void accept() {
+    acceptor.async_accept([this](error_code error, tcp::socket socket) {
+      if (error == asio::error::operation_aborted) return;
+      if (!error) {
+        const bool full = open >= limits.connections;
+        std::make_shared<Session>(std::move(socket), site, limits, open)->start(full);
+        return accept();
+      }
+      // Without descriptors for another connection: as soon as one may have ended.
+      pause.expires_after(std::chrono::milliseconds(50));
+      pause.async_wait([this](error_code again) {
+        if (!again) accept();
+      });
+    });
+  }
+  void watch(const std::function<bool()>& stopped) {
+    timer.expires_after(std::chrono::milliseconds(100));
+    timer.async_wait([this, &stopped](error_code error) {
+      if (error) return;
+      if (stopped()) return context.stop();
+      watch(stopped);
+    });
+  }
+
+  const Site& site;
+  ServerLimits limits;
+  std::size_t open = 0;
+  asio::io_context context{1};
+  tcp::acceptor acceptor{context};
+  asio::steady_timer timer{context}, pause{context};
+};
+
+Server::Server(const Site& site, std::uint16_t port, const ServerLimits& limits)
+    : impl_(std::make_unique<Impl>(site, limits)) {
+  try {
+    const tcp::endpoint here(asio::ip::address_v4::loopback(), port);
+    impl_->acceptor.open(here.protocol());
+    impl_->acceptor.set_option(tcp::acceptor::reuse_address(true));
+    impl_->acceptor.bind(here);
+    impl_->acceptor.listen();
+  } catch (const boost::system::system_error& error) {
+    throw stream::Error({.file = "127.0.0.1:" + std::to_string(port),
+                         .where = {},
+                         .cause = "cannot be served: " + error.code().message(),
+                         .remedy = "name another port"});
+  }
+}
+
+Server::~Server() = default;
+
+std::uint16_t Server::port() const { return impl_->acceptor.local_endpoint().port(); }
+
+void Server::run(const std::function<bool()>& stopped) {
+  impl_->accept();
+  impl_->watch(stopped);
+  impl_->context.run();
+}
+
+}  // namespace terrace::tools

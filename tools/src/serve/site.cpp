@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "serve/site.hpp"
+
+#include <algorithm>
+#include <mutex>
+#include <set>
+#include <system_error>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "serve/viewer_files.hpp"
+#include "terrace/stream/error.hpp"
+#include "terrace/terrain/store_view.hpp"
+
+namespace terrace::tools {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+std::string type_of(const std::string& name) {
+  static constexpr std::pair<std::string_view, std::string_view> kTypes[] = {
+      {".html", "text/html; charset=utf-8"},
+      {".js", "text/javascript; charset=utf-8"},
+      {".css", "text/css; charset=utf-8"},
+      {".json", "application/json"},
+      {".svg", "image/svg+xml"},
+      {".wasm", "application/wasm"},
+  };
+  for (const auto& [ending, type] : kTypes) {
+    if (name.ends_with(ending)) return std::string(type);
+  }
+  return "application/octet-stream";
+}
+
+std::string hexadecimal(std::uint64_t value) {
+  std::string text;
+  do {
+    text.insert(text.begin(), "0123456789abcdef"[value & 15]);
+    value >>= 4;
+  } while (value > 0);
+  return text;
+}
+
+/// FNV-1a (RFC 9923).
+std::uint64_t hash_of(std::string_view bytes) {
+  std::uint64_t hash = 0xCBF29CE484222325;
+  for (const char c : bytes) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001B3;
+  return hash;
+}
+
+void add_text(Site& site, const std::string& name, std::string_view text) {
+  std::vector<std::byte> bytes(text.size());
+  std::transform(text.begin(), text.end(), bytes.begin(),
+                 [](char c) { return static_cast<std::byte>(c); });
+  site[name] = {stream::bytes_in_memory(name, std::move(bytes)), type_of(name),
+                '"' + hexadecimal(hash_of(text)) + '"'};
+}
+
+/// The manifest and the files that it lists.
+std::vector<std::string> files_of(const stream::Store& store) {
+  const auto source = stream::open_file(store.path() / "manifest.json");
+  std::string text(source->size(), '\0');
+  source->read(0, std::as_writable_bytes(std::span(text)));
+  std::vector<std::string> names{"manifest.json"};
+  const Json manifest = Json::parse(text);
+  for (const Json& level : manifest.at("levels")) {
+    for (const Json& segment : level.at("segments")) {
+      for (const char* part : {"data", "index"}) {
+        names.push_back(segment.at(part).at("file").get<std::string>());
+      }
+    }
+  }
+  return names;
+}
+
+std::string name_of(const stream::Store& store, const std::set<std::string>& taken) {
+  fs::path path = fs::absolute(store.path()).lexically_normal();
+  if (!path.has_filename()) path = path.parent_path();
+  std::string name = path.filename().string();
+  for (const std::string_view ending : {".store", ".terrace"}) {
+    if (name.size() > ending.size() && name.ends_with(ending)) {
+      name.resize(name.size() - ending.size());
+    }
+  }
+  // Names that every web server serves as they are.
+  for (char& c : name) {
+    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                       c == '-' || c == '_' || (c == '.' && &c != name.data());
+    if (!plain) c = '_';
+  }
+  std::string unique = name;
+  for (int i = 2; taken.contains(unique); ++i) unique = name + "-" + std::to_string(i);
+  return unique;
+}
+
+/// Notes what is read of a store's files.
+struct Readings {
+  std::mutex mutex;
+  std::map<std::string, std::map<std::uint64_t, std::uint64_t>> ends;  // by offset
+
+  void note(const std::string& file, std::uint64_t offset, std::uint64_t bytes) {
+    const std::lock_guard lock(mutex);
+    std::uint64_t& end = ends[file][offset];
+    end = std::max(end, offset + bytes);
+  }
+};
+
+template <class Shown>
+stream::LinearMap ground_of(const stream::Store& store) {
+  using View = terrain::StoreView<Shown>;
+  return View(store, {}, View::Reader::in_frame).ground();
+}
+
+}  // namespace
+
+std::string start_file(const stream::Store& store) {
+  const auto readings = std::make_shared<Readings>();
+  const stream::OpenByName files = [&](const std::string& name) {
+    std::shared_ptr<stream::ByteSource> file = stream::open_file(store.path() / name);
+    return stream::bytes_by_function(
+        file->name(), file->size(),
+        [file, name, readings](std::uint64_t offset, std::span<std::byte> out) {
+          readings->note(name, offset, out.size());
+          file->read(offset, out);
+        });
+  };
+  const stream::Store noted = stream::Store::open(store.path().string(), files);
+  // A view begins with the root and the records of the clusters below it.
+  const Json ground =
+      store.schema().grid ? ground_of<std::int32_t>(noted) : ground_of<tri::PointCloud>(noted);
+
+  Json parts = Json::array();
+  std::string bytes;
+  for (const auto& [name, ends] : readings->ends) {
+    const auto file = stream::open_file(store.path() / name);
+    for (auto at = ends.begin(); at != ends.end();) {
+      const std::uint64_t begin = at->first;
+      std::uint64_t end = at->second;
+      while (++at != ends.end() && at->first <= end) end = std::max(end, at->second);
+      if (begin == end) continue;
+      parts.push_back({name, begin, end - begin});
+      const std::size_t size = bytes.size();
+      bytes.resize(size + (end - begin));
+      file->read(begin, std::as_writable_bytes(std::span(bytes).subspan(size)));
+    }
+  }
+  const Json head = {
+      {"format", "terrace-start"}, {"version", 1}, {"ground", ground}, {"parts", parts}};
+  return head.dump() + "\n" + bytes;
+}
+
+Site make_site(std::span<const stream::Store> stores) {
+  Site site;
+  for (const ViewerFile& file : viewer_files()) add_text(site, std::string(file.name), file.bytes);
+  Json list = Json::array();
+  std::set<std::string> names;
+  for (const stream::Store& store : stores) {
+    const std::string name = name_of(store, names);
+    names.insert(name);
+    const std::string folder = "stores/" + name + "/";
+    const std::string checksum = hexadecimal(store.checksum());
+    for (const std::string& file : files_of(store)) {
+      const fs::path path = store.path() / file;
+      std::error_code error;
+      if (!fs::is_regular_file(fs::symlink_status(path, error))) {
+        throw stream::Error({.file = path.string(),
+                             .where = {},
+                             .cause = "is not a regular file: links are not served",
+                             .remedy = "put the file itself there"});
+      }
+      std::shared_ptr<const stream::ByteSource> bytes = stream::open_file(path);
+      const std::string tag = '"' + checksum + "-" + hexadecimal(bytes->size()) + '"';
+      site[folder + file] = {std::move(bytes), type_of(file), tag};
+    }
+    add_text(site, "stores/" + name + ".start", start_file(store));
+    list.push_back({{"name", name}, {"points", store.points()}, {"checksum", checksum}});
+  }
+  add_text(site, "stores.json",
+           Json{{"format", "terrace-stores"}, {"version", 1}, {"stores", list}}.dump(1) + "\n");
+  return site;
+}
+
+}  // namespace terrace::tools

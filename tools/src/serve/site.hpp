@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <terrace/stream/byte_source.hpp>
+#include <terrace/stream/store.hpp>
+
+/// What the viewer needs of a web server: its own files and those of the stores, each at a path.
+
+namespace terrace::tools {
+
+struct Resource {
+  std::shared_ptr<const stream::ByteSource> bytes;
+  std::string type;  ///< of the media
+  std::string tag;   ///< the entity tag, quoted
+};
+
+/// By path, without the slash at the front. There is nothing besides: no path of a request ever
+/// becomes one of a file system.
+using Site = std::map<std::string, Resource>;
+
+/// The viewer, `stores.json`, and of each store its files in `stores/NAME/` and
+/// `stores/NAME.start`, which has the parts that the first picture is made of. Names are those of
+/// the folders, made unique. Files are opened here and stay open. Throws: stream::Error, also if a
+/// file of a store is a link.
+Site make_site(std::span<const stream::Store> stores);
+
+/// The parts of a store that a view needs to begin: a line of JSON with the ground map and the list
+/// of parts, then their bytes. tools/viewer/README.md describes it.
+std::string start_file(const stream::Store& store);
+
+struct Published {
+  std::uint64_t files = 0, bytes = 0;
+};
+
+/// Writes the site as a folder for any web server. It appears whole and synced, by one rename.
+/// replace: a folder that terrace has published before gives way.
+/// Throws: stream::Error; stream::Stopped if a store is to stop.
+Published publish(const Site& site, std::span<const stream::Store> stores,
+                  const std::filesystem::path& folder, bool replace);
+
+}  // namespace terrace::tools

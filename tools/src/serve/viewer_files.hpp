@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <span>
+#include <string_view>
+
+namespace terrace::tools {
+
+/// A file of the viewer (tools/viewer/dist), which the command carries within itself.
+struct ViewerFile {
+  std::string_view name;
+  std::string_view bytes;
+};
+
+std::span<const ViewerFile> viewer_files();
+
+}  // namespace terrace::tools

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <terrace/stream/store.hpp>
+
+#include "base/units.hpp"
+#include "cli/interrupt.hpp"
+#include "serve/site.hpp"
+#include "verbs/verbs.hpp"
+
+namespace terrace::tools {
+
+using namespace terrain;
+namespace {
+
+class PublishCommand final : public Command {
+ public:
+  void define(CLI::App& app) override {
+    app.add_option("STORE", stores_, "what to show; several may be named")->required();
+    add_output(app, output_, "the folder to write: viewer and copies of the stores");
+    not_yet(app, {"--repack"});
+  }
+
+  Summary run(const CommonOptions& common) override {
+    const Stopwatch watch;
+    std::vector<stream::Store> stores;
+    for (const std::string& path : stores_) stores.push_back(open_store(path));
+    const Published published = publish(make_site(stores), stores, output_, common.force);
+    Summary summary;
+    summary.json = {{"stores", stores.size()},
+                    {"files", published.files},
+                    {"bytes", published.bytes},
+                    {"seconds", watch.seconds()},
+                    {"peak_rss_bytes", peak_rss_bytes()}};
+    summary.text = output_ + ": " + with_commas(published.files) + " files, " +
+                   readable_bytes(published.bytes) + ", in " + readable_seconds(watch.seconds()) +
+                   "; copy the folder to any web server\n";
+    return summary;
+  }
+
+ private:
+  std::vector<std::string> stores_;
+  std::string output_;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_publish() { return std::make_unique<PublishCommand>(); }
+
+}  // namespace terrace::tools

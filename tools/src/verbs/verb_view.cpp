@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <fcntl.h>
+#include <spawn.h>
+#include <terrace/stream/store.hpp>
+#include <unistd.h>
+
+#include "base/units.hpp"
+#include "cli/interrupt.hpp"
+#include "serve/server.hpp"
+#include "serve/site.hpp"
+#include "verbs/verbs.hpp"
+
+extern char** environ;
+
+namespace terrace::tools {
+
+using namespace terrain;
+namespace {
+
+/// False if there is no xdg-open. It ends by itself; whether a browser came nobody can tell.
+bool open_browser(const std::string& address) {
+  std::string program = "xdg-open", argument = address;
+  char* const arguments[] = {program.data(), argument.data(), nullptr};
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  for (const int descriptor : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    posix_spawn_file_actions_addopen(&actions, descriptor, "/dev/null", O_RDWR, 0);
+  }
+  pid_t child = 0;
+  const int error = ::posix_spawnp(&child, program.c_str(), &actions, nullptr, arguments, environ);
+  posix_spawn_file_actions_destroy(&actions);
+  return error == 0;
+}
+
+class ViewCommand final : public Command {
+ public:
+  void define(CLI::App& app) override {
+    app.add_option("STORE", stores_, "what to show; several may be named")->required();
+    app.add_option("--port", port_, "of 127.0.0.1 (default: any that is free)")
+        ->check(CLI::Range(0, 65535))
+        ->type_name("PORT");
+    app.add_flag("--no-open", no_open_, "do not open a browser");
+  }
+
+  Summary run(const CommonOptions& common) override {
+    std::vector<stream::Store> stores;
+    for (const std::string& path : stores_) stores.push_back(open_store(path));
+    const Site site = make_site(stores);
+    Server server(site, static_cast<std::uint16_t>(port_));
+    const std::string address = "http://127.0.0.1:" + std::to_string(server.port()) + "/";
+    common.say(address + " shows " +
+               (stores.size() == 1 ? "the store" : std::to_string(stores.size()) + " stores") +
+               " until Ctrl-C");
+    if (!no_open_ && !open_browser(address)) {
+      common.say("there is no xdg-open to open a browser: open the address yourself");
+    }
+    const Stopwatch watch;
+    server.run([] { return interrupted(); });
+    Summary summary;
+    summary.json = {{"address", address},
+                    {"stores", stores.size()},
+                    {"seconds", watch.seconds()},
+                    {"peak_rss_bytes", peak_rss_bytes()}};
+    return summary;
+  }
+
+ private:
+  std::vector<std::string> stores_;
+  int port_ = 0;
+  bool no_open_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_view() { return std::make_unique<ViewCommand>(); }
+
+}  // namespace terrace::tools

@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "scene.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <map>
+#include <random>
+#include <set>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <terrace/terrain/build.hpp>
+#include <unistd.h>
+
+#include "terrace/stream/geotiff_writer.hpp"
+
+namespace terrace::viewer {
+namespace {
+
+constexpr std::uint32_t kColumns = 160, kRows = 130;
+constexpr stream::LinearMap kGround{10, 0, 0, 0, -10, 0, 0, 0, 1};
+
+double height(std::uint32_t column, std::uint32_t row) {
+  return std::round(200.0 + 90.0 * std::sin(column / 15.0) * std::cos(row / 19.0));
+}
+
+/// A store of a raster in a folder of its own.
+class Scenes : public testing::Test {
+ protected:
+  Scenes()
+      : folder_(std::filesystem::temp_directory_path() / ("scenes-" + std::to_string(::getpid()))) {
+    std::filesystem::create_directories(folder_);
+    stream::GeoTiffOptions options;
+    options.columns = kColumns;
+    options.rows = kRows;
+    options.world.xy = {10, 0, 0, 0, -10, 0};
+    options.sample.type = stream::ScalarType::i16;
+    std::vector<std::int16_t> samples;
+    for (std::uint32_t row = 0; row < kRows; ++row) {
+      for (std::uint32_t column = 0; column < kColumns; ++column) {
+        samples.push_back(static_cast<std::int16_t>(height(column, row)));
+      }
+    }
+    const std::string file = (folder_ / "dem.tif").string();
+    stream::GeoTiffWriter writer(file, options);
+    writer.write_rows(std::as_bytes(std::span(samples)));
+    writer.commit();
+    terrain::BuildRequest request{.inputs = {file}, .store = folder_ / "store"};
+    request.block_points = 500;
+    terrain::build_store(request);
+  }
+  ~Scenes() override { std::filesystem::remove_all(folder_); }
+
+  [[nodiscard]] stream::Store store() const { return stream::Store::open(folder_ / "store"); }
+
+  std::filesystem::path folder_;
+};
+
+/// What a page has: arrays by slot, to which changes are applied.
+struct Mirror {
+  std::vector<SceneVertex> vertices;
+  std::vector<SceneTriangle> triangles;
+
+  void apply(const SceneChanges& changes) {
+    const auto put = [](const auto& blocks, const auto& from, auto& to) {
+      for (std::size_t i = 0; i < blocks.size(); ++i) {
+        const std::size_t begin = blocks[i] * SceneChanges::kBlock;
+        if (to.size() < begin + SceneChanges::kBlock) to.resize(begin + SceneChanges::kBlock);
+        std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(i * SceneChanges::kBlock),
+                    SceneChanges::kBlock, to.begin() + static_cast<std::ptrdiff_t>(begin));
+      }
+    };
+    put(changes.vertex_blocks, changes.vertices, vertices);
+    put(changes.triangle_blocks, changes.triangles, triangles);
+  }
+  [[nodiscard]] std::array<int, 2> cell(std::uint32_t slot) const {
+    const SceneVertex& v = vertices[slot];
+    return {static_cast<int>(std::lround(v.x / 10 + (kColumns - 1) / 2.0)),
+            static_cast<int>(std::lround((kRows - 1) / 2.0 - v.y / 10))};
+  }
+};
+
+tri::View looking(double east, double north, double above, double pixel_error) {
+  tri::View view;
+  view.camera =
+      tri::perspective_camera({{east, north, above}, {0.2, 0.3, -1}, {0, 0, 1}}, 45, 1.5, 700);
+  view.pixel_error = pixel_error;
+  return view;
+}
+
+// After every frame the arrays are the Delaunay triangulation of the vertices in them, each at the
+// height of its cell; in the end at the level that was asked for.
+TEST_F(Scenes, TheArraysAreTheTriangulation) {
+  const auto scene = Scene::open(store(), kGround, 1'000'000);
+  Mirror mirror;
+  bool sliding = false;
+  std::size_t most = 0;
+  double time = 0;
+  for (const auto& view :
+       {looking(0, 0, 4000, 20), looking(300, 200, 900, 1), looking(-500, -300, 1500, 3)}) {
+    for (int frame = 0; frame < 2000; ++frame) {
+      const SceneState state = scene->frame(view, 0.004, time += 0.01);
+      mirror.apply(scene->take_changes());
+      std::set<std::uint32_t> used;
+      std::set<std::array<std::array<int, 2>, 3>> triangles;
+      for (const SceneTriangle& t : mirror.triangles) {
+        if (t == SceneTriangle{}) continue;
+        std::array<std::array<int, 2>, 3> corners{mirror.cell(t[0]), mirror.cell(t[1]),
+                                                  mirror.cell(t[2])};
+        used.insert(t.begin(), t.end());
+        std::sort(corners.begin(), corners.end());
+        EXPECT_TRUE(triangles.insert(corners).second);
+      }
+      ASSERT_EQ(triangles.size(), state.triangles);
+      std::vector<std::array<std::int32_t, 2>> points;
+      for (const std::uint32_t slot : used) {
+        const auto [column, row] = mirror.cell(slot);
+        const SceneVertex& v = mirror.vertices[slot];
+        ASSERT_NE(v.level, SceneVertex::kNone);
+        EXPECT_EQ(v.z, height(static_cast<std::uint32_t>(column), static_cast<std::uint32_t>(row)));
+        EXPECT_GT(v.normal[2], 0);
+        sliding |= v.start_z != v.z;
+        points.push_back({column, row});
+      }
+      ASSERT_EQ(points.size(), state.points);
+      most = std::max(most, points.size());
+      tri::Delaunay2<std::int32_t> fresh;
+      fresh.build(points);
+      ASSERT_EQ(fresh.hash(), scene->hash());
+      for (const tri::TriangleId id : fresh.all_triangles()) {
+        std::array<std::array<int, 2>, 3> corners;
+        for (std::size_t i = 0; i < 3; ++i) {
+          const auto p = fresh.point(fresh.vertices(id)[i]);
+          corners[i] = {p[0], p[1]};
+        }
+        std::sort(corners.begin(), corners.end());
+        ASSERT_TRUE(triangles.contains(corners));
+      }
+      if (state.settled) break;
+      ASSERT_LT(frame, 1999);
+    }
+  }
+  EXPECT_TRUE(sliding) << "nothing slides into place";
+  EXPECT_GT(most, 5000u);
+}
+
+TEST_F(Scenes, ARayMeetsTheSurfaceWhereItsHeightIs) {
+  const auto scene = Scene::open(store(), kGround, 1'000'000);
+  tri::View all;
+  all.ground_error = 0;
+  while (!scene->frame(all, 0.01, 0).settled) {
+  }
+  std::mt19937_64 random(7);
+  for (int i = 0; i < 50; ++i) {
+    const auto column = static_cast<std::uint32_t>(40 + random() % 80);
+    const auto row = static_cast<std::uint32_t>(40 + random() % 50);
+    SCOPED_TRACE(testing::Message() << column << ", " << row);
+    const double x = 10 * (column - (kColumns - 1) / 2.0), y = 10 * ((kRows - 1) / 2.0 - row);
+    const auto hit = scene->pick({x + 1, y - 2, 5000}, {0, 0, -1}, 0.01);
+    ASSERT_TRUE(hit);
+    EXPECT_NEAR(hit->stored[0], column + 0.1, 1e-4);
+    EXPECT_NEAR(hit->stored[1], row + 0.2, 1e-4);
+    // Between the samples of the cell around it.
+    double low = 1e9, high = -1e9;
+    for (std::uint32_t dc = 0; dc < 2; ++dc) {
+      for (std::uint32_t dr = 0; dr < 2; ++dr) {
+        low = std::min(low, height(column + dc, row + dr));
+        high = std::max(high, height(column + dc, row + dr));
+      }
+    }
+    EXPECT_GE(hit->stored[2], low - 1e-3);
+    EXPECT_LE(hit->stored[2], high + 1e-3);
+    EXPECT_NEAR(hit->place[2], hit->stored[2], 1e-3);
+  }
+  EXPECT_FALSE(scene->pick({0, 0, 5000}, {0, 0, 1}, 0.01));
+  EXPECT_FALSE(scene->pick({1e5, 0, 5000}, {0, 0, -1}, 0.01));
+}
+
+TEST_F(Scenes, ClustersExpandAndCollapseByHand) {
+  const auto scene = Scene::open(store(), kGround, 1'000'000);
+  const tri::View coarse = looking(0, 0, 1e6, 100);
+  const auto settle = [&] {
+    SceneState state;
+    do {
+      state = scene->frame(coarse, 0.01, 0);
+    } while (!state.settled);
+    return state;
+  };
+  const SceneState before = settle();
+  const std::uint64_t hash = scene->hash();
+  auto hit = scene->pick({0, 0, 5000}, {0, 0, -1}, 0.01);
+  ASSERT_TRUE(hit);
+  scene->pin(*hit, tri::ViewPin::expanded);
+  const SceneState expanded = settle();
+  EXPECT_EQ(expanded.expanded, before.expanded + 1);
+  EXPECT_GT(expanded.points, before.points);
+  scene->release();
+  EXPECT_EQ(settle().points, before.points);
+  EXPECT_EQ(scene->hash(), hash);
+}
+
+}  // namespace
+}  // namespace terrace::viewer

@@ -1,0 +1,221 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// The functions of the WebAssembly module: one store under one camera. JavaScript brings the
+/// bytes.
+///
+/// A call takes what is longer than a number from input(), where JavaScript has written it, and
+/// leaves what is longer at output().
+
+#include <cstring>
+#include <exception>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <terrace/stream/error.hpp>
+#include <terrace/stream/given_bytes.hpp>
+#include <terrace/stream/store.hpp>
+
+#include "scene.hpp"
+
+namespace {
+
+using namespace terrace;
+
+enum Status : int { kDone = 0, kMissing = 1, kFailed = 2 };
+
+/// Ranges told at once; there is no sense in more requests than that.
+constexpr std::size_t kMostRanges = 1024;
+
+struct Module {
+  std::vector<double> input;  // of doubles, so that it is aligned for them
+  stream::GivenBytes given;
+  std::optional<stream::Store> store;
+  std::unique_ptr<viewer::Scene> scene;
+  viewer::SceneState state;
+  std::vector<double> numbers;
+  std::string text;
+  std::optional<viewer::SceneHit> hit;
+};
+
+Module& module() {
+  static Module the;
+  return the;
+}
+
+const char* input_text() { return reinterpret_cast<const char*>(module().input.data()); }
+
+void tell(std::span<const stream::ByteRange> ranges) {
+  module().text.clear();
+  for (const stream::ByteRange& range : ranges.first(std::min(ranges.size(), kMostRanges))) {
+    module().text += range.file + '\t' + std::to_string(range.offset) + '\t' +
+                     std::to_string(range.bytes) + '\n';
+  }
+}
+
+template <class Work>
+int guarded(const Work& work) {
+  try {
+    return work();
+  } catch (const stream::MissingBytes& missing) {
+    tell(missing.ranges());
+    return kMissing;
+  } catch (const std::exception& error) {
+    module().text = error.what();
+    return kFailed;
+  }
+}
+
+stream::Point3 point_of(const double* at) { return {at[0], at[1], at[2]}; }
+
+}  // namespace
+
+#define TERRACE_EXPORT(name) extern "C" __attribute__((export_name(#name), visibility("default")))
+
+/// Room for this many bytes of input; valid until the next call of it.
+TERRACE_EXPORT(input) void* terrace_input(std::size_t bytes) {
+  module().input.resize(bytes / sizeof(double) + 1);
+  return module().input.data();
+}
+/// Text after kMissing (lines of file, offset, bytes), after kFailed (what is wrong).
+TERRACE_EXPORT(text) const char* terrace_text() { return module().text.data(); }
+TERRACE_EXPORT(text_size) std::size_t terrace_text_size() { return module().text.size(); }
+/// Numbers that a call has left.
+TERRACE_EXPORT(numbers) const double* terrace_numbers() { return module().numbers.data(); }
+
+/// input: a name. A file of the store and its size.
+TERRACE_EXPORT(add_file) int terrace_add_file(std::size_t name, double bytes) {
+  return guarded([&] {
+    module().given.add_file({input_text(), name}, static_cast<std::uint64_t>(bytes));
+    return kDone;
+  });
+}
+/// input: a name and behind it the bytes from `offset` on.
+TERRACE_EXPORT(give) int terrace_give(std::size_t name, double offset, std::size_t bytes) {
+  return guarded([&] {
+    module().given.give({input_text(), name}, static_cast<std::uint64_t>(offset),
+                        std::as_bytes(std::span(input_text() + name, bytes)));
+    return kDone;
+  });
+}
+/// input: a name. Its bytes were damaged and will be brought again.
+TERRACE_EXPORT(forget) int terrace_forget(std::size_t name) {
+  return guarded([&] {
+    module().given.forget({input_text(), name});
+    return kDone;
+  });
+}
+
+/// input: the nine numbers of the map from stored coordinates to metres. numbers: the box of the
+/// scene; 1 for triangles, 0 for points; the store's checksum.
+TERRACE_EXPORT(open) int terrace_open(double max_points) {
+  return guarded([&] {
+    Module& m = module();
+    stream::LinearMap ground{};
+    std::memcpy(ground.data(), m.input.data(), sizeof ground);
+    if (!m.store) m.store = stream::Store::open("store", m.given.open());
+    m.scene = viewer::Scene::open(*m.store, ground, static_cast<std::size_t>(max_points));
+    const stream::Box3 box = m.scene->box();
+    m.numbers = {box.min[0],
+                 box.min[1],
+                 box.min[2],
+                 box.max[0],
+                 box.max[1],
+                 box.max[2],
+                 m.store->schema().grid ? 1.0 : 0.0,
+                 static_cast<double>(m.store->checksum())};
+    return kDone;
+  });
+}
+
+/// input: eye, direction, up; field of view in degrees, aspect, height in pixels; pixels of error;
+/// seconds to spend; the time. numbers: points, triangles, expanded clusters, slots of vertices and
+/// of triangles, whether it is settled, the worst demand, clusters and bytes read. text: what is
+/// missing.
+TERRACE_EXPORT(frame) int terrace_frame() {
+  return guarded([&] {
+    Module& m = module();
+    const double* in = m.input.data();
+    tri::View view;
+    view.camera = tri::perspective_camera({point_of(in), point_of(in + 3), point_of(in + 6)}, in[9],
+                                          in[10], in[11]);
+    view.pixel_error = in[12];
+    const viewer::SceneState s = m.scene->frame(view, in[13], in[14]);
+    m.numbers = {static_cast<double>(s.points),
+                 static_cast<double>(s.triangles),
+                 static_cast<double>(s.expanded),
+                 static_cast<double>(s.vertex_slots),
+                 static_cast<double>(s.triangle_slots),
+                 s.settled ? 1.0 : 0.0,
+                 s.worst,
+                 static_cast<double>(s.clusters),
+                 static_cast<double>(s.stored_bytes)};
+    tell(m.scene->missing());
+    return kDone;
+  });
+}
+
+/// numbers: blocks of vertices, their addresses, that of the vertices; the same of triangles.
+TERRACE_EXPORT(changes) int terrace_changes() {
+  return guarded([&] {
+    const viewer::SceneChanges& c = module().scene->take_changes();
+    const auto address = [](const void* at) {
+      return static_cast<double>(reinterpret_cast<std::uintptr_t>(at));
+    };
+    module().numbers = {static_cast<double>(c.vertex_blocks.size()),
+                        address(c.vertex_blocks.data()),
+                        address(c.vertices.data()),
+                        static_cast<double>(c.triangle_blocks.size()),
+                        address(c.triangle_blocks.data()),
+                        address(c.triangles.data())};
+    return kDone;
+  });
+}
+
+/// text: sixteen hexadecimal digits.
+TERRACE_EXPORT(hash) int terrace_hash() {
+  return guarded([&] {
+    std::uint64_t hash = module().scene->hash();
+    module().text.assign(16, '0');
+    for (std::size_t i = 16; i-- > 0; hash >>= 4) module().text[i] = "0123456789abcdef"[hash & 15];
+    return kDone;
+  });
+}
+
+/// input: origin, direction, the angle. numbers: nothing met (0) or 1; stored place; place in the
+/// view frame; level; level and ordinal of the cluster.
+TERRACE_EXPORT(pick) int terrace_pick() {
+  return guarded([&] {
+    Module& m = module();
+    const double* in = m.input.data();
+    m.hit = m.scene->pick(point_of(in), point_of(in + 3), in[6]);
+    m.numbers = {0};
+    if (m.hit) {
+      m.numbers = {1,
+                   m.hit->stored[0],
+                   m.hit->stored[1],
+                   m.hit->stored[2],
+                   m.hit->place[0],
+                   m.hit->place[1],
+                   m.hit->place[2],
+                   static_cast<double>(m.hit->level),
+                   static_cast<double>(tri::level_of(m.hit->cluster)),
+                   static_cast<double>(tri::ordinal_of(m.hit->cluster))};
+    }
+    return kDone;
+  });
+}
+
+/// Of what was picked last: 1 expands, 0 collapses, -1 leaves all to the view again.
+TERRACE_EXPORT(pin) int terrace_pin(int how) {
+  return guarded([&] {
+    Module& m = module();
+    if (how < 0) {
+      m.scene->release();
+    } else if (m.hit) {
+      m.scene->pin(*m.hit, how > 0 ? tri::ViewPin::expanded : tri::ViewPin::collapsed);
+    }
+    return kDone;
+  });
+}

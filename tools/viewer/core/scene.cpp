@@ -1,0 +1,347 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "scene.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <type_traits>
+
+#include <terrace/terrain/store_view.hpp>
+#include <terrace/tri/geomorph.hpp>
+
+namespace terrace::viewer {
+namespace {
+
+using stream::Point3;
+
+Point3 difference(const Point3& a, const Point3& b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+double dot(const Point3& a, const Point3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+Point3 cross(const Point3& a, const Point3& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+/// An array of which blocks of slots are marked as changed.
+template <class Value>
+class Blocks {
+ public:
+  /// Of growth all is new.
+  void grow(std::size_t slots) {
+    const std::size_t blocks = (slots + SceneChanges::kBlock - 1) / SceneChanges::kBlock;
+    if (blocks * SceneChanges::kBlock <= values_.size()) return;
+    values_.resize(blocks * SceneChanges::kBlock);
+    for (std::size_t b = marked_.size(); b < blocks; ++b)
+      changed_.push_back(static_cast<std::uint32_t>(b));
+    marked_.resize(blocks, true);
+  }
+  Value& change(std::uint32_t slot) {
+    const std::size_t block = slot / SceneChanges::kBlock;
+    if (!marked_[block]) {
+      marked_[block] = true;
+      changed_.push_back(static_cast<std::uint32_t>(block));
+    }
+    return values_[slot];
+  }
+  const Value& operator[](std::uint32_t slot) const { return values_[slot]; }
+  [[nodiscard]] std::size_t size() const { return values_.size(); }
+  void take(std::vector<std::uint32_t>& blocks, std::vector<Value>& values) {
+    std::sort(changed_.begin(), changed_.end());
+    blocks.clear();
+    values.clear();
+    for (const std::uint32_t block : changed_) {
+      marked_[block] = false;
+      blocks.push_back(block);
+      const auto begin =
+          values_.begin() + static_cast<std::ptrdiff_t>(block * SceneChanges::kBlock);
+      values.insert(values.end(), begin, begin + SceneChanges::kBlock);
+    }
+    changed_.clear();
+  }
+
+ private:
+  std::vector<Value> values_;
+  std::vector<bool> marked_;
+  std::vector<std::uint32_t> changed_;
+};
+
+template <class Shown>
+class SceneOf final : public Scene {
+ public:
+  using View = terrain::StoreView<Shown>;
+  static constexpr bool kTriangles = std::is_integral_v<Shown>;
+
+  SceneOf(const stream::Store& store, const stream::LinearMap& ground,
+          const tri::ViewOptions& options)
+      : view_(store, ground, options), bounds_(store.bounds()) {
+    grow();
+    for (const tri::VertexId vertex : mesh().all_vertices()) place(vertex);
+    if constexpr (kTriangles) {
+      for (const tri::TriangleId triangle : mesh().all_triangles()) add(triangle);
+      renew_normals();
+    }
+  }
+
+  SceneState frame(const tri::View& wish, double seconds, double time) override {
+    const auto& step = view_.frame(wish, seconds);
+    apply(*step.delta, time);
+    const terrain::ViewTraffic traffic = view_.traffic();
+    SceneState state{.points = view_.model().point_count(),
+                     .expanded = view_.model().expanded_count(),
+                     .vertex_slots = mesh().vertex_slots(),
+                     .settled = view_.settled(),
+                     .worst = step.worst,
+                     .clusters = static_cast<std::size_t>(traffic.clusters),
+                     .stored_bytes = static_cast<std::size_t>(traffic.bytes)};
+    if constexpr (kTriangles) {
+      state.triangles = mesh().triangle_count();
+      state.triangle_slots = mesh().triangle_slots();
+    }
+    return state;
+  }
+  const SceneChanges& take_changes() override {
+    vertices_.take(changes_.vertex_blocks, changes_.vertices);
+    triangles_.take(changes_.triangle_blocks, changes_.triangles);
+    return changes_;
+  }
+  [[nodiscard]] std::span<const stream::ByteRange> missing() const override {
+    return view_.missing();
+  }
+  [[nodiscard]] std::uint64_t hash() const override { return mesh().hash(); }
+  [[nodiscard]] std::optional<SceneHit> pick(const Point3& origin, const Point3& direction,
+                                             double angle) const override;
+  void pin(const SceneHit& hit, tri::ViewPin how) override {
+    std::vector<tri::ClusterId> clusters;
+    if (how == tri::ViewPin::collapsed) {
+      if (tri::level_of(hit.cluster) < view_.model().top()) clusters = {hit.cluster};
+    } else if (mesh().alive(picked_)) {
+      view_.model().heads(picked_, clusters);
+      // Of those that the point heads, the coarsest that is not expanded.
+      std::erase_if(clusters, [&](tri::ClusterId id) { return !view_.model().can_expand(id); });
+      if (clusters.size() > 1) clusters.resize(1);
+    }
+    for (const tri::ClusterId id : clusters) {
+      view_.pin(id, how);
+      pinned_.push_back(id);
+    }
+  }
+  void release() override {
+    for (const tri::ClusterId id : pinned_) view_.unpin(id);
+    pinned_.clear();
+  }
+  [[nodiscard]] stream::Box3 box() const override {
+    stream::Box3 box;
+    for (unsigned corner = 0; corner < 8; ++corner) {
+      box.include(view_.in_view_frame(Point3{(corner & 1 ? bounds_.max : bounds_.min)[0],
+                                             (corner & 2 ? bounds_.max : bounds_.min)[1],
+                                             (corner & 4 ? bounds_.max : bounds_.min)[2]}));
+    }
+    return box;
+  }
+
+ private:
+  [[nodiscard]] const auto& mesh() const { return view_.model().triangulation(); }
+  void grow() {
+    vertices_.grow(mesh().vertex_slots());
+    listed_.resize(vertices_.size());
+    if constexpr (kTriangles) triangles_.grow(mesh().triangle_slots());
+  }
+  /// Without sliding.
+  void place(tri::VertexId vertex) {
+    const Point3 p = view_.in_view_frame(vertex);
+    SceneVertex& v = vertices_.change(slot(vertex));
+    v.x = static_cast<float>(p[0]);
+    v.y = static_cast<float>(p[1]);
+    v.z = static_cast<float>(p[2]);
+    v.level = static_cast<std::uint8_t>(view_.model().level(vertex));
+    v.start_z = v.z;
+    v.start_time = -1e9F;
+  }
+  template <class Delta>
+  void apply(const Delta& delta, double time);
+  void add(tri::TriangleId triangle) {
+    SceneTriangle& corners = triangles_.change(slot(triangle));
+    const auto vertices = mesh().vertices(triangle);
+    for (std::size_t i = 0; i < 3; ++i) {
+      corners[i] = slot(vertices[i]);
+      list(vertices[i]);
+    }
+  }
+  void list(tri::VertexId vertex) {
+    if (slot(vertex) >= listed_.size() || listed_[slot(vertex)]) return;
+    listed_[slot(vertex)] = true;
+    without_normal_.push_back(vertex);
+  }
+  void renew_normals();
+  void slide(const tri::Slides& slides, double time) {
+    for (std::size_t i = 0; i < slides.size(); ++i) {
+      SceneVertex& v = vertices_.change(slot(slides.vertices[i]));
+      v.start_z = static_cast<float>(view_.in_view_frame(slides.start[i])[2]);
+      v.start_time = static_cast<float>(time);
+    }
+  }
+  [[nodiscard]] Point3 position(std::uint32_t slot) const {
+    return {vertices_[slot].x, vertices_[slot].y, vertices_[slot].z};
+  }
+
+  View view_;
+  stream::Box3 bounds_;
+  Blocks<SceneVertex> vertices_;
+  Blocks<SceneTriangle> triangles_;
+  SceneChanges changes_;
+  std::vector<bool> listed_;  // in without_normal_, by slot
+  std::vector<tri::VertexId> without_normal_, ring_;
+  std::vector<tri::ClusterId> pinned_;
+  mutable tri::VertexId picked_ = tri::kNoVertex;
+  tri::Geomorph2<std::int32_t> morph_;  // of rasters
+};
+
+template <class Shown>
+template <class Delta>
+void SceneOf<Shown>::apply(const Delta& delta, double time) {
+  grow();
+  if constexpr (kTriangles) {
+    for (const tri::TriangleId triangle : delta.changes.removed_triangles) {
+      triangles_.change(slot(triangle)) = {};
+    }
+  }
+  for (const tri::VertexId vertex : delta.changes.removed_vertices) {
+    vertices_.change(slot(vertex)) = {};
+  }
+  for (const tri::VertexId vertex : delta.changes.added_vertices) place(vertex);
+  for (const tri::VertexId vertex : delta.reassigned) place(vertex);
+  if constexpr (kTriangles) {
+    for (const tri::TriangleId triangle : delta.changes.added_triangles) add(triangle);
+    for (const auto& corners : delta.changes.removed_corners) {
+      for (const tri::VertexId vertex : corners) list(vertex);
+    }
+    for (const tri::VertexId vertex : delta.reassigned) {
+      list(vertex);
+      mesh().adjacent(vertex, ring_);
+      for (const tri::VertexId other : ring_) list(other);
+    }
+    renew_normals();
+    if (delta.changes.added_vertices.empty() && delta.reassigned.empty()) return;
+    morph_.make(view_.model(), delta);
+    slide(morph_.added, time);
+    slide(morph_.reassigned, time);
+  }
+}
+
+template <class Shown>
+void SceneOf<Shown>::renew_normals() {
+  if constexpr (kTriangles) {
+    for (const tri::VertexId vertex : without_normal_) {
+      listed_[slot(vertex)] = false;
+      if (!mesh().alive(vertex)) continue;
+      mesh().adjacent(vertex, ring_);
+      const Point3 middle = position(slot(vertex));
+      const auto stored = mesh().point(vertex);
+      Point3 sum{};
+      for (std::size_t i = 0; i < ring_.size(); ++i) {
+        const tri::VertexId a = ring_[i], b = ring_[(i + 1) % ring_.size()];
+        // The ring of a vertex on the hull is open; there the turn is not to the left.
+        const auto p = mesh().point(a), q = mesh().point(b);
+        const std::int64_t turn = std::int64_t{p[0] - stored[0]} * (q[1] - stored[1]) -
+                                  std::int64_t{p[1] - stored[1]} * (q[0] - stored[0]);
+        if (turn <= 0) continue;
+        Point3 normal =
+            cross(difference(position(slot(a)), middle), difference(position(slot(b)), middle));
+        // Rows grow downward: in the view frame the same triangle turns the other way.
+        const double sign = normal[2] < 0 ? -1 : 1;
+        for (std::size_t k = 0; k < 3; ++k) sum[k] += sign * normal[k];
+      }
+      const double length = std::sqrt(dot(sum, sum));
+      SceneVertex& v = vertices_.change(slot(vertex));
+      for (std::size_t k = 0; k < 3; ++k) {
+        v.normal[k] = length > 0 ? static_cast<std::int8_t>(std::lround(127 * sum[k] / length))
+                                 : static_cast<std::int8_t>(k == 2 ? 127 : 0);
+      }
+    }
+    without_normal_.clear();
+  }
+}
+
+template <class Shown>
+std::optional<SceneHit> SceneOf<Shown>::pick(const Point3& origin, const Point3& direction,
+                                             double angle) const {
+  const double length = std::sqrt(dot(direction, direction));
+  const Point3 way{direction[0] / length, direction[1] / length, direction[2] / length};
+  double best = std::numeric_limits<double>::infinity();
+  std::optional<SceneHit> hit;
+  const auto told = [&](tri::VertexId vertex, const Point3& stored, const Point3& place) {
+    picked_ = vertex;
+    const tri::PointId id = view_.model().point_id(vertex);
+    hit = {.stored = stored,
+           .place = place,
+           .level = tri::level_of(id.cluster),
+           .cluster = id.cluster};
+  };
+  if constexpr (kTriangles) {
+    // T. Möller, B. Trumbore, "Fast, minimum storage ray-triangle intersection",
+    // doi:10.1080/10867651.1997.10487468.
+    tri::TriangleId found = tri::kNoTriangle;
+    std::array<double, 3> weights{};
+    for (const tri::TriangleId triangle : mesh().all_triangles()) {
+      const SceneTriangle& corners = triangles_[slot(triangle)];
+      const Point3 a = position(corners[0]);
+      const Point3 ab = difference(position(corners[1]), a),
+                   ac = difference(position(corners[2]), a);
+      const Point3 p = cross(way, ac);
+      const double determinant = dot(ab, p);
+      if (determinant == 0) continue;
+      const Point3 from = difference(origin, a);
+      const double u = dot(from, p) / determinant;
+      if (!(u >= 0 && u <= 1)) continue;
+      const Point3 q = cross(from, ab);
+      const double v = dot(way, q) / determinant;
+      if (!(v >= 0 && u + v <= 1)) continue;
+      const double distance = dot(ac, q) / determinant;
+      if (!(distance > 0 && distance < best)) continue;
+      best = distance;
+      found = triangle;
+      weights = {1 - u - v, u, v};
+    }
+    if (found == tri::kNoTriangle) return {};
+    const auto vertices = mesh().vertices(found);
+    Point3 stored{};
+    std::size_t nearest = 0;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const Point3 corner = view_.stored(vertices[i]);
+      for (std::size_t k = 0; k < 3; ++k) stored[k] += weights[i] * corner[k];
+      if (weights[i] > weights[nearest]) nearest = i;
+    }
+    told(vertices[nearest], stored,
+         {origin[0] + best * way[0], origin[1] + best * way[1], origin[2] + best * way[2]});
+  } else {
+    for (const tri::VertexId vertex : mesh().all_vertices()) {
+      const Point3 place = position(slot(vertex)), to = difference(place, origin);
+      const double along = dot(to, way);
+      if (along <= 0) continue;
+      const double aside = std::sqrt(std::max(0.0, dot(to, to) - along * along)) / along;
+      // Of those about as near to the line the nearer ones hide the others.
+      if (aside > angle || along * (1 + aside / angle) >= best) continue;
+      best = along * (1 + aside / angle);
+      told(vertex, view_.stored(vertex), place);
+    }
+  }
+  return hit;
+}
+
+}  // namespace
+
+std::unique_ptr<Scene> Scene::open(const stream::Store& store, const stream::LinearMap& ground,
+                                   std::size_t max_points) {
+  if (store.points() == 0) throw std::invalid_argument("the store has no points");
+  tri::ViewOptions options;
+  options.max_points = max_points;
+  options.max_cached_bytes = std::size_t{128} << 20;
+  if (store.schema().grid) {
+    options.model.old_heights = true;  // for the slides
+    return std::make_unique<SceneOf<std::int32_t>>(store, ground, options);
+  }
+  return std::make_unique<SceneOf<tri::PointCloud>>(store, ground, options);
+}
+
+}  // namespace terrace::viewer

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <terrace/stream/given_bytes.hpp>
+#include <terrace/stream/store.hpp>
+#include <terrace/stream/store_query.hpp>
+#include <terrace/tri/view.hpp>
+
+namespace terrace::viewer {
+
+/// A vertex as a graphics processor takes it: metres in the view frame of terrain::StoreView.
+struct SceneVertex {
+  static constexpr std::uint8_t kNone = 255;  ///< the level of a slot without a vertex
+
+  float x = 0, y = 0, z = 0;
+  std::array<std::int8_t, 3> normal{};  ///< upward, times 127; null without triangles
+  std::uint8_t level = kNone;           ///< the highest of the point
+  float start_z = 0;                    ///< where z slides from
+  float start_time = -1e9F;             ///< and when it began, in the seconds of Scene::frame()
+};
+static_assert(sizeof(SceneVertex) == 24);
+
+using SceneTriangle = std::array<std::uint32_t, 3>;  ///< slots of vertices; all 0: none
+
+/// What a frame has changed, in blocks of 64 slots: block b is slots 64 b ... 64 b + 63.
+struct SceneChanges {
+  static constexpr std::size_t kBlock = 64;
+  std::vector<std::uint32_t> vertex_blocks, triangle_blocks;
+  std::vector<SceneVertex> vertices;     ///< kBlock for each of vertex_blocks
+  std::vector<SceneTriangle> triangles;  ///< likewise
+};
+
+struct SceneState {
+  std::size_t points = 0, triangles = 0, expanded = 0;
+  std::size_t vertex_slots = 0, triangle_slots = 0;
+  bool settled = false;
+  double worst = 0.0;                          ///< as in tri::ViewControl::Step
+  std::size_t clusters = 0, stored_bytes = 0;  ///< read so far
+};
+
+struct SceneHit {
+  stream::Point3 stored{};   ///< on the surface, or the point itself, in stored coordinates
+  stream::Point3 place{};    ///< the same in the view frame
+  unsigned level = 0;        ///< of the nearest corner
+  tri::ClusterId cluster{};  ///< whose member that corner is
+};
+
+/// A store under a camera as arrays to draw: triangles of rasters, of other stores the points.
+/// Bytes of the store may be missing.
+class Scene {
+ public:
+  /// Throws: stream::MissingBytes; stream::Error; std::invalid_argument for a store without points.
+  static std::unique_ptr<Scene> open(const stream::Store& store, const stream::LinearMap& ground,
+                                     std::size_t max_points);
+  virtual ~Scene() = default;
+
+  /// As terrain::StoreView::frame(). time: of this frame, from which new vertices slide into place.
+  virtual SceneState frame(const tri::View& view, double seconds, double time) = 0;
+  /// The changes since the last call; all there is at first.
+  virtual const SceneChanges& take_changes() = 0;
+  [[nodiscard]] virtual std::span<const stream::ByteRange> missing() const = 0;
+  /// Of the triangulation, or the set of points.
+  [[nodiscard]] virtual std::uint64_t hash() const = 0;
+  /// Where a ray meets the surface first; of points, the one nearest to the ray's line as seen from
+  /// its origin, within `angle` (radians). O(what is drawn).
+  [[nodiscard]] virtual std::optional<SceneHit> pick(const stream::Point3& origin,
+                                                     const stream::Point3& direction,
+                                                     double angle) const = 0;
+  /// Expands the clusters that the vertex nearest to a hit heads, one level down; or collapses the
+  /// cluster that it is a member of. They stay so until release().
+  virtual void pin(const SceneHit& hit, tri::ViewPin how) = 0;
+  virtual void release() = 0;
+  /// The box of all points in the view frame.
+  [[nodiscard]] virtual stream::Box3 box() const = 0;
+};
+
+}  // namespace terrace::viewer

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// A camera that turns about a place on the ground: metres east, north and up, angles in degrees.
+
+export type Vec3 = [number, number, number];
+
+export const FOV = 45;
+const RADIANS = Math.PI / 180;
+const LEAST_TILT = 2, MOST_TILT = 89.9;
+
+export const add = (a: Vec3, b: Vec3, s = 1): Vec3 => [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]];
+export const dot = (a: Vec3, b: Vec3): number => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+export const cross = (a: Vec3, b: Vec3): Vec3 =>
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+export const length = (a: Vec3): number => Math.sqrt(dot(a, a));
+export const unit = (a: Vec3): Vec3 => {
+  const l = length(a);
+  return [a[0] / l, a[1] / l, a[2] / l];
+};
+
+export class OrbitCamera {
+  target: Vec3 = [0, 0, 0];
+  azimuth = 0;   ///< where it looks, from north to the east
+  tilt = 40;     ///< below the horizon
+  distance = 1;
+  least = 1;     ///< distances
+  most = 1e9;
+
+  get direction(): Vec3 {
+    const a = this.azimuth * RADIANS, t = this.tilt * RADIANS;
+    return [Math.sin(a) * Math.cos(t), Math.cos(a) * Math.cos(t), -Math.sin(t)];
+  }
+  get eye(): Vec3 {
+    return add(this.target, this.direction, -this.distance);
+  }
+  get right(): Vec3 {
+    const a = this.azimuth * RADIANS;
+    return [Math.cos(a), -Math.sin(a), 0];
+  }
+  get up(): Vec3 {
+    return cross(this.right, this.direction);
+  }
+
+  fit(box: number[], aspect: number): void {
+    const size: Vec3 = [box[3] - box[0], box[4] - box[1], box[5] - box[2]];
+    const extent = Math.max(length(size), 1e-3);
+    this.target = [(box[0] + box[3]) / 2, (box[1] + box[4]) / 2, (box[2] + box[5]) / 2];
+    this.azimuth = 0;
+    this.tilt = 42;
+    this.distance = 0.4 * extent / Math.tan(FOV / 2 * RADIANS) / Math.min(1, aspect);
+    this.least = extent * 1e-5;
+    this.most = extent * 8;
+  }
+  orbit(turn: number, tilt: number): void {
+    this.azimuth = (this.azimuth + turn + 360) % 360;
+    this.tilt = Math.min(MOST_TILT, Math.max(LEAST_TILT, this.tilt + tilt));
+  }
+  /// By pixels of a picture of this height; the ground follows the pointer.
+  pan(right: number, down: number, height: number): void {
+    const metres = 2 * this.distance * Math.tan(FOV / 2 * RADIANS) / height;
+    const a = this.azimuth * RADIANS;
+    const forward: Vec3 = [Math.sin(a), Math.cos(a), 0];
+    const steep = Math.max(0.25, Math.sin(this.tilt * RADIANS));
+    this.target = add(add(this.target, this.right, -right * metres), forward, down * metres / steep);
+  }
+  /// The ray through a place of the picture, x and y from -1 to 1, right and up.
+  ray(x: number, y: number, aspect: number): Vec3 {
+    const t = Math.tan(FOV / 2 * RADIANS);
+    return unit(add(add(this.direction, this.right, x * t * aspect), this.up, y * t));
+  }
+  /// Nearer by the factor, with what lies under x, y staying there.
+  zoom(factor: number, x: number, y: number, aspect: number): void {
+    const before = this.distance;
+    this.distance = Math.min(this.most, Math.max(this.least, this.distance * factor));
+    const share = 1 - this.distance / before;
+    const ray = this.ray(x, y, aspect);
+    const old = add(this.target, this.direction, -before);
+    // Where the ray meets the level of the target; at the horizon only straight ahead.
+    const drop = (this.target[2] - old[2]) / ray[2];
+    if (!(drop > 0) || drop > 6 * before) return;
+    const place = add(old, ray, drop);
+    this.target = add(this.target, add(place, this.target, -1), share);
+  }
+  /// The same picture, with the target at this distance: what is turned about is what is seen.
+  retarget(distance: number): void {
+    const eye = this.eye;
+    this.distance = Math.min(this.most, Math.max(this.least, distance));
+    this.target = add(eye, this.direction, this.distance);
+  }
+
+  /// View and projection, column by column as WebGL takes them.
+  matrix(aspect: number, near: number, far: number): Float32Array {
+    const f = 1 / Math.tan(FOV / 2 * RADIANS);
+    const r = this.right, u = this.up, d = this.direction, e = this.eye;
+    const view = [
+      [r[0], r[1], r[2], -dot(r, e)], [u[0], u[1], u[2], -dot(u, e)], [-d[0], -d[1], -d[2], dot(d, e)], [0, 0, 0, 1]
+    ];
+    const rows = [
+      view[0].map(v => v * f / aspect), view[1].map(v => v * f),
+      view[2].map((v, i) => v * (far + near) / (near - far) + view[3][i] * 2 * far * near / (near - far)),
+      view[2].map(v => -v)
+    ];
+    return new Float32Array([0, 1, 2, 3].flatMap(column => rows.map(row => row[column])));
+  }
+}

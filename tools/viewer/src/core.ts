@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// The C++ core in WebAssembly (core/module.cpp): one store under one camera. It waits for nothing: what it
+/// lacks it names, and it goes on once that was given.
+
+export interface ByteRange {
+  file: string;
+  offset: number;
+  bytes: number;
+}
+
+export interface State {
+  points: number;
+  triangles: number;
+  expanded: number;
+  vertexSlots: number;
+  triangleSlots: number;
+  settled: boolean;
+  worst: number;
+  clusters: number;
+  storedBytes: number;
+}
+
+/// Blocks of 64 slots that changed: 24 bytes a vertex, three numbers a triangle.
+export interface Changes {
+  vertexBlocks: Uint32Array;
+  vertices: Uint8Array;
+  triangleBlocks: Uint32Array;
+  triangles: Uint32Array;
+}
+
+export interface Camera {
+  eye: number[];
+  direction: number[];
+  up: number[];
+  fov: number;  ///< degrees, vertical
+  aspect: number;
+  height: number;  ///< pixels
+  error: number;   ///< pixels
+}
+
+export interface Hit {
+  stored: number[];
+  place: number[];
+  level: number;
+  clusterLevel: number;
+  clusterOrdinal: number;
+}
+
+export const BLOCK = 64;
+export const VERTEX_BYTES = 24;
+
+export class CoreError extends Error {}
+
+const MISSING = 1;
+const FAILED = 2;
+
+interface Exports {
+  memory: WebAssembly.Memory;
+  _initialize(): void;
+  input(bytes: number): number;
+  text(): number;
+  text_size(): number;
+  numbers(): number;
+  add_file(name: number, bytes: number): number;
+  give(name: number, offset: number, bytes: number): number;
+  forget(name: number): number;
+  open(maxPoints: number): number;
+  frame(): number;
+  changes(): number;
+  hash(): number;
+  pick(): number;
+  pin(how: number): number;
+}
+
+export class Core {
+  private readonly encoder = new TextEncoder();
+  private readonly decoder = new TextDecoder();
+
+  private constructor(private readonly wasm: Exports) {}
+
+  static async load(bytes: BufferSource): Promise<Core> {
+    let memory: WebAssembly.Memory;
+    const imports = {
+      env: {emscripten_notify_memory_growth: () => {}},
+      wasi_snapshot_preview1: {
+        clock_time_get: (_clock: number, _precision: bigint, at: number) => {
+          new DataView(memory.buffer).setBigUint64(at, BigInt(Math.round(performance.now() * 1e6)), true);
+          return 0;
+        },
+        proc_exit: (code: number) => {
+          throw new CoreError(`the core ended with ${code}`);
+        }
+      }
+    };
+    const {instance} = await WebAssembly.instantiate(bytes, imports);
+    const wasm = instance.exports as unknown as Exports;
+    memory = wasm.memory;
+    wasm._initialize();
+    return new Core(wasm);
+  }
+
+  addFile(name: string, bytes: number): void {
+    this.check(this.wasm.add_file(this.write(name), bytes));
+  }
+  give(name: string, offset: number, bytes: Uint8Array): void {
+    this.check(this.wasm.give(this.write(name, bytes), offset, bytes.length));
+  }
+  forget(name: string): void {
+    this.check(this.wasm.forget(this.write(name)));
+  }
+  /// What is missing, or the box of the scene.
+  open(ground: number[], maxPoints: number): {missing: ByteRange[]}|{box: number[], triangles: boolean} {
+    this.writeNumbers(ground);
+    if (this.check(this.wasm.open(maxPoints)) === MISSING) return {missing: this.missing()};
+    const numbers = this.numbers(8);
+    return {box: numbers.slice(0, 6), triangles: numbers[6] === 1};
+  }
+  /// Works for about `seconds`; `time` is that of the picture.
+  frame(camera: Camera, seconds: number, time: number): {state: State, missing: ByteRange[]} {
+    this.writeNumbers([
+      ...camera.eye, ...camera.direction, ...camera.up, camera.fov, camera.aspect, camera.height, camera.error, seconds,
+      time
+    ]);
+    this.check(this.wasm.frame());
+    const n = this.numbers(9);
+    return {
+      state: {
+        points: n[0],
+        triangles: n[1],
+        expanded: n[2],
+        vertexSlots: n[3],
+        triangleSlots: n[4],
+        settled: n[5] === 1,
+        worst: n[6],
+        clusters: n[7],
+        storedBytes: n[8]
+      },
+      missing: this.missing()
+    };
+  }
+  /// Copies of what has changed since the last call.
+  changes(): Changes {
+    this.check(this.wasm.changes());
+    const [vertexBlocks, vertexBlocksAt, verticesAt, triangleBlocks, triangleBlocksAt, trianglesAt] = this.numbers(6);
+    const buffer = this.wasm.memory.buffer;
+    return {
+      vertexBlocks: new Uint32Array(buffer, vertexBlocksAt, vertexBlocks).slice(),
+      vertices: new Uint8Array(buffer, verticesAt, vertexBlocks * BLOCK * VERTEX_BYTES).slice(),
+      triangleBlocks: new Uint32Array(buffer, triangleBlocksAt, triangleBlocks).slice(),
+      triangles: new Uint32Array(buffer, trianglesAt, triangleBlocks * BLOCK * 3).slice()
+    };
+  }
+  hash(): string {
+    this.check(this.wasm.hash());
+    return this.text();
+  }
+  pick(origin: number[], direction: number[], angle: number): Hit|null {
+    this.writeNumbers([...origin, ...direction, angle]);
+    this.check(this.wasm.pick());
+    if (this.numbers(1)[0] === 0) return null;
+    const n = this.numbers(10);
+    return {
+      stored: n.slice(1, 4),
+      place: n.slice(4, 7),
+      level: n[7],
+      clusterLevel: n[8],
+      clusterOrdinal: n[9]
+    };
+  }
+  /// Of what was picked last: 1 expands, 0 collapses, -1 leaves all to the view again.
+  pin(how: number): void {
+    this.check(this.wasm.pin(how));
+  }
+
+  private check(status: number): number {
+    if (status === FAILED) throw new CoreError(this.text());
+    return status;
+  }
+  private text(): string {
+    return this.decoder.decode(new Uint8Array(this.wasm.memory.buffer, this.wasm.text(), this.wasm.text_size()));
+  }
+  private missing(): ByteRange[] {
+    return this.text().split('\n').filter(line => line !== '').map(line => {
+      const [file, offset, bytes] = line.split('\t');
+      return {file, offset: Number(offset), bytes: Number(bytes)};
+    });
+  }
+  private numbers(count: number): number[] {
+    return Array.from(new Float64Array(this.wasm.memory.buffer, this.wasm.numbers(), count));
+  }
+  private write(name: string, bytes?: Uint8Array): number {
+    const encoded = this.encoder.encode(name);
+    const at = this.wasm.input(encoded.length + (bytes?.length ?? 0));
+    const memory = new Uint8Array(this.wasm.memory.buffer);
+    memory.set(encoded, at);
+    if (bytes) memory.set(bytes, at + encoded.length);
+    return encoded.length;
+  }
+  private writeNumbers(numbers: number[]): void {
+    const at = this.wasm.input(8 * numbers.length);
+    new Float64Array(this.wasm.memory.buffer, at, numbers.length).set(numbers);
+  }
+}

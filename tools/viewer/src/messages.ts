@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// What the page and the worker tell each other.
+
+import type {Camera, Changes, Hit, State} from './core';
+import type {Stats} from './ranges';
+import type {Manifest} from './store';
+
+export type ToWorker =
+    |{type: 'open', wasm: string, store: string, start: string, maxPoints: number}
+    |{type: 'view', camera: Camera, serial: number}
+    |{type: 'drawn'}
+    |{type: 'pick', id: number, origin: number[], direction: number[], angle: number}
+    |{type: 'pin', how: number}
+    |{type: 'hash', id: number}
+    |{type: 'retry'};
+
+export type FromWorker =
+    |{type: 'progress', bytes: number}
+    |{type: 'opened', manifest: Manifest, box: number[], triangles: boolean}
+    |{type: 'frame', serial: number, state: State, changes: Changes, stats: Stats, milliseconds: number, loading: boolean, time: number}
+    |{type: 'picked', id: number, hit: Hit|null}
+    |{type: 'hashed', id: number, hash: string}
+    |{type: 'failed', message: string};

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// Brings byte ranges of a store from a static web server, and never wrong ones.
+
+import type {ByteRange} from './core';
+
+/// Between ranges nearer than this fetching the gap is cheaper than another request.
+const GAP = 8192;
+const MOST_BYTES = 256 * 1024;
+const MOST_REQUESTS = 6;
+const TRIES = 4;
+/// A request that another view does not want is given up after this time.
+const PATIENCE = 700;
+
+/// What went wrong, in words for people. `fatal`: the same request would end the same way.
+export class FetchFault extends Error {
+  constructor(message: string, readonly fatal: boolean) {
+    super(message);
+  }
+}
+
+export interface Stats {
+  requests: number;
+  bytes: number;
+}
+
+interface Flight extends ByteRange {
+  abort: AbortController;
+  wanted: number;  ///< when it was wanted last
+  view: number;    ///< and for which view
+}
+
+/// Ranges joined where they are near, in the order of their first parts.
+export function joined(ranges: ByteRange[], gap = GAP, most = MOST_BYTES): ByteRange[] {
+  const rank = new Map(ranges.map((range, i) => [range, i]));
+  const sorted =
+      [...ranges].sort((a, b) => a.file < b.file ? -1 : a.file > b.file ? 1 : a.offset - b.offset);
+  const result: Array<ByteRange&{rank: number}> = [];
+  for (const range of sorted) {
+    const last = result[result.length - 1];
+    const end = range.offset + range.bytes;
+    if (last && last.file === range.file && range.offset <= last.offset + last.bytes + gap &&
+        Math.max(end, last.offset + last.bytes) - last.offset <= most) {
+      last.bytes = Math.max(last.bytes, end - last.offset);
+      last.rank = Math.min(last.rank, rank.get(range)!);
+    } else {
+      result.push({...range, rank: rank.get(range)!});
+    }
+  }
+  return result.sort((a, b) => a.rank - b.rank).map(({file, offset, bytes}) => ({file, offset, bytes}));
+}
+
+export class Ranges {
+  readonly stats: Stats = {requests: 0, bytes: 0};
+  private flights: Flight[] = [];
+  private readonly tags = new Map<string, string>();
+  private fresh = false;
+
+  /// sizes: of the files, by name. `give`: takes what has come. `failed`: what cannot be had. `ended`: after
+  /// each request, however it went.
+  constructor(
+      private readonly base: string, private readonly sizes: Map<string, number>,
+      private readonly give: (range: ByteRange, bytes: Uint8Array) => void,
+      private readonly failed: (fault: FetchFault) => void, private readonly ended: () => void) {}
+
+  get waiting(): boolean {
+    return this.flights.length > 0;
+  }
+  /// From now on no cache is to be believed: what came was damaged.
+  distrust(): void {
+    this.fresh = true;
+    this.tags.clear();
+  }
+  /// The most important ranges first, as a view lacks them. Those of an earlier view that are not among them are given
+  /// up after a while.
+  want(ranges: ByteRange[], view: number, now: number): void {
+    const left: ByteRange[] = [];
+    for (const range of ranges) {
+      const flight = this.flights.find(
+          f => f.file === range.file && f.offset <= range.offset && range.offset + range.bytes <= f.offset + f.bytes);
+      if (flight) {
+        flight.wanted = now;
+        flight.view = view;
+      } else {
+        left.push(range);
+      }
+    }
+    for (const flight of this.flights) {
+      if (flight.view !== view && now - flight.wanted > PATIENCE) flight.abort.abort();
+    }
+    if (this.flights.length >= MOST_REQUESTS) return;
+    for (const range of joined(left).slice(0, MOST_REQUESTS - this.flights.length)) {
+      void this.start({...range, abort: new AbortController(), wanted: now, view});
+    }
+  }
+  stop(): void {
+    for (const flight of this.flights) flight.abort.abort();
+    this.flights = [];
+  }
+
+  private async start(flight: Flight): Promise<void> {
+    this.flights.push(flight);
+    let bytes: Uint8Array|null = null, fault: FetchFault|null = null;
+    try {
+      bytes = await this.patiently(flight, flight.abort.signal);
+    } catch (error) {
+      if (!flight.abort.signal.aborted) {
+        fault = error instanceof FetchFault ? error : new FetchFault(String(error), true);
+      }
+    }
+    this.flights = this.flights.filter(f => f !== flight);
+    if (bytes) this.give(flight, bytes);
+    if (fault) this.failed(fault);
+    this.ended();
+  }
+  private async patiently(range: ByteRange, signal: AbortSignal): Promise<Uint8Array> {
+    for (let turn = 1;; ++turn) {
+      try {
+        return await this.once(range, signal);
+      } catch (error) {
+        if (signal.aborted) throw error;
+        if (error instanceof FetchFault && error.fatal) throw error;
+        const why = error instanceof FetchFault ? error.message : `${range.file}: the server does not answer`;
+        if (turn === TRIES) throw new FetchFault(why, false);
+        await new Promise(resume => setTimeout(resume, 250 * 2 ** turn));
+      }
+    }
+  }
+  private async once(range: ByteRange, signal: AbortSignal): Promise<Uint8Array> {
+    const last = range.offset + range.bytes - 1;
+    ++this.stats.requests;
+    const response = await fetch(this.base + encodeURIComponent(range.file), {
+      headers: {Range: `bytes=${range.offset}-${last}`},
+      cache: this.fresh ? 'reload' : 'default',
+      signal
+    });
+    const fault = (what: string, fatal: boolean) => {
+      response.body?.cancel().catch(() => {});
+      return new FetchFault(`${range.file}: ${what}`, fatal);
+    };
+    if (response.status === 200) {
+      throw fault(
+          'the server sends whole files where a part was asked for (HTTP 200 instead of 206). ' +
+              'It must support range requests, as "terrace view" and most web servers do.',
+          true);
+    }
+    if (response.status === 404) throw fault('the server has no such file (HTTP 404).', true);
+    if (response.status === 416) throw fault('the file on the server is smaller than the store says (HTTP 416).', true);
+    if (response.status !== 206) {
+      throw fault(`the server answers with HTTP ${response.status}.`, response.status < 500 && response.status !== 429);
+    }
+    const placed = response.headers.get('Content-Range');
+    if (placed !== null) {  // servers elsewhere may hide it
+      const [, first, end, size] = /^bytes (\d+)-(\d+)\/(\d+|\*)$/.exec(placed) ?? [];
+      if (Number(first) !== range.offset || Number(end) !== last) {
+        throw fault('the server sends another part than the one asked for.', true);
+      }
+      if (size !== '*' && Number(size) !== this.sizes.get(range.file)) {
+        throw fault('the store on the server has been replaced. Load it anew.', true);
+      }
+    }
+    const tag = response.headers.get('ETag');
+    if (tag !== null) {
+      const known = this.tags.get(range.file);
+      if (known !== undefined && known !== tag) {
+        throw fault('the store on the server has been replaced. Load it anew.', true);
+      }
+      this.tags.set(range.file, tag);
+    }
+    const bytes = new Uint8Array(await response.arrayBuffer());
+    this.stats.bytes += bytes.length;
+    if (bytes.length !== range.bytes) {
+      throw fault(`${bytes.length} bytes came where ${range.bytes} were asked for.`, false);
+    }
+    return bytes;
+  }
+}

@@ -1,0 +1,300 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// Draws the scene by WebGL 2 from buffers that are indexed by the core's slots.
+
+import {BLOCK, type Changes, type State, VERTEX_BYTES} from './core';
+import type {OrbitCamera} from './camera';
+
+export type Colour = 'height'|'slope'|'level';
+
+export interface Look {
+  colour: Colour;
+  wire: boolean;
+  dark: boolean;
+  pointSize: number;
+}
+
+/// The ramps of `terrace render`.
+const LAND = [[0.00, 96, 145, 92], [0.18, 150, 178, 110], [0.36, 212, 201, 140], [0.54, 196, 160, 105],
+              [0.70, 160, 122, 92], [0.85, 178, 166, 158], [1.00, 250, 250, 250]];
+const SLOPE = [[0, 250, 250, 245], [15, 250, 215, 110], [35, 205, 70, 45], [60, 75, 15, 30]];
+/// From the coarsest level to level 0.
+const LEVELS = [[0, 68, 34, 112], [0.25, 49, 104, 142], [0.5, 53, 183, 121], [0.75, 180, 221, 44], [1, 253, 231, 80]];
+
+const SLIDE_SECONDS = 0.45;
+
+const VERTEX = `#version 300 es
+precision highp float;
+layout(location = 0) in vec3 place;
+layout(location = 1) in vec3 normal;
+layout(location = 2) in float level;
+layout(location = 3) in vec2 start;
+uniform mat4 matrix;
+uniform float time, pointSize;
+out vec3 at;
+out vec3 up;
+out float levelOf;
+void main() {
+  float t = clamp((time - start.y) / ${SLIDE_SECONDS.toFixed(2)}, 0.0, 1.0);
+  at = vec3(place.xy, mix(start.x, place.z, t * t * (3.0 - 2.0 * t)));
+  up = normal;
+  levelOf = level * 255.0;
+  gl_Position = levelOf > 254.0 ? vec4(2.0, 2.0, 2.0, 1.0) : matrix * vec4(at, 1.0);
+  gl_PointSize = pointSize;
+}`;
+
+const FRAGMENT = `#version 300 es
+precision highp float;
+in vec3 at;
+in vec3 up;
+in float levelOf;
+uniform sampler2D ramp;
+uniform int mode;  // 0 height, 1 slope, 2 level, 3 wire
+uniform vec2 heights;
+uniform float top;
+uniform bool lit;
+uniform vec4 wire;
+uniform vec3 sky;
+uniform vec3 eye;
+uniform float haze;
+out vec4 colour;
+void main() {
+  if (mode == 3) {
+    colour = wire;
+    return;
+  }
+  vec3 n = lit ? normalize(up) : vec3(0.0, 0.0, 1.0);
+  float share = mode == 0 ? (at.z - heights.x) / max(heights.y - heights.x, 1e-6)
+      : mode == 1 ? degrees(acos(clamp(n.z, 0.0, 1.0))) / 60.0
+      : 1.0 - levelOf / max(top, 1.0);
+  vec3 base = texture(ramp, vec2(clamp(share, 0.0, 1.0), 0.5)).rgb;
+  float light = 1.0;
+  if (lit) {
+    // From the north-west, as maps have it, and a little from the sky.
+    float sun = max(dot(n, normalize(vec3(-0.55, 0.55, 0.63))), 0.0);
+    light = 0.36 + 0.78 * sun + 0.06 * n.z;
+  }
+  float far = 1.0 - exp(-pow(distance(at, eye) / haze, 2.0));
+  colour = vec4(mix(base * light, sky, 0.55 * far), 1.0);
+}`;
+
+class GrowingBuffer {
+  mirror = new Uint8Array(0);
+  readonly buffer: WebGLBuffer;
+  constructor(
+      private readonly gl: WebGL2RenderingContext, private readonly target: number, private readonly bytes: number) {
+    this.buffer = gl.createBuffer()!;
+  }
+  /// Blocks of BLOCK items; neighbours go up together.
+  put(blocks: Uint32Array, data: Uint8Array, slots: number): void {
+    const size = BLOCK * this.bytes, needed = Math.ceil(slots / BLOCK) * size;
+    const grown = needed > this.mirror.length;
+    if (grown) {
+      const mirror = new Uint8Array(Math.max(needed, Math.ceil(this.mirror.length * 1.5 / size) * size));
+      mirror.set(this.mirror);
+      this.mirror = mirror;
+    }
+    blocks.forEach((block, i) => this.mirror.set(data.subarray(i * size, (i + 1) * size), block * size));
+    const gl = this.gl;
+    gl.bindVertexArray(null);
+    gl.bindBuffer(this.target, this.buffer);
+    if (grown) {
+      gl.bufferData(this.target, this.mirror, gl.DYNAMIC_DRAW);
+      return;
+    }
+    for (let i = 0; i < blocks.length;) {
+      let end = i + 1;
+      while (end < blocks.length && blocks[end] - blocks[end - 1] <= 2) ++end;
+      const from = blocks[i] * size, to = (blocks[end - 1] + 1) * size;
+      gl.bufferSubData(this.target, from, this.mirror, from, to - from);
+      i = end;
+    }
+  }
+}
+
+export class Renderer {
+  readonly gl: WebGL2RenderingContext;
+  private readonly program: WebGLProgram;
+  private readonly uniforms = new Map<string, WebGLUniformLocation|null>();
+  private readonly ramps: Record<Colour, WebGLTexture>;
+  private vertices!: GrowingBuffer;
+  private triangles!: GrowingBuffer;
+  private lines!: WebGLBuffer;
+  private surface!: WebGLVertexArrayObject;
+  private wires!: WebGLVertexArrayObject;
+  private linesStale = true;
+  private state: State|null = null;
+  private box = [0, 0, 0, 1, 1, 1];
+  private top = 1;
+  private asTriangles = true;
+  private slidingUntil = 0;
+
+  constructor(private readonly canvas: HTMLCanvasElement) {
+    const gl = canvas.getContext('webgl2', {antialias: true, alpha: false, preserveDrawingBuffer: true});
+    if (!gl) throw new Error('This browser has no WebGL 2, which the viewer draws with.');
+    this.gl = gl;
+    this.program = gl.createProgram()!;
+    for (const [type, text] of [[gl.VERTEX_SHADER, VERTEX], [gl.FRAGMENT_SHADER, FRAGMENT]] as const) {
+      const shader = gl.createShader(type)!;
+      gl.shaderSource(shader, text);
+      gl.compileShader(shader);
+      gl.attachShader(this.program, shader);
+    }
+    gl.linkProgram(this.program);
+    if (!gl.getProgramParameter(this.program, gl.LINK_STATUS)) {
+      throw new Error(`The graphics driver refuses the viewer's shaders: ${gl.getProgramInfoLog(this.program)}`);
+    }
+    this.ramps = {height: this.ramp(LAND), slope: this.ramp(SLOPE), level: this.ramp(LEVELS)};
+    gl.enable(gl.DEPTH_TEST);
+    this.clear();
+  }
+
+  /// Forgets the scene.
+  clear(): void {
+    const gl = this.gl;
+    this.vertices = new GrowingBuffer(gl, gl.ARRAY_BUFFER, VERTEX_BYTES);
+    this.triangles = new GrowingBuffer(gl, gl.ELEMENT_ARRAY_BUFFER, 12);
+    this.lines = gl.createBuffer()!;
+    this.surface = this.array(this.triangles.buffer);
+    this.wires = this.array(this.lines);
+    this.linesStale = true;
+    this.state = null;
+  }
+  show(box: number[], top: number, triangles: boolean): void {
+    this.box = box;
+    this.top = top;
+    this.asTriangles = triangles;
+  }
+  apply(state: State, changes: Changes, time: number): void {
+    this.state = state;
+    if (changes.vertexBlocks.length > 0) {
+      this.vertices.put(changes.vertexBlocks, changes.vertices, state.vertexSlots);
+      this.slidingUntil = time + SLIDE_SECONDS;
+    }
+    if (changes.triangleBlocks.length > 0) {
+      const bytes = new Uint8Array(changes.triangles.buffer, changes.triangles.byteOffset, changes.triangles.byteLength);
+      this.triangles.put(changes.triangleBlocks, bytes, state.triangleSlots);
+      this.linesStale = true;
+    }
+  }
+  /// Whether vertices are on their way.
+  sliding(time: number): boolean {
+    return time < this.slidingUntil;
+  }
+  resize(): boolean {
+    const ratio = Math.min(window.devicePixelRatio || 1, 2);
+    const width = Math.max(1, Math.round(this.canvas.clientWidth * ratio));
+    const height = Math.max(1, Math.round(this.canvas.clientHeight * ratio));
+    if (this.canvas.width === width && this.canvas.height === height) return false;
+    this.canvas.width = width;
+    this.canvas.height = height;
+    return true;
+  }
+
+  draw(camera: OrbitCamera, look: Look, time: number): void {
+    const gl = this.gl;
+    const sky = look.dark ? [0.075, 0.09, 0.115] : [0.86, 0.90, 0.94];
+    gl.viewport(0, 0, this.canvas.width, this.canvas.height);
+    gl.clearColor(sky[0], sky[1], sky[2], 1);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    if (!this.state) return;
+    const aspect = this.canvas.width / this.canvas.height;
+    const eye = camera.eye, box = this.box;
+    const extent = Math.hypot(box[3] - box[0], box[4] - box[1], box[5] - box[2]);
+    let farthest = 0;
+    for (let i = 0; i < 8; ++i) {
+      farthest = Math.max(farthest, Math.hypot(box[i & 1 ? 3 : 0] - eye[0], box[i & 2 ? 4 : 1] - eye[1],
+                                               box[i & 4 ? 5 : 2] - eye[2]));
+    }
+    const far = farthest * 1.01 + camera.distance * 0.01;
+    const near = Math.max(far * 2e-5, camera.distance * 0.02);
+    gl.useProgram(this.program);
+    gl.uniformMatrix4fv(this.uniform('matrix'), false, camera.matrix(aspect, near, far));
+    gl.uniform1f(this.uniform('time'), time);
+    gl.uniform1f(this.uniform('pointSize'), look.pointSize);
+    gl.uniform2f(this.uniform('heights'), box[2], box[5]);
+    gl.uniform1f(this.uniform('top'), this.top);
+    gl.uniform1i(this.uniform('lit'), this.asTriangles ? 1 : 0);
+    gl.uniform3f(this.uniform('sky'), sky[0], sky[1], sky[2]);
+    gl.uniform3f(this.uniform('eye'), eye[0], eye[1], eye[2]);
+    gl.uniform1f(this.uniform('haze'), extent * 2.5);
+    const shade = look.dark || look.colour === 'level' ? [0.02, 0.03, 0.05] : [0.1, 0.12, 0.16];
+    gl.uniform4f(this.uniform('wire'), shade[0], shade[1], shade[2], 0.28);
+    gl.uniform1i(this.uniform('mode'), {height: 0, slope: 1, level: 2}[look.colour]);
+    gl.bindTexture(gl.TEXTURE_2D, this.ramps[look.colour]);
+    if (!this.asTriangles) {
+      gl.bindVertexArray(this.surface);
+      gl.drawArrays(gl.POINTS, 0, this.state.vertexSlots);
+      return;
+    }
+    gl.enable(gl.POLYGON_OFFSET_FILL);
+    gl.polygonOffset(1, 1);
+    gl.bindVertexArray(this.surface);
+    gl.drawElements(gl.TRIANGLES, this.state.triangleSlots * 3, gl.UNSIGNED_INT, 0);
+    gl.disable(gl.POLYGON_OFFSET_FILL);
+    if (!look.wire) return;
+    if (this.linesStale) this.makeLines();
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
+    gl.depthMask(false);
+    gl.uniform1i(this.uniform('mode'), 3);
+    gl.bindVertexArray(this.wires);
+    gl.drawElements(gl.LINES, this.lineCount, gl.UNSIGNED_INT, 0);
+    gl.depthMask(true);
+    gl.disable(gl.BLEND);
+  }
+
+  private lineCount = 0;
+  /// Each edge once: of the two triangles that have it the one that goes upward in slots, or the only one.
+  private makeLines(): void {
+    const gl = this.gl;
+    const corners = new Uint32Array(this.triangles.mirror.buffer, 0, (this.state?.triangleSlots ?? 0) * 3);
+    const lines = new Uint32Array(corners.length * 2);
+    let count = 0;
+    for (let i = 0; i < corners.length; i += 3) {
+      const a = corners[i], b = corners[i + 1], c = corners[i + 2];
+      if (a === b) continue;
+      // On the hull an edge may go the other way; the picture lacks nothing by it that one would miss.
+      if (a < b) lines[count++] = a, lines[count++] = b;
+      if (b < c) lines[count++] = b, lines[count++] = c;
+      if (c < a) lines[count++] = c, lines[count++] = a;
+    }
+    this.lineCount = count;
+    gl.bindVertexArray(null);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.lines);
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, lines.subarray(0, count), gl.DYNAMIC_DRAW);
+    this.linesStale = false;
+  }
+  private array(elements: WebGLBuffer): WebGLVertexArrayObject {
+    const gl = this.gl, array = gl.createVertexArray()!;
+    gl.bindVertexArray(array);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.vertices.buffer);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, elements);
+    gl.vertexAttribPointer(0, 3, gl.FLOAT, false, VERTEX_BYTES, 0);
+    gl.vertexAttribPointer(1, 3, gl.BYTE, true, VERTEX_BYTES, 12);
+    gl.vertexAttribPointer(2, 1, gl.UNSIGNED_BYTE, true, VERTEX_BYTES, 15);
+    gl.vertexAttribPointer(3, 2, gl.FLOAT, false, VERTEX_BYTES, 16);
+    for (let i = 0; i < 4; ++i) gl.enableVertexAttribArray(i);
+    gl.bindVertexArray(null);
+    return array;
+  }
+  private ramp(stops: number[][]): WebGLTexture {
+    const gl = this.gl, texels = new Uint8Array(256 * 4), last = stops[stops.length - 1][0];
+    for (let i = 0; i < 256; ++i) {
+      const place = i / 255 * last;
+      const next = Math.max(1, stops.findIndex(stop => stop[0] >= place));
+      const a = stops[next - 1], b = stops[next], t = (place - a[0]) / (b[0] - a[0]);
+      for (let c = 1; c < 4; ++c) texels[4 * i + c - 1] = Math.round((1 - t) * a[c] + t * b[c]);
+      texels[4 * i + 3] = 255;
+    }
+    const texture = gl.createTexture()!;
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, 256, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, texels);
+    for (const name of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, name, gl.CLAMP_TO_EDGE);
+    for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, name, gl.LINEAR);
+    return texture;
+  }
+  private uniform(name: string): WebGLUniformLocation|null {
+    if (!this.uniforms.has(name)) this.uniforms.set(name, this.gl.getUniformLocation(this.program, name));
+    return this.uniforms.get(name)!;
+  }
+}

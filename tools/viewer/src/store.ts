@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// What the viewer knows of a store before the core reads it: its manifest, and the start file that `terrace
+/// publish` and `terrace view` lay beside it.
+
+import type {ByteRange} from './core';
+
+export interface Channel {
+  name: string;
+  unit: string;
+  scale: number;
+  offset: number;
+}
+
+export interface Manifest {
+  kind: 'grid'|'cloud';
+  points: number;
+  checksum: string;
+  world: number[];
+  coordinates: Channel[];
+  crs: {epsg: number, name: string, geographic: boolean, horizontal_unit: string};
+  levels: Array<{level: number, points: number}>;
+  files: Map<string, number>;  ///< sizes by name
+}
+
+export function parseManifest(bytes: Uint8Array): Manifest {
+  const json = JSON.parse(new TextDecoder().decode(bytes));
+  if (json.format !== 'terrace-store') throw new Error('manifest.json: it does not say that this is a store');
+  const files = new Map<string, number>([['manifest.json', bytes.length]]);
+  for (const level of json.levels) {
+    for (const segment of level.segments) {
+      for (const file of [segment.data, segment.index]) files.set(file.file, file.bytes);
+    }
+  }
+  return {...json, files};
+}
+
+/// The parts of a store that the first picture needs, in one file: a line of JSON, and then the bytes of each
+/// part in turn.
+export interface Start {
+  ground: number[];  ///< from stored coordinates to metres
+  parts: Array<ByteRange&{data: Uint8Array}>;
+}
+
+export function parseStart(bytes: Uint8Array): Start {
+  const end = bytes.indexOf(10);
+  const head = end < 0 ? {} : JSON.parse(new TextDecoder().decode(bytes.subarray(0, end)));
+  if (head.format !== 'terrace-start' || head.version !== 1) throw new Error('it is not a start file of this version');
+  const parts: Start['parts'] = [];
+  let at = end + 1;
+  for (const [file, offset, size] of head.parts as Array<[string, number, number]>) {
+    parts.push({file, offset, bytes: size, data: bytes.subarray(at, at + size)});
+    at += size;
+  }
+  if (at !== bytes.length) throw new Error(`${bytes.length} bytes came where ${at} were expected`);
+  return {ground: head.ground, parts};
+}
+
+/// Coordinates of the CRS for a point in stored coordinates.
+export function worldPoint(manifest: Manifest, stored: number[]): number[] {
+  const w = manifest.world, z = manifest.coordinates[2];
+  return [
+    stored[0] * w[0] + stored[1] * w[1] + w[2], stored[0] * w[3] + stored[1] * w[4] + w[5],
+    stored[2] * z.scale + z.offset
+  ];
+}

@@ -1,0 +1,556 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// The page: what the user does goes to the camera and the worker, what comes back to the renderer.
+
+import {add, FOV, length, OrbitCamera, type Vec3} from './camera';
+import type {Hit} from './core';
+import type {FromWorker, ToWorker} from './messages';
+import {type Colour, type Look, Renderer} from './render';
+import {type Manifest, worldPoint} from './store';
+
+/// Of the stores that the page shows, from stores.json.
+interface Listed {
+  name: string;
+  points: number;
+}
+
+const phone = matchMedia('(max-width: 640px)').matches;
+/// Points at once: what phones draw without effort is less.
+const MOST_POINTS = phone ? 400_000 : 1_500_000;
+const LEGENDS: Record<Colour, string> = {
+  height: 'rgb(96 145 92),rgb(150 178 110) 18%,rgb(212 201 140) 36%,rgb(196 160 105) 54%,rgb(160 122 92) 70%,' +
+      'rgb(178 166 158) 85%,rgb(250 250 250)',
+  slope: 'rgb(250 250 245),rgb(250 215 110) 25%,rgb(205 70 45) 58%,rgb(75 15 30)',
+  level: 'rgb(68 34 112),rgb(49 104 142) 25%,rgb(53 183 121) 50%,rgb(180 221 44) 75%,rgb(253 231 80)'
+};
+
+function element<T extends HTMLElement>(id: string): T {
+  return document.getElementById(id) as T;
+}
+const count = (n: number) => Math.round(n).toLocaleString('en');
+const readable = (bytes: number) =>
+    bytes < 1e6 ? `${Math.max(1, Math.round(bytes / 1e3))} KB` : `${(bytes / 1e6).toFixed(1)} MB`;
+const metres = (n: number) => Math.abs(n) < 10_000 ? `${n.toFixed(Math.abs(n) < 10 ? 2 : Math.abs(n) < 1000 ? 1 : 0)} m` : `${(n / 1000).toFixed(2)} km`;
+
+class Viewer {
+  private readonly canvas = element<HTMLCanvasElement>('picture');
+  private readonly renderer: Renderer;
+  private readonly camera = new OrbitCamera();
+  private readonly look: Look = {colour: 'height', wire: false, dark: false, pointSize: 2.5};
+  private error = 4;
+  private stores: Listed[] = [];
+  private store = '';
+  private worker: Worker|null = null;
+  private manifest: Manifest|null = null;
+  private box: number[] = [];
+  private asTriangles = true;
+  private picks = new Map<number, (hit: Hit|null) => void>();
+  private hashes = new Map<number, (hash: string) => void>();
+  private next = 0;
+  private serial = 0;  ///< of the last view
+  private redraw = true;
+  private moved = true;
+  private status: FromWorker&{type: 'frame'}|null = null;
+  private frameTime = 16;
+  private lastDrawn = 0;
+  private hit: Hit|null = null;
+  private before: Hit|null = null;
+  private linkTimer = 0;
+  private pivotTimer = 0;
+
+  constructor() {
+    this.renderer = new Renderer(this.canvas);
+    this.setDark(matchMedia('(prefers-color-scheme: dark)').matches);
+    this.readLink();
+    this.bind();
+    requestAnimationFrame(() => this.tick());
+  }
+
+  async start(): Promise<void> {
+    try {
+      const response = await fetch('stores.json');
+      if (!response.ok) throw new Error(`the server answers with HTTP ${response.status}.`);
+      const list = await response.json();
+      this.stores = list.stores;
+      if (this.stores.length === 0) throw new Error('it lists no store.');
+    } catch (error) {
+      this.fail(`stores.json: ${(error as Error).message}`);
+      return;
+    }
+    const select = element<HTMLSelectElement>('store');
+    select.replaceChildren(...this.stores.map(store => new Option(store.name, store.name)));
+    select.disabled = this.stores.length === 1;
+    const wanted = this.link.get('s');
+    this.open(this.stores.find(store => store.name === wanted)?.name ?? this.stores[0].name, true);
+  }
+
+  /// For tests and for those who look behind the curtain.
+  async hash(): Promise<string> {
+    return new Promise(resolve => {
+      const id = ++this.next;
+      this.hashes.set(id, resolve);
+      this.tell({type: 'hash', id});
+    });
+  }
+  get settled(): boolean {
+    return !this.moved && this.status !== null && this.status.serial === this.serial && this.status.state.settled && !this.renderer.sliding(this.now);
+  }
+  get state(): object {
+    return {
+      store: this.store,
+      settled: this.settled,
+      camera: {target: this.camera.target, azimuth: this.camera.azimuth, tilt: this.camera.tilt, distance: this.camera.distance},
+      points: this.status?.state.points ?? 0,
+      triangles: this.status?.state.triangles ?? 0,
+      bytes: this.status?.stats.bytes ?? 0,
+      requests: this.status?.stats.requests ?? 0
+    };
+  }
+  /// For tests: the view of a recorded flight.
+  fly(eye: Vec3, direction: Vec3, aspect: number, height: number, error: number): void {
+    this.tell({
+      type: 'view',
+      serial: ++this.serial,
+      camera: {eye, direction, up: [0, 0, 1], fov: FOV, aspect, height, error}
+    });
+  }
+
+  // ---- The worker ------------------------------------------------------------------------------
+
+  private open(name: string, first: boolean): void {
+    this.worker?.terminate();
+    this.renderer.clear();
+    this.store = name;
+    this.manifest = null;
+    this.status = null;
+    this.closePlace();
+    element<HTMLSelectElement>('store').value = name;
+    element('progress').hidden = false;
+    element('message').hidden = true;
+    document.title = `${name} · terrace`;
+    this.worker = new Worker('worker.js');
+    this.worker.onmessage = event => this.hear(event.data as FromWorker, first);
+    this.worker.onerror = event => this.fail(event.message || 'the viewer\'s worker cannot be loaded.');
+    const at = (path: string) => new URL(path, document.baseURI).href;
+    this.tell({
+      type: 'open',
+      wasm: at('core.wasm'),
+      store: at(`stores/${encodeURIComponent(name)}/`),
+      start: at(`stores/${encodeURIComponent(name)}.start`),
+      maxPoints: MOST_POINTS
+    });
+  }
+  private tell(message: ToWorker): void {
+    this.worker?.postMessage(message);
+  }
+  private hear(message: FromWorker, first: boolean): void {
+    switch (message.type) {
+      case 'progress':
+        element('progress-text').textContent = `Loading, ${readable(message.bytes)}`;
+        break;
+      case 'opened':
+        this.manifest = message.manifest;
+        this.box = message.box;
+        this.asTriangles = message.triangles;
+        this.renderer.show(message.box, message.manifest.levels.length - 1, message.triangles);
+        this.camera.fit(message.box, this.aspect);
+        if (first) this.applyLink();
+        for (const id of ['by-slope', 'with-wire']) element(id).hidden = !message.triangles;
+        element('with-size').hidden = message.triangles;
+        this.legend();
+        this.sendView();
+        break;
+      case 'frame': {
+        // The clock of the worker has another origin; slides count from now.
+        const shift = this.now - message.time;
+        if (message.changes.vertexBlocks.length > 0) this.shift(message.changes.vertices, message.time, shift);
+        this.renderer.apply(message.state, message.changes, this.now);
+        this.status = message;
+        element('progress').hidden = true;
+        this.redraw = true;
+        this.tell({type: 'drawn'});
+        break;
+      }
+      case 'picked':
+        this.picks.get(message.id)?.(message.hit);
+        this.picks.delete(message.id);
+        break;
+      case 'hashed':
+        this.hashes.get(message.id)?.(message.hash);
+        this.hashes.delete(message.id);
+        break;
+      case 'failed':
+        this.fail(message.message);
+        break;
+    }
+  }
+  /// Start times of the vertices of a frame, from the worker's clock to the page's.
+  private shift(vertices: Uint8Array, time: number, by: number): void {
+    const floats = new Float32Array(vertices.buffer, vertices.byteOffset, vertices.byteLength / 4);
+    const exact = Math.fround(time), to = Math.fround(time + by);
+    for (let i = 5; i < floats.length; i += 6) {
+      if (floats[i] === exact) {
+        floats[i] = to;
+      } else if (floats[i] > 0) {
+        floats[i] += by;
+      }
+    }
+  }
+  private fail(message: string): void {
+    element('progress').hidden = true;
+    element('message').hidden = false;
+    element('message-text').textContent = message;
+  }
+  private pick(x: number, y: number, pixels: number): Promise<Hit|null> {
+    const ray = this.camera.ray(x, y, this.aspect);
+    return this.pickRay(this.camera.eye, ray, pixels * Math.tan(FOV / 2 * Math.PI / 180) * 2 / this.canvas.clientHeight);
+  }
+  private pickRay(origin: Vec3, direction: Vec3, angle: number): Promise<Hit|null> {
+    return new Promise(resolve => {
+      const id = ++this.next;
+      this.picks.set(id, resolve);
+      this.tell({type: 'pick', id, origin, direction, angle});
+    });
+  }
+
+  // ---- The picture -----------------------------------------------------------------------------
+
+  private get now(): number {
+    return performance.now() / 1000;
+  }
+  private get aspect(): number {
+    return Math.max(1e-3, this.canvas.clientWidth / Math.max(1, this.canvas.clientHeight));
+  }
+  private tick(): void {
+    requestAnimationFrame(() => this.tick());
+    if (this.renderer.resize()) this.moved = true;
+    if (this.moved) {
+      this.moved = false;
+      this.redraw = true;
+      this.sendView();
+    }
+    const time = this.now;
+    if (!this.redraw && !this.renderer.sliding(time)) return;
+    this.redraw = false;
+    this.renderer.draw(this.camera, this.look, time);
+    // A pause is no frame.
+    if (time - this.lastDrawn < 0.5) this.frameTime = 0.9 * this.frameTime + 100 * (time - this.lastDrawn);
+    this.lastDrawn = time;
+    this.showMark();
+    this.showStatus();
+  }
+  private sendView(): void {
+    if (!this.manifest) return;
+    this.tell({
+      type: 'view',
+      serial: ++this.serial,
+      camera: {
+        eye: this.camera.eye,
+        direction: this.camera.direction,
+        up: this.camera.up,
+        fov: FOV,
+        aspect: this.aspect,
+        height: this.canvas.clientHeight,
+        error: this.error
+      }
+    });
+    clearTimeout(this.linkTimer);
+    this.linkTimer = window.setTimeout(() => this.writeLink(), 300);
+  }
+  private showStatus(): void {
+    const s = this.status;
+    if (!s) return;
+    const parts = [`<b>${count(s.state.points)}</b> points`];
+    if (this.asTriangles) parts.push(`<b>${count(s.state.triangles)}</b> triangles`);
+    parts.push(`<b>${readable(s.stats.bytes)}</b>`);
+    parts[parts.length - 1] += `<span class="wide"> · <b>${count(s.stats.requests)}</b> requests · ` +
+        `<b>${this.frameTime.toFixed(0)}</b> ms a frame</span>`;
+    parts.push(s.state.settled ? (s.state.worst > 1 ? 'as fine as memory allows' : 'as fine as asked for') : 'refining');
+    element('status').innerHTML = parts.join(' · ');
+  }
+  private legend(): void {
+    if (!this.manifest) return;
+    const texts: Record<Colour, [string, string]> = {
+      height: [metres(this.box[2]), metres(this.box[5])],
+      slope: ['0°', '60°'],
+      level: ['coarse', 'fine']
+    };
+    [element('legend-low').textContent, element('legend-high').textContent] = texts[this.look.colour];
+    element('legend-ramp').style.background = `linear-gradient(90deg,${LEGENDS[this.look.colour]})`;
+  }
+
+  // ---- A place ---------------------------------------------------------------------------------
+
+  private showPlace(hit: Hit|null): void {
+    this.before = this.hit;
+    this.hit = hit;
+    if (!hit || !this.manifest) return this.closePlace();
+    const crs = this.manifest.crs;
+    const world = worldPoint(this.manifest, hit.stored);
+    const digits = crs.geographic ? 6 : 2;
+    const unit = this.manifest.coordinates[2].unit;
+    const rows: Array<[string, string]> = [
+      [crs.geographic ? 'Longitude' : 'East', world[0].toFixed(digits)],
+      [crs.geographic ? 'Latitude' : 'North', world[1].toFixed(digits)],
+      ['Height', `${world[2].toFixed(2)}${unit ? ` ${unit === 'metre' ? 'm' : unit}` : ''}`],
+      ['Level', `${hit.level}`],
+      ['Cluster', `${hit.clusterLevel}/${hit.clusterOrdinal}`]
+    ];
+    if (crs.epsg) rows.push(['CRS', `EPSG:${crs.epsg}`]);
+    if (this.before) {
+      const way = add(hit.place as Vec3, this.before.place as Vec3, -1);
+      rows.push(['From the last', `${metres(Math.hypot(way[0], way[1]))}, ${way[2] < 0 ? '−' : '+'}${metres(Math.abs(way[2]))}`]);
+    }
+    element('place-text').replaceChildren(...rows.flatMap(([name, value]) => {
+      const dt = document.createElement('dt'), dd = document.createElement('dd');
+      dt.textContent = name;
+      dd.textContent = value;
+      return [dt, dd];
+    }));
+    element('place').hidden = false;
+    this.redraw = true;
+  }
+  private closePlace(): void {
+    this.hit = this.before = null;
+    element('place').hidden = true;
+    element('mark').hidden = true;
+  }
+  private showMark(): void {
+    const mark = element('mark');
+    if (!this.hit) {
+      mark.hidden = true;
+      return;
+    }
+    const to = add(this.hit.place as Vec3, this.camera.eye, -1);
+    const t = Math.tan(FOV / 2 * Math.PI / 180);
+    const part = (axis: Vec3) => to[0] * axis[0] + to[1] * axis[1] + to[2] * axis[2];
+    const depth = part(this.camera.direction);
+    mark.hidden = depth <= 0;
+    mark.style.left = `${(1 + part(this.camera.right) / depth / t / this.aspect) / 2 * this.canvas.clientWidth}px`;
+    mark.style.top = `${(1 - part(this.camera.up) / depth / t) / 2 * this.canvas.clientHeight}px`;
+  }
+
+  // ---- The link --------------------------------------------------------------------------------
+
+  private link = new URLSearchParams();
+  private readLink(): void {
+    this.link = new URLSearchParams(location.hash.slice(1));
+    const colour = this.link.get('c');
+    if (colour === 'height' || colour === 'slope' || colour === 'level') this.look.colour = colour;
+    this.look.wire = this.link.get('w') === '1';
+    const error = Number(this.link.get('q'));
+    if (error >= 0.5 && error <= 32) this.error = error;
+  }
+  private applyLink(): void {
+    const numbers = (this.link.get('v') ?? '').split(',').map(Number);
+    if (numbers.length !== 6 || !numbers.every(Number.isFinite) || numbers[5] <= 0) return;
+    this.camera.target = [numbers[0], numbers[1], numbers[2]];
+    this.camera.azimuth = numbers[3];
+    this.camera.tilt = Math.min(89.9, Math.max(2, numbers[4]));
+    this.camera.distance = numbers[5];
+  }
+  private writeLink(): void {
+    const c = this.camera;
+    const view = [...c.target.map(n => n.toFixed(2)), c.azimuth.toFixed(2), c.tilt.toFixed(2), c.distance.toPrecision(6)];
+    const parts = [`s=${encodeURIComponent(this.store)}`, `v=${view.join(',')}`, `c=${this.look.colour}`, `q=${this.error}`];
+    if (this.look.wire) parts.push('w=1');
+    history.replaceState(null, '', `#${parts.join('&')}`);
+  }
+
+  // ---- What the user does ----------------------------------------------------------------------
+
+  private setDark(dark: boolean): void {
+    this.look.dark = dark;
+    document.documentElement.classList.toggle('dark', dark);
+    element('theme').textContent = dark ? 'Light' : 'Dark';
+    this.redraw = true;
+  }
+  private showControls(): void {
+    for (const input of document.querySelectorAll<HTMLInputElement>('input[name=colour]')) {
+      input.checked = input.value === this.look.colour;
+    }
+    element<HTMLInputElement>('wire').checked = this.look.wire;
+    element<HTMLInputElement>('detail').value = String(4 - Math.log2(this.error));
+    element('detail-text').textContent = `within ${this.error} px`;
+    this.legend();
+  }
+  private change(): void {
+    this.moved = true;
+    clearTimeout(this.pivotTimer);
+    this.pivotTimer = window.setTimeout(() => void this.turnAboutWhatIsSeen(), 250);
+  }
+  /// Once the camera rests: what it turns about is the ground in the middle of the picture.
+  private async turnAboutWhatIsSeen(): Promise<void> {
+    const eye = this.camera.eye, direction = this.camera.direction;
+    const hit = await this.pickRay(eye, direction, 0.02);
+    if (!hit || length(add(this.camera.eye, eye, -1)) > 0) return;
+    this.camera.retarget(length(add(hit.place as Vec3, eye, -1)));
+  }
+  private at(event: {clientX: number, clientY: number}): [number, number] {
+    return [2 * event.clientX / this.canvas.clientWidth - 1, 1 - 2 * event.clientY / this.canvas.clientHeight];
+  }
+  private bind(): void {
+    this.showControls();
+    const canvas = this.canvas;
+    const pointers = new Map<number, {x: number, y: number}>();
+    let travelled = 0, turning = false;
+    canvas.addEventListener('contextmenu', event => event.preventDefault());
+    canvas.addEventListener('pointerdown', event => {
+      canvas.setPointerCapture(event.pointerId);
+      pointers.set(event.pointerId, {x: event.clientX, y: event.clientY});
+      turning = event.button === 2 || event.button === 1 || event.ctrlKey || event.shiftKey;
+      travelled = pointers.size > 1 ? 1e9 : 0;
+    });
+    canvas.addEventListener('pointermove', event => {
+      const last = pointers.get(event.pointerId);
+      if (!last) return;
+      const dx = event.clientX - last.x, dy = event.clientY - last.y;
+      travelled += Math.abs(dx) + Math.abs(dy);
+      if (pointers.size === 2) {
+        const other = [...pointers.entries()].find(([id]) => id !== event.pointerId)![1];
+        const before = Math.hypot(last.x - other.x, last.y - other.y);
+        const after = Math.hypot(event.clientX - other.x, event.clientY - other.y);
+        const turn = Math.atan2(event.clientY - other.y, event.clientX - other.x) - Math.atan2(last.y - other.y, last.x - other.x);
+        const middle = {clientX: (event.clientX + other.x) / 2, clientY: (event.clientY + other.y) / 2};
+        this.camera.zoom(before / Math.max(after, 1), ...this.at(middle), this.aspect);
+        const degrees = (turn * 180 / Math.PI + 540) % 360 - 180;
+        this.camera.orbit(-degrees, 0);
+        this.camera.pan(dx / 2, 0, canvas.clientHeight);
+        this.camera.orbit(0, dy * 0.08);
+      } else if (turning) {
+        this.camera.orbit(dx * 0.3, dy * 0.25);
+      } else if (travelled > 4) {
+        this.camera.pan(dx, dy, canvas.clientHeight);
+      }
+      last.x = event.clientX;
+      last.y = event.clientY;
+      if (travelled > 4) this.change();
+    });
+    const up = (event: PointerEvent) => {
+      pointers.delete(event.pointerId);
+      if (event.type === 'pointerup' && travelled <= 4 && pointers.size === 0 && !turning && this.manifest) {
+        void this.pick(...this.at(event), 12).then(hit => this.showPlace(hit));
+      }
+    };
+    canvas.addEventListener('pointerup', up);
+    canvas.addEventListener('pointercancel', up);
+    canvas.addEventListener('wheel', event => {
+      event.preventDefault();
+      const lines = event.deltaMode === 1 ? 16 : 1;
+      this.camera.zoom(Math.exp(Math.max(-240, Math.min(240, event.deltaY * lines)) * 0.0016), ...this.at(event), this.aspect);
+      this.change();
+    }, {passive: false});
+    canvas.addEventListener('dblclick', event => {
+      this.camera.zoom(0.5, ...this.at(event), this.aspect);
+      this.change();
+    });
+    canvas.addEventListener('keydown', event => this.key(event));
+
+    for (const input of document.querySelectorAll<HTMLInputElement>('input[name=colour]')) {
+      input.addEventListener('change', () => {
+        this.look.colour = input.value as Colour;
+        this.changeLook();
+      });
+    }
+    element('wire').addEventListener('change', event => {
+      this.look.wire = (event.target as HTMLInputElement).checked;
+      this.changeLook();
+    });
+    element('detail').addEventListener('input', event => {
+      this.error = Math.round(100 * 2 ** (4 - Number((event.target as HTMLInputElement).value))) / 100;
+      this.showControls();
+      this.moved = true;
+    });
+    element('size').addEventListener('input', event => {
+      this.look.pointSize = Number((event.target as HTMLInputElement).value) * Math.min(devicePixelRatio || 1, 2);
+      this.redraw = true;
+    });
+    element('store').addEventListener('change', event => this.open((event.target as HTMLSelectElement).value, false));
+    element('fit').addEventListener('click', () => this.fit());
+    element('theme').addEventListener('click', () => this.setDark(!this.look.dark));
+    element('link').addEventListener('click', () => {
+      this.writeLink();
+      void navigator.clipboard?.writeText(location.href);
+      element('link').textContent = 'Copied';
+      setTimeout(() => element('link').textContent = 'Copy link', 1500);
+    });
+    element('menu').addEventListener('click', () => {
+      const open = element('tools').classList.toggle('open');
+      element('menu').setAttribute('aria-expanded', String(open));
+    });
+    element('place-close').addEventListener('click', () => this.closePlace());
+    element('expand').addEventListener('click', () => this.tell({type: 'pin', how: 1}));
+    element('collapse').addEventListener('click', () => this.tell({type: 'pin', how: 0}));
+    element('release').addEventListener('click', () => this.tell({type: 'pin', how: -1}));
+    element('retry').addEventListener('click', () => {
+      element('message').hidden = true;
+      if (this.stores.length === 0) {
+        void this.start();
+      } else if (this.manifest) {
+        this.tell({type: 'retry'});
+      } else {
+        this.open(this.store, true);
+      }
+    });
+    addEventListener('hashchange', () => {
+      this.readLink();
+      this.showControls();
+      const wanted = this.link.get('s');
+      if (wanted !== null && wanted !== this.store && this.stores.some(store => store.name === wanted)) {
+        this.open(wanted, true);
+      } else {
+        this.applyLink();
+        this.moved = true;
+      }
+    });
+    canvas.addEventListener('webglcontextlost', event => {
+      event.preventDefault();
+      this.fail('The graphics driver has given up. Load the page anew.');
+    });
+  }
+  private changeLook(): void {
+    this.redraw = true;
+    this.legend();
+    this.writeLink();
+  }
+  private fit(): void {
+    if (!this.manifest) return;
+    this.camera.fit(this.box, this.aspect);
+    this.moved = true;
+  }
+  private key(event: KeyboardEvent): void {
+    const step = event.shiftKey ? 180 : 60;
+    const height = this.canvas.clientHeight;
+    const keys: Record<string, () => void> = {
+      ArrowLeft: () => this.camera.pan(step, 0, height),
+      ArrowRight: () => this.camera.pan(-step, 0, height),
+      ArrowUp: () => this.camera.pan(0, step, height),
+      ArrowDown: () => this.camera.pan(0, -step, height),
+      '+': () => this.camera.zoom(0.8, 0, 0, this.aspect),
+      '=': () => this.camera.zoom(0.8, 0, 0, this.aspect),
+      '-': () => this.camera.zoom(1.25, 0, 0, this.aspect),
+      q: () => this.camera.orbit(-6, 0),
+      e: () => this.camera.orbit(6, 0),
+      r: () => this.camera.orbit(0, 4),
+      f: () => this.camera.orbit(0, -4),
+      Home: () => this.fit(),
+      Escape: () => this.closePlace(),
+      Enter: () => void this.pick(0, 0, 12).then(hit => this.showPlace(hit))
+    };
+    const act = keys[event.key] ?? keys[event.key.toLowerCase()];
+    if (!act || event.ctrlKey || event.altKey || event.metaKey) return;
+    event.preventDefault();
+    act();
+    this.change();
+  }
+}
+
+try {
+  const viewer = new Viewer();
+  Object.assign(window, {terrace: viewer});
+  void viewer.start();
+} catch (error) {
+  element('progress').hidden = true;
+  element('message').hidden = false;
+  element('message-text').textContent = (error as Error).message;
+  element('retry').hidden = true;
+}

@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// The worker: the core, the bytes that it lacks, and a frame whenever there is something to do.
+
+import {type Camera, Core, CoreError} from './core';
+import type {FromWorker, ToWorker} from './messages';
+import {FetchFault, Ranges} from './ranges';
+import {type Manifest, parseManifest, parseStart} from './store';
+
+/// Of a frame in the worker, in milliseconds.
+const FRAME = 10;
+/// Frames that the page may be behind.
+const AHEAD = 6;
+
+declare const self: {
+  onmessage: ((event: {data: ToWorker}) => void)|null;
+  postMessage(message: FromWorker, transfer: Transferable[]): void;
+};
+
+function post(message: FromWorker, transfer: Transferable[] = []): void {
+  self.postMessage(message, transfer);
+}
+
+async function fetchWhole(url: string, what: string): Promise<Uint8Array> {
+  let response: Response;
+  try {
+    response = await fetch(url);
+  } catch {
+    throw new FetchFault(`${what}: the server does not answer`, false);
+  }
+  if (!response.ok) throw new FetchFault(`${what}: the server answers with HTTP ${response.status}.`, false);
+  return new Uint8Array(await response.arrayBuffer());
+}
+
+class Session {
+  private core!: Core;
+  private ranges!: Ranges;
+  private manifest!: Manifest;
+  private ground: number[] = [];
+  private camera: Camera|null = null;
+  private serial = 0;  ///< of the view
+  private opened = false;
+  private failed = false;
+  private damaged = 0;  ///< how often what came was damaged
+  private undrawn = 0;
+  private scheduled = false;
+  private idle = false;  ///< nothing to do before something new comes
+  private share = 0.5;   ///< of a frame that the step may take; the rest is for normals, slides and copies
+
+  constructor(private readonly request: ToWorker&{type: 'open'}) {}
+
+  async open(): Promise<void> {
+    try {
+      const [wasm, bytes] =
+          await Promise.all([fetchWhole(this.request.wasm, 'the viewer'), fetchWhole(this.request.start, 'the store')]);
+      this.core = await Core.load(wasm as BufferSource);
+      let start;
+      try {
+        start = parseStart(bytes);
+      } catch (error) {
+        throw new FetchFault(`the start file of the store is damaged: ${(error as Error).message}`, false);
+      }
+      const manifest = start.parts.find(part => part.file === 'manifest.json');
+      if (!manifest) throw new FetchFault('the start file of the store is damaged: it has no manifest', false);
+      this.manifest = parseManifest(manifest.data);
+      this.ground = start.ground;
+      for (const [name, size] of this.manifest.files) this.core.addFile(name, size);
+      for (const part of start.parts) this.core.give(part.file, part.offset, part.data);
+      this.ranges = new Ranges(
+          this.request.store, this.manifest.files,
+          (range, data) => this.core.give(range.file, range.offset, data), fault => this.fail(fault.message),
+          () => this.wake());
+      this.ranges.stats.requests = 1;
+      this.ranges.stats.bytes = bytes.length;
+      post({type: 'progress', bytes: bytes.length});
+      this.schedule();
+    } catch (error) {
+      this.fail((error as Error).message);
+    }
+  }
+  /// After a fault: the same again.
+  retry(): void {
+    this.failed = false;
+    if (!this.ranges) {
+      void this.open();
+      return;
+    }
+    this.damaged = 0;
+    this.ranges.distrust();
+    this.wake();
+  }
+  view(camera: Camera, serial: number): void {
+    this.camera = camera;
+    this.serial = serial;
+    this.wake();
+  }
+  drawn(): void {
+    this.undrawn = Math.max(0, this.undrawn - 1);
+    if (!this.idle) this.schedule();
+  }
+  pick(request: ToWorker&{type: 'pick'}): void {
+    const hit = this.opened ? this.core.pick(request.origin, request.direction, request.angle) : null;
+    post({type: 'picked', id: request.id, hit});
+  }
+  pin(how: number): void {
+    if (this.opened) this.core.pin(how);
+    this.wake();
+  }
+  hash(id: number): void {
+    post({type: 'hashed', id, hash: this.opened ? this.core.hash() : ''});
+  }
+
+  private fail(message: string): void {
+    if (this.failed) return;
+    this.failed = true;
+    this.ranges?.stop();
+    post({type: 'failed', message});
+  }
+  private wake(): void {
+    this.idle = false;
+    this.schedule();
+  }
+  private schedule(): void {
+    if (this.scheduled || this.failed || !this.ranges) return;
+    this.scheduled = true;
+    setTimeout(() => {
+      this.scheduled = false;
+      this.step();
+    });
+  }
+  private step(): void {
+    if (this.failed || this.undrawn >= AHEAD) return;
+    try {
+      if (this.opened) {
+        this.frame();
+      } else {
+        this.tryToOpen();
+      }
+    } catch (error) {
+      this.suspect(error as Error);
+    }
+  }
+  /// Bytes whose checksum is wrong are fetched once more, past all caches.
+  private suspect(error: Error): void {
+    if (!(error instanceof CoreError) || ++this.damaged > 1) return this.fail(error.message);
+    for (const name of this.manifest.files.keys()) this.core.forget(name);
+    this.ranges.distrust();
+    this.schedule();
+  }
+  private tryToOpen(): void {
+    const result = this.core.open(this.ground, this.request.maxPoints);
+    if ('missing' in result) {
+      post({type: 'progress', bytes: this.ranges.stats.bytes});
+      this.ranges.want(result.missing, 0, performance.now());
+      return;
+    }
+    this.opened = true;
+    post({type: 'opened', manifest: this.manifest, box: result.box, triangles: result.triangles});
+    this.schedule();
+  }
+  private frame(): void {
+    if (!this.camera) return;
+    const begin = performance.now();
+    const {state, missing} = this.core.frame(this.camera, this.share * FRAME / 1000, begin / 1000);
+    const changes = this.core.changes();
+    this.ranges.want(missing, this.serial, begin);
+    const milliseconds = performance.now() - begin;
+    this.share = Math.min(0.9, Math.max(0.1, this.share * Math.min(1.1, Math.max(0.7, FRAME / milliseconds))));
+    const changed = changes.vertexBlocks.length > 0 || changes.triangleBlocks.length > 0;
+    // What is missing wakes it again.
+    this.idle = state.settled || (!changed && this.ranges.waiting && missing.length > 0);
+    ++this.undrawn;
+    post(
+        {
+          type: 'frame',
+          serial: this.serial,
+          state,
+          changes,
+          stats: {...this.ranges.stats},
+          milliseconds,
+          loading: !state.settled,
+          time: begin / 1000
+        },
+        [changes.vertexBlocks.buffer, changes.vertices.buffer, changes.triangleBlocks.buffer, changes.triangles.buffer]);
+    if (!this.idle) this.schedule();
+  }
+}
+
+let session: Session|null = null;
+self.onmessage = event => {
+  const message = event.data;
+  switch (message.type) {
+    case 'open':
+      session = new Session(message);
+      void session.open();
+      break;
+    case 'view':
+      session?.view(message.camera, message.serial);
+      break;
+    case 'drawn':
+      session?.drawn();
+      break;
+    case 'pick':
+      session?.pick(message);
+      break;
+    case 'pin':
+      session?.pin(message.how);
+      break;
+    case 'hash':
+      session?.hash(message.id);
+      break;
+    case 'retry':
+      session?.retry();
+      break;
+  }
+};
