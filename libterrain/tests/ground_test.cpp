@@ -7,10 +7,9 @@
 #include <gtest/gtest.h>
 
 #include "base/portable_math.hpp"
+#include "earth/crs/crs_definition.hpp"
 
 namespace terrace::terrain {
-
-using namespace terrain;
 namespace {
 
 stream::Placement geographic(double cell) {

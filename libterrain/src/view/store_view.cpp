@@ -81,7 +81,7 @@ class FramedSource final : public tri::ClusterSource {
     return inner_.read(id);
   }
 
-  /// What was read so far; may be asked while another thread reads.
+  /// Bytes read so far; may be called while another thread reads.
   [[nodiscard]] ViewTraffic traffic() const { return {clusters_, points_, bytes_}; }
   [[nodiscard]] std::vector<std::uint64_t> counts() const {
     std::vector<std::uint64_t> counts;
@@ -111,7 +111,7 @@ class ReadingThread {
   ReadingThread(const ReadingThread&) = delete;
   ReadingThread& operator=(const ReadingThread&) = delete;
 
-  /// What was read since the last call. Throws what reading threw.
+  /// The clusters read since the last call. Rethrows what reading threw.
   std::vector<tri::GivenCluster>& take() {
     taken_.clear();
     const std::lock_guard lock(mutex_);
@@ -152,7 +152,7 @@ class ReadingThread {
 
   FramedSource& source_;
   std::vector<tri::GivenCluster> taken_;
-  std::mutex mutex_;  ///< of what follows
+  std::mutex mutex_;  ///< guards the members below
   std::condition_variable wake_;
   std::deque<tri::ViewRequest> queue_;
   std::vector<tri::GivenCluster> ready_;
@@ -176,7 +176,7 @@ struct StoreView<Coord>::Impl {
     if (reader == Reader::thread) thread = std::make_unique<ReadingThread>(source);
   }
 
-  /// What the step before asked for, as far as a part of the time goes.
+  /// Reads what the last step asked for, within a share of the frame's time.
   void read_within(double seconds) {
     const tri::StepBudget budget{.seconds = seconds, .clock = steady_seconds};
     meter.start(budget);
@@ -192,7 +192,7 @@ struct StoreView<Coord>::Impl {
   FramedSource source;
   Control control;
   bool settled = false;
-  std::vector<tri::ViewRequest> wanted;  ///< by the step before, without a thread that reads
+  std::vector<tri::ViewRequest> wanted;  ///< by the last step, without a reading thread
   tri::StepMeter meter;
   std::unique_ptr<ReadingThread> thread;
 };

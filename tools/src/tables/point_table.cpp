@@ -14,8 +14,6 @@
 
 namespace terrace::tools {
 
-using namespace terrain;
-
 std::vector<double> PointTable::column(const std::string& name) const {
   std::string known;
   for (std::size_t c = 0; c < info.attributes.size(); ++c) {
@@ -35,7 +33,7 @@ std::vector<double> PointTable::column(const std::string& name) const {
 }
 
 std::uint64_t reading_within_memory(const stream::PointSource& source, std::uint64_t memory_bytes) {
-  // The program itself, what PROJ reads to tell the CRS, and the blocks that are read ahead.
+  // The program itself, PROJ's database, and the blocks that are read ahead.
   constexpr std::uint64_t kBeside = std::uint64_t{32} << 20;
   const std::uint64_t reading = source.reading_bytes();
   if (reading == 0 || kBeside + reading <= memory_bytes) return reading;
@@ -63,7 +61,7 @@ PointTable read_point_table(const std::string& file, const std::string& format,
   while (source->next(block)) {
     check_interrupt();
     stream::to_world(table.info, block);
-    // A vector that grows is there twice for a moment.
+    // A growing vector exists twice for a moment.
     if (2 * bytes_per_point * (table.size() + block.size()) > memory_bytes - reading) {
       throw stream::Error({.file = file,
                            .where = {},
