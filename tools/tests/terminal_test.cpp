@@ -6,8 +6,6 @@
 #include <gtest/gtest.h>
 
 namespace terrace::tools {
-
-using namespace terrain;
 namespace {
 
 TEST(Terminal, TextThatATerminalShowsStays) {
