@@ -28,7 +28,7 @@ constexpr stream::Point3 kCentre{400000.0, 5200000.0, 700.0};
 
 class ScanSurfaceTest : public ::testing::Test {
  protected:
-  /// 3,000 random points on a sphere, in UTM metres.
+  /// 3,000 random points on a sphere, in metres.
   ScanSurfaceTest() {
     const std::filesystem::path text = folder_.path() / "points.xyz";
     std::mt19937_64 random(5);
@@ -50,7 +50,6 @@ class ScanSurfaceTest : public ::testing::Test {
     BuildRequest request;
     request.inputs = {text.string()};
     request.store = folder_.path() / "store";
-    request.crs.emplace().epsg = 32632;
     request.block_points = 500;
     build_store(request);
   }
