@@ -27,6 +27,7 @@
 #include "terrace/terrain/bounded_mesh.hpp"
 #include "terrace/terrain/build.hpp"
 #include "terrace/terrain/region.hpp"
+#include "terrace/terrain/triangle_mesh.hpp"
 
 /// Clouds, and what any mesh of them must be.
 
