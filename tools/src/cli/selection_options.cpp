@@ -36,10 +36,12 @@ void SelectionOptions::define(CLI::App& app) {
   add_where(app, where_);
   app.add_option(
          "--region", region_,
-         "only points inside a box in the CRS of the input; COPC and EPT are read only there")
+         "only points inside a box in the CRS of the input; of COPC and EPT nothing else is "
+         "read")
       ->type_name("MINX,MINY[,MINZ],MAXX,MAXY[,MAXZ]");
   add_number(app, "--resolution", resolution_,
-             "COPC and EPT: only the points down to this spacing, in units of the CRS", kAboveZero);
+             "of COPC and EPT only the points down to this spacing, in units of its CRS",
+             kAboveZero);
   app.add_option("--keep", keep_, "only these attributes, or none")->type_name("NAME,NAME");
   app.add_option("--drop", drop_, "all attributes but these")->type_name("NAME,NAME");
 }

@@ -7,7 +7,7 @@
 #include <CLI/CLI.hpp>
 #include <terrace/stream/source.hpp>
 
-/// --where, --region, --resolution, --keep and --drop of verbs that read files.
+/// --where, --region, --resolution, --keep and --drop of what reads files.
 
 namespace terrace::tools {
 

@@ -13,7 +13,7 @@
 #include "cli/interrupt.hpp"
 #include "cli/option_values.hpp"
 #include "earth/ground.hpp"
-#include "picture/height_grid.hpp"
+#include "mesh/height_grid.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/mesh_reader.hpp"
 #include "terrace/stream/source.hpp"

@@ -17,7 +17,6 @@
 #include "picture/camera.hpp"
 #include "picture/color.hpp"
 #include "picture/draw.hpp"
-#include "picture/height_grid.hpp"
 #include "picture/picture_input.hpp"
 #include "tables/dendrogram_file.hpp"
 #include "tables/matching_result.hpp"

@@ -155,7 +155,7 @@ CoordinateSystem system_of(const stream::Store& store);
 Transformation transformation_to(const stream::Store& store, const std::string& named,
                                  const std::optional<DatumShift>& shift = std::nullopt);
 
-/// Converts regions in another CRS to the store's; a default-constructed one changes nothing.
+/// Regions in another CRS as regions in the store's; made by default, it leaves them as they are.
 class RegionConversion {
  public:
   RegionConversion() = default;
@@ -170,8 +170,7 @@ class RegionConversion {
   stream::Box3 bounds_;
 };
 
-/// Converts places from the store's CRS to another; a default-constructed one changes nothing.
-/// Heights stay.
+/// Places of the store's CRS in another; made by default, it leaves them as they are. Heights stay.
 class PlaceConversion {
  public:
   PlaceConversion() = default;
@@ -184,7 +183,7 @@ class PlaceConversion {
   std::optional<Transformation> change_;
 };
 
-/// "dx,dy,dz" or "dx,dy,dz,rx,ry,rz,ds"; nullopt if the text is empty. Throws: UsageError.
+/// "dx,dy,dz" or "dx,dy,dz,rx,ry,rz,ds"; nothing if the text is empty. Throws: UsageError.
 std::optional<DatumShift> parse_datum_shift(const std::string& text);
 
 }  // namespace terrace::terrain

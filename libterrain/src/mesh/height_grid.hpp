@@ -1,18 +1,17 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
-#include "mesh/scene.hpp"
-#include "terrace/stream/point.hpp"
+#include <terrace/stream/point.hpp>
 
-namespace terrace::tools {
+#include "terrace/terrain/triangle_mesh.hpp"
 
-using namespace terrain;
+namespace terrace::terrain {
 
-/// The cells of a raster, squares of them averaged into one so that a picture can be made of a
-/// raster of any size in little memory.
+/// The cells of a raster, squares of them averaged into one: a mesh of a raster of any size in
+/// little memory, for pictures.
 class HeightGrid {
  public:
   /// The smallest reduction with which columns x rows are at most `most_cells`.
@@ -36,4 +35,4 @@ class HeightGrid {
   std::vector<std::uint32_t> counts_;
 };
 
-}  // namespace terrace::tools
+}  // namespace terrace::terrain

@@ -1,11 +1,11 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
-#include "picture/height_grid.hpp"
+// SPDX-License-Identifier: Apache-2.0
+#include "mesh/height_grid.hpp"
 
 #include <set>
 
 #include <gtest/gtest.h>
 
-namespace terrace::tools {
+namespace terrace::terrain {
 namespace {
 
 TEST(HeightGrid, KeepsCellsThatFit) {
@@ -51,4 +51,4 @@ TEST(HeightGrid, IgnoresWhatLiesOutside) {
 }
 
 }  // namespace
-}  // namespace terrace::tools
+}  // namespace terrace::terrain

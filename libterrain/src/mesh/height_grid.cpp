@@ -1,9 +1,9 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
-#include "picture/height_grid.hpp"
+// SPDX-License-Identifier: Apache-2.0
+#include "mesh/height_grid.hpp"
 
 #include <algorithm>
 
-namespace terrace::tools {
+namespace terrace::terrain {
 
 HeightGrid::HeightGrid(std::uint64_t columns, std::uint64_t rows, std::uint64_t most_cells)
     : full_columns_(columns), full_rows_(rows) {
@@ -65,4 +65,4 @@ TriangleMesh HeightGrid::mesh() const {
   return mesh;
 }
 
-}  // namespace terrace::tools
+}  // namespace terrace::terrain
