@@ -16,8 +16,6 @@
 
 namespace terrace::terrain {
 
-using namespace terrain;
-
 /// Samples of a function on a lattice of longitudes and latitudes, for tests.
 class AnalyticSurface final : public TileSurface {
  public:
@@ -52,9 +50,9 @@ class AnalyticSurface final : public TileSurface {
     });
   }
 
-  bool rows(const GeographicBox& box, SurfaceRows& out) override {
-    out = {};
-    if (!in_rows) return false;
+  SurfacePart part(const GeographicBox& box) override {
+    if (!in_rows) return TileSurface::part(box);
+    SurfaceRows out;
     int row_before = -1;
     visit(box, [&](int column, int row, double height) {
       if (row != row_before) out.latitude.push_back(latitude(row));
@@ -62,7 +60,7 @@ class AnalyticSurface final : public TileSurface {
       if (out.latitude.size() == 1) out.longitude.push_back(longitude(column));
       out.height.push_back(height);
     });
-    return true;
+    return out;
   }
 
   std::optional<HeightRange> range(const GeographicBox& box) override {

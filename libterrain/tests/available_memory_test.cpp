@@ -11,8 +11,6 @@
 #include <unistd.h>
 
 namespace terrace::terrain {
-
-using namespace terrain;
 namespace {
 
 namespace fs = std::filesystem;

@@ -16,8 +16,6 @@
 #include <gtest/gtest.h>
 
 namespace terrace::terrain {
-
-using namespace terrain;
 namespace {
 
 constexpr std::int64_t kColumns = 23, kRows = 31;

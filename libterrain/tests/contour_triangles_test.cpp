@@ -19,8 +19,6 @@
 #include <terrace/tri/delaunay2.hpp>
 
 namespace terrace::terrain {
-
-using namespace terrain;
 namespace {
 
 using Triangle = ContourTriangles::Triangle;

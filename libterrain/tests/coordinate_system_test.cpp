@@ -19,8 +19,6 @@
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
-
-using namespace terrain;
 namespace {
 
 TEST(CoordinateSystem, KnowsWhatTheCodesMeasureIn) {

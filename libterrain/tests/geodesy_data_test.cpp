@@ -21,8 +21,6 @@
 #include "tile/format/ellipsoid.hpp"
 
 namespace terrace::terrain {
-
-using namespace terrain;
 namespace {
 
 std::string data_file(const std::string& name) {

@@ -15,8 +15,6 @@
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
-
-using namespace terrain;
 namespace {
 
 constexpr std::uint64_t kMemory = std::uint64_t{1} << 30;

@@ -12,8 +12,6 @@
 #include "terrace/stream/error.hpp"
 
 namespace terrace::terrain {
-
-using namespace terrain;
 namespace {
 
 struct PlacedGrid {

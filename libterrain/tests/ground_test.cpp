@@ -10,8 +10,6 @@
 #include "earth/crs/crs_definition.hpp"
 
 namespace terrace::terrain {
-
-using namespace terrain;
 namespace {
 
 stream::Placement geographic(double cell) {

@@ -8,8 +8,6 @@
 #include <gtest/gtest.h>
 
 namespace terrace::terrain {
-
-using namespace terrain;
 namespace {
 
 constexpr double kRange = 1000.0;

@@ -8,8 +8,6 @@
 #include <gtest/gtest.h>
 
 namespace terrace::terrain {
-
-using namespace terrain;
 namespace {
 
 LineDistance distance_in(const char* crs) { return {CoordinateSystem::parse(crs), 1}; }

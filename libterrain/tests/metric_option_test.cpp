@@ -11,8 +11,6 @@
 #include "terrace/terrain/metric_choice.hpp"
 
 namespace terrace::terrain {
-
-using namespace terrain;
 namespace {
 
 constexpr stream::Point3 kOrigin{0, 0, 0};

@@ -9,8 +9,6 @@
 #include <gtest/gtest.h>
 
 namespace terrace::terrain {
-
-using namespace terrain;
 namespace {
 
 TEST(OrderedWork, CommitsEachResultOnceInOrder) {

@@ -4,8 +4,6 @@
 #include <gtest/gtest.h>
 
 namespace terrace::terrain {
-
-using namespace terrain;
 namespace {
 
 TEST(PlaceFile, QuotesAroundQuotesTakeNoStack) {

@@ -6,8 +6,6 @@
 #include <gtest/gtest.h>
 
 namespace terrace::terrain {
-
-using namespace terrain;
 namespace {
 
 TEST(PortableMath, AgreesWithTheLibrary) {

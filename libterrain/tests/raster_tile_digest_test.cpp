@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tile/make/raster_tile_digest.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -18,10 +16,9 @@
 #include "temporary_folder.hpp"
 #include "terrace/terrain/build.hpp"
 #include "tile/make/raster_tile_surface.hpp"
+#include "tile/make/tiled_raster.hpp"
 
 namespace terrace::terrain {
-
-using namespace terrain;
 namespace {
 
 namespace fs = std::filesystem;
@@ -116,14 +113,16 @@ class RasterDigest : public ::testing::TestWithParam<Frame> {
     a.surface.samples(box, left);
     b.surface.samples(box, right);
     if (left.longitude != right.longitude || left.height != right.height) return false;
-    SurfaceRows lines, others;
-    const bool in_rows = a.surface.rows(box, lines);
-    if (in_rows != b.surface.rows(box, others)) return false;
+    const SurfacePart own = a.surface.part(box), other_part = b.surface.part(box);
+    if (own.index() != other_part.index()) return false;
     const auto same = [](double p, double q) { return p == q || (std::isnan(p) && std::isnan(q)); };
-    if (in_rows && (lines.longitude != others.longitude || lines.latitude != others.latitude ||
-                    !std::equal(lines.height.begin(), lines.height.end(), others.height.begin(),
-                                others.height.end(), same))) {
-      return false;
+    if (const auto* const lines = std::get_if<SurfaceRows>(&own)) {
+      const auto& others = std::get<SurfaceRows>(other_part);
+      if (lines->longitude != others.longitude || lines->latitude != others.latitude ||
+          !std::equal(lines->height.begin(), lines->height.end(), others.height.begin(),
+                      others.height.end(), same)) {
+        return false;
+      }
     }
     for (int part = 0; part < 4; ++part) {
       const double x = random(), y = random();

@@ -22,8 +22,6 @@
 #include "tile/make/height_cache.hpp"
 
 namespace terrace::terrain {
-
-using namespace terrain;
 namespace {
 
 namespace fs = std::filesystem;
@@ -119,11 +117,12 @@ TEST_F(RasterOfDegrees, RowsAreTheSamples) {
         const GeographicBox box{west - 0.5 * size, south - 0.5 * size, west + size, south + size};
         SCOPED_TRACE(testing::Message() << "from " << world[2] << " by " << world[0] << ", round "
                                         << round << ": " << box.west << "," << box.south);
-        SurfaceRows rows;
-        if (!surface.rows(box, rows)) continue;
+        const SurfacePart part = surface.part(box);
+        const auto* const rows = std::get_if<SurfaceRows>(&part);
+        if (rows == nullptr) continue;
         ++in_a_row;
         const Heights expected = sampled(other, box);
-        EXPECT_EQ(in_rows(rows), expected);
+        EXPECT_EQ(in_rows(*rows), expected);
         samples += expected.size();
       }
       EXPECT_GT(in_a_row, 40);
@@ -140,8 +139,7 @@ TEST_F(RasterOfDegrees, ProjectedOrTurnedRastersHaveNoRows) {
     const TiledRaster raster(store, CoordinateSystem::of(store.schema().crs, "test").value(),
                              {store.schema(), HeightReference::ignore, "", 1 << 20});
     RasterTileSurface surface(raster);
-    SurfaceRows rows;
-    EXPECT_FALSE(surface.rows(surface.bounds(), rows));
+    EXPECT_TRUE(std::holds_alternative<SurfaceGrid>(surface.part(surface.bounds())));
   }
 }
 

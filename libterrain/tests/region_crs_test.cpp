@@ -9,8 +9,6 @@
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
-
-using namespace terrain;
 namespace {
 
 const stream::Box3 kEverywhere{{-1e8, -1e8, -1e8}, {1e8, 1e8, 1e8}};

@@ -22,8 +22,6 @@
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
-
-using namespace terrain;
 namespace {
 
 /// A file that goes with the object.

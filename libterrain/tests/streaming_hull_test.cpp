@@ -12,8 +12,6 @@
 #include "base/orientation.hpp"
 
 namespace terrace::terrain {
-
-using namespace terrain;
 namespace {
 
 /// Places of few different coordinates, so that many are on one line or equal, or of many.

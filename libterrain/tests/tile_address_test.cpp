@@ -6,8 +6,6 @@
 #include "base/portable_math.hpp"
 
 namespace terrace::terrain {
-
-using namespace terrain;
 namespace {
 
 TEST(TileAddress, PathsReadBack) {

@@ -10,8 +10,6 @@
 #include "tile/format/ellipsoid.hpp"
 
 namespace terrace::terrain {
-
-using namespace terrain;
 namespace {
 
 using stream::Point3;

@@ -17,8 +17,6 @@
 #include "tile/make/height_blocks.hpp"
 
 namespace terrace::terrain {
-
-using namespace terrain;
 namespace {
 
 namespace fs = std::filesystem;

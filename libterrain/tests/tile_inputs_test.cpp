@@ -17,7 +17,6 @@
 
 namespace terrace::terrain {
 
-using namespace terrain;
 namespace {
 
 /// Notes the box around all that it is asked.
@@ -32,9 +31,9 @@ class Spy final : public TileSurface {
     note(box);
     asked_.samples(box, out);
   }
-  bool rows(const GeographicBox& box, SurfaceRows& out) override {
+  SurfacePart part(const GeographicBox& box) override {
     note(box);
-    return asked_.rows(box, out);
+    return asked_.part(box);
   }
   std::optional<HeightRange> range(const GeographicBox& box) override {
     note(box);

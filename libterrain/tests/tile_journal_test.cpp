@@ -12,8 +12,6 @@
 #include "temporary_folder.hpp"
 
 namespace terrace::terrain {
-
-using namespace terrain;
 namespace {
 
 namespace fs = std::filesystem;

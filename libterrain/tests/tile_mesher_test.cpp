@@ -17,8 +17,6 @@
 #include "tile/verify/tile_mesh_check.hpp"
 
 namespace terrace::terrain {
-
-using namespace terrain;
 namespace {
 
 /// Some 40,000 samples, well inside a tile of zoom 6 and across borders of deeper ones.

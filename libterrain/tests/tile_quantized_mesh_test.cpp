@@ -11,8 +11,6 @@
 #include "tile/format/quantized_mesh.hpp"
 
 namespace terrace::terrain {
-
-using namespace terrain;
 namespace {
 
 // A lattice of side x side vertices in shuffled order.

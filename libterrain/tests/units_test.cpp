@@ -8,8 +8,6 @@
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
-
-using namespace terrain;
 namespace {
 
 TEST(ParseMemory, TakesPowersOf1024) {

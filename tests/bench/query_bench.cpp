@@ -17,8 +17,8 @@
 
 #include "../../libterrain/tests/temporary_folder.hpp"
 #include "base/portable_math.hpp"
-#include "cli/choices.hpp"
 #include "cli/cli.hpp"
+#include "cli/option_values.hpp"
 #include "sample/place_file.hpp"
 #include "sample/sample_run.hpp"
 #include "surface/store_window.hpp"

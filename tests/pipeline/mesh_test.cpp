@@ -20,7 +20,7 @@
 #include <terrace/stream/store.hpp>
 
 #include "../../libterrain/tests/temporary_folder.hpp"
-#include "cli/detail_options.hpp"
+#include "cli/option_values.hpp"
 #include "terrace/terrain/build.hpp"
 #include "terrace/terrain/detail_mesh.hpp"
 

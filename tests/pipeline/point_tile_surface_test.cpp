@@ -26,7 +26,6 @@
 #include "tile/make/crowded_leaf.hpp"
 #include "tile/make/sample_parts.hpp"
 #include "tile/make/tile_mesher.hpp"
-#include "tile/set/tile_candidates.hpp"
 
 namespace terrace {
 namespace {

@@ -4,14 +4,10 @@
 #include <cmath>
 
 #include "base/units.hpp"
-#include "cli/choices.hpp"
-#include "cli/clustering_options.hpp"
-#include "cli/detail_options.hpp"
-#include "cli/line_option.hpp"
-#include "cli/smooth_option.hpp"
+#include "cli/option_values.hpp"
 #include "fuzz_target.hpp"
 #include "picture/camera.hpp"
-#include "scan/surface_run.hpp"
+#include "scan/criterion.hpp"
 #include "synth/synth_cloud.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/bounded_mesh.hpp"

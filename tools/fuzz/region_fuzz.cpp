@@ -5,7 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "cli/detail_options.hpp"
+#include "cli/option_values.hpp"
 #include "fuzz_target.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/error.hpp"

@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 
 namespace terrace::tools {
-
 namespace {
 
 TEST(Terminal, TextThatATerminalShowsStays) {

@@ -90,6 +90,20 @@ FacilitySolution solve_fast(const FacilityPoints& problem, const FacilityOptions
   return engine->solution();
 }
 
+/// By a matrix of costs or a local search.
+template <class Problem>
+FacilitySolution solve_any(const Problem& problem, const FacilityOptions& options,
+                           FacilityReport* report) {
+  check(problem);
+  FacilityReport own;
+  if (report) *report = {};
+  if (needs_matrix(options.strategy)) {
+    return solve_by_matrix(problem, options, report ? *report : own);
+  }
+  const auto engine = make_search(problem, options.strategy, options.threads);
+  return run_search(*engine, options, report);
+}
+
 }  // namespace
 
 const char* name_of(FacilityStrategy strategy) {
@@ -122,27 +136,15 @@ const char* name_of(FacilityStrategy strategy) {
 
 FacilitySolution solve(const FacilityPoints& problem, const FacilityOptions& options,
                        FacilityReport* report) {
+  if (options.strategy != FacilityStrategy::fast) return solve_any(problem, options, report);
   check(problem);
-  FacilityReport own;
   if (report) *report = {};
-  if (needs_matrix(options.strategy)) {
-    return solve_by_matrix(problem, options, report ? *report : own);
-  }
-  if (options.strategy == FacilityStrategy::fast) return solve_fast(problem, options, report);
-  const auto engine = make_search(problem, options.strategy, options.threads);
-  return run_search(*engine, options, report);
+  return solve_fast(problem, options, report);
 }
 
 FacilitySolution solve(const FacilityEntities& problem, const FacilityOptions& options,
                        FacilityReport* report) {
-  check(problem);
-  FacilityReport own;
-  if (report) *report = {};
-  if (needs_matrix(options.strategy)) {
-    return solve_by_matrix(problem, options, report ? *report : own);
-  }
-  const auto engine = make_search(problem, options.strategy, options.threads);
-  return run_search(*engine, options, report);
+  return solve_any(problem, options, report);
 }
 
 FacilitySolution solve(const FacilityMatrix& problem, const FacilityOptions& options,

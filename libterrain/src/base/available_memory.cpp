@@ -106,8 +106,8 @@ std::optional<std::uint64_t> cgroup_memory_limit(const fs::path& proc) {
   for (const Hierarchy& hierarchy : hierarchies(proc)) {
     const std::optional<std::string> place = place_in(hierarchy, proc);
     if (!place) continue;
-    // In a container the mount may show a part of the hierarchy only, of which the process's place
-    // is a part, or which the place is seen from already.
+    // In a container the mount may show only a part of the hierarchy, and the process's path may
+    // start at its root or at the mount's.
     fs::path below = fs::path(*place).lexically_relative("/");
     const fs::path within = fs::path(*place).lexically_relative(hierarchy.root);
     if (!within.empty() && *within.begin() != "..") below = within;

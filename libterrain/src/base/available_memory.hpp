@@ -8,8 +8,8 @@
 namespace terrace::terrain {
 
 /// Bytes that this process may use: the machine's memory, or less where its cgroup (or one above
-/// it, of version 1 or 2) or its limits RLIMIT_AS and RLIMIT_DATA say so. The only place that asks;
-/// the libraries are told.
+/// it, of version 1 or 2) or its limits RLIMIT_AS and RLIMIT_DATA say so. The only place that asks
+/// the system; the libraries are passed a limit.
 std::uint64_t available_memory_bytes();
 
 /// The smallest memory limit of the cgroups that a process belongs to and of those above them;

@@ -24,7 +24,7 @@ inline void tell_spooled(const stream::SourceInfo& info, const Context& context)
               readable_bytes(info.spooled_bytes) + " were set aside in a temporary file");
 }
 
-/// Collects what of the input is damaged and left out, to be told at the end.
+/// Collects the damaged parts of the input, which are left out, for a report at the end.
 class DamageReport {
  public:
   /// For SourceOptions::on_damage; the report must outlive the source.
@@ -34,7 +34,7 @@ class DamageReport {
       std::string line = parts.file + ": " + (parts.where.empty() ? "" : parts.where + ": ") +
                          parts.cause + " (" + with_commas(points) + " points left out)";
       const std::lock_guard lock(mutex_);
-      // One of several files is opened twice: to see that they agree, and to be read.
+      // One of several files is opened twice: to check that they agree, and to read it.
       if (std::find(lines_.begin(), lines_.end(), line) != lines_.end()) return;
       ++parts_;
       if (lines_.size() < kMostLines) lines_.push_back(std::move(line));

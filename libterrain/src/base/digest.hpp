@@ -9,8 +9,7 @@
 
 namespace terrace::terrain {
 
-/// Puts numbers and texts together into one number of 64 bits that tells whether they are the same,
-/// in the same order. No protection against those who want two to look alike.
+/// A 64-bit hash of a sequence of numbers and texts. Not cryptographic.
 class Digest {
  public:
   constexpr void add(std::uint64_t number) { value_ = scramble(value_ ^ number); }

@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
+#include <string>
 #include <string_view>
 
-/// By what files can be told to be terrace's.
+/// The marks that identify files written by terrace.
 
 namespace terrace::terrain {
 
 /// The comment that marks files of formats with comments.
 inline constexpr const char* kWriterMark = "written by terrace";
-/// How files begin that have no room for comments.
+/// How files begin in formats without comments.
 inline constexpr std::string_view kContourHead =
     R"({"type":"FeatureCollection","generator":"terrace contour","features":[)";
 /// How all GeoJSON of ours begins.
@@ -18,5 +20,11 @@ inline constexpr std::string_view kGeoJsonMark =
 inline constexpr std::string_view kLinesHead =
     R"({"type":"FeatureCollection","generator":"terrace",)";
 inline constexpr std::string_view kProfileHead = "distance,x,y,height";
+
+/// Whether the regular file at `path` is empty or has terrace's mark at the place that its format
+/// has for that: a comment of the header (PLY, OBJ, VTK), the generator (GLB, GeoJSON, LAS), the
+/// tag Software (TIFF, PNG), the first bytes (overlays). nullopt for formats without such a place,
+/// as CSV; false if the file cannot be read.
+[[nodiscard]] std::optional<bool> marked_by_terrace(const std::string& path);
 
 }  // namespace terrace::terrain

@@ -23,8 +23,8 @@ class FixedText {
     return FixedText(decimals);
   }
 
-  /// Nothing for NaN. Numbers too large for so many digits in 64 bits are written as short as they
-  /// read back the same.
+  /// Empty for NaN. Numbers with too many digits for 64 bits get their shortest text that reads
+  /// back the same.
   void append(std::string& text, double value) const {
     if (std::isnan(value)) return;
     char digits[40];

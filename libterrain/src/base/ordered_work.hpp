@@ -16,11 +16,11 @@ namespace terrace::terrain {
 
 /// Makes `count` results by several threads, of which the calling one is the first, and takes them
 /// in order: make(worker, i) runs on the thread numbered `worker` (0 to threads - 1), in no order,
-/// commit(i, result) on any of them, but one at a time and i ascending. So what commits leave
-/// behind does not depend on the number of threads, and no thread waits for another's commits while
-/// there is something to make. At most two results per thread wait. What make or commit throws
-/// comes out, of several makes that of the smallest i; the other threads end with the result that
-/// they are at.
+/// commit(i, result) on any of them, but one at a time and i ascending. So the
+/// effect of the commits does not depend on the number of threads, and no thread waits for
+/// another's commits while there is something to make. At most two results per thread wait. An
+/// exception of make or commit is rethrown, that of the smallest i; other threads stop after their
+/// present result.
 template <class Make, class Commit>
 void in_order(std::size_t count, unsigned threads, const Make& make, const Commit& commit) {
   using Result = decltype(make(0U, std::size_t{0}));
@@ -93,7 +93,7 @@ void in_order(std::size_t count, unsigned threads, const Make& make, const Commi
 
   {
     std::vector<std::jthread> others;
-    // If a thread cannot be started, those there are do the work.
+    // If a thread cannot be started, the existing ones do the work.
     try {
       for (unsigned worker = 1; worker < threads; ++worker) others.emplace_back(work, worker);
     } catch (const std::system_error&) {

@@ -38,7 +38,7 @@ void parallel_for(std::size_t items, unsigned threads,
     try {
       for (unsigned thread = 1; thread < wanted; ++thread) helpers.emplace_back(run, thread);
     } catch (const std::system_error&) {
-      // The system grants no more threads. Those there are do the same work.
+      // The system grants no more threads: the existing ones do the work.
     }
     run(0);
   }

@@ -3,9 +3,9 @@
 
 #include <cstdint>
 
-/// Functions whose last bit must not depend on the machine. The C library's versions of them may
-/// round differently from release to release and processor to processor, and what is clustered or
-/// written would differ with them. Only +, -, *, / and sqrt are used, which IEEE 754 fixes.
+/// Functions with the same bits on every machine. The C library's versions may round differently
+/// from release to release and processor to processor, and clusters and files would differ. Only +,
+/// -, *, / and sqrt are used, which IEEE 754 fixes.
 
 namespace terrace::terrain {
 

@@ -82,7 +82,7 @@ void RegionGrid::mark_edge(const Point2& a, const Point2& b) {
   }
 }
 
-/// Neighbouring cells of a row without a ring between them lie on the same side: one is asked for.
+/// Neighbouring cells of a row without a ring between them lie on the same side: one is tested.
 void RegionGrid::classify(const std::function<bool(const Point2&)>& inside) {
   for (std::size_t row = 0; row < side_; ++row) {
     const double y = low_[1] + (static_cast<double>(row) + 0.5) / per_unit_[1];

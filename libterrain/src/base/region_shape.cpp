@@ -93,7 +93,7 @@ class Geos {
   std::string said_;
 };
 
-/// What is wrong with a polygon, and where; nothing if it is valid.
+/// What is wrong with a polygon, and where; nullopt if it is valid.
 std::optional<std::string> fault_of(const Geos& geos, const GEOSGeometry* polygon) {
   char* reason = nullptr;
   GEOSGeometry* place = nullptr;

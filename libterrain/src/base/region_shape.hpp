@@ -13,13 +13,13 @@
 
 namespace terrace::terrain {
 
-/// Polygons prepared for questions, which GEOS answers where the grid does not. Its predicates
-/// compute in twice the digits of a double where rounding could matter. All functions may be called
+/// Polygons prepared for queries, answered by GEOS where the grid cannot decide. Its predicates use
+/// twice the precision of a double where rounding could matter. All functions may be called
 /// from several threads.
 class RegionShape {
  public:
   /// Throws: stream::Error that names `file`, the polygon, the ring and the place if there is no
-  /// polygon or one is not valid as OGC Simple Features has it. Polygons may overlap each other.
+  /// polygon or one is not valid by OGC Simple Features. Polygons may overlap each other.
   RegionShape(std::vector<Polygon> polygons, const std::string& file);
   RegionShape(const RegionShape&) = delete;
   RegionShape& operator=(const RegionShape&) = delete;
@@ -48,7 +48,7 @@ class RegionShape {
 };
 
 /// The part of the plane that is inside the polygon by the even-odd rule, as valid polygons; the
-/// polygon itself where it is valid. None if it has no area.
+/// polygon itself where it is valid. Empty if it has no area.
 std::vector<Polygon> valid_polygons(const Polygon& polygon);
 
 }  // namespace terrace::terrain

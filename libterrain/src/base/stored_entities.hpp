@@ -24,8 +24,8 @@ inline constexpr std::string_view kEntitiesParameter = "entities";
 /// Throws: stream::Error if the store holds anything but points; `what` needs them.
 void need_points(const stream::Store& store, const std::string& what);
 
-/// Where things of a store are as they were read to the last bit, zeros with their sign: as it is
-/// where the transform changes nothing, as sums would take the sign off.
+/// The place in the CRS, bit for bit as it was read: an identity transform is skipped, because sums
+/// would lose the sign of zeros.
 [[nodiscard]] stream::Point3 exact_world_point(const stream::Placement& placement,
                                                const stream::Point3& stored);
 
@@ -38,7 +38,7 @@ class CornerReader {
   /// Most corners of an entity, at most stream::kPolylineVertices.
   [[nodiscard]] std::size_t most() const { return others_.size() / 3 + 1; }
   /// Reads all corners but the first, to corners[1] and on, and returns how many there are with it.
-  /// corners: most() of them. Throws: stream::Error on a number of vertices that no entity has.
+  /// corners: most() of them. Throws: stream::Error on an impossible number of vertices.
   std::size_t operator()(std::span<const std::byte> record,
                          std::span<stream::Point3> corners) const;
 

@@ -194,7 +194,7 @@ std::string readable_bound(double value) {
   // The least number of 3 digits that is not below the value.
   const double unit = std::pow(10.0, std::floor(std::log10(value)) - 2.0);
   const double shorter = std::round(value / unit);
-  // What differs by rounding errors alone is the same number.
+  // Numbers that differ by rounding errors alone count as equal.
   const double kept = value <= shorter * unit * (1.0 + 1e-12) ? shorter : std::ceil(value / unit);
   return readable_number(kept * unit);
 }

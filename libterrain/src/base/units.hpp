@@ -34,16 +34,16 @@ std::string with_commas(std::uint64_t value);
 std::string counted(std::uint64_t number, std::string_view noun);
 /// "3.2 GiB", "640 MiB", "12 bytes".
 std::string readable_bytes(std::uint64_t bytes);
-/// "12.3 M/s", "45 k/s": a rate to read.
+/// "12.3 M/s", "45 k/s": a rate for people.
 std::string readable_rate(double per_second);
 /// "1:02:03", "4:05", "0.8 s".
 std::string readable_seconds(double seconds);
 /// The shortest text that reads back as the same double: "0.1", "1e+20", "nan".
 std::string number_text(double value);
-/// A number to read, of so many digits, but never without those before the point: "2.99", "1,834",
-/// "0.00012", "4345.68" (of 6), "nan". Of 10 digits, as coordinates have, no commas.
+/// A number for people, of so many digits, but never without those before the point: "2.99",
+/// "1,834", "0.00012", "4345.68" (of 6), "nan". Of 10 digits, as coordinates have, no commas.
 std::string readable_number(double value, int digits = 3);
-/// The same of 3 digits, rounded up: what is within the value is within what is printed.
+/// The same of 3 digits, rounded up, so that the printed bound holds.
 std::string readable_bound(double value);
 
 }  // namespace terrace::terrain

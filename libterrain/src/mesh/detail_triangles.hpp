@@ -10,7 +10,7 @@
 
 namespace terrace::terrain {
 
-/// What detail_mesh() gives of a store of triangles. Throws: stream::Error on a damaged store, or
+/// detail_mesh() of a store of triangles. Throws: stream::Error on a damaged store, or
 /// when the triangles would not fit into memory_bytes, saying what they need.
 [[nodiscard]] TriangleMesh detail_triangles(const stream::Store& store, const Detail& detail,
                                             std::uint64_t memory_bytes);

@@ -65,7 +65,7 @@ double rms_step(const tri::Delaunay2<Coord>& triangulation, const std::vector<do
   return edges > 0.0 ? std::sqrt(sum / edges) : 0.0;
 }
 
-/// Heights as the store has them, before and after.
+/// Heights of the store, before and after the change.
 template <class Coord>
 std::vector<tri::HeightChange> smoothed(const tri::Multiresolution2<Coord>& model,
                                         const stream::Placement& placement,
@@ -105,7 +105,7 @@ std::vector<double> changed_heights(const tri::Multiresolution2<Coord>& model,
                                     const HeightOptions& options) {
   const auto& triangulation = model.triangulation();
   const stream::Channel& z = placement.coordinates[2];
-  // As in world_point(): what an overlay does not change stays the same to the last bit.
+  // As in world_point(): heights that an overlay does not change stay the same to the last bit.
   const auto real = [&](double height) { return height * z.scale + z.offset; };
   std::vector<double> heights(triangulation.vertex_slots(), 0.0);
   for (const tri::VertexId v : triangulation.all_vertices()) {

@@ -15,9 +15,9 @@ namespace terrace::terrain {
 /// Peak bytes per vertex that changing heights takes, beside the mesh.
 std::uint64_t height_bytes_per_vertex(const HeightOptions& options);
 
-/// The heights in real units by the slot of the vertex. Of points of equal x and y only the one
-/// that stands for the vertex has a say. Throws: stream::Error on a damaged overlay, or where it
-/// can not be written; std::invalid_argument where smoothing leaves the range of doubles.
+/// The heights in real units by the slot of the vertex. Of points with equal x and y only the one
+/// that stands for the vertex counts. Throws: stream::Error on a damaged overlay, or where it
+/// cannot be written; std::invalid_argument where smoothing leaves the range of doubles.
 template <class Coord>
 std::vector<double> changed_heights(const tri::Multiresolution2<Coord>& model,
                                     const stream::Placement& placement,

@@ -9,17 +9,17 @@
 namespace terrace::terrain {
 
 /// True if the mesh is seen from above without overlap: nearly all triangles, seen along z, turn
-/// the same way. A cloud of points is none.
+/// the same way. False for a cloud of points.
 bool is_height_field(const TriangleMesh& mesh);
 
 /// Whether more than half of the surface is steeper than 60 degrees: triangles between the upper
 /// and the lower side of a body that was triangulated as if it were a terrain.
 bool mostly_steep(const TriangleMesh& mesh);
 
-/// What of `heights`, one per vertex, the surface shows: a sample of about 100,000 that is even
-/// over its area (with `flat` as seen from above), so that parts with small triangles count no more
-/// than others of their size. Of a cloud out of a store: even over the parts of space that have
-/// points; of other clouds: over the points. O(triangles + points).
+/// A sample of about 100,000 of `heights` (one per vertex), even over the area of the surface (with
+/// `flat` as seen from above), so that dense parts count no more than others. For a cloud out of a
+/// store: even over the parts of space that have points; for other clouds: over the points.
+/// O(triangles + points).
 std::vector<double> shown_heights(const TriangleMesh& mesh, const std::vector<double>& heights,
                                   bool flat);
 

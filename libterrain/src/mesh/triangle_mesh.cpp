@@ -56,7 +56,7 @@ void append_points(TriangleMesh& mesh, const stream::Schema& schema,
     };
     if (red && green && blue) {
       const auto share = [&](std::size_t column) {
-        // 16-bit colours are told by their type; what is stored as a float is 0 to 255.
+        // The type tells 16-bit colours apart; floats range from 0 to 255.
         const bool wide = schema.attributes[column].type == stream::ScalarType::u16;
         return clamped<std::uint16_t>(wide ? value(column) : value(column) * 257);
       };

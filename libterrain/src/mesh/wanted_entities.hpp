@@ -12,11 +12,10 @@
 
 namespace terrace::terrain {
 
-/// Visits what `detail` wants of a store of entities, clusters in the order of for_each_wanted():
-/// the record of each, and its corners in the CRS, to the last bit where the store's coordinates
-/// are the CRS's. An entity is where its first corner is.
-/// Throws: stream::Error on a damaged store, and when there are more than fit into memory_bytes at
-/// bytes_each.
+/// Visits the entities of a store that `detail` wants, clusters in the order of for_each_wanted():
+/// the record of each, and its corners in the CRS, bit for bit where the store's coordinates are
+/// the CRS's. The first corner is the place of an entity. Throws: stream::Error on a damaged store,
+/// and when there are more than fit into memory_bytes at bytes_each.
 void for_each_wanted_entity(
     const stream::Store& store, const Detail& detail, std::uint64_t memory_bytes,
     std::size_t bytes_each,

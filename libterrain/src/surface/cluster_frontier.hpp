@@ -15,7 +15,7 @@
 namespace terrace::terrain {
 
 /// The way down into a store's clusters, step by step: which have been read, and the boxes of all
-/// that have not. Whatever a box of open() does not meet holds no point that is still missing.
+/// that have not. Where no box of open() reaches, no point is missing.
 class ClusterFrontier {
  public:
   /// A cluster that was not read; its box holds all points below it too.
@@ -52,7 +52,7 @@ class ClusterFrontier {
 
   void read_one(std::size_t at, const Take& take);
   void add_below(const stream::StoreQuery::Node& node);
-  /// Takes empty boxes off: all that is below has the x,y of the head. False: nothing is left.
+  /// Skips boxes that are one point: all below has the x,y of the head. False if none is left.
   bool settle(Open& open) const;
 
   stream::StoreQuery reader_;

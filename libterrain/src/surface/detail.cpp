@@ -36,7 +36,8 @@ bool Detail::reaches_into(const Region& there, const stream::Box3& world_box) co
 
 namespace {
 
-/// Walks down the levels and remembers which clusters the points on its way head.
+/// Walks down the levels and collects the clusters that the points on the way head. Unlike
+/// stream::StoreQuery it reads whole records, and wanted levels in file order.
 class Descent {
  public:
   using Visit = std::function<void(stream::ClusterId, const stream::ClusterRecord&,
@@ -78,8 +79,8 @@ class Descent {
     }
   }
 
-  /// Whether points of a cluster of level 0 may meet the condition. What lies above is read for
-  /// what it heads, whatever its points are.
+  /// Whether points of a cluster of level 0 may meet the condition. Clusters above are read in any
+  /// case, for the clusters that they head.
   [[nodiscard]] bool possible(stream::ClusterId id, const stream::ClusterRecord& record) const {
     return !detail_.where || stream::level_of(id) > 0 ||
            detail_.where->possible(world_box(placement_, record.summary.box),

@@ -2,30 +2,55 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include <terrace/stream/store.hpp>
 
-#include "surface/filled_grid.hpp"
 #include "surface/store_window.hpp"
 
 namespace terrace::terrain {
 
-/// Heights everywhere, from those around: for cells of a raster that have no data, and for places
-/// that no surface through irregular points reaches. It depends on the store alone and is the same
-/// from whichever window it is asked.
+/// A grid of means with gaps that are filled from those around: a smooth surface made by averaging
+/// upward and filling downward over halved grids (S. J. Gortler et al., The Lumigraph, 1996,
+/// doi:10.1145/237170.237200, "pull-push").
+class FilledGrid {
+ public:
+  /// sum, weight: by rows, columns * rows of each; a cell without weight is a gap. Requires a cell
+  /// with weight.
+  FilledGrid(std::size_t columns, std::size_t rows, std::vector<double> sum,
+             std::vector<double> weight);
+
+  /// Bilinear between the centres of cells; x, y in cells, the first cell's centre at 0.5. Outside
+  /// the grid the height at its border.
+  [[nodiscard]] double height(double x, double y) const;
+
+  /// A hash of what height() depends on from `first` to `last`, inclusive: grids of equal size with
+  /// equal hashes have equal heights there.
+  [[nodiscard]] std::uint64_t digest(const std::array<double, 2>& first,
+                                     const std::array<double, 2>& last) const;
+
+ private:
+  std::size_t columns_ = 0, rows_ = 0;
+  std::vector<float> heights_;
+};
+
+/// Heights everywhere, interpolated from those around: for cells of a raster without data, and for
+/// places beyond the hull of irregular points. Depends on the store alone.
 class StoreFill {
  public:
-  /// Reads one level of the store. Memory: at most 20 MiB, 4 MiB of them to stay.
+  /// Reads one level of the store. Memory: at most 20 MiB, then 4 MiB.
   /// Throws: stream::Error on a damaged store, or if nothing in it has a height.
   explicit StoreFill(const stream::Store& store);
 
-  /// The height at stored x, y in the vertical unit of the store. Far outside that of the border.
+  /// The height at stored x, y in the vertical unit of the store. Far outside it is the height at
+  /// the border.
   [[nodiscard]] double height(double x, double y) const;
 
-  /// A number of what height() depends on for places in the box, borders included: of two rasters
-  /// of equal size with the same number it gives the same there.
+  /// A hash of what height() depends on in the closed box: rasters of equal size with equal hashes
+  /// have equal heights there.
   [[nodiscard]] std::uint64_t digest(const StoredBox& box) const;
 
  private:

@@ -12,8 +12,7 @@
 #include <terrace/stream/store.hpp>
 #include <terrace/stream/store_query.hpp>
 
-/// Parts of a store at full resolution, or at a level: what works on a store window by window reads
-/// through this.
+/// Parts of a store at full resolution or at a level, for work that goes window by window.
 
 namespace terrace::terrain {
 
@@ -54,7 +53,7 @@ inline stream::Box3 tall(const StoredBox& box) {
   return {{box.min[0], box.min[1], -kFar}, {box.max[0], box.max[1], kFar}};
 }
 
-/// Between which heights the points in a box lie, as the index tells it without reading them.
+/// Bounds on the heights of the points in a box, from the index alone.
 struct ClusterHeights {
   double low = 0.0, high = 0.0;      ///< stored; of all clusters that reach into the box
   std::vector<stream::Point3> some;  ///< a few of the points in the box, if some were on the way

@@ -22,8 +22,6 @@
 #include "version.hpp"
 
 namespace terrace::tools {
-
-using namespace terrain;
 namespace {
 
 constexpr int kDone = 0;
@@ -61,7 +59,7 @@ const Verb& find_verb(const std::string& name) {
   throw UsageError("there is no verb '" + name + "'; `terrace --help` lists them");
 }
 
-/// parse(text), with the option's name before what it throws.
+/// parse(text), with the option's name in front of the message of an error.
 template <class Parse>
 std::uint64_t value_of_option(const std::string& name, const std::string& text,
                               const Parse& parse) {
@@ -151,8 +149,8 @@ int run_verb(const Verb& verb, std::vector<std::string> arguments) {
   const Summary summary = command->run(common);
   try {
     if (common.json) {
-      // A file's name or text in it may be no UTF-8, and what a terminal obeys is escaped with
-      // all that is not ASCII.
+      // File names and texts in files may not be UTF-8. Escaping all that is not ASCII also escapes
+      // what a terminal would obey.
       constexpr auto kReplace = nlohmann::ordered_json::error_handler_t::replace;
       print_result(summary.json.dump(-1, ' ', true, kReplace) + '\n');
     } else if (summary.text_is_result) {
@@ -161,7 +159,7 @@ int run_verb(const Verb& verb, std::vector<std::string> arguments) {
       print_lines(summary.text);
     }
   } catch (const stream::ClosedPipe&) {
-    // Nobody wants to read the summary; what it would have said still is the exit code.
+    // Nobody reads the summary; the exit code still counts.
   }
   return summary.exit_code;
 }
@@ -186,7 +184,7 @@ int dispatch(const std::vector<std::string>& arguments) {
   return run_verb(find_verb(first), {arguments.begin() + 1, arguments.end()});
 }
 
-/// What went wrong, for people: texts of the standard library say little to them.
+/// The message for people; those of the standard library are of little use to them.
 std::string message_of(const std::exception& error) {
   if (dynamic_cast<const std::bad_alloc*>(&error) != nullptr) {
     return "out of memory; give a smaller --memory or a smaller input";
@@ -308,7 +306,7 @@ int run_command_line(int argc, const char* const* argv) {
     print_message(error.what());
     return kInterrupted;
   } catch (const std::exception& error) {
-    // A wait that Ctrl-C ended, or a read or write that the signal cut short, is not a fault.
+    // A wait, read or write that Ctrl-C cut short is not a failure.
     if (interrupted()) {
       print_message("interrupted; run the same command again to start anew");
       return kInterrupted;

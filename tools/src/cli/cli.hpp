@@ -9,8 +9,10 @@
 #include <span>
 #include <string>
 
+#include <nlohmann/json.hpp>
+
+#include "base/stopwatch.hpp"
 #include "cli/progress.hpp"
-#include "cli/summary.hpp"
 #include "terrace/stream/source.hpp"
 #include "terrace/terrain/context.hpp"
 
@@ -19,12 +21,30 @@ class App;
 class Option;
 }  // namespace CLI
 
-/// The frame of the command line: the table of verbs, the options that all of them have, and what
-/// becomes of errors. A verb is one file, verb_NAME.cpp, with one Command.
+/// The frame of the command line: the table of verbs, their common options, and the reporting of
+/// errors. A verb is one file, verb_NAME.cpp, with one Command.
 
 namespace terrace::tools {
 
-/// What every verb understands.
+using namespace terrain;
+
+/// How a verb ends: one JSON object for programs (plain numbers, SI units, bytes, seconds) and a
+/// text for people. With --json the object goes to standard output; else the text to standard
+/// error, or to standard output where it is what was asked for (`info`).
+struct Summary {
+  nlohmann::ordered_json json = nlohmann::ordered_json::object();
+  std::string text;  ///< lines, each ended by '\n'
+  bool text_is_result = false;
+  int exit_code = 0;  ///< 1 where a check found a fault
+
+  /// Adds what the work cost: "seconds" and "peak_rss_bytes".
+  void add_cost(const Stopwatch& watch);
+};
+
+/// Largest resident set of this process so far.
+std::uint64_t peak_rss_bytes();
+
+/// The options that every verb has.
 struct CommonOptions {
   unsigned threads = 1;                       ///< --threads; all cores unless given
   std::optional<std::uint64_t> memory_bytes;  ///< --memory, if given
@@ -35,7 +55,7 @@ struct CommonOptions {
   bool force = false;                         ///< --force
   ProgressMode progress = ProgressMode::automatic;
 
-  /// --memory, or else what the verb grants itself: `standard`; 0 means half of what there is.
+  /// --memory, or else the verb's default `standard`; 0 stands for half of the available memory.
   [[nodiscard]] std::uint64_t memory_or(std::uint64_t standard) const;
   /// What a source may hold, one part in `parts` of memory_or(0) without the program itself: 64 MiB
   /// at least, from where on the order of a raster's cells does not depend on it.
@@ -44,7 +64,7 @@ struct CommonOptions {
   void say(const std::string& line) const;
   /// An explanation; only with -v.
   void explain(const std::string& line) const;
-  /// What the libraries are given: progress and notes go to standard error, Ctrl-C asks to stop.
+  /// The context for the libraries: progress and notes go to standard error, Ctrl-C asks to stop.
   /// These options must outlive it.
   [[nodiscard]] terrain::Context context() const;
 };
@@ -71,17 +91,17 @@ struct Verb {
   std::unique_ptr<Command> (*create)() = nullptr;  ///< nullptr: not available yet
 };
 
-/// All verbs of the contract, those that are not available yet among them.
+/// All verbs, including those that are not available yet.
 std::span<const Verb> verbs();
 
-/// Options of the contract that do not work yet: refused with exit 2, hidden from the help.
+/// Options that are not available yet: refused with exit 2, hidden from the help.
 void not_yet(CLI::App& app, std::initializer_list<const char*> names);
 
-/// The numbers that an option takes: finite, and not outside these.
+/// The finite numbers that an option takes.
 struct NumberRange {
   double least = -std::numeric_limits<double>::infinity();
   double most = std::numeric_limits<double>::infinity();
-  bool above_least = false;  ///< the least itself is outside
+  bool above_least = false;  ///< excludes `least`
 };
 inline constexpr NumberRange kAboveZero{.least = 0.0, .above_least = true};
 inline constexpr NumberRange kNotNegative{.least = 0.0};
@@ -89,14 +109,14 @@ inline constexpr NumberRange kNotNegative{.least = 0.0};
 inline constexpr NumberRange kFactor{.least = 1e-12, .most = 1e12};
 inline constexpr NumberRange kFactorOrZero{.least = 0.0, .most = 1e12};
 
-/// The one way in which an option takes a real number. `value` is its default, shown in the help.
+/// Adds an option that takes a real number. `value` is its default, shown in the help.
 CLI::Option* add_number(CLI::App& app, const std::string& name, double& value,
                         const std::string& description, const NumberRange& range = {});
 /// Without a default.
 CLI::Option* add_number(CLI::App& app, const std::string& name, std::optional<double>& value,
                         const std::string& description, const NumberRange& range = {});
 
-/// parse_count() for an option, which its UsageError names.
+/// parse_count() for an option; its UsageError names the option.
 std::uint64_t count_of_option(const std::string& name, const std::string& text);
 
 /// The option -o, --output: required, kept in `target`.
@@ -106,7 +126,7 @@ CLI::Option* add_output(CLI::App& app, std::string& target, const std::string& d
 CLI::Option* add_heights_of_colour(CLI::App& app, stream::HeightsOfColour& target);
 /// --skip-damaged, of laser data.
 CLI::Option* add_skip_damaged(CLI::App& app, bool& target);
-/// --cell, the size of cells of rasters that do not say it.
+/// --cell, the cell size of rasters without georeferencing.
 CLI::Option* add_cell_of_source(CLI::App& app, std::optional<double>& target);
 
 /// Runs the command line and returns the exit code. Never throws.

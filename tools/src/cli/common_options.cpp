@@ -1,20 +1,38 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
+#include <fstream>
 #include <memory>
 #include <optional>
+
+#include <sys/resource.h>
 
 #include "cli/cli.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/option_names.hpp"
 #include "cli/terminal.hpp"
 
-// Apart from the command line, which needs all verbs: libraries of the tools speak by these.
+// Apart from cli.cpp, which needs all verbs.
 namespace terrace::tools {
 
-using namespace terrain;
+std::uint64_t peak_rss_bytes() {
+  // ru_maxrss is the last resort: it survives exec and so includes the caller's.
+  std::ifstream status("/proc/self/status");
+  for (std::string word; status >> word;) {
+    std::uint64_t kibibytes = 0;
+    if (word == "VmHWM:" && status >> kibibytes) return kibibytes * 1024;
+  }
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
+}
+
+void Summary::add_cost(const Stopwatch& watch) {
+  json["seconds"] = watch.seconds();
+  json["peak_rss_bytes"] = peak_rss_bytes();
+}
 
 std::uint64_t CommonOptions::memory_or(std::uint64_t standard) const {
-  return terrain::Context{.memory_bytes = memory_bytes}.memory_or(standard);
+  return Context{.memory_bytes = memory_bytes}.memory_or(standard);
 }
 
 std::uint64_t CommonOptions::reading_memory(std::uint64_t parts) const {
@@ -31,9 +49,9 @@ void CommonOptions::explain(const std::string& line) const {
   if (verbose && !quiet) print_message(line);
 }
 
-terrain::Context CommonOptions::context() const {
+Context CommonOptions::context() const {
   const auto show = [mode = progress, meter = std::make_shared<std::optional<ProgressMeter>>()](
-                        const terrain::Progress& now) {
+                        const Progress& now) {
     if (now.ended) {
       meter->reset();
     } else {

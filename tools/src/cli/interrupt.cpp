@@ -7,6 +7,7 @@
 #include <csignal>
 #include <cstdlib>
 #include <future>
+#include <new>
 #include <system_error>
 #include <thread>
 #include <utility>
@@ -15,6 +16,7 @@
 #include <unistd.h>
 
 #include "cli/terminal.hpp"
+#include "terrace/stream/error.hpp"
 
 namespace terrace::tools {
 namespace {
@@ -26,7 +28,7 @@ volatile std::sig_atomic_t stop_requested = 0;
 std::array<int, 2> wake_pipe{-1, -1};
 
 extern "C" void on_stop_signal(int signal) {
-  // A second Ctrl-C means it: the default action ends the process.
+  // A second Ctrl-C takes the default action, which ends the process.
   if (stop_requested != 0) {
     std::signal(signal, SIG_DFL);
     ::raise(signal);
@@ -38,10 +40,10 @@ extern "C" void on_stop_signal(int signal) {
   errno = error;
 }
 
-/// Passes the signal on to `stop`. Without a thread only loops that look at the flag end.
+/// Passes the signal on to `stop`. If no thread can be started, only loops that poll the flag end.
 void watch_for_signals(const std::stop_source& stop) {
   if (wake_pipe[0] < 0) return;
-  // Signals shall cut short what the other threads wait in, not this one.
+  // Signals are to interrupt system calls of the other threads, not of this one.
   sigset_t all, before;
   sigfillset(&all);
   pthread_sigmask(SIG_SETMASK, &all, &before);
@@ -57,6 +59,26 @@ void watch_for_signals(const std::stop_source& stop) {
   pthread_sigmask(SIG_SETMASK, &before, nullptr);
 }
 
+void run_interruptible(const std::function<void()>& work) {
+  std::packaged_task<void()> task(work);
+  std::future<void> done = task.get_future();
+  std::thread worker;
+  try {
+    worker = std::thread(std::move(task));
+  } catch (const std::system_error&) {
+    return work();  // the system grants no thread: Ctrl-C ends what looks for it
+  }
+  using namespace std::chrono_literals;
+  while (done.wait_for(50ms) != std::future_status::ready) {
+    if (!interrupted() || done.wait_for(1s) == std::future_status::ready) continue;
+    print_message(kStopped);
+    // Not exit(): the worker would still run during the destructors.
+    std::_Exit(130);
+  }
+  worker.join();
+  done.get();
+}
+
 }  // namespace
 
 void install_signal_handlers() {
@@ -70,7 +92,7 @@ void install_signal_handlers() {
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
   std::signal(SIGPIPE, SIG_IGN);
-  // Beyond a file size limit, writes shall fail with an error that can be told to the user.
+  // Beyond a file size limit, writes fail with an error that can be reported.
   std::signal(SIGXFSZ, SIG_IGN);
 }
 
@@ -94,24 +116,18 @@ stream::Store open_store(const std::filesystem::path& path) {
   return stream::Store::open(path).with_stop(stop_token());
 }
 
-void run_interruptible(const std::function<void()>& work) {
-  std::packaged_task<void()> task(work);
-  std::future<void> done = task.get_future();
-  std::thread worker;
+void call_library(const std::string& file, const std::string& method,
+                  const std::function<void()>& work) {
   try {
-    worker = std::thread(std::move(task));
-  } catch (const std::system_error&) {
-    return work();  // the system grants no thread: Ctrl-C ends what looks for it
+    run_interruptible(work);
+  } catch (const std::invalid_argument& error) {
+    throw stream::Error({.file = file, .where = {}, .cause = error.what(), .remedy = {}});
+  } catch (const std::bad_alloc&) {
+    throw stream::Error({.file = file,
+                         .where = {},
+                         .cause = "does not fit into memory with method " + method,
+                         .remedy = "take fewer points, or another method"});
   }
-  using namespace std::chrono_literals;
-  while (done.wait_for(50ms) != std::future_status::ready) {
-    if (!interrupted() || done.wait_for(1s) == std::future_status::ready) continue;
-    print_message(kStopped);
-    // Not exit(): the worker would go on beneath the destructors.
-    std::_Exit(130);
-  }
-  worker.join();
-  done.get();
 }
 
 }  // namespace terrace::tools

@@ -17,7 +17,7 @@ class Interrupted : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// From here on SIGINT and SIGTERM only ask to stop (the second one ends the process at once), and
+/// From then on SIGINT and SIGTERM only ask to stop (the second one ends the process at once), and
 /// a closed pipe is an error of the write instead of a signal.
 void install_signal_handlers();
 
@@ -27,16 +27,18 @@ void install_signal_handlers();
 /// Throws Interrupted if the user has asked to stop. Loops call it once per block.
 void check_interrupt();
 
-/// A store whose reading ends by it, with stream::Stopped. Throws: as stream::Store::open.
+/// A store whose reading throws stream::Stopped once the user has asked to stop. Throws: as
+/// stream::Store::open.
 [[nodiscard]] stream::Store open_store(const std::filesystem::path& path);
 
-/// The same request for what waits: reading and writing pipes ends with stream::Stopped.
+/// The same request as a token: reading and writing pipes ends with stream::Stopped.
 [[nodiscard]] std::stop_token stop_token();
 
-/// Calls `work` on a thread of its own and returns when it is done; what it throws comes out. If
-/// the user asks to stop and the work does not end by itself within a second (it calls
-/// check_interrupt() now and then, or it does not), the process ends here with a message and exit
-/// code 130. So `work` must not be writing anything.
-void run_interruptible(const std::function<void()>& work);
+/// Does long work of a library on points in memory. `work` runs on a thread of its own; if the user
+/// asks to stop and it does not end by itself within a second, the process ends here with a message
+/// and exit code 130, so it must not be writing anything. Exceptions are rethrown,
+/// std::invalid_argument and std::bad_alloc as a stream::Error that names the file.
+void call_library(const std::string& file, const std::string& method,
+                  const std::function<void()>& work);
 
 }  // namespace terrace::tools

@@ -6,12 +6,9 @@
 
 #include "base/file_marks.hpp"
 #include "cli/cli.hpp"
-#include "cli/summary.hpp"
 #include "terrace/stream/point_writer.hpp"
 
 namespace terrace::tools {
-
-using namespace terrain;
 
 /// How tables of the command begin: formats without room for a comment.
 inline constexpr std::string_view kPairsHead = "a,b,distance";
@@ -28,21 +25,20 @@ inline constexpr std::string_view kDendrogramHead = "a,b,height,size";
 /// it.
 bool written_by_terrace(const std::string& path);
 
-/// A CRS for the header of points: with WKT 1, which LAS asks for. What is wrong with a CRS keeps
-/// no points from being written: it stays as it is recorded.
+/// A CRS for the header of points: with WKT 1, which LAS asks for. A CRS that cannot be
+/// interpreted is written as it is recorded.
 stream::Crs crs_to_write(const stream::Crs& recorded);
 
-/// Says in the summary of a verb if coordinates were moved to fit the file's format.
+/// Reports in the summary if coordinates were rounded to fit the file's format.
 void tell_rounding(const stream::PointWriter& writer, Summary& summary);
 
-/// Whether the output `path` may be written, to be asked before the work begins. Returns the
-/// writers' `replace`: true if a file is there, or where a link leads, and --force says to replace
-/// it. Throws: stream::Error if something is there and `force` is false, or if it is no file of
+/// Checks, before the work begins, that the output `path` may be written. Returns the writers'
+/// `replace`: true if there is a file, or where a link leads, and --force allows to replace it.
+/// Throws: stream::Error if something is there and `force` is false, or if it is not a file of
 /// ours.
 bool may_replace(const std::string& path, bool force);
 
-/// For a file of points at `path`, which may be written: as may_replace(). format: as the user
-/// named it, or empty.
+/// Options for a file of points at `path`, after may_replace(). format: the user's, or empty.
 stream::WriterOptions point_writer_options(const std::string& path, const std::string& format,
                                            const CommonOptions& common);
 

@@ -13,8 +13,8 @@ enum class ProgressMode : std::uint8_t {
   none,
 };
 
-/// Shows how far the work has come, on standard error, at most ten times a second: rate, share done
-/// and time left. The line is gone when the object is.
+/// Shows progress on standard error, at most ten times a second: rate, share done and time left.
+/// The destructor removes the line.
 class ProgressMeter {
  public:
   /// what: what is counted, as in "points".

@@ -19,7 +19,7 @@ unsigned char byte_at(std::string_view text, std::size_t i) {
   return i < text.size() ? static_cast<unsigned char>(text[i]) : 0;
 }
 
-/// Bytes of the UTF-8 character (RFC 3629) that `text` begins with, 0 if it begins with none.
+/// The length of the UTF-8 character (RFC 3629) at the start of `text`; 0 if it is not valid.
 std::size_t character_length(std::string_view text, std::uint32_t& code) {
   const unsigned char first = byte_at(text, 0);
   if (first < 0x80) {
@@ -89,8 +89,8 @@ void secure_standard_descriptors() noexcept {
   constexpr std::array<int, 3> kModes{O_WRONLY, O_RDONLY, O_RDONLY};
   for (int descriptor = 0; descriptor < 3; ++descriptor) {
     if (::fcntl(descriptor, F_GETFD) >= 0 || errno != EBADF) continue;
-    // The lowest number that is free is the one that is missing. A folder cannot be read or written
-    // either, where there is no /dev/null.
+    // open() returns the lowest free number, which is the missing one. Without /dev/null a folder
+    // serves: it cannot be read or written either.
     if (::open("/dev/null", kModes[static_cast<std::size_t>(descriptor)]) < 0 &&
         ::open("/", O_RDONLY | O_DIRECTORY) < 0) {
       ::_exit(1);

@@ -9,8 +9,6 @@
 #include "base/vector.hpp"
 
 namespace terrace::tools {
-
-using namespace terrain;
 namespace {
 
 /// Neither snow nor shadow.

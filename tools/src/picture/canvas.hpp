@@ -46,7 +46,7 @@ class Canvas {
 struct Light {
   stream::Point3 direction{};  ///< toward the light, unit length
   double relief = 1.0;         ///< slopes are multiplied by this before they are lit
-  double flat = 0.0;           ///< what a surface facing `bright` receives is made 1
+  double flat = 0.0;           ///< the light on flat ground, which is shown as 1
 
   /// Cartographic light from the north-west, 45 degrees high, turned with the viewer.
   static Light for_terrain(const ViewDirection& view, double relief);

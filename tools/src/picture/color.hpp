@@ -19,7 +19,7 @@ Rgb sea_colour(double share);
 Rgb slope_colour(double degrees);
 /// Colours that differ well for small numbers: levels, classes, clusters.
 Rgb category_colour(std::int64_t category);
-/// The same for clusters, whose numbers say nothing of who lies beside whom: scattered. Negative
+/// The same for clusters, scattered, because consecutive numbers are not neighbours. Negative
 /// numbers, points without a cluster, are light grey.
 Rgb cluster_colour(std::int64_t cluster);
 

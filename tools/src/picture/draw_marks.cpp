@@ -8,8 +8,6 @@
 #include "picture/draw.hpp"
 
 namespace terrace::tools {
-
-using namespace terrain;
 namespace {
 
 /// Whether all of a disc is behind what has been drawn. One sample that is not will do: on a steep
@@ -34,7 +32,7 @@ bool is_hidden(Canvas& canvas, double cx, double cy, double radius, double depth
 void draw_marks(const std::vector<stream::Point3>& positions, const Camera& camera,
                 const DrawOptions& options, Canvas& canvas) {
   if (positions.empty()) return;
-  // As large as can be told apart, up to a few pixels.
+  // As large as they can be without merging, up to a few pixels.
   const double share =
       static_cast<double>(canvas.width()) * canvas.height() / static_cast<double>(positions.size());
   const double radius = std::clamp(0.14 * std::sqrt(share), 1.0, 8.0);

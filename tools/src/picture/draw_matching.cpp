@@ -10,8 +10,6 @@
 #include "tables/matching_result.hpp"
 
 namespace terrace::tools {
-
-using namespace terrain;
 namespace {
 
 using Colour = std::array<float, 3>;
@@ -29,7 +27,7 @@ class Brush {
               const Colour& colour) {
     const double reach = radius + 0.5;
     const double dx = b[0] - a[0], dy = b[1] - a[1], square = dx * dx + dy * dy;
-    // What is no number, or far beyond the picture, is not drawn.
+    // NaN and places far beyond the picture are not drawn.
     if (!(square < 1e18 && std::abs(a[0]) + std::abs(a[1]) < 1e9)) return;
     const double top = std::max(std::floor(std::min(a[1], b[1]) - reach), double{0.0} + first_);
     const double bottom = std::min(std::ceil(std::max(a[1], b[1]) + reach), double{0.0} + last_);

@@ -13,15 +13,13 @@
 #include "picture/draw.hpp"
 
 namespace terrace::tools {
-
-using namespace terrain;
 namespace {
 
 struct Splat {
   float x, y, depth, radius;
 };
 
-/// What the samples show, beside the canvas: radii of the discs, 0 where there is none.
+/// Per sample, beside the canvas: the radius of the disc, 0 where there is none.
 using Radii = std::vector<float>;
 
 /// A surface steeper than this, from sample to sample, is taken for two surfaces.
@@ -63,7 +61,7 @@ void set_radii(const TriangleMesh& cloud, const Camera& camera, const Canvas& ca
   // apart, less.
   const double scattered = 1.34 * std::sqrt(std::numbers::pi / kRank);
   const double apart = 0.8 * std::sqrt(std::numbers::pi / kRank);
-  // What covers a tenth of the picture tells nothing of a shape.
+  // Discs that cover a tenth of the picture show no shape.
   const double most = std::max(1.0, 0.1 * std::min(canvas.width(), canvas.height()));
   std::array<std::vector<std::uint32_t>, 256> groups;
   for (std::size_t i = 0; i < splats.size(); ++i) {
@@ -89,7 +87,7 @@ void set_radii(const TriangleMesh& cloud, const Camera& camera, const Canvas& ca
 }
 
 /// Averages depths over a square somewhat larger than the disc, only over neighbours whose depth is
-/// no jump away: normals of discs would else be those of the discs. Rows, then columns.
+/// not a jump away: else the normals would be those of the discs. Rows, then columns.
 void smooth_depths(Canvas& canvas, const Radii& radii, const Camera& camera, unsigned threads) {
   const auto width = static_cast<int>(canvas.width()), height = static_cast<int>(canvas.height());
   std::vector<float> other(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
@@ -183,7 +181,7 @@ void draw_points(const TriangleMesh& cloud, const std::vector<Rgb>& colours, con
   if (splats.empty()) return;
   // Discs of radius r cover all but exp(-points * pi * r^2 / area) of an area over which so many
   // points are scattered evenly. Of a closed body half of the points lie behind the other half, so
-  // that this leaves half a percent there, and nothing of a terrain.
+  // half a percent of it stays uncovered, and nothing of a terrain.
   constexpr double kCover = 1.9;
   const double per_point = covered_area(splats, canvas) / static_cast<double>(splats.size());
   const auto usual = static_cast<float>(std::clamp(kCover * std::sqrt(per_point), 1.0, 60.0));

@@ -10,21 +10,19 @@
 
 #include <CLI/CLI.hpp>
 
-#include "cli/detail_options.hpp"
 #include "cli/interrupt.hpp"
+#include "cli/option_values.hpp"
 #include "earth/ground.hpp"
-#include "picture/height_grid.hpp"
-#include "scan/surface_run.hpp"
+#include "mesh/height_grid.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/mesh_reader.hpp"
 #include "terrace/stream/source.hpp"
 #include "terrace/terrain/detail.hpp"
 #include "terrace/terrain/detail_mesh.hpp"
 #include "terrace/terrain/error.hpp"
+#include "terrace/terrain/scan_surface.hpp"
 
 namespace terrace::tools {
-
-using namespace terrain;
 namespace {
 
 /// Moves positions in stored coordinates to metres on the ground about their middle, and keeps the
@@ -43,8 +41,8 @@ void put_on_ground(PictureInput& input, const stream::Placement& placement, cons
   input.assumption = ground.assumption();
 }
 
-/// A mesh file says little of its CRS. x and y that could be degrees, beside heights that could not
-/// be any, are taken for longitude and latitude.
+/// Mesh files rarely name their CRS. x and y that could be degrees, beside heights that could not,
+/// are taken for longitude and latitude.
 bool looks_geographic(const stream::MeshFile& file) {
   for (const std::string& comment : file.info.comments) {
     if (comment.find("EPSG:4326") != std::string::npos) return true;
@@ -69,7 +67,7 @@ PictureInput from_mesh(stream::MeshFile file) {
   return input;
 }
 
-/// Bytes that a point of a cloud takes until it is drawn.
+/// Memory of a point of a cloud until it is drawn.
 constexpr std::uint64_t kPictureBytesPerPoint = 100;
 
 PictureInput from_source(const std::string& path, stream::HeightsOfColour colours,
@@ -183,7 +181,7 @@ PictureInput from_store(const std::string& path, const PictureSelection& selecti
   put_on_ground(input, world, ground);
   if (input.terrain || !mostly_steep(input.mesh)) return input;
   input = {};
-  input.mesh = surface_of_store(store, detail, {}, false, common.memory_or(0)).mesh;
+  input.mesh = scan_surface(store, detail, {}, common.context()).mesh;
   input.guess = "no height field: the surface is that of 'terrace surface'";
   put_on_ground(input, world, ground);
   return input;
@@ -212,14 +210,14 @@ PictureInput read_picture_input(const std::string& path, const PictureSelection&
   const std::uint64_t most_cells = 2 * size.width * size.height;
   const auto no_colours = [&] {
     if (selection.colours == stream::HeightsOfColour::none) return;
-    throw UsageError("'" + path + "' is no PNG: --rgb does not apply");
+    throw UsageError("'" + path + "' is not a PNG: --rgb does not apply");
   };
   if (std::filesystem::is_directory(path) || stream::Store::recover(path)) {
     no_colours();
     return from_store(path, selection, most_cells, common);
   }
   if (!selection.level.empty() || !selection.region.empty() || !selection.focuses.empty()) {
-    throw UsageError("'" + path + "' is no store: --level, --region and --focus do not apply");
+    throw UsageError("'" + path + "' is not a store: --level, --region and --focus do not apply");
   }
   if (auto file = stream::read_mesh(path, {.stop = stop_token()})) {
     no_colours();

@@ -10,11 +10,9 @@
 
 namespace terrace::tools {
 
-using namespace terrain;
-
 /// The part of an input that a picture shows.
 struct PictureSelection {
-  std::string level;   ///< empty: what a picture can show
+  std::string level;   ///< empty: as much as a picture can show
   std::string region;  ///< empty: everywhere
   std::vector<std::string> focuses;
   stream::HeightsOfColour colours = stream::HeightsOfColour::none;
@@ -28,9 +26,9 @@ void define_picture_input(CLI::App& app, PictureSelection& selection);
 struct PictureInput {
   TriangleMesh mesh;            ///< positions in metres about the middle of the whole
   std::vector<double> heights;  ///< of the vertices, in the source's unit
-  bool terrain = false;         ///< a height field for certain; else the mesh tells
-  std::string guess;            ///< what changes the picture and was guessed
-  std::string assumption;       ///< what had to be assumed of units
+  bool terrain = false;         ///< certainly a height field; else judged by the mesh
+  std::string guess;            ///< a guess that the picture depends on
+  std::string assumption;       ///< an assumption about units
 };
 
 /// Reads a store, a raster (reduced to about four cells per pixel), a mesh, or a cloud of points.

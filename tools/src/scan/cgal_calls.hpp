@@ -12,8 +12,8 @@
 
 namespace terrace::tools {
 
-/// Faces between the points, which are different and not all in one plane. With CGAL's defaults: 5
-/// for the bound of the ratio of radii, 0.52 radians for the bend at an edge.
+/// Faces between distinct points that are not all in one plane, with CGAL's defaults: a radius
+/// ratio bound of 5 and a beta of 0.52 radians.
 std::vector<std::array<std::uint32_t, 3>> advancing_front(std::span<const tri::Point3> points);
 
 /// alpha, offset > 0; at least one point.

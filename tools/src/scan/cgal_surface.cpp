@@ -20,7 +20,7 @@ namespace {
 
 using Sides = std::array<double, 3>;
 
-/// The sides of the points' box. Throws where CGAL's constructions could not bear the points.
+/// The sides of the points' box. Throws for coordinates that CGAL's constructions cannot handle.
 Sides checked_box(std::span<const tri::Point3> points) {
   constexpr double kLargest = 1e100, kSmallest = 1e-100;
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -55,7 +55,7 @@ Sides checked_box(std::span<const tri::Point3> points) {
 tri::RestoredSurface advancing_front_surface(std::span<const tri::Point3> points) {
   if (points.empty()) return {};
   checked_box(points);
-  // CGAL wants different points that span space.
+  // CGAL requires distinct points that span space.
   tri::Delaunay3<double> triangulation;
   const std::vector<tri::VertexId> vertices = triangulation.build(points);
   if (triangulation.tetrahedron_count() == 0) return {};

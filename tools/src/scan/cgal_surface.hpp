@@ -10,9 +10,9 @@
 namespace terrace::tools {
 
 /// CGAL's advancing front (D. Cohen-Steiner, F. Da, doi:10.1007/s00371-003-0217-z): smooth where
-/// samples are dense, manifold, open where there are none. Leaves out points. Components are turned
-/// so that their volume is positive. CGAL 5.5 breaks ties of equal radii by addresses in memory, so
-/// single faces can differ from run to run. No faces where all points are in one plane.
+/// samples are dense, manifold, open where there are none. May leave out points. Components are
+/// turned so that their volume is positive. CGAL 5.5 breaks ties of equal radii by addresses in
+/// memory, so single faces can differ from run to run. No faces where all points are in one plane.
 ///
 /// Throws std::invalid_argument as alpha_wrap_surface(). About 2 s per 100,000 points.
 tri::RestoredSurface advancing_front_surface(std::span<const tri::Point3> points);

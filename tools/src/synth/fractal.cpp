@@ -21,8 +21,8 @@ constexpr double kNoiseVariance = 1.0 / 6.0;
 constexpr double kRoundingStepVariance = 2.0 / 12.0;
 
 /// Adds the noise of lattice points first, first + 1, ... of one lattice row. 32-bit arithmetic, so
-/// that the compiler makes vectors of it; the mixing is C. Wellons' `lowbias32`, with the upper key
-/// put in between, so that rows are not shifted copies of one another.
+/// that the compiler can vectorise it; the mixing is C. Wellons' `lowbias32`, with the upper half
+/// of the key mixed in between, so that rows are not shifted copies of one another.
 void add_noise(std::uint64_t key, std::int64_t first, float amplitude, float* values,
                std::size_t count) {
   const auto low = static_cast<std::uint32_t>(key);

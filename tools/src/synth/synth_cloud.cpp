@@ -25,8 +25,7 @@ double random_unit(std::uint64_t seed, std::uint64_t n, std::uint64_t k) {
 /// The nearest multiple of 1/units.
 double rounded(double value, double units) { return std::nearbyint(value * units) / units; }
 
-/// A direction at random: the normalised sum of uniform numbers is not even on the sphere, but
-/// without any preferred side.
+/// A uniformly random direction, by rejection from the cube.
 stream::Point3 random_direction(std::uint64_t seed, std::uint64_t n) {
   stream::Point3 v{};
   double square = 0;
@@ -52,7 +51,7 @@ class CloudSurface : public Cloud {
       waves_[i].phase = 360 * random_unit(scramble(seed), i, 9);
       waves_[i].amplitude = 0.12 / cycles;
     }
-    // As dense as it takes for all points to find room; the last swath then ends a little early.
+    // Dense enough for all points; the last swath then ends a little early.
     spacing_ = std::sqrt(4 * kPi / static_cast<double>(std::max<std::uint64_t>(points, 8)));
     while (lay_swaths() < points) spacing_ *= 0.999;
   }

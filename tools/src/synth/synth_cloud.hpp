@@ -10,8 +10,8 @@
 
 namespace terrace::tools {
 
-/// A made-up cloud: the n-th point is a function of n and the seed alone, so points can be made in
-/// any order and by any number of threads. Coordinates are whole multiples of a unit (1 mm or
+/// A synthetic cloud: the n-th point is a function of n and the seed alone, so points can be made
+/// in any order and by any number of threads. Coordinates are whole multiples of a unit (1 mm or
 /// 10^-6), as the decimals of real scans are. The same doubles on every machine.
 class Cloud {
  public:
@@ -22,10 +22,10 @@ class Cloud {
 /// A scan of a bumpy closed surface of about 100 m radius: swaths of 500 points across, line by
 /// line around the body, each swath nearer to the other pole.
 std::unique_ptr<Cloud> make_surface(std::uint64_t points, std::uint64_t seed);
-/// Evenly at random in the unit cube.
+/// Uniform random points in the unit cube.
 std::unique_ptr<Cloud> make_uniform(std::uint64_t seed);
-/// Blobs of about 1000 points with bell-shaped density, one after the other, their centres at
-/// random in the unit cube, of different sizes.
+/// Blobs of about 1000 points with bell-shaped density, one after the other, of
+/// different sizes, with random centres in the unit cube.
 std::unique_ptr<Cloud> make_clusters(std::uint64_t points, std::uint64_t seed);
 
 /// A shuffled order of 0 ... size - 1 that needs no memory: a Feistel cipher on the next even
@@ -56,7 +56,7 @@ class DeliveryOrder {
  private:
   std::unique_ptr<Permutation> all_;
   std::vector<std::uint64_t> delivered_;  ///< place of each piece's first point in the delivery
-  std::vector<std::uint64_t> made_;       ///< and its number as made
+  std::vector<std::uint64_t> made_;       ///< its number in the order as made
 };
 
 }  // namespace terrace::tools

@@ -4,23 +4,18 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <condition_variable>
 #include <cstring>
-#include <exception>
 #include <filesystem>
 #include <limits>
-#include <mutex>
 #include <optional>
 #include <vector>
 
-#include "base/parallel.hpp"
+#include "base/ordered_work.hpp"
 #include "cli/interrupt.hpp"
 #include "terrace/stream/geotiff_writer.hpp"
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::tools {
-
-using namespace terrain;
 namespace {
 
 constexpr std::uint32_t kSynthTile = 256;
@@ -51,7 +46,7 @@ void to_samples(std::span<const float> heights, float base, Sample* samples) {
     if constexpr (std::is_same_v<Sample, float>) {
       samples[i] = base + heights[i];
     } else {
-      // Rounded by truncation of a positive number, which is what vectors of floats can do.
+      // Rounded by truncating a positive number, which can be vectorised.
       const float shifted = base + heights[i] + 32768.5F;
       samples[i] = static_cast<Sample>(static_cast<std::int32_t>(shifted) - 32768);
     }
@@ -61,7 +56,7 @@ void to_samples(std::span<const float> heights, float base, Sample* samples) {
 template <class Sample>
 void measure(const Sample* row, const Sample* row_above, std::size_t width,
              Statistics& statistics) {
-  // Eight sums side by side: the compiler may then use vectors, in an order that is fixed.
+  // Eight sums side by side, so that the compiler can vectorise them in a fixed order.
   std::array<double, 8> sums{};
   Sample low = row[0], high = row[0];
   const auto square = [](Sample a, Sample b) {
@@ -98,8 +93,9 @@ class Maker {
         columns_(static_cast<std::uint32_t>(options.size.width)),
         rows_(static_cast<std::uint32_t>(options.size.height)),
         writer_(path, writer_options(options)) {
-    // Each thread holds a piece as samples and some rows of lattices, about 48 bytes a column.
-    const std::uint64_t per_column = kSynthTile * sizeof(Sample) + 48;
+    // Each thread holds a piece as samples and some rows of lattices, about 48 bytes a column; two
+    // pieces more wait until they are written.
+    const std::uint64_t per_column = 3 * kSynthTile * sizeof(Sample) + 48;
     constexpr std::uint64_t kOverhead = 48u << 20;
     const std::uint64_t share =
         (std::max(options.memory_bytes, 2 * kOverhead) - kOverhead) / options.threads;
@@ -110,14 +106,28 @@ class Maker {
   }
 
   Statistics run() {
-    const auto threads = static_cast<unsigned>(std::min<std::uint64_t>(options_.threads, pieces_));
-    parallel_for(threads, threads, [this](unsigned, std::size_t) { work(); });
-    if (failure_) std::rethrow_exception(failure_);
+    Statistics all;
+    std::uint64_t cells = 0;
+    in_order(
+        pieces_, options_.threads, [this](unsigned, std::size_t i) { return make(piece(i)); },
+        [&](std::size_t i, const Made& made) {
+          check_interrupt();
+          const Piece p = piece(i);
+          write(p, made.tiles);
+          all.add(made.statistics);
+          cells += std::uint64_t{p.columns} * p.rows;
+          progress_(cells);
+        });
     writer_.commit();
-    return statistics_;
+    return all;
   }
 
  private:
+  struct Made {
+    std::vector<Sample> tiles;
+    Statistics statistics;
+  };
+
   static stream::GeoTiffOptions writer_options(const SynthDemOptions& options) {
     stream::GeoTiffOptions tiff;
     tiff.columns = static_cast<std::uint32_t>(options.size.width);
@@ -125,7 +135,7 @@ class Maker {
     tiff.sample.name = "height";
     tiff.sample.type =
         std::is_same_v<Sample, float> ? stream::ScalarType::f32 : stream::ScalarType::i16;
-    // Somewhere sensible: in the Alps, whether in UTM zone 32 or in degrees.
+    // In the Alps, whether in UTM zone 32 or in degrees.
     const double x = options.crs.geographic ? 8.0 : 400000.0;
     const double y = options.crs.geographic ? 47.0 : 5200000.0;
     const double c = options.cell;
@@ -149,55 +159,22 @@ class Maker {
     return p;
   }
 
-  /// Makes pieces until there are none. They are made in any order and written in theirs, so that
-  /// the file is the same for any number of threads.
-  void work() {
-    try {
-      std::vector<Sample> tiles;
-      for (;;) {
-        std::uint64_t number = 0;
-        {
-          const std::lock_guard lock(mutex_);
-          if (next_ == pieces_ || failure_) return;
-          number = next_++;
-        }
-        const Piece p = piece(number);
-        const Statistics statistics = make(p, tiles);
-        std::unique_lock lock(mutex_);
-        turn_.wait(lock, [&] { return written_ == number || failure_; });
-        if (failure_) return;
-        check_interrupt();
-        write(p, tiles);
-        statistics_.add(statistics);
-        cells_ += std::uint64_t{p.columns} * p.rows;
-        progress_(cells_);
-        ++written_;
-        turn_.notify_all();
-      }
-    } catch (...) {
-      const std::lock_guard lock(mutex_);
-      if (!failure_) failure_ = std::current_exception();
-      turn_.notify_all();
-    }
-  }
-
-  Statistics make(const Piece& p, std::vector<Sample>& tiles) const {
+  Made make(const Piece& p) const {
     constexpr std::size_t kTileSize = std::size_t{kSynthTile} * kSynthTile;
-    tiles.assign(p.tiles * kTileSize, Sample{});
+    Made made{std::vector<Sample>(p.tiles * kTileSize), {}};
     std::vector<Sample> row(p.columns), above(p.columns);
     Fractal::Rows rows(fractal_, p.first_column, p.columns);
-    Statistics statistics;
     for (std::uint32_t y = 0; y < p.rows; ++y) {
       to_samples(rows.row(p.first_row + y), base_, row.data());
-      measure(row.data(), y == 0 ? nullptr : above.data(), p.columns, statistics);
+      measure(row.data(), y == 0 ? nullptr : above.data(), p.columns, made.statistics);
       for (std::uint32_t t = 0; t < p.tiles; ++t) {
         const std::uint32_t width = std::min(kSynthTile, p.columns - t * kSynthTile);
-        std::memcpy(tiles.data() + t * kTileSize + std::size_t{y} * kSynthTile,
+        std::memcpy(made.tiles.data() + t * kTileSize + std::size_t{y} * kSynthTile,
                     row.data() + t * kSynthTile, width * sizeof(Sample));
       }
       row.swap(above);
     }
-    return statistics;
+    return made;
   }
 
   void write(const Piece& p, const std::vector<Sample>& tiles) {
@@ -217,12 +194,6 @@ class Maker {
   stream::GeoTiffWriter writer_;
   std::uint32_t piece_columns_ = kSynthTile, pieces_across_ = 1;
   std::uint64_t pieces_ = 0;
-
-  std::mutex mutex_;
-  std::condition_variable turn_;
-  std::uint64_t next_ = 0, written_ = 0, cells_ = 0;
-  Statistics statistics_;
-  std::exception_ptr failure_;
 };
 
 /// The RMS step of a small piece at the corner, before rounding.

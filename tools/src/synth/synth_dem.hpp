@@ -27,7 +27,7 @@ struct SynthDemOptions {
   bool replace = false;
 };
 
-/// What a fractal DEM is like.
+/// Measurements of a fractal DEM.
 struct SynthDemResult {
   std::uint64_t bytes = 0;
   double base = 0.0;  ///< mean height of the endless plane it is cut from

@@ -23,17 +23,14 @@ enum class ClusterMethod : std::uint8_t {
   complete,
 };
 
-/// The method of that name as on the command line; nothing for another name.
-std::optional<ClusterMethod> cluster_method_of(const std::string& name);
-
-/// What `terrace cluster` was asked to do with points on the ground.
+/// The request of `terrace cluster`, for points on the ground.
 struct ClusterRequest {
   ClusterMethod method = ClusterMethod::facility;
-  std::string strategy = "automatic";  ///< of facility
+  cluster::FacilityStrategy strategy = cluster::FacilityStrategy::automatic;  ///< of facility
   std::string iterations;  ///< of facility: tenth, log10, log2, a number; empty: by effort
   cluster::Effort effort = cluster::Effort::standard;
   std::size_t batch = 1;  ///< gains judged at once
-  std::size_t k = 0;      ///< clusters wanted; 0: not said
+  std::size_t k = 0;      ///< clusters wanted; 0: not given
   std::optional<double> height;
   std::optional<std::uint32_t> bound_iterations;  ///< of the lower bound; 0: none
   std::size_t restarts = 1;
@@ -53,8 +50,7 @@ struct ClusterOutcome {
   std::vector<std::string> notes;  ///< what the user should know
 };
 
-/// Called now and then with the share of the work that is done, where that is known; may throw to
-/// stop the work.
+/// Called now and then with the share of the work that is done, if known; may throw to stop.
 using ClusterProgress = std::function<void(double fraction)>;
 
 /// Clusters points. Throws: UsageError where options do not go together, std::invalid_argument on

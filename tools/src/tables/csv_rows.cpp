@@ -10,7 +10,7 @@
 namespace terrace::tools {
 namespace {
 
-/// What is no text may be one line of gigabytes.
+/// A binary file may be one line of gigabytes.
 constexpr std::size_t kLongestLine = 1000;
 
 }  // namespace

@@ -10,10 +10,10 @@
 
 namespace terrace::tools {
 
-/// The lines of a text file behind a first line that says what it is.
+/// The lines of a text file after a header that identifies it.
 class CsvRows {
  public:
-  /// Nothing for any file whose first line is another, and for what is no file.
+  /// nullopt if the first line is another, or if it is not a regular file.
   static std::optional<CsvRows> open(const std::string& path, std::string_view header);
 
   /// The next line that is not empty, without its end; false at the end of the file.
@@ -33,7 +33,7 @@ class CsvRows {
   std::uint64_t number_ = 0;
 };
 
-/// Takes the number at the beginning of `text`, and the comma behind it unless it is the last.
+/// Takes the number at the beginning of `text`, and the comma after it unless it is the last.
 template <class T>
 bool take_cell(std::string_view& text, T& value, bool last = false) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);

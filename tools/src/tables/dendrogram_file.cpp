@@ -12,8 +12,6 @@
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::tools {
-
-using namespace terrain;
 namespace {
 
 std::string row_text(const cluster::Merge& merge) {
@@ -50,7 +48,7 @@ std::optional<cluster::Dendrogram> read_dendrogram(const std::string& path) {
   };
   for (std::string_view line; rows->next(line);) {
     cluster::Merge merge{};
-    if (!parse_row(line, merge)) fail(rows->where(), "is no row of a dendrogram");
+    if (!parse_row(line, merge)) fail(rows->where(), "is not a row of a dendrogram");
     dendrogram.merges.push_back(merge);
     if (dendrogram.merges.size() >= cluster::kMostDendrogramPoints) {
       fail(rows->where(), "is one row too many");
@@ -58,7 +56,7 @@ std::optional<cluster::Dendrogram> read_dendrogram(const std::string& path) {
   }
   dendrogram.points = dendrogram.merges.size() + 1;
   const std::string fault = cluster::dendrogram_fault(dendrogram);
-  if (!fault.empty()) fail("", "is no dendrogram: " + fault);
+  if (!fault.empty()) fail("", "is not a dendrogram: " + fault);
   return dendrogram;
 }
 

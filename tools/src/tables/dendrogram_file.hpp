@@ -12,8 +12,9 @@ namespace terrace::tools {
 /// are the shortest decimals that read back as the same double. Throws: stream::Error.
 void write_dendrogram(const std::string& path, const cluster::Dendrogram& dendrogram, bool replace);
 
-/// The dendrogram in a file that begins with the line "a,b,height,size"; nothing for any other
-/// file. Throws: stream::Error, naming the line, if a row is no row or the rows are no dendrogram.
+/// The dendrogram in a file that begins with the line "a,b,height,size"; nullopt for any other
+/// file. Throws: stream::Error, naming the line, if a row is malformed or the rows do not form a
+/// dendrogram.
 std::optional<cluster::Dendrogram> read_dendrogram(const std::string& path);
 
 }  // namespace terrace::tools

@@ -7,6 +7,7 @@
 #include "base/units.hpp"
 #include "cli/interrupt.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/stream/sink.hpp"
 
 namespace terrace::tools {
 
@@ -37,7 +38,7 @@ std::vector<std::uint32_t> read_labels(const std::string& path, std::size_t poin
     if ((!number || label == kNoCluster) && line != "-1") {
       throw stream::Error({.file = path,
                            .where = where,
-                           .cause = "'" + line.substr(0, 40) + "' is no cluster number",
+                           .cause = "'" + line.substr(0, 40) + "' is not a cluster number",
                            .remedy = "write one whole number from 0 to 4294967294 per line, or -1 "
                                      "for a point in no cluster"});
     }
@@ -63,6 +64,17 @@ std::vector<std::uint32_t> read_labels(const std::string& path, std::size_t poin
                          .remedy = "give the labels of these points, in the order of the input"});
   }
   return labels;
+}
+
+void write_labels(const std::string& path, std::span<const std::uint32_t> labels, bool replace) {
+  std::string text;
+  for (const std::uint32_t label : labels) {
+    text += label == kNoCluster ? "-1" : std::to_string(label);
+    text += '\n';
+  }
+  stream::Sink file(path, replace, stop_token());
+  file.write(text);
+  file.commit();
 }
 
 }  // namespace terrace::tools

@@ -3,15 +3,19 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
 namespace terrace::tools {
 
-/// Reads one cluster number per line, as `cluster --labels` writes them: 0 and up, or -1 for points
-/// in no cluster, which all get one number of their own.
-/// Throws: stream::Error on a line that is no such number (the line is named), and where there are
-/// not as many as points.
+/// One cluster number per line, in the order of the points; -1 for outliers (cluster::kOutlier).
+/// "-" is standard output. Throws: stream::Error; ClosedPipe.
+void write_labels(const std::string& path, std::span<const std::uint32_t> labels, bool replace);
+
+/// Reads such a file. Points in no cluster all get one number of their own.
+/// Throws: stream::Error on a line that is not such a number (the line is named), and unless there
+/// are as many as points.
 std::vector<std::uint32_t> read_labels(const std::string& path, std::size_t points);
 
 }  // namespace terrace::tools

@@ -2,17 +2,16 @@
 #include "tables/match_run.hpp"
 
 #include <algorithm>
-#include <array>
 #include <limits>
 #include <stdexcept>
 #include <utility>
 
+#include <terrace/cluster/hierarchy.hpp>
 #include <terrace/matching/halving.hpp>
 #include <terrace/matching/large_matching.hpp>
 #include <terrace/matching/point_matching.hpp>
 
 #include "base/units.hpp"
-#include "tables/facility_labels.hpp"
 
 namespace terrace::tools {
 
@@ -21,17 +20,11 @@ namespace {
 
 using matching::Point3;
 
-constexpr std::array<std::pair<const char*, MatchMethod>, 4> kMatchMethods{
-    {{"auto", MatchMethod::automatic},
-     {"exact", MatchMethod::exact},
-     {"monotone", MatchMethod::monotone},
-     {"monte-carlo", MatchMethod::monte_carlo}}};
-
-/// Points in a cluster that is matched first where the set is large.
+/// Size of the clusters that are matched first in large sets.
 constexpr double kClusterSize = 10000;
-/// What an exact matching takes for a point, measured.
+/// Memory of an exact matching per point, measured.
 constexpr std::uint64_t kExactBytes = 800;
-/// What windows take for a point, besides those at work.
+/// Memory of windows per point, besides those at work.
 constexpr std::uint64_t kWindowBytes = 150;
 
 std::size_t exact_limit() { return matching::LargeMatchingOptions{}.exact_limit; }
@@ -66,14 +59,14 @@ bool halves(MatchMethod method) {
   return method == MatchMethod::monotone || method == MatchMethod::monte_carlo;
 }
 
-/// The clusters that are matched first: the caller's, or those of facility location where there are
-/// too many points to match all at once.
+/// The clusters that are matched first: the caller's, or by facility location if there are too many
+/// points to match at once.
 std::vector<std::uint32_t> clusters_of(const MatchRequest& request, std::span<const Point3> points,
                                        const MatchProgress& progress) {
   if (!request.labels.empty()) return {request.labels.begin(), request.labels.end()};
   if (request.method != MatchMethod::automatic || points.size() <= exact_limit()) return {};
-  return facility_labels(points, kClusterSize, request.seed, request.threads,
-                         [&](std::uint64_t done) { progress(done, points.size()); });
+  return cluster::clusters_of_size(points, kClusterSize, request.seed, request.threads,
+                                   [&](std::uint64_t done) { progress(done, points.size()); });
 }
 
 MatchOutcome halve(const MatchRequest& request, std::span<const Point3> points,
@@ -92,13 +85,6 @@ MatchOutcome halve(const MatchRequest& request, std::span<const Point3> points,
 }
 
 }  // namespace
-
-std::optional<MatchMethod> match_method_of(const std::string& name) {
-  for (const auto& [known, method] : kMatchMethods) {
-    if (name == known) return method;
-  }
-  return std::nullopt;
-}
 
 MatchOutcome run_matching(const MatchRequest& request, std::span<const Point3> points,
                           const MatchProgress& progress) {
@@ -141,7 +127,7 @@ TreeOutcome run_matching_tree(const MatchRequest& request, std::span<const Point
   if (halves(request.method)) {
     options.matcher = [&](std::span<const Point3> nodes) {
       matching::HalvingOptions halving = halving_options(request);
-      // Clusters are matched side by side already.
+      // Clusters are matched in parallel already.
       if (!labels.empty()) halving.threads = 1;
       return std::move(matching::match_by_halving(nodes, halving).mate);
     };
@@ -150,7 +136,7 @@ TreeOutcome run_matching_tree(const MatchRequest& request, std::span<const Point
       return std::move(matching::match_points(nodes).mate);
     };
   }
-  // The tree, and the levels as they are matched.
+  // The tree, and the level being matched.
   const std::uint64_t tree_bytes = 120 * points.size();
   check_memory(labels.empty() ? tree_bytes + kExactBytes * points.size() : tree_bytes, request,
                points.size(), "raise it, or name clusters with --labels");

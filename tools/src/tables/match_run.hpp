@@ -15,10 +15,7 @@ namespace terrace::tools {
 
 enum class MatchMethod : std::uint8_t { automatic, exact, monotone, monte_carlo };
 
-/// The method of that name as on the command line; nothing for another name.
-std::optional<MatchMethod> match_method_of(const std::string& name);
-
-/// What `terrace match` was asked to do with points on the ground.
+/// The request of `terrace match`, for points on the ground.
 struct MatchRequest {
   MatchMethod method = MatchMethod::automatic;
   std::span<const std::uint32_t> labels{};  ///< the cluster of each point; empty: none given
@@ -29,8 +26,7 @@ struct MatchRequest {
   std::uint64_t memory_bytes = 0;
 };
 
-/// Called now and then with what is done and what there is to do, in whatever is counted; may throw
-/// to stop the work.
+/// Called now and then with the work done and the total, in any unit; may throw to stop.
 using MatchProgress = std::function<void(std::uint64_t done, std::uint64_t total)>;
 
 struct MatchOutcome {
@@ -42,10 +38,10 @@ struct MatchOutcome {
   std::size_t clusters = 0;  ///< that were matched first; 0: none
 };
 
-/// Pairs points. Beyond what is matched exactly, `automatic` first makes clusters by facility
-/// location unless there are labels.
-/// Throws: std::invalid_argument on bad data, std::runtime_error where the memory does not do, what
-/// `progress` throws.
+/// Pairs points. Sets too large to match exactly are first clustered by facility location
+/// (`automatic`), unless there are labels.
+/// Throws: std::invalid_argument on bad data, std::runtime_error if the memory does not suffice;
+/// what `progress` throws.
 MatchOutcome run_matching(const MatchRequest& request, std::span<const matching::Point3> points,
                           const MatchProgress& progress);
 

@@ -13,11 +13,9 @@
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::tools {
-
-using namespace terrain;
 namespace {
 
-/// A row as it stands in the file.
+/// A row of the file.
 struct Row {
   std::uint32_t a = 0, b = 0;
   double distance = 0;
@@ -29,7 +27,7 @@ bool parse(std::string_view text, bool tree, Row& row) {
          (!tree || (take_cell(text, row.size) && take_cell(text, row.level, true)));
 }
 
-/// Checks rows one by one; what is wrong with one, else nothing.
+/// Checks rows one by one.
 class Checker {
  public:
   Checker(std::size_t points, bool tree)
@@ -96,15 +94,15 @@ MatchingResult read_matching_result(const std::string& path, std::size_t points)
   std::optional<CsvRows> rows = CsvRows::open(path, kPairsHead);
   MatchingResult result{.points = points, .tree = !rows, .lines = {}};
   if (result.tree) rows = CsvRows::open(path, kTreeHead);
-  if (!rows) fail("", "is no result of 'terrace match'");
+  if (!rows) fail("", "is not a result of 'terrace match'");
   // Nodes of a tree are numbered in 32 bits.
-  if (points > std::numeric_limits<std::uint32_t>::max() / 2) fail("", "is of too many points");
+  if (points > std::numeric_limits<std::uint32_t>::max() / 2) fail("", "has too many points");
   const std::size_t most = result.tree ? points - std::min<std::size_t>(points, 1) : points / 2;
   Checker checker(points, result.tree);
   for (std::string_view line; rows->next(line);) {
     Row row;
     if (!parse(line, result.tree, row)) {
-      fail(rows->where(), "is no row " + std::string(result.tree ? kTreeHead : kPairsHead));
+      fail(rows->where(), "is not a row " + std::string(result.tree ? kTreeHead : kPairsHead));
     }
     if (result.lines.size() == most) {
       fail(rows->where(), "is one row too many for " + with_commas(points) + " points");

@@ -29,9 +29,9 @@ struct MatchingResult {
 /// Whether a file begins as one that `match` writes.
 bool is_matching_result(const std::string& path);
 
-/// Reads such a file about so many points. Throws: stream::Error, naming the line, if a row is no
-/// row, names a node that there is not (yet) or that another row has taken, or contradicts itself;
-/// and if the rows are not those of so many points. 12 bytes a row.
+/// Reads such a file for `points` points. Throws: stream::Error, naming the line, if a row is
+/// malformed, names a node that does not exist (yet) or that another row has taken, or contradicts
+/// itself; and if the number of rows does not fit the points. Memory: 12 bytes a row.
 MatchingResult read_matching_result(const std::string& path, std::size_t points);
 
 /// Such a result with the places of its nodes, ready to be drawn.

@@ -14,8 +14,6 @@
 
 namespace terrace::tools {
 
-using namespace terrain;
-
 std::vector<double> PointTable::column(const std::string& name) const {
   std::string known;
   for (std::size_t c = 0; c < info.attributes.size(); ++c) {
@@ -85,7 +83,7 @@ PointTable read_point_table(const std::string& file, const std::string& format,
   while (source->next(block)) {
     check_interrupt();
     stream::to_world(table.info, block);
-    // A vector that grows is there twice for a moment.
+    // A growing vector exists twice for a moment.
     if (2 * bytes_per_point * (table.size() + block.size()) > memory_bytes - reading) {
       throw stream::Error({.file = file,
                            .where = {},

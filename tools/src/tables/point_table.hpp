@@ -13,10 +13,8 @@
 
 namespace terrace::tools {
 
-using namespace terrain;
-
-/// A whole file of points in memory, in the order in which it is read (for files that are no
-/// rasters the order of the file).
+/// A whole file of points in memory, in the order of reading (that of the file, except for
+/// rasters).
 struct PointTable {
   stream::SourceInfo info;
   std::vector<stream::Point3> positions;  ///< in the coordinates of the CRS
@@ -25,12 +23,12 @@ struct PointTable {
 
   [[nodiscard]] std::size_t size() const { return positions.size(); }
   /// The attribute of that name as doubles, scale and offset applied.
-  /// Throws: UsageError naming the columns that there are.
+  /// Throws: UsageError naming the existing columns.
   [[nodiscard]] std::vector<double> column(const std::string& name) const;
 };
 
-/// What reading the source takes, which is not left for anything else. Throws: stream::Error if it
-/// is more than memory_bytes, saying what it needs.
+/// The memory that reading the source takes. Throws: stream::Error if it is more than memory_bytes,
+/// saying what it needs.
 std::uint64_t reading_within_memory(const stream::PointSource& source, std::uint64_t memory_bytes);
 
 /// Beside so many bytes of reading. Throws: stream::Error if writing to `file` would take more than
@@ -47,7 +45,7 @@ PointTable read_point_table(const std::string& file, const std::string& format,
 /// Metres on the ground for the points of a table: ground = scale * (position - origin).
 struct GroundFrame {
   stream::Point3 origin{}, scale{1, 1, 1};
-  std::string assumption;  ///< what had to be assumed of units; empty if nothing
+  std::string assumption;  ///< an assumption about units; may be empty
 
   /// About the middle of the table's points, with heights weighed besides.
   static GroundFrame of(const PointTable& table, double z_weight);

@@ -18,8 +18,8 @@
 #include <terrace/stream/error.hpp>
 
 #include "base/units.hpp"
-#include "cli/clustering_options.hpp"
 #include "cli/interrupt.hpp"
+#include "cli/option_values.hpp"
 #include "cli/selection_options.hpp"
 #include "terrace/terrain/build.hpp"
 #include "terrace/terrain/crs.hpp"
@@ -27,11 +27,9 @@
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
-
-using namespace terrain;
 namespace {
 
-/// The trial run behind --dry-run reads this many points and scales up.
+/// The trial run of --dry-run reads this many points and scales up.
 constexpr std::uint64_t kTrialPoints = 1'000'000;
 
 /// From here on memory goes back to the system as soon as it is freed, where the C library can be
@@ -52,7 +50,8 @@ class BuildCommand final : public Command {
            "line, or a pattern in quotes; - is standard input")
         ->required();
     add_output(app, output_, "the store to write");
-    app.add_option("--input-format", request_.input_format, "instead of telling it by content");
+    app.add_option("--input-format", request_.input_format,
+                   "format of the input; else by its content, then its ending");
     app.add_option(
            "--entities", entities_,
            "what is read and clustered: points; the triangles of a mesh (OBJ, OFF, PLY, "
@@ -70,7 +69,7 @@ class BuildCommand final : public Command {
     app.add_option("--vertical", request_.vertical, "what heights refer to")
         ->check(CLI::IsMember({"ellipsoidal", "orthometric"}));
     selection_.define(app);
-    app.add_option("--band", request_.band, "of rasters, from 1")->check(CLI::Range(1, 65535));
+    app.add_option("--band", request_.band, "band of rasters, from 1")->check(CLI::Range(1, 65535));
     add_skip_damaged(app, request_.skip_damaged);
     add_heights_of_colour(app, request_.heights_of_colour);
     add_cell_of_source(app, request_.cell);
@@ -88,24 +87,24 @@ class BuildCommand final : public Command {
         ->capture_default_str()
         ->type_name("METRIC");
     app.add_option("--channel", channels_,
-                   "ATTRIBUTE:WEIGHT, repeatable: the attribute counts in distances, a unit of it "
-                   "as many metres; much slower")
+                   "ATTRIBUTE:WEIGHT, repeatable: the attribute counts in distances, one unit as "
+                   "WEIGHT metres; much slower")
         ->type_name("NAME:W");
     add_number(app, "--outlier-price", outlier_price_,
-               "times the diagonal of a block: points that it costs less to leave out steer no "
-               "cluster; they are kept with outlier = 1",
+               "times the diagonal of a block: points that are cheaper to leave out do not shape "
+               "clusters; they are kept with outlier = 1",
                kFactor);
     app.add_option("--strategy", strategy_,
                    "how clusters are searched: automatic, or a local search of the thesis, slower")
-        ->check(CLI::IsMember(names_of_strategies()))
         ->type_name("NAME")
         ->capture_default_str();
-    app.add_option("--order", order_,
-                   "of points: stream as they come, spatial such that near ones follow one another "
-                   "(through a temporary file beside the store), auto if they do not already")
+    app.add_option(
+           "--order", order_,
+           "order of points: stream as they come, spatial sorts near ones together (through "
+           "a temporary file beside the store), auto does so where they are not")
         ->check(CLI::IsMember({"auto", "stream", "spatial"}))
         ->capture_default_str();
-    app.add_flag("--dry-run", dry_run_, "only tell points, disk and time, from a trial");
+    app.add_flag("--dry-run", dry_run_, "only estimate points, disk and time, from a trial");
     not_yet(app, {"--resume", "--append"});
   }
 
@@ -121,7 +120,7 @@ class BuildCommand final : public Command {
     }
     request_.block_points = block_;
     request_.metric = MetricChoice::parse(metric_);
-    request_.strategy = strategy_of(strategy_);
+    request_.strategy = parse_strategy(strategy_);
     if (outlier_price_) request_.outlier_price = *outlier_price_;
     for (const std::string& channel : channels_) request_.channels.push_back(channel_of(channel));
     request_.selection =
@@ -192,7 +191,7 @@ class BuildCommand final : public Command {
             .stop = stop_token()};
   }
 
-  /// Builds a store of the first points, weighs it and does not keep it.
+  /// Builds a store of the first points, measures it and removes it.
   Summary estimate(const CommonOptions& common) {
     if (std::find(request_.inputs.begin(), request_.inputs.end(), "-") != request_.inputs.end()) {
       throw UsageError("--dry-run reads its input before the build does: name files, not -");

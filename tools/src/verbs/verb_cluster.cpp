@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // cluster: clusters one file of points in memory, by any method of libcluster.
 #include <algorithm>
+#include <array>
+#include <cstddef>
 #include <limits>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -10,26 +13,151 @@
 #include <CLI/CLI.hpp>
 
 #include "base/units.hpp"
-#include "cli/clustering_options.hpp"
 #include "cli/interrupt.hpp"
-#include "cli/library_call.hpp"
+#include "cli/option_values.hpp"
 #include "cli/output.hpp"
-#include "tables/cluster_channels.hpp"
-#include "tables/cluster_output.hpp"
 #include "tables/cluster_run.hpp"
-#include "tables/cluster_summary.hpp"
 #include "tables/dendrogram_file.hpp"
+#include "tables/label_file.hpp"
 #include "tables/point_table.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/stream/point_writer.hpp"
 #include "terrace/terrain/build.hpp"
 #include "terrace/terrain/error.hpp"
 #include "terrace/terrain/metric_choice.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
-
-using namespace terrain;
 namespace {
+
+/// Columns that count in distances.
+struct ChannelTable {
+  std::vector<double> values;   ///< by point, then column
+  std::vector<double> weights;  ///< metres of a unit, by column
+};
+
+/// options: "NAME:WEIGHT" of columns. Throws: UsageError; what PointTable::column() throws.
+ChannelTable read_channels(const PointTable& table, const std::vector<std::string>& options) {
+  ChannelTable channels;
+  std::vector<std::vector<double>> columns;
+  for (const std::string& text : options) {
+    const auto& [name, weight] = channel_of(text);
+    columns.push_back(table.column(name));
+    channels.weights.push_back(weight);
+  }
+  channels.values.resize(table.size() * columns.size());
+  for (std::size_t c = 0; c < columns.size(); ++c) {
+    for (std::size_t i = 0; i < table.size(); ++i) {
+      channels.values[i * columns.size() + c] = columns[c][i];
+    }
+  }
+  return channels;
+}
+
+/// The table with two more columns, `cluster` and `representative` (the number of the point that
+/// stands for the cluster), both -1 for outliers; columns of these names are replaced. format: of
+/// point files, empty: by ending. Throws: stream::Error, Interrupted.
+void write_clustered(const std::string& path, const std::string& format, const PointTable& table,
+                     const ClusterOutcome& outcome, bool replace) {
+  // Columns of an earlier clustering are replaced.
+  struct Kept {
+    std::size_t offset = 0, size = 0;
+  };
+  std::vector<stream::Channel> attributes;
+  std::vector<Kept> kept;
+  for (std::size_t c = 0; c < table.info.attributes.size(); ++c) {
+    const stream::Channel& channel = table.info.attributes[c];
+    if (channel.name == "cluster" || channel.name == "representative") continue;
+    attributes.push_back(channel);
+    kept.push_back({table.info.attribute_offset(c), stream::size_of(channel.type)});
+  }
+  attributes.push_back({.name = "cluster", .type = stream::ScalarType::i32});
+  attributes.push_back({.name = "representative", .type = stream::ScalarType::i32});
+  const auto writer =
+      stream::open_point_writer(path,
+                                {.attributes = std::move(attributes),
+                                 .comments = {kWriterMark},
+                                 .crs = crs_to_write(table.info.crs),
+                                 .lattice = lattice_of(table.info)},
+                                {.format = format, .replace = replace, .stop = stop_token()});
+  constexpr std::size_t kBlock = 65536;
+  const std::size_t record_bytes = table.info.payload_size();
+  stream::PointBlock block;
+  for (std::size_t begin = 0; begin < table.size(); begin += kBlock) {
+    check_interrupt();
+    const std::size_t end = std::min(begin + kBlock, table.size());
+    block.clear();
+    for (std::size_t i = begin; i < end; ++i) {
+      block.positions.push_back(table.positions[i]);
+      const std::byte* const record = table.payload.data() + i * record_bytes;
+      for (const Kept& part : kept) {
+        block.payload.insert(block.payload.end(), record + part.offset,
+                             record + part.offset + part.size);
+      }
+      const std::uint32_t cluster = outcome.labels[i];
+      const bool outlier = cluster == cluster::kOutlier;
+      const std::array<std::int32_t, 2> labels{
+          outlier ? -1 : static_cast<std::int32_t>(cluster),
+          outlier ? -1 : static_cast<std::int32_t>(outcome.representatives[cluster])};
+      const auto bytes = std::as_bytes(std::span(labels));
+      block.payload.insert(block.payload.end(), bytes.begin(), bytes.end());
+    }
+    writer->append(block);
+  }
+  writer->finish();
+}
+
+/// Clusters, costs, and how far from the optimum.
+Summary summary_of(const ClusterOutcome& outcome, std::uint64_t points, const Stopwatch& watch) {
+  const auto rounded = [](double value) { return readable_number(value, 6); };
+  const auto outliers = static_cast<std::size_t>(
+      std::count(outcome.labels.begin(), outcome.labels.end(), cluster::kOutlier));
+  const auto number = [](const std::optional<double>& value) -> nlohmann::ordered_json {
+    return value ? nlohmann::ordered_json(*value) : nlohmann::ordered_json(nullptr);
+  };
+  std::optional<double> cost;
+  if (outcome.connection_cost) {
+    cost = *outcome.connection_cost + outcome.opening_cost.value_or(0.0) +
+           outcome.outlier_cost.value_or(0.0);
+  }
+  std::optional<double> gap;
+  if (cost && outcome.lower_bound && *outcome.lower_bound > 0) {
+    gap = std::max(0.0, *cost / *outcome.lower_bound - 1.0);
+  }
+  Summary summary;
+  summary.json = {{"points", points},
+                  {"clusters", outcome.representatives.size()},
+                  {"outliers", outliers},
+                  {"cost", number(cost)},
+                  {"opening_cost", number(outcome.opening_cost)},
+                  {"connection_cost", number(outcome.connection_cost)},
+                  {"outlier_cost", number(outcome.outlier_cost)},
+                  {"lower_bound", number(outcome.lower_bound)},
+                  {"gap", number(gap)}};
+  summary.add_cost(watch);
+  std::string& text = summary.text;
+  text = with_commas(points) + " points, ";
+  if (!outcome.labels.empty()) {
+    text += with_commas(outcome.representatives.size()) + " clusters";
+    if (outliers > 0) text += " and " + with_commas(outliers) + " outliers";
+    text += ", ";
+  }
+  text += readable_seconds(watch.seconds()) + "\n";
+  if (cost) {
+    text += "cost " + rounded(*cost);
+    if (outcome.opening_cost) {
+      text += " = " + rounded(*outcome.opening_cost) + " for opening + " +
+              rounded(*outcome.connection_cost) + " for connecting";
+    }
+    if (outliers > 0) text += " + " + rounded(*outcome.outlier_cost) + " for outliers";
+    text += "\n";
+  }
+  if (gap) {
+    text += "lower bound " + rounded(*outcome.lower_bound) + ": at most " +
+            readable_bound(100 * *gap) + " % above the optimum\n";
+  }
+  return summary;
+}
 
 class ClusterCommand final : public Command {
  public:
@@ -47,10 +175,12 @@ class ClusterCommand final : public Command {
     app.add_option("--dendrogram", dendrogram_,
                    "single, complete: the whole tree as rows a,b,height,size (SciPy's)")
         ->type_name("FILE.csv");
-    app.add_option("--format", format_,
-                   "Of the output: xyz, csv, ply, ply-ascii, las, laz, copc (else its ending)")
+    app.add_option(
+           "--format", format_,
+           "Format of the output: xyz, csv, ply, ply-ascii, las, laz, copc; else by its ending")
         ->type_name("NAME");
-    app.add_option("--input-format", input_format_, "Of the input (else its content, its ending)")
+    app.add_option("--input-format", input_format_,
+                   "Format of the input; else by its content, then its ending")
         ->type_name("NAME");
     app.add_option("--method", method_,
                    "facility, primal-dual, k-means, k-median, single or complete")
@@ -65,11 +195,10 @@ class ClusterCommand final : public Command {
     add_number(app, "--facility-cost", facility_cost_,
                "Times the diagonal of the points: larger makes fewer clusters", kFactor);
     add_number(app, "--outlier-price", outlier_price_,
-               "facility: leave a point out if that costs less; times the diagonal", kFactor)
+               "facility: leave a point out if that is cheaper; times the diagonal", kFactor)
         ->type_name("PRICE");
-    app.add_option("--strategy", request_.strategy,
+    app.add_option("--strategy", strategy_,
                    "facility: automatic, fast, full-scan, quadtree, octree, kd-tree or facilities")
-        ->check(CLI::IsMember(names_of_strategies()))
         ->capture_default_str()
         ->type_name("NAME");
     app.add_option("--iterations", request_.iterations,
@@ -78,11 +207,11 @@ class ClusterCommand final : public Command {
     app.add_option("--effort", effort_, "facility: how long to search")
         ->check(CLI::IsMember({"fast", "default", "fine", "full"}))
         ->capture_default_str();
-    app.add_option("--batch", request_.batch, "facility: candidates judged at once")
+    app.add_option("--batch", request_.batch, "facility: candidates evaluated at once")
         ->check(CLI::Range(1U, 4294967295U))
         ->capture_default_str();
     app.add_option("--restarts", request_.restarts,
-                   "k-means, k-median: runs, the best of which counts")
+                   "k-means, k-median: number of runs; the best one counts")
         ->check(CLI::Range(1U, 4294967295U))
         ->capture_default_str();
     app.add_option("--bound-iterations", request_.bound_iterations,
@@ -94,7 +223,7 @@ class ClusterCommand final : public Command {
         ->capture_default_str()
         ->type_name("METRIC");
     app.add_option("--channel", channels_,
-                   "A column that counts in distances too, and how many metres its unit is worth")
+                   "A column that counts in distances, one unit as WEIGHT metres")
         ->allow_extra_args(false)
         ->type_name("NAME:WEIGHT");
     app.add_option("--weight", weight_, "The column of the points' weights")->type_name("NAME");
@@ -154,32 +283,31 @@ class ClusterCommand final : public Command {
     }
     for (const std::string& note : outcome.notes) common.say(note);
 
-    if (!labels_.empty()) write_labels(labels_, outcome, replace_labels);
+    if (!labels_.empty()) write_labels(labels_, outcome.labels, replace_labels);
     if (!dendrogram_.empty()) write_dendrogram(dendrogram_, *outcome.dendrogram, replace_tree);
-    const std::size_t outliers = static_cast<std::size_t>(
-        std::count(outcome.labels.begin(), outcome.labels.end(), cluster::kOutlier));
-    const std::uint64_t points = table.size();
     if (!output_.empty()) write_clustered(output_, format_, table, outcome, replace_points);
-    Summary summary = cluster_summary(outcome, points, outliers, watch.seconds());
-    // Costs are a result; they stay out of the way of another one on standard output.
+    Summary summary = summary_of(outcome, table.size(), watch);
+    // Costs are a result too, unless another one goes to standard output.
     summary.text_is_result = output_ != "-" && labels_ != "-" && dendrogram_ != "-";
     return summary;
   }
 
  private:
   void check_usage(const CommonOptions& common) {
-    const auto method = cluster_method_of(method_);
-    if (!method) {
-      throw UsageError("--method " + method_ +
-                       ": the methods are facility, primal-dual, k-means, k-median, single and "
-                       "complete");
-    }
-    request_.method = *method;
+    const auto method = choice<ClusterMethod>(method_, "--method",
+                                              {{"facility", ClusterMethod::facility},
+                                               {"primal-dual", ClusterMethod::primal_dual},
+                                               {"k-means", ClusterMethod::k_means},
+                                               {"k-median", ClusterMethod::k_median},
+                                               {"single", ClusterMethod::single},
+                                               {"complete", ClusterMethod::complete}});
+    request_.method = method;
+    request_.strategy = parse_strategy(strategy_);
     request_.effort = *effort_of(effort_);
     request_.cuda = device_ == "cuda";
     request_.seed = common.seed;
     request_.threads = common.threads;
-    const bool tree = *method == ClusterMethod::single || *method == ClusterMethod::complete;
+    const bool tree = method == ClusterMethod::single || method == ClusterMethod::complete;
     const bool flat = !output_.empty() || !labels_.empty();
     if (!flat && dendrogram_.empty()) {
       throw UsageError(
@@ -195,15 +323,15 @@ class ClusterCommand final : public Command {
                        "--height H");
     }
     if (request_.k != 0 && request_.height) throw UsageError("give either -k or --height");
-    const bool counts = *method == ClusterMethod::k_means || *method == ClusterMethod::k_median;
+    const bool counts = method == ClusterMethod::k_means || method == ClusterMethod::k_median;
     if (counts && request_.k == 0) throw UsageError("--method " + method_ + " needs -k K");
     if (!counts && !tree && request_.k != 0) {
       throw UsageError("--method " + method_ +
                        " finds the number of clusters itself, by --facility-cost; -k is for "
                        "k-means, k-median, single and complete");
     }
-    if (*method != ClusterMethod::facility &&
-        (outlier_price_ || request_.strategy != "automatic" || !request_.iterations.empty() ||
+    if (method != ClusterMethod::facility &&
+        (outlier_price_ || strategy_ != "automatic" || !request_.iterations.empty() ||
          request_.batch != 1)) {
       throw UsageError(
           "--outlier-price, --strategy, --iterations and --batch are for --method "
@@ -216,7 +344,7 @@ class ClusterCommand final : public Command {
   ClusterRequest request_;
   std::string input_, output_, labels_, dendrogram_, format_, input_format_;
   std::string method_ = "facility", effort_ = "default", metric_ = "euclidean", weight_;
-  std::string device_ = "cpu";
+  std::string device_ = "cpu", strategy_ = "automatic";
   std::vector<std::string> channels_;
   double facility_cost_ = 1.0, z_weight_ = 1.0;
   std::optional<double> outlier_price_;

@@ -23,8 +23,6 @@
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
-
-using namespace terrain;
 namespace {
 
 class ConvertCommand : public Command {
@@ -36,10 +34,12 @@ class ConvertCommand : public Command {
            "them, @FILE with a name a line, or a pattern in quotes; - is standard input")
         ->required();
     add_output(app, output_, "The file to write; - is standard output");
-    app.add_option("--format", format_,
-                   "Of the output: xyz, csv, ply, ply-ascii, las, laz, copc (else its ending)")
+    app.add_option(
+           "--format", format_,
+           "Format of the output: xyz, csv, ply, ply-ascii, las, laz, copc; else by its ending")
         ->type_name("NAME");
-    app.add_option("--input-format", input_format_, "Of the input (else its content, its ending)")
+    app.add_option("--input-format", input_format_,
+                   "Format of the input; else by its content, then its ending")
         ->type_name("NAME");
     selection_.define(app);
     add_skip_damaged(app, skip_damaged_);
@@ -92,9 +92,8 @@ class ConvertCommand : public Command {
     summary.json = {{"points", writer->points()},
                     {"nodata", source->progress().nodata},
                     {"excluded", source->progress().excluded},
-                    {"lost", source->progress().lost},
-                    {"seconds", watch.seconds()},
-                    {"peak_rss_bytes", peak_rss_bytes()}};
+                    {"lost", source->progress().lost}};
+    summary.add_cost(watch);
     const std::uint64_t excluded = source->progress().excluded;
     summary.text = output_ + ": " + with_commas(writer->points()) + " points" +
                    (excluded > 0 ? " (" + with_commas(excluded) + " were not selected)" : "") +

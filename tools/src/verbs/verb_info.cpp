@@ -28,7 +28,7 @@ class InfoCommand : public Command {
     if (store && colours_ != stream::HeightsOfColour::none) {
       throw UsageError("'" + input_ + "' is a store: --rgb does not apply");
     }
-    return store ? info_of_store(input_, common) : info_of_file(input_, colours_, common);
+    return store ? info_of_store(input_) : info_of_file(input_, colours_, common);
   }
 
  private:

@@ -18,7 +18,7 @@
 #include "base/stored_entities.hpp"
 #include "base/units.hpp"
 #include "cli/interrupt.hpp"
-#include "cli/library_call.hpp"
+#include "cli/option_values.hpp"
 #include "cli/output.hpp"
 #include "tables/label_file.hpp"
 #include "tables/match_run.hpp"
@@ -28,8 +28,6 @@
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
-
-using namespace terrain;
 namespace {
 
 class MatchCommand final : public Command {
@@ -42,20 +40,20 @@ class MatchCommand final : public Command {
                "The pairs, rows a,b,distance: numbers of points in the order of the input, from 0, "
                "and metres; with --tree rows a,b,distance,size,level, of triangles with the box of "
                "what is below: minx,miny,minz,maxx,maxy,maxz; - is standard output");
-    app.add_option("--input-format", input_format_, "Of the input (else its content, its ending)")
+    app.add_option("--input-format", input_format_,
+                   "Format of the input; else by its content, then its ending")
         ->type_name("NAME");
     app.add_option("--method", method_,
                    "auto: the optimum up to half a million points, beyond it clusters first, then "
                    "windows, with a proven bound; exact: the optimum; monotone: repeated halving, "
-                   "near it; monte-carlo: random halving, as the thesis has it")
-        ->check(CLI::IsMember({"auto", "exact", "monotone", "monte-carlo"}))
+                   "near it; monte-carlo: random halving, as in the thesis")
         ->capture_default_str()
         ->type_name("NAME");
     app.add_option("--iterations", iterations_,
-                   "monotone, monte-carlo: at most so many (default: as many as points)")
+                   "monotone, monte-carlo: most iterations (default: as many as points)")
         ->type_name("N");
-    add_number(app, "--seconds", seconds_, "monotone, monte-carlo: begin no iteration after",
-               kAboveZero)
+    add_number(app, "--seconds", seconds_,
+               "monotone, monte-carlo: begin no iteration after S seconds", kAboveZero)
         ->type_name("S");
     add_number(app, "--z-weight", z_weight_, "How much heights count in a distance", kFactorOrZero);
     app.add_flag(
@@ -125,7 +123,11 @@ class MatchCommand final : public Command {
  private:
   [[nodiscard]] MatchRequest request_of(const CommonOptions& common) const {
     MatchRequest request;
-    request.method = *match_method_of(method_);
+    request.method = choice<MatchMethod>(method_, "--method",
+                                         {{"auto", MatchMethod::automatic},
+                                          {"exact", MatchMethod::exact},
+                                          {"monotone", MatchMethod::monotone},
+                                          {"monte-carlo", MatchMethod::monte_carlo}});
     const bool halving =
         request.method == MatchMethod::monotone || request.method == MatchMethod::monte_carlo;
     if (!halving && (!iterations_.empty() || seconds_)) {
@@ -149,7 +151,7 @@ class MatchCommand final : public Command {
     std::string text = std::string(kPairsHead) + '\n';
     for (std::uint32_t a = 0; a < outcome.mate.size(); ++a) {
       const std::uint32_t b = outcome.mate[a];
-      // Who has no partner has a number above all.
+      // A point without a partner has a number above all.
       if (b <= a || b >= outcome.mate.size()) continue;
       const stream::Point3 &p = positions_[a], &q = positions_[b];
       const double distance = portable_hypot(portable_hypot(p[0] - q[0], p[1] - q[1]), p[2] - q[2]);
@@ -159,7 +161,7 @@ class MatchCommand final : public Command {
     return text;
   }
 
-  /// The boxes of the triangles that a table has; its positions, first corners, become centroids.
+  /// The boxes of the triangles of a table; its positions (first corners) become centroids.
   [[nodiscard]] std::vector<matching::Box<3>> to_centroids(PointTable& table) const {
     const CornerReader read(table.info, stream::Entities::triangles, input_);
     const std::size_t record = table.info.payload_size();
@@ -179,7 +181,7 @@ class MatchCommand final : public Command {
     return boxes;
   }
 
-  /// boxes: of what the tree is over, in the coordinates of the file; none: rows without.
+  /// boxes: of the entities, in the coordinates of the file; empty: rows without boxes.
   static std::string rows_of(const TreeOutcome& outcome, std::vector<matching::Box<3>> boxes = {}) {
     const bool boxed = !boxes.empty();
     std::string text = std::string(boxed ? kBoxTreeHead : kTreeHead) + '\n';
@@ -253,7 +255,7 @@ class MatchCommand final : public Command {
     return summary;
   }
 
-  /// What is known of the matching, for the user.
+  /// How good the matching is.
   static std::string guarantee(const MatchOutcome& outcome) {
     if (outcome.optimal) return " (the optimum)";
     if (!outcome.lower_bound || !(*outcome.lower_bound > 0.0)) return " (no bound)";
@@ -262,8 +264,7 @@ class MatchCommand final : public Command {
   }
 
   void finish(Summary& summary, const Stopwatch& watch) const {
-    summary.json["seconds"] = watch.seconds();
-    summary.json["peak_rss_bytes"] = peak_rss_bytes();
+    summary.add_cost(watch);
     summary.text += ", " + readable_seconds(watch.seconds()) + '\n';
     summary.text_is_result = output_ != "-";
   }

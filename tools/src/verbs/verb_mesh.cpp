@@ -14,13 +14,11 @@
 #include <terrace/stream/store.hpp>
 
 #include "base/units.hpp"
-#include "cli/choices.hpp"
-#include "cli/crs_options.hpp"
-#include "cli/detail_options.hpp"
 #include "cli/interrupt.hpp"
+#include "cli/option_values.hpp"
 #include "cli/output.hpp"
 #include "cli/selection_options.hpp"
-#include "cli/smooth_option.hpp"
+#include "cli/store_options.hpp"
 #include "terrace/terrain/bounded_mesh.hpp"
 #include "terrace/terrain/detail.hpp"
 #include "terrace/terrain/detail_mesh.hpp"
@@ -29,14 +27,12 @@
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
-
-using namespace terrain;
 namespace {
 
-/// For work that allocates and frees blocks of about the same sizes again and again, on several
-/// threads: from here on what is freed stays with the process, where the C library can be told so.
-/// Else the system takes large blocks back each time and clears each page that it gives anew, which
-/// took 7 % of the time of meshing. What is in use at the same time does not grow.
+/// For work on several threads that allocates and frees blocks of similar sizes again and again:
+/// from then on freed memory stays with the process, if the C library allows. Otherwise the system
+/// takes large blocks back and clears each new page, which took 7 % of the time of meshing. The
+/// peak does not grow.
 void keep_freed_memory() {
 #ifdef __GLIBC__
   constexpr int kMegabyte = 1 << 20;
@@ -49,16 +45,9 @@ void keep_freed_memory() {
 class MeshCommand final : public Command {
  public:
   void define(CLI::App& app) override {
-    app.add_option("STORE", store_, "where the points come from")->required();
+    part_.define(app, "only triangles that reach inside");
     add_output(app, output_, "the file to write: .ply, .obj, .glb");
     app.add_option("--format", format_, "ply, ply-ascii, obj, glb; else by the file's ending");
-    app.add_option("--level", level_, "detail outside the focuses: a number or top")
-        ->default_str("0; with --focus top");
-    app.add_option("--region", region_,
-                   "only triangles that reach inside: a box, minx,miny[,minz],maxx,maxy[,maxz], or "
-                   "a GeoJSON file");
-    app.add_option("--focus", focuses_, "BOX:L, all points of level L inside the box; repeatable")
-        ->allow_extra_args(false);
     app.add_option(
            "--smooth", smooth_,
            "laplacian, taubin (keeps what is wide) or bilateral (keeps steps), :STEPS behind "
@@ -103,7 +92,6 @@ class MeshCommand final : public Command {
         ->type_name("NAME");
     add_where(app, where_);
     not_yet(app, {"--base"});
-    crs_.define(app);
   }
 
   Summary run(const CommonOptions& common) override {
@@ -113,10 +101,11 @@ class MeshCommand final : public Command {
  private:
   Summary bounded(const CommonOptions& common) const {
     const Stopwatch watch;
-    if ((!level_.empty() && level_ != "0") || !focuses_.empty() || !smooth_.empty() ||
-        metric_ != "euclidean" || !overlay_.empty() || !save_overlay_.empty()) {
+    if ((!part_.level.empty() && part_.level != "0") || !part_.focuses.empty() ||
+        !smooth_.empty() || metric_ != "euclidean" || !overlay_.empty() || !save_overlay_.empty()) {
       throw UsageError(
-          "--max-error and --max-points are about all samples: without --level, --focus, --smooth, "
+          "--max-error and --max-points concern all samples: they exclude --level, --focus, "
+          "--smooth, "
           "--overlay and --metric");
     }
     BoundedMeshOptions options;
@@ -138,9 +127,9 @@ class MeshCommand final : public Command {
     }
     options.fill = parse_fill(fill_);
     options.path = output_;
-    const stream::Store store = open_store(store_);
-    if (!region_.empty()) options.region = crs_.regions(store, common)(Region::parse(region_));
-    if (crs_.places(store, common).has_effect()) {
+    const stream::Store store = open_store(part_.path);
+    options.region = part_.detail(store, common).region;
+    if (part_.crs.places(store, common).has_effect()) {
       throw UsageError(
           "--to-crs: between other coordinates the triangles would be other surfaces, and the "
           "bound would not hold; write the mesh in the store's CRS");
@@ -209,10 +198,9 @@ class MeshCommand final : public Command {
     if (save && save_overlay_ == output_) {
       throw UsageError("--save-overlay and --output are the same file");
     }
-    const stream::Store store = open_store(store_);
-    const Detail detail =
-        parse_detail(store, level_, region_, focuses_, crs_.regions(store, common));
-    const PlaceConversion places = crs_.places(store, common);
+    const stream::Store store = open_store(part_.path);
+    const Detail detail = part_.detail(store, common);
+    const PlaceConversion places = part_.crs.places(store, common);
     const bool replace = may_replace(output_, common.force);
     std::optional<stream::Overlay> overlay;
     if (!overlay_.empty())
@@ -229,10 +217,8 @@ class MeshCommand final : public Command {
     if (writer) writer->finish();
 
     Summary summary;
-    summary.json = {{"vertices", mesh.positions.size()},
-                    {"triangles", mesh.triangles.size()},
-                    {"seconds", watch.seconds()},
-                    {"peak_rss_bytes", peak_rss_bytes()}};
+    summary.json = {{"vertices", mesh.positions.size()}, {"triangles", mesh.triangles.size()}};
+    summary.add_cost(watch);
     summary.text = output_ + ": " + with_commas(mesh.positions.size()) + " vertices, " +
                    with_commas(mesh.triangles.size()) + " triangles in " +
                    readable_seconds(watch.seconds()) + "\n";
@@ -243,12 +229,11 @@ class MeshCommand final : public Command {
     return summary;
   }
 
-  std::string store_, output_, format_, level_, region_, smooth_, metric_ = "euclidean";
+  PartOptions part_;
+  std::string output_, format_, smooth_, metric_ = "euclidean";
   std::string overlay_, save_overlay_, where_;
   std::string max_points_, quality_ = "removal", duplicates_, fill_ = "none";
   std::optional<double> max_error_;
-  std::vector<std::string> focuses_;
-  CrsOptions crs_;
 };
 
 }  // namespace

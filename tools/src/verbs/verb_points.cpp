@@ -17,11 +17,10 @@
 #include <terrace/stream/store_query.hpp>
 
 #include "base/units.hpp"
-#include "cli/crs_options.hpp"
-#include "cli/detail_options.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/output.hpp"
 #include "cli/selection_options.hpp"
+#include "cli/store_options.hpp"
 #include "tables/point_table.hpp"
 #include "terrace/terrain/detail.hpp"
 #include "terrace/terrain/detail_lines.hpp"
@@ -31,11 +30,9 @@
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
-
-using namespace terrain;
 namespace {
 
-/// Points on their way to the writer. An overlay's heights come in place of the store's, which say
+/// Collects points for the writer. An overlay's heights replace the store's, which still decide
 /// what is inside a region.
 class PointOutput {
  public:
@@ -62,7 +59,7 @@ class PointOutput {
     block_.clear();
   }
 
-  /// Heights that are the overlay's.
+  /// The number of heights from the overlay.
   [[nodiscard]] std::uint64_t replaced() const { return replaced_; }
 
  private:
@@ -86,12 +83,11 @@ class PointOutput {
   stream::PointWriter& writer_;
   stream::PointBlock block_;
   std::optional<stream::ClusterId> cluster_;
-  std::span<const stream::OverlayValue> heights_;  ///< of `cluster_`, those still to come
+  std::span<const stream::OverlayValue> heights_;  ///< the remaining ones of `cluster_`
   std::uint64_t replaced_ = 0;
 };
 
-/// Points that were found near a place, in their order, with the distance in metres as a further
-/// column.
+/// Writes the points found near a place, in order, with the distance in metres as a further column.
 void write_found(const stream::Store& store, const std::vector<stream::FoundPoint>& found,
                  const PlaceConversion& places, stream::PointWriter& writer) {
   const stream::StoreSchema& schema = store.schema();
@@ -123,26 +119,18 @@ void write_found(const stream::Store& store, const std::vector<stream::FoundPoin
 class PointsCommand final : public Command {
  public:
   void define(CLI::App& app) override {
-    app.add_option("STORE", store_, "where the points come from")->required();
+    part_.define(app, "only points inside");
     add_output(app, output_,
                "the file to write: .xyz, .csv, .ply, .las, .laz, .copc.laz, and .geojson for the "
                "lines of build --entities; - is standard output");
     app.add_option("--format", format_,
                    "xyz, csv, ply, ply-ascii, las, laz, copc, geojson; else by the file's ending");
-    app.add_option("--level", level_, "points of this level and above: a number or top")
-        ->default_str("0; with --focus top");
-    app.add_option(
-        "--region", region_,
-        "only points inside: a box, minx,miny[,minz],maxx,maxy[,maxz], or a GeoJSON file");
-    app.add_option("--focus", focuses_,
-                   "BOX:L, points of level L and above inside the box; repeatable")
-        ->allow_extra_args(false);
     app.add_option("--near", near_,
                    "X,Y[,Z] in the store's CRS: the points near a place, the nearest first, with "
                    "their distance in metres on the ground; without Z heights do not count")
         ->excludes("--region")
         ->excludes("--focus");
-    app.add_option("-k", count_, "with --near: so many points")
+    app.add_option("-k", count_, "with --near: the number of points")
         ->check(CLI::Range(0U, 4294967295U))
         ->type_name("K")
         ->needs("--near");
@@ -154,14 +142,13 @@ class PointsCommand final : public Command {
                    "a file of mesh --save-overlay: its heights in place of the store's")
         ->type_name("FILE")
         ->excludes("--near");
-    crs_.define(app);
     not_yet(app, {"--max-points"});
   }
 
   Summary run(const CommonOptions& common) override {
     const Stopwatch watch;
-    const stream::Store store = open_store(store_);
-    Detail detail = parse_detail(store, level_, region_, focuses_, crs_.regions(store, common));
+    const stream::Store store = open_store(part_.path);
+    Detail detail = part_.detail(store, common);
     if (!where_.empty()) detail.where.emplace(where_, store.schema());
     if (!near_.empty() && detail.where) {
       throw UsageError("--near finds the nearest of all points: without --where");
@@ -172,7 +159,7 @@ class PointsCommand final : public Command {
     }
     std::optional<stream::Overlay> overlay;
     if (!overlay_.empty()) overlay.emplace(open_height_overlay(overlay_, store));
-    const std::optional<Transformation> to = crs_.to(store, common);
+    const std::optional<Transformation> to = part_.crs.to(store, common);
     const auto writer =
         stream::open_point_writer(output_, header(store, store.schema().attributes, to),
                                   point_writer_options(output_, format_, common));
@@ -187,10 +174,8 @@ class PointsCommand final : public Command {
     writer->finish();
 
     Summary summary;
-    summary.json = {{"vertices", points},
-                    {"triangles", 0},
-                    {"seconds", watch.seconds()},
-                    {"peak_rss_bytes", peak_rss_bytes()}};
+    summary.json = {{"vertices", points}, {"triangles", 0}};
+    summary.add_cost(watch);
     summary.text = output_ + ": " + with_commas(points) + " points in " +
                    readable_seconds(watch.seconds()) + "\n";
     tell_rounding(*writer, summary);
@@ -229,17 +214,15 @@ class PointsCommand final : public Command {
           "another ending, e.g. .csv");
     }
     LineSet lines = detail_lines(store, detail, common.context());
-    const std::optional<Transformation> to = crs_.to(store, common);
+    const std::optional<Transformation> to = part_.crs.to(store, common);
     places(to)(lines.vertices);
     stream::Sink file(output_, may_replace(output_, common.force), stop_token());
     write_geojson(lines, to ? to->to().crs() : store.schema().crs,
                   [&](std::string_view text) { file.write(text); });
     file.commit();
     Summary summary;
-    summary.json = {{"lines", lines.lines.size()},
-                    {"vertices", lines.vertices.size()},
-                    {"seconds", watch.seconds()},
-                    {"peak_rss_bytes", peak_rss_bytes()}};
+    summary.json = {{"lines", lines.lines.size()}, {"vertices", lines.vertices.size()}};
+    summary.add_cost(watch);
     summary.text = output_ + ": " + with_commas(lines.lines.size()) + " lines of " +
                    with_commas(lines.vertices.size()) + " vertices in " +
                    readable_seconds(watch.seconds()) + "\n";
@@ -259,17 +242,15 @@ class PointsCommand final : public Command {
                : points_within(query, place, *radius_, level);
     std::vector<stream::Channel> attributes = store.schema().attributes;
     attributes.push_back({.name = "distance", .unit = "metre"});
-    const std::optional<Transformation> to = crs_.to(store, common);
+    const std::optional<Transformation> to = part_.crs.to(store, common);
     const auto writer = stream::open_point_writer(output_, header(store, std::move(attributes), to),
                                                   point_writer_options(output_, format_, common));
     writing_within_memory(*writer, output_, common.memory_or(0));
     write_found(store, found, places(to), *writer);
     writer->finish();
     Summary summary;
-    summary.json = {{"vertices", found.size()},
-                    {"triangles", 0},
-                    {"seconds", watch.seconds()},
-                    {"peak_rss_bytes", peak_rss_bytes()}};
+    summary.json = {{"vertices", found.size()}, {"triangles", 0}};
+    summary.add_cost(watch);
     summary.text = output_ + ": " + with_commas(found.size()) + " points";
     if (!found.empty()) {
       summary.json["nearest_metres"] = found.front().distance;
@@ -282,11 +263,10 @@ class PointsCommand final : public Command {
     return summary;
   }
 
-  std::string store_, output_, format_, level_, region_, overlay_, near_, where_;
+  PartOptions part_;
+  std::string output_, format_, overlay_, near_, where_;
   std::optional<std::size_t> count_;
   std::optional<double> radius_;
-  std::vector<std::string> focuses_;
-  CrsOptions crs_;
 };
 
 }  // namespace

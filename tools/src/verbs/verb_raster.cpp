@@ -8,24 +8,20 @@
 #include <terrace/stream/store.hpp>
 
 #include "base/units.hpp"
-#include "cli/choices.hpp"
-#include "cli/crs_options.hpp"
-#include "cli/detail_options.hpp"
-#include "cli/interrupt.hpp"
+#include "cli/option_values.hpp"
 #include "cli/output.hpp"
+#include "cli/store_options.hpp"
 #include "terrace/terrain/error.hpp"
 #include "terrace/terrain/raster.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
-
-using namespace terrain;
 namespace {
 
 class RasterCommand final : public Command {
  public:
   void define(CLI::App& app) override {
-    app.add_option("STORE", store_, "where the heights come from")->required();
+    surface_.define(app);
     add_output(app, output_, "the Cloud Optimized GeoTIFF to write");
     app.add_option("--value", value_,
                    "height; slope in degrees; aspect in degrees clockwise from north, downhill; "
@@ -40,16 +36,6 @@ class RasterCommand final : public Command {
         ->type_name("SIZE");
     app.add_option("--region", region_,
                    "only what is inside: minx,miny,maxx,maxy or a GeoJSON file");
-    app.add_option("--method", method_, "between samples: linear, natural or nearest")
-        ->capture_default_str()
-        ->type_name("NAME");
-    app.add_option("--level", level_, "only points of this level and above: a number or top")
-        ->capture_default_str();
-    add_number(app, "--max-edge", max_edge_,
-               "of points: triangles with a longer side, on the ground, are no data (default: "
-               "none is too long)",
-               kAboveZero)
-        ->type_name("METRES");
     crs_.define(app);
   }
 
@@ -57,13 +43,9 @@ class RasterCommand final : public Command {
     const Stopwatch watch;
     RasterRequest request;
     request.value = parse_raster_value(value_);
-    request.sampler.method = parse_interpolation(method_);
-    const std::optional<unsigned> level = parse_level(level_);
-    request.sampler.max_edge = max_edge_;
     request.cell = cell_;
     if (output_ == "-") throw UsageError("a GeoTIFF cannot go to standard output; name a file");
-    const stream::Store store = open_store(store_);
-    request.sampler.level = level.value_or(store.top());
+    const stream::Store store = surface_.open(request.sampler);
     if (!region_.empty()) request.region = crs_.regions(store, common)(Region::parse(region_));
     request.to = crs_.to(store, common);
     request.output = output_;
@@ -74,9 +56,8 @@ class RasterCommand final : public Command {
     summary.json = {{"columns", outcome.columns},
                     {"rows", outcome.rows},
                     {"cells", outcome.columns * outcome.rows},
-                    {"nodata", outcome.columns * outcome.rows - outcome.cells_with_data},
-                    {"seconds", watch.seconds()},
-                    {"peak_rss_bytes", peak_rss_bytes()}};
+                    {"nodata", outcome.columns * outcome.rows - outcome.cells_with_data}};
+    summary.add_cost(watch);
     summary.text = output_ + ": " + with_commas(outcome.columns) + " x " +
                    with_commas(outcome.rows) + " cells, " +
                    with_commas(outcome.columns * outcome.rows - outcome.cells_with_data) +
@@ -85,8 +66,9 @@ class RasterCommand final : public Command {
   }
 
  private:
-  std::string store_, output_, value_ = "height", region_, method_ = "linear", level_ = "0";
-  std::optional<double> cell_, max_edge_;
+  SurfaceOptions surface_;
+  std::string output_, value_ = "height", region_;
+  std::optional<double> cell_;
   CrsOptions crs_;
 };
 

@@ -17,7 +17,6 @@
 #include "picture/camera.hpp"
 #include "picture/color.hpp"
 #include "picture/draw.hpp"
-#include "picture/height_grid.hpp"
 #include "picture/picture_input.hpp"
 #include "tables/dendrogram_file.hpp"
 #include "tables/matching_result.hpp"
@@ -27,8 +26,6 @@
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
-
-using namespace terrain;
 namespace {
 
 /// Square root of the mean squared slope (rise over run) of the triangles, weighed by area.
@@ -65,7 +62,7 @@ class RenderCommand : public Command {
         ->required()
         ->type_name("FILE");
     add_output(app, output_, "The picture (PNG); - is standard output");
-    app.add_option("--size", size_, "Of the picture in pixels")
+    app.add_option("--size", size_, "Size of the picture in pixels")
         ->capture_default_str()
         ->type_name("WxH");
     app.add_option("--color", color_, "height, slope, level, rgb, class, cluster or grey")
@@ -128,40 +125,40 @@ class RenderCommand : public Command {
     } else {
       draw_triangles(mesh, colours, camera, light, options, canvas);
     }
-    check_interrupt();
-    stream::write_png(output_, size.width, size.height, 3, canvas.resolve(), replace, stop_token());
-
-    Summary summary;
-    summary.json["width"] = size.width;
-    summary.json["height"] = size.height;
+    Summary summary = write(canvas, size, replace);
     summary.json["vertices"] = mesh.positions.size();
     summary.json["triangles"] = mesh.triangles.size();
     summary.json["exaggeration"] = factor;
-    summary.json["seconds"] = watch.seconds();
-    summary.json["peak_rss_bytes"] = peak_rss_bytes();
-    summary.text = output_ + ": " + std::to_string(size.width) + " x " +
-                   std::to_string(size.height) + " pixels, " + with_commas(mesh.positions.size()) +
-                   " points, " + with_commas(mesh.triangles.size()) + " triangles";
+    summary.add_cost(watch);
+    summary.text += with_commas(mesh.positions.size()) + " points, " +
+                    with_commas(mesh.triangles.size()) + " triangles";
     if (factor != 1) summary.text += ", heights x " + readable_number(factor);
     summary.text += ", " + readable_seconds(watch.seconds()) + '\n';
     return summary;
   }
 
  private:
+  /// Writes the picture. The summary begins with its size.
+  [[nodiscard]] Summary write(const Canvas& canvas, const ImageSize& size, bool replace) const {
+    check_interrupt();
+    stream::write_png(output_, size.width, size.height, 3, canvas.resolve(), replace, stop_token());
+    Summary summary;
+    summary.json = {{"width", size.width}, {"height", size.height}};
+    summary.text = output_ + ": " + std::to_string(size.width) + " x " +
+                   std::to_string(size.height) + " pixels, ";
+    return summary;
+  }
+
   Summary render_tree(const cluster::Dendrogram& tree, const ImageSize& size, bool replace,
                       const Stopwatch& watch) {
     Canvas canvas(static_cast<std::uint32_t>(size.width), static_cast<std::uint32_t>(size.height));
     draw_dendrogram(tree, canvas);
-    check_interrupt();
-    stream::write_png(output_, size.width, size.height, 3, canvas.resolve(), replace, stop_token());
-    Summary summary;
-    summary.json = {{"width", size.width},        {"height", size.height},
-                    {"points", tree.points},      {"merges", tree.merges.size()},
-                    {"seconds", watch.seconds()}, {"peak_rss_bytes", peak_rss_bytes()}};
-    summary.text = output_ + ": " + std::to_string(size.width) + " x " +
-                   std::to_string(size.height) + " pixels, a dendrogram of " +
-                   with_commas(tree.points) + " points, " + readable_seconds(watch.seconds()) +
-                   '\n';
+    Summary summary = write(canvas, size, replace);
+    summary.json["points"] = tree.points;
+    summary.json["merges"] = tree.merges.size();
+    summary.add_cost(watch);
+    summary.text += "a dendrogram of " + with_commas(tree.points) + " points, " +
+                    readable_seconds(watch.seconds()) + '\n';
     return summary;
   }
 
@@ -187,23 +184,15 @@ class RenderCommand : public Command {
     Camera camera(view);
     fit(camera, picture.positions, canvas);
     draw_matching(picture, camera, {.threads = common.threads}, canvas);
-    check_interrupt();
-    stream::write_png(output_, size.width, size.height, 3, canvas.resolve(), replace, stop_token());
-
     const MatchingResult& result = picture.result;
-    Summary summary;
-    summary.json = {{"width", size.width},
-                    {"height", size.height},
-                    {"points", result.points},
-                    {"lines", result.lines.size()},
-                    {"levels", result.top},
-                    {"seconds", watch.seconds()},
-                    {"peak_rss_bytes", peak_rss_bytes()}};
-    summary.text = output_ + ": " + std::to_string(size.width) + " x " +
-                   std::to_string(size.height) + " pixels, " + with_commas(result.lines.size()) +
-                   (result.tree ? " lines of a tree of " : " pairs of ") +
-                   with_commas(result.points) + " points, " + readable_seconds(watch.seconds()) +
-                   '\n';
+    Summary summary = write(canvas, size, replace);
+    summary.json["points"] = result.points;
+    summary.json["lines"] = result.lines.size();
+    summary.json["levels"] = result.top;
+    summary.add_cost(watch);
+    summary.text +=
+        with_commas(result.lines.size()) + (result.tree ? " lines of a tree of " : " pairs of ") +
+        with_commas(result.points) + " points, " + readable_seconds(watch.seconds()) + '\n';
     return summary;
   }
 
@@ -260,7 +249,7 @@ class RenderCommand : public Command {
 
   /// Multiplies the heights and chooses the relief of the light. Returns the factor for heights.
   double exaggerate(TriangleMesh& mesh, bool terrain, const ViewDirection& view) {
-    // Slopes of this size make light and shadow that are easy to see without looking wild.
+    // An RMS slope that gives clear light and shadow.
     constexpr double kPleasant = 0.45;
     const double slope = terrain ? rms_slope(mesh) : 0;
     const double wanted = slope > 0 ? std::clamp(kPleasant / slope, 1.0, 25.0) : 1.0;

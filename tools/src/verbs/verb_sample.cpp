@@ -11,24 +11,20 @@
 #include <terrace/stream/store.hpp>
 
 #include "base/units.hpp"
-#include "cli/choices.hpp"
-#include "cli/crs_options.hpp"
-#include "cli/detail_options.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/output.hpp"
+#include "cli/store_options.hpp"
 #include "sample/sample_run.hpp"
 #include "terrace/terrain/crs.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
-
-using namespace terrain;
 namespace {
 
 class SampleCommand final : public Command {
  public:
   void define(CLI::App& app) override {
-    app.add_option("STORE", store_, "where the heights come from")->required();
+    surface_.define(app);
     app.add_option("--points", points_,
                    "CSV of places, one a line; columns by name (x,y; lon,lat; longitude,latitude; "
                    "easting,northing) or else the first two; - is standard input")
@@ -40,18 +36,6 @@ class SampleCommand final : public Command {
                    "no data")
         ->capture_default_str()
         ->type_name("FILE");
-    app.add_option("--method", method_,
-                   "linear: on the triangulated points; natural: natural neighbours, smooth; "
-                   "nearest: the nearest point")
-        ->capture_default_str()
-        ->type_name("NAME");
-    add_number(app, "--max-edge", max_edge_,
-               "of irregular points and coarser levels: triangles with a longer side (metres on "
-               "the ground) are no data, as over water and in shadows (default: none)",
-               kAboveZero)
-        ->type_name("METRES");
-    app.add_option("--level", level_, "only points of this level and above: a number or top")
-        ->capture_default_str();
     app.add_option("--points-crs", points_crs_,
                    "the CRS of the places (EPSG:n or a WKT file; x,y is lon,lat), if it is not the "
                    "store's");
@@ -65,11 +49,7 @@ class SampleCommand final : public Command {
   Summary run(const CommonOptions& common) override {
     const Stopwatch watch;
     SamplerOptions options;
-    options.method = parse_interpolation(method_);
-    options.max_edge = max_edge_;
-    const std::optional<unsigned> level = parse_level(level_);
-    const stream::Store store = open_store(store_);
-    options.level = level.value_or(store.top());
+    const stream::Store store = surface_.open(options);
     const PlaceConversions conversions = conversions_for(store, common);
     PlaceFile places(points_, stop_token());
     stream::Sink output(output_, may_replace(output_, common.force), stop_token());
@@ -79,8 +59,8 @@ class SampleCommand final : public Command {
     output.commit();
     if (counts.points > 0 && counts.answered == 0) {
       common.say(
-          "no point has a height: are their coordinates in the CRS of the store? --points-crs "
-          "says otherwise");
+          "no point has a height: are their coordinates in the CRS of the store? Else give "
+          "--points-crs");
     }
 
     Summary summary;
@@ -118,9 +98,8 @@ class SampleCommand final : public Command {
     return conversions;
   }
 
-  std::string store_, points_ = "-", output_ = "-", method_ = "linear", level_ = "0", points_crs_,
-                      to_crs_, shift_;
-  std::optional<double> max_edge_;
+  SurfaceOptions surface_;
+  std::string points_ = "-", output_ = "-", points_crs_, to_crs_, shift_;
 };
 
 }  // namespace

@@ -8,13 +8,11 @@
 #include <terrace/stream/store.hpp>
 
 #include "base/units.hpp"
-#include "cli/crs_options.hpp"
-#include "cli/detail_options.hpp"
 #include "cli/interrupt.hpp"
-#include "cli/library_call.hpp"
 #include "cli/output.hpp"
+#include "cli/store_options.hpp"
 #include "mesh/vtk_file.hpp"
-#include "scan/surface_run.hpp"
+#include "scan/criterion.hpp"
 #include "terrace/terrain/detail.hpp"
 #include "terrace/terrain/error.hpp"
 #include "terrace/terrain/metric_choice.hpp"
@@ -22,23 +20,14 @@
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
-
-using namespace terrain;
 namespace {
 
 class SurfaceCommand final : public Command {
  public:
   void define(CLI::App& app) override {
-    app.add_option("STORE", store_, "where the points come from")->required();
+    part_.define(app, "only points inside");
     add_output(app, output_, "the file to write: .ply, .obj, .glb; with --tetrahedra .vtk");
     app.add_option("--format", format_, "ply, ply-ascii, obj, glb; else by the file's ending");
-    app.add_option("--level", level_, "detail outside the focuses: a number or top")
-        ->default_str("0; with --focus top");
-    app.add_option(
-        "--region", region_,
-        "only points inside: a box, minx,miny[,minz],maxx,maxy[,maxz], or a GeoJSON file");
-    app.add_option("--focus", focuses_, "BOX:L, all points of level L inside the box; repeatable")
-        ->allow_extra_args(false);
     app.add_option("--criterion", criterion_,
                    "what lies on the surface: gabriel; edge[:FACTOR], facets whose edges are short "
                    "beside the others (0.5), which does not restore scans yet: pieces or the hull; "
@@ -53,53 +42,53 @@ class SurfaceCommand final : public Command {
         ->capture_default_str()
         ->type_name("METRIC");
     app.add_flag("--tetrahedra", tetrahedra_, "write the tetrahedra inside instead");
-    crs_.define(app);
   }
 
   Summary run(const CommonOptions& common) override {
     const Stopwatch watch;
-    SurfaceCriterion criterion = parse_criterion(criterion_);
-    criterion.restore.metric = surface_metric(MetricChoice::parse(metric_), criterion);
+    ScanSurfaceOptions options = parse_criterion(criterion_);
+    set_metric(MetricChoice::parse(metric_), options);
+    options.tetrahedra = tetrahedra_;
     const bool vtk = output_.ends_with(".vtk");
     if (tetrahedra_ != vtk) throw UsageError("--tetrahedra and an output named .vtk go together");
-    const stream::Store store = open_store(store_);
-    const Detail detail =
-        parse_detail(store, level_, region_, focuses_, crs_.regions(store, common));
-    const PlaceConversion places = crs_.places(store, common);
+    if (tetrahedra_ && options.method) {
+      throw UsageError("--tetrahedra is for --criterion gabriel and edge");
+    }
+    const stream::Store store = open_store(part_.path);
+    const Detail detail = part_.detail(store, common);
+    const PlaceConversion places = part_.crs.places(store, common);
     const bool replace = may_replace(output_, common.force);
-    SurfaceOutcome outcome;
-    call_library(store_, criterion_, [&] {
-      outcome = surface_of_store(store, detail, criterion, tetrahedra_, common.memory_or(0));
-    });
-    places(outcome.mesh.positions);
+    ScanSurface surface;
+    call_library(part_.path, criterion_,
+                 [&] { surface = scan_surface(store, detail, options, common.context()); });
+    places(surface.mesh.positions);
     const stream::WriterOptions writer{.format = format_, .replace = replace, .stop = stop_token()};
     if (tetrahedra_) {
-      write_vtk(output_, outcome.mesh.positions, outcome.mesh.levels, outcome.tetrahedra, writer);
+      write_vtk(output_, surface.mesh.positions, surface.mesh.levels, surface.tetrahedra, writer);
     } else {
-      write_mesh(output_, outcome.mesh, writer);
+      write_mesh(output_, surface.mesh, writer);
     }
-    return summary_of(outcome, watch);
+    return summary_of(surface, watch);
   }
 
  private:
-  [[nodiscard]] Summary summary_of(const SurfaceOutcome& outcome, const Stopwatch& watch) const {
-    const tri::SurfaceMeasures& measures = outcome.measures;
+  [[nodiscard]] Summary summary_of(const ScanSurface& surface, const Stopwatch& watch) const {
+    const tri::SurfaceMeasures& measures = surface.measures;
     Summary summary;
-    summary.json = {{"vertices", outcome.mesh.positions.size()},
+    summary.json = {{"vertices", surface.mesh.positions.size()},
                     {"area", measures.area},
                     {"volume", measures.volume},
                     {"components", measures.components},
                     {"euler_characteristic", measures.euler_characteristic},
-                    {"closed", measures.closed},
-                    {"seconds", watch.seconds()},
-                    {"peak_rss_bytes", peak_rss_bytes()}};
-    summary.text = output_ + ": " + with_commas(outcome.mesh.positions.size()) + " vertices, ";
+                    {"closed", measures.closed}};
+    summary.add_cost(watch);
+    summary.text = output_ + ": " + with_commas(surface.mesh.positions.size()) + " vertices, ";
     if (tetrahedra_) {
-      summary.json["tetrahedra"] = outcome.tetrahedra.size();
-      summary.text += with_commas(outcome.tetrahedra.size()) + " tetrahedra";
+      summary.json["tetrahedra"] = surface.tetrahedra.size();
+      summary.text += with_commas(surface.tetrahedra.size()) + " tetrahedra";
     } else {
-      summary.json["triangles"] = outcome.mesh.triangles.size();
-      summary.text += with_commas(outcome.mesh.triangles.size()) + " triangles, " +
+      summary.json["triangles"] = surface.mesh.triangles.size();
+      summary.text += with_commas(surface.mesh.triangles.size()) + " triangles, " +
                       (measures.closed ? "closed, " : "open, ") + with_commas(measures.components) +
                       (measures.components == 1 ? " component" : " components");
     }
@@ -107,11 +96,9 @@ class SurfaceCommand final : public Command {
     return summary;
   }
 
-  std::string store_, output_, format_, level_, region_, criterion_ = "gabriel",
-                                                         metric_ = "euclidean";
-  std::vector<std::string> focuses_;
+  PartOptions part_;
+  std::string output_, format_, criterion_ = "gabriel", metric_ = "euclidean";
   bool tetrahedra_ = false;
-  CrsOptions crs_;
 };
 
 }  // namespace

@@ -22,8 +22,6 @@
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
-
-using namespace terrain;
 namespace {
 
 class SynthCommand : public Command {
@@ -99,9 +97,8 @@ class SynthCommand : public Command {
                     {"rows", dem_.size.height},
                     {"height", {{"min", result.minimum}, {"max", result.maximum}}},
                     {"rms_step", result.rms_step},
-                    {"bytes", result.bytes},
-                    {"seconds", watch.seconds()},
-                    {"peak_rss_bytes", peak_rss_bytes()}};
+                    {"bytes", result.bytes}};
+    summary.add_cost(watch);
     summary.text = output_ + ": " + std::to_string(dem_.size.width) + " x " +
                    std::to_string(dem_.size.height) + " cells, heights " +
                    number_text(std::round(result.minimum)) + " to " +
@@ -144,10 +141,8 @@ class SynthCommand : public Command {
     std::error_code ignored;
     const std::uintmax_t bytes = output_ == "-" ? 0 : std::filesystem::file_size(output_, ignored);
     Summary summary;
-    summary.json = {{"points", points},
-                    {"bytes", bytes},
-                    {"seconds", watch.seconds()},
-                    {"peak_rss_bytes", peak_rss_bytes()}};
+    summary.json = {{"points", points}, {"bytes", bytes}};
+    summary.add_cost(watch);
     summary.text = output_ + ": " + with_commas(points) + " points, " +
                    readable_seconds(watch.seconds()) + '\n';
     return summary;

@@ -12,18 +12,16 @@
 #include <terrace/stream/store.hpp>
 
 #include "base/units.hpp"
-#include "cli/choices.hpp"
 #include "cli/interrupt.hpp"
+#include "cli/option_values.hpp"
 #include "terrace/terrain/error.hpp"
 #include "terrace/terrain/tiles.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
-
-using namespace terrain;
 namespace {
 
-/// "LAST" or "FIRST-LAST"; the request's own without any.
+/// "LAST" or "FIRST-LAST"; empty leaves the request's own.
 void set_zooms(const std::string& text, TilesRequest& request) {
   if (text.empty()) return;
   const auto number = [&](std::string_view part) {
@@ -61,8 +59,8 @@ class TileCommand final : public Command {
     app.add_option("--format", format_, "quantized-mesh")->capture_default_str();
     app.add_option("--zoom", zoom_, "FIRST-LAST; else from 0 to where tiles show every sample");
     add_number(app, "--max-error", max_error_,
-               "metres within which the deepest zoom is of every sample, twice as much at each "
-               "zoom above; else what globes expect: 77067 / 2^zoom",
+               "error bound of the deepest zoom in metres, twice as much at each zoom above; else "
+               "what globes expect: 77067 / 2^zoom",
                kAboveZero)
         ->type_name("METRES");
     app.add_option("--quality", quality_, "greedy, removal (fewer triangles) or fitted")
@@ -134,10 +132,9 @@ Summary TileCommand::run(const CommonOptions& common) {
     summary.text += "zoom " + std::to_string(zoom.zoom) + ": " + counted(zoom.tiles, "tile") +
                     ", within " + readable_bound(zoom.max_error) + " m\n";
   }
-  summary.json = {{"tiles", result.tiles},      {"bytes", result.bytes},
-                  {"made", result.made},        {"kept", result.kept},
-                  {"removed", result.removed},  {"zooms", zooms},
-                  {"seconds", watch.seconds()}, {"peak_rss_bytes", peak_rss_bytes()}};
+  summary.json = {{"tiles", result.tiles}, {"bytes", result.bytes},     {"made", result.made},
+                  {"kept", result.kept},   {"removed", result.removed}, {"zooms", zooms}};
+  summary.add_cost(watch);
   summary.text += output_ + ": " + counted(result.tiles, "tile") + ", " +
                   readable_bytes(result.bytes) + ", in " + readable_seconds(watch.seconds());
   if (result.made < result.tiles) {

@@ -12,18 +12,16 @@
 #include <terrace/stream/store.hpp>
 
 #include "base/units.hpp"
-#include "cli/choices.hpp"
 #include "cli/interrupt.hpp"
+#include "cli/option_values.hpp"
 #include "terrace/terrain/error.hpp"
 #include "terrace/terrain/tile_check.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
-
-using namespace terrain;
 namespace {
 
-/// The problems in the summary's two forms.
+/// Adds a problem to both forms of the summary.
 void add_problem(const stream::Problem& problem, nlohmann::ordered_json& list, std::string& text) {
   list.push_back({{"file", problem.file}, {"offset", problem.offset}, {"what", problem.what}});
   text += problem.file + ": byte " + std::to_string(problem.offset) + ": " + problem.what + "\n";
@@ -36,13 +34,13 @@ class VerifyCommand final : public Command {
     app.add_option("--store", store_,
                    "where the tiles' samples come from: heights are checked against all of them");
     add_number(app, "--max-error", max_error_,
-               "metres that the deepest zoom may be off, twice as much at each zoom above; else "
+               "error bound of the deepest zoom in metres, twice as much at each zoom above; else "
                "what layer.json states",
                kAboveZero)
         ->type_name("METRES");
     app.add_option("--vertical", vertical_,
-                   "ellipsoidal: the store's heights are above the ellipsoid; ignore: take them as "
-                   "if; orthometric: above the sea, as `terrace tile` says");
+                   "what the store's heights refer to: ellipsoidal; orthometric, as for `terrace "
+                   "tile`; ignore takes them as ellipsoidal");
     app.add_option("--geoid", geoid_, "the geoid grid that the tiles were made with")
         ->type_name("FILE");
   }
@@ -51,7 +49,7 @@ class VerifyCommand final : public Command {
     if (is_tile_folder(path_)) return tiles(common);
     if (!store_.empty() || max_error_ || !vertical_.empty() || !geoid_.empty()) {
       throw UsageError("--store, --max-error, --vertical and --geoid are for tile sets, and " +
-                       path_ + " is none");
+                       path_ + " is not one");
     }
     return store();
   }

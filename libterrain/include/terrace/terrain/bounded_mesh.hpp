@@ -42,10 +42,10 @@ struct BoundedMeshResult {
   std::uint64_t vertices = 0, triangles = 0;
   double max_error = 0.0, rms_error = 0.0;  ///< metres
   std::uint64_t samples = 0;                ///< with data, in the region, that meet the condition
-  std::uint64_t uncovered = 0;   ///< of these, such as lie on no triangle: they have no error
-  std::uint64_t duplicates = 0;  ///< samples at the place of another
-  double reading_seconds = 0.0;  ///< of all threads together, decoding included
-  double meshing_seconds = 0.0;  ///< likewise, the check included
+  std::uint64_t uncovered = 0;              ///< of these, those on no triangle: they have no error
+  std::uint64_t duplicates = 0;             ///< samples at the place of another
+  double reading_seconds = 0.0;             ///< of all threads together, decoding included
+  double meshing_seconds = 0.0;             ///< likewise, the check included
 };
 
 /// Writes the mesh of a store's samples at full resolution, with the fewest triangles within the

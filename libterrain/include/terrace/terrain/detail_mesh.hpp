@@ -21,8 +21,8 @@ namespace terrace::terrain {
 /// Where the vertices of a mesh have other heights than in the store: first the overlay's, then
 /// smoothed ones.
 struct HeightOptions {
-  /// With a region only inside it, its border staying: on the triangulation as it is made, so of
-  /// rasters on the unit grid. An edge_height of 0 becomes four times the root mean square of the
+  /// With a region only inside it; its border stays. Works on the triangulation, so for rasters on
+  /// the unit grid. An edge_height of 0 becomes four times the root mean square of the
   /// height differences along edges.
   std::optional<tri::SmoothingOptions> smoothing{};
   /// Replaces the heights of the points that it has; see open_height_overlay().
@@ -45,8 +45,8 @@ struct DetailMeshOptions {
 /// above, levels the highest of each vertex's point. With a region, the triangles that reach into
 /// it, whole. The store never changes. One thread.
 ///
-/// Of a store of triangles: those that `detail` wants, as they were read, to the last bit and
-/// turned as they were; equal corners are one vertex. A triangle is where its first corner is, for
+/// A store of triangles gives those that `detail` wants, bit for bit and with their orientation;
+/// equal corners are one vertex. A triangle is where its first corner is, for
 /// regions too. Without options.
 ///
 /// Takes half of the available memory unless the context gives another bound. Throws:

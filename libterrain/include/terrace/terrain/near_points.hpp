@@ -10,7 +10,7 @@
 
 namespace terrace::terrain {
 
-/// A place in a store's CRS. Without a height it is a vertical line: heights then count for nothing
+/// A place in a store's CRS. Without a height it is a vertical line: heights then do not count
 /// in distances.
 struct NearPlace {
   std::array<double, 2> xy{};

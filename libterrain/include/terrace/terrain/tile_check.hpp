@@ -26,25 +26,25 @@ struct TileCheckRequest {
 
 struct ZoomCheck {
   unsigned zoom = 0;
-  std::uint64_t tiles = 0;      ///< that are there
+  std::uint64_t tiles = 0;      ///< existing files
   std::uint64_t samples = 0;    ///< in its tiles; those on borders of tiles in each of them
-  std::uint64_t uncovered = 0;  ///< of these, such as lie on no triangle: they have no error
+  std::uint64_t uncovered = 0;  ///< of these, those on no triangle: they have no error
   double max_error = 0.0;       ///< metres; 0 if none was measured
 };
 
 struct TileCheckResult {
   std::vector<stream::Problem> problems;  ///< of layer.json, then by zoom, row, column
   std::uint64_t tiles = 0, samples = 0;
-  std::uint64_t torn = 0;  ///< files that a killed run was writing: harmless
+  std::uint64_t torn = 0;  ///< temporary files of a killed run: harmless
   std::vector<ZoomCheck> zooms;
 };
 
-/// Whether `folder` is one of tiles, whole or begun.
+/// Whether `folder` holds a tile set, finished or not.
 bool is_tile_folder(const std::string& folder);
 
 /// Decodes and checks every tile of a set: layer.json against the files, each tile's bytes and
 /// mesh by itself, its bytes against the checksum in the journal where there is one, the sides that
-/// neighbours share, across the line of 180 degrees too, and the heights against every sample of
+/// neighbours share, across the antimeridian too, and the heights against every sample of
 /// the store if one is given. The result does not depend on the number of threads. Memory: of one
 /// row of tiles' borders, and of a tile and a part of its samples per thread; at least 176 MiB.
 /// Throws: stream::Error if layer.json cannot be read, the store is damaged or the memory does not

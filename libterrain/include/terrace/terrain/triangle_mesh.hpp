@@ -21,8 +21,8 @@ struct TriangleMesh {
   std::vector<std::uint8_t> levels;                     ///< of a store
   std::vector<std::int32_t> classes;                    ///< class or cluster
   std::vector<std::uint32_t> representatives;  ///< of the clusters: vertex numbers, any length
-  /// Red, green and blue, 65,535 at most. Clouds whose colours are of 8 bits in fields of 16, which
-  /// is common, have them as they are.
+  /// Red, green and blue, 65,535 at most. Colours of 8 bits in fields of 16, which are common in
+  /// clouds, are not scaled.
   std::vector<std::array<std::uint16_t, 3>> colours;
   std::vector<std::array<float, 3>> normals;  ///< unit length
   /// For a cloud that is coarse somewhere: how many levels are left out around each point.

@@ -17,9 +17,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// By a RasterMesher or a PointMesher.
-template <class Mesher>
-BoundedMeshResult mesh_by(Mesher mesher, const BoundedMeshOptions& options,
+BoundedMeshResult mesh_by(BoundedMesher&& mesher, const BoundedMeshOptions& options,
                           const std::stop_token& stop) {
   const double metres = mesher.metres_vertical();
   BoundedMeshResult result;

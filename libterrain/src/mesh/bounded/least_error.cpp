@@ -67,7 +67,7 @@ class Bracket {
   int in_a_row_ = 0;
 };
 
-/// About where the estimate times `factor` is what is wanted, from `start` on.
+/// A bound at which the estimate times `factor` is about `wanted`, searched from `start`.
 double by_estimate(const LeastErrorSearch& search, double wanted, double factor, double start) {
   constexpr int kMost = 12;
   Bracket bracket(wanted, search.range);

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t kSpoolPiece = 65536;  // vertices or triangles at a time
 
-/// What the pieces would be called if they were ever published.
+/// The name that the temporary files are derived from.
 std::filesystem::path spool_name(const std::string& path) {
   return path != "-" ? std::filesystem::path(path)
                      : std::filesystem::temp_directory_path() / "terrace-mesh";

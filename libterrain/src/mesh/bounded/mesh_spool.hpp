@@ -12,7 +12,7 @@
 namespace terrace::terrain {
 
 /// Keeps a mesh that comes in pieces on disk, beside the file that it will become, until its counts
-/// are known and it can be written. What is kept goes with the object.
+/// are known and it can be written. The temporary files are removed with the object.
 class MeshSpool {
  public:
   /// path: of the mesh file; "-" keeps the pieces in the folder for temporary files.

@@ -5,46 +5,161 @@
 #include <cmath>
 #include <numeric>
 #include <string>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
 #include <terrace/stream/error.hpp>
 
 #include "base/ordered_work.hpp"
-#include "base/progress_report.hpp"
 #include "base/stopwatch.hpp"
 #include "base/units.hpp"
-#include "mesh/bounded/aim_within.hpp"
-#include "mesh/bounded/point_mesh_estimate.hpp"
-#include "mesh/bounded/point_mesh_joiner.hpp"
-#include "mesh/bounded/point_mesh_sides.hpp"
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
 namespace {
 
-/// A sample, its lists and what removal adds; the mesh and its check.
+/// A sample, its lists and the memory of removal; the mesh and its check.
 constexpr std::uint64_t kBytesPerPoint = 24 + 40 + 200;
 /// The same where few of many samples become vertices.
 constexpr std::uint64_t kBytesPerSample = 80;
-/// Cells become one window where that has no more vertices than this, so that those on its sides,
-/// which cannot be removed, are few among them; and only so many.
+/// Cells are joined into windows of at most this many vertices, so that those on the sides, which
+/// cannot be removed, are few among them; and of at most this many cells.
 constexpr double kPointsPerMeshWindow = 10000.0;
 constexpr double kMostMeshCells = 4.0;
-/// What a thread needs to read, and what is there besides.
+/// Memory for reading per thread, and for everything else.
 constexpr std::uint64_t kBytesPerReader = std::uint64_t{12} << 20;
 constexpr std::uint64_t kBytesBeside = std::uint64_t{48} << 20;
+
+/// The middle's share of a cell's width and height: about an eighth of its area.
+constexpr double kMiddle = 0.35;
+/// With fewer samples there the whole cell is taken.
+constexpr std::size_t kFewSamples = 500;
+
+/// Estimates how many vertices a mesh will have, from the samples in the middle of cells. May be
+/// used by several threads at once.
+class PointMeshEstimate {
+ public:
+  PointMeshEstimate(const PointMeshCuts& cuts, PointMeshSamples& samples,
+                    tri::PointDuplicates duplicates);
+
+  /// Vertices of a cell's mesh by greedy insertion. max_error: in the unit of heights.
+  [[nodiscard]] double in_cell(std::uint32_t cell, double max_error) const;
+  /// The average over all cells, estimated from four of them.
+  [[nodiscard]] double per_cell(double max_error) const;
+
+ private:
+  const PointMeshCuts& cuts_;
+  PointMeshSamples& samples_;
+  tri::PointTinOptions options_;
+};
+
+PointMeshEstimate::PointMeshEstimate(const PointMeshCuts& cuts, PointMeshSamples& samples,
+                                     tri::PointDuplicates duplicates)
+    : cuts_(cuts), samples_(samples) {
+  options_.quality = tri::TinQuality::kGreedy;
+  // They are refused elsewhere.
+  options_.duplicates =
+      duplicates == tri::PointDuplicates::kError ? tri::PointDuplicates::kFirst : duplicates;
+}
+
+double PointMeshEstimate::in_cell(std::uint32_t number, double max_error) const {
+  const PointMeshCuts::Cell& cell = cuts_.cells[number];
+  PlaneBox box;
+  for (std::size_t k = 0; k < 2; ++k) {
+    const double middle = cell.low[k] / 2.0 + cell.high[k] / 2.0;
+    const double reach = kMiddle * (cell.high[k] - cell.low[k]) / 2.0;
+    box.min[k] = middle - reach;
+    box.max[k] = middle + reach;
+  }
+  MeshSamples samples;
+  samples_.read(number, 1, box, samples);
+  if (samples.size() < kFewSamples) {
+    samples = {};
+    samples_.read(number, 1, {}, samples);
+  }
+  tri::PointTinOptions options = options_;
+  options.max_error = max_error;
+  const tri::PointTin tin = tri::point_tin(samples.x, samples.y, samples.z, {}, options);
+  return static_cast<double>(tin.inserted) * static_cast<double>(samples_.count(number, 1)) /
+         static_cast<double>(samples.size());
+}
+
+double PointMeshEstimate::per_cell(double max_error) const {
+  const auto count = static_cast<std::uint32_t>(cuts_.cells.size());
+  double vertices = 0.0;
+  for (const std::uint32_t k : {1U, 3U, 5U, 7U}) vertices += in_cell(count * k / 8, max_error);
+  return vertices / 4.0;
+}
+
+/// Makes one mesh of the meshes of a plan's windows. Memory: 4 bytes per knot and per vertex of the
+/// sides between windows that are in the mesh and windows that are not yet.
+class PointMeshJoiner {
+ public:
+  /// Sides that no window needs any more are dropped.
+  PointMeshJoiner(const PointMeshPlan& plan, PointMeshSides& sides, MeshSpool& spool);
+
+  /// Adds window i; windows come in order.
+  WindowMeasures add(std::size_t i, const PointWindowTin& tin);
+
+ private:
+  const PointMeshPlan& plan_;
+  PointMeshSides& sides_;
+  MeshSpool& spool_;
+  std::vector<std::uint32_t> knots_;  ///< numbers of vertices
+  std::unordered_map<std::uint32_t, std::vector<std::uint32_t>> open_sides_;
+};
+
+PointMeshJoiner::PointMeshJoiner(const PointMeshPlan& plan, PointMeshSides& sides, MeshSpool& spool)
+    : plan_(plan), sides_(sides), spool_(spool), knots_(plan.knots.size(), kNoNumber) {}
+
+WindowMeasures PointMeshJoiner::add(std::size_t i, const PointWindowTin& tin) {
+  std::vector<std::uint32_t> numbers;
+  numbers.reserve(tin.vertices.size());
+  for (std::size_t v = 0; v < tin.vertices.size(); ++v) {
+    std::uint32_t own = kNoNumber;
+    std::uint32_t* known = &own;
+    if (v < tin.shared.size()) {
+      const PointWindowTin::Shared& shared = tin.shared[v];
+      if (shared.knot != kNoNumber) {
+        known = &knots_[shared.knot];
+      } else if (shared.side != kNoNumber) {
+        std::vector<std::uint32_t>& side = open_sides_[shared.side];
+        if (side.size() <= shared.place) side.resize(shared.place + 1, kNoNumber);
+        known = &side[shared.place];
+      }
+    }
+    if (*known == kNoNumber) {
+      *known = static_cast<std::uint32_t>(spool_.vertices());
+      spool_.add_vertex(tin.vertices[v]);
+    }
+    numbers.push_back(*known);
+  }
+  for (const auto& t : tin.triangles) {
+    spool_.add_triangle({numbers[t[0]], numbers[t[1]], numbers[t[2]]});
+  }
+  for (const std::uint32_t side : plan_.windows[i].sides) {
+    // The later of its two windows closes it.
+    if (std::max(plan_.sides[side].windows[0], plan_.sides[side].windows[1]) != i) continue;
+    open_sides_.erase(side);
+    sides_.drop(side);
+  }
+  return {.max_error = tin.errors.largest,
+          .rms_error = tin.errors.rms,
+          .covered = tin.errors.covered,
+          .samples = tin.samples,
+          .uncovered = tin.uncovered,
+          .duplicates = tin.duplicates,
+          .work = tin.samples,
+          .reading_seconds = tin.reading_seconds,
+          .meshing_seconds = tin.meshing_seconds};
+}
 
 }  // namespace
 
 PointMesher::PointMesher(const stream::Store& store, const BoundedMeshOptions& options,
                          const Context& context)
-    : store_(store),
-      options_(options),
-      context_(context),
-      placement_(store.schema()),
-      bounds_(world_box(placement_, store.bounds())),
-      rounding_(options.path, bounds_, options.writer) {
+    : BoundedMesher(store, options, context) {
   const Stopwatch reading;
   Detail detail;
   detail.region = options.region;
@@ -58,33 +173,21 @@ PointMesher::PointMesher(const stream::Store& store, const BoundedMeshOptions& o
     for (std::uint32_t i = 0; i < cuts_.cells.size(); ++i) {
       most = std::max<std::uint64_t>(most, samples_->count(i, 1));
     }
-    cell_threads_ = threads_within_memory(most * kBytesPerPoint, most);
+    cell_threads_ = threads_for(most * kBytesPerPoint, most);
   }
   reading_seconds_ = reading.seconds();
 }
 
-unsigned PointMesher::threads_within_memory(std::uint64_t each, std::uint64_t points) const {
-  const std::uint64_t beside = single() ? 0 : kBytesBeside;
-  if (!single()) each += kBytesPerReader;
-  const std::uint64_t memory = context_.memory_or(0);
-  if (memory < beside + each) {
-    throw stream::Error({.file = store_.path().string(),
-                         .where = {},
-                         .cause = "a mesh with a bound needs " +
-                                  std::to_string(((beside + each) >> 20) + 1) + "M of memory for " +
-                                  with_commas(points) +
-                                  " irregular points at a time, `memory_bytes` allows " +
-                                  std::to_string(memory >> 20) + "M",
-                         .remedy = "allow more"});
-  }
-  return static_cast<unsigned>(std::min<std::uint64_t>(
-      context_.threads, (memory - beside) / std::max<std::uint64_t>(each, 1)));
+unsigned PointMesher::threads_for(std::uint64_t each, std::uint64_t points) const {
+  return threads_within_memory(single() ? each : each + kBytesPerReader,
+                               single() ? 0 : kBytesBeside,
+                               " for " + with_commas(points) + " irregular points at a time");
 }
 
 PointMeshOptions PointMesher::mesh_options(double max_error) const {
   PointMeshOptions out;
   out.bound = max_error;
-  const Aim aim = aim_within(max_error, rounding_, options_.path);
+  const Aim aim = aim_within(max_error);
   out.first_aim = aim.first;
   out.tin.max_error = aim.sure;
   out.tin.duplicates = options_.duplicates;
@@ -95,7 +198,7 @@ PointMeshOptions PointMesher::mesh_options(double max_error) const {
 BoundedMeshResult PointMesher::run_whole(const PointMeshOptions& options, MeshSpool& spool) const {
   const Stopwatch meshing;
   const std::uint64_t points = scan_.whole->size();
-  threads_within_memory(points * kBytesPerPoint, points);
+  static_cast<void>(threads_for(points * kBytesPerPoint, points));
   const PointWindowTin tin =
       mesh_samples(*scan_.whole, {}, {}, options, rounding_, store_.path().string());
   BoundedMeshResult result;
@@ -131,10 +234,10 @@ PointMeshPlan PointMesher::plan_for(double max_error) const {
   });
 }
 
-BoundedMeshResult PointMesher::run_windows(const PointMeshOptions& options, MeshSpool& spool,
-                                           std::uint64_t most_vertices) const {
-  BoundedMeshResult result;
+BoundedMeshResult PointMesher::run_plan(const PointMeshOptions& options, MeshSpool& spool,
+                                        std::uint64_t most_vertices) const {
   if (!samples_) {  // on one line: no surface
+    BoundedMeshResult result;
     result.samples = result.uncovered = scan_.samples;
     return result;
   }
@@ -149,42 +252,10 @@ BoundedMeshResult PointMesher::run_windows(const PointMeshOptions& options, Mesh
   const PointWindowMesher mesher(plan, *samples_, sides, options, rounding_,
                                  store_.path().string());
   PointMeshJoiner joiner(plan, sides, spool);
-  ProgressReport report(context_, "samples");
-  double squares = 0.0, covered = 0.0;
-  struct Enough {};
-  try {
-    in_order(
-        plan.windows.size(), threads_within_memory(each, most),
-        [&](unsigned, std::size_t i) {
-          context_.check_stop();
-          return mesher.mesh(i);
-        },
-        [&](std::size_t i, const PointWindowTin& tin) {
-          joiner.add(i, tin);
-          result.samples += tin.samples;
-          if (spool.vertices() > most_vertices) throw Enough{};
-          result.max_error = std::max(result.max_error, tin.errors.largest);
-          const auto count = static_cast<double>(tin.errors.covered);
-          squares += tin.errors.rms * tin.errors.rms * count;
-          covered += count;
-          result.uncovered += tin.uncovered;
-          result.duplicates += tin.duplicates;
-          result.reading_seconds += tin.reading_seconds;
-          result.meshing_seconds += tin.meshing_seconds;
-          report.update(result.samples,
-                        static_cast<double>(result.samples) / static_cast<double>(scan_.samples));
-        });
-  } catch (const Enough&) {
-    // The caller sees it by the number of vertices, told from the part that is made.
-    const double part =
-        std::max(1.0, static_cast<double>(result.samples)) / static_cast<double>(scan_.samples);
-    result.vertices = static_cast<std::uint64_t>(static_cast<double>(spool.vertices()) / part);
-    result.vertices = std::max(result.vertices, most_vertices + 1);
-    return result;
-  }
-  result.vertices = spool.vertices();
-  result.rms_error = covered > 0.0 ? std::sqrt(squares / covered) : 0.0;
-  return result;
+  return run_windows(
+      plan.windows.size(), threads_for(each, most), scan_.samples, spool, most_vertices,
+      [&](unsigned, std::size_t i) { return mesher.mesh(i); },
+      [&](std::size_t i, const PointWindowTin& tin) { return joiner.add(i, tin); });
 }
 
 double PointMesher::estimate(double max_error) const {
@@ -225,7 +296,7 @@ BoundedMeshResult PointMesher::run(double max_error, MeshSpool& spool,
   BoundedMeshResult result;
   try {
     if (!single()) {
-      result = run_windows(mesh_options(max_error), spool, most_vertices);
+      result = run_plan(mesh_options(max_error), spool, most_vertices);
     } else {
       PointMeshOptions options;
       if (options_.max_points > 0) {

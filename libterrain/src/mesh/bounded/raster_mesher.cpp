@@ -2,20 +2,18 @@
 #include "mesh/bounded/raster_mesher.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cassert>
 #include <cmath>
-#include <string>
+#include <limits>
+#include <map>
+#include <optional>
+#include <span>
 #include <utility>
-
-#include <terrace/stream/error.hpp>
 
 #include "base/ordered_work.hpp"
 #include "base/portable_math.hpp"
-#include "base/progress_report.hpp"
-#include "base/units.hpp"
 #include "earth/ground.hpp"
-#include "mesh/bounded/aim_within.hpp"
-#include "mesh/bounded/lattice_plan.hpp"
-#include "mesh/bounded/window_joiner.hpp"
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
@@ -26,34 +24,225 @@ constexpr std::int64_t kWindowCells = 512, kWidestCells = 2048;
 /// Vertices that a window should have, so that those on its sides, which cannot be removed, are
 /// few among them.
 constexpr double kVerticesPerWindow = 3000.0;
-/// Cells of a window that is a sample of all.
+/// Cells, each way, of the windows that estimates are made from.
 constexpr std::int64_t kSampleCells = 256;
 /// What a thread needs at worst: a window of kWindowCells with every sample a vertex, or one of
 /// kWidestCells with few, and the results that wait.
 constexpr std::uint64_t kBytesPerThread = std::uint64_t{112} << 20;
 constexpr std::uint64_t kRasterBytesBeside = std::uint64_t{48} << 20;
+constexpr std::uint64_t kFillBytes = std::uint64_t{32} << 20;
+
+/// How large windows should be, from the vertices per sample of greedy insertion.
+std::int64_t window_cells(double per_sample) {
+  std::int64_t cells = kWindowCells;
+  while (per_sample * static_cast<double>(cells * cells) < kVerticesPerWindow &&
+         cells < kWidestCells) {
+    cells *= 2;
+  }
+  return cells;
+}
+
+/// The samples of a raster store that a region needs: those inside and the next ones outside, so
+/// that every triangle of neighbouring samples that reaches inside has its corners. All of them
+/// without a region; empty where the region misses the raster.
+LatticeWindow lattice_of(const stream::Store& store, const std::optional<Region>& region) {
+  const stream::StoreSchema& schema = store.schema();
+  assert(schema.grid);
+  const auto columns = static_cast<std::int64_t>(schema.columns);
+  const auto rows = static_cast<std::int64_t>(schema.rows);
+  if (!region) return {0, 0, columns, rows};
+  const stream::Placement& placement = schema;
+  stream::Box3 box;
+  for (unsigned corner = 0; corner < 4; ++corner) {
+    const Point2 stored =
+        stored_place(placement, {((corner & 1) != 0 ? region->box().max : region->box().min)[0],
+                                 ((corner & 2) != 0 ? region->box().max : region->box().min)[1]});
+    box.include(stream::Point3{stored[0], stored[1], 0.0});
+  }
+  const auto first = [](double low, std::int64_t count) {
+    return static_cast<std::int64_t>(
+        std::clamp(std::floor(low) - 1.0, 0.0, static_cast<double>(count)));
+  };
+  const auto last = [](double high, std::int64_t count) {
+    return static_cast<std::int64_t>(
+        std::clamp(std::ceil(high) + 1.0, -1.0, static_cast<double>(count - 1)));
+  };
+  const std::int64_t c0 = first(box.min[0], columns), c1 = last(box.max[0], columns);
+  const std::int64_t r0 = first(box.min[1], rows), r1 = last(box.max[1], rows);
+  // More than a sample outside: nothing of it is inside.
+  const bool missed = box.empty() || box.max[0] < 0.0 || box.max[1] < 0.0 ||
+                      box.min[0] > static_cast<double>(columns - 1) ||
+                      box.min[1] > static_cast<double>(rows - 1) || c1 < c0 || r1 < r0;
+  if (missed) return {};
+  return {c0, r0, c1 - c0 + 1, r1 - r0 + 1};
+}
+
+std::vector<std::int64_t> cut(std::int64_t first, std::int64_t samples, std::int64_t cells) {
+  const std::int64_t total = samples - 1;
+  const std::int64_t parts = std::max<std::int64_t>(1, (total + cells / 2) / cells);
+  std::vector<std::int64_t> sides;
+  for (std::int64_t i = 0; i <= parts; ++i) sides.push_back(first + total * i / parts);
+  return sides;
+}
+
+/// A rectangle of samples cut into windows that share their sides: the last column of one is the
+/// first of the next.
+class LatticePlan {
+ public:
+  /// whole: at least 1 sample each way. cells: how many cells a window should have each way;
+  /// windows are equal to within one cell and have at most 1.5 times as many.
+  LatticePlan(const LatticeWindow& whole, std::int64_t cells);
+
+  [[nodiscard]] const LatticeWindow& whole() const { return whole_; }
+  [[nodiscard]] std::size_t across() const { return columns_.size() - 1; }
+  [[nodiscard]] std::size_t down() const { return rows_.size() - 1; }
+  [[nodiscard]] std::size_t size() const { return across() * down(); }
+  /// Window i, counted along rows from the first row on.
+  [[nodiscard]] LatticeWindow window(std::size_t i) const;
+
+ private:
+  LatticeWindow whole_;
+  std::vector<std::int64_t> columns_, rows_;  ///< of the sides
+};
+
+LatticePlan::LatticePlan(const LatticeWindow& whole, std::int64_t cells)
+    : whole_(whole),
+      columns_(cut(whole.column, whole.columns, cells)),
+      rows_(cut(whole.row, whole.rows, cells)) {
+  assert(whole.columns > 0 && whole.rows > 0 && cells > 0);
+}
+
+LatticeWindow LatticePlan::window(std::size_t i) const {
+  assert(i < size());
+  const std::size_t x = i % across(), y = i / across();
+  return {columns_[x], rows_[y], columns_[x + 1] - columns_[x] + 1, rows_[y + 1] - rows_[y] + 1};
+}
+
+constexpr std::uint32_t kNoVertex = std::numeric_limits<std::uint32_t>::max();
+
+/// Makes one mesh of the meshes of a plan's windows: a vertex on a side of several of them becomes
+/// one vertex. Memory: 4 bytes per column of the raster, samples on sides beside cells without
+/// data, and the spool.
+class WindowJoiner {
+ public:
+  WindowJoiner(const LatticePlan& plan, MeshSpool& spool);
+
+  /// Adds window i; windows come in order.
+  WindowMeasures add(std::size_t i, WindowTin&& tin);
+
+ private:
+  /// Samples on the sides and inside of this window that lie on no triangle, once all windows that
+  /// share them have been added.
+  std::uint64_t uncovered(const WindowTin& tin);
+  [[nodiscard]] std::uint32_t* shared(const WindowTin& tin, const tri::GridVertex& vertex);
+
+  const LatticePlan& plan_;
+  MeshSpool& spool_;
+  // Numbers of the vertices on the lines of sides above and below the row of windows at hand, and
+  // on the left and right side of the window.
+  std::vector<std::uint32_t> above_, below_, left_, right_;
+  /// By row and column, how many windows do not cover a sample on their sides: it is uncovered if
+  /// none of those that share it does.
+  std::map<std::pair<std::int64_t, std::int64_t>, unsigned> on_sides_;
+};
+
+WindowJoiner::WindowJoiner(const LatticePlan& plan, MeshSpool& spool)
+    : plan_(plan),
+      spool_(spool),
+      above_(static_cast<std::size_t>(plan.whole().columns), kNoVertex),
+      below_(above_) {}
+
+std::uint32_t* WindowJoiner::shared(const WindowTin& tin, const tri::GridVertex& vertex) {
+  // A corner belongs to two sides; the line above or below knows it whatever its window, the sides
+  // to the left and right only if it lies between.
+  const std::int64_t column = tin.window.column - plan_.whole().column + vertex.column;
+  if (vertex.row == 0) return &above_[static_cast<std::size_t>(column)];
+  if (vertex.row + 1 == tin.window.rows) return &below_[static_cast<std::size_t>(column)];
+  if (vertex.column == 0) return &left_[vertex.row];
+  if (vertex.column + 1 == tin.window.columns) return &right_[vertex.row];
+  return nullptr;
+}
+
+std::uint64_t WindowJoiner::uncovered(const WindowTin& tin) {
+  std::uint64_t uncovered = 0;
+  const LatticeWindow &window = tin.window, &whole = plan_.whole();
+  for (const std::uint32_t at : tin.uncovered) {
+    const std::int64_t column = at % window.columns, row = at / window.columns;
+    const auto between = [](std::int64_t place, std::int64_t first, std::int64_t count,
+                            std::int64_t whole_first, std::int64_t whole_count) {
+      return (place == 0 && first > whole_first) ||
+             (place + 1 == count && first + count < whole_first + whole_count);
+    };
+    const unsigned windows =
+        (between(column, window.column, window.columns, whole.column, whole.columns) ? 2U : 1U) *
+        (between(row, window.row, window.rows, whole.row, whole.rows) ? 2U : 1U);
+    if (windows == 1) {
+      ++uncovered;
+      continue;
+    }
+    const auto known = on_sides_.try_emplace({window.row + row, window.column + column}, 0U).first;
+    if (++known->second < windows) continue;
+    ++uncovered;
+    on_sides_.erase(known);
+  }
+  return uncovered;
+}
+
+WindowMeasures WindowJoiner::add(std::size_t i, WindowTin&& tin) {
+  const WindowMeasures measures{.max_error = tin.check.max_error,
+                                .rms_error = tin.check.rms_error,
+                                .covered = tin.check.covered,
+                                .samples = tin.samples,
+                                .uncovered = uncovered(tin),
+                                .work = tin.window.size(),
+                                .reading_seconds = tin.reading_seconds,
+                                .meshing_seconds = tin.meshing_seconds};
+  const auto rows = static_cast<std::size_t>(tin.window.rows);
+  if (i % plan_.across() == 0) {
+    if (i > 0) above_ = std::exchange(below_, std::vector<std::uint32_t>(below_.size(), kNoVertex));
+    left_.assign(rows, kNoVertex);
+  } else {
+    left_ = std::move(right_);
+  }
+  right_.assign(rows, kNoVertex);
+
+  // Vertices that are there already make room for those behind them.
+  std::vector<std::uint32_t> numbers;
+  numbers.reserve(tin.vertices.size());
+  const auto first = static_cast<std::uint32_t>(spool_.vertices());
+  std::uint32_t fresh = 0;
+  for (std::size_t k = 0; k < tin.vertices.size(); ++k) {
+    std::uint32_t* const at_side = shared(tin, tin.vertices[k]);
+    if (at_side != nullptr && *at_side != kNoVertex) {
+      numbers.push_back(*at_side);
+      continue;
+    }
+    numbers.push_back(first + fresh);
+    tin.positions[fresh++] = tin.positions[k];
+    if (at_side != nullptr) *at_side = numbers.back();
+  }
+  for (auto& triangle : tin.triangles) {
+    for (std::uint32_t& vertex : triangle) vertex = numbers[vertex];
+  }
+  spool_.add_vertices(std::span(tin.positions).first(fresh));
+  spool_.add_triangles(tin.triangles);
+  return measures;
+}
 
 }  // namespace
 
 RasterMesher::RasterMesher(const stream::Store& store, const BoundedMeshOptions& options,
                            const Context& context)
-    : store_(store),
-      options_(options),
-      context_(context),
-      placement_(store.schema()),
-      whole_(lattice_of(store, options.region)),
-      bounds_(world_box(placement_, store.bounds())),
-      rounding_(options.path, bounds_, options.writer) {
+    : BoundedMesher(store, options, context), whole_(lattice_of(store, options.region)) {
   if (whole_.columns < 2 || whole_.rows < 2) {
     throw UsageError(options.region ? "`region`: nothing of it lies on the raster of the store"
                                     : "the raster is one line of samples: it has no triangles");
   }
-  threads_ = threads_within_memory();
-  if (options.fill == Fill::interpolate) fill_ = std::make_shared<StoreFill>(store);
-}
-
-double RasterMesher::metres_vertical() const {
-  return Ground(placement_).map(store_.bounds())[8] / placement_.coordinates[2].scale;
+  const bool interpolates = options.fill == Fill::interpolate;
+  threads_ = threads_within_memory(
+      kBytesPerThread, kRasterBytesBeside + 8 * static_cast<std::uint64_t>(whole_.columns) +
+                           (interpolates ? kFillBytes : 0));
+  if (interpolates) fill_ = std::make_shared<StoreFill>(store);
 }
 
 double RasterMesher::estimate(double max_error) const {
@@ -63,23 +252,6 @@ double RasterMesher::estimate(double max_error) const {
 
 bool RasterMesher::can_estimate() const {
   return whole_.size() >= std::size_t{24} * kSampleCells * kSampleCells;
-}
-
-unsigned RasterMesher::threads_within_memory() const {
-  const std::uint64_t memory = context_.memory_or(0);
-  const std::uint64_t beside = kRasterBytesBeside + 8 * static_cast<std::uint64_t>(whole_.columns) +
-                               (options_.fill == Fill::interpolate ? std::uint64_t{32} << 20 : 0);
-  if (memory < beside + kBytesPerThread) {
-    throw stream::Error({.file = store_.path().string(),
-                         .where = {},
-                         .cause = "a mesh with a bound needs " +
-                                  std::to_string(((beside + kBytesPerThread) >> 20) + 1) +
-                                  "M of memory, `memory_bytes` allows " +
-                                  std::to_string(memory >> 20) + "M",
-                         .remedy = "allow more"});
-  }
-  return static_cast<unsigned>(
-      std::min<std::uint64_t>(context_.threads, (memory - beside) / kBytesPerThread));
 }
 
 std::vector<std::unique_ptr<WindowMesher>> RasterMesher::meshers(double max_error) const {
@@ -94,7 +266,7 @@ std::vector<std::unique_ptr<WindowMesher>> RasterMesher::meshers(double max_erro
 WindowTinOptions RasterMesher::window_options(double max_error) const {
   WindowTinOptions out;
   out.bound = max_error;
-  const Aim aim = aim_within(max_error, rounding_, options_.path);
+  const Aim aim = aim_within(max_error);
   out.first_aim = aim.first;
   out.aim = aim.sure;
   out.whole = whole_;
@@ -145,60 +317,23 @@ RasterMesher::Sample RasterMesher::sample(double max_error, tri::TinQuality qual
   return sample;
 }
 
-std::int64_t RasterMesher::window_cells(double per_sample) {
-  std::int64_t cells = kWindowCells;
-  while (per_sample * static_cast<double>(cells * cells) < kVerticesPerWindow &&
-         cells < kWidestCells) {
-    cells *= 2;
-  }
-  return cells;
-}
-
 BoundedMeshResult RasterMesher::run(double max_error, MeshSpool& spool,
                                     std::uint64_t most_vertices) {
-  BoundedMeshResult result;
   std::int64_t cells = kWindowCells;
+  Sample sample;
   if (LatticePlan(whole_, cells).size() > 1) {
-    const Sample sample = this->sample(max_error, tri::TinQuality::kGreedy, 2, 2);
+    sample = this->sample(max_error, tri::TinQuality::kGreedy, 2, 2);
     cells = window_cells(sample.vertices_per_sample);
-    result.reading_seconds = sample.reading_seconds;
-    result.meshing_seconds = sample.meshing_seconds;
   }
   const LatticePlan plan(whole_, cells);
   const auto meshers = this->meshers(max_error);
   WindowJoiner joiner(plan, spool);
-  ProgressReport report(context_, "samples");
-  double squares = 0.0, covered = 0.0;
-  std::uint64_t samples_seen = 0;
-  struct Enough {};
-  try {
-    in_order(
-        plan.size(), threads_,
-        [&](unsigned worker, std::size_t i) { return meshers[worker]->mesh(plan.window(i)); },
-        [&](std::size_t i, WindowTin&& tin) {
-          result.max_error = std::max(result.max_error, tin.check.max_error);
-          const auto count = static_cast<double>(tin.check.covered);
-          squares += tin.check.rms_error * tin.check.rms_error * count;
-          covered += count;
-          result.samples += tin.samples;
-          result.reading_seconds += tin.reading_seconds;
-          result.meshing_seconds += tin.meshing_seconds;
-          samples_seen += tin.window.size();
-          joiner.add(i, std::move(tin));
-          if (spool.vertices() > most_vertices) throw Enough{};
-          report.update(samples_seen,
-                        static_cast<double>(samples_seen) / static_cast<double>(whole_.size()));
-        });
-    result.vertices = spool.vertices();
-    result.uncovered = joiner.uncovered();
-  } catch (const Enough&) {
-    const double part = static_cast<double>(samples_seen) / static_cast<double>(whole_.size());
-    result.vertices = std::max(
-        spool.vertices(),
-        static_cast<std::uint64_t>(static_cast<double>(spool.vertices()) / std::min(1.0, part)));
-  }
-  result.triangles = spool.triangles();
-  result.rms_error = covered > 0.0 ? std::sqrt(squares / covered) : 0.0;
+  BoundedMeshResult result = run_windows(
+      plan.size(), threads_, whole_.size(), spool, most_vertices,
+      [&](unsigned worker, std::size_t i) { return meshers[worker]->mesh(plan.window(i)); },
+      [&](std::size_t i, WindowTin&& tin) { return joiner.add(i, std::move(tin)); });
+  result.reading_seconds += sample.reading_seconds;
+  result.meshing_seconds += sample.meshing_seconds;
   return result;
 }
 

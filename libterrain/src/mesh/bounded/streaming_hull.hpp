@@ -20,7 +20,7 @@ std::vector<Point2> convex_hull(std::vector<Point2> points, bool keep_straight =
 
 /// Where the line of `axis` = c (0: x, 1: y) enters and leaves a convex polygon, the lower place
 /// along it first: on the polygon's border, or outside by a rounding error, so that what the line
-/// has inside lies between. Nothing if the line misses it. hull: as convex_hull() makes it, with an
+/// has inside lies between. nullopt if the line misses it. hull: as convex_hull() makes it, with an
 /// area. O(corners).
 std::optional<std::array<double, 2>> crossings(std::span<const Point2> hull, unsigned axis,
                                                double c);

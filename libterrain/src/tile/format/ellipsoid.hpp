@@ -7,7 +7,7 @@
 #include "terrace/stream/point.hpp"
 
 /// The WGS 84 ellipsoid as web globes see it. Angles in degrees, lengths in metres; geocentric
-/// coordinates are Earth-centred, Earth-fixed. Built on portable_math, so that what is written has
+/// coordinates are Earth-centred, Earth-fixed. Built on portable_math, so that tiles have
 /// the same bytes everywhere.
 
 namespace terrace::terrain {

@@ -15,7 +15,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "tiles are little-endian");
 
-// Appends values as they are in memory.
+// Appends the bytes of values in memory.
 class Writer {
  public:
   template <class T>

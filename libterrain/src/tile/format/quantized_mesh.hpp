@@ -35,7 +35,7 @@ struct TileMesh {
   std::string metadata;
 
   [[nodiscard]] std::size_t size() const { return u.size(); }
-  /// What a client reads for a vertex's height, metres.
+  /// The height of a vertex that a client decodes, metres.
   [[nodiscard]] double metres(std::size_t vertex) const {
     const double low = lowest, high = highest;
     return low + (high - low) * height[vertex] / kTileUnits;
@@ -55,8 +55,8 @@ struct TileEdges {
 };
 TileEdges edges_of(const TileMesh& mesh);
 
-/// Numbers the vertices in the order in which the triangles use them first, as the format wants;
-/// vertices that none uses go.
+/// Numbers the vertices in the order in which the triangles use them first, as the format requires;
+/// unused vertices are dropped.
 void order_vertices(TileMesh& mesh);
 
 /// The tile's bytes. mesh: in the order of order_vertices(), with a vertex in each corner.

@@ -23,7 +23,8 @@ struct TileAddress {
 
 /// "9/543/380.terrain", the path under the folder of a tile set.
 std::string tile_path(const TileAddress& tile);
-/// The address of such a path; nothing if it is none (leading zeros, too large, another ending).
+/// The address of such a path; nullopt for any other text (leading zeros, too large, another
+/// ending).
 std::optional<TileAddress> parse_tile_path(const std::string& path);
 
 inline constexpr std::uint32_t tile_columns(unsigned zoom) { return std::uint32_t{2} << zoom; }

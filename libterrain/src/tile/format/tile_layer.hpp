@@ -8,19 +8,18 @@
 
 namespace terrace::terrain {
 
-/// What layer.json, the description of a tile set, says.
+/// The contents of layer.json, the description of a tile set.
 struct TileLayer {
   std::string name;
   GeographicBox bounds;
   unsigned first_zoom = 0, last_zoom = 0;
   /// Extensions that every tile has: "octvertexnormals", "watermask", "metadata".
   std::vector<std::string> extensions;
-  /// Per zoom from 0 on: the tiles that are there.
+  /// The existing tiles per zoom, from 0 on.
   std::vector<std::vector<TileRange>> available;
-  /// The bound in metres that the tiles of a zoom keep, per zoom from 0 on; of zooms without tiles
-  /// 0.
+  /// The error bound of a zoom in metres, per zoom from 0 on; 0 for zooms without tiles.
   std::vector<double> max_errors;
-  /// What made the tiles what they are: two runs with equal text make equal tiles.
+  /// Identifies the store and the options: two runs with equal text make equal tiles.
   std::string fingerprint;
 };
 

@@ -13,7 +13,7 @@
 namespace terrace::terrain {
 
 /// Lowest and highest samples of the square blocks of a raster, so that what cannot matter need not
-/// be read, and a digest of each, so that what has not changed need not be made again.
+/// be read, and a hash of each, so that tiles of unchanged blocks are kept.
 class HeightBlocks {
  public:
   /// Reads the store once. Memory: 20 bytes per block, at most 20 MiB. Throws: stream::Error.
@@ -22,14 +22,14 @@ class HeightBlocks {
   struct Range {
     double low = 0.0, high = 0.0;  ///< in the vertical unit of the store
   };
-  /// Over the blocks that meet the window; nothing if no sample in them has data.
+  /// Over the blocks that meet the window; nullopt if no sample in them has data.
   [[nodiscard]] std::optional<Range> range(const LatticeWindow& window) const;
 
   /// A block that has data and lies in the window, if there is one: its lattice rectangle.
   [[nodiscard]] std::optional<LatticeWindow> some_block_within(const LatticeWindow& window) const;
 
-  /// A number of the samples of all blocks that meet the window, and of their places: of two
-  /// rasters of equal size, whatever the clusters of their stores, it is the same if these are.
+  /// A hash of the samples, with their places, of all blocks that meet the window. It does not
+  /// depend on how the store clusters them.
   [[nodiscard]] std::uint64_t digest(const LatticeWindow& window) const;
 
   /// Whether every block that meets the window has all its samples.

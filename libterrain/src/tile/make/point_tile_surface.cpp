@@ -141,7 +141,7 @@ void PointTileSurface::samples(const GeographicBox& box, SurfaceSamples& out) {
   for (std::size_t i = 0; i < places.size(); ++i) {
     const Point2 p = places[i];
     const double height = points_.positions[i][2] * channel.scale + channel.offset;
-    // Written so that NaN is outside.
+    // Comparisons with NaN are false: it is outside.
     const bool inside = p[0] >= box.west && p[0] <= box.east && p[1] >= box.south &&
                         p[1] <= box.north && std::isfinite(height);
     if (!inside) continue;

@@ -21,7 +21,7 @@
 
 namespace terrace::terrain {
 
-/// What all threads know of a store of irregular points that is tiled.
+/// What all threads share of a store of irregular points that is tiled.
 struct TiledCloud : TiledStore {
   /// Memory that a thread may use for the triangles of a part.
   std::uint64_t window_bytes = 0;
@@ -31,14 +31,14 @@ struct TiledCloud : TiledStore {
   std::unique_ptr<const CloudSamples> samples{};
 
   /// Reads a level of the store, and a few clusters; all of it where it fits into whole_bytes.
-  /// Throws: stream::Error if no place of it can be told on the globe.
+  /// Throws: stream::Error if no place of it has a longitude and latitude.
   TiledCloud(const stream::Store& tiled, CoordinateSystem system, EllipsoidalHeights heights,
              std::uint64_t window_bytes, std::uint64_t whole_bytes, unsigned threads);
 };
 
 /// The surface of a store of irregular points: linear in the triangles of the Delaunay
 /// triangulation of all of them by stored x, y, filled beyond their hull. Of points at one x, y the
-/// first in the order of StoreWindow::points() counts, and the others are no samples.
+/// first in the order of StoreWindow::points() counts, and the others are not samples.
 class PointTileSurface final : public TileSurface {
  public:
   explicit PointTileSurface(const TiledCloud& cloud);

@@ -8,15 +8,13 @@
 
 #include "surface/store_window.hpp"
 #include "tile/make/height_cache.hpp"
-#include "tile/make/raster_tile_digest.hpp"
 #include "tile/make/tile_surface.hpp"
 #include "tile/make/tiled_raster.hpp"
 
 namespace terrace::terrain {
 
 /// The surface of a raster store: bilinear between four samples with data, filled elsewhere.
-/// Memory: 36 MiB, and of the largest box that was asked for 8 bytes per sample, or 24 where
-/// samples() are.
+/// Memory: 36 MiB, and 8 bytes per sample of the largest box that was asked for, 24 for samples().
 class RasterTileSurface final : public TileSurface {
  public:
   explicit RasterTileSurface(const TiledRaster& raster);
@@ -25,22 +23,24 @@ class RasterTileSurface final : public TileSurface {
   [[nodiscard]] double spacing() const override { return raster_.spacing; }
   void expect(const GeographicBox& box) override;
   void samples(const GeographicBox& box, SurfaceSamples& out) override;
-  bool rows(const GeographicBox& box, SurfaceRows& out) override;
-  bool grid(const GeographicBox& box, SurfaceGrid& out) override;
+  SurfacePart part(const GeographicBox& box) override;
   std::optional<HeightRange> range(const GeographicBox& box) override;
   void heights(std::span<const double> longitude, std::span<const double> latitude,
                std::span<double> out) override;
   void water(std::span<const double> longitude, std::span<const double> latitude,
              std::span<std::uint8_t> out) override;
-  std::uint64_t digest(const GeographicBox& box) override { return digest_of(raster_, box); }
+  std::uint64_t digest(const GeographicBox& box) override { return raster_.digest(box); }
 
  private:
+  /// False where the samples are not in rows along parallels.
+  bool rows(const GeographicBox& box, SurfaceRows& out);
+  void grid(const GeographicBox& box, SurfaceGrid& out);
   /// Calls visit(i, place on the lattice, the sample north-west of it, distance to the next row)
   /// for each place, in an order that reads little. The sample's right neighbour follows it.
   template <class Visit>
   void visit_places(std::span<const double> longitude, std::span<const double> latitude,
                     const Visit& visit);
-  /// The heights of a window: of the one that is held, or read into it.
+  /// The heights of a window: from the held one, or read.
   struct View {
     const double* first = nullptr;
     std::int64_t stride = 0;

@@ -7,13 +7,12 @@
 #include <span>
 #include <vector>
 
-#include "tile/make/quadratic_patch.hpp"
 #include "tile/make/raster_tile_surface.hpp"
 
 namespace terrace::terrain {
 namespace {
 
-/// Samples that a place between exact ones may be off at the places where it is checked.
+/// Largest error of an interpolated place, in samples, at the places where it is checked.
 constexpr double kTolerance = 0.005;
 /// Cells along a part of a mask: smaller ones are placed one by one, larger ones are cut unless
 /// they are all the same.
@@ -27,6 +26,39 @@ constexpr double kWorst = 0.2113248654051871;
 /// A rectangle of cells.
 struct WaterPart {
   std::size_t column, row, columns, rows;
+};
+
+/// The polynomial of second degree in both directions through 3 x 3 values: row k of the
+/// coefficients has those of t^k, in powers of s along the row.
+struct QuadraticPatch {
+  std::array<std::array<double, 3>, 3> coefficients{};
+
+  /// Values at 0, 1/2 and 1 each way, row by row.
+  explicit QuadraticPatch(const std::array<double, 9>& values) {
+    const auto through = [](double a, double b, double c) {
+      return std::array{a, 4.0 * b - 3.0 * a - c, 2.0 * (a - 2.0 * b + c)};
+    };
+    std::array<std::array<double, 3>, 3> along{};
+    for (std::size_t j = 0; j < 3; ++j) {
+      along[j] = through(values[3 * j], values[3 * j + 1], values[3 * j + 2]);
+    }
+    for (std::size_t m = 0; m < 3; ++m) {
+      const auto down = through(along[0][m], along[1][m], along[2][m]);
+      for (std::size_t k = 0; k < 3; ++k) coefficients[k][m] = down[k];
+    }
+  }
+  /// Coefficients along the row at t.
+  [[nodiscard]] std::array<double, 3> at_row(double t) const {
+    std::array<double, 3> row{};
+    for (std::size_t m = 0; m < 3; ++m) {
+      row[m] = (coefficients[2][m] * t + coefficients[1][m]) * t + coefficients[0][m];
+    }
+    return row;
+  }
+  static double value(const std::array<double, 3>& row, double s) {
+    return (row[2] * s + row[1]) * s + row[0];
+  }
+  [[nodiscard]] double value(double s, double t) const { return value(at_row(t), s); }
 };
 
 /// Fills a mask of cells in rows and columns, part by part. View: reads a window of heights.
@@ -156,7 +188,7 @@ void WaterMask<View>::look(const WaterPart& part, std::span<Point2> places) {
   const double right = static_cast<double>(schema.columns);
   const double bottom = static_cast<double>(schema.rows);
   for (Point2& p : places) {
-    // What is far off is asked at the raster's border, where nothing is.
+    // Far places are moved to just outside the raster's border, where nothing is.
     p = {std::clamp(std::floor(p[0] + 0.5), -1.0, right),
          std::clamp(std::floor(p[1] + 0.5), -1.0, bottom)};
   }
@@ -202,7 +234,7 @@ void WaterMask<View>::fill(const WaterPart& part) {
   bool good = true;
   for (std::size_t k = 0; k < 4; ++k) {
     const double s = worst((k & 1) != 0), t = worst((k & 2) != 0);
-    // Written so that NaN is bad.
+    // `!(x <= y)` also rejects NaN.
     good = good && std::abs(column.value(s, t) - places[9 + k][0]) <= kTolerance &&
            std::abs(row.value(s, t) - places[9 + k][1]) <= kTolerance;
   }
@@ -227,7 +259,7 @@ void WaterMask<View>::fill(const WaterPart& part) {
   look(part, between);
 }
 
-/// Whether numbers a step of places apart are so by equal distances.
+/// Whether every `step`-th number is equally spaced.
 bool even(std::span<const double> places, std::size_t step) {
   const std::size_t last = (places.size() - 1) / step;
   const double each = (places[last * step] - places[0]) / static_cast<double>(last);
@@ -238,8 +270,7 @@ bool even(std::span<const double> places, std::size_t step) {
   return true;
 }
 
-/// How many places stand in the first row, if all stand in rows and columns at equal distances;
-/// else 0.
+/// The number of places in the first row of a regular grid; 0 if it is not one.
 std::size_t columns_of(std::span<const double> longitude, std::span<const double> latitude) {
   std::size_t columns = 0;
   while (columns < latitude.size() && latitude[columns] == latitude[0]) ++columns;

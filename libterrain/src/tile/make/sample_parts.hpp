@@ -3,17 +3,19 @@
 
 #include <array>
 #include <functional>
+#include <vector>
 
+#include "terrace/terrain/context.hpp"
 #include "tile/format/tile_address.hpp"
 #include "tile/make/tile_surface.hpp"
 
-/// Boxes of any number of samples, part by part.
+/// Boxes and tiles that have samples; boxes of any number of samples, part by part.
 
 namespace terrace::terrain {
 
 /// The four parts of a box, from the south-west on.
 std::array<GeographicBox, 4> quarters_of(const GeographicBox& box);
-/// Whether to look into a box.
+/// Whether a box may have samples.
 bool may_have_samples(const GeographicBox& box, TileSurface& surface);
 /// Whether the samples of a box are too many to be asked for at once.
 bool is_to_be_cut(const GeographicBox& box, TileSurface& surface);
@@ -23,5 +25,11 @@ bool is_to_be_cut(const GeographicBox& box, TileSurface& surface);
 /// of one part.
 void for_each_part(const GeographicBox& box, TileSurface& surface,
                    const std::function<void(const SurfaceSamples&)>& visit);
+
+/// The tiles of a zoom that may have samples, sorted by row, then column. Searched from zoom 0
+/// down, so the cost is proportional to these tiles however far apart the samples lie. Throws:
+/// stream::Stopped.
+std::vector<TileAddress> tiles_with_samples(TileSurface& surface, unsigned zoom,
+                                            const Context& context);
 
 }  // namespace terrace::terrain

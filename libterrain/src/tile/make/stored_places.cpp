@@ -16,13 +16,12 @@ namespace terrace::terrain {
 namespace {
 
 constexpr double kFarPlace = std::numeric_limits<double>::infinity();
-/// Metres and degrees that a place may be off after it was converted there and back, with a shift
-/// of datum in between: much more than it is.
+/// Generous bounds on the error of converting a place there and back, with a datum shift.
 constexpr double kMarginMetres = 0.02;
 constexpr double kMarginDegrees = 2e-7;
 /// Steps across a box in which its image is looked at.
 constexpr unsigned kPlaceSteps = 24;
-/// Across boxes up to this size (degrees) fewer will do: second differences tell how much bulges.
+/// Fewer steps do across boxes up to this size (degrees): second differences bound the bulge.
 constexpr double kSmall = 1.0;
 constexpr unsigned kSmallSteps = 6;
 constexpr unsigned kBoundsSteps = 64;
@@ -55,8 +54,8 @@ struct PlaceGrid {
     }
     return places;
   }
-  /// The largest of a coordinate of what became of the places; infinite where one has none. Between
-  /// places a quadratic function is an eighth of it off a straight line.
+  /// The largest second difference of a coordinate of the converted places; infinite if one has
+  /// none. Between places a quadratic function deviates from a line by an eighth of it.
   [[nodiscard]] double second_difference(std::span<const Point2> made, std::size_t axis) const {
     double largest = 0.0;
     const auto look = [&](std::size_t at, std::size_t step) {
@@ -108,7 +107,7 @@ StoredPlaces::StoredPlaces(const stream::Store& store, CoordinateSystem system)
     first_longitude_ = all.min[0];
     last_longitude_ = all.max[0];
   }
-  find_bounds(store.path().string());
+  find_bounds(store.path().string(), store.schema().grid);
 }
 
 Point2 StoredPlaces::world(const Point2& stored) const {
@@ -116,7 +115,12 @@ Point2 StoredPlaces::world(const Point2& stored) const {
   return {p[0], p[1]};
 }
 
-void StoredPlaces::find_bounds(const std::string& file) {
+double StoredPlaces::lattice_spacing() const {
+  return std::min(shortest_steps_[0] * kBoundsSteps / stored_.max[0],
+                  shortest_steps_[1] * kBoundsSteps / stored_.max[1]);
+}
+
+void StoredPlaces::find_bounds(const std::string& file, bool is_lattice) {
   std::vector<Point2> places;
   for (unsigned j = 0; j <= kBoundsSteps; ++j) {
     for (unsigned i = 0; i <= kBoundsSteps; ++i) {
@@ -132,25 +136,29 @@ void StoredPlaces::find_bounds(const std::string& file) {
       const Point2& p = places[j * (kBoundsSteps + 1) + i];
       if (!std::isfinite(p[0]) || !std::isfinite(p[1])) continue;
       include(all, p);
-      const auto step_to = [&](const Point2& next) {
+      const auto step_to = [&](const Point2& next, double& shortest) {
         if (!std::isfinite(next[0])) return;
         const double wide = std::abs(next[0] - p[0]);
-        // Between neighbours more than half of the globe: the line of 180 degrees lies between.
+        // Neighbours more than half of the globe apart: the antimeridian lies between them.
         if (wide > 180.0) {
           crosses = true;
           return;
         }
-        step = {std::max(step[0], wide), std::max(step[1], std::abs(next[1] - p[1]))};
+        const double tall = std::abs(next[1] - p[1]);
+        step = {std::max(step[0], wide), std::max(step[1], tall)};
+        const double length = std::max(wide, tall);
+        if (length > 0.0) shortest = std::min(shortest, length);
       };
-      if (i < kBoundsSteps) step_to(places[j * (kBoundsSteps + 1) + i + 1]);
-      if (j < kBoundsSteps) step_to(places[(j + 1) * (kBoundsSteps + 1) + i]);
+      if (i < kBoundsSteps) step_to(places[j * (kBoundsSteps + 1) + i + 1], shortest_steps_[0]);
+      if (j < kBoundsSteps) step_to(places[(j + 1) * (kBoundsSteps + 1) + i], shortest_steps_[1]);
     }
   }
-  if (!(all.min[0] <= all.max[0])) {
-    throw stream::Error({.file = file,
-                         .where = {},
-                         .cause = "its places cannot be told on the globe by " + crs_.title(),
-                         .remedy = "build the store anew with the right `crs`"});
+  if (!(all.min[0] <= all.max[0]) || (is_lattice && !std::isfinite(lattice_spacing()))) {
+    throw stream::Error(
+        {.file = file,
+         .where = {},
+         .cause = "cannot be converted to longitude and latitude with " + crs_.title(),
+         .remedy = "build the store anew with the right `crs`"});
   }
   // Between the places looked at, the border of a projected box may bulge by part of a step.
   if (!crs_.is_geographic()) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <span>
 #include <string>
 #include <vector>
@@ -14,14 +15,14 @@
 
 namespace terrace::terrain {
 
-/// Longitudes in [-180, 180], whatever turn they were in.
+/// The same longitude in [-180, 180].
 double wrapped_longitude(double longitude);
 
 /// Where a store lies on the globe: its points, or the whole lattice of a raster. Const members may
 /// be called by several threads at once.
 class StoredPlaces {
  public:
-  /// Throws: stream::Error if no place of the store can be told on the globe.
+  /// Throws: stream::Error if no place of the store has a longitude and latitude.
   StoredPlaces(const stream::Store& store, CoordinateSystem system);
 
   [[nodiscard]] const CoordinateSystem& crs() const { return crs_; }
@@ -29,24 +30,29 @@ class StoredPlaces {
   [[nodiscard]] const StoredBox& stored_bounds() const { return stored_; }
   /// Around all of them on the globe, a little larger where the store is projected.
   [[nodiscard]] const GeographicBox& bounds() const { return bounds_; }
-  /// West and east end of a store in degrees, in its own unit and turn: may go beyond 180 degrees.
+  /// West and east end of a store in degrees, in its own unit and turn: may be beyond the
+  /// antimeridian.
   [[nodiscard]] std::array<double, 2> longitudes() const {
     return {first_longitude_, last_longitude_};
   }
 
-  /// The boxes of stored coordinates outside of which no point of a geographic box lies: none if it
-  /// does not meet bounds(). Two, apart from each other, where a store in degrees goes around the
-  /// globe.
+  /// Of a raster: the least distance of neighbouring samples in degrees along a parallel or
+  /// meridian, as far as the corners of 64 x 64 parts of it tell.
+  [[nodiscard]] double lattice_spacing() const;
+
+  /// The boxes of stored coordinates that contain all points of a geographic box: none if it does
+  /// not meet bounds(), two where a store in degrees goes around the globe.
   [[nodiscard]] std::vector<StoredBox> windows(const GeographicBox& box) const;
 
-  /// Stored x, y to longitude in [-180, 180] and latitude, in place; NaN: on no place.
+  /// Stored x, y to longitude in [-180, 180] and latitude, in place; NaN where there
+  /// is none.
   void to_geographic(std::span<Point2> places) const;
-  /// Longitude and latitude to stored x, y, in place. Both numbers of the line of 180 degrees give
-  /// the same; what has no place there goes to a corner outside stored_bounds().
+  /// Longitude and latitude to stored x, y, in place. -180 and 180 give the same. Places that
+  /// have none get a corner outside stored_bounds().
   void to_stored(std::span<Point2> places) const;
 
  private:
-  void find_bounds(const std::string& file);
+  void find_bounds(const std::string& file, bool is_lattice);
   [[nodiscard]] Point2 world(const Point2& stored) const;
   [[nodiscard]] double in_turn(double longitude) const;
 
@@ -56,7 +62,11 @@ class StoredPlaces {
   GeographicBox bounds_;
   /// For a store in degrees: its range of longitudes, and a full turn in its unit.
   double first_longitude_ = 0.0, last_longitude_ = 0.0, turn_ = 360.0;
-  Point2 margin_{};  ///< stored: what converting there and back may be off, and more
+  Point2 margin_{};  ///< stored: more than the error of converting there and back
+  /// Degrees, along a parallel or meridian: the shortest step of the grid that bounds are found by,
+  /// along each stored axis.
+  Point2 shortest_steps_{std::numeric_limits<double>::infinity(),
+                         std::numeric_limits<double>::infinity()};
 };
 
 }  // namespace terrace::terrain

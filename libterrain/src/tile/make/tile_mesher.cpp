@@ -81,20 +81,21 @@ tri::PointTin tin_of(const TileAddress& tile, const TileLeaf& leaf, TileSurface&
   if (is_to_be_cut(box_of(tile, leaf), surface)) {
     return mesh_crowded_leaf(tile, leaf, frame, options, surface);
   }
-  if (SurfaceRows rows; surface.rows(box_of(tile, leaf), rows)) {
-    across.convert(rows.longitude);
-    down.convert(rows.latitude);
-    return tri::point_tin(tri::SampleRows{rows.longitude, rows.latitude, rows.height}, frame,
+  SurfacePart part = surface.part(box_of(tile, leaf));
+  if (auto* const rows = std::get_if<SurfaceRows>(&part)) {
+    across.convert(rows->longitude);
+    down.convert(rows->latitude);
+    return tri::point_tin(tri::SampleRows{rows->longitude, rows->latitude, rows->height}, frame,
                           options);
   }
-  if (SurfaceGrid grid; surface.grid(box_of(tile, leaf), grid)) {
-    across.convert(grid.longitude, grid.height);
-    down.convert(grid.latitude, grid.height);
-    return tri::point_tin(tri::SampleGrid{grid.columns, grid.longitude, grid.latitude, grid.height},
-                          frame, options);
+  if (auto* const grid = std::get_if<SurfaceGrid>(&part)) {
+    across.convert(grid->longitude, grid->height);
+    down.convert(grid->latitude, grid->height);
+    return tri::point_tin(
+        tri::SampleGrid{grid->columns, grid->longitude, grid->latitude, grid->height}, frame,
+        options);
   }
-  SurfaceSamples samples;
-  surface.samples(box_of(tile, leaf), samples);
+  auto& samples = std::get<SurfaceSamples>(part);
   across.convert(samples.longitude);
   down.convert(samples.latitude);
   return tri::point_tin(samples.longitude, samples.latitude, samples.height, frame, options);
@@ -108,7 +109,7 @@ void mesh_leaf(const TileAddress& tile, const TileLeaf& leaf, const ZoomPlan& pl
   if (range) {
     const double error = flat_error(frame, plan.height_step, *range);
     if (error <= plan.max_error && (range->certain || pieces.has_data)) {
-      // Whatever the triangles: nothing needs to be read.
+      // Any triangles are within the bound: nothing needs to be read.
       pieces.max_error = std::max(pieces.max_error, error);
       pieces.has_data = true;
     } else {
@@ -249,7 +250,7 @@ MadeTile make_tile(const TileAddress& tile, const ZoomPlan& plan, TileSurface& s
   TileSides sides(tile, plan, surface);
   for (const TileLeaf& leaf : leaves_of(tile, plan, surface)) {
     const auto range = surface.range(box_of(tile, leaf));
-    // Where heights differ less than the bound, nothing but the sides is read as a rule.
+    // Where heights differ by less than the bound, usually only the sides are read.
     if (range && range->high - range->low > plan.max_error) surface.expect(box_of(tile, leaf));
     mesh_leaf(tile, leaf, plan, surface, options.quality, sides.around(leaf), pieces);
   }

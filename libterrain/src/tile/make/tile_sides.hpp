@@ -15,7 +15,7 @@
 
 namespace terrace::terrain {
 
-/// What all tiles of a zoom have in context.
+/// What all tiles of a zoom have in common.
 struct ZoomPlan {
   unsigned zoom = 0;
   double max_error = 0.0;     ///< metres
@@ -85,7 +85,7 @@ class TileSides {
   /// their heights if the surface wants sides to go through them.
   SamplesAt add_samples(const Side& side, std::vector<double>& t, std::vector<double>& longitude,
                         std::vector<double>& latitude);
-  /// Samples in a box around places on a side or at its end, the same for all tiles there; nothing
+  /// Samples in a box around places on a side or at its end, the same for all tiles there; nullopt
   /// if they may be too many.
   std::optional<SurfaceSamples> samples_near(const GeographicBox& box);
   /// The samples at the end of a side: the same for all sides and tiles that meet there.

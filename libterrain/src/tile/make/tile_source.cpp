@@ -17,12 +17,11 @@
 namespace terrace::terrain {
 namespace {
 
-/// What a thread needs: the samples of a leaf or of a part of a tile, their mesh and what is kept
-/// of the store.
+/// Memory of a thread: the samples of a leaf or of a part of a tile, their mesh and its caches.
 constexpr std::uint64_t kBytesPerThread = std::uint64_t{96} << 20;
 /// Fill and blocks of the store, and the lists of tiles.
 constexpr std::uint64_t kBytesBeside = std::uint64_t{80} << 20;
-/// What the triangles of a part may take of a thread, whatever the memory allowed.
+/// The least memory for the triangles of a part.
 constexpr std::uint64_t kLeastWindowBytes = std::uint64_t{64} << 20;
 
 template <class Tiled, class Surface>
@@ -42,7 +41,7 @@ class SourceOf final : public TileSource {
   std::unique_ptr<Tiled> tiled_;
 };
 
-/// Metres above the ellipsoid; nothing: heights are taken from those around.
+/// Metres above the ellipsoid; nullopt: heights are interpolated from those around.
 std::optional<double> flat_height(const stream::Store& store, const TilesRequest& request,
                                   double metres_per_unit) {
   if (request.fill == Fill::none) throw UsageError("`fill` none: globes have no holes");

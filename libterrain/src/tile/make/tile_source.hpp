@@ -14,7 +14,7 @@
 
 namespace terrace::terrain {
 
-/// What a job over tiles may take.
+/// The resources of a job over tiles.
 struct TileResources {
   std::uint64_t memory_bytes = 0;
   unsigned threads = 1;
@@ -38,7 +38,7 @@ class TileSource {
 
 /// The source for a raster or for irregular points. Reads the store once or twice.
 /// Throws: UsageError for options that make no sense or not for this kind of store; stream::Error
-/// if no place of it can be told on the globe, or on a damaged one; stream::Stopped.
+/// if no place of it has a longitude and latitude, or on a damaged one; stream::Stopped.
 std::unique_ptr<TileSource> open_tile_source(const stream::Store& store,
                                              const TilesRequest& request,
                                              const TileResources& resources,

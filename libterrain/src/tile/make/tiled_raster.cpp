@@ -10,39 +10,11 @@
 
 #include <terrace/stream/error.hpp>
 
+#include "base/digest.hpp"
+#include "earth/crs/crs_definition.hpp"
+
 namespace terrace::terrain {
 namespace {
-
-/// Neighbouring samples are closer nowhere, in degrees along a parallel or meridian, as far as the
-/// corners of 64 x 64 parts of the raster tell.
-double lattice_spacing(const StoredPlaces& places) {
-  constexpr std::size_t kSteps = 64;
-  const std::array<double, 2> samples = places.stored_bounds().max;
-  std::vector<Point2> corners;
-  for (std::size_t j = 0; j <= kSteps; ++j) {
-    for (std::size_t i = 0; i <= kSteps; ++i) {
-      corners.push_back({samples[0] * static_cast<double>(i) / kSteps,
-                         samples[1] * static_cast<double>(j) / kSteps});
-    }
-  }
-  places.to_geographic(corners);
-  double spacing = std::numeric_limits<double>::infinity();
-  const auto step = [&](std::size_t from, std::size_t to, double samples_along) {
-    const double wide = std::abs(corners[to][0] - corners[from][0]);
-    const double length = std::max(wide, std::abs(corners[to][1] - corners[from][1]));
-    // Between neighbours more than half of the globe: the line of 180 degrees lies between.
-    if (!(wide <= 180.0) || !(length > 0.0)) return;
-    spacing = std::min(spacing, length * static_cast<double>(kSteps) / samples_along);
-  };
-  for (std::size_t j = 0; j <= kSteps; ++j) {
-    for (std::size_t i = 0; i <= kSteps; ++i) {
-      const std::size_t at = j * (kSteps + 1) + i;
-      if (i < kSteps) step(at, at + 1, samples[0]);
-      if (j < kSteps) step(at, at + kSteps + 1, samples[1]);
-    }
-  }
-  return spacing;
-}
 
 /// The same store, if it can be tiled.
 const stream::Store& checked(const stream::Store& store) {
@@ -51,6 +23,120 @@ const stream::Store& checked(const stream::Store& store) {
                        .where = {},
                        .cause = "a raster of one line of samples has no surface to tile",
                        .remedy = {}});
+}
+
+/// A projected raster's places are looked at in so many steps along a box. Wider boxes than this
+/// (degrees) may hold places outside the raster that its projection tears apart.
+constexpr unsigned kDigestSteps = 24;
+constexpr double kSmooth = 1.0;
+/// Samples around a place: those it lies between, and what rounding moves.
+constexpr double kDigestMargin = 2.0;
+
+void add_raster(const TiledRaster& raster, Digest& digest) {
+  const stream::StoreSchema& schema = raster.store.schema();
+  digest.add(schema.columns);
+  digest.add(schema.rows);
+  for (const double number : schema.world.xy) digest.add(number);
+  const stream::Channel& height = schema.coordinates[2];
+  digest.add(std::uint64_t{static_cast<std::uint8_t>(height.type)});
+  digest.add(height.scale);
+  digest.add(height.offset);
+  const stream::Crs crs = raster.places.crs().crs();
+  digest.add(static_cast<std::uint64_t>(crs.epsg));
+  digest.add(crs.wkt);
+  raster.add_to(digest);
+}
+
+/// The samples of a window that is not empty.
+StoredBox box_of(const LatticeWindow& window) {
+  return {{static_cast<double>(window.column), static_cast<double>(window.row)},
+          {static_cast<double>(window.column + window.columns - 1),
+           static_cast<double>(window.row + window.rows - 1)}};
+}
+
+/// Adds the samples of a window, and the fill where it is used.
+void add_window(const TiledRaster& raster, const LatticeWindow& window, Digest& digest) {
+  digest.add(raster.blocks.digest(window));
+  if (raster.flat_fill) return;
+  raster.blocks.for_each_incomplete(
+      window, [&](const LatticeWindow& block) { digest.add(raster.fill.digest(box_of(block))); });
+  // What hangs over the raster's borders.
+  const stream::StoreSchema& schema = raster.store.schema();
+  const auto columns = static_cast<std::int64_t>(schema.columns);
+  const auto rows = static_cast<std::int64_t>(schema.rows);
+  const std::int64_t right = window.column + window.columns - columns;
+  const std::int64_t bottom = window.row + window.rows - rows;
+  for (const LatticeWindow& strip :
+       {LatticeWindow{window.column, window.row, -window.column, window.rows},
+        LatticeWindow{columns, window.row, right, window.rows},
+        LatticeWindow{window.column, window.row, window.columns, -window.row},
+        LatticeWindow{window.column, rows, window.columns, bottom}}) {
+    if (strip.columns > 0 && strip.rows > 0) digest.add(raster.fill.digest(box_of(strip)));
+  }
+}
+
+/// The lattice around places of it, two samples over its borders at most: what lies beyond is asked
+/// there. Some part of the raster is always in it.
+LatticeWindow window_of(const TiledRaster& raster, const stream::Box3& around, double margin) {
+  const stream::StoreSchema& schema = raster.store.schema();
+  LatticeWindow window;
+  const auto span = [&](std::size_t axis, std::uint64_t count, std::int64_t& first,
+                        std::int64_t& size) {
+    const double last = static_cast<double>(count - 1);
+    const double low = std::clamp(std::floor(around.min[axis] - margin), -2.0, last);
+    const double high = std::clamp(std::ceil(around.max[axis] + margin), 0.0, last + 2.0);
+    first = static_cast<std::int64_t>(low);
+    size = static_cast<std::int64_t>(high - low) + 1;
+  };
+  span(0, schema.columns, window.column, window.columns);
+  span(1, schema.rows, window.row, window.rows);
+  return window;
+}
+
+void add_everything(const TiledRaster& raster, Digest& digest) {
+  const stream::StoreSchema& schema = raster.store.schema();
+  const auto columns = static_cast<std::int64_t>(schema.columns);
+  const auto rows = static_cast<std::int64_t>(schema.rows);
+  add_window(raster, {-2, -2, columns + 4, rows + 4}, digest);
+}
+
+/// Places of the box in the raster's CRS, in `steps` each way; empty if some has no place there.
+std::vector<Point2> places_of(const TiledRaster& raster, const GeographicBox& box, unsigned steps) {
+  std::vector<Point2> places;
+  for (unsigned j = 0; j <= steps; ++j) {
+    for (unsigned i = 0; i <= steps; ++i) {
+      double longitude = box.west + (box.east - box.west) * i / steps;
+      // A raster in degrees may be in any turn; projections take the first.
+      if (!raster.places.crs().is_geographic()) longitude = std::remainder(longitude, 360.0);
+      const double latitude = box.south + (box.north - box.south) * j / steps;
+      places.push_back({longitude, std::clamp(latitude, -90.0, 90.0)});
+    }
+  }
+  raster.places.crs().from_geographic(places);
+  const bool good = std::all_of(places.begin(), places.end(), [](const Point2& p) {
+    return std::isfinite(p[0]) && std::isfinite(p[1]);
+  });
+  return good ? places : std::vector<Point2>{};
+}
+
+/// In degrees, places are looked up in the turn nearest to the raster's own longitudes.
+void add_in_all_turns(const TiledRaster& raster, const stream::Box3& box, double margin,
+                      Digest& digest) {
+  const auto [first, last] = raster.places.longitudes();
+  const double beside = std::max(0.0, 360.0 - (last - first)) / 2.0 + 1e-6;
+  for (int turn = -2; turn <= 2; ++turn) {
+    const double west = std::max(box.min[0] + 360.0 * turn, first - beside);
+    const double east = std::min(box.max[0] + 360.0 * turn, last + beside);
+    if (west > east) continue;
+    stream::Box3 around;
+    for (const double x : {west, east}) {
+      for (const double y : {box.min[1], box.max[1]}) {
+        const Point2 place = stored_place(raster.store.schema(), {x, y});
+        around.include(stream::Point3{place[0], place[1], 0.0});
+      }
+    }
+    add_window(raster, window_of(raster, around, margin), digest);
+  }
 }
 
 }  // namespace
@@ -63,12 +149,7 @@ TiledRaster::TiledRaster(const stream::Store& tiled, CoordinateSystem system,
   const std::array<double, 6>& world = tiled.schema().world.xy;
   const CoordinateSystem& crs = places.crs();
   upright = crs.is_geographic() && crs.counts_as_wgs84() && world[1] == 0.0 && world[3] == 0.0;
-  spacing = lattice_spacing(places);
-  if (spacing < std::numeric_limits<double>::infinity()) return;
-  throw stream::Error({.file = tiled.path().string(),
-                       .where = {},
-                       .cause = "its places cannot be told on the globe by " + crs.title(),
-                       .remedy = "build the store anew with the right `crs`"});
+  spacing = places.lattice_spacing();
 }
 
 LatticeWindow TiledRaster::window_around(const GeographicBox& box) const {
@@ -86,6 +167,46 @@ LatticeWindow TiledRaster::window_around(const GeographicBox& box) const {
     size[axis] = static_cast<std::int64_t>(std::min(std::ceil(high + 1.0), last)) - first[axis] + 1;
   }
   return {first[0], first[1], size[0], size[1]};
+}
+
+std::uint64_t TiledRaster::digest(const GeographicBox& box) const {
+  Digest sum;
+  add_raster(*this, sum);
+  const CrsDefinition& crs = places.crs().definition();
+  const bool geographic = places.crs().is_geographic();
+  const bool straight = geographic && places.crs().counts_as_wgs84();
+  const GeographicBox& all = places.bounds();
+  const bool inside = box.west >= all.west && box.east <= all.east && box.south >= all.south &&
+                      box.north <= all.north;
+  const bool smooth =
+      geographic ? crs.degrees_per_unit == 1.0 : inside || box.east - box.west <= kSmooth;
+  const unsigned steps = straight ? 1 : kDigestSteps;
+  std::vector<Point2> looked_at;
+  if (smooth) looked_at = places_of(*this, box, steps);
+  if (looked_at.empty()) {
+    add_everything(*this, sum);
+    return sum.value();
+  }
+  if (!geographic) {
+    for (Point2& p : looked_at) p = stored_place(store.schema(), p);
+  }
+  stream::Box3 around;
+  for (const Point2& p : looked_at) around.include(stream::Point3{p[0], p[1], 0.0});
+  // What bulges between the places looked at.
+  const auto bulge = [&](std::size_t axis) {
+    return straight ? 0.0 : (around.max[axis] - around.min[axis]) / steps;
+  };
+  for (const std::size_t axis : {std::size_t{0}, std::size_t{1}}) {
+    const double more = bulge(axis);
+    around.min[axis] -= more;
+    around.max[axis] += more;
+  }
+  if (geographic) {
+    add_in_all_turns(*this, around, kDigestMargin, sum);
+  } else {
+    add_window(*this, window_of(*this, around, kDigestMargin), sum);
+  }
+  return sum.value();
 }
 
 }  // namespace terrace::terrain

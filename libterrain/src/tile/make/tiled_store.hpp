@@ -15,24 +15,25 @@
 
 namespace terrace::terrain {
 
-/// What all threads know of a store that is tiled, of whatever kind.
+/// What all threads share of a store that is tiled, whether a raster or irregular points.
 struct TiledStore {
   stream::Store store;
   StoredPlaces places;
   EllipsoidalHeights vertical;
   StoreFill fill;
   double spacing = 0.0;  ///< see TileSurface::spacing()
-  /// Heights where there are no samples: nullopt takes those around, else this height in metres.
+  /// The height in metres where there are no samples; nullopt interpolates those around.
   std::optional<double> flat_fill{};
-  /// Where the surface has this height (in the store's unit) is water; nullopt: where a raster has
+  /// Water is where the surface has this height (in the store's unit); nullopt: where a raster has
   /// no data.
   std::optional<double> water_height{};
 
-  /// Reads a level of the store. Throws: stream::Error if no place of it can be told on the globe.
+  /// Reads a level of the store. Throws: stream::Error if no place of it has a longitude and
+  /// latitude.
   TiledStore(const stream::Store& tiled, CoordinateSystem system, EllipsoidalHeights heights)
       : store(tiled), places(tiled, std::move(system)), vertical(std::move(heights)), fill(tiled) {}
 
-  /// Heights of all samples, as a digest must know them.
+  /// Adds what the heights of all samples depend on besides the samples.
   void add_to(Digest& digest) const {
     vertical.add_to(digest);
     for (const std::optional<double>& option : {flat_fill, water_height}) {

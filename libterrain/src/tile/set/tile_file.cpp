@@ -55,7 +55,7 @@ std::vector<std::byte> read_tile_file(const std::string& path) {
   }
   struct stat status {};
   if (::fstat(file.number(), &status) != 0 || !S_ISREG(status.st_mode)) {
-    throw stream::system_error(path, "is no file that can be read", errno);
+    throw stream::system_error(path, "is not a file that can be read", errno);
   }
   std::vector<std::byte> bytes(static_cast<std::size_t>(status.st_size));
   std::size_t at = 0;

@@ -14,7 +14,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// Version of the way tiles are made: raise it when equal inputs are to give other bytes.
+/// Version of the tile maker: raise it when equal inputs give other bytes.
 constexpr std::uint64_t kGeneration = 1;
 
 }  // namespace

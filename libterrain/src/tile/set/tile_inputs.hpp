@@ -15,20 +15,20 @@ namespace terrace::terrain {
 struct TileInputs {
   TileMeshOptions mesh;
   bool gzip = false;
-  std::string source_options;  ///< of the command line, that the surface depends on
+  std::string source_options;  ///< that the surface depends on
   std::string metadata;        ///< of this tile
 };
 
-/// All places at which make_tile() may ask a surface about: the tile and what lies around it. May
-/// reach beyond 180 degrees and the poles.
+/// Contains all places at which make_tile() may query a surface: the tile and a margin. May reach
+/// beyond 180 degrees and the poles.
 GeographicBox reach_of(const TileAddress& tile, const TileSurface& surface);
 
-/// A number of all that a tile's bytes, or that it has no data, depend on: if it is the same as of
-/// an earlier tile, that one need not be made again.
+/// A hash of all that a tile's bytes depend on, or the fact that it has no data: while it stays the
+/// same, the tile is up to date.
 std::uint64_t digest_of(const TileAddress& tile, const ZoomPlan& plan, const TileInputs& inputs,
                         TileSurface& surface);
 
-/// A number of the bytes of a file. Throws: stream::Error if it cannot be read.
+/// A hash of the bytes of a file. Throws: stream::Error if it cannot be read.
 std::uint64_t digest_of_file(const std::string& path);
 
 }  // namespace terrace::terrain

@@ -60,7 +60,7 @@ bool by_address(const TileJournal::Record& a, const TileJournal::Record& b) {
 struct Lines {
   std::vector<TileJournal::Record> records;  ///< sorted, of each tile the last
   bool tidy = true;                          ///< sorted as they stand in the file, each tile once
-  std::uint64_t good_bytes = 0;              ///< 0: it is no journal of this version
+  std::uint64_t good_bytes = 0;              ///< 0: not a journal of this version
 };
 
 Lines read_lines(const std::string& path) {

@@ -13,11 +13,11 @@
 
 namespace terrace::terrain {
 
-/// What is known of a finished tile.
+/// The record of a finished tile.
 struct FinishedTile {
   std::uint64_t bytes = 0;  ///< of its file; 0: there is no such tile, because it has no data
   std::uint64_t checksum = 0;
-  std::uint64_t inputs = 0;  ///< TileInputs::digest: of all that its bytes depend on
+  std::uint64_t inputs = 0;  ///< digest_of(): of all that its bytes depend on
   double max_error = 0.0;    ///< metres
 
   friend bool operator==(const FinishedTile&, const FinishedTile&) = default;
@@ -29,8 +29,8 @@ std::uint64_t checksum_of(std::span<const std::byte> bytes);
 /// The file in the folder of a tile set that says which tiles are finished and what they were made
 /// from. It is there while the set is made, so that an interrupted run can go on, and stays, so
 /// that a later run makes only what changed. One line per tile; of several lines of a tile the last
-/// counts. A line that is cut short, as a crash leaves it, ends what is believed; what is believed
-/// is checked against the tile's file anyhow.
+/// counts. A truncated line, as a crash leaves it, ends the records; each record is
+/// checked against the tile's file in any case.
 class TileJournal {
  public:
   static constexpr const char* kName = ".terrace-tiles";
@@ -40,12 +40,12 @@ class TileJournal {
   /// else begins a new one. Memory: 48 bytes per tile. Throws: stream::Error.
   explicit TileJournal(const std::string& folder);
 
-  /// What an earlier run has finished; nullptr if not this tile.
+  /// The record of an earlier run; nullptr if it did not finish this tile.
   [[nodiscard]] const FinishedTile* find(const TileAddress& tile) const;
-  /// Adds a line for a tile whose state is new.
+  /// Adds a line for a tile whose state has changed.
   void add(const TileAddress& tile, const FinishedTile& finished);
-  /// Replaces all lines by these, sorted by address, if they say anything else. Nothing is added
-  /// after that. Throws: stream::Error.
+  /// Replaces all lines by these, sorted by address, unless they are the same. The last call.
+  /// Throws: stream::Error.
   void finish(std::vector<Record> records);
 
  private:
@@ -55,8 +55,8 @@ class TileJournal {
   std::ofstream file_;
 };
 
-/// The records of a finished set, sorted by address; none where there is no journal that this
-/// version can read.
+/// The records of a finished set, sorted by address; empty without a journal that this version can
+/// read.
 std::vector<TileJournal::Record> read_tile_records(const std::string& folder);
 
 }  // namespace terrace::terrain

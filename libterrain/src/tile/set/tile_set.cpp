@@ -32,7 +32,7 @@ namespace fs = std::filesystem;
 constexpr const char* kLayerName = "layer.json";
 constexpr const char* kLockName = ".terrace-tiles.lock";
 
-/// What the surface depends on besides the store.
+/// The options that the surface depends on besides the store.
 std::string source_options_of(const TilesRequest& request) {
   std::string text = request.fill == Fill::interpolate ? "interpolate" : "flat";
   if (request.flat_height) text += ":" + number_text(*request.flat_height);
@@ -46,7 +46,7 @@ std::string source_options_of(const TilesRequest& request) {
   return text;
 }
 
-/// A text that is the same for the same store and options, and only for them.
+/// Identifies the store and the options; a change invalidates a finished set.
 std::string fingerprint_of(const stream::Store& store, const TileSetOptions& options) {
   const TilesRequest& request = options.request;
   std::string text = "1 ";
@@ -86,7 +86,7 @@ bool holds_others(const std::string& folder) {
                      [](const auto& entry) { return entry.path().filename() != kLockName; });
 }
 
-/// Not touched if it says the same.
+/// An identical file is not touched.
 void write_layer(const std::string& path, const std::string& text) {
   const std::vector<std::byte> before = read_tile_file(path);
   const auto bytes = std::as_bytes(std::span(text));
@@ -100,11 +100,11 @@ void write_layer(const std::string& path, const std::string& text) {
 /// other runs.
 class TileFolder {
  public:
-  /// `folder` may be written if it is not there, or empty, or `force` and a tile set of ours, or
-  /// `resume` and a begun one, and no other run writes to it. Throws: stream::Error with the
+  /// `folder` may be written if it is missing or empty, or a tile set of ours with `force`, or an
+  /// unfinished one with `resume`, and no other run writes to it. Throws: stream::Error with the
   /// remedy.
   TileFolder(const std::string& folder, bool force, bool resume);
-  /// A folder that was made here and stayed empty goes.
+  /// Removes a folder that was created here and stayed empty.
   ~TileFolder();
   TileFolder(const TileFolder&) = delete;
   TileFolder& operator=(const TileFolder&) = delete;
@@ -123,8 +123,8 @@ TileFolder::TileFolder(const std::string& folder, bool force, bool resume)
   const auto refuse = [&](const std::string& cause, const std::string& remedy) {
     throw stream::Error({.file = folder, .where = {}, .cause = cause, .remedy = remedy});
   };
-  if (fs::exists(path_) && !fs::is_directory(path_)) refuse("is no folder", "name another one");
-  // Nothing is made in a folder of somebody else, not even the lock.
+  if (fs::exists(path_) && !fs::is_directory(path_)) refuse("is not a folder", "name another one");
+  // Nothing is created in a foreign folder, not even the lock.
   if (holds_others(path_)) {
     refuse("is not empty and holds no tile set", "name another folder, or empty it yourself");
   }
@@ -166,7 +166,7 @@ unsigned native_zoom(double spacing) {
   return zoom;
 }
 
-/// Throws: UsageError for what does not go together.
+/// Throws: UsageError for options that do not go together.
 void check_request(const TilesRequest& request) {
   for (const unsigned zoom : {request.first_zoom, request.last_zoom.value_or(0)}) {
     if (zoom > kDeepestZoom) {

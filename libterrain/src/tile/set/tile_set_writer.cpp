@@ -13,7 +13,7 @@
 #include "base/ordered_work.hpp"
 #include "base/progress_report.hpp"
 #include "tile/format/tile_layer.hpp"
-#include "tile/set/tile_candidates.hpp"
+#include "tile/make/sample_parts.hpp"
 #include "tile/set/tile_file.hpp"
 #include "tile/set/tile_inputs.hpp"
 

@@ -28,8 +28,8 @@ struct TileSetOptions {
   [[nodiscard]] double max_error(unsigned zoom) const;
 };
 
-/// Writes the tiles of one folder, zoom by zoom. What is there, whole and made from the same is
-/// kept; before anything changes, `layer.json` goes: until the set is whole again it is none.
+/// Writes the tiles of one folder, zoom by zoom. Files that are whole and up to date are kept.
+/// Before anything changes, `layer.json` is removed: an unfinished set has none.
 class TileSetWriter {
  public:
   TileSetWriter(const std::vector<std::unique_ptr<TileSurface>>& surfaces,
@@ -45,17 +45,17 @@ class TileSetWriter {
 
   /// The deepest first: its tiles are named in the metadata of those above.
   void write_zoom(unsigned zoom);
-  /// After all zooms: removes tiles of an earlier set that this one does not have and what killed
-  /// runs were writing, and has the journal say what is there.
+  /// After all zooms: removes tiles of an earlier set that this one does not have, and temporary
+  /// files of killed runs; completes the journal.
   void finish();
 
   TilesOutcome result;
   std::vector<std::vector<TileAddress>> present;  ///< per zoom, sorted by row, then column
 
  private:
-  /// What became of a tile.
+  /// The outcome of one tile.
   struct Written {
-    bool made = false;  ///< else it was known already
+    bool made = false;  ///< else its record was up to date
     bool kept = false;  ///< its file was not touched
     FinishedTile finished;
   };

@@ -11,16 +11,17 @@
 #include <utility>
 
 #include <terrace/stream/error.hpp>
+#include <terrace/stream/gzip.hpp>
 
 #include "base/ordered_work.hpp"
 #include "base/progress_report.hpp"
 #include "base/units.hpp"
+#include "tile/format/quantized_mesh.hpp"
 #include "tile/format/tile_layer.hpp"
+#include "tile/make/sample_parts.hpp"
 #include "tile/make/tile_source.hpp"
-#include "tile/set/tile_candidates.hpp"
 #include "tile/set/tile_file.hpp"
 #include "tile/set/tile_journal.hpp"
-#include "tile/verify/tile_borders.hpp"
 #include "tile/verify/tile_height_check.hpp"
 #include "tile/verify/tile_inventory.hpp"
 #include "tile/verify/tile_mesh_check.hpp"
@@ -31,6 +32,59 @@ namespace {
 /// Metres by which rounding may exceed a bound: samples are placed on the globe to a hundredth of a
 /// millimetre.
 constexpr double kHeightSlack = 1e-4;
+
+/// What a tile may unpack to.
+constexpr std::uint64_t kMostBorderBytes = std::uint64_t{1} << 28;
+/// Metres by which neighbours' heights may differ.
+constexpr double kBorderSlack = 1e-3;
+
+/// Vertices on a side of a tile: place along it in units of the tile, and metres.
+using BorderSide = std::vector<std::pair<std::uint16_t, double>>;
+
+struct TileBorders {
+  BorderSide west, south, east, north;
+};
+
+TileBorders borders_of(const TileMesh& mesh) {
+  const TileEdges edges = edges_of(mesh);
+  const auto take = [&](const std::vector<std::uint32_t>& list,
+                        const std::vector<std::uint16_t>& along) {
+    BorderSide side;
+    for (const std::uint32_t vertex : list) side.emplace_back(along[vertex], mesh.metres(vertex));
+    return side;
+  };
+  return {take(edges.west, mesh.v), take(edges.south, mesh.u), take(edges.east, mesh.v),
+          take(edges.north, mesh.u)};
+}
+
+/// What is wrong between the sides of two neighbours; empty if they fit.
+std::string misfit(const BorderSide& a, const BorderSide& b) {
+  const bool same_places = a.size() == b.size() && std::equal(a.begin(), a.end(), b.begin(),
+                                                              [](const auto& p, const auto& q) {
+                                                                return p.first == q.first;
+                                                              });
+  if (!same_places) return "vertices at other places";
+  double most = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    most = std::max(most, std::abs(a[i].second - b[i].second));
+  }
+  return most > kBorderSlack ? "heights that differ by up to " + readable_number(most) + " m" : "";
+}
+
+/// Decodes the bytes of a tile's file, compressed or not. Throws: stream::Error, with `name`.
+DecodedTile unpack_tile(const std::vector<std::byte>& bytes, const std::string& name) {
+  if (!stream::is_gzip(bytes)) return decode_tile(bytes, name);
+  try {
+    return decode_tile(stream::gunzip(bytes, kMostBorderBytes, name), name);
+  } catch (const stream::Error& packed) {
+    // One plain tile of 65536 begins as gzip does.
+    try {
+      return decode_tile(bytes, name);
+    } catch (const stream::Error&) {
+      throw packed;
+    }
+  }
+}
 
 /// A tile that was looked at.
 struct Checked {

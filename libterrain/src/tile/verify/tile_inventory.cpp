@@ -50,13 +50,14 @@ void Inventory::bounds() {
   const GeographicBox& b = layer_.bounds;
   const bool good = b.west >= -180.0 && b.west <= b.east && b.east <= 180.0 && b.south >= -90.0 &&
                     b.south <= b.north && b.north <= 90.0;
-  if (!good) problem(layer_path_, "bounds that are no box on the globe");
+  if (!good) problem(layer_path_, "bounds that are not a box on the globe");
   if (!layer_.max_errors.empty() && layer_.max_errors.size() != layer_.available.size()) {
     problem(layer_path_, "errors of " + std::to_string(layer_.max_errors.size()) +
                              " zooms, tiles of " + std::to_string(layer_.available.size()));
   }
   for (const double error : layer_.max_errors) {
-    if (!std::isfinite(error) || error < 0.0) problem(layer_path_, "an error that is no distance");
+    if (!std::isfinite(error) || error < 0.0)
+      problem(layer_path_, "an error that is not a distance");
   }
 }
 

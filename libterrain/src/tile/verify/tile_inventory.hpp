@@ -13,7 +13,7 @@
 
 namespace terrace::terrain {
 
-/// What of a tile set lies in its folder.
+/// The files of a tile set in its folder.
 struct TileInventory {
   /// Per zoom the tiles that are there, sorted by row, then column.
   std::vector<std::vector<TileAddress>> tiles;

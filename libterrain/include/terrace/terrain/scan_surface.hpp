@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <terrace/stream/store.hpp>
+#include <terrace/tri/shape.hpp>
+
+#include "terrace/terrain/context.hpp"
+#include "terrace/terrain/detail.hpp"
+#include "terrace/terrain/triangle_mesh.hpp"
+
+/// The surface that the points of a scan lie on.
+
+namespace terrace::terrain {
+
+/// A caller's own way from points, in metres, to a surface.
+struct SurfaceMethod {
+  /// Corners that are input points are named in RestoredSurface::input; a surface without any has
+  /// new points as its corners.
+  std::function<tri::RestoredSurface(std::span<const tri::Point3>)> restore;
+  std::uint64_t bytes_per_point = 0;  ///< peak memory
+};
+
+struct ScanSurfaceOptions {
+  tri::RestoreOptions restore{};
+  std::optional<SurfaceMethod> method{};  ///< in place of tri::restore_surface()
+  bool tetrahedra = false;  ///< the tetrahedra inside the surface, not triangles; without `method`
+};
+
+/// A surface, or the tetrahedra inside it. Positions are in the store's CRS.
+struct ScanSurface {
+  TriangleMesh mesh;
+  std::vector<std::array<std::uint32_t, 4>> tetrahedra;  ///< where asked for, in place of triangles
+  tri::SurfaceMeasures measures;                         ///< of the surface, in metres
+};
+
+/// The surface of the points that `detail` wants, restored in metres on the ground: of points in
+/// degrees about the middle of their box. One thread. Throws: stream::Error on a damaged store, and
+/// where the points do not fit into the context's memory, saying what they need; UsageError for
+/// tetrahedra beside a method; what the method throws; stream::Stopped.
+[[nodiscard]] ScanSurface scan_surface(const stream::Store& store, const Detail& detail,
+                                       const ScanSurfaceOptions& options = {},
+                                       const Context& context = {});
+
+}  // namespace terrace::terrain

@@ -1,0 +1,352 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mesh/bounded/point_cells.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <numeric>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include <terrace/stream/error.hpp>
+
+#include "mesh/bounded/streaming_hull.hpp"
+#include "terrace/terrain/detail.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+/// Cells are planned to be this full.
+constexpr double kFullness = 0.88;
+/// How far, in shares of the samples of one cell, a line may be from where it divides best.
+constexpr double kSlack = 0.05;
+
+class Cutter {
+ public:
+  Cutter(std::vector<Point2> some, std::uint64_t period, std::size_t most)
+      : some_(std::move(some)),
+        period_(static_cast<double>(period)),
+        most_(static_cast<double>(most)) {}
+
+  PointMeshCuts make() {
+    Part whole;
+    whole.end = some_.size();
+    cuts_.root = divide(whole);
+    return std::move(cuts_);
+  }
+
+ private:
+  struct Part {
+    std::size_t begin = 0, end = 0;  ///< of some_
+    double cells = 0.0;              ///< to divide it into; 0: not known
+    PlaneBox box;
+  };
+  struct Line {
+    unsigned axis = 0;
+    double at = 0.0;
+    bool balanced = false;
+  };
+
+  std::uint32_t divide(const Part& part);
+  [[nodiscard]] std::optional<Line> line_for(const Part& part, double share, double slack) const;
+  [[nodiscard]] std::optional<Line> line_along(const Part& part, unsigned axis, double share,
+                                               double slack) const;
+  [[nodiscard]] std::array<Point2, 2> bounds(const Part& part) const;
+  std::uint32_t add_cell(const Part& part);
+
+  std::vector<Point2> some_;
+  double period_, most_;
+  PointMeshCuts cuts_;
+};
+
+std::uint32_t Cutter::divide(const Part& part) {
+  const double count = static_cast<double>(part.end - part.begin) * period_;
+  if (count <= most_) return add_cell(part);
+  const double cells =
+      part.cells >= 2.0 ? part.cells : std::max(2.0, std::ceil(count / (kFullness * most_)));
+  const double lower_cells = std::floor(cells / 2.0);
+  const auto line = line_for(part, lower_cells / cells, kSlack / cells);
+  if (!line) return add_cell(part);
+
+  const unsigned axis = line->axis;
+  const auto middle = std::partition(some_.begin() + static_cast<std::ptrdiff_t>(part.begin),
+                                     some_.begin() + static_cast<std::ptrdiff_t>(part.end),
+                                     [&](const Point2& p) { return p[axis] < line->at; });
+  Part lower = part, upper = part;
+  lower.end = upper.begin = static_cast<std::size_t>(middle - some_.begin());
+  lower.box.max[axis] = upper.box.min[axis] = line->at;
+  lower.cells = line->balanced ? lower_cells : 0.0;
+  upper.cells = line->balanced ? cells - lower_cells : 0.0;
+  const auto number = static_cast<std::uint32_t>(cuts_.nodes.size());
+  const auto first = static_cast<std::uint32_t>(cuts_.cells.size());
+  cuts_.nodes.push_back({axis, line->at, {}, first, 0});
+  const std::uint32_t below = divide(lower), above = divide(upper);
+  cuts_.nodes[number].next = {below, above};
+  cuts_.nodes[number].cells = static_cast<std::uint32_t>(cuts_.cells.size()) - first;
+  return number;
+}
+
+std::array<Point2, 2> Cutter::bounds(const Part& part) const {
+  Point2 low = some_[part.begin], high = low;
+  for (std::size_t i = part.begin; i < part.end; ++i) {
+    for (std::size_t k = 0; k < 2; ++k) {
+      low[k] = std::min(low[k], some_[i][k]);
+      high[k] = std::max(high[k], some_[i][k]);
+    }
+  }
+  return {low, high};
+}
+
+std::optional<Cutter::Line> Cutter::line_for(const Part& part, double share, double slack) const {
+  const auto [low, high] = bounds(part);
+  const unsigned longer = high[1] - low[1] > high[0] - low[0] ? 1 : 0;
+  for (const double reach : {slack, 1.0}) {
+    for (const unsigned axis : {longer, 1 - longer}) {
+      if (const auto line = line_along(part, axis, share, reach)) return line;
+    }
+  }
+  return std::nullopt;
+}
+
+std::optional<Cutter::Line> Cutter::line_along(const Part& part, unsigned axis, double share,
+                                               double slack) const {
+  std::vector<double> at;
+  at.reserve(part.end - part.begin);
+  for (std::size_t i = part.begin; i < part.end; ++i) at.push_back(some_[i][axis]);
+  const auto last = static_cast<double>(at.size() - 1);
+  const auto first_rank = static_cast<std::size_t>(std::max(0.0, (share - slack) * last));
+  const auto last_rank = static_cast<std::size_t>(std::min(last, (share + slack) * last + 1.0));
+  const auto place = [&](std::size_t rank) {
+    return at.begin() + static_cast<std::ptrdiff_t>(rank);
+  };
+  std::nth_element(at.begin(), place(first_rank), at.end());
+  if (last_rank > first_rank) {
+    std::nth_element(place(first_rank) + 1, place(last_rank), at.end());
+  }
+  std::sort(place(first_rank), place(last_rank) + 1);
+  // The widest gap; of a lattice's, which are all alike, the nearest. With all ranks allowed the
+  // nearest, however narrow.
+  const bool any = slack >= 1.0;
+  const double wanted = share * last;
+  double best = 0.0, lower = 0.0, upper = 0.0;
+  for (std::size_t rank = first_rank; rank < last_rank; ++rank) {
+    const double gap = at[rank + 1] - at[rank];
+    if (!(gap > 0.0)) continue;
+    const double away = std::abs(static_cast<double>(rank) + 0.5 - wanted) / (last + 1.0);
+    const double worth = any ? 1.0 / (1.0 + away * last) : gap * (1.0 - away);
+    if (worth > best) {
+      best = worth;
+      lower = at[rank];
+      upper = at[rank + 1];
+    }
+  }
+  if (!(best > 0.0)) return std::nullopt;
+  double line = number_between(lower, upper);
+  if (line == lower) {
+    // No number fits between: the line runs through samples, but not through all above it.
+    line = upper;
+    const bool more = std::any_of(some_.begin() + static_cast<std::ptrdiff_t>(part.begin),
+                                  some_.begin() + static_cast<std::ptrdiff_t>(part.end),
+                                  [&](const Point2& p) { return p[axis] > line; });
+    if (!more) return std::nullopt;
+  }
+  return Line{axis, line, !any};
+}
+
+std::uint32_t Cutter::add_cell(const Part& part) {
+  PointMeshCuts::Cell cell;
+  cell.box = part.box;
+  cell.samples = static_cast<double>(part.end - part.begin) * period_;
+  const auto [low, high] = bounds(part);
+  cell.low = low;
+  cell.high = high;
+  const double width = high[0] - low[0], height = high[1] - low[1];
+  cell.spacing =
+      std::max(std::sqrt(width * height / cell.samples), std::max(width, height) / cell.samples);
+  cuts_.cells.push_back(cell);
+  return PointMeshCuts::kCell + static_cast<std::uint32_t>(cuts_.cells.size() - 1);
+}
+
+constexpr std::size_t kBufferBytes = std::size_t{16} << 20;
+constexpr std::size_t kLeastChunk = 40, kMostChunk = 4096;  // points
+
+std::filesystem::path place_for(const std::string& path) {
+  if (path != "-") return path + ".samples";
+  return std::filesystem::temp_directory_path() / "terrace.samples";
+}
+
+constexpr std::size_t kMostPlaces = std::size_t{1} << 20;
+/// The limit of tri::point_tin(); products of two are finite.
+constexpr double kLargest = 1e100;
+
+/// Drops every other place.
+void thin_out(std::vector<Point2>& places) {
+  for (std::size_t i = 0; 2 * i < places.size(); ++i) places[i] = places[2 * i];
+  places.resize((places.size() + 1) / 2);
+}
+
+}  // namespace
+
+double number_between(double a, double b) {
+  const double quarter = b / 4.0 - a / 4.0;
+  const double low = a + quarter, high = b - quarter;
+  if (!(a < low && low < high && high < b)) {
+    const double middle = a / 2.0 + b / 2.0;
+    return a < middle && middle < b ? middle : a;
+  }
+  if (low < 0.0 && high > 0.0) return 0.0;
+  for (double step = std::ldexp(1.0, std::ilogb(high - low) + 1);; step /= 2.0) {
+    const double number = std::floor(high / step) * step;
+    if (number > low && number <= high) return number;
+  }
+}
+
+PointMeshCuts cut_for_point_mesh(std::vector<Point2> some, std::uint64_t period, std::size_t most) {
+  return Cutter(std::move(some), period, most).make();
+}
+
+double merged_height(std::span<const double> heights, tri::PointDuplicates duplicates) {
+  double height = heights.front();
+  if (duplicates == tri::PointDuplicates::kMin) {
+    height = *std::min_element(heights.begin(), heights.end());
+  } else if (duplicates == tri::PointDuplicates::kMax) {
+    height = *std::max_element(heights.begin(), heights.end());
+  } else if (duplicates == tri::PointDuplicates::kMean) {
+    double sum = 0.0;
+    for (const double other : heights) sum += other - heights.front();
+    height += sum / static_cast<double>(heights.size());
+  } else if (duplicates == tri::PointDuplicates::kAll) {
+    const auto [low, high] = std::minmax_element(heights.begin(), heights.end());
+    height = *low + (*high - *low) / 2.0;
+  }
+  return height;
+}
+
+void SharedPlaces::add(const MeshSamples& samples) {
+  std::vector<std::uint32_t> order(samples.size());
+  std::iota(order.begin(), order.end(), 0U);
+  const auto place = [&](std::uint32_t i) { return Point2{samples.x[i], samples.y[i]}; };
+  std::sort(order.begin(), order.end(),
+            [&](std::uint32_t a, std::uint32_t b) { return place(a) < place(b); });
+  for (std::size_t first = 0, end = 0; first < order.size(); first = end) {
+    double low = samples.z[order[first]], high = low;
+    for (end = first + 1; end < order.size() && place(order[end]) == place(order[first]); ++end) {
+      low = std::min(low, samples.z[order[end]]);
+      high = std::max(high, samples.z[order[end]]);
+    }
+    if (end - first == 1) continue;
+    if (places == 0 || high - low > range) {
+      range = high - low;
+      widest = place(order[first]);
+    }
+    ++places;
+  }
+}
+
+PointMeshSamples::PointMeshSamples(const stream::Store& store, const Detail& detail,
+                                   const PointMeshCuts& cuts, const std::string& path)
+    : cuts_(cuts),
+      file_(place_for(path), true),
+      chunk_points_(std::clamp(kBufferBytes / sizeof(stream::Point3) / cuts.cells.size(),
+                               kLeastChunk, kMostChunk)),
+      counts_(cuts.cells.size(), 0),
+      waiting_(cuts.cells.size()),
+      chunks_(cuts.cells.size()) {
+  for_each_wanted_point(
+      store, detail,
+      [&](stream::ClusterId, const stream::ClusterPoints&, std::size_t, const stream::Point3& p) {
+        deal(cuts.cell_of({p[0], p[1]}), p);
+      });
+  // The rest is kept without spare capacity; the file's buffer is flushed.
+  for (std::vector<stream::Point3>& rest : waiting_) rest.shrink_to_fit();
+  file_.read_at(0, {});
+}
+
+void PointMeshSamples::deal(std::size_t cell, const stream::Point3& p) {
+  std::vector<stream::Point3>& waiting = waiting_[cell];
+  if (waiting.capacity() < chunk_points_) waiting.reserve(chunk_points_);
+  waiting.push_back(p);
+  ++counts_[cell];
+  if (waiting.size() < chunk_points_) return;
+  file_.write(std::as_bytes(std::span(waiting)));
+  chunks_[cell].push_back(written_++);
+  waiting.clear();
+}
+
+std::size_t PointMeshSamples::count(std::uint32_t first_cell, std::uint32_t cells) const {
+  const auto first = counts_.begin() + first_cell;
+  return std::accumulate(first, first + cells, std::size_t{0});
+}
+
+void PointMeshSamples::read(std::uint32_t first_cell, std::uint32_t cells, const PlaneBox& box,
+                            MeshSamples& out) {
+  for (std::uint32_t cell = first_cell; cell < first_cell + cells; ++cell) {
+    if (cuts_.cells[cell].box.meets(box)) read_cell(cell, box, out);
+  }
+}
+
+void PointMeshSamples::read_cell(std::size_t cell, const PlaneBox& box, MeshSamples& out) {
+  const auto take = [&](std::span<const stream::Point3> points) {
+    for (const stream::Point3& p : points) {
+      if (box.contains({p[0], p[1]})) out.add(p);
+    }
+  };
+  std::vector<stream::Point3> chunk(chunk_points_);
+  const auto bytes = std::as_writable_bytes(std::span(chunk));
+  for (const std::uint32_t number : chunks_[cell]) {
+    std::size_t got = 0;
+    {
+      const std::lock_guard lock(mutex_);
+      got = file_.read_at(std::uint64_t{number} * bytes.size(), bytes);
+    }
+    if (got != bytes.size()) {
+      throw stream::Error({.file = file_.target().string(),
+                           .where = "byte " + std::to_string(number * bytes.size()),
+                           .cause = "a temporary file lost its end while it was in use",
+                           .remedy = "look after the disk and run again"});
+    }
+    take(chunk);
+  }
+  take(waiting_[cell]);
+}
+
+PointMeshScan scan_point_mesh(const stream::Store& store, const Detail& detail, std::size_t few) {
+  PointMeshScan scan;
+  scan.whole.emplace();
+  StreamingHull hull;
+  const auto add = [&](const stream::Point3& p) {
+    if (!(std::abs(p[0]) < kLargest && std::abs(p[1]) < kLargest && std::abs(p[2]) < kLargest)) {
+      throw stream::Error({.file = store.path().string(),
+                           .where = {},
+                           .cause = "a point has a coordinate that is not finite or above 1e100",
+                           .remedy = "leave it out of the store, or of the `region`"});
+    }
+    if (scan.samples % scan.period == 0) {
+      if (scan.some.size() == kMostPlaces) {
+        thin_out(scan.some);
+        scan.period *= 2;
+      }
+      if (scan.samples % scan.period == 0) scan.some.push_back({p[0], p[1]});
+    }
+    ++scan.samples;
+    hull.add({p[0], p[1]});
+    if (!scan.whole) return;
+    if (scan.samples > few) {
+      scan.whole.reset();
+    } else {
+      scan.whole->add(p);
+    }
+  };
+  for_each_wanted_point(store, detail,
+                        [&](stream::ClusterId, const stream::ClusterPoints&, std::size_t,
+                            const stream::Point3& p) { add(p); });
+  if (scan.whole) {
+    scan.some = {};
+  } else {
+    scan.hull = hull.corners();
+  }
+  return scan;
+}
+
+}  // namespace terrace::terrain

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <terrace/stream/atomic_file.hpp>
+#include <terrace/stream/store.hpp>
+#include <terrace/tri/point_tin.hpp>
+
+#include "terrace/terrain/detail.hpp"
+#include "terrace/terrain/region.hpp"
+
+/// The samples of a region, scanned once and dealt to the cells of a kd-like cut of the plane.
+
+namespace terrace::terrain {
+
+inline constexpr std::uint32_t kNoNumber = std::numeric_limits<std::uint32_t>::max();
+
+/// A half-open rectangle of the plane: with its lower borders, without its upper ones. May be
+/// infinite.
+struct PlaneBox {
+  Point2 min{-std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
+  Point2 max{std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
+
+  [[nodiscard]] bool contains(const Point2& p) const {
+    return p[0] >= min[0] && p[0] < max[0] && p[1] >= min[1] && p[1] < max[1];
+  }
+  [[nodiscard]] bool meets(const PlaneBox& other) const {
+    return min[0] < other.max[0] && other.min[0] < max[0] && min[1] < other.max[1] &&
+           other.min[1] < max[1];
+  }
+};
+
+/// The plane, cut by lines of equal x or y again and again until every cell has few samples.
+struct PointMeshCuts {
+  /// A line, and the two sides of it.
+  struct Node {
+    unsigned axis = 0;  ///< 0: a line of equal x
+    double line = 0.0;
+    std::array<std::uint32_t, 2> next{};      ///< nodes, or kCell + a cell
+    std::uint32_t first_cell = 0, cells = 0;  ///< of both
+  };
+  struct Cell {
+    PlaneBox box;
+    Point2 low{}, high{};  ///< approximate bounds of its samples
+    double samples = 0.0;  ///< approximate
+    double spacing = 0.0;  ///< approximate distance of neighbours
+  };
+  static constexpr std::uint32_t kCell = 0x80000000U;
+  std::vector<Node> nodes;
+  std::vector<Cell> cells;  ///< neighbours mostly near in order
+  std::uint32_t root = kCell;
+
+  [[nodiscard]] std::uint32_t cell_of(const Point2& p) const {
+    std::uint32_t at = root;
+    while (at < kCell) {
+      const Node& node = nodes[at];
+      at = node.next[p[node.axis] < node.line ? 0 : 1];
+    }
+    return at - kCell;
+  }
+};
+
+/// Cuts the plane into cells of slightly fewer than `most` samples, unless too many share a place.
+/// `some`: every `period`-th sample.
+///
+/// Lines run between samples of `some` wherever there is room for a number, in the widest gap near
+/// the wanted one. Others may lie on a line: they belong to the cell above.
+/// Depends on the arguments alone. O(n log n) for n of `some`.
+PointMeshCuts cut_for_point_mesh(std::vector<Point2> some, std::uint64_t period, std::size_t most);
+
+/// A number strictly between a and b of few binary digits, not close to either; a if there is none
+/// between. Requires a < b.
+double number_between(double a, double b);
+
+/// Samples in the CRS's coordinates.
+struct MeshSamples {
+  std::vector<double> x, y, z;
+
+  [[nodiscard]] std::size_t size() const { return x.size(); }
+  void reserve(std::size_t count) {
+    for (std::vector<double>* axis : {&x, &y, &z}) axis->reserve(count);
+  }
+  void add(const stream::Point3& p) {
+    x.push_back(p[0]);
+    y.push_back(p[1]);
+    z.push_back(p[2]);
+  }
+};
+
+/// The height that stands for several samples at one place, as tri::point_tin() takes it. With
+/// kError that of the first, with kAll the middle of the lowest and the highest. heights: in order,
+/// not empty.
+double merged_height(std::span<const double> heights, tri::PointDuplicates duplicates);
+
+/// The places that several samples share.
+struct SharedPlaces {
+  std::uint64_t places = 0;
+  double range = 0.0;  ///< the largest difference of heights at one of them
+  Point2 widest{};     ///< the place with that difference
+
+  /// Adds those of more samples, none of which shares a place with earlier ones. O(n log n).
+  void add(const MeshSamples& samples);
+};
+
+/// The samples of a region, dealt to the cells of the plane: on disk, beside the file that is made,
+/// as clusters may reach over many cells. The file is removed with the object. Several
+/// threads may read at once.
+class PointMeshSamples {
+ public:
+  /// One pass over the store. path: of the mesh. Throws: stream::Error on a damaged store, or if
+  /// the file cannot be written. Memory: 16 MiB, and 4 bytes per 40 samples or more.
+  PointMeshSamples(const stream::Store& store, const Detail& detail, const PointMeshCuts& cuts,
+                   const std::string& path);
+
+  [[nodiscard]] std::size_t count(std::uint32_t first_cell, std::uint32_t cells) const;
+  /// Appends the samples of some cells that lie in the box, by cells, of each in the order of the
+  /// store: of its levels from the top down, in each by id.
+  void read(std::uint32_t first_cell, std::uint32_t cells, const PlaneBox& box, MeshSamples& out);
+
+ private:
+  void deal(std::size_t cell, const stream::Point3& p);
+  void read_cell(std::size_t cell, const PlaneBox& box, MeshSamples& out);
+
+  const PointMeshCuts& cuts_;
+  stream::AtomicFile file_;
+  std::size_t chunk_points_;
+  std::vector<std::size_t> counts_;
+  std::vector<std::vector<stream::Point3>> waiting_;  ///< until they make a chunk; then the rest
+  std::vector<std::vector<std::uint32_t>> chunks_;    ///< numbers, per cell
+  std::uint32_t written_ = 0;
+  std::mutex mutex_;
+};
+
+/// The result of one pass over the samples of a region.
+struct PointMeshScan {
+  std::uint64_t samples = 0;
+  std::optional<MeshSamples> whole;  ///< all samples, if they are few
+  // Else:
+  std::vector<Point2> some;  ///< every `period`-th place
+  std::uint64_t period = 1;
+  std::vector<Point2> hull;  ///< as convex_hull() of all
+};
+
+/// Reads all samples once, in the order of the store. few: how many at most are kept. Memory: of
+/// `few` samples, of up to a million places, and of the hull.
+/// Throws: stream::Error on a damaged store.
+PointMeshScan scan_point_mesh(const stream::Store& store, const Detail& detail, std::size_t few);
+
+}  // namespace terrace::terrain

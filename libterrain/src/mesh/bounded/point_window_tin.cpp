@@ -1,0 +1,362 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mesh/bounded/point_window_tin.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <map>
+#include <memory>
+#include <stdexcept>
+#include <utility>
+
+#include <terrace/stream/error.hpp>
+
+#include "base/orientation.hpp"
+#include "base/stopwatch.hpp"
+#include "base/units.hpp"
+#include "mesh/bounded/streaming_hull.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+/// A sample on a side of the hull.
+struct Along {
+  double at = 0.0;
+  tri::Point3 sample{};
+};
+
+/// A side of the frame on the hull.
+struct OuterSide {
+  Point2 from{}, to{};
+  std::vector<Along> samples;  ///< on it, its ends not among them
+
+  [[nodiscard]] double least() const { return std::min(from[0], to[0]); }
+  [[nodiscard]] double greatest() const { return std::max(from[0], to[0]); }
+};
+
+/// The outer sides of a frame, to find those that samples lie on: by x, apart those above the frame
+/// from those below.
+class OuterSides {
+ public:
+  void add(const Point2& from, const Point2& to) {
+    chain(from, to).push_back(OuterSide{from, to, {}});
+  }
+  void sort() {
+    for (std::vector<OuterSide>& sides : chains_) {
+      std::sort(sides.begin(), sides.end(),
+                [](const OuterSide& a, const OuterSide& b) { return a.least() < b.least(); });
+    }
+  }
+  [[nodiscard]] bool empty() const {
+    return chains_[0].empty() && chains_[1].empty() && chains_[2].empty() && chains_[3].empty();
+  }
+  /// The side that a place lies on, ends included; nullptr if there is none.
+  OuterSide* find(const Point2& p) {
+    for (std::vector<OuterSide>& sides : chains_) {
+      auto after = std::upper_bound(sides.begin(), sides.end(), p[0],
+                                    [](double x, const OuterSide& s) { return x < s.least(); });
+      if (after == sides.begin()) continue;
+      OuterSide& side = *(after - 1);
+      if (p[0] > side.greatest() || p[1] < std::min(side.from[1], side.to[1]) ||
+          p[1] > std::max(side.from[1], side.to[1])) {
+        continue;
+      }
+      if (orientation(side.from, side.to, p) == 0) return &side;
+    }
+    return nullptr;
+  }
+  OuterSide& between(const Point2& from, const Point2& to) {
+    std::vector<OuterSide>& sides = chain(from, to);
+    return *std::find_if(sides.begin(), sides.end(),
+                         [&](const OuterSide& s) { return s.from == from && s.to == to; });
+  }
+
+ private:
+  std::vector<OuterSide>& chain(const Point2& from, const Point2& to) {
+    if (from[0] == to[0]) return chains_[from[1] < to[1] ? 2 : 3];
+    return chains_[from[0] < to[0] ? 0 : 1];
+  }
+
+  std::array<std::vector<OuterSide>, 4> chains_;
+};
+
+/// The samples of `side` that have to be vertices, in order, each once. level: whether all samples
+/// of the window have one height.
+std::vector<tri::Point3> simplify(OuterSide& side, double from_height, double to_height, bool level,
+                                  const tri::PointTinOptions& options) {
+  if (side.samples.empty()) return {};
+  const unsigned axis =
+      std::abs(side.to[0] - side.from[0]) >= std::abs(side.to[1] - side.from[1]) ? 0 : 1;
+  const double sign = side.to[axis] > side.from[axis] ? 1.0 : -1.0;
+  for (Along& along : side.samples) along.at = sign * along.sample[axis];
+  std::stable_sort(side.samples.begin(), side.samples.end(),
+                   [](const Along& a, const Along& b) { return a.at < b.at; });
+  std::vector<double> at{sign * side.from[axis]}, height{from_height}, group;
+  std::vector<tri::Point3> places{{side.from[0], side.from[1], from_height}};
+  double apart = 0.0;  // the lowest and the highest of a place where all count, from their middle
+  for (std::size_t i = 0; i < side.samples.size(); ++i) {
+    const Along& along = side.samples[i];
+    group.push_back(along.sample[2]);
+    if (i + 1 < side.samples.size() && side.samples[i + 1].at == along.at) continue;
+    at.push_back(along.at);
+    height.push_back(merged_height(group, options.duplicates));
+    if (options.duplicates == tri::PointDuplicates::kAll) {
+      const double highest = *std::max_element(group.begin(), group.end());
+      apart = std::max(apart, highest - height.back());
+    }
+    places.push_back({along.sample[0], along.sample[1], height.back()});
+    group.clear();
+  }
+  at.push_back(sign * side.to[axis]);
+  height.push_back(to_height);
+  std::vector<tri::Point3> chosen;
+  if (options.max_error > 0.0) {
+    // A little less, as others interpolate with other rounding.
+    const double bound = std::max(0.0, options.max_error - apart) * (1.0 - 0x1p-20);
+    const std::vector<tri::LineVertex> line = tri::simplify_line(at, height, bound).vertices;
+    for (std::size_t i = 1; i + 1 < line.size(); ++i) chosen.push_back(places[line[i].sample]);
+    return chosen;
+  }
+  // Samples that are not vertices would be off by a rounding error, unless all is level.
+  if (!level) chosen.assign(places.begin() + 1, places.end());
+  return chosen;
+}
+
+bool on_border(const PlaneBox& box, const Point2& a, const Point2& b) {
+  for (std::size_t k = 0; k < 2; ++k) {
+    if (a[k] == b[k] && (a[k] == box.min[k] || a[k] == box.max[k])) return true;
+  }
+  return false;
+}
+
+/// The errors of the mesh that a reader gets back from a format that rounds.
+tri::TinErrors measure_rounded(const MeshSamples& samples, const PlaneBox& box,
+                               const PointWindowTin& tin, const stream::MeshRounding& rounding) {
+  std::vector<tri::Point3> read;
+  read.reserve(tin.vertices.size());
+  for (const tri::Point3& p : tin.vertices) read.push_back(rounding(p));
+  // The window's straight sides move as a whole. Samples that they pass over belong to the
+  // neighbour then, whose surface is the same at the side.
+  const tri::Point3 low = rounding({box.min[0], box.min[1], 0.0});
+  const tri::Point3 high = rounding({box.max[0], box.max[1], 0.0});
+  MeshSamples moved = samples;
+  for (double& x : moved.x) x = std::min(std::max(x, low[0]), high[0]);
+  for (double& y : moved.y) y = std::min(std::max(y, low[1]), high[1]);
+  return tri::measure_surface(moved.x, moved.y, moved.z, read, tin.triangles);
+}
+
+/// Removes the samples that the vertices of a frame represent; returns the number of their places.
+/// Interpolation at a vertex has a rounding error, which matters where no error is allowed.
+std::size_t take_out_vertices(const std::vector<tri::Point3>& frame,
+                              tri::PointDuplicates duplicates, MeshSamples& samples) {
+  std::map<Point2, std::vector<std::size_t>> at;
+  for (const tri::Point3& v : frame) at.try_emplace({v[0], v[1]});
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const auto found = at.find({samples.x[i], samples.y[i]});
+    if (found != at.end()) found->second.push_back(i);
+  }
+  std::vector<char> out(samples.size(), 0);
+  std::size_t places = 0;
+  std::vector<double> heights;
+  for (const tri::Point3& v : frame) {
+    const std::vector<std::size_t>& own = at[{v[0], v[1]}];
+    if (own.empty()) continue;
+    heights.clear();
+    for (const std::size_t i : own) heights.push_back(samples.z[i]);
+    const bool differ = duplicates == tri::PointDuplicates::kAll &&
+                        std::count(heights.begin(), heights.end(), v[2]) !=
+                            static_cast<std::ptrdiff_t>(heights.size());
+    if (differ || merged_height(heights, duplicates) != v[2]) continue;
+    ++places;
+    for (const std::size_t i : own) out[i] = 1;
+  }
+  MeshSamples left;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    if (out[i] == 0) left.add({samples.x[i], samples.y[i], samples.z[i]});
+  }
+  samples = std::move(left);
+  return places;
+}
+
+/// As mesh_samples(), to options.tin.max_error. may_miss: then the result may be beyond the bound.
+PointWindowTin mesh_to_aim(const MeshSamples& samples, const std::vector<tri::Point3>& frame,
+                           const PlaneBox& box, const PointMeshOptions& options,
+                           const stream::MeshRounding& rounding, const std::string& source,
+                           bool may_miss) {
+  const auto fail = [&](const std::string& cause, const std::string& remedy) {
+    throw stream::Error({.file = source, .where = {}, .cause = cause, .remedy = remedy});
+  };
+  const bool refuse = options.tin.duplicates == tri::PointDuplicates::kError;
+  MeshSamples left;
+  const MeshSamples* taken = &samples;
+  std::size_t vertex_places = 0;
+  if (!frame.empty() && options.tin.max_error == 0.0) {
+    left = samples;
+    vertex_places = take_out_vertices(frame, options.tin.duplicates, left);
+    if (refuse && samples.size() - left.size() > vertex_places) throw SamplesShareAPlace{};
+    taken = &left;
+  }
+  tri::PointTin tin;
+  try {
+    tin = tri::point_tin(taken->x, taken->y, taken->z, frame, options.tin);
+  } catch (const std::invalid_argument& error) {
+    SharedPlaces shared;
+    if (refuse) shared.add(samples);
+    if (shared.places > 0) throw SamplesShareAPlace{};
+    fail(error.what(), "look at the store's points");
+  }
+  const bool all = options.tin.duplicates == tri::PointDuplicates::kAll;
+  if (all && tin.duplicate_range > options.tin.max_error) throw SamplesShareAPlace{};
+  // Those taken out have no error.
+  tin.errors.rms *=
+      std::sqrt(static_cast<double>(tin.errors.covered) /
+                std::max(1.0, static_cast<double>(tin.errors.covered + vertex_places)));
+  tin.errors.covered += vertex_places;
+  tin.duplicates += samples.size() - taken->size() - vertex_places;
+  PointWindowTin out;
+  out.samples = samples.size();
+  out.duplicates = tin.duplicates;
+  out.vertices = std::move(tin.vertices);
+  out.triangles = std::move(tin.triangles);
+  out.errors = tin.errors;
+  const bool exact = rounding.largest() == stream::Point3{};
+  if (!exact) {
+    if (tin.duplicates > 0 && !all) {
+      fail(
+          "the format of the mesh rounds positions, so the error where several samples have one "
+          "place and not all of them count cannot be verified",
+          "write PLY, which is exact, or leave out `duplicates`");
+    }
+    out.errors = measure_rounded(samples, box, out, rounding);
+  }
+  out.uncovered = out.triangles.empty() ? samples.size() : out.errors.uncovered;
+  const bool missed = exact && tin.errors.uncovered > 0 && !out.triangles.empty();
+  const bool beyond = options.tin.max_points == 0 && out.errors.largest > options.bound;
+  if (missed || (beyond && !may_miss)) {
+    fail(missed ? "the mesh leaves out samples"
+                : "the mesh misses its bound: " + number_text(out.errors.largest) + " of " +
+                      number_text(options.bound),
+         exact ? "this is a fault of terrace, please report it" : "write PLY, which is exact");
+  }
+  return out;
+}
+
+/// The border of a window, counter-clockwise: the vertices on its sides inside the hull, and along
+/// the hull the corners and those samples on it that the bound needs.
+struct PointMeshFrame {
+  std::vector<tri::Point3> vertices;
+  std::vector<PointWindowTin::Shared> shared;  ///< in parallel
+};
+
+/// sides: the vertices of window.sides, in parallel.
+PointMeshFrame frame_of(const PointMeshPlan& plan, const PointMeshPlan::Window& window,
+                        const std::vector<std::shared_ptr<const SideVertices>>& sides,
+                        const MeshSamples& samples, const tri::PointTinOptions& options) {
+  struct Vertex {
+    double height = 0.0;
+    PointWindowTin::Shared shared;
+    std::vector<double> samples;  ///< at a corner of the hull
+  };
+  std::map<Point2, Vertex> vertices;
+  for (std::size_t i = 0; i < sides.size(); ++i) {
+    const PointMeshPlan::Side& side = plan.sides[window.sides[i]];
+    for (std::uint32_t k = 0; k < sides[i]->size(); ++k) {
+      const SideVertex& v = (*sides[i])[k];
+      PointWindowTin::Shared shared{kNoNumber, window.sides[i], k};
+      if (k == 0 || k + 1 == sides[i]->size()) shared = {side.knots[k == 0 ? 0 : 1], kNoNumber, 0};
+      const Point2 place = side.axis == 0 ? Point2{side.line, v.at} : Point2{v.at, side.line};
+      vertices.try_emplace(place, Vertex{v.height, shared, {}});
+    }
+  }
+  for (const Point2& corner : window.corners) vertices.try_emplace(corner);
+
+  std::vector<Point2> places;
+  for (const auto& [place, vertex] : vertices) places.push_back(place);
+  const std::vector<Point2> ring = convex_hull(std::move(places), true);
+  const auto after = [&](std::size_t i) { return ring[i + 1 == ring.size() ? 0 : i + 1]; };
+  OuterSides outer;
+  for (std::size_t i = 0; i < ring.size(); ++i) {
+    if (!on_border(window.box, ring[i], after(i))) outer.add(ring[i], after(i));
+  }
+  outer.sort();
+  if (!outer.empty()) {
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      const Point2 p{samples.x[i], samples.y[i]};
+      OuterSide* const side = outer.find(p);
+      if (side == nullptr) continue;
+      if (p == side->from || p == side->to) {
+        vertices[p].samples.push_back(samples.z[i]);
+      } else {
+        side->samples.push_back({0.0, {p[0], p[1], samples.z[i]}});
+      }
+    }
+  }
+  PointMeshFrame frame;
+  const auto height_at = [&](const Point2& place) {
+    const Vertex& v = vertices.at(place);
+    const bool settled = v.shared.knot != kNoNumber || v.shared.side != kNoNumber;
+    assert(settled || !v.samples.empty());
+    return settled ? v.height : merged_height(v.samples, options.duplicates);
+  };
+  const auto [low, high] = std::minmax_element(samples.z.begin(), samples.z.end());
+  const bool level = low == high || *low == *high;
+  for (std::size_t i = 0; i < ring.size(); ++i) {
+    frame.vertices.push_back({ring[i][0], ring[i][1], height_at(ring[i])});
+    frame.shared.push_back(vertices.at(ring[i]).shared);
+    if (on_border(window.box, ring[i], after(i))) continue;
+    OuterSide& side = outer.between(ring[i], after(i));
+    for (const tri::Point3& p :
+         simplify(side, height_at(ring[i]), height_at(after(i)), level, options)) {
+      frame.vertices.push_back(p);
+      frame.shared.emplace_back();
+    }
+  }
+  return frame;
+}
+
+}  // namespace
+
+PointWindowTin mesh_samples(const MeshSamples& samples, const std::vector<tri::Point3>& frame,
+                            const PlaneBox& box, const PointMeshOptions& options,
+                            const stream::MeshRounding& rounding, const std::string& source) {
+  if (options.first_aim > options.tin.max_error) {
+    PointMeshOptions first = options;
+    first.tin.max_error = options.first_aim;
+    PointWindowTin tin = mesh_to_aim(samples, frame, box, first, rounding, source, true);
+    if (!(tin.errors.largest > options.bound)) return tin;
+  }
+  return mesh_to_aim(samples, frame, box, options, rounding, source, false);
+}
+
+PointWindowMesher::PointWindowMesher(const PointMeshPlan& plan, PointMeshSamples& samples,
+                                     PointMeshSides& sides, const PointMeshOptions& options,
+                                     const stream::MeshRounding& rounding, std::string source)
+    : plan_(plan),
+      samples_(samples),
+      sides_(sides),
+      options_(options),
+      rounding_(rounding),
+      source_(std::move(source)) {}
+
+PointWindowTin PointWindowMesher::mesh(std::size_t number) const {
+  const PointMeshPlan::Window& window = plan_.windows[number];
+  const Stopwatch reading;
+  std::vector<std::shared_ptr<const SideVertices>> sides;
+  for (const std::uint32_t side : window.sides) sides.push_back(sides_.vertices(side));
+  MeshSamples samples;
+  samples.reserve(samples_.count(window.first_cell, window.cells));
+  samples_.read(window.first_cell, window.cells, {}, samples);
+  const double reading_seconds = reading.seconds();
+
+  const Stopwatch meshing;
+  PointMeshFrame frame = frame_of(plan_, window, sides, samples, options_.tin);
+  PointWindowTin out =
+      mesh_samples(samples, frame.vertices, window.box, options_, rounding_, source_);
+  out.shared = std::move(frame.shared);
+  out.reading_seconds = reading_seconds;
+  out.meshing_seconds = meshing.seconds();
+  return out;
+}
+
+}  // namespace terrace::terrain

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <terrace/tri/point_tin.hpp>
+
+#include "mesh/bounded/point_cells.hpp"
+#include "terrace/terrain/region.hpp"
+
+/// The windows that irregular samples are meshed in, and the vertices on their sides.
+
+namespace terrace::terrain {
+
+/// How the region of irregular samples, their convex hull, is cut into windows that are meshed one
+/// by one. Each is a cell, or several together that make a rectangle, cut with the hull: convex. No
+/// window reaches over a cut line, but one may end within another's side.
+struct PointMeshPlan {
+  /// Where a cut line ends, at the hull or at another cut line.
+  struct Knot {
+    Point2 place{};
+    bool at_hull = false;
+  };
+  /// A stretch of a cut line between two knots, with one window on either side.
+  struct Side {
+    unsigned axis = 0;  ///< 0: of points of equal x
+    double line = 0.0;
+    std::array<std::uint32_t, 2> knots{};    ///< the lower first
+    std::array<std::uint32_t, 2> windows{};  ///< that of smaller coordinates first
+  };
+  struct Window {
+    PlaneBox box;
+    std::uint32_t first_cell = 0, cells = 0;
+    double samples = 0.0;              ///< approximate
+    double spacing = 0.0;              ///< approximate distance of neighbours
+    std::vector<std::uint32_t> sides;  ///< inside the hull
+    std::vector<Point2> corners;       ///< of the hull
+  };
+  std::vector<Knot> knots;
+  std::vector<Side> sides;
+  std::vector<Window> windows;  ///< in the order of their cells
+};
+
+/// hull: of all samples, with an area. together(first, cells): whether these cells, which are all
+/// of one node, shall be one window.
+PointMeshPlan plan_point_mesh(
+    const PointMeshCuts& cuts, std::span<const Point2> hull,
+    const std::function<bool(std::uint32_t first, std::uint32_t cells)>& together);
+
+/// A vertex on a side: its place along it and its height.
+struct SideVertex {
+  double at = 0.0, height = 0.0;
+};
+using SideVertices = std::vector<SideVertex>;
+
+/// The vertices on the sides of the windows, settled before the windows are meshed: the Delaunay
+/// triangulation of the samples close to a side, cut along it, within a share of the bound. It
+/// depends on these samples alone, so both windows at a side have the same vertices there. May be
+/// used by several threads at once.
+class PointMeshSides {
+ public:
+  /// max_error: of the mesh, in the unit of heights.
+  PointMeshSides(const PointMeshPlan& plan, PointMeshSamples& samples,
+                 tri::PointDuplicates duplicates, double max_error);
+
+  /// The vertices of a side, its knots included, ascending. Kept until drop().
+  std::shared_ptr<const SideVertices> vertices(std::uint32_t side);
+  void drop(std::uint32_t side);
+
+ private:
+  [[nodiscard]] SideVertices settle(const PointMeshPlan::Side& side);
+  [[nodiscard]] MeshSamples near_side(const PointMeshPlan::Side& side) const;
+  [[nodiscard]] double height_at(std::uint32_t knot);
+  [[nodiscard]] double settle_knot(std::uint32_t knot) const;
+
+  const PointMeshPlan& plan_;
+  PointMeshSamples& samples_;
+  tri::PointDuplicates duplicates_;
+  double side_error_;
+  std::vector<std::vector<std::uint32_t>> windows_at_;  ///< per knot
+  std::mutex mutex_;
+  std::vector<std::shared_ptr<const SideVertices>> known_;
+  std::vector<std::optional<double>> heights_;  ///< of knots
+};
+
+}  // namespace terrace::terrain

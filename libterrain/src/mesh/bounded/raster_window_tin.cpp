@@ -1,0 +1,288 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mesh/bounded/raster_window_tin.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include <terrace/stream/error.hpp>
+
+#include "base/portable_math.hpp"
+#include "base/stopwatch.hpp"
+#include "base/units.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+void keep_what_touches(WindowTin& tin, const Region& region) {
+  std::erase_if(tin.triangles, [&](const std::array<std::uint32_t, 3>& t) {
+    return !region.touches({tin.positions[t[0]], tin.positions[t[1]], tin.positions[t[2]]});
+  });
+}
+
+void order_by_use(WindowTin& tin) {
+  constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+  std::vector<std::uint32_t> numbers(tin.vertices.size(), kNone);
+  std::vector<tri::GridVertex> vertices;
+  std::vector<stream::Point3> positions;
+  vertices.reserve(tin.vertices.size());
+  positions.reserve(tin.vertices.size());
+  for (auto& triangle : tin.triangles) {
+    for (std::uint32_t& vertex : triangle) {
+      std::uint32_t& number = numbers[vertex];
+      if (number == kNone) {
+        number = static_cast<std::uint32_t>(vertices.size());
+        vertices.push_back(tin.vertices[vertex]);
+        positions.push_back(tin.positions[vertex]);
+      }
+      vertex = number;
+    }
+  }
+  tin.vertices = std::move(vertices);
+  tin.positions = std::move(positions);
+}
+
+}  // namespace
+
+/// The samples of a window and of the lines around it, as far as the raster has them.
+template <class T>
+struct WindowMesher::Samples {
+  std::int64_t columns = 0, rows = 0;  ///< of the window
+  std::vector<T> heights;              ///< of the window
+  // The lines just outside; empty at the raster's borders.
+  std::vector<T> above, below, left, right;
+  std::uint64_t with_data = 0;
+
+  [[nodiscard]] std::vector<T> column(std::int64_t c) const {
+    std::vector<T> line;
+    for (std::int64_t r = 0; r < rows; ++r) {
+      line.push_back(heights[static_cast<std::size_t>(r * columns + c)]);
+    }
+    return line;
+  }
+  [[nodiscard]] std::vector<T> row(std::int64_t r) const {
+    const auto first = heights.begin() + static_cast<std::ptrdiff_t>(r * columns);
+    return {first, first + static_cast<std::ptrdiff_t>(columns)};
+  }
+};
+
+WindowMesher::WindowMesher(const stream::Store& store, WindowTinOptions options,
+                           const stream::MeshRounding& rounding)
+    : store_(store),
+      options_(std::move(options)),
+      rounding_(rounding),
+      placement_(store.schema()),
+      reader_(store, std::uint64_t{8} << 20) {}
+
+bool WindowMesher::in_region(const LatticeWindow& window, std::int64_t column, std::int64_t row,
+                             double height) const {
+  if (!options_.region) return true;
+  stream::Point3 p = world_point(placement_, {static_cast<double>(window.column + column),
+                                              static_cast<double>(window.row + row), 0.0});
+  p[2] = height;
+  return options_.region->contains(p);
+}
+
+template <class T>
+WindowMesher::Samples<T> WindowMesher::read(const LatticeWindow& window) {
+  const stream::StoreSchema& schema = store_.schema();
+  LatticeWindow wide{window.column - 1, window.row - 1, window.columns + 2, window.rows + 2};
+  std::vector<T> heights(wide.size());
+  reader_.heights(wide, std::span<T>(heights));
+  const bool has_left = window.column > 0, has_above = window.row > 0;
+  const bool has_right = window.column + window.columns < static_cast<std::int64_t>(schema.columns);
+  const bool has_below = window.row + window.rows < static_cast<std::int64_t>(schema.rows);
+
+  Samples<T> samples;
+  samples.columns = window.columns;
+  samples.rows = window.rows;
+  const std::int64_t own_column = window.column == options_.whole.column ? 0 : 1;
+  const std::int64_t own_row = window.row == options_.whole.row ? 0 : 1;
+  const auto counts = [&](std::int64_t c, std::int64_t r) {
+    return c >= own_column && r >= own_row && c < window.columns && r < window.rows;
+  };
+  for (std::int64_t r = -1; r <= window.rows; ++r) {
+    if ((r < 0 && !has_above) || (r == window.rows && !has_below)) continue;
+    for (std::int64_t c = -1; c <= window.columns; ++c) {
+      if ((c < 0 && !has_left) || (c == window.columns && !has_right)) continue;
+      T& height = heights[static_cast<std::size_t>((r + 1) * wide.columns + c + 1)];
+      const bool data = std::isfinite(height);
+      if (data && counts(c, r) && in_region(window, c, r, static_cast<double>(height))) {
+        ++samples.with_data;
+      }
+      if (!data && options_.fill) {
+        height = static_cast<T>(options_.fill(window.column + c, window.row + r));
+      }
+    }
+  }
+  const auto line = [&](std::int64_t c, std::int64_t r, std::int64_t count, std::int64_t step) {
+    std::vector<T> out;
+    auto at = static_cast<std::size_t>((r + 1) * wide.columns + c + 1);
+    for (std::int64_t i = 0; i < count; ++i, at += static_cast<std::size_t>(step)) {
+      out.push_back(heights[at]);
+    }
+    return out;
+  };
+  if (has_above) samples.above = line(0, -1, window.columns, 1);
+  if (has_below) samples.below = line(0, window.rows, window.columns, 1);
+  if (has_left) samples.left = line(-1, 0, window.rows, wide.columns);
+  if (has_right) samples.right = line(window.columns, 0, window.rows, wide.columns);
+  samples.heights.reserve(window.size());
+  for (std::int64_t r = 0; r < window.rows; ++r) {
+    const auto first = heights.begin() + static_cast<std::ptrdiff_t>((r + 1) * wide.columns + 1);
+    samples.heights.insert(samples.heights.end(), first,
+                           first + static_cast<std::ptrdiff_t>(window.columns));
+  }
+  return samples;
+}
+
+std::vector<stream::Point3> WindowMesher::positions(const WindowTin& tin) const {
+  std::vector<stream::Point3> positions;
+  positions.reserve(tin.vertices.size());
+  for (const tri::GridVertex& vertex : tin.vertices) {
+    stream::Point3 p =
+        world_point(placement_, {static_cast<double>(tin.window.column + vertex.column),
+                                 static_cast<double>(tin.window.row + vertex.row), 0.0});
+    p[2] = vertex.height;
+    positions.push_back(p);
+  }
+  return positions;
+}
+
+void WindowMesher::measure_as_read(
+    WindowTin& tin,
+    const std::function<tri::GridTinCheck(std::span<const tri::Point3>, double)>& measure) const {
+  const stream::Point3& moved = rounding_.largest();
+  const bool exact = moved == stream::Point3{};
+  std::vector<tri::Point3> read;
+  read.reserve(tin.vertices.size());
+  for (std::size_t i = 0; i < tin.vertices.size(); ++i) {
+    const tri::GridVertex& vertex = tin.vertices[i];
+    tri::Point3 p{static_cast<double>(vertex.column), static_cast<double>(vertex.row),
+                  vertex.height};
+    if (!exact) {
+      const stream::Point3 back = rounding_(tin.positions[i]);
+      const std::array<double, 2> stored = stored_place(placement_, {back[0], back[1]});
+      p = {stored[0] - static_cast<double>(tin.window.column),
+           stored[1] - static_cast<double>(tin.window.row), back[2]};
+    }
+    read.push_back(p);
+  }
+  const std::array<double, 6>& m = placement_.world.xy;
+  const double cell = std::min(portable_hypot(m[0], m[3]), portable_hypot(m[1], m[4]));
+  const double tolerance = std::min(1.0, 2.0 * portable_hypot(moved[0], moved[1]) / cell);
+  tin.check = measure(read, tolerance);
+}
+
+void WindowMesher::require_sound(const WindowTin& tin) const {
+  const bool exact = rounding_.largest() == stream::Point3{};
+  const auto fail = [&](const std::string& cause, const std::string& remedy) {
+    throw stream::Error({.file = store_.path().string(),
+                         .where = "window at column " + std::to_string(tin.window.column) +
+                                  ", row " + std::to_string(tin.window.row),
+                         .cause = cause,
+                         .remedy = remedy});
+  };
+  if (tin.check.max_error > options_.bound) {
+    if (exact) {
+      fail("the mesh misses its bound: " + number_text(tin.check.max_error) + " of " +
+               number_text(options_.bound),
+           "this is a fault of terrace, please report it");
+    }
+    fail("the numbers of the file's format are too coarse for this bound so far from its origin",
+         "write PLY, which is exact, or a smaller `region`");
+  }
+  if (tin.check.nodata_covered > 0 || tin.check.uncovered_inner > 0 || tin.check.turned > 0) {
+    fail("the mesh covers cells without data, leaves out cells with data, or folds",
+         exact ? "this is a fault of terrace, please report it"
+               : "write PLY, which is exact, or a smaller `region`");
+  }
+}
+
+template <class T>
+WindowTin WindowMesher::mesh_as(const LatticeWindow& window, tri::TinQuality quality,
+                                bool checked) {
+  const Stopwatch reading;
+  const Samples<T> samples = read<T>(window);
+  WindowTin out;
+  out.window = window;
+  out.samples = samples.with_data;
+  out.reading_seconds = reading.seconds();
+
+  const Stopwatch meshing;
+  const auto settle = [&](const std::vector<T>& line, const std::vector<T>& inside,
+                          const std::vector<T>& outside) {
+    return tri::settle_side<T>(line, inside, outside, options_.aim);
+  };
+  const std::int64_t last_column = window.columns - 1, last_row = window.rows - 1;
+  const std::vector<T> none;
+  const tri::GridSides sides{
+      .first_row = settle(samples.row(0), last_row > 0 ? samples.row(1) : none, samples.above),
+      .last_row = settle(samples.row(last_row), last_row > 0 ? samples.row(last_row - 1) : none,
+                         samples.below),
+      .first_column =
+          settle(samples.column(0), last_column > 0 ? samples.column(1) : none, samples.left),
+      .last_column =
+          settle(samples.column(last_column),
+                 last_column > 0 ? samples.column(last_column - 1) : none, samples.right)};
+  const tri::GridWindow<T> grid{static_cast<std::uint32_t>(window.columns),
+                                static_cast<std::uint32_t>(window.rows), samples.heights};
+  tri::GridTinOptions options = options_.tin;
+  options.quality = quality;
+  options.measure = false;  // what was written is checked instead
+  const auto mesh_to = [&](double aim) {
+    options.max_error = aim;
+    tri::GridTin tin = tri::grid_tin<T>(grid, sides, options);
+    out.vertices = std::move(tin.vertices);
+    out.triangles = std::move(tin.triangles);
+    if (!checked) return;
+    out.positions = positions(out);
+    measure_as_read(out, [&](std::span<const tri::Point3> points, double tolerance) {
+      return tri::check_grid_tin<T>(grid, points, out.triangles, tolerance);
+    });
+  };
+  mesh_to(options_.first_aim);
+  if (checked) {
+    if (out.check.max_error > options_.bound && options_.aim < options_.first_aim) {
+      mesh_to(options_.aim);
+    }
+    require_sound(out);
+    // Samples in the region lie on triangles that reach into it, which are kept.
+    for (const std::uint32_t at : out.check.uncovered_at) {
+      if (in_region(window, at % window.columns, at / window.columns,
+                    static_cast<double>(samples.heights[at]))) {
+        out.uncovered.push_back(at);
+      }
+    }
+    if (options_.region) keep_what_touches(out, *options_.region);
+    order_by_use(out);
+  }
+  out.meshing_seconds = meshing.seconds();
+  return out;
+}
+
+WindowTin WindowMesher::mesh(const LatticeWindow& window) {
+  if (options_.region) {
+    constexpr double kAnyHeight = std::numeric_limits<double>::infinity();
+    const stream::Box3 box{
+        {static_cast<double>(window.column), static_cast<double>(window.row), -kAnyHeight},
+        {static_cast<double>(window.column + window.columns - 1),
+         static_cast<double>(window.row + window.rows - 1), kAnyHeight}};
+    WindowTin nothing;
+    nothing.window = window;
+    if (options_.region->overlap(world_box(placement_, box)) == Overlap::none) return nothing;
+  }
+  const tri::TinQuality quality = options_.tin.quality;
+  return reader_.float_is_exact() ? mesh_as<float>(window, quality, true)
+                                  : mesh_as<double>(window, quality, true);
+}
+
+WindowCount WindowMesher::count(const LatticeWindow& window, tri::TinQuality quality) {
+  const WindowTin tin = reader_.float_is_exact() ? mesh_as<float>(window, quality, false)
+                                                 : mesh_as<double>(window, quality, false);
+  return {tin.vertices.size(), tin.reading_seconds, tin.meshing_seconds};
+}
+
+}  // namespace terrace::terrain

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include <terrace/stream/mesh_writer.hpp>
+#include <terrace/stream/store.hpp>
+#include <terrace/tri/grid_tin.hpp>
+
+#include "surface/store_window.hpp"
+#include "terrace/terrain/region.hpp"
+
+namespace terrace::terrain {
+
+/// How the windows of a raster are meshed. Heights in the store's vertical unit.
+struct WindowTinOptions {
+  double bound = 0.0;  ///< what readers of the file may see
+  /// The targets of Aim: sides are meshed to the second, smaller one, and so is the inside of a
+  /// window where the first misses the bound.
+  double first_aim = 0.0, aim = 0.0;
+  tri::GridTinOptions tin;
+  LatticeWindow whole;  ///< of which the windows are parts
+  /// With a region the meshes have only the triangles that reach into it.
+  std::optional<Region> region;
+  /// The height that a sample without data gets; empty: it stays without data.
+  std::function<double(std::int64_t column, std::int64_t row)> fill;
+};
+
+/// The mesh of one window. Vertices are in the order in which the triangles use them first.
+struct WindowTin {
+  LatticeWindow window;
+  std::vector<tri::GridVertex> vertices;  ///< columns and rows count from the window's first
+  std::vector<stream::Point3> positions;  ///< of the vertices, in the CRS
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  tri::GridTinCheck check;  ///< of the mesh that a reader gets back
+  /// Samples with data, before filling and inside the region; those on the first row and column
+  /// count in the previous window.
+  std::uint64_t samples = 0;
+  /// Numbers in the window of such samples, those on the first row and column included, that lie on
+  /// no triangle of this window.
+  std::vector<std::uint32_t> uncovered;
+  double reading_seconds = 0.0, meshing_seconds = 0.0;
+};
+
+struct WindowCount {
+  std::size_t vertices = 0;
+  double reading_seconds = 0.0, meshing_seconds = 0.0;
+};
+
+/// Meshes windows of one raster store. One object per thread.
+class WindowMesher {
+ public:
+  WindowMesher(const stream::Store& store, WindowTinOptions options,
+               const stream::MeshRounding& rounding);
+
+  /// The vertices on a side depend on the samples on it and next to it alone, so two windows that
+  /// share it have the same vertices there.
+  /// Throws: stream::Error on a damaged store, and where the rounded positions break the bound.
+  WindowTin mesh(const LatticeWindow& window);
+  /// How many vertices it has, unchecked, and how long that took.
+  WindowCount count(const LatticeWindow& window, tri::TinQuality quality);
+
+ private:
+  template <class T>
+  struct Samples;
+  template <class T>
+  Samples<T> read(const LatticeWindow& window);
+  template <class T>
+  WindowTin mesh_as(const LatticeWindow& window, tri::TinQuality quality, bool checked);
+  /// Whether a sample of the window lies in the region, if there is one.
+  [[nodiscard]] bool in_region(const LatticeWindow& window, std::int64_t column, std::int64_t row,
+                               double height) const;
+  [[nodiscard]] std::vector<stream::Point3> positions(const WindowTin& tin) const;
+  void measure_as_read(WindowTin& tin,
+                       const std::function<tri::GridTinCheck(std::span<const tri::Point3>,
+                                                             double tolerance)>& measure) const;
+  /// Throws: stream::Error if a reader of the file would see more than the bound, or a hole.
+  void require_sound(const WindowTin& tin) const;
+
+  const stream::Store& store_;
+  WindowTinOptions options_;
+  const stream::MeshRounding& rounding_;
+  stream::Placement placement_;
+  StoreWindow reader_;
+};
+
+}  // namespace terrace::terrain

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mesh/height_grid.hpp"
+
+#include <algorithm>
+
+namespace terrace::terrain {
+
+HeightGrid::HeightGrid(std::uint64_t columns, std::uint64_t rows, std::uint64_t most_cells)
+    : full_columns_(columns), full_rows_(rows) {
+  const auto reduced = [this](std::uint64_t n) { return (n + reduction_ - 1) / reduction_; };
+  while (reduced(columns) * reduced(rows) > most_cells && reduction_ < std::max(columns, rows)) {
+    ++reduction_;
+  }
+  columns_ = reduced(columns);
+  rows_ = reduced(rows);
+  sums_.assign(columns_ * rows_, 0.0);
+  counts_.assign(columns_ * rows_, 0);
+}
+
+void HeightGrid::add(const stream::Point3& cell) {
+  if (!(cell[0] >= 0 && cell[1] >= 0)) return;
+  const auto column = static_cast<std::uint64_t>(cell[0]),
+             row = static_cast<std::uint64_t>(cell[1]);
+  if (column >= full_columns_ || row >= full_rows_) return;
+  const std::size_t place = row / reduction_ * columns_ + column / reduction_;
+  sums_[place] += cell[2];
+  ++counts_[place];
+}
+
+TriangleMesh HeightGrid::mesh() const {
+  constexpr std::uint32_t kNone = 0xFFFFFFFFu;
+  TriangleMesh mesh;
+  std::vector<std::uint32_t> vertex(sums_.size(), kNone);
+  // The place of an averaged square is its middle.
+  const double shift = 0.5 * static_cast<double>(reduction_ - 1);
+  for (std::uint64_t row = 0; row < rows_; ++row) {
+    for (std::uint64_t column = 0; column < columns_; ++column) {
+      const std::size_t place = row * columns_ + column;
+      if (counts_[place] == 0) continue;
+      vertex[place] = static_cast<std::uint32_t>(mesh.positions.size());
+      mesh.positions.push_back({static_cast<double>(column * reduction_) + shift,
+                                static_cast<double>(row * reduction_) + shift,
+                                sums_[place] / static_cast<double>(counts_[place])});
+    }
+  }
+  for (std::uint64_t row = 0; row + 1 < rows_; ++row) {
+    for (std::uint64_t column = 0; column + 1 < columns_; ++column) {
+      const std::size_t place = row * columns_ + column;
+      // Around the square; leaving out any corner leaves one triangle.
+      const std::array<std::uint32_t, 4> around{
+          vertex[place], vertex[place + 1], vertex[place + columns_ + 1], vertex[place + columns_]};
+      const auto missing = std::count(around.begin(), around.end(), kNone);
+      if (missing > 1) continue;
+      if (missing == 0) {
+        mesh.triangles.push_back({around[0], around[1], around[2]});
+        mesh.triangles.push_back({around[0], around[2], around[3]});
+      } else {
+        std::array<std::uint32_t, 3> rest{};
+        std::copy_if(around.begin(), around.end(), rest.begin(),
+                     [](std::uint32_t v) { return v != kNone; });
+        mesh.triangles.push_back(rest);
+      }
+    }
+  }
+  return mesh;
+}
+
+}  // namespace terrace::terrain

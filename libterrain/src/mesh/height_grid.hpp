@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <terrace/stream/point.hpp>
+
+#include "terrace/terrain/triangle_mesh.hpp"
+
+namespace terrace::terrain {
+
+/// The cells of a raster, squares of them averaged into one: a mesh of a raster of any size in
+/// little memory, for pictures.
+class HeightGrid {
+ public:
+  /// The smallest reduction with which columns x rows are at most `most_cells`.
+  HeightGrid(std::uint64_t columns, std::uint64_t rows, std::uint64_t most_cells);
+
+  /// Adds a cell: stored coordinates (column, row, raw sample). Order does not matter. Cells
+  /// outside are ignored.
+  void add(const stream::Point3& cell);
+
+  [[nodiscard]] std::uint64_t reduction() const { return reduction_; }
+
+  /// Two triangles per square of four cells with data, three cells one. Positions are stored
+  /// coordinates.
+  [[nodiscard]] TriangleMesh mesh() const;
+
+ private:
+  std::uint64_t reduction_ = 1;
+  std::uint64_t columns_ = 0, rows_ = 0;  ///< reduced
+  std::uint64_t full_columns_ = 0, full_rows_ = 0;
+  std::vector<double> sums_;
+  std::vector<std::uint32_t> counts_;
+};
+
+}  // namespace terrace::terrain

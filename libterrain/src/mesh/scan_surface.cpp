@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "terrace/terrain/scan_surface.hpp"
+
+#include <limits>
+#include <utility>
+
+#include <terrace/stream/error.hpp>
+
+#include "base/units.hpp"
+#include "earth/ground.hpp"
+#include "terrace/terrain/detail_mesh.hpp"
+#include "terrace/terrain/error.hpp"
+
+namespace terrace::terrain {
+namespace {
+
+/// Peak bytes per point: tetrahedra and their vertices, the shape, positions in the CRS and on the
+/// ground, and the surface.
+constexpr std::uint64_t kSurfaceBytesPerPoint = 300 + 60 + 48 + 2 * 60;
+
+void check_memory(const stream::Store& store, const Detail& detail, std::uint64_t bytes_per_point,
+                  std::uint64_t memory_bytes) {
+  std::uint64_t points = 0;
+  for_each_wanted_record(
+      store, detail,
+      [&](stream::ClusterId, const stream::ClusterRecord& record) { points += record.points; });
+  const std::uint64_t needed = points * bytes_per_point;
+  if (needed <= memory_bytes) return;
+  throw stream::Error({.file = store.path().string(),
+                       .where = {},
+                       .cause = "a surface of " + with_commas(points) + " points needs " +
+                                readable_bytes(needed) + ", `memory_bytes` allows " +
+                                readable_bytes(memory_bytes),
+                       .remedy = "take a coarser `level` or a smaller `region`"});
+}
+
+/// Metres about the middle of the positions.
+std::vector<stream::Point3> on_ground(const std::vector<stream::Point3>& positions,
+                                      const stream::StoreSchema& schema) {
+  stream::Box3 box;
+  for (const stream::Point3& p : positions) box.include(p);
+  // The positions are in the CRS already.
+  stream::Placement placement = schema;
+  placement.world = {};
+  for (stream::Channel& channel : placement.coordinates) channel.scale = 1, channel.offset = 0;
+  const GroundMap map = Ground(placement).map(box);
+  std::vector<stream::Point3> ground;
+  ground.reserve(positions.size());
+  for (const stream::Point3& p : positions) {
+    stream::Point3 place;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      place[axis] = map[4 * axis] * (p[axis] - (0.5 * box.min[axis] + 0.5 * box.max[axis]));
+    }
+    ground.push_back(place);
+  }
+  return ground;
+}
+
+/// Back from metres about the middle of `positions` to the CRS.
+std::vector<stream::Point3> from_ground(const std::vector<tri::Point3>& ground,
+                                        const std::vector<stream::Point3>& positions,
+                                        const stream::StoreSchema& schema) {
+  if (ground.empty()) return {};
+  stream::Box3 box;
+  for (const stream::Point3& p : positions) box.include(p);
+  const std::vector<stream::Point3> corners = on_ground({box.min, box.max}, schema);
+  std::vector<stream::Point3> places;
+  places.reserve(ground.size());
+  for (const tri::Point3& p : ground) {
+    stream::Point3 place;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double metres = corners[1][axis] - corners[0][axis];
+      const double units = box.max[axis] - box.min[axis];
+      place[axis] = 0.5 * box.min[axis] + 0.5 * box.max[axis] +
+                    (metres > 0.0 ? p[axis] * (units / metres) : p[axis]);
+    }
+    places.push_back(place);
+  }
+  return places;
+}
+
+template <class Triangulation>
+void keep_tetrahedra(const std::vector<stream::Point3>& ground, const tri::ShapeOptions& options,
+                     TriangleMesh points, Triangulation triangulation, ScanSurface& out) {
+  const std::vector<tri::VertexId> vertices = triangulation.build(ground, 2);
+  tri::BasicShape3<Triangulation> shape(options);
+  shape.restore(triangulation);
+  out.measures = tri::measure(shape.surface(triangulation).surface);
+  // The first of several equal points stands for all.
+  constexpr auto kUnused = std::numeric_limits<std::uint32_t>::max();
+  std::vector<std::uint32_t> number(triangulation.vertex_slots(), kUnused);
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    std::uint32_t& n = number[tri::slot(vertices[i])];
+    if (n == kUnused) n = static_cast<std::uint32_t>(i);
+  }
+  for (const tri::TetrahedronId t : shape.kept_tetrahedra()) {
+    std::array<std::uint32_t, 4> corners{};
+    for (std::size_t k = 0; k < 4; ++k) {
+      corners[k] = number[tri::slot(triangulation.vertices(t)[k])];
+    }
+    out.tetrahedra.push_back(corners);
+  }
+  out.mesh = std::move(points);
+}
+
+}  // namespace
+
+ScanSurface scan_surface(const stream::Store& store, const Detail& detail,
+                         const ScanSurfaceOptions& options, const Context& context) {
+  if (options.tetrahedra && options.method) {
+    throw UsageError("a surface by another method has no tetrahedra");
+  }
+  const stream::Store source = store.with_stop(context.stop);
+  check_memory(source, detail,
+               options.method ? options.method->bytes_per_point : kSurfaceBytesPerPoint,
+               context.memory_or(0));
+  TriangleMesh points = detail_points(source, detail);
+  const std::vector<stream::Point3> ground = on_ground(points.positions, source.schema());
+  ScanSurface out;
+  if (options.tetrahedra) {
+    if (options.restore.metric) {
+      keep_tetrahedra(ground, options.restore.shape, std::move(points),
+                      tri::Delaunay3<double, tri::EllipticalMetric3>(*options.restore.metric), out);
+    } else {
+      keep_tetrahedra(ground, options.restore.shape, std::move(points), tri::Delaunay3<double>(),
+                      out);
+    }
+    return out;
+  }
+  tri::RestoredSurface surface = options.method ? options.method->restore(ground)
+                                                : tri::restore_surface(ground, options.restore);
+  out.measures = tri::measure(surface.surface);
+  out.mesh.triangles = std::move(surface.surface.faces);
+  if (surface.input.empty()) {
+    out.mesh.positions = from_ground(surface.surface.points, points.positions, source.schema());
+    return out;
+  }
+  for (const std::size_t i : surface.input) {
+    out.mesh.positions.push_back(points.positions[i]);
+    out.mesh.levels.push_back(points.levels[i]);
+  }
+  return out;
+}
+
+}  // namespace terrace::terrain

@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/option_values.hpp"
+
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <system_error>
+
+#include <nlohmann/json.hpp>
+
+#include "base/units.hpp"
+#include "terrace/stream/error.hpp"
+#include "terrace/terrain/error.hpp"
+
+namespace terrace::tools {
+namespace {
+
+unsigned checked(std::optional<unsigned> level, const stream::Store& store) {
+  const unsigned top = store.top();
+  if (level && *level > top) {
+    throw UsageError("the store has no level " + std::to_string(*level) + ": its top is level " +
+                     std::to_string(top));
+  }
+  return level.value_or(top);
+}
+
+/// depth guards against files made to exhaust the stack.
+void collect_line(const nlohmann::json& object, int depth,
+                  std::vector<std::vector<Point2>>& lines) {
+  if (depth > 8) return;
+  const std::string type = object.value("type", "");
+  if (type == "Feature") return collect_line(object.at("geometry"), depth + 1, lines);
+  if (type == "FeatureCollection") {
+    for (const nlohmann::json& feature : object.at("features"))
+      collect_line(feature, depth + 1, lines);
+  } else if (type == "LineString") {
+    lines.emplace_back();
+    for (const nlohmann::json& p : object.at("coordinates")) {
+      lines.back().push_back({p.at(0).get<double>(), p.at(1).get<double>()});
+    }
+  }
+}
+
+}  // namespace
+
+Fill parse_fill(const std::string& text) {
+  return choice<Fill>(
+      text, "--fill",
+      {{"none", Fill::none}, {"flat", Fill::flat}, {"interpolate", Fill::interpolate}});
+}
+
+HeightReference parse_height_reference(const std::string& text) {
+  if (text.empty()) return HeightReference::recorded;
+  return choice<HeightReference>(text, "--vertical",
+                                 {{"ellipsoidal", HeightReference::ellipsoidal},
+                                  {"orthometric", HeightReference::orthometric},
+                                  {"ignore", HeightReference::ignore}});
+}
+
+tri::TinQuality parse_quality(const std::string& text) {
+  return choice<tri::TinQuality>(text, "--quality",
+                                 {{"greedy", tri::TinQuality::kGreedy},
+                                  {"removal", tri::TinQuality::kRemoval},
+                                  {"fitted", tri::TinQuality::kFitted}});
+}
+
+tri::PointDuplicates parse_duplicates(const std::string& text) {
+  return choice<tri::PointDuplicates>(text, "--duplicates",
+                                      {{"all", tri::PointDuplicates::kAll},
+                                       {"min", tri::PointDuplicates::kMin},
+                                       {"max", tri::PointDuplicates::kMax},
+                                       {"mean", tri::PointDuplicates::kMean},
+                                       {"first", tri::PointDuplicates::kFirst},
+                                       {"error", tri::PointDuplicates::kError}});
+}
+
+tri::Interpolation parse_interpolation(const std::string& text) {
+  return choice<tri::Interpolation>(text, "--method",
+                                    {{"linear", tri::Interpolation::kLinear},
+                                     {"natural", tri::Interpolation::kNaturalNeighbour},
+                                     {"nearest", tri::Interpolation::kNearest}});
+}
+
+RasterValue parse_raster_value(const std::string& text) {
+  return choice<RasterValue>(text, "--value",
+                             {{"height", RasterValue::height},
+                              {"slope", RasterValue::slope},
+                              {"aspect", RasterValue::aspect},
+                              {"hillshade", RasterValue::hillshade}});
+}
+
+cluster::FacilityStrategy parse_strategy(const std::string& text) {
+  using cluster::FacilityStrategy;
+  return choice<FacilityStrategy>(text, "--strategy",
+                                  {{"automatic", FacilityStrategy::automatic},
+                                   {"fast", FacilityStrategy::fast},
+                                   {"full-scan", FacilityStrategy::full_scan},
+                                   {"quadtree", FacilityStrategy::quadtree},
+                                   {"octree", FacilityStrategy::octree},
+                                   {"kd-tree", FacilityStrategy::kd_tree},
+                                   {"facilities", FacilityStrategy::facilities}});
+}
+
+std::pair<std::string, double> channel_of(const std::string& text) {
+  const std::size_t colon = text.rfind(':');
+  if (colon == std::string::npos || colon == 0) {
+    throw UsageError("--channel " + text + ": write NAME:WEIGHT, as in intensity:0.5");
+  }
+  const double weight = parse_number(text.substr(colon + 1), "the weight of --channel " + text);
+  if (!(weight >= 0.0) || !std::isfinite(weight)) {
+    throw UsageError("--channel " + text + ": a weight is a number from 0 up");
+  }
+  return {text.substr(0, colon), weight};
+}
+
+Detail parse_detail(const stream::Store& store, const std::string& level, const std::string& region,
+                    const std::vector<std::string>& focuses, const RegionConversion& conversion) {
+  Detail detail;
+  if (!level.empty()) {
+    detail.level = checked(parse_level(level), store);
+  } else if (!focuses.empty()) {
+    detail.level = store.top();
+  }
+  if (!region.empty()) detail.region = conversion(Region::parse(region));
+  for (const std::string& text : focuses) {
+    Focus focus = parse_focus(text);
+    detail.focuses.push_back({conversion(std::move(focus.region)), checked(focus.level, store)});
+  }
+  return detail;
+}
+
+std::optional<unsigned> parse_level(const std::string& text) {
+  if (text == "top") return std::nullopt;
+  unsigned level = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), level);
+  if (error != std::errc{} || end != text.data() + text.size() || level > 255) {
+    throw UsageError("'" + text + "' is not a level; write a number from 0 (full detail) or 'top'");
+  }
+  return level;
+}
+
+Focus parse_focus(const std::string& text) {
+  const std::size_t colon = text.rfind(':');
+  if (colon == std::string::npos) {
+    throw UsageError("the focus '" + text + "' names no level; write BOX:L");
+  }
+  return {.region = Region::parse(text.substr(0, colon)),
+          .level = parse_level(text.substr(colon + 1))};
+}
+
+std::vector<Point2> parse_line(const std::string& text) {
+  const auto bad = [&](const std::string& cause) {
+    return stream::Error({.file = text,
+                          .where = {},
+                          .cause = cause,
+                          .remedy = "give x1,y1,x2,y2,... or a GeoJSON file with one LineString"});
+  };
+  std::vector<Point2> line;
+  if (text.find(',') != std::string::npos &&
+      text.find_first_not_of("0123456789+-.,eE ") == std::string::npos) {
+    const std::vector<double> v = parse_numbers(text, "--line");
+    if (v.size() < 4 || v.size() % 2 != 0) {
+      throw UsageError("--line has " + std::to_string(v.size()) +
+                       " numbers; write x1,y1,x2,y2 and more pairs if wanted");
+    }
+    for (std::size_t i = 0; i < v.size(); i += 2) line.push_back({v[i], v[i + 1]});
+    return line;
+  }
+  std::ifstream file(text);
+  if (!file) throw bad("is neither a list of places nor a readable file");
+  std::vector<std::vector<Point2>> lines;
+  try {
+    collect_line(nlohmann::json::parse(file), 0, lines);
+  } catch (const nlohmann::json::exception& error) {
+    throw bad(std::string("is not GeoJSON (") + error.what() + ")");
+  }
+  if (lines.size() != 1) throw bad("holds " + std::to_string(lines.size()) + " lines");
+  if (lines.front().size() < 2) throw bad("the line has fewer than two places");
+  return lines.front();
+}
+
+std::optional<tri::SmoothingOptions> parse_smoothing(const std::string& text) {
+  if (text.empty()) return std::nullopt;
+  const std::size_t colon = text.find(':');
+  const std::string name = text.substr(0, colon);
+  tri::SmoothingOptions options;
+  if (name == "laplacian") {
+    options.method = tri::Smoothing::kLaplacian;
+  } else if (name == "taubin") {
+    options.method = tri::Smoothing::kTaubin;
+  } else if (name == "bilateral") {
+    options.method = tri::Smoothing::kBilateral;
+  } else {
+    throw UsageError(
+        "--smooth is laplacian, taubin or bilateral, with :STEPS behind if wanted, not '" + text +
+        "'");
+  }
+  if (colon != std::string::npos) {
+    const std::uint64_t steps = parse_count(text.substr(colon + 1));
+    if (steps == 0 || steps > 10000) throw UsageError("--smooth takes 1 to 10000 steps");
+    options.iterations = static_cast<unsigned>(steps);
+  }
+  return options;
+}
+
+}  // namespace terrace::tools

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/store_options.hpp"
+
+#include <utility>
+
+#include <CLI/CLI.hpp>
+
+#include "cli/cli.hpp"
+#include "cli/interrupt.hpp"
+#include "cli/option_values.hpp"
+
+namespace terrace::tools {
+
+Transformation CrsOptions::change(const stream::Store& store, const std::string& named,
+                                  const CommonOptions& common) const {
+  Transformation change = transformation_to(store, named, parse_datum_shift(shift_));
+  if (!change.note().empty()) common.say(change.note());
+  return change;
+}
+
+RegionConversion CrsOptions::regions(const stream::Store& store,
+                                     const CommonOptions& common) const {
+  if (region_.empty()) return {};
+  return RegionConversion(store, change(store, region_, common));
+}
+
+PlaceConversion CrsOptions::places(const stream::Store& store, const CommonOptions& common) const {
+  if (to_.empty()) return {};
+  return PlaceConversion(change(store, to_, common));
+}
+
+std::optional<Transformation> CrsOptions::to(const stream::Store& store,
+                                             const CommonOptions& common) const {
+  if (to_.empty()) return std::nullopt;
+  Transformation to = change(store, to_, common);
+  if (to.identity()) return std::nullopt;
+  return to;
+}
+
+void CrsOptions::define(CLI::App& app) {
+  define_region(app);
+  app.add_option("--to-crs", to_, "the CRS of what is written; heights stay as they are");
+}
+
+void CrsOptions::define_region(CLI::App& app) {
+  app.add_option("--region-crs", region_,
+                 "the CRS of regions and focuses (EPSG:n or a WKT file; x,y is lon,lat), if it is "
+                 "not the store's");
+  app.add_option("--towgs84", shift_,
+                 "dx,dy,dz[,rx,ry,rz,ds] to WGS 84 from the datum of such a CRS, or of the store, "
+                 "if it is another");
+}
+
+void PartOptions::define(CLI::App& app, const std::string& kept) {
+  app.add_option("STORE", path, "where the points come from")->required();
+  app.add_option("--level", level, "points of this level and above outside the focuses, or top")
+      ->default_str("0; with --focus top");
+  app.add_option("--region", region,
+                 kept + ": a box, minx,miny[,minz],maxx,maxy[,maxz], or a GeoJSON file");
+  app.add_option("--focus", focuses, "BOX:L, all points of level L inside the box; repeatable")
+      ->allow_extra_args(false);
+  crs.define(app);
+}
+
+Detail PartOptions::detail(const stream::Store& store, const CommonOptions& common) const {
+  return parse_detail(store, level, region, focuses, crs.regions(store, common));
+}
+
+void SurfaceOptions::define(CLI::App& app) {
+  define_triangles(app);
+  app.add_option("--method", method,
+                 "linear: on the triangulated points; natural: natural neighbours, smooth; "
+                 "nearest: the nearest point")
+      ->capture_default_str()
+      ->type_name("NAME");
+}
+
+void SurfaceOptions::define_triangles(CLI::App& app) {
+  app.add_option("STORE", path, "where the heights come from")->required();
+  app.add_option("--level", level, "only points of this level and above: a number or top")
+      ->capture_default_str();
+  add_number(app, "--max-edge", max_edge,
+             "of irregular points and coarser levels: triangles with a longer side (metres on the "
+             "ground) are no data, as over water and in shadows (default: none)",
+             kAboveZero)
+      ->type_name("METRES");
+}
+
+stream::Store SurfaceOptions::open(SamplerOptions& sampler) const {
+  sampler.method = parse_interpolation(method);
+  sampler.max_edge = max_edge;
+  const std::optional<unsigned> wanted = parse_level(level);
+  stream::Store store = open_store(path);
+  sampler.level = wanted.value_or(store.top());
+  return store;
+}
+
+}  // namespace terrace::tools

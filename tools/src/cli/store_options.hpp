@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <terrace/stream/store.hpp>
+#include <terrace/tri/interpolation.hpp>
+
+#include "terrace/terrain/crs.hpp"
+#include "terrace/terrain/detail.hpp"
+#include "terrace/terrain/heights.hpp"
+
+namespace CLI {
+class App;
+}
+
+/// Options that several verbs on stores have.
+
+namespace terrace::tools {
+
+struct CommonOptions;
+
+using namespace terrain;
+
+/// --region-crs, --to-crs and --towgs84.
+class CrsOptions {
+ public:
+  void define(CLI::App& app);
+  /// Without --to-crs.
+  void define_region(CLI::App& app);
+  /// Each reports the operation that it uses between datums. Throws: as transformation_to.
+  [[nodiscard]] RegionConversion regions(const stream::Store& store,
+                                         const CommonOptions& common) const;
+  [[nodiscard]] PlaceConversion places(const stream::Store& store,
+                                       const CommonOptions& common) const;
+  /// To --to-crs; nullopt without it, or if it is the store's.
+  [[nodiscard]] std::optional<Transformation> to(const stream::Store& store,
+                                                 const CommonOptions& common) const;
+
+ private:
+  [[nodiscard]] Transformation change(const stream::Store& store, const std::string& named,
+                                      const CommonOptions& common) const;
+  std::string region_, to_, shift_;
+};
+
+/// Which part of a store at which detail: the store, --level, --region, --focus and CrsOptions.
+struct PartOptions {
+  std::string path, level, region;
+  std::vector<std::string> focuses;
+  CrsOptions crs;
+
+  /// kept: what a region keeps, as in "only points inside".
+  void define(CLI::App& app, const std::string& kept);
+  /// Throws: as parse_detail.
+  [[nodiscard]] Detail detail(const stream::Store& store, const CommonOptions& common) const;
+};
+
+/// The surface between a store's samples: the store, --level, --max-edge and --method.
+struct SurfaceOptions {
+  std::string path, level = "0", method = "linear";
+  std::optional<double> max_edge;
+
+  void define(CLI::App& app);
+  /// Without --method.
+  void define_triangles(CLI::App& app);
+  /// Checks the options, then opens the store. Throws: UsageError, stream::Error.
+  [[nodiscard]] stream::Store open(SamplerOptions& sampler) const;
+};
+
+}  // namespace terrace::tools

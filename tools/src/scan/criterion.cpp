@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "scan/criterion.hpp"
+
+#include <charconv>
+#include <cmath>
+
+#include "scan/cgal_surface.hpp"
+#include "terrace/terrain/error.hpp"
+
+namespace terrace::tools {
+namespace {
+
+/// Memory of CGAL's triangulation.
+constexpr std::uint64_t kCgalBytesPerPoint = 1200;
+
+std::optional<double> positive_number(const std::string& text) {
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  if (!(value > 0.0) || !std::isfinite(value)) return std::nullopt;
+  return value;
+}
+
+}  // namespace
+
+ScanSurfaceOptions parse_criterion(const std::string& text) {
+  const std::size_t colon = text.find(':');
+  const std::string name = text.substr(0, colon);
+  ScanSurfaceOptions options;
+  std::optional<double> value;
+  if (colon != std::string::npos) {
+    value = positive_number(text.substr(colon + 1));
+    if (!value) throw UsageError("--criterion: a positive number must follow '" + name + ":'");
+  }
+  if (name == "edge") {
+    options.restore.shape.criterion = tri::ShapeCriterion::kEdgeLength;
+    if (value) options.restore.shape.edge_factor = *value;
+  } else if (name == "alpha-wrap") {
+    options.method = {[alpha = value.value_or(0.0)](std::span<const tri::Point3> points) {
+                        return tri::RestoredSurface{alpha_wrap_surface(points, alpha), {}};
+                      },
+                      kCgalBytesPerPoint};
+  } else if (name == "advancing-front" && !value) {
+    options.method = {advancing_front_surface, kCgalBytesPerPoint};
+  } else if (name != "gabriel" || value) {
+    throw UsageError(
+        "--criterion is edge[:FACTOR], gabriel, advancing-front or alpha-wrap[:METRES], not '" +
+        text + "'");
+  }
+  return options;
+}
+
+void set_metric(const MetricChoice& metric, ScanSurfaceOptions& options) {
+  if (metric.kind == MetricChoice::Kind::euclidean) return;
+  if (metric.kind != MetricChoice::Kind::elliptical) {
+    throw UsageError("a surface has the metric euclidean or elliptical:FILE, not " + metric.text);
+  }
+  if (options.method) throw UsageError("--metric is for --criterion gabriel and edge");
+  if (metric.has_boxes()) {
+    throw UsageError("--metric: a surface has one ellipsoid, so its region has no \"box\"");
+  }
+  options.restore.metric = metric.regions.front().metric.map();
+}
+
+}  // namespace terrace::tools

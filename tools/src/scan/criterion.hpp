@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <string>
+
+#include "terrace/terrain/metric_choice.hpp"
+#include "terrace/terrain/scan_surface.hpp"
+
+namespace terrace::tools {
+
+using namespace terrain;
+
+/// The method that --criterion names: edge[:FACTOR], gabriel, advancing-front or
+/// alpha-wrap[:METRES]. Throws: UsageError.
+ScanSurfaceOptions parse_criterion(const std::string& text);
+
+/// Sets the elliptical metric between positions in metres; a Euclidean one changes nothing.
+/// Throws: UsageError for another kind of metric, one with boxes, or beside a method of CGAL's.
+void set_metric(const MetricChoice& metric, ScanSurfaceOptions& options);
+
+}  // namespace terrace::tools
