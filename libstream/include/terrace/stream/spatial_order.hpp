@@ -13,44 +13,46 @@
 
 namespace terrace::stream {
 
-/// Whether the points of a source come as they are (`stream`), such that those of a block lie close
-/// together (`spatial`), or the latter only if they do not already (`automatic`).
+/// Whether the points of a source keep their order (`stream`), are reordered so that those of a
+/// block are close together (`spatial`), or are reordered only if they are not close already
+/// (`automatic`).
 enum class Order : std::uint8_t { automatic, stream, spatial };
 
 struct SpatialOrderOptions {
   Order order = Order::automatic;
-  std::size_t block_points = 10000;  ///< most points per block that has been put in order
-  /// Lengths on the ground of a unit of the three stored coordinates, in a box of these. Empty: all
-  /// count alike.
+  std::size_t block_points = 10000;  ///< maximum points per block after reordering
+  /// Lengths on the ground of one unit of each of the three stored coordinates, within this box.
+  /// Empty: all are equal.
   std::function<std::array<double, 3>(const Box3&)> unit_lengths{};
-  std::filesystem::path folder{};  ///< of the temporary file; empty: $TMPDIR or /tmp
+  std::filesystem::path folder{};  ///< folder of the temporary file; empty: $TMPDIR or /tmp
   std::stop_token stop{};          ///< ends next() with Stopped
-  /// Called while points are set aside, with those read so far.
+  /// Called while points are set aside, with the number read so far.
   std::function<void(const Progress&)> reading{};
 };
 
-/// A source whose points may come in another order than they are read.
+/// A source that may deliver points in a different order from that of reading.
 class OrderedSource : public PointSource {
  public:
   struct Report {
     bool reordered = false;
     /// How much wider blocks in the order of the source are than those of a k-d tree over the same
-    /// points, the mean over the axes; of the points that decided, 0 without any.
+    /// points, averaged over the axes; for the points that decided, 0 if there were none.
     double spread = 0;
-    std::uint64_t temporary_bytes = 0;  ///< of disk, at most at one time
+    std::uint64_t temporary_bytes = 0;  ///< maximum disk space used at one time
   };
   [[nodiscard]] virtual Report report() const = 0;
 };
 
-/// Puts the points of a source in order without ever holding more than a part of them.
+/// Reorders the points of a source while holding only a part of them.
 ///
-/// The stream is judged by windows of 262,144 points, the first and every fourth after it: blocks
-/// that are not compact are more than twice as wide as those of a k-d tree over the window. If they
-/// are in the first window, all points are put in order; later, those that follow. They go into 256
-/// buckets, the leaves of a k-d tree over the window, in a temporary file as large as their packed
-/// records; once all are there the buckets come back one after another, each cut by a k-d tree into
-/// blocks. A bucket of more than 262,144 points is first divided in turn, which takes no more disk
-/// as what has been read is written over. Cells of a raster stay as they are.
+/// The stream is tested in windows of 262,144 points, the first and every fourth after it: blocks
+/// are not compact if they are more than twice as wide as those of a k-d tree over the window. If
+/// this is so in the first window, all points are reordered; later, those that follow. They go into
+/// 256 buckets, the leaves of a k-d tree over the window, in a temporary file as large as their
+/// packed records; once all are there the buckets are read back one after another, each divided by
+/// a k-d tree into blocks. A bucket of more than 262,144 points is first divided in the same way,
+/// which takes no additional disk space, as data already read is overwritten. Cells of a raster
+/// keep their order.
 ///
 /// The order depends on nothing but the points, their order and the options. Memory: the window
 /// twice, 8 MiB for the buckets, as much again for each time one had to be divided, and what comes
