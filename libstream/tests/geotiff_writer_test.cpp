@@ -137,7 +137,7 @@ TEST(GeoTiffWriter, GdalReadsTheSame) {
     EXPECT_EQ(band["minimum"], 0.0);
     EXPECT_EQ(band["maximum"], 249.75);
     EXPECT_EQ(info["metadata"]["IMAGE_STRUCTURE"]["COMPRESSION"], geographic ? "ZSTD" : "DEFLATE");
-    // No complaint of any kind, either.
+    // There must be no complaint of any kind.
     EXPECT_EQ(output_of("gdalinfo '" + path + "' 2>&1 >/dev/null | head -3"), "");
   }
 }
@@ -201,7 +201,7 @@ TEST(GeoTiffWriter, AFileSizeLimitIsAnErrorAndLeavesNothing) {
   EXPECT_TRUE(fs::is_empty(folder.path()));
 }
 
-/// Sparse, so that the file stays small: what counts is that offsets are 64 bits wide.
+/// Sparse, so that the file stays small: the point is that offsets are 64 bits wide.
 TEST(GeoTiffWriter, IsABigTiffWhereFourGigabytesMightNotDo) {
   const TempFolder folder;
   const auto magic_of = [&](std::uint32_t rows) {
