@@ -201,7 +201,7 @@ TEST(GeoTiffWriter, AFileSizeLimitIsAnErrorAndLeavesNothing) {
   EXPECT_TRUE(fs::is_empty(folder.path()));
 }
 
-/// Sparse, so that the file stays small: the point is that offsets are 64 bits wide.
+/// Sparse, so that the file stays small: what counts is that offsets are 64 bits wide.
 TEST(GeoTiffWriter, IsABigTiffWhereFourGigabytesMightNotDo) {
   const TempFolder folder;
   const auto magic_of = [&](std::uint32_t rows) {

@@ -14,7 +14,7 @@ namespace terrace::stream {
 
 enum class GeoTiffCompression { none, deflate, zstd };
 
-/// The metadata of a GeoTIFF with one band.
+/// What a GeoTIFF of one band says of itself.
 struct GeoTiffOptions {
   std::uint32_t columns = 0, rows = 0;
   Channel sample;               ///< type of the samples; scale, offset and unit unless default
@@ -24,7 +24,7 @@ struct GeoTiffOptions {
   std::optional<double> nodata;
   GeoTiffCompression compression = GeoTiffCompression::deflate;
   int level = 6;             ///< of the compression: 1 to 12 (deflate), 1 to 22 (zstd)
-  bool predictor = true;     ///< encode differences of neighbours: smaller for terrain
+  bool predictor = true;     ///< code differences of neighbours: smaller for terrain
   std::uint32_t tile = 256;  ///< columns and rows of a tile, a multiple of 16
   bool replace = false;      ///< an existing file
 };

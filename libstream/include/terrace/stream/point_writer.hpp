@@ -47,8 +47,8 @@ class PointWriter {
   virtual void finish() = 0;
   /// Points appended so far.
   [[nodiscard]] virtual std::uint64_t points() const = 0;
-  /// The maximum distance by which a coordinate was moved to fit the integers of the format; 0 if
-  /// none was moved by more than the rounding of doubles.
+  /// How far a coordinate was moved to fit the integers of the format, at most; 0 where none was
+  /// moved by more than doubles lose on the way.
   [[nodiscard]] virtual double rounding() const { return 0.0; }
 };
 
@@ -65,7 +65,7 @@ struct WriterOptions {
   /// What "copc" may hold, roughly: 40 MiB at least; more than 128 MiB are not needed. The bytes of
   /// the file do not depend on it.
   std::uint64_t memory_bytes = 128u << 20;
-  unsigned threads = 1;  ///< encoding threads of "laz" and "copc"; the bytes are the same
+  unsigned threads = 1;  ///< that encode at once, of "laz" and "copc"; the bytes are the same
 };
 
 /// A writer for `path`; "-" is standard output, for "xyz" (also if no format is named) and "csv".

@@ -58,7 +58,7 @@ struct PointBlock {
 struct Progress {
   std::uint64_t points = 0;
   std::uint64_t nodata = 0;  ///< cells without data, left out
-  /// Points among them that their file marks as withheld (LAS): delivered like all others.
+  /// Points among them that their file marks as withheld (LAS): they are delivered like all others.
   std::uint64_t withheld = 0;
   /// Points left out by Selection::where, region and resolution, whether they were read or not.
   std::uint64_t excluded = 0;
@@ -99,8 +99,8 @@ struct Selection {
   /// Points outside of this box, in the source's CRS, are left out; without heights its z are
   /// infinite. COPC, EPT and LAS whose header lies outside are read only as far as needed.
   std::optional<Box3> region{};
-  /// Above 0: only points of an octree's nodes down to the first depth whose spacing is at most
-  /// this, in units of the CRS. Formats without an octree are refused.
+  /// Above 0: points of an octree's nodes down to the first depth whose spacing is at most this, in
+  /// units of the CRS. Formats without an octree are refused.
   double resolution = 0.0;
 };
 

@@ -43,16 +43,15 @@ class OrderedSource : public PointSource {
   [[nodiscard]] virtual Report report() const = 0;
 };
 
-/// Reorders the points of a source while holding only a part of them.
+/// Puts the points of a source in order without ever holding more than a part of them.
 ///
-/// The stream is tested in windows of 262,144 points, the first and every fourth after it: blocks
-/// are not compact if they are more than twice as wide as those of a k-d tree over the window. If
-/// this is so in the first window, all points are reordered; later, those that follow. They go into
-/// 256 buckets, the leaves of a k-d tree over the window, in a temporary file as large as their
-/// packed records; once all are there the buckets are read back one after another, each divided by
-/// a k-d tree into blocks. A bucket of more than 262,144 points is first divided in the same way,
-/// which takes no additional disk space, as data already read is overwritten. Cells of a raster
-/// keep their order.
+/// The stream is judged by windows of 262,144 points, the first and every fourth after it: blocks
+/// that are not compact are more than twice as wide as those of a k-d tree over the window. If they
+/// are in the first window, all points are put in order; later, those that follow. They go into 256
+/// buckets, the leaves of a k-d tree over the window, in a temporary file as large as their packed
+/// records; once all are there the buckets come back one after another, each cut by a k-d tree into
+/// blocks. A bucket of more than 262,144 points is first divided in turn, which takes no more disk
+/// as what has been read is written over. Cells of a raster stay as they are.
 ///
 /// The order depends on nothing but the points, their order and the options. Memory: the window
 /// twice, 8 MiB for the buckets, as much again for each time one had to be divided, and what comes

@@ -146,8 +146,9 @@ struct ModelOptions {
 /// If the source throws, or contradicts itself (HierarchyError), the model is unchanged. After
 /// std::bad_alloc during a step the model can only be destroyed.
 ///
-/// Memory besides the triangulation: 16 bytes per vertex, 4 per member and 48 per expanded cluster;
-/// more for points above level 0. With clusters of 140 members about 21 bytes per vertex.
+/// Memory, beside the triangulation: 16 bytes per vertex and 4 per member, 48 per expanded cluster;
+/// more for points above level 0. With clusters of 140 members about 21 bytes per
+/// vertex.
 ///
 /// Triangulation: Delaunay2 or Delaunay3, in any metric.
 template <class Triangulation>

@@ -198,8 +198,8 @@ enum class ViewPin : std::uint8_t { expanded, collapsed };
 /// sizes, but it is also stable once reached.
 ///
 /// Cost of a step without changes: O(expanded clusters + collapsed clusters next to wanted ones).
-/// Memory besides the model: 85 bytes per expanded cluster and 65 per cluster that could be
-/// expanded (with outlines 32 more each), and the given clusters that are kept.
+/// Memory beside the model: 85 bytes per expanded cluster and 65 per cluster that could be expanded
+/// (with outlines 32 more each), and the given clusters that are kept.
 ///
 /// Triangulation: Delaunay2, for points in the plane with heights.
 template <class Triangulation>
