@@ -5,9 +5,10 @@
 //   scan  patches 500 points wide of a bumpy closed surface
 //   shuf  the scan shuffled: each block is a coarse copy of the whole surface
 //   cube  uniform in a cube
-// Counters: Q_tenth, Q_log10 and Q_log2 are percent above (below, if negative) the thesis's search
-// from Meyerson's start with 0.1 m, m ceil(log10 m) (what the thesis calls the full number) and
-// m ceil(log2 m) candidates, mean over blocks; clusters per block, and the median of their sizes.
+// Counters: Q_tenth, Q_log10 and Q_log2 are the percentages above (below, if negative) the cost of
+// the thesis's search from Meyerson's start with 0.1 m, m ceil(log10 m) (the thesis's "full
+// number") and m ceil(log2 m) candidates, mean over blocks; clusters per block, and the median of
+// their sizes.
 #include <algorithm>
 #include <array>
 #include <cstdlib>
@@ -68,7 +69,7 @@ Input make_input(std::size_t which) {
   return input;
 }
 
-/// Made on first use: a filter pays for what it selects.
+/// Made on first use: a filtered run makes only what it needs.
 const Input& input_of(std::size_t which) {
   static std::array<std::optional<Input>, kInputs.size()> inputs;
   if (!inputs[which]) inputs[which] = make_input(which);
@@ -121,7 +122,7 @@ void cluster_blocks(benchmark::State& state, std::size_t which, Effort effort, S
   report_quality(state, input, *clusterer, effort);
 }
 
-/// The textbook's search by full scans, 0.1 m candidates, for scale.
+/// The textbook search by full scans with 0.1 m candidates, for comparison.
 void reference(benchmark::State& state, std::size_t which) {
   const FacilityPoints problem{.points = input_of(which).blocks[0]};
   for ([[maybe_unused]] const auto iteration : state) {

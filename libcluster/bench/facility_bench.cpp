@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// The general facility location problem and k-median against known optima: a table of every
+// The general facility location problem and k-median compared with known optima: a table of every
 // instance in TERRACE_DATA/facility (OR-Library, UflLib, Kratica), then mean and worst by group.
-// Without the data, and with TERRACE_BENCH_SMALL, of instances that it makes, where the best bound
-// stands for the optimum. Columns, all in percent of the optimum but for costs and seconds:
+// Without the data, and with TERRACE_BENCH_SMALL, synthetic instances, with the best bound instead
+// of the optimum. Columns, all in percent of the optimum except costs and seconds:
 //   search   interchange with default options, one thread; k_median for p-median
 //            instances, their bound included in the seconds
 //   JV, JMS  jain_vazirani and greedy_stars
 //   bound    lower_bound from the search's solution
 //   JV bnd, JMS bnd   the bounds of the two primal-dual algorithms
-// Last, lower bounds of points: BlockClusterer's solution of a fractal elevation model, its gap;
-// and k-median of points.
+// Finally, lower bounds of points (BlockClusterer's solution for a fractal elevation model and its
+// gap) and k-median of points.
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The hierarchy over whole streams, with a sink that drops everything: from positions in memory to
-// the root, all levels. Inputs: square tiles of a fractal elevation model, and a shuffled scan of a
-// closed surface. The overhead is measured with a clustering that costs next to nothing.
+// The hierarchy over complete streams, with a sink that discards everything: from positions in
+// memory to the root, all levels. Inputs: square tiles of a fractal elevation model, and a shuffled
+// scan of a closed surface. The overhead is measured with a clustering that costs almost nothing.
 #include <algorithm>
 #include <cstdlib>
 #include <memory>
@@ -78,8 +78,8 @@ void stream(benchmark::State& state, const std::vector<Point3>& points) {
 void hierarchy_terrain_tiles(benchmark::State& state) { stream(state, terrain_tiles()); }
 void hierarchy_shuffled_scan(benchmark::State& state) { stream(state, shuffled_scan()); }
 
-// Under other metrics, on 400,000 points of the shuffled scan: elliptical is linear, the others are
-// local searches.
+// Other metrics, on 400,000 points of the shuffled scan: elliptical is linear, the others are local
+// searches.
 const Metric& metric_of(std::int64_t which) {
   static const std::vector<Metric> metrics{
       Elliptical(2.0, 0.5, 30.0), Minkowski{1.0}, SquaredEuclidean{},
@@ -105,7 +105,7 @@ void hierarchy_metric(benchmark::State& state) {
   report(state, result);
 }
 
-// Everything but the clustering. Clusters of about 100 points, an ordinary size; neighbours in the
+// Everything except the clustering. Clusters of about 100 points, a typical size; neighbours in the
 // block are in different ones, as in a shuffled scan.
 void hierarchy_overhead(benchmark::State& state) {
   const std::vector<Point3>& points = shuffled_scan();

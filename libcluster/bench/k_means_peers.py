@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""k-means beside scikit-learn, both on one thread, from the same centres, until no assignment
+"""Compares k-means with scikit-learn, both on one thread, from the same centres, until no assignment
 changes. Needs numpy and scikit-learn.
 
 k_means_peers.py BENCH DATA [K]
 BENCH  the program cluster_k_means_bench
-DATA   text, one point per line (two or three numbers), gzipped or not: for the bar the set birch1
+DATA   text, one point per line (two or three numbers), gzipped or not; the bar applies to the set birch1
 K      number of centres, 100 if not given; they are points drawn with the seeds 1, 2, 3
 """
 

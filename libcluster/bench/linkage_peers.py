@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Linkage of this library beside fastcluster, on the same machine in the same run.
+"""Compares linkage of this library with fastcluster, on the same machine in the same run.
 
     linkage_peers.py PROGRAM [single] [complete] [memory] [--full]
 
-PROGRAM is cluster_linkage_bench; without further words all three parts run. Points are uniform in a
+PROGRAM is cluster_linkage_bench; without further arguments all three parts run. Points are uniform in a
 cube. fastcluster's single linkage without a matrix is quadratic: it is timed at 20 000 points and
-scaled to 100 000, with --full timed there. Its complete linkage is timed with the distances it
-needs (SciPy's pdist); peak memory is that of the process less what it had before. Times are the
-least of several.
+scaled to 100 000, or timed there with --full. Its complete linkage is timed including the distances
+it needs (SciPy's pdist); peak memory is that of the process minus its previous memory. Times are
+the least of several.
 """
 import json
 import resource

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// The local search by its strategies, on blocks of 10 000 points, facility cost 1 diagonal,
+// The strategies of the local search, on blocks of 10 000 points, facility cost 1 diagonal,
 // Meyerson's start:
 //   <input>/<strategy>/<metric>          0.1 m candidates, one thread
 //   <input>/<strategy>/threads:T         one gain by T threads
 //   <input>/<strategy>/batch:B/threads:T several gains at once
 // Inputs: scan (a patch of a bumpy surface), shuf (all of the surface, at random), cube.
-// Time is for a whole search, start included. Columns: ns per gain (all but the start: the mean
-// over the search, with what it opens), share of positive gains, share of vertices (clients and
-// facilities) inspected, Q against batch 1 in %, clients that were not
-// at their nearest facility in %.
+// Times are for a complete search, including the start. Columns: ns per gain (everything except the
+// start: the mean over the search, including openings), share of positive gains, share of vertices
+// (clients and facilities) inspected, Q relative to batch 1 in %, clients not at their nearest
+// facility in %.
 #include <chrono>
 #include <cstdlib>
 #include <functional>

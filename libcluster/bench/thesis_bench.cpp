@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The thesis, rerun: J. Skála, Algorithms for manipulating large geometric data, tables 7.1, 7.4 to
-// 7.8 and figures 7.5, 7.6, 7.12 to 7.14, on inputs made here, beside the thesis's own figures (in
-// square brackets). Those are for comparison only: other data, other machines, and the thesis's
-// counts differ between its tables. Its logarithm is the decimal one, its speed-ups are shares of
-// time saved.
+// 7.8 and figures 7.5, 7.6, 7.12 to 7.14, on synthetic inputs, next to the thesis's own figures (in
+// square brackets). Those are for comparison only: data and machines differ, and the thesis's
+// counts differ between its tables. Its logarithm is decimal, its speed-ups are shares of time
+// saved.
 // TERRACE_BENCH_SMALL: everything once on tiny inputs.
 #include <array>
 #include <chrono>
@@ -40,7 +40,7 @@ constexpr const char* kUsage =
     "                figure7.13,figure7.14; all by default\n"
     "  --threads N   for what the thesis ran on four (all processors)\n";
 
-/// Takes the first name off a list with commas.
+/// Takes the first name off a comma-separated list.
 std::string_view take(std::string_view& list) {
   const std::size_t comma = list.find(',');
   const std::string_view name = list.substr(0, comma);

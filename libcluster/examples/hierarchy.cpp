@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Builds the hierarchy of a small terrain and reads it back: the point of the top level that
-// stands for most of the terrain, and the way from there down to a point of full resolution.
+// Builds the hierarchy of a small terrain and reads it back: from the point of the top level that
+// represents most of the terrain down to a point of full resolution.
 #include "terrace/cluster/hierarchy.hpp"
 
 #include <cmath>
@@ -21,7 +21,7 @@ class MemorySink : public HierarchySink {
  public:
   struct Cluster {
     std::vector<Point3> points;
-    std::vector<std::uint64_t> children;  ///< one level below, per point; none on level 0
+    std::vector<std::uint64_t> children;  ///< one level below, per point; empty on level 0
     Summary summary;
   };
 
@@ -70,7 +70,7 @@ int main() {
   HierarchyOptions options;
   options.block_size = 400;
   options.threads = 2;
-  // Positions are degrees, heights metres; clusters are to be compact in metres.
+  // Positions are in degrees, heights in metres; clusters should be compact in metres.
   options.ground = [](const Bounds& block) {
     constexpr double kDegree = 3.14159265358979323846 / 180;
     constexpr double kMetresPerDegree = 111195.0;
@@ -101,7 +101,7 @@ int main() {
                 static_cast<unsigned long long>(result.level_clusters[level]));
   }
 
-  // Down from the top, always into the first point's cluster.
+  // From the top down, always into the first point's cluster.
   const MemorySink::Cluster* cluster = &sink.top;
   for (unsigned level = result.top; level > 0; --level) {
     cluster = &sink.levels.at(level - 1).at(cluster->children.front());

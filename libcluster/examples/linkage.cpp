@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads points, one a line with two or three coordinates, from standard input and prints their
-// dendrogram, a row for each merge as in SciPy's linkage matrix: cluster, cluster, height, size.
+// Reads points, one per line with two or three coordinates, from standard input and prints their
+// dendrogram, one row per merge as in SciPy's linkage matrix: cluster, cluster, height, size.
 //     linkage single|complete|complete-float [THREADS] < points
-// Without arguments it clusters two small rings, and prints how many clusters each linkage makes of
-// them below a height.
+// Without arguments it clusters two small rings, and prints the number of clusters below a height
+// for each linkage.
 #include "terrace/cluster/linkage.hpp"
 
 #include <algorithm>

@@ -17,9 +17,9 @@ int main() {
   }
   points.push_back({9000.0, 9000.0, 0.0});
 
-  // Ways along streets, not as the crow flies.
+  // Distances along streets, not as the crow flies.
   FacilityPoints problem{.points = points, .metric = Minkowski{1.0}, .facility_cost = 0.2};
-  problem.outlier_price = 0.1;  // points farther than that from every facility are left out
+  problem.outlier_price = 0.1;  // points farther than this from every facility are left out
   FacilitySolution solution = solve(problem, {.effort = Effort::fine});
   solution.lower_bound = lower_bound(problem, solution).lower_bound;
 

@@ -4,8 +4,8 @@
 //     segment_image [INPUT.ppm [OUTPUT.ppm [FACILITY_COST [COLOUR_WEIGHT]]]]
 //
 // Reads a binary PPM (P6, 8 bits) and writes one in which every pixel has the colour of its
-// cluster's representative. Without arguments it makes a picture of its own, and checks that the
-// segments are the shapes in it.
+// cluster's representative. Without arguments it generates a picture and checks that the segments
+// are the shapes in it.
 #include <array>
 #include <cstdint>
 #include <cstdio>
@@ -50,12 +50,12 @@ Image read_ppm(const std::string& path) {
   Image image;
   image.width = header_number(in, path);
   image.height = header_number(in, path);
-  if (header_number(in, path) != 255) throw std::runtime_error(path + ": not of 8 bits a channel");
+  if (header_number(in, path) != 255) throw std::runtime_error(path + ": not 8 bits per channel");
   in.get();
   image.rgb.resize(3 * image.width * image.height);
   in.read(reinterpret_cast<char*>(image.rgb.data()),
           static_cast<std::streamsize>(image.rgb.size()));
-  if (!in) throw std::runtime_error(path + ": is cut off");
+  if (!in) throw std::runtime_error(path + ": is truncated");
   return image;
 }
 
@@ -67,7 +67,7 @@ void write_ppm(const Image& image, const std::string& path) {
   if (!out.flush()) throw std::runtime_error(path + ": cannot be written");
 }
 
-/// Shapes of even colour: a square and a disc on a ground, 0, 1, 2.
+/// Shapes of uniform colour: a square and a disc on a background: 0, 1, 2.
 int shape_at(std::size_t x, std::size_t y) {
   const double dx = static_cast<double>(x) - 70.0, dy = static_cast<double>(y) - 65.0;
   if (dx * dx + dy * dy < 20.0 * 20.0) return 2;
@@ -90,7 +90,7 @@ Image made_picture() {
   return image;
 }
 
-/// colour_weight: how many pixels of distance a step of one in a colour channel is worth.
+/// colour_weight: the pixels of distance that a step of one in a colour channel is worth.
 FacilitySolution segment(const Image& image, double facility_cost, double colour_weight) {
   std::vector<Point3> positions;
   for (std::size_t y = 0; y < image.height; ++y) {
@@ -113,7 +113,7 @@ void paint(Image& image, const FacilitySolution& solution) {
   }
 }
 
-/// Pixels whose segment's representative is in another shape.
+/// Number of pixels whose segment's representative is in another shape.
 std::size_t misplaced(const Image& image, const FacilitySolution& solution) {
   const auto shape = [&](std::size_t i) { return shape_at(i % image.width, i / image.width); };
   std::size_t count = 0;
@@ -137,7 +137,7 @@ int main(int argc, char** argv) {
     if (own) {
       const std::size_t wrong = misplaced(image, solution);
       std::printf("%zu pixels in a segment of another shape\n", wrong);
-      // The ground may be several segments; the shapes are told apart.
+      // The background may be several segments; the shapes must be separate.
       return wrong == 0 && solution.facilities.size() >= 3 && solution.facilities.size() <= 30 ? 0
                                                                                                : 1;
     }

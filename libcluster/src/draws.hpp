@@ -39,7 +39,7 @@ inline std::uint64_t splitmix64(std::uint64_t x) {
   return x ^ (x >> 31);
 }
 
-/// A seed of its own for each of many runs.
+/// A different seed for each of many runs.
 inline std::uint64_t seed_of_run(std::uint64_t seed, std::uint64_t run) {
   return splitmix64(seed + run * kGoldenGamma);
 }

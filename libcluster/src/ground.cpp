@@ -8,7 +8,7 @@
 namespace terrace::cluster {
 namespace {
 
-// Points are taken four at a time: twelve independent lanes that the compiler turns into vectors.
+// Points are processed four at a time: twelve independent lanes that the compiler vectorises.
 constexpr std::size_t kGroup = 4;
 
 }  // namespace
@@ -42,7 +42,7 @@ void check_ground_map(const GroundMap& map, const Bounds& box, unsigned level,
       std::all_of(map.begin(), map.end(), [](double entry) { return std::isfinite(entry); });
   if (!finite) fail("the ground map has an entry that is not finite");
   if (std::all_of(map.begin(), map.end(), [](double entry) { return entry == 0.0; })) {
-    fail("the ground map is zero, so that all distances would be");
+    fail("the ground map is zero, so all distances would be zero");
   }
   if (!(ground_extent(map, box) <= 1e150)) {
     fail("its ground extent is beyond 1e150; check the coordinates and the ground map");

@@ -39,7 +39,7 @@ inline Point3 mapped(const GroundMap& m, const Point3& v) {
 
 inline double squared_length(const Point3& v) { return v[0] * v[0] + v[1] * v[1] + v[2] * v[2]; }
 
-/// The sum of the ground extents of a box, every entry of the map taken as positive: no vector
+/// The sum of the ground extents of a box, with the absolute values of the map's entries: no vector
 /// between two points of the box is longer on the ground, and nothing is squared.
 inline double ground_extent(const GroundMap& m, const Bounds& box) {
   const Point3 size = difference(box.max, box.min);

@@ -54,7 +54,7 @@ double minkowski(double p, double x, double y, double z) {
   const double largest = std::max({x, y, z});
   if (largest == 0.0 || std::isinf(p)) return largest;
   if (p == 1.0) return x + y + z;
-  // Relative to the largest, so that powers neither overflow nor vanish.
+  // Relative to the largest, so that powers neither overflow nor underflow.
   using portable::power;
   return largest *
          power(power(x / largest, p) + power(y / largest, p) + power(z / largest, p), 1.0 / p);
@@ -85,7 +85,7 @@ Elliptical::Elliptical(const Point3& semi_axes, const LinearMap& axes) : map_{},
       }
     }
   }
-  // M = sum over the axes of e e^T / semi-axis: the turn back leaves it symmetric.
+  // M = sum over the axes of e e^T / semi-axis: rotating back makes it symmetric.
   for (std::size_t i = 0; i < 3; ++i) {
     for (std::size_t j = 0; j < 3; ++j) {
       for (std::size_t k = 0; k < 3; ++k) {
@@ -101,10 +101,9 @@ EllipticalField::EllipticalField(std::vector<Region> regions, const std::optiona
   for (std::size_t r = 0; r < regions_.size(); ++r) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       if (regions_[r].box.min[axis] <= regions_[r].box.max[axis]) continue;
-      throw std::invalid_argument("region " + std::to_string(r) +
-                                  " of a field of metrics is empty or not a number along axis " +
-                                  std::to_string(axis) +
-                                  ": its minimum must not exceed its maximum");
+      throw std::invalid_argument(
+          "region " + std::to_string(r) + " of a field of metrics is empty or NaN along axis " +
+          std::to_string(axis) + ": its minimum must not exceed its maximum");
     }
   }
 }
@@ -139,7 +138,7 @@ double EllipticalField::least_scale(const Point3& position) const {
 }
 
 std::optional<LinearMap> EllipticalField::uniform_in(const Bounds& box) const {
-  // Around the box as it lies in the frame.
+  // The bounding box of the box as transformed to the frame.
   Bounds around = box;
   if (frame_ && box.min[0] <= box.max[0]) {
     around = kEmptyBounds;

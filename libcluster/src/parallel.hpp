@@ -7,12 +7,13 @@
 
 #include "thread_team.hpp"
 
-/// Loops shared by threads that are there for one loop: for work that takes milliseconds. Who does
-/// what varies, so each call must write to places of its own, or of its thread.
+/// Loops shared by threads that live for one loop: for work that takes milliseconds. The assignment
+/// of work to threads varies, so each call must write only to its own memory, or that of its
+/// thread.
 
 namespace terrace::cluster {
 
-/// As many as asked for, 0 standing for one per core, and no more than there is work for.
+/// The number of threads requested (0: one per core), but no more than there are pieces of work.
 inline unsigned threads_for(std::size_t pieces, unsigned threads) {
   if (threads == 0) threads = std::max(1u, std::thread::hardware_concurrency());
   constexpr std::size_t kMost = 256;
@@ -20,8 +21,8 @@ inline unsigned threads_for(std::size_t pieces, unsigned threads) {
       std::clamp<std::size_t>(pieces, 1, std::min<std::size_t>(threads, kMost)));
 }
 
-/// Calls work(k), or work(k, thread), for every k below `count`. The first exception comes out,
-/// when all have stopped.
+/// Calls work(k), or work(k, thread), for every k below `count`. Rethrows the first exception when
+/// all threads have stopped.
 template <class Work>
 void parallel(std::size_t count, unsigned threads, Work&& work) {
   ThreadTeam(threads_for(count, threads)).run(count, work);

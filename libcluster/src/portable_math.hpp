@@ -10,9 +10,9 @@
 #include <limits>
 #include <numbers>
 
-/// Functions of the C library whose last bit differs from release to release and from processor to
-/// processor, made here of +, -, *, / and sqrt alone, which IEEE 754 fixes, so that clusters are
-/// the same everywhere. (fmod, remquo, frexp and ldexp are exact.)
+/// Replacements for functions of the C library whose last bit differs between releases and
+/// processors, made of +, -, *, / and sqrt alone, which IEEE 754 defines exactly, so that clusters
+/// are the same everywhere. (fmod, remquo, frexp and ldexp are exact.)
 
 namespace terrace::cluster::portable {
 
@@ -20,7 +20,7 @@ namespace terrace::cluster::portable {
 inline std::array<double, 2> sine_cosine(double degrees) {
   int quarter = 0;
   const double x = std::remquo(degrees, 90.0, &quarter) * (std::numbers::pi / 180.0);
-  // Taylor's series; |x| <= pi / 4.
+  // Taylor series; |x| <= pi / 4.
   double s = 0.0, c = 0.0;
   for (int k = 9; k >= 1; --k) {
     s = (1.0 + s) * (-x * x / (2 * k * (2 * k + 1)));
@@ -40,7 +40,7 @@ inline std::array<double, 2> sine_cosine(double degrees) {
   }
 }
 
-/// sqrt(x^2 + y^2), where the squares would overflow or vanish as well.
+/// sqrt(x^2 + y^2), also where the squares would overflow or underflow.
 inline double length(double x, double y) {
   const double squares = x * x + y * y;
   if (squares > 1e-280 && squares < 1e300) return std::sqrt(squares);
@@ -51,7 +51,7 @@ inline double length(double x, double y) {
   return largest * std::sqrt(x * x + y * y);
 }
 
-/// c[0] + c[1] x + c[2] x^2 + ..., even and odd terms apart, which processors do side by side.
+/// c[0] + c[1] x + c[2] x^2 + ..., even and odd terms separately, which processors do in parallel.
 template <std::size_t N>
 double polynomial(const std::array<double, N>& c, double x) {
   const double square = x * x;
@@ -80,7 +80,7 @@ inline double power(double x, double p) {
     for (std::size_t n = 1; n < c.size(); ++n) c[n] = c[n - 1] / static_cast<double>(n);
     return c;
   }();
-  // ln 2 in two parts, the first with trailing zeros, so that whole multiples of it are exact.
+  // ln 2 in two parts, the first with trailing zeros, so that integer multiples of it are exact.
   constexpr double kLn2High = 0x1.62e42fefa0000p-1, kLn2Low = 0x1.cf79abc9e3b3ap-40;
   // x = m 2^e with m from sqrt(1/2) to sqrt(2); ln m = 2 artanh(s).
   int e = 0;
@@ -89,7 +89,7 @@ inline double power(double x, double p) {
     e = -64;
   }
   const auto bits = std::bit_cast<std::uint64_t>(x);
-  // What reaches sqrt(1/2) in the mantissa is taken for the next power of two.
+  // Mantissas of at least sqrt(1/2) count towards the next power of two.
   const std::uint64_t up = bits + (0x3ff0000000000000 - 0x3fe6a09e667f3bcd);
   e += static_cast<int>(up >> 52) - 1023;
   const double m = std::bit_cast<double>(bits - ((up & 0xfff0000000000000) - 0x3ff0000000000000));

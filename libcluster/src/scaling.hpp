@@ -7,9 +7,9 @@
 
 namespace terrace::cluster {
 
-/// Maps a block to coordinates in [0, 1], so that squares neither overflow nor vanish whatever the
-/// offset and scale of the block. Lengths are divided by a power of two: nothing is rounded but the
-/// difference to the corner.
+/// Maps a block to coordinates in [0, 1], so that squares neither overflow nor underflow whatever
+/// the offset and scale of the block. Lengths are divided by a power of two: only the difference to
+/// the corner is rounded.
 struct Scaling {
   Point3 corner{};      ///< least coordinates
   int exponent = 0;     ///< the longest side lies in [2^(exponent-1), 2^exponent)
@@ -27,7 +27,7 @@ struct Scaling {
   [[nodiscard]] Point3 scaled(const Point3& p) const {
     return {scaled(p[0], 0), scaled(p[1], 1), scaled(p[2], 2)};
   }
-  /// A scaled length in the unit of the points; infinite where that exceeds the range of double.
+  /// A scaled length in the unit of the points; infinite if it overflows a double.
   [[nodiscard]] double unscaled(double length) const;
 
  private:

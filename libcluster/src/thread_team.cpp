@@ -8,7 +8,7 @@
 namespace terrace::cluster {
 namespace {
 
-// Some tens of microseconds, several times what a gain takes.
+// Some tens of microseconds, several times the duration of a gain.
 constexpr int kLooks = 4000;
 
 void pause() {
@@ -26,9 +26,9 @@ ThreadTeam::ThreadTeam(unsigned threads) {
   try {
     for (unsigned i = 1; i < threads; ++i) threads_.emplace_back([this, i] { run_thread(i); });
   } catch (const std::system_error&) {
-    // Those there are do the same work.
+    // The existing threads do the same work.
   } catch (const std::bad_alloc&) {
-    // Likewise. Not thrown: those that run would never be joined.
+    // Likewise. Not rethrown: running threads would never be joined.
   }
 }
 
@@ -44,7 +44,7 @@ void ThreadTeam::run_together(std::size_t count, void* task, Call call) {
   task_ = task;
   call_ = call;
   next_.store(0, std::memory_order_relaxed);
-  state_.fetch_add(kStep);  // nobody is at work, so this is odd and ends in 0
+  state_.fetch_add(kStep);  // nobody is working, so this is odd and ends in 0
   state_.notify_all();
   work(0);
   state_.fetch_add(kStep);
@@ -73,7 +73,7 @@ void ThreadTeam::work(unsigned thread) {
 }
 
 void ThreadTeam::run_thread(unsigned thread) {
-  std::uint64_t done = 0;  // the count of the last work taken part in
+  std::uint64_t done = 0;  // the count of the last work this thread took part in
   int looks = 0;
   for (;;) {
     std::uint64_t state = state_.load();
@@ -90,7 +90,7 @@ void ThreadTeam::run_thread(unsigned thread) {
       pause();
     } else {
       state_.wait(state);
-      // Woken by the start of work or by another thread's coming and going.
+      // Woken by the start of work or by other threads joining or leaving.
     }
   }
 }

@@ -12,12 +12,12 @@
 
 namespace terrace::cluster {
 
-/// Threads that wait for short pieces of work and take them within a microsecond: they look for
-/// work for a while before they sleep. The caller never waits for a thread that has not begun, so
-/// that a busy machine costs nothing but the help.
+/// Threads that wait for short pieces of work and start on them within a microsecond: they spin for
+/// a while before they sleep. The caller never waits for a thread that has not begun, so that on a
+/// busy machine only the help is lost.
 class ThreadTeam {
  public:
-  /// threads: the caller's included; starts as many as the system grants.
+  /// threads: includes the caller's; starts as many as the system grants.
   explicit ThreadTeam(unsigned threads);
   ~ThreadTeam();
   ThreadTeam(const ThreadTeam&) = delete;
@@ -25,11 +25,10 @@ class ThreadTeam {
 
   [[nodiscard]] std::size_t threads() const { return threads_.size() + 1; }
 
-  /// Calls task(0) ... task(count - 1), each once, by any threads, and returns when all are done.
-  /// A task may take the number of its thread too, below threads(), the caller's is 0: calls with
-  /// the same number do not overlap.
-  /// The first exception to occur comes out, when nothing runs any more; pieces not yet begun are
-  /// left out then.
+  /// Calls task(0) ... task(count - 1), each once, on any threads, and returns when all are done. A
+  /// task may also take the number of its thread, below threads(), where the caller's is 0: calls
+  /// with the same number do not overlap. Rethrows the first exception when nothing runs any more;
+  /// pieces not yet begun are then skipped.
   template <class Task>
   void run(std::size_t count, Task&& task) {
     if (threads_.empty() || count < 2) {
@@ -56,8 +55,8 @@ class ThreadTeam {
   void work(unsigned thread);
   void run_thread(unsigned thread);
 
-  // The upper half counts: odd while there is work. The lower half is the number of threads, the
-  // caller's not included, that are at it.
+  // The upper half counts work: odd while there is some. The lower half is the number of threads
+  // working on it, not counting the caller's.
   static constexpr std::uint64_t kStep = std::uint64_t{1} << 32;
   std::atomic<std::uint64_t> state_ = 0;
   std::atomic<bool> stop_ = false;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// No exception of a worker ends the process. A program of its own, since it replaces operator new:
+// A worker's exception must not end the process. A separate program, as it replaces operator new:
 // each allocation fails in turn, on whichever thread it is.
 #include <atomic>
 #include <cstdlib>
@@ -31,12 +31,12 @@ void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 namespace terrace::cluster {
 namespace {
 
-/// Calls work() again and again, with the first allocation failing, the second, ... and all after
+/// Calls work() repeatedly, with the first allocation failing, then the second, ... and all after
 /// it, about `times` times in all. Returns how often it threw std::bad_alloc.
 template <class Work>
 int fail_in_turn(int times, const Work& work) {
   constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
-  work();  // what is made once
+  work();  // one-time initialisation
   left = kNever;
   work();
   const std::int64_t all = kNever - left.exchange(kNever);

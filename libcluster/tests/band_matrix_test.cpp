@@ -30,7 +30,7 @@ TEST(BandIndex, EveryPairIsThereOnceOrTwice) {
       }
     }
     ASSERT_EQ(used.size(), n * (n / 2));
-    // And the thesis's way from the place to the pair (7.9) leads back.
+    // The thesis's mapping from the place to the pair (7.9) inverts it.
     for (std::uint64_t row = 0; row < n; ++row) {
       for (std::uint64_t column = 0; column < n / 2; ++column) {
         const std::uint64_t j = (column + row + 1) % n;
@@ -82,7 +82,7 @@ TEST(BandMatrix, SaysHowMuchMemoryItNeeds) {
     return "no exception";
   };
   EXPECT_NE(error(10000, 8, 399999999).find("400000000 bytes"), std::string::npos);
-  // Half of 10^14 entries; without a limit it is for the system to refuse them.
+  // Half of 10^14 entries; without a limit the system must refuse them.
   EXPECT_NE(error(10000000, 8, std::uint64_t{1} << 40).find("400000000000000 bytes"),
             std::string::npos);
   EXPECT_EQ(checked_band_bytes(10000000, 8, 0), 400000000000000u);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How good the clusterings are, against the best ones and against the reference search.
+// Quality of the clusterings compared with the optimum and with the reference search.
 #include <gtest/gtest.h>
 
 #include "clustering_laws.hpp"
@@ -97,7 +97,7 @@ TEST(BlockCost, BeatsTheShortSearchAndIsCloseToTheFullOne) {
 }
 
 TEST(BlockCost, HoldsOnLinesClustersAndMixedDensity) {
-  // Where a wrong number of seeds would show.
+  // Cases in which a wrong number of seeds would show.
   std::mt19937_64 random(12);
   std::vector<Point3> line, groups, mixed, rows;
   for (int i = 0; i < 3000; ++i) {
@@ -122,7 +122,7 @@ TEST(BlockCost, HoldsOnLinesClustersAndMixedDensity) {
 }
 
 TEST(BlockCost, WeightsCountLikeThatManyPoints) {
-  // A point of weight w is w points at one place.
+  // A point of weight w equals w coincident points.
   std::mt19937_64 random(8);
   std::vector<Point3> points = inputs::cube(2600, random);
   std::vector<Point3> repeated;

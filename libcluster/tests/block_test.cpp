@@ -39,7 +39,7 @@ std::vector<Block> ordinary_blocks(std::uint64_t seed) {
   return blocks;
 }
 
-/// Blocks that break what is not careful, each at several sizes.
+/// Blocks that break careless code, each at several sizes.
 std::vector<Block> degenerate_blocks(std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::vector<Block> blocks;
@@ -100,7 +100,7 @@ std::vector<Block> degenerate_blocks(std::uint64_t seed) {
   return blocks;
 }
 
-/// Beside the portable one.
+/// In addition to the portable path.
 std::vector<SimdPath> available_paths() {
   std::vector<SimdPath> paths;
   for (const SimdPath path : {SimdPath::avx2, SimdPath::avx512}) {
@@ -143,7 +143,7 @@ TEST(BlockClusterer, ResultsAreValidAndTheSameOnAllPaths) {
       BlockClustering expected;
       portable.run(block.points, block.weights, options, expected);
       laws::expect_valid(block.points, block.weights, options, expected, laws::kFloatSlack);
-      // Every one has seen other blocks before; so none is carried over either.
+      // Each clusterer has seen other blocks before, so this also tests that nothing carries over.
       for (BlockClusterer& clusterer : clusterers) {
         BlockClustering clustering;
         clusterer.run(block.points, block.weights, options, clustering);
@@ -197,7 +197,7 @@ TEST(BlockClusterer, NoPointsGiveAnEmptyResult) {
 }
 
 TEST(BlockClusterer, PlacesFarApartAreFacilitiesOfTheirOwn) {
-  // Two places, 500 points each: joining them would cost far more than a facility.
+  // Two places with 500 points each: joining them would cost far more than a facility.
   std::vector<Point3> points;
   for (int i = 0; i < 1000; ++i) points.push_back({i % 2 == 0 ? 0.0 : 1.0, 0, 0});
   BlockClusterer clusterer;
@@ -208,7 +208,8 @@ TEST(BlockClusterer, PlacesFarApartAreFacilitiesOfTheirOwn) {
 }
 
 TEST(BlockClusterer, HeavyPointsThatFloatsCannotTellApartAreFacilities) {
-  // 1e-9 of the box apart: the same place in single precision, but worth 1e3 facilities.
+  // 1e-9 of the box apart: coincident in single precision, but the difference is worth 1e3
+  // facilities.
   std::mt19937_64 random(9);
   std::vector<Point3> points = inputs::cube(3000, random);
   std::vector<double> weights(points.size(), 1.0);
@@ -252,7 +253,7 @@ TEST(BlockClusterer, ScaleOffsetAndEqualWeightsChangeNothing) {
   std::mt19937_64 random(6);
   std::vector<Point3> points = inputs::cube(3000, random);
   for (Point3& p : points) {
-    for (double& v : p) v = std::floor(v * 1000);  // so that moving rounds nothing
+    for (double& v : p) v = std::floor(v * 1000);  // so that moving is exact
   }
   BlockClusterer clusterer;
   BlockClustering expected;
@@ -293,7 +294,7 @@ TEST(BlockClusterer, PathsThatTheMachineLacksAreRefused) {
   EXPECT_NO_THROW(BlockClusterer{SimdPath::portable});
   EXPECT_NO_THROW(BlockClusterer{SimdPath::automatic});
   EXPECT_NO_THROW(BlockClusterer{best_simd_path()});
-  // Paths are numbered from the slowest on, and no machine has the last one.
+  // Paths are numbered from the slowest; no machine has the last one.
   constexpr auto kOfNoMachine = static_cast<SimdPath>(255);
   for (const SimdPath path : {SimdPath::avx2, SimdPath::avx512, kOfNoMachine}) {
     if (path <= best_simd_path()) {

@@ -17,7 +17,7 @@ namespace {
 constexpr BoxTree::Kind kKinds[] = {BoxTree::Kind::quadtree, BoxTree::Kind::octree,
                                     BoxTree::Kind::kd_tree};
 
-// Every node: its box and connection are those of its clients, its children share them out.
+// Checks every node: its box and connection are those of its clients, which its children partition.
 void expect_tree(const BoxTree& tree, const std::vector<Point3>& points,
                  const std::vector<double>& connections) {
   const auto& nodes = tree.nodes();

@@ -1,8 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: Apache-2.0
-# check_symbols.sh NM ARCHIVE: fails if the archive defines a weak function that does not name its
-# instruction set. The linker may take such a function for the whole program, which then stops on
-# processors that lack the instructions.
+# check_symbols.sh NM ARCHIVE: fails if the archive defines a weak function that does not name its instruction set. The
+# linker may use such a function for the whole program, which then crashes on processors that lack the instructions.
 set -eu
 symbols=$("$1" --defined-only "$2")
 echo "$symbols" | grep -q run_engine || { echo "no engine in $2"; exit 1; }

@@ -13,15 +13,15 @@
 #include "terrace/cluster/block.hpp"
 #include "terrace/cluster/facility_location.hpp"
 
-/// What every clustering of a block promises, checked independently of how it was found.
+/// The guarantees of every clustering of a block, checked independently of how it was found.
 
 namespace terrace::cluster::laws {
 
-/// Nearest facilities are found in single precision relative to the block's box: so much may one
-/// facility be farther than another, in diagonals, and yet be taken for the nearer.
+/// Nearest facilities are found in single precision relative to the block's box: a facility may be
+/// this much farther than another, in diagonals, and yet be taken for the nearer one.
 inline constexpr double kFloatSlack = 1e-6;
 
-/// Among denormal numbers lengths have few digits.
+/// Denormal lengths have few digits.
 inline constexpr double kDenormalSlack = 1e-319;
 
 /// Distance without overflow or underflow.
@@ -45,8 +45,8 @@ inline double weight(std::span<const double> weights, std::size_t i) {
   return weights.empty() ? 1.0 : weights[i];
 }
 
-/// Structure, costs recomputed, and every point at its nearest facility; `slack` is the tolerance
-/// of the latter in diagonals.
+/// Checks the structure, recomputed costs, and that every point is at its nearest facility; `slack`
+/// is the tolerance of the latter in diagonals.
 inline void expect_valid(std::span<const Point3> points, std::span<const double> weights,
                          const BlockOptions& options, const BlockClustering& clustering,
                          double slack) {
@@ -101,8 +101,8 @@ inline double optimum(std::span<const Point3> points, std::span<const double> we
   return best;
 }
 
-/// The textbook's search, whose costs others are measured against: every candidate is judged by a
-/// scan of all points.
+/// The textbook search, to whose costs others are compared: every candidate is evaluated by a scan
+/// of all points.
 inline FacilitySolution textbook_search(std::span<const Point3> points, double facility_cost,
                                         Effort effort, std::uint64_t seed) {
   return solve(FacilityPoints{.points = points, .facility_cost = facility_cost},

@@ -11,7 +11,7 @@ namespace {
 
 using laws::message_of;
 
-/// A symmetric matrix; `levels` different values if not 0, so that most are equal.
+/// A symmetric matrix; with `levels` different values if not 0, so that most are equal.
 laws::Distances random_distances(std::size_t count, unsigned levels, std::mt19937_64& random) {
   laws::Distances d(count, std::vector<double>(count, 0.0));
   for (std::size_t i = 0; i < count; ++i) {
@@ -45,7 +45,7 @@ TEST(CompleteLinkage, IsThatOfTheTextbook) {
         SCOPED_TRACE(testing::Message() << name << ", " << count << " points, seed " << seed);
         const laws::Distances d = laws::distances_of(points);
         ASSERT_EQ(laws::complete_fault(complete_linkage(points), d, 1e-14), "");
-        if (name == "geometric spacing" && count > 100) continue;  // more than the range of float
+        if (name == "geometric spacing" && count > 100) continue;  // beyond the range of float
         ASSERT_EQ(laws::complete_fault(complete_linkage(points, {.entry = MatrixEntry::float32}), d,
                                        laws::kFloatTolerance),
                   "");
@@ -54,8 +54,8 @@ TEST(CompleteLinkage, IsThatOfTheTextbook) {
   }
 }
 
-/// The law by which runs on other devices are judged: which of several equal distances comes first
-/// may change the heights that follow.
+/// The law for runs on other devices: the order among equal distances may change the heights that
+/// follow.
 TEST(CompleteLinkage, EqualDistancesAllowRunsOfDifferentHeights) {
   const laws::Distances d = laws::distances_of({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}});
   const Dendrogram pairs{4, {{0, 1, 1, 2}, {2, 3, 1, 2}, {4, 5, 3, 4}}};
@@ -123,7 +123,7 @@ TEST(CompleteLinkage, ThreadsAndInstructionsDoNotMatter) {
   }
 }
 
-/// Each next point is farther from the one before than from all others: rounds merge one pair.
+/// Each point is farther from the previous one than all others are: rounds merge one pair.
 TEST(CompleteLinkage, GeometricSpacingTakesTheChain) {
   for (const std::size_t count : {600u, 1000u}) {
     std::vector<Point3> points;
@@ -141,7 +141,7 @@ TEST(CompleteLinkage, GeometricSpacingTakesTheChain) {
 }
 
 TEST(CompleteLinkage, GridsTakeFewRounds) {
-  // A round that would merge one pair after the other takes seconds here.
+  // A round that merged one pair after the other would take seconds here.
   std::vector<Point3> points;
   for (unsigned i = 0; i < 4096; ++i) {
     points.push_back({static_cast<double>(i % 16), static_cast<double>(i / 16 % 16),
@@ -232,7 +232,7 @@ TEST(CompleteLinkage, MatricesBeyondTheLimitAreRefused) {
             "no exception");
 }
 
-// The tests of all paths pass over what the machine lacks: here is where they say so.
+// The tests of all paths skip instruction sets that the machine lacks; this one reports it.
 TEST(InstructionSets, Avx2IsTested) {
   if (best_simd_path() < SimdPath::avx2) GTEST_SKIP() << "the processor lacks AVX2";
 }

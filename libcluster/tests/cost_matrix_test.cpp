@@ -50,8 +50,8 @@ TEST(CostMatrix, HoldsTheWeightedDistancesOfAllPairs) {
   EXPECT_NEAR(matrix.view().cost(3, 7), std::hypot(flat, 0.5 * (values[3] - values[7])), 1e-12);
 }
 
-// A solution by way of the matrix costs the same as the search on points reckons it, and no less
-// than its bound.
+// A solution found through the matrix has the cost that the search on points computes, which is not
+// below its bound.
 TEST(CostMatrix, AgreesWithTheSearchOnPoints) {
   std::mt19937_64 random(4);
   laws::OwnedProblem p;

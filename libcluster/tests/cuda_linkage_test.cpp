@@ -55,7 +55,7 @@ TEST(CudaLinkage, GivesTheDendrogramsOfTheCpu) {
     std::mt19937_64 random(count);
     const std::vector<Point3> points = inputs::cube(count, random);
     EXPECT_EQ(cuda_complete_linkage(points), complete_linkage(points));
-    // Roundings to float are equal now and then: several runs are valid.
+    // Roundings to float are sometimes equal: several runs are valid.
     EXPECT_EQ(laws::complete_fault(cuda_complete_linkage(points, MatrixEntry::float32),
                                    laws::distances_of(points), laws::kFloatTolerance),
               "");

@@ -39,7 +39,7 @@ TEST(DeviceLinkage, GivesTheDendrogramsOfTheCpu) {
       LoopDevice loop(lanes, true, count);
       EXPECT_EQ(complete_on<double>(loop, points), complete_linkage(points));
       EXPECT_EQ(single_on(loop, points), single_linkage(points));
-      // Roundings to float are equal now and then: several runs are valid.
+      // Roundings to float are sometimes equal: several runs are valid.
       EXPECT_EQ(laws::complete_fault(complete_on<float>(loop, points), laws::distances_of(points),
                                      laws::kFloatTolerance),
                 "");
@@ -70,7 +70,7 @@ TEST(DeviceLinkage, TiesAndDegenerateInputs) {
 }
 
 TEST(DeviceLinkage, DoesNotDependOnTheOrderOfThreads) {
-  // Ties everywhere: any choice that depended on the order would show.
+  // Ties everywhere: any dependence on the order would show.
   for (const auto& [name, points] : laws::linkage_inputs(200, 4)) {
     SCOPED_TRACE(name);
     LoopDevice straight(1, false, 0);

@@ -19,7 +19,7 @@ namespace {
 using inputs::kInfinity;
 
 Point3 random_point(std::mt19937_64& random, double scale) {
-  // A grid now and then, so that ties and equal corners happen.
+  // Sometimes a grid, so that ties and equal corners occur.
   const bool coarse = random() % 2 == 0;
   Point3 p{};
   for (double& x : p) {
@@ -73,7 +73,7 @@ TEST(Entities, TheReadyDistancesAreMetrics) {
       3.0);
 }
 
-// Against both readings of b, in extended precision.
+// Compared with both orders of b, in extended precision.
 TEST(Entities, PolylinesKeepTheOrderOfTheirVertices) {
   std::mt19937_64 random(17);
   for (int trial = 0; trial < 3000; ++trial) {
@@ -147,7 +147,7 @@ TEST(Entities, PointsByIndexAreThePointsThemselves) {
 
 TEST(Entities, TrianglesClusterByPlaceAndShape) {
   std::mt19937_64 random(2);
-  // Small ones here, small ones there, and large ones around both.
+  // Small ones in two places, and large ones around both.
   std::vector<Triangle> triangles;
   for (std::size_t i = 0; i < 300; ++i) {
     Triangle t{};
@@ -176,7 +176,7 @@ TEST(Entities, TrianglesClusterByPlaceAndShape) {
   }
 }
 
-// Levenshtein's distance, a metric.
+// The Levenshtein distance, a metric.
 double edits(const std::string& a, const std::string& b) {
   std::vector<std::size_t> row(b.size() + 1);
   for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;

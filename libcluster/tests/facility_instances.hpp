@@ -24,13 +24,13 @@ struct Instance {
   std::string file;    ///< relative to the folder of facility instances
   std::string format;  ///< orlib, simple, or pmed
   double optimum = 0.0;
-  bool proved = true;       ///< else `optimum` is the best value known
-  std::size_t medians = 0;  ///< k of a p-median instance, else 0
+  bool proved = true;       ///< otherwise `optimum` is the best value known
+  std::size_t medians = 0;  ///< k of a p-median instance, otherwise 0
   std::size_t facilities = 0, clients = 0;
   std::vector<double> opening, connection;
 
   [[nodiscard]] FacilityMatrix matrix() const { return {facilities, clients, opening, connection}; }
-  /// The folder: orlib, kratica_M, pmedian, or that of UflLib.
+  /// The folder: orlib, kratica_M, pmedian, or UflLib's own folder.
   [[nodiscard]] std::string group() const {
     return std::filesystem::path(file).parent_path().filename().string();
   }
@@ -40,7 +40,7 @@ struct Instance {
   }
 };
 
-/// Words of a text, and numbers among them; every complaint names the source.
+/// Words of a text, and the numbers among them; every error names the source.
 class Words {
  public:
   Words(std::string source, std::string text)
@@ -85,7 +85,7 @@ class Words {
 inline constexpr std::size_t kMostPlaces = 10000;
 
 /// "m n", m times "capacity opening-cost", then per client its demand and m costs, each for the
-/// whole demand. Capacities may be the word `capacity`; they are not used.
+/// whole demand. A capacity may be the word `capacity`; capacities are not used.
 inline void read_orlib(Words& words, Instance& instance) {
   instance.facilities = words.count(1, kMostPlaces);
   instance.clients = words.count(1, kMostPlaces);
@@ -120,8 +120,8 @@ inline void read_simple(Words& words, Instance& instance) {
   words.end();
 }
 
-/// "n edges k", then "from to length" per edge; of edges that are given twice the last counts.
-/// Costs are the lengths of shortest paths.
+/// "n edges k", then "from to length" per edge; of repeated edges the last counts. Costs are the
+/// lengths of shortest paths.
 inline void read_pmed(Words& words, Instance& instance) {
   const std::size_t n = words.count(1, kMostPlaces);
   const std::size_t edges = words.count(0, n * n);
@@ -158,7 +158,7 @@ inline void parse(Words words, Instance& instance) {
   } else if (instance.format == "pmed") {
     read_pmed(words, instance);
   } else {
-    words.fail(instance.format + " is no known format");
+    words.fail(instance.format + " is not a known format");
   }
 }
 
@@ -203,13 +203,13 @@ inline std::vector<Instance> listed(const std::filesystem::path& folder) {
   return all;
 }
 
-/// Reads the costs of a listed instance. Throws: std::invalid_argument if the file is not what the
-/// list says.
+/// Reads the costs of a listed instance. Throws: std::invalid_argument if the file does not match
+/// the list.
 inline void load(const std::filesystem::path& folder, Instance& instance) {
   const std::size_t facilities = instance.facilities, clients = instance.clients;
   parse(Words(instance.file, read_text(folder / instance.file)), instance);
   if (instance.facilities != facilities || instance.clients != clients) {
-    throw std::invalid_argument(instance.file + ": another size than in optima.tsv");
+    throw std::invalid_argument(instance.file + ": the size differs from optima.tsv");
   }
 }
 

@@ -63,7 +63,7 @@ TEST(FacilityInstances, CostsAreNearTheKnownOptima) {
     if (instance.is_metric()) {
       EXPECT_LE(above, 0.02);
     }
-    // In these groups good solutions are isolated on purpose: no local search finds its way.
+    // In these groups good solutions are isolated by design: no local search finds them.
     const std::string group = instance.group();
     if (group == "GapA" || group == "GapB" || group == "Chess" || group == "Fpp11") continue;
     sum += above;
@@ -107,7 +107,7 @@ TEST(FacilityInstances, ReaderRefusesWhatIsNotAnInstance) {
   EXPECT_EQ(small.connection, (std::vector{1.5, 2.5}));
   EXPECT_EQ(read("simple", "FILE: x\n2 2 0\n1 5 1 2\n2 6 3 4\n").connection,
             (std::vector{1.0, 2.0, 3.0, 4.0}));
-  // The last of edges that are given twice counts, and paths may be shorter than edges.
+  // Of repeated edges the last counts, and paths may be shorter than edges.
   EXPECT_EQ(read("pmed", "3 4 1\n1 2 9\n2 3 1\n1 3 8\n2 1 2\n").connection,
             (std::vector{0.0, 2.0, 3.0, 2.0, 0.0, 1.0, 3.0, 1.0, 0.0}));
   for (const auto& [format, text] : std::vector<std::pair<std::string, std::string>>{

@@ -42,7 +42,7 @@ TEST(FastStrategy, IsAsGoodAsTheSearchUnderLinearMetrics) {
       ASSERT_NO_FATAL_FAILURE(laws::expect_solution(p, fast, 1e-8));
       const FacilitySolution search = solve(p.view());
       EXPECT_LT(fast.cost(), search.cost());
-      // In single precision ties are broken otherwise than in double.
+      // In single precision ties are broken differently from double.
       EXPECT_LE(report.search.wrongly_assigned, 3u);
       const FacilitySolution full =
           solve(p.view(), {.strategy = FacilityStrategy::fast, .effort = Effort::full});

@@ -19,7 +19,7 @@
 #include "recording_sink.hpp"
 #include "waiting_threads.hpp"
 
-/// How blocks are cut, clustered, committed and given up, with stand-ins for the clustering.
+/// How blocks are cut, clustered, committed and abandoned, with stand-ins for the clustering.
 
 namespace terrace::cluster {
 namespace {
@@ -126,7 +126,7 @@ TEST(HierarchyEngine, ClusteringThatKeepsAllPointsStillEnds) {
       push_all(engine, line(n), 2);
       const HierarchyResult result = engine.finish();
       laws::check_hierarchy(sink, result, line(n), block_size);
-      // Tried again with ever higher costs, beyond any sum of distances in a block.
+      // Retried with ever higher costs, beyond any sum of distances in a block.
       EXPECT_EQ(costs[0], 1.0);
       EXPECT_EQ(costs[1], 4.0);
       EXPECT_GT(*std::max_element(costs.begin(), costs.end()), 0x1p24);
@@ -161,7 +161,7 @@ TEST(HierarchyEngine, WeightsAreCountsWithMeanOne) {
     EXPECT_NEAR(sum / static_cast<double>(call.points), 1.0, 1e-12);
   }
   EXPECT_EQ(weighted, sink.levels[1].size() + sink.levels[2].size());
-  // With one thread level 1's first block is the first one with weights.
+  // With one thread the first block of level 1 is the first one with weights.
   const auto call =
       std::find_if(calls.begin(), calls.end(), [](const Call& c) { return !c.weights.empty(); });
   const RecordedBlock& block = sink.levels[1][0];
@@ -225,8 +225,8 @@ TEST(HierarchyEngine, ClusteringSeesGroundPositions) {
   EXPECT_EQ(seen[1][7], (Point3{14, 0, 0})) << "relative to the minimum of the block";
 }
 
-// Where maps differ between blocks, the error is the smaller of two bounds, each of which holds
-// for all descendants: the sum of legs, and the direct distance by the block's own map.
+// If maps differ between blocks, the error is the smaller of two bounds, each of which is valid for
+// all descendants: the sum of legs, and the direct distance by the block's own map.
 TEST(HierarchyEngine, ErrorHoldsWhereMapsDiffer) {
   std::mt19937_64 random(12);
   std::vector<Point3> points(5000);
@@ -410,7 +410,7 @@ TEST(HierarchyEngine, ExceptionsComeOutOnce) {
 }
 
 /// Its first block fails while another is being prepared by a thread that is not the caller's. That
-/// one lingers until all other threads wait for it, or the failure has come out.
+/// one lingers until all other threads wait for it, or the failure has been thrown.
 class LingeringSink : public RecordingSink {
  public:
   std::unique_ptr<Prepared> prepare(const FinishedBlock& block) override {
@@ -485,7 +485,7 @@ TEST(HierarchyEngine, DestructorStopsQuietly) {
       EXPECT_FALSE(sink.has_root);
     }
   }
-  // With a failure that nobody asked for.
+  // With an additional failure.
   Trap trap{Where::commit, 3, {}};
   TrappedSink sink(trap);
   HierarchyEngine engine(small_blocks(2), sink, [] { return runs_of_ten; });

@@ -18,12 +18,12 @@
 #include "terrace/cluster/hierarchy.hpp"
 
 /// Entities of several corners in the stream (thesis chapter 9). The payload is the entity's
-/// number, under which its corners are looked up.
+/// number, by which its corners are looked up.
 
 namespace terrace::cluster {
 namespace {
 
-// Entities of k corners side by side.
+// Entities of k corners, contiguous.
 struct Entities {
   std::size_t k = 3;
   bool ordered = false;
@@ -67,7 +67,7 @@ struct Entities {
   }
 };
 
-// Small entities on a lattice and off it, a few of them equal or without extent.
+// Small entities on a lattice and off it, a few of them equal or degenerate.
 Entities soup(std::size_t n, std::size_t k, bool ordered, std::mt19937_64& random) {
   Entities entities{k, ordered, {}};
   for (std::size_t i = 0; i < n; ++i) {
@@ -99,8 +99,8 @@ struct BuiltEntities {
   }
 };
 
-// The hierarchy's laws; every entity is with the representative that is nearest by the public
-// distance; any number of threads gives the same.
+// The hierarchy's laws; every entity is with the nearest representative by the public distance; any
+// number of threads gives the same.
 TEST(HierarchyEntities, AreWithTheNearestRepresentative) {
   const GroundMap oblong{2, 0, 0, 0, 0.5, 0, 0, 0, 3};
   int run = 0;
@@ -148,7 +148,7 @@ TEST(HierarchyEntities, ClusterByAllCorners) {
       entities.corners.push_back({corner[0] + inputs::uniform(random),
                                   corner[1] + inputs::uniform(random), inputs::uniform(random)});
     }
-    // Which corner comes first changes nothing.
+    // Which corner comes first makes no difference.
     std::rotate(entities.corners.end() - 3, entities.corners.end() - 3 + (i / 3) % 3,
                 entities.corners.end());
   }
@@ -216,7 +216,7 @@ TEST(HierarchyEntities, WhatCannotBeClusteredIsRefused) {
   };
   try {
     build();
-    FAIL() << "a corner that is not a number was taken";
+    FAIL() << "a NaN corner was accepted";
   } catch (const std::invalid_argument& e) {
     EXPECT_NE(std::string(e.what()).find("corner 2 of entity 10 in block 1 of level 0"),
               std::string::npos)

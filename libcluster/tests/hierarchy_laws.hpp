@@ -13,8 +13,8 @@
 #include "recording_sink.hpp"
 #include "terrace/cluster/hierarchy.hpp"
 
-/// What every hierarchy promises, checked against brute force over all descendants. Payloads must
-/// be what numbered_payload() makes.
+/// The guarantees of every hierarchy, checked by brute force over all descendants. Payloads must be
+/// those of numbered_payload().
 
 namespace terrace::cluster::laws {
 
@@ -32,7 +32,7 @@ inline long double ground_distance(const GroundMap& m, const Point3& a, const Po
   return std::sqrt(sum);
 }
 
-/// The shape of one block: its clusters are a partition, grouped, in ascending order.
+/// Checks one block: its clusters are a partition, grouped, in ascending order.
 inline void check_partition(const RecordedBlock& block, std::size_t block_size) {
   const std::size_t n = block.positions.size();
   const std::size_t clusters = block.representatives.size();
@@ -61,7 +61,7 @@ inline void check_partition(const RecordedBlock& block, std::size_t block_size) 
   }
 }
 
-/// A cluster with all its descendants, as numbers of input points, and its block.
+/// A cluster with all its descendants, as input indices, and its block.
 struct Expanded {
   const RecordedBlock* block = nullptr;
   std::size_t c = 0;
@@ -90,7 +90,7 @@ inline void check_summary(const Expanded& cluster, std::span<const Point3> input
   if (cluster.block->level == 0) {
     EXPECT_LE(static_cast<long double>(summary.error), farthest * (1.0L + 1e-12L));
   }
-  // No corner is farther than three edges.
+  // No corner is farther away than three edges.
   long double edges = 0.0L;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     Point3 corner = box.min;
@@ -100,7 +100,7 @@ inline void check_summary(const Expanded& cluster, std::span<const Point3> input
   EXPECT_LE(static_cast<long double>(summary.error), edges * (1.0L + 1e-12L));
 }
 
-/// All of it. `map` is the one of all blocks.
+/// Checks everything. `map` is that of all blocks.
 inline void check_hierarchy(const RecordingSink& sink, const HierarchyResult& result,
                             std::span<const Point3> input, std::size_t block_size,
                             const GroundMap& map = {1, 0, 0, 0, 1, 0, 0, 0, 1}) {
@@ -112,7 +112,7 @@ inline void check_hierarchy(const RecordingSink& sink, const HierarchyResult& re
   ASSERT_EQ(result.level_clusters.size(), result.top + 1);
   ASSERT_LE(sink.top.positions.size(), block_size);
 
-  // What each level should consist of: the input, or the clusters of the level below, in order.
+  // The expected content of each level: the input, or the clusters of the level below, in order.
   std::vector<Expanded> below;
   std::vector<std::vector<std::uint64_t>> heads;  // input number, by level and ordinal
   std::vector<bool> placed(input.size(), false);

@@ -58,7 +58,7 @@ TEST(HierarchyMetric, LawsHoldUnderEveryMetric) {
         if (mapped) options.ground = [&](const Bounds&) { return map; };
         RecordingSink sink, again;
         const HierarchyResult result = build(input.points, options, sink);
-        // Errors are those of the ground, whatever the metric.
+        // Errors are ground distances, whatever the metric.
         laws::check_hierarchy(sink, result, input.points, 70, mapped ? map : kIdentityMap);
         options.threads = 3;
         build(input.points, options, again);
@@ -86,7 +86,7 @@ TEST(HierarchyMetric, ClustersFollowTheMetric) {
     options.metric = metrics[k];
     results.push_back(build(points, options, sinks[k]));
   }
-  // Each is better than the Euclidean one in its own metric, for about as many clusters.
+  // Each beats the Euclidean one in its own metric, for about as many clusters.
   for (std::size_t k = 1; k < metrics.size(); ++k) {
     SCOPED_TRACE(name_of(metrics[k]));
     const auto clusters = static_cast<double>(results[k].level_clusters[0]);
@@ -99,7 +99,7 @@ TEST(HierarchyMetric, ClustersFollowTheMetric) {
   }
 }
 
-// The regions of a field lie on the ground: in degrees they would be elsewhere.
+// The regions of a field are on the ground: in degrees they would be elsewhere.
 TEST(HierarchyMetric, FieldsAreOnTheGround) {
   std::mt19937_64 random(32);
   std::vector<Point3> metres = inputs::cube(900, random);
@@ -119,7 +119,7 @@ TEST(HierarchyMetric, FieldsAreOnTheGround) {
     EXPECT_EQ(by_metres.levels[0][b].order, by_degrees.levels[0][b].order);
     EXPECT_EQ(by_metres.levels[0][b].representatives, by_degrees.levels[0][b].representatives);
   }
-  // The same if each block has a frame of its own, here twice as large in every other one.
+  // The same if each block has its own frame, here twice as large for every other one.
   const auto growth = [](const Bounds& box) { return box.min[1] > 0x1p4 + 0x1p-9 ? 2.0 : 1.0; };
   options.ground = [&](const Bounds& box) {
     return GroundMap{growth(box) * 0x1p16, 0, 0, 0, growth(box) * 0x1p17, 0, 0, 0, growth(box)};

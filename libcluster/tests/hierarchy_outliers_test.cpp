@@ -28,7 +28,7 @@ namespace {
 struct Built {
   RecordingSink sink;
   HierarchyResult result;
-  std::set<std::uint64_t> outliers;  // numbers of the input
+  std::set<std::uint64_t> outliers;  // input indices
 
   Built(const std::vector<Point3>& points, HierarchyOptions options) {
     std::mutex mutex;
@@ -60,8 +60,8 @@ std::vector<FacilityStrategy> searches() {
           FacilityStrategy::octree,    FacilityStrategy::kd_tree,   FacilityStrategy::facilities};
 }
 
-// A surface of one block, and what stands far off it: whether it is there changes neither
-// representatives nor clusters of the surface.
+// A surface of one block with distant points: their presence changes neither representatives nor
+// clusters of the surface.
 TEST(HierarchyOutliers, SteerNoCluster) {
   std::mt19937_64 random(71);
   const std::vector<Point3> surface = inputs::scan(2, 50, random);
@@ -75,7 +75,7 @@ TEST(HierarchyOutliers, SteerNoCluster) {
   for (const auto& [at, place] : birds) {
     all.insert(all.begin() + static_cast<std::ptrdiff_t>(at), place);
   }
-  const std::set<std::uint64_t> numbers{0, 701, 3002};  // as later insertions have moved them
+  const std::set<std::uint64_t> numbers{0, 701, 3002};  // positions shifted by later insertions
   // A point of the next block, so that there is a level above.
   std::vector<Point3> without = surface;
   for (std::vector<Point3>* points : {&all, &without}) points->push_back(surface[0]);
@@ -148,7 +148,7 @@ TEST(HierarchyOutliers, LawsHoldForEveryInputPriceAndStrategy) {
   }
 }
 
-// What leave_out() leaves out lowers the cost, and what it keeps is no farther than the price.
+// Clients left out by leave_out() lower the cost, and those kept are no farther than the price.
 TEST(HierarchyOutliers, LeavingOutLowersTheCost) {
   std::mt19937_64 random(72);
   std::size_t left_out = 0;
@@ -199,7 +199,7 @@ TEST(HierarchyOutliers, LeavingOutLowersTheCost) {
   EXPECT_GT(left_out, 100u);
 }
 
-// About as good as the local search that knows of the price all along.
+// About as good as the local search that takes the price into account throughout.
 TEST(HierarchyOutliers, CostBesideTheSearchWithThePrice) {
   std::mt19937_64 random(73);
   for (const double price : {0.02, 0.05, 0.1}) {
@@ -214,7 +214,7 @@ TEST(HierarchyOutliers, CostBesideTheSearchWithThePrice) {
     options.block.effort = Effort::fine;
     const auto cost = [&](const Built& built) {
       const RecordedBlock& block = built.sink.levels[0][0];
-      // In one unit for both.
+      // Both in the same unit.
       const double unit = 10.0;
       double sum =
           unit * options.block.facility_cost * static_cast<double>(block.representatives.size());
@@ -236,7 +236,7 @@ TEST(HierarchyOutliers, CostBesideTheSearchWithThePrice) {
   }
 }
 
-// The searches find the same solution, whichever computes the gains (7.3.2).
+// The searches find the same solution, whichever strategy computes the gains (7.3.2).
 TEST(HierarchyStrategy, SearchesOfTheThesisGiveOneHierarchy) {
   std::mt19937_64 random(74);
   const std::vector<Point3> points = inputs::cube(1500, random);

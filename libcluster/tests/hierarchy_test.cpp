@@ -185,7 +185,7 @@ TEST(Hierarchy, DegreesClusterLikeTheirTwinInMetres) {
       }
     }
   }
-  // Degrees beside metres of height make height bands: other clusters altogether.
+  // Degrees combined with heights in metres make height bands: entirely different clusters.
   EXPECT_NE(by_metres.levels[0][0].order, without_map.levels[0][0].order);
 }
 
@@ -194,7 +194,7 @@ TEST(Hierarchy, AnyLinearMapAndLargeOffsets) {
   std::vector<Point3> points = inputs::cube(1000, random);
   for (Point3& p : points) p = {p[0] + 4e5, p[1] + 5.2e6, 100.0 * p[2]};
   const std::vector<GroundMap> maps = {
-      {0.5, 0.25, 0, -0.25, 0.5, 0, 0, 0, 3},          // turned
+      {0.5, 0.25, 0, -0.25, 0.5, 0, 0, 0, 3},          // rotated
       {1, -1, 0, 1, 1e-9, 0, 0, 0, 1},                 // skewed
       {78000.3, 0, 0, 0, -111000.7, 0, 0, 0, 0.3048},  // mirrored
       {1, 0, 0, 0, 1, 0, 0, 0, 0},                     // heights do not count

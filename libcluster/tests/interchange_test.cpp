@@ -41,14 +41,14 @@ TEST(Interchange, GainIsWhatOpeningSpares) {
       if (search.state().is_open(candidate)) continue;
       const double before = search.cost();
       const double gain = search.gain(candidate);
-      // Losses are carried out as well: the law does not depend on the sign. Clients of closed
-      // facilities may find a nearer one than was counted on.
+      // Losses are carried out too: the law does not depend on the sign. Clients of closed
+      // facilities may find a nearer one than assumed.
       search.open(candidate);
       ASSERT_LE(search.cost(), before - gain + 1e-9 * before);
       if (search.closings().size() <= 1) {
         ASSERT_NEAR(before - search.cost(), gain, 1e-9 * before);
       }
-      // The nearest and second nearest, against a scan.
+      // The nearest and second nearest, compared with a scan.
       for (std::uint32_t i = 0; i < problem.clients; ++i) {
         std::vector<double> all;
         for (const std::uint32_t j : search.state().facilities()) all.push_back(costs.cost(j, i));
@@ -83,7 +83,8 @@ TEST(Interchange, EndsWhereNoSingleMoveHelps) {
       open[a] = !open[a];
       EXPECT_GE(cost(open), least) << "opening or closing " << a;
       for (std::size_t b = 0; b < a; ++b) {
-        if (open[a] != open[b]) continue;  // a has changed: now one opens and the other closes
+        // a has changed: one of the two opens and the other closes
+        if (open[a] != open[b]) continue;
         open[b] = !open[b];
         EXPECT_GE(cost(open), least) << "exchanging " << a << " and " << b;
         open[b] = !open[b];

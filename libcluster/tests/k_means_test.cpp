@@ -38,10 +38,10 @@ std::size_t count_of(const std::vector<std::uint32_t>& assignment, std::uint32_t
   return static_cast<std::size_t>(std::count(assignment.begin(), assignment.end(), cluster));
 }
 
-/// Lloyd's iteration as the books have it, with the rule of k_means.hpp for empty clusters.
+/// Textbook Lloyd's iteration, with the rule of k_means.hpp for empty clusters.
 KMeansResult plain_lloyd(std::vector<Point3> centres, std::vector<Point3> points,
                          std::vector<double> weights, std::size_t max_iterations) {
-  // From the least coordinates, so that means are rounded as in the library.
+  // Relative to the least coordinates, so that means are rounded as in the library.
   Point3 corner = points.front();
   for (const Point3& p : points) {
     for (unsigned axis = 0; axis < 3; ++axis) corner[axis] = std::min(corner[axis], p[axis]);
@@ -144,7 +144,7 @@ TEST(KMeans, EqualsPlainLloyd) {
     const std::vector<Point3> points = make_points(kind, count, random);
     std::vector<double> weights;
     if (seed % 3 == 0) {
-      // Whole numbers: ties of the grid stay ties.
+      // Integers: ties of the grid remain ties.
       for (std::size_t i = 0; i < count; ++i) {
         weights.push_back(static_cast<double>(1 + random() % 9));
       }
@@ -220,7 +220,7 @@ TEST(KMeans, SeedsFindClustersFarApart) {
       ASSERT_EQ(seeds.assignment[i], seeds.assignment[i % 27]);
     }
     for (const Point3& c : seeds.centres) {
-      // Seeds are points, moved to the corner and back.
+      // Seeds are points, translated to the corner and back.
       const bool found = std::any_of(points.begin(), points.end(),
                                      [&](const Point3& p) { return squared(p, c) < 1e-18; });
       ASSERT_TRUE(found);
@@ -343,7 +343,7 @@ TEST(KMeans, AnyScaleAndOffset) {
       }
     }
   }
-  // The whole range of double: the sides of the box exceed it.
+  // The full range of double: the sides of the box exceed it.
   std::vector<Point3> wide = points;
   for (Point3& p : wide) {
     for (double& v : p) v = (v - 0.5) * std::numeric_limits<double>::max() * 2;

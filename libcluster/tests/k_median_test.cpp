@@ -66,7 +66,7 @@ TEST(KMedian, EndsWhereNoExchangeHelps) {
   }
 }
 
-// Structure and costs of a solution for points, by the definitions.
+// Structure and costs of a solution for points, from the definitions.
 void expect_medians(const FacilityPoints& problem, std::size_t k, const FacilitySolution& s) {
   ASSERT_EQ(s.facilities.size(), k);
   ASSERT_EQ(std::set<std::uint32_t>(s.facilities.begin(), s.facilities.end()).size(), k);

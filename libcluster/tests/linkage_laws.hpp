@@ -12,7 +12,7 @@
 #include "terrace/cluster/dendrogram.hpp"
 #include "terrace/cluster/point.hpp"
 
-/// What linkage must obey, by brute force, and inputs that break what is not careful.
+/// The laws of linkage by brute force, and inputs that break careless code.
 
 namespace terrace::cluster::laws {
 
@@ -25,7 +25,7 @@ inline bool contains(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
-/// The words of the std::invalid_argument that `action` throws.
+/// The message of the std::invalid_argument that `action` throws.
 inline std::string message_of(const std::function<void()>& action) {
   try {
     action();
@@ -47,7 +47,7 @@ inline Distances distances_of(const std::vector<Point3>& points) {
   Distances d(points.size(), std::vector<double>(points.size(), 0.0));
   for (std::size_t i = 0; i < points.size(); ++i) {
     for (std::size_t j = 0; j < points.size(); ++j) {
-      // In long double, whose range has room for the squares of all doubles.
+      // In long double, whose range holds the squares of all doubles.
       long double sum = 0;
       for (unsigned a = 0; a < 3; ++a) {
         const long double v = static_cast<long double>(points[i][a]) - points[j][a];
@@ -59,8 +59,8 @@ inline Distances distances_of(const std::vector<Point3>& points) {
   return d;
 }
 
-/// Agglomeration as in the textbook, O(n^3): the nearest two clusters merge, over and over;
-/// `combine` gives the distance to the new cluster. The heights.
+/// Textbook agglomeration, O(n^3): the nearest two clusters merge repeatedly; `combine` gives the
+/// distance to the new cluster. Returns the heights.
 inline std::vector<double> brute_heights(Distances d, bool complete) {
   std::vector<double> heights;
   std::vector<std::size_t> active(d.size());
@@ -88,7 +88,7 @@ inline std::vector<double> brute_heights(Distances d, bool complete) {
   return heights;
 }
 
-/// The points of each cluster, rows included.
+/// The points of each cluster, including those made by rows.
 inline std::vector<std::vector<std::uint32_t>> members_of(const Dendrogram& dendrogram) {
   std::vector<std::vector<std::uint32_t>> members(dendrogram.points);
   for (std::uint32_t i = 0; i < dendrogram.points; ++i) members[i] = {i};
@@ -103,16 +103,17 @@ inline std::vector<std::vector<std::uint32_t>> members_of(const Dendrogram& dend
 /// Relative tolerance of heights computed from a float matrix, whose entries are rounded once.
 inline constexpr double kFloatTolerance = 1e-7;
 
-/// What is wrong with a dendrogram as a run of complete linkage: each row must merge two clusters
-/// than which none are nearer, at the distance of their farthest points, up to `tolerance`
-/// (relative). Empty if nothing is. This is the whole law: where distances are equal several runs
-/// are valid, and not even their heights need be the same. O(n^2) unless many distances are equal.
+/// Checks a dendrogram as a run of complete linkage: each row must merge two clusters than which
+/// none are nearer, at the distance of their farthest points, up to `tolerance` (relative). Returns
+/// the fault, or an empty string. This is the complete law: if distances are equal several runs are
+/// valid, and even their heights may differ. O(n^2) unless many distances are equal.
 inline std::string complete_fault(const Dendrogram& dendrogram, Distances d, double tolerance) {
   if (std::string fault = dendrogram_fault(dendrogram); !fault.empty()) return fault;
-  std::vector<std::size_t> place(dendrogram.points);  // of each cluster its row of d
+  std::vector<std::size_t> place(dendrogram.points);  // row of d of each cluster
   for (std::size_t i = 0; i < place.size(); ++i) place[i] = i;
   std::vector<std::size_t> active = place;
-  std::vector<std::size_t> nearest(place.size());  // of each active row the other nearest to it
+  // for each active row the other one nearest to it
+  std::vector<std::size_t> nearest(place.size());
   const auto find_nearest = [&](std::size_t i) {
     std::size_t best = i;
     for (const std::size_t j : active) {
@@ -141,7 +142,7 @@ inline std::string complete_fault(const Dendrogram& dendrogram, Distances d, dou
   return {};
 }
 
-/// Inputs of about `count` points, degenerate ones among them.
+/// Inputs of about `count` points, including degenerate ones.
 struct NamedPoints {
   std::string name;
   std::vector<Point3> points;

@@ -4,13 +4,14 @@
 
     linkage_scipy_vectors.py PROGRAM [DATA]
 
-PROGRAM is examples/linkage; DATA, or else the environment variable TERRACE_DATA, a folder with clustering/linkage/SET_NAME.METHOD.Z.gz (linkage
-matrices of SciPy) and clustering/SET/NAME.data.gz (the points). Standard library only.
+PROGRAM is examples/linkage. DATA, or else the environment variable TERRACE_DATA, names a folder with
+clustering/linkage/SET_NAME.METHOD.Z.gz (linkage matrices of SciPy) and clustering/SET/NAME.data.gz
+(the points). Standard library only.
 
-Where heights differ throughout, the rows must be the same. Where some are equal SciPy's dendrogram
-is one of several: single linkage has the same heights then, complete linkage need not, so each row
-is held against the points instead: the height is the largest distance within the new cluster, and
-no two clusters of that moment were nearer. Exits with 77 (skipped) if there are no vectors.
+If all heights differ, the rows must be the same. If some are equal, SciPy's dendrogram is one of
+several: single linkage still has the same heights, complete linkage need not, so each row is
+compared with the points instead: the height is the largest distance within the new cluster, and no
+two clusters at that moment were nearer. Exits with 77 (skipped) if there are no vectors.
 """
 import gzip
 import math
@@ -38,7 +39,7 @@ def close(x, y, tolerance):
 
 
 def complete_fault(points, rows, tolerance):
-    """What is wrong with rows as a run of complete linkage, or None."""
+    """The fault of rows as a run of complete linkage, or None."""
     count = len(points)
     distance = {i: {} for i in range(count)}
     for i in range(count):

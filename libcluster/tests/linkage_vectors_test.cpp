@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A small set of points and what scipy.cluster.hierarchy 1.10.1 makes of it: linkage() and
+// A small set of points and the results of scipy.cluster.hierarchy 1.10.1: linkage() and
 // fcluster(), its labels renumbered by first appearance.
 #include <gtest/gtest.h>
 

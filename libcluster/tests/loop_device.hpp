@@ -13,12 +13,12 @@
 
 namespace terrace::cluster {
 
-/// A device for kernels (see src/device_primitives.hpp) that is a loop over their indices, in an
-/// order drawn anew for each kernel: what depends on the order of threads gives different results.
-/// Memory starts with rubbish.
+/// A device for kernels (see src/cuda/device_primitives.hpp) that loops over their indices, in an
+/// order drawn for each kernel: any dependence on the order of threads gives different results.
+/// Memory starts with garbage.
 class LoopDevice {
  public:
-  /// lanes: threads of a group. Without shuffling the order is ascending.
+  /// lanes: threads per group. Without shuffling the order is ascending.
   LoopDevice(std::uint32_t lanes, bool shuffle, std::uint64_t seed)
       : lanes_(lanes), shuffle_(shuffle), random_(seed) {}
 

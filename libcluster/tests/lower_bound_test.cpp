@@ -21,7 +21,7 @@ TEST(LowerBound, IsBelowTheOptimum) {
     const double best = laws::optimum(problem.matrix());
     const LowerBound ascent = lower_bound(problem.matrix(), {}, {.steps = 0});
     const LowerBound bound = lower_bound(problem.matrix(), {}, {.steps = 200});
-    // Not a hair above: the bound is rounded down, the optimum as it comes.
+    // Not a hair above: the bound is rounded down, the optimum is not.
     EXPECT_LE(ascent.lower_bound, best);
     EXPECT_LE(bound.lower_bound, best);
     EXPECT_GE(bound.lower_bound, ascent.lower_bound);

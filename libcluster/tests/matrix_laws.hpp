@@ -12,8 +12,8 @@
 #include "inputs.hpp"
 #include "terrace/cluster/facility_location.hpp"
 
-/// Small random problems with a cost matrix, their optimum by brute force, and what every solution
-/// promises, checked independently of how it was found.
+/// Small random problems with a cost matrix, their optimum by brute force, and the guarantees of
+/// every solution, checked independently of how it was found.
 
 namespace terrace::cluster::laws {
 
@@ -30,9 +30,9 @@ struct MatrixProblem {
   }
 };
 
-/// Seeds in turn: uniform costs, whole numbers with many ties, points in a square, points on a
-/// small grid with duplicates, sparse ones where most connections are next to impossible, and
-/// free facilities.
+/// Seeds in turn: uniform costs, integers with many ties, points in a square, points on a small
+/// grid with duplicates, sparse ones where most connections are prohibitively expensive, and free
+/// facilities.
 inline MatrixProblem random_problem(std::uint64_t seed, std::size_t most_facilities,
                                     std::size_t most_clients) {
   std::mt19937_64 random(seed);
@@ -108,8 +108,9 @@ inline double optimum(const FacilityMatrix& problem, std::size_t count = 0) {
   return best;
 }
 
-/// Structure, costs recomputed, every client at a cheapest open facility. `pays`: whether opening
-/// costs count (in a k-median problem they do not, and facilities may be without clients).
+/// Checks the structure, recomputed costs, and that every client is at a cheapest open facility.
+/// `pays`: whether opening costs count (in a k-median problem they do not, and facilities may have
+/// no clients).
 inline void expect_solution(const FacilityMatrix& problem, const FacilitySolution& solution,
                             bool pays = true) {
   ASSERT_FALSE(solution.facilities.empty());

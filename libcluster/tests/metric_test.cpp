@@ -83,7 +83,7 @@ TEST(Metric, MinkowskiTakesAbsoluteValuesAndSums) {
   EXPECT_NEAR(distance(Minkowski{2.0}, origin, {3e300, 4e300, 0}), 5e300, 1e286);
 }
 
-/// The C library's pow gives other last bits for some of these.
+/// The C library's pow gives different last bits for some of these.
 TEST(Metric, PowersHaveTheSameBitsOnEveryMachine) {
   const auto of = [](double p) { return distance(Minkowski{p}, {0, 0, 0}, {1, 2.25, -0.3}); };
   EXPECT_EQ(of(1.5), 0x1.5eea974e767f3p+1);
@@ -123,7 +123,7 @@ TEST(Metric, ADistanceInAFieldBelongsToTheRegionOfTheFacility) {
 }
 
 TEST(Metric, TheBoxesOfAFieldMayBeInAnotherFrame) {
-  // A quarter turn, twice as long, and moved: (x, y) is at (3 - 2y, 2x, z) in the frame.
+  // A quarter turn, twice as long, and translated: (x, y) is at (3 - 2y, 2x, z) in the frame.
   const EllipticalField field({{{{1, 0, -1}, {3, 10, 1}}, Elliptical(10.0, 10.0, 0.0, 10.0)}},
                               EllipticalField::Frame{{0, -2, 0, 2, 0, 0, 0, 0, 1}, {3, 0, 0}});
   for (double x = -2; x <= 7; x += 0.25) {
@@ -137,7 +137,7 @@ TEST(Metric, TheBoxesOfAFieldMayBeInAnotherFrame) {
   EXPECT_FALSE(field.uniform_in({{4, 0, 0}, {7, 1, 0}}));
 }
 
-// What a metric declares of itself holds for random points.
+// The properties that a metric declares hold for random points.
 TEST(Metric, DeclarationsHold) {
   std::mt19937_64 random(7);
   for (const Metric& metric : all_metrics()) {
@@ -152,7 +152,7 @@ TEST(Metric, DeclarationsHold) {
       triangle =
           triangle && distance(metric, a, c) <= (ab + distance(metric, b, c)) * (1.0 + 1e-12);
     }
-    // True, and nothing that could be used is held back.
+    // True, and no usable property is undeclared.
     EXPECT_EQ(is_symmetric(metric), symmetric);
     EXPECT_EQ(obeys_triangle_inequality(metric), triangle);
   }

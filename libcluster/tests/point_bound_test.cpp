@@ -42,7 +42,7 @@ std::vector<Metric> metrics() {
       }}};
 }
 
-// Some have weights, some a price of being left out, some duplicates; Euclidean ones channels.
+// Some have weights, some a price of being left out, some duplicates; Euclidean ones have channels.
 void make(Case& c, std::uint64_t seed, std::size_t most_points) {
   std::mt19937_64 random(seed);
   c.points = inputs::cube(2 + random() % (most_points - 1), random);
@@ -69,7 +69,7 @@ void make(Case& c, std::uint64_t seed, std::size_t most_points) {
   c.refer();
 }
 
-// The same as a matrix, whose last facility is to be left out at the price, if there is one.
+// The same as a matrix, whose last facility means being left out at the price, if there is one.
 struct AsMatrix {
   std::vector<double> opening, connection;
   FacilityMatrix matrix;
@@ -107,7 +107,7 @@ struct AsMatrix {
   }
 };
 
-// A solution to start from: each point its own facility, or all that of the first.
+// A solution to start from: each point its own facility, or all points at the first.
 FacilitySolution start_of(const FacilityPoints& p, bool one) {
   FacilitySolution start;
   for (std::uint32_t i = 0; i < p.points.size(); ++i) {
@@ -129,9 +129,9 @@ TEST(PointBound, IsBelowTheOptimum) {
     const LowerBound bound = lower_bound(c.problem, start_of(c.problem, seed % 2 == 0));
     EXPECT_LE(bound.lower_bound, best);
     ASSERT_EQ(bound.duals.size(), c.points.size());
-    // What the duals are worth by the definition.
+    // The value of the duals by definition.
     const double value = dual_value(same.matrix, bound.duals);
-    // Exponents below 1 make much of little rounding.
+    // Exponents below 1 amplify small roundings.
     const auto* power = std::get_if<Minkowski>(&c.problem.metric);
     const double slack = power && power->p < 1.0 ? 1e-5 : 1e-11;
     EXPECT_NEAR(bound.lower_bound, value, slack * static_cast<double>(c.points.size()) * best);
@@ -143,7 +143,7 @@ TEST(PointBound, IsBelowTheOptimum) {
 }
 
 TEST(PointBound, IsThatOfTheMatrix) {
-  // Larger, so that the tree has leaves to leave out: the two ways to the same limit.
+  // Larger, so that the tree has leaves to prune: the two methods reach the same limit.
   for (std::uint64_t seed = 1; seed <= 27; ++seed) {
     Case c;
     make(c, seed, 10);
@@ -203,7 +203,7 @@ TEST(PointBound, HugeTinyAndFarCoordinates) {
       FacilityPoints problem;
       problem.points = points;
       problem.facility_cost = 0.3;
-      // The optimum of the same points brought near: differences are exact.
+      // The optimum of the same points moved close to the origin: differences are exact.
       std::vector<Point3> near = points;
       for (Point3& p : near) {
         for (std::size_t a = 0; a < 3; ++a) p[a] = (p[a] - points[0][a]) / scale;

@@ -80,7 +80,7 @@ TEST(PointSearch, GainIsWhatOpeningSparesInEveryStrategy) {
         for (const auto& search : searches) {
           ASSERT_EQ(search->gain(candidate), gain);  // to the last bit
         }
-        // Losses are carried out as well: the law does not depend on the sign.
+        // Losses are carried out too: the law does not depend on the sign.
         if (gain <= 0 && step % 3 != 0) continue;
         for (const auto& search : searches) search->open(candidate);
         const FacilitySolution after = searches[0]->solution();
@@ -217,7 +217,7 @@ TEST(PointSearch, NeverBeatsTheOptimumAndComesNear) {
   EXPECT_LE(ratios / metric_problems, 1.05);
 }
 
-// Figure 7.3: four clusters of which the block has three, and one point of the fourth.
+// Figure 7.3: four clusters, of which the block has three, and one point of the fourth.
 TEST(PointSearch, TheSingleOutlierIsLeftOut) {
   std::mt19937_64 random(4);
   OwnedProblem p;
@@ -303,7 +303,7 @@ TEST(PointSearch, ScaleAndOffsetDoNotMatter) {
     heavy.facility_cost = plain.facility_cost * 1e300;
     EXPECT_EQ(solve(heavy.view()).facilities, expected.facilities);
   }
-  // Squares of 1e300 are beyond double: the search is right, its costs are infinite.
+  // Squares of 1e300 overflow a double: the search is correct, its costs are infinite.
   OwnedProblem squares = p;
   squares.metric = SquaredEuclidean{};
   squares.channel_weights.clear();

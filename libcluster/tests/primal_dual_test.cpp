@@ -72,7 +72,7 @@ TEST(PrimalDual, KeepsItsPromises) {
     EXPECT_EQ(growth.divisor, 1.0);
     EXPECT_LE(most_paid_share(matrix, growth.duals, 1.0), 1.0 + 1e-9);
     EXPECT_LE(most_paid_share(matrix, stars.duals, stars.divisor), 1.0 + 1e-8);
-    // Duals pay for the stars, and clients then change only to cheaper ones.
+    // Duals pay for the stars, and clients then change only to cheaper facilities.
     EXPECT_LE(stars.solution.cost(), sum_of(stars.duals) * (1.0 + 1e-12));
     if (!problem.metric) continue;
     EXPECT_LE(growth.solution.cost(), 3.0 * growth.solution.lower_bound * (1.0 + 1e-9));
@@ -82,7 +82,7 @@ TEST(PrimalDual, KeepsItsPromises) {
     stars_cost += stars.solution.cost() / best;
     ++count;
   }
-  // On metric costs; measured: 1.012 both.
+  // On metric costs; measured: 1.012 for both.
   EXPECT_LT(growth_cost / count, 1.05);
   EXPECT_LT(stars_cost / count, 1.05);
 }
@@ -104,7 +104,7 @@ TEST(PrimalDual, FollowsTheClock) {
 }
 
 TEST(PrimalDual, ClosesWhatSharesAPayer) {
-  // The client between pays for both facilities: only the first that opened stays.
+  // The client in between pays for both facilities: only the first to open stays.
   const std::vector<double> opening{2.0, 3.0}, costs{1.0, 0.5, 9.0, 9.0, 0.5, 1.0};
   const FacilityMatrix problem{2, 3, opening, costs};
   const PrimalDual growth = jain_vazirani(problem);

@@ -17,7 +17,7 @@
 
 namespace terrace::cluster {
 
-/// A FinishedBlock that owns what it shows.
+/// A FinishedBlock that owns its data.
 struct RecordedBlock {
   unsigned level = 0;
   std::uint64_t block = 0;
@@ -41,7 +41,7 @@ struct RecordedBlock {
 
   friend bool operator==(const RecordedBlock&, const RecordedBlock&) = default;
 
-  /// The input number of point i, when payloads are what numbered_payload() makes.
+  /// The input index of point i, if payloads are those of numbered_payload().
   [[nodiscard]] std::uint64_t id(std::size_t i) const {
     std::uint64_t id = 0;
     std::memcpy(&id, payload.data() + sizeof id * i, sizeof id);
@@ -52,7 +52,7 @@ struct RecordedBlock {
   }
 };
 
-/// Eight bytes per point: its number in the input.
+/// Eight bytes per point: its input index.
 inline std::vector<std::byte> numbered_payload(std::size_t begin, std::size_t end) {
   std::vector<std::byte> payload((end - begin) * sizeof(std::uint64_t));
   for (std::uint64_t i = begin; i < end; ++i) {

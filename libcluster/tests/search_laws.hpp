@@ -14,8 +14,8 @@
 #include "inputs.hpp"
 #include "terrace/cluster/facility_location.hpp"
 
-/// Facility location of points judged from outside: costs from the definitions, in the points' own
-/// coordinates, and the least cost over all solutions.
+/// Facility location of points checked independently: costs from the definitions, in the points'
+/// own coordinates, and the least cost over all solutions.
 
 namespace terrace::cluster::laws {
 
@@ -33,7 +33,7 @@ struct OwnedProblem {
   }
 };
 
-/// The distance with channels as metric.hpp describes it.
+/// The distance including channels, as defined in metric.hpp.
 inline double full_distance(const OwnedProblem& p, std::uint32_t facility, std::uint32_t client) {
   const double d = distance(p.metric, p.points[facility], p.points[client]);
   const std::size_t count = p.channel_weights.size();
@@ -50,7 +50,7 @@ inline double full_distance(const OwnedProblem& p, std::uint32_t facility, std::
   return squared || std::isinf(power) ? sum : std::pow(sum, 1.0 / power);
 }
 
-/// What facility_cost and outlier_price multiply.
+/// The factor of facility_cost and outlier_price.
 inline double full_diagonal(const OwnedProblem& p) {
   OwnedProblem box;
   box.metric = p.metric;
@@ -75,12 +75,12 @@ inline double full_diagonal(const OwnedProblem& p) {
   return full_distance(box, 0, 1);
 }
 
-/// Price of leaving out a client of weight 1; infinite if outliers are not allowed.
+/// The price of leaving out a client of weight 1; infinite if outliers are not allowed.
 inline double outlier_price(const OwnedProblem& p) {
   return std::isinf(p.outlier_price) ? p.outlier_price : p.outlier_price * full_diagonal(p);
 }
 
-/// Structure, and the three costs from their definitions.
+/// Checks the structure, and the three costs from their definitions.
 inline void expect_solution(const OwnedProblem& p, const FacilitySolution& s, double slack = 1e-9) {
   ASSERT_EQ(s.assignment.size(), p.points.size());
   ASSERT_FALSE(s.facilities.empty());
@@ -100,7 +100,7 @@ inline void expect_solution(const OwnedProblem& p, const FacilitySolution& s, do
     }
     ASSERT_LT(s.assignment[i], s.facilities.size());
     const double d = full_distance(p, s.facilities[s.assignment[i]], i);
-    EXPECT_LE(d, price * (1 + 1e-9)) << "connected dearly: " << i;
+    EXPECT_LE(d, price * (1 + 1e-9)) << "connected above the price: " << i;
     connections += w * d;
   }
   const double opening = static_cast<double>(s.facilities.size()) * p.facility_cost * unit;
@@ -157,7 +157,7 @@ inline std::vector<Metric> metrics() {
       CustomMetric{uphill, false, true}};
 }
 
-/// Point sets in about the unit cube, degenerate ones among them.
+/// Point sets in about the unit cube, including degenerate ones.
 inline std::vector<OwnedProblem> problems(std::size_t count, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::vector<OwnedProblem> sets;

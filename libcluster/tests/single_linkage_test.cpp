@@ -12,7 +12,7 @@ namespace {
 
 using laws::heights_of;
 
-/// Lengths of the minimum spanning tree, ascending. O(n^2), after Prim.
+/// Lengths of the minimum spanning tree, ascending, by Prim's algorithm. O(n^2).
 std::vector<double> prim(const std::vector<Point3>& points) {
   const laws::Distances d = laws::distances_of(points);
   std::vector<double> near(points.size(), std::numeric_limits<double>::infinity());
@@ -50,7 +50,7 @@ TEST(SingleLinkage, IsThatOfTheTextbook) {
         const Dendrogram dendrogram = single_linkage(points);
         ASSERT_EQ(dendrogram_fault(dendrogram), "");
         expect_near(heights_of(dendrogram), laws::brute_heights(laws::distances_of(points), false));
-        // Which clusters they are: single linkage cut at a height gives the components.
+        // The clusters themselves: single linkage cut at a height gives the components.
         const laws::Distances d = laws::distances_of(points);
         const auto members = laws::members_of(dendrogram);
         for (const Merge& merge : dendrogram.merges) {

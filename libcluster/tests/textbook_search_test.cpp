@@ -9,7 +9,7 @@ namespace terrace::cluster {
 namespace {
 
 TEST(CandidateCount, FollowsTheThesis) {
-  // 1640 points: 6560 iterations (thesis 7.3.4), so its logarithm is the decimal one.
+  // 1640 points: 6560 iterations (thesis 7.3.4), so its logarithm is decimal.
   EXPECT_EQ(candidate_count(Effort::fine, 1640), 6560u);
   EXPECT_EQ(candidate_count(Effort::fine, 10000), 40000u);
   EXPECT_EQ(candidate_count(Effort::full, 10000), 140000u);

@@ -13,8 +13,8 @@
 
 namespace terrace::cluster {
 
-/// Returns when every other thread of the process waits for something, or `enough` says so: what
-/// comes next finds them asleep, whatever the machine's load.
+/// Returns when every other thread of the process is waiting, or when `enough` returns true:
+/// subsequent work finds them asleep, whatever the machine's load.
 inline void wait_until_others_wait(const std::function<bool()>& enough = [] { return false; }) {
   namespace fs = std::filesystem;
   const std::string own = std::to_string(::gettid());

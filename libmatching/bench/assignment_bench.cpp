@@ -2,7 +2,7 @@
 // Assignment between two sets of uniform points in the unit square, Euclidean costs.
 //
 // matching_assignment_bench --peer MATRIX N prints three times in seconds and the cost for a file
-// of N * N doubles: what assignment_peers.py compares with.
+// of N * N doubles, for comparison by assignment_peers.py.
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -41,7 +41,7 @@ std::vector<double> euclidean_costs(std::span<const Point2> rows, std::span<cons
   return costs;
 }
 
-/// The k least entries of each row.
+/// The k smallest entries of each row.
 struct Candidates {
   std::size_t columns;
   std::vector<std::size_t> begin{0};

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Assignment beside SciPy, both on one thread, on the same points: two sets of n uniform points
-in the unit square, costs are Euclidean distances. The matrix is there before the clock starts,
-and so are the candidates, the 40 nearest columns of each row; `points` makes its own. Needs numpy
-and scipy. Exit status 0 if the matrix is not slower anywhere and the points are 10 times as fast
-from n = 4000 on.
+"""Compares assignment with SciPy, both on one thread, on the same points: two sets of n uniform
+points in the unit square with Euclidean costs. The matrix and the candidates (the 40 nearest
+columns of each row) are made before the clock starts; `points` makes its own. Needs numpy and
+scipy. Exit status 0 if the matrix is never slower and the points are 10 times as fast from
+n = 4000 on.
 
 assignment_peers.py BENCH [N...]
 BENCH  the program matching_assignment_bench

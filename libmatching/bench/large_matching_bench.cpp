@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Matching of large sets: time, the proven gap, and how far the result is above the exact optimum
-// of the points of windows of 10,000, drawn at random: the 5,000 pairs nearest to a place.
+// Matching of large sets: time, the proven gap, and the excess over the exact optimum within random
+// windows of 10,000 points: the 5,000 pairs nearest to a place.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -45,7 +45,7 @@ double distance(const std::array<double, D>& p, const std::array<double, D>& q) 
   return std::sqrt(sum);
 }
 
-/// Above the optimum in each window, as a share.
+/// The excess over the optimum in each window, as a share.
 template <std::size_t D>
 std::vector<double> above_in_windows(const std::vector<std::array<double, D>>& points,
                                      const LargeMatching& matching, std::size_t pairs) {

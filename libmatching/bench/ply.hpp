@@ -12,8 +12,8 @@
 
 #include "terrace/matching/triangle_hierarchy.hpp"
 
-/// Points and triangles of PLY text or bytes, as far as the benchmark's files need it: elements of
-/// numbers and lists; faces of more corners are divided into fans, other elements are passed over.
+/// Points and triangles of text or binary PLY, as far as the benchmark's files need it: elements of
+/// numbers and lists; polygons are divided into fans, other elements are skipped.
 
 namespace terrace::matching::ply {
 
@@ -23,7 +23,7 @@ struct Mesh {
 };
 
 struct Property {
-  std::string type, count_type, name;  // count_type is empty but for lists
+  std::string type, count_type, name;  // count_type is empty except for lists
 };
 
 struct Element {

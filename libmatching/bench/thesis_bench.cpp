@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The thesis, rerun: J. Skála, Algorithms for manipulating large geometric data, figures 7.21 to
-// 7.24 (section 7.5.2), on uniform random points, with our monotone method and the optimum beside
-// the Monte Carlo method. thesis_plots.py draws what is written.
+// 7.24 (section 7.5.2), on uniform random points, with our monotone method and the optimum for
+// comparison. thesis_plots.py plots the output.
 // TERRACE_BENCH_SMALL: everything once on tiny inputs.
 #include <algorithm>
 #include <array>

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Plots of figures 7.21 to 7.24 of the thesis from the CSV files of matching_thesis_bench.
 
-J. Skála, Algorithms for manipulating large geometric data, section 7.5.2. Those of the four
-figure_7_*.csv that are in the folder become .svg beside them; the same numbers give the same bytes.
+J. Skála, Algorithms for manipulating large geometric data, section 7.5.2. Each of the
+four figure_7_*.csv in the folder becomes an .svg next to it; the same numbers give the same bytes.
 Needs matplotlib.
 
 usage: thesis_plots.py DIR
@@ -19,7 +19,7 @@ matplotlib.use('svg')
 from matplotlib import pyplot
 from matplotlib.ticker import LogLocator, NullFormatter
 
-# Ids in the files are hashes: of this, not of the time.
+# Ids in the files are hashes of this, not of the time.
 matplotlib.rcParams.update({
     'svg.hashsalt': 'terrace-matching', 'svg.fonttype': 'path', 'font.size': 10.5,
     'axes.spines.top': False, 'axes.spines.right': False, 'axes.grid': True,
@@ -139,7 +139,7 @@ def main(folder):
                          ('7_24', figure_7_24)):
         if not os.path.exists(os.path.join(folder, f'figure_{figure}.csv')):
             continue
-        # No date: the bytes depend on the numbers alone.
+        # No date: the bytes depend on the numbers only.
         draw(rows_of(folder, figure)).savefig(os.path.join(folder, f'figure_{figure}.svg'),
                                               metadata={'Date': None})
         drawn += 1

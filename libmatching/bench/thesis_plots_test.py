@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Draws the figures of a small run twice: all four must be there, with the same bytes.
+"""Draws the figures of a small run twice: all four must exist and have the same bytes.
 
 thesis_plots_test.py BENCH    exit status 77 (skipped) without matplotlib
 """

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A tree of repeated matching over points and over the triangles of a roof, asked for what is near
-// and for what a ray meets first.
+// A tree of repeated matching over points and over the triangles of a roof, queried for nearest
+// neighbours and for the first hit of a ray.
 #include <cstdio>
 #include <vector>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Five places, paired so that the pairs' distances sum to the least; one stays over.
+// Five points, paired so that the total distance is minimal; one is left over.
 #include <cstdio>
 #include <vector>
 

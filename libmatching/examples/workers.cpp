@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which worker gets which job, and the proof that no other choice is cheaper.
+// Assigns workers to jobs and proves that no other assignment is cheaper.
 #include <cstdio>
 #include <vector>
 

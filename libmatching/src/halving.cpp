@@ -19,7 +19,7 @@
 namespace terrace::matching {
 namespace {
 
-/// Fills the distances from one point to some others.
+/// Fills in the distances from one point to some others.
 using Row = std::function<void(std::uint32_t from, std::span<const std::uint32_t> to, double* out)>;
 
 std::uint64_t seed_of_iteration(std::uint64_t seed, std::uint64_t iteration) {
@@ -60,7 +60,7 @@ Halves ends_apart(const std::vector<std::uint32_t>& mate, std::mt19937_64& rando
   return halves;
 }
 
-/// A matching of one iteration.
+/// The matching of one iteration.
 struct Trial {
   std::vector<std::uint32_t> mate;
   double cost = std::numeric_limits<double>::infinity();
@@ -86,7 +86,7 @@ class Matcher {
       trial.mate[j] = i;
       distance[std::min(i, j)] = costs_[r * columns + assignment.column[r]];
     }
-    // In the order of the points, so that equal matchings have equal costs.
+    // Added in the order of the points, so that equal matchings have equal costs.
     for (const double d : distance) trial.cost += d;
     return trial;
   }
@@ -97,7 +97,7 @@ class Matcher {
   std::vector<double> costs_;
 };
 
-/// Keeps the best and knows when to stop.
+/// Keeps the best matching and decides when to stop.
 class Search {
  public:
   Search(std::uint64_t total, const HalvingOptions& options) : total_(total), options_(options) {}
@@ -132,7 +132,7 @@ void monte_carlo(std::uint32_t count, const Row& row, const HalvingOptions& opti
   std::vector<Matcher> matchers(threads, Matcher(count, row));
   std::vector<Trial> trials(threads);
   while (search.goes_on()) {
-    // A round of one iteration per thread; they are looked at in their order.
+    // A round of one iteration per thread; results are evaluated in iteration order.
     const auto round = static_cast<unsigned>(std::min<std::uint64_t>(threads, search.left()));
     const std::uint64_t first = search.result.iterations;
     for_each_index(round, round, [&](std::size_t t) {
@@ -192,7 +192,7 @@ HalvingMatching run(std::size_t count, const Row& row, const HalvingOptions& opt
 }  // namespace
 
 HalvingMatching match_by_halving(std::span<const Point3> points, const HalvingOptions& options) {
-  // Squares of greater coordinates would overflow.
+  // Squares of larger coordinates would overflow.
   constexpr double kFarthest = 1e150;
   for (std::size_t i = 0; i < points.size(); ++i) {
     for (const double x : points[i]) {

@@ -10,8 +10,8 @@
 
 namespace terrace::matching {
 
-/// Points by their label: group g is order[begin[g]] .. order[begin[g + 1] - 1], indices ascending.
-/// Groups are by ascending label, none is empty.
+/// Points grouped by label: group g is order[begin[g]] .. order[begin[g + 1] - 1], indices
+/// ascending. Groups are by ascending label and not empty.
 struct LabelGroups {
   std::vector<std::uint32_t> order;
   std::vector<std::uint32_t> begin;
@@ -22,7 +22,7 @@ struct LabelGroups {
   }
 };
 
-/// All one group where there are no labels.
+/// All points are one group if there are no labels.
 inline LabelGroups group_by_label(std::uint32_t points, std::span<const std::uint32_t> labels) {
   LabelGroups groups;
   groups.begin.push_back(0);

@@ -24,7 +24,7 @@ using windows::Unit;
   throw std::invalid_argument("match_large: " + what);
 }
 
-/// Sets of points to be matched, each for itself: set k is [ends[k - 1], ends[k]) of `points`.
+/// Sets of points to be matched independently: set k is [ends[k - 1], ends[k]) of `points`.
 struct Parts {
   std::vector<std::uint32_t> points;
   std::vector<std::size_t> ends;
@@ -41,7 +41,7 @@ class Windows {
  public:
   using Point = std::array<double, D>;
 
-  /// points: so scaled that squares neither overflow nor vanish.
+  /// points: scaled so that squares neither overflow nor underflow.
   Windows(std::span<const Point> points, const LargeMatchingOptions& options,
           const PointMetric& metric)
       : points_(points),
@@ -67,7 +67,7 @@ class Windows {
       if (before - cost_ <= options_.tolerance * before) break;
     }
     result_.cost = cost_;
-    // Rounding alone may lift the bound above the cost.
+    // Rounding alone can lift the bound above the cost.
     result_.dual_bound =
         result_.optimal ? cost_ : std::min(cost_, discs_.bound(points_, metric_, threads_));
     const auto alone = std::find(result_.mate.begin(), result_.mate.end(), kNobody);
@@ -96,7 +96,7 @@ class Windows {
     return sum;
   }
 
-  // Matches each part, then what was left over in the odd ones, until at most one point is.
+  // Matches each part, then the points left over in the odd ones, until at most one is left.
   void first_matching() {
     std::vector<std::uint32_t> all(points_.size());
     std::iota(all.begin(), all.end(), 0u);
@@ -126,8 +126,7 @@ class Windows {
     return parts;
   }
 
-  // A cluster of more points than four windows have is cut: it would take too long, or too much
-  // memory.
+  // A cluster with more points than four windows is cut: it would take too much time or memory.
   Parts clusters() const {
     const LabelGroups groups =
         group_by_label(static_cast<std::uint32_t>(points_.size()), options_.labels);
@@ -143,7 +142,7 @@ class Windows {
     return parts;
   }
 
-  // Compact sets of present pairs; the point left over is in one of them.
+  // Compact sets of the current pairs; the point left over is in one of them.
   Parts pairs_together(unsigned round) const {
     std::vector<Unit<D>> units;
     units.reserve(points_.size() / 2 + 1);
@@ -172,7 +171,7 @@ class Windows {
     return parts;
   }
 
-  // What a cut leaves within a part is in the order of the standard library's nth_element.
+  // Sorts within parts: a cut leaves them in the order of the standard library's nth_element.
   static void sort_within(Parts& parts) {
     std::size_t begin = 0;
     for (const std::size_t end : parts.ends) {
@@ -188,13 +187,13 @@ class Windows {
     const std::uint64_t left = planned_ > done ? planned_ - done : 0;
     const std::uint64_t rounds = options_.rounds - std::min(options_.rounds, result_.rounds + 1);
     if (!options_.progress(done, done + left + rounds * parts_, cost_)) stopped_ = true;
-    // The first matching must be whole.
+    // The first matching must be complete.
     return !stopped_ || cost_ == 0.0;
   }
 
-  /// Returns false if stopped before all were matched; those that were are in the matching.
+  /// Returns false if stopped before all parts were matched; those matched are in the matching.
   bool match_parts(const Parts& parts, bool first = false) {
-    // A round that is stopped has no duals for some points: those of the round before stay.
+    // A round that is stopped has no duals for some points: those of the previous round are kept.
     Discs discs(keep_duals_ ? points_.size() : 0);
     if (keep_duals_) discs.start(parts.count());
     parts_ = parts.count();
@@ -223,7 +222,7 @@ class Windows {
     }
     const PointMatching matching = match_points(std::span<const Point>(points), options);
     if (keep_duals_) discs.take(k, members, matching);
-    // Equally good matchings are not exchanged: they might go round in a circle for ever.
+    // Matchings of equal cost are not exchanged: they might alternate for ever.
     if (!first && !(matching.cost < cost_of(members) * (1.0 - 1e-12))) return;
     for (std::size_t m = 0; m < members.size(); ++m) {
       const std::uint32_t mate = matching.mate[m];
@@ -245,7 +244,7 @@ class Windows {
   const PointMetric& metric_;
   unsigned threads_;
   LargeMatching result_;
-  Discs discs_{0};  // of the last round that was whole
+  Discs discs_{0};  // of the last completed round
   bool keep_duals_ = true, stopped_ = false;
   double cost_ = 0.0;
   std::atomic<std::uint64_t> windows_done_{0};
@@ -274,7 +273,7 @@ LargeMatching match(std::span<const std::array<double, D>> points,
     result.optimal = true;
     return result;
   }
-  if (points.size() >= kNobody) refuse_large("at most 2^32 - 2 points have numbers");
+  if (points.size() >= kNobody) refuse_large("at most 2^32 - 2 points are possible");
   double largest = 0.0;
   for (std::size_t i = 0; i < points.size(); ++i) {
     for (const double c : points[i]) {
@@ -298,8 +297,7 @@ LargeMatching match(std::span<const std::array<double, D>> points,
     result.cost = std::ldexp(result.cost, shift);
     result.dual_bound = std::ldexp(result.dual_bound, shift);
   }
-  if (!std::isfinite(result.cost))
-    refuse_large("the cost passes the range of double; scale the points");
+  if (!std::isfinite(result.cost)) refuse_large("the cost overflows a double; scale the points");
   return result;
 }
 

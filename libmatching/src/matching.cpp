@@ -48,7 +48,7 @@ Matching solve(std::size_t vertex_count, std::span<const AnyEdge> edges, int exp
   if (alone != blossom::kNone) refuse_edges(blossom::unmatchable(solver, alone));
   Matching result = blossom::proof_of(solver);
   result.exponent = exponent;
-  // The least of parallel edges is the matched one.
+  // The cheapest of parallel edges is the matched one.
   std::vector<std::size_t> chosen(vertex_count, edges.size());
   for (std::size_t k = 0; k < edges.size(); ++k) {
     const AnyEdge& e = edges[k];
@@ -67,7 +67,7 @@ std::int64_t rounded(const WeightedEdge& e, int exponent) {
 }
 std::int64_t rounded(const IntegerEdge& e, int) { return e.weight; }
 
-/// Sums of duals over the chain of blossoms from a vertex outward, and the chain itself.
+/// Sums of duals along the chain of blossoms from a vertex outward, and the chain itself.
 std::vector<std::uint32_t> chain_of(const Matching& m, std::uint32_t vertex) {
   std::vector<std::uint32_t> chain;
   for (std::uint32_t b = m.vertex_blossom[vertex]; b != kNobody; b = m.blossom_parent[b]) {
@@ -96,22 +96,22 @@ std::string shape_error(const Matching& m) {
   }
   for (std::size_t v = 0; v < n; ++v) {
     if (m.mate[v] >= n || m.mate[v] == v || m.mate[m.mate[v]] != v) {
-      return "vertex " + std::to_string(v) + " is not matched both ways";
+      return "vertex " + std::to_string(v) + " is not the partner of its partner";
     }
     if (m.vertex_blossom[v] != kNobody && m.vertex_blossom[v] >= blossoms) {
-      return "vertex " + std::to_string(v) + " names a blossom that is not there";
+      return "vertex " + std::to_string(v) + " names a blossom that does not exist";
     }
   }
   for (std::size_t b = 0; b < blossoms; ++b) {
     if (m.blossom_parent[b] != kNobody && m.blossom_parent[b] >= blossoms) {
-      return "blossom " + std::to_string(b) + " names a parent that is not there";
+      return "blossom " + std::to_string(b) + " names a parent that does not exist";
     }
     if (m.blossom_dual[b] < 0) return "blossom " + std::to_string(b) + " has a negative dual";
   }
   return {};
 }
 
-// Odd size, and one matched edge over the border where the dual is not 0.
+// Checks that sizes are odd and that one matched edge crosses the border where the dual is not 0.
 std::string blossom_error(const Matching& m) {
   std::vector<std::size_t> size(m.blossom_dual.size(), 0), leaving(m.blossom_dual.size(), 0);
   for (std::uint32_t v = 0; v < m.mate.size(); ++v) {
@@ -139,7 +139,7 @@ std::string error_of(const Matching& m, std::span<const AnyEdge> edges) {
   for (std::size_t k = 0; k < edges.size(); ++k) {
     const AnyEdge& e = edges[k];
     if (e.i >= m.mate.size() || e.j >= m.mate.size() || e.i == e.j) {
-      return "edge " + std::to_string(k) + " does not belong to the graph";
+      return "edge " + std::to_string(k) + " is not in the graph";
     }
     const std::int64_t slack = 2 * rounded(e, m.exponent) - m.vertex_dual[e.i] -
                                m.vertex_dual[e.j] - separating_duals(m, e.i, e.j);
@@ -157,7 +157,7 @@ std::string error_of(const Matching& m, std::span<const AnyEdge> edges) {
 }  // namespace
 
 double Matching::dual_bound() const {
-  // Summed as integers in two parts, so that nothing is lost or overflows.
+  // Summed as integers in two parts, so that the sum is exact and cannot overflow.
   double high = 0.0;
   std::int64_t low = 0;
   const auto add = [&](std::int64_t dual) {
@@ -203,7 +203,7 @@ Matching min_weight_perfect_matching(std::size_t vertex_count, std::span<const I
     const IntegerEdge& e = edges[k];
     if (e.weight > kLargest || e.weight < -kLargest) {
       refuse_edges("edge " + std::to_string(k) + " weighs " + std::to_string(e.weight) +
-                   "; weights up to 2^57 fit, divide them");
+                   "; weights up to 2^57 fit; divide them");
     }
     doubled.push_back({e.i, e.j, 2 * e.weight});
   }

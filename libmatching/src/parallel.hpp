@@ -12,9 +12,9 @@
 
 namespace terrace::matching {
 
-/// Calls work(k) for k below count, several at once. `watch` is called by the caller's thread after
-/// each of its own; false keeps all further k from being begun.
-/// Returns whether all were done. Throws what the first k that failed has thrown.
+/// Calls work(k) for k below count, concurrently. `watch` is called by the caller's thread after
+/// each of its own; if it returns false, no further k is begun.
+/// Returns whether all were done. Rethrows the exception of the first k that failed.
 inline bool for_each_index(std::size_t count, unsigned threads,
                            const std::function<void(std::size_t)>& work,
                            const std::function<bool()>& watch = {}) {
@@ -38,7 +38,7 @@ inline bool for_each_index(std::size_t count, unsigned threads,
     try {
       for (unsigned t = 1; t < threads && t < count; ++t) others.emplace_back(run, t);
     } catch (const std::system_error&) {
-      // The system grants no more threads. Those there are do the same work.
+      // The system grants no more threads. The existing ones do the same work.
     }
     run(0);
   }

@@ -79,7 +79,7 @@ class Problem {
     }
   }
 
-  // By a power of two, so that squares neither overflow nor vanish; nothing is rounded by it.
+  // Scales by a power of two, which is exact, so that squares neither overflow nor underflow.
   void scale_points() {
     double largest = 0.0;
     for (const Point& p : given_) {
@@ -112,8 +112,8 @@ class Problem {
     };
   }
 
-  // Nearest neighbours, the caller's edges, and pairs along the halving order, which are a perfect
-  // matching and so make the graph feasible.
+  // Nearest neighbours, the caller's edges, and pairs along the halving order; these pairs are a
+  // perfect matching and so make the graph feasible.
   void set_candidates() {
     const auto n = static_cast<std::uint32_t>(points_.size());
     const BoxTree<D> tree(points_);
@@ -142,7 +142,7 @@ class Problem {
     std::vector<Edge> edges;
     edges.reserve(candidates_.size() + (n % 2 == 0 ? 0 : n));
     for (const auto& [i, j] : candidates_) edges.push_back({i, j, cost_(i, j)});
-    // An odd number of points gets a vertex for nobody, at no cost from all.
+    // An odd number of points gets a vertex for nobody, at cost 0 to all.
     const std::uint32_t nobody = n % 2 == 0 ? blossom::kNone : n;
     for (std::uint32_t i = 0; nobody != blossom::kNone && i < n; ++i) edges.push_back({i, n, 0});
     Solver solver(n + n % 2, std::move(edges), nobody);
@@ -187,8 +187,7 @@ class Problem {
     proof.exponent = std::ilogb(cost_.scale) - shift;
     result.dual_bound = proof.dual_bound();
     proof.cost = result.cost;
-    if (!std::isfinite(result.cost))
-      refuse_points("the cost passes the range of double; scale the points");
+    if (!std::isfinite(result.cost)) refuse_points("the cost overflows a double; scale the points");
   }
 
   std::span<const Point> given_;

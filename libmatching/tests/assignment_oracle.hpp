@@ -13,10 +13,10 @@
 
 namespace terrace::matching {
 
-/// The least cost over all ways to give min(rows, columns) rows a column.
+/// The least cost over all ways to assign min(rows, columns) rows to columns.
 template <class Number>
 double brute_force(const std::vector<Number>& costs, std::size_t rows, std::size_t columns) {
-  // The longer side is permuted; its head meets the shorter side.
+  // The longer side is permuted; its first elements are matched to the shorter side.
   const bool tall = rows > columns;
   std::vector<std::size_t> permutation(tall ? rows : columns);
   std::iota(permutation.begin(), permutation.end(), std::size_t{0});
@@ -37,7 +37,7 @@ inline double uniform(std::mt19937_64& random) {
   return static_cast<double>(random() >> 11) * 0x1p-53;
 }
 
-/// The words of the std::invalid_argument that `call` throws.
+/// The message of the std::invalid_argument that `call` throws.
 inline std::string message_of(const auto& call) {
   try {
     call();

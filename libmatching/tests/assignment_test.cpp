@@ -70,7 +70,7 @@ TYPED_TEST(AssignTyped, TakesEqualCosts) {
   }
 }
 
-// Points on a small grid, each several times: nothing but ties and zeros.
+// Points on a small grid, each several times: all ties and zeros.
 TEST(Assign, TakesGridsWithDuplicates) {
   for (const std::size_t columns : {120u, 90u, 150u}) {
     const std::size_t rows = 120;
@@ -189,7 +189,7 @@ TEST(Check, SeesEveryBrokenCondition) {
   EXPECT_THROW(spoiled([](Assignment& a) { a.row_dual.pop_back(); }), std::invalid_argument);
 }
 
-// The published optimum of an instance of the OR library.
+// The published optimum of an OR-Library instance.
 TEST(Assign, FindsTheKnownOptimum) {
   const char* data = std::getenv("TERRACE_DATA");
   if (data == nullptr) GTEST_SKIP() << "TERRACE_DATA names no data folder";

@@ -48,7 +48,7 @@ void expect_sound(const BoundingVolumeHierarchy<D>& tree, const std::vector<Box<
   };
   std::vector<Open> open{{0, 0}};
   std::size_t seen = 0, slots = 0, deepest = 0;
-  // In the order of a walk that takes the first child first, nodes and slots are consecutive.
+  // Nodes and slots are consecutive in a walk that visits the first child first.
   while (!open.empty()) {
     const auto [at, depth] = open.back();
     open.pop_back();
@@ -97,7 +97,7 @@ double area(const Box<D>& box) {
   return sum;
 }
 
-/// What each way of making leaves costs below a node, times area, by trying them all.
+/// The least cost below a node, times area, over all choices of leaves, by brute force.
 template <std::size_t D>
 std::vector<double> all_costs(const std::vector<TreeChildren>& rows,
                               const std::vector<Box<D>>& boxes, std::uint32_t v,
@@ -166,11 +166,11 @@ TEST(BoundingVolumeHierarchy, CountsTheSurfaceAreaHeuristic) {
   HierarchyOptions options;
   options.leaf_size = 1;
   const BoundingVolumeHierarchy<3> tree(rows, cubes, options);
-  // Areas: 18 of the root, 10 of the two below, 6 of each cube.
+  // Areas: 18 for the root, 10 for each node below it, 6 for each cube.
   EXPECT_NEAR(tree.surface_area_cost(), (18.0 + 2 * 10.0 + 4 * 6.0) / 18.0, 1e-5);
   EXPECT_NEAR(tree.surface_area_cost({2.0, 0.5}), (2 * (18.0 + 2 * 10.0) + 0.5 * 24.0) / 18.0,
               1e-5);
-  // One leaf of all is tried at 4; the tree is dearer with a step at 10.
+  // A single leaf is possible with leaf_size 4; it wins if a step costs 10.
   options.leaf_size = 4;
   options.costs.traversal = 10.0;
   const BoundingVolumeHierarchy<3> flat(rows, cubes, options);
@@ -204,7 +204,7 @@ TEST(BoundingVolumeHierarchy, TakesDeepTreesAndAnyScale) {
     expect_sound(scaled, boxes, 8);
     EXPECT_GT(scaled.surface_area_cost(), 1.0);
   }
-  // Georeferenced: the boxes are small beside the coordinates.
+  // Georeferenced: the boxes are small compared to the coordinates.
   auto far = random_boxes<3>(100, 0.001, random);
   for (Box<3>& box : far) {
     for (auto* corner : {&box.lo, &box.hi}) {
@@ -275,7 +275,7 @@ template <class Make>
 void expect_refused(Make&& make, const std::string& what) {
   try {
     (void)make();
-    ADD_FAILURE() << "taken, not refused: " << what;
+    ADD_FAILURE() << "accepted, not refused: " << what;
   } catch (const std::invalid_argument& e) {
     EXPECT_NE(std::string(e.what()).find(what), std::string::npos) << e.what();
   }
@@ -290,9 +290,9 @@ TEST(BoundingVolumeHierarchy, RefusesBadInput) {
   rows[1] = {2, 4};
   expect_refused(make, "row 1 names node 4, which is not made");
   rows[1] = {0, 3};
-  expect_refused(make, "row 1 names node 0, which has a parent");
+  expect_refused(make, "row 1 names node 0, which already has a parent");
   rows[1] = {2, 2};
-  expect_refused(make, "row 1 names node 2, which has a parent");
+  expect_refused(make, "row 1 names node 2, which already has a parent");
   rows[0] = {0, 3};
   expect_refused(make, "row 0 names node 3, which is not made");
   rows = {{0, 1}};

@@ -25,7 +25,7 @@ double distance(const Point3& p, const Point3& q) {
   return std::hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]);
 }
 
-/// The optimum over all matchings, one point left over if their number is odd.
+/// The optimum over all matchings, with one point left over if their number is odd.
 double optimum(const std::vector<Point3>& points) {
   const auto n = points.size();
   std::vector<double> best(std::size_t{1} << n, std::numeric_limits<double>::infinity());
@@ -93,7 +93,7 @@ TEST(Halving, MonteCarloFindsTheOptimumOfVeryFewPoints) {
   }
 }
 
-// What the thesis's method lacks, at the same number of assignments.
+// The thesis's method falls short of this at the same number of assignments.
 TEST(Halving, MonotoneIsFarBelowMonteCarlo) {
   std::mt19937_64 random(4);
   const std::vector<Point3> points = uniform(100, random);

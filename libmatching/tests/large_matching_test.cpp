@@ -29,7 +29,7 @@ double length(const std::array<double, D>& p, const std::array<double, D>& q) {
 }
 
 /// Kinds of sets: uniform, clumps of very different density, a grid (all ties), a line, few places
-/// with many equal points.
+/// with many duplicates.
 template <std::size_t D>
 Points<D> points_of_kind(int kind, std::size_t n, std::mt19937_64& random) {
   Points<D> points(n);
@@ -94,7 +94,7 @@ TEST(LargeMatching, EnclosesTheOptimumOfSmallSets) {
     expect_bounds(match_large(flat, options), flat);
     const auto solid = points_of_kind<3>(kind, n, random);
     expect_bounds(match_large(solid, options), solid);
-    // Clusters that have nothing to do with places.
+    // Clusters unrelated to position.
     std::vector<std::uint32_t> labels(n);
     for (std::uint32_t& label : labels) label = static_cast<std::uint32_t>(random() % 3) * 1000u;
     options.labels = labels;
@@ -112,7 +112,7 @@ TEST(LargeMatching, WindowsComeNearTheOptimum) {
     const auto flat = points_of_kind<2>(kind, 6001, random);
     const LargeMatching m = match_large(flat, options);
     expect_bounds(m, flat);
-    // Where many points are equal most pairs cost nothing, and few far ones are all the cost.
+    // Where many points coincide most pairs cost nothing, and a few far ones are all the cost.
     if (kind < 2) {
       EXPECT_LE(m.cost, 1.03 * match_points(flat).cost);
       EXPECT_LE(m.gap(), 0.12);
@@ -140,7 +140,7 @@ TEST(LargeMatching, IsExactUpToTheLimit) {
   options.exact_limit = 500;
   options.window = 100;
   EXPECT_FALSE(match_large(points, options).optimal);
-  // One window for all.
+  // One window for all points.
   options.window = 502;
   std::vector<std::uint32_t> labels(points.size());
   for (std::size_t i = 0; i < labels.size(); ++i) labels[i] = static_cast<std::uint32_t>(i % 3);
@@ -182,7 +182,7 @@ TEST(LargeMatching, ClustersAreMatchedWithinThemselvesFirst) {
   options.rounds = 0;
   const LargeMatching m = match_large(points, options);
   expect_bounds(m, points);
-  // Between clusters there are the pairs of what was left over alone, here at most one.
+  // Only points left over in their clusters, at most one each, are paired across clusters.
   std::size_t across = 0, odd = 0;
   double within = 0.0;
   for (std::uint32_t i = 0; i < points.size(); ++i) {
@@ -200,7 +200,7 @@ TEST(LargeMatching, ClustersAreMatchedWithinThemselvesFirst) {
   }
   EXPECT_EQ(2 * across, odd);
   EXPECT_NEAR(within, expected, 1e-12 * expected);
-  // Windows then make up for the borders.
+  // Windows then compensate for the borders.
   options.rounds = 8;
   options.window = 200;
   EXPECT_LT(match_large(points, options).cost, m.cost);

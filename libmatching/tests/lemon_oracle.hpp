@@ -5,8 +5,8 @@
 #include <memory>
 #include <vector>
 
-/// LEMON's blossom algorithm as an oracle. Its headers are not C++20, so that they stay behind this
-/// one and lemon_oracle.cpp is compiled as C++17.
+/// LEMON's blossom algorithm as an oracle. Its headers do not compile as C++20, so this header
+/// hides them and lemon_oracle.cpp is compiled as C++17.
 class LemonOracle {
  public:
   struct Edge {
@@ -19,7 +19,7 @@ class LemonOracle {
   LemonOracle(const LemonOracle&) = delete;
   LemonOracle& operator=(const LemonOracle&) = delete;
 
-  /// Whether there is a perfect matching; then its least weight in `cost`.
+  /// Whether there is a perfect matching; if so, its least weight in `cost`.
   bool solve(std::int64_t& cost);
 
  private:

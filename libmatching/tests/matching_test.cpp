@@ -47,7 +47,7 @@ TEST(Matching, EqualsSubsetProgrammingOnSmallGraphs) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     std::mt19937_64 random(seed);
     const auto n = static_cast<std::uint32_t>(2 * (1 + random() % 6));
-    // Few values make ties and blossoms of dual 0, negative ones are allowed.
+    // Few values make ties and blossoms of dual 0; negative ones are allowed.
     const auto values = static_cast<std::int64_t>(1 + random() % 20);
     const auto edges = random_graph(n, 0.2 + 0.8 * oracles::uniform(random), values,
                                     -static_cast<std::int64_t>(random() % 10), random);
@@ -140,8 +140,8 @@ TEST(Matching, NamesWhatIsWrong) {
   EXPECT_NE(matching_message(2, {{0, 2, 1}}).find("edge 0"), std::string::npos);
   EXPECT_NE(matching_message(2, {{0, 1, std::nan("")}}).find("edge 0"), std::string::npos);
   EXPECT_NE(matching_message(2, {{0, 1, INFINITY}}).find("edge 0"), std::string::npos);
-  EXPECT_NE(matching_message(2, {}).find("vertex 0 stays alone"), std::string::npos);
-  // A star: without its middle the three rays are odd components.
+  EXPECT_NE(matching_message(2, {}).find("vertex 0 cannot be matched"), std::string::npos);
+  // A star: without its centre the three leaves are odd components.
   const std::string star = matching_message(4, {{0, 3, 1}, {1, 3, 1}, {2, 3, 1}});
   EXPECT_NE(star.find("removing the 1 vertices {3} leaves 2 components"), std::string::npos)
       << star;
@@ -149,7 +149,7 @@ TEST(Matching, NamesWhatIsWrong) {
   EXPECT_THROW(min_weight_perfect_matching(2, heavy), std::invalid_argument);
 }
 
-// The checker itself: each broken law is seen.
+// Tests the checker itself: each violated condition is detected.
 TEST(Matching, TheProofCannotBeForged) {
   // Two triangles joined by one long edge: each is a blossom with a dual.
   const std::vector<IntegerEdge> edges{{0, 1, 2}, {1, 2, 2}, {0, 2, 2}, {3, 4, 2},

@@ -42,8 +42,9 @@ double least_cost(const std::vector<Point>& points) {
                              : match_points(std::span<const Point>(points)).cost;
 }
 
-/// Every law that needs no clusters: sizes, positions, and that each level is matched at the least
-/// cost, the nodes present there being found from the rows alone. `nodes` is where it begins.
+/// Checks everything that does not depend on clusters: sizes, positions, and that each level is
+/// matched at the least cost, given the nodes of that level as derived from the rows alone. `nodes`
+/// is the first level.
 template <class Point>
 void expect_levels_optimal(const MatchingTree<Point>& tree, const std::vector<Point>& points,
                            std::vector<std::uint32_t> nodes, std::uint32_t first,
@@ -80,8 +81,7 @@ void expect_levels_optimal(const MatchingTree<Point>& tree, const std::vector<Po
   EXPECT_EQ(nodes.size(), 1u);
 }
 
-/// Every leaf once, children before parents and below them in level, sizes summed, positions the
-/// means.
+/// Every leaf once, children before parents and of lower level, sizes summed, positions the means.
 template <class Point>
 void expect_tree(const MatchingTree<Point>& tree, const std::vector<Point>& points,
                  std::span<const double> weights = {}, double unit = 1.0) {
@@ -146,7 +146,7 @@ TEST(MatchingTree, MatchesEachLevelAtTheLeastCost) {
     std::mt19937_64 random(seed);
     const std::size_t n = seed <= 40 ? random() % 13 : 100 + random() % 300;
     auto flat = uniform_points<Point2>(n, random);
-    // Small integers as well, for ties and equal points.
+    // Small integers too, for ties and duplicates.
     if (seed % 2 == 0) {
       for (Point2& p : flat) p = {std::floor(4 * p[0]), std::floor(4 * p[1])};
     }
@@ -196,7 +196,7 @@ TEST(MatchingTree, PutsPairsAtTheirWeightedMidpoints) {
   MatchingTreeOptions<Point2> options;
   options.weights = weights;
   expect_tree(tree_of(points, options), points, weights);
-  // Weights matter by their ratios alone.
+  // Only the ratios of weights matter.
   const MatchingTree<Point2> tree = tree_of(points, options);
   std::vector<double> scaled = weights;
   for (double& w : scaled) w *= 0x1p900;
@@ -211,7 +211,7 @@ TEST(MatchingTree, MatchesWithinClustersThenTheClusters) {
     std::mt19937_64 random(seed);
     const auto points = uniform_points<Point3>(400, random);
     const auto n = static_cast<std::uint32_t>(points.size());
-    // Dense labels, labels with gaps, labels beyond the number of points, and one for each.
+    // Dense labels, labels with gaps, labels beyond the number of points, and one per point.
     std::vector<std::uint32_t> labels(n);
     for (std::uint32_t i = 0; i < n; ++i) {
       const auto drawn = static_cast<std::uint32_t>(random() % 9);
@@ -282,7 +282,7 @@ TEST(MatchingTree, ReportsProgressAndStops) {
     EXPECT_TRUE(std::is_sorted(seen.begin(), seen.end()));
     EXPECT_EQ(seen.back(), 199u);
     std::size_t calls = 0;
-    // The caller's thread reports the last levels at least, so it stops before the end.
+    // The caller's thread reports at least the last levels, so it stops before the end.
     options.progress = [&](std::size_t, std::size_t) { return ++calls < 2; };
     const MatchingTree<Point2> stopped = tree_of(points, options);
     EXPECT_EQ(calls, 2u);
@@ -296,7 +296,7 @@ TEST(MatchingTree, TakesTheCallersMatcher) {
   std::mt19937_64 random(5);
   const auto points = uniform_points<Point2>(37, random);
   MatchingTreeOptions<Point2> options;
-  // Neighbours in the order given; the last one is left over.
+  // Pairs neighbours in the given order; the last one is left over.
   options.matcher = [](std::span<const Point2> present) {
     std::vector<std::uint32_t> mate(present.size());
     for (std::uint32_t i = 0; i < mate.size(); ++i) mate[i] = i ^ 1u;
@@ -365,7 +365,7 @@ TEST(MatchingTree, RefusesBadInput) {
   options.weights = short_weights;
   refuse(options, "3 weights for 5 points");
   options.weights = heavy;
-  refuse(options, "sum passes the range");
+  refuse(options, "sum overflows a double");
   // Nothing is read before the number is checked.
   const std::span<const Point3> many(points.data(), std::size_t{1} << 31);
   EXPECT_NE(refusal(many).find("MiB"), std::string::npos);

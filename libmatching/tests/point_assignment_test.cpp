@@ -134,7 +134,7 @@ TYPED_TEST(AssignPointsTyped, NamesTheBadPoint) {
   }
 }
 
-// Thousands of points: the proof is by the labels.
+// Thousands of points, proven optimal by the labels.
 TEST(AssignPoints, ProvesItselfOptimalOnThousandsOfPoints) {
   std::mt19937_64 random(6);
   const auto draw = [&] { return uniform(random); };

@@ -18,7 +18,7 @@ namespace {
 
 using oracles::uniform;
 
-/// Uniform, on a small grid (ties and equal points), on a line, and far from the origin.
+/// Uniform, on a small grid (ties and duplicates), on a line, and far from the origin.
 template <std::size_t D>
 std::array<double, D> draw(std::uint64_t kind, std::mt19937_64& random) {
   std::array<double, D> p;
@@ -131,7 +131,7 @@ TEST(PointHierarchy, FindsTheFirstBall) {
       if (q % 4 == 0) ray.t_max = 1.5 * uniform(random);
       const auto hit = hierarchy.hit(ray, radius);
       EXPECT_EQ(other.hit(ray, radius), hit);
-      // What is tangential within rounding may go either way.
+      // A ray that is tangential up to rounding may hit or miss.
       RayHit sure, possible;
       sure.t = possible.t = std::numeric_limits<double>::infinity();
       for (std::uint32_t i = 0; i < points.size(); ++i) {

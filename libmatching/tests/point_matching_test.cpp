@@ -44,7 +44,7 @@ void expect_pairs(const PointMatching& m, std::size_t n) {
   EXPECT_EQ(alone, n % 2);
 }
 
-/// The proof of the sparse graph holds on the complete one: this is what pricing promises.
+/// The proof of the sparse graph holds on the complete graph: the promise of pricing.
 template <std::size_t D>
 void expect_optimal(const PointMatching& m, const std::vector<std::array<double, D>>& points) {
   expect_pairs(m, points.size());
@@ -60,7 +60,7 @@ TEST(PointMatching, EqualsSubsetProgramming) {
     PointMatchingOptions options;
     options.neighbours = 1 + seed % 4;
     std::vector<Point2> flat = uniform_points(n, random);
-    // Small integers as well, for ties and equal points.
+    // Small integers too, for ties and duplicates.
     if (seed % 2 == 0) {
       for (Point2& p : flat) p = {std::floor(4 * p[0]), std::floor(4 * p[1])};
     }
@@ -130,7 +130,7 @@ TEST(PointMatching, TakesPointsOnALine) {
   for (std::size_t k = 0; k < points.size(); ++k) points[k] = {uniform(random), 0.25};
   const PointMatching m = match_points(points);
   expect_optimal(m, points);
-  // On a line neighbours by rank are optimal.
+  // On a line, pairing neighbours by rank is optimal.
   std::sort(points.begin(), points.end());
   double cost = 0.0;
   for (std::size_t k = 0; k < points.size(); k += 2) cost += points[k + 1][0] - points[k][0];
@@ -150,7 +150,7 @@ TEST(PointMatching, TakesGridsOfTies) {
   }
 }
 
-// Odd clusters far apart: no neighbour list joins them, pricing has to.
+// Odd clusters far apart: no neighbour list joins them, so pricing must.
 TEST(PointMatching, JoinsOddClusters) {
   std::size_t rounds = 0;
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
@@ -238,7 +238,7 @@ TEST(PointMatching, NamesWhatIsWrong) {
     EXPECT_NE(std::string(error.what()).find("point 2"), std::string::npos) << error.what();
   }
   try {
-    // Refused before a point is read.
+    // Refused before any point is read.
     match_points(std::span<const Point2>(points.data(), std::size_t{1} << 30));
     ADD_FAILURE();
   } catch (const std::invalid_argument& error) {
@@ -279,7 +279,7 @@ TEST(PointMatching, EqualsTheKnownOptimaOfTsplib) {
   for (const auto& [name, optimum] : tsplib::read_optima(list)) {
     SCOPED_TRACE(name);
     std::ifstream file(folder + "tsplib/" + name + ".tsp");
-    if (!file) continue;  // the three largest are compressed: the benchmark reads them
+    if (!file) continue;  // the three largest are compressed: only the benchmark reads them
     const tsplib::Instance instance = tsplib::read(file);
     PointMatchingOptions options;
     options.metric = tsplib::metric_of(instance);

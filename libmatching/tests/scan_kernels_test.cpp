@@ -15,7 +15,7 @@ class ScanKernelsTyped : public testing::Test {};
 using CostTypes = testing::Types<double, float, std::int32_t>;
 TYPED_TEST_SUITE(ScanKernelsTyped, CostTypes);
 
-// Each instruction set against the definition, one column after the other.
+// Each instruction set against the definition, column by column.
 TYPED_TEST(ScanKernelsTyped, DoWhatTheySayOnEveryInstructionSet) {
   using Number = LabelOf<TypeParam>;
   for (const ScanPath path : {ScanPath::portable, ScanPath::avx2, ScanPath::avx512}) {
@@ -64,7 +64,7 @@ TYPED_TEST(ScanKernelsTyped, DoWhatTheySayOnEveryInstructionSet) {
   }
 }
 
-// The tests of all paths pass over what the machine lacks: here is where they say so.
+// The tests of all paths skip instruction sets that the machine lacks; this one reports it.
 TEST(InstructionSets, Avx2IsTested) {
   if (!has_scan_path(ScanPath::avx2)) GTEST_SKIP() << "the processor lacks AVX2";
 }

@@ -15,7 +15,7 @@
 namespace terrace::matching {
 namespace {
 
-// What a matrix has in place of a pair that may not be chosen.
+// Stands in a matrix for a pair that must not be chosen.
 constexpr double kAbsent = 1e6;
 
 TEST(AssignSparse, EqualsBruteForceOrSaysThatThereIsNone) {
@@ -29,7 +29,7 @@ TEST(AssignSparse, EqualsBruteForceOrSaysThatThereIsNone) {
     std::vector<CostEdge> edges;
     for (std::size_t k = 0; k < rows * columns; ++k) {
       if (random() % 5 > density) continue;
-      // Some pairs several times; the cheapest counts.
+      // Some pairs more than once; the cheapest counts.
       const std::size_t entry = random() % costs.size();
       const double cost = static_cast<double>(random() % 9) - 3.0;
       costs[entry] = std::min(costs[entry], cost);
@@ -72,7 +72,7 @@ TEST(AssignSparse, AllPairsEqualTheMatrix) {
   }
 }
 
-// A band: each row has its own column and its neighbours'.
+// A band: each row has its own column and those of its neighbours.
 TEST(AssignSparse, ProvesItselfOptimalOnABand) {
   for (const double scale : {1e-300, 1.0, 1e300}) {
     std::mt19937_64 random(9);

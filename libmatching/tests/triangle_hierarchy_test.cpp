@@ -29,7 +29,7 @@ struct Mesh {
   }
 };
 
-/// Triangles of any shape; on a small grid many lack area, are equal, or lie in planes of rays.
+/// Triangles of any shape; on a small grid many have no area, are equal, or lie in planes of rays.
 Mesh random_mesh(std::size_t n, bool grid, std::mt19937_64& random) {
   Mesh mesh;
   mesh.corners.resize(3 * n);
@@ -49,7 +49,7 @@ Mesh random_mesh(std::size_t n, bool grid, std::mt19937_64& random) {
   return mesh;
 }
 
-/// A closed surface around the origin: an octahedron, divided, its corners put on a bumpy sphere.
+/// A closed surface around the origin: a subdivided octahedron with its corners on a bumpy sphere.
 Mesh ball_mesh(int divisions, std::mt19937_64& random) {
   Mesh mesh;
   mesh.corners = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
@@ -123,7 +123,8 @@ TEST(TriangleHierarchy, FindsTheFirstTriangle) {
       if (q % 4 == 0) ray.t_max = uniform(random);
       const auto hit = hierarchy.hit(ray);
       EXPECT_EQ(other.hit(ray), hit);
-      if (grid) continue;  // which of those that touch comes first is the trees' concern above
+      // which of two touching triangles comes first is tested above for the trees
+      if (grid) continue;
       double sure = kInfinity, possible = kInfinity;
       for (std::uint32_t k = 0; k < mesh.triangles.size(); ++k) {
         const auto in = oracles::crossing(ray, mesh.of(k), -1e-9L);
@@ -146,8 +147,8 @@ TEST(TriangleHierarchy, FindsTheFirstTriangle) {
   EXPECT_GT(hits, 300u);
 }
 
-// Rays within the plane of all triangles, as far as roundings allow: where such a triangle is met
-// is theirs to say, but it is the same for every tree.
+// Rays within the plane of all triangles, up to rounding: where such a triangle is hit is up to the
+// implementation, but it must be the same for every tree.
 TEST(TriangleHierarchy, AnswersTheSameForEveryTreeWhenEdgeOn) {
   std::size_t hits = 0;
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {
@@ -220,7 +221,7 @@ TEST(TriangleHierarchy, LetsNoRayOutOfAClosedSurface) {
   for (int q = 0; q < 20000; ++q) {
     Ray ray;
     for (double& c : ray.origin) c = 0.4 * (uniform(random) - 0.5);
-    // At corners and middles of edges as they are rounded, and anywhere.
+    // At corners and edge midpoints as rounded, and anywhere.
     const Triangle& triangle = mesh.triangles[random() % mesh.triangles.size()];
     for (std::size_t d = 0; d < 3; ++d) {
       const double first = mesh.corners[triangle[0]][d], second = mesh.corners[triangle[1]][d];
@@ -232,7 +233,7 @@ TEST(TriangleHierarchy, LetsNoRayOutOfAClosedSurface) {
   }
 }
 
-/// Nearest place of a triangle by looking at ever smaller parts around the best one.
+/// Distance to a triangle by searching ever smaller parts around the best one.
 double distance_by_search(const Point3& place, const std::array<Point3, 3>& corners) {
   double best = kInfinity, u0 = 0.0, v0 = 0.0, width = 1.0;
   for (int round = 0; round < 60; ++round, width *= 0.6) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reading rasters as points, one thread, from the page cache. The terrain is midpoint noise: the
-// sum of a few octaves of a lattice of random values, 16-bit.
+// Reading rasters as points, one thread, from the page cache. The terrain is value noise: the sum
+// of a few octaves of a lattice of random values, 16-bit.
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>
@@ -42,7 +42,7 @@ std::int16_t height(std::uint32_t column, std::uint32_t row) {
   return static_cast<std::int16_t>(sum);
 }
 
-/// Files made once, removed at the end.
+/// Files made once and removed at the end.
 class Inputs {
  public:
   Inputs()
@@ -95,7 +95,7 @@ void read_points(benchmark::State& state, stream::GeoTiffCompression compression
   state.SetItemsProcessed(static_cast<std::int64_t>(points));
 }
 
-/// The floor: libtiff's decoding and the copy into windows, without points.
+/// The lower limit: libtiff's decoding and the copy into windows, without points.
 void read_windows(benchmark::State& state, stream::GeoTiffCompression compression) {
   const std::string file = inputs().file(compression, false);
   const auto raster = stream::open_geotiff(file);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decoding and encoding LAZ on one core, from memory to memory: made scans of some formats, and the
-// files in TERRACE_DATA where it is set. Items are points, bytes those of the records.
+// Decoding and encoding LAZ on one core, in memory: synthetic scans of some formats, and the files
+// in TERRACE_DATA if it is set. Items are points, bytes those of the records.
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Reading and writing files of points, warm: survey coordinates (millimetres in a UTM zone), the
-// same with three more columns, and with those of LAS's point format 6. Items are points.
+// same with three more columns, and with those of LAS point format 6. Items are points.
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -109,7 +109,7 @@ void read(benchmark::State& state, const std::string& format, Columns columns) {
   std::filesystem::remove(path);
 }
 
-/// Without the syncs, which would measure the disk: the file is given up after its last point.
+/// Without the syncs, which would measure the disk: the file is abandoned after its last point.
 void write(benchmark::State& state, const std::string& format, Columns columns) {
   const std::string path = scratch_file();
   Survey survey(columns);
@@ -122,7 +122,7 @@ void write(benchmark::State& state, const std::string& format, Columns columns) 
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(point_count()));
 }
 
-/// COPC of a hilly survey, syncs included: its work begins after the last point.
+/// COPC of a hilly survey, including syncs: its work begins after the last point.
 void write_octree(benchmark::State& state) {
   const std::string path = scratch_file();
   Survey survey(Columns::laser);

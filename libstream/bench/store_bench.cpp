@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The store on a fractal int16 raster (midpoint displacement with an RMS step of about 2.65 m from
-// cell to cell) and on a cloud of decimals on a surface: encoding, reading all of it, reading
-// clusters at random, and the size. Blocks are clustered once beforehand by a stand-in.
+// cell to cell) and on a cloud of decimals on a surface: encoding, reading everything, reading
+// random clusters, and the size. Blocks are clustered once beforehand by a stand-in.
 #include <cstdlib>
 #include <filesystem>
 #include <optional>
@@ -91,7 +91,7 @@ void count_points(benchmark::State& state, std::uint64_t points) {
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(points));
 }
 
-/// encode() of blocks that have their tables, no I/O.
+/// encode() of blocks whose tables exist, without I/O.
 void encode(benchmark::State& state, bool grid) {
   const Input& in = input(grid);
   const auto path = store_path(grid).string() + "-encode";
@@ -100,7 +100,7 @@ void encode(benchmark::State& state, bool grid) {
   for (const testing::OwnedBlock& block : in.blocks) {
     if (block.level == 0) level0.push_back(block.view());
   }
-  // Tables are made from 64 blocks; a small input is given as often as that takes.
+  // Tables are made from 64 blocks; a small input is repeated as often as necessary.
   for (std::size_t b = 0; b < 64; ++b) writer.append(writer.encode(level0[b % level0.size()]));
   std::uint64_t points = 0;
   for (auto _ : state) {
@@ -136,7 +136,7 @@ void read_all(benchmark::State& state, bool grid) {
       static_cast<double>(index) / static_cast<double>(clusters);
 }
 
-/// One cluster of level 0, drawn at random: record and points.
+/// One random cluster of level 0: record and points.
 void read_one(benchmark::State& state, bool grid) {
   const Store& store = built(grid);
   std::mt19937_64 random(1);

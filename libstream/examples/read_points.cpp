@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads points from a file, or from several as one, and prints how many there are and their bounds:
+// Reads points from a file, or from several as one, and prints their number and bounds:
 //   read_points [FILE...]
-// Without a file it writes a small one first, so that it always has something to show.
+// Without arguments it writes a small file first, so that it always has something to show.
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>

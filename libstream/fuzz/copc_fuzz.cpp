@@ -10,8 +10,8 @@
 #include "format/copc/hierarchy.hpp"
 #include "fuzz_points.hpp"
 
-/// Any bytes are an octree or refused: 8 with the points that a header promises, the info VLR, and
-/// then the file that its page lies in.
+/// Any bytes are an octree or refused: 8 with the number of points in the header, the info VLR, and
+/// then the file that contains its page.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace terrace::stream;
   constexpr std::size_t kPointsBytes = 8, kInfoBytes = 160;

@@ -13,7 +13,7 @@
 
 namespace {
 
-/// A folder for the files of one data set, removed with the process.
+/// A folder for the files of one dataset, removed with the process.
 class Folder {
  public:
   Folder() {
@@ -43,7 +43,7 @@ class Folder {
 
 }  // namespace
 
-/// Any files are a data set or refused: ept.json, two files of the hierarchy, and the root's points
+/// Any files are a dataset or refused: ept.json, two files of the hierarchy, and the root's points
 /// in each of the three forms, with zero bytes between them.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace terrace::stream;

@@ -16,14 +16,14 @@
 
 namespace terrace::stream {
 
-/// Stops the fuzzer where the library broke a promise, in release builds too.
+/// Stops the fuzzer if the library broke a guarantee, in release builds too.
 inline void require(bool good, const char* what) {
   if (good) return;
   std::fprintf(stderr, "broken promise: %s\n", what);
   std::abort();
 }
 
-/// The input as a file in memory, so that the reader takes its ordinary way.
+/// The input as a file in memory, so that the reader uses its ordinary path.
 class MemoryFile {
  public:
   MemoryFile(const std::uint8_t* data, std::size_t size) : fd_(memfd_create("fuzz", 0)) {
@@ -41,7 +41,7 @@ class MemoryFile {
   std::string name_;
 };
 
-/// What came of reading a file: its points folded into one number, or an Error.
+/// The result of reading a file: its points folded into one number, or an Error.
 struct Reading {
   bool refused = false;
   std::uint64_t points = 0;
@@ -50,7 +50,7 @@ struct Reading {
   friend bool operator==(const Reading&, const Reading&) = default;
 };
 
-/// Reads all of a file and holds the reader to its promises: blocks within their size, columns of
+/// Reads a complete file and checks the reader's guarantees: blocks within their size, columns of
 /// the right length, finite coordinates, no exception but Error.
 inline Reading read_through(const std::string& file, const SourceOptions& options) {
   Reading reading;
@@ -69,7 +69,7 @@ inline Reading read_through(const std::string& file, const SourceOptions& option
         for (const double value : block.positions[i]) {
           require(value - value == 0.0, "finite coordinates");
         }
-        // In the order of the points, so that blocks of any size fold alike.
+        // In the order of the points, so that blocks of any size give the same number.
         fold(&block.positions[i], sizeof(Point3));
         fold(block.payload.data() + i * record, record);
       }
@@ -87,8 +87,8 @@ inline Reading read_through(const std::string& file, const SourceOptions& option
   return reading;
 }
 
-/// Reads cells of a raster and holds the reader to its promises. A few blocks will do: sparse and
-/// packed files can be sound and very large.
+/// Reads cells of a raster and checks the reader's guarantees. A few blocks suffice: sparse and
+/// compressed files can be valid and very large.
 inline void read_cells(PointSource& source, std::size_t block_points) {
   const SourceInfo& info = source.info();
   PointBlock block;

@@ -3,8 +3,8 @@
 
 #include "fuzz_points.hpp"
 
-/// GeoJSON: refused, or no more positions than the file can hold, with as many in its lines as in
-/// their segments.
+/// GeoJSON is refused, or has no more positions than the file can hold, and as many in its lines as
+/// in its segments.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace terrace::stream;
   const MemoryFile file(data, size);

@@ -25,7 +25,7 @@ void read_or_refuse(Open&& open) {
   }
 }
 
-/// A file whose name is that of a tile.
+/// A file with the name of a tile.
 class TileFile {
  public:
   TileFile(const std::uint8_t* data, std::size_t size) {
@@ -52,7 +52,7 @@ class TileFile {
 }  // namespace terrace::stream
 
 /// Any bytes as each of the grids: an Error, or points within the grid. As a binary grid they are
-/// its header, and the samples too.
+/// both its header and its samples.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace terrace::stream;
   const MemoryFile file(data, size);
@@ -74,7 +74,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
                              bytes_in_memory("grid", {bytes, bytes + size}));
     });
   }
-  // What is no archive is a tile only by its size.
+  // Data that is not an archive is a tile only if its size is right.
   if (text.starts_with("PK") || text.starts_with("\x1f\x8b") || size < 1000) {
     const TileFile tile(data, size);
     read_or_refuse([&] { return open_hgt(tile.name()); });

@@ -12,8 +12,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const Reading threads =
       read_through(file.name(), {.format = "las", .block_points = 500, .threads = 2});
   require(large == threads, "the same points by any number of threads");
-  // What is whole is read the same where damage is left out; of the rest there is as much as can
-  // be.
+  // An intact file is read the same if damage is left out; of a damaged file as much as possible is
+  // read.
   std::uint64_t told = 0;
   const OnDamage count = [&told](const Error&, std::uint64_t points) { told += points; };
   const Reading rest =

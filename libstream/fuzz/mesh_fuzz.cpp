@@ -4,9 +4,9 @@
 #include "fuzz_points.hpp"
 #include "terrace/stream/mesh_reader.hpp"
 
-/// Mesh files, PLY, OBJ, OFF and STL: refused, or triangles of vertices that are there, with a
-/// whole record for each vertex, and no more of them than the file can hold. As a stream they are
-/// as many.
+/// Mesh files, PLY, OBJ, OFF and STL: refused, or triangles of existing vertices, with a complete
+/// record for each vertex, and no more of them than the file can hold. As a stream there are as
+/// many.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace terrace::stream;
   const MemoryFile file(data, size);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The parsers of a store: a cluster's bytes under given tables, tables, an index page, a manifest.
-// The first byte chooses. Whatever comes must be refused with Damage or Error, or be consistent.
+// The parsers of a store: a cluster's bytes with given tables, tables, an index page, a manifest.
+// The first byte selects one. All input must be refused with Damage or Error, or be consistent.
 #include <cassert>
 #include <cstdint>
 #include <cstdlib>
@@ -26,7 +26,7 @@ StoreSchema schema_for(bool grid, int version) {
   StoreSchema schema;
   schema.grid = grid;
   std::vector<ScalarType> types{ScalarType::u8, ScalarType::f32, ScalarType::f64};
-  // A column may lie beside one of integers.
+  // A column of kind "beside" needs one of integers before it.
   if (version > 1) types.insert(types.begin(), {ScalarType::u64, ScalarType::i16});
   for (const ScalarType type : types) {
     schema.attributes.push_back({std::string(name_of(type)), type, 1.0, 0.0, {}});
@@ -34,7 +34,7 @@ StoreSchema schema_for(bool grid, int version) {
   return schema;
 }
 
-/// Frequencies in which everything is likely, so that bytes reach far into the decoder. The levels
+/// Frequencies in which everything is likely, so that bytes reach far into the decoder. All levels
 /// have the same contexts.
 Tables even_tables(const Layout& layout, ColumnKind kind) {
   Tables tables;
@@ -88,7 +88,7 @@ void read_page(ByteReader in, std::size_t attributes) {
   const std::uint32_t clusters = 1 + in.get<std::uint8_t>() % kPageClusters;
   const ByteView rest = in.take(in.left());
   Bytes bytes(rest.begin(), rest.end());
-  put(bytes, crc32(bytes));  // nobody guesses a checksum: the parser behind it is the target
+  put(bytes, crc32(bytes));  // a fuzzer cannot guess a checksum: the parser after it is the target
   const IndexPage page(std::move(bytes), clusters, attributes);
   for (std::uint32_t i = 0; i < clusters; ++i) {
     for (std::size_t a = 0; a < attributes; ++a) static_cast<void>(page.range(i, a));
@@ -109,7 +109,7 @@ void read_tables(ByteReader in, int version) {
   require(second.predictor.coefficients == tables.predictor.coefficients);
 }
 
-/// Nobody guesses a checksum: the parser behind it is the target.
+/// A fuzzer cannot guess a checksum: the parser after it is the target.
 void mend_manifest(std::string& text) {
   constexpr std::size_t kDigitsFromEnd = 12;  // eight digits, a quote, newline, brace, newline
   if (text.size() < kDigitsFromEnd) return;

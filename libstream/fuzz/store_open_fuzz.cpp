@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A whole store: Store::open, all ways to read it, and verify. Its checksums are mended first, so
-// that what lies behind them is the target. The input is file after file: two bytes for the length
-// of the name, the name, four bytes for the number of bytes, the bytes.
+// A complete store: Store::open, all ways to read it, and verify. Its checksums are recomputed
+// first, so that the code after them is the target. The input is file after file: two bytes for the
+// length of the name, the name, four bytes for the number of bytes, the bytes.
 #include <cmath>
 #include <cstdlib>
 #include <optional>
@@ -17,7 +17,7 @@ namespace {
 using namespace terrace::stream;
 namespace fs = std::filesystem;
 
-/// One folder for the life of the process.
+/// One folder for the lifetime of the process.
 class Folder {
  public:
   Folder() {
@@ -57,7 +57,7 @@ testing::StoreFiles files_of(std::string_view input) {
   return files;
 }
 
-/// What Store promises of any store that opens.
+/// The guarantees of Store for any store that opens.
 class Promises {
  public:
   explicit Promises(const Store& store) : store_(store) {}
@@ -110,7 +110,7 @@ void read_all(const Store& store) {
       whole = false;
     }
   }
-  // One by one, from behind, so that what can be read of a damaged store is read.
+  // One by one, backwards, so that the readable parts of a damaged store are read.
   ClusterPoints points;
   for (const LevelInfo& level : store.levels()) {
     for (std::uint64_t i = std::min<std::uint64_t>(level.clusters, 300); i-- > 0;) {
@@ -124,7 +124,7 @@ void read_all(const Store& store) {
       }
     }
   }
-  // Queries end, whatever the hierarchy says, and find all points of a sound store.
+  // Queries terminate, whatever the hierarchy says, and find all points of an intact store.
   std::optional<std::uint64_t> counted;
   try {
     StoreQuery query(store);

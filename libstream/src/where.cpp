@@ -38,7 +38,7 @@ enum class Where::Operation : std::uint8_t {
   either,
 };
 
-/// By precedence climbing: operands and operators come out in postfix order.
+/// Precedence climbing: operands and operators are emitted in postfix order.
 class Where::Parser {
  public:
   Parser(Where& where, const Schema& schema)
@@ -62,7 +62,7 @@ class Where::Parser {
     Operation operation;
     unsigned precedence;
   };
-  // Longer signs stand before those that they begin with.
+  // Longer operators come before their prefixes.
   static constexpr std::array<Binary, 14> kBinary{{{"||", Operation::either, 1},
                                                    {"or", Operation::either, 1},
                                                    {"&&", Operation::both, 2},
@@ -96,7 +96,7 @@ class Where::Parser {
   void skip_blanks() {
     while (at_ < text_.size() && std::isspace(static_cast<unsigned char>(text_[at_])) != 0) ++at_;
   }
-  /// Moves past a sign or word that stands here.
+  /// Moves past a given operator or word.
   bool take(std::string_view sign) {
     skip_blanks();
     if (!text_.substr(at_).starts_with(sign)) return false;
@@ -213,7 +213,7 @@ class Where::Parser {
 
 namespace {
 
-/// Points that are computed together: the operands stay in the first cache.
+/// Points that are evaluated together: the operands stay in the first-level cache.
 constexpr std::size_t kLanes = 256;
 using Lanes = std::array<double, kLanes>;
 
@@ -238,8 +238,8 @@ void combine(Lanes& a, const Lanes& b, const Function& function) {
   for (std::size_t i = 0; i < kLanes; ++i) a[i] = static_cast<double>(function(a[i], b[i]));
 }
 
-/// Interval arithmetic. Every operation of doubles is monotonic in each operand, rounding included,
-/// so its ends lie at those of the operands; where one is no number anything is possible.
+/// Interval arithmetic. Every operation on doubles is monotonic in each operand, including
+/// rounding, so its ends are at those of the operands; if one is NaN anything is possible.
 ValueRange hull(std::initializer_list<double> ends, bool nan) {
   ValueRange range{std::min(ends), std::max(ends), nan};
   for (const double end : ends) {
@@ -254,8 +254,8 @@ bool may_hold(const ValueRange& v) { return v.low != 0.0 || v.high != 0.0; }
 bool may_fail(const ValueRange& v) { return v.nan || (v.low <= 0.0 && v.high >= 0.0); }
 bool is_one(const ValueRange& v) { return !v.nan && v.low == v.high; }
 
-/// `sure` pairs compare as wanted and `never` ones do not, unless there is a NaN, of which nothing
-/// is less, equal or greater.
+/// `sure` pairs compare as wanted and `never` ones do not, unless there is a NaN, which compares
+/// false.
 ValueRange comparison(const ValueRange& a, const ValueRange& b, bool sure, bool never) {
   return truth(!sure || a.nan || b.nan, !never);
 }

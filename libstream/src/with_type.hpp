@@ -8,7 +8,7 @@
 
 namespace terrace::stream {
 
-/// Calls visit(T{}) with the C++ type T that `type` names.
+/// Calls visit(T{}) with the C++ type T for `type`.
 template <class Visit>
 decltype(auto) with_type(ScalarType type, Visit&& visit) {
   switch (type) {

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Reads stores and overlays. Written from FORMAT.md alone, and to stay so: where it and the library
+"""Reads stores and overlays. Written from FORMAT.md alone, and to be kept so: if it and the library
 differ, one of the three is wrong.
 
     decode_store.py STORE            every point: its cluster's level and ordinal, coordinates, attributes
@@ -49,7 +49,7 @@ def crc16(data):
 
 
 def real(form, k):
-    """The double that integer `k` stands for in a number form."""
+    """The double represented by integer `k` in a number form."""
     if form < 20:
         value = float(k) / 10 ** (form % 10)
         return value if form < 10 else struct.unpack("<f", struct.pack("<f", value))[0]
@@ -263,7 +263,7 @@ def attribute(source, context, count, kind):
 
 
 def column(source, number, count, floating, before):
-    """The number form (None but for floats) and the integers of a column of version 2."""
+    """The number form (None except for floats) and the integers of a column of version 2."""
     c, kind = 148 + 10 * number, source.tables.kinds[number]
     head = source.symbol(c)
     form = head % 22 if floating else None
@@ -330,7 +330,7 @@ def key(kind, value):
 
 
 class Cluster:
-    """`points` (three doubles), `attributes` (a column each), `children` (per level below, from the next), the place of
+    """`points` (three doubles), `attributes` (a column each), `children` (per level below, from the next), the position of
     the representative (None in the root)."""
 
     def __init__(self, data, entry, tables, schema, level, root, grid):
@@ -448,7 +448,7 @@ class Store:
         self.levels = [Level(folder, k, levels, self.manifest) for k in range(len(levels))]
 
     def points(self):
-        """Of every point the level and the ordinal of the cluster that it is a member of, coordinates, attributes."""
+        """For every point: level and ordinal of its cluster, coordinates, attributes."""
         for number, level in enumerate(self.levels):
             for ordinal, cluster in enumerate(level.clusters):
                 for k in cluster.members() if cluster else ():

@@ -25,7 +25,7 @@ inline std::string compressed(std::string_view bytes) {
   return out;
 }
 
-/// A data set of 8 x 8 x 8 units with the corner at 0, of records that a test writes itself.
+/// A dataset of 8 x 8 x 8 units with its corner at 0, with records written by the test itself.
 struct EptParts {
   Json metadata = {
       {"version", "1.0.0"},
@@ -65,7 +65,7 @@ struct EptParts {
   }
 };
 
-/// Three nodes; the last is told by a file of the hierarchy of its own.
+/// Three nodes; the last is described by a separate file of the hierarchy.
 inline EptParts small_parts() {
   EptParts parts;
   parts.add("0-0-0-0.bin", {{-8, -8, 0}, {7, 7, 31}});

@@ -49,7 +49,7 @@ TEST(Ept, ReadsWhatItsSchemaSays) {
   expect_coarser_parts(file);
 }
 
-// The intensity comes first, and is the number of points of the node.
+// The intensity comes first, and equals the number of points of the node.
 TEST(Ept, RecordsThatBeginLikeGzipAreRecords) {
   const TempFolder folder;
   EptParts parts;
@@ -65,7 +65,7 @@ TEST(Ept, AFolderWithEptJsonIsOneInput) {
   for (const fs::path& name : {folder.path() / "all" / "scan", folder.path() / "all"}) {
     EXPECT_EQ(read_file(name).info.files, std::vector<std::string>{inside});
   }
-  // Beside another, on a lattice that begins elsewhere.
+  // Next to another dataset, on a lattice that begins elsewhere.
   EptParts other = small_parts();
   other.metadata["schema"][1]["offset"] = 104;
   other.write(folder.path() / "all" / "scan2");
@@ -98,7 +98,7 @@ TEST(Ept, CoordinatesMayBeOfAnyType) {
       const TempFolder folder;
       EXPECT_EQ(read_file(parts.write(folder.path())).points.positions,
                 std::vector<Point3>({{1, 2, 3}}));
-      // Not a number, and more than a double holds.
+      // NaN, and more than a double can hold.
       if (*type == 'f' || size == 8) {
         std::fill_n(parts.nodes["0-0-0-0.bin"].begin(), size, *type == 'f' ? '\xff' : '\x7f');
         const TempFolder damaged;
@@ -149,7 +149,7 @@ TEST(Ept, NodesOfLazAgree) {
   EXPECT_NE(read(3, 0.5).find("scale or offset"), std::string::npos);
 }
 
-/// A copy of the data set whose nodes hold records of its schema.
+/// A copy of the dataset whose nodes hold records of its schema.
 std::string write_by_schema(const fs::path& from, const fs::path& folder, bool zstandard) {
   Json metadata = Json::parse(read_text(from / "ept.json"));
   metadata["dataType"] = zstandard ? "zstandard" : "binary";
@@ -157,7 +157,7 @@ std::string write_by_schema(const fs::path& from, const fs::path& folder, bool z
   fs::copy(from / "ept-hierarchy", folder / "ept-hierarchy");
   for (const auto& entry : fs::directory_iterator(from / "ept-data")) {
     const AllPoints node = read_file(entry.path());
-    // The headers' offsets are not those of the schema.
+    // The headers' offsets differ from those of the schema.
     const Lattice lattice = lattice_of(node.info).value();
     for (std::size_t axis = 0; axis < 3; ++axis) {
       metadata["schema"][axis]["offset"] = lattice.offset[axis];
@@ -222,7 +222,7 @@ TEST(Ept, LoneStarInAllThreeForms) {
     const std::size_t bytes = points.info.payload_size();
     for (std::size_t i = 0; i < points.points.size(); ++i) {
       const Point3 at = world_point(points.info, points.points.positions[i]);
-      // In steps, as offsets differ.
+      // Compared in steps, as offsets differ.
       std::vector<double> values;
       for (const double value : at) values.push_back(std::round(value / 0.00025));
       for (const auto& [type, offset] : columns) {

@@ -11,13 +11,13 @@
 
 namespace terrace::stream {
 
-/// GDAL's command line tools, where they are installed, are the oracle of what a GeoTIFF means.
+/// GDAL's command line tools, if installed, are the oracle for the meaning of a GeoTIFF.
 inline bool has_gdal() {
   static const bool found = std::system("command -v gdalinfo >/dev/null 2>&1") == 0;
   return found;
 }
 
-/// What a command prints.
+/// The output of a command.
 inline std::string output_of(const std::string& command) {
   std::string text;
   FILE* const pipe = popen((command + " 2>/dev/null").c_str(), "r");

@@ -24,7 +24,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// What is in GeoJSON by walking it as a whole.
+/// The contents of GeoJSON, found by walking the parsed document.
 struct Walked {
   std::vector<Point3> positions;
   std::vector<std::vector<Point3>> lines;
@@ -101,7 +101,7 @@ class GeoJson : public testing::Test {
     return points;
   }
 
-  /// The lines, joined again. Checks the columns on the way.
+  /// Joins the lines again and checks the columns on the way.
   static std::vector<std::vector<Point3>> lines_of(const std::vector<std::string>& files,
                                                    Entities entities,
                                                    std::uint64_t* excluded = nullptr) {
@@ -177,7 +177,7 @@ class GeoJson : public testing::Test {
   TempFolder folder_;
 };
 
-/// Random geometries of all types, nested, with members that mean nothing here.
+/// Random geometries of all types, nested, with irrelevant members.
 class Maker {
  public:
   explicit Maker(std::uint64_t seed) : random_(seed) {}
@@ -363,7 +363,7 @@ TEST_F(GeoJson, IsRefusedWhereItIsNone) {
   }
   expect_error(R"({"type":"Feature","geometry":{)" + deep + "}}", "nested too deeply");
 
-  // A feature that is longer than memory allows, before it is read as a whole.
+  // A feature longer than memory allows is refused before it is read completely.
   std::string large = R"({"type":"LineString","coordinates":[[0,0])";
   for (int i = 0; i < 400'000; ++i) large += ",[1,1]";
   SourceOptions little = options(Entities::polylines);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What libtiff writes, in every encoding it has, must be read back bit by bit.
+// Files written by libtiff, in all of its encodings, must be read back bit for bit.
 #include <bit>
 #include <cmath>
 #include <random>
@@ -141,7 +141,7 @@ TEST(GeoTiffEncodings, EveryTypeAndCodecReadsBack) {
          {COMPRESSION_NONE, COMPRESSION_LZW, COMPRESSION_PACKBITS, COMPRESSION_ADOBE_DEFLATE,
           COMPRESSION_DEFLATE, COMPRESSION_LZMA, COMPRESSION_ZSTD, COMPRESSION_LERC}) {
       if (TIFFIsCODECConfigured(static_cast<std::uint16_t>(codec)) == 0) continue;
-      // LERC knows no 64-bit integers.
+      // LERC does not support 64-bit integers.
       if (codec == COMPRESSION_LERC && (type == ScalarType::i64 || type == ScalarType::u64)) {
         continue;
       }
@@ -158,7 +158,7 @@ TEST(GeoTiffEncodings, EveryTypeAndCodecReadsBack) {
         spec.columns = 1 + static_cast<std::uint32_t>(random() % 90);
         spec.rows = 1 + static_cast<std::uint32_t>(random() % 90);
         spec.mode = random() % 2 == 0 ? "w" : "w8";
-        // libtiff's writer (4.5) forgets the byte order with predictor 3; its reader does not, as
+        // libtiff's writer (4.5) ignores the byte order with predictor 3; its reader does not, as
         // the real files show.
         if (predictor != 3 && random() % 2 == 0) spec.mode += "b";
         if (random() % 2 == 0) {
@@ -203,8 +203,8 @@ TEST(GeoTiffEncodings, OneCompressedStripLargerThanMemoryIsReadByRows) {
   EXPECT_EQ(points, values.size());
 }
 
-/// Strips are read row by row where they are large, in windows in any order; and a file says what
-/// it holds: not the strip decoded.
+/// Large strips are read row by row, in windows in any order; and the memory reported for a file
+/// does not include the decoded strip.
 TEST(GeoTiffEncodings, ALargeStripIsNotHeldDecoded) {
   const TempFolder folder;
   const std::string path = (folder.path() / "x.tif").string();
@@ -251,7 +251,7 @@ TEST(GeoTiffEncodings, ATileLargerThanMemoryIsRefusedWithItsNeeds) {
   EXPECT_NO_THROW(open_geotiff(path));
 }
 
-/// Packs unsigned numbers of `bits` bits, each row from a byte on, from the highest bit on.
+/// Packs unsigned numbers of `bits` bits, each row starting at a byte, from the highest bit on.
 std::vector<std::uint8_t> packed(const std::vector<std::uint32_t>& values, std::size_t columns,
                                  unsigned bits) {
   std::vector<std::uint8_t> out;

@@ -159,7 +159,8 @@ TEST(GeoReference, ScaleOffsetAndUnitOfABand) {
   EXPECT_EQ(band_metadata(xml, 0).unit, "metre");
   EXPECT_EQ(band_metadata(xml, 1).scale, 7);
   EXPECT_EQ(band_metadata(xml, 1).offset, std::nullopt);
-  for (std::size_t n = 0; n < xml.size(); ++n) band_metadata(xml.substr(0, n), 0);  // any cut
+  // truncated anywhere
+  for (std::size_t n = 0; n < xml.size(); ++n) band_metadata(xml.substr(0, n), 0);
   EXPECT_THROW(info_with([](TIFF* tiff) {
                  TIFFSetField(tiff, 42112,
                               "<Item name=\"SCALE\" sample=\"0\" role=\"scale\">0</Item>");
@@ -167,7 +168,7 @@ TEST(GeoReference, ScaleOffsetAndUnitOfABand) {
                Error);
 }
 
-/// GDAL gives the outer corner of the first cell, we the place of its sample.
+/// GDAL gives the outer corner of the first cell, we the position of its sample.
 TEST(GeoReference, RealFilesLieWhereGdalPutsThem) {
   const auto folder = real_data();
   if (!folder) GTEST_SKIP() << "needs TERRACE_DATA";
@@ -176,7 +177,7 @@ TEST(GeoReference, RealFilesLieWhereGdalPutsThem) {
   for (const auto& entry : std::filesystem::recursive_directory_iterator(*folder / "dem")) {
     const std::string path = entry.path().string();
     if (entry.path().extension() != ".tif" || path.find("hostile") != path.npos) continue;
-    // A few of the many encodings of one place will do: gdalinfo takes its time.
+    // A few of the many encodings of one place suffice: gdalinfo is slow.
     const std::string name = entry.path().filename().string();
     const bool alike = path.find("/encodings/") != path.npos || name.starts_with("float") ||
                        name.starts_with("uint") || name.starts_with("int") ||

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files that lie about themselves: each gives one Error, or exactly what a sound reader would read;
-// never a crash, a hang, a huge allocation or a word on standard error.
+// Files with false contents: each gives one Error, or exactly what a correct reader would read;
+// never a crash, a hang, a huge allocation or output on standard error.
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
@@ -39,13 +39,13 @@ std::uint64_t points_in(const std::string& path) {
   return points;
 }
 
-/// A file of its own each time: truncating one and writing it anew makes ext4 flush it.
+/// A new file each time: truncating and rewriting one makes ext4 flush it.
 void write_anew(const std::string& path, const std::string& bytes) {
   std::filesystem::remove(path);
   std::ofstream(path, std::ios::binary) << bytes;
 }
 
-/// GDAL's zoo of malformed files that hold something sound; all the others are refused.
+/// GDAL's collection of malformed files with valid contents; all the others are refused.
 const std::map<std::string, std::uint64_t> kSound{
     {"byte_bigtiff_invalid_slong8_for_stripoffsets.tif", 400},
     {"huge-implied-number-strips.tif", 400},
@@ -53,7 +53,7 @@ const std::map<std::string, std::uint64_t> kSound{
     {"tag_without_null_byte.tif", 1},
 };
 
-/// Opens and reads the file in a process of its own, short of memory and time, with standard error
+/// Opens and reads the file in a separate process with little memory and time, with standard error
 /// captured in `log`. Exit code: 0 as expected, 1 not, 2 another exception.
 int read_confined(const std::string& path, const std::string& log) {
   const pid_t child = fork();
@@ -100,7 +100,7 @@ TEST(GeoTiffHostile, TheZooIsRefusedOrReadSoundly) {
   EXPECT_GT(files, 25u);
 }
 
-/// A file cut at any byte gives an Error, or all samples in their places.
+/// A file truncated at any byte gives an Error, or all samples in their places.
 void cut_everywhere(const TiffSpec& spec, const std::vector<std::byte>& samples) {
   const TempFolder folder;
   const std::string path = (folder.path() / "whole.tif").string();
@@ -184,7 +184,7 @@ TEST(GeoTiffHostile, AnyByteChangedIsAnErrorOrARaster) {
         write_anew(path, changed);
         try {
           const auto source = points_of(open_geotiff(path));
-          if (*source->info().points > 1000000) continue;  // sparse, or deflated: sound but long
+          if (*source->info().points > 1000000) continue;  // sparse or deflated: valid but long
           PointBlock block;
           while (source->next(block)) {
             for (const Point3& p : block.positions) {

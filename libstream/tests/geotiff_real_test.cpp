@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Real elevation models and GDAL's own zoo of TIFF files, against what GDAL 3.6 says of them
+// Real elevation models and GDAL's own collection of TIFF files, compared with GDAL 3.6's results
 // (data/dem_facts.tsv: file, columns, rows, type, checksum, valid %, min, max, mean).
 #include <cmath>
 #include <cstdint>
@@ -100,7 +100,7 @@ TEST(GeoTiffReal, SamplesAreThoseGdalReads) {
       EXPECT_EQ(max, std::stod(f.max));
       EXPECT_NEAR(sum / static_cast<double>(count), std::stod(f.mean), 1e-6 * (max - min));
     }
-    // What GDAL sums up for cells without data is their nodata value, or a NaN as it stands.
+    // GDAL's sum uses the nodata value for cells without data, or NaN as it is.
     EXPECT_EQ(checksum(whole, whole.info.nodata.value_or(std::nan(""))), f.checksum);
   }
   EXPECT_GT(files, 100u);

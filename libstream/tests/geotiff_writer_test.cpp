@@ -147,7 +147,7 @@ TEST(GeoTiffWriter, GdalReadsTheSame) {
     EXPECT_EQ(band["minimum"], 0.0);
     EXPECT_EQ(band["maximum"], 249.75);
     EXPECT_EQ(info["metadata"]["IMAGE_STRUCTURE"]["COMPRESSION"], geographic ? "ZSTD" : "DEFLATE");
-    // No complaint of any kind, either.
+    // There must be no complaint of any kind.
     EXPECT_EQ(output_of("gdalinfo '" + path + "' 2>&1 >/dev/null | head -3"), "");
   }
 }

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""The golden stores, decoded from FORMAT.md alone, have the points of the texts beside them."""
+"""The golden stores, decoded from FORMAT.md alone, have the points of the accompanying texts."""
 import lzma
 import pathlib
 import unittest

@@ -20,7 +20,7 @@
 #include "terrace/stream/gzip.hpp"
 #include "terrace/stream/input.hpp"
 
-/// gzip that is unpacked as it comes, against libdeflate's.
+/// gzip decompressed as a stream, compared with libdeflate.
 
 namespace terrace::stream {
 namespace {
@@ -39,7 +39,7 @@ std::string some_text(std::size_t size, std::mt19937_64& random) {
   return text;
 }
 
-// `bytes` in pieces of random lengths up to most_in, asked for in such of up to most_out.
+// `bytes` in pieces of random lengths up to most_in, requested in pieces of up to most_out.
 std::string unpacked(const std::string& bytes, std::size_t most_in, std::size_t most_out,
                      std::mt19937_64& random) {
   std::size_t given = std::min<std::size_t>(bytes.size(), random() % 30);
@@ -66,7 +66,7 @@ TEST(GzipStream, UnpacksWhateverThePiecesAre) {
     SCOPED_TRACE("seed 20, round " + std::to_string(round));
     std::string text, bytes;
     for (std::size_t member = 0; member <= random() % 4; ++member) {
-      // Some are empty, as the last of bgzip's.
+      // Some are empty, like the last one of bgzip.
       const std::string part = some_text(random() % 5 == 0 ? 0 : random() % 200'000, random);
       text += part;
       bytes += packed(part, 1 + static_cast<int>(random() % 12));
@@ -82,7 +82,7 @@ TEST(GzipStream, EveryCutIsNoticed) {
   const std::string one = packed(some_text(700, random));
   const std::string bytes = one + packed(some_text(300, random));
   for (std::size_t size = 0; size < bytes.size(); ++size) {
-    if (size == one.size()) continue;  // a whole member
+    if (size == one.size()) continue;  // a complete member
     const std::string cut = bytes.substr(0, size);
     try {
       unpacked(cut, 100, 100, random);
@@ -95,7 +95,7 @@ TEST(GzipStream, EveryCutIsNoticed) {
   }
 }
 
-// No change of a byte goes unnoticed but in the header, of which nothing is used.
+// Every changed byte is noticed, except in the header, which is not used.
 TEST(GzipStream, DamageIsNoticed) {
   std::mt19937_64 random(22);
   const std::string text = some_text(500, random);
@@ -151,7 +151,7 @@ TEST_F(GzipInput, ComesThroughPipes) {
       const std::string pipe = (folder_.path() / "pipe").string();
       ::remove(pipe.c_str());
       ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
-      // The first byte comes alone.
+      // The first byte arrives alone.
       const std::string bytes = gzipped ? packed(text) : text;
       std::thread writer([&] {
         std::ofstream out(pipe, std::ios::binary);

@@ -39,7 +39,7 @@ TEST(Gzip, RefusesDamage) {
   for (std::size_t size = 0; size < packed.size(); ++size) {
     EXPECT_THROW(gunzip(std::span(packed).first(size), 1 << 20, "test"), Error) << size;
   }
-  // After the header, whose time and system are free, every changed byte shows.
+  // After the header, whose time and system are arbitrary, every changed byte is noticed.
   for (std::size_t at = 10; at < packed.size(); ++at) {
     auto damaged = packed;
     damaged[at] ^= std::byte{0x10};

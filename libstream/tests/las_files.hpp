@@ -18,7 +18,7 @@ void put(std::string& bytes, std::size_t at, T value) {
   std::memcpy(bytes.data() + at, &value, sizeof value);
 }
 
-/// The bytes of a LAS file, of parts that need not fit one another.
+/// The bytes of a LAS file, made of parts that need not be consistent.
 struct LasParts {
   unsigned point_format = 1, minor = 2;
   std::size_t record_bytes = 28;

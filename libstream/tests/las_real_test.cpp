@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scans that others have made, where TERRACE_DATA names a folder that has them.
+// Scans by third parties, if TERRACE_DATA names a folder that has them.
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
@@ -29,7 +29,7 @@ std::filesystem::path data_folder() {
   return data == nullptr ? std::filesystem::path() : std::filesystem::path(data) / "lidar";
 }
 
-/// Reads a file and writes it anew, which must not move anything.
+/// Reads a file and rewrites it, which must not move anything.
 void copy_points(const std::string& from, const std::string& to, unsigned threads = 1) {
   const auto source = open_source(std::span(&from, 1), {.threads = threads});
   const auto writer = open_point_writer(
@@ -44,7 +44,7 @@ void copy_points(const std::string& from, const std::string& to, unsigned thread
   EXPECT_EQ(writer->rounding(), 0.0);
 }
 
-/// The records of a file after they were read and written again.
+/// The records of a file after it was read and rewritten.
 std::string records_through(const std::filesystem::path& file, const TempFolder& temp,
                             unsigned threads = 1) {
   const std::string path = temp.path() / "copy.las";
@@ -128,14 +128,14 @@ TEST(LasReal, CompressedRecordsAreThoseLaszipDecodes) {
     ++seen;
     std::filesystem::path file = folder / name;
     if (name.ends_with(".copc.laz")) {
-      // Without the mark of COPC, which is read by its octree, it comes in the order of the file.
+      // Without the mark of COPC, which is read by its octree, it is read in the order of the file.
       std::string bytes = read_text(file);
       bytes.replace(377, 4, "none");
       file = write_text(temp.path() / "plain.laz", bytes);
     }
     EXPECT_EQ(fnv1a(records_through(file, temp, 1)), hash);
     EXPECT_EQ(fnv1a(records_through(file, temp, 3)), hash);
-    // Compressed here, and as it comes from a pipe.
+    // Compressed here, and from a pipe.
     const std::string laz = temp.path() / "copy.laz";
     copy_points(temp.path() / "copy.las", laz);
     EXPECT_EQ(fnv1a(records_through(laz, temp)), hash);

@@ -173,7 +173,7 @@ TEST_F(Las, DecimalsAreAsFineAsThePointsAsk) {
   };
   EXPECT_EQ(written({{691000.25, 5338000.125, 7}}), (Point3{0.001, 0.001, 1}));
   EXPECT_EQ(written({{-0.0946899, 0.0329874, 1.5}, {0.06, 0.18, 0}}), (Point3{1e-7, 1e-7, 0.1}));
-  // A third has as many as 32 bits reach, all over the bounds.
+  // 1/3 gets as many decimals as 32 bits allow within the bounds.
   Box3 bounds{.min = {0, 0, 0}, .max = {1e6, 1e6, 1}};
   EXPECT_EQ(written({{1 / 3.0, 0, 0}}, bounds), (Point3{0.001, 0.001, 1}));
   bounds.max[1] = 1e12;
@@ -211,7 +211,7 @@ TEST_F(Las, CompressedFilesOfSeveralChunksComeBack) {
       EXPECT_TRUE(same_bits(again.points.positions, all.points.positions));
       EXPECT_EQ(again.points.payload, all.points.payload);
     }
-    // What is wrong is found in its chunk, by any number of threads.
+    // Damage is found in its chunk, by any number of threads.
     std::string bytes = read_text(laz);
     const std::string good = bytes;
     bytes[bytes.size() * 3 / 4] ^= 0x55;
@@ -226,7 +226,7 @@ TEST_F(Las, CompressedFilesOfSeveralChunksComeBack) {
   }
 }
 
-// What is left are whole chunks, the same by any number of threads; the damaged one is named.
+// Complete chunks remain, the same by any number of threads; the damaged one is named.
 TEST_F(Las, DamagedChunksAreLeftOutWhereThatIsWanted) {
   std::mt19937_64 random(3);
   for (const unsigned format : {3U, 7U}) {
@@ -272,7 +272,7 @@ TEST_F(Las, DamagedChunksAreLeftOutWhereThatIsWanted) {
       rest.erase(rest.begin() + 50000, rest.begin() + 100000);
       EXPECT_TRUE(same_bits(some.points.positions, rest));
     }
-    // Without its table the chunks are found one after the other, up to where the file ends.
+    // Without their table the chunks are found one after the other, up to the end of the file.
     const AllPoints cut = read(good.substr(0, good.size() / 2), 2);
     ASSERT_EQ(told.size(), 2U);
     EXPECT_NE(told[0].what.find("chunk table"), std::string::npos) << told[0].what;
@@ -280,13 +280,13 @@ TEST_F(Las, DamagedChunksAreLeftOutWhereThatIsWanted) {
     std::vector<Point3> first = all.points.positions;
     first.resize(cut.points.size());
     EXPECT_TRUE(same_bits(cut.points.positions, first));
-    // LAS that is cut off has what is there, to the last whole record.
+    // Truncated LAS is read up to the last complete record.
     const std::string las = read_text((folder_.path() / "a.las").string());
     const AllPoints records = read(las.substr(0, las.size() - 5 * parts.record_bytes - 3), 1);
     ASSERT_EQ(told.size(), 1U);
     EXPECT_EQ(told[0].points, 6U);
     EXPECT_EQ(records.points.size(), 169994U);
-    // Nothing is told of what is whole.
+    // Nothing is reported for an intact file.
     EXPECT_EQ(read(good, 3).points.size(), 170000U);
     EXPECT_TRUE(told.empty());
   }

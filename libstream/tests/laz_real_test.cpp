@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// LAZ files that others have made (data/laz_facts.tsv: file, points, FNV-1a of the records as
-// LASzip decodes them), where TERRACE_DATA names a folder that has them.
+// LAZ files by third parties (data/laz_facts.tsv: file, points, FNV-1a of the records as decoded by
+// LASzip), if TERRACE_DATA names a folder that has them.
 #include <cstdint>
 #include <fstream>
 #include <map>
@@ -51,7 +51,7 @@ TEST(LazReal, RecordsAreThoseLaszipDecodes) {
       ByteVector records(chunk.points * file.vlr.record_length());
       decoder.decode_chunk(file.chunk(chunk), records);
       hash = fnv1a(records, hash);
-      // What is encoded again are the file's bytes: all were written by LASzip or after it.
+      // Encoding again gives the file's bytes: all were written by LASzip or a faithful port.
       ByteVector again;
       encoder.encode_chunk(records, again);
       EXPECT_TRUE(std::ranges::equal(again, file.chunk(chunk)));

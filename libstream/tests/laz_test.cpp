@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The LAZ codec: bytes that LASzip makes of given values, and records there and back.
+// The LAZ codec: LASzip's bytes for given values, and round trips of records.
 #include "terrace/stream/laz.hpp"
 
 #include <algorithm>
@@ -172,7 +172,7 @@ TEST(LazChunkTable, IsThatOfLaszip) {
   vlr.chunk_size = Vlr::kVariable;
   ByteVector variable = write_chunk_table(chunks, vlr);
   EXPECT_EQ(hex(variable), head + "82088dbbd2d072e732b20e000000");
-  variable.push_back(std::byte{0x55});  // what follows the table is another's
+  variable.push_back(std::byte{0x55});  // the bytes after the table belong to something else
   EXPECT_EQ(read_chunk_table(variable, vlr, 100123, 2069), chunks);
 
   EXPECT_EQ(hex(write_chunk_table({}, vlr)), "0000000000000000");
@@ -233,11 +233,11 @@ TEST(LazVlr, RefusesWhatItDoesNotKnow) {
   ByteVector layered = good;  // formats 0 to 5 are not layered
   layered[0] = std::byte{3};
   EXPECT_THROW(Vlr::parse(layered, 3, 34), Corrupt);
-  ByteVector variable = good;  // some writers take 0 for it
+  ByteVector variable = good;  // some writers use 0 for it
   std::fill_n(variable.begin() + 12, 4, std::byte{0});
   EXPECT_EQ(Vlr::parse(variable, 3, 34).chunk_size, Vlr::kVariable);
   Vlr waves = Vlr::of(4, 57);
-  waves.items[2].version = 2;  // another name of the same
+  waves.items[2].version = 2;  // another name for the same
   EXPECT_EQ(Vlr::parse(waves.serialise(), 4, 57).items, waves.items);
   Vlr mixed = Vlr::of(1, 28);
   mixed.items[1].version = 1;
@@ -334,8 +334,8 @@ TEST(LazChunk, ChannelsAreThoseOfLaszip) {
                sizes("17") + layers + "ea592dd7ae7f58260a7d9ffea8a5ec054ebbfc01000000");
 }
 
-/// Records in which each byte is likely to be that of the record before, by chance one of another
-/// or any: all that a model can meet happens soon.
+/// Records in which each byte probably equals that of the previous record, sometimes that of
+/// another one or any value: so all situations of a model occur soon.
 ByteVector made_records(std::size_t length, std::size_t count, unsigned wildness,
                         std::mt19937& random) {
   ByteVector records(length * count);
@@ -363,7 +363,7 @@ std::vector<Vlr> all_codings() {
   return all;
 }
 
-/// Decodes as from a pipe: `feed` bytes more at a time, `most` records at a time.
+/// Decodes as from a pipe: `feed` more bytes at a time, `most` records at a time.
 ByteVector decoded_in_steps(Decoder& decoder, std::span<const std::byte> chunk, std::size_t length,
                             std::size_t points, std::size_t feed, std::size_t most, bool layered) {
   ByteVector records(points * length);
@@ -468,7 +468,7 @@ TEST(LazChunk, LayersThatAreNotWantedKeepTheFirstPointsValue) {
   const ByteVector records = made_records(length, count, 20, random);
   ByteVector chunk;
   Encoder(vlr).encode_chunk(records, chunk);
-  parts.push_back({0, 0, 0});  // X, Y, returns and channel alone
+  parts.push_back({0, 0, 0});  // X, Y, returns and channel only
   for (const Part& wanted : parts) {
     ByteVector expected = records;
     for (const Part& part : parts) {
@@ -498,7 +498,7 @@ TEST(LazChunk, DamageIsAnErrorOrAWrongValueAndNothingElse) {
     Encoder(vlr).encode_chunk(records, chunk);
     Decoder decoder(vlr);
     for (std::size_t size = 0; size < chunk.size(); ++size) {
-      // Not a part of something larger, so that a sanitizer sees the end.
+      // Not a part of a larger buffer, so that a sanitizer sees the end.
       const ByteVector cut(chunk.begin(), chunk.begin() + static_cast<std::ptrdiff_t>(size));
       EXPECT_THROW(decoder.decode_chunk(cut, decoded), Corrupt) << size;
     }
@@ -514,7 +514,7 @@ TEST(LazChunk, DamageIsAnErrorOrAWrongValueAndNothingElse) {
     ByteVector more = chunk;
     more.push_back(std::byte{0});
     EXPECT_THROW(decoder.decode_chunk(more, decoded), Corrupt);
-    // What a decoder met before makes no difference.
+    // A decoder's history makes no difference.
     decoder.decode_chunk(chunk, decoded);
     EXPECT_TRUE(decoded == records);
   }

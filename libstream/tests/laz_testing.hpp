@@ -30,7 +30,7 @@ inline ByteVector read_bytes(const std::filesystem::path& path) {
   return {bytes.begin(), bytes.end()};
 }
 
-/// Not the usual offset: the one that the published hashes were made with.
+/// Not the usual offset basis: the one with which the published hashes were made.
 inline constexpr std::uint64_t kFnvStart = 1469598103934665603u;
 
 inline std::uint64_t fnv1a(std::span<const std::byte> bytes, std::uint64_t hash = kFnvStart) {
@@ -40,7 +40,7 @@ inline std::uint64_t fnv1a(std::span<const std::byte> bytes, std::uint64_t hash 
   return hash;
 }
 
-/// What a LAS header says, as far as chunks need it, and where the bytes are.
+/// The fields of a LAS header that chunks need, and the positions of the bytes.
 struct LazFile {
   ByteVector bytes;
   Vlr vlr;
@@ -88,8 +88,8 @@ struct LazFile {
 inline constexpr std::array<std::size_t, 11> kRecordLengths{20, 28, 26, 34, 57, 63,
                                                             30, 36, 38, 59, 67};
 
-/// Records as of an airborne scanner that sweeps over hills: pulses in time, some with two returns;
-/// colours that change slowly.
+/// Records of a synthetic airborne scanner that sweeps over hills: pulses in time, some with two
+/// returns; colours that change slowly.
 inline ByteVector scanned_records(unsigned format, std::size_t length, std::size_t count) {
   std::mt19937 random(format);
   const bool modern = format >= 6;
@@ -136,7 +136,7 @@ inline ByteVector scanned_records(unsigned format, std::size_t length, std::size
   return records;
 }
 
-/// A LAZ file of records, header and all, in chunks of vlr.chunk_size points.
+/// A complete LAZ file of records, in chunks of vlr.chunk_size points.
 inline ByteVector laz_file(unsigned format, const Vlr& vlr, std::span<const std::byte> records) {
   const std::size_t header_size = format >= 6 ? 375 : 227, length = vlr.record_length();
   const ByteVector payload = vlr.serialise();

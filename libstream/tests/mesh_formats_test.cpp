@@ -22,8 +22,8 @@
 #include "terrace/stream/mesh_reader.hpp"
 #include "terrace/stream/source.hpp"
 
-/// OBJ, OFF and STL: their vertices as points, and as meshes. One random mesh is written in all of
-/// them by this test.
+/// OBJ, OFF and STL: their vertices as points, and as meshes. This test writes one random mesh in
+/// all of them.
 
 namespace terrace::stream {
 namespace {
@@ -37,7 +37,7 @@ SmallMesh random_mesh(std::mt19937_64& random) {
   SmallMesh mesh;
   const std::size_t count = 3 + random() % 60;
   for (std::size_t i = 0; i < count; ++i) {
-    // Floats, which all of the formats hold; every vertex at a place of its own.
+    // Floats, which all of the formats can hold; all vertices at different places.
     const auto coordinate = [&] {
       return static_cast<double>(static_cast<float>(random() % 100000) / 7);
     };
@@ -192,7 +192,7 @@ TEST_F(MeshFormats, FacesAreTheSameInAll) {
         for (const std::uint32_t v : t) found.push_back(file->vertices.positions.at(v));
       }
       EXPECT_EQ(found, corners);
-      // Corners at one place are one vertex.
+      // Coincident corners are one vertex.
       const std::set<Point3> places(corners.begin(), corners.end());
       const bool soup = name.ends_with("stl");
       EXPECT_EQ(file->vertices.size(), soup ? places.size() : mesh.vertices.size());
@@ -248,7 +248,7 @@ TEST_F(MeshFormats, DamageIsNamed) {
   }
 }
 
-// Facts of real files, where they are.
+// Facts of real files, if they are available.
 TEST(MeshFormatsReal, HaveTheFactsOfTheirReadme) {
   const char* data = std::getenv("TERRACE_DATA");
   if (data == nullptr) GTEST_SKIP() << "TERRACE_DATA is not set";
@@ -258,7 +258,7 @@ TEST(MeshFormatsReal, HaveTheFactsOfTheirReadme) {
   const auto cow = read_mesh(scan + "cow.off");
   ASSERT_TRUE(cow);
   EXPECT_EQ(cow->triangles.size(), 5520U);
-  // Packed, as the archive of scans has it.
+  // Compressed, as in the archive of scans.
   EXPECT_GT(read_all({scan + "dragon_vrip_res3.ply.gz"}).points.size(), 10'000U);
 }
 

@@ -54,7 +54,7 @@ TEST_F(MeshReader, ReadsStrips) {
            "8 0 1 2 3 -1 2 3 4\n");
   ASSERT_TRUE(file);
   ASSERT_EQ(file->triangles.size(), 3u);
-  EXPECT_EQ(file->triangles[1], (std::array<std::uint32_t, 3>{2, 1, 3}));  // turned
+  EXPECT_EQ(file->triangles[1], (std::array<std::uint32_t, 3>{2, 1, 3}));  // reversed
   EXPECT_EQ(file->triangles[2], (std::array<std::uint32_t, 3>{2, 3, 4}));
 }
 
@@ -73,7 +73,7 @@ TEST_F(MeshReader, LeavesCloudsToOthers) {
   EXPECT_FALSE(read("c.xyz", "1 2 3\n"));
 }
 
-// What the library writes comes back, bit for bit.
+// The library's own output is read back bit for bit.
 TEST_F(MeshReader, ReadsWhatTheLibraryWrites) {
   const std::vector<Point3> positions{{0.1, 1e7 + 0.2, -3}, {1, 0, 0.5}, {5, 5, 5}};
   const std::vector<float> levels{1, 2, 7};
@@ -98,7 +98,7 @@ TEST_F(MeshReader, ReadsWhatTheLibraryWrites) {
   }
 }
 
-// A damaged file is read as what it says, or refused: never past its end.
+// A damaged file is read as it stands, or refused: never beyond its end.
 TEST_F(MeshReader, SurvivesDamage) {
   const std::string good = kSquare;
   for (std::size_t end = 0; end < good.size(); ++end) {
@@ -123,7 +123,7 @@ TEST_F(MeshReader, SurvivesDamage) {
   }
 }
 
-// Nothing is left out without a word: their vertices are not known yet.
+// Nothing may be dropped silently: the faces' vertices are not known yet.
 TEST_F(MeshReader, RefusesFacesBeforeTheVertices) {
   EXPECT_THROW(read("f.ply",
                     "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int vertex_index\n"
@@ -132,7 +132,7 @@ TEST_F(MeshReader, RefusesFacesBeforeTheVertices) {
                Error);
 }
 
-// Their properties could differ, and there would be levels for some vertices only.
+// Their properties could differ, and only some vertices would have levels.
 TEST_F(MeshReader, RefusesASecondElementOfVertices) {
   std::string twice = kSquare;
   const std::string faces = "element face", row = "4 0 1 2 3";
@@ -141,7 +141,7 @@ TEST_F(MeshReader, RefusesASecondElementOfVertices) {
   EXPECT_THROW(read("twice.ply", twice), Error);
 }
 
-// Facts of the real scans, where they are.
+// Facts of the real scans, if they are available.
 TEST(MeshReaderReal, HasTheFactsOfItsReadme) {
   const char* data = std::getenv("TERRACE_DATA");
   if (data == nullptr) GTEST_SKIP() << "TERRACE_DATA is not set";

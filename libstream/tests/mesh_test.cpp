@@ -137,7 +137,7 @@ TEST_F(MeshFile, PlyIsReadBackBitForBit) {
   }
 }
 
-/// A GLB file taken apart by the specification's own words.
+/// A GLB file parsed according to the specification.
 struct Glb {
   nlohmann::json json;
   std::string binary;
@@ -218,7 +218,7 @@ TEST_F(MeshFile, GlbKeepsPositionsAboutItsOrigin) {
       EXPECT_EQ(glb.value<float>(level, i, 0), mesh.levels[i]);
     }
     for (std::size_t k = 0; k < 3; ++k) {
-      // As a reader sees them: the decimal numbers are the stored floats, exactly.
+      // As a reader sees them: the decimal numbers are exactly the stored floats.
       EXPECT_EQ(accessor["min"][k].get<double>(), static_cast<double>(min[k]));
       EXPECT_EQ(accessor["max"][k].get<double>(), static_cast<double>(max[k]));
     }

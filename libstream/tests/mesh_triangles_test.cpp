@@ -17,7 +17,7 @@
 #include "terrace/stream/mesh_writer.hpp"
 #include "terrace/stream/source.hpp"
 
-/// Entities::triangles against read_mesh(), which holds the mesh in memory.
+/// Entities::triangles compared with read_mesh(), which holds the mesh in memory.
 
 namespace terrace::stream {
 namespace {
@@ -137,13 +137,13 @@ TEST_F(MeshTriangles, AreThoseOfTheMesh) {
       EXPECT_TRUE(same_bits(triangles_of({file}, block), expected)) << block;
     }
   }
-  // One after the other.
+  // One file after the other.
   std::vector<Corners> twice = in_memory(packed);
   twice.insert(twice.end(), twice.begin(), twice.begin() + 5);
   EXPECT_TRUE(same_bits(triangles_of({packed, put("b.obj", obj)}, 3), twice));
 }
 
-// More vertices than are kept in memory, named in no order.
+// More vertices than are kept in memory, referenced in random order.
 TEST_F(MeshTriangles, NameVerticesAnywhereInALargeFile) {
   std::mt19937_64 random(77);
   constexpr std::uint32_t kVertices = 750'001, kTriangles = 20'000;

@@ -43,7 +43,7 @@ class Files {
   std::vector<std::string> names_;
 };
 
-/// Random rasters with holes, overlapping at random: against a map from place to last sample.
+/// Random rasters with holes and random overlaps, compared with a map from place to last sample.
 TEST(Mosaic, TheLastValidSampleWinsAndEachCellIsOnePoint) {
   for (std::uint64_t seed = 1; seed <= 25; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));

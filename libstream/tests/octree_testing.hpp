@@ -15,7 +15,7 @@
 #include "point_files.hpp"
 #include "terrace/stream/schema.hpp"
 
-/// What holds for whatever is read by its octree.
+/// Properties of every file that is read by its octree.
 
 namespace terrace::stream {
 
@@ -26,7 +26,7 @@ inline constexpr Box3 kEverywhere{{-kInfinity, -kInfinity, -kInfinity},
 /// A place in the CRS and the packed attributes.
 using Record = std::pair<Point3, std::string>;
 
-/// Those inside of a region, sorted: equal for the same points in any order.
+/// Those inside a region, sorted: equal for the same points in any order.
 inline std::vector<Record> records(const AllPoints& all, const Box3& region = kEverywhere) {
   std::vector<Record> found;
   const std::size_t bytes = all.info.payload_size();
@@ -40,7 +40,7 @@ inline std::vector<Record> records(const AllPoints& all, const Box3& region = kE
   return found;
 }
 
-/// Regions of each of the files, which have the points `all`, have just those inside.
+/// Regions of each of the files, which have the points `all`, contain exactly those inside.
 inline void expect_parts_of_regions(const std::vector<std::string>& files, const AllPoints& all) {
   Box3 bounds;
   for (const Point3& p : all.points.positions) bounds.include(world_point(all.info, p));
@@ -68,7 +68,7 @@ inline void expect_parts_of_regions(const std::vector<std::string>& files, const
   }
 }
 
-/// Each depth of the file's octree has more points than the one before, and these among them.
+/// Each depth of the file's octree has more points than the previous one, and includes these.
 inline void expect_coarser_parts(const std::string& file) {
   const AllPoints all = read_file(file);
   ASSERT_TRUE(all.info.octree);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Overlays: what is written comes back, and nothing else is taken for an overlay of the store.
+// Overlays: the written values are read back, and nothing else is accepted as an overlay of the
+// store.
 #include "terrace/stream/overlay.hpp"
 
 #include <algorithm>
@@ -76,7 +77,7 @@ Values values_of(Overlay& overlay) {
   return values;
 }
 
-/// The words of the Error that opening and reading throw; empty if there is none.
+/// The message of the Error that opening and reading throw; empty if there is none.
 std::string refusal(const fs::path& path, const Store& store) {
   try {
     Overlay overlay = Overlay::open(path, store);
@@ -109,7 +110,7 @@ TEST(StoreOverlay, ComesBack) {
     EXPECT_EQ(overlay.channel(), "height");
     EXPECT_EQ(overlay.values(), values.size());
     EXPECT_EQ(values_of(overlay), values);
-    // Cluster by cluster, those without values too, first upward, then any.
+    // Cluster by cluster, including those without values, first ascending, then in any order.
     std::vector<ClusterId> clusters;
     for (unsigned level = 0; level <= store.top(); ++level) {
       for (std::uint64_t c = 0; c < store.levels()[level].clusters; ++c) {
@@ -130,7 +131,7 @@ TEST(StoreOverlay, ComesBack) {
       clusters.resize(std::min<std::size_t>(clusters.size(), 50));
     }
   }
-  // The last one has several pages, so that the search among them was tried.
+  // The last one has several pages, so the search among them was exercised.
   EXPECT_GT(store.points(), 2 * 4096u);
 }
 
@@ -208,7 +209,7 @@ TEST(StoreOverlay, OfAnotherStoreIsRefusedWithBothChecksums) {
     EXPECT_TRUE(contains(bytes_of(store->path() / "manifest.json"), digits));
   }
   EXPECT_TRUE(contains(text, "two")) << text;
-  // What is no overlay at all.
+  // Files that are not overlays.
   EXPECT_TRUE(contains(refusal(folder.path() / "none", one), "there is no overlay"));
   EXPECT_TRUE(contains(refusal(folder.path() / "one", one), "there is no overlay"));
   EXPECT_TRUE(contains(refusal(one.path() / "manifest.json", one), "does not say"));
@@ -237,7 +238,7 @@ TEST(StoreOverlay, FlipsInEveryByteAndEveryTruncationAreFound) {
   EXPECT_NE(refusal(path, store), "");
 }
 
-/// Writes the checksums of header, pages and directory anew, as far as they can be found.
+/// Recomputes the checksums of header, pages and directory, as far as they can be found.
 void repair(std::string& bytes, std::size_t header, std::size_t directory,
             const std::vector<std::size_t>& pages) {
   const auto sign = [&](std::size_t begin, std::size_t end) {
@@ -276,7 +277,7 @@ TEST(StoreOverlay, LiesWithGoodChecksumsAreRefusedOrConsistent) {
   std::size_t refused = 0;
   for (int turn = 0; turn < 600; ++turn) {
     SCOPED_TRACE("turn " + std::to_string(turn) + " of seed 11");
-    // Mostly where counts and places are.
+    // Mostly in counts and positions.
     const std::size_t at = turn % 3 == 0   ? 20 + random() % (header - 24)
                            : turn % 3 == 1 ? directory + random() % (good.size() - 4 - directory)
                                            : pages[random() % pages.size()] + random() % 64;

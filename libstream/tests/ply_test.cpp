@@ -12,7 +12,7 @@
 namespace terrace::stream {
 namespace {
 
-/// Makes PLY files by hand, an independent way to say the same as the reader.
+/// Makes PLY files by hand, independently of the reader.
 class PlyText {
  public:
   explicit PlyText(std::string encoding) : encoding_(std::move(encoding)) {
@@ -117,7 +117,7 @@ TEST_F(Ply, ReadsEveryTypeInEveryEncoding) {
   }
 }
 
-/// A file with everything that has to be skipped: elements of fixed size and with lists before the
+/// A file with everything that must be skipped: elements of fixed size and with lists before the
 /// vertices, a list among the vertices' properties, and faces after them.
 std::string crowded(const std::string& encoding) {
   PlyText ply(encoding);
@@ -165,8 +165,8 @@ TEST_F(Ply, CutAtAnyByteItIsRefusedOrWhole) {
       AllPoints all;
       const std::string error = error_of([&] { all = read(cut, {.format = "ply"}); });
       if (error.empty()) {
-        // Only the faces are cut: all vertices are there. In ASCII the last digits of a number can
-        // be missing unnoticed.
+        // Only the faces are cut: all vertices are complete. In ASCII the last digits of a number
+        // can be missing unnoticed.
         EXPECT_EQ(all.points.size(), 3u);
         if (encoding != "ascii") {
           EXPECT_TRUE(same_bits(all.points.positions, kCrowdedPoints));
@@ -296,7 +296,7 @@ TEST_F(Ply, ReadsHeadersOfOtherPrograms) {
             0u);
 }
 
-/// The law of the writers: coordinates and columns of every type come back bit for bit.
+/// The law of the writers: coordinates and columns of every type are read back bit for bit.
 TEST_F(Ply, WritesWhatItReadsBitForBit) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     SCOPED_TRACE(seed);

@@ -13,7 +13,7 @@
 namespace terrace::stream {
 namespace {
 
-/// libpng's simple reader as the oracle; `format` is one of its PNG_FORMAT_ values.
+/// libpng's simplified reader as the oracle; `format` is one of its PNG_FORMAT_ values.
 std::vector<std::uint8_t> decode(const std::string& path, std::uint32_t format, std::size_t& width,
                                  std::size_t& height) {
   png_image image{};
@@ -52,7 +52,7 @@ TEST(Png, SixteenBitsAreBigEndianInTheFile) {
   const std::string path = (folder.path() / "g.png").string();
   const std::vector<std::uint16_t> samples{0, 1, 255, 256, 0x1234, 65535};
   write_png_grey16(path, 3, 2, samples);
-  // Read with libpng's plain interface, which gives the bytes as they are in the file.
+  // Read with libpng's low-level interface, which gives the bytes as they are in the file.
   FILE* file = std::fopen(path.c_str(), "rb");
   ASSERT_NE(file, nullptr);
   png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);

@@ -65,7 +65,7 @@ inline std::string read_text(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-/// The message of the Error that `act` throws; empty if it throws none.
+/// The message of the Error thrown by `act`; empty if there is none.
 template <class Act>
 std::string error_of(Act&& act) {
   try {
@@ -76,7 +76,7 @@ std::string error_of(Act&& act) {
   return {};
 }
 
-/// Equal bit for bit: tells 0 from -0.
+/// Equal bit for bit: distinguishes 0 from -0.
 inline bool same_bits(std::span<const Point3> a, std::span<const Point3> b) {
   return a.size() == b.size() &&
          (a.empty() || std::memcmp(a.data(), b.data(), a.size_bytes()) == 0);
@@ -109,7 +109,7 @@ void append_values(std::vector<std::byte>& payload, const T&... values) {
   (append(values), ...);
 }
 
-/// Appends a value of that type with any bits, but finite where it is a double or a float.
+/// Appends a value of that type with any bits, but finite for a double or a float.
 inline void append_any(std::vector<std::byte>& payload, ScalarType type, std::mt19937_64& random) {
   if (type == ScalarType::f64) return append_values(payload, any_double(random));
   if (type == ScalarType::f32) {

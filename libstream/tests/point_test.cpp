@@ -36,7 +36,7 @@ TEST(Box3, IgnoresNaN) {
   EXPECT_FALSE(box.contains({nan, 0.5, 0.5}));
 }
 
-// Under the sanitizers: no place in no records.
+// For the sanitizers: an empty view must not compute addresses.
 TEST(Schema, ViewsRecordsThatAreNotThere) {
   Schema schema;
   schema.attributes = {{.name = "a", .type = ScalarType::f64},

@@ -97,7 +97,8 @@ TEST(Nodata, RubbishIsNoRule) {
   }
 }
 
-/// The kernels against the rule cell by cell, over all steps and lengths around the chunk size.
+/// The kernels compared with the rule cell by cell, over all steps and lengths around the chunk
+/// size.
 TEST(Overlay, LaysValidCellsOverOthers) {
   std::mt19937_64 random(3);
   for (int round = 0; round < 3000; ++round) {

@@ -50,7 +50,7 @@ TEST(RasterOrder, TilesAreFewSquareAndNotTooLarge) {
     const std::uint64_t width = (window.columns + tiles.columns - 1) / tiles.columns;
     const std::uint64_t height = (window.rows + tiles.rows - 1) / tiles.rows;
     ASSERT_LE(width * height, cells);
-    // In a window of several tiles each way, tiles are about square and about full.
+    // In a window of several tiles in each direction, tiles are nearly square and nearly full.
     if (tiles.columns > 8 && tiles.rows > 8 && cells >= 4096) {
       const double shape = static_cast<double>(width) / (static_cast<double>(height) * aspect);
       EXPECT_GT(shape, 0.7);

@@ -14,7 +14,7 @@
 
 namespace terrace::stream {
 
-/// A whole raster in memory; cells without data hold `value` 0 and `valid` 0.
+/// A complete raster in memory; cells without data hold `value` 0 and `valid` 0.
 struct WholeRaster {
   RasterInfo info;
   std::vector<std::byte> samples;

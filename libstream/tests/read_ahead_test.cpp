@@ -88,7 +88,7 @@ TEST(ReadAhead, ReadsNoFurtherThanAskedAndStopsAtOnce) {
   EXPECT_LE(made, 1 + 4 + 1);
 }
 
-/// A block, then a wait that a stop alone ends.
+/// A block, then a wait that only a stop ends.
 class Waiting final : public PointSource {
  public:
   explicit Waiting(std::stop_token stop) : stop_(std::move(stop)) {}
@@ -130,7 +130,7 @@ TEST(ReadAhead, ItsEndAndTheCallersStopEndTheReading) {
   EXPECT_THROW(source->next(block), Stopped);
 }
 
-/// A pipe with a name, in a folder that goes with it.
+/// A named pipe, in a folder that is removed with it.
 class NamedPipe {
  public:
   NamedPipe() : path_((folder_.path() / "pipe").string()) { ::mkfifo(path_.c_str(), 0600); }
@@ -152,7 +152,7 @@ TEST(ReadAhead, AStopEndsOpeningAPipeWithoutAWriter) {
 TEST(ReadAhead, ASourceEndsWhileItsPipeIdles) {
   const NamedPipe pipe;
   const std::array<std::string, 1> files{pipe.path()};
-  // For reading too, so that it opens at once and has a reader.
+  // Opened for reading too, so that it opens at once and has a reader.
   const int writer = ::open(pipe.path().c_str(), O_RDWR | O_CLOEXEC);
   std::string lines;
   while (lines.size() < 8192) lines += "1 2 3\n";

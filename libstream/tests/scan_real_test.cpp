@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scans that others have made, where TERRACE_DATA names a folder that has them.
+// Scans by third parties, if TERRACE_DATA names a folder that has them.
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -52,7 +52,7 @@ AllPoints read_scan(const std::filesystem::path& path) {
   FILE* pipe = popen(("gzip -dc '" + path.string() + "'").c_str(), "r");
   EXPECT_NE(pipe, nullptr);
   AllPoints all = read_file("/proc/self/fd/" + std::to_string(fileno(pipe)));
-  // What follows the vertices is not read: gzip may end with a closed pipe.
+  // Data after the vertices is not read: gzip may end with a closed pipe.
   pclose(pipe);
   return all;
 }

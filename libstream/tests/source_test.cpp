@@ -34,7 +34,7 @@ class Source : public ::testing::Test {
   TempFolder folder_;
 };
 
-/// Makes standard input or output another file for the life of the object.
+/// Redirects standard input or output for the lifetime of the object.
 class Redirected {
  public:
   Redirected(int standard, int fd) : standard_(standard), saved_(dup(standard)) {
@@ -85,7 +85,7 @@ TEST_F(Source, FoldersListsAndPatternsStandForFiles) {
             "321");
   EXPECT_EQ(heads({"@" + list}), "3211");
 
-  // A name that is there is that file, whatever it looks like.
+  // A name that exists is that file, whatever it looks like.
   put("survey/[1].xyz", "7 0 0\n");
   EXPECT_EQ(heads({survey + "/[1].xyz"}), "7");
   fs::remove(survey + "/[1].xyz");
@@ -146,7 +146,7 @@ TEST_F(Source, NamesFormatsThatItDoesNotReadAndWhatToDo) {
       {tar, "tar archive", "tar xf"},
       {"version https://git-lfs.github.com/spec/v1\n", "Git LFS", "git lfs pull"}};
   for (const auto& [content, name, remedy] : by_content) {
-    // Whatever it is called.
+    // Whatever its name.
     for (const char* file : {"a.tif", "b.xyz", "noending"}) {
       const std::string text = refusal({put(file, content)});
       EXPECT_NE(text.find(name), std::string::npos) << text;
@@ -163,7 +163,7 @@ TEST_F(Source, NamesFormatsThatItDoesNotReadAndWhatToDo) {
     const std::string text = refusal({put(file, binary)});
     EXPECT_NE(text.find(name), std::string::npos) << text;
   }
-  // What can be read is read, whatever its name says.
+  // A readable file is read, whatever its name says.
   EXPECT_EQ(read_all({put("h.laz", "1 2 3\n")}).info.format, "xyz");
 }
 
@@ -256,7 +256,7 @@ TEST_F(Source, TextGoesToStandardOutput) {
 }
 
 TEST_F(Source, PromisesInAPipeAreNotBelieved) {
-  // Nothing is known of the bytes to come, so nothing may be made ready for them.
+  // Nothing is known about the bytes to come, so no memory may be allocated for them.
   const std::string text =
       "ply\nformat binary_little_endian 1.0\nelement vertex 1000000000000000000\n"
       "property double x\nproperty double y\nproperty double z\nend_header\n" +

@@ -61,7 +61,7 @@ MadePoints::Place rows(std::uint64_t width) {
   };
 }
 
-/// A square of `side` squared places, all over it again and again.
+/// A square of `side` squared places, visited repeatedly in random order.
 MadePoints::Place shuffled(std::uint64_t side) {
   return [side](std::uint64_t i) {
     // Odd steps visit every place of a power of two.
@@ -111,7 +111,7 @@ Read read(std::uint64_t count, const MadePoints::Place& place, Order order,
   return read;
 }
 
-/// Every point came once, at its place, with its record.
+/// Every point was delivered once, at its place, with its record.
 void expect_all(const Read& read, std::uint64_t count, const MadePoints::Place& place) {
   std::vector<bool> met(count);
   std::uint64_t points = 0;
@@ -146,7 +146,7 @@ TEST(SpatialOrderTest, ShuffledPointsComeInCompactBlocks) {
     expect_all(ordered, kCount, shuffled(kSide));
     EXPECT_TRUE(ordered.report.reordered);
     EXPECT_GT(ordered.report.spread, 10);
-    // As little wider than a square of so many places as pieces of a k-d tree are.
+    // As close to a square of this many places as the pieces of a k-d tree are.
     EXPECT_LT(ordered.width(), 1.3 * 2 * std::sqrt(kBlock));
     const std::uint64_t record = 3 * size_of(type) + 9;
     EXPECT_LE(ordered.report.temporary_bytes, kCount * record);
@@ -191,7 +191,8 @@ TEST(SpatialOrderTest, WideScanLinesAreReordered) {
   EXPECT_LT(ordered.width(), 1.3 * 2 * std::sqrt(kBlock));
 }
 
-// The first planes know only where the stream began: nearly all that follows goes to one bucket.
+// The first planes are based only on the beginning of the stream: nearly everything after it goes
+// to one bucket.
 TEST(SpatialOrderTest, BucketsThatGrewLargeAreDivided) {
   constexpr std::uint64_t kCount = 2u << 20;
   const auto place = [](std::uint64_t i) {

@@ -13,8 +13,7 @@
 namespace terrace::stream::testing {
 
 /// A stand-in for the hierarchy builder: clusters blocks by the nearest of evenly strided seeds and
-/// hands them on, level by level, the root last. Good clusters are not its aim, a valid hierarchy
-/// is.
+/// passes them on, level by level, the root last. The aim is a valid hierarchy, not good clusters.
 class StandInHierarchy {
  public:
   struct Options {
@@ -125,7 +124,7 @@ class StandInHierarchy {
       seeds.push_back(points.positions[(2 * s + 1) * n / (2 * k)]);
     std::vector<std::uint32_t> assigned(n);
     for (int round = 0; round < 3; ++round) {
-      // Nearest seed; then the seeds move to the means.
+      // Assign to the nearest seed; then move the seeds to the means.
       for (std::size_t i = 0; i < n; ++i) {
         double best = std::numeric_limits<double>::infinity();
         for (std::size_t s = 0; s < k; ++s) {

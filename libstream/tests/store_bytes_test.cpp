@@ -12,7 +12,7 @@
 namespace terrace::stream::store {
 namespace {
 
-/// Bit by bit, as the polynomial is defined.
+/// Bit by bit, by the definition of the polynomial.
 std::uint16_t crc16_by_bits(ByteView bytes) {
   unsigned crc = 0xFFFF;
   for (const std::uint8_t byte : bytes) {

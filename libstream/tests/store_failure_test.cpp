@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What must not happen: half-written stores that open, damage that goes unnoticed, strangers' files
-// removed.
+// What must not happen: half-written stores that open, damage that goes unnoticed, other programs'
+// files removed.
 #include <csignal>
 #include <fstream>
 #include <random>
@@ -32,7 +32,7 @@ using testing::StandInHierarchy;
 using testing::TemporaryFolder;
 using testing::write_bytes;
 
-/// One byte in place: rewriting whole files would wait for the disk each time.
+/// One byte in place: rewriting complete files would wait for the disk each time.
 void overwrite(const fs::path& file, std::size_t at, char byte) {
   std::fstream out(file, std::ios::binary | std::ios::in | std::ios::out);
   out.seekp(static_cast<std::streamoff>(at));
@@ -199,8 +199,8 @@ TEST(StoreWriting, AbandonedWritersLeaveNothing) {
   EXPECT_TRUE(names_in(folder.path()).empty());
 }
 
-/// Writes a store in a process that ends without a word before block `last`, if there are as many.
-/// True if it came to the end.
+/// Writes a store in a process that dies silently before block `last`, if there are that many.
+/// Returns whether it completed.
 bool writes_until(const fs::path& path, std::size_t last,
                   const std::vector<testing::Block>& blocks) {
   const pid_t child = ::fork();
@@ -226,7 +226,7 @@ bool writes_until(const fs::path& path, std::size_t last,
   return WEXITSTATUS(status) == 0;
 }
 
-// Dying within a block, a sync or a rename is a test of the command: tests/cli/crash_cli_test.py.
+// Dying within a block, a sync or a rename is tested with the command: tests/cli/crash_cli_test.py.
 TEST(StoreWriting, KilledWritersLeaveNothingThatOpensAndAreCleanedUp) {
   const TemporaryFolder folder;
   const auto path = folder.path() / "s";
@@ -242,7 +242,7 @@ TEST(StoreWriting, KilledWritersLeaveNothingThatOpensAndAreCleanedUp) {
   EXPECT_EQ(names_in(folder.path()), (std::vector<std::string>{"s"}));
   EXPECT_TRUE(Store::open(path).verify(testing::expect_no_problem));
   fs::remove_all(path);
-  // What a living one has the next one does not touch.
+  // The next writer does not touch the files of a living one.
   EXPECT_FALSE(writes_until(path, 1, blocks));
   const StoreWriter living(path, testing::cloud_schema());
   const auto with_living = names_in(folder.path());
@@ -264,7 +264,7 @@ TEST(StoreWriting, LinksAreFollowed) {
   EXPECT_EQ(names_in(folder.path() / "elsewhere"), (std::vector<std::string>{"s"}));
 }
 
-/// What a writer leaves that dies between the two renames of a replacement.
+/// The files left by a writer that dies between the two renames of a replacement.
 TEST(StoreWriting, AStoreThatWasMovedAsideGetsItsNameBack) {
   const TemporaryFolder folder;
   const auto path = folder.path() / "s";
@@ -285,7 +285,8 @@ TEST(StoreWriting, AStoreThatWasMovedAsideGetsItsNameBack) {
   fs::rename(path, aside);
   EXPECT_TRUE(contains(error_of([&] { write_small(path, 2); }), "exists"));
   EXPECT_EQ(files_of(path), files);
-  // Beside a whole store it is what the new one has replaced, and without its manifest nothing.
+  // Next to a complete store it is what the new one replaced, and without its manifest it is
+  // nothing.
   fs::copy(path, aside);
   write_small(path, 2, /*replace=*/true);
   EXPECT_EQ(names_in(folder.path()), (std::vector<std::string>{"s"}));
@@ -335,7 +336,8 @@ TEST(StoreWriting, AStoreMayHaveTheLongestName) {
   EXPECT_TRUE(Store::open(path).verify(testing::expect_no_problem));
 }
 
-/// Runs `write` in a process whose files may not grow beyond `limit`. True if it threw an Error.
+/// Runs `write` in a process whose files may not grow beyond `limit`. Returns whether it threw an
+/// Error.
 bool throws_under_limit(rlim_t limit, const fs::path& path) {
   const pid_t child = ::fork();
   if (child == 0) {
@@ -422,8 +424,8 @@ std::map<std::string, std::string> files_for_threads(const StoreSchema& schema,
 }
 
 TEST(StoreWriting, BytesDoNotDependOnWhenBlocksAreEncoded) {
-  // More blocks than a segment has, so that some are encoded with tables that go out of use; with
-  // cells given twice, whose order must survive.
+  // More blocks than a segment has, so that some are encoded with tables that become obsolete; with
+  // cells given twice, whose order must be preserved.
   std::mt19937_64 random(12);
   std::vector<std::vector<Point3>> blocks;
   for (int b = 0; b < 1200; ++b) {
@@ -437,7 +439,7 @@ TEST(StoreWriting, BytesDoNotDependOnWhenBlocksAreEncoded) {
   }
   const auto recorded = testing::recorded_hierarchy(
       blocks, {.block_points = 70, .cluster_points = 16, .scale = {1, 1, 1}});
-  // A cloud's rows are coded as columns, which keep the order of the points.
+  // A cloud's rows are coded as columns, which preserve the order of the points.
   for (const StoreSchema& schema :
        {testing::grid_schema(ScalarType::i16), testing::cloud_schema()}) {
     const auto expected = files_for_threads(schema, recorded, 1);

@@ -9,7 +9,7 @@
 #include "stand_in_hierarchy.hpp"
 #include "terrace/stream/store.hpp"
 
-/// Inputs of a realistic kind for tests and benchmarks of the store.
+/// Realistic inputs for tests and benchmarks of the store.
 
 namespace terrace::stream::testing {
 
@@ -48,7 +48,7 @@ inline std::vector<OwnedBlock> recorded_hierarchy(const std::vector<std::vector<
 }
 
 /// A raster of side x side heights by midpoint displacement (diamond-square), rounded to integers,
-/// with `step` as the root mean square of the difference between neighbours, about.
+/// with approximately `step` as the root mean square of the difference between neighbours.
 inline std::vector<double> fractal_heights(int side, double step, std::uint64_t seed) {
   int size = 1;
   while (size < side) size *= 2;
@@ -59,7 +59,7 @@ inline std::vector<double> fractal_heights(int side, double step, std::uint64_t 
     return h[static_cast<std::size_t>(y) * static_cast<std::size_t>(stride) +
              static_cast<std::size_t>(x)];
   };
-  // The sum of four even numbers is near enough to a normal one. Fractal dimension 2.2.
+  // The sum of four even numbers is close enough to normal. Fractal dimension 2.2.
   const auto noise = [&] {
     double sum = -2;
     for (int i = 0; i < 4; ++i) sum += static_cast<double>(random() >> 11) * 0x1p-53;
@@ -98,7 +98,7 @@ inline std::vector<double> fractal_heights(int side, double step, std::uint64_t 
   return result;
 }
 
-/// The tile of a raster as stored points: column, row, height.
+/// A tile of a raster as stored points: column, row, height.
 inline std::vector<Point3> tile(const std::vector<double>& heights, int width, int height, int x0,
                                 int y0, int side) {
   std::vector<Point3> points;
@@ -112,7 +112,8 @@ inline std::vector<Point3> tile(const std::vector<double>& heights, int width, i
   return points;
 }
 
-/// A patch of a rolling surface, sampled at random, in whole centimetres: a scan without its order.
+/// A patch of a rolling surface, sampled at random, in integer centimetres: a scan without its
+/// order.
 inline std::vector<Point3> scan_patch(int number, std::size_t points) {
   std::mt19937_64 random(static_cast<std::uint64_t>(number) + 1);
   const auto uniform = [&] { return static_cast<double>(random() >> 11) * 0x1p-53; };

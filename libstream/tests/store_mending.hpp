@@ -16,8 +16,8 @@
 #include "store/manifest.hpp"
 #include "store/read/index_page.hpp"
 
-/// Stores as bytes in memory that anything can be done to: mend() makes all checksums right again,
-/// so that what lies behind them is reached. For tests and for the fuzzer.
+/// Stores as bytes in memory that can be modified arbitrarily: mend() recomputes all checksums, so
+/// that the code after them is reached. For tests and for the fuzzer.
 
 namespace terrace::stream::testing {
 
@@ -33,7 +33,7 @@ inline StoreFiles read_files(const std::filesystem::path& folder) {
   return files;
 }
 
-/// Into an existing folder.
+/// Writes into an existing folder.
 inline void write_files(const std::filesystem::path& folder, const StoreFiles& files) {
   for (const auto& [name, bytes] : files) {
     std::ofstream(folder / name, std::ios::binary) << bytes;
@@ -44,7 +44,7 @@ inline std::uint32_t crc32_of(const std::string& bytes, std::size_t begin, std::
   return store::crc32(0, bytes.data() + begin, end - begin);
 }
 
-/// Writes the CRC-32 of [begin, end - 4) behind it.
+/// Writes the CRC-32 of [begin, end - 4) after it.
 inline void sign(std::string& bytes, std::size_t begin, std::size_t end) {
   const std::uint32_t checksum = crc32_of(bytes, begin, end - 4);
   std::memcpy(bytes.data() + end - 4, &checksum, 4);
@@ -55,7 +55,7 @@ struct LevelBytes {
   std::string& data;
   std::string& index;
   std::size_t clusters = 0, directory_bytes = 0;
-  std::size_t attributes = 0;  ///< that the index has ranges of
+  std::size_t attributes = 0;  ///< number of attributes with ranges in the index
 
   [[nodiscard]] std::size_t pages() const { return (clusters + 127) / 128; }
   [[nodiscard]] std::size_t directory() const { return index.size() - directory_bytes; }
@@ -78,7 +78,7 @@ struct LevelBytes {
   }
 };
 
-/// The checksum column of a page, the twelfth, is 16 bits wide in whatever the library writes.
+/// The checksum column of a page, the twelfth, is 16 bits wide in everything the library writes.
 inline void mend_cluster_checksums(LevelBytes& level, std::size_t page) {
   const std::size_t begin = level.page_offset(page), end = level.page_offset(page + 1);
   const std::size_t count = level.clusters_of(page);
@@ -92,7 +92,7 @@ inline void mend_cluster_checksums(LevelBytes& level, std::size_t page) {
       const auto* const bytes = reinterpret_cast<const std::uint8_t*>(level.data.data());
       store::put(checksums, there ? store::crc16({bytes + from, to - from}) : std::uint16_t{0});
     }
-    // Where the columns begin, and how many bits lie before the checksums.
+    // Where the columns begin, and how many bits precede the checksums.
     store::ByteReader in(
         {reinterpret_cast<const std::uint8_t*>(level.index.data()) + begin, end - begin});
     in.varint();
@@ -122,8 +122,8 @@ inline void mend_cluster_checksums(LevelBytes& level, std::size_t page) {
   sign(level.index, begin, end);
 }
 
-/// The levels whose files are there. `manifest`: as JSON; what it says of a directory's size and of
-/// the clusters need not be true.
+/// The levels whose files exist. `manifest`: as JSON; its size of a directory and its number of
+/// clusters need not be true.
 inline void for_each_level(StoreFiles& files, nlohmann::ordered_json& manifest,
                            const std::function<void(LevelBytes&, nlohmann::ordered_json&)>& use) {
   if (!manifest.contains("levels") || !manifest["levels"].is_array()) return;
@@ -146,8 +146,8 @@ inline void for_each_level(StoreFiles& files, nlohmann::ordered_json& manifest,
   }
 }
 
-/// Makes sizes and checksums right: of clusters, pages, directories, files and the manifest. Files
-/// that are too damaged to tell where something is keep what they have.
+/// Corrects sizes and checksums: of clusters, pages, directories, files and the manifest. Files too
+/// damaged to locate their parts stay as they are.
 inline void mend(StoreFiles& files) {
   std::string& text = files[kManifestName];
   auto manifest = nlohmann::ordered_json::parse(text, nullptr, /*allow_exceptions=*/false);
@@ -168,7 +168,7 @@ inline void mend(StoreFiles& files) {
   text = manifest.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
   constexpr std::size_t kDigitsFromEnd = 12;  // eight digits, a quote, newline, brace, newline
   const std::string checksum = store::hexadecimal(crc32_of(text, 0, text.size()));
-  // Whoever put a key behind the checksum gets a manifest whose checksum is wrong.
+  // If an edit has put a key after the checksum, the manifest keeps a wrong checksum.
   text.replace(text.size() - kDigitsFromEnd, 8, checksum);
 }
 
@@ -181,8 +181,8 @@ inline void edit_manifest(StoreFiles& files,
   mend(files);
 }
 
-/// Calls edit(entries, offset of the first in the data file) for a page of a level, writes what is
-/// left of it, moves what lies behind it, and mends.
+/// Calls edit(entries, offset of the first in the data file) for a page of a level, writes the
+/// result, moves what follows it, and mends.
 inline void edit_page(StoreFiles& files, unsigned level, std::size_t page,
                       const std::function<void(std::vector<store::Entry>&, std::uint64_t&)>& edit) {
   auto manifest = nlohmann::ordered_json::parse(files[kManifestName]);

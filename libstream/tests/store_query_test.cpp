@@ -91,7 +91,7 @@ std::vector<QueriedStore> stores_of_all_kinds() {
       testing::grid_schema(ScalarType::i16),
       testing::grid_blocks(ScalarType::i16, testing::Relief::fractal, 70, 60, 20, 12),
       testing::StandInHierarchy::Options{.block_points = 400, .cluster_points = 40});
-  // One block, so that the root holds all points; and no point at all.
+  // One block, so that the root holds all points; and an empty store.
   stores.emplace_back(testing::cloud_schema(),
                       testing::cloud_blocks(testing::Numbers::decimals, 30, 500, 13),
                       testing::StandInHierarchy::Options{});
@@ -100,7 +100,7 @@ std::vector<QueriedStore> stores_of_all_kinds() {
   return stores;
 }
 
-/// Boxes of all sizes around points and anywhere, flat and inverted ones too.
+/// Boxes of all sizes around points and anywhere, including flat and inverted ones.
 Box3 random_box(std::mt19937_64& random, const QueriedStore& queried) {
   const auto& points = queried.points();
   const auto corner = [&]() -> Point3 {
@@ -175,7 +175,7 @@ TEST(StoreQuery, NearestPointsAndRadiiAreThoseOfBruteForce) {
         if (level_of(point.cluster) < level) continue;
         expected.push_back(point);
       }
-      // All of them first: their distances are right, and their order is what they say.
+      // First all of them: their distances are correct and in order.
       const auto all = query.nearest(place, expected.size() + 1, metric, level);
       ASSERT_EQ(all.size(), expected.size());
       for (const FoundPoint& point : all) {

@@ -74,7 +74,7 @@ TEST(Store, ReadingEndsOnceItIsAskedToStop) {
   }
 }
 
-/// Rasters of every sample type, smooth and rough, come back bit for bit.
+/// Rasters of every sample type, smooth and rough, are read back bit for bit.
 TEST(Store, GridsComeBackBitForBit) {
   for (const ScalarType type : testing::kAllTypes) {
     for (const testing::Relief relief :
@@ -140,7 +140,7 @@ TEST(Store, AttributesOfAllTypesComeBackBitForBit) {
   std::uint64_t row = 0;
   for (auto& block : blocks) {
     for (std::size_t i = 0; i < block.positions.size(); ++i, ++row) {
-      // Constant, counting and random bytes in turn: the last also make NaNs of every payload.
+      // Constant, counting and random bytes in turn: the last also make NaNs with every payload.
       for (const Channel& channel : schema.attributes) {
         const std::uint64_t value = row < 1800 ? 0 : row < 3600 ? row : random();
         const auto* bytes = reinterpret_cast<const std::byte*>(&value);
@@ -151,8 +151,8 @@ TEST(Store, AttributesOfAllTypesComeBackBitForBit) {
   testing::check_round_trip(schema, blocks, {.block_points = 900, .cluster_points = 60});
 }
 
-// What a survey's points carry: colours that change together in fields too wide for them, pulses at
-// a few intervals, a field that nobody set. With random points the order of the lines is gone.
+// Typical attributes of a survey: colours that change together in fields too wide for them, pulses
+// at a few intervals, a field that is never set. With random points the order of the lines is lost.
 TEST(Store, AttributesOfScanLinesAreSmall) {
   StoreSchema schema = testing::cloud_schema();
   for (const char* colour : {"red", "green", "blue"}) {
@@ -207,7 +207,7 @@ TEST(Store, DecimalAttributesAreSmall) {
   EXPECT_LT(with, without + 6000 * 2);
 }
 
-// Whatever the values, NaN and the ends of 64 bits among them; close to what they are.
+// For any values, including NaN and the ends of 64 bits, ranges are close to the values.
 TEST(Store, RangesOfAttributesHoldTheirValues) {
   StoreSchema schema = testing::cloud_schema();
   for (const ScalarType type : testing::kAllTypes) {
@@ -254,7 +254,7 @@ TEST(Store, RangesOfAttributesHoldTheirValues) {
           high = std::max(high, value);
         }
         at += size_of(channel.type);
-        // By a 32nd of what a page reaches at either end.
+        // By a 32nd of the range of a page at either end.
         if (channel.type == ScalarType::u32) {
           EXPECT_LE(ranges[a].high - ranges[a].low, high - low + 0x1p32 / 31 * 2);
         }
@@ -295,7 +295,7 @@ TEST(Store, FailuresOfTheCallersBytesReachTheCaller) {
   struct Lost : std::runtime_error {
     using std::runtime_error::runtime_error;
   };
-  // Each read in turn is the one that fails: opening and verifying throw what the function threw.
+  // Each read in turn fails: opening and verifying throw what the function threw.
   for (int failing = 0;; ++failing) {
     int reads = 0;
     const auto open = [&] {
@@ -316,7 +316,7 @@ TEST(Store, FailuresOfTheCallersBytesReachTheCaller) {
     } catch (const Lost&) {
     }
   }
-  // A file that is shorter than the manifest says is refused at once.
+  // A file shorter than the manifest says is refused at once.
   const auto cut = [&](const std::string& name) {
     auto bytes = files.at(name);
     if (name != "manifest.json") bytes.pop_back();
@@ -325,7 +325,7 @@ TEST(Store, FailuresOfTheCallersBytesReachTheCaller) {
   EXPECT_THROW(Store::open("server", cut), Error);
 }
 
-/// data/stores/README.md: every version reads them, for ever.
+/// data/stores/README.md: every version must read them.
 TEST(Store, GoldenStoresAreSound) {
   const std::filesystem::path folder = std::filesystem::path(TERRACE_TEST_DATA) / "stores";
   for (const auto& [name, version, points] :
@@ -345,8 +345,8 @@ TEST(Store, GoldenStoresAreSound) {
   EXPECT_EQ(Overlay::open(folder / "grid.overlay", store).values(), 918u);
 }
 
-/// The bytes of a store do not depend on the compiler or its optimisation: GCC at -O3 and the
-/// sanitizers' build, Clang at -O1, find the same checksums. They change with the format alone.
+/// The bytes of a store do not depend on the compiler or its optimisation: GCC at -O3 and with
+/// sanitizers, and Clang at -O1, give the same checksums. They change only with the format.
 TEST(Store, ChecksumsAreTheSameWithEveryCompiler) {
   const TemporaryFolder folder;
   const auto checksum = [&](const char* name, const StoreSchema& schema, const auto& blocks) {

@@ -19,7 +19,7 @@
 #include "temp_folder.hpp"
 #include "terrace/stream/store.hpp"
 
-/// What the tests of the store share: inputs of many kinds and the check that they come back.
+/// Shared by the tests of the store: inputs of many kinds and the round-trip check.
 
 namespace terrace::stream::testing {
 
@@ -178,7 +178,7 @@ inline std::vector<Block> grid_blocks(ScalarType type, Relief relief, int width,
   return blocks;
 }
 
-/// `lines`: decimals, one point near the one before.
+/// `lines`: decimals, each point near the previous one.
 enum class Numbers { decimals, floats, doubles, extremes, mixed, lines };
 
 inline std::vector<Block> cloud_blocks(Numbers numbers, std::size_t points,
@@ -217,7 +217,7 @@ inline std::vector<Block> cloud_blocks(Numbers numbers, std::size_t points,
   return blocks;
 }
 
-/// Points as bit patterns, with their attributes, and how often each is there.
+/// Points as bit patterns, with their attributes, and the number of occurrences of each.
 class PointBag {
  public:
   struct Item {
@@ -290,7 +290,7 @@ inline std::uint64_t check_round_trip(const StoreSchema& schema, const std::vect
   }
   EXPECT_EQ(store.points(), n);
   EXPECT_EQ(store.bounds(), bounds);
-  // The largest doubles have no sum.
+  // The sum of the largest doubles overflows.
   if (const double mean = sum / static_cast<double>(n); std::isfinite(mean)) {
     const double size = std::max(std::abs(bounds.min[2]), std::abs(bounds.max[2]));
     EXPECT_NEAR(store.mean_height(), mean, 1e-9 * size);
@@ -298,7 +298,7 @@ inline std::uint64_t check_round_trip(const StoreSchema& schema, const std::vect
   EXPECT_TRUE(all_points(store) == expected) << "other points came back";
   EXPECT_TRUE(store.verify(expect_no_problem));
 
-  // One by one, the same as in sequence; and what heads a cluster is its representative.
+  // One by one, the same as in sequence; and the head of a cluster is its representative.
   ClusterPoints single, head;
   for (unsigned level = 0; level <= store.top(); ++level) {
     std::uint64_t next = 0;

@@ -47,11 +47,11 @@ inline const std::array<TIFFFieldInfo, 8>& geo_fields() {
   return fields;
 }
 
-/// Writes `samples`, native values by rows, bands of a cell side by side.
+/// Writes `samples`, native values by rows, bands interleaved by cell.
 inline void write_tiff(const std::filesystem::path& path, const TiffSpec& spec,
                        const std::vector<std::byte>& samples) {
   const TIFFErrorHandler handler =
-      TIFFSetWarningHandler(nullptr);  // Deflate's old code: on purpose
+      TIFFSetWarningHandler(nullptr);  // Deflate's old code is intended
   TIFF* tiff = TIFFOpen(path.c_str(), spec.mode.c_str());
   ASSERT_NE(tiff, nullptr) << path;
   TIFFMergeFieldInfo(tiff, geo_fields().data(), static_cast<std::uint32_t>(geo_fields().size()));
@@ -105,7 +105,7 @@ inline void write_tiff(const std::filesystem::path& path, const TiffSpec& spec,
   TIFFSetWarningHandler(handler);
 }
 
-/// Sets pixel scale 1 x 1 and a tie point, for a raster that lies at (x, y).
+/// Sets pixel scale 1 x 1 and a tie point, for a raster at (x, y).
 inline std::function<void(TIFF*)> placed_at(double x, double y, double cell = 1.0) {
   return [=](TIFF* tiff) {
     const std::array<double, 3> scale{cell, cell, 0};

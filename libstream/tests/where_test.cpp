@@ -21,7 +21,7 @@
 namespace terrace::stream {
 namespace {
 
-/// Points with attributes of several types, of which some are NaN.
+/// Points with attributes of several types, some of which are NaN.
 struct Cloud {
   Schema schema;
   std::vector<Point3> positions;
@@ -68,10 +68,10 @@ struct Cloud {
 
 bool truth(double value) { return !std::isnan(value) && value != 0.0; }
 
-/// A condition as text and as what it means.
+/// A condition as text and as a function.
 struct Expression {
   std::string text;
-  unsigned precedence;  ///< of its outermost operator; 9: an operand
+  unsigned precedence;  ///< of its outermost operator; 9 for an operand
   std::function<double(std::size_t)> value;
 };
 
@@ -112,7 +112,7 @@ class RandomExpressions {
          {"/", 6, [](double a, double b) { return a / b; }}}};
     const Operator& op = kOperators[below(kOperators.size())];
     const Expression a = make(depth - 1), b = make(depth - 1);
-    // Parentheses where they are needed, and now and then where not.
+    // Parentheses where they are needed, and sometimes elsewhere.
     const bool compares = op.precedence == 3 || op.precedence == 4;
     const auto side = [&](const Expression& e, bool right) {
       const bool needed =
@@ -169,8 +169,8 @@ TEST(Where, RandomConditionsMeanWhatTheyMean) {
   EXPECT_LT(met, all - all / 10);
 }
 
-// Law: where a point meets the condition, its box and the ranges of its attributes say it is
-// possible; and often they say that it is not.
+// Law: if a point meets the condition, its box and the ranges of its attributes say it is possible;
+// and often they exclude it otherwise.
 TEST(Where, RangesTellWhatIsPossible) {
   std::size_t told = 0, none = 0;
   for (std::uint64_t seed = 1; seed <= 3000; ++seed) {
@@ -215,7 +215,7 @@ TEST(Where, ConditionsOfTheUsualKind) {
            {"1e0 == 1.0", "1"}}) {
     EXPECT_EQ(cloud.matches(text), cloud.matches(same)) << text;
   }
-  // What is not a number meets nothing.
+  // NaN does not meet any condition.
   EXPECT_EQ(cloud.matches("\"a b\" - \"a b\""), std::vector<std::uint8_t>(500, 0));
   EXPECT_EQ(cloud.matches("0 / 0"), std::vector<std::uint8_t>(500, 0));
 }
@@ -285,7 +285,7 @@ TEST(Selection, LeavesPointsAndAttributesOut) {
     PointBlock block;
     while (source->next(block)) {
       ASSERT_FALSE(block.empty());
-      // Filled up but for the last one.
+      // Full except for the last one.
       const bool last = found.size() + block.size() == expected.size();
       ASSERT_TRUE(block.size() == block_points || (last && block.size() < block_points));
       ASSERT_EQ(block.payload.size(), block.size() * 3);
@@ -318,7 +318,7 @@ TEST(Selection, NamesWhatIsNotThere) {
   EXPECT_THROW(static_cast<void>(open({.selection = {.keep = std::vector<std::string>{"d"}}})),
                Error);
   EXPECT_THROW(static_cast<void>(open({.selection = {.drop = {"a", "d"}}})), Error);
-  // Nothing is kept of the records, and no point is a stream too.
+  // No attribute is kept, and no point is left: an empty stream is valid too.
   const auto none = open({.selection = {.where = "z > 100", .keep = std::vector<std::string>{}}});
   EXPECT_EQ(none->info().payload_size(), 0u);
   PointBlock block;

@@ -175,7 +175,7 @@ TEST_F(Xyz, ReportsProgress) {
   EXPECT_EQ(last, 1.0);
 }
 
-/// The law of both text formats: what is written is read back bit for bit.
+/// The law of both text formats: the written values are read back bit for bit.
 TEST_F(Xyz, WritesWhatItReadsBitForBit) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     SCOPED_TRACE(seed);
@@ -211,7 +211,7 @@ TEST_F(Xyz, WritesWhatItReadsBitForBit) {
   }
 }
 
-// Every step of a lattice comes out with its decimals, whatever the sum was rounded to.
+// Every step of a lattice is written with its decimals, however the sum was rounded.
 TEST_F(Xyz, WritesTheDecimalsOfALattice) {
   std::mt19937_64 random(41);
   for (const auto& [scale, offset, decimals] :
@@ -248,7 +248,7 @@ TEST_F(Xyz, WritesTheDecimalsOfALattice) {
   }
 }
 
-// What is on no lattice of decimals, or off its steps, keeps every bit.
+// Values on no lattice of decimals, or off its steps, keep every bit.
 TEST_F(Xyz, WritesOtherPlacesBitForBit) {
   std::mt19937_64 random(42);
   for (const double scale : {1.0 / 3600, 0.01}) {

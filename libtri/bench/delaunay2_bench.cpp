@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The planar triangulation beside CGAL's Delaunay_triangulation_2 with EPICK, in one run on the
-// same points. Uniform: 1,000,000 points of 26 bits; grid: 1000 x 1000, in random order. Clusters:
-// 500 compact ones, the 300 points nearest to centres on a lattice.
+// Compares the planar triangulation with CGAL's Delaunay_triangulation_2 with EPICK, in one run on
+// the same points. Uniform: 1,000,000 points of 26 bits; grid: 1000 x 1000, in random order.
+// Clusters: 500 compact ones, each the 300 points nearest to a centre on a lattice.
 //
 // items_per_second counts points and is a median of 5 rounds. A round of a cluster row removes
-// (collapse) or inserts (expand) all clusters once; what restores the state after it is not timed.
+// (collapse) or inserts (expand) all clusters once; restoring the state afterwards is not timed.
 #include <algorithm>
 #include <cstdlib>
 #include <ctime>
@@ -57,8 +57,8 @@ const std::vector<Cells>& input_points(Input input) {
   return points;
 }
 
-/// Numbers of the points of each cluster, along a Hilbert curve, as a store keeps them; and of a
-/// point near the cluster that is in none.
+/// Indices of the points of each cluster, along a Hilbert curve as in a store, and of a point near
+/// the cluster that is in none.
 struct Cluster {
   std::vector<std::uint32_t> members;
   std::uint32_t outside = 0;
@@ -86,7 +86,7 @@ std::vector<Cluster> find_clusters(const std::vector<Cells>& points) {
         const std::int64_t y = p[1] - centre[1];
         return x * x + y * y;
       };
-      // Breadth first, far enough to have the nearest ones.
+      // Breadth-first, far enough to include the nearest points.
       std::vector<VertexId> found{triangulation.nearest(centre)};
       seen[slot(found[0])] = 1;
       for (std::size_t k = 0; found.size() < 3 * kClusterSize; ++k) {
@@ -131,8 +131,8 @@ std::vector<Cluster> ordered_clusters(Input input, Order order) {
   return clusters;
 }
 
-/// One interface over both triangulations. Points and handles of a cluster lie together, as a store
-/// delivers them.
+/// One interface over both triangulations. Points and handles of a cluster are contiguous, as a
+/// store delivers them.
 template <class Coord>
 struct Ours {
   using Point = std::array<Coord, 2>;
@@ -217,7 +217,7 @@ struct Cgal {
   }
 };
 
-/// CPU time of the process, which has one thread: other load of the machine disturbs it less.
+/// CPU time of the process, which has one thread: it is less affected by other load on the machine.
 class Stopwatch {
  public:
   [[nodiscard]] double seconds() const {
@@ -228,7 +228,7 @@ class Stopwatch {
   std::clock_t start_ = std::clock();
 };
 
-/// VmRSS or VmHWM in bytes; 0 where there is no such file.
+/// VmRSS or VmHWM in bytes; 0 if there is no such file.
 double resident(const std::string& key) {
   std::ifstream file("/proc/self/status");
   std::string word;
@@ -237,7 +237,7 @@ double resident(const std::string& key) {
   return 0;
 }
 
-/// Lets the peak of resident memory start again from what is in use.
+/// Resets the peak of resident memory to the current value.
 void start_peak() {
 #ifdef __GLIBC__
   malloc_trim(0);
@@ -245,8 +245,8 @@ void start_peak() {
   std::ofstream("/proc/self/clear_refs") << "5";
 }
 
-/// Times `rounds` calls of round(), which returns seconds, and reports the median; the counters
-/// show the slowest and the fastest, in points per second.
+/// Times `rounds` calls of round(), which returns seconds, and reports the median; counters give
+/// the slowest and the fastest, in points per second.
 template <class Round>
 void measure(benchmark::State& state, std::size_t points, Round round) {
   std::vector<double> seconds(kSmall ? 1 : 5);
@@ -313,7 +313,7 @@ void clusters(benchmark::State& state) {
       }
     }
   };
-  // Once round, so that memory is there.
+  // One warm-up round, so that memory is allocated.
   remove();
   insert();
   measure(state, all.size() * kClusterSize, [&] {

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The spatial triangulation beside CGAL's Delaunay_triangulation_3 with EPICK, in one run on the
-// same points. Cube: 200,000 uniform points of 21 bits; torus: as many on one of radii 1 and 0.4
-// with radial noise of 0.001, rounded to 21 bits; grid: 60^3, where every cube is cospherical; all
-// in random order. Clusters: 200 compact ones, the 100 points nearest to random points.
+// Compares the spatial triangulation with CGAL's Delaunay_triangulation_3 with EPICK, in one run on
+// the same points. Cube: 200,000 uniform points of 21 bits; torus: as many on a torus of radii 1
+// and 0.4 with radial noise of 0.001, rounded to 21 bits; grid: 60^3, where every cube is
+// cospherical; all in random order. Clusters: 200 compact ones, each the 100 points nearest to a
+// random point.
 //
 // items_per_second counts points and is a median of 5 rounds (CGAL's removal: 1). A round of a
-// cluster row removes or inserts all clusters once; what restores the state after it is not timed.
+// cluster row removes or inserts all clusters once; restoring the state afterwards is not timed.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -58,7 +59,7 @@ std::vector<Cells> make_points(Input input) {
       points.push_back({cell(unit()), cell(unit()), cell(unit())});
       continue;
     }
-    // Two normal numbers by Box and Muller; uniform in area by rejection.
+    // Two normal numbers by the Box-Muller transform; uniform in area by rejection.
     const double u = 2 * M_PI * unit();
     const double v = 2 * M_PI * unit();
     if (unit() * 1.4 > 1 + 0.4 * std::cos(v)) continue;
@@ -79,7 +80,7 @@ const std::vector<Cells>& input_points(Input input) {
   return points;
 }
 
-/// Numbers of the points of each cluster, in random order, and of a point near the cluster that is
+/// Indices of the points of each cluster, in random order, and of a point near the cluster that is
 /// in none.
 struct Cluster {
   std::vector<std::uint32_t> members;
@@ -105,7 +106,7 @@ std::vector<Cluster> find_clusters(const std::vector<Cells>& points) {
       }
       return square;
     };
-    // Breadth first, far enough to have the nearest ones.
+    // Breadth-first, far enough to include the nearest points.
     std::vector<VertexId> found{centre};
     for (std::size_t k = 0; k < found.size() && found.size() < 8 * kClusterSize; ++k) {
       triangulation.adjacent(found[k], around);
@@ -136,7 +137,7 @@ const std::vector<Cluster>& input_clusters(Input input) {
   return clusters;
 }
 
-/// One interface over both triangulations. Points and handles of a cluster lie together.
+/// One interface over both triangulations. Points and handles of a cluster are contiguous.
 template <class Coord>
 struct Ours {
   static constexpr std::size_t kRounds = 5;
@@ -227,7 +228,7 @@ struct Cgal {
   }
 };
 
-/// CPU time of the process, which has one thread: other load of the machine disturbs it less.
+/// CPU time of the process, which has one thread: it is less affected by other load on the machine.
 class Stopwatch {
  public:
   [[nodiscard]] double seconds() const {
@@ -238,7 +239,7 @@ class Stopwatch {
   std::clock_t start_ = std::clock();
 };
 
-/// VmRSS or VmHWM in bytes; 0 where there is no such file.
+/// VmRSS or VmHWM in bytes; 0 if there is no such file.
 double resident(const std::string& key) {
   std::ifstream file("/proc/self/status");
   std::string word;
@@ -247,7 +248,7 @@ double resident(const std::string& key) {
   return 0;
 }
 
-/// Lets the peak of resident memory start again from what is in use.
+/// Resets the peak of resident memory to the current value.
 void start_peak() {
 #ifdef __GLIBC__
   malloc_trim(0);
@@ -255,8 +256,8 @@ void start_peak() {
   std::ofstream("/proc/self/clear_refs") << "5";
 }
 
-/// Times calls of round(), which returns seconds, and reports the median; the counters show the
-/// slowest and the fastest, in points per second.
+/// Times calls of round(), which returns seconds, and reports the median; counters give the slowest
+/// and the fastest, in points per second.
 template <class Round>
 void measure(benchmark::State& state, std::size_t points, std::size_t rounds, Round round) {
   std::vector<double> seconds(kSmall ? 1 : rounds);
@@ -328,7 +329,7 @@ void clusters(benchmark::State& state) {
       }
     }
   };
-  // Once round, so that memory is there.
+  // One warm-up round, so that memory is allocated.
   remove();
   insert();
   measure(state, all.size() * kClusterSize, kAction == kInsert ? 3 : Engine::kRounds, [&] {

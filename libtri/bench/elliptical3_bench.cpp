@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The elliptical tetrahedralisation beside the Euclidean one of doubles, and beside CGAL's
+// Compares the elliptical tetrahedralisation with the Euclidean one of doubles, and with CGAL's
 // Delaunay_triangulation_3 with EPICK on points that were mapped and rounded, in one run on the
 // same points: 100,000 uniform ones, or the complete grid of 46^3, in random order. Metrics: a
-// sphere; axes of 5, 1, 2 along those of the coordinates, and turned; 100, 1, 1 turned. Then the
-// removal of 200 compact sets of 100 of the uniform ones, and their insertion with hints. Then
+// sphere; axes of 5, 1, 2 along those of the coordinates, and rotated; 100, 1, 1 rotated. Then the
+// removal of 200 compact sets of 100 of the uniform points, and their insertion with hints. Then
 // flips to three regions.
 //
 // items_per_second counts points; CPU time, median of 5 rounds.
@@ -113,7 +113,7 @@ void cgal_mapped(benchmark::State& state) {
   });
 }
 
-/// Sets of points near each other in the metric, none in two of them.
+/// Disjoint sets of points close to each other in the metric.
 template <class Triangulation>
 std::vector<std::vector<tri::VertexId>> compact_sets(const Triangulation& triangulation) {
   std::mt19937_64 random(2);
@@ -185,8 +185,8 @@ void elliptical_sets(benchmark::State& state) {
       state.range(0) != 0);
 }
 
-/// Three boxes that cover most of the cube, ellipsoids of the given ratio. Counts besides how many
-/// facets stay that are not Delaunay, of those within regions about twice as many as tetrahedra.
+/// Three boxes that cover most of the cube, ellipsoids of the given ratio. Also counts the facets
+/// that remain non-Delaunay; there are about twice as many facets within regions as tetrahedra.
 void regions(benchmark::State& state) {
   const auto points = input_points(static_cast<Input>(state.range(0)));
   const auto ratio = static_cast<double>(state.range(1));

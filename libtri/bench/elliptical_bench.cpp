@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The elliptical triangulation beside the Euclidean one, and beside CGAL's Delaunay_triangulation_2
-// with EPICK on points that were mapped and rounded, in one run on the same points: 200,000
-// uniform ones, or the complete grid of 447 x 447 in random order. Then flips to three regions.
+// Compares the elliptical triangulation with the Euclidean one, and with CGAL's
+// Delaunay_triangulation_2 with EPICK on points that were mapped and rounded, in one run on the
+// same points: 200,000 uniform ones, or the complete grid of 447 x 447 in random order. Then flips
+// to three regions.
 //
 // items_per_second counts points; CPU time, median of 5 rounds.
 #include <algorithm>

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Error-bounded meshes of a raster in windows of 512 cells, on one thread: triangles, and seconds
-// of meshing (settling of sides included) and of the check at every sample.
+// of meshing (including the settling of sides) and of the check at every sample.
 //
-// The raster is the file of 32-bit floats that TERRACE_GRID names, TERRACE_GRID_COLUMNS to a row,
-// or else made here: fractal relief of about the same roughness.
+// The raster is the file of 32-bit floats named by TERRACE_GRID, with TERRACE_GRID_COLUMNS per row,
+// or else synthetic: fractal relief of about the same roughness.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -32,8 +32,8 @@ struct Raster {
   }
 };
 
-/// Diamonds and squares; amplitudes fall by 2^-0.8 a level (A. Fournier, D. Fussell, L. Carpenter,
-/// "Computer rendering of stochastic models", 1982).
+/// Diamond-square algorithm; amplitudes fall by 2^-0.8 per level (A. Fournier, D. Fussell, L.
+/// Carpenter, "Computer rendering of stochastic models", 1982).
 Raster fractal(std::uint32_t cells) {
   Raster raster{cells + 1, cells + 1, {}};
   const std::size_t stride = raster.columns;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// How the time of expanding and collapsing is shared between the triangulation, its journal, the
-// source and the model's own bookkeeping. Times in microseconds per cluster (of the moving focus:
-// per step); `own/tri` is the model's own share over the triangulation's, which the project keeps
-// below 1.
+// How the time of expanding and collapsing is divided between the triangulation, its journal, the
+// source and the model's own bookkeeping. Times in microseconds per cluster (for the moving focus,
+// per step); `own/tri` is the model's own share relative to the triangulation's, which the project
+// keeps below 1.
 #include <cstdlib>
 #include <map>
 #include <memory>
@@ -40,7 +40,7 @@ ArraySource& source(Kind kind) {
 class Shares {
  public:
   Shares(benchmark::State& state, ArraySource& source) : state_(state), source_(source) {}
-  /// Runs a step and books its time. Returns the points it added or removed.
+  /// Runs a step and records its time. Returns the number of points added or removed.
   template <class Step>
   void run(const Model& model, Step&& step) {
     const double tri = Triangulation::seconds(), journal = Triangulation::journal_seconds();
@@ -58,7 +58,7 @@ class Shares {
     points_ += difference(points, model.point_count());
     clusters_ += difference(clusters, model.expanded_count());
   }
-  /// For steps that do both at once: counts steps instead of clusters.
+  /// For steps that both add and remove: counts steps instead of clusters.
   void count_step(double points) {
     ++steps_;
     step_points_ += points;
@@ -87,7 +87,7 @@ class Shares {
   double steps_ = 0, step_points_ = 0;
 };
 
-/// 500 clusters of level 0 here and there, each in a step of its own, above a model of level 1.
+/// 500 scattered clusters of level 0, each in a step of its own, on top of a model of level 1.
 void expand_one_by_one(benchmark::State& state, Kind kind, bool deltas, bool measure_collapse) {
   ArraySource& src = source(kind);
   Model model(src, {1, {}}, {deltas});
@@ -124,7 +124,7 @@ void expand_one_by_one(benchmark::State& state, Kind kind, bool deltas, bool mea
   shares.report();
 }
 
-/// The whole hierarchy in one step, after the root alone.
+/// The whole hierarchy in one step, starting from the root alone.
 void whole_level(benchmark::State& state, Kind kind, bool deltas, bool measure_collapse) {
   ArraySource& src = source(kind);
   Model model(src, {}, {deltas});
@@ -167,7 +167,7 @@ void moving_focus(benchmark::State& state, Kind kind) {
   shares.report();
 }
 
-/// From nothing, points in bulk; reports the bytes per vertex of model and triangulation.
+/// From scratch, points in bulk; reports the bytes per vertex of model and triangulation.
 void start(benchmark::State& state, Kind kind) {
   ArraySource& src = source(kind);
   for (auto _ : state) {

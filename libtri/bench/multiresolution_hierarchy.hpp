@@ -12,8 +12,8 @@
 
 #include "terrace/tri/multiresolution.hpp"
 
-/// Large hierarchies of compact clusters, fast to make, and clocks between the model and what it
-/// uses.
+/// Large hierarchies of compact clusters that are fast to make, and timers between the model and
+/// what it uses.
 
 namespace terrace::tri::bench {
 
@@ -23,7 +23,7 @@ inline double unit(std::mt19937_64& random) {
 
 using Clock = std::chrono::steady_clock;
 
-/// Adds the time from its making to its end to `sum`, in seconds.
+/// Adds its lifetime in seconds to `sum`.
 class Lap {
  public:
   explicit Lap(double& sum) : sum_(sum), begin_(Clock::now()) {}
@@ -36,15 +36,16 @@ class Lap {
   Clock::time_point begin_;
 };
 
-/// All clusters in memory, members in arrays that follow each other.
+/// All clusters in memory, with members in contiguous arrays.
 class ArraySource : public ClusterSource {
  public:
   struct Level {
     std::vector<Point3> positions;
     std::vector<std::uint64_t> children;
-    std::vector<std::uint32_t> first{0};  ///< of each cluster, and the end
+    std::vector<std::uint32_t> first{0};  ///< start of each cluster, and the end
     std::vector<Box3> boxes;
-    std::vector<double> errors;  ///< no descendant is farther in the plane from the head
+    /// upper bound of the distance in the plane between the head and a descendant
+    std::vector<double> errors;
   };
   std::vector<Level> levels;  ///< the last one is the root alone
   mutable double seconds = 0.0;
@@ -70,16 +71,16 @@ class ArraySource : public ClusterSource {
   }
 };
 
-/// In cells of about `cell_points` points one becomes the centre; each point joins the nearest
-/// centre of the cells around its own; members keep the order of `points`. Repeats with the centres
-/// as points, `levels` times.
+/// In each cell of about `cell_points` points one becomes a centre; each point joins the nearest
+/// centre of the cells around its own; members keep the order of `points`. Repeats this `levels`
+/// times with the centres as points.
 inline ArraySource make_hierarchy(std::vector<Point3> points, unsigned levels, double cell_points,
                                   std::mt19937_64& random) {
   struct Node {
     Point3 position;
     std::vector<std::uint64_t> children;
     Box3 box;
-    double reach = 0.0;  // no descendant is farther
+    double reach = 0.0;  // upper bound of the distance of descendants
   };
   std::vector<Node> nodes(points.size());
   double side = 1.0;
@@ -100,7 +101,7 @@ inline ArraySource make_hierarchy(std::vector<Point3> points, unsigned levels, d
       return static_cast<std::size_t>(y) * static_cast<std::size_t>(cells) +
              static_cast<std::size_t>(x);
     };
-    // One of the cell's nodes at random, by a reservoir of one.
+    // One of the cell's nodes at random, by reservoir sampling.
     constexpr std::uint32_t kNone = 0xFFFFFFFFu;
     std::vector<std::uint32_t> centre(all, kNone), seen(all, 0);
     for (std::uint32_t i = 0; i < nodes.size(); ++i) {
@@ -183,7 +184,7 @@ inline ArraySource make_hierarchy(std::vector<Point3> points, unsigned levels, d
   return source;
 }
 
-/// side x side points, row by row, as a raster's cluster has its members.
+/// side x side points, row by row, as in a raster's cluster.
 inline std::vector<Point3> grid_points(int side) {
   std::vector<Point3> points;
   points.reserve(static_cast<std::size_t>(side) * static_cast<std::size_t>(side));
@@ -195,7 +196,7 @@ inline std::vector<Point3> grid_points(int side) {
   return points;
 }
 
-/// Random integers of 26 bits, in the order of a k-d tree, as a cloud's cluster has its members.
+/// Random integers of 26 bits, in the order of a k-d tree, as in a cloud's cluster.
 inline std::vector<Point3> random_points(std::size_t count, std::mt19937_64& random) {
   std::vector<Point3> points(count);
   for (Point3& p : points) {
@@ -213,7 +214,7 @@ inline std::vector<Point3> random_points(std::size_t count, std::mt19937_64& ran
   return points;
 }
 
-/// A triangulation behind a clock: what the model spends in it, and for the journal.
+/// A triangulation wrapped in a timer: the time the model spends in it, and on the journal.
 template <class T>
 class Timed {
  public:

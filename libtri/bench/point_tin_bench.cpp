@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Error-bounded surfaces of 4.2 million irregular points over fractal terrain (midpoint
 // displacement of exponent 0.8; a small one with TERRACE_BENCH_SMALL), one thread, at errors that
-// leave about 1 % and about half of the samples as vertices of the greedy surface. The counters
-// tell vertices, triangles, and the largest error as the independent measurement finds it (its time
+// leave about 1 % and about half of the samples as vertices of the greedy surface. Counters give
+// vertices, triangles, and the largest error according to the independent measurement (whose time
 // is a benchmark of its own). `tile`: samples on a lattice, within a frame.
 #include <algorithm>
 #include <cmath>
@@ -30,7 +30,7 @@ const std::size_t kCount = kSmall ? 4000 : 4'200'000;
 
 double unit(std::mt19937_64& random) { return static_cast<double>(random() >> 11) * 0x1p-53; }
 
-/// Diamond and square steps, heights of amplitude 1000 at the largest step.
+/// Diamond-square algorithm, with amplitude 1000 at the largest step.
 std::vector<double> terrain() {
   std::vector<double> height(kSide * kSide, 0.0);
   std::mt19937_64 random(1);
@@ -117,7 +117,8 @@ void measure(benchmark::State& state, double max_error) {
         measure_surface(input().x, input().y, input().z, tin.vertices, tin.triangles));
 }
 
-/// The samples of a 16th of the area as a tile on its lattice of 15 bits, its sides of 33 vertices.
+/// The samples of a 16th of the area as a tile on its lattice of 15 bits, with sides of 33
+/// vertices.
 void tile(benchmark::State& state, double max_error) {
   const double extent = 10 * static_cast<double>(kSide - 1) / 4;
   const double scale = 32767 / extent;

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Restoring shapes: from scratch and after a change, on a torus of 200,000 points with noise, and
-// on the scans of the folder that TERRACE_DATA names, of which a table tells how good they come
-// out.
+// Restoring shapes: from scratch and after a change, on a noisy torus of 200,000 points, and on the
+// scans in the folder named by TERRACE_DATA, for which a table shows the quality of the results.
 //
 // Times are of the restoring alone, after the build; a "change" is the removal of the 100 points
-// nearest to one of them, or their insertion again.
+// nearest to one of them, or their reinsertion.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -35,7 +34,7 @@ const std::vector<Point3>& torus() {
     std::vector<Point3> result;
     while (result.size() < kCount) {
       const double a = 2 * std::numbers::pi * unit(), b = 2 * std::numbers::pi * unit();
-      if (unit() * 1.4 > 1 + 0.4 * std::cos(b)) continue;  // even by area
+      if (unit() * 1.4 > 1 + 0.4 * std::cos(b)) continue;  // uniform by area
       const double tube = 0.4 + 0.001 * (2 * unit() - 1);
       const double radius = 1 + tube * std::cos(b);
       result.push_back({radius * std::cos(a), radius * std::sin(a), tube * std::sin(b)});
@@ -81,7 +80,7 @@ void update(benchmark::State& state) {
   Shape3<Coord> shape;
   triangulation.start_journal();
   shape.restore(triangulation);
-  // The points nearest to one of them, breadth first.
+  // The points nearest to one of them, breadth-first.
   std::vector<VertexId> cluster{*triangulation.all_vertices().begin()}, around;
   for (std::size_t i = 0; cluster.size() < 100; ++i) {
     triangulation.adjacent(cluster[i], around);

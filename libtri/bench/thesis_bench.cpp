@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Table 8.1 of the thesis beside ours: random clusters of an elevation model, expanded above a
-// coarse triangulation, are collapsed: by the model (its sets, and its bookkeeping with the
+// Table 8.1 of the thesis compared with ours: random clusters of an elevation model, expanded on
+// top of a coarse triangulation, are collapsed: by the model (as sets, and its bookkeeping with the
 // journal), point by point, and point by point by CGAL. Writes table_8_1.csv.
 //
 //   tri_thesis_bench --out DIR
@@ -47,7 +47,7 @@ constexpr std::array<ThesisRow, 6> kThesis{{{15, 4454, 0.01, 0.09, 0.09},
                                             {250, 73060, 6.66, 4.04, 1.54},
                                             {500, 146741, 35.23, 10.34, 5.54}}};
 
-/// CPU time of the process, which has one thread: other load of the machine disturbs it less.
+/// CPU time of the process, which has one thread: it is less affected by other load on the machine.
 double now() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
 double median(std::vector<double> values) {
@@ -76,8 +76,8 @@ struct Times {
   std::size_t points = 0;
 };
 
-/// What the model and its journal add: all it spends, less what the triangulation and the source
-/// do.
+/// The overhead of the model and its journal: its total time minus that of the triangulation and
+/// the source.
 void bookkeeping(ArraySource& source, const std::vector<ClusterId>& clusters, Times& times) {
   std::vector<double> own;
   Model model(source, {1, {}});

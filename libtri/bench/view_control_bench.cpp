@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// A camera flies over a grid of points in clusters of about 140, three levels, with as tight an
-// error as keeps about 500,000 of them in the model: 600 frames, each moving by 1 % of the width of
-// what is seen, a step of 10 ms at most per frame. What a step asks for is given before the next
-// one. Times in milliseconds of the steps; `at_target`: share of the frames after whose step
-// nothing shows a greater error; `stop_frames`: steps until the view that stopped is at its target
-// and nothing is left to do; `decide`: a step that finds nothing to do.
+// A camera flies over a grid of points in clusters of about 140, three levels, with an error chosen
+// such that about 500,000 of them are in the model: 600 frames, each moving by 1 % of the width of
+// the view, with one step of at most 10 ms per frame. The clusters that a step requests are given
+// before the next one. Times in milliseconds of the steps; `at_target`: share of the frames after
+// whose step no greater error is visible; `stop_frames`: steps until a view that stopped is at its
+// target and nothing is left to do; `decide`: a step that finds nothing to do.
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -40,8 +40,8 @@ std::vector<std::uint64_t> counts() {
 
 enum Kind { kPerspective, kMap };
 
-/// The way of the camera: a circle about the middle, the camera looking ahead and down. For the map
-/// it looks straight down.
+/// The camera's path: a circle about the middle, looking ahead and down; for the map, straight
+/// down.
 struct Flight {
   Kind kind;
   double middle = side() / 2.0, radius = side() * 0.22;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A coarse grid gets detail in one place and loses it again; a consumer that only knows the changes
+// A coarse grid gets detail in one place and loses it again; a consumer that sees only the changes
 // keeps its own list of triangles.
 #include <cstdio>
 #include <cstdlib>
@@ -35,7 +35,7 @@ int main() {
   terrain.insert(detail, inserted, terrain.nearest({3050, 3050}));
   correct = update() && correct;
 
-  // Points that were there before stay.
+  // Points that already existed stay.
   std::vector<VertexId> added;
   for (const auto& [vertex, created] : inserted)
     if (created) added.push_back(vertex);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A coarse lattice of points in space gets detail in one place and loses it again; a consumer that
-// only knows the changes keeps its own list of tetrahedra.
+// sees only the changes keeps its own list of tetrahedra.
 #include <cstdio>
 #include <cstdlib>
 #include <set>
@@ -44,7 +44,7 @@ int main() {
   const Location3 location = space.locate({301, 302, 303});
   correct = correct && location.place != Place3::kOutside && space.alive(location.tetrahedron);
 
-  // Points that were there before stay.
+  // Points that already existed stay.
   std::vector<VertexId> added;
   for (const auto& [vertex, created] : inserted)
     if (created) added.push_back(vertex);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Edges that follow a direction: everywhere, and in two regions only. Detail comes and goes.
+// Edges that follow a direction: everywhere, or in two regions only. Detail comes and goes.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -14,7 +14,7 @@ using Point = std::array<double, 2>;
 
 namespace {
 
-/// Length of the edges of triangles inside a box along and across a direction: the mean ratio.
+/// Mean ratio of the extents, along and across a direction, of the edges of triangles inside a box.
 template <class Triangulation>
 double stretch(const Triangulation& t, const std::vector<std::array<tri::VertexId, 3>>& triangles,
                const tri::Box3& box, double degrees) {
@@ -47,14 +47,14 @@ int main() {
   for (int i = 0; i < 4000; ++i) points.push_back({100 * unit(), 100 * unit()});
   const tri::Box3 everything = tri::box2(0, 0, 100, 100);
 
-  // One ellipse, four times as long as wide, its long axis 30 degrees from +x.
+  // One ellipse, four times as long as wide, with its long axis 30 degrees from +x.
   const tri::LinearMap2 ellipse = tri::ellipse_map(4, 1, 30);
   tri::Delaunay2<double, tri::EllipticalMetric2> slanted(ellipse);
   slanted.build(points);
   const double everywhere = stretch(slanted, all(slanted), everything, 30);
   std::printf("one ellipse: edges are %.2f times as long along it as across\n", everywhere);
 
-  // It is dynamic: what is inserted and removed again leaves no trace.
+  // It is dynamic: inserting and removing points leaves no trace.
   const std::uint64_t before = slanted.hash();
   std::vector<Point> detail;
   for (int i = 0; i < 500; ++i) detail.push_back({40 + 10 * unit(), 40 + 10 * unit()});
@@ -67,7 +67,7 @@ int main() {
   const bool same = slanted.hash() == before;
   std::printf("detail came and went: %s triangles\n", same ? "the same" : "NOT the same");
 
-  // Two regions with ellipses of their own, Euclidean outside.
+  // Two regions, each with its own ellipse, Euclidean outside.
   tri::Delaunay2<double> plain;
   plain.build(points);
   const tri::Box3 left = tri::box2(10, 10, 45, 90), right = tri::box2(55, 10, 90, 90);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A camera flies over a terrain that is never in memory as a whole. Each frame the control brings
-// the model nearer to what the camera wants and names the clusters it lacks; here a "loader" brings
-// them two frames later, in a viewer it would be threads or requests to a server.
+// the model closer to what the camera wants and names the missing clusters; here a "loader"
+// delivers them two frames later. In a viewer it would be threads or requests to a server.
 #include <cmath>
 #include <cstdio>
 #include <deque>
@@ -16,8 +16,9 @@ namespace tri = terrace::tri;
 
 namespace {
 
-// 729 x 729 heights in three levels: the middle of every 3 x 3 cells stands for its neighbours, and
-// of every 9 x 9 for its neighbours' middles. Any store of clusters can be a source.
+// 729 x 729 heights in three levels: the middle of every 3 x 3 cells represents its neighbours, and
+// the middle of every 9 x 9 represents the middles around it. Any store of clusters can be a
+// source.
 class Raster : public tri::ClusterSource {
  public:
   static constexpr std::uint64_t kSide = 729;
@@ -100,7 +101,7 @@ int main() {
   for (int frame = 0; frame < kFrames; ++frame) {
     tri::View view;
     view.pixel_error = 8.0;
-    // Over the terrain to its middle, looking ahead and down; there it stops.
+    // Flies to the middle of the terrain, looking ahead and down, and stops there.
     const double way = 100.0 + 2.5 * std::min(frame, 100);
     view.camera =
         tri::perspective_camera({{way, way, 60.0}, {1, 1, -1.2}, {0, 0, 1}}, 60.0, 1.6, 800.0);

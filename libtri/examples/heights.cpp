@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A hill on scattered points: heights, slopes and aspects at queries, a smoother version of it as
-// an overlay, and how good the mesh is.
+// A hill on scattered points: heights, slopes and aspects at query points, a smoothed version as an
+// overlay, and mesh quality.
 #include <cmath>
 #include <cstdio>
 #include <vector>
@@ -25,7 +25,7 @@ int main() {
     heights[slot(v)] = 100 - 0.5 * std::hypot(x - 200, y - 200);
   }
 
-  // Many queries in one call: heights, and where the slope faces.
+  // Many queries in one call: heights, and slope and aspect.
   const std::vector<tri::Point2> queries{{200, 120.5}, {280.25, 200}, {-50, 0}};
   const auto found =
       tri::heights_at(terrain, heights, queries, tri::Interpolation::kNaturalNeighbour);
@@ -38,7 +38,7 @@ int main() {
 
   if (std::isnan(found[2])) std::printf("(-50, 0) is outside the hull\n");
 
-  // The top rounded off: new heights for the vertices of a window, none for those on its border.
+  // Rounds off the top: new heights for the vertices in a window, except those on its border.
   tri::SmoothingOptions options;
   options.iterations = 20;
   const auto window = tri::vertices_in(terrain, tri::box2(150, 150, 250, 250));

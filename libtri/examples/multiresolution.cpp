@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A raster of 27 x 27 heights in two levels: the middle of every 3 x 3 cells stands for its
+// A raster of 27 x 27 heights in two levels: the middle of every 3 x 3 cells represents its
 // neighbours. The model is coarse, then fine in one corner, then coarse again.
 #include "terrace/tri/multiresolution.hpp"
 
@@ -58,7 +58,7 @@ int main() {
   std::printf("coarse: %zu vertices, %zu triangles\n", model.triangulation().vertex_count(),
               model.triangulation().triangle_count());
 
-  // All of level 0 inside the box; elsewhere the level below stays as it is.
+  // All of level 0 inside the box; the rest stays as it is.
   const auto& finer = model.refine(tri::box2(0, 0, 7, 7), 0);
   std::printf("a fine corner: %zu vertices and %zu triangles more, %zu triangles gone\n",
               finer.changes.added_vertices.size(), finer.changes.added_triangles.size(),
@@ -70,7 +70,7 @@ int main() {
   std::printf("  its first new vertex has level %u and height %g\n", model.level(vertex),
               model.height(vertex));
 
-  // The very triangulation of before.
+  // The same triangulation as before.
   model.set_level(1);
   const bool same = model.triangulation().hash() == before;
   std::printf("coarse again: %s\n", same ? "the same triangles" : "NOT the same triangles");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Points of a dumbbell. Its surface comes back from the points alone; then a part is sampled more
-// densely, and the shape follows the triangulation's changes.
+// Restores the surface of a dumbbell from points alone; then a part is sampled more densely, and
+// the shape follows the changes of the triangulation.
 #include "terrace/tri/shape.hpp"
 
 #include <cmath>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Operations on points of a lattice of 6 x 6 x 5, so that ties, duplicates and flat states are
-// everywhere. After each one the triangulation must be valid and equal to one built anew.
+// frequent. After each one the triangulation must be valid and equal to a rebuild.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -26,7 +26,7 @@ void check(const Delaunay3<Coord>& triangulation) {
   std::abort();
 }
 
-// Each operation is one byte for its kind and count, then a byte per operand.
+// Each operation is one byte for its kind and count, then one byte per operand.
 template <class Coord>
 void run(const std::uint8_t* data, std::size_t size) {
   Delaunay3<Coord> triangulation;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A view control over a small hierarchy with points of a 10 x 10 raster, records that lie, and
-// steps, gifts and pins in any order. Budgets hold, the triangulation stays valid and equal to one
-// built anew, and in the end a view that stays settles.
+// A view control over a small hierarchy with points of a 10 x 10 raster and false records, with
+// steps, given clusters and pins in any order. Budgets must hold, the triangulation must stay valid
+// and equal to a rebuild, and in the end a view that stays must settle.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -32,7 +32,7 @@ class Input {
   [[nodiscard]] bool empty() const { return at_ >= size_; }
   std::uint8_t byte() { return at_ < size_ ? data_[at_++] : std::uint8_t{0}; }
   std::size_t below(std::size_t count) { return byte() % count; }
-  /// -16 to 16 in eighths, or something that is hardly a number.
+  /// -16 to 16 in eighths, or an extreme or invalid value.
   double number() {
     constexpr double kInfinity = std::numeric_limits<double>::infinity();
     constexpr double kOdd[] = {

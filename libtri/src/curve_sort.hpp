@@ -12,11 +12,11 @@
 #include "for_blocks.hpp"
 #include "pool.hpp"
 
-/// Sorting of points by the cell of a space-filling curve that they are in.
+/// Sorts points by their cell on a space-filling curve.
 
 namespace terrace::tri {
 
-/// Calls work(from, to) for ranges of 0 .. count - 1, in several threads where that pays.
+/// Calls work(from, to) for ranges of 0 .. count - 1, on several threads if that pays.
 template <class Work>
 void for_ranges(std::uint32_t count, unsigned threads, const Work& work) {
   constexpr std::uint32_t kRange = 16384;
@@ -55,9 +55,9 @@ void radix_sort(Pool<CurveEntry>& entries) {
   }
 }
 
-/// Sorts a range of point numbers. cells_of(range) lays a raster over these points: single() tells
-/// that they are all in one place, key(number) is the place of a point's cell on the curve, of
-/// kKeyBits bits. What one raster does not tell apart the next, over fewer points, does, so
+/// Sorts a range of point indices. cells_of(range) lays a raster over these points: single()
+/// returns whether they all coincide, key(index) is the position of a point's cell on the curve, of
+/// kKeyBits bits. Points in one cell are distinguished by the next raster, over fewer points, so
 /// recursion is never deep. Threads compute keys.
 template <unsigned kKeyBits, class CellsOf>
 void sort_along_curve(std::span<std::uint32_t> order, const CellsOf& cells_of,
@@ -71,7 +71,7 @@ void sort_along_curve(std::span<std::uint32_t> order, const CellsOf& cells_of,
   const auto count = static_cast<std::uint32_t>(order.size());
   Pool<CurveEntry> entries;
   entries.resize(count);
-  // Few points are told apart by the curve's coarse cells, and if not, in the runs below.
+  // Few points are separated by the curve's coarse cells, or otherwise in the runs below.
   const bool few = count < kFew;
   const unsigned shift = few ? kKeyBits - 16 : 0;
   for_ranges(count, threads, [&](std::uint32_t from, std::uint32_t to) {
@@ -82,7 +82,7 @@ void sort_along_curve(std::span<std::uint32_t> order, const CellsOf& cells_of,
   } else {
     radix_sort<(kKeyBits + 2) / 3, 3>(entries);
   }
-  // Entries are gone before the runs are sorted, so that memory does not add up.
+  // Entries are freed before the runs are sorted, so that memory does not add up.
   std::vector<std::span<std::uint32_t>> long_runs;
   std::uint32_t begin = 0;
   for (std::uint32_t i = 0; i < count; ++i) {

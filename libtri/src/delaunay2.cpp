@@ -18,7 +18,7 @@ namespace {
 
 using planar::kNone;
 
-/// Coordinates of the lines of a grid; throws where they would be rounded or out of range.
+/// The coordinates of a grid's lines; throws if they would be rounded or out of range.
 template <class Kernel, class Coord>
 std::vector<Coord> grid_lines(Coord begin, Coord step, std::uint32_t count, const char* axis) {
   std::vector<Coord> lines(count);
@@ -27,7 +27,7 @@ std::vector<Coord> grid_lines(Coord begin, Coord step, std::uint32_t count, cons
     if constexpr (std::is_same_v<Coord, double>) {
       const double offset = i * step;
       lines[i] = begin + offset;
-      // x + y is exact if and only if both are recovered from it.
+      // x + y is exact if and only if both can be recovered from it.
       exact = Kernel::valid({lines[i], lines[i]}) && offset / step == i &&
               lines[i] - begin == offset && lines[i] - offset == begin &&
               std::fma(static_cast<double>(i), step, -offset) == 0;
@@ -146,7 +146,7 @@ template <class Coord, class Metric>
 std::size_t Delaunay2<Coord, Metric>::triangle_count() const {
   const auto& mesh = impl_->mesh;
   if (mesh.flat) return 0;
-  // Of 2 n - 2 triangles, as many are ghosts as there are hull edges.
+  // Of 2 n - 2 triangles, the ghosts are as many as the hull edges.
   return 2 * std::size_t{mesh.vertex_count} - 2 - planar::degree(mesh, planar::kGhost);
 }
 

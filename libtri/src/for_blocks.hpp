@@ -14,7 +14,8 @@ namespace terrace::tri {
 
 /// Calls work(begin, end, worker) for consecutive blocks of `block` numbers out of 0 .. count - 1
 /// in `threads` threads (0: one per core). make() gives each thread its worker. Which thread takes
-/// which block varies, the blocks do not. The first exception comes out when all have stopped.
+/// which block varies, the blocks do not. Rethrows the first exception when all threads have
+/// stopped.
 template <class Make, class Work>
 void for_blocks(std::size_t count, std::size_t block, unsigned threads, Make make, Work work) {
   const std::size_t blocks = (count + block - 1) / block;
@@ -34,12 +35,12 @@ void for_blocks(std::size_t count, std::size_t block, unsigned threads, Make mak
       next = blocks;
     }
   };
-  std::vector<std::thread> others;  // no jthread: not all standard libraries have it
+  std::vector<std::thread> others;  // std::jthread is missing in some standard libraries
   others.reserve(used);
   try {
     for (std::size_t i = 1; i < used; ++i) others.emplace_back(run);
   } catch (const std::system_error&) {
-    // The system grants no more threads. Those there are do the same work.
+    // The system grants no more threads. The existing ones do the same work.
   }
   run();
   for (std::thread& other : others) other.join();

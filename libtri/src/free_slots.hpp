@@ -6,18 +6,18 @@
 #include <cstdint>
 #include <vector>
 
-/// The free slots of an array, one bit each, nothing before the first is freed.
+/// The free slots of an array, one bit each; nothing is allocated before the first is freed.
 
 namespace terrace::tri {
 
-/// Slots are taken block by block of 64, the block that was used up longest ago last, in each the
-/// lowest first: what is removed together and inserted together stays together in memory, in
-/// whatever order that happens. (Chained in the order of their freeing, the slots of a cluster come
-/// back shuffled, and one that has left the caches takes twice the time.)
+/// Slots are taken in blocks of 64, the most recently freed block first, the lowest slot of a block
+/// first: slots that are freed together and reused together stay together in memory, in whatever
+/// order that happens. (Chained in the order of their freeing, the slots of a cluster come back
+/// shuffled; once it has left the caches this takes twice the time.)
 class FreeSlots {
  public:
   [[nodiscard]] bool empty() const { return blocks_.empty(); }
-  /// The slot that take() would take. Not while empty().
+  /// The slot that take() would return. Requires !empty().
   [[nodiscard]] std::uint32_t next() const {
     const std::uint32_t block = blocks_.back();
     return block * 64 + static_cast<std::uint32_t>(std::countr_zero(bits_[block]));
@@ -56,7 +56,7 @@ class FreeSlots {
 
  private:
   std::vector<std::uint64_t> bits_;
-  std::vector<std::uint32_t> blocks_;  ///< those with a bit, as a stack
+  std::vector<std::uint32_t> blocks_;  ///< blocks with a set bit, as a stack
 };
 
 }  // namespace terrace::tri

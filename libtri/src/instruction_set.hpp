@@ -5,7 +5,8 @@
 
 namespace terrace::tri {
 
-/// What inner loops are compiled for; the best that the processor supports is chosen at run time.
+/// The instruction sets for which inner loops are compiled; the best one supported is chosen at run
+/// time.
 enum class InstructionSet : std::uint8_t { kPortable, kAvx2, kAvx512 };
 bool supported(InstructionSet set);
 InstructionSet best_instruction_set();

@@ -17,9 +17,9 @@
 namespace terrace::tri {
 namespace {
 
-/// Queries sorted at a time, so that memory is bounded.
+/// Queries sorted at a time, to bound memory.
 constexpr std::size_t kSorted = std::size_t{1} << 24;
-/// Queries per block of work. The first of each searches from afar.
+/// Queries per block of work. The first query of a block searches from afar.
 constexpr std::size_t kBlock = 8192;
 
 void check_queries(std::span<const Point2> queries) {
@@ -31,7 +31,7 @@ void check_queries(std::span<const Point2> queries) {
   }
 }
 
-/// results[i] = answer(sampler, queries[i]), in an order of queries where the next one is near.
+/// results[i] = answer(sampler, queries[i]), in an order in which successive queries are close.
 template <class Mesh, class Result, class Answer>
 void answer_all(const Mesh& mesh, std::span<const Point2> queries, std::vector<Result>& results,
                 unsigned threads, Answer answer) {

@@ -8,8 +8,8 @@
 
 #include "terrace/tri/delaunay2.hpp"
 
-/// What slots held when a change first touched them. One bit per slot tells whether it was touched
-/// already, so the cost of recording does not depend on how often a slot is used again.
+/// The former contents of slots, recorded when a change first touches them. One bit per slot marks
+/// it as touched, so the cost of recording does not depend on how often a slot is reused.
 
 namespace terrace::tri {
 
@@ -40,7 +40,7 @@ class Journal {
     on_ = false;
   }
 
-  /// Call only while on(), before the slot changes.
+  /// To be called only while on(), before the slot changes.
   void touch_cell(std::uint32_t slot, const Corners& before) {
     if (cells_.first_touch(slot)) cells_.records.push_back({slot, before});
   }
@@ -48,10 +48,10 @@ class Journal {
     if (vertices_.first_touch(slot)) vertices_.records.push_back({slot, was_alive, before});
   }
 
-  /// Turns the records into net changes and empties the journal. What is there now: point(slot) is
-  /// that of a living vertex, corners(slot) those of a finite cell, else nullptr;
-  /// is_finite(corners) judges recorded ones. `changes`: a triangulation's, empty; the last two are
-  /// its lists of cells.
+  /// Turns the records into net changes and empties the journal. The current state: point(slot) is
+  /// that of a living vertex, corners(slot) those of a finite cell, otherwise nullptr;
+  /// is_finite(corners) classifies recorded ones. `changes`: a triangulation's, empty; the last two
+  /// arguments are its lists of cells.
   template <class PointNow, class CornersNow, class IsFinite, class Changes, class CellId>
   void take(const PointNow& point, const CornersNow& corners, const IsFinite& is_finite,
             Changes& changes, std::vector<CellId>& removed_cells,
@@ -59,7 +59,7 @@ class Journal {
     for (const VertexRecord& record : vertices_.records) {
       const Point* const now = point(record.slot);
       if (record.was_alive && now != nullptr && record.before == *now) {
-        // The same again; so its cells may be the same as well.
+        // Unchanged; then its cells may be unchanged too.
         vertices_.untouch(record.slot);
         continue;
       }

@@ -19,24 +19,25 @@ void* checked(void* memory) {
 
 #ifdef __linux__
 
-// Below this the heap serves: mappings are too coarse and too dear for small triangulations.
+// Smaller arrays are on the heap: mappings are too coarse and too expensive for them.
 constexpr std::size_t kMapFrom = std::size_t{1} << 20;
 
 std::size_t round_up(std::size_t bytes, std::size_t unit) {
   return (bytes + unit - 1) / unit * unit;
 }
 
-// Huge pages where whole ones fit; a last part stays in small pages by itself. The whole mapping is
-// advised, that part too: the kernel refuses to move one whose parts have different advice.
+// Huge pages where whole ones fit; a last part stays in small pages automatically. The whole
+// mapping is advised, including that part: the kernel refuses to move a mapping whose parts have
+// different advice.
 void advise(void* memory, std::size_t bytes) {
-  // Only a hint: without it everything works, more slowly.
+  // Only a hint: without it everything works, but more slowly.
   if (bytes >= kHugePage) (void)madvise(memory, bytes, MADV_HUGEPAGE);
 }
 
 void* map(std::size_t bytes) {
   constexpr std::size_t kSmallPage = 4096;
   const std::size_t length = round_up(bytes, kSmallPage);
-  // Aligned to a huge page by cutting the ends of a larger mapping.
+  // Aligned to a huge page by cutting the ends off a larger mapping.
   void* raw = mmap(nullptr, length + kHugePage, PROT_READ | PROT_WRITE,
                    MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
   if (raw == MAP_FAILED) throw std::bad_alloc();
@@ -49,8 +50,8 @@ void* map(std::size_t bytes) {
   return begin + head;
 }
 
-// Grows a mapping: in place, or to an address that keeps its huge pages whole. Where the kernel
-// chooses the address they would all fall apart into small ones.
+// Grows a mapping in place, or moves it to an address that keeps its huge pages whole. At an
+// address chosen by the kernel they would all be split into small ones.
 void* remap(void* memory, std::size_t old_bytes, std::size_t new_bytes) {
   void* grown = mremap(memory, old_bytes, new_bytes, 0);
   if (grown == MAP_FAILED) {
@@ -78,7 +79,7 @@ void* allocate_pages(std::size_t bytes) {
 
 void* resize_pages(void* memory, std::size_t old_bytes, std::size_t new_bytes) {
 #ifdef __linux__
-  // What is below is in small pages: it is copied.
+  // Smaller arrays are in small pages and are copied.
   if (old_bytes >= kHugePage && new_bytes >= kHugePage) return remap(memory, old_bytes, new_bytes);
   if (old_bytes >= kMapFrom || new_bytes >= kMapFrom) {
     void* moved = allocate_pages(new_bytes);

@@ -10,17 +10,17 @@
 #include <utility>
 
 /// Growing arrays of plain data for the triangulation: unlike std::vector they leave new elements
-/// uninitialised, grow by an eighth without a second copy where the system can move pages, and use
-/// huge pages once they are large (a sixth faster: the accesses are scattered).
+/// uninitialised, grow by an eighth without a second copy if the system can move pages, and use
+/// huge pages once they are large (a sixth faster, as accesses are scattered).
 
 namespace terrace::tri {
 
 inline constexpr std::size_t kHugePage = std::size_t{2} << 20;
 
-/// Memory of at least `bytes` bytes; throws std::bad_alloc.
+/// Allocates at least `bytes` bytes; throws std::bad_alloc.
 void* allocate_pages(std::size_t bytes);
-/// Moves `old_bytes` bytes of contents to `new_bytes` bytes of memory; throws std::bad_alloc, the
-/// old memory then stays.
+/// Moves `old_bytes` bytes of contents to `new_bytes` bytes of memory; throws std::bad_alloc, which
+/// leaves the old memory valid.
 void* resize_pages(void* memory, std::size_t old_bytes, std::size_t new_bytes);
 void free_pages(void* memory, std::size_t bytes) noexcept;
 
@@ -80,7 +80,7 @@ class Pool {
     if (capacity_ < 4096) return 2 * capacity_ + 16;
     const std::size_t eighth = capacity_ + capacity_ / 8;
     if (eighth * sizeof(T) < kHugePage) return eighth;
-    // Whole huge pages: what is first used in small ones stays in them.
+    // Grows by whole huge pages: memory first used as small pages stays in them.
     const std::size_t whole = eighth * sizeof(T) / kHugePage * kHugePage / sizeof(T);
     return whole > capacity_ ? whole : whole + kHugePage / sizeof(T);
   }

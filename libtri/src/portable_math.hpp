@@ -7,9 +7,9 @@
 #include <cstddef>
 #include <numbers>
 
-/// Functions of the C library whose last bit differs from release to release and from processor to
-/// processor, made here of +, -, *, / and sqrt alone, which IEEE 754 fixes, so that triangles and
-/// numbers are the same everywhere. (remquo is exact.)
+/// Replacements for functions of the C library whose last bit differs between releases and
+/// processors, made of +, -, *, / and sqrt alone, which IEEE 754 defines exactly, so that triangles
+/// and numbers are the same everywhere. (remquo is exact.)
 
 namespace terrace::tri::portable {
 
@@ -17,7 +17,7 @@ namespace terrace::tri::portable {
 inline std::array<double, 2> sine_cosine(double degrees) {
   int quarter = 0;
   const double x = std::remquo(degrees, 90.0, &quarter) * (std::numbers::pi / 180.0);
-  // Taylor's series; |x| <= pi / 4.
+  // Taylor series; |x| <= pi / 4.
   double s = 0.0, c = 0.0;
   for (int k = 9; k >= 1; --k) {
     s = (1.0 + s) * (-x * x / (2 * k * (2 * k + 1)));
@@ -37,7 +37,7 @@ inline std::array<double, 2> sine_cosine(double degrees) {
   }
 }
 
-/// sqrt(x^2 + y^2), where the squares would overflow or vanish as well.
+/// sqrt(x^2 + y^2), also where the squares would overflow or underflow.
 inline double length(double x, double y) {
   const double squares = x * x + y * y;
   if (squares > 1e-280 && squares < 1e300) return std::sqrt(squares);
@@ -48,12 +48,13 @@ inline double length(double x, double y) {
   return largest * std::sqrt(x * x + y * y);
 }
 
-/// The angle of the vector (x, y) from the x axis in degrees, -180 to 180, within 4e-16 of itself;
-/// exact at multiples of 45. As atan2(y, x): 0 or 180 with the sign of y if y is a zero.
+/// The angle of the vector (x, y) from the x axis in degrees, -180 to 180, with a relative error of
+/// 4e-16; exact at multiples of 45. As with atan2(y, x): 0 or 180 with the sign of y if y is zero.
 inline double angle_degrees(double y, double x) {
   const double a = std::abs(x), b = std::abs(y);
   if (std::isnan(a) || std::isnan(b)) return a + b;
-  // The tangent, at most 1: the nearest eighth, whose angle is known, and the angle from there.
+  // The tangent, at most 1: the angle of the nearest eighth is known; the series gives the
+  // difference.
   double t = a == b ? 1.0 : std::min(a, b) / std::max(a, b);
   if (b == 0.0) t = 0.0;
   static constexpr std::array<double, 9> kEighths{0.0,

@@ -17,12 +17,12 @@ using Vector = std::array<double, 2>;
 
 double length(const Vector& v) { return portable::length(v[0], v[1]); }
 
-/// The part above zero of the volume under a triangle with these heights, over its area.
+/// The volume above zero under a triangle with these heights, divided by its area.
 double mean_above(std::array<double, 3> h) {
   if (std::isnan(h[0] + h[1] + h[2])) return std::numeric_limits<double>::quiet_NaN();
   std::sort(h.begin(), h.end());
   const auto& [low, middle, high] = h;
-  // A tip that is cut off is a pyramid over a similar triangle.
+  // A cut-off tip is a pyramid over a similar triangle.
   const auto tip = [](double apex, double b, double c) {
     return apex * (apex / (apex - b)) * (apex / (apex - c)) / 3;
   };
@@ -45,8 +45,8 @@ TriangleQuality triangle_quality(const Delaunay2<Coord>& triangulation, const He
     at[i] = {static_cast<double>(p[0]), static_cast<double>(p[1])};
     height[i] = heights(vertices[i]) - datum;
   }
-  // Edges opposite to corner i, counter-clockwise; all scaled by a power of two to lengths about 1,
-  // so that only what is a size itself can leave the range of doubles.
+  // Edges opposite to corner i, counter-clockwise; all scaled by a power of two to lengths of about
+  // 1, so that only results that are sizes themselves can overflow.
   std::array<Vector, 3> edge;
   int exponent = 0;
   const auto take_edges = [&](double unit) {

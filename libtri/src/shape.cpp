@@ -116,7 +116,7 @@ ShapeSurface BasicShape3<Triangulation>::surface(const Triangulation& triangulat
     const spatial::Tetrahedron& tetrahedron = mesh.tetrahedron[t];
     for (std::uint32_t i = 0; i < 4; ++i) {
       if (shape::is_kept(of[spatial::tetrahedron_of(tetrahedron.mate[i])])) continue;
-      // With the corner first in order: seen from the other side they turn counter-clockwise.
+      // In order with the corner first, so counter-clockwise when seen from the other side.
       faces.push_back(spatial::facet_of(tetrahedron, i));
       for (const std::uint32_t v : faces.back()) number[v] = 0;
     }

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::uint32_t kOutside = 0xFFFFFFFFu;
 
-/// The step of Taubin's second pass: 1 / strength + 1 / step = pass band.
+/// The second step of Taubin's method: 1 / strength + 1 / step = pass band.
 double back_step(const SmoothingOptions& options) {
   return -options.strength / (1 - options.pass_band * options.strength);
 }
@@ -28,27 +28,28 @@ void check(const SmoothingOptions& options) {
           "strength " + std::to_string(options.strength) + " is not in 0 < strength <= 1");
   if (options.method == Smoothing::kBilateral)
     require(options.edge_height > 0, "edge_height " + std::to_string(options.edge_height) +
-                                         " is not positive; give the least height of a step that "
-                                         "is to stay");
+                                         " is not positive; give the smallest height difference "
+                                         "to preserve");
   if (options.method != Smoothing::kTaubin) return;
   require(options.pass_band > 0 && options.pass_band < 1,
           "pass_band " + std::to_string(options.pass_band) + " is not in 0 < pass_band < 1");
-  // What is roughest, of eigenvalue 2, must not grow.
+  // The roughest component, of eigenvalue 2, must not grow.
   const double growth = (1 - 2 * options.strength) * (1 - 2 * back_step(options));
   require(std::abs(growth) <= 1, "strength " + std::to_string(options.strength) +
                                      " is too large for this method; use at most 0.6");
 }
 
-/// The vertices of a region by rows of a sparse matrix: those that move, then those that stay.
+/// The vertices of a region by rows of a sparse matrix: first those that move, then those that
+/// stay.
 struct Rows {
   std::vector<std::uint32_t> vertex;
   std::size_t moving = 0;
-  std::vector<std::size_t> begin;  ///< of row i in the following; one more at the end
+  std::vector<std::size_t> begin;  ///< start of row i in the following arrays; one extra at the end
   std::vector<std::uint32_t> neighbour;
-  std::vector<double> weight;  ///< >= 0; 1 in sum per row
+  std::vector<double> weight;  ///< >= 0; the sum per row is 1
 };
 
-/// The vectors from a vertex to its neighbours, scaled to at most 1, as angles do not change by it.
+/// The vectors from a vertex to its neighbours, scaled to at most 1, which does not change angles.
 void scale(const planar::Query& origin, std::vector<planar::Query>& at) {
   bool huge = false;
   for (const auto& p : at)
@@ -65,8 +66,8 @@ void scale(const planar::Query& origin, std::vector<planar::Query>& at) {
 }
 
 /// Weights of the neighbours of a vertex at the origin: the sum of the cotangents of the two angles
-/// that look at an edge, which is twice the side of its Voronoi cells over its length. False where
-/// they are not numbers.
+/// opposite to an edge, which is twice the common side of the Voronoi cells divided by the edge's
+/// length. Returns false if they are NaN.
 bool weigh(const std::vector<planar::Query>& at, std::vector<double>& weights) {
   weights.assign(at.size(), 0);
   for (std::size_t i = 0; i < at.size(); ++i) {
@@ -74,13 +75,13 @@ bool weigh(const std::vector<planar::Query>& at, std::vector<double>& weights) {
     const auto& [bx, by] = at[i];
     const auto& [cx, cy] = at[next];
     const double cross = bx * cy - by * cx;
-    // The angle at c looks at the edge to b, that at b at the edge to c.
+    // The angle at c is opposite to the edge to b, the angle at b opposite to the edge to c.
     weights[i] += ((bx - cx) * -cx + (by - cy) * -cy) / cross;
     weights[next] += ((cx - bx) * -bx + (cy - by) * -by) / cross;
   }
   double sum = 0;
   for (double& w : weights) {
-    w = std::isnan(w) ? w : std::max(w, 0.0);  // negative by rounding only
+    w = std::isnan(w) ? w : std::max(w, 0.0);  // negative only by rounding
     sum += w;
   }
   for (double& w : weights) w /= sum;
@@ -133,7 +134,7 @@ Rows make_rows(const Mesh& mesh, std::span<const VertexId> region) {
   return rows;
 }
 
-/// next = height + step * (mean of neighbours - height) where rows move; count(d) weighs a
+/// next = height + step * (mean of neighbours - height) for rows that move; count(d) weighs a
 /// neighbour that is higher by d.
 template <class Count>
 void take_step(const Rows& rows, double step, std::vector<double>& height,

@@ -1,7 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: Apache-2.0
-# check_wasm.sh EM++ LIBTRI FOLDER SOURCES...: compiles the core and examples/flight.cpp for WebAssembly and runs
-# it; without Emscripten it is skipped. Every source is compiled apart, as Emscripten caches nothing.
+# check_wasm.sh EM++ LIBTRI FOLDER SOURCES...: compiles the core and examples/flight.cpp for WebAssembly and runs it;
+# skipped without Emscripten. Every source is compiled separately, as Emscripten caches nothing.
 set -eu
 compiler=$1 root=$2 folder=$3/wasm
 shift 3

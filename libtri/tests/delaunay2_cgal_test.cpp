@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// CGAL's Delaunay_triangulation_2 as an oracle, ties included: it perturbs by the same order. So
+// CGAL's Delaunay_triangulation_2 as an oracle, including ties: it perturbs in the same order. So
 // sets of triangles must be equal, whatever the input.
 #include <algorithm>
 #include <cmath>
@@ -106,8 +106,8 @@ TEST(DoubleKernel, SignsAreExact) {
   std::mt19937_64 random(5);
   for (int round = 0; round < 20'000; ++round) {
     SCOPED_TRACE("round " + std::to_string(round));
-    // Points on a small raster, moved far out, scaled, and disturbed in the last bits: decisions
-    // from plain to impossible for doubles.
+    // Points on a small raster, moved far out, scaled, and disturbed in the last bits: from easy to
+    // undecidable in doubles.
     const double scale = std::ldexp(1.0, static_cast<int>(random() % 500) - 250);
     const double offset = round % 3 == 0 ? 0 : std::ldexp(scale, static_cast<int>(random() % 50));
     std::array<std::array<double, 2>, 4> p;
@@ -122,7 +122,7 @@ TEST(DoubleKernel, SignsAreExact) {
   }
 }
 
-// ---- Real files, where the environment names a folder of them ----------------------------------
+// ---- Real files, if the environment names a folder ----------------------------------------------
 
 std::filesystem::path data_folder() {
   const char* folder = std::getenv("TERRACE_DATA");
@@ -136,7 +136,7 @@ std::string contents(const std::filesystem::path& path) {
   return text.str();
 }
 
-/// All numbers of a text in pairs, whatever stands between them.
+/// All numbers of a text in pairs, whatever the separators.
 std::vector<std::array<double, 2>> number_pairs(const std::string& text, std::size_t limit) {
   std::vector<std::array<double, 2>> points;
   std::vector<double> numbers;
@@ -168,7 +168,7 @@ TEST(Delaunay2RealFiles, SameTrianglesAsCgal) {
       std::string text = contents(entry.path());
       std::size_t limit = 100'000;
       if (std::string(folder) == "cdt") {
-        // Counts of points and edges in the first line, then the points.
+        // Numbers of points and edges in the first line, then the points.
         limit = static_cast<std::size_t>(std::strtoul(text.c_str(), nullptr, 10));
         text.erase(0, text.find('\n'));
       }

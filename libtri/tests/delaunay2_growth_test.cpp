@@ -11,11 +11,11 @@
 namespace terrace::tri {
 namespace {
 
-// Large arrays are mapped memory that the system moves when it grows: here several times, past the
-// sizes where that begins.
+// Large arrays are mapped memory that the system moves when it grows: here several times, beyond
+// the sizes at which that begins.
 TEST(Delaunay2Growth, InsertionFromNothingGoesOn) {
   using Point = Delaunay2<std::int32_t>::Point;
-  // One point per tile of 20 x 20 first, then tile by tile: short walks, small cavities.
+  // First one point per tile of 20 x 20, then tile by tile: short walks, small cavities.
   std::vector<Point> points;
   for (std::int32_t y = 0; y < 400; y += 20)
     for (std::int32_t x = 0; x < 400; x += 20) points.push_back({x, y});
@@ -31,8 +31,8 @@ TEST(Delaunay2Growth, InsertionFromNothingGoesOn) {
   EXPECT_EQ(grown.hash(), built.hash());
 }
 
-// Sets large enough that their scratch memory is not kept: one hole; holes that are too long to be
-// filled, which are given up after all has been flooded; and a small set after these.
+// Sets so large that their scratch memory is released; one hole; holes that are too long to be
+// filled, which are given up after everything has been flooded; and a small set after these.
 TEST(Delaunay2Growth, LargeSetsLeaveTheRest) {
   constexpr std::int32_t kSide = 300;
   Delaunay2<std::int32_t> triangulation;

@@ -100,7 +100,7 @@ TYPED_TEST(Delaunay2Test, RemovalOfSetsEqualsRebuild) {
       triangulation.build(points);
       std::vector<VertexId> vertices;
       for (const VertexId v : triangulation.all_vertices()) vertices.push_back(v);
-      // Compact sets: nearest to a vertex, now and then with vertices left out (islands).
+      // Compact sets: nearest to a vertex, sometimes with vertices left out (islands).
       const auto centre = triangulation.point(vertices[random() % vertices.size()]);
       const auto distance = [&](VertexId v) {
         const auto p = triangulation.point(v);
@@ -173,7 +173,7 @@ TYPED_TEST(Delaunay2Test, JournalTellsTheNetDifference) {
     std::mt19937_64 random(9);
     const auto points = make_points<TypeParam>(kind, 300, 4);
     Delaunay2<TypeParam> triangulation;
-    // What a consumer knows: arrays by slot, kept up to date by changes only.
+    // A consumer's state: arrays by slot, kept up to date by changes only.
     std::map<TriangleId, Triple> triangles;
     std::map<VertexId, std::array<TypeParam, 2>> vertices;
     typename Delaunay2<TypeParam>::Changes changes;
@@ -306,7 +306,7 @@ TYPED_TEST(Delaunay2Test, GridEqualsBuild) {
     built.build(points);
     EXPECT_EQ(grid.hash(), built.hash());
     EXPECT_EQ(grid.triangle_count(), built.triangle_count());
-    // It is an ordinary triangulation from here on.
+    // From here on it is an ordinary triangulation.
     if (columns * rows < 2) continue;
     grid.remove(first);
     grid.insert({static_cast<TypeParam>(4), static_cast<TypeParam>(12)});
@@ -339,7 +339,7 @@ TYPED_TEST(Delaunay2Test, NeighboursOfAVertexAreInOrder) {
     ends += around.size() - triangles;
     ASSERT_EQ(triangulation.vertices(triangulation.triangle_at(v)).size(), 3u);
   }
-  // One gap per hull vertex: as many as the count of triangles tells.
+  // One gap per hull vertex: consistent with the number of triangles.
   EXPECT_EQ(triangulation.triangle_count() + 2 + ends, 2 * triangulation.vertex_count());
 }
 

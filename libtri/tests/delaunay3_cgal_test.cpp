@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sets of tetrahedra and signs of predicates against CGAL's, on made points.
+// Sets of tetrahedra and signs of predicates against CGAL's, on synthetic points.
 #include <algorithm>
 #include <cmath>
 
@@ -56,7 +56,7 @@ TYPED_TEST(Delaunay3CgalTest, SameTetrahedraAfterRemoval) {
 }
 
 TEST(Delaunay3Cgal, SameTetrahedraWhenPointsLeaveTheLattice) {
-  // Multiples of a power of two, then points between them, then all again without these.
+  // Multiples of a power of two, then points in between, then all again without these.
   for (const double scale : {1.0, 0x1p-30, 0x1p-79, 0x1p-82, 0x1p79, 0x1p100, 0.1}) {
     SCOPED_TRACE("scale " + std::to_string(std::log2(scale)));
     std::mt19937_64 random(35);
@@ -86,8 +86,8 @@ TEST(Delaunay3Cgal, SameTetrahedraWhenPointsLeaveTheLattice) {
   }
 }
 
-/// What a filter says of the fifth point must be right, also where exact arithmetic finds it on the
-/// sphere of the others, not in one plane; it may leave anything open.
+/// A filter's verdict on the fifth point must be right, even where exact arithmetic finds it on the
+/// sphere of the others (which are not coplanar); it may leave anything undecided.
 template <class Ours>
 spatial::Verdict expect_right_verdict(std::array<typename Ours::Point, 5> p, int turn, int side) {
   if (turn < 0) {
@@ -138,9 +138,9 @@ TEST(DoubleKernel3, SignsAreExact) {
   std::mt19937_64 random(5);
   for (int round = 0; round < 20'000; ++round) {
     SCOPED_TRACE("round " + std::to_string(round));
-    // Points on a small raster, moved far out, scaled, and disturbed in the last bits: decisions
-    // from plain to impossible for doubles.
-    // Those that are not disturbed, and not scaled too far, the filter must decide.
+    // Points on a small raster, moved far out, scaled, and disturbed in the last bits: from easy to
+    // undecidable in doubles. Those that are neither disturbed nor scaled too far must be decided
+    // by the filter.
     const int exponent = static_cast<int>(random() % (round % 2 == 0 ? 2000 : 180));
     const double scale = std::ldexp(1.0, exponent - (round % 2 == 0 ? 1000 : 90));
     const double offset = round % 3 == 0 ? 0 : std::ldexp(scale, static_cast<int>(random() % 20));
@@ -163,7 +163,7 @@ TEST(IntKernel3, SignsAreExact) {
   std::mt19937_64 random(6);
   for (int round = 0; round < 20'000; ++round) {
     SCOPED_TRACE("round " + std::to_string(round));
-    // From small rasters to the whole range, nearly cospherical or not.
+    // From small rasters to the full range, nearly cospherical or not.
     const std::uint64_t bound = std::uint64_t{1} << (1 + random() % 30);
     std::array<Ours::Point, 5> p;
     std::array<Exact::Point_3, 5> q;

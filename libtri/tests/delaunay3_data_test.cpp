@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tetrahedra of scans, and of point sets that were hard for others, in the data folder that
-// TERRACE_DATA names.
+// Tetrahedra of scans, and of point sets that were difficult for other programs, in the data folder
+// named by TERRACE_DATA.
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -26,7 +26,7 @@ class Delaunay3DataTest : public ::testing::Test {
     folder_ = folder;
   }
 
-  /// Points of the scan, none if it is not there.
+  /// Points of the scan; empty if it does not exist.
   [[nodiscard]] DoublePoints scan(const std::string& name) const {
     std::ifstream file(folder_ / "scan" / name, std::ios::binary);
     if (!file) return {};
@@ -42,8 +42,8 @@ class Delaunay3DataTest : public ::testing::Test {
 constexpr const char* kScans[] = {"armadillo_tm.ply", "bun_zipper.ply", "cow.obj",   "fandisk.obj",
                                   "lucy_100k.ply",    "spot.obj",       "teapot.obj"};
 
-/// On a raster of so many bits over the longest side: few bits make points equal, coplanar and
-/// cospherical.
+/// Rounded to a raster of this many bits over the longest side: few bits make points equal,
+/// coplanar and cospherical.
 std::vector<std::array<std::int32_t, 3>> with_bits(const DoublePoints& points, unsigned bits) {
   double step = 0.0;
   auto result = quantised(points, step);
@@ -91,7 +91,7 @@ TEST_F(Delaunay3DataTest, PointSetsInTheSpaceOfTheirNumbersHaveTheTetrahedraOfCg
         const bool of_number = (c >= '0' && c <= '9') || c == '-' || c == '.' || c == 'e';
         if (!of_number) c = ' ';
       }
-      // Any three numbers that follow each other are a point: coordinates, indices of edges, all.
+      // Any three consecutive numbers are a point: coordinates, indices of edges, everything.
       std::istringstream words(numbers);
       std::string word;
       std::vector<double> values;
@@ -132,7 +132,7 @@ void expect_no_history(const std::vector<std::array<Coord, 3>>& points, std::uin
   }
   EXPECT_EQ(grown.hash(), hash);
 
-  // Parts in space go and come back; what is left in between is a triangulation of its own.
+  // Parts of space are removed and reinserted; the state in between is a triangulation too.
   for (int round = 0; round < 3; ++round) {
     std::vector<VertexId> going;
     std::vector<std::array<Coord, 3>> gone, left;
@@ -170,7 +170,7 @@ TEST_F(Delaunay3DataTest, ScansHaveNoHistory) {
 
 TEST_F(Delaunay3DataTest, SignsOfThePublishedCases) {
   // A. Nanevski, G. Blelloch, R. Harper, "Automatic generation of staged geometric predicates",
-  // doi:10.1145/507635.507662: lines of number, coordinates, sign; of a left-handed frame.
+  // doi:10.1145/507635.507662: lines of number, coordinates, sign; in a left-handed frame.
   using Ours = spatial::DoubleKernel;
   double number = 0;
   std::array<std::array<double, 3>, 5> p;

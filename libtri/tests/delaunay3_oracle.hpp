@@ -12,7 +12,7 @@
 
 #include "delaunay3/access.hpp"
 
-/// CGAL's Delaunay_triangulation_3 as an oracle, ties included: it perturbs by the same order. So
+/// CGAL's Delaunay_triangulation_3 as an oracle, including ties: it perturbs in the same order. So
 /// sets of tetrahedra must be equal, whatever the input.
 
 namespace terrace::tri {

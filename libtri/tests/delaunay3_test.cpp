@@ -56,7 +56,7 @@ TYPED_TEST(Delaunay3Test, BuildIsValidAndCompleteForEveryKindOfPoints) {
 }
 
 TYPED_TEST(Delaunay3Test, ThreadsLeaveNoTrace) {
-  // Enough for passes in parts, with duplicates across their border, long cavities, and ties.
+  // Enough for passes in parts, with duplicates across their border, large cavities, and ties.
   for (const PointSet3 kind : {PointSet3::kUniform, PointSet3::kGrid, PointSet3::kFiveBits,
                                PointSet3::kSlab, PointSet3::kClusters}) {
     SCOPED_TRACE(name(kind));
@@ -79,7 +79,7 @@ TYPED_TEST(Delaunay3Test, ThreadsLeaveNoTrace) {
     }
     inserted.insert(points, {});
     ASSERT_EQ(inserted.hash(), one.hash());
-    // It is an ordinary triangulation from here on.
+    // From here on it is an ordinary triangulation.
     const std::vector<VertexId> some(vertices.begin(), vertices.begin() + 300);
     std::set<VertexId> going(some.begin(), some.end());
     two.remove(std::vector<VertexId>(going.begin(), going.end()));
@@ -191,7 +191,7 @@ TYPED_TEST(Delaunay3Test, CompactSetsLeaveNoTrace) {
       Delaunay3<TypeParam> triangulation;
       triangulation.build(points);
       const std::uint64_t before = triangulation.hash();
-      // Those nearest to a centre, some of them left as islands.
+      // Those nearest to a centre, some of them left out as islands.
       const auto centre = points[random() % points.size()];
       std::vector<std::pair<double, VertexId>> by_distance;
       for (const VertexId v : triangulation.all_vertices()) {
@@ -221,8 +221,8 @@ TYPED_TEST(Delaunay3Test, CompactSetsLeaveNoTrace) {
 }
 
 TYPED_TEST(Delaunay3Test, CavitiesAndHolesOfAnySize) {
-  // Points near a sphere, whose centre is joined to all of them, 2 n - 4 facets round it: sizes
-  // below and above those that are treated apart.
+  // Points near a sphere, whose centre is joined to all of them, with 2 n - 4 facets around it:
+  // sizes below and above those that are handled separately.
   for (const std::size_t count : {5u, 40u, 61u, 62u, 63u, 64u, 65u, 66u, 130u, 200u, 3000u}) {
     SCOPED_TRACE(count);
     std::mt19937_64 random(count);
@@ -272,7 +272,7 @@ TYPED_TEST(Delaunay3Test, EveryPathOfTheScanLeavesTheSameTetrahedra) {
         if (random() % 2 == 0) going.push_back(v);
       triangulation.remove(std::span<const VertexId>(going));
       ASSERT_EQ(find_fault(triangulation), "");
-      // The same slots too.
+      // The slots are the same too.
       const auto& first = Delaunay3Access::mesh(triangulations.front());
       const auto& mesh = Delaunay3Access::mesh(triangulation);
       ASSERT_EQ(mesh.tetrahedron.size(), first.tetrahedron.size());
@@ -293,7 +293,7 @@ TYPED_TEST(Delaunay3Test, JournalTellsTheNetDifference) {
     std::mt19937_64 random(9);
     const auto points = make_points3<TypeParam>(kind, 150, 4);
     Delaunay3<TypeParam> triangulation;
-    // What a consumer knows: arrays by slot, kept up to date by changes only.
+    // A consumer's state: arrays by slot, kept up to date by changes only.
     std::map<TetrahedronId, Corners> tetrahedra;
     std::map<VertexId, std::array<TypeParam, 3>> vertices;
     typename Delaunay3<TypeParam>::Changes changes;

@@ -72,7 +72,7 @@ TEST(EllipticalKernel, SignsAreExact) {
   std::mt19937_64 random(6);
   for (int round = 0; round < 4000; ++round) {
     SCOPED_TRACE("round " + std::to_string(round));
-    // From plain to impossible for doubles, as for DoubleKernel.
+    // From easy to undecidable in doubles, as for DoubleKernel.
     const double scale = std::ldexp(1.0, static_cast<int>(random() % 500) - 250);
     const double offset = round % 3 == 0 ? 0 : std::ldexp(scale, static_cast<int>(random() % 50));
     std::array<PlanePoint, 4> p;

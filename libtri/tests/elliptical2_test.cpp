@@ -102,7 +102,8 @@ TEST(EllipticalMetric2, RandomOperationsEqualRebuild) {
 }
 
 TEST(EllipticalMetric2, PointsThatWouldFallTogetherWhenMappedStayApart) {
-  // So flat an ellipse, so far out, that neighbours along it have the same mapped doubles.
+  // An ellipse so flat and coordinates so large that neighbours along it have the same mapped
+  // doubles.
   const LinearMap2 map = ellipse_map(1e12, 1, 45);
   std::vector<PlanePoint> points;
   for (int i = 0; i < 30; ++i) {
@@ -120,7 +121,7 @@ TEST(EllipticalMetric2, PointsThatWouldFallTogetherWhenMappedStayApart) {
   for (std::size_t i = 0; i < points.size(); ++i)
     EXPECT_EQ(triangulation.point(vertices[i]), points[i]);
   EXPECT_EQ(find_fault(triangulation), "");
-  // Equal coordinates are one vertex, and only those.
+  // Points with equal coordinates share a vertex, and only those.
   EXPECT_FALSE(triangulation.insert(points[7]).created);
   EXPECT_TRUE(triangulation.insert({1e9, std::nextafter(1e9, 2e9)}).created);
   EXPECT_EQ(find_fault(triangulation), "");
@@ -197,7 +198,7 @@ TEST(Metric2, MapsMeasureEllipses) {
       std::hypot(turned[0] * 5 * c + turned[1] * 5 * s, turned[2] * 5 * c + turned[3] * 5 * s), 1.0,
       1e-15);
   EXPECT_NEAR(std::hypot(turned[1] * c - turned[0] * s, turned[3] * c - turned[2] * s), 1.0, 1e-15);
-  // Maps of space: the upright one bit for bit, another one by its lengths.
+  // Maps of space: an axis-parallel one bit for bit, another one by its lengths.
   EXPECT_EQ(plane_map({turned[0], turned[1], 0, turned[2], turned[3], 0, 0, 0, 9}), turned);
   const std::array<double, 9> m{2, 0.5, 0.25, 0.5, 1, -0.5, 0.25, -0.5, 3};
   const LinearMap2 flat = plane_map(m);

@@ -72,7 +72,7 @@ TEST(EllipticalMetric3, TetrahedraAreCgalsOfTheMappedPointsForEllipsoids) {
   }
 }
 
-/// From plain to impossible for doubles.
+/// From easy to undecidable in doubles.
 std::vector<Space> hard_points(int round, std::size_t count, std::mt19937_64& random) {
   const double scale = std::ldexp(1.0, static_cast<int>(random() % 200) - 100);
   const double offset = round % 3 == 0 ? 0 : std::ldexp(scale, static_cast<int>(random() % 50));
@@ -87,7 +87,8 @@ std::vector<Space> hard_points(int round, std::size_t count, std::mt19937_64& ra
   return points;
 }
 
-/// An invertible matrix of small integers, scaled by powers of two far apart in every fifth round.
+/// An invertible matrix of small integers, in every fifth round scaled by very different powers of
+/// two.
 LinearMap3 hard_map(int round, std::mt19937_64& random) {
   while (true) {
     LinearMap3 map;
@@ -122,7 +123,7 @@ TEST(EllipticalKernel3, SignsAreExact) {
       ASSERT_EQ(EllipticalKernel::in_sphere(c[0], c[1], c[2], c[3], p[4]), side);
       tied += side == 0;
       using Corner = EllipticalKernel::Vertex;
-      // It may leave anything open.
+      // It may leave anything undecided.
       const auto verdict = EllipticalKernel::Probe(p[4], {}).side(Corner{c[0], 0}, Corner{c[1], 0},
                                                                   Corner{c[2], 0}, Corner{c[3], 0});
       if (verdict != spatial::Verdict::kOpen) {
@@ -148,7 +149,7 @@ TEST(EllipticalKernel3, MappedDifferencesAreWithinTheirBound) {
     const spatial::QuadraticForm form(map);
     if (!(form.spread() < 0x1p28)) continue;
     const EllipticalKernel::Scope scope(form);
-    // Only lengths can be told, as R is M but for a turn and a power of two.
+    // Only lengths can be compared, as R equals M up to a rotation and a power of two.
     const Space got = EllipticalKernel::mapped(p[1], p[0]);
     const double length = std::hypot(got[0], got[1], got[2]);
     double wanted = std::sqrt(CGAL::to_double(square(map, exact_difference(p[1], p[0]))));
@@ -172,8 +173,8 @@ TEST(EllipticalKernel3, SmallestSpheresAreExact) {
     const LinearMap3 map = hard_map(round, random);
     const spatial::QuadraticForm form(map);
     const EllipticalKernel::Scope scope(form);
-    // The smallest sphere through both ends of an edge that contains the third corner, or that of
-    // all three; by its centre.
+    // The smallest sphere through both ends of an edge that contains the third corner, or that
+    // through all three; by its centre.
     std::array<Rationals, 4> at;
     for (std::size_t i = 0; i < 4; ++i) at[i] = mapped_by(map, exact_difference(p[i], p[0]));
     const auto minus = [](const Rationals& u, const Rationals& v) {
@@ -196,7 +197,7 @@ TEST(EllipticalKernel3, SmallestSpheresAreExact) {
     }
     if (radius2 < 0) {
       ++acute;
-      // Equally far from all three, in their plane: a linear system by Cramer's rule.
+      // Equidistant from all three, in their plane: a linear system solved by Cramer's rule.
       const Rationals &e = at[1], &f = at[2];
       const Rationals n{e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2],
                         e[0] * f[1] - e[1] * f[0]};

@@ -53,8 +53,8 @@ TEST(EllipticalMetric3, WithAMapThatKeepsSpheresItIsDelaunay3) {
   }
 }
 
-/// Maps of whole numbers and powers of two that keep the lexicographic order: small whole points
-/// are mapped without rounding.
+/// Maps of integers and powers of two that keep the lexicographic order: small integer points are
+/// mapped without rounding.
 TEST(EllipticalMetric3, OfWholePointsAndMapsItIsDelaunay3OfTheMappedPoints) {
   for (const LinearMap3& m :
        {LinearMap3{4, 0, 0, 0, 1, 0, 0, 0, 0.5}, LinearMap3{1, 0, 0, 3, 1, 0, -2, 5, 1},
@@ -72,7 +72,7 @@ TEST(EllipticalMetric3, OfWholePointsAndMapsItIsDelaunay3OfTheMappedPoints) {
       Delaunay3<double> plain;
       const auto vertices = elliptical.build(points);
       const auto others = plain.build(mapped);
-      // Equal vertices, by the points they came from.
+      // Equal vertices, by the points from which they came.
       std::vector<Corners3> wanted;
       std::vector<Space> original(plain.vertex_slots());
       for (std::size_t i = 0; i < points.size(); ++i) {
@@ -278,7 +278,7 @@ TEST(EllipticalModel3, HasLevelsOfDetail) {
             model.set_detail({2, {{box, 0}}});
         }
         ASSERT_EQ(find_fault(model.triangulation()), "");
-        // What is present, from the expanded clusters alone.
+        // The points present, derived from the expanded clusters alone.
         std::vector<Space> present = source.root().positions;
         for (const ClusterId id : model.expanded()) {
           const auto& more = source.at(id).positions;

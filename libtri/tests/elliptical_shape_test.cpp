@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The shape in an elliptical metric: that of the mapped points.
+// The shape in an elliptical metric equals that of the mapped points.
 #include <algorithm>
 #include <cmath>
 #include <random>
@@ -18,7 +18,7 @@
 namespace terrace::tri::test {
 namespace {
 
-/// Points spread evenly on the unit sphere, on a spiral, then stretched.
+/// Points spread uniformly on the unit sphere, on a spiral, then stretched.
 std::vector<Space> ellipsoid(std::size_t count, const Space& radii) {
   std::vector<Space> points;
   for (std::size_t i = 0; i < count; ++i) {
@@ -43,7 +43,7 @@ std::vector<ShapeOptions> all_options() {
   return result;
 }
 
-/// Whole maps that keep the lexicographic order map small whole points without rounding.
+/// Integer maps that keep the lexicographic order map small integer points without rounding.
 TEST(EllipticalShape, OfWholePointsAndMapsItIsTheShapeOfTheMappedPoints) {
   for (const LinearMap3& m :
        {LinearMap3{4, 0, 0, 0, 1, 0, 0, 0, 0.5}, LinearMap3{1, 0, 0, 3, 1, 0, -2, 5, 1}}) {
@@ -125,7 +125,7 @@ TEST(EllipticalShape, AnEllipsoidOfStretchedSamplesComesBack) {
   EXPECT_EQ(measures.components, 1u);
   EXPECT_EQ(measures.euler_characteristic, 2);
   EXPECT_NEAR(measures.volume, 4.0 / 3 * 3.141592653589793 * 40, 1.5);
-  // Edges: with 1, which restores even samples (see ShapeOptions).
+  // Edge lengths: with 1, which restores uniform samples (see ShapeOptions).
   options.shape = {ShapeCriterion::kEdgeLength, ShapeRule::kFlood, 1.0, true};
   EXPECT_EQ(measure(restore_surface(points, options).surface).faces, 3996u);
 

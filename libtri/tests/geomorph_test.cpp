@@ -16,7 +16,7 @@ namespace {
 template <class Coord>
 using Model = MultiresolutionModel<Delaunay2<Coord>>;
 
-// A copy of the whole surface, and its height by trying all triangles.
+// A copy of the whole surface, with heights found by testing all triangles.
 template <class Coord>
 struct Surface {
   std::vector<std::array<Point3, 3>> triangles;
@@ -79,7 +79,7 @@ class Geomorph : public testing::Test {};
 using Coords = testing::Types<std::int32_t, double>;
 TYPED_TEST_SUITE(Geomorph, Coords);
 
-// Whatever a step does: what is new starts on the old surface, what goes ends on the new one.
+// Whatever a step does: new vertices start on the old surface, removed ones end on the new one.
 TYPED_TEST(Geomorph, StartsOnTheOldSurfaceAndEndsOnTheNew) {
   std::size_t inside = 0, changed = 0;
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
@@ -145,7 +145,7 @@ TYPED_TEST(Geomorph, CollapseMirrorsExpand) {
     ASSERT_EQ(forth.size(), again.size());
     for (const auto& [place, heights] : forth) {
       ASSERT_EQ(again.at(place).second, heights.second);
-      // The same triangle, its corners in another order.
+      // The same triangle with its corners in another order.
       ASSERT_NEAR(again.at(place).first, heights.first, 1e-9 * (1.0 + std::abs(heights.first)));
     }
     ASSERT_EQ(by_place(there.reassigned), by_place(reversed(back.reassigned)));
@@ -153,7 +153,7 @@ TYPED_TEST(Geomorph, CollapseMirrorsExpand) {
   }
 }
 
-// The height that a vertex had, also where its slot was used again in the same step.
+// The former height of a vertex, even where its slot was reused in the same step.
 TYPED_TEST(Geomorph, StepsOfManyOperations) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     World world(seed, Shape::duplicates, 250);

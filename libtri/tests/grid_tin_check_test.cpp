@@ -38,7 +38,7 @@ TEST(GridTinCheck, CountsWhatIsNotCovered) {
   EXPECT_EQ(check.uncovered, 6U);
   EXPECT_EQ(check.uncovered_inner, 6U);
   EXPECT_EQ(check.max_error, 1);
-  heights[12] = kNoHeight;  // column 0, row 3: its 3 neighbours are not inner then
+  heights[12] = kNoHeight;  // column 0, row 3: then its 3 neighbours are not inner
   check = check_grid_tin<double>({4, 4, heights}, kSquare, Triangles{{0, 1, 2}});
   EXPECT_EQ(check.samples, 15U);
   EXPECT_EQ(check.uncovered, 5U);
@@ -71,15 +71,15 @@ TEST(GridTinCheck, CornersOffTheLattice) {
   check = check_grid_tin<double>({4, 4, heights}, moved, kHalves, 0.002);
   EXPECT_EQ(check.covered, 16U);
   EXPECT_LE(check.max_error, 1e-12);
-  // Data that is missing is covered only if it is really inside.
+  // A sample without data is covered only if it is strictly inside.
   heights[0] = kNoHeight;
   EXPECT_EQ(check_grid_tin<double>({4, 4, heights}, moved, kHalves, 0.002).nodata_covered, 0U);
   heights[5] = kNoHeight;
   EXPECT_EQ(check_grid_tin<double>({4, 4, heights}, moved, kHalves, 0.002).nodata_covered, 1U);
 }
 
-/// A window of relief, with gaps for even seeds, and triangles across it that overlap and hang
-/// over.
+/// A window of relief, with gaps for even seeds, and triangles across it that overlap each other
+/// and its sides.
 struct Tangle {
   OwnedWindow<float> owned;
   std::vector<Point3> points;
@@ -185,7 +185,7 @@ TEST(GridTinCheck, MisuseIsRefused) {
   }
 }
 
-// The tests of all paths pass over what the machine lacks: here is where they say so.
+// The tests of all paths skip instruction sets that the machine lacks; this one reports it.
 TEST(InstructionSets, Avx2IsTested) {
   if (!supported(InstructionSet::kAvx2)) GTEST_SKIP() << "the processor lacks AVX2";
 }

@@ -12,8 +12,8 @@
 #include "grid_windows.hpp"
 #include "terrace/tri/grid_tin.hpp"
 
-/// What tests of meshes of grids share: windows meshed by themselves, and the slow way to look at
-/// the result.
+/// Shared by tests of meshes of grids: windows meshed on their own, and brute-force checks of the
+/// result.
 
 namespace grid_tin_oracle {
 
@@ -39,7 +39,7 @@ inline Corners corners_of(const GridTin& tin, std::size_t i) {
   return result;
 }
 
-/// Every sample against every triangle, positions in integers. Returns the greatest error.
+/// Every sample against every triangle, with integer positions. Returns the greatest error.
 template <class T>
 double brute_force(const OwnedWindow<T>& owned, const GridTin& tin, bool gaps) {
   double most = 0;
@@ -49,7 +49,7 @@ double brute_force(const OwnedWindow<T>& owned, const GridTin& tin, bool gaps) {
     Corners t = corners_of(tin, i);
     std::array<long double, 3> z{};
     for (std::size_t k = 0; k < 3; ++k) z[k] = tin.vertices[tin.triangles[i][k]].height;
-    // Rows grow southward unless said otherwise: clockwise on the lattice.
+    // Rows grow southward unless stated otherwise: clockwise on the lattice.
     std::int64_t twice = turn(t[0], t[1], t[2]);
     EXPECT_LT(twice, 0) << "triangle " << i;
     std::swap(t[1], t[2]);
@@ -64,7 +64,7 @@ double brute_force(const OwnedWindow<T>& owned, const GridTin& tin, bool gaps) {
         const T height = owned.at(x, y);
         EXPECT_TRUE(std::isfinite(height)) << "no data at " << x << ", " << y;
         covered[std::size_t{y} * owned.columns + x] = true;
-        // Relative to the sample, so that nothing is lost where heights are equal.
+        // Relative to the sample, so that the result is exact if heights are equal.
         long double sum = 0;
         for (std::size_t k = 0; k < 3; ++k)
           sum += static_cast<long double>(w[k]) * (z[k] - static_cast<long double>(height));

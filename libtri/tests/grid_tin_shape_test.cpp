@@ -15,7 +15,7 @@ using namespace grid_tin_oracle;
 
 __extension__ typedef __int128 Int128;
 
-/// Sorted, so that equal triangles are equal.
+/// Sorted, so that equal triangles compare equal.
 Corners key_of(Corners corners) {
   std::sort(corners.begin(), corners.end());
   return corners;

@@ -11,7 +11,7 @@ namespace {
 
 using namespace grid_tin_oracle;
 
-/// Windows of a raster that share sides, each settled with the lines beside.
+/// Windows of a raster that share sides, each settled with the adjacent lines.
 TEST(GridTin, WindowsFitTogether) {
   for (const Gaps gaps : kGapPatterns) {
     for (const Relief relief : {Relief::kHills, Relief::kNoise}) {
@@ -46,7 +46,7 @@ TEST(GridTin, WindowsFitTogether) {
           EXPECT_LE(tin.check.max_error, bound);
           EXPECT_EQ(tin.check.uncovered_inner, 0U);
           EXPECT_EQ(tin.check.nodata_covered, 0U);
-          // No vertex on a side but the settled ones.
+          // The only vertices on a side are the settled ones.
           for (const GridVertex& v : tin.vertices) {
             const auto on = [](const std::vector<std::uint32_t>& side, std::uint32_t at) {
               return std::binary_search(side.begin(), side.end(), at);

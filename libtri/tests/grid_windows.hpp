@@ -14,7 +14,7 @@
 
 namespace terrace::tri {
 
-/// A sample that is not there.
+/// A missing sample.
 inline constexpr double kNoHeight = std::numeric_limits<double>::quiet_NaN();
 
 enum class Relief {

@@ -29,7 +29,8 @@ Weights weights_of(const ExactOracle& oracle, const Point2& query) {
   if (!result.third) return weights;
   for (const auto& [point, weight] : found)
     weights[to_point(point)] =
-        CGAL::to_double(CGAL::exact(weight / result.second));  // of the interval it is less exact
+        // of the interval the result is less exact
+        CGAL::to_double(CGAL::exact(weight / result.second));
   return weights;
 }
 

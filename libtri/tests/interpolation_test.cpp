@@ -26,7 +26,7 @@ const double kNan = std::numeric_limits<double>::quiet_NaN();
 template <class Coord>
 class InterpolationTest : public ::testing::Test {
  public:
-  /// Decided by every edge of the hull, or of the line.
+  /// Decided at every edge of the hull, or of the line.
   static bool in_hull(const Delaunay2<Coord>& triangulation, const Point2& query) {
     for (const TriangleId t : triangulation.all_triangles()) {
       const auto v = triangulation.vertices(t);
@@ -63,7 +63,7 @@ TYPED_TEST(InterpolationTest, WeightsObeyTheirLaws) {
           weights_at(triangulation, query, method, weights);
           ASSERT_EQ(!weights.empty(), this->in_hull(triangulation, query));
           if (weights.empty()) continue;
-          // The sum, and the mean of the vertices; halves, as differences may overflow.
+          // The sum, and the mean of the vertices; uses halves, as differences may overflow.
           double sum = 0;
           Point2 mean{};
           Point2 extent{};
@@ -101,7 +101,7 @@ TYPED_TEST(InterpolationTest, LinearWeightsAreThoseOfOneTriangle) {
   for (const Point2& query : make_queries(triangulation, 300, 1)) {
     weights_at(triangulation, query, Interpolation::kLinear, weights);
     if (weights.empty()) continue;
-    // The sum and the mean, tested above, leave no freedom in a triangle.
+    // The sum and the mean, tested above, determine the weights in a triangle.
     std::size_t holders = 0;
     for (const TriangleId t : triangulation.all_triangles()) {
       const auto corners = triangulation.vertices(t);
@@ -139,7 +139,7 @@ TYPED_TEST(InterpolationTest, NearestIsNearest) {
 }
 
 TYPED_TEST(InterpolationTest, CocircularPointsMayBeTriangulatedAnyWay) {
-  // Mirrored, the perturbation chooses the other diagonals; the weights do not know.
+  // Mirrored, the perturbation chooses the other diagonals; the weights must not change.
   Delaunay2<TypeParam> grid;
   grid.build_grid(0, 0, 7, 12, 12);
   Delaunay2<TypeParam> mirrored;
@@ -179,8 +179,8 @@ TYPED_TEST(InterpolationTest, NaturalNeighboursAreContinuousAcrossCircles) {
     std::mt19937_64 random(2);
     std::vector<double> heights(triangulation.vertex_slots());
     for (double& h : heights) h = to_unit(random());
-    // Steps along lines through the whole. Vertices are 1 apart or more, heights differ by less
-    // than 1: on these sets no slope is near 100.
+    // Steps along lines through the whole set. Vertices are at least 1 apart, heights differ by
+    // less than 1: on these sets no slope is near 100.
     const double step = 1e-5;
     std::vector<Point2> queries;
     for (int line = 0; line < 20; ++line) {
@@ -315,7 +315,7 @@ TYPED_TEST(InterpolationTest, GradientsAreDerivatives) {
 }
 
 TEST(Interpolation, GradientsOnEdgesAndVerticesAreMeans) {
-  // A square of four triangles about its middle, which is raised.
+  // A square of four triangles about its centre, which is raised.
   Delaunay2<double> triangulation;
   const std::vector<std::array<double, 2>> points{{0, 0}, {4, 0}, {4, 4}, {0, 4}, {2, 1}};
   const auto vertices = triangulation.build(points);
@@ -342,7 +342,7 @@ TEST(Interpolation, GradientsOnEdgesAndVerticesAreMeans) {
 }
 
 TEST(Interpolation, ManyNeighboursOfOneQuery) {
-  // A regular polygon: every circle of three of its corners contains the middle.
+  // A regular polygon: every circle through three of its corners contains the centre.
   constexpr std::size_t kCorners = 1500;
   std::vector<std::array<double, 2>> points;
   for (std::size_t i = 0; i < kCorners; ++i) {
@@ -362,7 +362,7 @@ TEST(Interpolation, SlopeAndAspect) {
   EXPECT_DOUBLE_EQ(slope_degrees({0, 0}), 0);
   EXPECT_DOUBLE_EQ(slope_degrees({3, 4}), std::atan(5) * 180 / 3.14159265358979323846);
   EXPECT_TRUE(std::isnan(slope_degrees({})));
-  // It rises to the north, so it faces south; and so on clockwise.
+  // It rises to the north, so it faces south; and so on, clockwise.
   EXPECT_DOUBLE_EQ(aspect_degrees({0, 1}), 180);
   EXPECT_DOUBLE_EQ(aspect_degrees({1, 0}), 270);
   EXPECT_DOUBLE_EQ(aspect_degrees({0, -1}), 0);
@@ -374,7 +374,7 @@ TEST(Interpolation, SlopeAndAspect) {
   EXPECT_TRUE(std::isnan(aspect_degrees({})));
 }
 
-/// The C library's atan and atan2 give other last bits for some of these.
+/// The C library's atan and atan2 give different last bits for some of these.
 TEST(Interpolation, SlopeAndAspectHaveTheSameBitsOnEveryMachine) {
   EXPECT_EQ(slope_degrees({0.1, 0.2}), 0x1.93571a47a1deep+3);
   EXPECT_EQ(aspect_degrees({0.1, 0.2}), 0x1.9d214e634c3b8p+7);

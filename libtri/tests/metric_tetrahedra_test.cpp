@@ -18,7 +18,8 @@ namespace {
 
 using spatial::EllipticalKernel;
 
-/// Three boxes of different ellipsoids over the extent of the points, two of them overlapping.
+/// Three boxes with different ellipsoids within the bounding box of the points, two of them
+/// overlapping.
 template <class Coord>
 MetricField3 three_regions(const std::vector<std::array<Coord, 3>>& points) {
   Space low{}, high{};
@@ -100,7 +101,7 @@ class Check {
         const MetricField3& field)
       : before_(before), after_(after), field_(field) {}
 
-  /// All that is guaranteed. Returns how many tetrahedra are not among those before.
+  /// Checks all guarantees. Returns the number of tetrahedra that did not exist before.
   std::size_t run(std::size_t stuck, const LinearMap3& given) {
     is_a_tetrahedralisation();
     const auto old = sorted(before_), fresh = sorted(after_);
@@ -124,8 +125,8 @@ class Check {
   }
 
  private:
-  /// Positive volumes, every facet in two of opposite directions or in one, the same sum of
-  /// volumes and the same corners: so the hull is covered once.
+  /// Positive volumes, every facet in two of opposite directions or in one, the same sum of volumes
+  /// and the same corners: so the hull is covered once.
   void is_a_tetrahedralisation() {
     std::set<Space> corners_before, corners_after;
     for (const Corners3& t : before_) corners_before.insert(t.begin(), t.end());
@@ -175,7 +176,7 @@ class Check {
     return count;
   }
 
-  /// By the number of tetrahedra round the edge that is in the way.
+  /// By the number of tetrahedra around the edge that is in the way.
   [[nodiscard]] bool can_be_flipped(const Facet& facet, const Space& d, const Space& e,
                                     const LinearMap3& map) const {
     std::size_t in_the_way = 0;
@@ -191,7 +192,7 @@ class Check {
       if (of_e != 0) {
         can = can && ring.size() == 3;
       } else {
-        // Closed round the edge, or both outer facets on the hull and in one plane.
+        // Closed around the edge, or both outer facets on the hull and coplanar.
         can = can && (ring.size() == 4 ||
                       (ring.size() == 2 && facets_.at(directed({a, b, d}).first).size() == 1 &&
                        facets_.at(directed({a, b, e}).first).size() == 1));
@@ -243,7 +244,7 @@ TYPED_TEST(MetricTetrahedraTest, AreOfThePointsAlone) {
     Delaunay3<TypeParam> one;
     one.build(points);
     const MetricTetrahedra expected = metric_tetrahedra(one, field);
-    // Another order, and others that come and go.
+    // Another order, and temporary points.
     std::mt19937_64 random(7);
     std::shuffle(points.begin(), points.end(), random);
     Delaunay3<TypeParam> other;

@@ -16,7 +16,8 @@
 namespace terrace::tri::test {
 namespace {
 
-/// Three boxes of different ellipses over the extent of the points, two of them overlapping.
+/// Three boxes with different ellipses within the bounding box of the points, two of them
+/// overlapping.
 template <class Coord>
 MetricField2 three_regions(const std::vector<std::array<Coord, 2>>& points) {
   PlanePoint low{}, high{};
@@ -68,11 +69,11 @@ std::set<PlaneEdge> border(const std::map<PlaneEdge, PlanePoint>& edges) {
   return result;
 }
 
-/// All that is guaranteed. Returns the number of triangles that are not among `before`.
+/// Checks all guarantees. Returns the number of triangles that are not in `before`.
 std::size_t check(const std::vector<Corners>& before, const std::vector<Corners>& after,
                   const MetricField2& field, const LinearMap2& given = kIdentityMap<2>) {
-  // A triangulation of the same: positive areas, every edge matched, the same border; so it covers
-  // what is within the border once. And it has the same corners.
+  // A triangulation of the same points: positive areas, every edge matched, the same border; so it
+  // covers the inside of the border once. And it has the same corners.
   EXPECT_EQ(before.size(), after.size());
   std::set<PlanePoint> corners_before, corners_after;
   for (const Corners& t : before) corners_before.insert(t.begin(), t.end());
@@ -146,7 +147,7 @@ TYPED_TEST(MetricTriangles, AreOfThePointsAlone) {
     Delaunay2<TypeParam> one;
     one.build(points);
     const auto expected = corners_of_all(one, metric_triangles(one, field));
-    // Another order, and others that come and go.
+    // Another order, and temporary points.
     std::mt19937_64 random(7);
     std::shuffle(points.begin(), points.end(), random);
     Delaunay2<TypeParam> other;
@@ -223,7 +224,7 @@ TEST(MetricTriangles2, AWindowIsAFunctionOfThePointsAndTheWindow) {
     Delaunay2<double> other;
     for (const auto& p : points) other.insert(p);
     EXPECT_TRUE(corners_of_all(other, metric_triangles(other, field, window)) == result);
-    // Infinite in all directions: everything.
+    // Infinite in all directions: covers everything.
     constexpr double kInfinity = std::numeric_limits<double>::infinity();
     EXPECT_TRUE(
         metric_triangles(other, field, box2(-kInfinity, -kInfinity, kInfinity, kInfinity)) ==
@@ -254,7 +255,7 @@ TEST(MetricField2, RefusesWhatIsNoField) {
     return p[0] > 0 ? LinearMap2{1, 0, 0, kNan} : kIdentityMap<2>;
   });
   EXPECT_THROW(static_cast<void>(metric_triangles(triangulation, bad)), std::invalid_argument);
-  // Closed boxes, the first one holds, Euclidean outside.
+  // Closed boxes, the first one applies, Euclidean outside.
   const MetricField2 field({{box, {2, 0, 0, 1}}, {box2(1, 0, 2, 1), {3, 0, 0, 1}}});
   EXPECT_EQ(field({1, 1})[0], 2);
   EXPECT_EQ(field({1.5, 0})[0], 3);

@@ -10,7 +10,7 @@
 #include "terrace/tri/delaunay3.hpp"
 #include "terrace/tri/metric.hpp"
 
-/// Metrics of space for the tests, and what they mean, in rational numbers.
+/// Metrics of space for the tests, and their definition in rational numbers.
 
 namespace terrace::tri::test {
 
@@ -19,8 +19,8 @@ using Elliptical3 = Delaunay3<double, EllipticalMetric3>;
 using Space = std::array<double, 3>;
 using Corners3 = std::array<Space, 4>;
 
-/// Maps that keep the lexicographic order, so that mapped ties are broken alike; every metric has
-/// one such map.
+/// Maps that keep the lexicographic order, so that mapped ties are broken in the same way; every
+/// metric has one such map.
 inline const std::vector<LinearMap3>& lower_maps3() {
   static const std::vector<LinearMap3> maps{{1, 0, 0, 0, 1, 0, 0, 0, 1},
                                             {1, 0, 0, 0, 3, 0, 0, 0, 0.25},
@@ -31,7 +31,7 @@ inline const std::vector<LinearMap3>& lower_maps3() {
   return maps;
 }
 
-/// Rotations with rational entries that are not all doubles, and those of the axes.
+/// Rotations with rational entries, not all of which are doubles, and those of the axes.
 inline const std::vector<LinearMap3>& rotations() {
   static const std::vector<LinearMap3> axes{
       kIdentityMap<3>,
@@ -73,8 +73,8 @@ inline Rational determinant(const Rationals& a, const Rationals& b, const Ration
          a[2] * (b[0] * c[1] - b[1] * c[0]);
 }
 
-/// 1 where p lies inside the ellipsoid through the four corners, 0 on it, -1 outside; whatever
-/// their order. They are not coplanar.
+/// 1 if p lies inside the ellipsoid through the four corners, 0 if on it, -1 if outside; for any
+/// order of the corners, which are not coplanar.
 inline int in_ellipsoid(const LinearMap3& m, const Corners3& corners, const Space& p) {
   std::array<Rationals, 4> d;
   std::array<Rational, 4> s;

@@ -36,7 +36,7 @@ std::vector<Point3> points_at(Place place, std::size_t count, std::mt19937_64& r
   return points;
 }
 
-/// All points that are present, from the expanded clusters alone.
+/// All points present, derived from the expanded clusters alone.
 template <class Coord>
 std::vector<std::array<Coord, 3>> present(MemorySource& source,
                                           const MultiresolutionModel<Delaunay3<Coord>>& model) {
@@ -52,7 +52,7 @@ std::vector<std::array<Coord, 3>> present(MemorySource& source,
   return points;
 }
 
-/// A cluster that is expanded or can be; the root where there is none.
+/// A cluster that is expanded or can be; the root if there is none.
 template <class Coord>
 ClusterId any_cluster(const MultiresolutionModel<Delaunay3<Coord>>& model, ClusterId root,
                       std::mt19937_64& random) {

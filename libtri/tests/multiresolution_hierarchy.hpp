@@ -10,8 +10,8 @@
 
 #include "terrace/tri/multiresolution.hpp"
 
-/// Hierarchies of clusters in memory, for the tests: small, made by nearest-centre clustering, with
-/// all that a source could do wrong.
+/// Hierarchies of clusters in memory for the tests: small, made by nearest-centre clustering, able
+/// to simulate every fault of a source.
 
 namespace terrace::tri::test {
 
@@ -84,7 +84,7 @@ inline MemorySource make_hierarchy(const std::vector<Point3>& points, unsigned l
   struct Node {
     Point3 position;
     std::vector<std::uint64_t> children;  // level 0 first
-    Box3 box;                             // of what it heads, itself included
+    Box3 box;                             // of the points that it heads, including itself
   };
   std::vector<Node> nodes;
   for (const Point3& p : points) nodes.push_back({p, {}, {p, p}});
@@ -108,7 +108,7 @@ inline MemorySource make_hierarchy(const std::vector<Point3>& points, unsigned l
           nearest = c;
         }
       }
-      // Some stray, so that clusters overlap and points of equal coordinates part.
+      // Some go astray, so that clusters overlap and points with equal coordinates are separated.
       if (below(random, 6) == 0) nearest = below(random, centres);
       MemorySource::Cluster& cluster = clusters[nearest];
       cluster.positions.push_back(nodes[i].position);
@@ -136,7 +136,7 @@ inline MemorySource make_hierarchy(const std::vector<Point3>& points, unsigned l
   return source;
 }
 
-/// Kinds of point sets; heights tell all points apart.
+/// Kinds of point sets; heights distinguish all points.
 enum class Shape { random, grid, duplicates, line, one_place };
 
 inline std::vector<Point3> make_points(Shape shape, std::size_t count, std::mt19937_64& random) {

@@ -20,7 +20,7 @@ MemorySource good_source(std::uint64_t seed) {
   return make_hierarchy(make_points(Shape::duplicates, 150, random), 3, 4.0, random);
 }
 
-// Wherever in a step the source fails: the model is as before, and the next step works.
+// Wherever in a step the source fails, the model is unchanged and the next step works.
 TEST(MultiresolutionFailure, LeavesTheModelUnchanged) {
   const Detail details[] = {{0, {}},
                             {3, {}},
@@ -66,7 +66,7 @@ TEST(MultiresolutionFailure, LeavesNothingWhenTheModelCannotBegin) {
   }
 }
 
-// Spoils one cluster of an otherwise good source, and expects a step into it to fail with the
+// Corrupts one cluster of an otherwise good source, and expects a step into it to fail with the
 // message, whether it comes first or last among the clusters of the step.
 void expect_refused(const std::function<void(MemorySource&, ClusterId)>& spoil, unsigned level,
                     const std::string& message) {
@@ -74,7 +74,7 @@ void expect_refused(const std::function<void(MemorySource&, ClusterId)>& spoil, 
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     MemorySource source = good_source(seed);
     const WholeTree tree(source);
-    // The spoiled cluster must have two members at least, to contradict each other.
+    // The corrupted cluster must have at least two members, to contradict each other.
     std::uint64_t ordinal = 0;
     while (source.levels[level][ordinal].positions.size() < 2) ++ordinal;
     const ClusterId id = cluster_id(level, ordinal);
@@ -92,7 +92,7 @@ void expect_refused(const std::function<void(MemorySource&, ClusterId)>& spoil, 
     EXPECT_TRUE(none.empty());
     source.levels = good.levels;
     ASSERT_NO_FATAL_FAILURE(check_model(model, source, {}));
-    // Nothing of the failure is left in the way.
+    // The failure leaves nothing behind.
     ASSERT_NO_THROW(model.set_level(0));
     ASSERT_NO_FATAL_FAILURE(check_model(model, source, wanted(tree, source, {0, {}})));
   }
@@ -117,7 +117,7 @@ TEST(MultiresolutionHostile, CountsThatContradictEachOther) {
                  0, "its record claims 18446744073709551615 members");
 }
 
-// A tree cannot have cycles, since levels fall; what is left of them are clusters with two heads.
+// A tree cannot have cycles, as levels decrease; what can occur are clusters with two heads.
 TEST(MultiresolutionHostile, ClusterWithTwoHeads) {
   expect_refused([](MemorySource& s, ClusterId id) { s.at(id).children[1] = s.at(id).children[0]; },
                  1, "heads as well");
@@ -151,7 +151,7 @@ TEST(MultiresolutionHostile, CoordinatesThatTheTriangulationCannotTake) {
   source.at(cluster_id(0, 0)).record.members = 1;
   MultiresolutionModel<StandIn<double>> model(source);
   EXPECT_THROW(model.set_level(0), HierarchyError);
-  // Any height will do, and negative zero is zero.
+  // Any height is accepted, and negative zero is zero.
   source.at(cluster_id(0, 0)).positions[0] = {1e9, -0.0, std::nan("")};
   EXPECT_NO_THROW(model.set_level(0));
 }

@@ -12,11 +12,11 @@
 #include "multiresolution_hierarchy.hpp"
 #include "terrace/tri/multiresolution.hpp"
 
-/// What the model must be, said in the plainest way.
+/// The specification of the model, in the plainest form.
 
 namespace terrace::tri::test {
 
-/// The tree of all clusters of a hierarchy: parent by child, the root left out.
+/// The tree of all clusters of a hierarchy: parent by child, without the root.
 class WholeTree {
  public:
   explicit WholeTree(MemorySource& source) : source_(&source) {
@@ -52,7 +52,7 @@ class WholeTree {
 
 using ClusterSet = std::set<ClusterId>;
 
-/// The clusters that a detail asks for, by its definition.
+/// The clusters that a detail requests, by its definition.
 inline ClusterSet wanted(const WholeTree& tree, MemorySource& source, const Detail& detail) {
   ClusterSet result;
   for (const auto& [id, parent] : tree.parents) {
@@ -124,8 +124,8 @@ Expectation<Point> expect(MemorySource& source, const ClusterSet& expanded) {
   return result;
 }
 
-/// Compares all that a model says with the expectation, and its triangles with those made from
-/// scratch.
+/// Compares everything that a model reports with the expectation, and its triangles with those made
+/// from scratch.
 template <class T>
 void check_model(const MultiresolutionModel<T>& model, MemorySource& source,
                  const ClusterSet& expanded) {
@@ -165,27 +165,27 @@ void check_model(const MultiresolutionModel<T>& model, MemorySource& source,
   ASSERT_EQ(model.triangulation().hash(), fresh.hash());
 }
 
-/// A consumer that looks at the whole once and lives on deltas from then on.
+/// A consumer that reads the whole model once and only deltas from then on.
 template <class T>
 class Consumer {
  public:
   explicit Consumer(const MultiresolutionModel<T>& model) : model_(&model) { look(*this); }
 
-  /// Applies a delta as its documentation says, each claim checked. `several`: of a step of
-  /// several.
+  /// Applies a delta as documented and checks each claim. `several`: the delta combines several
+  /// steps.
   void apply(const typename MultiresolutionModel<T>::Delta& delta, bool several = false) {
     for (const TriangleId t : delta.changes.removed_triangles) {
-      ASSERT_EQ(triangles_.erase(t), 1u) << "removed a triangle that was not there";
+      ASSERT_EQ(triangles_.erase(t), 1u) << "removed a triangle that did not exist";
     }
     for (const VertexId v : delta.changes.removed_vertices) {
-      ASSERT_EQ(vertices_.erase(v), 1u) << "removed a vertex that was not there";
+      ASSERT_EQ(vertices_.erase(v), 1u) << "removed a vertex that did not exist";
     }
     for (const VertexId v : delta.changes.added_vertices) {
       ASSERT_TRUE(vertices_.emplace(v, vertex(v)).second) << "added a vertex twice";
     }
     for (const VertexId v : delta.reassigned) {
       const auto at = vertices_.find(v);
-      ASSERT_NE(at, vertices_.end()) << "reassigned a vertex that was not there";
+      ASSERT_NE(at, vertices_.end()) << "reassigned a vertex that did not exist";
       if (!several) {
         ASSERT_NE(at->second.id, model_->point_id(v)) << "reassigned to the point it had";
       }
@@ -196,7 +196,7 @@ class Consumer {
           << "added a triangle twice";
     }
   }
-  /// Against the model of now.
+  /// Compares with the current model.
   void check() const {
     Consumer now(*model_);
     ASSERT_EQ(vertices_, now.vertices_);

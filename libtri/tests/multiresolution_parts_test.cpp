@@ -43,7 +43,7 @@ TEST(Box, IsClosed) {
   EXPECT_FALSE(contains(a, box2(0, 0, 1, 1)));
 }
 
-// Against std::map, with ids that differ little, so that runs of places form and dissolve.
+// Against std::map, with ids that differ little, so that long probe sequences form and dissolve.
 TEST(ClusterMap, BehavesLikeAMap) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);

@@ -16,9 +16,9 @@
 namespace terrace::tri::test {
 
 /// A stand-in for a triangulation that is too simple to be wrong: it keeps a set of points and
-/// calls any three that follow each other in lexicographic order a triangle. All is made anew after
-/// each change, the journal by comparing with a copy. It shows faults of the model apart from those
-/// of the triangulation.
+/// calls any three consecutive ones in lexicographic order a triangle. Everything is rebuilt after
+/// each change, and the journal is made by comparison with a copy. It separates faults of the model
+/// from those of the triangulation.
 template <class Coord>
 class StandIn {
  public:
@@ -103,7 +103,7 @@ class StandIn {
   }
 
  private:
-  // With the slots: a point that comes back in another one makes other triangles.
+  // Includes the slots: a point that comes back in another slot makes other triangles.
   using Corner = std::pair<Point, std::uint32_t>;
   using Corners = std::array<Corner, 3>;
   struct State {

@@ -95,8 +95,8 @@ std::vector<ClusterId> expandable(const MultiresolutionModel<T>& model, MemorySo
   return found;
 }
 
-// Any sequence of steps: the expanded set is what the step's definition says, the model is what the
-// expanded set says, and a consumer of deltas sees just that.
+// Any sequence of steps: the expanded set agrees with the step's definition, the model with the
+// expanded set, and a consumer of deltas sees exactly that.
 TYPED_TEST(Multiresolution, EveryStepDoesWhatItSays) {
   for (Case& c : cases(40)) {
     TRACE_CASE(c);
@@ -180,8 +180,8 @@ TYPED_TEST(Multiresolution, CollapseIsTheInverseOfExpand) {
   }
 }
 
-// The order in which a set of clusters came to be expanded leaves no trace, nor does what was
-// expanded meanwhile, nor whether points came in bulk.
+// The order in which a set of clusters was expanded leaves no trace, nor does whatever was expanded
+// meanwhile, nor whether points came in bulk.
 TYPED_TEST(Multiresolution, OrderLeavesNoTrace) {
   for (Case& c : cases(15)) {
     TRACE_CASE(c);
@@ -263,8 +263,8 @@ TYPED_TEST(Multiresolution, WithoutDeltasTheModelIsTheSame) {
   }
 }
 
-// One step takes a vertex out with one cluster and puts it back with another, where it may or may
-// not get its old slot. Whichever, the consumer learns of the new height.
+// One step takes a vertex out with one cluster and puts it back with another, possibly in its
+// former slot. Either way, the consumer learns the new height.
 TYPED_TEST(Multiresolution, VertexThatChangesHandsWithinAStep) {
   MemorySource source;
   source.levels.resize(2);
@@ -290,7 +290,7 @@ TYPED_TEST(Multiresolution, VertexThatChangesHandsWithinAStep) {
   }
 }
 
-// Roots of no, one and two points; clusters without members; one level only.
+// Roots with zero, one and two points; clusters without members; one level only.
 TYPED_TEST(Multiresolution, TinyHierarchies) {
   for (const std::size_t count : {0u, 1u, 2u, 3u}) {
     SCOPED_TRACE(count);
@@ -306,7 +306,7 @@ TYPED_TEST(Multiresolution, TinyHierarchies) {
     model.refine(box2(0, 0, 9, 9), 0);
     ASSERT_NO_FATAL_FAILURE(check_model(model, source, {}));
 
-    // The same root above one level of clusters with no or one member.
+    // The same root above one level of clusters with zero or one member.
     MemorySource two;
     two.levels.resize(2);
     for (std::size_t i = 0; i < count; ++i) {

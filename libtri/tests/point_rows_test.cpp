@@ -55,7 +55,7 @@ struct Shape {
   double first;   ///< place of the first column and row, in steps from the frame's side
 };
 
-/// `gaps`: the share of samples that are not there.
+/// `gaps`: the share of missing samples.
 Grid make_grid(const Shape& shape, double gaps, std::uint64_t seed) {
   Grid grid;
   std::mt19937_64 random(seed);
@@ -101,7 +101,8 @@ PointTinOptions options_of(double error, TinQuality quality, double step = 0x1p-
   return options;
 }
 
-/// Triangles counter-clockwise, every edge once in each direction, but for those of the frame.
+/// Triangles are counter-clockwise, and every edge occurs once in each direction, except those of
+/// the frame.
 void check_framed_mesh(const PointTin& tin, const std::vector<Point3>& frame) {
   ASSERT_EQ(tin.sample.size(), tin.vertices.size());
   const auto place = [&](std::uint32_t v) {
@@ -129,7 +130,7 @@ void check_framed_mesh(const PointTin& tin, const std::vector<Point3>& frame) {
   }
 }
 
-/// What the tin says of its errors, against measure_surface(), which knows nothing of rows.
+/// The errors that the TIN reports, against measure_surface(), which does not depend on rows.
 void check_errors(const Places& places, const std::vector<double>& heights, const PointTin& tin,
                   double bound) {
   std::vector<double> x, y, z;
@@ -192,7 +193,7 @@ TEST(PointRows, KeepTheErrorOnALattice) {
   }
 }
 
-/// A grid turned and bent, as rasters of other projections are.
+/// A grid rotated and bent, like rasters in other projections.
 struct Bend {
   double degrees;
   bool mirrored;
@@ -233,7 +234,7 @@ TEST(PointRows, TurnedAndBentGridsKeepTheError) {
                        std::to_string(static_cast<int>(quality)));
           Grid grid = make_grid(shape, 0.05, 3);
           Places places = bent(grid, shape.extent, bend);
-          // What has no place has no height.
+          // A sample without a place has no height.
           places.x[5] = places.y[5] = grid.z[5] = kMissing;
           const std::vector<Point3> frame = make_frame(shape.extent, 5, 4);
           const PointTinOptions options = options_of(error, quality);
@@ -311,7 +312,7 @@ TEST(PointRows, AllPathsGiveTheSame) {
   }
 }
 
-// Several samples for each place of the lattice, and cliffs between them.
+// Several samples per place of the lattice, with cliffs between them.
 TEST(PointRows, LatticeTooCoarseForTheError) {
   Grid grid = make_grid({120, 120, 20, 0}, 0.0, 9);
   std::mt19937_64 random(9);
@@ -332,7 +333,7 @@ TEST(PointRows, ErrorZero) {
   const PointTin tin = point_tin(grid.rows(), frame, options_of(0.0, TinQuality::kRemoval));
   check_framed_mesh(tin, frame);
   check_errors(Places(grid), grid.z, tin, 0.0);
-  // All inside are vertices: their heights are rounded.
+  // All inside are vertices, as their heights are rounded.
   EXPECT_GT(tin.vertices.size(), 250u);
 }
 
@@ -346,7 +347,7 @@ TEST(PointRows, SamplesOnTheFrameAndAHairOutside) {
   EXPECT_EQ(flat.errors.covered, 16u);
   EXPECT_EQ(flat.errors.uncovered, 9u);
   EXPECT_EQ(flat.triangles.size(), 2u);
-  // Beyond the bound outside, on a side, inside.
+  // Beyond the bound outside, on a side, and inside.
   grid.z[4] = grid.z[9] = grid.z[22] = grid.z[12] = 300;
   const PointTin tin = point_tin(grid.rows(), frame, options_of(0.5, TinQuality::kGreedy));
   check_framed_mesh(tin, frame);
@@ -380,7 +381,7 @@ TEST(PointRows, FewSamples) {
   EXPECT_EQ(row.errors.covered, 3u);
 }
 
-// What has no fast way goes the other, with the numbers of rows and columns.
+// Inputs without a fast path take the other one, with the numbers of rows and columns.
 TEST(PointRows, IrregularPlacesAndFrames) {
   Grid grid = make_grid({40, 40, 1000, 0}, 0.05, 13);
   grid.x[7] += 10;

@@ -47,7 +47,7 @@ TEST(PointTin, KeepsTheFrame) {
         inside += x >= 0 && x <= 1000 && y >= 0 && y <= 1000 ? 1 : 0;
         cloud.add(x, y, rough(x / 1000, y / 1000));
       }
-      // A hair outside and on the sides, where the frame's heights stand.
+      // A hair outside and on the sides, where the frame determines the heights.
       cloud.add(500, std::nextafter(1000.0, 2000.0), 0);
       cloud.add(std::nextafter(0.0, -1.0), 20, 0);
       cloud.add(500, 1000, 500);
@@ -65,7 +65,7 @@ TEST(PointTin, KeepsTheFrame) {
       const TinErrors measured = measure(cloud, tin);
       EXPECT_EQ(measured.covered, inside);
       EXPECT_NEAR(measured.largest, tin.errors.largest, 1e-9);
-      // All but these two keep the error.
+      // All except these two keep the error.
       cloud.z[cloud.size() - 1] = frame[0][2];
       cloud.x[cloud.size() - 2] = 2000;
       EXPECT_LE(measure(cloud, tin).largest, 2 + 1e-9);
@@ -105,7 +105,7 @@ TEST(PointTin, KeepsTheErrorOnALattice) {
       const TinErrors measured = measure(cloud, tin);
       EXPECT_EQ(measured.covered, tin.errors.covered);
       EXPECT_NEAR(measured.largest, tin.errors.largest, 1e-9);
-      // A coarse lattice cannot show the terrain, and says so.
+      // A coarse lattice cannot represent the terrain, and reports it.
       if (tin.stuck == 0) {
         EXPECT_LE(tin.errors.largest, 1.5);
       } else {

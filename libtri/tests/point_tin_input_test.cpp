@@ -139,7 +139,7 @@ TEST(PointTin, RefusesBadInput) {
   EXPECT_NE(frame({{0, 0, 0}, {4, 0, 0}, {2, 0, 0}, {4, 4, 0}}), "accepted");
   EXPECT_NE(frame({{0, 0, 0}, {4, 0, 0}, {4, 4, nan}}), "accepted");
   EXPECT_NE(frame({{0, 0, 0}, {4, 0, 0}, {4, 4, 0}, {0, 0, 0}, {4, 0, 0}, {4, 4, 0}}), "accepted");
-  // A pentagram turns left everywhere, but goes around twice.
+  // A pentagram turns left everywhere but goes around twice.
   EXPECT_NE(frame({{0, 3, 0}, {-2, -2, 0}, {3, 1, 0}, {-3, 1, 0}, {2, -2, 0}}), "accepted");
   PointTinOptions lattice;
   lattice.lattice = TinLattice{0, 1};

@@ -16,7 +16,7 @@
 #include "points.hpp"
 #include "terrace/tri/point_tin.hpp"
 
-/// What tests of meshes of points share: clouds with heights, and the slow way to look at a mesh.
+/// Shared by tests of meshes of points: clouds with heights, and brute-force checks of a mesh.
 
 namespace terrace::tri::point_tin_oracle {
 
@@ -51,7 +51,8 @@ inline double rough(double u, double v) {
          2 * std::sin(97 * u + 41 * v);
 }
 
-/// Heights by the place within the unit square of the cloud's box, with steps and noise.
+/// Heights by the position within the unit square of the cloud's bounding box, with steps and
+/// noise.
 inline Cloud make_cloud(PointSet kind, std::size_t count, std::uint64_t seed) {
   Cloud cloud;
   std::mt19937_64 random(seed);
@@ -79,8 +80,8 @@ inline Place place_of(const PointTin& tin, std::uint32_t v) {
   return {tin.vertices[v][0], tin.vertices[v][1]};
 }
 
-/// Triangles counter-clockwise, every edge once in each direction but for a simple border; no
-/// vertex twice or unused. Returns the border's edges.
+/// Triangles are counter-clockwise, every edge occurs once in each direction except for a simple
+/// border; no vertex is duplicated or unused. Returns the border's edges.
 inline std::set<std::array<std::uint32_t, 2>> check_mesh(const PointTin& tin) {
   EXPECT_EQ(tin.sample.size(), tin.vertices.size());
   std::set<std::array<std::uint32_t, 2>> edges;
@@ -98,7 +99,7 @@ inline std::set<std::array<std::uint32_t, 2>> check_mesh(const PointTin& tin) {
   std::set<std::array<std::uint32_t, 2>> border;
   for (const auto& e : edges)
     if (!edges.contains({e[1], e[0]})) border.insert(e);
-  // Euler: a disc.
+  // Euler's formula: a disc.
   if (!tin.triangles.empty()) {
     EXPECT_EQ(tin.triangles.size(), 2 * tin.vertices.size() - 2 - border.size());
   }
@@ -116,7 +117,7 @@ inline void check_delaunay(const PointTin& tin) {
   }
 }
 
-/// Every sample in every triangle, by another formula than the library's.
+/// Every sample in every triangle, by a different formula from the library's.
 inline TinErrors brute_force(const Cloud& cloud, const PointTin& tin) {
   TinErrors result;
   double squares = 0;

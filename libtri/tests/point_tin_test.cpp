@@ -61,7 +61,7 @@ TEST(PointTin, KeepsTheErrorOverTheHull) {
   }
 }
 
-// So many samples that the first vertices are chosen by few of them, and the last in parts.
+// So many samples that the first vertices are chosen by a few of them, and the last in parts.
 TEST(PointTin, KeepsTheErrorOfManySamples) {
   for (const PointSet kind : {PointSet::kUniform, PointSet::kGrid, PointSet::kClusters}) {
     const Cloud cloud = make_cloud(kind, 70000, 17);
@@ -125,7 +125,7 @@ TEST(PointTin, MaxPoints) {
     EXPECT_LT(greedy, before);
     before = greedy;
   }
-  // The error comes first where it is the weaker wish.
+  // The error limit applies if it allows fewer vertices.
   PointTinOptions options;
   options.max_error = 30;
   const PointTin free = make(cloud, {}, options);
@@ -137,7 +137,7 @@ TEST(PointTin, MaxPoints) {
 }
 
 TEST(PointTin, OrderOfSamplesDoesNotMatterForTheResult) {
-  // All places differ, so the order along the curve and with it all else is the same.
+  // All places differ, so the order along the curve is the same, and with it everything else.
   const Cloud cloud = make_cloud(PointSet::kUniform, 4000, 13);
   Cloud shuffled = cloud;
   std::mt19937_64 random(13);

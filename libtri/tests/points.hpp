@@ -20,7 +20,7 @@ enum class PointSet {
   kGrid,        ///< a complete grid, row by row
   kHorizontal,  ///< on one line
   kSlanted,     ///< on one line, duplicates among them
-  kOffLine,     ///< on one line but the last point
+  kOffLine,     ///< collinear except the last point
   kCircle,      ///< cocircular: integer points on one circle, then its centre
   kClusters,    ///< tight clusters far apart
   kHuge,        ///< at the ends of the range

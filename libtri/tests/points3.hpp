@@ -22,7 +22,7 @@ enum class PointSet3 {
   kSlab,       ///< two layers of a grid
   kLine,       ///< on one line, duplicates among them
   kPlane,      ///< in one plane, duplicates among them
-  kOffPlane,   ///< in one plane but the last point
+  kOffPlane,   ///< coplanar except the last point
   kSphere,     ///< cospherical: integer points on one sphere, then its centre
   kCurves,     ///< on two skew lines: every pair of edges makes a tetrahedron
   kClusters,   ///< tight clusters far apart

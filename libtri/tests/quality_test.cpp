@@ -25,7 +25,7 @@ TEST(Quality, KnownTriangles) {
   const TriangleId only = *triangulation.all_triangles().begin();
   const TriangleQuality q = triangle_quality(triangulation, tilted, only);
   EXPECT_NEAR(q.min_angle_degrees, 36.86989764584402, 1e-12);
-  EXPECT_NEAR(q.aspect, 5 / (2 * std::sqrt(3.0)), 1e-15);  // the radius is 1
+  EXPECT_NEAR(q.aspect, 5 / (2 * std::sqrt(3.0)), 1e-15);  // the inscribed radius is 1
   auto edges = q.edges;
   std::sort(edges.begin(), edges.end());
   EXPECT_EQ(edges, (std::array<double, 3>{3, 4, 5}));
@@ -33,7 +33,7 @@ TEST(Quality, KnownTriangles) {
   EXPECT_DOUBLE_EQ(q.surface_area, 4 * 5 / 2.0);
   EXPECT_DOUBLE_EQ(q.volume_above, 6 * 7 / 3.0);
   EXPECT_EQ(q.volume_below, 0);
-  // Half way up: above is a tip of a quarter of the area.
+  // Half way up: above it is a tip of a quarter of the area.
   const TriangleQuality cut = triangle_quality(triangulation, tilted, only, 3);
   EXPECT_DOUBLE_EQ(cut.volume_above, 1.5 * 2 / 3);
   EXPECT_DOUBLE_EQ(cut.volume_above - cut.volume_below, 6 * (7 / 3.0 - 3));
@@ -82,7 +82,7 @@ TYPED_TEST(QualityTest, SumsAgreeWithBruteForce) {
     std::vector<double> heights(triangulation.vertex_slots());
     for (double& h : heights) h = to_unit(random()) - 0.5;
     const MeshQuality q = mesh_quality(triangulation, heights, 0.1, 7);
-    // The hull's area by its edges, the integral of height by corners, edges as pairs.
+    // The hull's area from its edges, the integral of height from corners, edges as pairs.
     double area = 0;
     double volume = 0;
     double above = 0;
@@ -100,7 +100,7 @@ TYPED_TEST(QualityTest, SumsAgreeWithBruteForce) {
                           2;
       volume +=
           size * ((heights[slot(v[0])] + heights[slot(v[1])] + heights[slot(v[2])]) / 3 - 0.1);
-      // Many small pieces, each at its middle.
+      // Many small pieces, each evaluated at its centre.
       constexpr int kParts = 24;
       for (int i = 0; i < kParts; ++i) {
         for (int k = 0; i + k < kParts; ++k) {

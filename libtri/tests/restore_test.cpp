@@ -80,7 +80,7 @@ TEST(RestoreTest, DegeneratePoints) {
     for (const PointSet3 kind : {PointSet3::kLine, PointSet3::kPlane}) {
       const auto points = make_points3<double>(kind, 30, 2);
       const Surface surface = restore_surface(points, options).surface;
-      // Rounding takes points off their plane.
+      // Rounding moves points off their plane.
       if (bits == 0) {
         EXPECT_TRUE(surface.faces.empty());
       }

@@ -31,7 +31,7 @@ inline std::size_t size_of(const std::string& type) {
   return 4;
 }
 
-/// One number, from text or from little-endian bytes.
+/// One number, from text or little-endian bytes.
 inline double read_number(std::istream& in, const std::string& type, bool ascii) {
   double value = std::numeric_limits<double>::quiet_NaN();
   if (ascii) {
@@ -62,7 +62,7 @@ inline Surface read_ply(std::istream& in) {
   struct Element {
     std::string name;
     std::size_t count;
-    std::vector<std::vector<std::string>> properties;  // words after "property"
+    std::vector<std::vector<std::string>> properties;  // the words after "property"
   };
   std::vector<Element> elements;
   bool ascii = true;
@@ -104,7 +104,7 @@ inline Surface read_ply(std::istream& in) {
       if (element.name == "vertex") surface.points.push_back(point);
     }
   }
-  if (!in || surface.points.empty()) throw std::runtime_error("not a whole PLY file");
+  if (!in || surface.points.empty()) throw std::runtime_error("not a complete PLY file");
   return surface;
 }
 
@@ -133,7 +133,7 @@ inline Surface read_obj(std::istream& in) {
   return surface;
 }
 
-/// Each opening (a connected set of edges in one face) closed by a fan to its centre, so that the
+/// Closes each opening (a connected set of edges in one face) by a fan to its centre, so that the
 /// enclosed volume is defined.
 inline Surface with_openings_closed(Surface surface) {
   using Edge = std::pair<std::uint32_t, std::uint32_t>;
@@ -171,7 +171,7 @@ inline Surface with_openings_closed(Surface surface) {
   return surface;
 }
 
-/// The corners of the box at 0 and 2^24 - 1 on its longest side.
+/// Maps the bounding box to 0 .. 2^24 - 1 on its longest side.
 inline std::vector<std::array<std::int32_t, 3>> quantised(
     const std::vector<std::array<double, 3>>& points, double& step) {
   std::array<double, 3> low = points.at(0), high = low;

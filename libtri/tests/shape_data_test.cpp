@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scans of the data folder that TERRACE_DATA names.
+// Scans in the data folder named by TERRACE_DATA.
 #include <cstdlib>
 #include <filesystem>
 
@@ -17,7 +17,7 @@ class ShapeDataTest : public ::testing::Test {
     const char* folder = std::getenv("TERRACE_DATA");
     if (folder == nullptr) GTEST_SKIP() << "TERRACE_DATA is not set";
     path_ = std::filesystem::path(folder) / "scan" / "bun_zipper.ply";
-    if (!std::filesystem::exists(path_)) GTEST_SKIP() << path_ << " is not there";
+    if (!std::filesystem::exists(path_)) GTEST_SKIP() << path_ << " does not exist";
   }
   std::filesystem::path path_;
 };

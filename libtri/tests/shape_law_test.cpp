@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What holds for any points: the rules' definition, independence of order and history, the update.
+// Properties that hold for any points: the rules' definition, independence of order and history,
+// the update.
 #include <random>
 
 #include <gtest/gtest.h>
@@ -26,8 +27,8 @@ std::string name(const ShapeOptions& options) {
          (options.keep_vertices ? ", no vertex lost" : "");
 }
 
-/// The edge lengths of huge and tiny points are not those of the oracle's to the last bit, and
-/// their ties are frequent.
+/// The edge lengths of huge and tiny points differ from the oracle's in the last bit, and their
+/// ties are frequent.
 bool comparable(PointSet3 kind, const ShapeOptions& options) {
   return options.criterion == ShapeCriterion::kGabriel || kind == PointSet3::kUniform ||
          kind == PointSet3::kFullRange;
@@ -65,7 +66,7 @@ TYPED_TEST(ShapeLawTest, NoVertexIsLost) {
     triangulation.build(make_points3<TypeParam>(kind, kind == PointSet3::kCurves ? 60 : 1000, 8));
     if (triangulation.tetrahedron_count() == 0) continue;
     for (ShapeOptions options : all_options()) {
-      // Nothing but the guard keeps anything where the factor is that small.
+      // With such a small factor only the guard keeps anything.
       options.edge_factor = 1e-12;
       SCOPED_TRACE(terrace::tri::name(kind) + ", " + name(options));
       Shape3<TypeParam> shape(options);
@@ -92,7 +93,7 @@ TYPED_TEST(ShapeLawTest, DependsOnThePointsAlone) {
     Delaunay3<TypeParam> built;
     built.build(points);
     for (int round = 0; round < 2; ++round) {
-      // Another order, and a history with points that have come and gone.
+      // Another order, and a history with temporary points.
       std::shuffle(points.begin(), points.end(), random);
       Delaunay3<TypeParam> grown;
       for (const auto& p : make_points3<TypeParam>(PointSet3::kFiveBits, 40, 77)) grown.insert(p);
@@ -149,14 +150,14 @@ TYPED_TEST(ShapeLawTest, UpdateEqualsRestore) {
       Triangulation triangulation;
       std::vector<Shape3<TypeParam>> shapes;
       for (const ShapeOptions& options : all_options()) {
-        // From scratch anyway; one is enough.
+        // Computed from scratch in any case; one run is enough.
         if (options.rule == ShapeRule::kPublished && shapes.size() != 2) continue;
         shapes.emplace_back(options);
       }
       triangulation.start_journal();
       typename Triangulation::Changes changes;
       for (int step = 0; step < 30; ++step) {
-        // Several operations within one set of changes now and then.
+        // Sometimes several operations within one set of changes.
         do {
           std::vector<VertexId> alive;
           for (const VertexId v : triangulation.all_vertices()) alive.push_back(v);

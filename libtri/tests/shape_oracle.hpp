@@ -15,8 +15,9 @@
 
 #include "terrace/tri/shape.hpp"
 
-/// The rules of shape.hpp from their definition, slowly: on tetrahedra named by their sorted
-/// corners, with rational numbers for the spheres, and every set scanned whole in each step.
+/// The rules of shape.hpp implemented slowly from their definition: on tetrahedra identified by
+/// their sorted corners, with rational numbers for the spheres, and with a full scan of every set
+/// in each step.
 
 namespace terrace::tri {
 
@@ -30,7 +31,7 @@ ShapeCorners shape_corners(const Delaunay3<Coord>& triangulation, TetrahedronId 
   const auto vertices = triangulation.vertices(t);
   for (std::size_t i = 0; i < 4; ++i) {
     const auto p = triangulation.point(vertices[i]);
-    // One zero.
+    // Merges -0.0 and 0.0.
     for (std::size_t k = 0; k < 3; ++k) result[i][k] = static_cast<double>(p[k]) + 0.0;
   }
   std::sort(result.begin(), result.end());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Made shapes of known volume, and options.
+// Synthetic shapes of known volume, and options.
 #include "terrace/tri/shape.hpp"
 
 #include <cmath>
@@ -25,7 +25,7 @@ struct Noise {
   double operator()() { return (static_cast<double>(random() >> 11) * 0x1p-53 - 0.5) * 2 * size; }
 };
 
-/// Rings about the z axis through a profile's points, about `step` apart.
+/// Rings about the z axis through the points of a profile, about `step` apart.
 void add_revolved(Points& points, const std::vector<std::array<double, 2>>& profile, double step,
                   Noise& noise) {
   for (const auto& [radius, z] : profile) {
@@ -62,8 +62,7 @@ void add_line(std::vector<std::array<double, 2>>& profile, std::array<double, 2>
         {from[0] + (to[0] - from[0]) * i / count, from[1] + (to[1] - from[1]) * i / count});
 }
 
-/// Measures of the restored surface, the same from doubles and from integers of 24 bits but for the
-/// rounding.
+/// Measures of the restored surface, the same from doubles and from 24-bit integers up to rounding.
 SurfaceMeasures restored(const Points& points, const ShapeOptions& options = {}) {
   Delaunay3<double> triangulation;
   triangulation.build(points);
@@ -165,7 +164,7 @@ TEST(ShapeTest, PublishedRuleLeavesMore) {
   options.rule = ShapeRule::kPublished;
   Shape3<double> published(options);
   published.restore(triangulation);
-  // A tetrahedron that the published rule removes the flood removes too.
+  // A tetrahedron removed by the published rule is also removed by the flood.
   for (const TetrahedronId t : triangulation.all_tetrahedra()) {
     if (flood.kept(t)) {
       EXPECT_TRUE(published.kept(t));
@@ -175,7 +174,7 @@ TEST(ShapeTest, PublishedRuleLeavesMore) {
 }
 
 TEST(ShapeTest, AGridStaysWhole) {
-  // No facet's smallest sphere has a point of the grid inside.
+  // No facet's smallest sphere contains a grid point in its interior.
   const auto points = make_points3<std::int32_t>(PointSet3::kGrid, 512, 0);
   Delaunay3<std::int32_t> triangulation;
   triangulation.build(points);

@@ -133,7 +133,7 @@ TYPED_TEST(SmoothingTest, LaplacianAndBilateralObeyTheMaximumPrinciple) {
 }
 
 TYPED_TEST(SmoothingTest, LaplacianStepIsTheWeightedMean) {
-  // On a grid the neighbours along the axes count a quarter each, diagonals nothing.
+  // On a grid the neighbours along the axes count a quarter each, the diagonal ones nothing.
   Delaunay2<TypeParam> triangulation;
   triangulation.build_grid(0, 0, 3, 9, 9);
   const auto heights = noise(triangulation);
@@ -159,7 +159,7 @@ TYPED_TEST(SmoothingTest, TaubinKeepsWhatIsWideAndTakesWhatIsRough) {
       return std::sin(x * 2 * 3.14159265358979323846 / length);
     });
   };
-  // The amplitude on the middle row, away from the border that stays.
+  // The amplitude on the middle row, away from the border, which stays.
   const auto amplitude = [&](double length, Smoothing method) {
     const auto heights = wave(length);
     const auto result = applied(
@@ -195,7 +195,7 @@ TYPED_TEST(SmoothingTest, BilateralKeepsAStepThatTheLaplacianLoses) {
     EXPECT_GT(bilateral[high] - bilateral[low], 9.9);
     EXPECT_LT(laplacian[high] - laplacian[low], 4);
   }
-  // And the noise is gone.
+  // The noise is gone.
   for (TypeParam x = 5; x < 15; ++x)
     EXPECT_LT(std::abs(bilateral[slot(triangulation.nearest({x, 20}))]), 0.05);
 }

@@ -57,7 +57,7 @@ TEST(SurfaceTest, TwoThatShareAnEdge) {
   surface.points.push_back({-1, 0, 0});
   surface.points.push_back({0, -1, 0});
   for (auto face : tetrahedron().faces) {
-    for (auto& v : face) v = v == 1 ? 4 : v == 2 ? 5 : v;  // about the axis of 0 and 3
+    for (auto& v : face) v = v == 1 ? 4 : v == 2 ? 5 : v;  // rotates about the axis through 0 and 3
     surface.faces.push_back(face);
   }
   const SurfaceMeasures measured = measure(surface);

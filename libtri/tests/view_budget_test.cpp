@@ -19,8 +19,9 @@ using Control = ViewControl2<std::int32_t>;
   SCOPED_TRACE(testing::Message() << "seed " << (w).seed << ", shape " \
                                   << static_cast<int>((w).shape))
 
-// Neither budget of memory is ever exceeded, and the view still comes as near as they let it: what
-// stays collapsed for want of room could only be had at the cost of what is about as important.
+// Neither memory budget is ever exceeded, and the view still comes as close as they allow: clusters
+// that stay collapsed for lack of room could only be had at the cost of others of about the same
+// importance.
 TEST(ViewBudget, MemoryIsNeverExceeded) {
   std::size_t full = 0;
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {
@@ -52,8 +53,8 @@ TEST(ViewBudget, MemoryIsNeverExceeded) {
           ASSERT_LE(control.cached_bytes(), options.max_cached_bytes);
         }
       }
-      // None of the blocked clusters that the cache could hold has room, and for the first one
-      // not enough is less important.
+      // No blocked cluster that the cache could hold has room, and for the first one too few points
+      // are less important.
       const auto demands = all_demands(tree, world.source, view, options);
       const ClusterSet open = expanded_set(control);
       const std::size_t points = control.model().point_count();
@@ -82,7 +83,7 @@ TEST(ViewBudget, MemoryIsNeverExceeded) {
   EXPECT_GT(full, 50u);
 }
 
-// Under a limit of points steps cut short end where whole ones do.
+// Under a limit of points interrupted steps end where complete ones do.
 TEST(ViewBudget, InterruptionsLeaveNoTraceUnderALimitOfPoints) {
   for (std::uint64_t seed = 1; seed <= 30; ++seed) {
     World world(seed, kWorldShapes[seed % 3], 500);
@@ -91,11 +92,12 @@ TEST(ViewBudget, InterruptionsLeaveNoTraceUnderALimitOfPoints) {
     options.max_points = world.source.root().positions.size() + below(world.random, 200);
     Control whole(counts(world.source), load_root(world.source), options);
     Control cut(counts(world.source), load_root(world.source), options);
-    // All is there before, so that both see the same.
+    // Everything is given beforehand, so that both see the same.
     for (const auto& [id, parent] : WholeTree(world.source).parents) {
       ViewRequest request{id, {}, 0, 0.0};
       for (const auto& [child, above] : WholeTree(world.source).parents) {
-        // The last child of a cluster in no order: the head's is the one that no member heads.
+        // The last child of a cluster, in no particular order: the head's child is the one that no
+        // member heads.
         if (above != id) continue;
         const auto& cluster = world.source.at(id);
         bool member = false;
@@ -119,7 +121,7 @@ TEST(ViewBudget, InterruptionsLeaveNoTraceUnderALimitOfPoints) {
   }
 }
 
-// What went out of the cache is asked for again when it is wanted again.
+// A cluster evicted from the cache is requested again when it is wanted again.
 TEST(ViewBudget, EvictedIsAskedForAgain) {
   World world(11, Shape::random, 500);
   while (world.source.levels[0].size() < 30 || world.source.top() > 2) {
@@ -166,7 +168,7 @@ TEST(ViewBudget, WithRoomNothingIsAskedForTwice) {
   }
 }
 
-// A cluster larger than the whole budget is neither asked for nor taken.
+// A cluster larger than the whole budget is neither requested nor accepted.
 TEST(ViewBudget, ClusterLargerThanTheCache) {
   World world(2, Shape::random, 400);
   ViewOptions options;
@@ -184,8 +186,8 @@ TEST(ViewBudget, ClusterLargerThanTheCache) {
   EXPECT_EQ(control.cached_bytes(), 0u);
 }
 
-// With a clock that each look moves by 1 ms: a step ends in time, but for its first operation, and
-// all is done in the end. Without a limit of time nobody looks at it.
+// With a clock that advances by 1 ms at each reading: a step ends in time, except for its first
+// operation, and everything is done in the end. Without a time limit the clock is not read.
 TEST(ViewBudget, TimeIsKept) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     World world(seed, Shape::random, 500);
@@ -241,7 +243,7 @@ TEST(ViewBudget, RecoversFromAStall) {
   EXPECT_LT(settle(control, world.source, fine, budget), 60);
 }
 
-// Outlines: the same view with a smaller error for what may show one.
+// Outlines: the same view with a smaller error for clusters that may show one.
 TEST(ViewSilhouette, RefinesWhereAnOutlineMayShow) {
   std::size_t more = 0, rightly = 0;
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
@@ -255,13 +257,13 @@ TEST(ViewSilhouette, RefinesWhereAnOutlineMayShow) {
     none.silhouette = all.silhouette = half.silhouette = 0.2;
     const bool perspective = view.camera->perspective;
     none.cone = [&](ClusterId, const ClusterRecord&) {
-      // Faces the camera: no normal perpendicular to a line of sight that is in the picture.
+      // Faces the camera: no normal perpendicular to a line of sight within the picture.
       NormalCone cone{view.camera->direction, 1.0};
       return perspective ? NormalCone{{0, 0, 1}, 0.0} : cone;
     };
     all.cone = [](ClusterId, const ClusterRecord&) { return NormalCone{{0, 0, 1}, 180.0}; };
     half.cone = [&](ClusterId id, const ClusterRecord& record) {
-      EXPECT_TRUE(asked.insert(id).second) << "asked twice";
+      EXPECT_TRUE(asked.insert(id).second) << "requested twice";
       EXPECT_EQ(record.members, world.source.at(id).positions.size());
       return NormalCone{{0, 0, 1}, ordinal_of(id) % 2 ? 180.0 : 0.0};
     };

@@ -30,7 +30,7 @@ ViewOptions random_options(World& world) {
   return options;
 }
 
-// Steps end where the recursive rule over the whole hierarchy says, from wherever they start.
+// Steps end where the recursive rule over the whole hierarchy says, wherever they start.
 TYPED_TEST(ViewControlOf, EndsWhereTheRuleSays) {
   int mixed = 0;
   for (std::uint64_t seed = 1; seed <= 25; ++seed) {
@@ -60,11 +60,11 @@ TYPED_TEST(ViewControlOf, EndsWhereTheRuleSays) {
       }
     }
   }
-  EXPECT_GT(mixed, 50) << "the views show all or nothing";
+  EXPECT_GT(mixed, 50) << "the views show everything or nothing";
 }
 
-// However steps are cut short, and in whatever portions clusters arrive, the triangulation is valid
-// in between and the end is the same.
+// However steps are interrupted, and in whatever portions clusters arrive, the triangulation is
+// valid in between and the end is the same.
 TEST(ViewControl, InterruptedStepsEndAtTheSame) {
   using T = Delaunay2<std::int32_t>;
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
@@ -96,8 +96,8 @@ TEST(ViewControl, InterruptedStepsEndAtTheSame) {
   }
 }
 
-// After any step at all a consumer of deltas sees what is there, also where expanding and
-// collapsing meet in one step and points share vertices.
+// After any step a consumer of deltas sees the current state, even where expanding and collapsing
+// meet in one step and points share vertices.
 TEST(ViewControl, DeltasTellAll) {
   using T = StandIn<std::int32_t>;
   for (std::uint64_t seed = 1; seed <= 30; ++seed) {
@@ -125,7 +125,7 @@ Camera looking_down(double x, double y, double height) {
   return perspective_camera({{x, y, height}, {0, 0, -1}, {0, 1, 0}}, 60.0, 1.5, 1000.0);
 }
 
-// A camera that trembles by less than the band changes nothing, and one that goes away and comes
+// A camera that jitters by less than the band changes nothing, and one that goes away and comes
 // back finds the same.
 TEST(ViewControl, TremblingChangesNothing) {
   std::size_t expanded = 0;
@@ -138,13 +138,13 @@ TEST(ViewControl, TremblingChangesNothing) {
     view.pixel_error = 20.0 + 100.0 * unit(world.random);
     const double x = world.box.min[0] + unit(world.random) * world.extent();
     const double y = world.box.min[1] + unit(world.random) * world.extent();
-    // No box is nearer than this; the view turns by the ratio, too.
+    // No box is nearer than this; the view turns by the same ratio.
     const double least = height - world.box.max[2];
     const double tremble = 0.02 * least;
     view.camera = looking_down(x, y, height);
     settle(control, world.source, view);
     expanded += control.model().expanded_count();
-    // What is at the very edge may come with the first few trembles, never to go again.
+    // A cluster at the very edge may come with the first few movements, and then stays.
     std::size_t collapsed = 0, after = 0;
     for (int frame = 0; frame < 200; ++frame) {
       const auto shake = [&] { return tremble * (unit(world.random) - 0.5); };
@@ -185,8 +185,8 @@ TEST(ViewControl, StandingStillSettles) {
   }
 }
 
-// What is not there is asked for once; forgotten, withdrawn or dropped from the cache it is asked
-// for again.
+// A missing cluster is requested once; if forgotten, withdrawn or evicted from the cache, it is
+// requested again.
 TEST(ViewControl, AsksOnce) {
   World world(7, Shape::random, 400);
   while (world.source.top() < 2 || world.source.levels[0].size() < 20) {
@@ -217,7 +217,7 @@ TEST(ViewControl, AsksOnce) {
   }
   EXPECT_EQ(asked, useful);
 
-  // From the start again: asked, withdrawn, asked again, forgotten, asked again.
+  // From the start again: requested, withdrawn, requested again, forgotten, requested again.
   ViewControl2<std::int32_t> other(counts(world.source), load_root(world.source));
   const std::size_t first = other.step(fine).requests.size();
   ASSERT_GT(first, 0u);
@@ -284,7 +284,7 @@ TEST(ViewControl, PinnedFromTheStart) {
   EXPECT_EQ(control.model().expanded(), std::vector<ClusterId>{top[0]});
 }
 
-// A cluster that contradicts itself stays collapsed, is told of, and can be given anew.
+// A cluster that contradicts itself stays collapsed, is reported, and can be given again.
 TEST(ViewControl, FaultyClustersAreToldOf) {
   World world(5, Shape::random);
   ViewControl2<std::int32_t> control(counts(world.source), load_root(world.source));
@@ -354,7 +354,7 @@ TEST(ViewControl, RefusesWhatMakesNoSense) {
   EXPECT_THROW(control.give(above), HierarchyError);
 }
 
-// Boxes and errors that are not numbers neither crash nor bring in what is not seen.
+// Boxes and errors with NaN neither crash nor bring in clusters that are not visible.
 TEST(ViewControl, HostileRecords) {
   const double bad[] = {std::nan(""), std::numeric_limits<double>::infinity(),
                         -std::numeric_limits<double>::infinity(), 1e308, -1.0};

@@ -36,7 +36,7 @@ Matrix product(const Matrix& a, const Matrix& b) {
   return c;
 }
 
-// Looks along -z of a frame turned about z and then tilted about x.
+// Looks along -z of a frame rotated about z and then tilted about x.
 Matrix view_matrix(const Point3& eye, double turn, double tilt) {
   const double c = std::cos(turn), s = std::sin(turn), d = std::cos(tilt), t = std::sin(tilt);
   const Matrix move{1, 0, 0, -eye[0], 0, 1, 0, -eye[1], 0, 0, 1, -eye[2], 0, 0, 0, 1};
@@ -50,8 +50,9 @@ Pose pose_of(const Point3& eye, double turn, double tilt) {
   return {eye, {-s * t, c * t, -d}, {-s * d, c * d, t}};
 }
 
-// A matrix and the numbers it is made of give the same camera; what is seen is what the matrix maps
-// into the picture, and a step across the view is as many pixels as the matrix maps it to.
+// A matrix and the parameters from which it is made give the same camera; a point is visible if the
+// matrix maps it into the picture, and a step across the view is as many pixels as the matrix maps
+// it to.
 TEST(Camera, MatrixAndPoseAgree) {
   std::mt19937_64 random(1);
   int seen = 0;
@@ -64,7 +65,7 @@ TEST(Camera, MatrixAndPoseAgree) {
     const double f = 1.0 / std::tan(fov * std::acos(-1.0) / 360.0);
     const bool perspective = i % 3 != 0;
     const double extent = 500.0 * (0.1 + unit(random));
-    // Depth in one of the usual manners.
+    // Depth in one of the usual conventions.
     const Matrix projection =
         perspective
             ? (i % 2 ? Matrix{f / aspect, 0, 0, 0, 0, f, 0, 0, 0, 0, -1.002, -0.2002, 0, 0, -1, 0}
@@ -162,7 +163,7 @@ ViewDemand measured(const View& view, const ViewOptions& options,
   return demand;
 }
 
-// Rounding included: a box inside another is never wanted more.
+// Including rounding: a box inside another never has a greater demand.
 TEST(ViewMeasure, DemandFallsInward) {
   std::mt19937_64 random(2);
   int in_view = 0;
@@ -198,8 +199,8 @@ TEST(ViewMeasure, DemandFallsInward) {
   EXPECT_GT(in_view, 500);
 }
 
-// Level ground seen from above shows no outline; seen along, or where the cone is wide, it may. By
-// random normals and lines of sight: an outline is never missed.
+// Level ground seen from above shows no outline; seen from the side, or if the cone is wide, it
+// may. By random normals and lines of sight: an outline is never missed.
 TEST(ViewMeasure, OutlinesAreNeverMissed) {
   ViewOptions options;
   options.silhouette = 0.25;
@@ -249,7 +250,7 @@ TEST(ViewMeasure, OutlinesAreNeverMissed) {
       const double length = std::hypot(sight[0], sight[1], sight[2]);
       double along = 0.0;
       for (std::size_t k = 0; k < 3; ++k) along += cone.axis[k] * sight[k] / length;
-      // The normal nearest to perpendicular leans by the cone's half angle.
+      // The normal closest to perpendicular leans by the cone's half angle.
       const double pi = std::acos(-1.0);
       outline = std::abs(std::asin(along)) <= cone.half_angle_degrees * pi / 180.0;
     }

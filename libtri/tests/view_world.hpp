@@ -13,7 +13,7 @@
 #include "multiresolution_oracle.hpp"
 #include "terrace/tri/view.hpp"
 
-/// Hierarchies with true errors, and what a view asks of them, said in the plainest way.
+/// Hierarchies with true errors, and the demands of a view on them, in the plainest form.
 
 namespace terrace::tri::test {
 
@@ -60,7 +60,7 @@ struct Demands {
   double want, keep;
 };
 
-/// By the definition, with no regard to the clusters above.
+/// By definition, regardless of the clusters above.
 inline Demands own_demands(const View& view, const ViewOptions& options,
                            const ClusterRecord& record, unsigned level) {
   Demands result{0.0, 0.0};
@@ -122,11 +122,11 @@ inline Demands own_demands(const View& view, const ViewOptions& options,
   return result;
 }
 
-/// How much each cluster is in demand: never more than the cluster above.
+/// The demand of each cluster: never greater than that of the cluster above.
 inline std::map<ClusterId, Demands> all_demands(const WholeTree& tree, MemorySource& source,
                                                 const View& view, const ViewOptions& options) {
   std::map<ClusterId, Demands> result;
-  // Ids ascend by level, so parents come first from the end.
+  // Ids ascend by level, so from the end parents come first.
   for (auto it = tree.parents.rbegin(); it != tree.parents.rend(); ++it) {
     Demands d = own_demands(view, options, source.at(it->first).record, level_of(it->first));
     const auto above = result.find(it->second);
@@ -139,7 +139,7 @@ inline std::map<ClusterId, Demands> all_demands(const WholeTree& tree, MemorySou
   return result;
 }
 
-/// Where steps must end that start from `before`.
+/// Where steps that start from `before` must end.
 inline ClusterSet wanted_by(const WholeTree& tree, MemorySource& source, const View& view,
                             const ViewOptions& options, const ClusterSet& before) {
   ClusterSet result;
@@ -155,7 +155,7 @@ ClusterSet expanded_set(const ViewControl<T>& control) {
   return {ids.begin(), ids.end()};
 }
 
-/// Steps, giving what is asked for, until a step changes and lacks nothing that can be had.
+/// Steps, giving what is requested, until a step changes nothing and lacks nothing available.
 /// Returns the number of steps.
 template <class T>
 int settle(ViewControl<T>& control, MemorySource& source, const View& view,
@@ -178,7 +178,7 @@ struct World {
   Shape shape;
   std::mt19937_64 random;
   MemorySource source;
-  Box3 box;  // of all points
+  Box3 box;  // bounding box of all points
 
   World(std::uint64_t seed_, Shape shape_, std::size_t most = 300)
       : seed(seed_), shape(shape_), random(seed_) {

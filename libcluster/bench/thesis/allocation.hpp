@@ -3,13 +3,13 @@
 
 #include <cstddef>
 
-/// How much memory the program has allocated: allocation.cpp replaces operator new and delete of
-/// the whole program.
+/// The memory allocated by the program: allocation.cpp replaces operator new and delete of the
+/// whole program.
 
 namespace terrace::cluster::thesis {
 
-/// The most bytes alive at once since the construction, beyond those alive at the construction.
-/// One at a time; memory of all threads counts.
+/// The peak of live bytes since construction, beyond those alive at construction. One object at a
+/// time; memory of all threads counts.
 class PeakMemory {
  public:
   PeakMemory();

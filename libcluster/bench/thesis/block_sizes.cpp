@@ -59,7 +59,7 @@ BlockSizeRun run_once(std::uint64_t points, std::size_t block, Effort effort,
   return result;
 }
 
-/// How much more the blocks cost after the short search.
+/// By how much the cost of the blocks is higher after the short search.
 struct Errors {
   double low = std::numeric_limits<double>::infinity(), mean = 0.0, high = -low;
 };

@@ -14,7 +14,7 @@ namespace {
 constexpr std::size_t kPoints = 1640;
 constexpr std::uint64_t kSeeds = 20;
 
-/// Half of them uniform in a rectangle, half in twelve heaps there.
+/// Half of them uniform in a rectangle, half in twelve clumps there.
 std::vector<Point3> make_points() {
   std::mt19937_64 random(12);
   std::vector<Point3> heaps(12);

@@ -12,7 +12,7 @@
 namespace terrace::cluster::thesis {
 namespace {
 
-/// A set cut into pieces of random lengths, the pieces in random order.
+/// A set cut into pieces of random lengths, which are put in random order.
 class Shuffled final : public PointSet {
  public:
   Shuffled(std::unique_ptr<PointSet> set, std::uint64_t shortest, std::uint64_t longest)
@@ -29,7 +29,7 @@ class Shuffled final : public PointSet {
     }
   }
 
-  /// Reads on: first is where the last call ended.
+  /// Continues reading: first is where the last call ended.
   void read(std::uint64_t, std::span<Point3> points) override {
     while (!points.empty()) {
       Piece& piece = pieces_[next_];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Figure 7.6: memory over the size of blocks.
+// Figure 7.6: memory as a function of block size.
 #include <array>
 #include <cmath>
 
@@ -18,7 +18,7 @@ struct Measured {
   std::vector<std::uint64_t> level_points;
 };
 
-// Memory does not depend on the length of the search, so the short one does.
+// Memory does not depend on the length of the search, so the short one suffices.
 Measured measure(std::uint64_t points, std::size_t block) {
   const auto set = large_sets()[3].make(points);
   Measured measured;
@@ -42,7 +42,7 @@ double ratio_at(const Series& ratios, double m) {
   return ratios.y[i - 1] + share * (ratios.y[i] - ratios.y[i - 1]);
 }
 
-/// The factor that brings `model` nearest to `measured` in least squares.
+/// The factor that fits `model` to `measured` by least squares.
 double fit(const std::vector<double>& model, const std::vector<double>& measured) {
   double both = 0.0;
   double square = 0.0;
@@ -89,7 +89,7 @@ void figure_7_6(Setting& setting) {
   }
   setting.report.table(table);
 
-  // The equations say what memory is proportional to.
+  // The equations give values that memory is proportional to.
   Series smooth{.name = "m log(N / m), fitted", .colour = "#222"};
   Series steps{.name = "m l, whole levels, fitted", .colour = "#0072b2"};
   const double smooth_unit = fit(equation, heap.y);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Figures 7.13 and 7.14: how often a gain is positive, and how much of the problem is looked at,
+// Figures 7.13 and 7.14: how often a gain is positive, and how much of the problem is inspected,
 // over the course of a search and for several facility costs.
 #include <algorithm>
 #include <array>
@@ -61,7 +61,7 @@ Course follow(const Blocks& blocks, double facility_cost, FacilityStrategy strat
 
 using Share = double (SearchStatistics::*)() const;
 
-/// One curve for each facility cost: a table of five stages and, to plot, all bins.
+/// One curve per facility cost: a table of five stages and, for the plot, all bins.
 void report_courses(Setting& setting, const std::string& name, const std::string& title,
                     const std::string& label, const std::array<Course, kCosts.size()>& courses,
                     std::size_t per_bin, Share share) {

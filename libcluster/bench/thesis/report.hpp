@@ -10,7 +10,7 @@
 
 #include "svg_plot.hpp"
 
-/// Where results go: tables to stdout and as CSV into a folder, plots as SVG into the folder.
+/// Output of results: tables to stdout and as CSV into a folder, plots as SVG into the folder.
 
 namespace terrace::cluster::thesis {
 
@@ -28,19 +28,19 @@ struct Table {
 std::string fixed(double value, int digits);
 std::string grouped(std::uint64_t value);
 std::string percent(double share, int digits = 1);
-/// What share of the time `before` is spared by taking `after`, as the thesis gives its speed-ups:
-/// twice as fast is "50 %".
+/// The share of the time `before` that is saved by `after`, as the thesis states speed-ups: twice
+/// as fast is "50 %".
 std::string time_saved(double before, double after);
-/// "[0:20:18]": a figure of the thesis in a column of ours.
+/// "[0:20:18]": a figure of the thesis in one of our columns.
 std::string quoted(std::string_view figure);
 
 class Report {
  public:
-  /// The folder is made. Without one no files are written.
-  /// Throws: std::filesystem::filesystem_error.
+  /// Creates the folder. Without a folder no files are written. Throws:
+  /// std::filesystem::filesystem_error.
   explicit Report(std::optional<std::filesystem::path> folder);
 
-  /// Throws: std::logic_error on a row of another length, std::runtime_error if a file cannot be
+  /// Throws: std::logic_error for a row of the wrong length, std::runtime_error if a file cannot be
   /// written.
   void table(const Table& table);
   /// As CSV only.

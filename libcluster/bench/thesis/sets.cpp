@@ -15,7 +15,7 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 
 /// SplitMix64 (Steele, Lea, Flood 2014): the seed of the k-th number is k steps away, so any number
-/// can be had without those before it.
+/// can be computed without the previous ones.
 class Hash {
  public:
   explicit Hash(std::uint64_t seed) : state_(seed) {}
@@ -91,7 +91,8 @@ class Scan final : public PointSet {
  private:
   [[nodiscard]] Point3 point(std::uint64_t index) const {
     const std::uint64_t swath = index / (width_ * rows_);
-    const std::uint64_t width = std::min(width_, around_ - swath * width_);  // the last is narrower
+    // the last swath is narrower
+    const std::uint64_t width = std::min(width_, around_ - swath * width_);
     const std::uint64_t in_swath = index - swath * width_ * rows_;
     Hash random(seed_, index);
     const double u =
@@ -150,8 +151,8 @@ class Plant final : public PointSet {
 
 using Kind = NamedSet::Kind;
 
-// Sizes as section 7.3.4 gives them; where it says "million" only, two digits more are made up of
-// zeros. Cells and steps are in metres.
+// Sizes as in section 7.3.4; where it gives only "million", two more digits are zeros. Cells and
+// steps are in metres.
 constexpr std::array<NamedSet, 8> kLarge{{{"Grand Canyon", 8'400'000, Kind::terrain, 60, 13},
                                           {"Puget Sound", 268'500'000, Kind::terrain, 10, 2.65},
                                           {"Earth", 309'400'000, Kind::terrain, 1000, 40},

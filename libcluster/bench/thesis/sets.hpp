@@ -9,8 +9,8 @@
 
 #include "terrace/cluster/point.hpp"
 
-/// Point sets of any size in constant memory, which stand for those of the thesis: points are made
-/// when they are read, anywhere in the stream, and the same ones each time.
+/// Point sets of any size in constant memory that stand for those of the thesis: points are
+/// generated when they are read, anywhere in the stream, and the same ones each time.
 
 namespace terrace::cluster::thesis {
 
@@ -31,20 +31,20 @@ class PointSet {
 
 /// A fractal elevation model on a square lattice, in tiles of 100 x 100 points, tile after tile, in
 /// patches of 4 x 4 tiles, patch after patch. Neighbours in a row are `cell` apart and differ by
-/// `step` in height (root mean square); heights are whole units. Patches are fractals of their own
-/// on a common wavy ground.
+/// `step` in height (root mean square); heights are integers. Patches are independent fractals on a
+/// common undulating base.
 std::unique_ptr<PointSet> make_terrain(std::uint64_t size, double cell, double step,
                                        std::uint64_t seed);
 
-/// A bumpy closed surface as a laser scanner sees it: swaths from pole to pole, one after another,
-/// at most 500 points wide, points about equally dense along and across.
+/// A bumpy closed surface as seen by a laser scanner: swaths from pole to pole, one after another,
+/// at most 500 points wide, with about the same density along and across.
 std::unique_ptr<PointSet> make_scan(std::uint64_t size, std::uint64_t seed);
 
-/// Not a surface but a plant full of pipes: rings of 12 points, 40 to a pipe, 64 pipes to a cell of
-/// a cubic lattice, cell after cell.
+/// Not a surface but a plant full of pipes: rings of 12 points, 40 per pipe, 64 pipes per cell of a
+/// cubic lattice, cell after cell.
 std::unique_ptr<PointSet> make_plant(std::uint64_t size, std::uint64_t seed);
 
-/// A set of the thesis and how it is made here.
+/// A set of the thesis and how it is generated here.
 struct NamedSet {
   enum class Kind : std::uint8_t { terrain, scan, plant };
   std::string_view thesis_name;
@@ -52,12 +52,12 @@ struct NamedSet {
   Kind kind;
   double cell = 0.0, step = 0.0;  ///< of a terrain
 
-  /// "terrain, as Grand Canyon"
+  /// For example "terrain, as Grand Canyon".
   [[nodiscard]] std::string name() const;
   [[nodiscard]] std::unique_ptr<PointSet> make(std::uint64_t size) const;
 };
 
-/// The eight of tables 7.2, 7.3, 7.6 and 7.7, in their order.
+/// The eight of tables 7.2, 7.3, 7.6 and 7.7, in that order.
 std::span<const NamedSet> large_sets();
 /// The four of table 7.4.
 std::span<const NamedSet> single_sets();

@@ -9,7 +9,7 @@
 
 namespace terrace::cluster::thesis {
 
-/// One pass over the scan that stands for Lucy, with m ceil(log10 m) candidates a block and the
+/// One pass over the scan that stands for Lucy, with m ceil(log10 m) candidates per block and the
 /// partition by facilities.
 struct BlockSizeRun {
   std::size_t block = 0;
@@ -28,7 +28,7 @@ struct Setting {
   std::vector<BlockSizeRun> block_size_runs = {};  ///< see block_size_runs()
 
   [[nodiscard]] bool is_small() const { return size == Size::small; }
-  /// How many points a set of the thesis has here.
+  /// The number of points that a set of the thesis has here.
   [[nodiscard]] std::uint64_t points(std::uint64_t of_thesis) const {
     if (size == Size::full) return of_thesis;
     return std::min<std::uint64_t>(of_thesis, is_small() ? 3000 : 1'000'000);
@@ -38,8 +38,8 @@ struct Setting {
   }
 };
 
-/// For the six block sizes of tables 7.1 and 7.5, which come from the same runs; made when first
-/// asked for.
+/// For the six block sizes of tables 7.1 and 7.5, which come from the same runs; computed on first
+/// use.
 const std::vector<BlockSizeRun>& block_size_runs(Setting& setting);
 
 }  // namespace terrace::cluster::thesis

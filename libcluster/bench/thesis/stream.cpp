@@ -25,7 +25,7 @@ class Timed {
 
 }  // namespace
 
-/// Adds up what the blocks of level 0 cost, and drops them.
+/// Adds up the costs of the blocks of level 0, and discards the blocks.
 class StreamClustering::Weighing final : public HierarchySink {
  public:
   Weighing(double facility_cost, OnBlock on_block)
@@ -75,7 +75,8 @@ StreamClustering::StreamClustering(StreamClustering&&) noexcept = default;
 
 void StreamClustering::push(std::span<const Point3> points) {
   const Timed timed(seconds_);
-  // Full blocks, as the thesis has them: what does not fit the present one would begin another.
+  // Full blocks, as in the thesis: a batch that does not fit into the current one would begin
+  // another.
   while (!points.empty()) {
     const std::size_t count = std::min(points.size(), block_ - held_);
     builder_->push(points.first(count));
@@ -92,7 +93,7 @@ void StreamClustering::finish() {
 double StreamClustering::cost() const { return sink_->cost; }
 
 void run(PointSet& set, std::span<StreamClustering> streams) {
-  std::array<Point3, 500> buffer;  // not on the heap: it is no part of anybody's memory
+  std::array<Point3, 500> buffer;  // not on the heap, so that it does not count as memory
   for (std::uint64_t first = 0; first < set.size(); first += buffer.size()) {
     const std::span points(
         buffer.data(), static_cast<std::size_t>(std::min<std::uint64_t>(500, set.size() - first)));

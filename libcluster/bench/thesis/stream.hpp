@@ -12,13 +12,13 @@
 #include "terrace/cluster/hierarchy.hpp"
 
 /// The library's HierarchyBuilder with the searches of the thesis (4.3, 7.1), one block at a time,
-/// timed and weighed.
+/// with time and cost measured.
 
 namespace terrace::cluster::thesis {
 
 struct StreamOptions {
   std::size_t block = 10'000;  ///< points clustered together (m)
-  double facility_cost = 1.0;  ///< times the diagonal of the block
+  double facility_cost = 1.0;  ///< times the diagonal of the block's bounding box
   FacilityStrategy strategy =
       FacilityStrategy::facilities;  ///< or `fast`, the library's own engine
   Effort effort = Effort::standard;
@@ -30,7 +30,7 @@ struct StreamOptions {
 struct StreamBlock {
   const FinishedBlock& block;
   double facility_cost = 0.0;  ///< of one facility
-  double cost = 0.0;           ///< of all of them and the connections
+  double cost = 0.0;           ///< of all facilities and the connections
 };
 
 class StreamClustering {
@@ -43,25 +43,25 @@ class StreamClustering {
   void push(std::span<const Point3> points);
   void finish();
 
-  /// Time within the library.
+  /// Time spent in the library.
   [[nodiscard]] double seconds() const { return seconds_; }
   /// The sum over all blocks of level 0, in their order.
   [[nodiscard]] double cost() const;
-  /// Points that came to each level; [0] is the input.
+  /// Points that reached each level; [0] is the input.
   [[nodiscard]] std::vector<std::uint64_t> level_points() const { return result_.level_points; }
 
  private:
   class Weighing;
 
-  std::size_t block_, held_ = 0;  ///< points of a block, and of the one that is forming
+  std::size_t block_, held_ = 0;  ///< points per block, and in the current one
   std::unique_ptr<Weighing> sink_;
   std::unique_ptr<HierarchyBuilder> builder_;
   HierarchyResult result_;
   double seconds_ = 0.0;
 };
 
-/// Reads a set to its end, some points at a time, and gives all of it to each of the streams, so
-/// that a disturbance of the machine hits all of them.
+/// Reads a set to its end, a few points at a time, and gives all of it to each of the streams, so
+/// that disturbances of the machine affect all of them.
 void run(PointSet& set, std::span<StreamClustering> streams);
 
 }  // namespace terrace::cluster::thesis

@@ -13,7 +13,7 @@ namespace {
 constexpr double kWidth = 760, kHeight = 480;
 constexpr double kLeft = 78, kRight = 24, kTop = 46, kBottom = 58;
 
-// Okabe and Ito: distinct to colour-blind eyes too.
+// Okabe and Ito's colours, which are distinct for colour-blind readers too.
 constexpr std::array kPalette{"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"};
 
 std::string format(const char* pattern, double value) {
@@ -84,7 +84,7 @@ Scale scale_of(const Axis& axis, const std::vector<Series>& all, bool is_x) {
 
 struct Tick {
   double value;
-  std::string label;  ///< empty: a minor one
+  std::string label;  ///< empty: a minor tick
 };
 
 std::vector<Tick> ticks_of(const Scale& scale) {
@@ -97,7 +97,7 @@ std::vector<Tick> ticks_of(const Scale& scale) {
         if (at < scale.low - slack || at > scale.high + slack) continue;
         std::string label = digit == 1 ? format("%g", std::pow(10.0, power)) : "";
         if (digit == 1 && power > 5) label = "1e" + format("%g", power);
-        // Less than two decades: name more.
+        // Less than two decades: label more ticks.
         if (scale.high - scale.low < 2.0 && (digit == 2 || digit == 5))
           label = format("%g", digit * std::pow(10.0, power));
         ticks.push_back({std::pow(10.0, at), label});
@@ -170,7 +170,7 @@ std::string drawn(const Series& series, const std::string& colour, const Scale& 
   return out + "'/>\n";
 }
 
-/// In an upper corner, on a ground that hides the curves a little.
+/// In an upper corner, on a background that partly hides the curves.
 std::string legend(const Plot& plot, const std::vector<std::string>& colours, const Scale& x,
                    const Scale& y) {
   const std::vector<Series>& all = plot.series;

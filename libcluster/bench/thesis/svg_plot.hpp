@@ -11,7 +11,7 @@ namespace terrace::cluster::thesis {
 
 struct Series {
   enum class Mark { line, dashes, dots };
-  std::string name;  ///< in the legend; empty: not there
+  std::string name;  ///< in the legend; empty: not listed
   std::vector<double> x = {}, y = {};
   Mark mark = Mark::line;
   double size = 1.6;        ///< stroke width of lines, radius of dots, in pixels
@@ -21,7 +21,7 @@ struct Series {
 struct Axis {
   std::string label;
   bool log = false;
-  std::optional<double> low = {}, high = {};  ///< else what the data need
+  std::optional<double> low = {}, high = {};  ///< otherwise from the data
 };
 
 struct Plot {
@@ -32,8 +32,8 @@ struct Plot {
   bool equal_scales = false;  ///< a unit of x is as long as one of y
 };
 
-/// On a logarithmic axis values that are not positive break lines. A plot without any data has its
-/// frame alone.
+/// On a logarithmic axis values that are not positive break lines. A plot without data has only its
+/// frame.
 [[nodiscard]] std::string svg(const Plot& plot);
 
 }  // namespace terrace::cluster::thesis

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Table 7.4: what the plain search spends its time on.
+// Table 7.4: where the plain search spends its time.
 #include <array>
 #include <chrono>
 #include <random>

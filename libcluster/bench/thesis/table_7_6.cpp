@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Table 7.6: the time that partitions of space save.
+// Table 7.6: the time saved by partitions of space.
 #include <array>
 #include <stdexcept>
 
@@ -12,7 +12,7 @@ namespace {
 constexpr std::array kStrategies{FacilityStrategy::full_scan,  FacilityStrategy::quadtree,
                                  FacilityStrategy::octree,     FacilityStrategy::kd_tree,
                                  FacilityStrategy::facilities, FacilityStrategy::fast};
-constexpr std::size_t kExact = 5;  // all but the last give the same solution
+constexpr std::size_t kExact = 5;  // all except the last give the same solution
 
 struct ThesisRow {
   const char* time;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Table 7.7: the time that threads save.
+// Table 7.7: the time saved by threads.
 #include <array>
 #include <stdexcept>
 

@@ -28,7 +28,7 @@ constexpr std::array<ThesisRow, 4> kThesis{{{"Objects", 1420, "2.855", "2.434", 
                                             {"Cow", 2905, "25.578", "19.420", "24 %"},
                                             {"Head CT", 4098, "70.369", "54.951", "22 %"}}};
 
-/// Throws: std::runtime_error if it is not what complete linkage by floats may give.
+/// Throws: std::runtime_error if it is not a valid result of complete linkage by floats.
 void check(const Dendrogram& dendrogram, const laws::Distances& distances, const char* where) {
   const std::string fault = laws::complete_fault(dendrogram, distances, laws::kFloatTolerance);
   if (!fault.empty()) {
@@ -36,7 +36,7 @@ void check(const Dendrogram& dendrogram, const laws::Distances& distances, const
   }
 }
 
-/// The shortest of some runs, of which the first also loads code and wakes the device.
+/// The shortest of several runs; the first also loads code and wakes the device.
 template <class Run>
 double shortest(const Run& linkage, Dendrogram& result) {
   double best = std::numeric_limits<double>::infinity();
@@ -88,7 +88,7 @@ void table_7_8(Setting& setting) {
     if (cuda.available) {
       const double gpu_time =
           shortest([&] { return cuda_complete_linkage(points, options.entry); }, device);
-      // Not necessarily the processor's dendrogram: floats are equal now and then.
+      // Not necessarily the processor's dendrogram: floats can be equal.
       check(device, distances, "on the GPU");
       row[5] = fixed(1e3 * gpu_time, 2);
       row[7] = time_saved(one_time, gpu_time);

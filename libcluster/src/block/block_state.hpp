@@ -10,8 +10,8 @@
 
 namespace terrace::cluster {
 
-/// A grow-only array, aligned for vectors, whose capacity is a multiple of sixteen. Only its
-/// storage is managed: the owner says how much of it counts. Defined for float and std::uint32_t.
+/// A grow-only array, aligned for vectors, whose capacity is a multiple of sixteen. It manages only
+/// its storage: the owner tracks how many elements count. Defined for float and std::uint32_t.
 template <class T>
 class Column {
  public:
@@ -19,11 +19,11 @@ class Column {
   Column(const Column&) = delete;
   Column& operator=(const Column&) = delete;
   ~Column();
-  /// Makes room for `count` elements; the first `kept` survive.
+  /// Makes room for `count` elements; the first `kept` are preserved.
   void reserve(std::size_t count, std::size_t kept = 0);
   [[nodiscard]] std::size_t capacity() const { return capacity_; }
   void swap(Column& other) noexcept;
-  // Inlined at any rate, see tests/check_symbols.sh.
+  // Always inlined, see tests/check_symbols.sh.
   [[gnu::always_inline]] operator T*() { return data_; }
   [[gnu::always_inline]] operator const T*() const { return data_; }
 
@@ -41,7 +41,7 @@ inline constexpr std::uint32_t kLanes = 16;
 /// A coordinate beyond all points; its square is finite.
 inline constexpr float kFarAway = 1e18f;
 
-/// A block under clustering, in the unit of its box, single precision.
+/// A block during clustering, in the unit of its bounding box, in single precision.
 ///
 /// The points lie along a space-filling curve, so that sixteen neighbours in memory (a *group*) are
 /// neighbours in space. Each facility owns a *segment* of the pool with a copy of its clients, so
@@ -54,7 +54,7 @@ struct BlockState {
   Column<float> x, y, z, w;
   Column<std::uint32_t> original;  ///< number of the point in the block
   Column<std::uint32_t> nearest;   ///< facility, as of the last assignment
-  Column<float> distance;          ///< and the squared distance to it, then the distance
+  Column<float> distance;          ///< distance to it, squared at first
 
   // Groups: a ball around sixteen points of the curve.
   std::uint32_t group_count = 0;
@@ -62,9 +62,9 @@ struct BlockState {
 
   // Facilities. Surplus lanes are far away.
   std::uint32_t facility_count = 0;
-  Column<std::uint32_t> facility;        ///< the point, by its place on the curve
+  Column<std::uint32_t> facility;        ///< the point, by its position on the curve
   Column<float> fx, fy, fz;              ///< its position
-  Column<float> reach;                   ///< squared: candidates farther away spare nothing here
+  Column<float> reach;                   ///< squared: candidates farther away cannot gain here
   Column<float> furthest;                ///< longest connection
   Column<float> load, spent;             ///< sums of w and of w d
   Column<float> mean_x, mean_y, mean_z;  ///< centre of mass of the clients
@@ -73,17 +73,17 @@ struct BlockState {
   // Pool of segments.
   std::uint32_t pool_used = 0;
   Column<float> px, py, pz, pw, pd;
-  Column<float> pp;  ///< the client's place on the curve, as a float (exact below 2^24)
+  Column<float> pp;  ///< the client's position on the curve, as a float (exact below 2^24)
 
-  // Facilities near the candidate at hand.
+  // Facilities near the current candidate.
   std::uint32_t near_count = 0;
   Column<std::uint32_t> near, closes;
   Column<float> scratch;
   Column<float> scratch_pool;
 
-  /// Room for `facilities` facilities.
+  /// Makes room for `facilities` facilities.
   void reserve_facilities(std::uint32_t facilities);
-  /// Room for `more` more floats at the end of the pool; may move all segments.
+  /// Makes room for `more` additional floats at the end of the pool; may move all segments.
   void reserve_pool(std::uint32_t more);
   /// Appends a facility without clients.
   std::uint32_t add_facility(std::uint32_t point);
@@ -91,17 +91,18 @@ struct BlockState {
   void remove_facility(std::uint32_t j);
   /// Fills the pool from `nearest` and `distance`; drops facilities without clients.
   void build_segments();
-  /// Brings the facilities into the order of the curve.
+  /// Sorts the facilities in the order of the curve.
   void sort_facilities();
 
  private:
   Column<float> spare_[6];
 };
 
-/// Brings the points of a block into the order of a space-filling curve and into single precision.
+/// Sorts the points of a block along a space-filling curve and converts them to single precision.
 class CurveSorter {
  public:
-  /// Fills the points of `state`, weights divided by their mean, and makes room for the groups.
+  /// Fills the points of `state`, with weights divided by their mean, and makes room for the
+  /// groups.
   void load(std::span<const Point3> points, std::span<const double> weights, double mean_weight,
             const Scaling& scaling, BlockState& state);
 

@@ -12,9 +12,9 @@ struct SearchPlan {
   std::uint32_t random_candidates = 0;  ///< if not 0, instead of sweeps
   std::uint32_t sweeps = 1;             ///< along the curve
   float candidates = 3.0f;              ///< per facility and sweep, at least
-  std::uint32_t most_spacing = 32;      ///< points from one candidate to the next
+  std::uint32_t most_spacing = 32;      ///< maximum number of points from one candidate to the next
   std::uint32_t polish = 1;             ///< rounds of moving facilities and assigning all points
-  std::uint64_t seed = 1;               ///< of the random candidates
+  std::uint64_t seed = 1;               ///< seed of the random candidates
 };
 
 /// Clusters the block: fills facilities (in curve order) and nearest.

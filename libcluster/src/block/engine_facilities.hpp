@@ -7,13 +7,13 @@
 
 namespace terrace::cluster {
 
-/// Facilities one by one: what is known of their clients, and where they stand.
+/// Single facilities: data about their clients, and their positions.
 template <class V>
 class Facilities {
  public:
   explicit Facilities(BlockState& state) : s_(state) {}
 
-  /// What the pruning needs to know of facility j, from its segment.
+  /// Computes the data that pruning needs about facility j, from its segment.
   void summarise(std::uint32_t j) {
     V load = V::broadcast(0);
     V spent = load;

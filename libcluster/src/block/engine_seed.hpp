@@ -7,8 +7,8 @@
 
 namespace terrace::cluster {
 
-/// The start: facilities at equal distances along the curve, in the number that the cost of runs of
-/// the curve suggests.
+/// The start: facilities at equal distances along the curve; their number is derived from the cost
+/// of runs of the curve.
 template <class V>
 class Seeder {
  public:
@@ -54,10 +54,10 @@ class Seeder {
     const float shift = curvature > 0 ? 0.5f * (before - after) / curvature : 0.0f;
     // 2^-shift for |shift| <= 1/2
     const float stretch = 1.0f + shift * (-0.69315f + shift * (0.24023f - shift * 0.0555f));
-    // Runs of a curve are longer than good clusters where the points fill an area or a volume,
-    // which makes many facilities look cheaper than they are. How fast the cost grows when the
-    // length is multiplied by four tells the dimension: about 4 on a line, 2 on a surface. Fitted
-    // by trial.
+    // Runs of a curve are longer than good clusters if the points fill an area or a volume, which
+    // makes many facilities look cheaper than they are. The growth of the cost when the length is
+    // multiplied by four indicates the dimension: about 4 on a line, 2 on a surface. Fitted
+    // empirically.
     const float growth =
         connection[best - 1] > 0 ? connection[best + 1] / connection[best - 1] : 4.0f;
     const float correction = 0.7f + 0.3f * (growth - 2.3f) / 0.73f;

@@ -10,20 +10,20 @@
 
 namespace terrace::cluster {
 
-/// The last step of clustering a block, in double precision: sums the cost, and opens facilities at
-/// points that single precision could not tell from their facility although they pay more than a
-/// facility costs (close pairs of great weight).
+/// The last step of clustering a block, in double precision: adds up the cost, and opens facilities
+/// at points that single precision cannot distinguish from their facility although they pay more
+/// than a facility costs (close pairs of great weight).
 class ExactFinish {
  public:
-  /// facility_cost: scaled. Changes facilities and assignment of `clustering` where needed.
-  /// Returns the scaled connection cost.
+  /// facility_cost: scaled. Changes facilities and assignment of `clustering` if necessary. Returns
+  /// the scaled connection cost.
   double run(std::span<const Point3> points, std::span<const double> weights,
              const Scaling& scaling, double facility_cost, BlockClustering& clustering);
 
  private:
   struct Costs {
     double sum = 0.0, greatest = 0.0;
-    std::uint32_t where = 0;  ///< the point of the greatest
+    std::uint32_t where = 0;  ///< the point with the greatest
   };
   [[nodiscard]] Costs costs(std::span<const Point3> points, std::span<const double> weights,
                             const Scaling& scaling, const BlockClustering& clustering) const;

@@ -9,13 +9,13 @@
 
 namespace terrace::cluster {
 
-/// Blocks of fewer points are searched in full: a reduced search is up to 30 % off there (thesis
+/// Blocks of fewer points are searched in full: there a reduced search is up to 30 % worse (thesis
 /// table 7.5).
 inline constexpr std::size_t kFullSearchBelow = 2500;
 
-/// BlockClusterer on points of a metric that is linear on their box, whose diagonal is that of the
-/// metric. Requires: linear_map() of it, no channels, no outliers, check(problem).
-/// The costs in `result` are those of the mapped points and not to be used.
+/// BlockClusterer on points of a metric that is linear on their bounding box, whose diagonal is
+/// that of the metric. Requires: its linear_map(), no channels, no outliers, check(problem). The
+/// costs in `result` are those of the mapped points and must not be used.
 void run_linear(BlockClusterer& clusterer, const FacilityPoints& problem, Effort effort,
                 std::uint64_t seed, BlockClustering& result);
 

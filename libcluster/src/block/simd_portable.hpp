@@ -4,9 +4,9 @@
 #include <cmath>
 #include <cstdint>
 
-/// Sixteen floats in plain C++. The operations and their meaning are the same in simd_avx2.hpp and
-/// simd_avx512.hpp, to the bit: IEEE arithmetic without contraction, one fixed tree of reductions,
-/// min and max that give the second operand when neither is less.
+/// Sixteen floats in plain C++. The operations and their results are the same, to the bit, in
+/// simd_avx2.hpp and simd_avx512.hpp: IEEE arithmetic without contraction, one fixed tree of
+/// reductions, min and max that return the second operand if neither is less.
 
 namespace terrace::cluster::simd {
 
@@ -45,7 +45,7 @@ struct Portable {
     for (int i = 0; i < 16; ++i) to[i] = v[i];
   }
 
-  /// Whole numbers from 0 to 2^24
+  /// Integers from 0 to 2^24
   void store_as_integers(std::uint32_t* to) const {
     for (int i = 0; i < 16; ++i) to[i] = static_cast<std::uint32_t>(v[i]);
   }

@@ -46,7 +46,7 @@ __device__ Best<Entry> nearest_of_warp(Best<Entry> best) {
 
 template <class Entry, class Kernel>
 __global__ void __launch_bounds__(kThreads) run_reduce(Kernel kernel) {
-  // The same for all threads of the block, so that all of them or none meet at the barrier.
+  // The same for all threads of the block, so that either all or none reach the barrier.
   if (kernel.skip(blockIdx.x)) return;
   __shared__ Entry value[kThreads / kWarp];
   __shared__ std::uint32_t index[kThreads / kWarp];

@@ -12,7 +12,7 @@
 namespace terrace::cluster {
 namespace {
 
-/// The points are looked at first: what is wrong with them is wrong on every machine.
+/// Points are checked first: invalid points give the same error on every machine.
 LinkagePoints checked(std::span<const Point3> points) {
   LinkagePoints scaled(points);
   if (const CudaStatus status = cuda_available(); !status.available) {
@@ -31,7 +31,7 @@ CudaStatus cuda_available() {
   return {false,
           {},
           "this machine has no CUDA device that works (" + fault +
-              "): cluster on the CPU, or see to the GPU and its driver"};
+              "): cluster on the CPU, or check the GPU and its driver"};
 }
 
 Dendrogram cuda_complete_linkage(std::span<const Point3> points, MatrixEntry entry) {
@@ -52,7 +52,7 @@ Dendrogram cuda_single_linkage(std::span<const Point3> points) {
 CudaStatus cuda_available() {
   return {false,
           {},
-          "this build is without CUDA: cluster on the CPU, or build with nvcc in PATH and the "
+          "this build has no CUDA: cluster on the CPU, or build with nvcc in PATH and the "
           "option -Dterrace_cuda=enabled"};
 }
 

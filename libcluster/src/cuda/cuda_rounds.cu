@@ -9,11 +9,11 @@
 namespace terrace::cluster::device {
 namespace {
 
-/// Throws std::invalid_argument if the device has less memory left.
+/// Throws std::invalid_argument if the device has less free memory.
 void check_memory(std::size_t points, std::uint64_t bytes, const char* remedy) {
   std::size_t left = 0;
   std::size_t all = 0;
-  check_cuda(cudaMemGetInfo(&left, &all), "ask for its memory");
+  check_cuda(cudaMemGetInfo(&left, &all), "query its memory");
   if (bytes <= left) return;
   throw std::invalid_argument(std::to_string(points) + " points would need " +
                               std::to_string(bytes) + " bytes of memory on the device, which has " +
@@ -26,7 +26,7 @@ std::string cuda_fault() {
   int count = 0;
   cudaError_t error = cudaGetDeviceCount(&count);
   if (error == cudaSuccess && count == 0) error = cudaErrorNoDevice;
-  // Whether the kernels here can run on it.
+  // Whether the kernels here can run on the device.
   cudaFuncAttributes attributes;
   if (error == cudaSuccess) error = cudaFuncGetAttributes(&attributes, run_each<OwnClusters>);
   if (error == cudaSuccess) return {};
@@ -37,8 +37,8 @@ std::string cuda_fault() {
 std::string cuda_device_name() {
   int device = 0;
   cudaDeviceProp properties;
-  check_cuda(cudaGetDevice(&device), "tell its device");
-  check_cuda(cudaGetDeviceProperties(&properties, device), "tell its device");
+  check_cuda(cudaGetDevice(&device), "query its device");
+  check_cuda(cudaGetDeviceProperties(&properties, device), "query its device");
   return properties.name;
 }
 

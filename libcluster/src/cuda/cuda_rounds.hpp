@@ -8,11 +8,11 @@
 #include "cuda/device_primitives.hpp"
 #include "terrace/cluster/point.hpp"
 
-/// What is compiled for the GPU, as plain C++ sees it. Only in builds with CUDA.
+/// The interface of the code compiled for the GPU, for plain C++. Only in builds with CUDA.
 
 namespace terrace::cluster::device {
 
-/// Why there is no device to use; empty if there is one.
+/// Why there is no usable device; empty if there is one.
 [[nodiscard]] std::string cuda_fault();
 [[nodiscard]] std::string cuda_device_name();
 

@@ -7,25 +7,25 @@
 #include "cuda/device_primitives.hpp"
 
 /// Kernels of complete linkage on the band-shaped half matrix (thesis 7.6.2): row i of `slots` rows
-/// has the distances to the slots i+1 .. i+half, counted modulo `slots`. The number of slots is odd
-/// here, if need be by one slot without a cluster, so that no pair is stored twice.
+/// has the distances to the slots i+1 .. i+half, modulo `slots`. The number of slots is odd here,
+/// if necessary by adding a slot without a cluster, so that no pair is stored twice.
 
 namespace terrace::cluster::device {
 
-/// The clusters of a round, by slot. Pointers into the memory of the device.
+/// The clusters of a round, by slot. Pointers into device memory.
 template <class Entry>
 struct Slots {
   std::uint32_t slots = 0;
   std::uint32_t half = 0;             ///< slots / 2, the length of a row
   Entry* band = nullptr;              ///< squared distances
   std::uint32_t* alive = nullptr;     ///< 1 if there is a cluster
-  std::uint32_t* stale = nullptr;     ///< 1 if its nearest neighbour is to be found again
-  std::uint32_t* nearest = nullptr;   ///< its nearest neighbour, the lowest of equals
-  Entry* distance = nullptr;          ///< of that
+  std::uint32_t* stale = nullptr;     ///< 1 if its nearest neighbour must be found again
+  std::uint32_t* nearest = nullptr;   ///< its nearest neighbour, the lowest slot on ties
+  Entry* distance = nullptr;          ///< distance of the nearest neighbour
   std::uint32_t* partner = nullptr;   ///< what it merges with in this round, or itself
   std::uint32_t* original = nullptr;  ///< a point of it
 
-  /// The slot that an entry of a row is about.
+  /// The slot to which an entry of a row refers.
   TERRACE_CLUSTER_HOST_DEVICE std::uint32_t other(std::uint32_t row, std::uint32_t column) const {
     return static_cast<std::uint32_t>(band_partner(slots, {row, column}));
   }
@@ -44,7 +44,7 @@ TERRACE_CLUSTER_HOST_DEVICE Entry greater_of(Entry a, Entry b) {
   return a < b ? b : a;
 }
 
-/// lanes over rows: distances of the points. Rounded to Entry once.
+/// lanes over rows: distances of the points, rounded to Entry once.
 template <class Entry>
 struct FillBand {
   Slots<Entry> s;
@@ -61,7 +61,7 @@ struct FillBand {
   }
 };
 
-/// each over slots: a cluster to each of the first `points`.
+/// each over slots: assigns a cluster to each of the first `points`.
 template <class Entry>
 struct FillSlots {
   Slots<Entry> s;
@@ -102,8 +102,8 @@ struct NearestOfRow {
   }
 };
 
-/// reduce over slots, for few that are stale: in the own row and in the rows of the others. What is
-/// in the others is not next to each other in memory.
+/// reduce over slots, if few are stale: in the slot's own row and in the rows of the others.
+/// Accesses to the others are not contiguous.
 template <class Entry>
 struct NearestOfStale {
   Slots<Entry> s;
@@ -124,13 +124,13 @@ struct NearestOfStale {
   }
 };
 
-/// each over kRows rows times slots: the nearest neighbour of a slot among some rows. Neighbouring
-/// indices read neighbouring columns of one row.
+/// each over kRows rows times slots: the nearest neighbour of a slot among some rows. Adjacent
+/// indices read adjacent columns of one row.
 template <class Entry>
 struct NearestOfRows {
   static constexpr std::uint32_t kRows = 512;
   Slots<Entry> s;
-  Entry* value;  // of the parts
+  Entry* value;  // by part
   std::uint32_t* index;
 
   static std::uint32_t parts(std::uint32_t slots) { return (slots + kRows - 1) / kRows; }
@@ -152,7 +152,7 @@ struct NearestOfRows {
   }
 };
 
-/// each over slots: after NearestOfRow and NearestOfRows, the nearest of all.
+/// each over slots: after NearestOfRow and NearestOfRows, the overall nearest.
 template <class Entry>
 struct NearestOfParts {
   Slots<Entry> s;
@@ -177,8 +177,8 @@ struct RoundCounts {
 };
 
 /// each over slots: pairs that are each other's nearest. Complete linkage is reducible: merging one
-/// such pair brings no cluster nearer to another, so all of them can merge at once.
-/// The links are stored by the point of the cluster that ends, which it does once.
+/// such pair brings no cluster nearer to another, so all of them can merge at once. Links are
+/// stored by the point of the cluster that disappears, which happens once.
 template <class Entry>
 struct MatchPairs {
   Slots<Entry> s;
@@ -205,7 +205,7 @@ struct MatchPairs {
 
 /// lanes over slots, after MarkStale: distances of merged clusters, the greater ones. A pair of two
 /// merged clusters is updated by the lower of them, from the four distances of their halves; those
-/// of clusters that end are read only, so nothing is read that another index writes.
+/// of disappearing clusters are only read, so no index reads what another one writes.
 template <class Entry>
 struct UpdateBand {
   Slots<Entry> s;
@@ -229,8 +229,8 @@ struct UpdateBand {
   }
 };
 
-/// each over slots, after MatchPairs: which clusters are left, and whose nearest neighbour may be
-/// another now. Distances only grow, so one that did not merge stays the nearest.
+/// each over slots, after MatchPairs: which clusters remain, and whose nearest neighbour may have
+/// changed. Distances only grow, so a nearest neighbour that did not merge stays the nearest.
 template <class Entry>
 struct MarkStale {
   Slots<Entry> s;
@@ -244,17 +244,17 @@ struct MarkStale {
       s.alive[i] = 0;
       return;
     }
-    // That of a cluster that merged is its partner.
+    // The nearest neighbour of a cluster that merged is its partner.
     if (s.partner[s.nearest[i]] == s.nearest[i]) return;
     s.stale[i] = 1;
     add(&counts->stale, 1);
   }
 };
 
-// Compaction: kernels that move the clusters that a round leaves to the first slots, in order, so
+// Compaction: kernels that move the remaining clusters of a round to the first slots, in order, so
 // that the band shrinks with their number, and merge their distances on the way.
 
-/// The slots are cut into this many parts, whose clusters are counted at the same time.
+/// The slots are divided into this many parts, whose clusters are counted concurrently.
 inline constexpr std::uint32_t kScanParts = 1024;
 
 /// each over kScanParts.
@@ -273,7 +273,7 @@ struct CountAlive {
   }
 };
 
-/// each over kScanParts: the new slot of each cluster and the old one of each new slot.
+/// each over kScanParts: the new slot of each cluster and the former slot of each new one.
 template <class Entry>
 struct NumberAlive {
   Slots<Entry> s;
@@ -294,7 +294,7 @@ struct NumberAlive {
   }
 };
 
-/// lanes over new slots: of two clusters the greatest distance between their halves.
+/// lanes over new slots: the greatest distance between the halves of two clusters.
 template <class Entry>
 struct MergeBand {
   Slots<Entry> from, to;

@@ -12,14 +12,13 @@
 #include "terrace/cluster/point.hpp"
 
 /// Single linkage in rounds on a device (see device_primitives.hpp), by Borůvka: in each round
-/// every cluster joins the one with the point nearest to one of its own. Merging reciprocal pairs
-/// alone would take a round for every point that a large cluster takes up; this takes at most log2
-/// n. No matrix is kept: distances are computed again in each round, which is faster than to read
-/// them.
+/// every cluster joins the one with the point nearest to one of its own. Merging only reciprocal
+/// pairs would take a round for every point that a large cluster absorbs; this takes at most log2
+/// n. No matrix is kept: distances are recomputed in each round, which is faster than reading them.
 
 namespace terrace::cluster::device {
 
-/// Points and, of each, the name of its cluster, which is the number of a point of it.
+/// Points and, for each, the name of its cluster, which is the index of one of its points.
 struct Labelled {
   const double *x, *y, *z;
   std::uint32_t points;
@@ -30,10 +29,10 @@ struct Labelled {
 struct NearestOther {
   Labelled p;
   std::uint32_t parts;
-  double* value;  // of the parts
+  double* value;  // by part
   std::uint32_t* index;
 
-  /// So many that there are threads enough, and few enough for memory.
+  /// Enough for all threads, and few enough for memory.
   static std::uint32_t parts_of(std::uint32_t points) {
     return points / 1024 < 64 ? points / 1024 + 1 : 64;
   }
@@ -55,13 +54,13 @@ struct NearestOther {
 };
 
 /// The edges of a round. Edges are compared by length, then by their points, so no two are equal
-/// and the chosen ones form no circle.
+/// and the chosen ones form no cycle.
 struct RoundEdges {
-  std::uint64_t* least;   ///< by cluster: the bits of the squared length; order as the numbers
+  std::uint64_t* least;   ///< by cluster: the bits of the squared length, ordered like the numbers
   std::uint64_t* ends;    ///< by cluster: the lower point, then the higher
   double* value;          ///< by point: to the nearest point of another cluster
   std::uint32_t* index;   ///< by point: that point
-  std::uint32_t* parent;  ///< by cluster: what it joins, or itself
+  std::uint32_t* parent;  ///< by cluster: the one it joins, or itself
 };
 
 TERRACE_CLUSTER_HOST_DEVICE inline std::uint64_t bits_of(double value) {
@@ -83,7 +82,7 @@ struct ClearEdges {
   }
 };
 
-/// each over points: the nearest over all parts, and the shortest length of its cluster.
+/// each over points: the nearest over all parts, and the shortest length for its cluster.
 struct ShortestLength {
   Labelled p;
   RoundEdges e;
@@ -102,7 +101,7 @@ struct ShortestLength {
   }
 };
 
-/// each over points: among the edges of that length the one of the lowest points.
+/// each over points: among the edges of that length the one with the lowest points.
 struct LowestEnds {
   Labelled p;
   RoundEdges e;
@@ -116,8 +115,8 @@ struct LowestEnds {
   }
 };
 
-/// each over points: every cluster joins that at the other end of its edge; of two with the same
-/// edge the lower stays. The links are stored by the cluster that ends.
+/// each over points: every cluster joins the one at the other end of its edge; of two with the same
+/// edge the lower stays. Links are stored by the cluster that disappears.
 struct JoinClusters {
   Labelled p;
   RoundEdges e;
@@ -169,8 +168,8 @@ struct OwnClusters {
          kSmallMemory;
 }
 
-/// points: at least two, fewer than 2^31, as LinkagePoints scales them. The links in no order that
-/// matters, all but one point's. Throws what the device does.
+/// points: at least two, fewer than 2^31, as scaled by LinkagePoints. Returns the links in no
+/// particular order, one for each point but one. Throws what the device throws.
 template <class Device>
 std::vector<RoundLink> single_rounds(Device& device, std::span<const Point3> points) {
   using u32 = std::uint32_t;

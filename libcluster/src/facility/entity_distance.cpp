@@ -10,7 +10,7 @@ namespace terrace::cluster {
 namespace {
 
 double distance_of(std::span<const Point3> a, std::span<const Point3> b, bool ordered) {
-  // Halves, as differences may leave the range of double; relative to the largest, as squares may.
+  // Uses halves, as differences may overflow; relative to the largest, as squares may.
   double largest = 0.0;
   for (const Point3& p : a) {
     for (const Point3& q : b) {

@@ -49,7 +49,7 @@ FacilitySolution solve_by_matrix(const Problem& problem, const FacilityOptions& 
   const CostMatrix matrix = cost_matrix(problem, options.memory_limit);
   FacilitySolution solution = solve_matrix(matrix.view(), options, report);
   if (std::isfinite(problem.outlier_price)) {
-    // To the matrix an outlier is a client whose connection costs the price.
+    // In the matrix an outlier is a client whose connection costs the price.
     const double lower_bound = solution.lower_bound;
     const auto engine = make_search(problem, FacilityStrategy::full_scan);
     engine->start(solution);
@@ -70,7 +70,7 @@ FacilitySolution solve_fast(const FacilityPoints& problem, const FacilityOptions
                       name_of(problem.metric) + "\" is not one on these points");
   }
   if (problem.channels.size() > 0) refuse(kFast, "has no channels");
-  if (std::isfinite(problem.outlier_price)) refuse(kFast, "leaves nobody out");
+  if (std::isfinite(problem.outlier_price)) refuse(kFast, "cannot leave clients out");
   if (options.start) refuse(kFast, "has a start of its own");
 
   BlockClusterer clusterer;

@@ -14,17 +14,17 @@
 
 #include "hierarchy/hierarchy_block.hpp"
 
-/// Blocks worked on by several threads and committed in order. Private to the hierarchy.
+/// Blocks processed by several threads and committed in order. Private to the hierarchy.
 
 namespace terrace::cluster {
 
-/// Takes blocks through two stages: `process`, by all threads at once, and `commit`, by one thread
-/// at a time and, within each level, in the order of block numbers 0, 1, ... The owner's thread is
-/// one of the threads: it works whenever it would have to wait, so that with one thread all
-/// happens in it, at once.
+/// Passes blocks through two stages: `process`, by all threads concurrently, and `commit`, by one
+/// thread at a time and, within each level, in the order of block numbers 0, 1, ... The owner's
+/// thread is one of the threads: it works whenever it would have to wait, so that with one thread
+/// everything happens there, immediately.
 ///
-/// The first exception of a stage ends the work: what is queued is dropped, and the next waiting
-/// call of the owner throws it, once, when all threads have come to rest.
+/// The first exception of a stage ends the work: queued blocks are dropped, and the next waiting
+/// call of the owner throws it, once, when all threads are idle.
 class BlockPipeline {
  public:
   using BlockPtr = std::unique_ptr<HierarchyBlock>;
@@ -32,27 +32,27 @@ class BlockPipeline {
     std::function<void(HierarchyBlock&, unsigned thread)> process;
     /// May submit further blocks of higher levels.
     std::function<void(HierarchyBlock&)> commit;
-    /// Called once, after the first failure; empty: nobody.
+    /// Called once, after the first failure, unless empty.
     std::function<void()> failed{};
   };
 
   /// Starts threads - 1 threads, or as many as the system grants. thread is below `threads`.
   BlockPipeline(unsigned threads, Stages stages);
-  /// Drops what is queued and waits for what is running.
+  /// Drops queued blocks and waits for running ones.
   ~BlockPipeline();
   BlockPipeline(const BlockPipeline&) = delete;
   BlockPipeline& operator=(const BlockPipeline&) = delete;
 
-  /// An empty block of that level, used before or new.
+  /// An empty block of that level, recycled or new.
   BlockPtr take(unsigned level);
   /// Never waits, so that commit may call it. After a failure it drops the block.
   void submit(BlockPtr block);
 
-  // The owner's thread only:
+  // Only on the owner's thread:
 
-  /// Returns when there is room for another block: a few per thread may be under way.
+  /// Returns when there is room for another block: a few per thread may be in progress.
   void wait_for_room() { wait_below(limit_); }
-  /// Returns when all blocks are committed, those included that commit submitted.
+  /// Returns when all blocks are committed, including those submitted by commit.
   void wait_for_all() { wait_below(1); }
 
  private:
@@ -65,7 +65,7 @@ class BlockPipeline {
   BlockPtr next_ready();
   void fail(std::exception_ptr failure);
 
-  // Blocks that are processed and whose turn has not come. Few, hence not sorted.
+  // Processed blocks whose turn has not come. Few, hence not sorted.
   struct Lane {
     std::uint64_t next = 0;
     std::vector<BlockPtr> ready;
@@ -74,13 +74,13 @@ class BlockPipeline {
   const Stages stages_;
   std::size_t limit_;
 
-  std::mutex mutex_;  // guards all below but threads_
+  std::mutex mutex_;  // guards everything below except threads_
   std::condition_variable work_, progress_;
   std::deque<BlockPtr> queue_;
   std::vector<Lane> lanes_;     // by level
-  std::vector<BlockPtr> free_;  // to be used again
+  std::vector<BlockPtr> free_;  // for reuse
   std::size_t under_way_ = 0;   // submitted, not yet committed
-  std::size_t running_ = 0;     // threads within run_one()
+  std::size_t running_ = 0;     // threads inside run_one()
   bool committing_ = false;
   bool stop_ = false;
   bool failed_ = false;

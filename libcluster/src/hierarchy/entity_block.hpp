@@ -10,14 +10,13 @@
 
 namespace terrace::cluster {
 
-/// Clusters the blocks of a hierarchy whose points stand for entities of several corners. One
+/// Clusters the blocks of a hierarchy whose points represent entities of several corners. One
 /// object per thread.
 class EntityBlockClusterer {
  public:
-  /// corners: on the ground, `count` of each entity side by side; `ordered` as PayloadCorners has
-  /// it. facility_cost: times the diagonal of the box of all corners. The costs in `result` are not
-  /// filled in.
-  /// Throws: std::invalid_argument as solve(FacilityEntities).
+  /// corners: on the ground, `count` contiguous ones per entity; `ordered` as in PayloadCorners.
+  /// facility_cost: times the diagonal of the bounding box of all corners. The costs in `result`
+  /// are not filled in. Throws: std::invalid_argument as solve(FacilityEntities).
   void run(std::span<const Point3> corners, std::size_t count, bool ordered,
            std::span<const double> weights, double facility_cost, const FacilityOptions& options,
            BlockClustering& result);

@@ -18,7 +18,7 @@
 
 namespace terrace::cluster {
 
-/// The points of a block and, once it is processed, its clusters. Blocks are used again and keep
+/// The points of a block and, once it is processed, its clusters. Blocks are recycled and keep
 /// their memory.
 struct HierarchyBlock {
   unsigned level = 0;
@@ -36,7 +36,7 @@ struct HierarchyBlock {
 
   [[nodiscard]] std::size_t size() const { return positions.size(); }
 
-  /// Empties the block for a new use.
+  /// Empties the block for reuse.
   void reset(unsigned new_level);
   /// Appends cluster c of a processed block one level below, whose ordinal is now known.
   void append_representative(const HierarchyBlock& below, std::size_t c, std::uint64_t ordinal,
@@ -44,24 +44,24 @@ struct HierarchyBlock {
   [[nodiscard]] FinishedBlock finished() const;
 };
 
-/// How a block is clustered where distances are Euclidean: BlockClusterer::run, or a stand-in of
-/// the tests.
+/// How a block is clustered if distances are Euclidean: BlockClusterer::run, or a stand-in in
+/// tests.
 using ClusterFunction = std::function<void(std::span<const Point3>, std::span<const double>,
                                            const BlockOptions&, BlockClustering&)>;
 
 /// The seed of one block: a fixed mixture, so that blocks may be clustered in any order.
 std::uint64_t block_seed(std::uint64_t seed, unsigned level, std::uint64_t block);
 
-/// Clusters blocks and sums them up. One object per thread.
+/// Clusters blocks and computes their summaries. One object per thread.
 class BlockProcessor {
  public:
   /// The options must outlive the processor.
   BlockProcessor(const HierarchyOptions& options, ClusterFunction cluster);
 
   /// Fills in clustering, first, order and summaries. At most half of the points, rounded up,
-  /// become representatives: where the facility cost is too low for that, it is raised for this
-  /// block. Without that bound the hierarchy might never come to an end.
-  /// Throws: std::invalid_argument as check_ground_map().
+  /// become representatives: if the facility cost is too low for that, it is raised for this block.
+  /// Without that limit the hierarchy might never end. Throws: std::invalid_argument as
+  /// check_ground_map().
   void process(HierarchyBlock& block);
 
  private:
@@ -74,9 +74,9 @@ class BlockProcessor {
 
   const HierarchyOptions& options_;
   ClusterFunction cluster_;
-  Metric metric_;                                       // of the block in work
-  std::optional<MetricBlockClusterer> metric_cluster_;  // unless all is as BlockClusterer has it
-  EntityBlockClusterer entity_cluster_;                 // where points have further corners
+  Metric metric_;                                       // of the current block
+  std::optional<MetricBlockClusterer> metric_cluster_;  // unless BlockClusterer does everything
+  EntityBlockClusterer entity_cluster_;                 // if points have further corners
   std::vector<Point3> ground_, corners_;
   std::vector<double> weights_, channels_;
 };

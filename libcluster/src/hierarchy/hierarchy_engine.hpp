@@ -13,7 +13,7 @@
 #include "hierarchy/hierarchy_block.hpp"
 #include "terrace/cluster/hierarchy.hpp"
 
-/// What HierarchyBuilder is made of; here tests can put another clustering in. Private.
+/// The implementation of HierarchyBuilder, in which tests can replace the clustering. Private.
 
 namespace terrace::cluster {
 
@@ -23,16 +23,16 @@ class HierarchyEngine {
   HierarchyEngine(HierarchyOptions options, HierarchySink& sink,
                   const std::function<ClusterFunction()>& make_cluster);
 
-  /// As HierarchyBuilder's.
+  /// See HierarchyBuilder.
   void push(std::span<const Point3> positions, std::span<const std::byte> payload);
   HierarchyResult finish();
 
  private:
   using BlockPtr = BlockPipeline::BlockPtr;
 
-  // A level is a stream of points cut into blocks. `open` is the block that the next point goes
-  // to; it is submitted when a point comes that does not fit, so that a level of just one block
-  // becomes the root.
+  // A level is a stream of points cut into blocks. `open` is the block for the next point; it is
+  // submitted when a point arrives that does not fit, so that a level of a single block becomes the
+  // root.
   struct Level {
     unsigned level = 0;
     BlockPtr open;
@@ -51,8 +51,8 @@ class HierarchyEngine {
   const HierarchyOptions options_;
   HierarchySink& sink_;
   std::vector<BlockProcessor> processors_;  // by thread
-  // Level 0 belongs to the caller of push(), except for `clusters`; that and the levels above to
-  // whoever commits. A deque, so that adding a level leaves `base_` where it is.
+  // Level 0 belongs to the caller of push(), except `clusters`; that and the levels above belong to
+  // the committing thread. A deque, so that adding a level does not move `base_`.
   std::deque<Level> levels_;
   Level& base_;
   std::uint64_t outliers_ = 0;  // in committed blocks

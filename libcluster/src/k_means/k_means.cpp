@@ -17,9 +17,9 @@
 namespace terrace::cluster {
 namespace {
 
-// Points nearer to their centre, in the unit of the box, are at it: a mean of many is rounded.
+// Points closer to their centre, in the unit of the box, count as at it: a mean of many is rounded.
 constexpr double kAtCentre2 = 0x1p-72;
-// Centres of the caller, in the same unit: beyond, squares would overflow.
+// Limit of the caller's centres, in the same unit: beyond it squares would overflow.
 constexpr double kFarthest = 0x1p+400;
 constexpr double kLeastWeight = 0x1p-500;
 
@@ -28,7 +28,7 @@ void check_points(std::span<const Point3> points, const char* what) {
     for (unsigned axis = 0; axis < 3; ++axis) {
       if (!std::isfinite(points[i][axis])) {
         throw std::invalid_argument(std::string(what) + " " + std::to_string(i) +
-                                    " has a coordinate that is infinite or not a number; "
+                                    " has a coordinate that is infinite or NaN; "
                                     "leave it out or give it a position");
       }
     }
@@ -46,7 +46,7 @@ void check(std::span<const Point3> points, std::span<const double> weights, std:
   }
   if (!(options.tolerance >= 0)) {
     throw std::invalid_argument(
-        "the tolerance of k-means is negative or not a number; "
+        "the tolerance of k-means is negative or NaN; "
         "0 iterates until no assignment changes");
   }
   check_points(points, "point");
@@ -81,7 +81,7 @@ struct Run {
 
   void iterate(const KMeansOptions& options, double diagonal) {
     const double still2 = options.tolerance * diagonal * options.tolerance * diagonal;
-    bool assigned = false;  // to the present centres
+    bool assigned = false;  // to the current centres
     while (iterations < options.max_iterations && !converged) {
       const bool changed = filter.assign(centres);
       ++iterations;
@@ -106,7 +106,8 @@ struct Run {
     for (std::size_t place = 0; place < tree.count; ++place) sse += cost(place);
   }
 
-  /// Gives each empty cluster a point, as k_means.hpp says. Returns whether there was one to give.
+  /// Gives each empty cluster a point, as described in k_means.hpp. Returns whether there was one
+  /// to give.
   bool fill_empty() {
     const std::span<KMeansFilter::Sum> sums = filter.sums();
     const auto is_empty = [](const KMeansFilter::Sum& sum) { return sum.weight == 0; };
@@ -140,7 +141,7 @@ struct Run {
     }
     if (moves.empty()) return false;
     for (const auto& [place, c] : moves) filter.move_point(place, c);
-    // Added up anew: to subtract a heavy point would leave rounding of its size.
+    // Recomputed: subtracting a heavy point would leave rounding errors of its size.
     std::fill(sums.begin(), sums.end(), KMeansFilter::Sum{});
     for (std::size_t place = 0; place < tree.count; ++place) {
       KMeansFilter::Sum& sum = sums[filter.cluster(place)];
@@ -167,7 +168,7 @@ Point3 unscaled(const Point3& p, const Scaling& scaling) {
   Point3 result{};
   for (unsigned axis = 0; axis < 3; ++axis) {
     const double corner = scaling.corner[axis];
-    // Halves where the sides exceed the range of double.
+    // Uses halves if the sides overflow a double.
     result[axis] = scaling.plain || scaling.exponent < 0
                        ? corner + scaling.unscaled(p[axis])
                        : 2 * (0.5 * corner + std::ldexp(p[axis], scaling.exponent - 1));

@@ -7,7 +7,7 @@
 namespace terrace::cluster {
 namespace {
 
-/// Chunks are long beside k, so that their sums take less memory than the points.
+/// Chunks are long compared to k, so that their sums take less memory than the points.
 std::size_t chunk_level(const KMeansTree& tree, std::size_t clusters) {
   const std::size_t least = std::max<std::size_t>(8192, 4 * clusters);
   std::size_t level = 0;
@@ -109,9 +109,9 @@ void KMeansFilter::visit(std::size_t level, std::size_t index, const Candidates&
     least = std::min(least, d);
   }
 
-  // Against the best: |p - c|^2 - |p - best|^2 is linear in p and least at the corner farthest in
-  // the direction from the best to c. The margin covers the rounding of both squares anywhere in
-  // the box, whose error is relative.
+  // Compared to the best: |p - c|^2 - |p - best|^2 is linear in p and least at the corner farthest
+  // in the direction from the best to c. The margin covers the relative rounding errors of both
+  // squares anywhere in the box.
   const double bx = from.x[best];
   const double by = from.y[best];
   const double bz = from.z[best];
@@ -206,7 +206,7 @@ void KMeansFilter::assign_block(std::size_t block, const Candidates& candidates,
 void KMeansFilter::move_point(std::size_t place, std::uint32_t cluster) {
   cluster_[place] = cluster;
   owner_[place / KMeansTree::kBlock] = kMixed;
-  // The copies that fill the last block go with the last point: they must not count as a change.
+  // The copies that fill the last block move with the last point: they must not count as a change.
   if (place + 1 == tree_.count) {
     std::fill(cluster_.begin() + static_cast<std::ptrdiff_t>(place), cluster_.end(), cluster);
   }

@@ -12,9 +12,9 @@
 namespace terrace::cluster {
 
 /// Assigns the points of a tree to the nearest of k centres. From the root down each node keeps the
-/// centres that may be nearest to some point of its box; where one is left the whole node is its.
-/// What is left out is farther than another centre from all of the box by more than rounding, so
-/// the assignment is the one of comparing all computed distances, the lowest number among equals.
+/// centres that may be nearest to some point of its box; if one is left the whole node is assigned
+/// to it. Excluded centres are farther than another one from all of the box by more than rounding,
+/// so the assignment equals that from comparing all computed distances, the lowest number on ties.
 class KMeansFilter {
  public:
   struct Sum {
@@ -25,14 +25,14 @@ class KMeansFilter {
   /// tree and team outlive this object.
   KMeansFilter(const KMeansTree& tree, std::size_t clusters, ThreadTeam& team);
 
-  /// One assignment. Returns whether a point changed its cluster since the last.
+  /// One assignment. Returns whether a point has changed its cluster since the last one.
   bool assign(std::span<const Point3> centres);
 
   /// Sums of the clusters, always added up in the same order.
   [[nodiscard]] std::span<Sum> sums() { return sums_; }
-  /// The cluster of the point at a place.
+  /// The cluster of the point at a position.
   [[nodiscard]] std::uint32_t cluster(std::size_t place) const { return cluster_[place]; }
-  /// Overrules the last assignment.
+  /// Overrides the last assignment.
   void move_point(std::size_t place, std::uint32_t cluster);
 
  private:
@@ -47,7 +47,7 @@ class KMeansFilter {
   struct Scratch {
     std::vector<double> x, y, z;  // room for k candidates on each level
     std::vector<std::uint32_t> number;
-    std::vector<Sum> sums;  // of the chunk in work
+    std::vector<Sum> sums;  // of the current chunk
     bool changed = false;
   };
 
@@ -66,8 +66,8 @@ class KMeansFilter {
   const KMeansTree& tree_;
   const std::size_t clusters_;
   ThreadTeam& team_;
-  std::size_t chunk_level_ = 0;         // the nodes of this level are shared among threads
-  std::vector<std::uint32_t> cluster_;  // by place, padded
+  std::size_t chunk_level_ = 0;         // the nodes of this level are divided among threads
+  std::vector<std::uint32_t> cluster_;  // by position, padded
   std::vector<std::uint32_t> owner_;    // by block: the cluster of all its points, or kMixed
   std::vector<Sum> sums_;
   std::vector<Sum> chunk_sums_;

@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t kFan = KMeansTree::kFan;
 
-/// Squared distance from a point to a box, less what rounding could add to it.
+/// Squared distance from a point to a box, minus a bound of its rounding error.
 double below_box(const Point3& p, const KMeansTree::Node& box) {
   double sum = 0;
   for (unsigned axis = 0; axis < 3; ++axis) {
@@ -35,10 +35,10 @@ class CentreSeeder {
     }
   }
 
-  /// The sum that is left with the seeds so far.
+  /// The sum that remains with the seeds so far.
   [[nodiscard]] double total() const { return states_.back().front().sum; }
 
-  /// A place drawn by what it costs; requires total() > 0.
+  /// A position drawn with probability proportional to its cost; requires total() > 0.
   [[nodiscard]] std::size_t draw(bool first, std::mt19937_64& random) const {
     double at = draw_unit(random) * total();
     std::size_t node = 0;
@@ -50,7 +50,7 @@ class CentreSeeder {
                   at, [&](std::size_t place) { return first ? tree_.w[place] : cost(place); });
   }
 
-  /// How much less total() would be with a seed there.
+  /// By how much a seed there would lower total().
   [[nodiscard]] double gain(const Point3& seed) const { return gain(seed, states_.size() - 1, 0); }
 
   void add(const Point3& seed) { add(seed, states_.size() - 1, 0); }
@@ -63,7 +63,7 @@ class CentreSeeder {
 
   [[nodiscard]] double cost(std::size_t place) const { return tree_.w[place] * cost_[place]; }
 
-  /// The part of [first, end) in which `at` falls, never one of no size.
+  /// The part of [first, end) in which `at` falls, never an empty one.
   template <class Size>
   static std::size_t chosen(std::size_t first, std::size_t end, double& at, const Size& size) {
     std::size_t last = first;
@@ -115,7 +115,7 @@ class CentreSeeder {
   }
 
   const KMeansTree& tree_;
-  std::vector<double> cost_;  // by place: squared distance to the nearest seed
+  std::vector<double> cost_;  // by position: squared distance to the nearest seed
   std::vector<std::vector<State>> states_;
 };
 
@@ -126,10 +126,10 @@ std::vector<Point3> k_means_seeds(const KMeansTree& tree, std::size_t clusters,
   CentreSeeder seeder(tree);
   std::vector<Point3> seeds{tree.point(seeder.draw(true, random))};
   seeder.add(seeds.front());
-  // 0.7 is about the natural logarithm of two.
+  // 0.7 is approximately the natural logarithm of two.
   const std::size_t draws = 2 + static_cast<std::size_t>(std::bit_width(clusters)) * 7 / 10;
   while (seeds.size() < clusters) {
-    // Every point has a seed in its place: what is left over stays empty.
+    // Every point coincides with a seed: further clusters stay empty.
     if (seeder.total() <= 0) {
       seeds.resize(clusters, seeds.front());
       break;

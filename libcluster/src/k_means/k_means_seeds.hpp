@@ -9,9 +9,9 @@
 
 namespace terrace::cluster {
 
-/// Places of k seeds by greedy k-means++: each is drawn with probability proportional to weight
-/// times squared distance to the nearest seed so far, a few times, and the draw that leaves the
-/// least sum of these is taken. Boxes that a new seed cannot serve better are left out.
+/// Positions of k seeds by greedy k-means++: each is drawn with probability proportional to weight
+/// times squared distance to the nearest seed so far, several times, and the draw that leaves the
+/// least sum of these is taken. Boxes that a new seed cannot improve are skipped.
 [[nodiscard]] std::vector<Point3> k_means_seeds(const KMeansTree& tree, std::size_t clusters,
                                                 std::mt19937_64& random);
 

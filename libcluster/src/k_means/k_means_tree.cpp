@@ -10,7 +10,7 @@ namespace {
 
 constexpr unsigned kAxisBits = 20;
 
-/// The lowest twenty bits with one gap each, or with two.
+/// Spreads the lowest twenty bits with one gap each, or with two.
 std::uint64_t spread_by_one(std::uint64_t v) {
   v = (v | v << 16) & 0x0000FFFF0000FFFF;
   v = (v | v << 8) & 0x00FF00FF00FF00FF;

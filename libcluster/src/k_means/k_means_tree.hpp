@@ -19,8 +19,8 @@ inline double squared(const Point3& a, const Point3& b) {
   return x * x + y * y + z * z;
 }
 
-/// Points in the order of a Z-order curve, in blocks of kBlock, and a tree over the blocks: each
-/// node has up to kFan children that follow each other, with a box and sums.
+/// Points in Z-order, in blocks of kBlock, and a tree over the blocks: each node has up to kFan
+/// consecutive children, a box and sums.
 struct KMeansTree {
   static constexpr std::size_t kBlock = 32;
   static constexpr std::size_t kFan = 4;

@@ -20,8 +20,8 @@ const LinkageKernels<T>& kernels_of(SimdPath path) {
   if (path == SimdPath::automatic) path = best;
   if (path > best) {
     throw std::invalid_argument(
-        "this processor lacks the instructions of the SIMD path asked for; "
-        "SimdPath::automatic takes the best there is");
+        "this processor lacks the instructions of the requested SIMD path; "
+        "SimdPath::automatic takes the best available");
   }
 #ifdef TERRACE_CLUSTER_X86
   if constexpr (sizeof(T) == sizeof(float)) {
@@ -56,7 +56,7 @@ Dendrogram of_points(std::span<const Point3> points, const LinkageOptions& optio
   const LinkagePoints linkage_points(points);
   BandMatrix<T> matrix(points.size(), options.memory_limit);
   if (points.size() < 2) return make_dendrogram(points.size(), {});
-  // In the order of a kD-tree most clusters that merge have rows that are near in the matrix.
+  // In the order of a kD-tree most clusters that merge have nearby rows in the matrix.
   std::vector<std::uint32_t> all(points.size());
   std::iota(all.begin(), all.end(), 0u);
   const LinkageTree tree(linkage_points.scaled(), all, options.threads);
@@ -75,8 +75,8 @@ Dendrogram of_points(std::span<const Point3> points, const LinkageOptions& optio
   return make_dendrogram(points.size(), links);
 }
 
-/// An order in which near things are near: halves by which of two far things is nearer, and so on.
-/// Three calls of `distance` for each thing and level.
+/// An order in which close things are close: recursive halving by which of two distant things is
+/// nearer. Three calls of `distance` per thing and level.
 void order_by_distance(std::span<std::uint32_t> things, const PairDistance& distance) {
   constexpr std::size_t kEnough = 8;
   if (things.size() <= kEnough) return;
@@ -106,7 +106,7 @@ void order_by_distance(std::span<std::uint32_t> things, const PairDistance& dist
                      return x.key < y.key || (x.key == y.key && x.thing < y.thing);
                    });
   for (std::size_t i = 0; i < things.size(); ++i) things[i] = items[i].thing;
-  // Which things a half has does not depend on how the library finds a median; their order would.
+  // The contents of a half do not depend on how the library finds a median, but their order would.
   std::sort(things.begin(), things.begin() + static_cast<std::ptrdiff_t>(half));
   std::sort(things.begin() + static_cast<std::ptrdiff_t>(half), things.end());
   order_by_distance(things.first(half), distance);
@@ -123,7 +123,7 @@ Dendrogram of_function(std::size_t count, const PairDistance& distance,
     check_distance(value, std::numeric_limits<T>::max(), i, j);
     return value;
   };
-  // As of points: clusters that merge should have rows that are near in the matrix.
+  // As for points: clusters that merge should have nearby rows in the matrix.
   std::vector<std::uint32_t> thing(count);
   std::iota(thing.begin(), thing.end(), 0u);
   order_by_distance(thing, checked);

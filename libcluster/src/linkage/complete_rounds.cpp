@@ -11,8 +11,9 @@ namespace terrace::cluster {
 namespace {
 
 constexpr std::size_t kRowsPerBlock = 32;
-constexpr std::size_t kThreadsFrom = 512;  ///< clusters; below, threads cost more than they save
-constexpr std::size_t kChainBelow = 8;     ///< a round that merges less than 1/8 is followed by it
+constexpr std::size_t kThreadsFrom = 512;  ///< with fewer clusters threads cost more than they save
+/// a round that merges less than 1/8 is followed by the chain
+constexpr std::size_t kChainBelow = 8;
 
 constexpr std::uint32_t kPairsPerCheck = 256;
 constexpr std::size_t kPrefetch = 8;
@@ -102,7 +103,7 @@ void CompleteRounds<T>::note_minima(std::uint32_t c, const Cluster& cluster, std
   ahead_[c] = {least, place};
 }
 
-/// Each thread took rows in ascending order, so the first of equal ones is that of least number.
+/// Each thread took rows in ascending order, so the first on ties is that of least number.
 template <class T>
 void CompleteRounds<T>::end_minima() {
   behind_.assign(ahead_.size(), {std::numeric_limits<T>::infinity(), kNone});
@@ -123,9 +124,9 @@ const typename CompleteRounds<T>::Nearest& CompleteRounds<T>::nearest(std::uint3
   return behind_[c].distance < ahead_[c].distance ? behind_[c] : ahead_[c];
 }
 
-/// Pairs up clusters that are each other's nearest. At equal distances, which regular grids have
-/// throughout, a cluster has the choice of the first ahead and the first behind, and takes what is
-/// left: where all would insist on one of their nearest, few pairs would agree.
+/// Pairs up clusters that are each other's nearest. At equal distances, which are everywhere on
+/// regular grids, a cluster can choose between the first ahead and the first behind, and takes
+/// whichever is left: if all insisted on one of their nearest, few pairs would agree.
 template <class T>
 std::size_t CompleteRounds<T>::match() {
   partner_.assign(size(), kNone);
@@ -180,7 +181,7 @@ typename CompleteRounds<T>::Cluster CompleteRounds<T>::shrunk(std::uint32_t k, C
   const std::uint32_t m = size();
   const Pieces own = pieces(a);
   T* const wide = columns.buffer.data();
-  // Zero where the row of a has no entry: never the larger one.
+  // Zero where the row of a has no entry, so that it is never the larger one.
   std::fill(wide + own.wrapped.end, wide + a + 1, T{0});
   std::fill(wide + own.after.end, wide + m, T{0});
   std::copy_n(own.after.values, own.after.end - own.after.begin, wide + own.after.begin);
@@ -207,7 +208,7 @@ typename CompleteRounds<T>::Cluster CompleteRounds<T>::shrunk(std::uint32_t k, C
   return {row, after + wrapped, clusters_[a].name};
 }
 
-/// Goes over to the new clusters and finds their nearest.
+/// Replaces the clusters by the new ones and finds their nearest.
 template <class T>
 void CompleteRounds<T>::shrink() {
   const auto count = static_cast<std::uint32_t>(first_.size());
@@ -226,12 +227,13 @@ void CompleteRounds<T>::shrink() {
   end_minima();
 }
 
-// Entries of merged clusters that are in the rows of others: with near clusters in near rows they
-// are few, but each is a row apart from the next.
+// Entries of merged clusters that are in the rows of others: if close clusters have close rows
+// these are few, but each is in a different row.
 
-/// shrunk() makes the row of the new cluster k of those of its parts. What it needs from rows of
-/// others is brought in here, into the row of the first part. That only reads entries with a second
-/// part, and only writes entries of two first parts, so all clusters may do it at once.
+/// shrunk() makes the row of the new cluster k from those of its parts. Entries that it needs from
+/// rows of others are brought in here, into the row of the first part. This only reads entries with
+/// a second part, and only writes entries of two first parts, so all clusters may do it
+/// concurrently.
 template <class T>
 void CompleteRounds<T>::bring_in(std::uint32_t k, Columns& columns) {
   std::vector<std::uint32_t>& others = columns.others;
@@ -255,7 +257,7 @@ void CompleteRounds<T>::bring_in(std::uint32_t k, Columns& columns) {
   }
 }
 
-/// New clusters whose entry belongs to the row of k, with an entry of their parts that is neither
+/// New clusters whose entry belongs to the row of k and that have an entry of their parts neither
 /// in the row of the first part of k nor, in a column of that row, in the row of the second.
 template <class T>
 void CompleteRounds<T>::list_others(std::uint32_t k, std::vector<std::uint32_t>& others) const {
@@ -298,8 +300,8 @@ void CompleteRounds<T>::list_others(std::uint32_t k, std::vector<std::uint32_t>&
 }
 
 // The nearest-neighbour chain: from any cluster to its nearest, on to the nearest of that, until
-// two are each other's nearest and merge. Each step looks at m distances, half of them one per row,
-// so it serves only where rounds would merge too few clusters.
+// two are each other's nearest and merge. Each step examines m distances, half of them one per row,
+// so it is used only if rounds would merge too few clusters.
 
 /// Merges until three quarters of the clusters are left, and lists those. Entries of clusters that
 /// are gone are infinite. O(m^2): a cluster joins the chain once for itself and at most twice for
@@ -317,7 +319,7 @@ void CompleteRounds<T>::chain() {
       chain.push_back(start);
     }
     const std::uint32_t c = chain.back();
-    // Among equally near ones take the last on the chain: it would never end otherwise.
+    // On ties take the last one on the chain: otherwise it might never end.
     Nearest best{std::numeric_limits<T>::infinity(), kNone};
     if (chain.size() > 1) best = {entry(c, chain[chain.size() - 2]), chain[chain.size() - 2]};
     best = nearest_of(c, best);

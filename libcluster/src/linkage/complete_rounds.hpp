@@ -13,21 +13,22 @@
 
 namespace terrace::cluster {
 
-/// Complete linkage over a band matrix, which it uses up.
+/// Complete linkage over a band matrix, which it consumes.
 ///
 /// Clusters are numbered 0..m-1 along the matrix. The row of cluster c holds its distances to the
-/// `length` clusters that follow, modulo m. When clusters merge or go, rows shrink where they are:
-/// a pair stays in the row of the same cluster for good, so lengths begin to differ, but no entry
+/// `length` clusters that follow, modulo m. When clusters merge or disappear, rows shrink in place:
+/// a pair always stays in the row of the same cluster, so lengths begin to differ, but no entry
 /// ever moves to another row. A new cluster takes the place of the first of its two parts.
 template <class T>
 class CompleteRounds {
  public:
-  /// Makes the entries of row i of the matrix, or checks them; several rows at once, in any order.
+  /// Makes the entries of row i of the matrix, or checks them; called for several rows
+  /// concurrently, in any order.
   using FillRow = std::function<void(std::size_t i, T* row)>;
 
   CompleteRounds(BandMatrix<T>& matrix, const LinkageKernels<T>& kernels, unsigned threads);
-  /// All merges, by the first rows of the clusters. Of a pair that is there twice (even n), only
-  /// the copy in the upper half of the matrix counts.
+  /// All merges, by the first rows of the clusters. If a pair has two copies (even n), only the
+  /// copy in the upper half of the matrix counts.
   std::vector<Link> run(const FillRow& fill);
 
  private:
@@ -51,7 +52,7 @@ class CompleteRounds {
   struct Pieces {
     Piece after, wrapped;
   };
-  /// What a thread found out about columns, and room for its work.
+  /// A thread's results on columns, and its scratch memory.
   struct Columns {
     std::vector<T> best;
     std::vector<Index> row;
@@ -60,7 +61,7 @@ class CompleteRounds {
   };
 
   [[nodiscard]] std::uint32_t size() const { return static_cast<std::uint32_t>(clusters_.size()); }
-  /// Steps from a to b, less one, modulo their number: the place of b in the row of a.
+  /// Steps from a to b, less one, modulo their number: the position of b in the row of a.
   [[nodiscard]] std::uint32_t offset(std::uint32_t a, std::uint32_t b) const {
     return b > a ? b - a - 1 : b + size() - a - 1;
   }
@@ -96,11 +97,11 @@ class CompleteRounds {
   const LinkageKernels<T>& kernels_;
   const unsigned threads_;
   std::vector<Cluster> clusters_;
-  std::vector<Columns> columns_;         ///< of each thread
+  std::vector<Columns> columns_;         ///< by thread
   std::vector<Nearest> ahead_, behind_;  ///< nearest in the own row, and in the own column
-  std::vector<std::uint32_t> partner_;   ///< with which a cluster merges, or kNone
-  /// New clusters: their parts, the same twice if there is one only; and of each old cluster the
-  /// new one, and how many first parts come before it.
+  std::vector<std::uint32_t> partner_;   ///< the partner with which a cluster merges, or kNone
+  /// New clusters: their parts, twice the same if there is only one; and for each old cluster the
+  /// new one, and the number of first parts before it.
   std::vector<std::uint32_t> first_, second_, new_cluster_, firsts_before_;
   std::vector<std::uint32_t> pair_first_, pair_second_;  ///< those with two parts
   std::vector<Link> links_;

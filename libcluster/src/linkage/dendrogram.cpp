@@ -18,7 +18,7 @@ std::string text_of(const Link& link) {
   return "points " + std::to_string(link.i) + " and " + std::to_string(link.j);
 }
 
-/// Numbers of the links by height, equal ones in the order in which they came.
+/// Indices of the links by height, ties in their original order.
 std::vector<std::uint32_t> by_height(std::span<const Link> links) {
   struct Key {
     double height;
@@ -37,7 +37,7 @@ std::vector<std::uint32_t> by_height(std::span<const Link> links) {
 /// Flat clusters after the first `count` merges.
 std::vector<std::uint32_t> labels_after(const Dendrogram& dendrogram, std::size_t count) {
   const std::size_t n = dendrogram.points;
-  // A cluster that is merged no more names itself, others get the name from above.
+  // A cluster that is not merged further names itself, others get the name from above.
   std::vector<std::uint32_t> name(n + count, kNoLabel);
   for (std::size_t r = count; r-- > 0;) {
     const Merge& merge = dendrogram.merges[r];
@@ -80,7 +80,7 @@ Dendrogram make_dendrogram(std::size_t points, std::span<const Link> links) {
                                   what);
     };
     if (link.i >= points || link.j >= points) fail("names a point that does not exist");
-    if (!(link.height >= 0.0)) fail("has a height that is negative or not a number");
+    if (!(link.height >= 0.0)) fail("has a height that is negative or NaN");
   }
   Dendrogram dendrogram{.points = points, .merges = {}};
   dendrogram.merges.reserve(links.size());
@@ -94,7 +94,7 @@ Dendrogram make_dendrogram(std::size_t points, std::span<const Link> links) {
     const std::uint32_t y = sets.find(links[r].j);
     if (!sets.unite(x, y)) {
       throw std::invalid_argument("link " + std::to_string(r) + ": " + text_of(links[r]) +
-                                  " are one cluster already; links must form a tree");
+                                  " are already in one cluster; links must form a tree");
     }
     const std::uint32_t root = std::min(x, y);
     const auto [a, b] = std::minmax(cluster[x], cluster[y]);
@@ -106,7 +106,7 @@ Dendrogram make_dendrogram(std::size_t points, std::span<const Link> links) {
 }
 
 std::vector<std::uint32_t> cut_height(const Dendrogram& dendrogram, double height) {
-  if (std::isnan(height)) throw std::invalid_argument("the height of the cut is not a number");
+  if (std::isnan(height)) throw std::invalid_argument("the height of the cut is NaN");
   return labels_after(dendrogram, merges_up_to(dendrogram, height));
 }
 
@@ -137,7 +137,7 @@ std::string dendrogram_fault(const Dendrogram& dendrogram) {
     const std::string row = "row " + std::to_string(r) + ": ";
     if (!(merge.a < merge.b)) return row + "a is not below b";
     if (merge.b >= n + r) return row + "a cluster that does not exist yet";
-    if (merged[merge.a] || merged[merge.b]) return row + "a cluster that is merged already";
+    if (merged[merge.a] || merged[merge.b]) return row + "a cluster that is already merged";
     merged[merge.a] = merged[merge.b] = true;
     if (merge.size != size_of(merge.a) + size_of(merge.b)) return row + "the size is wrong";
     if (!(merge.height >= last)) return row + "the height is below the row before, or negative";

@@ -5,7 +5,7 @@
 
 /// Included once for each instruction set, with TERRACE_VECTOR_BYTES the size of its registers.
 /// Everything is local to the object, see tests/check_symbols.sh; so nothing of the standard
-/// library is called, either.
+/// library is called either.
 
 namespace terrace::cluster {
 namespace {

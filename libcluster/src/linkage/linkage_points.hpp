@@ -7,20 +7,20 @@
 
 #include "terrace/cluster/point.hpp"
 
-/// Points as linkage computes with them. Private to linkage.
+/// The representation of points for linkage. Private to linkage.
 
 namespace terrace::cluster {
 
-/// Copies of points, scaled by a power of two so that squares of distances neither overflow nor,
-/// above 1e-150 of the largest coordinate, vanish. Scaling is exact: distances are those of the
+/// Copies of points, scaled by a power of two so that squares of distances do not overflow, nor
+/// underflow above 1e-150 of the largest coordinate. Scaling is exact: distances are those of the
 /// points to the last bit.
 class LinkagePoints {
  public:
-  /// Throws std::invalid_argument for coordinates that are not finite or are beyond 1e307, and for
-  /// too many points.
+  /// Throws std::invalid_argument for coordinates that are not finite or beyond 1e307, and for too
+  /// many points.
   explicit LinkagePoints(std::span<const Point3> points);
   [[nodiscard]] const std::vector<Point3>& scaled() const { return scaled_; }
-  /// The distance of which this is the square after scaling.
+  /// The distance whose square after scaling is given.
   [[nodiscard]] double height(double square) const;
 
  private:

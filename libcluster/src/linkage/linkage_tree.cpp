@@ -6,7 +6,7 @@
 namespace terrace::cluster {
 namespace {
 
-constexpr unsigned kSharedLevels = 6;  ///< whose nodes are split one level after the other
+constexpr unsigned kSharedLevels = 6;  ///< their nodes are split one level after the other
 
 }  // namespace
 
@@ -54,7 +54,8 @@ void LinkageTree::split(std::size_t node, unsigned level, std::vector<Record>& r
   boxes_[node] = box;
   const auto at = [&](std::size_t i) { return records.begin() + static_cast<std::ptrdiff_t>(i); };
   if (level == depth_) {
-    // Which points a leaf has does not depend on how the library finds a median; their order would.
+    // The contents of a leaf do not depend on how the library finds a median, but their order
+    // would.
     std::sort(at(begin), at(end),
               [](const Record& x, const Record& y) { return x.number < y.number; });
     return;

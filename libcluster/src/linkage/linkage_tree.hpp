@@ -13,12 +13,12 @@
 
 namespace terrace::cluster {
 
-/// A kD-tree over points in its own order: the points of a node are consecutive. Nodes are
-/// numbered as in a heap (root 1, children 2v and 2v + 1); all leaves are on one level, and node q
-/// of a level with 2^t nodes has the points from floor(q n / 2^t) on.
+/// A kD-tree over points in its own order: the points of a node are consecutive. Nodes are numbered
+/// as in a heap (root 1, children 2v and 2v + 1); all leaves are on one level, and node q of a
+/// level with 2^t nodes has the points from floor(q n / 2^t) on.
 class LinkageTree {
  public:
-  static constexpr std::size_t kLeaf = 8;  ///< most points of a leaf
+  static constexpr std::size_t kLeaf = 8;  ///< maximum points per leaf
 
   struct Box {
     Point3 low, high;
@@ -33,15 +33,15 @@ class LinkageTree {
   [[nodiscard]] std::size_t nodes() const { return 2 * leaves(); }  ///< 1 .. nodes() - 1
   [[nodiscard]] std::size_t leaf_node(std::size_t leaf) const { return leaves() + leaf; }
   [[nodiscard]] bool is_leaf(std::size_t node) const { return node >= leaves(); }
-  /// The first point of a leaf; of leaf + 1 the end.
+  /// The first point of a leaf; leaf_begin(leaf + 1) is its end.
   [[nodiscard]] std::size_t leaf_begin(std::size_t leaf) const { return (leaf * size()) >> depth_; }
   [[nodiscard]] const Box& box(std::size_t node) const { return boxes_[node]; }
-  /// Coordinates in tree order; kLeaf surplus entries follow, which may be read.
+  /// Coordinates in tree order; kLeaf extra entries follow, which may be read.
   [[nodiscard]] const double* axis(unsigned a) const { return axes_[a].data(); }
   [[nodiscard]] Point3 point(std::size_t i) const {
     return {axes_[0][i], axes_[1][i], axes_[2][i]};
   }
-  /// The number that the point in place i came with.
+  /// The input index of the point at position i.
   [[nodiscard]] std::uint32_t number(std::size_t i) const { return number_[i]; }
 
  private:
@@ -58,7 +58,7 @@ class LinkageTree {
   std::vector<std::uint32_t> number_;
 };
 
-/// A lower bound of squared_distance(p, q) for all q in the box, rounding included: all operations
+/// A lower bound of squared_distance(p, q) for all q in the box, including rounding: all operations
 /// are monotone and in the same order as there.
 [[nodiscard]] inline double squared_distance(const Point3& p, const LinkageTree::Box& box) {
   double sum[3];

@@ -41,7 +41,7 @@ NeighbourLists::NeighbourLists(const LinkageTree& tree, unsigned threads)
                   });
 }
 
-/// All points of a leaf search together: what one of them needs, the others mostly do as well.
+/// All points of a leaf search together: they mostly need the same nodes.
 void NeighbourLists::search(const LinkageTree& tree, std::size_t leaf) {
   const std::size_t first = tree.leaf_begin(leaf);
   const std::size_t count = tree.leaf_begin(leaf + 1) - first;
@@ -95,7 +95,7 @@ void NeighbourLists::search(const LinkageTree& tree, std::size_t leaf) {
   stack[waiting++] = {0.0, 1};
   while (waiting > 0) {
     const Waiting top = stack[--waiting];
-    // Equal distances count: of several neighbours at one distance the places decide.
+    // Ties count: among several neighbours at one distance the positions decide.
     if (top.square > reach || top.node == own) continue;
     if (tree.is_leaf(top.node)) {
       visit(top.node);

@@ -10,8 +10,8 @@
 
 namespace terrace::cluster {
 
-/// A pair of places in a tree with the square of its length. Pairs are ordered by length, then by
-/// their places, so that no two are equal and the minimum spanning tree is unique.
+/// A pair of positions in a tree with the square of its length. Pairs are ordered by length, then
+/// by their positions, so that no two are equal and the minimum spanning tree is unique.
 struct TreeEdge {
   double square;
   std::uint32_t low, high;  ///< low < high
@@ -25,13 +25,13 @@ struct TreeEdge {
   }
 };
 
-/// For each place of a tree the nearest others in the order of TreeEdge.
+/// For each position of a tree the nearest others in the order of TreeEdge.
 class NeighbourLists {
  public:
   static constexpr unsigned kMost = 8;
 
   NeighbourLists(const LinkageTree& tree, unsigned threads);
-  /// In each list: kMost, or all other points if they are fewer.
+  /// The length of each list: kMost, or the number of all other points if less.
   [[nodiscard]] unsigned length() const { return length_; }
   [[nodiscard]] std::uint32_t* of(std::size_t place) { return lists_.data() + place * length_; }
 

@@ -13,8 +13,8 @@
 namespace terrace::cluster {
 namespace {
 
-/// Which points are the first at their place; links each of the others to the first, at height 0.
-/// The tree over what is left has no ties but those of geometry.
+/// The first point at each position; the others at the position are linked to it, at height 0. The
+/// tree over the distinct points then has only geometric ties.
 std::vector<std::uint32_t> distinct(const std::vector<Point3>& points, std::vector<Link>& links) {
   const auto hash = [](const Point3& p) {
     std::uint64_t h = 0;

@@ -174,7 +174,7 @@ void SpanningTree::search_from(const Group& group, std::uint32_t own) {
   }
   if (best_place == kMixed) return;
   offer(own, best);
-  // The nearest of another component for as long as that is another one: the list's last entry.
+  // The nearest point of another component replaces the last entry of the list.
   const unsigned last = lists_.length() - 1;
   lists_.of(best_place)[last] = best.low == best_place ? best.high : best.low;
   used_[best_place] = static_cast<std::uint8_t>(last);
@@ -183,7 +183,7 @@ void SpanningTree::search_from(const Group& group, std::uint32_t own) {
 void SpanningTree::merge() {
   for (const std::uint32_t root : roots_) {
     const TreeEdge& edge = shortest_[root];
-    // Two components may have chosen each other: one comes first.
+    // Two components may have chosen each other: the first one unites them.
     if (root != largest_ && sets_.unite(edge.low, edge.high)) edges_.push_back(edge);
   }
   for (const std::uint32_t root : roots_) sets_.flatten(root);

@@ -16,13 +16,13 @@
 
 namespace terrace::cluster {
 
-/// The Euclidean minimum spanning tree of the points of a kD-tree, no two of them equal.
+/// The Euclidean minimum spanning tree of the points of a kD-tree, all of them different.
 ///
-/// Borůvka: in each round every component but the largest takes its shortest edge to another one.
-/// A point's candidate is the first neighbour of its list in another component. When its list is
-/// used up it has a bound instead, and searches the tree only if that is below what its component
-/// has found so far, together with others of its leaf; the search leaves out nodes that lie in the
-/// component as a whole. The largest component, which would search longest, is found by the others.
+/// Borůvka: in each round every component but the largest takes its shortest edge to another one. A
+/// point's candidate is the first neighbour in its list in another component. When its list is
+/// exhausted it has a bound instead, and searches the tree only if that is below what its component
+/// has found so far, together with others of its leaf; the search skips nodes that lie entirely in
+/// the component. The largest component, which would search longest, is found by the others.
 class SpanningTree {
  public:
   SpanningTree(const LinkageTree& tree, unsigned threads);
@@ -34,7 +34,7 @@ class SpanningTree {
    public:
     void lock(std::uint32_t key) {
       while (flags_[key % kCount].test_and_set(std::memory_order_acquire)) {
-        std::this_thread::yield();  // whoever holds it may be waiting for a processor
+        std::this_thread::yield();  // the holder may be waiting for a processor
       }
     }
     void unlock(std::uint32_t key) { flags_[key % kCount].clear(std::memory_order_release); }
@@ -72,14 +72,14 @@ class SpanningTree {
   const unsigned threads_;
   const std::uint32_t count_;
   NeighbourLists lists_;
-  std::vector<std::uint8_t> used_;        ///< entries of the list that are in the own component
-  std::vector<double> bound_;             ///< no other component is nearer once the list is used up
-  std::vector<std::uint32_t> component_;  ///< of each place: the least place of its component
-  std::vector<std::uint32_t> label_;      ///< of each node: its component, or kMixed
-  std::vector<TreeEdge> shortest_;        ///< found so far from a component, at its least place
-  Locks locks_;                           ///< of shortest_, which several threads lower
+  std::vector<std::uint8_t> used_;  ///< list entries that are in the point's own component
+  std::vector<double> bound_;       ///< no other component is nearer once the list is exhausted
+  std::vector<std::uint32_t> component_;  ///< by position: the lowest position of its component
+  std::vector<std::uint32_t> label_;      ///< by node: its component, or kMixed
+  std::vector<TreeEdge> shortest_;        ///< found so far for a component, at its lowest position
+  Locks locks_;                           ///< protect shortest_, which several threads lower
   std::vector<std::uint32_t> roots_;      ///< the components
-  std::uint32_t largest_ = 0;             ///< component, kMixed at first
+  std::uint32_t largest_ = 0;             ///< largest component, kMixed at first
   UnionFind sets_;
   std::vector<TreeEdge> edges_;
 };

@@ -12,7 +12,7 @@
 namespace terrace::matching::thesis {
 namespace {
 
-/// Distances from n uniform points to n others: a half of the Monte Carlo method.
+/// Distances from n uniform points to n others: one iteration of the Monte Carlo method.
 std::vector<double> distances(std::size_t n) {
   const std::vector<Point3> points = uniform_points(2 * n, 21);
   std::vector<double> costs;
@@ -26,8 +26,8 @@ std::vector<double> distances(std::size_t n) {
   return costs;
 }
 
-/// cost(i, j) = i * j, of R. E. Machol and M. Wien, "A hard assignment problem", 1976: nearly every
-/// row has to look at all that were assigned before it.
+/// cost(i, j) = i * j, from R. E. Machol and M. Wien, "A hard assignment problem", 1976: nearly
+/// every row has to examine all rows assigned before it.
 std::vector<double> products(std::size_t n) {
   std::vector<double> costs;
   costs.reserve(n * n);
@@ -37,7 +37,7 @@ std::vector<double> products(std::size_t n) {
   return costs;
 }
 
-/// Median of three runs, of more where these are short.
+/// Median of three runs, or of more where these are short.
 double seconds_of(const std::vector<double>& costs, std::size_t n, bool once) {
   std::vector<double> times;
   double sum = 0.0;
@@ -76,7 +76,7 @@ double exponent(const std::vector<Time>& times) {
 
 void figure_7_21(Setting& setting) {
   std::printf("\nFigure 7.21: seconds of an assignment of n rows to n columns, one thread.\n");
-  // What takes no longer than a microsecond or two says nothing of growth.
+  // Times of a microsecond or two say nothing about growth.
   std::vector<std::size_t> sizes{50, 100, 200, 400, 800, 1600};
   if (setting.is_small()) {
     sizes = {20, 40};
@@ -89,7 +89,7 @@ void figure_7_21(Setting& setting) {
     const std::string name = hard ? "product" : "euclidean";
     std::vector<Time> times;
     for (const std::size_t n : sizes) {
-      // Half a minute and more, and nothing new.
+      // Half a minute and more, without new information.
       if (hard && n > (setting.size == Setting::Size::full ? 3200u : 1600u)) continue;
       times.push_back({n, seconds_of(hard ? products(n) : distances(n), n, setting.is_small())});
       std::printf("%-10s n = %4zu  %.6f s\n", name.c_str(), n, times.back().seconds);

@@ -25,7 +25,7 @@ struct SearchRun {
   double optimum = 0.0;
   HalvingMatching monte_carlo, monotone;
 
-  /// Per cent above the optimum after so many iterations.
+  /// Per cent above the optimum after this many iterations.
   [[nodiscard]] double gap_after(std::uint64_t iterations_done, const HalvingMatching& of) const;
 };
 
@@ -34,18 +34,18 @@ struct Setting {
   enum class Size { small, standard, full };  ///< small: as a test, in a second or two
   Size size = Size::standard;
   unsigned threads = 1;
-  std::optional<std::filesystem::path> out = {};  ///< a folder that exists; none: stdout alone
+  std::optional<std::filesystem::path> out = {};  ///< an existing folder; nullopt: stdout only
   std::vector<SearchRun> runs = {};               ///< see search_runs()
 
   [[nodiscard]] bool is_small() const { return size == Size::small; }
 };
 
-/// A table written row by row; numbers are the shortest decimals that read back the same.
+/// A table written row by row; numbers are the shortest decimals that round-trip.
 class Csv {
  public:
   using Cell = std::variant<std::string, std::uint64_t, double>;
 
-  /// Writes nothing where the setting has no folder.
+  /// Writes nothing if the setting has no folder.
   Csv(const Setting& setting, const std::string& name, const std::string& header);
   void row(std::initializer_list<Cell> cells);
   /// Throws: std::runtime_error if the file could not be written.
@@ -60,7 +60,7 @@ class Csv {
 std::vector<Point3> uniform_points(std::size_t count, std::uint64_t seed);
 /// Processor, cores and compiler.
 std::string machine();
-/// "12.35" of 12.3456 with 2 digits.
+/// fixed(12.3456, 2) is "12.35".
 std::string fixed(double value, int digits);
 
 /// Running time of the assignment against n.
@@ -69,7 +69,7 @@ void figure_7_21(Setting& setting);
 void figure_7_22(Setting& setting);
 /// The least cost so far against iterations.
 void figure_7_23(Setting& setting);
-/// By how many per cent of the one before each new least cost is lower.
+/// By how many per cent each new least cost is below the previous one.
 void figure_7_24(Setting& setting);
 
 }  // namespace terrace::matching::thesis

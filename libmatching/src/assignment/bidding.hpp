@@ -11,26 +11,26 @@
 
 namespace terrace::matching {
 
-/// The least cost - label of a row, its column, and the second least (no less; equal if there is
-/// none).
+/// The least cost - label of a row, its column, and the second least (at least as large; equal if
+/// there is no other column).
 template <class Number>
 struct Offer {
   std::uint32_t column;
   Number least, second;
 };
 
-/// Labels to start from where rows and columns are equally many: the rows bid for columns as in an
-/// auction (D. Bertsekas, "The auction algorithm", 1988), in rounds whose least raise gets smaller.
-/// The rounds only bring the labels near the optimal ones, so that the searches that follow grow
-/// small trees; nothing of the proof rests on them, and the number of bids is bounded.
+/// Initial labels where rows and columns are equally many: the rows bid for columns as in an
+/// auction (D. Bertsekas, "The auction algorithm", 1988), in rounds with a decreasing minimum
+/// raise. The rounds only bring the labels near the optimal ones, so that the following searches
+/// grow small trees; the proof does not rest on them, and the number of bids is bounded.
 ///
 /// look(row): an Offer;  fell(column): its label fell. Labels must be feasible at the start for
-/// some labels of rows, as 0 is, and stay so: they only fall.
+/// some labels of rows, as 0 is, and remain so because they only fall.
 template <class Number, class Look, class Fell>
 void bid(std::size_t rows, std::vector<Number>& labels, const Look& look, const Fell& fell) {
-  // Few rows have small trees anyway, and simple numbers stay simple.
+  // Few rows have small trees anyway; and results with simple numbers stay simple.
   constexpr std::size_t kFewRows = 100, kRounds = 5, kBidsPerRow = 20;
-  // The least raise at first, times the mean distance between a row's two best columns.
+  // The first minimum raise, as a multiple of the mean distance between a row's two best columns.
   constexpr Number kFirstRaise = 10;
   if (rows < kFewRows) return;
   Number gaps = 0;

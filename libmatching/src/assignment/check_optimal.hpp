@@ -12,7 +12,7 @@
 
 namespace terrace::matching {
 
-/// Collects by how much an assignment misses the conditions of optimality; see check().
+/// Measures how far an assignment violates the conditions of optimality; see check().
 template <class Number>
 class OptimalityCheck {
  public:
@@ -33,7 +33,7 @@ class OptimalityCheck {
         continue;
       }
       if (j >= columns) fail(i, "has a column out of range");
-      if (used[j]) fail(i, "has a column that an earlier row has");
+      if (used[j]) fail(i, "repeats the column of an earlier row");
       used[j] = true;
       ++count;
     }
@@ -68,7 +68,7 @@ class OptimalityCheck {
   [[noreturn]] static void fail(std::size_t row, const char* what) {
     throw std::invalid_argument("check: row " + std::to_string(row) + " " + what);
   }
-  // Written so that what is not a number comes out as such, and stays.
+  // `!(x <= y)` also catches NaN, which then stays in the result.
   void demand_not_above(Number value) {
     if (worst_ == worst_ && !(value <= worst_)) worst_ = value;
   }

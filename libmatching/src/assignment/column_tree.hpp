@@ -23,10 +23,10 @@ double distance_between(const std::array<double, D>& a, const std::array<double,
   return std::sqrt(sum);
 }
 
-/// A kd-tree of the columns that answers "which are least by distance minus label?".
+/// A kd-tree of the columns that answers which columns have the least distance minus label.
 ///
-/// Columns are numbered by their place in the tree; original() has the caller's number. Each node
-/// has the largest label below it.
+/// Columns are numbered by their position in the tree; original() has the caller's number. Each
+/// node holds the largest label below it.
 template <std::size_t D>
 class ColumnTree {
  public:
@@ -46,9 +46,9 @@ class ColumnTree {
   /// Hides columns from the next nearest().
   void hide(std::uint32_t column) { mark_[column] = round_ + 1; }
 
-  /// The `count` columns, or all if there are fewer, that are least by distance - label, below
-  /// `limit` and not hidden; in no particular order, behind `found`. Returns what distance - label
-  /// of all others is not below: the largest of those found, or `limit`.
+  /// The `count` columns (or all, if there are fewer) with the least distance - label that are
+  /// below `limit` and not hidden; appended to `found` in no particular order. Returns a lower
+  /// bound of distance - label for all others: the largest value found, or `limit`.
   double nearest(const Point& p, const std::vector<double>& labels, std::size_t count, double limit,
                  std::vector<Candidate>& found) {
     ++round_;
@@ -58,7 +58,7 @@ class ColumnTree {
     return best_.size() < count ? limit : best_.front().key;
   }
 
-  /// The nearest column that was not taken, kUnassigned if all were.
+  /// The nearest column that is not taken; kUnassigned if all are.
   Candidate nearest_free(const Point& p) const {
     Candidate best{kUnassigned, std::numeric_limits<double>::infinity()};
     if (!nodes_.empty()) descend_free(p, 0, best);
@@ -73,7 +73,8 @@ class ColumnTree {
     }
   }
 
-  /// The label of the column fell: bounds above it are lowered as far as they change.
+  /// To be called after the label of the column fell: lowers the bounds above it as far as they
+  /// change.
   void lowered(const std::vector<double>& labels, std::uint32_t column) {
     std::uint32_t n = leaf_[column];
     const auto first = labels.begin() + nodes_[n].begin, last = labels.begin() + nodes_[n].end;
@@ -130,7 +131,7 @@ class ColumnTree {
     const auto at = [&](std::size_t k) {
       return original_.begin() + static_cast<std::ptrdiff_t>(k);
     };
-    // Equal coordinates in the order of the caller: the same tree with every standard library.
+    // Ties in the order of the caller: the same tree with every standard library.
     std::nth_element(at(begin), at(middle), at(end), [&](std::uint32_t a, std::uint32_t b) {
       const double x = points[a][widest], y = points[b][widest];
       return x != y ? x < y : a < b;
@@ -165,7 +166,7 @@ class ColumnTree {
           best_.pop_back();
         }
         best_.push_back({key, distance, j});
-        // A heap only once it is full.
+        // Becomes a heap only once it is full.
         if (full) {
           std::push_heap(best_.begin(), best_.end());
         } else if (best_.size() == count) {

@@ -12,12 +12,12 @@
 
 namespace terrace::matching {
 
-/// Shortest augmenting paths on a matrix whose rows come from `Rows`: rows(i) is a pointer to the
-/// costs of row i, good until the next call.
+/// Shortest augmenting paths on a matrix whose rows come from `Rows`: rows(i) points to the costs
+/// of row i and is valid until the next call.
 ///
-/// Labels of columns start at 0 and only fall, and only on columns that have a row. When all
-/// columns have one and rows are left, labels are shifted so that those of rows are not above 0;
-/// from then on a path may also end at a row that gives its column up.
+/// Labels of columns start at 0 and only fall, and only for columns that have a row. When all
+/// columns have one and rows remain, labels are shifted so that those of rows are not positive;
+/// from then on a path may also end at a row, which gives up its column.
 template <class Cost, class Rows>
 class DenseSolver {
  public:
@@ -60,7 +60,7 @@ class DenseSolver {
     Number distance, label;
   };
 
-  /// The first column of row `costs` with this value of cost - label, one without a row if any.
+  /// The first column of row `costs` with this value of cost - label, preferably one without a row.
   std::uint32_t column_at(const Cost* costs, Number value, bool look_for_free,
                           std::uint32_t except) const {
     std::uint32_t found = kUnassigned;
@@ -73,8 +73,8 @@ class DenseSolver {
   }
 
   /// Augmenting row reduction: a row takes its best column, whose label falls until the second best
-  /// is as good; who had the column looks anew. On real costs the falls get ever smaller, so the
-  /// number of steps is bounded. Returns the rows that are left.
+  /// is as good; the row that loses the column searches again. With real costs the falls get ever
+  /// smaller, so the number of steps is bounded. Returns the rows that remain.
   std::vector<std::uint32_t> reduce_rows(std::size_t count) {
     std::vector<std::uint32_t> left;
     std::size_t steps = kReductionSteps * count;
@@ -95,7 +95,7 @@ class DenseSolver {
         if (steps != 0) --steps;
         if (columns_ > 1 && least < second) {
           const Number label = result_.column_dual[column] - (second - least);
-          // Rounding may eat the difference; then there is no progress in going on.
+          // Rounding can absorb the difference; further steps would make no progress.
           if (!free && !(label < result_.column_dual[column])) {
             left.push_back(row);
             break;
@@ -126,7 +126,7 @@ class DenseSolver {
       const std::size_t end = std::min(columns_, (b + 1) * kScanBlock);
       for (std::size_t j = b * kScanBlock; j < end; ++j) {
         if (distance_[j] != least) continue;
-        // Among equally near columns a free one ends the search at once.
+        // Among equally near columns a free one ends the search immediately.
         if (row_of_[j] == kUnassigned) return static_cast<std::uint32_t>(j);
         if (found == kUnassigned) found = static_cast<std::uint32_t>(j);
       }
@@ -167,7 +167,8 @@ class DenseSolver {
       distance_[j] = kFar<Number>;
       row = row_of_[j];
     }
-    // Labels: rows of the tree rise, its columns fall, so that the path's edges become tight.
+    // Labels of the tree's rows rise and those of its columns fall, so that the path's edges become
+    // tight.
     result_.row_dual[start] += reached;
     for (const Settled& s : settled_) {
       const Number fall = reached - s.distance;

@@ -21,7 +21,7 @@ inline void check_sizes(std::size_t rows, std::size_t columns) {
   }
 }
 
-/// Throws std::invalid_argument with the place of the first entry that is not finite or too large.
+/// Throws std::invalid_argument naming the first entry that is not finite or too large.
 template <class Cost>
 void check_row(std::span<const Cost> costs, std::size_t row) {
   if constexpr (std::is_floating_point_v<Cost>) {
@@ -33,8 +33,8 @@ void check_row(std::span<const Cost> costs, std::size_t row) {
     throw std::invalid_argument(
         "assign: the entry at row " + std::to_string(row) + ", column " + std::to_string(j) +
         (std::isfinite(costs[j]) ? " is above 1e300 in magnitude; divide all costs by a power of 2"
-                                 : " is not finite; leave out what must not be chosen with "
-                                   "assign_sparse, or give it a high cost"));
+                                 : " is not finite; for pairs that must not be chosen use "
+                                   "assign_sparse or a high cost"));
   }
 }
 

@@ -17,7 +17,7 @@
 namespace terrace::matching {
 namespace {
 
-/// Columns a row starts with, and about how many it may get at a time.
+/// The number of columns a row starts with, and about how many it may get at a time.
 constexpr std::size_t kFirstCandidates = 12, kMoreCandidates = 32;
 
 template <std::size_t D>
@@ -40,7 +40,8 @@ double magnitude(std::span<const std::array<double, D>> points, const char* set,
   return largest;
 }
 
-/// Both sets times a power of two, which is exact, so that squares neither overflow nor vanish.
+/// Scales both sets by a power of two, which is exact, so that squares neither overflow nor
+/// underflow.
 template <std::size_t D>
 struct Scaled {
   int exponent = 0;
@@ -73,7 +74,7 @@ class NearCandidates {
     for (std::size_t i = 0; i < rows.size(); ++i)
       threshold_[i] = tree_.nearest(rows[i], labels, kFirstCandidates, all, lists_[i]);
     step_ = threshold_;
-    // Not for ever where a row has all columns from the start, and not 0 where they are equal.
+    // Finite even where a row has all columns from the start, and not 0 where they are equal.
     for (double& step : step_) step = step > 0 ? std::min(step, 1.0) : 0.01;
   }
 
@@ -86,10 +87,11 @@ class NearCandidates {
                   [&](const Candidate& c) { return c.cost - labels[c.column] > threshold_[row]; });
     const std::size_t before = list.size(), count = std::max(kMoreCandidates, before);
     for (const Candidate& c : list) tree_.hide(c.column);
-    // Where many columns are equally near their number rules, elsewhere the distance.
+    // Where many columns are equally near, the number of columns limits the batch; elsewhere the
+    // distance does.
     const double aim = std::min(limit, threshold_[row] + step_[row]);
     const double reached = tree_.nearest(rows_[row], labels, count, aim, list);
-    // Steps grow as long as they bring nothing, be it that they are lost in rounding.
+    // Steps grow while they add no column (they may be lost in rounding).
     if (list.size() == before) step_[row] *= 2;
     threshold_[row] = std::max(threshold_[row], reached);
     return before;
@@ -107,13 +109,13 @@ class NearCandidates {
   std::vector<double> threshold_, step_;
 };
 
-/// For rows.size() <= columns.size(), without the cost.
+/// For rows.size() <= columns.size(); does not compute the cost.
 template <std::size_t D>
 Assignment assign_wide(const Points<D>& rows, const Points<D>& columns) {
   ColumnTree<D> tree(columns);
   NearCandidates<D> source(rows, tree, columns.size());
   SparseSolver<NearCandidates<D>> solver(rows.size(), columns.size(), source);
-  // Every column is within reach of every row, so there is always a way.
+  // Every column is within reach of every row, so a path always exists.
   solver.solve();
   Assignment result = solver.result();
   for (std::uint32_t& j : result.column) j = tree.original(j);

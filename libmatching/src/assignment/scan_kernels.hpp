@@ -8,13 +8,13 @@
 
 namespace terrace::matching {
 
-/// The numbers in which costs of a type are added: doubles for doubles and floats, 64 bits for
-/// integers of 32.
+/// The type in which costs are added: double for double and float, 64-bit integers for 32-bit
+/// integers.
 template <class Cost>
 using LabelOf = std::conditional_t<std::is_integral_v<Cost>, std::int64_t, double>;
 
-/// Farther than everything, and the label that keeps a settled column there: base + c - kSettled is
-/// not below kFar for any cost c.
+/// kFar: larger than every distance. kSettled: the label that keeps a settled column there, as base
+/// + c - kSettled is at least kFar for any cost c.
 template <class Number>
 inline constexpr Number kFar = std::numeric_limits<Number>::infinity();
 template <>
@@ -32,17 +32,17 @@ inline constexpr std::size_t kScanBlock = 128;
 template <class Cost>
 struct ScanKernels {
   using Number = LabelOf<Cost>;
-  /// For each column j: through = (base + costs[j]) - labels[j]; where that is below distance[j] it
-  /// goes there and `row` into previous[j]. block_least gets the least distance of each block of
-  /// columns; returns the least of all.
+  /// For each column j: through = (base + costs[j]) - labels[j]; where that is below distance[j],
+  /// it replaces distance[j], and `row` replaces previous[j]. block_least gets the least distance
+  /// of each block of columns; returns the overall least.
   Number (*relax)(const Cost* costs, const Number* labels, std::size_t columns, Number base,
                   std::int64_t row, Number* distance, std::int64_t* previous, Number* block_least);
-  /// The least two of costs[j] - labels[j], equal if two columns are; kFar if there are none.
+  /// The two least values of costs[j] - labels[j], equal if two columns tie; kFar if missing.
   void (*least_two)(const Cost* costs, const Number* labels, std::size_t columns, Number* first,
                     Number* second);
 };
 
-/// Those for the best instruction set this processor has.
+/// The kernels for the best instruction set of this processor.
 template <class Cost>
 const ScanKernels<Cost>& scan_kernels();
 

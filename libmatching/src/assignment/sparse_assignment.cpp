@@ -16,9 +16,9 @@
 namespace terrace::matching {
 namespace {
 
-/// Compressed rows of our own; nothing is absent but what may not be chosen.
+/// Compressed rows that we own; absent pairs must not be chosen.
 struct EdgeLists {
-  // On few edges bids for what only one row can have go on without end.
+  // With few edges, bidding for a column that only one row can have might never end.
   static constexpr bool kComplete = false;
 
   std::size_t columns = 0;
@@ -50,7 +50,7 @@ void check_edge(std::size_t k, std::uint32_t column, std::size_t columns, double
   }
 }
 
-/// `visit` calls its argument with row, column and cost of each edge, the same ones each time.
+/// `visit` calls its argument with row, column and cost of each edge, the same edges on each call.
 template <class Visit>
 EdgeLists make_lists(std::size_t rows, std::size_t columns, std::size_t count, const Visit& visit) {
   EdgeLists lists;
@@ -116,7 +116,7 @@ EdgeLists lists_of(std::span<const CostEdge> edges, std::size_t rows, std::size_
   });
 }
 
-/// The cheapest of the row's edges to its column; false if there is none.
+/// Finds the cheapest of the row's edges to its column; false if there is no such edge.
 bool chosen_cost(const EdgeLists& lists, std::size_t row, std::uint32_t column, double& cost) {
   bool found = false;
   for (const Candidate& c : lists.candidates(row)) {

@@ -22,12 +22,12 @@ struct Candidate {
 /// Shortest augmenting paths on lists of candidates, rows <= columns.
 ///
 /// `Source` holds the lists:
-///   kComplete: that every column is within reach of every row, in the list or absent;
+///   kComplete: every column is within reach of every row, whether in the list or absent;
 ///   std::span<const Candidate> candidates(row): changed by extend() only;
-///   double threshold(row): cost - label of columns not in the list is at least this much;
+///   double threshold(row): lower bound of cost - label for columns not in the list;
 ///   size_t extend(row, labels, limit): raises the threshold, to `limit` at most, and adds the
-///     columns below it to the list, from the returned place on; columns that are not below the old
-///     threshold may leave the list;
+///     columns below it to the list, from the returned position on; columns that are not below the
+///     old threshold may leave the list;
 ///   Candidate nearest_free(row): some near free column, kUnassigned if it knows none;
 ///   void lowered(labels, column): its label fell;  void taken(column): it got its first row.
 /// Labels of columns start at 0 and only fall; with rows < columns only on columns that have a row.
@@ -46,8 +46,8 @@ class SparseSolver {
     result_.column_dual.assign(columns, 0.0);
   }
 
-  /// False if a row finds no way to a free column; result() is then of no use, and tree_rows() are
-  /// the rows that reach only tree_rows().size() - 1 columns.
+  /// False if a row has no path to a free column; result() is then invalid, and tree_rows() are the
+  /// rows that reach only tree_rows().size() - 1 columns.
   bool solve() {
     if (Source::kComplete && rows_ == row_of_.size()) {
       bid(
@@ -60,7 +60,7 @@ class SparseSolver {
     return true;
   }
 
-  /// Without the cost.
+  /// The cost is not filled in.
   Assignment result() { return std::move(result_); }
 
   std::vector<std::uint32_t> tree_rows() const {
@@ -77,12 +77,12 @@ class SparseSolver {
     std::uint32_t column;
     double distance;
   };
-  /// A column at its distance, or a row at the distance where its absent columns may come in.
+  /// A column at its distance, or a row at the distance from which its absent columns matter.
   struct Event {
     double key;
     std::uint32_t id;
     bool row;
-    // The standard heap keeps the largest in front. Equal keys: fixed order.
+    // std::push_heap keeps the largest in front. Ties have a fixed order.
     bool operator<(const Event& other) const {
       if (key != other.key) return key > other.key;
       if (row != other.row) return row;
@@ -105,13 +105,13 @@ class SparseSolver {
       }
       if (found.second == kInfinity) found.second = found.least;
       if (found.least <= found.second) return found;
-      // The best one may be absent.
+      // The best column may be absent.
       source_.extend(row, result_.column_dual, kInfinity);
     }
   }
 
-  /// Augmenting row reduction as in DenseSolver, the columns that are not candidates standing in
-  /// with the threshold.
+  /// Augmenting row reduction as in DenseSolver; the threshold stands in for columns that are not
+  /// candidates.
   std::vector<std::uint32_t> reduce_rows() {
     std::vector<std::uint32_t> left;
     auto& labels = result_.column_dual;
@@ -175,7 +175,7 @@ class SparseSolver {
     std::push_heap(heap_.begin(), heap_.end());
   }
 
-  /// Candidates of the row from `first` on; absent ones matter if they are below `limit`.
+  /// Relaxes the row's candidates from `first` on; absent ones matter if they are below `limit`.
   void relax(std::uint32_t row, std::size_t first, double limit) {
     const double base = row_distance_[row] - result_.row_dual[row];
     for (const Candidate& c : source_.candidates(row).subspan(first)) {
@@ -219,14 +219,15 @@ class SparseSolver {
       }
       if (distance_[event.id] != event.key) continue;
       settled_.push_back({event.id, event.key});
-      // Settled: nothing is below.
+      // Settled: no distance is below.
       distance_[event.id] = -kInfinity;
       const std::uint32_t row = row_of_[event.id];
       row_distance_[row] = event.key;
       relax(row, 0, kInfinity);
     }
     if (sink_ == kUnassigned) return false;
-    // Labels: rows of the tree rise, its columns fall, so that the path's edges become tight.
+    // Labels of the tree's rows rise and those of its columns fall, so that the path's edges become
+    // tight.
     result_.row_dual[start] += bound_;
     for (const Settled& s : settled_) {
       const double fall = bound_ - s.distance;

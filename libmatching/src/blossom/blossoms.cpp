@@ -11,7 +11,7 @@ std::uint32_t Solver::tree_parent(std::uint32_t plus) const {
   return mate == kNone ? kNone : top(nodes_[top(mate)].enter_from);
 }
 
-// The two walks alternate, so that the work is that of the shorter cycle.
+// The two walks alternate, so that the work is bounded by the shorter path.
 std::uint32_t Solver::common_ancestor(std::uint32_t u, std::uint32_t v) {
   ++stamp_;
   std::uint32_t a = top(u), b = top(v);
@@ -29,7 +29,7 @@ void Solver::shrink(std::uint32_t u, std::uint32_t v) {
   const std::uint32_t apex = common_ancestor(u, v);
   const std::uint32_t blossom = new_blossom();
   std::vector<Part>& cycle = parts(blossom);
-  // From u up to the apex, then turned round: the links are those of the way down.
+  // From u up to the apex, then reversed: the links point the way down.
   std::uint32_t x = top(u), from = u, to = v;
   while (x != apex) {
     cycle.push_back({x, from, to});
@@ -126,8 +126,8 @@ void Solver::expand(std::uint32_t blossom) {
   const std::uint32_t entry = nodes_[top(b.enter_to)].place;
   const std::uint32_t exit = nodes_[top(b.base)].place;
   match_parts(blossom, exit);
-  // The parts on the even way from the entry to the exit stay in the tree. Those that stay minus
-  // are not touched vertex by vertex: in a deep nest the next expansion would do so again.
+  // The parts on the even path from the entry to the exit stay in the tree. Parts that stay minus
+  // are not updated vertex by vertex: in a deep nest the next expansion would repeat that.
   const std::uint32_t ahead = (entry + count - exit) % count;
   const bool forward = ahead % 2 == 1;
   std::uint32_t k = entry, from = b.enter_from, to = b.enter_to;

@@ -13,8 +13,9 @@
 
 namespace terrace::matching::blossom {
 
-/// The order of points by halving along the longer side of their box, down to kLeaf points. It is
-/// fixed by coordinates and indices, whatever the standard library's nth_element does.
+/// The order of points by recursive halving along the longer side of their bounding box, down to
+/// kLeaf points. It depends on coordinates and indices only, not on the standard library's
+/// nth_element.
 inline constexpr std::uint32_t kLeaf = 8;
 
 template <std::size_t D>
@@ -56,7 +57,7 @@ std::vector<std::uint32_t> halving_order(std::span<const std::array<double, D>> 
   return order;
 }
 
-/// Nested boxes over a sequence of points that is in halving order, or a part of such a sequence.
+/// Nested boxes over a sequence of points in halving order, or a part of such a sequence.
 template <std::size_t D>
 class BoxTree {
  public:
@@ -91,8 +92,8 @@ class BoxTree {
     return sum;
   }
 
-  /// The k points nearest to point i, itself left out, nearest first, in `found`; fewer if there
-  /// are not so many. Equally far ones are taken in the order in which the tree is walked.
+  /// The k points nearest to point i (excluding i), nearest first, in `found`; fewer if there are
+  /// fewer. Ties are in the order in which the tree is walked.
   void nearest(std::uint32_t i, std::size_t k,
                std::vector<std::pair<double, std::uint32_t>>& found) const {
     found.clear();

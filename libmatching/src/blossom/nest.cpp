@@ -19,7 +19,8 @@ Nest::Nest(const Solver& solver) {
   for (std::uint32_t x = 0; x < count; ++x) {
     if (solver.in_use(x)) children_[fill[slot(x)]++] = x;
   }
-  // Depth first: a blossom is met before its parts, where its range opens, and again after them.
+  // Depth first: a blossom is visited before its parts, where its range begins, and again after
+  // them.
   ranges_.assign(count, {});
   std::vector<std::uint32_t> open;
   for (const std::uint32_t top : children_of(kNone)) {

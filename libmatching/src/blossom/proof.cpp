@@ -25,8 +25,8 @@ Matching proof_of(Solver& solver) {
   }
   result.vertex_dual.resize(n);
   result.vertex_blossom.resize(n);
-  // A potential is the vertex's own dual and those around it. Their sums are kept per blossom, as
-  // nests may be deep.
+  // A potential is the sum of the vertex's own dual and those of the blossoms around it. Sums are
+  // kept per blossom, as nests may be deep.
   std::vector<std::int64_t> around(solver.node_count(), -1);
   std::vector<std::uint32_t> chain;
   for (std::uint32_t v = 0; v < n; ++v) {
@@ -50,7 +50,8 @@ Matching proof_of(Solver& solver) {
 std::string unmatchable(const Solver& solver, std::uint32_t vertex) {
   const std::vector<std::uint32_t>& witness = solver.witness();
   std::string text = "the graph has no perfect matching: vertex " + std::to_string(vertex) +
-                     " stays alone; removing the " + std::to_string(witness.size()) + " vertices {";
+                     " cannot be matched; removing the " + std::to_string(witness.size()) +
+                     " vertices {";
   const std::size_t shown = std::min<std::size_t>(witness.size(), 8);
   for (std::size_t k = 0; k < shown; ++k) {
     text += (k == 0 ? "" : ", ") + std::to_string(witness[k]);

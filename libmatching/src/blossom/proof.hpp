@@ -6,8 +6,8 @@
 
 namespace terrace::matching::blossom {
 
-/// What the solver knows as the public result: partners and duals, the blossoms numbered from 0.
-/// The caller fills cost and exponent.
+/// Converts the solver's result to the public one: partners and duals, with blossoms numbered from
+/// 0. The caller fills in cost and exponent.
 Matching proof_of(Solver& solver);
 
 /// The message for a vertex that solve() could not match.

@@ -30,7 +30,7 @@ Solver::Outcome Solver::search(std::uint32_t root, std::int64_t limit) {
     heap_.pop_back();
     if (event.b == kGrow) {
       const Vertex& v = vertices_[event.a];
-      // A better edge, or another way into the tree, has made the event void.
+      // A better edge, or another way into the tree, has invalidated the event.
       if (v.label != Label::kFree || v.key - v.potential != event.time) continue;
       delta_ = event.time;
       if (nodes_[top(event.a)].mate == kNone) {
@@ -66,7 +66,7 @@ void Solver::push(std::int64_t time, std::uint32_t a, std::uint32_t b) {
     return;
   }
   if (time > kLimit) {
-    throw std::overflow_error("matching: the duals pass 64 bits; use smaller weights");
+    throw std::overflow_error("matching: the duals overflow 64 bits; use smaller weights");
   }
   heap_.push_back({time, a, b});
   std::push_heap(heap_.begin(), heap_.end(), [](const Event& x, const Event& y) {
@@ -123,7 +123,7 @@ void Solver::scan(std::uint32_t vertex) {
   }
 }
 
-// A free vertex may be grown to (or augmented to) at the time its best edge is tight.
+// A free vertex may be grown to (or augmented to) when its best edge becomes tight.
 void Solver::offer(std::uint32_t vertex) {
   const Vertex& w = vertices_[vertex];
   const std::int64_t time = w.key - w.potential;
@@ -166,7 +166,7 @@ void Solver::end_tree() {
       vertex.label = Label::kFree;
       vertex.potential += change;
       if (vertex.potential > kLimit || vertex.potential < -kLimit) {
-        throw std::overflow_error("matching: the duals pass 64 bits; use smaller weights");
+        throw std::overflow_error("matching: the duals overflow 64 bits; use smaller weights");
       }
       if (v == x.last) break;
     }
@@ -177,8 +177,8 @@ void Solver::end_tree() {
   heap_.clear();
 }
 
-// No event is left: every minus node is a vertex, and each plus node is an odd component once they
-// are removed. There is one more of them than of minus nodes.
+// No event is left: every minus node is a vertex, and each plus node becomes an odd component once
+// the minus nodes are removed. There is one more plus node than minus nodes.
 void Solver::collect_witness() {
   witness_.clear();
   for (const std::uint32_t node : labelled_) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The frame of the blossom solver: the graph, the first duals, and the loop over exposed vertices.
+// The main loop of the blossom solver: the graph, the initial duals, and the searches from exposed
+// vertices.
 #include "blossom/solver.hpp"
 
 #include <algorithm>
@@ -33,8 +34,8 @@ void Solver::index_arcs() {
   }
 }
 
-// Half the least weight around each vertex is feasible; then each exposed vertex rises as far as it
-// may and takes a neighbour that is exposed and tight.
+// Half the least weight at each vertex is feasible; then each exposed vertex rises as far as it may
+// and takes a neighbour that is exposed and whose edge is tight.
 void Solver::start_duals() {
   const auto arcs_of = [&](std::uint32_t v) {
     return std::span<const Arc>(arcs_).subspan(arc_begin_[v],
@@ -45,7 +46,7 @@ void Solver::start_duals() {
     for (const Arc& arc : arcs_of(v)) {
       if (arc.to != late_) least = std::min(least, arc.cost);
     }
-    // Costs are even. The late vertex starts so low that nothing reaches it.
+    // Costs are even. The late vertex starts so low that no search reaches it.
     if (least != std::numeric_limits<std::int64_t>::max()) vertices_[v].potential = least / 2;
     if (v == late_) vertices_[v].potential = -kLimit / 4;
   }
@@ -75,9 +76,8 @@ std::uint32_t Solver::solve() {
     if (in_use(x) && nodes_[x].parent == kNone && nodes_[x].mate == kNone) ++exposed;
   }
   const auto is_exposed = [&](std::uint32_t v) { return nodes_[top(v)].mate == kNone; };
-  // Trees stop at a limit that grows from pass to pass: so the exposed vertices rise about
-  // evenly, their trees meet half way and stay small, and few are left for the searches without a
-  // limit.
+  // Trees stop at a limit that grows from pass to pass: so the exposed vertices rise about evenly,
+  // their trees meet half way and stay small, and few remain for the searches without a limit.
   std::int64_t limit = first_limit();
   while (true) {
     const bool unlimited = exposed <= 2 || limit > kLimit / 16;
@@ -87,7 +87,7 @@ std::uint32_t Solver::solve() {
       if (!is_exposed(v) || nodes_[top(v)].base != v) continue;
       const bool last = exposed == 2 && late_ != kNone && is_exposed(late_);
       if (v == late_ && !last) continue;
-      // When two are left the late vertex is the root: its tree is one edge.
+      // When two remain, the late vertex is the root: its tree is one edge.
       const std::uint32_t root = top(last ? late_ : v);
       const Outcome outcome =
           search(root, unlimited || last ? std::numeric_limits<std::int64_t>::max() : limit);
@@ -99,7 +99,7 @@ std::uint32_t Solver::solve() {
   }
 }
 
-// A sixteenth of the mean of the least costs around the vertices.
+// A sixteenth of the mean over the vertices of the least cost at each.
 std::int64_t Solver::first_limit() const {
   double sum = 0.0;
   for (std::uint32_t v = 0; v < n_; ++v) {
@@ -114,7 +114,7 @@ std::int64_t Solver::first_limit() const {
 
 std::vector<std::uint32_t> Solver::mates() {
   std::vector<std::uint32_t> mate(n_, kNone), open;
-  // Each of a blossom's parts is a range of its list of vertices.
+  // Each part of a blossom is a range of the blossom's list of vertices.
   std::vector<std::uint32_t> position(n_, 0);
   const auto holds = [&](std::uint32_t node, std::uint32_t vertex) {
     const Node& x = nodes_[node];

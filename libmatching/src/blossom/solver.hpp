@@ -9,45 +9,46 @@
 namespace terrace::matching::blossom {
 
 inline constexpr std::uint32_t kNone = 0xFFFFFFFFu;
-/// No potential may pass this: sums of three stay inside 64 bits.
+/// Bound of all potentials: sums of three fit into 64 bits.
 inline constexpr std::int64_t kLimit = std::int64_t{1} << 60;
 
-/// An edge with its doubled integer weight: doubled, so that all duals are integers.
+/// An edge with its integer weight, doubled so that all duals are integers.
 struct Edge {
   std::uint32_t i, j;
   std::int64_t cost;
 };
 
 /// Minimum-weight perfect matching by the primal-dual blossom method, one alternating tree at a
-/// time, on a sparse graph whose edges may be added to between two solutions.
+/// time, on a sparse graph to which edges may be added between two solutions.
 ///
 /// A *node* is a vertex (id below n) or a blossom (id n and up). A node without a parent is a *top*
 /// node; only top nodes are matched, labelled and in the tree. The *potential* of a vertex is its
-/// own dual plus those of all blossoms around it, so that between different top nodes the slack of
-/// an edge is cost - potential(i) - potential(j), whatever is nested.
+/// own dual plus those of all blossoms around it, so between different top nodes the slack of an
+/// edge is cost - potential(i) - potential(j), whatever the nesting.
 ///
-/// While a tree stands, the potential of a vertex labelled plus is stored less `delta_`, that of
-/// one labelled minus is stored plus `delta_`, and so are the duals of labelled blossoms: a dual
+/// While a tree exists, the potential of a vertex labelled plus is stored less `delta_`, that of
+/// one labelled minus is stored plus `delta_`, and likewise the duals of labelled blossoms: a dual
 /// change of the whole tree is one addition to `delta_`.
 class Solver {
  public:
   /// Takes n vertices and edges (ends below n, i != j, |cost| below kLimit / 4). Vertex `late`, if
-  /// any, may have edges to all others: it is matched last, so that its many edges are not scanned
-  /// again and again.
+  /// given, may have edges to all others: it is matched last, so that its many edges are not
+  /// scanned repeatedly.
   Solver(std::uint32_t n, std::vector<Edge> edges, std::uint32_t late = kNone);
 
-  /// Matches every vertex at least weight.
+  /// Computes a perfect matching of least weight.
   /// Returns kNone, or an exposed vertex that cannot be matched (then witness() proves it).
-  /// Throws std::overflow_error where a potential passes kLimit.
+  /// Throws std::overflow_error if a potential exceeds kLimit.
   std::uint32_t solve();
 
-  /// Adds edges and repairs the duals where they are violated, at the price of exposing vertices.
+  /// Adds edges; where they violate the duals these are repaired, which may expose vertices.
   void add(std::span<const Edge> edges);
 
-  /// The vertices whose removal leaves more odd components than they are, after a failed solve().
+  /// After a failed solve(): the vertices whose removal leaves more odd components than there are
+  /// of them.
   const std::vector<std::uint32_t>& witness() const { return witness_; }
 
-  /// The partner of each vertex, kNone where exposed.
+  /// The partner of each vertex; kNone where exposed.
   std::vector<std::uint32_t> mates();
 
   std::uint32_t vertex_count() const { return n_; }
@@ -148,10 +149,10 @@ class Solver {
   std::vector<std::uint32_t> spare_;  // blossoms not in use
   bool started_ = false;
 
-  // The tree that stands.
+  // The current tree.
   std::int64_t delta_ = 0;
-  // Events from this delta on are not needed: an augmentation is known, or the limit. Whether one
-  // was left out for that.
+  // Events from this delta on are not needed: an augmentation or the limit comes first. And whether
+  // an event was dropped for that reason.
   std::int64_t bound_ = 0;
   bool left_out_ = false;
   std::vector<Event> heap_;

@@ -21,7 +21,7 @@ using tree::area_of;
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-// The nearest float not above, and one more step where the difference that x is was rounded up.
+// The nearest float not above x, one step lower where the subtraction that gave x was rounded up.
 float rounded_down(double x) {
   const double lower = x - std::abs(x) * 0x1p-51;
   const auto f = static_cast<float>(lower);
@@ -76,7 +76,7 @@ HierarchyFrame<D> frame_of(std::span<const Box<D>> boxes) {
   return frame;
 }
 
-/// The boxes of all nodes, and which of them become leaves.
+/// The boxes of all nodes, and which nodes become leaves.
 template <std::size_t D>
 class Plan {
  public:
@@ -115,7 +115,7 @@ class Plan {
   }
   [[nodiscard]] const FloatBox<D>& box(std::uint32_t v) const { return boxes_[v]; }
 
-  /// The larger child first: it is asked for more often, and is in the cache then.
+  /// The larger child first: it is visited more often, and the next node is in the cache.
   [[nodiscard]] TreeChildren children(std::uint32_t v) const {
     const auto [a, b] = rows_[v - count_];
     if (area_of(boxes_[a]) >= area_of(boxes_[b])) return {a, b};
@@ -152,7 +152,7 @@ BoundingVolumeHierarchy<D>::BoundingVolumeHierarchy(std::span<const TreeChildren
                                                     std::span<const Box<D>> boxes,
                                                     const HierarchyOptions& options) {
   check_costs(options.costs);
-  if (options.leaf_size == 0) refuse_volumes("leaf_size is 0; a leaf takes one primitive at least");
+  if (options.leaf_size == 0) refuse_volumes("leaf_size is 0; a leaf holds at least one primitive");
   tree::check_rows(rows, boxes.size());
   tree::check_boxes(boxes);
   frame_ = frame_of(boxes);

@@ -12,7 +12,7 @@
 
 #include "terrace/matching/bounding_volume_hierarchy.hpp"
 
-/// What must hold of a tree over boxes that comes from the caller.
+/// Preconditions of a caller's tree over boxes.
 
 namespace terrace::matching::tree {
 
@@ -42,7 +42,7 @@ inline void check_rows(std::span<const TreeChildren> rows, std::size_t n) {
   }
   if (rows.size() != (n == 0 ? 0 : n - 1)) {
     refuse_tree(std::to_string(rows.size()) + " rows for " + std::to_string(n) +
-                " primitives; a binary tree has one row less than leaves");
+                " primitives; a binary tree has one row fewer than leaves");
   }
   std::vector<bool> taken(n + rows.size(), false);
   for (std::size_t r = 0; r < rows.size(); ++r) {
@@ -50,7 +50,7 @@ inline void check_rows(std::span<const TreeChildren> rows, std::size_t n) {
       if (child >= n + r || taken[child]) {
         refuse_tree("row " + std::to_string(r) + " names node " + std::to_string(child) +
                     ", which " +
-                    (child >= n + r ? "is not made by an earlier row" : "has a parent already"));
+                    (child >= n + r ? "is not made by an earlier row" : "already has a parent"));
       }
       taken[child] = true;
     }

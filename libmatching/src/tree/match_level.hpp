@@ -11,8 +11,8 @@
 
 namespace terrace::matching::tree {
 
-/// How matching trees match the nodes of a level where the caller does not say: the partner of
-/// each, kNobody for the one left over. The result must not depend on the number of threads.
+/// The default matcher of a level's nodes in matching trees: the partner of each, kNobody for the
+/// one left over. The result must not depend on the number of threads.
 template <std::size_t D>
 std::vector<std::uint32_t> match_level(std::span<const std::array<double, D>> points,
                                        unsigned threads) {

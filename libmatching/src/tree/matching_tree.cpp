@@ -21,10 +21,10 @@ namespace {
   throw std::invalid_argument("make_matching_tree: " + what);
 }
 
-/// Thrown to leave the work when the caller has ended it.
+/// Thrown to abandon the work when the caller has ended it.
 struct Stopped {};
 
-// Squares of what lies between the limits neither overflow nor vanish.
+// Squares of values between the limits neither overflow nor underflow.
 template <std::size_t D>
 double distance(const std::array<double, D>& p, const std::array<double, D>& q) {
   double largest = 0.0;
@@ -39,7 +39,7 @@ double distance(const std::array<double, D>& p, const std::array<double, D>& q) 
   return std::ldexp(std::sqrt(sum), shift);
 }
 
-// Never outside the two, so that pairs of equal points stay where they are.
+// Never outside the segment between the two, so that pairs of equal points stay where they are.
 template <std::size_t D>
 std::array<double, D> midpoint(const std::array<double, D>& p, double p_weight,
                                const std::array<double, D>& q, double q_weight) {
@@ -97,11 +97,11 @@ class Builder {
     const auto differ = [&](std::size_t size, const char* what, const char* one) {
       if (size == 0 || size == n) return;
       refuse_tree(std::to_string(size) + " " + what + " for " + std::to_string(n) +
-                  " points; give one " + one + " per point or none");
+                  " points; give one " + one + " per point, or leave them out");
     };
     differ(options_.labels.size(), "labels", "label");
     differ(options_.weights.size(), "weights", "weight");
-    // The tree, the clusters, and what is kept of the nodes of a level.
+    // The tree, the clusters, and what is kept per node of a level.
     const double needed = static_cast<double>(n) *
                           (sizeof(MatchingTreeRow) + 2.0 * sizeof(Point) + 4 * sizeof(double));
     const bool fits =
@@ -109,7 +109,7 @@ class Builder {
     if (n < kNobody / 2 && fits) return;
     refuse_tree("the tree of " + std::to_string(n) + " points would need about " +
                 std::to_string(static_cast<std::uint64_t>(needed / (1024.0 * 1024.0))) +
-                " MiB, and at most 2^31 - 2 points have numbers; build trees of parts");
+                " MiB, and at most 2^31 - 2 points are possible; build trees of parts");
   }
 
   void check_values() const {
@@ -130,8 +130,7 @@ class Builder {
       }
       sum += w;
     }
-    if (!std::isfinite(sum))
-      refuse_tree("the weights' sum passes the range of double; divide them");
+    if (!std::isfinite(sum)) refuse_tree("the weights' sum overflows a double; divide them");
   }
 
   [[nodiscard]] unsigned threads() const {
@@ -139,7 +138,7 @@ class Builder {
     return std::max(1u, std::thread::hardware_concurrency());
   }
 
-  // A cluster of m points makes m - 1 rows, so each has its place before any is built.
+  // A cluster of m points makes m - 1 rows, so the place of every row is known before any is built.
   void build_clusters(const LabelGroups& groups, std::vector<Node>& roots) {
     std::vector<std::uint32_t> by_size(groups.count());
     std::iota(by_size.begin(), by_size.end(), 0u);
@@ -159,7 +158,7 @@ class Builder {
           roots[g] = join(nodes, groups.begin[g] - g, 0, for_each, t == 0);
         }
       } catch (const Stopped&) {
-        // By the caller, or because another thread has failed.
+        // Stopped by the caller, or because another thread has failed.
       } catch (...) {
         ended_ = true;
         failures[t] = std::current_exception();
@@ -170,7 +169,7 @@ class Builder {
       try {
         for (unsigned t = 1; t < clusters; ++t) others.emplace_back(work, t);
       } catch (const std::system_error&) {
-        // The system grants no more threads. Those there are do the same work.
+        // The system grants no more threads. The existing ones do the same work.
       }
       work(0);
     }
@@ -190,7 +189,7 @@ class Builder {
     return nodes;
   }
 
-  /// Matches again and again; the rows go to `row` and on. Returns the one node that is left.
+  /// Matches repeatedly; rows are written from `row` on. Returns the one node that remains.
   Node join(std::vector<Node>& nodes, std::uint32_t row, std::uint32_t level, unsigned threads,
             bool callers_thread) {
     while (nodes.size() > 1) {
@@ -227,7 +226,7 @@ class Builder {
       if (mate[i] == kNobody && ++alone <= mate.size() % 2) continue;
       if (mate[i] < mate.size() && mate[i] != i && mate[mate[i]] == i) continue;
       refuse_tree("the matcher did not pair node " + std::to_string(i) + " of " +
-                  std::to_string(mate.size()) + " with one that is paired with it");
+                  std::to_string(mate.size()) + " mutually");
     }
     return mate;
   }
@@ -236,7 +235,7 @@ class Builder {
     const double apart = distance(p.position, q.position);
     if (!std::isfinite(apart)) {
       refuse_tree("nodes " + std::to_string(p.number) + " and " + std::to_string(q.number) +
-                  " are farther apart than double can say; scale the points");
+                  " are farther apart than a double can represent; scale the points");
     }
     const Node made{static_cast<std::uint32_t>(points_.size()) + row, p.size + q.size, level,
                     p.weight + q.weight, midpoint(p.position, p.weight, q.position, q.weight)};

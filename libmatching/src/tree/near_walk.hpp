@@ -17,7 +17,7 @@
 
 namespace terrace::matching::tree {
 
-/// What waits on the way down. Trees of matchings are shallow; others may have any depth.
+/// Nodes still to be visited. Trees of matchings are shallow; others may have any depth.
 template <class Entry>
 class WalkStack {
  public:
@@ -40,8 +40,8 @@ class WalkStack {
   std::size_t size_ = 0;
 };
 
-/// A box's bound is compared with this factor, so that roundings cut nothing off: the squared
-/// distance of a box and that of a primitive within are both right to some 2^-50.
+/// Factor for comparisons with a box's bound, so that rounding prunes nothing wrongly: the squared
+/// distances of a box and of a primitive inside are both accurate to some 2^-50.
 inline constexpr double kSlack = 1.0 - 0x1p-47;
 
 template <class AnyBox, std::size_t D>
@@ -56,7 +56,7 @@ double squared_distance(const AnyBox& box, const std::array<double, D>& p) {
   return sum;
 }
 
-/// A place in the units of the primitives and in those of the boxes.
+/// A point in the units of the primitives and in those of the boxes.
 template <std::size_t D>
 struct FramedPlace {
   std::array<double, D> scaled, framed;
@@ -65,13 +65,13 @@ struct FramedPlace {
     for (std::size_t d = 0; d < D; ++d) {
       if (!std::isfinite(place[d])) {
         throw std::invalid_argument("a query's coordinate " + std::to_string(d) +
-                                    " is not finite; ask for a place");
+                                    " is not finite; give a finite point");
       }
       scaled[d] = place[d] * frame.scale;
       framed[d] = scaled[d] - frame.centre[d];
       if (std::abs(scaled[d]) > 0x1p460) {
         throw std::invalid_argument("a query's coordinate " + std::to_string(d) +
-                                    " is too far off for distances to have squares; scale all");
+                                    " is too large for squared distances; scale all points");
       }
     }
   }

@@ -15,10 +15,10 @@
 
 namespace terrace::matching::tree {
 
-/// A primitive by its squared distance in the hierarchy's scale, ties by index.
+/// A primitive with its squared distance in the hierarchy's scale; ties by index.
 using Candidate = std::pair<double, std::uint32_t>;
 
-/// The nearest primitive; squared(slot) is the squared distance of that in a slot.
+/// The nearest primitive; squared(slot) is the squared distance of the primitive in that slot.
 template <std::size_t D, class Squared>
 std::optional<Neighbour> nearest_one(const BoundingVolumeHierarchy<D>& tree,
                                      const std::array<double, D>& framed, Squared&& squared) {

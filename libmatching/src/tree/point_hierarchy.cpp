@@ -27,7 +27,7 @@ double squared_distance(const std::array<double, D>& p, const std::array<double,
 
 double dot(const Point3& p, const Point3& q) { return p[0] * q[0] + p[1] * q[1] + p[2] * q[2]; }
 
-// From the place on the ray that is nearest to the centre, so that balls far off keep their shape
+// Computed from the point of the ray nearest to the centre, so that distant balls keep their shape
 // (E. Haines et al., "Precision improvements for ray/sphere intersection", 2019).
 std::optional<double> meets(const tree::FramedRay& ray, const Point3& centre, double radius) {
   const Point3& along = ray.direction;
@@ -73,12 +73,13 @@ void PointHierarchy<D>::nearest(const Point& query, std::size_t k,
 
 template <std::size_t D>
 std::optional<RayHit> PointHierarchy<D>::hit(const Ray& ray, double radius) const requires(D == 3) {
-  // Clang 14 instantiates it in the plane all the same.
+  // Clang 14 instantiates this in the plane too.
   if constexpr (D == 3) {
     const double scaled = radius * tree_.frame().scale;
     if (!(radius >= 0.0) || !(scaled <= 0x1p460)) {
-      throw std::invalid_argument("the balls' radius is " + std::to_string(radius) +
-                                  "; it must be finite, not negative, and of the points' order");
+      throw std::invalid_argument(
+          "the radius is " + std::to_string(radius) +
+          "; it must be finite, not negative, and comparable to the coordinates");
     }
     const tree::FramedRay framed(ray, tree_.frame(), radius);
     const RayHit best =

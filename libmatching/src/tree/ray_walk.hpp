@@ -17,11 +17,12 @@
 
 namespace terrace::matching::tree {
 
-/// A ray in the units of the primitives, its direction's largest coordinate from 1/2 to 1, and what
-/// the boxes need of it.
+/// A ray in the units of the primitives, its direction's largest coordinate from 1/2 to 1, with the
+/// values that box tests need.
 class FramedRay {
  public:
-  /// margin: how far beyond a box the ray still meets what is in it, in the caller's unit.
+  /// margin: how far outside a box the ray may still hit the primitives in it, in the caller's
+  /// unit.
   FramedRay(const Ray& ray, const HierarchyFrame<3>& frame, double margin = 0.0) {
     const FramedPlace<3> place(ray.origin, frame);
     origin = place.scaled;
@@ -41,7 +42,7 @@ class FramedRay {
     }
     t_min = ray.t_min * unit_;
     t_max = ray.t_max * unit_;
-    // Primitives are met with errors of some 2^-51 of all coordinates that enter.
+    // Hits have errors of some 2^-51 of all coordinates involved.
     const double wide = margin * frame.scale + 0x1p-48 * (far + margin * frame.scale);
     for (std::size_t d = 0; d < 3; ++d) {
       direction[d] = std::ldexp(ray.direction[d], -exponent);
@@ -52,7 +53,7 @@ class FramedRay {
     }
   }
 
-  /// From t of this ray to t of the caller's.
+  /// Converts t of this ray to t of the caller's.
   [[nodiscard]] double callers_t(double t) const { return t / unit_; }
 
   struct Range {
@@ -60,8 +61,8 @@ class FramedRay {
     [[nodiscard]] bool empty() const { return !(enter <= leave); }
   };
 
-  /// Where the ray is within the box, not before t_min nor after `last`. Where a coordinate of the
-  /// direction is 0 and the origin on the box's border, 0 times infinity is passed over: that axis
+  /// The interval in which the ray is within the box, from t_min to `last`. Where a coordinate of
+  /// the direction is 0 and the origin on the box's border, 0 times infinity is ignored: that axis
   /// excludes nothing.
   template <class AnyBox>
   [[nodiscard]] Range within(const AnyBox& box, double last) const {
@@ -77,9 +78,9 @@ class FramedRay {
     return range;
   }
 
-  /// t moved to where the ray is within the box of the primitive that was met at t, none if it is
-  /// nowhere: so no node around is left out on the ground of an earlier hit, and all trees answer
-  /// the same. A matter of some roundings but for triangles seen nearly edge-on. The box's
+  /// Moves t to where the ray is within the box of the primitive that was hit at t; nullopt if that
+  /// is nowhere. So no enclosing node is skipped because of an earlier hit, and all trees answer
+  /// the same. The change is a few roundings, except for triangles seen nearly edge-on. The box's
   /// coordinates are in the units of the primitives.
   [[nodiscard]] std::optional<double> moved_into(Box<3> box, const HierarchyFrame<3>& frame,
                                                  double t) const {
@@ -106,7 +107,7 @@ class FramedRay {
   double unit_;
 };
 
-/// Calls leaf(node, best) for each leaf that the ray enters not after the best hit so far, near
+/// Calls leaf(node, best) for each leaf that the ray enters no later than the best hit so far, near
 /// ones first; leaf() lowers best.t, in the ray's own t.
 template <class Leaf>
 RayHit walk_ray(const BoundingVolumeHierarchy<3>& tree, const FramedRay& ray, Leaf&& leaf) {

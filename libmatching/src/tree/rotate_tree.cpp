@@ -18,7 +18,7 @@ class Rotation {
       : count_(static_cast<std::uint32_t>(boxes.size())),
         children_(rows.begin(), rows.end()),
         boxes_(boxes.begin(), boxes.end()) {
-    // By a power of two, so that areas neither overflow nor vanish.
+    // Scaled by a power of two, so that areas neither overflow nor underflow.
     double largest = 0.0;
     for (const Box<D>& box : boxes_) {
       for (std::size_t d = 0; d < D; ++d) {
@@ -40,7 +40,7 @@ class Rotation {
     set_order();
   }
 
-  /// Whether it gained enough to go on.
+  /// One pass; returns whether it gained enough to go on.
   bool pass() {
     double gained = 0.0;
     for (const std::uint32_t v : order_) gained += rotate(v);
@@ -49,7 +49,7 @@ class Rotation {
     return gained > 1e-3 * cost_;
   }
 
-  /// The rows by a walk that leaves each after its children.
+  /// The rows in the order of a walk that leaves each node after its children.
   [[nodiscard]] std::vector<TreeChildren> rows() const {
     std::vector<std::uint32_t> number(boxes_.size());
     for (std::uint32_t i = 0; i < count_; ++i) number[i] = i;
@@ -73,14 +73,14 @@ class Rotation {
     return box;
   }
 
-  // An inner node that is no pair of primitives.
+  // An inner node that is not a pair of primitives.
   [[nodiscard]] bool may_change(std::uint32_t v) const {
     if (v < count_) return false;
     const auto [a, b] = children_[v - count_];
     return a >= count_ || b >= count_;
   }
 
-  /// Two nodes change places: `first` is a child of `first_parent`, and so on.
+  /// Two nodes that change places: `first` is a child of `first_parent`, and so on.
   struct Swap {
     std::uint32_t first_parent = 0, first = 0, second_parent = 0, second = 0;
     double gain = 0.0;
@@ -114,7 +114,7 @@ class Rotation {
         if (gain > best.gain) best = {a, left.a, b, child, gain};
       }
     }
-    // Less would be rounding.
+    // Smaller gains would be rounding.
     if (!(best.gain > 1e-12 * tree::area_of(boxes_[v]))) return 0.0;
     replace(best.first_parent, best.first, best.second);
     replace(best.second_parent, best.second, best.first);
@@ -131,7 +131,7 @@ class Rotation {
     (children.a == child ? children.a : children.b) = by;
   }
 
-  // Parents before children from the root, then turned round.
+  // Parents before children from the root, then reversed.
   void set_order() {
     order_.clear();
     if (children_.empty()) return;
@@ -152,8 +152,8 @@ class Rotation {
   std::uint32_t count_;
   std::vector<TreeChildren> children_;
   std::vector<Box<D>> boxes_;
-  std::vector<std::uint32_t> order_;  // of the inner nodes, children first; the root stays the last
-  double cost_ = 0.0;                 // the sum of the inner nodes' areas
+  std::vector<std::uint32_t> order_;  // the inner nodes, children first, the root last
+  double cost_ = 0.0;                 // sum of the inner nodes' areas
 };
 
 }  // namespace

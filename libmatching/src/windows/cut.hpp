@@ -12,19 +12,19 @@
 
 namespace terrace::matching::windows {
 
-/// Something that windows do not divide: a point, or a pair at its midpoint.
+/// An item that windows do not divide: a point, or a pair at its midpoint.
 template <std::size_t D>
 struct Unit {
   std::array<double, D> centre;
   std::uint32_t name;
 };
 
-/// Brings units into an order in which consecutive ranges are compact windows of at most `most`
-/// units, and adds the end of each range, counted from `first`, to `ends`.
+/// Reorders units so that consecutive ranges are compact windows of at most `most` units, and
+/// appends the end of each range, counted from `first`, to `ends`.
 ///
-/// Ranges are split across the longest side of their box, not in the middle but at a share between
-/// 3/8 and 5/8 that the seed draws for each split: with another seed the windows have other
-/// borders. With `even` every part of a range has an even number of units, but for the last.
+/// Ranges are split across the longest side of their bounding box, at a share between 3/8 and 5/8
+/// that the seed determines for each split: with another seed the windows have other borders. With
+/// `even`, every part except the last of a range has an even number of units.
 /// Cost: O(n log(n / most)).
 template <std::size_t D>
 void cut(std::span<Unit<D>> units, std::size_t most, bool even, std::uint64_t seed,
@@ -62,7 +62,7 @@ void cut(std::span<Unit<D>> units, std::size_t most, bool even, std::uint64_t se
                      [axis](const Unit<D>& a, const Unit<D>& b) {
                        return std::tie(a.centre[axis], a.name) < std::tie(b.centre[axis], b.name);
                      });
-    // The left part first.
+    // The left part comes first.
     open.emplace_back(begin + part, end);
     open.emplace_back(begin, begin + part);
   }

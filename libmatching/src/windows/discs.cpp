@@ -22,7 +22,7 @@ void Discs::take(std::size_t w, std::span<const std::uint32_t> points,
   const std::size_t blossoms = proof.blossom_dual.size();
   const double unit = std::ldexp(1.0, -1 - proof.exponent);
   // Where a point is left over, the blossoms around the vertex for nobody hold an even number of
-  // points, and are none on their own.
+  // points and cannot be used alone.
   std::vector<bool> dropped(blossoms, false);
   if (proof.mate.size() > points.size()) {
     for (std::uint32_t b = proof.vertex_blossom.back(); b != kNobody; b = proof.blossom_parent[b]) {
@@ -30,10 +30,10 @@ void Discs::take(std::size_t w, std::span<const std::uint32_t> points,
     }
   }
   Window& window = windows_[w];
-  // Blossoms are numbered anew as they are met on the way out from the points, the outermost of a
-  // way first. Nests may be deep, so each is visited once.
+  // Blossoms are renumbered as they are met on the way outward from the points, the outermost of
+  // each path first. Nests may be deep, so each blossom is visited once.
   std::vector<std::uint32_t> number(blossoms, kNobody), chain;
-  std::vector<double> around;  // of each moat: its width and those outward
+  std::vector<double> around;  // for each moat: its width plus those outside it
   for (std::size_t k = 0; k < points.size(); ++k) {
     std::uint32_t b = proof.vertex_blossom[k];
     for (; b != kNobody && !dropped[b] && number[b] == kNobody; b = proof.blossom_parent[b]) {
@@ -55,10 +55,10 @@ void Discs::take(std::size_t w, std::span<const std::uint32_t> points,
   }
 }
 
-// A moat gives way for all points inside at once, the outer ones first; what is left the discs
-// give.
+// A moat shrinks for all points inside at once, the outer moats first; the discs shrink by the
+// rest.
 void Discs::give_way(const std::vector<double>& excess) {
-  // For each moat, what its points need; then what it and those outward give.
+  // For each moat, the amount its points need; then the amount that it and the moats outside give.
   std::vector<std::vector<double>> given(windows_.size());
   for (std::size_t w = 0; w < windows_.size(); ++w) given[w].assign(windows_[w].moats.size(), 0.0);
   for (std::size_t i = 0; i < radius_.size(); ++i) {
@@ -91,7 +91,7 @@ void Discs::give_way(const std::vector<double>& excess) {
 
 namespace {
 
-/// Tells how much of a point's radius is too much for the points of other windows.
+/// Computes how much of a point's radius is too much for the points of other windows.
 template <std::size_t D>
 class Excess {
  public:
@@ -120,7 +120,7 @@ class Excess {
     }
   }
 
-  /// Each point's distance to the nearest other one, but at most `most`.
+  /// Each point's distance to its nearest neighbour, but at most `most`.
   std::vector<double> nearest(std::span<const double> most) const {
     std::vector<double> result(points_.size(), 0.0);
     for_each_chunk([&](std::uint32_t k, std::vector<std::uint32_t>&) {
@@ -208,8 +208,8 @@ class Excess {
   unsigned threads_;
   std::vector<std::uint32_t> order_;
   BoxTree<D> tree_;
-  std::vector<std::uint32_t> owner_;  // of each box: the window, if all its points are of one
-  std::vector<double> largest_;       // of each box
+  std::vector<std::uint32_t> owner_;  // for each box: the window, if all its points are in one
+  std::vector<double> largest_;       // for each box
 };
 
 }  // namespace
@@ -218,15 +218,16 @@ template <std::size_t D>
 double Discs::bound(std::span<const std::array<double, D>> points, const PointMetric& metric,
                     unsigned threads) {
   Excess<D> excess(points, metric, window_, threads);
-  // First those give way that reach far beyond their window, as if all others were no larger than
-  // their nearest neighbour is far: one wide moat would else lower a thousand small discs. Then of
-  // each pair both, by half.
+  // First shrink those that reach far beyond their window, as if the radii of all others were at
+  // most the distance to their nearest neighbour: otherwise one wide moat would lower a thousand
+  // small discs. Then shrink both of each pair, by half each.
   give_way(excess(radius_, excess.nearest(radius_), 1.0));
   give_way(excess(radius_, radius_, 0.5));
   double sum = 0.0;
   for (const Window& window : windows_) sum += window.sum;
   if (radius_.size() % 2 == 0) return sum;
-  // Nobody is at distance 0 from all: a point may be left over at the price of its radius.
+  // The vertex for nobody is at distance 0 from all: a point may be left over at the price of its
+  // radius.
   return sum - *std::max_element(radius_.begin(), radius_.end());
 }
 

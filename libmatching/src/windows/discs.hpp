@@ -12,26 +12,26 @@
 namespace terrace::matching::windows {
 
 /// The duals of points that were matched window by window, as lengths: each point is the centre of
-/// a disc, and each blossom has a moat of some width around the discs and moats inside. Two points
-/// of different windows are as far apart as their duals demand where the sum of their radii, moats
-/// included, is not above their distance.
+/// a disc, and each blossom has a moat of some width around the discs and moats inside. The duals
+/// of two points of different windows are feasible if the sum of their radii, moats included, is at
+/// most their distance.
 class Discs {
  public:
   explicit Discs(std::size_t points) : radius_(points, 0.0), moat_(points, kNobody) {}
 
-  /// Forgets all windows; there will be so many.
+  /// Forgets all windows and prepares for this many.
   void start(std::size_t windows);
-  /// Takes the duals of window `w`, whose points these are. May be called for several windows at
-  /// once.
+  /// Takes the duals of window `w` with these points. May be called concurrently for different
+  /// windows.
   void take(std::size_t w, std::span<const std::uint32_t> points, const PointMatching& matching);
 
-  /// Lowers discs and moats until no pair from different windows is too near. The windows are used
-  /// up by it.
+  /// Lowers discs and moats until no pair from different windows is too close. Consumes the
+  /// windows.
   ///
-  /// points: positions, in which radii are lengths. metric: as given to match_points() for them.
-  /// Returns: a bound below the cost of every perfect matching; of an odd number of points, of
-  /// every matching that leaves one over.
-  /// Cost: O(n log n) where radii are of the size of the distances between neighbours.
+  /// points: positions, in the unit of the radii. metric: as given to match_points() for them.
+  /// Returns: a lower bound of the cost of every perfect matching; if n is odd, of every matching
+  /// that leaves one point over.
+  /// Cost: O(n log n) if radii are of the order of the distances between neighbours.
   template <std::size_t D>
   double bound(std::span<const std::array<double, D>> points, const PointMetric& metric,
                unsigned threads);
@@ -42,14 +42,14 @@ class Discs {
     std::uint32_t parent;  // the next one outward
   };
   struct Window {
-    double sum = 0.0;         // of all discs and moats, the vertex for nobody left out
+    double sum = 0.0;         // over all discs and moats except the vertex for nobody
     std::vector<Moat> moats;  // parents first
   };
 
   void give_way(const std::vector<double>& excess);
 
-  std::vector<double> radius_;       // of each point, moats included
-  std::vector<std::uint32_t> moat_;  // of each point: the innermost around it, in its window
+  std::vector<double> radius_;       // for each point, moats included
+  std::vector<std::uint32_t> moat_;  // for each point: the innermost moat around it, in its window
   std::vector<std::uint32_t> window_;
   std::vector<Window> windows_;
 };

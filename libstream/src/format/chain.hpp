@@ -9,14 +9,15 @@
 
 namespace terrace::stream {
 
-/// Opens one file of a format. first: what the first of several files says; null for itself.
+/// Opens one file of a format. first: the properties of the first of several files; null for the
+/// first.
 using OpenOne = std::unique_ptr<PointSource> (*)(const std::string& file,
                                                  const SourceOptions& options,
                                                  const SourceInfo* first);
 
-/// Several files, one after the other, as one source; a single one as it is. Looks at the head of
-/// each at once and opens it (again) when its turn comes, pipes only once.
-/// Throws: Error if one cannot be opened or differs from the first in channels or CRS.
+/// Several files, one after the other, as one source; a single one unchanged. Checks the head of
+/// each immediately and (re)opens it when its turn comes; pipes are opened only once. Throws: Error
+/// if one cannot be opened or differs from the first in channels or CRS.
 std::unique_ptr<PointSource> open_in_turn(std::span<const std::string> files,
                                           const SourceOptions& options, OpenOne open_one);
 

@@ -5,15 +5,15 @@
 
 namespace terrace::stream {
 
-/// A format that is not read here but is common where points, rasters and meshes come from.
+/// A format that is not supported but common for points, rasters and meshes.
 struct ForeignFormat {
-  std::string_view name;    ///< with what it is, to stand behind "is"
-  std::string_view remedy;  ///< what turns a file of it into one that can be read
+  std::string_view name;    ///< with a description, to follow "is"
+  std::string_view remedy;  ///< how to convert such a file into a readable one
 };
 
-/// The format that the first bytes of a file (4,096 or all) tell; nullptr if none.
+/// The format recognised by the first bytes of a file (4,096 or all); nullptr if none.
 const ForeignFormat* foreign_format_of_content(std::string_view head);
-/// The format that an ending tells: ".laz", in lower case; nullptr if none.
+/// The format of an ending in lower case such as ".laz"; nullptr if none.
 const ForeignFormat* foreign_format_of_ending(std::string_view ending);
 
 }  // namespace terrace::stream

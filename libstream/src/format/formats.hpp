@@ -19,7 +19,8 @@ const Format& las_format();
 const Format& ept_format();
 /// The Stanford polygon format: ASCII, binary little-endian and big-endian.
 const Format& ply_format();
-/// The vertices of Wavefront's OBJ, of Geomview's OFF, and the corners of STL: see mesh/points.cpp.
+/// The vertices of Wavefront's OBJ and of Geomview's OFF, and the corners of STL: see
+/// mesh/points.cpp.
 const Format& obj_format();
 const Format& off_format();
 const Format& stl_format();
@@ -33,12 +34,12 @@ const Format& ascii_grid_format();
 const Format& binary_grid_format();
 /// Digital elevation models of the USGS, in ASCII.
 const Format& usgs_dem_format();
-/// PNG: grey height maps, and colours that mean heights.
+/// PNG: grey height maps, and colours that encode heights.
 const Format& png_format();
-/// Text of one point per line: XYZ, CSV and their like.
+/// Text with one point per line: XYZ, CSV and the like.
 const Format& xyz_format();
 
-/// The format that an ending tells, that of ".csv.gz" being ".csv"; nullptr if none.
+/// The format of a file's ending (".csv.gz" counts as ".csv"); nullptr if none.
 const Format* format_of_name(const std::string& file);
 
 }  // namespace terrace::stream

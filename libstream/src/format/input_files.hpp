@@ -9,9 +9,8 @@
 
 namespace terrace::stream {
 
-/// The files that open_source() means by these names: folders, lists and patterns by what they
-/// stand for, folders of EPT by their ept.json. format: as SourceOptions has it. Throws: Error for
-/// one that stands for nothing.
+/// Expands the names given to open_source(): folders, lists and patterns to their files, folders of
+/// EPT to their ept.json. format: as in SourceOptions. Throws: Error for a name without files.
 std::vector<std::string> input_files(std::span<const std::string> names, const std::string& format);
 
 }  // namespace terrace::stream

@@ -12,11 +12,11 @@
 #include "terrace/stream/source.hpp"
 
 /// The octree in which COPC and EPT arrange points: every node has some of the points in its cube,
-/// each depth half the spacing of the one before.
+/// and each depth has half the spacing of the previous one.
 
 namespace terrace::stream {
 
-/// Places of deeper nodes do not fit COPC's signed 32 bits.
+/// Positions of deeper nodes do not fit into COPC's signed 32 bits.
 inline constexpr unsigned kDeepestNode = 30;
 
 /// A node with points.
@@ -30,24 +30,24 @@ struct OctreeNode {
 /// "D-X-Y-Z", as EPT names it.
 std::string name_of(const OctreeNode& node);
 
-/// Parents before children, and nodes beside each other in Morton order.
+/// Parents before children, and siblings in Morton order.
 bool before(const OctreeNode& a, const OctreeNode& b);
 
 struct Octree {
   Point3 centre{};
   double half_size = 0.0;  ///< of the root's cube, in the CRS
   double spacing = 0.0;    ///< of the root's points, in the CRS
-  /// In the order of before(): nodes that follow one another lie together.
+  /// In the order of before(): consecutive nodes are close together.
   std::vector<OctreeNode> nodes;
 
   [[nodiscard]] Box3 box(const OctreeNode& node) const;
   [[nodiscard]] std::uint64_t points() const;
-  /// What a source says of the nodes.
+  /// The public description of the nodes.
   [[nodiscard]] OctreeInfo info() const;
-  /// Puts the nodes in order. Returns one that is there twice, nullptr if there is none.
+  /// Sorts the nodes. Returns a duplicate node, nullptr if there is none.
   const OctreeNode* arrange();
   /// Keeps the nodes down to the first depth whose spacing is at most `resolution` (all, if that is
-  /// 0) whose cubes, grown by `margin`, meet the region.
+  /// 0) whose cubes, enlarged by `margin`, meet the region.
   void keep(const std::optional<Box3>& region, double resolution, const Point3& margin);
 };
 

@@ -10,16 +10,16 @@
 
 namespace terrace::stream {
 
-/// The attributes of a stream on their way into a file.
+/// The attributes of a stream being written to a file.
 class OutputColumns {
  public:
   explicit OutputColumns(std::span<const Channel> attributes);
 
   [[nodiscard]] std::size_t size() const { return columns_.size(); }
-  /// The type in the file: the column's own, or float64 where real values are written.
+  /// The type in the file: the column's own, or float64 if real values are written.
   [[nodiscard]] ScalarType type(std::size_t column) const { return columns_[column].written; }
-  /// Fit for a header: distinct, not empty, none of x, y, z in either case, no blanks, no control
-  /// characters.
+  /// A name suitable for a header: unique, not empty, not x, y or z in either case, without blanks
+  /// and control characters.
   [[nodiscard]] const std::string& name(std::size_t column) const { return columns_[column].name; }
 
   /// Asserts that the block has records of these columns.
@@ -34,7 +34,7 @@ class OutputColumns {
     std::string name;
     ScalarType stored, written;
     double scale, offset;
-    bool real;  ///< scale and offset are applied
+    bool real;  ///< whether scale and offset are applied
   };
   std::vector<OutputColumn> columns_;
   std::size_t record_bytes_ = 0;

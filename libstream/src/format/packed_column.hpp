@@ -14,13 +14,13 @@ struct PackedColumn {
   std::size_t stride = 0;
   std::size_t count = 0;
   ScalarType type = ScalarType::f32;
-  bool swap = false;  ///< the bytes are in the other order than this machine's
+  bool swap = false;  ///< the bytes are not in native order
 };
 
 /// Copies the column into coordinate `axis` of `points`.
 void decode_coordinate(const PackedColumn& column, Point3* points, std::size_t axis);
-/// Copies the column's values to `to`, `to_stride` bytes apart, in this machine's byte order. `to`
-/// may be the rows themselves.
+/// Copies the column's values to `to`, `to_stride` bytes apart, in native byte order. `to` may be
+/// the rows themselves.
 void decode_values(const PackedColumn& column, std::byte* to, std::size_t to_stride);
 
 }  // namespace terrace::stream

@@ -11,19 +11,19 @@
 #include "format/las/record_reader.hpp"
 #include "terrace/stream/source.hpp"
 
-/// Point records in parts, of which each can be read by itself: chunks of LAZ, nodes of an octree.
+/// Point records in parts that can be read independently: chunks of LAZ, nodes of an octree.
 
 namespace terrace::stream {
 
-/// Reads parts, one at a time. Each thread takes its own.
+/// Reads parts, one at a time. Each thread has its own.
 class PartReader {
  public:
   virtual ~PartReader() = default;
-  /// Goes to the first record of a part. Throws: Error.
+  /// Moves to the first record of a part. Throws: Error.
   virtual void start(std::size_t part) = 0;
-  /// Reads records of the part to the beginning of `room`: as many as it has room for or fewer, one
-  /// at least. Returns their bytes. Asked only for records that RecordParts promises.
-  /// Throws: Error if they are not there, and with the last one unless the part ends there.
+  /// Reads records of the part to the beginning of `room`: as many as fit or fewer, at least one.
+  /// Returns their bytes. Called only for records that RecordParts promises. Throws: Error if they
+  /// do not exist, and with the last one unless the part ends there.
   virtual std::size_t read(std::span<std::byte> room) = 0;
 };
 
@@ -39,11 +39,11 @@ struct RecordParts {
   std::function<std::unique_ptr<PartReader>()> make_reader{};
 };
 
-/// The records of the parts, in their order, read by up to options.threads threads, a few parts
-/// ahead of the one that is asked for and within options.memory_bytes. Null if there is nothing to
-/// gain from several threads and nobody wants to be told of damage, or no memory for them.
+/// The records of the parts, in order, read by up to options.threads threads, a few parts ahead of
+/// the current one and within options.memory_bytes. Null if several threads would bring no gain and
+/// damage is not to be reported, or if there is no memory for them.
 std::unique_ptr<RecordReader> parts_ahead(const RecordParts& parts, const SourceOptions& options);
-/// The same by the caller's thread, in small pieces: however many points a part has, its records
+/// The same on the caller's thread, in small pieces: however many points a part has, its records
 /// are not held at once.
 std::unique_ptr<RecordReader> parts_in_turn(RecordParts parts);
 

@@ -15,26 +15,26 @@
 
 namespace terrace::stream {
 
-/// Points in little-endian records of one length, and how to make sense of them.
+/// Points in little-endian records of one length, and their interpretation.
 struct RecordStream {
-  /// info.points: how many `records` has. A coordinate's type is that in the record.
+  /// info.points: the number in `records`. A coordinate's type is that in the record.
   SourceInfo info{};
   std::size_t record_bytes = 0;
   std::array<std::size_t, 3> coordinate_offsets{0, 4, 8};
   std::vector<LasField> fields{};  ///< of info.attributes
-  std::unique_ptr<Input> input{};  ///< what `records` reads, where it has no file of its own
+  std::unique_ptr<Input> input{};  ///< the input of `records`, unless they have their own file
   std::unique_ptr<RecordReader> records{};
-  std::uint64_t points = 0;  ///< that the file has, wanted or not
+  std::uint64_t points = 0;  ///< number in the file, wanted or not
   bool moved = false;
-  Point3 shift{};  ///< if moved: what to add to coordinates
+  Point3 shift{};  ///< if moved: added to coordinates
 };
 
 /// Moves coordinates onto the lattice of the first of several files. Throws: Error unless the
-/// scales are equal and the offsets differ by whole steps.
+/// scales are equal and the offsets differ by integer steps.
 void move_onto(const SourceInfo& first, RecordStream& stream);
 
 /// Blocks of these points. Throws in next(): Error as the RecordReader, and for coordinates that
-/// are not finite or out of reach once moved.
+/// are not finite or out of range once moved.
 std::unique_ptr<PointSource> source_of_records(RecordStream stream, std::size_t block_points);
 
 }  // namespace terrace::stream

@@ -7,9 +7,9 @@
 
 namespace terrace::stream {
 
-/// What options.selection leaves of a source; the source itself if they ask for nothing.
-/// Blocks of points are filled up again, those of a raster stay the tiles that they are.
-/// Throws: Error for a condition that makes no sense and names that are not there.
+/// The part of a source selected by options.selection; the source itself if everything is selected.
+/// Blocks of points are refilled, those of a raster remain its tiles. Throws: Error for an invalid
+/// condition and for unknown names.
 std::unique_ptr<PointSource> selection_of(std::unique_ptr<PointSource> source,
                                           const SourceOptions& options);
 

@@ -9,9 +9,9 @@
 
 namespace terrace::stream {
 
-/// What `format.open` makes of the files, those that are not seekable (pipes, gzip) being read to
-/// their end first and set aside in temporary files without names. Messages have the names of
-/// `files`. Throws: Error, Stopped.
+/// The result of `format.open` for the files, after reading those without random access (pipes,
+/// gzip) to their end into unnamed temporary files. Messages have the names of `files`. Throws:
+/// Error, Stopped.
 std::unique_ptr<PointSource> open_spooled(const Format& format, std::span<const std::string> files,
                                           const SourceOptions& options);
 

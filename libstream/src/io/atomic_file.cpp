@@ -35,9 +35,9 @@ std::string remedy_for(int error_number) {
     case EACCES:
     case EPERM:
     case EROFS:
-      return "choose a folder that can be written";
+      return "choose a writable folder";
     case ENOENT:
-      return "make the folder first";
+      return "create the folder first";
     default:
       return {};
   }
@@ -46,8 +46,8 @@ std::string remedy_for(int error_number) {
 }  // namespace
 
 struct AtomicFile::Impl {
-  fs::path target;  ///< as it was named
-  fs::path place;   ///< where links lead
+  fs::path target;  ///< as given
+  fs::path place;   ///< after following symbolic links
   fs::path temporary;
   bool replace = false;
   int descriptor = -1;
@@ -68,7 +68,7 @@ struct AtomicFile::Impl {
     std::error_code error;
     const fs::file_status status = fs::status(target, error);
     if (status.type() == fs::file_type::not_found) return;
-    if (error) fail("cannot be looked at", error.value());
+    if (error) fail("cannot be inspected", error.value());
     if (status.type() != fs::file_type::regular) {
       throw Error({.file = target.string(),
                    .where = {},
@@ -85,8 +85,8 @@ struct AtomicFile::Impl {
                  .remedy = "remove it, choose another name, or ask to replace it"});
   }
 
-  /// Creates and locks the temporary. Between the two steps another writer may take it for
-  /// abandoned: it has the lock then, or has had it and has removed the name.
+  /// Creates and locks the temporary file. Between the two steps another writer may take it for
+  /// abandoned: then that writer holds the lock, or held it and has removed the name.
   void create() {
     sweep_temporaries(place);
     for (int attempt = 0;; ++attempt) {
@@ -96,7 +96,7 @@ struct AtomicFile::Impl {
         if (errno == EEXIST && attempt < 1000) continue;
         fail("cannot be created", errno);
       }
-      // Without locks (some network disks) we go on.
+      // On file systems without locks (some network disks) work continues.
       const bool taken = ::flock(descriptor, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
       struct stat status {};
       if (!taken && ::fstat(descriptor, &status) == 0 && status.st_nlink > 0) return;
@@ -130,18 +130,18 @@ struct AtomicFile::Impl {
         fail("cannot be renamed into place", errno);
       return;
     }
-    // Linking, unlike renaming, refuses a name that has been taken meanwhile.
+    // Linking, unlike renaming, fails if the name has been taken meanwhile.
     if (::link(temporary.c_str(), place.c_str()) == 0) {
       ::unlink(temporary.c_str());
       return;
     }
     if (errno == EEXIST) fail_because_it_exists();
-    check_target();  // a file system without hard links: look, then rename
+    check_target();  // a file system without hard links: check, then rename
     if (::rename(temporary.c_str(), place.c_str()) != 0)
       fail("cannot be renamed into place", errno);
   }
 
-  /// Makes the new name durable; a folder that cannot be opened or synced has no say in that.
+  /// Makes the new name durable; a folder that cannot be opened or synced is not an error.
   void sync_folder() const {
     const int folder_descriptor =
         ::open(folder_of(place).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
@@ -158,7 +158,7 @@ AtomicFile::AtomicFile(const fs::path& target, bool replace) : impl_(std::make_u
     throw Error({.file = target.string(),
                  .where = {},
                  .cause = "names no file",
-                 .remedy = "give the name of a file"});
+                 .remedy = "give a file name"});
   }
   impl_->check_target();
   impl_->place = follow_links(target);
@@ -215,7 +215,7 @@ void AtomicFile::commit() {
   impl.flush();
   if (::fsync(impl.descriptor) != 0) impl.fail("cannot be synced", errno);
   impl.publish();
-  // From here on the temporary's name is gone: the descriptor is only closed, and last of all, so
+  // From here on the temporary file's name is gone: the descriptor is only closed, and last, so
   // that the lock outlives the name.
   const int descriptor = std::exchange(impl.descriptor, -1);
   if (::close(descriptor) != 0 && errno != EINTR) impl.fail("cannot be closed", errno);

@@ -8,7 +8,7 @@
 
 namespace terrace::stream {
 
-/// Appends the bytes of a number, little-endian whatever the machine.
+/// Appends the bytes of a number in little-endian order on every machine.
 template <class T>
 void append_little_endian(std::string& out, T value) {
   char bytes[sizeof(T)];
@@ -17,7 +17,7 @@ void append_little_endian(std::string& out, T value) {
   out.append(bytes, sizeof(T));
 }
 
-/// A number that lies little-endian at `at`, which need not be aligned.
+/// Reads a little-endian number at `at`, which need not be aligned.
 template <class T>
 T load_little_endian(const char* at) {
   char bytes[sizeof(T)];

@@ -39,8 +39,8 @@ FileLock::FileLock(const std::filesystem::path& path) : path_(path) {
       ::close(std::exchange(descriptor_, -1));
       return;
     }
-    // A holder may have removed the name between our open and our lock: then what we hold is not
-    // what others will find.
+    // A holder may have removed the name between our open and our lock: then our lock is on a file
+    // that others will not find.
     struct stat ours {
     }, named{};
     if (::fstat(descriptor_, &ours) == 0 && ::stat(path.c_str(), &named) == 0 &&
@@ -70,8 +70,8 @@ FileLock& FileLock::operator=(FileLock&& other) noexcept {
 
 void FileLock::release() noexcept {
   if (descriptor_ < 0) return;
-  // The name goes first: whoever opens it from now on makes a new one. Where nothing can be locked
-  // it may be somebody else's.
+  // The name is removed first: anyone who opens it from now on creates a new file. Without working
+  // locks the file may belong to another process.
   if (exclusive_ || made_) ::unlink(path_.c_str());
   ::close(std::exchange(descriptor_, -1));
 }

@@ -7,8 +7,8 @@
 
 namespace terrace::stream {
 
-/// Holds SIGXFSZ back on this thread, so that a write beyond RLIMIT_FSIZE fails with EFBIG instead
-/// of ending the process; takes back the signal that the failed write has left pending.
+/// Blocks SIGXFSZ on this thread, so that a write beyond RLIMIT_FSIZE fails with EFBIG instead of
+/// ending the process; consumes the pending signal of the failed write.
 class FileSizeSignalBlock {
  public:
   FileSizeSignalBlock() {

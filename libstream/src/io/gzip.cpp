@@ -18,10 +18,10 @@ struct Free {
 };
 
 [[noreturn]] void refuse(const std::string& name, const std::string& cause) {
-  throw Error({.file = name, .where = "gzip", .cause = cause, .remedy = "make the file anew"});
+  throw Error({.file = name, .where = "gzip", .cause = cause, .remedy = "recreate the file"});
 }
 
-// The size that the last four bytes state, modulo 2^32.
+// The size stated in the last four bytes, modulo 2^32.
 std::uint64_t stated_size(std::span<const std::byte> bytes) {
   std::uint64_t size = 0;
   for (std::size_t i = 0; i < 4; ++i) {
@@ -53,7 +53,7 @@ std::vector<std::byte> gzip(std::span<const std::byte> bytes, int level) {
 
 std::vector<std::byte> gunzip(std::span<const std::byte> bytes, std::uint64_t most,
                               const std::string& name) {
-  if (!is_gzip(bytes) || bytes.size() < kLeast) refuse(name, "no gzip, or cut short");
+  if (!is_gzip(bytes) || bytes.size() < kLeast) refuse(name, "not gzip, or truncated");
   const std::uint64_t size = stated_size(bytes);
   if (size > most) {
     refuse(name, "states " + std::to_string(size) + " bytes, more than the " +
@@ -67,7 +67,7 @@ std::vector<std::byte> gunzip(std::span<const std::byte> bytes, std::uint64_t mo
   const libdeflate_result result = libdeflate_gzip_decompress_ex(
       decompressor.get(), bytes.data(), bytes.size(), out.data(), out.size(), &used, &made);
   if (result != LIBDEFLATE_SUCCESS || made != size || used != bytes.size()) {
-    refuse(name, "damaged: it does not unpack to what its checksum says");
+    refuse(name, "damaged: the contents do not match their checksum and size");
   }
   return out;
 }

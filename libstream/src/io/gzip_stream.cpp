@@ -16,7 +16,7 @@ namespace terrace::stream {
 namespace {
 
 constexpr std::size_t kPackedBytes = std::size_t{64} << 10;
-constexpr int kGzipOnly = 16;  // added to the bits of the window
+constexpr int kGzipOnly = 16;  // added to the number of window bits
 
 }  // namespace
 
@@ -45,7 +45,7 @@ void GzipStream::fail(const std::string& cause) const {
   throw Error({.file = name_,
                .where = "byte " + std::to_string(used_) + " of the gzip data",
                .cause = cause,
-               .remedy = "the file is damaged or cut off: get it anew"});
+               .remedy = "the file is damaged or truncated: obtain it again"});
 }
 
 bool GzipStream::refill(const Read& read) {
@@ -66,7 +66,7 @@ std::size_t GzipStream::read(char* to, std::size_t most, const Read& read) {
       inflateReset(&stream);
       in_member_ = true;
     }
-    if (begin_ == end_ && !refill(read)) fail("the data end before their gzip member does");
+    if (begin_ == end_ && !refill(read)) fail("the data ends within a gzip member");
     stream.next_in = reinterpret_cast<Bytef*>(packed_.data() + begin_);
     stream.avail_in = static_cast<uInt>(end_ - begin_);
     stream.next_out = reinterpret_cast<Bytef*>(to);

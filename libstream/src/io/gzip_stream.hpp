@@ -11,36 +11,36 @@
 
 namespace terrace::stream {
 
-/// Unpacks gzip (RFC 1952) as its bytes come, one member after another (as bgzip and `cat a.gz
-/// b.gz` write them). Holds 128 KiB.
+/// Decompresses gzip (RFC 1952) as its bytes arrive, one member after another (as written by bgzip
+/// and `cat a.gz b.gz`). Holds 128 KiB.
 class GzipStream {
  public:
-  /// Reads packed bytes, at most so many; 0 at their end.
+  /// Reads at most `most` compressed bytes; returns 0 at their end.
   using Read = std::function<std::size_t(char* to, std::size_t most)>;
 
-  /// name: of the input, for messages. first: packed bytes that have been read already.
+  /// name: of the input, for messages. first: compressed bytes that have already been read.
   explicit GzipStream(std::string name, std::string_view first = {});
   ~GzipStream();
   GzipStream(const GzipStream&) = delete;
   GzipStream& operator=(const GzipStream&) = delete;
 
-  /// Unpacked bytes, at least one unless they have ended. Requires: most > 0. Throws: Error, naming
-  /// the place in the packed bytes, if they are damaged, end within a member, or are followed by
-  /// what is no member; what `read` throws.
+  /// Decompressed bytes, at least one unless they have ended. Requires: most > 0. Throws: Error,
+  /// naming the position in the compressed bytes, if they are damaged, end within a member, or are
+  /// followed by something else than a member; whatever `read` throws.
   std::size_t read(char* to, std::size_t most, const Read& read);
 
  private:
   struct Inflater;
 
   [[noreturn]] void fail(const std::string& cause) const;
-  /// Reads more packed bytes behind those that are left; false at their end.
+  /// Reads more compressed bytes after those that are left; false at their end.
   bool refill(const Read& read);
 
   std::string name_;
   std::unique_ptr<Inflater> inflater_;
   std::vector<char> packed_;
-  std::size_t begin_ = 0, end_ = 0;  ///< of packed_, what has not been unpacked
-  std::uint64_t used_ = 0;           ///< packed bytes before begin_
+  std::size_t begin_ = 0, end_ = 0;  ///< in packed_: bytes not yet decompressed
+  std::uint64_t used_ = 0;           ///< compressed bytes before begin_
   bool in_member_ = true;
 };
 

@@ -24,7 +24,7 @@
 namespace terrace::stream {
 namespace {
 
-/// Pipes whose first bytes have been looked at: they cannot be opened again without losing them.
+/// Pipes whose first bytes have been read: they cannot be reopened without losing them.
 std::map<std::string, std::unique_ptr<Input>>& heads() {
   thread_local std::map<std::string, std::unique_ptr<Input>> kept;
   return kept;
@@ -37,8 +37,8 @@ std::string shown(const std::string& file) {
 int open_for_reading(const std::string& file) {
   if (file == kStandardStream) return STDIN_FILENO;
   struct stat status {};
-  // To open a pipe without O_NONBLOCK is to wait for its writer where no stop ends the wait. poll()
-  // waits for it too.
+  // Opening a pipe without O_NONBLOCK would wait for its writer without reacting to a stop. poll()
+  // waits for the writer too.
   const bool pipe = ::stat(file.c_str(), &status) == 0 && S_ISFIFO(status.st_mode);
   const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | (pipe ? O_NONBLOCK : 0));
   if (fd < 0) throw system_error(file, "cannot open", errno, "check the name and its permissions");
@@ -54,7 +54,7 @@ class Input::Descriptor {
       : fd_(open_for_reading(file)), owned_(file != kStandardStream) {
     struct stat status {};
     if (::fstat(fd_, &status) == 0 && S_ISREG(status.st_mode)) {
-      // Standard input that is a file may have been read before: what is left counts.
+      // Standard input from a file may already have been read in part: only the rest counts.
       const off_t at = owned_ ? 0 : std::max<off_t>(0, ::lseek(fd_, 0, SEEK_CUR));
       size_ = static_cast<std::uint64_t>(std::max<off_t>(0, status.st_size - at));
       ::posix_fadvise(fd_, 0, 0, POSIX_FADV_SEQUENTIAL);
@@ -104,14 +104,14 @@ class Input::Descriptor {
   [[nodiscard]] bool skip(std::uint64_t count) const {
     return ::lseek(fd_, static_cast<off_t>(count), SEEK_CUR) >= 0;
   }
-  /// Known for a regular file only.
+  /// Known only for a regular file.
   [[nodiscard]] std::optional<std::uint64_t> size() const { return size_; }
 
  private:
   int fd_;
   bool owned_;
   std::optional<std::uint64_t> size_;
-  std::optional<StopWaiter> waiter_;  ///< of all but regular files, which never keep one waiting
+  std::optional<StopWaiter> waiter_;  ///< for everything except regular files, which never block
 };
 
 Input::Input(const std::string& file, const std::stop_token& stop, std::size_t at_once,
@@ -129,7 +129,7 @@ Input::Input(const std::string& file, const std::stop_token& stop, std::size_t a
   buffer_.resize(at_once);
   looked_at_ = packed == Packed::as_it_is;
   if (looked_at_ || !size_)
-    return;  // a pipe is not looked at before it is read: it may have no writer yet
+    return;  // not checked before the first read: a pipe may have no writer yet
   looked_at_ = true;
   if (descriptor_->begins_as_gzip()) {
     size_.reset();

@@ -15,7 +15,7 @@ bool LineReader::next(std::string_view& line) {
   while (length == std::string_view::npos) {
     const std::size_t searched = window.size();
     if (searched <= kMaxLine) window = input_->fill(searched + 1);
-    if (window.size() == searched) {  // the last line, or one that never ends
+    if (window.size() == searched) {  // the last line, or one without an end
       if (searched == 0) return false;
       length = searched;
       line_end = 0;
@@ -27,7 +27,7 @@ bool LineReader::next(std::string_view& line) {
     throw Error({.file = input_->name(),
                  .where = "line " + std::to_string(number_ + 1),
                  .cause = "longer than " + std::to_string(kMaxLine) + " bytes",
-                 .remedy = "this is no text of points, or its line ends are missing"});
+                 .remedy = "this is not a text of points, or its line ends are missing"});
   }
   pending_ = length + line_end;
   ++number_;

@@ -9,36 +9,37 @@
 
 namespace terrace::stream {
 
-/// The lines of a text, in a window of bounded size. Lines end in LF or CR LF; the last needs none.
+/// The lines of a text, in a window of bounded size. Lines end in LF or CR LF; the last needs no
+/// end.
 class LineReader {
  public:
-  /// Longest line in bytes; a longer one is an Error, for it would have to be held whole.
+  /// Maximum length of a line in bytes; a longer one is an Error, as a line is held in memory.
   static constexpr std::size_t kMaxLine = 64u << 10;
 
-  /// `input` must outlive the reader; nobody else may move it between two lines.
+  /// `input` must outlive the reader and not be moved by others between two lines.
   explicit LineReader(Input& input) : input_(&input) {}
 
-  /// The next line without its end; false when there is none. `line` is valid until the next call.
+  /// The next line without its end; false if there is none. `line` is valid until the next call.
   /// Throws: Error if the line is longer than kMaxLine or cannot be read.
   bool next(std::string_view& line);
-  /// Makes the next call of next() return the line last returned once more.
+  /// Makes the next call of next() return the last line again.
   void hold() {
     pending_ = 0;
     --number_;
   }
-  /// Moves past one line of any length that is not blank; false when there is none.
+  /// Skips one line of any length that is not blank; false if there is none.
   bool skip();
-  /// Moves the input past the line last returned, which then is no longer valid.
+  /// Moves the input past the last line, which is then invalid.
   void release() {
     input_->consume(pending_);
     pending_ = 0;
   }
-  /// Number of the line last returned, counted from 1.
+  /// Number of the last line, counted from 1.
   [[nodiscard]] std::uint64_t number() const { return number_; }
 
  private:
   Input* input_;
-  std::size_t pending_ = 0;  ///< bytes of the line last returned, its end included
+  std::size_t pending_ = 0;  ///< bytes of the last line, including its end
   std::uint64_t number_ = 0;
 };
 

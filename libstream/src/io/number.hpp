@@ -8,16 +8,17 @@
 
 namespace terrace::stream {
 
-/// Most characters append_number() adds: the shortest form of a double has at most 24.
+/// Maximum number of characters that append_number() adds: the shortest form of a double has at
+/// most 24.
 inline constexpr std::size_t kMaxNumber = 32;
 
 /// True if the decimal number in `text`, known to be out of a floating type's range, is too small
 /// rather than too large.
 bool is_underflow(std::string_view text);
 
-/// Reads the number that starts at `at`, rounded correctly to T (float or double); a leading '+' is
-/// allowed. Returns the place after it, or null if there is no number or it is too large. What is
-/// too small becomes zero. Never looks at `end` or beyond; does not depend on the locale.
+/// Reads the number that starts at `at`, correctly rounded to T (float or double); a leading '+' is
+/// allowed. Returns the position after it, or null if there is no number or it is too large. Values
+/// that underflow become zero. Never reads at `end` or beyond; does not depend on the locale.
 template <class T>
 const char* parse_real(const char* at, const char* end, T& value) {
   if (at != end && *at == '+') {

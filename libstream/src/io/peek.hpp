@@ -8,17 +8,17 @@
 
 namespace terrace::stream {
 
-/// True for a file that can be opened again from its start; false for pipes and standard input.
+/// True for a file that can be reopened from its start; false for pipes and standard input.
 bool is_rereadable(const std::string& file);
 
-/// True for a rereadable file whose bytes can be read at any place as they are: not gzip.
+/// True for a rereadable file that allows random access: not gzip.
 bool is_seekable(const std::string& file);
 
-/// The first bytes of a file (of gzip unpacked, see Input), at most `most`. What is read from a
-/// pipe is kept for the next Input of that name on this thread, or until drop_heads(). Throws:
+/// The first bytes of a file (decompressed, if gzip; see Input), at most `most`. Bytes read from a
+/// pipe are kept for the next Input of that name on this thread, or until drop_heads(). Throws:
 /// Error if the file cannot be opened or read, Stopped.
 std::vector<char> peek_head(const std::string& file, std::size_t most, const std::stop_token& stop);
-/// Forgets what peek_head() has kept and nobody has taken.
+/// Forgets unused bytes kept by peek_head().
 void drop_heads();
 
 }  // namespace terrace::stream

@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::size_t kPendingBytes = 64u << 10;
 
-/// True where a write may have to wait for another program or a person.
+/// True if a write may block on another program or a person.
 bool may_wait(int descriptor) {
   struct stat status {};
   if (::fstat(descriptor, &status) != 0) return false;
@@ -55,7 +55,7 @@ void Sink::write_at(std::uint64_t offset, std::string_view text) {
 
 void Sink::flush() {
   for (std::string_view left = pending_; !left.empty();) {
-    // A pipe that is ready takes so many bytes at once; with more the write itself would wait.
+    // A pipe that is ready accepts this many bytes at once; a larger write could block.
     const std::size_t most = waiter_ ? PIPE_BUF : left.size();
     if (waiter_) waiter_->wait(STDOUT_FILENO, POLLOUT);
     const ssize_t written = ::write(STDOUT_FILENO, left.data(), std::min(left.size(), most));

@@ -17,7 +17,7 @@
 namespace terrace::stream {
 namespace {
 
-/// A file that never had a name, or whose name is gone at once where the file system knows no such.
+/// A file without a name; if the file system does not support that, the name is removed at once.
 int open_nameless(std::filesystem::path folder) {
   if (folder.empty()) {
     std::error_code error;

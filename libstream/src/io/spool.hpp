@@ -11,25 +11,25 @@
 
 namespace terrace::stream {
 
-/// A temporary file without a name: what it takes is free again as soon as the object goes, however
-/// the process ends. Holds what can only be read front to back (packed files, text, pipes) where it
-/// is needed at any place.
+/// A temporary file without a name: its space is freed when the object is destroyed or the process
+/// ends in any way. Holds data that can only be read front to back (compressed files, text, pipes)
+/// but is needed with random access.
 class Spool final : public ByteSource {
  public:
-  /// name: of what is spooled, for messages. folder: where; empty: $TMPDIR or /tmp.
-  /// Throws: Error if no file can be made.
+  /// name: of the spooled input, for messages. folder: where; empty: $TMPDIR or /tmp. Throws: Error
+  /// if the file cannot be created.
   explicit Spool(std::string name, const std::filesystem::path& folder = {});
   ~Spool() override;
   Spool(const Spool&) = delete;
   Spool& operator=(const Spool&) = delete;
 
-  /// Throws: Error, if the disk is full above all.
+  /// Throws: Error, usually because the disk is full.
   void append(std::span<const std::byte> bytes) { write(size_, bytes); }
-  /// Writes at any place; what is skipped reads as zero.
+  /// Writes at any position; gaps read as zero.
   void write(std::uint64_t offset, std::span<const std::byte> bytes);
 
   [[nodiscard]] const std::string& name() const override { return name_; }
-  /// A name by which this process can open it, for what takes names only.
+  /// A name by which this process can open the file, for interfaces that need a name.
   [[nodiscard]] std::string path() const { return "/proc/self/fd/" + std::to_string(descriptor_); }
   [[nodiscard]] std::uint64_t size() const override { return size_; }
   void read(std::uint64_t offset, std::span<std::byte> out) const override;

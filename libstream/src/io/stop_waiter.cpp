@@ -16,7 +16,7 @@ StopWaiter::StopWaiter(const std::stop_token& stop) : stop_(stop) {
   if (!stop.stop_possible()) return;
   std::array<int, 2> ends{};
   if (::pipe(ends.data()) != 0) {
-    throw system_error({}, "cannot make a pipe", errno, "close files or raise ulimit -n");
+    throw system_error({}, "cannot create a pipe", errno, "close files or raise ulimit -n");
   }
   read_end_ = ends[0];
   write_end_ = ends[1];
@@ -39,10 +39,10 @@ void StopWaiter::wait(int descriptor, short events) const {
     if (stop_.stop_requested()) throw Stopped();
     std::array<pollfd, 2> waiting{};
     waiting[0] = {.fd = descriptor, .events = events, .revents = 0};
-    waiting[1] = {.fd = read_end_, .events = POLLIN, .revents = 0};  // below 0: not looked at
+    waiting[1] = {.fd = read_end_, .events = POLLIN, .revents = 0};  // below 0: ignored
     const int ready = ::poll(waiting.data(), waiting.size(), -1);
     if (stop_.stop_requested()) throw Stopped();
-    // A poll that fails for another reason than a signal leaves it to the read to tell why.
+    // If poll fails for a reason other than a signal, the following read reports the cause.
     if (ready < 0 && errno != EINTR) return;
     if (waiting[0].revents != 0) return;
   }

@@ -7,7 +7,7 @@
 
 namespace terrace::stream {
 
-/// Waits for a descriptor to be ready, or for a stop.
+/// Waits until a descriptor is ready, or for a stop.
 class StopWaiter {
  public:
   /// Throws: Error if there are too many open files.
@@ -17,7 +17,7 @@ class StopWaiter {
   StopWaiter& operator=(const StopWaiter&) = delete;
 
   /// Returns when `descriptor` is ready for `events` of poll(), or has ended or failed, which the
-  /// next read or write tells. Throws: Stopped.
+  /// next read or write reports. Throws: Stopped.
   void wait(int descriptor, short events) const;
 
  private:

@@ -21,7 +21,7 @@ namespace terrace::stream {
 namespace fs = std::filesystem;
 namespace {
 
-/// File systems take names of 255 bytes at most: a hash (64-bit FNV-1a) stands for a long one.
+/// File systems limit names to 255 bytes: a hash (64-bit FNV-1a) replaces a long name.
 std::string prefix_of(const fs::path& target) {
   constexpr std::size_t kMostNamed = 200;
   std::string name = target.filename().string();
@@ -44,7 +44,7 @@ bool nothing_at(const fs::path& path) {
   return ::lstat(path.c_str(), &status) != 0 && errno == ENOENT;
 }
 
-/// PID or PID-ATTEMPT. Keeps `a` and `a.tmp-b` apart, whose prefixes begin alike.
+/// PID or PID-ATTEMPT. Distinguishes `a` from `a.tmp-b`, whose prefixes begin alike.
 bool is_number_of_writer(std::string_view text) {
   const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
   const std::size_t dash = std::min(text.find('-'), text.size());
@@ -53,7 +53,7 @@ bool is_number_of_writer(std::string_view text) {
          (attempt.empty() || std::all_of(attempt.begin() + 1, attempt.end(), is_digit));
 }
 
-/// The temporaries beside `target`, whole or in part, without their endings.
+/// The temporary files of `target`, complete or partial, without their endings.
 std::set<std::string> temporaries_of(const fs::path& target) {
   const std::string prefix = prefix_of(target);
   std::set<std::string> names;
@@ -73,18 +73,18 @@ fs::path with_ending(const fs::path& path, const char* ending) {
   return fs::path(path).concat(ending);
 }
 
-/// The lock of a temporary; not exclusive if its writer lives or may live.
+/// The lock of a temporary file; not exclusive if its writer is or may be alive.
 FileLock lock_of_dead(const fs::path& temporary) {
   std::error_code error;
   const fs::file_status status = fs::symlink_status(temporary, error);
   try {
     return FileLock(fs::is_regular_file(status) ? temporary : with_ending(temporary, kLockEnding));
   } catch (const Error&) {
-    return {};  // somebody else's, or not to be written
+    return {};  // it belongs to another process, or is not writable
   }
 }
 
-/// Whether a folder is still a whole store: its manifest is the first file to go.
+/// Whether a folder is still a complete store: its manifest is removed first.
 bool has_manifest(const fs::path& folder) {
   std::error_code ignored;
   return fs::is_regular_file(folder / kManifestName, ignored);
@@ -98,7 +98,7 @@ bool put_back(const fs::path& replaced, const fs::path& target) {
 }  // namespace
 
 fs::path follow_links(fs::path path) {
-  constexpr int kMostLinks = 40;  // as Linux
+  constexpr int kMostLinks = 40;  // the same as Linux
   for (int links = 0; links <= kMostLinks; ++links) {
     std::error_code error;
     const fs::path next = fs::read_symlink(path, error);
@@ -124,9 +124,9 @@ void sweep_temporaries(const fs::path& target) {
     if (!lock.exclusive()) continue;
     const fs::path replaced = with_ending(temporary, kReplacedEnding);
     put_back(replaced, target);
-    // Unless nothing else bears the name and putting it back has failed.
+    // Unless no other file has the name and restoring it has failed.
     if (!nothing_at(target) || !has_manifest(replaced)) remove_store_folder(replaced);
-    // A file goes with its lock.
+    // A file is removed with its lock.
     std::error_code ignored;
     if (fs::is_directory(fs::symlink_status(temporary, ignored))) remove_store_folder(temporary);
   }
@@ -150,7 +150,8 @@ int rename_exclusively(const fs::path& from, const fs::path& to) {
   if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return 0;
   if (errno != EINVAL && errno != ENOSYS) return errno;
 #endif
-  // Without it an empty folder that appears just now would be replaced; anything else would not.
+  // Without this check an empty folder that has just appeared would be replaced; anything else
+  // would not.
   if (!nothing_at(to)) return EEXIST;
   return ::rename(from.c_str(), to.c_str()) == 0 ? 0 : errno;
 }

@@ -10,21 +10,21 @@ namespace terrace::stream {
 /// A blank inside a line.
 inline bool is_blank(char c) { return c == ' ' || c == '\t'; }
 
-/// A blank, or what ends a line.
+/// A blank or a line end.
 inline bool is_white_space(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
 /// ASCII letters in lower case.
 std::string lower_case(std::string text);
 
-/// `line` from its first character that is no blank.
+/// `line` from its first nonblank character.
 inline std::string_view trim_left(std::string_view line) {
   while (!line.empty() && is_blank(line.front())) line.remove_prefix(1);
   return line;
 }
 /// `line` without the blanks at both ends.
 std::string_view trim(std::string_view line);
-/// The fields of a line, blanks around them removed. The separator ' ' stands for runs of blanks.
+/// The fields of a line, with surrounding blanks removed. The separator ' ' means runs of blanks.
 std::vector<std::string_view> split_fields(std::string_view line, char separator);
-/// `text` made fit for an error message: in quotes, cut to 40 characters, nothing unprintable.
+/// `text` prepared for an error message: in quotes, cut to 40 characters, without unprintable ones.
 std::string in_quotes(std::string_view text);
 
 }  // namespace terrace::stream

@@ -10,24 +10,24 @@
 #include "laz/bytes.hpp"
 #include "laz/models.hpp"
 
-/// The arithmetic coder: an interval of 32 bits that is narrowed symbol by symbol and leaves byte
-/// by byte. SymbolDecoder and SymbolEncoder have the same functions, so that what is coded is
-/// written down once: the encoder's return what they are given, the decoder's what they decode.
-/// Source: A. Said, Introduction to arithmetic coding, HPL-2004-76.
+/// The arithmetic coder: an interval of 32 bits that is narrowed symbol by symbol and emitted byte
+/// by byte. SymbolDecoder and SymbolEncoder have the same functions, so that each coding is written
+/// once: the encoder's functions return their argument, the decoder's the decoded value. Source: A.
+/// Said, Introduction to arithmetic coding, HPL-2004-76.
 
 namespace terrace::stream::laz {
 
-/// reserve() must be called at least once per so many coded bytes. A symbol or bit takes at most 2,
-/// raw bits at most 3 per 19.
+/// reserve() must be called at least once per this many coded bytes. A symbol or bit takes at most
+/// 2, raw bits at most 3 per 19.
 inline constexpr std::size_t kReserve = 64;
-/// Bytes that the end of a stream adds, which are those that a decoder reads ahead.
+/// Bytes added at the end of a stream, which are those that a decoder reads ahead.
 inline constexpr std::size_t kStreamEnds = 4;
 
 inline constexpr std::uint32_t kMostLength = 0xffffffff;
 inline constexpr std::uint32_t kLeastLength = 1u << 24;
 
-/// The bytes that a decoder reads. Its inner loop does not check for their end: near it, reserve()
-/// moves on to a copy of the last few with zeros behind.
+/// The bytes read by a decoder. Its inner loop does not check for their end: near it, reserve()
+/// switches to a copy of the last few followed by zeros.
 struct CodedBytes {
   std::span<const std::uint8_t> stream;
   std::uint64_t origin = 0;  ///< offset of the stream in the chunk, for errors
@@ -36,8 +36,8 @@ struct CodedBytes {
   std::array<std::uint8_t, 2 * kReserve> tail{};
 };
 
-/// Decodes a stream. Works on a copy of itself in inner loops, which the compiler can keep in
-/// registers; `bytes` stays where it is.
+/// Decodes a stream. Inner loops work on a copy of it, which the compiler can keep in registers;
+/// `bytes` stays in place.
 class SymbolDecoder {
  public:
   static constexpr bool kDecoding = true;
@@ -46,11 +46,11 @@ class SymbolDecoder {
   /// Begins a stream. Throws: Corrupt unless it has 4 bytes.
   void begin(CodedBytes& bytes, std::span<const std::uint8_t> stream, std::uint64_t origin,
              ChunkNumber chunk);
-  /// Goes on with the stream in other memory, from offset() on.
+  /// Continues the stream in other memory, from offset() on.
   void resume(CodedBytes& bytes, std::span<const std::uint8_t> stream, std::uint64_t origin);
-  /// How many bytes of the span given last are used up; more than it has if they do not suffice.
+  /// Number of consumed bytes of the current span; more than it has if they do not suffice.
   [[nodiscard]] std::size_t offset() const { return offset(*bytes_, next_); }
-  /// Throws: Corrupt unless all bytes are used up; with `open`, only if they do not suffice.
+  /// Throws: Corrupt unless all bytes are consumed; with `open`, only if they do not suffice.
   void check_used(bool open) const;
   /// True if `size` bytes are left. Requires size >= kReserve.
   [[nodiscard]] bool has(std::size_t size) const {
@@ -69,7 +69,7 @@ class SymbolDecoder {
       model.begin(chunk_, symbols);
     const std::uint32_t unit = length_ >> kSymbolBits;
     // Many values hardly ever change: the likeliest symbol is tried first, without a division and
-    // with a branch that the processor predicts.
+    // with a branch that the processor predicts well.
     unsigned symbol = model.likely;
     std::uint32_t begin = model.from[symbol] * unit;
     std::uint32_t end = symbol + 1 == symbols ? length_ : model.from[symbol + 1] * unit;
@@ -145,13 +145,13 @@ class SymbolDecoder {
   }
 
   const std::uint8_t* next_ = nullptr;
-  const std::uint8_t* limit_ = nullptr;  ///< from where reserve() has something to do
+  const std::uint8_t* limit_ = nullptr;  ///< from here on reserve() has work to do
   std::uint32_t value_ = 0, length_ = 0;
   ChunkNumber chunk_ = 0;
   CodedBytes* bytes_ = nullptr;
 };
 
-/// Encodes a stream; works on a copy of itself in inner loops as SymbolDecoder does.
+/// Encodes a stream; inner loops work on a copy of it, as with SymbolDecoder.
 class SymbolEncoder {
  public:
   static constexpr bool kDecoding = false;
@@ -226,7 +226,7 @@ class SymbolEncoder {
       length_ <<= 8;
     }
   }
-  /// Adds one to the number that the bytes before `next` are; it never overflows.
+  /// Adds one to the number formed by the bytes before `next`; it cannot overflow.
   TERRACE_LAZ_INLINE static void carry(std::uint8_t* next) {
     do --next;
     while (++*next == 0);

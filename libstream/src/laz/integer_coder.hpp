@@ -10,17 +10,17 @@
 namespace terrace::stream::laz {
 
 /// Models of integers of 8, 16 or 32 bits that are coded as corrections of a prediction, modulo
-/// 2^Bits. A correction's magnitude k is adaptive in the caller's context; what places it in
-/// (2^(k-1), 2^k] or its mirror image [-2^k + 1, -2^(k-1)] is adaptive in its upper 8 bits.
+/// 2^Bits. A correction's magnitude k is adaptive in the caller's context; its position within
+/// (2^(k-1), 2^k] or the mirror image [-2^k + 1, -2^(k-1)] is adaptive in its upper 8 bits.
 template <unsigned Bits, unsigned Contexts>
 struct IntegerModels {
-  std::uint32_t magnitude;  ///< k of the number coded last
-  BitModel zero_or_one;     ///< what the correction is where k is 0
+  std::uint32_t magnitude;  ///< k of the last coded number
+  BitModel zero_or_one;     ///< the correction if k is 0
   std::array<SymbolModel<Bits + 1>, Contexts> magnitudes;
-  /// By k - 1, 2^min(k, 8) symbols. 2^31 is not followed by any.
+  /// By k - 1, 2^min(k, 8) symbols. 2^31 is followed by none.
   std::array<SymbolModel<256>, (Bits < 32 ? Bits : 31)> corrections;
 
-  /// Codes `value`, which decoding ignores, and returns it; of 8 and 16 bits as a number from 0.
+  /// Codes `value`, which decoding ignores, and returns it; for 8 and 16 bits as a number from 0.
   template <class Coder>
   TERRACE_LAZ_INLINE std::int32_t code(Coder& coder, std::int32_t predicted, std::int32_t value,
                                        unsigned context) {
@@ -30,7 +30,7 @@ struct IntegerModels {
   template <class Coder>
   TERRACE_LAZ_INLINE std::int32_t code(Coder& coder, std::int32_t predicted, std::int32_t value,
                                        SymbolModel<Bits + 1>& magnitudes_of_context) {
-    std::uint32_t correction = 0;  // of two's complement
+    std::uint32_t correction = 0;  // in two's complement
     unsigned k = 0;
     if constexpr (!Coder::kDecoding) {
       correction = static_cast<std::uint32_t>(value) - static_cast<std::uint32_t>(predicted);

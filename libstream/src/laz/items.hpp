@@ -10,9 +10,9 @@
 #include "laz/coder.hpp"
 #include "laz/integer_coder.hpp"
 
-/// What pointwise and layered chunks code alike. Each function codes a part of a record by the
-/// models of its struct. Values to encode are parameters, which decoding ignores; both directions
-/// return the value.
+/// The parts that pointwise and layered chunks code alike. Each function codes a part of a record
+/// with the models of its struct. Values to encode are parameters, which decoding ignores; both
+/// directions return the value.
 
 namespace terrace::stream::laz {
 
@@ -36,8 +36,8 @@ TERRACE_LAZ_INLINE std::uint8_t low_byte(unsigned value) {
   return static_cast<std::uint8_t>(value);
 }
 
-/// LASzip's running median of differences: five sorted values, of which the highest and lowest take
-/// turns in making room for a new one.
+/// LASzip's running median of differences: five sorted values; a new one replaces the highest and
+/// the lowest in turn.
 struct Median5 {
   std::array<std::int32_t, 5> sorted;
   bool drop_highest;
@@ -56,7 +56,7 @@ struct Median5 {
   }
 };
 
-/// The contexts of a correction of Y by the magnitude k of X's; of Z by the mean of both.
+/// The contexts of a correction of Y by the magnitude k of that of X; of Z by the mean of both.
 TERRACE_LAZ_INLINE unsigned y_context(unsigned k, bool single) {
   return (single ? 1 : 0) + (k < 20 ? k & ~1u : 20);
 }
@@ -64,7 +64,7 @@ TERRACE_LAZ_INLINE unsigned z_context(unsigned k, bool single) {
   return (single ? 1 : 0) + (k < 18 ? k & ~1u : 18);
 }
 
-/// Codes a coordinate by the median of the steps before.
+/// Codes a coordinate by the median of the previous steps.
 template <class Coder, class Models, class Median>
 TERRACE_LAZ_INLINE void code_step(Coder& coder, Models& models, Median& steps, unsigned context,
                                   const std::uint8_t* last, typename Coder::Record now) {
@@ -76,22 +76,23 @@ TERRACE_LAZ_INLINE void code_step(Coder& coder, Models& models, Median& steps, u
   steps.add(step);
 }
 
-/// GPS times, as the 64-bit patterns of the doubles: up to four sequences that take turns, each of
-/// which goes on by multiples of a difference. Layered chunks have no symbol for an unchanged time.
+/// GPS times, as the 64-bit patterns of the doubles: up to four alternating sequences, each of
+/// which continues by multiples of a difference. Layered chunks have no symbol for an unchanged
+/// time.
 template <bool kLayered>
 struct GpsTime {
-  static constexpr unsigned kUnchanged = kLayered ? 0 : 1;  ///< how many symbols mean that
+  static constexpr unsigned kUnchanged = kLayered ? 0 : 1;  ///< number of symbols for that
   static constexpr int kMostMultiple = 500, kLeastMultiple = -10;
   static constexpr unsigned kMultiples = kMostMultiple - kLeastMultiple + 1;
-  /// Behind the multiples and "unchanged": a time in full, then the sequences 1 to 3 further on.
+  /// After the multiples and "unchanged": a time in full, then the sequences 1 to 3 further on.
   static constexpr unsigned kFull = kMultiples + kUnchanged;
 
-  SymbolModel<5 + kUnchanged> first;  ///< where a sequence has no difference yet
+  SymbolModel<5 + kUnchanged> first;  ///< if a sequence has no difference yet
   SymbolModel<515 + kUnchanged> multiple;
   IntegerModels<32, 9> integers;
   std::array<std::uint64_t, 4> time;
   std::array<std::int32_t, 4> difference;
-  std::array<unsigned, 4> extremes;  ///< in a row, differences out of the range of multiples
+  std::array<unsigned, 4> extremes;  ///< consecutive differences out of the range of multiples
   unsigned current, newest;
 
   void begin(std::uint64_t time_of_first) {
@@ -103,7 +104,7 @@ struct GpsTime {
 
   template <class Coder>
   TERRACE_LAZ_INLINE std::uint64_t code(Coder& coder, std::uint64_t value) {
-    // How many sequences further on the one is that `value` continues; 4: in none of them.
+    // How many sequences further on is the one continued by `value`; 4: none of them.
     unsigned turns = 0;
     if constexpr (!Coder::kDecoding) {
       while (turns < 4 && !fits(value - time[(current + turns) & 3])) ++turns;
@@ -157,7 +158,7 @@ struct GpsTime {
   std::uint64_t advance(std::int32_t by) {
     return time[current] += static_cast<std::uint64_t>(static_cast<std::int64_t>(by));
   }
-  /// The nearest multiple; rounded as LASzip does, so that the bytes are the same.
+  /// The nearest multiple, rounded as in LASzip, so that the bytes are the same.
   static unsigned multiple_symbol(std::int32_t ahead, std::int32_t step) {
     const double ratio = static_cast<float>(ahead) / static_cast<float>(step);
     const double bounded = std::clamp(ratio, kLeastMultiple - 1.0, kMostMultiple + 1.0);
@@ -204,7 +205,8 @@ struct GpsTime {
   }
 };
 
-/// Colours, byte by byte: red after the point before, green after red's change, blue after both.
+/// Colours, byte by byte: red relative to the previous point, green relative to red's change, blue
+/// to both.
 struct Rgb {
   using Value = std::array<std::uint16_t, 3>;
 
@@ -257,12 +259,13 @@ struct Rgb {
   }
 };
 
-/// Wave packets: index, place and size in the file of waveforms, and where the return is in them.
+/// Wave packets: index, position and size in the file of waveforms, and the position of the return
+/// in them.
 struct WavePacket {
   static constexpr std::size_t kSize = 29;
 
   SymbolModel<256> index;
-  std::array<SymbolModel<4>, 4> ways;  ///< by the way of the point before
+  std::array<SymbolModel<4>, 4> ways;  ///< by that of the previous point
   IntegerModels<32, 1> offset_change, packet_size, return_place;
   IntegerModels<32, 3> direction;
   std::int32_t last_change;

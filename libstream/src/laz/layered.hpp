@@ -14,9 +14,10 @@
 #include "laz/layout.hpp"
 #include "terrace/stream/laz.hpp"
 
-/// Layered chunks, point formats 6 to 10: each attribute has a stream of its own, so that it can be
-/// skipped. What the others depend on is in the first layer: returns, scanner channel, and which of
-/// them change. Points go in runs of a few hundred through one layer after the other.
+/// Layered chunks, point formats 6 to 10: each attribute has a separate stream, so that it can be
+/// skipped. The first layer holds everything on which the others depend: returns, scanner channel,
+/// and which of them change. Points pass in runs of a few hundred through one layer after the
+/// other.
 
 namespace terrace::stream::laz {
 
@@ -55,7 +56,7 @@ enum Layer : std::size_t {
   kUserDataLayer,
   kSourceLayer,
   kTimeLayer,
-  kItemLayers,  ///< from here on those of the items behind the point
+  kItemLayers,  ///< the layers of the items after the point start here
 };
 
 inline std::size_t layer_count(const RecordLayout& layout) {
@@ -84,7 +85,7 @@ struct Channel14 {
   IntegerModels<16, 1> source;
   GpsTime<true> time;
 
-  // The items behind the point; a point's channel is not always the one whose models they use.
+  // The items after the point; the channel whose models they use is not always the point's.
   Rgb rgb;
   Rgb::Value last_rgb;
   SymbolModel<4> nir_changed;
@@ -110,12 +111,12 @@ class Layered {
 
   struct LayerCoder {
     Coder coder;
-    /// Decoding: whether the layer is there and wanted. Encoding: whether it has to be there.
+    /// Decoding: whether the layer exists and is wanted. Encoding: whether it must exist.
     bool used = false;
   };
   std::vector<LayerCoder> coders;
 
-  /// Begins a chunk with its first record; the layers' coders are the caller's to begin.
+  /// Begins a chunk with its first record; the caller must begin the layers' coders.
   void begin(const std::uint8_t* first) {
     known_.fill(false);
     current_ = channel_of(first);
@@ -168,17 +169,17 @@ class Layered {
                                kClassification = 16, kUserData = 17, kScanAngle = 18, kSource = 20,
                                kTime = 22, kSize = 30;
 
-  /// What the layers behind the first need to know of a point.
+  /// The data of a point that the layers after the first need.
   struct Point {
-    const std::uint8_t* last;  ///< the record that it is predicted from
+    const std::uint8_t* last;  ///< the record from which it is predicted
     std::uint8_t channel;
-    bool new_channel;    ///< begins with the values of `last`
+    bool new_channel;    ///< it begins with the values of `last`
     std::uint8_t level;  ///< of Z
     std::uint8_t z_context;
     std::uint8_t place;  ///< 2 for a first return, + 1 for a last
     bool time_changed, angle_changed, source_changed;
-    /// Channels whose models, and whose last value, the items behind the point use; and the one
-    /// that the last value is copied from to the former first.
+    /// The channels whose models and whose last value the items after the point use, and the one
+    /// from which the last value is first copied.
     std::uint8_t item_models, item_last, item_origin;
   };
 
@@ -187,7 +188,7 @@ class Layered {
     return last_extra_.data() + channel * layout_.extra_bytes;
   }
 
-  /// The first layer's part of a new channel; the others begin theirs when they get there.
+  /// Begins the first layer's part of a new channel; the others begin theirs when they get there.
   void begin_channel(unsigned channel) {
     known_[channel] = true;
     Channel14& models = channels_[channel];
@@ -359,9 +360,9 @@ class Layered {
     }
   }
 
-  /// Which channel's models and last values the items behind the point use. Version 3 has
-  /// two errors of the original software: where the channel does not change it uses channel 0's
-  /// models, and where it changes it reads and replaces the last value of the channel before.
+  /// Determines the channel whose models and last values the items after the point use. Version 3
+  /// has two errors of the original software: if the channel does not change it uses channel 0's
+  /// models, and if it changes it reads and replaces the last value of the previous channel.
   void place_items(Point& point, bool channel_changed) {
     const bool mended = layout_.version >= 4;
     const auto wanted = static_cast<std::uint8_t>(mended || channel_changed ? current_ : 0);
@@ -547,7 +548,7 @@ class Layered {
   Zeroed<Channel14> channels_;
   Zeroed<SymbolModel<256>> extra_;        ///< by channel and byte
   std::vector<std::uint8_t> last_extra_;  ///< likewise
-  std::vector<std::uint8_t> last_;        ///< by channel: records kept from call to call
+  std::vector<std::uint8_t> last_;        ///< by channel: records kept between calls
   std::array<const std::uint8_t*, kChannels> predecessors_{};  ///< the last record of each
   std::array<bool, kChannels> known_{}, item_known_{};
   unsigned current_ = 0, item_current_ = 0;

@@ -23,8 +23,8 @@
 
 namespace terrace::stream::laz {
 
-/// Models lie in zeroed memory and begin afresh when they are first used in a chunk, whose number
-/// (from 1 on) they keep: most contexts never occur, so nothing is spent on their models.
+/// Models are in zeroed memory and are initialised when they are first used in a chunk, whose
+/// number (from 1 on) they store: most contexts never occur, so nothing is spent on their models.
 using ChunkNumber = std::uint64_t;
 
 struct Free {
@@ -33,7 +33,7 @@ struct Free {
 template <class T>
 using Zeroed = std::unique_ptr<T[], Free>;
 
-/// `count` objects of zero bytes. Pages of the system that are never touched take no memory.
+/// `count` objects of zero bytes. Pages that are never touched take no memory.
 template <class T>
 Zeroed<T> make_zeroed(std::size_t count) {
   static_assert(std::is_trivially_default_constructible_v<T>);
@@ -45,23 +45,23 @@ Zeroed<T> make_zeroed(std::size_t count) {
 /// Intervals of symbols are in units of 2^-kSymbolBits.
 inline constexpr unsigned kSymbolBits = 15;
 
-/// A model of at most `Capacity` symbols; the caller passes how many there are, `symbols`, each
+/// A model of at most `Capacity` symbols; the caller passes the actual number, `symbols`, each
 /// time.
 template <unsigned Capacity>
 struct SymbolModel {
   /// A decoder looks up the first candidate by the upper bits of the value, and compares eight
-  /// symbols at once from there on. Values can exceed 2^15 by 63, so there is one bucket more.
+  /// symbols at once from there on. Values can exceed 2^15 by 63, so there is one extra bucket.
   static constexpr unsigned kLanes = 8;
   static constexpr unsigned kBucketBits = Capacity <= kLanes ? 0 : std::bit_width(Capacity - 1) - 1;
   using Candidate = std::conditional_t<(Capacity > 256), std::uint16_t, std::uint8_t>;
 
   ChunkNumber born;
-  std::uint32_t until;  ///< symbols to come before the next update
+  std::uint32_t until;  ///< symbols until the next update
   std::uint32_t cycle;
   std::uint32_t total;
-  std::uint32_t likely;                                  ///< a symbol of the greatest count
+  std::uint32_t likely;                                  ///< a symbol with the greatest count
   std::array<Candidate, (1u << kBucketBits) + 1> first;  ///< candidates
-  std::array<std::uint16_t, Capacity + kLanes> from;     ///< where a symbol's interval begins
+  std::array<std::uint16_t, Capacity + kLanes> from;     ///< start of each symbol's interval
   std::array<std::uint16_t, Capacity> count;
 
   TERRACE_LAZ_APART void begin(ChunkNumber chunk, unsigned symbols);
@@ -107,7 +107,7 @@ struct SymbolModel {
     until = cycle;
   }
 
-  /// The last symbol that begins at `value` or before.
+  /// The last symbol that begins at or before `value`.
   [[nodiscard]] TERRACE_LAZ_INLINE unsigned find(std::uint32_t value) const {
     unsigned symbol = kBucketBits == 0 ? 0 : first[value >> (kSymbolBits - kBucketBits)];
     for (;; symbol += kLanes) {
@@ -118,7 +118,7 @@ struct SymbolModel {
   }
 
  private:
-  /// How many of eight ascending numbers are not above `value`.
+  /// How many of eight ascending numbers are at most `value`.
   [[nodiscard]] TERRACE_LAZ_INLINE static unsigned lanes_begun(const std::uint16_t* at,
                                                                std::uint32_t value) {
 #if defined(__SSE2__)
@@ -135,7 +135,7 @@ struct SymbolModel {
   }
 };
 
-/// Fresh models to copy: of all symbols, or of 2, 4, ..., 256.
+/// Initialised models to copy: of all symbols, or of 2, 4, ..., 256.
 template <unsigned Capacity>
 inline constexpr std::array<SymbolModel<Capacity>, 1> kFresh{
     SymbolModel<Capacity>::fresh(Capacity)};
@@ -158,7 +158,7 @@ struct BitModel {
   ChunkNumber born;
   std::uint32_t until, cycle;
   std::uint32_t zeros, total;
-  std::uint32_t zero;  ///< how much of the interval is a 0's, in units of 2^-kBitBits
+  std::uint32_t zero;  ///< share of the interval for 0, in units of 2^-kBitBits
 
   void begin(ChunkNumber chunk) {
     born = chunk;

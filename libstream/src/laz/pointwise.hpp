@@ -8,9 +8,8 @@
 #include "laz/items.hpp"
 #include "laz/layout.hpp"
 
-/// Pointwise chunks, point formats 0 to 5: the first record as it is, then one stream with all
-/// items of all further points. This is version 2 of the items, which LASzip has written since
-/// 2011.
+/// Pointwise chunks, point formats 0 to 5: the first record uncoded, then one stream with all items
+/// of all further points. This is version 2 of the items, which LASzip has written since 2011.
 
 namespace terrace::stream::laz {
 
@@ -36,14 +35,14 @@ struct Returns10 {
 };
 inline constexpr Returns10 kReturns10 = Returns10::make();
 
-/// The 20 bytes that all records of formats 0 to 5 begin with. What both versions code.
+/// The first 20 bytes of all records of formats 0 to 5: the part that both versions code.
 struct Point10 {
   /// Offsets in the record.
   static constexpr std::size_t kX = 0, kY = 4, kZ = 8, kIntensity = 12, kReturns = 14,
                                kClassification = 15, kScanAngle = 16, kUserData = 17, kSource = 18;
 
-  SymbolModel<64> changed;  ///< a bit for each of what can be left out
-  /// By the byte of the point before.
+  SymbolModel<64> changed;  ///< a bit for each part that can be omitted
+  /// By the byte of the previous point.
   std::array<SymbolModel<256>, 256> returns, classification, user_data;
   IntegerModels<16, 1> source;
 
@@ -139,7 +138,7 @@ struct Point10V2 : Point10 {
   }
 };
 
-/// Models of a chunk of any of the formats; extra bytes have theirs beside.
+/// Models of a chunk in any of the formats; extra bytes have separate ones.
 struct PointwiseV2 {
   Point10V2 point;
   GpsTime<false> gps_time;
@@ -153,7 +152,7 @@ struct PointwiseV2 {
     wave_packet.begin();
   }
 
-  /// Codes a record after the one before.
+  /// Codes a record relative to the previous one.
   template <class Coder>
   TERRACE_LAZ_INLINE void code(Coder& coder, const RecordLayout& layout, SymbolModel<256>* extra,
                                const std::uint8_t* last, typename Coder::Record now) {

@@ -31,10 +31,10 @@ class Pointwise {
 
   Coder coder;
 
-  /// Bytes that a record takes at most.
+  /// Maximum coded bytes per record.
   [[nodiscard]] std::size_t most_bytes() const { return 512 + 4 * layout_.extra_bytes; }
 
-  /// Begins a chunk with its first record; the coder is the caller's to begin.
+  /// Begins a chunk with its first record; the caller must begin the coder.
   void begin(const std::uint8_t* first) {
     std::memcpy(last_.data(), first, last_.size());
     if (v1_ != nullptr) v1_[0].begin(layout_, first);
@@ -42,7 +42,7 @@ class Pointwise {
   }
 
   /// Codes the next `count` records; if `open`, only while there are most_bytes() to decode from.
-  /// Returns how many it coded.
+  /// Returns the number coded.
   std::size_t code(Record records, std::size_t count, bool open) {
     return v2_ != nullptr ? code(v2_[0], extra_v2_.get(), records, count, open)
                           : code(v1_[0], extra_v1_.get(), records, count, open);
@@ -74,7 +74,7 @@ class Pointwise {
   Zeroed<SymbolModel<9>> extra_v1_;
   Zeroed<PointwiseV2> v2_;
   Zeroed<SymbolModel<256>> extra_v2_;
-  std::vector<std::uint8_t> last_;  ///< the record coded last
+  std::vector<std::uint8_t> last_;  ///< the last coded record
 };
 
 }  // namespace terrace::stream::laz

@@ -91,7 +91,7 @@ struct Point10V1 : Point10 {
 struct GpsTimeV1 {
   static constexpr unsigned kMost = 509, kFull = 510, kSame = 511;
 
-  SymbolModel<3> first;  ///< without a difference: the same, a difference, a time in full
+  SymbolModel<3> first;  ///< if there is no difference yet: the same, a difference, a time in full
   SymbolModel<512> multiple;
   IntegerModels<32, 6> integers;
   std::uint64_t time;
@@ -163,7 +163,7 @@ struct PointwiseV1 {
   SymbolModel<64> rgb_changed;  ///< low and high bytes of red, green, blue
   IntegerModels<8, 6> rgb;
   WavePacket wave_packet;
-  IntegerModels<8, 1> extra_bytes;  ///< but for the magnitudes, which each byte has itself
+  IntegerModels<8, 1> extra_bytes;  ///< except the magnitudes, which are separate for each byte
 
   void begin(const RecordLayout& layout, const std::uint8_t* first) {
     point.begin();

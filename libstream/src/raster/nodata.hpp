@@ -9,19 +9,19 @@
 
 namespace terrace::stream {
 
-/// Which raw samples count as "no data": those in the closed range [low, high], where low > high
-/// is the empty range, and of floats NaN and the infinities in any case. A range and not one value,
-/// because the text that names a float is often rounded to fewer digits than the float has.
+/// The raw samples that count as "no data": those in the closed range [low, high], where low > high
+/// is the empty range, and for floats always NaN and the infinities. A range instead of one value,
+/// because the text of a float is often rounded to fewer digits than the float has.
 struct NodataRule {
-  std::optional<double> value;                     ///< as the file names it
+  std::optional<double> value;                     ///< as in the file
   bool unmatched = false;                          ///< no sample of this type can have that value
   double low = 1, high = 0;                        ///< floats
-  std::int64_t low_integer = 1, high_integer = 0;  ///< integers but u64
+  std::int64_t low_integer = 1, high_integer = 0;  ///< integers except u64
   std::uint64_t low_unsigned = 1, high_unsigned = 0;  ///< u64
 
-  /// What a file's text (GDAL_NODATA) means for samples of `type`, read as GDAL does: "nan", "inf"
-  /// and "-inf" in any case, decimals for integer samples ("-9999.0"), floats within two units of
-  /// their last place. An empty or unreadable text is no rule.
+  /// The meaning of a file's text (GDAL_NODATA) for samples of `type`, read as GDAL does: "nan",
+  /// "inf" and "-inf" in any case, decimals for integer samples ("-9999.0"), floats within two
+  /// units of their last place. An empty or unreadable text is no rule.
   static NodataRule parse(const std::string& text, ScalarType type);
 };
 

@@ -9,8 +9,9 @@
 
 namespace terrace::stream {
 
-/// What the window of a raster may take of a source's memory. The order of the points depends on it
-/// and must not depend on how much memory there is: it ends at that of 64 MiB.
+/// The share of a source's memory that the window of a raster may take. The order of the points
+/// depends on the window and must not depend on the available memory, so memory counts only up to
+/// 64 MiB.
 inline std::uint64_t window_bytes(std::uint64_t memory_bytes) {
   return std::min<std::uint64_t>(memory_bytes, 64u << 20) / 4 * 3;
 }
@@ -20,23 +21,24 @@ struct GridSize {
   std::uint64_t columns = 0, rows = 0;
 };
 
-/// Cells of a tile that is as square on the ground as can be and has at most `cells` cells.
-/// `aspect`: ground height / width of a cell.
+/// The size of a tile that is as square on the ground as possible and has at most `cells` cells.
+/// `aspect`: height / width of a cell on the ground.
 GridSize ground_square(std::uint64_t cells, double aspect);
 
-/// Into how many tiles a window is divided evenly so that none has more than `cells` cells and each
-/// is about square on the ground. Part i of n of a length L begins at cell i * L / n.
+/// The number of tiles into which a window is divided evenly so that none has more than `cells`
+/// cells and each is nearly square on the ground. Part i of n of a length L begins at cell i * L /
+/// n.
 GridSize tiles_of(GridSize window, std::uint64_t cells, double aspect);
 
 /// The fields of a rectangle along a generalised Hilbert curve (for sides of any length; steps go
-/// to a neighbour, once in a while diagonally), as row * columns + column. Begins at field 0; ends
+/// to a neighbour, occasionally a diagonal one), as row * columns + column. Begins at field 0; ends
 /// in the other corner of the longer side. Source: J. Cerveny, "Generalized Hilbert space-filling
 /// curve for rectangular domains of arbitrary (non-power of two) sizes", 2018.
 std::vector<std::uint32_t> hilbert_order(std::uint32_t columns, std::uint32_t rows);
 
-/// The window that is read at once, in cells: about 16 x 16 tiles or more, whole blocks of the
-/// raster where that is possible, and at most `cells` cells if blocks allow it. The raster is read
-/// in rows of such windows.
+/// The window that is read at once, in cells: at least about 16 x 16 tiles, complete blocks of the
+/// raster if possible, and at most `cells` cells if blocks allow it. The raster is read in rows of
+/// such windows.
 GridSize window_size(const RasterInfo& info, std::uint64_t cells, std::uint64_t tile_cells,
                      double aspect);
 

@@ -5,13 +5,13 @@
 
 #include "terrace/stream/schema.hpp"
 
-/// Where a raster lies that does not say it.
+/// The placement of a raster without georeferencing.
 
 namespace terrace::stream {
 
 /// Cells of 1 x 1, y = -row.
 inline constexpr WorldTransform kPlainWorld{{1, 0, 0, 0, -1, 0}};
-/// The comment that goes with it.
+/// The corresponding comment.
 inline const std::string kNoGeoreferencing =
     "no georeferencing: a plain grid with cells of 1 x 1, y = -row";
 

@@ -15,8 +15,8 @@ namespace terrace::stream::store {
 
 inline constexpr std::uint64_t kMostManifestBytes = 64u << 20;
 inline constexpr std::size_t kMostAttributes = 4096;
-/// So many points, cells without data, columns and rows are possible: sums and products of them,
-/// and of points with the bytes that a point takes anywhere, fit 64 bits.
+/// Limits of points, cells without data, columns and rows: sums and products of them, and of points
+/// and the bytes of a point, fit into 64 bits.
 inline constexpr std::uint64_t kMostStorePoints = std::uint64_t{1} << 48;
 inline constexpr std::uint64_t kMostColumns = std::uint64_t{1} << 31;
 
@@ -46,21 +46,21 @@ struct Manifest {
 /// Eight lower-case digits.
 std::string hexadecimal(std::uint32_t value);
 
-/// The manifest as JSON text, its own checksum included.
+/// The manifest as JSON text, including its checksum.
 std::string to_text(const Manifest& manifest);
 
 /// The text of a manifest. Throws: Error if it is too large or cannot be read.
 std::string read_manifest(const ByteSource& file);
 
 /// Throws: Error, in the name of `file`, if the text is not a manifest of this version or earlier,
-/// or not the one that was written.
+/// or was modified.
 Manifest parse_manifest(const std::string& text, const std::string& file);
 
-/// Whether `text`, which parse_manifest() has made `manifest` of, has the keys of the format, all
-/// of them, no others and in the format's order.
+/// Whether `text`, from which parse_manifest() made `manifest`, has exactly the keys of the format,
+/// in the format's order.
 bool is_as_written(const std::string& text, const Manifest& manifest);
 
-/// Whether `folder` has a manifest whose format is that of a store, of whatever version.
+/// Whether `folder` has a manifest whose format is that of a store of any version.
 bool looks_like_store(const std::filesystem::path& folder);
 
 }  // namespace terrace::stream::store

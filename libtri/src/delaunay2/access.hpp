@@ -15,8 +15,8 @@
 namespace terrace::tri {
 namespace planar {
 
-/// What computes in a metric: the kernel, the form of the metric that its predicates take, and the
-/// scope that gives it to them for the duration of a call.
+/// The computation in a metric: the kernel, the form of the metric that its predicates take, and
+/// the scope that passes it to them for the duration of a call.
 template <class Coord, class Metric>
 struct InMetric;
 
@@ -56,16 +56,16 @@ struct Delaunay2Access {
   static const auto& mesh(const Delaunay2<Coord, Metric>& triangulation) {
     return triangulation.impl_->mesh;
   }
-  /// Predicates on the mesh need this scope; it must not outlive the triangulation.
+  /// Predicates on the mesh need this scope, which must not outlive the triangulation.
   template <class Coord, class Metric>
   static auto scope(const Delaunay2<Coord, Metric>& triangulation) {
     return triangulation.impl_->scope();
   }
 };
 
-/// Full test of a triangulation: counts, free lists, links, orientation, the perturbed empty circle
-/// across every edge, the hull, and the sorted line while there are no triangles. Returns what is
-/// wrong first, or an empty string. O(n).
+/// Full check of a triangulation: counts, free lists, links, orientation, the perturbed empty
+/// circle across every edge, the hull, and the sorted line while there are no triangles. Returns a
+/// description of the first fault, or an empty string. O(n).
 template <class Coord, class Metric>
 std::string find_fault(const Delaunay2<Coord, Metric>& triangulation);
 

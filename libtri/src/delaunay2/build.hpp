@@ -14,7 +14,7 @@ template <class Kernel>
 std::vector<VertexId> build(Mesh<Kernel>& mesh, std::span<const typename Kernel::Point> points);
 
 /// Writes a complete grid into an empty mesh. xs, ys: coordinates of columns and rows, increasing
-/// by one and the same step. Returns the first vertex.
+/// by the same step. Returns the first vertex.
 template <class Kernel>
 std::uint32_t build_grid(Mesh<Kernel>& mesh, std::span<const typename Kernel::Coord> xs,
                          std::span<const typename Kernel::Coord> ys);

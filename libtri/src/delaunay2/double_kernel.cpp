@@ -12,7 +12,8 @@ using Epick = CGAL::Exact_predicates_inexact_constructions_kernel;
 
 Epick::Point_2 cgal(const DoubleKernel::Point& p) { return {p[0], p[1]}; }
 
-// Whole numbers that IntKernel can take, when ties are frequent (rasters) and must not be dear.
+// Converts to integers that IntKernel can take: with them ties, which are frequent on rasters, are
+// cheap.
 bool to_integers(const DoubleKernel::Point& p, IntKernel::Point& result) {
   for (std::size_t k = 0; k < 2; ++k) {
     if (!(p[k] >= 0 && p[k] < IntKernel::kLimit)) return false;

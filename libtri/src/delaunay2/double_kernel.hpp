@@ -4,8 +4,8 @@
 #include <array>
 #include <cmath>
 
-/// Exact predicates on doubles: one evaluation in double with a bound of its error decides nearly
-/// always; what is left goes to integers where the coordinates are some, else to CGAL.
+/// Exact predicates on doubles: one evaluation in double with an error bound nearly always decides;
+/// the remaining cases go to integers if the coordinates are integers, otherwise to CGAL.
 
 namespace terrace::tri::planar {
 
@@ -19,7 +19,7 @@ struct DoubleKernel {
     double cross;
     double dot;
   };
-  /// Rounded, for a first choice; what must be right is decided by the predicates.
+  /// Rounded, for a first choice; exact predicates make the final decision.
   static Angle angle(const Point& apex, const Point& b, const Point& c) {
     const double bx = b[0] - apex[0];
     const double by = b[1] - apex[1];
@@ -28,7 +28,7 @@ struct DoubleKernel {
     return {bx * cy - by * cx, bx * cx + by * cy};
   }
 
-  /// > 0 where a, b, c turn left, 0 where they are collinear.
+  /// > 0 if a, b, c turn left, 0 if they are collinear.
   static int orientation(const Point& a, const Point& b, const Point& c) {
     const double left = (b[0] - a[0]) * (c[1] - a[1]);
     const double right = (b[1] - a[1]) * (c[0] - a[0]);
@@ -37,22 +37,22 @@ struct DoubleKernel {
     // geometric predicates", doi:10.1007/PL00009321, rounded up; the last term covers products
     // that underflow.
     const double bound = 0x1.9p-52 * (std::abs(left) + std::abs(right)) + 0x1p-1000;
-    // Not so for infinities and NaN, when something overflowed.
+    // False for infinities and NaN, when something overflowed.
     if (std::abs(cross) > bound && bound < 0x1p1000) return cross > 0 ? 1 : -1;
     return orientation_exact(a, b, c);
   }
 
-  /// > 0 where p lies inside the circle through the counter-clockwise a, b, c; 0 where on it. The
-  /// form is that of IntKernel::in_circle().
+  /// > 0 if p lies inside the circle through the counter-clockwise a, b, c; 0 if on it. Same form
+  /// as IntKernel::in_circle().
   static int in_circle(const Point& a, const Point& b, const Point& c, const Point& p) {
     const Sized at_a = sized_angle(a, b, c);
     const Sized at_p = sized_angle(p, c, b);
     const double sine = at_a.cross * at_p.dot + at_p.cross * at_a.dot;
-    // Each term is a product of two rounded sums of two products of differences. A relative error
-    // of u = 2^-53 enters for the differences (2 + 2), products (1 + 1), sums (1 + 1), the product
-    // and the last sum: 10 u of the sum of absolute values, which are themselves rounded: 12 u is
-    // safe. Sizes below 2^-200 or above 2^200 (where underflow or overflow come near) are left to
-    // the exact test.
+    // Each term is a product of two rounded sums of two products of differences. Relative errors of
+    // u = 2^-53 come from the differences (2 + 2), products (1 + 1), sums (1 + 1), the product and
+    // the last sum: 10 u of the sum of absolute values, which are themselves rounded: 12 u is safe.
+    // Sizes below 2^-200 or above 2^200 (close to underflow or overflow) are left to the exact
+    // test.
     const double size = at_a.cross_size * at_p.dot_size + at_p.cross_size * at_a.dot_size;
     const double largest = at_a.dot_size + at_p.dot_size + at_a.cross_size + at_p.cross_size;
     if (std::abs(sine) > 12 * 0x1p-53 * size + 0x1p-400 && largest < 0x1p200)
@@ -60,7 +60,7 @@ struct DoubleKernel {
     return in_circle_exact(a, b, c, p);
   }
 
-  /// < 0 where a is nearer to p than b.
+  /// < 0 if a is nearer to p than b.
   static int compare_distance(const Point& p, const Point& a, const Point& b);
 
  private:

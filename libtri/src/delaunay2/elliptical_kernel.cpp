@@ -10,7 +10,7 @@
 namespace terrace::tri::planar {
 namespace {
 
-// Sums and products only: the ring of binary fractions is enough, and far faster than rationals.
+// Only sums and products: the ring of binary fractions suffices, and is far faster than rationals.
 #ifdef CGAL_HAS_MPZF
 using Number = CGAL::Mpzf;
 #else
@@ -49,7 +49,7 @@ QuadraticForm::QuadraticForm(const EllipticalMetric2& metric) {
   int exponent = 0;
   std::frexp(std::max({std::abs(map[0]), std::abs(map[1]), std::abs(map[2]), std::abs(map[3])}),
              &exponent);
-  // What underflows here is too small to matter to the filter.
+  // Terms that underflow here are too small to matter to the filter.
   LinearMap2 near_one = map;
   for (double& m : near_one) m = std::ldexp(m, -exponent);
   const Exact scaled = exact(near_one);
@@ -71,7 +71,7 @@ int EllipticalKernel::compare_distance(const Point& p, const Point& a, const Poi
   const Sized to_b = sized_angle(p, b, b);
   const double difference = to_a.dot - to_b.dot;
   const double size = to_a.dot_size + to_b.dot_size;
-  // 9 u of each dot, 1 u of the difference.
+  // 9 u for each dot product, 1 u for the difference.
   if (std::abs(difference) > 16 * 0x1p-53 * size + 0x1p-400 && size < 0x1p400)
     return difference < 0 ? -1 : 1;
   const QuadraticForm::Exact& q = *form_->exact_;

@@ -6,13 +6,13 @@
 #include "double_kernel.hpp"
 #include "terrace/tri/metric.hpp"
 
-/// Exact predicates in an elliptical metric, on the points as they are: nothing is mapped, so
-/// nothing is rounded. What turns left and what lies between is the same in all linear metrics;
-/// only circles become ellipses and distances lengths of mapped vectors.
+/// Exact predicates in an elliptical metric, on the original points: nothing is mapped, so nothing
+/// is rounded. Orientation and betweenness are the same in all linear metrics; only circles become
+/// ellipses and distances the lengths of mapped vectors.
 
 namespace terrace::tri::planar {
 
-/// A metric made ready for the predicates, which need its map M only by Q = M^T M.
+/// A metric prepared for the predicates, which need its map M only as Q = M^T M.
 class QuadraticForm {
  public:
   explicit QuadraticForm(const EllipticalMetric2& metric);
@@ -20,7 +20,8 @@ class QuadraticForm {
  private:
   friend class EllipticalKernel;
   struct Exact;
-  // Q times a power of two, its largest entry near 1, each entry within 2^-52 of itself.
+  // Q times a power of two such that its largest entry is near 1, each entry with a relative error
+  // of at most 2^-52.
   double xx_, xy_, yy_;
   std::shared_ptr<const Exact> exact_;
 };
@@ -40,24 +41,25 @@ class EllipticalKernel : public DoubleKernel {
     const QuadraticForm* before_;
   };
 
-  /// > 0 where p lies inside the ellipse of the metric through the counter-clockwise a, b, c; 0
-  /// where on it. As DoubleKernel::in_circle(): the crosses of mapped vectors are those of the
-  /// vectors times the determinant of M, which changes no sign; their dots are d^T Q e.
+  /// > 0 if p lies inside the metric's ellipse through the counter-clockwise a, b, c; 0 if on it.
+  /// As DoubleKernel::in_circle(): the cross products of mapped vectors are those of the vectors
+  /// times the determinant of M, which changes no sign; their dot products are d^T Q e.
   static int in_circle(const Point& a, const Point& b, const Point& c, const Point& p) {
     const Sized at_a = sized_angle(a, b, c);
     const Sized at_p = sized_angle(p, c, b);
     const double sine = at_a.cross * at_p.dot + at_p.cross * at_a.dot;
     const double size = at_a.cross_size * at_p.dot_size + at_p.cross_size * at_a.dot_size;
-    // In units of u = 2^-53: differences 2 + 2; of the dots products 1, sum of two 1, entries of Q
-    // 2, products with them 1, sums 2; of the crosses products 1, sum 1; then product 1 and sum 1:
-    // 15 u of the sum of absolute values, itself rounded: 18 u is safe. Otherwise as there.
+    // In units of u = 2^-53: differences 2 + 2; for the dot products: products 1, sum of two 1,
+    // entries of Q 2, products with them 1, sums 2; for the cross products: products 1, sum 1; then
+    // product 1 and sum 1: 15 u of the sum of absolute values, itself rounded: 18 u is safe.
+    // Otherwise as in DoubleKernel.
     const double largest = at_a.dot_size + at_p.dot_size + at_a.cross_size + at_p.cross_size;
     if (std::abs(sine) > 18 * 0x1p-53 * size + 0x1p-400 && largest < 0x1p200)
       return sine < 0 ? 1 : -1;
     return in_circle_exact(a, b, c, p);
   }
 
-  /// < 0 where a is nearer to p than b.
+  /// < 0 if a is nearer to p than b.
   static int compare_distance(const Point& p, const Point& a, const Point& b);
 
  private:

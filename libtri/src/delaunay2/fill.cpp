@@ -12,7 +12,7 @@ namespace terrace::tri::planar {
 namespace {
 
 /// Chooses the apex of the triangle at the base from vertex[last] to vertex[first], which has the
-/// polygon's part (first, ..., last) to its left.
+/// part (first, ..., last) of the polygon on its left.
 template <class Kernel>
 class ApexChoice {
  public:
@@ -35,7 +35,7 @@ class ApexChoice {
   }
 
  private:
-  // The candidate that no other one beats.
+  // The candidate that is beaten by no other.
   template <class Beaten>
   std::uint32_t best(std::uint32_t first, std::uint32_t last, Beaten beaten) const {
     std::uint32_t result = first + 1;
@@ -68,12 +68,12 @@ class ApexChoice {
     return result != kNone ? result : ghost;
   }
 
-  // Whether candidate m is inside the circle of the base and the best one so far.
+  // Whether candidate m is inside the circle of the base and the best candidate so far.
   bool beats(double cotangent, double least, std::uint32_t m, std::uint32_t so_far, const Point& b,
              const Point& c) const {
     if constexpr (std::is_same_v<Kernel, IntKernel>) {
       // Both quotients are of exact integers: three roundings each. (This is the only place where
-      // integers meet floating point; what it leaves open is decided exactly.)
+      // integers meet floating point; undecided cases are decided exactly.)
       const double margin = 0x1p-50 * (std::abs(cotangent) + std::abs(least));
       if (std::abs(cotangent - least) > margin) return cotangent < least;
     }

@@ -10,7 +10,7 @@
 namespace terrace::tri::planar {
 namespace {
 
-/// Where p is or would be among the vertices of the line.
+/// The position that p has or would have among the vertices of the line.
 template <class Kernel>
 std::vector<std::uint32_t>::iterator find_on_line(Mesh<Kernel>& mesh,
                                                   const typename Kernel::Point& p) {
@@ -41,7 +41,7 @@ void make_fan(Mesh<Kernel>& mesh, std::uint32_t apex) {
   std::vector<std::uint32_t> line = std::move(mesh.line);
   mesh.line = {};
   mesh.flat = false;
-  // So that apex, line[i], line[i + 1] turn left.
+  // Orients the line so that apex, line[i], line[i + 1] turn left.
   if (Kernel::orientation(mesh.point[line.front()], mesh.point[line.back()], mesh.point[apex]) < 0)
     std::reverse(line.begin(), line.end());
 

@@ -9,9 +9,10 @@
 
 namespace terrace::tri::planar {
 
-/// Numbers of the points along a Hilbert curve over their bounding box, so that points close in the
-/// result are close in the plane. Points too close to tell apart by 16 bits per axis are sorted in
-/// their own box. Points are valid. O(n); 16 bytes per point while it runs besides the result.
+/// Indices of the points along a Hilbert curve over their bounding box, so that points close in the
+/// result are close in the plane. Points that 16 bits per axis cannot distinguish are sorted in a
+/// box of their own. Points must be valid. O(n); besides the result 16 bytes per point while it
+/// runs.
 template <class Coord>
 Pool<std::uint32_t> hilbert_order(std::span<const std::array<Coord, 2>> points);
 

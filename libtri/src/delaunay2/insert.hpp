@@ -9,11 +9,11 @@
 namespace terrace::tri::planar {
 
 /// Joins a vertex, which has its slot and point but no triangle, to a triangulation with triangles.
-/// `conflict`: a triangle in conflict with it, as walk() finds where no corner equals the point.
+/// `conflict`: a triangle in conflict with it, as found by walk() if no corner equals the point.
 ///
 /// Bowyer and Watson's cavity, traversed depth-first across edges. It contains no vertex, so the
 /// traversal is a tree and needs no marks, and it meets the cavity's boundary in counter-clockwise
-/// order, so each new triangle is linked to the one before. About 4.2 triangles are replaced.
+/// order, so each new triangle is linked to the previous one. About 4.2 triangles are replaced.
 template <class Kernel>
 void insert_vertex(Mesh<Kernel>& mesh, std::uint32_t vertex, std::uint32_t conflict);
 
@@ -27,8 +27,8 @@ Inserted insert_point(Mesh<Kernel>& mesh, const typename Kernel::Point& p, std::
 
 /// Inserts points in an order of its own. Calls done(number, inserted) for each.
 ///
-/// The hint of a point is the one before on a Hilbert curve. As in bulk construction a coarse
-/// sample goes first: it saves a quarter of the triangles that would be made and replaced again.
+/// The hint of a point is the previous one on a Hilbert curve. As in bulk construction a coarse
+/// sample goes first: it saves a quarter of the temporary triangles.
 template <class Kernel, class Done>
 void insert_points(Mesh<Kernel>& mesh, std::span<const typename Kernel::Point> points,
                    std::uint32_t hint, Done done) {

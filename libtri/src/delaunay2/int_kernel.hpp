@@ -4,8 +4,8 @@
 #include <array>
 #include <cstdint>
 
-/// Exact predicates on integers of 30 bits, without floating point and without filters: differences
-/// have 31 bits with sign, their products fit 64 bits and products of those 128.
+/// Exact predicates on 30-bit integers, without floating point and filters: differences have 31
+/// bits with sign, their products fit into 64 bits and the products of those into 128.
 
 namespace terrace::tri::planar {
 
@@ -34,14 +34,14 @@ struct IntKernel {
     return {bx * cy - by * cx, bx * cx + by * cy};
   }
 
-  /// > 0 where a, b, c turn left, 0 where they are collinear.
+  /// > 0 if a, b, c turn left, 0 if they are collinear.
   static int orientation(Point a, Point b, Point c) { return sign(angle(a, b, c).cross); }
 
-  /// > 0 where p lies inside the circle through the counter-clockwise a, b, c; 0 where on it.
+  /// > 0 if p lies inside the circle through the counter-clockwise a, b, c; 0 if on it.
   ///
-  /// p is inside where the angles at a and at p over the chord bc add up to more than 180 degrees;
-  /// this is the sign of sin(A + P), for which 10 multiplications of short numbers suffice. The
-  /// function stays out of line: inlined it takes registers from its callers and is slower.
+  /// p is inside if the angles at a and at p over the chord bc add up to more than 180 degrees;
+  /// this is the sign of sin(A + P), for which 10 multiplications of short numbers suffice. Not
+  /// inlined on purpose: inlining takes registers from its callers and is slower.
   [[gnu::noinline]] static int in_circle(Point a, Point b, Point c, Point p) {
     const Angle at_a = angle(a, b, c);
     const Angle at_p = angle(p, c, b);
@@ -50,7 +50,7 @@ struct IntKernel {
     return (sine < 0) - (sine > 0);
   }
 
-  /// < 0 where a is nearer to p than b.
+  /// < 0 if a is nearer to p than b.
   static int compare_distance(Point p, Point a, Point b) {
     const auto square = [p](Point q) {
       const std::int64_t x = q[0] - p[0];

@@ -12,13 +12,13 @@
 #include "../journal.hpp"
 #include "../pool.hpp"
 
-/// The data of a triangulation and the steps that all algorithms share. No geometry here.
+/// The data of a triangulation and the operations that all algorithms share. No geometry here.
 
 namespace terrace::tri::planar {
 
 /// Beyond each hull edge lies a ghost triangle that joins it to this vertex "at infinity"; so every
-/// edge has two triangles and the whole is a sphere: n vertices have 2 n - 2 triangles, ghosts
-/// included.
+/// edge has two triangles and the whole is a sphere: n vertices have 2 n - 2 triangles, including
+/// ghosts.
 inline constexpr std::uint32_t kGhost = 0;
 inline constexpr std::uint32_t kFreeCorner = 0xFFFFFFFFu;
 
@@ -31,21 +31,21 @@ constexpr Side make_side(std::uint32_t triangle, std::uint32_t index) {
 constexpr std::uint32_t triangle_of(Side side) { return side >> 2; }
 constexpr std::uint32_t index_of(Side side) { return side & 3; }
 
-/// Index after and before i, counter-clockwise, of 0, 1, 2: from a table in a constant.
+/// Next and previous index of 0, 1, 2 counter-clockwise: from a table in a constant.
 constexpr std::uint32_t next_index(std::uint32_t i) { return 0b001001u >> (2 * i) & 3; }
 constexpr std::uint32_t previous_index(std::uint32_t i) { return 0b010010u >> (2 * i) & 3; }
 
 struct Triangle {
   /// Counter-clockwise. A free slot has kFreeCorner first.
   std::array<std::uint32_t, 3> corner;
-  /// mate[i]: the same edge as the side opposite to corner[i], seen from the neighbour. So the
-  /// neighbour's corner beyond it is known without a search.
+  /// mate[i]: the edge opposite to corner[i], as a side of the neighbour. So the neighbour's corner
+  /// beyond it is found without a search.
   std::array<Side, 3> mate;
 };
 static_assert(sizeof(Triangle) == 24);
 
 constexpr bool has_ghost(const std::array<std::uint32_t, 3>& corner) {
-  // One branch for the three: the least is zero.
+  // One branch instead of three: the least is zero.
   return std::min(corner[0], std::min(corner[1], corner[2])) == kGhost;
 }
 /// A finite triangle in use.
@@ -65,7 +65,7 @@ template <class Point>
 struct Hole {
   std::vector<std::uint32_t> vertex;  ///< counter-clockwise; may contain the ghost
   std::vector<Point> point;           ///< of vertex, in parallel
-  /// outer[i]: the side beyond the edge from vertex[i] to the next.
+  /// outer[i]: the side beyond the edge from vertex[i] to the next vertex.
   std::vector<Side> outer;
   std::vector<std::uint32_t> slots;  ///< triangle slots to fill, more than enough
   struct Part {
@@ -76,7 +76,7 @@ struct Hole {
   std::vector<Part> parts;
 };
 
-/// What removing a set of vertices takes out, see remove_set.cpp; scratch memory.
+/// What the removal of a set of vertices takes out, see remove_set.cpp; scratch memory.
 struct Region {
   struct Edge {
     std::uint32_t from;
@@ -84,15 +84,15 @@ struct Region {
     Side outer;
   };
   std::vector<std::uint32_t> removed;  ///< vertices
-  Pool<std::uint32_t> triangles;       ///< at a removed vertex
-  Pool<std::uint32_t> mixed;           ///< those of them with a kept corner
-  std::vector<Edge> boundary;          ///< with the region to the left, in no order
+  Pool<std::uint32_t> triangles;       ///< with a removed vertex
+  Pool<std::uint32_t> mixed;           ///< those of them that also have a kept vertex
+  std::vector<Edge> boundary;          ///< with the region to the left, in any order
   Pool<Side> rim;                      ///< edges that may be on the boundary
   Pool<Side> queue;
-  // The boundary by loops: numbers of edges, and where each loop ends among these.
+  // The boundary by loops: edge numbers, and where each loop ends among these.
   std::vector<std::uint32_t> ordered;
   std::vector<std::size_t> loop_ends;
-  std::vector<std::uint8_t> visited;  ///< by number of edge
+  std::vector<std::uint8_t> visited;  ///< by edge number
   std::vector<std::uint32_t> pinches;
 };
 
@@ -104,7 +104,7 @@ struct Mesh {
   // By vertex slot. Slot 0 is the ghost.
   Pool<Point> point;
   Pool<std::uint32_t> incident;  ///< a triangle at the vertex, or kNoIncident, or free
-  /// Set removal marks its vertices here; empty before the first one, zero between two.
+  /// Set removal marks its vertices here; empty before the first one, zero in between.
   Pool<std::uint8_t> mark;
   // By triangle slot. Empty while all points are collinear ("flat").
   Pool<Triangle> triangle;
@@ -131,7 +131,7 @@ struct Mesh {
     incident.push_back(kNoIncident);
   }
 
-  /// Forgets the slots, all of them free.
+  /// Forgets the slots, all of which are free.
   void forget_slots() {
     assert(vertex_count == 0 && flat);
     point.resize(1);
@@ -141,7 +141,7 @@ struct Mesh {
     free_vertices.clear();
     free_triangles.clear();
   }
-  /// Removes everything and releases the memory; the journal goes on.
+  /// Removes everything and releases the memory; the journal continues.
   void clear() {
     if (journal.on()) {
       for (std::uint32_t v = 1; v < point.size(); ++v)
@@ -160,7 +160,7 @@ struct Mesh {
     return t < triangle.size() && is_finite(triangle[t].corner);
   }
 
-  /// A slot with the point and no triangle.
+  /// Allocates a slot with the point and without triangles.
   std::uint32_t new_vertex(const Point& p) {
     std::uint32_t v = 0;
     if (!free_vertices.empty()) {
@@ -184,7 +184,7 @@ struct Mesh {
     --vertex_count;
   }
 
-  /// A slot for a triangle that the caller will write.
+  /// Allocates a slot for a triangle, which the caller must write.
   std::uint32_t new_triangle() {
     std::uint32_t t = 0;
     if (!free_triangles.empty()) {
@@ -204,7 +204,7 @@ struct Mesh {
     __builtin_prefetch(&triangle[next], 1);
     if (next + 8 < triangle.size()) __builtin_prefetch(&triangle[next + 8], 1);
   }
-  /// Before an algorithm overwrites or frees a triangle in use.
+  /// To be called before an algorithm overwrites or frees a triangle in use.
   void record(std::uint32_t t) {
     if (journal.on()) [[unlikely]]
       journal.touch_cell(t, triangle[t].corner);
@@ -248,7 +248,7 @@ bool same_point(const Point& a, const Point& b) {
   return a[0] == b[0] && a[1] == b[1];
 }
 
-/// Lexicographic order: that of the perturbation, and along any line.
+/// Lexicographic order: that of the perturbation, and that along any line.
 template <class Point>
 bool lexicographically_less(const Point& a, const Point& b) {
   return a[0] < b[0] || (a[0] == b[0] && a[1] < b[1]);

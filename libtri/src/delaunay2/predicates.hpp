@@ -7,7 +7,7 @@
 
 namespace terrace::tri::planar {
 
-/// inside_circle() where the four are cocircular. Out of line, as it is rare.
+/// inside_circle() if the four are cocircular. Not inlined, as it is rare.
 template <class Kernel>
 [[gnu::noinline]] bool inside_perturbed_circle(typename Kernel::Point a, typename Kernel::Point b,
                                                typename Kernel::Point c, typename Kernel::Point p) {
@@ -23,8 +23,8 @@ template <class Kernel>
 
 /// Whether p, different from a, b and c, lies inside the circle through the counter-clockwise a, b,
 /// c after the perturbation: every lifted point is raised infinitesimally, the lexicographically
-/// larger infinitely more. Of four cocircular points only the largest one counts: raised itself, p
-/// is outside; if another one is, the lifted plane tilts about the other two, and p is below it on
+/// larger infinitely more. Of four cocircular points only the largest counts: if it is p, p is
+/// outside; if it is another one, the lifted plane tilts about the other two, and p is below it on
 /// the side of the raised one. No three of the four are collinear, so the answer is never zero.
 template <class Kernel>
 [[gnu::always_inline]] inline bool inside_circle(const typename Kernel::Point& a,
@@ -45,8 +45,8 @@ bool between(const Point& a, const Point& p, const Point& b) {
              : lexicographically_less(b, p) && lexicographically_less(p, a);
 }
 
-/// Whether p is in conflict with the ghost triangle beyond the hull edge a -> b with the outside to
-/// its left: strictly outside, or inside the open edge.
+/// Whether p is in conflict with the ghost triangle beyond the hull edge a -> b that has the
+/// outside on its left: strictly outside, or inside the open edge.
 template <class Kernel>
 bool inside_ghost(const typename Kernel::Point& a, const typename Kernel::Point& b,
                   const typename Kernel::Point& p) {
@@ -54,8 +54,8 @@ bool inside_ghost(const typename Kernel::Point& a, const typename Kernel::Point&
   return side > 0 || (side == 0 && between(a, p, b));
 }
 
-/// Whether p, no corner of it, is in conflict with a triangle, ghost or not; `point`: the vertices'
-/// points.
+/// Whether p, which is not a corner, is in conflict with a triangle, ghost or not; `point`: the
+/// points of the vertices.
 template <class Kernel>
 [[gnu::always_inline]] inline bool in_conflict(const typename Kernel::Point* point,
                                                const Triangle& t, const typename Kernel::Point& p) {

@@ -34,8 +34,8 @@ bool nearer(const Mesh<Kernel>& mesh, const typename Kernel::Point& p, std::uint
   return order < 0 || (order == 0 && lexicographically_less(mesh.point[a], mesh.point[b]));
 }
 
-/// Calls visit(t, i) for the triangles round a vertex counter-clockwise, ghosts included, where
-/// corner i of t is the vertex, from triangle `start` on.
+/// Calls visit(t, i) for the triangles around a vertex counter-clockwise, including ghosts, where
+/// corner i of t is the vertex, starting from triangle `start`.
 template <class Kernel, class Visit>
 void for_star(const Mesh<Kernel>& mesh, std::uint32_t vertex, std::uint32_t start, Visit visit) {
   std::uint32_t t = start;
@@ -56,7 +56,7 @@ std::uint64_t mix(std::uint64_t z) {
 template <class Coord>
 std::uint64_t bits(Coord c) {
   if constexpr (std::is_same_v<Coord, double>) {
-    c += 0.0;  // one zero
+    c += 0.0;  // merges -0.0 and 0.0
     std::uint64_t result = 0;
     std::memcpy(&result, &c, sizeof result);
     return result;
@@ -109,8 +109,8 @@ Location locate(const Mesh<Kernel>& mesh, const typename Kernel::Point& p, std::
 }
 
 // A vertex that is not nearest has a neighbour that is nearer, and the nearest vertices, all on one
-// empty circle about p, are the corners of a convex polygon whose edges are there: so going to
-// better neighbours ends at the best vertex.
+// empty circle about p, are the corners of a convex polygon whose edges exist: so moving to better
+// neighbours ends at the best vertex.
 template <class Kernel>
 std::uint32_t nearest(const Mesh<Kernel>& mesh, const typename Kernel::Point& p,
                       std::uint32_t hint) {
@@ -143,7 +143,8 @@ void adjacent(const Mesh<Kernel>& mesh, std::uint32_t vertex, std::vector<Vertex
     if (at + 1 != mesh.line.end()) result.push_back(VertexId{*(at + 1)});
     return;
   }
-  // A hull vertex has one triangle whose next corner is the ghost: behind it its hull successor.
+  // A hull vertex has one triangle whose next corner is the ghost; its successor on the hull
+  // follows.
   std::uint32_t start = mesh.incident[vertex];
   for_star(mesh, vertex, mesh.incident[vertex], [&](std::uint32_t t, std::uint32_t i) {
     if (mesh.triangle[t].corner[next_index(i)] == kGhost)

@@ -8,7 +8,7 @@
 
 namespace terrace::tri::planar {
 
-/// As Delaunay2::locate(), nearest(), adjacent() and hash().
+/// See Delaunay2::locate(), nearest(), adjacent() and hash().
 template <class Kernel>
 Location locate(const Mesh<Kernel>& mesh, const typename Kernel::Point& p, std::uint32_t hint);
 template <class Kernel>
@@ -16,7 +16,7 @@ std::uint32_t nearest(const Mesh<Kernel>& mesh, const typename Kernel::Point& p,
                       std::uint32_t hint);
 template <class Kernel>
 void adjacent(const Mesh<Kernel>& mesh, std::uint32_t vertex, std::vector<VertexId>& result);
-/// Number of triangles at a vertex, ghosts included.
+/// Number of triangles at a vertex, including ghosts.
 template <class Kernel>
 std::uint32_t degree(const Mesh<Kernel>& mesh, std::uint32_t vertex);
 template <class Kernel>

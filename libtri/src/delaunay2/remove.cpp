@@ -12,7 +12,7 @@
 namespace terrace::tri::planar {
 namespace {
 
-/// The triangles round a vertex as a hole.
+/// Makes a hole of the triangles around a vertex.
 template <class Kernel>
 void open_star(Mesh<Kernel>& mesh, std::uint32_t vertex) {
   auto& hole = mesh.hole;
@@ -73,7 +73,7 @@ void remove_vertex(Mesh<Kernel>& mesh, std::uint32_t vertex) {
   }
   open_star(mesh, vertex);
   auto& hole = mesh.hole;
-  // Whatever leaves a line behind was joined to all of it.
+  // A vertex whose removal leaves a line was joined to all of it.
   if (hole.vertex.size() + 1 >= mesh.vertex_count) [[unlikely]] {
     std::vector<std::uint32_t> survivors;
     for (const std::uint32_t v : hole.vertex)

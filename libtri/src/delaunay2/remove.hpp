@@ -7,7 +7,7 @@
 
 namespace terrace::tri::planar {
 
-/// Removes a vertex: the hole of its triangles is filled anew.
+/// Removes a vertex: the hole of its triangles is filled again.
 template <class Kernel>
 void remove_vertex(Mesh<Kernel>& mesh, std::uint32_t vertex);
 
@@ -15,7 +15,7 @@ void remove_vertex(Mesh<Kernel>& mesh, std::uint32_t vertex);
 template <class Kernel>
 void remove_set(Mesh<Kernel>& mesh, std::span<const std::uint32_t> vertices);
 
-/// Whether finite vertices (the ghost among them is passed over) lie on one line.
+/// Whether finite vertices (a ghost among them is skipped) lie on one line.
 template <class Kernel>
 bool collinear(const Mesh<Kernel>& mesh, std::span<const std::uint32_t> vertices);
 

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Removal of a set of vertices by one hole, after J. Skala, thesis, section 8.1, but set-wise: all
-// triangles at the vertices are taken out first. Where what they leave is a simple disc (or
-// several) it is filled at once. The thesis's rules that a vertex must lie on the hole's boundary,
-// and that no boundary vertex may occur twice, become one count (Euler's formula) and one
-// comparison.
+// Removal of a set of vertices as one hole, after J. Skala, thesis, section 8.1, but set-wise: all
+// triangles at the vertices are taken out first. If they leave a simple disc (or several), it is
+// filled at once. The thesis's rules that a vertex must lie on the hole's boundary, and that no
+// boundary vertex may occur twice, become one count (Euler's formula) and one comparison.
 //
 // Vertices that stay but lie inside the hole (islands) or touch its boundary twice (pinches) are
-// absorbed: taken out as well and put back into the filled hole.
+// absorbed: taken out as well and reinserted into the filled hole.
 #include <algorithm>
 
 #include "double_kernel.hpp"
@@ -22,9 +21,9 @@ namespace {
 
 /// Sets below this size are removed one by one.
 constexpr std::size_t kMinSet = 4;
-/// Filling is quadratic at worst: longer boundaries are not tried.
+/// Filling is quadratic at worst: longer boundaries are not attempted.
 constexpr std::size_t kMaxBoundary = 4096;
-/// More scratch memory than this is not kept.
+/// Scratch memory beyond this is released.
 constexpr std::size_t kMostScratch = std::size_t{1} << 20;
 
 /// Values of Mesh::mark.
@@ -35,7 +34,7 @@ constexpr std::uint8_t kOnBoundary = 2;
 /// In Triangle::corner[0], between flood() and dry(): the triangle is part of the region.
 constexpr std::uint32_t kInRegion = 0x80000000u;
 
-/// In a queue's entry in place of the side that it was entered by.
+/// In a queue's entry, instead of the side through which it was entered.
 constexpr std::uint32_t kNoSide = 3;
 
 /// Arrays of the flood; each triangle adds at most three entries to the queue and one to the
@@ -69,13 +68,13 @@ struct Output {
   std::uint32_t size_ = 0;
 };
 
-/// Finds the region that removed vertices leave: all triangles at them, and the edges round these.
-/// region.removed: the vertices, kRemoved in Mesh::mark, where all others are kKept. Fills
+/// Finds the region left by removed vertices: all triangles at them, and the edges around these.
+/// region.removed: the vertices; Mesh::mark is kRemoved for them and kKept for all others. Fills
 /// region.triangles, .mixed and .boundary; the triangles bear kInRegion.
 ///
 /// The region is flooded across edges breadth-first, so that a triangle is fetched from memory long
-/// before its turn comes, and almost without branches, which nothing could foresee. (Turning round
-/// each vertex visits each triangle three times, one after the other.) O(triangles).
+/// before its turn comes, and almost without branches, which could not be predicted. (Walking
+/// around each vertex would visit each triangle three times in succession.) O(triangles).
 template <class Kernel>
 void flood(Mesh<Kernel>& mesh) {
   Region& region = mesh.region;
@@ -90,7 +89,7 @@ void flood(Mesh<Kernel>& mesh) {
     tail += really ? 1 : 0;
     __builtin_prefetch(&triangle[triangle_of(side)], 1);
   };
-  // A triangle of every vertex: the set need not be connected.
+  // Starts from a triangle of every vertex: the set need not be connected.
   for (const std::uint32_t v : region.removed) push(make_side(incident[v], kNoSide), true);
 
   std::uint32_t triangles = 0;
@@ -108,7 +107,7 @@ void flood(Mesh<Kernel>& mesh) {
     at.corner[0] |= kInRegion;
     out.triangles[triangles] = t;
     triangles += fresh ? 1 : 0;
-    // What lies across an edge with a removed vertex belongs to the region too.
+    // The triangle across an edge with a removed vertex belongs to the region too.
     push(at.mate[0], fresh & ((b | c) != 0) & (entered != 0));
     push(at.mate[1], fresh & ((c | a) != 0) & (entered != 1));
     push(at.mate[2], fresh & ((a | b) != 0) & (entered != 2));
@@ -121,7 +120,7 @@ void flood(Mesh<Kernel>& mesh) {
   region.triangles.resize(triangles);
   region.mixed.resize(mixed);
 
-  // The edges between kept vertices that have the region on one side only.
+  // The boundary: edges between kept vertices that have the region on one side only.
   region.boundary.clear();
   for (std::uint32_t k = 0; k < rim; ++k) {
     const Triangle& at = triangle[triangle_of(out.rim[k])];
@@ -134,7 +133,7 @@ void flood(Mesh<Kernel>& mesh) {
   }
 }
 
-/// Takes kInRegion from the region's triangles.
+/// Removes kInRegion from the region's triangles.
 template <class Kernel>
 void dry(Mesh<Kernel>& mesh) {
   for (const std::uint32_t t : span_of(mesh.region.triangles))
@@ -159,7 +158,7 @@ class SetRemoval {
   SetRemoval(const SetRemoval&) = delete;
   SetRemoval& operator=(const SetRemoval&) = delete;
 
-  /// Whether it was possible by holes; else nothing has changed.
+  /// Whether removal by holes was possible; if not, nothing has changed.
   bool run() {
     flood(mesh_);
     if (region_.boundary.size() > kMaxBoundary) {
@@ -184,8 +183,8 @@ class SetRemoval {
   }
 
  private:
-  /// Whether every hole is a disc whose boundary vertices are different. Mesh::incident of these
-  /// becomes the number of the edge that starts there.
+  /// Whether every hole is a disc whose boundary vertices are different. Sets Mesh::incident of
+  /// these to the number of the edge that starts there.
   bool is_simple() {
     const auto& boundary = region_.boundary;
     region_.pinches.clear();
@@ -199,7 +198,7 @@ class SetRemoval {
            2 * region_.removed.size() + boundary.size();
   }
 
-  /// Orders the boundary edges by loops.
+  /// Orders the boundary edges into loops.
   void trace_loops() {
     const auto& boundary = region_.boundary;
     region_.ordered.clear();
@@ -220,8 +219,8 @@ class SetRemoval {
       mesh_.incident[edge.from] = triangle_of(edge.outer);
   }
 
-  /// Adds islands and pinches to the removed vertices; false where there are too many, or none, or
-  /// the ghost is one.
+  /// Adds islands and pinches to the removed vertices; false if there are too many or none, or the
+  /// ghost is among them.
   bool absorb() {
     auto& removed = region_.removed;
     auto& pinches = region_.pinches;
@@ -240,7 +239,7 @@ class SetRemoval {
     for (const Region::Edge& edge : region_.boundary)
       if (mesh_.mark[edge.from] == kOnBoundary) mesh_.mark[edge.from] = kKept;
     if (!possible || removed.size() == before) return false;
-    // An island's triangles were all listed before; only pinches bring new ones.
+    // An island's triangles are all listed already; only pinches add new ones.
     if (!pinches.empty()) {
       dry(mesh_);
       flood(mesh_);
@@ -263,7 +262,7 @@ class SetRemoval {
   }
 
   bool survivors_collinear() const {
-    // Only when all survivors are on the boundary can they be collinear.
+    // Survivors can be collinear only if all of them are on the boundary.
     if (region_.boundary.size() + region_.removed.size() < mesh_.vertex_count) return false;
     std::vector<std::uint32_t> survivors;
     for (const Region::Edge& edge : region_.boundary) survivors.push_back(edge.from);
@@ -301,7 +300,7 @@ class SetRemoval {
     mesh_.last_vertex = hole.vertex.front();
   }
 
-  /// Inserts the absorbed vertices again.
+  /// Reinserts the absorbed vertices.
   void put_back() {
     for (std::size_t k = requested_; k < region_.removed.size(); ++k) {
       const std::uint32_t v = region_.removed[k];

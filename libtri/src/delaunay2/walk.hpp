@@ -7,17 +7,16 @@ namespace terrace::tri::planar {
 
 /// Where a walk ended.
 struct WalkEnd {
-  /// The finite triangle that contains the point, boundary included, or the ghost beyond a hull
-  /// edge that the point sees.
+  /// The finite triangle that contains the point, including its boundary, or the ghost beyond a
+  /// hull edge that the point sees.
   std::uint32_t triangle = kNone;
   bool outside = false;
 };
 
 /// Remembering stochastic walk (Devillers, Pion, Teillaud, doi:10.1142/S0129054102001047): from
-/// triangle to triangle through an edge that separates the present one from p, never testing the
+/// triangle to triangle through an edge that separates the current one from p, never testing the
 /// edge just crossed. Which of the other two is tried first is drawn by a small generator with a
-/// fixed seed. In a Delaunay triangulation no walk can go round in a circle. `start` may be a
-/// ghost.
+/// fixed seed. In a Delaunay triangulation the walk cannot cycle. `start` may be a ghost.
 template <class Kernel>
 WalkEnd walk(const Mesh<Kernel>& mesh, const typename Kernel::Point& p, std::uint32_t start) {
   using Point = typename Kernel::Point;

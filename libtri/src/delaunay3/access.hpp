@@ -15,8 +15,8 @@
 namespace terrace::tri {
 namespace spatial {
 
-/// What computes in a metric: the kernel, the form of the metric that its predicates take, and the
-/// scope that gives it to them for the duration of a call.
+/// The computation in a metric: the kernel, the form of the metric that its predicates take, and
+/// the scope that passes it to them for the duration of a call.
 template <class Coord, class Metric>
 struct InMetric;
 
@@ -60,16 +60,16 @@ struct Delaunay3Access {
   static auto& mesh(Delaunay3<Coord, Metric>& triangulation) {
     return triangulation.impl_->mesh;
   }
-  /// Predicates on the mesh need this scope; it must not outlive the triangulation.
+  /// Predicates on the mesh need this scope, which must not outlive the triangulation.
   template <class Coord, class Metric>
   static auto scope(const Delaunay3<Coord, Metric>& triangulation) {
     return triangulation.impl_->scope();
   }
 };
 
-/// Full test of a triangulation: counts, free lists, links, orientation, the perturbed empty sphere
-/// across every facet, the hull, and the sorted list while there are no tetrahedra. Returns what is
-/// wrong first, or an empty string. O(n).
+/// Full check of a triangulation: counts, free lists, links, orientation, the perturbed empty
+/// sphere across every facet, the hull, and the sorted list while there are no tetrahedra. Returns
+/// a description of the first fault, or an empty string. O(n).
 template <class Coord, class Metric>
 std::string find_fault(const Delaunay3<Coord, Metric>& triangulation);
 

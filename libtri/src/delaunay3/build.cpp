@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Bulk construction: vertices are numbered along a Hilbert curve and inserted one by one, each near
-// the one before, coarse samples first. Fine samples are inserted by two threads, see
+// the previous one, coarse samples first. Fine samples are inserted by two threads, see
 // parts_insert.cpp.
 #include "build.hpp"
 
@@ -19,7 +19,7 @@
 namespace terrace::tri::spatial {
 namespace {
 
-/// Passes over fewer points than this are not cut into parts.
+/// Passes over fewer points than this are not divided into parts.
 constexpr std::uint32_t kInParts = 8192;
 
 /// Puts points into slots begin, begin + 1, ... in Hilbert order. Returns the slot of each.
@@ -43,7 +43,7 @@ std::vector<VertexId> number_vertices(Mesh<Kernel>& mesh,
   return vertex_of;
 }
 
-/// The flat state of all slots from begin on; mesh.basis spans their plane.
+/// Sets up the flat state of all slots from begin on; mesh.basis spans their plane.
 template <class Kernel>
 void wait_all(Mesh<Kernel>& mesh, std::uint32_t begin, std::uint32_t end) {
   std::vector<std::uint32_t>& waiting = mesh.waiting;
@@ -65,7 +65,7 @@ void wait_all(Mesh<Kernel>& mesh, std::uint32_t begin, std::uint32_t end) {
   mesh.last_vertex = waiting.front();
 }
 
-/// Frees the slots of equal points and makes vertex_of tell who stands for them.
+/// Frees the slots of duplicates and sets vertex_of to the vertices that represent them.
 template <class Kernel>
 void resolve_aliases(Mesh<Kernel>& mesh, std::vector<VertexId>& vertex_of, std::uint32_t begin,
                      std::uint32_t end) {
@@ -84,8 +84,8 @@ void resolve_aliases(Mesh<Kernel>& mesh, std::vector<VertexId>& vertex_of, std::
   }
 }
 
-/// Inserts all but the four of the first tetrahedron: every fourth, of these every fourth before,
-/// and so on.
+/// Inserts all except the four of the first tetrahedron: every fourth, before that every fourth of
+/// these, and so on.
 template <class Kernel>
 void insert_all(Mesh<Kernel>& mesh, std::uint32_t begin, std::uint32_t end,
                 const std::array<std::uint32_t, 4>& first, unsigned threads) {
@@ -102,7 +102,7 @@ void insert_all(Mesh<Kernel>& mesh, std::uint32_t begin, std::uint32_t end,
       if (std::find(first.begin(), first.end(), begin + k) == first.end())
         going.push_back(begin + k);
     }
-    // With fewer the border of the parts is everywhere.
+    // With fewer points nearly all of space is close to the border of the parts.
     if (count / step < kInParts) {
       for (const std::uint32_t v : going) insert_slot(mesh, v, mesh.last_vertex);
     } else {
@@ -127,12 +127,12 @@ std::vector<VertexId> build(Mesh<Kernel>& mesh, std::span<const typename Kernel:
   if (apex == end) {
     wait_all(mesh, begin, end);
   } else {
-    // Uniform points have 6.77 tetrahedra each, ghosts included.
+    // Uniform points have 6.77 tetrahedra each, including ghosts.
     const std::size_t usual = 7 * std::size_t{mesh.vertex_count};
     mesh.tetrahedron.reserve(usual);
     mesh.mark.reserve(usual);
     const std::array<std::uint32_t, 4> first = {mesh.basis[0], mesh.basis[1], mesh.basis[2], apex};
-    // Several threads do not record; all slots were free before.
+    // Several threads cannot record; all slots were free before.
     Journal<typename Kernel::Point, 4> journal;
     std::swap(journal, mesh.journal);
     make_first(mesh, apex);

@@ -5,10 +5,10 @@
 
 #include "walk.hpp"
 
-/// Insertion of one vertex: Bowyer and Watson's cavity, breadth first. Each tetrahedron is tested
-/// once, as those tested and kept are marked too; the tests of a tetrahedron's neighbours are
-/// computed together before any of them is looked at, so that mispredicted branches do not wait for
-/// arithmetic. About 20 tetrahedra are replaced by 26.
+/// Insertion of one vertex: Bowyer and Watson's cavity, breadth-first. Each tetrahedron is tested
+/// once, as those tested and kept are marked too; a tetrahedron's neighbours are all tested before
+/// any result is used, so that mispredicted branches do not wait for arithmetic. About 20
+/// tetrahedra are replaced by 26.
 
 namespace terrace::tri::spatial {
 
@@ -18,8 +18,8 @@ class CavityInsertion {
   CavityInsertion(Mesh<Kernel>& mesh, Cavity& cavity, Part& part)
       : mesh_(mesh), cavity_(cavity), part_(part) {}
 
-  /// False where the cavity meets tetrahedra outside the part or the part is out of room; then
-  /// nothing has changed.
+  /// False if the cavity meets tetrahedra outside the part or the part is out of room; then nothing
+  /// has changed.
   bool run(std::uint32_t vertex, std::uint32_t conflict) {
     bool possible = collect(mesh_.vertex[vertex].point, conflict);
     if constexpr (!Part::kWhole) {
@@ -73,7 +73,7 @@ class CavityInsertion {
       }
       for (std::uint32_t i = 0; i < 4; ++i) {
         const std::uint32_t other = tetrahedron_of(t.mate[i]);
-        // Read again: it may be a neighbour twice.
+        // Read again: a neighbour may occur twice.
         if (mark[other] == kUnknown) {
           const Tetrahedron& tested = tetrahedron[other];
           if (filtered[i] == Verdict::kIn ||
@@ -98,7 +98,7 @@ class CavityInsertion {
     return true;
   }
 
-  /// The slots of the cavity are used again; more are taken or the rest is freed.
+  /// Reuses the slots of the cavity, and allocates more or frees the rest.
   void take_slots() {
     std::uint32_t gone = 0;
     for (std::size_t i = 0; i < inside_count_; ++i) {
@@ -123,7 +123,7 @@ class CavityInsertion {
   }
 
   /// Two passes over the facets: each writes its edges into a table, then finds those of its
-  /// neighbours there, in the other direction.
+  /// neighbours there, in the opposite direction.
   void fill_small(std::uint32_t vertex) {
     constexpr std::uint32_t kStride = Cavity::kStride;
     Side* const by_edge = cavity_.by_edge.data();
@@ -202,7 +202,7 @@ class CavityInsertion {
   bool out_of_room_ = false;
 };
 
-/// The whole mesh as a part.
+/// The whole mesh as one part.
 struct WholeMesh : Everywhere {
   template <class Mesh>
   static std::uint32_t new_tetrahedron(Mesh& mesh) {
@@ -212,7 +212,7 @@ struct WholeMesh : Everywhere {
   static void free_tetrahedron(Mesh& mesh, std::uint32_t t) {
     mesh.free_tetrahedron_slot(t);
   }
-  /// Counts finite tetrahedra: `all` of which some are ghosts.
+  /// Counts finite tetrahedra: `all` includes ghosts.
   template <class Mesh>
   static void count(Mesh& mesh, std::int64_t not_ghosts, std::int64_t all) {
     mesh.finite_count = static_cast<std::uint32_t>(mesh.finite_count + not_ghosts + all);

@@ -7,8 +7,8 @@
 
 #include "in_sphere.hpp"
 
-/// Exact predicates on doubles: one evaluation in double with a bound of its error decides nearly
-/// always; what is left goes to integers where the coordinates are some, else to CGAL.
+/// Exact predicates on doubles: one evaluation in double with an error bound nearly always decides;
+/// the remaining cases go to integers if the coordinates are integers, otherwise to CGAL.
 
 namespace terrace::tri::spatial {
 
@@ -25,7 +25,7 @@ struct DoubleKernel {
     return std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]);
   }
 
-  /// The sign of det(b - a, c - a, d - a): > 0 where the four are in order, 0 where coplanar.
+  /// The sign of det(b - a, c - a, d - a): > 0 if the four are in order, 0 if coplanar.
   static int orientation(const Point& a, const Point& b, const Point& c, const Point& d) {
     const Vector u = difference(b, a);
     const Vector v = difference(c, a);
@@ -34,7 +34,7 @@ struct DoubleKernel {
                        (u.x * v.y - u.y * v.x) * w.z;
     // The product of the three lengths bounds each of three sums of products; 8 relative errors of
     // u = 2^-53 enter (3 in differences, 2 in minors, 1 and 2 in the last step): 24 u times the
-    // product of lengths, here squared and rounded up. Far-off sizes are left to the exact test.
+    // product of lengths, here squared and rounded up. Extreme sizes are left to the exact test.
     const double size = u.square() * v.square() * w.square();
     if (det * det > 7.5e-30 * size && size > 0x1p-900 && size < 0x1p900) [[likely]]
       return det > 0 ? 1 : -1;
@@ -43,15 +43,16 @@ struct DoubleKernel {
   /// Whether a, b, c lie on one line.
   static bool collinear(const Point& a, const Point& b, const Point& c);
 
-  /// What all points of a mesh have in common: all coordinates are whole multiples of 2^k, k as
-  /// large as can be. On a grid differences are then small multiples, for which doubles are exact.
+  /// The common property of all points of a mesh: all coordinates are integer multiples of 2^k,
+  /// with the largest such k. On a grid differences are then small multiples, for which doubles are
+  /// exact.
   class Lattice {
    public:
     void add(const Point& p) {
       if (exponent_ < kLeast) return;
       for (const double c : p) add(c);
     }
-    /// Sphere tests are exact where the fifth power of the largest square is below this.
+    /// Sphere tests are exact if the fifth power of the largest square is below this.
     [[nodiscard]] double exact_fifth() const { return exact_fifth_; }
 
    private:
@@ -68,7 +69,7 @@ struct DoubleKernel {
     Probe(const Point& p, const Lattice& lattice)
         : x_{p[0], p[0]}, y_{p[1], p[1]}, z_{p[2], p[2]}, exact_fifth_(lattice.exact_fifth()) {}
 
-    /// Where the point lies with respect to the sphere through four vertices in order, after the
+    /// The position of the point relative to the sphere through four vertices in order, after the
     /// perturbation.
     [[gnu::always_inline]] Verdict side(const Vertex& a, const Vertex& b, const Vertex& c,
                                         const Vertex& d) const {
@@ -78,8 +79,8 @@ struct DoubleKernel {
       const Rows rows = {pairs(a, b, 0) - x_, pairs(c, d, 0) - x_, pairs(a, b, 1) - y_,
                          pairs(c, d, 1) - y_, pairs(a, b, 2) - z_, pairs(c, d, 2) - z_};
       const InSphere test = in_sphere_value(rows);
-      // As in IntKernel, and one relative error for each of the five differences in a product: 16 *
-      // 12 u < 2.2e-14. Sizes near underflow and overflow are left to the exact test.
+      // As in IntKernel, plus one relative error for each of the five differences in a product: 16
+      // * 12 u < 2.2e-14. Sizes near underflow and overflow are left to the exact test.
       const double fifth = test.largest * test.largest * test.largest * test.largest * test.largest;
       if (!(test.value * test.value > 4.9e-28 * fifth && fifth > 0x1p-900 && fifth < 0x1p900))
           [[unlikely]] {
@@ -95,11 +96,11 @@ struct DoubleKernel {
     double exact_fifth_;
   };
 
-  /// > 0 where p lies inside the sphere through a, b, c, d, which are in order; 0 where on it.
+  /// > 0 if p lies inside the sphere through a, b, c, d, which are in order; 0 if on it.
   static int in_sphere(const Point& a, const Point& b, const Point& c, const Point& d,
                        const Point& p);
 
-  /// < 0 where a is nearer to p than b.
+  /// < 0 if a is nearer to p than b.
   static int compare_distance(const Point& p, const Point& a, const Point& b);
 
  private:

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// The hole of one vertex filled by cutting ears, after J. Skala, thesis, section 8.2, and O.
+// Fills the hole of one vertex by cutting ears, after J. Skala, thesis, section 8.2, and O.
 // Devillers, "On deletion in Delaunay triangulations", doi:10.1142/S0218195902000815. An ear is the
-// tetrahedron of two neighbouring facets. Ears wait in a queue; that whose sphere contains the
-// removed vertex least comes first, measured by its power, in-sphere test / orientation.
+// tetrahedron of two neighbouring facets. Ears wait in a priority queue; first comes the one whose
+// sphere contains the removed vertex least, measured by its power, in-sphere test / orientation.
 //
-// The powers are rounded, so the order is only good, not exact, and where powers are equal it is
-// any. Before an ear is cut, exact perturbed tests tell whether its sphere is empty of the hole's
-// vertices: a tetrahedron that is has its place in the result whenever it is made. So the result is
-// exact with ties too. An ear that is not empty never will be and is dropped. Where no ear is left
-// before the hole is full (which ties and the hull can cause) the rest is wrapped.
+// The powers are rounded, so the order is only approximate, and arbitrary among equal powers.
+// Before an ear is cut, exact perturbed tests check that its sphere contains none of the hole's
+// vertices: such a tetrahedron belongs to the result whenever it is made. So the result is exact,
+// ties included. An ear that fails will always fail and is dropped. If no ear is left before the
+// hole is full (possible with ties and at the hull), the rest is wrapped.
 #include "ear_queue.hpp"
 
 #include <algorithm>
@@ -63,7 +63,7 @@ class EarQueue {
     return a.facet != b.facet ? a.facet > b.facet : a.apex > b.apex;
   }
 
-  /// Lists the edges of facets from a number on, and their ears.
+  /// Lists the edges of facets from index `first` on, and their ears.
   void add_facets(std::uint32_t first) {
     const auto count = static_cast<std::uint32_t>(hole_.facets.size());
     const auto before = static_cast<std::ptrdiff_t>(edges_.size());
@@ -91,7 +91,7 @@ class EarQueue {
     return std::uint64_t{from} << 32 | to;
   }
 
-  /// The tetrahedron of a facet and the corner of another one that is not in it.
+  /// The tetrahedron of a facet and the corner of another facet that is not in it.
   void add_ear(std::uint32_t facet, std::uint32_t other) {
     const auto [a, b, c] = hole_.facets[facet].corner;
     for (const std::uint32_t d : hole_.facets[other].corner) {
@@ -103,7 +103,7 @@ class EarQueue {
     }
   }
 
-  /// Rounded, or far back where it overflows.
+  /// Rounded; ordered last if it overflows.
   [[nodiscard]] double power(std::uint32_t d, std::uint32_t a, std::uint32_t b,
                              std::uint32_t c) const {
     std::array<std::array<double, 3>, 4> r;

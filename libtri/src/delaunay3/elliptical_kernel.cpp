@@ -14,7 +14,7 @@
 namespace terrace::tri::spatial {
 namespace {
 
-// Sums and products only: the ring of binary fractions is enough, and far faster than rationals.
+// Only sums and products: the ring of binary fractions suffices, and is far faster than rationals.
 #ifdef CGAL_HAS_MPZF
 using Number = CGAL::Mpzf;
 #else
@@ -52,12 +52,12 @@ std::array<T, 6> square_of(const LinearMap3& m) {
   return result;
 }
 
-/// Differences of whole numbers, small enough for what is made of them to fit 128 bits.
+/// Differences of integers, small enough for everything computed from them to fit into 128 bits.
 bool small_difference(const Point& from, const Point& to, Triple<Int128>& result) {
   constexpr double kLimit = 0x1p23;
   for (std::size_t k = 0; k < 3; ++k) {
     if (!(std::abs(to[k]) < 0x1p52 && std::abs(from[k]) < 0x1p52)) return false;
-    const double difference = to[k] - from[k];  // exact if both are whole
+    const double difference = to[k] - from[k];  // exact if both are integers
     if (!(std::abs(difference) < kLimit)) return false;
     const auto whole = static_cast<std::int64_t>(to[k]);
     if (static_cast<double>(whole) != to[k] ||
@@ -71,8 +71,9 @@ bool small_difference(const Point& from, const Point& to, Triple<Int128>& result
 }  // namespace
 
 struct QuadraticForm::Exact {
-  std::array<Number, 6> q;      ///< of the map as it was given
-  std::array<double, 6> near;   ///< times a power of two, each within 2^-52 of itself or 0
+  std::array<Number, 6> q;  ///< of the given map
+  /// times a power of two, each with a relative error of at most 2^-52, or 0
+  std::array<double, 6> near;
   std::array<bool, 6> is_zero;  ///< of q
 
   /// u^T Q v.
@@ -83,7 +84,7 @@ struct QuadraticForm::Exact {
     return sum;
   }
 
-  /// The sign of the sum of q and whole numbers, component by component; 2 where it is not known.
+  /// The sign of the sum of q times integers, component by component; 2 if unknown.
   [[nodiscard]] int sign_of_sum(const std::array<Int128, 6>& whole) const {
     double sum = 0, size = 0;
     bool zero = true;
@@ -109,7 +110,7 @@ QuadraticForm::QuadraticForm(const EllipticalMetric3& metric) : map_(metric.map(
   double most = 0;
   for (const double m : map_) most = std::max(most, std::abs(m));
   std::frexp(most, &exponent);
-  // What underflows here is too small to matter to the filters.
+  // Terms that underflow here are too small to matter to the filters.
   LinearMap3 near_one = map_;
   for (double& m : near_one) m = std::ldexp(m, -exponent);
 
@@ -123,7 +124,7 @@ QuadraticForm::QuadraticForm(const EllipticalMetric3& metric) : map_(metric.map(
   }
   exact_ = std::make_shared<const Exact>(std::move(exact));
 
-  // Cholesky's factor, with exact remainders: no entry suffers from cancellation.
+  // Cholesky factor with exact remainders: no entry suffers from cancellation.
   spread_ = filter2_ = std::numeric_limits<double>::infinity();
   const auto root = [](const Rational& square) { return std::sqrt(CGAL::to_double(square)); };
   if (CGAL::sign(q[0]) != CGAL::POSITIVE) return;
@@ -136,7 +137,7 @@ QuadraticForm::QuadraticForm(const EllipticalMetric3& metric) : map_(metric.map(
   r11_ = root(s11);
   r12_ = CGAL::to_double(s12) / r11_;
   r22_ = root(Rational(s22 - s12 * s12 / s11));
-  // Beyond that underflow would count, and filters decide little anyway.
+  // Beyond this underflow would matter, and filters decide little anyway.
   constexpr double kLeast = 0x1p-28;
   if (!(std::min({r00_, r11_, r22_}) > kLeast)) {
     r00_ = r01_ = r02_ = r11_ = r12_ = r22_ = 0;
@@ -151,7 +152,7 @@ QuadraticForm::QuadraticForm(const EllipticalMetric3& metric) : map_(metric.map(
   const double by_rows = std::max(1 + p01 + p02, 1 + p12);
   const double by_columns = std::max(1 + p01, 1 + p02 + p12);
   spread_ = std::sqrt(by_rows * by_columns) * (1 + 0x1p-40);
-  // Else errors of the second order would count.
+  // Otherwise second-order errors would matter.
   if (!(spread_ < 0x1p28)) return;
   const double bound = (160 + 200 * spread_) * 0x1p-53;
   filter2_ = bound * bound * 1.01;
@@ -161,8 +162,8 @@ int EllipticalKernel::in_sphere(const Point& a, const Point& b, const Point& c, 
                                 const Point& p) {
   const std::array<const Point*, 4> corner = {&a, &b, &c, &d};
   const QuadraticForm::Exact& q = *form_->exact_;
-  // Grids, where ties are frequent and must not be dear: the value is a sum over the entries of Q
-  // of whole numbers. At a tie they mostly vanish one by one.
+  // Grids, where ties are frequent and must be cheap: the value is a sum over the entries of Q
+  // times integers. At a tie most of these vanish one by one.
   std::array<Triple<Int128>, 4> whole;
   bool is_whole = true;
   for (std::size_t i = 0; i < 4 && is_whole; ++i)
@@ -194,7 +195,7 @@ int EllipticalKernel::in_sphere(const Point& a, const Point& b, const Point& c, 
 int EllipticalKernel::compare_distance(const Point& p, const Point& a, const Point& b) {
   const auto square = [](const Point& m) { return m[0] * m[0] + m[1] * m[1] + m[2] * m[2]; };
   const double to_a = square(mapped(a, p)), to_b = square(mapped(b, p));
-  // 2 * 9 u spread by the maps, 3 u by the squares, of each.
+  // 2 * 9 u spread for the maps and 3 u for the squares, each.
   const double bound = (20 * form_->spread_ + 8) * 0x1p-53 * (to_a + to_b);
   if (form_->spread_ < 0x1p28 && to_a + to_b < 0x1p900 && std::abs(to_a - to_b) > bound + 0x1p-900)
     return to_a < to_b ? -1 : 1;
@@ -209,11 +210,12 @@ int EllipticalKernel::angle(const Point& from, const Point& a, const Point& b) {
 
 bool EllipticalKernel::in_smallest_sphere(const Point& a, const Point& b, const Point& c,
                                           const Point& d) {
-  // On the edge opposite to an angle that is not acute; at a right angle both are the same.
+  // On the edge opposite to an angle that is not acute; at a right angle both cases coincide.
   if (angle(a, b, c) <= 0) return angle(d, b, c) < 0;
   if (angle(b, a, c) <= 0) return angle(d, a, c) < 0;
   if (angle(c, a, b) <= 0) return angle(d, a, b) < 0;
-  // The centre is (f e + g f) / (2 n), e and f the edges from a; scalar products only.
+  // The centre is (f e + g f) / (2 n), with e and f the edges from a; only scalar products are
+  // needed.
   const QuadraticForm::Exact& q = *form_->exact_;
   const Triple<Number> e = exactly(a, b), f = exactly(a, c), v = exactly(a, d);
   const Number ee = q.product(e, e), ff = q.product(f, f), ef = q.product(e, f);

@@ -6,25 +6,26 @@
 #include "double_kernel.hpp"
 #include "terrace/tri/metric.hpp"
 
-/// Exact predicates in an elliptical metric, on the points as they are: nothing is mapped but
-/// differences inside the filters. Orientation is the same in all linear metrics; only spheres
-/// become ellipsoids and distances lengths of mapped vectors.
+/// Exact predicates in an elliptical metric, on the original points: only differences are mapped,
+/// inside the filters. Orientation is the same in all linear metrics; only spheres become
+/// ellipsoids and distances the lengths of mapped vectors.
 
 namespace terrace::tri::spatial {
 
-/// A metric made ready for the predicates, which need its map M only by Q = M^T M.
+/// A metric prepared for the predicates, which need its map M only as Q = M^T M.
 ///
-/// Filters use the upper triangular R with R^T R = Q (times a power of two), its diagonal positive:
-/// it differs from M by a turn or a mirror, so sizes are those of M and turns are kept. Each of its
-/// entries is rounded from an exact one, within 5 u of itself, u = 2^-53. A difference mapped by it
-/// is then wrong by 9 u |R| |d| component by component (difference 1, entry 5, product 1, sums 2),
-/// and d = R^-1 m: so by 9 u spread() times the length of the mapped difference m.
+/// Filters use the upper triangular R with R^T R = Q (times a power of two) and a positive
+/// diagonal: it differs from M by a rotation or reflection, so it preserves lengths and
+/// orientation. Each of its entries is rounded from an exact one, with a relative error of at most
+/// 5 u, u = 2^-53. The error of a difference mapped by it is then 9 u |R| |d|, component by
+/// component (difference 1, entry 5, product 1, sums 2); as d = R^-1 m, that is 9 u spread() times
+/// the length of the mapped difference m.
 class QuadraticForm {
  public:
   explicit QuadraticForm(const EllipticalMetric3& metric);
 
-  /// A bound of the norm of |R| |R^-1|: 1 for axes along those of the coordinates, else it grows
-  /// with the ratio of the longest semi-axis to the shortest. May be infinite.
+  /// A bound of the norm of |R| |R^-1|: 1 for axes along those of the coordinates; otherwise it
+  /// grows with the ratio of the longest semi-axis to the shortest. May be infinite.
   [[nodiscard]] double spread() const { return spread_; }
 
  private:
@@ -51,10 +52,10 @@ class EllipticalKernel : public DoubleKernel {
    private:
     const QuadraticForm* before_;
   };
-  /// That of the scope, to be set in other threads as well.
+  /// The form of the current scope, to be set in other threads too.
   static const QuadraticForm& form() { return *form_; }
 
-  /// What the points have in common does not help: the metric's own numbers are anything.
+  /// A common property of the points would not help: the metric's own numbers are arbitrary.
   struct Lattice {
     void add(const Point&) {}
   };
@@ -69,8 +70,8 @@ class EllipticalKernel : public DoubleKernel {
       filter2_ = m.filter2_;
     }
 
-    /// Where the point lies with respect to the ellipsoid through four vertices in order: the
-    /// mapped differences meet the test of DoubleKernel.
+    /// The position of the point relative to the ellipsoid through four vertices in order: the test
+    /// of DoubleKernel applied to mapped differences.
     [[gnu::always_inline]] Verdict side(const Vertex& a, const Vertex& b, const Vertex& c,
                                         const Vertex& d) const {
       const auto pairs = [](const Vertex& v, const Vertex& w, std::size_t k) {
@@ -82,11 +83,11 @@ class EllipticalKernel : public DoubleKernel {
       const InSphere test = in_sphere_value(
           {r00_ * x01 + r01_ * y01 + r02_ * z01, r00_ * x23 + r01_ * y23 + r02_ * z23,
            r11_ * y01 + r12_ * z01, r11_ * y23 + r12_ * z23, r22_ * z01, r22_ * z23});
-      // Let L be the largest squared length of a mapped row. As in IntKernel the operations are
-      // wrong by 132 u L^2.5. By Hadamard a 3 x 3 minor is at most L^1.5; where each row is wrong
-      // by e, minors are by 3 e L, squares by 2 e L^0.5, the four products by 20 e L^2, and e is 9
-      // u spread L^0.5. So (160 + 200 spread) u L^2.5 bounds all. Sizes near underflow and overflow
-      // are left to the exact test.
+      // Let L be the largest squared length of a mapped row. As in IntKernel the operations cause
+      // an error of 132 u L^2.5. By Hadamard a 3 x 3 minor is at most L^1.5; if each row has an
+      // error of e, minors have 3 e L, squares 2 e L^0.5 and the four products 20 e L^2, where e is
+      // 9 u spread L^0.5. So (160 + 200 spread) u L^2.5 bounds the total. Sizes near underflow and
+      // overflow are left to the exact test.
       const double fifth = test.largest * test.largest * test.largest * test.largest * test.largest;
       if (test.value * test.value > filter2_ * fifth && fifth > 0x1p-900 && fifth < 0x1p900)
           [[likely]]
@@ -101,23 +102,23 @@ class EllipticalKernel : public DoubleKernel {
     double filter2_;
   };
 
-  /// > 0 where p lies inside the ellipsoid of the metric through a, b, c, d, which are in order; 0
-  /// where on it.
+  /// > 0 if p lies inside the metric's ellipsoid through a, b, c, d, which are in order; 0 if on
+  /// it.
   static int in_sphere(const Point& a, const Point& b, const Point& c, const Point& d,
                        const Point& p);
 
-  /// < 0 where a is nearer to p than b.
+  /// < 0 if a is nearer to p than b.
   static int compare_distance(const Point& p, const Point& a, const Point& b);
 
-  /// The sign of q(u, v), u from `from` to a and v from there to b: > 0 where the metric sees them
-  /// at an acute angle.
+  /// The sign of q(u, v), with u from `from` to a and v from `from` to b: > 0 if the angle is acute
+  /// in the metric.
   static int angle(const Point& from, const Point& a, const Point& b);
 
-  /// Whether d lies inside the smallest ellipsoid of the metric that contains the triangle a, b, c,
-  /// not on a line; d different from them. Exact.
+  /// Whether d lies inside the metric's smallest ellipsoid that contains the triangle a, b, c,
+  /// which is not degenerate; d is different from its corners. Exact.
   static bool in_smallest_sphere(const Point& a, const Point& b, const Point& c, const Point& d);
 
-  /// The difference p - origin mapped by M, the same on every machine, rounded.
+  /// The difference p - origin mapped by M, rounded; the same on every machine.
   static Point by_map(const Point& p, const Point& origin) {
     const LinearMap3& m = form_->map_;
     const double x = p[0] - origin[0], y = p[1] - origin[1], z = p[2] - origin[2];
@@ -125,7 +126,7 @@ class EllipticalKernel : public DoubleKernel {
             m[6] * x + m[7] * y + m[8] * z};
   }
 
-  /// The difference p - origin mapped by R, wrong by 9 u spread() times its length.
+  /// The difference p - origin mapped by R, with an error of 9 u spread() times its length.
   static Point mapped(const Point& p, const Point& origin) {
     const QuadraticForm& m = *form_;
     const double x = p[0] - origin[0], y = p[1] - origin[1], z = p[2] - origin[2];

@@ -28,7 +28,7 @@ std::uint32_t find_basis(Mesh<Kernel>& mesh) {
   return kNone;
 }
 
-/// Lets all waiting vertices in; apex, one of them, is off the plane of the basis.
+/// Inserts all waiting vertices; apex, one of them, is off the plane of the basis.
 template <class Kernel>
 void leave_flat(Mesh<Kernel>& mesh, std::uint32_t apex) {
   const std::vector<std::uint32_t> waiting = std::move(mesh.waiting);

@@ -6,8 +6,8 @@
 #include "insert.hpp"
 #include "mesh.hpp"
 
-/// The states without a tetrahedron: no point, or any number on a line or plane. Then the vertices
-/// wait in a sorted list, and the first point beside their plane lets all of them in.
+/// The states without tetrahedra: no point, or any number on a line or plane. Then the vertices
+/// wait in a sorted list, and the first point off their plane causes all of them to be inserted.
 
 namespace terrace::tri::spatial {
 
@@ -19,17 +19,18 @@ Inserted insert_flat(Mesh<Kernel>& mesh, const typename Kernel::Point& p);
 template <class Kernel>
 void remove_flat(Mesh<Kernel>& mesh, std::span<const std::uint32_t> vertices);
 
-/// Drops all tetrahedra and makes those of the survivors, which are all vertices left, from
-/// nothing; flat if they are coplanar.
+/// Drops all tetrahedra and rebuilds those of the survivors, which are all remaining vertices, from
+/// scratch; flat if they are coplanar.
 template <class Kernel>
 void restart(Mesh<Kernel>& mesh, std::vector<std::uint32_t> survivors);
 
-/// Whether vertices (the ghost among them is passed over) lie in one plane.
+/// Whether vertices (a ghost among them is skipped) lie in one plane.
 template <class Kernel>
 bool coplanar(const Mesh<Kernel>& mesh, std::span<const std::uint32_t> vertices);
 
-/// Adds p's vertex to the at most three that span a point, line or plane, if it is not on it yet.
-/// False, and nothing is added, where it is off their plane: the four of them span space.
+/// Adds p's vertex to the at most three that span a point, line or plane, if it is not in that
+/// span. Returns false, and adds nothing, if the basis spans a plane and p is off it: the four of
+/// them span space.
 template <class Kernel>
 bool extend_basis(const Mesh<Kernel>& mesh, std::vector<std::uint32_t>& basis,
                   std::uint32_t vertex) {
@@ -50,8 +51,8 @@ bool extend_basis(const Mesh<Kernel>& mesh, std::vector<std::uint32_t>& basis,
   }
 }
 
-/// The first tetrahedron and its ghosts, of the three vertices of the basis and one off their
-/// plane. The basis is forgotten and the mesh is no longer flat.
+/// Makes the first tetrahedron and its ghosts from the three vertices of the basis and one off
+/// their plane. Afterwards the basis is empty and the mesh no longer flat.
 template <class Kernel>
 void make_first(Mesh<Kernel>& mesh, std::uint32_t apex);
 

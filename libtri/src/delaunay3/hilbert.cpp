@@ -15,8 +15,8 @@ namespace {
 
 constexpr unsigned kBits = 10;  ///< of a key, per axis
 
-/// One step down the curve: the octant's place on it, and the state of the cube there. A state is
-/// the corner where the curve enters and the axis along which it leaves (C. Hamilton, A.
+/// One step down the curve: the octant's position on it, and the state of the cube there. A state
+/// is the corner where the curve enters and the axis along which it leaves (C. Hamilton, A.
 /// Rau-Chaplin, "Compact Hilbert indices", doi:10.1016/j.ipl.2007.08.034): 8 * axis + corner.
 struct Step {
   std::uint8_t place;
@@ -57,7 +57,7 @@ constexpr std::array<Step, 24 * 8> make_table() {
 }
 constexpr auto kTable = make_table();
 
-/// Place of a cell of a cube of 2^10 cells along each edge on the curve.
+/// Position on the curve of a cell of a cube with 2^10 cells along each edge.
 std::uint32_t hilbert_key(const std::array<std::uint32_t, 3>& cell) {
   std::uint32_t key = 0;
   std::uint32_t state = 0;
@@ -71,8 +71,8 @@ std::uint32_t hilbert_key(const std::array<std::uint32_t, 3>& cell) {
   return key;
 }
 
-/// Maps points of a set to cells of its bounding cube. The cube is filled, so that the middle of
-/// the curve is a plane between two halves of points spread evenly.
+/// Maps points of a set to cells of its bounding cube. The points fill the cube, so that the middle
+/// of the curve is a plane that halves uniformly spread points.
 template <class Coord>
 class Cells {
  public:
@@ -92,14 +92,14 @@ class Cells {
       scale_ = (std::uint64_t{1} << (32 + kBits)) / (static_cast<std::uint64_t>(extent_) + 1);
       single_ = extent_ == 0;
     } else {
-      // Halves: the extent of finite doubles may overflow.
+      // Uses halves: the extent of finite doubles may overflow.
       extent_ = std::max(
           {high[0] / 2 - low_[0] / 2, high[1] / 2 - low_[1] / 2, high[2] / 2 - low_[2] / 2});
       single_ = !(extent_ > 0);
     }
   }
 
-  /// All points are equal (or as good as).
+  /// All points are equal (or nearly so).
   [[nodiscard]] bool single() const { return single_; }
   [[nodiscard]] std::uint32_t key(std::uint32_t number) const {
     const Point& p = points_[number];

@@ -6,18 +6,18 @@
 #include <cstddef>
 #include <cstdint>
 
-/// The determinant of the sphere test in double, two lanes wide: SSE2 and NEON have them, so every
-/// machine runs the same operations in the same order.
+/// The determinant of the sphere test in double, two lanes wide: SSE2 and NEON both have them, so
+/// every machine executes the same operations in the same order.
 
 namespace terrace::tri::spatial {
 
 using Pair = double __attribute__((vector_size(16)));
 
-/// What a filter says of the place of a point with respect to a sphere.
-enum class Verdict : std::uint8_t { kOut, kIn, kOpen };  ///< kOpen: to be decided exactly
+/// A filter's verdict on the position of a point relative to a sphere.
+enum class Verdict : std::uint8_t { kOut, kIn, kOpen };  ///< kOpen: needs an exact test
 
-/// Four vectors from the tested point to the corners a, b, c, d: coordinates of a and b, of c and
-/// d.
+/// Four vectors from the tested point to the corners a, b, c, d: coordinates of a and b, and of c
+/// and d.
 struct Rows {
   Pair x01, x23, y01, y23, z01, z23;
 };
@@ -29,8 +29,8 @@ struct InSphere {
 
 inline Pair cross_lanes(Pair low, Pair high) { return __builtin_shufflevector(low, high, 1, 2); }
 
-/// The four 3 x 3 minors are one expression turned round cyclically, so two lanes do the work of
-/// two rows (after J. R. Shewchuk's insphere(), doi:10.1007/PL00009321).
+/// The four 3 x 3 minors are cyclic permutations of one expression, so two lanes do the work of two
+/// rows (after J. R. Shewchuk's insphere(), doi:10.1007/PL00009321).
 struct Minors {
   Pair c01, c23;  ///< of rows abc and bcd, cda and dab
 };
@@ -55,13 +55,13 @@ struct Minors {
   return {sum[1] - sum[0], more[0] > more[1] ? more[0] : more[1]};
 }
 
-/// in_sphere_value() of whole numbers is exact where largest^5 is below this: with L for `largest`,
-/// a 2 x 2 minor is at most L, summed over its products, a 3 x 3 minor 3 L^1.5 and the value
-/// 12 L^2.5 < 2^53. Coordinates of a row are then below 2^10.
+/// in_sphere_value() of integers is exact if largest^5 is below this: with L for `largest`, a 2 x 2
+/// minor is at most L, summed over its products, a 3 x 3 minor 3 L^1.5 and the value 12 L^2.5 <
+/// 2^53. Coordinates of a row are then below 2^10.
 inline constexpr double kExactFifth = 5.6e29;
 
-/// inside_perturbed_sphere() for whole numbers (or all times one power of two) of that size. Signs
-/// of 3 x 3 minors are orientations with the tested point in the place of a corner, and each row
+/// inside_perturbed_sphere() for integers (or integer multiples of a power of two) of that size.
+/// Signs of 3 x 3 minors are orientations with the tested point in place of a corner, and each row
 /// packs into one number in lexicographic order, that of the tested point being 0.
 [[gnu::noinline]] inline bool inside_small_perturbed_sphere(const Rows& r) {
   constexpr double kShift = 2048;

@@ -9,7 +9,7 @@
 namespace terrace::tri::spatial {
 
 /// Joins a vertex, which has its slot and point but no tetrahedron, to a triangulation with
-/// tetrahedra. `conflict`: a tetrahedron in conflict with it, as walk() finds where no corner
+/// tetrahedra. `conflict`: a tetrahedron in conflict with it, as found by walk() if no corner
 /// equals the point. See cavity_insert.hpp.
 template <class Kernel>
 void insert_vertex(Mesh<Kernel>& mesh, std::uint32_t vertex, std::uint32_t conflict);
@@ -22,10 +22,11 @@ struct Inserted {
 template <class Kernel>
 Inserted insert_point(Mesh<Kernel>& mesh, const typename Kernel::Point& p, std::uint32_t hint);
 
-/// Calls visit(k) for all k below count, every fourth of them first, of these again every fourth,
-/// and so on from the coarsest: points of a curve so inserted make half of the tetrahedra that are
-/// made and replaced again when they come in order (after N. Amenta, S. Choi, G. Rote, "Incremental
-/// constructions con BRIO", doi:10.1145/777792.777824, with fixed samples in place of random ones).
+/// Calls visit(k) for all k below count, first every fourth of them, before that every fourth of
+/// these, and so on from the coarsest: points of a curve inserted in this way make half of the
+/// temporary tetrahedra that they would make in order (after N. Amenta, S. Choi, G. Rote,
+/// "Incremental constructions con BRIO", doi:10.1145/777792.777824, with fixed samples instead of
+/// random ones).
 template <class Visit>
 void visit_coarse_first(std::uint32_t count, Visit visit) {
   constexpr std::uint32_t kFactor = 4;

@@ -11,8 +11,8 @@
 
 #include "in_sphere.hpp"
 
-/// Exact predicates on integers of 30 bits: orientation in integers only; the sphere test by a
-/// filter in double, as differences of such integers are exact there, and integers of 192 bits.
+/// Exact predicates on 30-bit integers: orientation in integers only; the sphere test by a filter
+/// in double, as differences of such integers are exact there, and by 192-bit integers.
 
 namespace terrace::tri::spatial {
 
@@ -35,7 +35,7 @@ struct IntKernel {
     return true;
   }
 
-  /// The sign of det(b - a, c - a, d - a): > 0 where the four are in order, 0 where coplanar.
+  /// The sign of det(b - a, c - a, d - a): > 0 if the four are in order, 0 if coplanar.
   static int orientation(const Point& a, const Point& b, const Point& c, const Point& d) {
     const Vector u = difference(b, a);
     const Vector v = difference(c, a);
@@ -51,7 +51,7 @@ struct IntKernel {
     return u.y * v.z == u.z * v.y && u.z * v.x == u.x * v.z && u.x * v.y == u.y * v.x;
   }
 
-  /// What all points of a mesh have in common: nothing to know of whole numbers.
+  /// The common property of all points of a mesh: integers need none.
   struct Lattice {
     static void add(const Point&) {}
   };
@@ -61,7 +61,7 @@ struct IntKernel {
    public:
     Probe(const Point& p, Lattice) : at_{p[0], p[1], p[2], 0} {}
 
-    /// Where the point lies with respect to the sphere through four vertices in order, after the
+    /// The position of the point relative to the sphere through four vertices in order, after the
     /// perturbation.
     [[gnu::always_inline]] Verdict side(const Vertex& a, const Vertex& b, const Vertex& c,
                                         const Vertex& d) const {
@@ -73,9 +73,9 @@ struct IntKernel {
       const Rows rows = {low(xy01), low(xy23), high(xy01), high(xy23), low(z01), low(z23)};
       const InSphere test = in_sphere_value(rows);
       // Let L be the largest squared length of a row. A 2 x 2 minor is at most L in absolute value,
-      // summed over its products, a 3 x 3 minor 3 L^1.5, the value 12 L^2.5. Of relative errors of
-      // u = 2^-53 there are 2 in a minor, 3 more in the next one, 3 in a square, 1 in the product,
-      // 2 in the sums: 11 * 12 u < 1.5e-14.
+      // summed over its products, a 3 x 3 minor 3 L^1.5, the value 12 L^2.5. Relative errors of u =
+      // 2^-53: 2 in a minor, 3 more in the next one, 3 in a square, 1 in the product, 2 in the
+      // sums: 11 * 12 u < 1.5e-14.
       const double fifth = test.largest * test.largest * test.largest * test.largest * test.largest;
       if (!(test.value * test.value > 2.25e-28 * fifth)) [[unlikely]] {
         if (!(fifth < kExactFifth)) return Verdict::kOpen;
@@ -96,7 +96,8 @@ struct IntKernel {
       return lanes;
     }
 #ifdef __SSE2__
-    // GCC 12 converts one lane after the other where rounding modes count, though none counts here.
+    // If rounding modes are to be respected, GCC 12 converts lane by lane, though rounding does not
+    // matter here.
     static Pair low(Lanes v) { return _mm_cvtepi32_pd(reinterpret_cast<__m128i>(v)); }
 #else
     static Pair low(Lanes v) {
@@ -108,7 +109,7 @@ struct IntKernel {
     Lanes at_;
   };
 
-  /// > 0 where p lies inside the sphere through a, b, c, d, which are in order; 0 where on it.
+  /// > 0 if p lies inside the sphere through a, b, c, d, which are in order; 0 if on it.
   [[gnu::noinline]] static int in_sphere(const Point& a, const Point& b, const Point& c,
                                          const Point& d, const Point& p) {
     const std::array<Vector, 4> r = {difference(a, p), difference(b, p), difference(c, p),
@@ -134,7 +135,7 @@ struct IntKernel {
     return static_cast<std::uint64_t>(low) != 0 ? 1 : 0;
   }
 
-  /// < 0 where a is nearer to p than b.
+  /// < 0 if a is nearer to p than b.
   static int compare_distance(const Point& p, const Point& a, const Point& b) {
     const auto square = [&p](const Point& q) {
       const Vector v = difference(q, p);

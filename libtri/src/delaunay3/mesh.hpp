@@ -13,7 +13,7 @@
 #include "delaunay3/wrap/scan.hpp"
 #include "facet_table.hpp"
 
-/// The data of a tetrahedralisation and the steps that all algorithms share. No geometry here.
+/// The data of a tetrahedralisation and the operations that all algorithms share. No geometry here.
 
 namespace terrace::tri::spatial {
 
@@ -32,10 +32,10 @@ constexpr std::uint32_t tetrahedron_of(Side side) { return side >> 2; }
 constexpr std::uint32_t index_of(Side side) { return side & 3; }
 
 struct Tetrahedron {
-  /// In order: det(b - a, c - a, d - a) > 0; with a ghost it is so for any point beyond its facet.
-  /// A free slot has kFreeCorner first, then the next free slot.
+  /// In order: det(b - a, c - a, d - a) > 0; for a ghost this holds with any point beyond its
+  /// facet. A free slot has kFreeCorner first, then the next free slot.
   std::array<std::uint32_t, 4> corner;
-  /// mate[i]: the same facet as the side opposite to corner[i], seen from the neighbour.
+  /// mate[i]: the facet opposite to corner[i], as a side of the neighbour.
   std::array<Side, 4> mate;
 };
 static_assert(sizeof(Tetrahedron) == 32);
@@ -69,35 +69,36 @@ inline constexpr std::uint32_t kMaxTetrahedra = (std::uint32_t{1} << 30) - 2;
 // What Vertex::incident holds: a tetrahedron at the vertex (below 2^30), or one of these.
 /// Within one operation: the vertex's number in a cavity or hole, with this bit.
 inline constexpr std::uint32_t kLocalBit = 0x40000000u;
-/// Within a removal: to be removed, not met yet; and met.
+/// During a removal: to be removed, not met yet; and met.
 inline constexpr std::uint32_t kToRemove = 0x7FFFFFF0u;
 inline constexpr std::uint32_t kRemoving = 0x7FFFFFF1u;
 /// A living vertex without tetrahedra (all points are coplanar).
 inline constexpr std::uint32_t kNoIncident = 0x7FFFFFFFu;
-/// The slot is free, the other bits are the next free slot.
+/// The slot is free; the other bits are the next free slot.
 inline constexpr std::uint32_t kFreeVertexBit = 0x80000000u;
 
 /// Values of Mesh::mark.
 inline constexpr std::uint8_t kUnknown = 0;
 inline constexpr std::uint8_t kTaken = 1;  ///< in the cavity or hole
-inline constexpr std::uint8_t kKept = 2;   ///< tested, and not in it
+inline constexpr std::uint8_t kKept = 2;   ///< tested and kept
 
 /// Scratch memory of insertion, see cavity_insert.hpp.
 struct Cavity {
   struct Facet {
-    std::array<std::uint32_t, 3> corner;  ///< with the new vertex before them in order
+    std::array<std::uint32_t, 3> corner;  ///< in order with the new vertex before them
     Side outer;                           ///< the same facet, seen from outside
-    std::array<std::uint32_t, 3> local;   ///< numbers of the corners among the boundary's vertices
-    std::uint32_t slot;                   ///< of the tetrahedron on it
+    /// local numbers of the corners among the boundary's vertices
+    std::array<std::uint32_t, 3> local;
+    std::uint32_t slot;  ///< slot of the tetrahedron on the facet
   };
-  /// With up to so many facets the boundary has 63 vertices, which are numbered from 1 with six
+  /// With up to this many facets the boundary has 63 vertices, which are numbered from 1 in six
   /// bits.
   static constexpr std::size_t kSmall = 2 * 63 - 4;
   static constexpr std::uint32_t kStride = 64;
 
   std::vector<std::uint32_t> inside;  ///< slots of the tetrahedra in conflict, as a queue
   std::vector<Facet> facets;
-  /// By directed edge of local numbers: which side has it. Never cleared.
+  /// By directed edge of local numbers: the side that has it. Never cleared.
   std::vector<Side> by_edge = std::vector<Side>(std::size_t{kStride} * kStride);
   /// The same for large cavities: both vertices of an edge, the smaller first, and a side.
   struct Edge {
@@ -112,14 +113,14 @@ struct Cavity {
   }
 };
 
-/// What the removal of vertices leaves: open facets round it, and the vertices on and in it, which
-/// have local numbers; scratch memory of removal. Local number 0 is the ghost's.
+/// The hole left by removed vertices: the open facets around it, and the vertices on and in it,
+/// which have local numbers; scratch memory of removal. Local number 0 is the ghost's.
 template <class Point>
 struct Hole {
   struct Facet {
-    /// Local numbers; a corner inside the hole and these are in order.
+    /// Local numbers; in order with a corner inside the hole before them.
     std::array<std::uint32_t, 3> corner;
-    Side outer;  ///< the side beyond; kMatched once both tetrahedra are there
+    Side outer;  ///< the side beyond; kMatched once both tetrahedra exist
   };
   static constexpr Side kMatched = 0xFFFFFFFFu;
 
@@ -127,17 +128,17 @@ struct Hole {
   std::vector<Point> point;             ///< of vertex, in parallel
   std::vector<std::uint32_t> incident;  ///< a new tetrahedron at each vertex
   std::vector<Facet> facets;
-  std::vector<std::uint32_t> slots;  ///< of the tetrahedra taken out
+  std::vector<std::uint32_t> slots;  ///< slots of the tetrahedra taken out
 
-  /// Fill the hole of one vertex by ear_queue.cpp, a second method to compare with.
+  /// Fill the hole of one vertex by ear_queue.cpp, a second method for comparison.
   bool by_ears = false;
 
-  // For wrap.hpp: open facets, as a stack, some of them closed again; facets by corners.
+  // For wrap.hpp: open facets as a stack (some already closed again), and facets by corners.
   std::vector<std::uint32_t> pending;
   std::vector<FacetEntry> table;
 
-  // For wrap.cpp: coordinates of the vertices by local number, padded; what a facet makes of each;
-  // numbers of those that may be the next corner.
+  // For wrap.cpp: coordinates of the vertices by local number, padded; the values of each vertex
+  // for a facet; numbers of the candidates for the next corner.
   std::vector<double> x, y, z;
   std::vector<double> power, volume;
   std::vector<std::uint32_t> near;
@@ -161,7 +162,7 @@ struct Mesh {
   using Vertex = typename Kernel::Vertex;  ///< point and incident
 
   Pool<Vertex> vertex;  ///< slot 0 is the ghost
-  /// Holds all points there have been since the slots were forgotten.
+  /// Covers all points that have existed since the slots were forgotten.
   typename Kernel::Lattice lattice;
   // By tetrahedron slot. Empty while all points are coplanar ("flat").
   Pool<Tetrahedron> tetrahedron;
@@ -169,7 +170,7 @@ struct Mesh {
 
   /// While flat: all vertices in lexicographic order.
   std::vector<std::uint32_t> waiting;
-  /// While flat: vertices of the waiting that span their point, line or plane.
+  /// While flat: those of the waiting vertices that span their point, line or plane.
   std::vector<std::uint32_t> basis;
   bool flat = true;
 
@@ -187,7 +188,7 @@ struct Mesh {
 
   Mesh() { vertex.push_back(Vertex{Point{}, kNoIncident}); }
 
-  /// Forgets the slots, all of them free.
+  /// Forgets the slots, all of which are free.
   void forget_slots() {
     assert(vertex_count == 0 && flat);
     vertex.resize(1);
@@ -197,7 +198,7 @@ struct Mesh {
     free_vertex = kFreeVertexBit - 1;
     free_tetrahedron = kNone;
   }
-  /// Removes everything and releases the memory; the journal goes on.
+  /// Removes everything and releases the memory; the journal continues.
   void clear() {
     if (journal.on()) {
       for (std::uint32_t v = 1; v < vertex.size(); ++v)
@@ -216,7 +217,7 @@ struct Mesh {
     return t < tetrahedron.size() && is_finite(tetrahedron[t].corner);
   }
 
-  /// A slot with the point and no tetrahedron.
+  /// Allocates a slot with the point and without tetrahedra.
   std::uint32_t new_vertex(const Point& p) {
     std::uint32_t v = free_vertex;
     const bool again = v != kFreeVertexBit - 1;
@@ -240,7 +241,7 @@ struct Mesh {
     --vertex_count;
   }
 
-  /// A slot for a tetrahedron that the caller will write.
+  /// Allocates a slot for a tetrahedron, which the caller must write.
   std::uint32_t new_tetrahedron() {
     std::uint32_t t = free_tetrahedron;
     if (t != kNone) {
@@ -258,7 +259,7 @@ struct Mesh {
     record(t);
     return t;
   }
-  /// Before an algorithm overwrites or frees a tetrahedron in use.
+  /// To be called before an algorithm overwrites or frees a tetrahedron in use.
   void record(std::uint32_t t) {
     if (journal.on()) [[unlikely]]
       journal.touch_cell(t, tetrahedron[t].corner);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Insertion of many vertices by two threads. Vertices are numbered along a Hilbert curve, so the
 // first half of the numbers lies on one side of space and the second on the other. Each thread
-// inserts the vertices of one half as long as it meets tetrahedra of that half only; others are put
-// off. A second round cuts the circle of numbers elsewhere, so that most of these are far from its
-// border; what is left is inserted one by one.
+// inserts the vertices of one half as long as it meets only tetrahedra of that half; others are
+// deferred. A second round cuts the circle of numbers elsewhere, so that most of these are far from
+// its border; the rest are inserted one by one.
 #include "parts_insert.hpp"
 
 #include <algorithm>
@@ -24,10 +24,11 @@ namespace {
 
 constexpr std::uint32_t kParts = 2;
 
-/// A part of the mesh in which one thread inserts while others do in theirs: the tetrahedra whose
-/// corners (but for the ghost) all have numbers in one range, which may go round the end. Such a
-/// tetrahedron only this thread reads and writes; one with corners in several ranges nobody writes,
-/// and all may read it. So what a part does depends on nothing that other parts do meanwhile.
+/// A part of the mesh in which one thread inserts while others work in theirs: the tetrahedra whose
+/// corners (except the ghost) all have numbers in one range, which may wrap around the end. Only
+/// this thread reads and writes such a tetrahedron; one with corners in several ranges is written
+/// by none, and all may read it. So the work on a part does not depend on what other parts do at
+/// the same time.
 ///
 /// New tetrahedra go to blocks of slots that alternate between the parts.
 class Part {
@@ -35,7 +36,7 @@ class Part {
   static constexpr bool kWhole = false;
   static constexpr std::uint32_t kBlock = 128;  ///< marks of two cache lines
 
-  /// Vertices first, first + 1, ..., `size` of `all` in a circle that begins at `begin`.
+  /// Vertices first, first + 1, ..., `size` of `all` on a circle that begins at `begin`.
   struct Range {
     std::uint32_t begin, all, first, size;
 
@@ -46,8 +47,8 @@ class Part {
     }
   };
 
-  /// Slots from `base` on: `blocks` blocks for each of `parts` parts, of which this is number
-  /// `number`; free_list: slots that this part may use first.
+  /// Slots from `base` on: `blocks` blocks for each of `parts` parts; this is part `number`.
+  /// free_list: slots that this part may use first.
   Part(const Range& range, std::uint32_t base, std::uint32_t parts, std::uint32_t number,
        std::uint32_t blocks, std::uint32_t free_list)
       : range_(range),
@@ -66,15 +67,15 @@ class Part {
       if (!owns(v)) return false;
     return true;
   }
-  /// Whether the neighbour beyond facet i may be read: where a corner of that facet is in the range
-  /// it belongs to nobody else.
+  /// Whether the neighbour beyond facet i may be read: if a corner of that facet is in the range,
+  /// it cannot belong to another thread.
   [[nodiscard]] bool may_read_beyond(const Tetrahedron& t, std::uint32_t i) const {
     for (std::uint32_t k = 0; k < 4; ++k)
       if (k != i && range_.has(t.corner[k])) return true;
     return false;
   }
 
-  /// Whether so many more slots are there for sure.
+  /// Whether this many more slots are certainly available.
   [[nodiscard]] bool has_room(std::size_t count) const { return used_ + count <= room_; }
   template <class Mesh>
   std::uint32_t new_tetrahedron(Mesh& mesh) {
@@ -112,7 +113,7 @@ class Part {
   std::int64_t finite_ = 0;
 };
 
-/// A thread that has this one's metric; not joinable if the system refuses to start one.
+/// Starts a thread with this one's metric; not joinable if the system refuses to start one.
 template <class Kernel, class Work>
 std::thread in_thread(const Work& work) {
   try {
@@ -129,7 +130,7 @@ std::thread in_thread(const Work& work) {
   }
 }
 
-/// The vertex on the curve nearest before v, else after it, that has tetrahedra and is in the
+/// The nearest vertex before v on the curve (or else after it) that has tetrahedra and is in the
 /// range, or kNone. Few steps, as one in four comes from coarser passes.
 template <class Kernel>
 std::uint32_t near_vertex(const Mesh<Kernel>& mesh, const Curve& curve, const Part::Range& range,
@@ -146,7 +147,7 @@ std::uint32_t near_vertex(const Mesh<Kernel>& mesh, const Curve& curve, const Pa
   return kNone;
 }
 
-/// What one thread does. Threads write to their own cache lines.
+/// The work of one thread. Threads write to separate cache lines.
 template <class Kernel>
 class alignas(128) Worker {
  public:
@@ -169,7 +170,7 @@ class alignas(128) Worker {
 
   Part part;
   std::vector<std::uint32_t> put_off;
-  std::size_t tried = 0;  ///< all, but for want of slots
+  std::size_t tried = 0;  ///< all, unless slots ran out
   std::exception_ptr failure;
 
  private:
@@ -211,8 +212,8 @@ class Round {
                Part::Range{curve.begin, all, curve.begin + (cut + half) % all, all - half}};
   }
 
-  /// Turns `going` (sorted) round to begin with the first part. Returns what could not be inserted,
-  /// sorted.
+  /// Rotates `going` (sorted) so that the first part comes first. Returns the vertices that could
+  /// not be inserted, sorted.
   std::vector<std::uint32_t> run(std::span<std::uint32_t> going, unsigned threads) {
     std::rotate(going.begin(), std::lower_bound(going.begin(), going.end(), ranges_[0].first),
                 going.end());
@@ -245,7 +246,7 @@ class Round {
       close_gaps(base, first.part, second.part);
       lists = {lists[0].subspan(first.tried), lists[1].subspan(second.tried)};
       if (first.tried + second.tried > 0) continue;
-      // A cavity that is larger than all the room.
+      // A cavity larger than all the room.
       for (const auto& list : lists) put_off.insert(put_off.end(), list.begin(), list.end());
       break;
     }
@@ -254,7 +255,7 @@ class Round {
   }
 
  private:
-  /// Frees slots up to a whole number of blocks, so that blocks are those of cache lines.
+  /// Frees slots up to a multiple of the block size, so that blocks align with cache lines.
   void fill_block() {
     while (mesh_.tetrahedron.size() % Part::kBlock != 0) {
       const std::uint32_t t = mesh_.tetrahedron.size();
@@ -266,8 +267,8 @@ class Round {
     }
   }
 
-  /// Slots for tetrahedra of so many new vertices, whole blocks. What is reserved anyway is taken
-  /// where it is nearly enough.
+  /// Makes room for the tetrahedra of this many new vertices, in whole blocks. Capacity that is
+  /// reserved anyway is used if it nearly suffices.
   void make_room(std::size_t vertices) {
     constexpr std::size_t kUnit = kParts * std::size_t{Part::kBlock};
     const std::size_t size = mesh_.tetrahedron.size();
@@ -283,7 +284,7 @@ class Round {
     std::fill(mesh_.mark.data() + size, mesh_.mark.data() + after, kUnknown);
   }
 
-  /// Gives the slots that the parts have not used back.
+  /// Returns the slots that the parts have not used.
   void close_gaps(std::uint32_t base, const Part& first, const Part& second) {
     std::uint32_t end = base;
     for (const Part* part : {&first, &second})
@@ -327,8 +328,8 @@ void insert_slot(Mesh<Kernel>& mesh, std::uint32_t vertex, std::uint32_t hint) {
 template <class Kernel>
 void insert_in_parts(Mesh<Kernel>& mesh, const Curve& curve, std::span<std::uint32_t> going,
                      unsigned threads) {
-  // A Hilbert curve goes through the halves of space one after the other, and so do its two middle
-  // quarters and its two outer ones, with the cut across.
+  // A Hilbert curve passes through the halves of space one after the other; so do its two middle
+  // quarters together and its two outer ones, with a perpendicular cut.
   const std::uint32_t all = curve.end - curve.begin;
   std::vector<std::uint32_t> left = Round<Kernel>(mesh, curve, 0).run(going, threads);
   left = Round<Kernel>(mesh, curve, all / 4).run(left, threads);

@@ -8,8 +8,8 @@
 
 namespace terrace::tri::spatial {
 
-/// Orientation of a tetrahedron's corners with p in the place of corner i: > 0 where p is on the
-/// same side of facet i as that corner.
+/// Orientation of a tetrahedron's corners with p in place of corner i: > 0 if p is on the same side
+/// of facet i as that corner.
 template <class Kernel>
 int orientation_with(const typename Kernel::Vertex* vertex, const Tetrahedron& t, std::uint32_t i,
                      const typename Kernel::Point& p) {
@@ -20,10 +20,10 @@ int orientation_with(const typename Kernel::Vertex* vertex, const Tetrahedron& t
 
 /// Whether p, cospherical with the four points in order, lies inside their sphere after the
 /// perturbation: every lifted point is raised infinitesimally, the lexicographically larger
-/// infinitely more. Of the five only the largest counts: raised itself, p is outside; if another
-/// one is, the lifted hyperplane tilts about the other three, and p is below it on the side of the
-/// raised one. Where p is in the plane of those three, the second largest decides: no four points
-/// of a sphere besides lie in one plane with them.
+/// infinitely more. Of the five only the largest counts: if it is p, p is outside; if it is another
+/// one, the lifted hyperplane tilts about the other three, and p is below it on the side of the
+/// raised one. If p is in the plane of those three, the second largest decides: then no other four
+/// of the points are coplanar.
 template <class Point, class Orientation>
 [[gnu::noinline]] bool inside_perturbed_sphere(std::array<const Point*, 4> corner, const Point& p,
                                                Orientation orientation) {
@@ -51,7 +51,7 @@ bool inside_perturbed_sphere(const typename Kernel::Point& a, const typename Ker
 }
 
 /// Whether p, different from the corners, lies inside the sphere through a, b, c, d, which are in
-/// order, after the perturbation. Exact from the start: for places where no filter has been asked.
+/// order, after the perturbation. Exact from the start: for callers that have not applied a filter.
 template <class Kernel>
 bool inside_sphere_exactly(const typename Kernel::Point& a, const typename Kernel::Point& b,
                            const typename Kernel::Point& c, const typename Kernel::Point& d,
@@ -60,7 +60,7 @@ bool inside_sphere_exactly(const typename Kernel::Point& a, const typename Kerne
   return sign != 0 ? sign > 0 : inside_perturbed_sphere<Kernel>(a, b, c, d, p);
 }
 
-/// The same with the filter before it.
+/// The same, preceded by the filter.
 template <class Kernel>
 bool inside_sphere(const typename Kernel::Vertex& a, const typename Kernel::Vertex& b,
                    const typename Kernel::Vertex& c, const typename Kernel::Vertex& d,
@@ -83,20 +83,20 @@ class Conflicts {
         point_(p),
         probe_(p, mesh.lattice) {}
 
-  /// The filter's answer; for ghosts kOpen.
+  /// The filter's verdict; kOpen for ghosts.
   [[gnu::always_inline]] Verdict filter(const Tetrahedron& t) const {
     const auto& [a, b, c, d] = t.corner;
     if (has_ghost(t.corner)) [[unlikely]]
       return Verdict::kOpen;
     return probe_.side(vertex_[a], vertex_[b], vertex_[c], vertex_[d]);
   }
-  /// Whether the point, no corner of it, is in conflict with a tetrahedron of which filter() says
-  /// kOpen.
+  /// Whether the point, which is not a corner, is in conflict with a tetrahedron for which filter()
+  /// returned kOpen.
   [[nodiscard, gnu::noinline]] bool decide(const Tetrahedron& t) const {
     const std::uint32_t ghost = ghost_index(t.corner);
     if (ghost == 4) return decide_finite(t);
-    // Beyond the hull facet; in its plane the sphere of the finite tetrahedron there cuts the
-    // circle of the facet out, perturbed in the same way.
+    // Beyond the hull facet; in its plane the sphere of the adjacent finite tetrahedron intersects
+    // in the facet's circle, perturbed in the same way.
     const int side = orientation_with<Kernel>(vertex_, t, ghost, point_);
     if (side != 0) return side > 0;
     return decide_finite(tetrahedron_[tetrahedron_of(t.mate[ghost])]);

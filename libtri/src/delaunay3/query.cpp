@@ -59,7 +59,8 @@ std::uint64_t mix(std::uint64_t z) {
   return z ^ (z >> 31);
 }
 std::uint64_t bits(std::int32_t c) { return static_cast<std::uint64_t>(c); }
-std::uint64_t bits(double c) { return std::bit_cast<std::uint64_t>(c + 0.0); }  // one zero
+// merges -0.0 and 0.0
+std::uint64_t bits(double c) { return std::bit_cast<std::uint64_t>(c + 0.0); }
 
 template <class Point>
 std::uint64_t hash_point(std::uint64_t h, const Point& p) {
@@ -107,8 +108,8 @@ Location3 locate(const Mesh<Kernel>& mesh, const typename Kernel::Point& p, std:
 }
 
 // A vertex that is not nearest has a neighbour that is nearer, and the nearest vertices, all on one
-// empty sphere about p, are the corners of a convex polytope whose edges are there: so going to
-// better neighbours ends at the best vertex.
+// empty sphere about p, are the corners of a convex polytope whose edges exist: so moving to better
+// neighbours ends at the best vertex.
 template <class Kernel>
 std::uint32_t nearest(const Mesh<Kernel>& mesh, const typename Kernel::Point& p,
                       std::uint32_t hint) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Removal of vertices, one or a set: all tetrahedra at them are taken out, and what they leave is
-// filled as a whole, whatever its form: with vertices that stay inside it (islands), with handles
-// and pinches, at the hull. A hole ends where tetrahedra that stay are beyond a facet; two that
-// touch in edges or vertices only are filled one after the other.
+// Removal of vertices, one or a set: all tetrahedra at them are taken out, and the hole is filled
+// as a whole, whatever its shape: with vertices that stay inside it (islands), with handles and
+// pinches, at the hull. A hole ends at facets beyond which a tetrahedron stays; holes that touch
+// only in edges or vertices are filled one after the other.
 #include "remove.hpp"
 
 #include "delaunay3/wrap/wrap.hpp"
@@ -16,7 +16,7 @@
 namespace terrace::tri::spatial {
 namespace {
 
-/// The filling of a hole looks at each of its vertices for each facet, so larger sets are cut.
+/// Filling a hole tests each of its vertices for each facet, so larger sets are divided.
 constexpr std::size_t kMaxSet = 512;
 
 template <class Kernel>
@@ -71,7 +71,7 @@ class Removal {
     return incident & ~kLocalBit;
   }
 
-  /// Lists the tetrahedra of a hole, the facets round it, and the vertices that stay at it.
+  /// Lists the tetrahedra of a hole, the facets around it, and the vertices that stay on it.
   void gather(std::uint32_t start) {
     hole_.vertex.assign(1, kGhost);
     hole_.point.assign(1, {});
@@ -112,9 +112,9 @@ class Removal {
       __builtin_prefetch(&mesh_.tetrahedron[tetrahedron_of(mate)]);
   }
 
-  /// Whether all has to be rebuilt: where no tetrahedron is left to start from; where the
-  /// survivors are coplanar, which requires that all of them are at the one hole; and where a
-  /// hole's vertices are so many that looking at each of them for each facet would cost more.
+  /// Whether everything must be rebuilt: if no tetrahedron is left to start from; if the survivors
+  /// are coplanar, which requires that all of them are on this hole; and if a hole has so many
+  /// vertices that testing each of them for each facet would cost more.
   [[nodiscard]] bool must_restart() const {
     if (hole_.facets.empty()) return true;
     const std::size_t vertices = hole_.vertex.size();

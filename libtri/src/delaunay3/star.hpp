@@ -8,8 +8,8 @@
 
 namespace terrace::tri::spatial {
 
-/// The tetrahedra round a vertex, ghosts included, breadth first. Marks of its own in a hash table,
-/// so that several readers can have one each.
+/// The tetrahedra around a vertex, including ghosts, breadth-first. Marks are in a hash table of
+/// its own, so that concurrent readers can each have one.
 template <class Kernel>
 class Star {
  public:

@@ -7,8 +7,8 @@ namespace terrace::tri::spatial {
 
 /// Where a walk ended.
 struct WalkEnd {
-  /// The finite tetrahedron that contains the point, boundary included, or the ghost beyond a hull
-  /// facet that the point sees; kNone: at the end of what may be read.
+  /// The finite tetrahedron that contains the point, including its boundary, or the ghost beyond a
+  /// hull facet that the point sees; kNone: the walk left what may be read.
   std::uint32_t tetrahedron = kNone;
   bool outside = false;
 };
@@ -19,8 +19,8 @@ struct Everywhere {
 };
 
 /// Remembering visibility walk: from tetrahedron to tetrahedron through the first facet that
-/// separates the present one from p, never testing the facet just crossed. In a (perturbed)
-/// Delaunay triangulation no such walk goes round in a circle. `start` may be a ghost. `part`: see
+/// separates the current one from p, never testing the facet just crossed. In a (perturbed)
+/// Delaunay triangulation the walk cannot cycle. `start` may be a ghost. `part`: see
 /// parts_insert.cpp.
 template <class Kernel, class Part = Everywhere>
 WalkEnd walk(const Mesh<Kernel>& mesh, const typename Kernel::Point& p, std::uint32_t start,

@@ -12,13 +12,13 @@
 namespace terrace::tri::planar {
 
 /// The parts that the geometry of the query's Voronoi cell needs. Numbers of corners, triangles and
-/// so on are local: indices into these arrays, which keep their capacity from query to query.
+/// so on are local: indices into these arrays, which keep their capacity between queries.
 struct Cavity {
   struct Corner {
     std::uint32_t vertex;
     Query at;
   };
-  /// An edge inside, counter-clockwise for the triangle `left`.
+  /// An inner edge, counter-clockwise for the triangle `left`.
   struct Link {
     std::uint32_t from;
     std::uint32_t to;
@@ -38,8 +38,8 @@ struct Cavity {
   std::vector<Corner> corner;
   std::vector<std::array<std::uint32_t, 3>> triangle;
   std::vector<Link> link;
-  std::vector<Edge> rim;         ///< all round: edge i + 1 starts where edge i ends
-  std::vector<Pending> pending;  ///< scratch, a stack of which the caller knows the height
+  std::vector<Edge> rim;         ///< closed: edge i + 1 starts where edge i ends
+  std::vector<Pending> pending;  ///< scratch: a stack shared by nested calls
 
   void clear() {
     corner.clear();
@@ -49,9 +49,9 @@ struct Cavity {
   }
 };
 
-/// The cavity of a query inside the hull that is no vertex and on no hull edge; `root` is a
+/// The cavity of a query that is inside the hull, not a vertex and not on a hull edge; `root` is a
 /// triangle that contains it. The circle test is exact and strict: of cocircular triangles all or
-/// none are taken. So the cavity is one piece, star-shaped about the query.
+/// none are taken. So the cavity is connected and star-shaped about the query.
 template <class Kernel>
 void find_cavity(const Mesh<Kernel>& mesh, const Query& p, std::uint32_t root, Cavity& cavity) {
   const Triangle* const triangle = mesh.triangle.data();
@@ -97,8 +97,8 @@ void find_cavity(const Mesh<Kernel>& mesh, const Query& p, std::uint32_t root, C
   }
 }
 
-/// For a vertex inside the hull: its neighbours as corners, and the polygon of them as rim. There
-/// are no triangles inside, as if it had just been removed from nothing. False for hull vertices.
+/// For a vertex inside the hull: its neighbours as corners, and their polygon as rim. There are no
+/// triangles inside, as if the vertex were the only point in the polygon. False for hull vertices.
 template <class Kernel>
 bool find_link(const Mesh<Kernel>& mesh, std::uint32_t vertex, Cavity& cavity) {
   cavity.clear();

@@ -8,7 +8,7 @@
 
 namespace terrace::tri {
 
-/// Throws std::invalid_argument where an array of heights is too short.
+/// Throws std::invalid_argument if an array of heights is too short.
 template <class Coord>
 void check_heights(const Delaunay2<Coord>& triangulation, const Heights& heights) {
   if (heights.slots() >= triangulation.vertex_slots()) return;

@@ -11,7 +11,8 @@
 #include "../delaunay2/mesh.hpp"
 #include "../delaunay2/predicates.hpp"
 
-/// Where a query of doubles lies in a triangulation of any coordinates, decided exactly.
+/// The position of a query in doubles within a triangulation of any coordinate type, decided
+/// exactly.
 
 namespace terrace::tri::planar {
 
@@ -27,14 +28,14 @@ struct QueryPlace {
     kNowhere,   ///< outside the hull
     kVertex,    ///< on corner[0]
     kHullEdge,  ///< inside the hull edge of corner[0] and corner[1]
-    kInside,    ///< in `triangle`, its edges that are not on the hull included
+    kInside,    ///< in `triangle`, including its edges that are not on the hull
   };
   Kind kind = kNowhere;
   std::array<std::uint32_t, 2> corner{};
-  std::uint32_t triangle = kNone;  ///< unless flat or outside, one that contains the query
+  std::uint32_t triangle = kNone;  ///< a triangle that contains the query, unless flat or outside
 };
 
-/// All points on one line: the hull is the segment.
+/// All points are on one line: the hull is the segment.
 template <class Kernel>
 QueryPlace place_on_line(const Mesh<Kernel>& mesh, const Query& p) {
   const auto after = std::partition_point(mesh.line.begin(), mesh.line.end(), [&](std::uint32_t v) {
@@ -49,7 +50,7 @@ QueryPlace place_on_line(const Mesh<Kernel>& mesh, const Query& p) {
   return {QueryPlace::kHullEdge, {*(after - 1), *after}, kNone};
 }
 
-/// As walk() in walk.hpp: the triangle that contains the query, or a ghost whose edge it sees.
+/// Like walk() in walk.hpp: the triangle that contains the query, or a ghost whose edge it sees.
 template <class Kernel>
 std::uint32_t walk_to(const Mesh<Kernel>& mesh, const Query& p, std::uint32_t start) {
   const auto* const point = mesh.point.data();
@@ -82,7 +83,7 @@ std::uint32_t walk_to(const Mesh<Kernel>& mesh, const Query& p, std::uint32_t st
   }
 }
 
-/// `last`: the triangle to start from, where the next search shall start.
+/// `last`: the triangle to start from; set to where the next search should start.
 template <class Kernel>
 QueryPlace find_place(const Mesh<Kernel>& mesh, const Query& p, std::uint32_t& last) {
   if (mesh.flat) return place_on_line(mesh, p);
@@ -101,8 +102,8 @@ QueryPlace find_place(const Mesh<Kernel>& mesh, const Query& p, std::uint32_t& l
   return {QueryPlace::kInside, {}, last};
 }
 
-/// Calls visit(t, i) for the triangles round a vertex counter-clockwise, ghosts included; corner i
-/// of t is the vertex.
+/// Calls visit(t, i) for the triangles around a vertex counter-clockwise, including ghosts; corner
+/// i of t is the vertex.
 template <class Kernel, class Visit>
 void for_triangles_round(const Mesh<Kernel>& mesh, std::uint32_t vertex, Visit visit) {
   const std::uint32_t start = mesh.incident[vertex];
@@ -114,8 +115,8 @@ void for_triangles_round(const Mesh<Kernel>& mesh, std::uint32_t vertex, Visit v
   } while (t != start);
 }
 
-/// The vertex nearest to the query, of several the lexicographically smallest. See nearest() in
-/// query.cpp for why going to better neighbours finds it.
+/// The vertex nearest to the query, on ties the lexicographically smallest. See nearest() in
+/// query.cpp for why moving to better neighbours finds it.
 template <class Kernel>
 std::uint32_t nearest_vertex(const Mesh<Kernel>& mesh, const Query& p, std::uint32_t& last) {
   if (mesh.vertex_count == 0) return kNone;
@@ -123,7 +124,8 @@ std::uint32_t nearest_vertex(const Mesh<Kernel>& mesh, const Query& p, std::uint
     return DoubleKernel::compare_distance(p, to_query(mesh.point[a]), to_query(mesh.point[b]));
   };
   if (mesh.flat) {
-    // Along the line the distance falls and then grows; the last vertex has none to fall to.
+    // Along the line the distance decreases and then increases; after the last vertex there is
+    // none.
     const auto found =
         std::partition_point(mesh.line.begin(), mesh.line.end() - 1,
                              [&](const std::uint32_t& v) { return compare(v, *(&v + 1)) > 0; });

@@ -12,7 +12,7 @@
 namespace terrace::tri::planar {
 
 /// Answers queries one after another, each search starting where the last one ended. For one
-/// thread; memory is kept from query to query.
+/// thread; memory is kept between queries.
 template <class Kernel>
 class Sampler {
  public:
@@ -21,11 +21,11 @@ class Sampler {
   Sampler(Sampler&&) = delete;
   Sampler& operator=(Sampler&&) = delete;
 
-  /// The next search starts at this vertex; kNone: at the one used last by the triangulation.
+  /// The next search starts at this vertex; kNone: at the vertex last used by the triangulation.
   void start_at(std::uint32_t vertex);
-  /// As weights_at().
+  /// See weights_at().
   std::span<const VertexWeight> weigh(const Query& p, Interpolation method);
-  /// As gradients_at().
+  /// See gradients_at().
   Gradient gradient(const Query& p, const Heights& heights, GradientFrom from);
 
  private:
@@ -34,15 +34,15 @@ class Sampler {
   void weigh_edge(const Query& p, std::uint32_t a, std::uint32_t b);
   void weigh_triangle(const Query& p, std::uint32_t t);
   void weigh_neighbours(const Query& p, std::uint32_t t);
-  /// Measures the cell of p in cavity_. False: doubles are not good enough.
+  /// Measures the cell of p in cavity_. Returns false if double precision does not suffice.
   bool measure(const Query& p);
   template <class Number>
   void take_weights(const VoronoiCell<Number>& cell);
   void divide_by_sum();
-  /// centre: the vertex on which p lies, or kNoVertex.
+  /// centre: the vertex at p, or kNoVertex.
   Gradient gradient_of_cell(const Query& p, const Heights& heights, VertexId centre);
   Gradient gradient_of_triangles(const Heights& heights);
-  /// The triangles that meet at p, in triangles_.
+  /// Stores the triangles that meet at p in triangles_.
   void find_triangles(const Query& p, const QueryPlace& place);
   Exact& exact();
 
@@ -52,8 +52,8 @@ class Sampler {
   Cavity cavity_;
   VoronoiCell<double> cell_;
   std::vector<std::uint32_t> triangles_;
-  std::vector<std::array<double, 2>> slopes_;  ///< of weights, by corner of cavity_
-  std::unique_ptr<Exact> exact_;               ///< made when it is needed first
+  std::vector<std::array<double, 2>> slopes_;  ///< slopes of weights, by corner of cavity_
+  std::unique_ptr<Exact> exact_;               ///< created on first use
 };
 
 }  // namespace terrace::tri::planar

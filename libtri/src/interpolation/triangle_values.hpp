@@ -9,12 +9,12 @@
 #include "terrace/tri/interpolation.hpp"
 #include "voronoi_cell.hpp"
 
-/// What triangles alone give, with doubles or exact rationals.
+/// Values that depend on triangles alone, with doubles or exact rationals.
 
 namespace terrace::tri::planar {
 
-/// Twice the areas of the triangles of p and two corners, in parts of their sum, where they are
-/// accurate. `corner` is counter-clockwise.
+/// Twice the areas of the triangles of p and two corners, as shares of their sum, if accurate.
+/// `corner` is counter-clockwise.
 template <class Number>
 bool barycentric(const Query& p, const std::array<Query, 3>& corner,
                  std::array<double, 3>& weights) {
@@ -47,7 +47,7 @@ struct Tilt {
   Number x = 0;
   Number y = 0;
   Number area = 0;
-  Number size = 0;  ///< of doubles: the sum of absolute values of the products in `area`
+  Number size = 0;  ///< for doubles: the sum of absolute values of the products in `area`
 
   void add(const std::array<Query, 3>& corner, const std::array<double, 3>& height) {
     const Number bx = Number(corner[1][0]) - Number(corner[0][0]);

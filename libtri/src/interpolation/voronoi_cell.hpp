@@ -9,21 +9,21 @@
 
 #include "cavity.hpp"
 
-/// The Voronoi cell that a query would get, and what it would take from each of its neighbours.
+/// The Voronoi cell that a query would get, and the areas it would take from its neighbours.
 ///
 /// The cell's corners are the centres of the circles through the query and the edges of the
-/// cavity's rim; inside lie the centres of the cavity's triangles, which are corners of the cells
-/// of today. What the query takes from corner v is the polygon of the cell's side towards v and of
-/// the centres of the triangles at v. Each edge of such polygons is shared by two of them, dual to
-/// an edge of the cavity, and adds to the area of one what it takes from the other.
+/// cavity's rim; inside lie the centres of the cavity's triangles, which are corners of the
+/// existing cells. The area that the query takes from corner v is a polygon: the cell's side
+/// towards v and the centres of the triangles at v. Each edge of such polygons is shared by two of
+/// them, is dual to an edge of the cavity, and adds to one area what it subtracts from the other.
 
 namespace terrace::tri::planar {
 
-/// Errors of weights above this are not accepted of doubles.
+/// Weights computed in double are not accepted with errors above this.
 inline constexpr double kTolerance = 1e-11;
-/// Roundings that add up in a weight, beside what VoronoiCell::error counts.
+/// Roundings that add up in a weight, besides those counted by VoronoiCell::error.
 inline constexpr double kRoundings = 4;
-/// Products of four lengths must neither overflow nor lose bits: sizes of squares.
+/// Bounds of squared sizes, so that products of four lengths neither overflow nor lose bits.
 inline constexpr double kLeastSquare = 1e-130;
 inline constexpr double kGreatestSquare = 1e130;
 
@@ -42,28 +42,29 @@ struct VoronoiCell {
     Number x;
     Number y;
   };
-  std::vector<Vector> at;      ///< of corners, less the query
-  std::vector<Vector> centre;  ///< of triangles, less the query
+  std::vector<Vector> at;      ///< corners relative to the query
+  std::vector<Vector> centre;  ///< circumcentres of triangles relative to the query
   std::vector<Vector> round;   ///< corners of the cell by edge of the rim
   std::vector<Number> area;    ///< twice the area taken from each corner
-  Number total = 0;            ///< twice the cell's
-  /// With doubles: the sum of squares of errors of centres, in units of rounding; an estimate.
+  Number total = 0;            ///< twice the cell's area
+  /// For doubles: the sum of squared errors of centres, in units of rounding; an estimate.
   Number error = 0;
-  Number extent = 0;  ///< of doubles: the sum of squares of `round`
+  Number extent = 0;  ///< for doubles: the sum of squares of `round`
 
   void measure(const Cavity& cavity, const Query& p);
-  /// With doubles, after measure(): whether the weights will be right to kTolerance.
+  /// For doubles, after measure(): whether the weights will be accurate to kTolerance.
   [[nodiscard]] bool accurate() const;
-  /// The derivatives of the weights area / total by the query's coordinates, by corner. On a vertex
-  /// (find_link()): numbers s(i) so that the sum of s(i) * (height(i) - height of the vertex) is
-  /// the mean gradient over the cell. After measure(). False: not right to kTolerance.
+  /// The derivatives of the weights area / total by the query's coordinates, per corner. On a
+  /// vertex (find_link()): numbers s(i) such that the sum of s(i) * (height(i) - height of the
+  /// vertex) is the mean gradient over the cell. To be called after measure(). Returns false if not
+  /// accurate to kTolerance.
   bool differentiate(const Cavity& cavity, bool on_vertex,
                      std::vector<std::array<double, 2>>& slopes);
 
  private:
   static Number cross(const Vector& a, const Vector& b) { return a.x * b.y - a.y * b.x; }
   static Number square(const Vector& a) { return a.x * a.x + a.y * a.y; }
-  /// The point as far from the origin as from b and c, which are counter-clockwise.
+  /// The point equidistant from the origin, b and c, which are counter-clockwise.
   Vector circumcentre(const Vector& b, const Vector& c);
 
   std::vector<Vector> slope_;
@@ -75,8 +76,8 @@ auto VoronoiCell<Number>::circumcentre(const Vector& b, const Vector& c) -> Vect
   const Number cc = square(c);
   const Number half = Number(0.5) / cross(b, c);
   const Vector result{(bb * c.y - cc * b.y) * half, (cc * b.x - bb * c.x) * half};
-  // The cross product has a relative error of 1 / sin of the angle, hence so does the radius. A
-  // sum, which is NaN where a term is.
+  // The cross product has a relative error of 1 / sin of the angle, hence so does the radius. This
+  // is a sum, so it is NaN if a term is.
   if constexpr (std::is_same_v<Number, double>) error += bb * cc * half * half * square(result);
   return result;
 }
@@ -96,7 +97,7 @@ void VoronoiCell<Number>::measure(const Cavity& cavity, const Query& p) {
     at[i] = {number(v[0]) - number(p[0]), number(v[1]) - number(p[1])};
   }
   for (std::size_t i = 0; i < centre.size(); ++i) {
-    // Differences of the vertices themselves, as those of needles must be right.
+    // Uses differences of the vertices themselves, as those of needles must be accurate.
     const auto [ia, ib, ic] = cavity.triangle[i];
     const Query& a = cavity.corner[ia].at;
     const Query& b = cavity.corner[ib].at;
@@ -132,17 +133,17 @@ void VoronoiCell<Number>::measure(const Cavity& cavity, const Query& p) {
 
 template <class Number>
 bool VoronoiCell<Number>::accurate() const {
-  // A centre that is off by e moves the border of an area by e along a length of at most the
+  // A centre with an error of e moves the border of an area by e along a length of at most the
   // cell's extent.
   constexpr double kFactor = kRoundings * 0x1p-53 / kTolerance;
   return total > kLeastSquare && total < kGreatestSquare &&
          error * extent * (kFactor * kFactor) < total * total;
 }
 
-// A query that moves towards a corner of the cavity moves the side of its cell before that corner.
+// A query that moves towards a corner of the cavity moves the side of its cell facing that corner.
 // B. Piper, "Properties of local coordinates based on Dirichlet tesselations",
-// doi:10.1007/978-3-7091-6916-2_15: area i grows by the side's length over the corner's distance,
-// times the vector from the query to the side's middle.
+// doi:10.1007/978-3-7091-6916-2_15: area i grows by the side's length divided by the corner's
+// distance, times the vector from the query to the side's midpoint.
 template <class Number>
 bool VoronoiCell<Number>::differentiate(const Cavity& cavity, bool on_vertex,
                                         std::vector<std::array<double, 2>>& slopes) {
@@ -174,7 +175,7 @@ bool VoronoiCell<Number>::differentiate(const Cavity& cavity, bool on_vertex,
     }
     slopes[i] = {Rounded<Number>::of(slope.x), Rounded<Number>::of(slope.y)};
   }
-  // The sum of slopes times corners is the identity: errors are measured against 1.
+  // The sum of slopes times corners is the identity, so errors are relative to 1.
   return !std::is_same_v<Number, double> ||
          size * std::sqrt(farthest) * (kRoundings * 0x1p-53 / kTolerance) < 1;
 }

@@ -52,7 +52,7 @@ void check(const LinearMap<Dimension>& map, const std::string& what) {
     throw std::invalid_argument(what + " has an entry that is not finite; give a finite matrix");
   }
   if (invertible(map)) return;
-  throw std::invalid_argument(what + " has no inverse (" + listed<Dimension>(map) +
+  throw std::invalid_argument(what + " is not invertible (" + listed<Dimension>(map) +
                               "), so it maps different points to one; give the map of an " +
                               (Dimension == 2 ? "ellipse" : "ellipsoid"));
 }
@@ -141,7 +141,7 @@ MetricField<Dimension>::MetricField(std::vector<Region> regions) {
     for (std::size_t axis = 0; axis < Dimension; ++axis) {
       if (regions[r].box.min[axis] <= regions[r].box.max[axis]) continue;
       throw std::invalid_argument("region " + std::to_string(r) +
-                                  " of a field of metrics is empty or not a number along axis " +
+                                  " of a field of metrics is empty or NaN along axis " +
                                   std::to_string(axis) + "; give min <= max");
     }
     check_metric(regions[r].map, "the map of region " + std::to_string(r));

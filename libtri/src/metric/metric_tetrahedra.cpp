@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Flips of tetrahedra of one region. A facet that is not Delaunay, with apices d and e: where the
-// line from d to e goes through the facet, two tetrahedra become three; where it passes an edge,
-// the three at that edge become two if there are only three; where it meets the edge, the four (or
-// on the hull two) at that edge become as many. Otherwise the facet is stuck until its
+// Flips of tetrahedra of one region. For a facet that is not Delaunay, with apices d and e: if the
+// line from d to e passes through the facet, two tetrahedra become three; if it passes outside an
+// edge, the three at that edge become two if there are only three; if it meets the edge, the four
+// (or on the hull two) at that edge become as many. Otherwise the facet is stuck until its
 // neighbourhood changes.
 //
-// Facets wait in the order of their corners, whatever their slots: so the result is canonical.
+// Facets wait in the order of their corners, not of their slots: so the result is canonical.
 #include <algorithm>
 #include <array>
 #include <cassert>
@@ -24,14 +24,14 @@ namespace {
 
 using namespace spatial;
 
-/// A copy of tetrahedra that can be flipped. No ghosts: kHullSide lies beyond the hull.
+/// A copy of tetrahedra that can be flipped. It has no ghosts: kHullSide stands for the outside.
 class Flips {
  public:
   using Vertex = EllipticalKernel::Vertex;
   static constexpr Side kHullSide = 0xFFFFFFFFu;
   static constexpr std::uint32_t kNoRegion = 0xFFFFFFFFu;
 
-  // By vertex slot: the point, the number of its region, its place in lexicographic order.
+  // By vertex slot: the point, the number of its region, its rank in lexicographic order.
   std::vector<Vertex> vertex;
   std::vector<std::uint32_t> region;
   std::vector<std::uint32_t> rank;
@@ -42,8 +42,8 @@ class Flips {
   }
   [[nodiscard]] std::uint32_t region_of(std::uint32_t t) const;
 
-  /// Flips what can be flipped among the tetrahedra of a region, in the metric of the scope. `own`:
-  /// those tetrahedra at the start. Returns how many facets are stuck.
+  /// Flips among the tetrahedra of a region, in the metric of the scope, until nothing changes.
+  /// `own`: the tetrahedra of the region at the start. Returns the number of stuck facets.
   std::size_t settle(std::uint32_t number, const std::vector<std::uint32_t>& own);
   [[nodiscard]] std::size_t flip_count() const { return flips_; }
 
@@ -85,7 +85,7 @@ Flips::Key Flips::key_of(Side side) const {
   return key;
 }
 
-/// Asked of a tetrahedron of the region; also true at its border, where nothing can be done.
+/// Called for a tetrahedron of the region; also true at its border, where no flip is possible.
 bool Flips::is_delaunay(std::uint32_t t, std::uint32_t i) const {
   const Side mate = tetrahedron[t].mate[i];
   if (mate == kHullSide) return true;
@@ -118,11 +118,11 @@ std::size_t Flips::settle(std::uint32_t number, const std::vector<std::uint32_t>
         continue;
       if (!try_flip(t, index_of(next.side))) stuck.push_back(next);
     }
-    // A flip elsewhere may have set one free.
+    // A flip elsewhere may have freed a stuck facet.
     if (flips_ == before) break;
     for (const Pending& one : stuck) pending_.push(one);
   }
-  // Some may be there twice.
+  // There may be duplicates.
   std::sort(stuck.begin(), stuck.end(),
             [](const Pending& a, const Pending& b) { return a.key < b.key; });
   const auto end = std::unique(stuck.begin(), stuck.end(),
@@ -135,7 +135,8 @@ bool Flips::try_flip(std::uint32_t t, std::uint32_t i) {
   const std::uint32_t o = tetrahedron_of(mate);
   const std::uint32_t d = tetrahedron[t].corner[i];
   const std::uint32_t e = tetrahedron[o].corner[index_of(mate)];
-  // On which side of the facets at d is e? Opposite to one of the facet's corners is its edge.
+  // On which side of the facets at d is e? Each of the facet's edges is opposite to one of its
+  // corners.
   std::uint32_t passed = 4;
   bool coplanar = false;
   for (std::uint32_t k = 0; k < 4; ++k) {
@@ -154,7 +155,7 @@ bool Flips::try_flip(std::uint32_t t, std::uint32_t i) {
   return true;
 }
 
-/// The corner beyond the facet opposite to a corner, or kNone beyond the hull.
+/// The corner beyond the facet opposite to a given corner, or kNone beyond the hull.
 std::uint32_t Flips::apex_beyond(std::uint32_t t, std::uint32_t corner) const {
   std::uint32_t k = 0;
   while (tetrahedron[t].corner[k] != corner) ++k;
@@ -162,7 +163,7 @@ std::uint32_t Flips::apex_beyond(std::uint32_t t, std::uint32_t corner) const {
   return side == kHullSide ? kNone : tetrahedron[tetrahedron_of(side)].corner[index_of(side)];
 }
 
-/// The line passes the edge opposite to corner number `edge` of the facet.
+/// The line passes outside the edge opposite to corner number `edge` of the facet.
 bool Flips::flip_at_edge(std::uint32_t t, std::uint32_t i, std::uint32_t edge, bool coplanar) {
   const Side mate = tetrahedron[t].mate[i];
   const std::uint32_t o = tetrahedron_of(mate);
@@ -206,13 +207,13 @@ std::uint32_t Flips::new_slot() {
   return t;
 }
 
-/// Takes tetrahedra out and puts others, corners in any order, into the same space.
+/// Replaces tetrahedra by others, with corners in any order, that fill the same space.
 void Flips::replace(std::span<const std::uint32_t> old, std::span<const Corners> fresh) {
   struct Facet {
     Key key;
     Side side;
   };
-  // Facets that wait for a tetrahedron: those round it, then those of new ones.
+  // Facets that wait for a second tetrahedron: those on the boundary, then those of new ones.
   std::array<Facet, 16> open;
   std::size_t count = 0;
   for (const std::uint32_t t : old) {
@@ -258,7 +259,7 @@ void Flips::replace(std::span<const std::uint32_t> old, std::span<const Corners>
 const LinearMap3& map_of(const Euclidean&) { return kIdentityMap<3>; }
 const LinearMap3& map_of(const EllipticalMetric3& metric) { return metric.map(); }
 
-/// Regions are numbered as their vertices come; the map of each.
+/// Numbers the regions in the order of their vertices, and keeps the map of each.
 template <class Triangulation>
 std::vector<LinearMap3> find_regions(const Triangulation& triangulation, const MetricField3& field,
                                      Flips& flips) {
@@ -270,9 +271,9 @@ std::vector<LinearMap3> find_regions(const Triangulation& triangulation, const M
     auto& place = flips.vertex[slot(v)].point;
     for (std::size_t k = 0; k < 3; ++k) place[k] = static_cast<double>(p[k]);
     const LinearMap3 map = field(place);
-    // Vertices that follow each other mostly share their region.
+    // Successive vertices mostly share their region.
     if (maps.empty() || map != maps[last]) {
-      // Before it is a key: NaN has no order.
+      // Checked before it becomes a key: NaN has no order.
       check_metric(map, "the field of metrics: the map at " + std::to_string(place[0]) + ", " +
                             std::to_string(place[1]) + ", " + std::to_string(place[2]));
       const auto [at, fresh] = known.try_emplace(map, static_cast<std::uint32_t>(maps.size()));
@@ -313,7 +314,7 @@ void copy_tetrahedra(const Triangulation& triangulation, Flips& flips) {
       t.mate[i] = Flips::kHullSide;
       if (beyond[i] == kNoTetrahedron) continue;
       const std::uint32_t other = number[slot(beyond[i])];
-      // From there it is opposite to the corner that is not one of this one's.
+      // Seen from there, it is opposite to the corner that is not one of this one's.
       const auto& corner = flips.tetrahedron[other].corner;
       std::uint32_t k = 0;
       while (std::find(t.corner.begin(), t.corner.end(), corner[k]) != t.corner.end()) ++k;
@@ -322,7 +323,7 @@ void copy_tetrahedra(const Triangulation& triangulation, Flips& flips) {
   }
 }
 
-/// All in one region: of the points alone, without flips.
+/// All points in one region: triangulated from scratch, without flips.
 template <class Triangulation>
 void build_anew(const Triangulation& triangulation, const LinearMap3& map,
                 MetricTetrahedra& result) {

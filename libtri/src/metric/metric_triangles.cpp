@@ -18,7 +18,8 @@ constexpr Side kNoSide = 0xFFFFFFFFu;
 const LinearMap2& map_of(const Euclidean&) { return kIdentityMap<2>; }
 const LinearMap2& map_of(const EllipticalMetric2& metric) { return metric.map(); }
 
-/// A copy of triangles that edges can be flipped in. No ghosts: kNoSide lies beyond the hull.
+/// A copy of triangles whose edges can be flipped. It has no ghosts: kNoSide stands for the
+/// outside.
 class Flips {
  public:
   template <class Triangulation>
@@ -26,7 +27,7 @@ class Flips {
         const std::optional<Box3>& window)
       : point_(triangulation.vertex_slots()), region_(triangulation.vertex_slots(), kNoRegion) {
     if (!window) triangle_.reserve(triangulation.triangle_count());
-    // The dense number of each triangle that takes part.
+    // The dense number of each participating triangle.
     std::vector<std::uint32_t> number(triangulation.triangle_slots(), kNone);
     for (const TriangleId id : triangulation.all_triangles()) {
       const auto corners = triangulation.vertices(id);
@@ -46,7 +47,7 @@ class Flips {
         const std::uint32_t other = beyond[i] == kNoTriangle ? kNone : number[slot(beyond[i])];
         t.mate[i] = kNoSide;
         if (other == kNone) continue;
-        // The same edge from there: its first corner is this one's second.
+        // The same edge seen from there: its first corner is this one's second.
         const auto& corner = triangle_[other].corner;
         const auto at = std::find(corner.begin(), corner.end(), t.corner[previous_index(i)]);
         t.mate[i] =
@@ -57,7 +58,7 @@ class Flips {
   }
 
   void run() {
-    // Triangles of one region come one after the other: number them so.
+    // Numbers the triangles region by region.
     std::vector<std::vector<std::uint32_t>> members(maps_.size());
     for (std::uint32_t t = 0; t < triangle_.size(); ++t) {
       const std::uint32_t region = region_of(triangle_[t]);
@@ -106,9 +107,9 @@ class Flips {
       for (const std::uint32_t v : t.corner) {
         if (region_[v] != kNoRegion) continue;
         const LinearMap2 map = field(point_[v]);
-        // Vertices that follow each other mostly share their region.
+        // Successive vertices mostly share their region.
         if (maps_.empty() || map != maps_[last_]) {
-          // Before it is a key: NaN has no order.
+          // Checked before it becomes a key: NaN has no order.
           check_metric(map, "the field of metrics: the map at " + std::to_string(point_[v][0]) +
                                 ", " + std::to_string(point_[v][1]));
           const auto [at, fresh] = known.try_emplace(map, static_cast<std::uint32_t>(maps_.size()));
@@ -143,7 +144,7 @@ class Flips {
       // Two of the neighbour's corners are this triangle's.
       if (region_[triangle_[o].corner[k]] != region) continue;
       const auto& [a, b, c] = triangle_[t].corner;
-      // A corner inside lies within the angle at the opposite one: the four are convex.
+      // A corner inside lies within the angle at the opposite one, so the four are convex.
       if (!inside_circle<EllipticalKernel>(point_[a], point_[b], point_[c],
                                            point_[triangle_[o].corner[k]]))
         continue;
@@ -155,7 +156,7 @@ class Flips {
     }
   }
 
-  /// Turns the edge between corner i of t and corner k of o into that from the one to the other,
+  /// Replaces the edge between corner i of t and corner k of o by the one that joins these corners,
   /// which becomes side 1 of both.
   void flip(std::uint32_t t, std::uint32_t i, std::uint32_t o, std::uint32_t k) {
     const Triangle one = triangle_[t];
@@ -181,7 +182,7 @@ class Flips {
   std::vector<std::uint32_t> region_;  // by vertex slot: index in maps_
   std::vector<Triangle> triangle_;
   std::vector<LinearMap2> maps_;
-  std::vector<bool> done_;  // regions whose metric is the triangulation's own
+  std::vector<bool> done_;  // regions whose metric is that of the triangulation
   std::uint32_t last_ = 0;
   std::vector<Side> pending_;
 };

@@ -11,7 +11,7 @@
 
 namespace terrace::tri {
 
-/// Where a cluster hangs in the tree of expanded clusters: under the expanded cluster in slot
+/// The position of a cluster in the tree of expanded clusters: below the expanded cluster in slot
 /// `parent`, headed by its member `index`, or by its own head if `index` is its number of members.
 struct ChildRef {
   std::uint32_t parent = 0;
@@ -19,9 +19,9 @@ struct ChildRef {
   friend bool operator==(const ChildRef&, const ChildRef&) = default;
 };
 
-/// A hash table from cluster id to ChildRef: open addressing, linear probing, deletion by moving
+/// A hash table from cluster id to ChildRef: open addressing, linear probing, deletion by shifting
 /// back (so no tombstones, and lookups stay short however often clusters come and go). 16 bytes per
-/// place, between 3/8 and 3/4 of the places in use once it has grown.
+/// place; between 3/8 and 3/4 of the places are in use once it has grown.
 class ClusterMap {
  public:
   [[nodiscard]] std::size_t size() const { return size_; }
@@ -42,7 +42,7 @@ class ClusterMap {
     }
   }
 
-  /// False, and nothing changes, if the id is there already. Requires a reserved place.
+  /// Returns false, and changes nothing, if the id already exists. Requires a reserved place.
   bool insert(ClusterId id, ChildRef where) {
     assert(size_ < places_.size() / 4 * 3);
     std::size_t i = home(id);
@@ -60,7 +60,7 @@ class ClusterMap {
       assert(places_[hole].id != kFree);
       hole = next(hole);
     }
-    // Whoever probed across the hole moves into it, and leaves the next one.
+    // An entry whose probe sequence crosses the hole moves into it, and leaves the next hole.
     for (std::size_t i = next(hole); places_[i].id != kFree; i = next(i)) {
       const std::size_t from_home = (i - home(places_[i].id)) & (places_.size() - 1);
       const std::size_t from_hole = (i - hole) & (places_.size() - 1);
@@ -73,13 +73,14 @@ class ClusterMap {
   }
 
  private:
-  static constexpr ClusterId kFree{~std::uint64_t{0}};  // level 255, the one ordinal never used
+  // level 255; the only ordinal that is never used
+  static constexpr ClusterId kFree{~std::uint64_t{0}};
   struct Place {
     ClusterId id = kFree;
     ChildRef where;
   };
 
-  // Fibonacci hashing: ordinals that follow each other land far apart.
+  // Fibonacci hashing: consecutive ordinals land far apart.
   [[nodiscard]] std::size_t home(ClusterId id) const {
     return static_cast<std::size_t>((static_cast<std::uint64_t>(id) * 0x9E3779B97F4A7C15u) >>
                                     shift_);

@@ -21,13 +21,14 @@
 #include "terrace/tri/multiresolution.hpp"
 #include "tree.hpp"
 
-/// The templates of multiresolution.hpp, for those who instantiate them.
+/// The templates of multiresolution.hpp, for files that instantiate them.
 
 namespace terrace::tri {
 
-/// What the model asks of a triangulation; all of this library have it. The result of any
-/// sequence of calls must be a function of the point set alone: then collapse is the exact inverse
-/// of expand. Point is an array of 2 or 3 coordinates, integers of at most 30 bits or doubles.
+/// The model's requirements on a triangulation; all triangulations of this library meet them. The
+/// result of any sequence of calls must be a function of the point set alone: then collapse is the
+/// exact inverse of expand. Point is an array of 2 or 3 coordinates, integers of at most 30 bits or
+/// doubles.
 template <class T>
 concept DynamicTriangulation = requires(T t, const T& c, std::span<const typename T::Point> points,
                                         std::span<typename T::Insertion> results, VertexId hint,
@@ -46,8 +47,8 @@ concept DynamicTriangulation = requires(T t, const T& c, std::span<const typenam
 
 namespace detail {
 
-/// The first coordinates of a position as the triangulation takes them. False if it cannot: not
-/// finite, or for integers not one of 30 bits.
+/// The first coordinates of a position as the triangulation takes them. Returns false if that is
+/// not possible: not finite, or for integers not an integer of 30 bits.
 template <class Point>
 bool to_point(const Point3& position, Point& point) {
   using Coord = typename Point::value_type;
@@ -74,7 +75,7 @@ struct MultiresolutionModel<Triangulation>::Impl {
 
   Impl(ClusterSource& source, const Detail& start, ModelOptions options, Triangulation empty);
 
-  // As the model's members of the same names.
+  // See the public members of the same names.
   const Delta& expand(ClusterId cluster);
   const Delta& collapse(ClusterId cluster);
   const Delta& refine(const Box3& region, unsigned level) {
@@ -107,7 +108,7 @@ struct MultiresolutionModel<Triangulation>::Impl {
     Slot slot;
     std::size_t first;  // of its points in points and heights
   };
-  // What a step has read and not yet inserted.
+  // Points that a step has read and not yet inserted.
   struct Stage {
     std::vector<Staged> clusters;
     std::vector<Point> points;
@@ -137,12 +138,12 @@ struct MultiresolutionModel<Triangulation>::Impl {
   bool open_ = false;  // between open_step() and close_step()
   Delta delta_;
   Stage stage_;
-  std::vector<VertexId> created_;                            // in a step that also collapses
-  std::vector<bool> marks_;                                  // scratch of finish_delta(), all false
-  std::vector<double> heights_before_;                       // with old_heights, by slot
-  std::vector<bool> noted_;                                  // those of heights_before_ that hold
-  std::vector<VertexId> noted_vertices_;                     // the same as a list
-  std::vector<VertexId> gone_;                               // scratch of remove_cluster()
+  std::vector<VertexId> created_;         // in a step that also collapses
+  std::vector<bool> marks_;               // scratch of finish_delta(), all false
+  std::vector<double> heights_before_;    // with old_heights, by slot
+  std::vector<bool> noted_;               // marks the valid entries of heights_before_
+  std::vector<VertexId> noted_vertices_;  // the same as a list
+  std::vector<VertexId> gone_;            // scratch of remove_cluster()
   std::vector<typename Triangulation::Insertion> inserted_;  // scratch of insert_clusters()
 };
 
@@ -155,7 +156,7 @@ MultiresolutionModel<Triangulation>::Impl::Impl(ClusterSource& source, const Det
       old_heights_(options.deltas && options.old_heights) {
   const ClusterTree::Take take_points = take();
   tree_.read_root(take_points);
-  // What is staged stays staged: the whole model goes if this fails.
+  // Staged clusters stay staged: if this fails, the whole model is destroyed.
   static_cast<void>(tree_.plan(judge(start), take_points));
   check_room();
   build_clusters();
@@ -250,8 +251,8 @@ auto MultiresolutionModel<Triangulation>::Impl::apply(const ClusterTree::Plan& p
     throw;
   }
   if (!open_) start_delta();
-  // Collapsing first keeps the peak low. With expanding first, vertices of points present before
-  // and after would stay, but those are few.
+  // Collapsing first keeps the peak memory low. Expanding first would keep vertices of points
+  // present before and after, but those are few.
   for (const Slot cluster : plan.collapsed) remove_cluster(cluster);
   if (!plan.staged.empty()) insert_clusters(deltas_ && (open_ || !plan.collapsed.empty()));
   if (!open_) finish_delta();
@@ -341,7 +342,7 @@ void MultiresolutionModel<Triangulation>::Impl::note(VertexOwners::Change change
   if (change == VertexOwners::Change::other && deltas_) delta_.reassigned.push_back(vertex);
   if (!old_heights_) return;
   if (change != VertexOwners::Change::other && change != VertexOwners::Change::last) return;
-  // The first change of a step is the one that knows the height of before.
+  // The first change within a step knows the former height.
   if (noted_.size() < owners_.slots()) {
     noted_.resize(owners_.slots());
     heights_before_.resize(owners_.slots());
@@ -365,7 +366,7 @@ void MultiresolutionModel<Triangulation>::Impl::finish_delta() {
   if (!deltas_) return;
   triangulation_.take_changes(delta_.changes);
   // A vertex that went with one point and came back with another has stayed, if it came back in its
-  // old slot.
+  // former slot.
   if (created_.size() > delta_.changes.added_vertices.size()) {
     delta_.reassigned.insert(delta_.reassigned.end(), created_.begin(), created_.end());
   }
@@ -373,7 +374,7 @@ void MultiresolutionModel<Triangulation>::Impl::finish_delta() {
   if (old_heights_) finish_heights();
 }
 
-// Only vertices that stayed are meant, each once.
+// Keeps only vertices that stayed, each once.
 template <class Triangulation>
 void MultiresolutionModel<Triangulation>::Impl::finish_reassigned() {
   const auto& added = delta_.changes.added_vertices;
@@ -428,7 +429,7 @@ template <class Triangulation>
 ChildRef MultiresolutionModel<Triangulation>::Impl::find(ClusterId cluster) const {
   if (const auto place = tree_.find(cluster)) return *place;
   throw std::invalid_argument(to_string(cluster) +
-                              " is not there: the cluster above it is not expanded");
+                              " cannot be used: the cluster above it is not expanded");
 }
 
 template <class Triangulation>

@@ -16,7 +16,7 @@ PointId point_id(VertexOwners::Owner owner, const ClusterTree& tree) {
 void VertexOwners::reserve(std::size_t vertex_slots) {
   const std::size_t capacity = standing_.capacity();
   if (vertex_slots <= capacity) return;
-  // By an eighth at least, not by doubling: it is the memory per vertex that counts here.
+  // Grows by at least an eighth instead of doubling: memory per vertex matters here.
   const std::size_t wanted = std::max(vertex_slots, capacity + capacity / 8 + 64);
   standing_.reserve(wanted);
   heights_.reserve(wanted);

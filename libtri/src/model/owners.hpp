@@ -12,7 +12,7 @@
 
 namespace terrace::tri {
 
-/// Which points lie on which vertex, and which of them stands for it: of points with equal
+/// Which points share which vertex, and which of them represents it: among points with equal
 /// coordinates the one of the highest level, then of the smallest id. A vertex lives as long as one
 /// of its owners.
 ///
@@ -26,13 +26,13 @@ class VertexOwners {
   };
   enum class Change {
     first,  ///< the vertex had no owner before
-    last,   ///< it has none now
-    other,  ///< another point stands for it than before
-    none    ///< the same point stands for it
+    last,   ///< the vertex has no owner left
+    other,  ///< the vertex is now represented by another point
+    none    ///< the same point represents the vertex
   };
 
   void reserve(std::size_t vertex_slots);
-  /// All vertices seen so far are below.
+  /// Upper bound of all vertex slots seen so far.
   [[nodiscard]] std::size_t slots() const { return standing_.size(); }
 
   Change add(VertexId vertex, Owner owner, double height, const ClusterTree& tree) {
@@ -46,7 +46,7 @@ class VertexOwners {
     return add_further(vertex, owner, height, tree);
   }
 
-  /// Call it while the owner's cluster is still in the tree.
+  /// To be called while the owner's cluster is still in the tree.
   Change remove(VertexId vertex, Owner owner, const ClusterTree& tree) {
     Owner& standing = standing_[static_cast<std::uint32_t>(vertex)];
     if (standing.slot == owner.slot && standing.index == owner.index) {
@@ -56,20 +56,20 @@ class VertexOwners {
     return remove_shared(vertex, owner, tree);
   }
 
-  /// The point that stands for a living vertex.
+  /// The point that represents a living vertex.
   [[nodiscard]] Owner standing(VertexId vertex) const {
     const Owner owner = standing_[static_cast<std::uint32_t>(vertex)];
     return {owner.slot, owner.index & ~kShared};
   }
-  /// Whether a point lies on the vertex in this slot, which is below slots().
+  /// Whether a point is on the vertex in this slot, which must be below slots().
   [[nodiscard]] bool owned(VertexId vertex) const {
     return standing_[static_cast<std::uint32_t>(vertex)].slot != ClusterTree::kNoSlot;
   }
   [[nodiscard]] double height(VertexId vertex) const {
     return heights_[static_cast<std::uint32_t>(vertex)];
   }
-  /// Calls visit(owner) for the point that stands for the vertex, then for the others in the order
-  /// in which they would follow.
+  /// Calls visit(owner) for the point that represents the vertex, then for the others in the order
+  /// of succession.
   template <class Visit>
   void for_each(VertexId vertex, Visit&& visit) const {
     visit(standing(vertex));
@@ -83,14 +83,14 @@ class VertexOwners {
   [[nodiscard]] std::size_t memory() const;
 
  private:
-  /// Set in the index of a standing owner that is not the only one.
+  /// Set in the index of a representing owner that is not the only one.
   static constexpr std::uint32_t kShared = 0x80000000u;
 
-  /// No point stands before this one.
+  /// Orders before all points.
   static constexpr PointId kFirst{cluster_id(255, 0), 0};
 
-  // An owner in waiting. Points on one line of sight (walls seen from above) can make many of
-  // them for one vertex, so they are kept in order.
+  // A waiting owner. Points at the same x, y (walls seen from above) can make many of them for one
+  // vertex, so they are kept in order.
   struct Further {
     VertexId vertex{};
     PointId id;

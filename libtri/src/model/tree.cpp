@@ -8,7 +8,7 @@
 namespace terrace::tri {
 namespace {
 
-// One ordinal less than 56 bits could number: the table of clusters keeps it to mean none.
+// One less than 56 bits allow: the table of clusters uses the last ordinal for "none".
 constexpr std::uint64_t kMaxClusters = (std::uint64_t{1} << 56) - 1;
 
 }  // namespace
@@ -22,8 +22,8 @@ void ClusterSource::announce(std::span<const ClusterId>) {}
 ClusterTree::ClusterTree(ClusterSource& source) : source_(&source) {
   const unsigned top = source.top();
   if (top > 255) {
-    throw HierarchyError(cluster_id(255, 0),
-                         "the source has " + std::to_string(top) + " levels, 255 are possible");
+    throw HierarchyError(cluster_id(255, 0), "the source has " + std::to_string(top) +
+                                                 " levels; at most 255 are possible");
   }
 }
 
@@ -145,7 +145,8 @@ ClusterTree::Plan ClusterTree::plan(const Judge& judge, const Take& take) {
       }
       if (!ids.empty()) source_->announce(ids);
       for (std::size_t i = 0; i < ids.size(); ++i) {
-        result.staged.push_back(kNoSlot);  // the place first: what is staged must be known
+        // the place first, as every staged cluster must be listed
+        result.staged.push_back(kNoSlot);
         result.staged.back() = stage(ids[i], wanted[i].child, take);
         if (wanted[i].children_too) here.push_back(result.staged.back());
       }
@@ -190,8 +191,8 @@ void ClusterTree::append_below(Slot slot, std::vector<Slot>& out) const {
   out.push_back(slot);
 }
 
-// Reads a cluster and hangs it into the tree. All that can fail comes before the first change that
-// shows.
+// Reads a cluster and adds it to the tree. Everything that can fail comes before the first visible
+// change.
 ClusterTree::Slot ClusterTree::stage(ClusterId id, ChildRef place, const Take& take) {
   const unsigned level = level_of(id);
   const bool is_root = place.parent == kNoSlot;
@@ -220,7 +221,7 @@ ClusterTree::Slot ClusterTree::stage(ClusterId id, ChildRef place, const Take& t
   cluster.live = true;
   cluster.vertices = std::make_unique<VertexId[]>(size);
   if (!is_root) {
-    // The parent's own head, or a member of the parent.
+    // The head is the parent's own head or a member of the parent.
     const Cluster& parent = clusters_[place.parent];
     const bool own = place.index == parent.size;
     cluster.home = own ? parent.home : place.parent;
@@ -235,7 +236,7 @@ ClusterTree::Slot ClusterTree::stage(ClusterId id, ChildRef place, const Take& t
   }
   if (free_.empty()) {
     clusters_.emplace_back();
-    free_.reserve(clusters_.capacity());  // so that release() never needs memory
+    free_.reserve(clusters_.capacity());  // so that release() never allocates
     free_.push_back(static_cast<Slot>(clusters_.size() - 1));
   }
   const Slot slot = free_.back();

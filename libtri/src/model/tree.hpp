@@ -15,32 +15,32 @@
 
 namespace terrace::tri {
 
-/// The expanded clusters and how they hang together; the part of the multiresolution model that
-/// knows nothing of any triangulation. A cluster of level L, headed by p, has as children the
-/// clusters of level L - 1 headed by p and by each member; it can be expanded while its parent is.
+/// The expanded clusters and their tree; the part of the multiresolution model that does not depend
+/// on a triangulation. A cluster of level L, headed by p, has as children the clusters of level L -
+/// 1 headed by p and by each member; it can be expanded while its parent is.
 ///
-/// A step has two halves. In the first, plan() or stage() reads from the source all that the step
-/// needs; any exception there leaves the tree as it was. In the second, the clusters to collapse
-/// are released; nothing in it can fail.
+/// A step has two halves. In the first, plan() or stage() reads everything the step needs from the
+/// source; an exception there leaves the tree unchanged. In the second, the clusters to collapse
+/// are released; that cannot fail.
 ///
 /// Memory: 48 bytes per expanded cluster and 4 per member; above level 0 also 20 + 8 * level per
-/// member and about 24 for its place in the map, and 64 once its record was asked for.
+/// member and about 24 for its entry in the map, and 64 once its record was requested.
 class ClusterTree {
  public:
   using Slot = std::uint32_t;
   static constexpr Slot kNoSlot = 0xFFFFFFFFu;
   static constexpr Slot kRoot = 0;
-  /// Indices have 31 bits, the last one means the head.
+  /// Indices have 31 bits; the last one stands for the head.
   static constexpr std::uint32_t kMaxMembers = 0x7FFFFFFEu;
 
   /// The source must outlive the tree. Call read_root() before anything else.
   explicit ClusterTree(ClusterSource& source);
 
-  // Clusters that are there: expanded or staged.
+  // Existing clusters: expanded or staged.
   [[nodiscard]] ClusterId id(Slot slot) const { return clusters_[slot].id; }
   [[nodiscard]] unsigned level(Slot slot) const { return level_of(clusters_[slot].id); }
   [[nodiscard]] std::uint32_t size(Slot slot) const { return clusters_[slot].size; }
-  /// One handle per member, to be filled in and read by the owner of the triangulation.
+  /// One handle per member, filled in and read by the owner of the triangulation.
   [[nodiscard]] std::span<VertexId> vertices(Slot slot) {
     return {clusters_[slot].vertices.get(), clusters_[slot].size};
   }
@@ -51,24 +51,23 @@ class ClusterTree {
   /// The cluster of `level` that a member heads. Requires level < level(slot).
   [[nodiscard]] ClusterId headed_by(Slot slot, std::uint32_t member, unsigned level) const;
 
-  // Clusters that could be there: the children of expanded clusters.
+  // Potential clusters: the children of expanded clusters.
   [[nodiscard]] std::optional<ChildRef> find(ClusterId id) const;
   [[nodiscard]] std::uint32_t child_count(Slot slot) const;
   [[nodiscard]] ClusterId child_id(ChildRef child) const;
   [[nodiscard]] VertexId head_vertex(ChildRef child) const;
-  /// The cluster one level below the child that the child's own head heads. Requires a child above
-  /// level 0.
+  /// The cluster one level below the child that has the same head. Requires a child above level 0.
   [[nodiscard]] ClusterId head_child(ChildRef child) const;
-  /// Whether a cluster is in this slot; any number.
+  /// Whether a cluster is in this slot; accepts any number.
   [[nodiscard]] bool live(Slot slot) const {
     return slot < clusters_.size() && clusters_[slot].live;
   }
   [[nodiscard]] Slot slots() const { return static_cast<Slot>(clusters_.size()); }
-  /// Where an expanded cluster hangs; its parent is kNoSlot for the root.
+  /// The position of an expanded cluster; its parent is kNoSlot for the root.
   [[nodiscard]] ChildRef place(Slot slot) const { return clusters_[slot].place; }
   /// kNoSlot while it is not expanded.
   [[nodiscard]] Slot child_slot(ChildRef child) const;
-  /// Asks the source at the first call, remembers afterwards. Throws: what the source throws;
+  /// Queries the source at the first call and remembers the record. Throws: what the source throws;
   /// HierarchyError if the record makes no sense.
   const ClusterRecord& record(ChildRef child);
 
@@ -76,9 +75,9 @@ class ClusterTree {
     return clusters_[slot].inner && clusters_[slot].inner->expanded != 0;
   }
 
-  /// Number of expanded clusters, the root not counted.
+  /// Number of expanded clusters, not counting the root.
   [[nodiscard]] std::size_t expanded_count() const { return live_ - 1; }
-  /// Calls visit(slot) for each of them, in no order worth knowing.
+  /// Calls visit(slot) for each of them, in unspecified order.
   template <class Visit>
   void for_each_expanded(Visit&& visit) const {
     for (Slot s = kRoot + 1; s < clusters_.size(); ++s) {
@@ -89,20 +88,20 @@ class ClusterTree {
 
   /// What a plan does with a child of an expanded cluster.
   enum class Verdict {
-    keep,          ///< leave it and all below it as it is
-    visit,         ///< leave it, but look at its children if it is expanded
-    expand,        ///< expand it, if it is not, and look at its children
-    expand_alone,  ///< the same, but none of its children is wanted expanded
-    collapse       ///< collapse it, if it is expanded, and with it all below
+    keep,          ///< leave it and everything below as it is
+    visit,         ///< leave it, but visit its children if it is expanded
+    expand,        ///< expand it, if it is not, and visit its children
+    expand_alone,  ///< the same, but do not expand any of its children
+    collapse       ///< collapse it, if it is expanded, and everything below
   };
   using Judge = std::function<Verdict(ChildRef, unsigned level, bool expanded)>;
-  /// Receives the positions of a staged cluster, before the next is read. May throw.
+  /// Receives the positions of a staged cluster before the next one is read. May throw.
   using Take = std::function<void(Slot, ClusterId, std::span<const Point3>)>;
 
   /// Stages the root.
   void read_root(const Take& take);
 
-  /// A step to come. `staged`: parents before children. `collapsed`: children before parents.
+  /// A planned step. `staged`: parents before children. `collapsed`: children before parents.
   struct Plan {
     std::vector<Slot> staged, collapsed;
   };
@@ -111,9 +110,9 @@ class ClusterTree {
   [[nodiscard]] Plan plan(const Judge& judge, const Take& take);
   /// The plan that expands one cluster. Requires that it is not expanded.
   [[nodiscard]] Plan plan_expand(ChildRef child, const Take& take);
-  /// The plan that collapses one cluster and all below it.
+  /// The plan that collapses one cluster and everything below it.
   [[nodiscard]] Plan plan_collapse(Slot slot) const;
-  /// Takes back what a plan has staged.
+  /// Undoes the staging of a plan.
   void cancel(const Plan& plan);
 
   /// Drops a collapsed cluster. Requires that nothing below it is expanded.
@@ -123,12 +122,12 @@ class ClusterTree {
   [[nodiscard]] std::size_t memory() const;
 
  private:
-  // What only clusters above level 0 have.
+  // Data of clusters above level 0 only.
   struct Inner {
-    std::vector<std::uint64_t> ordinals;  // of the clusters its members head: level per member
-    std::vector<Slot> children;           // of those one level down; kNoSlot if not expanded
-    std::vector<ClusterRecord> records;   // of the same; empty until one was asked for
-    std::uint32_t expanded = 0;           // number of children that are
+    std::vector<std::uint64_t> ordinals;  // the clusters headed by its members: level per member
+    std::vector<Slot> children;           // children one level down; kNoSlot if not expanded
+    std::vector<ClusterRecord> records;   // of the children; empty until one was requested
+    std::uint32_t expanded = 0;           // number of expanded children
   };
   struct Cluster {
     ClusterId id{};

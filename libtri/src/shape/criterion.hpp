@@ -16,12 +16,12 @@
 
 namespace terrace::tri::shape {
 
-/// Whether the mesh is in an elliptical metric, that of the scope.
+/// Whether the mesh is in an elliptical metric: that of the scope.
 template <class Mesh>
 inline constexpr bool is_elliptical =
     std::is_same_v<typename Mesh::Kernel, spatial::EllipticalKernel>;
 
-/// A criterion answers whether the facet opposite to corner i of a tetrahedron is a boundary facet
+/// A criterion returns whether the facet opposite to corner i of a tetrahedron is a boundary facet
 /// as seen from that tetrahedron.
 struct Gabriel {
   template <class Mesh>
@@ -38,9 +38,9 @@ struct Gabriel {
   }
 };
 
-/// The length, without over- or underflow. Symmetric.
+/// The length, without overflow or underflow. Symmetric.
 inline double distance(const Vector3& a, const Vector3& b) {
-  // The difference of quarters of finite doubles is finite; below, scaling is exact.
+  // The difference of quarters of finite doubles is finite; below that, scaling is exact.
   constexpr double kBig = 0x1p480, kSmall = 0x1p-480;
   Vector3 d = minus(a, b);
   const double m = largest(d);
@@ -55,7 +55,7 @@ inline double distance(const Vector3& a, const Vector3& b) {
   return std::sqrt(dot(d, d)) * 0x1p560;  // may be infinite, as the sum of such lengths would be
 }
 
-/// From a to b, in the metric mapped to where it is the Euclidean one.
+/// The vector from a to b; in an elliptical metric, mapped to where the metric is Euclidean.
 template <class Mesh>
 Vector3 edge(const Mesh&, const Vector3& a, const Vector3& b) {
   if constexpr (is_elliptical<Mesh>) {
@@ -65,7 +65,7 @@ Vector3 edge(const Mesh&, const Vector3& a, const Vector3& b) {
   }
 }
 
-/// The length that goes with it.
+/// The corresponding length.
 template <class Mesh>
 double edge_length(const Mesh& mesh, const Vector3& a, const Vector3& b) {
   if constexpr (is_elliptical<Mesh>) {
@@ -90,10 +90,11 @@ struct EdgeLength {
   }
 
  private:
-  /// In order of size, so that the order of the corners does not show in the last bit.
+  /// Added in order of size, so that the order of the corners does not affect the last bit.
   static double sum(std::array<double, 3> lengths) {
     std::sort(lengths.begin(), lengths.end());
-    return lengths[0] / 8 + lengths[1] / 8 + lengths[2] / 8;  // both sides alike, and finite
+    // both sides are scaled alike, and finite
+    return lengths[0] / 8 + lengths[1] / 8 + lengths[2] / 8;
   }
 };
 

@@ -8,16 +8,17 @@
 #include "../delaunay3/star.hpp"
 #include "state.hpp"
 
-/// The flood rule removes what can be reached from beyond the hull by facets that are not
-/// boundary facets as seen from the tetrahedron behind them. Which of these steps there are depends
-/// on the tetrahedra alone, so the set reached does not depend on any order.
+/// The flood rule removes what can be reached from beyond the hull through facets that are not
+/// boundary facets as seen from the tetrahedron behind them. These steps depend on the tetrahedra
+/// alone, so the reached set does not depend on the order.
 ///
-/// Every removed tetrahedron keeps the facet by which it was first reached. These make a forest
-/// rooted beyond the hull; the update needs it to know what has lost its way from there.
+/// Every removed tetrahedron stores the facet through which it was first reached. These form a
+/// forest rooted beyond the hull; the update needs it to find the tetrahedra that have lost their
+/// path.
 
 namespace terrace::tri::shape {
 
-/// Goes on from the tetrahedra in state.queue, breadth first so that ways are short.
+/// Continues from the tetrahedra in state.queue, breadth-first so that paths are short.
 template <class Criterion, class Mesh>
 void spread(const Mesh& mesh, State& state, const Criterion& criterion) {
   for (std::size_t at = 0; at < state.queue.size(); ++at) {
@@ -62,8 +63,8 @@ void flood(const Mesh& mesh, State& state, const Criterion& criterion) {
   find_lost(mesh, state);
 }
 
-/// A removed tetrahedron whose way from outside is gone, and all whose ways led through it: kept
-/// until judged again.
+/// A removed tetrahedron whose path from outside is gone, and all whose paths led through it: kept
+/// until tested again.
 template <class Mesh>
 void take_back(const Mesh& mesh, State& state, std::uint32_t orphan) {
   const auto back = [&](std::uint32_t t) {
@@ -80,9 +81,9 @@ void take_back(const Mesh& mesh, State& state, std::uint32_t orphan) {
   }
 }
 
-/// Tetrahedra that were there before and whose facets have come to the hull, appended to
-/// state.pending (and perhaps others, which does no harm). They had a neighbour that is gone and
-/// none that is new there, so their facet is among those of the removed ones only.
+/// Appends to state.pending the surviving tetrahedra that have gained a facet on the hull (and
+/// perhaps others, which does no harm). They had a neighbour that is gone and have no new one
+/// there, so their facet is among those of the removed ones only.
 template <class Changes, class Mesh>
 void find_exposed(const Mesh& mesh, State& state, const Changes& changes) {
   using Key = std::array<std::uint32_t, 3>;
@@ -118,9 +119,10 @@ void find_exposed(const Mesh& mesh, State& state, const Changes& changes) {
   }
 }
 
-/// The state after changes, equal to that of flood() but for the ways. A removed tetrahedron that
-/// is still there and whose way did not lead through any that is gone stays: its way is still one.
-/// All others are judged with all they could be reached from, so what can be reached is.
+/// Updates the state after changes; it equals that of flood() except for the paths. A removed
+/// tetrahedron that still exists and whose path did not lead through one that is gone stays
+/// removed: its path is still valid. All others are tested with everything from which they could be
+/// reached, so all reachable ones are found.
 template <class Criterion, class Changes, class Mesh>
 void update_flood(const Mesh& mesh, State& state, const Criterion& criterion,
                   const Changes& changes) {
@@ -148,8 +150,8 @@ void update_flood(const Mesh& mesh, State& state, const Criterion& criterion,
     state.keep(mesh, slot(id));
     state.pending.push_back(slot(id));
   }
-  // Ways through what is gone: their next step starts at what is there now, or at the hull, which
-  // is as good.
+  // Paths through tetrahedra that are gone: their next step now starts at the new tetrahedra, or at
+  // the hull, which is equivalent.
   for (const TetrahedronId id : changes.added_tetrahedra) {
     for (const spatial::Side side : mesh.tetrahedron[slot(id)].mate)
       if (state.of[spatial::tetrahedron_of(side)] == spatial::index_of(side))
@@ -160,7 +162,7 @@ void update_flood(const Mesh& mesh, State& state, const Criterion& criterion,
     if (state.of[t] == kKept) judge(mesh, state, criterion, t);
   spread(mesh, state, criterion);
 
-  // Degrees went up only among what was pending, and down only among what is in the queue.
+  // Degrees increased only among pending ones, and decreased only among those in the queue.
   for (const std::uint32_t v : state.lost) state.touched.push_back(v);
   for (const std::uint32_t t : state.queue)
     for (const std::uint32_t v : mesh.tetrahedron[t].corner) state.touched.push_back(v);

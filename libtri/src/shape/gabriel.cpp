@@ -8,7 +8,7 @@ namespace {
 
 using Epick = CGAL::Exact_predicates_inexact_constructions_kernel;
 
-/// A difference of whole numbers. Grids, where ties are frequent, must not be dear.
+/// A difference of integers. Ties, which are frequent on grids, must be cheap.
 struct Whole {
   std::int64_t x, y, z;
 };
@@ -38,7 +38,7 @@ Whole cross(const Whole& a, const Whole& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
-/// Differences below 2^18, so n is below 2^37, n x b below 2^56, and the two sides below 2^115.
+/// Differences are below 2^18, so n is below 2^37, n x b below 2^56, and the two sides below 2^115.
 bool in_smallest_sphere_whole(const Whole& b, const Whole& c, const Whole& d) {
   const std::int64_t bb = dot(b, b), cc = dot(c, c), bc = dot(b, c), dd = dot(d, d);
   if (bc <= 0) return dd - dot(d, b) - dot(d, c) + bc < 0;
@@ -61,7 +61,7 @@ bool in_smallest_sphere_exactly(const Vector3& pa, const Vector3& pb, const Vect
   const Epick kernel;
   const auto angle = kernel.angle_3_object();
   const auto side = kernel.side_of_bounded_sphere_3_object();
-  // At a right angle both spheres are the same.
+  // At a right angle both spheres coincide.
   if (angle(b, a, c) != CGAL::ACUTE) return side(b, c, d) == CGAL::ON_BOUNDED_SIDE;
   if (angle(a, b, c) != CGAL::ACUTE) return side(a, c, d) == CGAL::ON_BOUNDED_SIDE;
   if (angle(a, c, b) != CGAL::ACUTE) return side(a, b, d) == CGAL::ON_BOUNDED_SIDE;

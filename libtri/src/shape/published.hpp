@@ -11,7 +11,7 @@
 
 namespace terrace::tri::shape {
 
-/// By vertex slot: its place among all vertices, lexicographically.
+/// By vertex slot: its rank among all vertices in lexicographic order.
 template <class Mesh>
 std::vector<std::uint32_t> rank_vertices(const Mesh& mesh) {
   std::vector<std::uint32_t> order;

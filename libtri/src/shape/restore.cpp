@@ -31,7 +31,7 @@ void check(std::span<const Point3> points, const RestoreOptions& options) {
     throw std::invalid_argument("a metric and quantise_bits are given; leave one of them out");
 }
 
-/// Points that are in no face are left out.
+/// Drops points that are in no face.
 RestoredSurface compact(std::span<const Point3> points, std::vector<Face> faces) {
   RestoredSurface result;
   constexpr std::uint32_t kUnused = std::numeric_limits<std::uint32_t>::max();
@@ -76,7 +76,7 @@ std::vector<std::array<std::int32_t, 3>> quantised(std::span<const Point3> point
       max[k] = std::max(max[k], p[k]);
     }
   }
-  // Halves, so that no difference overflows.
+  // Uses halves, so that differences do not overflow.
   double side = 0.0;
   for (std::size_t k = 0; k < 3; ++k) side = std::max(side, max[k] / 2 - min[k] / 2);
   if (side == 0.0) return result;

@@ -7,16 +7,16 @@
 #include "../delaunay3/mesh.hpp"
 #include "terrace/tri/shape.hpp"
 
-/// What is known of a shape, and the steps that the rules share.
+/// The state of a shape, and the steps that the rules share.
 
 namespace terrace::tri::shape {
 
-// What State::of holds. Below kKept: removed, and the facet by which the flood came.
+// Values of State::of. Below kKept: removed, and the facet through which the flood came.
 inline constexpr std::uint8_t kKept = 4;
-/// No finite tetrahedron. A ghost has it too, so the neighbour of a living tetrahedron is open,
-/// that is removed or beyond the hull, if and only if its state is not kKept.
+/// Not a finite tetrahedron. A ghost has this value too, so the neighbour of a living tetrahedron
+/// is open (removed or beyond the hull) if and only if its state is not kKept.
 inline constexpr std::uint8_t kAbsent = 5;
-/// Removed by the flood and put back. Only between two operations.
+/// Removed by the flood and put back. Only set between two operations.
 inline constexpr std::uint8_t kRescuedBit = 8;
 
 constexpr bool is_kept(std::uint8_t state) { return state == kKept || (state & kRescuedBit) != 0; }
@@ -30,8 +30,8 @@ struct State {
   std::vector<std::uint32_t> rescued;  ///< tetrahedra
   std::size_t kept_count = 0;          ///< in state kKept
   // Scratch memory, kept between calls.
-  std::vector<std::uint32_t> queue;    ///< removed ones whose neighbours are to be judged
-  std::vector<std::uint32_t> pending;  ///< kept ones to be judged on all sides
+  std::vector<std::uint32_t> queue;    ///< removed ones whose neighbours are to be tested
+  std::vector<std::uint32_t> pending;  ///< kept ones to be tested on all sides
   std::vector<std::uint32_t> touched;  ///< vertices whose degree may have changed
 
   template <class Mesh>
@@ -52,7 +52,7 @@ struct State {
   }
 };
 
-/// All finite tetrahedra kept.
+/// Sets all finite tetrahedra to kept.
 template <class Mesh>
 void keep_all(const Mesh& mesh, State& state) {
   state.of.assign(mesh.tetrahedron.size(), kAbsent);

@@ -81,7 +81,7 @@ Point3 normal2(const Surface& surface, std::uint32_t face) {
   return {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
 }
 
-/// Six times the volume between a point and a face, positive where the face is turned away.
+/// Six times the volume between a point and a face, positive if the face is turned away.
 double volume6_from(const Surface& surface, const Point3& from, std::uint32_t face) {
   const Point3 normal = normal2(surface, face);
   const Point3& a = surface.points[surface.faces[face][0]];
@@ -99,14 +99,14 @@ void check(const Surface& surface) {
       if (face[i] == face[(i + 1) % 3])
         throw std::invalid_argument("face " + std::to_string(f) + ": corner " +
                                     std::to_string(face[i]) +
-                                    " is there twice; leave such faces out");
+                                    " occurs twice; leave such faces out");
     }
   }
 }
 
 void add_areas(const Surface& surface, SurfaceMeasures& result) {
   if (surface.faces.empty()) return;
-  // From a point of the surface: far from the origin the volumes would cancel badly.
+  // Measured from a point of the surface: far from the origin the volumes would cancel badly.
   const Point3& from = surface.points[surface.faces[0][0]];
   double area2 = 0.0, volume6 = 0.0;
   for (std::uint32_t f = 0; f < surface.faces.size(); ++f) {

@@ -13,8 +13,8 @@ namespace terrace::tri::tin {
 
 class Cavity {
  public:
-  /// Collects the triangles to be removed: `first`, which contains the new vertex, and those
-  /// reachable from it for which `inside(triangle)` (its circle contains the vertex, strictly).
+  /// Collects the triangles to remove: `first`, which contains the new vertex, and those reachable
+  /// from it for which `inside(triangle)` holds (its circle strictly contains the vertex).
   template <class Inside>
   void dig(const Triangles& triangles, std::uint32_t first, const Inside& inside) {
     edges_.clear();
@@ -36,8 +36,8 @@ class Cavity {
     }
   }
 
-  /// Fills the hole with the triangles of `vertex` and its sides. `flat(a, b)`: for a side of the
-  /// hull, whether the vertex lies on it; such a side is cut into two. The new triangles have the
+  /// Fills the hole with the triangles of `vertex` and its sides. `flat(a, b)`: for a side on the
+  /// hull, whether the vertex lies on it; such a side is split in two. The new triangles have the
   /// vertex as corner 0; their `place` and `error` are 0.
   template <class Flat>
   void fill(Triangles& triangles, std::uint32_t vertex, const Flat& flat) {
@@ -67,7 +67,7 @@ class Cavity {
     }
   }
 
-  /// The triangles that fill() made; they reuse all slots of those removed.
+  /// The triangles made by fill(); they reuse all slots of the removed ones.
   const std::vector<std::uint32_t>& created() const { return created_; }
 
  private:

@@ -10,12 +10,12 @@
 
 #include "mesh.hpp"
 
-/// Queues of the triangles with too great an error. Entries of triangles that have changed since
+/// Queues of the triangles whose error is too great. Entries of triangles that have changed since
 /// stay in the queue and are skipped when their turn comes.
 
 namespace terrace::tri::tin {
 
-/// Approximately the greatest error first: 4 buckets for each power of two, last in, first out. The
+/// Approximately the greatest error first: 4 buckets per power of two, last in, first out. The
 /// meshes are as good as with the exact order, and it is several times as fast.
 class ErrorBuckets {
  public:
@@ -30,14 +30,14 @@ class ErrorBuckets {
     top_ = std::max(top_, bucket + 1);
   }
 
-  /// The next triangle; kNone if there is none.
+  /// The next triangle; kNone if the queue is empty.
   std::uint32_t pop(const Triangles& triangles) {
     return pop(triangles, 1, [](const Triangle&) { return 0; });
   }
 
-  /// The same, but each bucket is sorted by tiles when its turn comes, so that triangles near each
-  /// other in the plane are also near each other in time and memory. `tile_of(triangle)` is a
-  /// number below `tiles`.
+  /// The same, but each bucket is sorted by tiles when its turn comes, so that triangles close to
+  /// each other in the plane are also close in time and memory. `tile_of(triangle)` is a number
+  /// below `tiles`.
   template <class TileOf>
   std::uint32_t pop(const Triangles& triangles, std::size_t tiles, const TileOf& tile_of) {
     for (; top_ > 0; --top_) {
@@ -65,7 +65,7 @@ class ErrorBuckets {
     return std::max(octave_quarter(error), base_) - base_;
   }
 
-  /// Brings those that are likely to be next, and their neighbours, into the cache.
+  /// Prefetches the triangles that are likely to be next, and their neighbours, into the cache.
   static void fetch_soon(const Triangles& triangles, const std::vector<std::uint32_t>& bucket) {
     const std::size_t size = bucket.size();
     if (size < 8) return;

@@ -10,14 +10,14 @@
 
 namespace terrace::tri::tin {
 
-/// Twice the area: > 0 where a, b, c turn left (columns to the right, rows upwards).
+/// Twice the area: > 0 if a, b, c turn left (columns to the right, rows upwards).
 template <class P>
 std::int64_t turn(const P& a, const P& b, const P& c) {
   return static_cast<std::int64_t>(b.x - a.x) * (c.y - a.y) -
          static_cast<std::int64_t>(b.y - a.y) * (c.x - a.x);
 }
 
-/// Calls visit(y, first x, last x) for each row of a counter-clockwise triangle, sides included,
+/// Calls visit(y, first x, last x) for each row of a counter-clockwise triangle, including sides,
 /// until it returns false.
 template <class P, class Visit>
 bool visit_rows(const P& a, const P& b, const P& c, const Visit& visit) {
@@ -43,7 +43,7 @@ bool visit_rows(const P& a, const P& b, const P& c, const Visit& visit) {
   return true;
 }
 
-/// The tangent of an angle of at most 30 degrees, to 1e-9. By the first terms of the series, as
+/// The tangent of an angle of at most 30 degrees, to 1e-9. Uses the first terms of the series, as
 /// results must not depend on a library's tangent.
 inline double tangent_of(double degrees) {
   constexpr double kRadians = 0.017453292519943295;
@@ -56,8 +56,8 @@ inline double tangent_of(double degrees) {
 
 class Ground {
  public:
-  /// Steps on the ground of a column and a row, the greatest difference of coordinates, and the
-  /// tangent of the smallest angle that is wide().
+  /// column_step, row_step: on the ground. extent: the greatest difference of coordinates. tangent:
+  /// that of the smallest angle that is wide().
   Ground(double column_step, double row_step, std::int64_t extent, double tangent)
       : tangent_(tangent) {
     const double x = std::fabs(column_step), y = std::fabs(row_step);
@@ -109,7 +109,7 @@ class Ground {
            0;
   }
 
-  std::int64_t x_, y_;  ///< squares of the steps, in proportion
+  std::int64_t x_, y_;  ///< squares of the steps, up to a common factor
   double area_;         ///< of a cell, in the same unit
   double tangent_;
   bool narrow_;  ///< 64 bits suffice

@@ -7,10 +7,10 @@
 
 namespace terrace::tri::tin {
 
-/// The whole number nearest to a place, halves up.
+/// The integer nearest to a place, halves up.
 inline double to_whole(double place) { return std::floor(place + 0.5); }
 
-/// The height of the lattice nearest to `height`.
+/// The lattice height nearest to `height`.
 inline double on_lattice(const TinLattice& lattice, double height) {
   return lattice.height_origin +
          to_whole((height - lattice.height_origin) / lattice.height_step) * lattice.height_step;

@@ -19,12 +19,12 @@
 #include "star.hpp"
 #include "terrace/tri/grid_tin.hpp"
 
-/// Error-bounded meshes of samples in rows and columns, with vertices at whole coordinates.
+/// Error-bounded meshes of samples in rows and columns, with vertices at integer coordinates.
 
 namespace terrace::tri::tin {
 
-/// Squares of 32 x 32 samples, so small that the triangles of one fit the nearest cache; numbered
-/// back and forth, so that each is next to the one before.
+/// Squares of 32 x 32 samples, so small that the triangles of one fit into the first-level cache;
+/// numbered boustrophedon, so that each is next to the previous one.
 class Tiles {
  public:
   Tiles(std::int32_t columns, std::int32_t rows)
@@ -45,7 +45,7 @@ class Tiles {
 };
 
 /// Whether a triangle is within the bound at one sample, or does not contain it. Most triangles
-/// that cannot take the place of a vertex fail at that vertex's own sample.
+/// that cannot replace a vertex fail at that vertex's own sample.
 template <class Vertex, class Sample>
 bool within_at(const Vertex& a, const Vertex& b, const Vertex& c, const Sample& sample,
                double bound) {
@@ -61,17 +61,18 @@ bool within_at(const Vertex& a, const Vertex& b, const Vertex& c, const Sample& 
   return std::fabs(sum) <= bound * static_cast<double>(at_a + at_b + at_c);
 }
 
-/// A mesh of an upright rectangle while it is being made.
+/// A mesh of an axis-parallel rectangle under construction.
 ///
 /// M. Garland, P. S. Heckbert, "Fast polygonal approximation of terrains and height fields",
 /// CMU-CS-95-181. The samples in a triangle are found by their rows and columns, so triangles need
 /// no lists of samples, unlike those of point_tin().
 ///
-/// `Samples`, RasterSamples or PlacedSamples, judges triangles:
-/// - Vertex: whole x, y and a height z, NaN without data. Sample: x, y, z of a sample.
-/// - kBeside: a vertex stands beside its sample, so it may fall on another vertex, on a side of the
-///   rectangle or into another triangle. Otherwise a vertex stands on its sample, in the triangle
-///   that was judged, unless it is to separate data from missing data.
+/// `Samples`, RasterSamples or PlacedSamples, evaluates triangles:
+/// - Vertex: integer x, y and a height z, NaN without data. Sample: x, y, z of a sample.
+/// - kBeside: a vertex may differ in position from its sample, so it may fall on another vertex, on
+/// a
+///   side of the rectangle or into another triangle. Otherwise a vertex is at its sample, in the
+///   triangle that was evaluated, unless it is to separate data from missing data.
 /// - kThinDelaunay: removal may leave thin triangles if they are Delaunay.
 /// - columns(), rows(), ground().
 /// - least_error(): smaller errors need not be ordered.
@@ -81,16 +82,17 @@ bool within_at(const Vertex& a, const Vertex& b, const Vertex& c, const Sample& 
 /// - place_of(vertex), sample_of(vertex).
 /// - within(a, b, c): whether the triangle is within the bound. fits(a, b, c, removed): whether it
 ///   may help to fill the hole of a removed vertex, given that vertex's sample.
-/// - narrow(v, b, c, rises): narrows by what v may rise to what the samples in the triangle allow.
-///   raise(v, rises): moves v to the middle; false if it stays.
+/// - narrow(v, b, c, rises): narrows the range by which v may rise to what the samples in the
+/// triangle
+///   allow. raise(v, rises): moves v to the middle of it; false if it stays.
 /// - covers(a, b, c): whether the triangle belongs to the result. publish(vertex, tin).
 template <class Samples>
 class LatticeSurface {
  public:
   using Vertex = typename Samples::Vertex;
 
-  /// `frame`: vertices on the sides of the rectangle. The four corners are among them, counter-
-  /// clockwise.
+  /// `frame`: vertices on the sides of the rectangle, counter-clockwise, including the four
+  /// corners.
   LatticeSurface(Samples samples, std::vector<Vertex> frame)
       : samples_(std::move(samples)),
         tiles_(samples_.columns(), samples_.rows()),
@@ -121,7 +123,7 @@ class LatticeSurface {
   const std::vector<Vertex>& vertices() const { return vertices_; }
   const Triangles& triangles() const { return triangles_; }
 
-  /// Refines to the bound and does what the quality asks for. `first`: see arrange().
+  /// Refines to the bound and applies the steps of the quality. `first`: see arrange().
   void make(TinQuality quality, std::size_t first) {
     refine<ErrorBuckets>(std::numeric_limits<std::size_t>::max());
     if (quality == TinQuality::kGreedy) return;
@@ -132,8 +134,8 @@ class LatticeSurface {
     remove();
   }
 
-  /// Inserts samples until all that can become vertices are within the bound or there are `most`
-  /// vertices with data. The result is Delaunay. Queue: ErrorBuckets or ErrorHeap.
+  /// Inserts samples until all that can become vertices are within the bound, or until there are
+  /// `most` vertices with data. The result is Delaunay. Queue: ErrorBuckets or ErrorHeap.
   template <class Queue>
   void refine(std::size_t most) {
     Queue queue(samples_.least_error());
@@ -169,7 +171,8 @@ class LatticeSurface {
           look(created);
         }
       }
-      // Else the triangle is still there, or its sample was a cure that lies outside it.
+      // Otherwise the triangle still exists, or its sample was a separating one that lies outside
+      // it.
       if (Samples::kBeside ? reached : spot.triangle == t) continue;
       samples_.give_up(place);
       look(t);
@@ -177,8 +180,8 @@ class LatticeSurface {
     samples_.restore();
   }
 
-  /// Brings vertices and triangles that are near each other in the plane near each other in memory.
-  /// The first `first` vertices stay the first.
+  /// Reorders vertices and triangles so that those close to each other in the plane are close in
+  /// memory. The first `first` vertices stay first.
   void arrange(std::size_t first) {
     std::vector<std::uint32_t> keys;
     keys.reserve(triangles_.size());
@@ -202,8 +205,7 @@ class LatticeSurface {
     triangles_.swap(triangles);
   }
 
-  /// Removes inner vertices where the bound still holds without them, in the order of their
-  /// numbers.
+  /// Removes inner vertices if the bound still holds without them, in the order of their numbers.
   void remove() {
     std::vector<std::uint32_t> triangle_of = triangle_of_vertices(triangles_, vertices_.size());
     Star star;
@@ -237,7 +239,7 @@ class LatticeSurface {
     }
   }
 
-  /// Moves heights of inner vertices to the middle of what the samples around them allow.
+  /// Moves heights of inner vertices to the middle of the range that the samples around them allow.
   void fit() {
     const std::vector<std::uint32_t> triangle_of =
         triangle_of_vertices(triangles_, vertices_.size());
@@ -251,7 +253,7 @@ class LatticeSurface {
       });
       const Vertex before = own;
       if (!inner || !samples_.raise(own, rises)) continue;
-      // Steps of height may be too large for the interval.
+      // Steps of height may be larger than the interval.
       if (Samples::kBeside && !around(v, triangle_of[v], [&](const Vertex& b, const Vertex& c) {
             return samples_.within(own, b, c);
           }))
@@ -282,8 +284,8 @@ class LatticeSurface {
  private:
   struct Spot {
     std::uint32_t triangle;  ///< kNone: outside
-    bool taken;              ///< a vertex is there
-    bool border;             ///< it is on a side of the rectangle
+    bool taken;              ///< a vertex is already there
+    bool border;             ///< on a side of the rectangle
   };
 
   const Vertex& vertex(const Triangle& triangle, unsigned i) const {
@@ -314,7 +316,7 @@ class LatticeSurface {
     return {t, zeros == 2, border};
   }
 
-  /// Inserts a vertex that lies in triangle t. The triangles made are cavity_.created().
+  /// Inserts a vertex that lies in triangle t. The new triangles are cavity_.created().
   void insert(std::uint32_t number, std::uint32_t t) {
     const Vertex p = vertices_[number];
     cavity_.dig(triangles_, t, [&](const Triangle& triangle) {
@@ -326,8 +328,8 @@ class LatticeSurface {
     });
   }
 
-  /// Calls visit(b, c) for the triangles v, b, c until it returns false. False: it did, or v is on
-  /// a side of the rectangle.
+  /// Calls visit(b, c) for the triangles v, b, c until it returns false. Returns false if it did,
+  /// or if v is on a side of the rectangle.
   template <class Visit>
   bool around(std::uint32_t v, std::uint32_t first, const Visit& visit) const {
     std::uint32_t t = first;
@@ -340,8 +342,8 @@ class LatticeSurface {
     return t == first;
   }
 
-  /// The places of elements once they are sorted by key, a number below `count`; equal keys keep
-  /// their order.
+  /// The positions of elements after sorting by key, a number below `count`; equal keys keep their
+  /// order.
   static std::vector<std::uint32_t> sorted_by(const std::vector<std::uint32_t>& keys,
                                               std::size_t count) {
     std::vector<std::uint32_t> starts(count + 1, 0);

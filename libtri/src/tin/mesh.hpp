@@ -8,7 +8,7 @@
 #include <limits>
 #include <vector>
 
-/// Triangles that know their neighbours, without coordinates: shared by all TINs.
+/// Triangles linked to their neighbours, without coordinates: shared by all TINs.
 
 namespace terrace::tri::tin {
 
@@ -18,15 +18,15 @@ inline constexpr std::uint32_t kNone = 0xFFFFFFFF;
 struct Triangle {
   std::array<std::uint32_t, 3> corner;  ///< counter-clockwise; corner[0] == kNone: no triangle
   std::array<std::uint32_t, 3> next;    ///< the triangle across side i, or kNone
-  std::uint32_t place;                  ///< the sample or point where the error is greatest
-  float error;                          ///< > 0 while it waits for `place` to be inserted
+  std::uint32_t place;                  ///< the sample or point with the greatest error
+  float error;                          ///< > 0 while `place` waits to be inserted
 
   bool live() const { return corner[0] != kNone; }
 };
 
 using Triangles = std::vector<Triangle>;
 
-/// An error as Triangle::error: at least as great, above 0, finite.
+/// An error as stored in Triangle::error: rounded up, above 0, finite.
 inline float rounded_up(double error) {
   constexpr float kHighest = std::numeric_limits<float>::max();
   if (!(error < double{kHighest})) return kHighest;
@@ -48,12 +48,12 @@ inline constexpr std::int32_t row_of(std::uint32_t place) {
 inline constexpr unsigned after(unsigned side) { return side == 2 ? 0 : side + 1; }
 inline constexpr unsigned before(unsigned side) { return side == 0 ? 2 : side - 1; }
 
-/// The side of `triangle` that `neighbour` is across, which must be one of its neighbours.
+/// The side of `triangle` across which `neighbour` lies, which must be one of its neighbours.
 inline unsigned side_to(const Triangle& triangle, std::uint32_t neighbour) {
   return triangle.next[0] == neighbour ? 0 : triangle.next[1] == neighbour ? 1 : 2;
 }
 
-/// The number of the corner that is `vertex`, which must be one of its corners.
+/// The index of the corner `vertex`, which must be one of its corners.
 inline unsigned corner_of(const Triangle& triangle, std::uint32_t vertex) {
   return triangle.corner[0] == vertex ? 0 : triangle.corner[1] == vertex ? 1 : 2;
 }

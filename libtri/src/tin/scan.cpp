@@ -6,7 +6,7 @@
 namespace terrace::tri::tin {
 namespace {
 
-/// A bit for each lane that is true.
+/// A bit for each true lane.
 [[gnu::always_inline]] inline unsigned bits_of(Ints16 mask) {
   unsigned bits = 0;
   for (int i = 0; i < 16; ++i) bits |= static_cast<unsigned>(mask[i] & 1) << i;

@@ -10,7 +10,7 @@
 
 namespace terrace::tri::tin {
 
-/// The scans for one instruction set. All sets give the same results, bit by bit.
+/// The scans for one instruction set. All sets give bit-identical results.
 struct Scans {
   GridScan<float> grid_floats;
   GridScan<double> grid_doubles;

@@ -6,7 +6,7 @@
 namespace terrace::tri::tin {
 namespace {
 
-/// A bit for each lane that is true.
+/// A bit for each true lane.
 [[gnu::always_inline]] inline unsigned bits_of(Ints16 mask) {
   __m256 halves[2];
   __builtin_memcpy(halves, &mask, sizeof mask);

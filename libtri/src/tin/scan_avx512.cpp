@@ -6,7 +6,7 @@
 namespace terrace::tri::tin {
 namespace {
 
-// Masks of lanes as in scan_masks.hpp, in registers of their own.
+// Masks of lanes as in scan_masks.hpp, but in mask registers.
 
 [[gnu::always_inline]] inline __mmask16 not_negative(Ints16 lanes) {
   return static_cast<__mmask16>(~_mm512_movepi32_mask((__m512i)lanes));

@@ -6,7 +6,7 @@
 
 // Vectors of 64 bytes. This file, scan_masks.hpp and the scans (*/scan_impl.hpp) are compiled once
 // for each instruction set. Nothing in them may be shared between objects, or the linker might keep
-// the version for newer processors only: everything is in anonymous namespaces, and no function of
+// only the version for newer processors: everything is in anonymous namespaces, and no function of
 // another header is called.
 
 namespace terrace::tri::tin {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Masks of lanes for instruction sets where a mask is a vector. bits_of() for Ints16 and Ints8 is
-// defined before.
+// Masks of lanes for instruction sets in which a mask is a vector. bits_of() for Ints16 and Ints8
+// must be defined before.
 #include "scan_lanes.hpp"
 
 namespace terrace::tri::tin {
@@ -30,7 +30,7 @@ template <class Ints>
 [[gnu::always_inline]] inline Ints both(Ints a, Ints b) {
   return a & b;
 }
-/// Lanes of a where the mask is set, else of b.
+/// Lanes of a where the mask is set, otherwise of b.
 template <class Ints, class Values>
 [[gnu::always_inline]] inline Values chosen(Ints mask, Values a, Values b) {
   return (Values)(((Ints)a & mask) | ((Ints)b & ~mask));
@@ -40,7 +40,7 @@ template <class Reals, class Ints>
 [[gnu::always_inline]] inline Reals kept(Reals lanes, Ints mask) {
   return (Reals)((Ints)lanes & mask);
 }
-/// A bit for each lane of the mask that is not at most the limit; NaN is not.
+/// A bit for each lane of the mask that is not at most the limit; this includes NaN.
 template <class Reals, class Ints>
 [[gnu::always_inline]] inline unsigned beyond(Reals lanes, Reals limit, Ints mask) {
   return bits_of(~(Ints)(lanes <= limit) & mask);

@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-/// What scans of the samples in a triangle find.
+/// The results of scanning the samples in a triangle.
 
 namespace terrace::tri::tin {
 
@@ -13,7 +13,7 @@ struct WorstSample {
   std::uint32_t place;  ///< row << 16 | column
 };
 
-/// By how much a vertex may rise (below 0: sink).
+/// The range by which a vertex may rise (negative: sink).
 struct Interval {
   double low = -__builtin_inf();
   double high = __builtin_inf();

@@ -78,7 +78,7 @@ std::vector<std::uint32_t> settle_side(std::span<const T> line, std::span<const 
   std::vector<std::uint32_t> vertices;
   if (line.empty()) return vertices;
   std::vector<std::uint8_t> kept = needed_on(line, beside, other_beside);
-  // Less than the bound, so that rounding later cannot exceed it.
+  // Slightly below the bound, so that later rounding cannot exceed it.
   const double limit = max_error * (1 - 1e-5);
   for (std::size_t a = 0, b = 1; b < line.size(); ++b) {
     if (kept[b] == 0) continue;

@@ -26,7 +26,7 @@ void check(std::span<const double> t, std::span<const double> heights, double ma
       throw std::invalid_argument("simplify_line: sample " + std::to_string(i) + " is not finite");
     if (i > 0 && t[i] < t[i - 1])
       throw std::invalid_argument("simplify_line: sample " + std::to_string(i) +
-                                  " is before the one in front of it");
+                                  " is before the previous sample");
   }
 }
 
@@ -37,7 +37,7 @@ LineVertex vertex_of(double t, double height, std::size_t sample,
   return {to_whole(t), on_lattice(*lattice, height), number};
 }
 
-/// Beyond the ends, which rounding may leave, the height is that of the end.
+/// Beyond the ends (rounding may go there) the height is that of the end.
 double height_at(const LineVertex& a, const LineVertex& b, double t) {
   if (!(t > a.t)) return a.height;
   if (!(t < b.t)) return b.height;
@@ -58,7 +58,7 @@ SimplifiedLine simplify_line(std::span<const double> t, std::span<const double> 
                              double max_error, const std::optional<TinLattice>& lattice) {
   check(t, heights, max_error, lattice);
   SimplifiedLine result;
-  // The first of several samples at one place stands for all.
+  // The first of several samples at one place represents them.
   std::vector<std::size_t> samples;
   for (std::size_t i = 0; i < t.size(); ++i)
     if (i == 0 || t[i] != t[i - 1]) samples.push_back(i);
@@ -69,7 +69,7 @@ SimplifiedLine simplify_line(std::span<const double> t, std::span<const double> 
   const LineVertex begin = vertex(0);
   const LineVertex end = vertex(samples.size() - 1);
   result.vertices.push_back(begin);
-  // Greatest error first splits every piece by itself, so the order of pieces does not matter.
+  // Greatest error first splits each piece independently, so the order of pieces does not matter.
   std::vector<Piece> pieces{{begin, end, 0, samples.size()}};
   while (!pieces.empty()) {
     const Piece piece = pieces.back();
@@ -94,7 +94,7 @@ SimplifiedLine simplify_line(std::span<const double> t, std::span<const double> 
       if (piece.to.t > result.vertices.back().t) result.vertices.push_back(piece.to);
       continue;
     }
-    // Rounding may put the vertex to either side of its own sample.
+    // Rounding may put the vertex on either side of its own sample.
     std::size_t cut = piece.first;
     while (cut < piece.last && t[samples[cut]] <= middle.t) ++cut;
     pieces.push_back({middle, piece.to, cut, piece.last});

@@ -12,20 +12,20 @@
 
 namespace terrace::tri::tin {
 
-/// Larger stars are left alone, as filling one takes time proportional to the third power.
+/// Larger stars are left alone, as filling one takes cubic time.
 inline constexpr std::size_t kMaxRing = 16;
 
-/// How a polygon is cut into triangles: the triangle on the chord from i to j (i < j, the polygon's
-/// part i..j on its other side) has its third corner at apex[i][j]. The chord of the whole is the
-/// last side, from 0 to size - 1.
+/// How a polygon is cut into triangles: the triangle on the chord from i to j (i < j, with the
+/// polygon's part i..j on its other side) has its third corner at apex[i][j]. The chord of the
+/// whole polygon is the last side, from 0 to size - 1.
 struct PolygonFill {
   std::array<std::array<std::uint8_t, kMaxRing>, kMaxRing> apex;
 };
 
-/// Among the ways to cut a counter-clockwise polygon of `size` corners into triangles, finds
-/// the one whose worst triangle costs least. `worst(i, m, j, limit)`, for corners i < m < j, is the
+/// Among the ways to cut a counter-clockwise polygon of `size` corners into triangles, finds the
+/// one whose worst triangle costs least. `worst(i, m, j, limit)`, for corners i < m < j, is the
 /// cost of a triangle, or any number above `limit` if it costs more than that, is not
-/// counter-clockwise or is not wanted. False if each way costs more than `limit`. Dynamic
+/// counter-clockwise or is not wanted. Returns false if each way costs more than `limit`. Dynamic
 /// programming, at most O(size^3) calls: G. T. Klincsek, "Minimal triangulations of polygonal
 /// domains", 1980.
 ///
@@ -57,9 +57,9 @@ bool fill_least_worst(std::size_t size, Cost limit, const Worst& worst, PolygonF
   return cost[0][size - 1] <= limit;
 }
 
-/// Any way to cut such a polygon into triangles for which fits(i, m, j), which must imply
-/// counter-clockwise. Slightly more triangles remain in the end than with fill_least_worst(), but
-/// calls are far fewer, as only parts beside a triangle that fits are looked at.
+/// Finds any way to cut such a polygon into triangles for which fits(i, m, j) holds, which must
+/// imply counter-clockwise. Slightly more triangles remain in the end than with fill_least_worst(),
+/// but there are far fewer calls, as only parts beside a fitting triangle are examined.
 template <class Fits>
 class AnyFill {
  public:
@@ -123,7 +123,7 @@ bool fill_delaunay(std::size_t size, const Left& left, const Inside& inside, Pol
 /// A vertex's triangles in counter-clockwise order.
 class Star {
  public:
-  /// False if the vertex lies on the hull or has more than kMaxRing neighbours.
+  /// Returns false if the vertex lies on the hull or has more than kMaxRing neighbours.
   bool gather(const Triangles& triangles, std::uint32_t vertex, std::uint32_t first) {
     size_ = 0;
     std::uint32_t t = first;
@@ -145,7 +145,8 @@ class Star {
 
   std::size_t size() const { return size_; }
   std::uint32_t ring(std::size_t i) const { return ring_[i]; }
-  std::uint32_t triangle(std::size_t i) const { return slot_[i]; }  ///< with ring(i), ring(i + 1)
+  /// the triangle with ring(i) and ring(i + 1)
+  std::uint32_t triangle(std::size_t i) const { return slot_[i]; }
 
   /// Calls visit(i, m, j) for each triangle of a fill.
   template <class Visit>
@@ -172,7 +173,7 @@ class Star {
     return visit(i, m, j) && all_of(fill, i, m, visit) && all_of(fill, m, j, visit);
   }
 
-  /// Side `side` of triangle t is side i of the ring.
+  /// Links side `side` of triangle t to side i of the ring.
   void link(Triangles& triangles, std::uint32_t t, unsigned side, std::size_t i) {
     triangles[t].next[side] = outer_[i];
     if (outer_[i] != kNone) triangles[outer_[i]].next[back_[i]] = t;

@@ -13,28 +13,29 @@
 
 namespace terrace::tri {
 
-/// Given clusters within a budget of bytes; what was not used for the longest time goes first. As
-/// a source it delivers what is there and never waits.
+/// An LRU cache of given clusters within a budget of bytes. As a source it delivers what it holds
+/// and never waits.
 class ViewCache final : public ClusterSource {
  public:
   /// counts: clusters of each level below the top.
   explicit ViewCache(std::vector<std::uint64_t> counts) : counts_(std::move(counts)) {}
-  /// No budget until this is called, before clusters are given.
+  /// There is no budget until this is called, before clusters are given.
   void limit(std::size_t max_bytes) { max_bytes_ = max_bytes; }
 
-  /// Takes the place of an earlier one. False if it is larger than the budget: it is not kept then.
+  /// Replaces an earlier version. Returns false if it is larger than the budget: then it is not
+  /// kept.
   bool give(GivenCluster cluster);
-  /// Null if it is not there. `use`: it goes last from now on.
+  /// Null if it is not cached. `use`: marks it as most recently used.
   const GivenCluster* find(ClusterId cluster, bool use);
   void drop(ClusterId cluster);
 
   [[nodiscard]] std::size_t bytes() const { return bytes_; }
   [[nodiscard]] std::size_t max_bytes() const { return max_bytes_; }
   [[nodiscard]] std::size_t size() const { return places_.size(); }
-  /// What a cluster with this many members takes.
+  /// Memory of a cluster with this many members.
   [[nodiscard]] static double bytes_of(unsigned level, std::uint64_t members);
 
-  /// Makes the record known that the model will ask for.
+  /// Provides the record that the model will request.
   void expect(ClusterId cluster, const ClusterRecord& record) {
     expected_ = cluster;
     record_ = record;
@@ -52,7 +53,7 @@ class ViewCache final : public ClusterSource {
 
   std::vector<std::uint64_t> counts_;
   std::size_t max_bytes_ = std::numeric_limits<std::size_t>::max(), bytes_ = 0;
-  Places clusters_;  // the longest unused first
+  Places clusters_;  // least recently used first
   std::unordered_map<ClusterId, Places::iterator> places_;
   ClusterId expected_{};
   ClusterRecord record_;

@@ -11,7 +11,7 @@ namespace {
 
 // Squares and products with normals stay finite below this.
 constexpr double kFar = 1e150;
-// Errors times pixels stay finite, and demands by error below those that are forced.
+// Errors times pixels stay finite, and demands due to errors stay below forced ones.
 constexpr double kMaxDemand = 1e299;
 constexpr std::size_t kBlock = 256;
 
@@ -22,8 +22,8 @@ struct Boxes {
   std::size_t count;
 };
 
-// The least value over the planes of the greatest signed distance of a box's point: not negative
-// where the box is not wholly outside of one plane.
+// The minimum over the planes of the greatest signed distance of a point of the box: not negative
+// unless the box is wholly outside one plane.
 void depth_inside(const Camera& camera, const Boxes& boxes, Block& depth) {
   depth.fill(std::numeric_limits<double>::infinity());
   for (const Plane& plane : camera.planes) {
@@ -40,7 +40,7 @@ void depth_inside(const Camera& camera, const Boxes& boxes, Block& depth) {
   }
 }
 
-// Euclidean distance to the nearest point; of the farthest, the greatest difference on an axis.
+// Euclidean distance to the nearest point; for the farthest, the greatest difference on an axis.
 void distances(const Point3& eye, const Boxes& boxes, Block& near, Block& far) {
   near.fill(0.0);
   far.fill(0.0);
@@ -99,10 +99,10 @@ void measure_camera(const View& view, const ViewOptions& options, const ViewColu
   const double scale = camera.pixels / view.pixel_error, guard = options.guard;
   for (std::size_t i = 0; i < boxes.count; ++i) {
     const double margin = guard * (camera.perspective ? far[i] : camera.height);
-    // A ground unit's pixels; the eye may lie in the box.
+    // Pixels of a ground unit; the eye may lie in the box.
     const double unit = camera.perspective ? scale / std::max(near[i], 1e-100) : scale;
     const double shown = std::min(error[i] * unit, kMaxDemand);
-    // Clusters above level 0 come early: what is below them has to be asked for.
+    // Clusters above level 0 come early, as the clusters below them have to be requested.
     const double lead = level[i] / (level[i] + 1.0) * margin;
     want[i] =
         std::max(want[i], depth[i] >= -lead ? std::min(shown * want_gain[i], kMaxDemand) : 0.0);
@@ -165,7 +165,7 @@ void ViewColumns::set(std::size_t i, const ClusterRecord& record, unsigned level
 void ViewColumns::set_cone(std::size_t i, const NormalCone& cone) {
   for (std::size_t k = 0; k < 3; ++k) columns_[kAxis + k][i] = cone.axis[k];
   const double angle = cone.half_angle_degrees;
-  // Beyond a right angle, or if it is not a number, any direction is possible.
+  // Beyond a right angle, or if it is NaN, any direction is possible.
   columns_[kSine][i] =
       angle >= 0.0 && angle < 90.0 ? std::sin(angle * std::numbers::pi / 180.0) : 1.0;
 }

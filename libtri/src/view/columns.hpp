@@ -10,12 +10,12 @@
 
 namespace terrace::tri {
 
-/// What a view must know of clusters, in columns, so that thousands are measured per step: box,
-/// error, level and, where outlines count, cone. 57 bytes per cluster, with cones 89.
+/// The data of clusters that a view needs, in columns, so that thousands are measured per step:
+/// box, error, level and, for outlines, the cone. 57 bytes per cluster, with cones 89.
 class ViewColumns {
  public:
-  /// Columns 0..2 hold the least x, y, z of the boxes, 3..5 the greatest, 6 the errors; with cones
-  /// 7..9 hold the axes, 10 the sines of the half angles.
+  /// Columns 0..2 hold the minima of the boxes in x, y, z, columns 3..5 the maxima, 6 the errors;
+  /// with cones 7..9 hold the axes, 10 the sines of the half angles.
   static constexpr std::size_t kError = 6, kAxis = 7, kSine = 10, kColumns = 11;
 
   explicit ViewColumns(bool cones = false) : cones_(cones) {}
@@ -29,13 +29,13 @@ class ViewColumns {
     for (std::size_t c = 0; c < (cones_ ? kColumns : kAxis); ++c) columns_[c].resize(size);
     levels_.resize(size);
   }
-  /// A box with a bound that is not a number, or empty, is never in view. An error that is not a
-  /// number, or negative, says nothing and counts as infinite.
+  /// A box that is empty or has a NaN bound is never in view. A NaN or negative error counts as
+  /// infinite.
   void set(std::size_t i, const ClusterRecord& record, unsigned level);
   void set_cone(std::size_t i, const NormalCone& cone);
   void set_error(std::size_t i, double error) { columns_[kError][i] = error; }
   void copy(std::size_t i, const ViewColumns& from, std::size_t j);
-  /// Widens the box of entry i to hold that of entry j.
+  /// Extends the box of entry i to hold that of entry j.
   void join(std::size_t i, const ViewColumns& from, std::size_t j);
   [[nodiscard]] std::size_t memory() const;
 
@@ -45,14 +45,14 @@ class ViewColumns {
   std::vector<std::uint8_t> levels_;
 };
 
-/// How urgently clusters are wanted: error over tolerated error, so more than 1 is to be expanded.
+/// How urgently clusters are wanted: error over tolerance; above 1 a cluster is to be expanded.
 struct ViewDemand {
-  /// At least this counts as asked for by a level or by name.
+  /// At least this is the demand of a cluster requested by a level or by name.
   static constexpr double kForced = 1e300;
 
   std::vector<double> want;      ///< by the view itself
   std::vector<double> keep;      ///< by the view widened by the guard; not less than want
-  std::vector<double> distance;  ///< of the box from the camera; 0 without one
+  std::vector<double> distance;  ///< of the box from the camera; 0 without a camera
 
   void resize(std::size_t size) {
     want.resize(size);
@@ -61,13 +61,13 @@ struct ViewDemand {
   }
 };
 
-/// Measures entries `first` up to `last`. Neither demand is greater for a cluster inside another
-/// one's box with no greater error, rounding included; outlines can break that.
-/// O(entries * (7 + focuses + regions)).
+/// Measures entries from `first` to `last`. Neither demand is greater for a cluster inside another
+/// one's box with no greater error, including rounding; outlines can violate that. O(entries * (7 +
+/// focuses + regions)).
 void measure(const View& view, const ViewOptions& options, const ViewColumns& columns,
              std::size_t first, std::size_t last, ViewDemand& demand);
 
-/// Throws std::invalid_argument where a tolerance is negative or not a number.
+/// Throws std::invalid_argument if a tolerance is negative or NaN.
 void check(const View& view);
 /// The same for options.
 void check(const ViewOptions& options);

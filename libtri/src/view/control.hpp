@@ -14,13 +14,13 @@
 #include "model/model.hpp"
 #include "terrace/tri/view.hpp"
 
-/// The template ViewControl of view.hpp, for those who instantiate it.
+/// The template ViewControl of view.hpp, for files that instantiate it.
 
 namespace terrace::tri {
 
 namespace detail {
 
-/// Throws HierarchyError where a given cluster contradicts itself.
+/// Throws HierarchyError if a given cluster contradicts itself.
 void check(const GivenCluster& cluster, unsigned top);
 ViewOptions checked(ViewOptions options);
 
@@ -67,7 +67,7 @@ struct ViewControl<Triangulation>::Impl {
   StepMeter meter_;
   std::uint64_t number_ = 0;  // of the step
   bool evict_ = true;         // whether room can still be made in this step
-  std::size_t claimed_ = 0;   // points of clusters that are given or asked for and wanted
+  std::size_t claimed_ = 0;   // points of wanted clusters that are given or requested
   double claimed_bytes_ = 0.0;
 };
 
@@ -117,7 +117,8 @@ auto ViewControl<Triangulation>::Impl::step(const View& view, const StepBudget& 
   return result_;
 }
 
-// Until no more than so many points of unwanted clusters are left; false if the budget ended first.
+// Collapses until at most this many points of unwanted clusters are left; false if the budget ended
+// first.
 template <class Triangulation>
 bool ViewControl<Triangulation>::Impl::collapse_unwanted(std::size_t up_to) {
   while (front_.points_below(options_.collapse_below) > up_to || up_to == 0) {
@@ -156,9 +157,9 @@ void ViewControl<Triangulation>::Impl::expand_wanted() {
   }
 }
 
-// Whether room could be made for so many points. Once there is none for a cluster, none is made for
-// a lesser one; but what is unwanted anyway always gives way. So it does not matter where a step
-// was interrupted.
+// Whether room could be made for this many points. Once there is none for a cluster, none is made
+// for a lesser one; but unwanted clusters always give way. So it does not matter where a step was
+// interrupted.
 template <class Triangulation>
 bool ViewControl<Triangulation>::Impl::could_fit(const Candidate& candidate, std::size_t points) {
   const std::size_t lack = lacking(points);
@@ -183,7 +184,7 @@ auto ViewControl<Triangulation>::Impl::make_room(const Candidate& candidate) -> 
       collapse(slot);
     }
   }
-  // What went may have had this cluster below it.
+  // The collapsed cluster may have been above this one.
   const auto place = tree().find(candidate.id);
   if (!place || *place != candidate.place) return Room::none;
   return meter_.has(members) ? Room::enough : Room::later;
@@ -194,7 +195,7 @@ void ViewControl<Triangulation>::Impl::ask(const Candidate& candidate) {
   const std::size_t members = static_cast<std::size_t>(
       std::min<std::uint64_t>(candidate.members, ClusterTree::kMaxMembers));
   const unsigned level = level_of(candidate.id);
-  // Nothing is asked for that could not be expanded, or kept until then.
+  // Nothing is requested that could not be expanded, or kept until then.
   const std::size_t claims = claimed_ + members;
   const auto known = asked_.find(candidate.id);
   const double bytes = ViewCache::bytes_of(level, members);
@@ -210,7 +211,7 @@ void ViewControl<Triangulation>::Impl::ask(const Candidate& candidate) {
   request(candidate, candidate.want, bytes);
 }
 
-// Asks early for what may be wanted soon, and holds on to it if it is there.
+// Requests early what may be wanted soon, and keeps it if it is cached.
 template <class Triangulation>
 void ViewControl<Triangulation>::Impl::ask_soon() {
   for (const Candidate& candidate : front_.soon()) {
@@ -263,7 +264,7 @@ void ViewControl<Triangulation>::Impl::collapse(Slot slot) {
   meter_.spend(points);
 }
 
-// What was asked for and is neither wanted now nor within the band of hysteresis.
+// Clusters that were requested and are neither wanted now nor within the band of hysteresis.
 template <class Triangulation>
 void ViewControl<Triangulation>::Impl::withdraw() {
   for (const auto& [id, asked] : asked_) {

@@ -80,8 +80,8 @@ void ViewFront::drop(Slot slot, ChildRef place) {
     free_groups_.push_back(group);
   }
   changed_groups_.push_back(group_of_[place.parent]);
-  // What gave way to something more important may find room again in the same step, as it would in
-  // the next.
+  // A cluster that gave way to a more important one may find room again in the same step, as it
+  // would in the next.
   if (own_.want[slot] > 1.0 && !pinned_down(slot)) {
     candidates_.push_back({own_.want[slot], own_.keep[slot], own_.distance[slot], place,
                            tree_->child_id(place), members(place)});
@@ -106,7 +106,7 @@ void ViewFront::bound(std::uint32_t number) {
   const Group& group = *groups_[number];
   ClusterRecord none;
   none.box = {{1.0, 1.0, 1.0}, {0.0, 0.0, 0.0}};
-  bounds_.set(number, none, tree_->level(group.parent) - 1);  // in no view
+  bounds_.set(number, none, tree_->level(group.parent) - 1);  // never in view
   double error = 0.0;
   for (std::uint32_t i = 0; i < group.columns.size(); ++i) {
     if (tree_->child_slot({group.parent, i}) != ClusterTree::kNoSlot) continue;
@@ -256,7 +256,7 @@ std::optional<ViewFront::Candidate> ViewFront::next() {
     std::pop_heap(candidates_.begin(), candidates_.end(), less_wanted);
     const Candidate candidate = candidates_.back();
     candidates_.pop_back();
-    // The cluster above may have been collapsed for want of room, and even come back.
+    // The cluster above may have been collapsed for lack of room, and even come back.
     const auto place = tree_->find(candidate.id);
     if (candidate.id == last_ || !place || *place != candidate.place) continue;
     last_ = candidate.id;

@@ -15,15 +15,16 @@
 
 namespace terrace::tri {
 
-/// Decides by a view which clusters to expand and which to collapse, and in what order; it knows
-/// the tree of expanded clusters and no triangulation.
+/// Decides by a view which clusters to expand and which to collapse, and in what order; it depends
+/// on the tree of expanded clusters, not on a triangulation.
 ///
-/// The demand of a cluster is taken to be no greater than that of the one above it: then what is
-/// wanted is a tree, whatever records and cones say. It loses no truth of the error: no descendant
-/// is farther from the head of the cluster above, which is present, than that one's error.
+/// The demand of a cluster is taken to be no greater than that of the one above it: so the wanted
+/// clusters form a tree, whatever records and cones say. The error bound remains true: no
+/// descendant is farther from the head of the cluster above, which is present, than that cluster's
+/// error.
 ///
 /// Per step it measures the expanded clusters, one box around the collapsed children of each, and
-/// the children themselves only where that box may hold one that is wanted.
+/// the children themselves only if that box may hold a wanted one.
 class ViewFront {
  public:
   using Slot = ClusterTree::Slot;
@@ -40,36 +41,38 @@ class ViewFront {
   /// The tree must outlive it.
   ViewFront(const ClusterTree& tree, const ViewOptions& options);
 
-  /// Call it for the root, then for every cluster that was expanded, with the records of its
-  /// children in the tree's order. In a step (after start()), `candidate` is what next() gave.
+  /// To be called for the root, then for every cluster that was expanded, with the records of its
+  /// children in the tree's order. In a step (after start()), `candidate` is what next() returned.
   void add(Slot slot, std::span<const ClusterRecord> children, const Candidate* candidate);
-  /// Call it after the tree has released the cluster, with the place where it hung.
+  /// To be called after the tree has released the cluster, with its former position.
   void drop(Slot slot, ChildRef place);
   [[nodiscard]] std::uint64_t members(ChildRef child) const {
     return groups_[group_of_[child.parent]]->members[child.index];
   }
-  /// As it was given, but for bounds beyond 1e150.
+  /// As given, except for bounds beyond 1e150.
   [[nodiscard]] ClusterRecord record(ChildRef child) const;
 
-  /// Overrides the view for one cluster: what is pinned expanded is so as soon as the cluster above
-  /// it is, and then all above it stays; what is pinned collapsed takes all below along.
+  /// Overrides the view for one cluster: a cluster pinned expanded is expanded as soon as the
+  /// cluster above it is, and then all above it stay; one pinned collapsed keeps everything below
+  /// collapsed.
   void pin(ClusterId cluster, Pin how) { pins_[cluster] = how; }
   void unpin(ClusterId cluster) { pins_.erase(cluster); }
 
-  /// Measures all. The view must live until the step's end.
+  /// Measures everything. The view must live until the end of the step.
   void start(const View& view);
-  /// The collapsed cluster that is wanted most, of equals the coarsest, then the smallest id; none
-  /// when no demand is left that is more than 1. Children of what was added take part.
+  /// The collapsed cluster with the greatest demand, on ties the coarsest, then the smallest id;
+  /// nullopt if no demand above 1 is left. Children of added clusters take part.
   [[nodiscard]] std::optional<Candidate> next();
-  /// Those that may be wanted soon, the most demanded first. Call it when next() has no more.
+  /// Clusters that may be wanted soon, the greatest demand first. To be called when next() has no
+  /// more.
   [[nodiscard]] std::span<const Candidate> soon();
   /// Points of expanded clusters whose demand is less than `below`.
   [[nodiscard]] std::size_t points_below(double below);
   /// The expanded cluster to collapse first, if its demand is less than `below`: out of view before
   /// in view, then the farthest; in view the least demand, then the farthest. Children before
-  /// parents. kNoSlot: none.
+  /// parents. kNoSlot if there is none.
   [[nodiscard]] Slot next_to_collapse(double below);
-  /// By the widened view, of a child now.
+  /// The demand of a child by the widened view, computed now.
   [[nodiscard]] double keep(ChildRef child);
 
   [[nodiscard]] std::size_t memory() const;
@@ -79,14 +82,14 @@ class ViewFront {
   // The children of one expanded cluster.
   struct Group {
     Slot parent = ClusterTree::kNoSlot;
-    std::vector<std::uint64_t> members;  // numbers of them
+    std::vector<std::uint64_t> members;  // their numbers
     ViewColumns columns;
   };
   struct Ordered {
     double key;
     ClusterId id;
     Slot slot;
-    std::size_t points_before;  // of those earlier in the order
+    std::size_t points_before;  // of clusters earlier in the order
   };
 
   /// The order of the heap: whether `a` comes after `b`.
@@ -110,21 +113,21 @@ class ViewFront {
   ViewColumns columns_;
   ViewDemand own_;
   std::vector<std::uint32_t> group_of_;
-  // By number of group: a box and the greatest error of its collapsed children.
+  // By group number: a box and the greatest error of its collapsed children.
   std::vector<std::unique_ptr<Group>> groups_;
   std::vector<std::uint32_t> free_groups_, changed_groups_;
   ViewColumns bounds_;
   ViewDemand bound_demand_;
 
-  // A step's.
+  // Of the current step.
   const View* view_ = nullptr;
   std::vector<Candidate> candidates_;  // a heap
   std::vector<Candidate> soon_;
   ViewDemand scratch_;
   std::vector<Slot> by_level_;
   std::vector<Ordered> order_;
-  double sorted_below_ = 0.0;  // order_ holds the clusters of a lesser key
-  std::size_t collapsed_ = 0;  // entries of order_ that are done with
+  double sorted_below_ = 0.0;  // order_ holds the clusters with a smaller key
+  std::size_t collapsed_ = 0;  // entries of order_ that are done
   ClusterId last_{~std::uint64_t{0}};
 };
 

@@ -36,7 +36,7 @@ void Geomorph2<Coord>::make(const Model& model, const typename Model::Delta& del
   if (delta.removed_heights.size() != changes.removed_vertices.size() ||
       delta.reassigned_heights.size() != delta.reassigned.size()) {
     throw std::invalid_argument(
-        "geomorph: the delta does not tell old heights; make the model with old_heights");
+        "geomorph: the delta has no old heights; make the model with old_heights");
   }
   added.clear();
   removed.clear();

@@ -8,8 +8,8 @@ namespace terrace::tri {
 namespace {
 
 constexpr std::uint32_t kLeaf = 4;
-// A point is in a triangle if no barycentric coordinate is less than minus this: what lies on an
-// edge must not fall between two triangles.
+// A point is in a triangle if no barycentric coordinate is less than minus this: a point on an edge
+// must not fall between two triangles.
 constexpr double kRounding = 1e-9;
 
 double doubled_area(const Point3& a, const Point3& b, double x, double y) {
@@ -34,7 +34,8 @@ void HeightPatches::build() {
   triangles_.swap(sorted_);
 }
 
-// Halves at the median along the longer side of what the middles span; boxes come from below.
+// Halves at the median along the longer side of the bounding box of the centres; boxes are computed
+// bottom-up.
 void HeightPatches::split(std::uint32_t node, std::uint32_t first, std::uint32_t last) {
   const double infinity = std::numeric_limits<double>::infinity();
   std::array<double, 4> box{infinity, infinity, -infinity, -infinity};
@@ -70,7 +71,7 @@ std::optional<double> HeightPatches::height(double x, double y) const {
   std::optional<double> result;
   if (nodes_.empty()) return result;
   double best = -kRounding;
-  std::array<std::uint32_t, 64> stack;  // of a balanced tree
+  std::array<std::uint32_t, 64> stack;  // enough for a balanced tree
   std::size_t depth = 0;
   stack[depth++] = 0;
   while (depth > 0) {
@@ -90,9 +91,9 @@ std::optional<double> HeightPatches::height(double x, double y) const {
       const double least = std::min({u, v, w});
       if (!(least >= best) || (result && least == best)) continue;
       best = least;
-      // At a corner the corner's own height, exactly.
+      // At a corner exactly the corner's own height.
       result = u == 1.0 ? a[2] : v == 1.0 ? b[2] : w == 1.0 ? c[2] : u * a[2] + v * b[2] + w * c[2];
-      if (least > 0.0) return result;  // inside; no other one holds it
+      if (least > 0.0) return result;  // inside; no other triangle contains it
     }
   }
   return result;

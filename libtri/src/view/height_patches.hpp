@@ -10,17 +10,17 @@
 
 namespace terrace::tri {
 
-/// Triangles over the plane with heights, none over another, in which points are found. Build it,
-/// ask, build it again; a tree of boxes over the triangles, O(n log n) to build, about O(log n) a
-/// question.
+/// Non-overlapping triangles over the plane with heights, in which points are located. It can be
+/// rebuilt and queried repeatedly; a tree of boxes over the triangles, O(n log n) to build, about
+/// O(log n) per query.
 class HeightPatches {
  public:
   using Corner = Point3;
   void clear() { triangles_.clear(); }
   void add(const Corner& a, const Corner& b, const Corner& c) { triangles_.push_back({a, b, c}); }
   void build();
-  /// The height of the surface above x, y, linear in the triangle that holds the point; none if
-  /// no triangle does, to within rounding.
+  /// The height of the surface at x, y, linear in the triangle that contains the point; nullopt if
+  /// no triangle does, up to rounding.
   [[nodiscard]] std::optional<double> height(double x, double y) const;
 
  private:
@@ -28,7 +28,7 @@ class HeightPatches {
     std::array<double, 4> box;   // least x, y, greatest x, y
     std::uint32_t first, count;  // triangles of a leaf; count 0: the children are at first, first+1
   };
-  // Thrice the middle of a triangle.
+  // Three times the centroid of a triangle.
   struct Place {
     double x, y;
     std::uint32_t triangle;

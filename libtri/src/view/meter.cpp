@@ -9,14 +9,14 @@
 namespace terrace::tri {
 namespace {
 
-// A new measurement counts an eighth, and one that was disturbed from outside no more than twice
-// what is usual.
+// A new measurement counts an eighth, and one disturbed from outside at most twice the usual value.
 void learn(double& rate, double measured) {
   if (rate > 0.0) measured = std::min(measured, 2.0 * rate);
   rate = rate > 0.0 ? rate + (measured - rate) / 8.0 : measured;
 }
 
-// A little of each operation, and of the end of a step, does not depend on the number of points.
+// A part of the cost of each operation, and of the end of a step, does not depend on the number of
+// points.
 double with_overhead(std::size_t points) { return static_cast<double>(points) + 16.0; }
 
 }  // namespace

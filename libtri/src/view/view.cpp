@@ -56,8 +56,8 @@ struct Frame {
 Frame frame(const Pose& pose) {
   check_finite(pose.position, "the position is not finite");
   Frame f;
-  f.forward = unit(pose.direction, "the direction is null or not finite");
-  f.right = cross(f.forward, unit(pose.up, "the up vector is null or not finite"));
+  f.forward = unit(pose.direction, "the direction is zero or not finite");
+  f.right = cross(f.forward, unit(pose.up, "the up vector is zero or not finite"));
   check_camera(std::hypot(f.right[0], f.right[1], f.right[2]) > 1e-9,
                "the up vector is parallel to the direction; choose another");
   f.right = unit(f.right, "the up vector is parallel to the direction");
@@ -121,12 +121,12 @@ Camera orthographic_camera(const Pose& pose, double view_height, double aspect,
 }
 
 // The planes are those of G. Gribb and K. Hartmann, "Fast extraction of viewing frustum planes from
-// the world-view-projection matrix" (2001), the depth ones left out.
+// the world-view-projection matrix" (2001), without the depth planes.
 Camera matrix_camera(const std::array<double, 16>& view_projection, double viewport_height_pixels) {
   check_positive(viewport_height_pixels, "the viewport's height must be positive and finite");
   std::array<std::array<double, 4>, 4> rows{};
   for (std::size_t i = 0; i < 16; ++i) {
-    check_camera(std::isfinite(view_projection[i]), "a number of the matrix is not finite");
+    check_camera(std::isfinite(view_projection[i]), "an entry of the matrix is not finite");
     rows[i / 4][i % 4] = view_projection[i];
   }
   const auto sum = [&](double sign, std::size_t row) {

@@ -12,10 +12,10 @@
 #define TERRACE_CLUSTER_HOST_DEVICE
 #endif
 
-/// The band-shaped half of a symmetric n x n matrix without its diagonal: row i holds the
-/// floor(n / 2) entries (i, i+1), (i, i+2), .. with columns modulo n. Rows are equally long, so
-/// equal shares of rows are equal shares of work. For odd n each pair is there once; for even n the
-/// n / 2 pairs {i, i + n/2} are there twice, in row i and in row i + n/2.
+/// The band-shaped half of a symmetric n x n matrix without its diagonal: row i holds the floor(n /
+/// 2) entries (i, i+1), (i, i+2), .. with columns modulo n. Rows are equally long, so equal shares
+/// of rows are equal shares of work. For odd n each pair occurs once; for even n the n / 2 pairs
+/// {i, i + n/2} occur twice, in row i and in row i + n/2.
 /// Source: J. Skála, Algorithms for manipulating large geometric data, 7.6.2. Its (7.10) as printed
 /// does not invert (7.9); band_place() does. The functions on places compile as CUDA, for host and
 /// device.
@@ -27,26 +27,26 @@ struct BandPlace {
   std::uint64_t row, column;
 };
 
-/// Entries of each row.
+/// Number of entries per row.
 TERRACE_CLUSTER_HOST_DEVICE inline constexpr std::uint64_t band_width(std::uint64_t n) {
   return n / 2;
 }
 
-/// The column of the square matrix that an entry of the band belongs to; its row is place.row.
+/// The column of the square matrix to which an entry of the band belongs; its row is place.row.
 TERRACE_CLUSTER_HOST_DEVICE inline constexpr std::uint64_t band_partner(std::uint64_t n,
                                                                         BandPlace place) {
   const std::uint64_t j = place.row + place.column + 1;
   return j < n ? j : j - n;
 }
 
-/// Where the pair {i, j} is, i != j, both below n. If it is there twice: in row i.
+/// The place of the pair {i, j}, i != j, both below n. If it occurs twice: in row i.
 TERRACE_CLUSTER_HOST_DEVICE inline constexpr BandPlace band_place(std::uint64_t n, std::uint64_t i,
                                                                   std::uint64_t j) {
   const std::uint64_t ahead = j > i ? j - i : j + n - i;  // (j - i) mod n
   return ahead > n / 2 ? BandPlace{j, n - ahead - 1} : BandPlace{i, ahead - 1};
 }
 
-/// The number of that entry, counted row by row.
+/// The index of that entry, counted row by row.
 TERRACE_CLUSTER_HOST_DEVICE inline constexpr std::uint64_t band_entry(std::uint64_t n,
                                                                       std::uint64_t i,
                                                                       std::uint64_t j) {
@@ -54,8 +54,8 @@ TERRACE_CLUSTER_HOST_DEVICE inline constexpr std::uint64_t band_entry(std::uint6
   return place.row * band_width(n) + place.column;
 }
 
-/// Bytes of the entries of a band matrix. Throws: std::invalid_argument, which says how many they
-/// are, if they exceed `memory_limit` (0: no limit).
+/// Bytes of the entries of a band matrix. Throws: std::invalid_argument, naming that number, if it
+/// exceeds `memory_limit` (0: no limit).
 [[nodiscard]] std::uint64_t checked_band_bytes(std::size_t n, std::size_t bytes_per_entry,
                                                std::uint64_t memory_limit);
 
@@ -63,8 +63,8 @@ TERRACE_CLUSTER_HOST_DEVICE inline constexpr std::uint64_t band_entry(std::uint6
 template <class T>
 class BandMatrix {
  public:
-  /// Throws: std::invalid_argument if the entries do not fit the limit, see checked_band_bytes(),
-  /// and std::bad_alloc.
+  /// Throws: std::invalid_argument if the entries exceed the limit, see checked_band_bytes(), and
+  /// std::bad_alloc.
   explicit BandMatrix(std::size_t n, std::uint64_t memory_limit = 0)
       : n_(n), data_(allocate(checked_band_bytes(n, sizeof(T), memory_limit))) {}
 

@@ -15,30 +15,30 @@
 ///     Q = k * fc + sum of weight(i) * distance(i, facility of i)
 /// where k is the number of facilities and fc, the facility cost, a multiple of the diagonal of the
 /// block's bounding box.
-/// Source: J. Skála, Algorithms for manipulating large geometric data, 4.2.3, 7.1, 7.3. Departs
-/// from it in: the start (equal distances along a space-filling curve instead of Meyerson's),
+/// Source: J. Skála, Algorithms for manipulating large geometric data, 4.2.3, 7.1, 7.3. It differs
+/// from that in: the start (equal distances along a space-filling curve instead of Meyerson's),
 /// candidates along that curve instead of random ones, facilities moved to the median of their
 /// clients, an exact last assignment. The thesis's own search is in facility_location.hpp.
 
 namespace terrace::cluster {
 
 struct BlockOptions {
-  double facility_cost = 1.0;  ///< positive; times the diagonal of the bounding box
+  double facility_cost = 1.0;  ///< positive; multiplied by the diagonal of the bounding box
   Effort effort = Effort::standard;
   std::uint64_t seed = 1;  ///< only Effort::full tries random candidates
 };
 
-/// Facilities in the order of their cluster numbers, which is the order of a space-filling curve:
-/// clusters of near numbers are near each other. assignment[i] is the cluster number of point i;
-/// the facility of a cluster is assigned to itself.
+/// Facilities in the order of their cluster numbers, which is that of a space-filling curve:
+/// clusters with close numbers are close to each other. assignment[i] is the cluster number of
+/// point i; the facility of a cluster is assigned to itself.
 /// Every point is assigned to the nearest facility (a weight multiplies all its distances alike),
-/// as computed in single precision in the unit of the block's box: another facility may be nearer
-/// by at most a millionth of the diagonal. Among equals, duplicates included, the lowest number
+/// as computed in single precision in the unit of the block's bounding box: another facility may be
+/// nearer by at most a millionth of the diagonal. On ties, duplicates included, the lowest number
 /// wins.
 struct BlockClustering {
   std::vector<std::uint32_t> facilities;
   std::vector<std::uint32_t> assignment;
-  double facility_cost = 0.0;    ///< the absolute one, in the unit of the points
+  double facility_cost = 0.0;    ///< the absolute facility cost, in the unit of the points
   double connection_cost = 0.0;  ///< sum of weighted distances, in double precision
 
   [[nodiscard]] double cost() const {
@@ -46,12 +46,12 @@ struct BlockClustering {
   }
 };
 
-/// Which code path runs. Every path gives the same bytes.
+/// Which code path runs. All paths give the same bytes.
 enum class SimdPath : std::uint8_t { automatic, portable, avx2, avx512 };
 
-/// Clusters blocks one after another, keeping its memory between them. One object per thread.
-/// The result depends on the points, their order, the weights and the options alone: not on the
-/// machine, on threads, or on the blocks before.
+/// Clusters blocks one after another, keeping its memory in between. One object per thread. The
+/// result depends only on the points, their order, the weights and the options: not on the machine,
+/// on threads, or on previous blocks.
 class BlockClusterer {
  public:
   /// Throws: std::invalid_argument if `path` is not available on this machine.
@@ -63,11 +63,11 @@ class BlockClusterer {
   /// points: n positions in one Cartesian frame, finite, any offset and scale; duplicates and
   /// degenerate blocks are ordinary (all points equal: one facility).
   /// weights: n positive finite numbers, or empty for 1 each. They multiply distances.
-  /// Blocks of fewer than 2500 points get Effort::full whatever the options say (a reduced search
-  /// is up to 30 % off there, thesis table 7.5). Requires n < 2^24. n = 0 gives an empty result.
-  /// Costs are infinite where they exceed the range of double; the clustering is correct even then.
-  /// Time: for blocks of 10 000 points at standard effort and with AVX-512, 0.05 to 0.1 us a point;
-  /// O(n k) for large n. Memory: about 140 bytes a point, kept for the next block.
+  /// Blocks of fewer than 2500 points get Effort::full whatever the options (there a reduced search
+  /// is up to 30 % worse, thesis table 7.5). Requires n < 2^24. n = 0 gives an empty result.
+  /// Costs are infinite if they overflow a double; the clustering is correct even then.
+  /// Time: for blocks of 10 000 points at standard effort and with AVX-512, 0.05 to 0.1 us per
+  /// point; O(n k) for large n. Memory: about 140 bytes per point, kept for the next block.
   void run(std::span<const Point3> points, std::span<const double> weights,
            const BlockOptions& options, BlockClustering& result);
 
@@ -76,7 +76,7 @@ class BlockClusterer {
   std::unique_ptr<Impl> impl_;
 };
 
-/// The path that `automatic` takes on this machine.
+/// The path that `automatic` chooses on this machine.
 SimdPath best_simd_path();
 
 }  // namespace terrace::cluster

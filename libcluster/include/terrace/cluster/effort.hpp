@@ -5,26 +5,26 @@
 
 namespace terrace::cluster {
 
-/// How long to search for facilities: by blocks (block.hpp, hierarchy.hpp) and in
+/// How long to search for facilities: in blocks (block.hpp, hierarchy.hpp) and in
 /// facility_location.hpp.
 ///
 /// Blocks of points: the figures are mean costs over blocks of 10 000 points relative to the
 /// thesis's full search, the first for surfaces, the second for volumes.
 /// Local search over n points or entities: the number of random candidates. Source: J. Skála,
 /// Algorithms for manipulating large geometric data, 7.3.1, whose full search is `fine`.
-/// Interchange on a matrix: restarts, each with its number of perturbations.
+/// Interchange on a matrix: restarts, and perturbations per restart.
 enum class Effort : std::uint8_t {
   /// Blocks: at least one candidate per 32 points; 1.2 to 2.9 % above. Local search: 0.1 n, at
   /// least 1. Interchange: 2 restarts, 50 perturbations.
   fast,
   /// Blocks: facilities also move, and points are assigned, twice; 0.8 to 2.3 % above. Local
-  /// search: as `fast`. Interchange: 8 restarts, 200 perturbations.
+  /// search: like `fast`. Interchange: 8 restarts, 200 perturbations.
   standard,
   /// Blocks: three sweeps of one candidate per 16 points; 0.4 to 1.2 % above. Local search:
   /// n ceil(log10 n). Interchange: 8 restarts, 1000 perturbations.
   fine,
-  /// Blocks: n ceil(log2 n) random candidates, 3.5 times the thesis's; equal within 0.1 %. Local
-  /// search: n ceil(log2 n). Interchange: 32 restarts, 1000 perturbations.
+  /// Blocks: n ceil(log2 n) random candidates, 3.5 times the thesis's; equal to it within 0.1 %.
+  /// Local search: n ceil(log2 n). Interchange: 32 restarts, 1000 perturbations.
   full,
 };
 

@@ -17,11 +17,12 @@
 
 /// The streaming cluster hierarchy: one pass over any number of points in constant memory, by
 /// divide and conquer over blocks; every level is kept. Source: J. Skála, Algorithms for
-/// manipulating large geometric data, 4.3, 7.1.2, 7.2. Departs from it in: blocks are clustered in
-/// parallel; distances are ground distances, under any metric; a level that fits one block becomes
-/// the top without being clustered; a facility cost that is too low to reduce a block is raised.
+/// manipulating large geometric data, 4.3, 7.1.2, 7.2. It differs from that in: blocks are
+/// clustered in parallel; distances are ground distances, under any metric; a level that fits one
+/// block becomes the top without being clustered; a facility cost that is too low to reduce a block
+/// is raised.
 ///
-/// Points come to level 0. Each block of a level is clustered on its own; the representative of
+/// Points arrive at level 0. Each block of a level is clustered on its own; the representative of
 /// each cluster, an input point, goes on to the level above, where it heads that cluster. So every
 /// input point ends in exactly one place: as a member, not a representative, of a cluster on the
 /// highest level that it reached, or as a point of the root.
@@ -29,29 +30,30 @@
 namespace terrace::cluster {
 
 /// A linear map, row-major: ground = map * position. Clustering measures distances on the ground
-/// (metres); positions stay as they came. Entries must be finite and not all zero. A map may be
+/// (metres); positions are stored unchanged. Entries must be finite and not all zero. A map may be
 /// singular: a row of zeros leaves that direction out of all distances.
 using GroundMap = LinearMap;
 
-/// Over all descendants of a cluster down to level 0, representative included.
-/// error: never less than the ground distance from the representative to a descendant; exact (the
-/// largest distance, rounded up) at level 0, above it the smaller of what the triangle inequality
-/// and the box give. Distances are by the map of the block; those within the levels below, which
+/// Over all descendants of a cluster down to level 0, including the representative.
+/// error: an upper bound of the ground distance from the representative to a descendant; at level 0
+/// the largest distance, rounded up, above it the smaller of the bounds from the triangle
+/// inequality and the box. Distances use the map of the block; those within the levels below, which
+/// the triangle inequality adds up, use the maps of the blocks there.
 /// the triangle inequality adds up, by the maps of the blocks there.
 struct Summary {
-  Bounds box;                     ///< of the positions as they came
+  Bounds box;                     ///< of the unmapped positions
   double error = 0.0;             ///< ground units
   std::uint64_t descendants = 0;  ///< level-0 points
   friend bool operator==(const Summary&, const Summary&) = default;
 };
 
-/// In place of a representative, which the root does not have.
+/// Instead of a representative, which the root does not have.
 inline constexpr std::uint32_t kNoRepresentative = 0xffffffff;
 
-/// A finished block as the sink sees it. Points are numbered within the block. Cluster c has the
-/// points order[first[c]] ... order[first[c + 1] - 1], representative among them, in ascending
-/// number. children has `level` ordinals per point: the clusters that it heads on levels 0, 1, ...
-/// The spans are valid until the call returns.
+/// A finished block as the sink receives it. Points are numbered within the block. Cluster c has
+/// the points order[first[c]] ... order[first[c + 1] - 1], including the representative, in
+/// ascending number. children has `level` ordinals per point: the clusters that it heads on levels
+/// 0, 1, ... The spans are valid until the call returns.
 struct FinishedBlock {
   unsigned level = 0;
   std::uint64_t block = 0;  ///< ordinal of the block on its level
@@ -67,12 +69,12 @@ struct FinishedBlock {
 /// Receives the hierarchy. `prepare` is called by several threads at once, as soon as a block is
 /// clustered; `commit` by one thread at a time, in the order of blocks within each level, with what
 /// prepare returned. Cluster ordinals follow from that order: the first block's clusters are 0, 1,
-/// ... Blocks of different levels are committed as they come, in no fixed order between them. An
-/// exception from either ends the build and comes out of push() or finish(), once, when no call to
+/// ... Blocks of different levels are committed in no fixed order relative to each other. An
+/// exception from either ends the build and is thrown by push() or finish(), once, when no call to
 /// the sink is running any more.
 class HierarchySink {
  public:
-  /// Whatever the sink makes of a block before its turn has come.
+  /// What the sink makes of a block before its turn has come.
   struct Prepared {
     virtual ~Prepared() = default;
   };
@@ -81,77 +83,78 @@ class HierarchySink {
   virtual std::unique_ptr<Prepared> prepare(const FinishedBlock& block) = 0;
   virtual void commit(unsigned level, std::unique_ptr<Prepared> prepared) = 0;
   /// The points of the top level, once, at the end, from finish(): one cluster without a
-  /// representative (representatives[0] is kNoRepresentative, its error is 0), order = 0, 1, ...
-  /// Without any input it has no points and an empty box.
+  /// representative (representatives[0] is kNoRepresentative, its error is 0), order = 0, 1, ... If
+  /// there was no input it has no points and an empty box.
   virtual void root(const FinishedBlock& block) = 0;
 };
 
-/// Attributes (colour, intensity) that the payload of a point holds, as further axes of distances.
+/// Attributes (colour, intensity) in the payload of a point, as further axes of distances.
 struct PayloadChannels {
   std::vector<double> weights;  ///< ground units per unit of each channel; not negative, finite
   /// Reads the channels of one point, as many as weights. Called from any thread.
   std::function<void(std::span<const std::byte> payload, std::span<double> values)> read;
 };
 
-/// Entities of several corners (segments, triangles, polylines of k vertices) in place of points:
+/// Entities of several corners (segments, triangles, polylines of k vertices) instead of points:
 /// the position of a "point" is its first corner, its payload holds the others. Distances are those
 /// of facility_location.hpp, on the ground. (thesis chapter 9)
 struct PayloadCorners {
-  std::size_t count = 1;  ///< in all, the position included; 1: points
+  std::size_t count = 1;  ///< total, including the position; 1: points
   /// Polylines: corners keep their order or its reverse. Otherwise any correspondence of corners
-  /// counts; there are at most three then.
+  /// counts; then there are at most three corners.
   bool ordered = false;
-  /// Fills in the corners of one entity, `count` of them, of which the first is there. Called from
+  /// Fills in the corners of one entity, `count` of them; the first is already there. Called from
   /// any thread.
   std::function<void(std::span<const std::byte> payload, std::span<Point3> corners)> read;
 };
 
 struct HierarchyOptions {
-  std::size_t block_size = 10000;  ///< most points clustered together; 2 to 2^24 - 1
-  /// Each block has a seed of its own, mixed from this one, its level and its ordinal. At most half
-  /// of a block's points, rounded up, become representatives; otherwise the levels might never end.
-  /// Where the facility cost is too low for that, it is raised for that block.
+  std::size_t block_size = 10000;  ///< maximum number of points clustered together; 2 to 2^24 - 1
+  /// Each block has its own seed, mixed from this one, its level and its ordinal. At most half of a
+  /// block's points, rounded up, become representatives; otherwise the levels might never end. If
+  /// the facility cost is too low for that, it is raised for that block.
   BlockOptions block;
   /// Distances on the ground, after `ground`; the boxes of a field are in that frame.
-  /// Summary::error stays a ground distance, the Euclidean one.
+  /// Summary::error remains a Euclidean ground distance.
   Metric metric = Euclidean{};
-  /// How blocks are clustered. automatic: as by BlockClusterer where the metric is linear in the
+  /// How blocks are clustered. automatic: by BlockClusterer if the metric is linear in the bounding
   /// box of the block (Euclidean, elliptical, a field with one region there) and there are no
   /// channels, otherwise by the local search that solve() of facility_location.hpp chooses. Any
   /// other: solve() with that strategy. A local search is ten to a hundred times slower. Its effort
-  /// is that of `block`, with `automatic` in blocks of fewer than 2500 points Effort::fine at
-  /// least; clusters are in the order of their representatives.
+  /// is that of `block`; with `automatic`, at least Effort::fine in blocks of fewer than 2500
+  /// points. Clusters are in the order of their representatives.
   FacilityStrategy strategy = FacilityStrategy::automatic;
-  /// As FacilityOptions has them: threads that work on one block, and candidates judged at once.
+  /// As in FacilityOptions: threads that work on one block, and candidates evaluated at once.
   unsigned search_threads = 1;
   std::size_t batch = 1;
-  /// What leaving out a point of level 0 costs, times the diagonal as the facility cost, and in
-  /// blocks of n < block_size points (the last one, tiles) times sqrt(block_size / n); infinite: no
-  /// point is left out. Outliers are found and taken out until none is left, the diagonal being
-  /// that of the points which remain, so they steer neither places nor sizes of clusters. Then each
-  /// becomes a member of the cluster whose representative is nearest (its box, error and count
-  /// include it) and `mark_outlier` is called on its payload. Their representatives are ordinary
-  /// points: above level 0 nothing is left out. (thesis 7.1.3, figure 7.3)
+  /// The cost of leaving out a point of level 0, as a multiple of the diagonal like the facility
+  /// cost, and in blocks of n < block_size points (the last one, tiles) multiplied by
+  /// sqrt(block_size / n); infinite: no point is left out. Outliers are found and removed until
+  /// there are none, with the diagonal of the remaining points, so they affect neither positions
+  /// nor sizes of clusters. Then each becomes a member of the cluster with the nearest
+  /// representative (its box, error and count include it) and `mark_outlier` is called on its
+  /// payload. Representatives are ordinary points: above level 0 nothing is left out. (thesis
+  /// 7.1.3, figure 7.3)
   double outlier_price = std::numeric_limits<double>::infinity();
-  std::function<void(std::span<std::byte> payload)> mark_outlier;  ///< from any thread
-  /// In place of `metric`: the metric for a block with these bounds. A field needs it where
-  /// `ground` depends on the block, as does the frame of the boxes then. Called from any thread.
+  std::function<void(std::span<std::byte> payload)> mark_outlier;  ///< called from any thread
+  /// Overrides `metric`: the metric for a block with these bounds. A field needs it if `ground`,
+  /// and with it the frame of the boxes, depends on the block. Called from any thread.
   std::function<Metric(const Bounds&)> metric_of;
-  PayloadChannels channels;  ///< empty: position alone
-  /// Of more than one: blocks are clustered by the local search for entities (strategies automatic,
-  /// full_scan, facilities), and the facility cost is a multiple of the diagonal of the box of all
-  /// corners. The metric is Euclidean then, without channels and outliers. Summaries are those of
-  /// the positions: what the other corners lie in is the sink's to keep.
+  PayloadChannels channels;  ///< empty: position only
+  /// If more than one: blocks are clustered by the local search for entities (strategies automatic,
+  /// full_scan, facilities), and the facility cost is a multiple of the diagonal of the bounding
+  /// box of all corners. The metric must be Euclidean, without channels and outliers. Summaries are
+  /// those of the positions: the sink must keep the bounds of the other corners itself.
   PayloadCorners corners;
   std::size_t payload_size = 0;  ///< bytes that travel with each point
-  /// Threads that work, the caller's included: it clusters blocks while it would have to wait. Any
-  /// number gives the same hierarchy; 1 (or 0) does everything in the caller's thread.
+  /// Working threads, including the caller's, which clusters blocks while it would have to wait.
+  /// Any number gives the same hierarchy; 1 (or 0) does everything in the caller's thread.
   unsigned threads = 1;
   /// The ground map for a block with these bounds; empty: the identity. Called from any thread.
   std::function<GroundMap(const Bounds&)> ground;
   SimdPath simd = SimdPath::automatic;
-  /// Called once when the work has failed, from the thread in which it failed: for an owner who is
-  /// waiting for input and would see the exception only in the next push(). Must neither throw nor
+  /// Called once when the work has failed, from the thread in which it failed: for an owner who
+  /// waits for input and would see the exception only in the next push(). Must neither throw nor
   /// call the builder.
   std::function<void()> on_failure;
 };
@@ -165,38 +168,38 @@ struct HierarchyResult {
   std::uint64_t outliers = 0;
 };
 
-/// Builds the hierarchy. Memory: a few blocks per thread and one per level. The result depends on
-/// the input, the options but threads and simd, and the seed alone.
+/// Builds the hierarchy. Memory: a few blocks per thread and one per level. The result depends only
+/// on the input, the seed and the options other than threads and simd.
 class HierarchyBuilder {
  public:
   /// The sink must outlive the builder.
   /// Throws: std::invalid_argument if block_size, facility_cost, outlier_price, the metric, a
   /// channel's weight or the number of corners is out of range, channels, corners or outliers have
-  /// no function, corners are given beside another metric, channels or outliers, or the SIMD path
+  /// no function, corners are combined with another metric, channels or outliers, or the SIMD path
   /// is not available.
   HierarchyBuilder(HierarchyOptions options, HierarchySink& sink);
-  /// Stops without finishing: waits for the blocks that are being clustered; then the sink gets no
-  /// more calls.
+  /// Stops without finishing: waits for the blocks that are being clustered; after that the sink
+  /// gets no more calls.
   ~HierarchyBuilder();
   HierarchyBuilder(const HierarchyBuilder&) = delete;
   HierarchyBuilder& operator=(const HierarchyBuilder&) = delete;
 
-  /// Appends points. A batch that fits into one block is never torn: if it does not fit into what
-  /// is left of the present block, that block is closed first, so tiles of a raster stay whole. A
-  /// larger batch is a plain stream: it fills the present block, and is cut wherever one is full.
-  /// An empty batch only reports failures.
-  /// Throws: std::invalid_argument on a coordinate that is not finite, naming its index in the
-  /// batch, and on a payload of another size than payload_size bytes per point (the builder is
-  /// unchanged); what the sink or `ground` threw, and std::invalid_argument on a ground map that is
-  /// not finite, is zero, or makes distances beyond 1e150, on a channel or corner that is not
-  /// finite, on a custom distance that is negative or not finite and on a strategy that a block
-  /// does not admit (the builder has ended then, and takes no more calls: they throw
-  /// std::logic_error).
+  /// Appends points. A batch that fits into one block is never split: if it does not fit into the
+  /// rest of the current block, that block is closed first, so raster tiles stay whole. A larger
+  /// batch is treated as a stream: it fills the current block, and is cut wherever one is full. An
+  /// empty batch only reports failures.
+  /// Throws: std::invalid_argument for a coordinate that is not finite, naming its index in the
+  /// batch, and for a payload whose size is not payload_size bytes per point (the builder is
+  /// unchanged). In the following cases the builder has ended, and further calls throw
+  /// std::logic_error: what the sink or `ground` threw, and std::invalid_argument for a ground map
+  /// that is not finite, is zero, or makes distances beyond 1e150, a channel or corner that is not
+  /// finite, a custom distance that is negative or not finite, and a strategy that a block does not
+  /// admit.
   void push(std::span<const Point3> positions, std::span<const std::byte> payload = {});
 
-  /// Clusters what is left, from level 0 upward; the top is the first level that fits one block.
+  /// Clusters the rest, from level 0 upward; the top is the first level that fits one block.
   /// Weights go up as counts of level-0 points and are scaled to mean 1 in each block's own copy.
-  /// Throws: as push(). To be called once.
+  /// Throws: as push(). May be called once.
   HierarchyResult finish();
 
  private:

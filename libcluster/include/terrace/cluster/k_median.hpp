@@ -6,9 +6,9 @@
 
 #include "terrace/cluster/facility_location.hpp"
 
-/// k-median: exactly k facilities, which cost nothing, and the least sum of connection costs.
-/// As the original method of stream clustering had it, a binary search over the facility cost for a
-/// facility location solution with k facilities, then exchanges of facilities to a local optimum.
+/// k-median: exactly k facilities, which cost nothing, and the least sum of connection costs. As in
+/// the original method of stream clustering: a binary search over the facility cost for a facility
+/// location solution with k facilities, then exchanges of facilities to a local optimum.
 /// Sources: L. O'Callaghan, N. Mishra, A. Meyerson, S. Guha, R. Motwani, Streaming-data algorithms
 /// for high-quality clustering, ICDE 2002; M. Charikar, S. Guha, Improved combinatorial algorithms
 /// for the facility location and k-median problems, FOCS 1999; R. Whitaker, A fast algorithm for
@@ -17,32 +17,31 @@
 namespace terrace::cluster {
 
 struct KMedianOptions {
-  /// Descents by exchanges: the first from what the binary search found, each further one from
+  /// Descents by exchanges: the first from the result of the binary search, each further one from
   /// that with half of the facilities replaced at random. At least 1; the best counts.
   std::uint32_t restarts = 32;
   /// Subgradient steps for lower_bound, each O(facilities * clients); 0: no bound.
   std::uint32_t bound_steps = 300;
   std::uint64_t seed = 1;
-  unsigned threads = 1;  ///< 0: one per core. Never changes the result.
+  unsigned threads = 1;  ///< 0: one per core. Does not change the result.
 };
 
-/// Opening costs of the problem are not read, and are 0 in the solution. Exactly k facilities are
-/// listed, if need be some without clients. No exchange of one of them for another improves the
+/// Opening costs of the problem are ignored, and 0 in the solution. Exactly k facilities are
+/// listed, some without clients if necessary. No exchange of one of them for another improves the
 /// solution by more than rounding.
-/// Where no facility cost gives exactly k, the nearest number is brought to k greedily: the
-/// facility that saves most opens, or the one whose closing costs least closes.
+/// If no facility cost gives exactly k, the closest number is brought to k greedily: the facility
+/// that saves most opens, or the one that costs least to close closes.
 /// Cost: O(facilities * clients) per round of exchanges, some rounds per restart.
 /// Throws: std::invalid_argument as check() does, if k is 0 or above the number of facilities, or
-/// without restarts.
+/// if restarts is 0.
 [[nodiscard]] FacilitySolution k_median(const FacilityMatrix& problem, std::size_t k,
                                         const KMedianOptions& options = {});
 
-/// The same for points. facility_cost is not read. Clients farther than outlier_price diagonals
-/// from all facilities are left out and pay that. Distances are computed as they are needed, in
-/// O(points) memory: a round of exchanges takes points^2 of them, seconds for 20,000 points. Of
-/// large sets the binary search considers a random sample of at least 4 k places.
-/// A facility always serves itself. Throws: as above, and on a custom distance that is negative or
-/// not a number.
+/// The same for points. facility_cost is ignored. Clients farther than outlier_price diagonals from
+/// all facilities are left out and pay that. Distances are computed as needed, in O(points) memory:
+/// a round of exchanges takes points^2 of them, seconds for 20,000 points. For large sets the
+/// binary search considers a random sample of at least 4 k places. A facility always serves itself.
+/// Throws: as above, and for a custom distance that is negative or NaN.
 [[nodiscard]] FacilitySolution k_median(const FacilityPoints& problem, std::size_t k,
                                         const KMedianOptions& options = {.restarts = 1,
                                                                          .bound_steps = 0});

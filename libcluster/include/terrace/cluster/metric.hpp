@@ -22,37 +22,37 @@ using LinearMap = std::array<double, 9>;
 
 inline constexpr LinearMap kIdentityMap{1, 0, 0, 0, 1, 0, 0, 0, 1};
 
-/// sqrt(sum of squares). The thesis's metric wherever it does not name one.
+/// sqrt(sum of squares). The thesis's metric unless it names another.
 struct Euclidean {};
 
-/// The square of the Euclidean distance, what k-means sums. No triangle inequality.
+/// The square of the Euclidean distance, as summed by k-means. No triangle inequality.
 struct SquaredEuclidean {};
 
-/// (|dx|^p + |dy|^p + |dz|^p)^(1/p); 4.2 of the thesis omits the absolute values and the sum.
-/// p = 1 is the city-block, p = infinity the maximum distance. Below 1 there is no triangle
+/// (|dx|^p + |dy|^p + |dz|^p)^(1/p); 4.2 of the thesis omits the absolute values and the sum. p = 1
+/// is the city-block distance, p = infinity the maximum distance. Below 1 there is no triangle
 /// inequality.
 struct Minkowski {
   double p = 2.0;  ///< positive; may be infinite
 };
 
-/// |M (client - facility)| where M maps an ellipsoid onto the unit sphere: every radius of the
-/// ellipsoid has length 1. A metric (symmetric, with triangle inequality) in ground units divided
-/// by the units of the semi-axes.
+/// |M (client - facility)| where M maps an ellipsoid onto the unit sphere: each of its radii has
+/// length 1. A metric (symmetric, with triangle inequality) in ground units divided by the units of
+/// the semi-axes.
 class Elliptical {
  public:
   /// The ellipse with semi-axis `a` along the direction `angle_degrees`, counter-clockwise from +x,
-  /// and `b` across it (both in the unit of the points), upright: `c` along z.
-  /// So M12 is (1/a - 1/b) sin cos; 4.5 of the thesis as printed has the opposite sign, which is
-  /// the angle clockwise. Throws: std::invalid_argument on a semi-axis that is not positive and
-  /// finite, whose reciprocal is infinite, or an angle that is not finite.
+  /// and `b` across it (both in the unit of the points), axis-parallel in z with `c` along it. So
+  /// M12 is (1/a - 1/b) sin cos; 4.5 of the thesis as printed has the opposite sign, that of a
+  /// clockwise angle. Throws: std::invalid_argument for a semi-axis that is not positive and finite
+  /// or whose reciprocal is infinite, or an angle that is not finite.
   Elliptical(double a, double b, double angle_degrees, double c = 1.0);
   /// The ellipsoid whose semi-axis i points along row i of `axes`, three orthonormal vectors.
   /// Throws: std::invalid_argument as above, and if the rows are not orthonormal to 1e-9.
   Elliptical(const Point3& semi_axes, const LinearMap& axes);
 
-  /// M: symmetric and positive definite. M of the Euclidean metric is the identity.
+  /// M: symmetric and positive definite. For the Euclidean metric it is the identity.
   [[nodiscard]] const LinearMap& map() const { return map_; }
-  /// No vector v has |M v| below this times |v|: the reciprocal of the longest semi-axis.
+  /// For every vector v, |M v| is at least this times |v|: the reciprocal of the longest semi-axis.
   [[nodiscard]] double least_scale() const { return least_scale_; }
 
  private:
@@ -60,32 +60,33 @@ class Elliptical {
   double least_scale_;
 };
 
-/// An elliptical metric in each region, the Euclidean one outside (7.4). Where regions overlap, the
-/// first of the list holds. A distance is measured with the map of the region of its *facility*;
-/// so distances between regions are not symmetric and break the triangle inequality.
+/// An elliptical metric in each region, the Euclidean metric outside (7.4). Where regions overlap,
+/// the first in the list applies. A distance is measured with the map of the region of its
+/// *facility*; so distances between regions are not symmetric and violate the triangle inequality.
 class EllipticalField {
  public:
   struct Region {
     Bounds box;  ///< closed
     Elliptical metric;
   };
-  /// The coordinates that boxes are in, if they are not those of the points: map * point + offset.
+  /// The coordinate frame of the boxes, if it is not that of the points: map * point + offset.
   struct Frame {
     LinearMap map = kIdentityMap;
     Point3 offset{};
   };
-  /// Throws: std::invalid_argument on an empty or not finite box (infinite sides are allowed),
-  /// naming its index.
+  /// Throws: std::invalid_argument for a box that is empty or has a NaN (infinite sides are
+  /// allowed), naming its index.
   explicit EllipticalField(std::vector<Region> regions,
                            const std::optional<Frame>& frame = std::nullopt);
 
-  /// The map that holds at a position: the field as a function from position to symmetric matrix.
+  /// The map at a position: the field as a function from position to symmetric matrix.
   [[nodiscard]] const LinearMap& operator()(const Point3& position) const;
-  /// As Elliptical::least_scale() at that position; 1 outside all regions.
+  /// Like Elliptical::least_scale() at that position; 1 outside all regions.
   [[nodiscard]] double least_scale(const Point3& position) const;
-  /// The map that holds in all of `box`, if there is one: then distances within it are symmetric
-  /// and obey the triangle inequality, and a linear map of the points makes them Euclidean. With a
-  /// frame it may be missed where a region's border passes close by.
+  /// The map that applies in all of `box`, nullopt if there are several: with one map distances
+  /// within the box are symmetric and obey the triangle inequality, and a linear map of the points
+  /// makes them Euclidean. With a frame a uniform box may be missed if a region's border passes
+  /// close by.
   [[nodiscard]] std::optional<LinearMap> uniform_in(const Bounds& box) const;
   [[nodiscard]] const std::vector<Region>& regions() const { return regions_; }
 
@@ -96,7 +97,8 @@ class EllipticalField {
   std::optional<Frame> frame_;
 };
 
-/// A distance of the caller's own. It must be finite, not negative, and 0 from a point to itself.
+/// A distance supplied by the caller. It must be finite, not negative, and 0 from a point to
+/// itself.
 struct CustomMetric {
   std::function<double(const Point3& facility, const Point3& client)> distance;
   bool symmetric = false;            ///< distance(a, b) == distance(b, a) always
@@ -106,7 +108,7 @@ struct CustomMetric {
 using Metric =
     std::variant<Euclidean, SquaredEuclidean, Minkowski, Elliptical, EllipticalField, CustomMetric>;
 
-/// What a strategy may rely on.
+/// Properties that a strategy may rely on.
 [[nodiscard]] bool is_symmetric(const Metric& metric);
 [[nodiscard]] bool obeys_triangle_inequality(const Metric& metric);
 
@@ -114,20 +116,19 @@ using Metric =
 /// "elliptical field", "custom".
 [[nodiscard]] std::string name_of(const Metric& metric);
 
-/// Throws: std::invalid_argument on a Minkowski p that is not positive, or a missing function.
+/// Throws: std::invalid_argument for a Minkowski p that is not positive, or a missing function.
 void check(const Metric& metric);
 
 [[nodiscard]] double distance(const Metric& metric, const Point3& facility, const Point3& client);
 
-/// Length of the diagonal of a box in the metric itself, in a field in the Euclidean one; the
-/// longest of its four diagonals where they differ. The facility cost is a multiple of it. 0 for an
-/// empty box.
+/// Length of the diagonal of a box in the metric, for a field in the Euclidean metric; if its four
+/// diagonals differ, the longest. The facility cost is a multiple of it. 0 for an empty box.
 [[nodiscard]] double diagonal(const Metric& metric, const Bounds& box);
 
-/// Columns of attributes beside the positions (colour, intensity, curvature), each with a weight
-/// that says how many ground units a unit of the attribute is worth. They add to the distance as
-/// further axes do: under the root for Euclidean and elliptical distances, to the sum of squares or
-/// of p-th powers for the others. Symmetry and the triangle inequality are kept.
+/// Columns of attributes besides the positions (colour, intensity, curvature), each with a weight:
+/// how many ground units a unit of the attribute is worth. They add to the distance as further
+/// axes: under the root for Euclidean and elliptical distances, to the sum of squares or of p-th
+/// powers for the others. Symmetry and the triangle inequality are preserved.
 struct Channels {
   std::span<const double> values;   ///< points x weights.size(), row by row; finite
   std::span<const double> weights;  ///< one per channel; not negative, finite

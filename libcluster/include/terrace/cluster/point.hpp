@@ -7,11 +7,11 @@
 #include <limits>
 #include <span>
 
-/// Points and boxes, in a Cartesian frame and a unit that the caller chooses.
+/// Points and boxes, in a Cartesian frame and a unit chosen by the caller.
 
 namespace terrace::cluster {
 
-/// A standard type, so that it is the same type in every library of the workspace.
+/// A standard type, so that it is the same in every library of the workspace.
 using Point3 = std::array<double, 3>;
 
 /// A closed axis-aligned box; min = +infinity and max = -infinity when empty.

@@ -9,7 +9,7 @@
 
 namespace terrace::cluster {
 
-/// Erlenkotter's procedure: feasible duals under improvement.
+/// Erlenkotter's procedure, which improves feasible duals.
 class DualAscent {
  public:
   /// Begins with the least cost of each client. O(facilities * clients).
@@ -36,11 +36,11 @@ class DualAscent {
 
   const ClientOrder* order_;
   std::vector<double> duals_;
-  std::vector<double> slack_;         // opening cost less what is paid, by facility
-  std::vector<std::uint32_t> reach_;  // per client: how many facilities cost at most its dual
+  std::vector<double> slack_;         // opening cost minus payments, by facility
+  std::vector<std::uint32_t> reach_;  // per client: number of facilities that cost at most its dual
   std::vector<std::uint32_t> all_;
-  std::vector<char> tight_;    // by facility: nothing is left of the slack
-  std::vector<char> support_;  // a few tight facilities that every client can reach one of
+  std::vector<char> tight_;    // by facility: its slack is used up
+  std::vector<char> support_;  // a few tight facilities, one of them within reach of every client
 };
 
 }  // namespace terrace::cluster

@@ -11,7 +11,8 @@
 
 namespace terrace::cluster {
 
-/// L(v) as it was computed, and how far rounding may have taken it above its true value.
+/// L(v) as computed, and an upper bound of how far rounding may have raised it above its true
+/// value.
 struct DualValue {
   double value = 0.0;
   double error = 0.0;
@@ -20,10 +21,10 @@ struct DualValue {
 
 /// Adds up L(v) = sum v_i + sum_j min(0, opening_j - paid_j), and bounds the rounding errors, which
 /// are at most (terms) epsilon/2 times the sum of absolute values for each of the sums; twice that
-/// is taken.
+/// is subtracted.
 class DualSum {
  public:
-  /// `terms`: how many differences v_i - c_ij each `paid` is a sum of, at most.
+  /// `terms`: the maximum number of differences v_i - c_ij that make up a `paid`.
   explicit DualSum(std::size_t terms) : terms_(static_cast<double>(terms) + 8.0) {}
   void client(double dual) {
     value_ += dual;
@@ -31,7 +32,7 @@ class DualSum {
     count_ += 1.0;
   }
   void facility(double opening, double paid) {
-    // Also a facility that seems not quite paid for may be, but for rounding.
+    // A facility that seems not quite paid for may be paid, up to rounding.
     paid_ += paid + opening;
     if (paid > opening) value_ += opening - paid;
     count_ += 1.0;
@@ -47,20 +48,20 @@ class DualSum {
   double value_ = 0.0, magnitude_ = 0.0, paid_ = 0.0, count_ = 0.0;
 };
 
-/// L and its supergradient, for whatever kind of problem.
+/// L and its supergradient, for any kind of problem.
 class DualFunction {
  public:
   virtual ~DualFunction() = default;
   /// slope[i] = weight of client i times (1 - number of paid facilities that connect it for less
   /// than its dual).
   virtual DualValue evaluate(std::span<const double> duals, std::span<double> slope) = 0;
-  /// Into the range in which the maximum lies.
+  /// Clamps duals to the range in which the maximum lies.
   virtual void clamp(std::span<double> duals) const = 0;
 };
 
 /// Subgradient steps that aim at `target`, the cost of a solution, from `duals`, which become the
-/// best that were found; returns the safe value there. The step is that of Polyak, halved after
-/// a number of steps without gain. Of the options it takes steps and progress.
+/// best ones found; returns the safe value there. The step is Polyak's, halved after a number of
+/// steps without gain. Of the options it uses steps and progress.
 double ascend(DualFunction& function, std::vector<double>& duals, double target,
               const LowerBoundOptions& options);
 

@@ -13,7 +13,7 @@
 namespace terrace::cluster {
 namespace {
 
-// The value at duals that are scaled, in the unit of the problem, rounded down.
+// The value at scaled duals, in the unit of the problem, rounded down.
 double finished(const MatrixRows& costs, const std::vector<double>& duals) {
   RowDual function(costs, costs.opening(), {}, 1);
   std::vector<double> slope(duals.size());

@@ -10,7 +10,7 @@
 
 namespace terrace::cluster {
 
-/// L(v) of a problem whose rows are at hand, or worked out one by one. O(facilities * clients) per
+/// L(v) of a problem whose rows are stored or computed one by one. O(facilities * clients) per
 /// evaluation.
 class RowDual final : public DualFunction {
  public:
@@ -20,7 +20,7 @@ class RowDual final : public DualFunction {
 
   DualValue evaluate(std::span<const double> duals, std::span<double> slope) override;
   void clamp(std::span<double> duals) const override;
-  /// The cheapest connection of each client: no smaller dual makes sense.
+  /// The cheapest connection of each client: smaller duals make no sense.
   [[nodiscard]] std::span<const double> floor() const { return floor_; }
 
  private:
@@ -30,9 +30,9 @@ class RowDual final : public DualFunction {
   std::vector<double> floor_, paid_;
 };
 
-/// L(v), rounded down so that no solution costs less; 0 where that would be negative.
-/// O(facilities * clients). Throws: std::invalid_argument as check() does, if there is not one dual
-/// per client, or one is not finite, naming it.
+/// L(v), rounded down so that no solution costs less; 0 if it would be negative. O(facilities *
+/// clients). Throws: std::invalid_argument as check() does, if there is not one dual per client, or
+/// if one is not finite, naming it.
 [[nodiscard]] double dual_value(const FacilityMatrix& problem, std::span<const double> duals);
 
 /// L of k-median: facilities cost nothing, and the k that are paid most are open,

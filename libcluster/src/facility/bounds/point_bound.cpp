@@ -22,12 +22,12 @@
 namespace terrace::cluster {
 namespace {
 
-/// L(v) of points, where all facilities cost the same and only the clients near a facility pay for
-/// it: those to which it is nearer than what they pay per weight. A leaf of facilities looks for
-/// the leaves with such clients together.
+/// L(v) of points, where all facilities cost the same and only nearby clients pay for a facility:
+/// those closer to it than their payment per weight. A leaf of facilities searches for the leaves
+/// with such clients together.
 ///
-/// The variables are u * sqrt(w), where u = v / w is the payment per weight: in v the light
-/// clients would hardly move, in u the heavy ones.
+/// The variables are u * sqrt(w), where u = v / w is the payment per weight: in terms of v light
+/// clients would hardly move, in terms of u heavy ones.
 template <class Space>
 class PointDual final : public DualFunction {
  public:
@@ -93,7 +93,7 @@ class PointDual final : public DualFunction {
     for (std::size_t i = 0; i < result.size(); ++i) result[i] = payments[i] * root_[i];
     return result;
   }
-  /// v, of the variables.
+  /// Converts variables to the duals v.
   [[nodiscard]] std::vector<double> duals(std::span<const double> variables) const {
     std::vector<double> result(variables.size());
     for (std::size_t i = 0; i < result.size(); ++i) {
@@ -103,7 +103,7 @@ class PointDual final : public DualFunction {
   }
 
  private:
-  // A weight may be too small beside others to be told from 0.
+  // A weight may underflow compared to others.
   [[nodiscard]] double payment(double variable, std::size_t i) const {
     return root_[i] > 0.0 ? variable / root_[i] : 0.0;
   }
@@ -130,7 +130,7 @@ class PointDual final : public DualFunction {
     }
   }
 
-  // Returns the most clients that a facility of the leaf has looked at.
+  // Returns the maximum number of clients that a facility of the leaf has examined.
   std::size_t visit(std::uint32_t leaf, Work& work) {
     const auto& nodes = tree_->nodes();
     const std::uint32_t first = nodes[leaf].first, end = first + nodes[leaf].count;
@@ -151,7 +151,7 @@ class PointDual final : public DualFunction {
     return most;
   }
 
-  // Whether some facility of the leaf may be nearer to the node's box than somebody pays there.
+  // Whether some facility of the leaf may be closer to the node's box than a payment there.
   [[nodiscard]] bool is_near(std::uint32_t leaf, std::uint32_t node) const {
     const BoxTree::Node& from = tree_->nodes()[leaf];
     const Bounds& box = tree_->nodes()[node].box;
@@ -161,8 +161,8 @@ class PointDual final : public DualFunction {
       }
       return false;
     } else {
-      // The distance of two boxes is that of any point of the one from the other grown by what the
-      // first extends beside the point.
+      // The distance of two boxes is that of any point of the one from the other, enlarged by the
+      // extent of the first around the point.
       const Point3& p = space_->points()[from.first];
       Bounds grown = box;
       for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -173,7 +173,7 @@ class PointDual final : public DualFunction {
     }
   }
 
-  // Returns how many clients it has looked at.
+  // Returns the number of clients examined.
   std::size_t add_up(std::uint32_t facility, Work& work) {
     auto from = distances_.from(facility);
     std::size_t looked = 0;
@@ -190,7 +190,7 @@ class PointDual final : public DualFunction {
     return looked;
   }
 
-  // Few facilities are worth opening: their distances are worked out again.
+  // Few facilities are worth opening, so their distances are recomputed.
   void count_payers(std::uint32_t facility, const Work& work) {
     const auto from = space_->from(facility);
     for (const std::uint32_t n : work.near) {
@@ -212,7 +212,8 @@ class PointDual final : public DualFunction {
   std::vector<double> root_;     // sqrt(w)
   std::vector<double> longest_;  // by node: the greatest payment in it
   std::vector<std::uint32_t> leaves_;
-  std::unique_ptr<std::atomic<std::uint32_t>[]> count_;  // per client: paid facilities it pays for
+  // per client: number of paid facilities it pays for
+  std::unique_ptr<std::atomic<std::uint32_t>[]> count_;
 };
 
 void check_start(const FacilitySolution& start, std::size_t count, double outlier_price,
@@ -235,7 +236,7 @@ void check_start(const FacilitySolution& start, std::size_t count, double outlie
   }
 }
 
-// The start in an order of its own, its distances, and what follows from them.
+// The start in its own order, its distances, and derived values.
 struct Start {
   std::vector<std::uint32_t> facility;  // per client
   std::vector<double> distance;         // at most the price
@@ -257,8 +258,8 @@ struct Start {
     for (std::size_t k = 0; k < order.size(); ++k) cost += frame.weights[k] * distance[k];
   }
 
-  // Payments per weight: in each cluster the same level, where that is above the distance, so high
-  // that the cluster pays for its facility.
+  // Payments per weight: the same level in each cluster, where it is above the distance, and so
+  // high that the cluster pays for its facility.
   [[nodiscard]] std::vector<double> payments(const SearchFrame& frame) const {
     const std::size_t n = facility.size();
     std::vector<std::uint32_t> clients(n);
@@ -298,7 +299,7 @@ void permute(SearchFrame& frame, const std::vector<std::uint32_t>& order) {
   }
 }
 
-// The duals, given as payments per weight, become the best that were found; returns L there.
+// The duals, given as payments per weight, become the best ones found; returns L there.
 template <class Space>
 double ascend_from(const Start& start, const Space& space, const SearchFrame& frame,
                    const BoxTree* tree, const LowerBoundOptions& options,

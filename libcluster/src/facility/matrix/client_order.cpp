@@ -17,7 +17,7 @@ ClientOrder::ClientOrder(const MatrixRows& costs) : facilities_(costs.facilities
   } catch (const std::bad_alloc&) {
     throw std::invalid_argument("facility costs sorted by client would need " +
                                 std::to_string(12 * m * n) +
-                                " bytes, more than there are: cluster the points instead "
+                                " bytes, more than available: cluster the points instead "
                                 "(FacilityPoints), or in blocks");
   }
   std::vector<double> column(m);

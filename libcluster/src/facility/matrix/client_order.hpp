@@ -8,8 +8,8 @@
 
 namespace terrace::cluster {
 
-/// For every client all facilities by ascending cost, equal ones by ascending number.
-/// Throws: std::invalid_argument if the memory is not to be had, saying how much it is.
+/// For every client all facilities by ascending cost, ties by ascending number. Throws:
+/// std::invalid_argument if memory cannot be allocated, naming the bytes needed.
 class ClientOrder {
  public:
   explicit ClientOrder(const MatrixRows& costs);

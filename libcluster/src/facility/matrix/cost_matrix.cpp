@@ -12,7 +12,7 @@ namespace {
 
 void check_memory(std::uint64_t n, std::uint64_t limit, const char* what) {
   if (limit == 0) limit = std::numeric_limits<std::size_t>::max() / 2;
-  // n is below 2^32, so that n^2 is in range and 8 n^2 may not be.
+  // n is below 2^32, so n^2 cannot overflow, but 8 n^2 can.
   if (n * n <= limit / sizeof(double)) return;
   throw std::invalid_argument("the costs of " + std::to_string(n) + " " + what + " would need " +
                               std::to_string((n * n >> 17) + 1) +

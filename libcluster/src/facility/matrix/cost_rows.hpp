@@ -10,8 +10,8 @@
 
 namespace terrace::cluster {
 
-/// Connection costs as the searches see them: by facility, stored or worked out on the fly, and
-/// multiplied by a power of two so that sums neither overflow nor vanish.
+/// Connection costs as the searches use them: by facility, stored or computed on the fly, and
+/// multiplied by a power of two so that sums neither overflow nor underflow.
 class CostRows {
  public:
   virtual ~CostRows() = default;
@@ -33,8 +33,8 @@ class CostRows {
   std::size_t facilities_, clients_;
 };
 
-/// A matrix whose costs are at most 2^900; it is copied only if they have to be scaled to be so, or
-/// if they are all so small that they lack digits.
+/// A matrix whose costs are at most 2^900; it is copied only if its costs must be scaled for that,
+/// or if they are all so small that they lack digits.
 class MatrixRows final : public CostRows {
  public:
   explicit MatrixRows(const FacilityMatrix& matrix);
@@ -46,7 +46,7 @@ class MatrixRows final : public CostRows {
     return connection_[facility * clients() + client];
   }
   [[nodiscard]] std::span<const double> opening() const { return opening_; }
-  /// A scaled cost in the unit of the matrix: infinite where that exceeds the range of double.
+  /// A scaled cost in the unit of the matrix: infinite if it overflows a double.
   [[nodiscard]] double unscaled(double cost) const;
   /// A cost of the matrix, scaled.
   [[nodiscard]] double scaled(double cost) const;
@@ -57,9 +57,9 @@ class MatrixRows final : public CostRows {
   int exponent_ = 0;
 };
 
-/// Where each client goes if these facilities are open: to the cheapest, the first of equals.
-/// Facilities without clients are closed. Costs are those of the matrix, infinite where they exceed
-/// the range of double. Requires: `open` ascending, not empty.
+/// Assigns each client to the cheapest of these facilities, on ties the first. Facilities without
+/// clients are closed. Costs are those of the matrix, infinite if they overflow a double. Requires:
+/// `open` ascending, not empty.
 FacilitySolution solution_of(const FacilityMatrix& matrix, std::span<const std::uint32_t> open);
 
 }  // namespace terrace::cluster

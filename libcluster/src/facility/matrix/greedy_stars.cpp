@@ -17,9 +17,9 @@
 namespace terrace::cluster {
 namespace {
 
-// The growth of offers is the same as this: take the star of a facility and some clients that costs
-// least per client, again and again; an open facility costs nothing more. A star gets no cheaper as
-// clients leave, except that its facility opens, so that a queue of old values will do.
+// The growth of offers is equivalent to repeatedly taking the star of a facility and some clients
+// with the least cost per client; an open facility costs nothing more. A star gets no cheaper as
+// clients leave, except that its facility opens, so a queue of outdated values suffices.
 class Stars {
  public:
   explicit Stars(const MatrixRows& costs)
@@ -34,7 +34,7 @@ class Stars {
     } catch (const std::bad_alloc&) {
       throw std::invalid_argument("clients sorted by facility would need " +
                                   std::to_string(4 * m * n) +
-                                  " bytes, more than there are: cluster the points instead "
+                                  " bytes, more than available: cluster the points instead "
                                   "(FacilityPoints), or in blocks");
     }
     std::vector<double> scratch;
@@ -62,7 +62,7 @@ class Stars {
       }
       if (opening_[j] > 0.0 || !is_open(j)) open_.push_back(j);
       opening_[j] = 0.0;
-      // Prices do not fall from star to star, but for rounding.
+      // Prices do not decrease from star to star, except by rounding.
       time = std::max(time, star.price);
       const std::uint32_t* const order = row_order(j);
       for (std::uint32_t k = 0; k < star.clients; ++k) {
@@ -90,7 +90,7 @@ class Stars {
     return std::find(open_.begin(), open_.end(), j) != open_.end();
   }
 
-  // Over the clients that wait, nearest first; those that do not are taken off the list.
+  // Over the waiting clients, nearest first; others are removed from the list.
   Star cheapest(std::uint32_t j) {
     std::uint32_t* const order = row_order(j);
     std::uint32_t kept = 0;
@@ -118,7 +118,7 @@ class Stars {
   const MatrixRows* costs_;
   std::vector<double> opening_;
   std::vector<std::uint32_t> order_;  // per facility: waiting clients, nearest first
-  std::vector<std::uint32_t> left_;   // per facility: how many of them
+  std::vector<std::uint32_t> left_;   // per facility: their number
   std::vector<char> connected_;
   std::vector<double> duals_;
   std::vector<std::uint32_t> open_;
@@ -138,7 +138,7 @@ bool is_feasible(const MatrixRows& costs, const std::vector<double>& duals, doub
   return true;
 }
 
-// By bisection between 1 and the harmonic number, for which they are feasible on any costs.
+// Bisection between 1 and the harmonic number, for which they are feasible on any costs.
 double least_divisor(const MatrixRows& costs, const std::vector<double>& duals) {
   if (is_feasible(costs, duals, 1.0)) return 1.0;
   double low = 1.0, high = 0.0;

@@ -17,7 +17,7 @@ using Clock = std::chrono::steady_clock;
 
 struct Length {
   std::uint32_t restarts;
-  std::size_t perturbations;  // of each
+  std::size_t perturbations;  // per restart
 };
 
 Length length_of(const FacilityOptions& options) {
@@ -31,7 +31,7 @@ struct Found {
   std::vector<std::uint32_t> open;
 };
 
-// Disturbed solutions that end up worse are given up: the search goes on from the best.
+// Perturbed solutions that end up worse are discarded: the search continues from the best.
 Found search(const MatrixRows& costs, const FacilityOptions& options, std::size_t perturbations,
              std::uint32_t run, Clock::time_point start) {
   std::mt19937_64 random(seed_of_run(options.seed, run));
@@ -66,7 +66,7 @@ FacilitySolution interchange(const FacilityMatrix& problem, const FacilityOption
     throw std::invalid_argument("a search without restarts: give at least 1");
   }
   if (std::isnan(options.seconds)) {
-    throw std::invalid_argument("the time limit is not a number: give seconds, or infinity");
+    throw std::invalid_argument("the time limit is NaN: give seconds, or infinity");
   }
   const auto start = Clock::now();
   const MatrixRows costs(problem);

@@ -10,7 +10,7 @@
 namespace terrace::cluster {
 namespace {
 
-using Event = std::pair<double, std::uint32_t>;  // when, and who
+using Event = std::pair<double, std::uint32_t>;  // time and facility or client
 using Events = std::priority_queue<Event, std::vector<Event>, std::greater<>>;
 
 class Growth {
@@ -30,7 +30,7 @@ class Growth {
       if (costs_->opening()[j] == 0.0) payments_.push({0.0, j});
     }
     for (std::size_t waiting = duals_.size(); waiting > 0;) {
-      // At equal times facilities open first: who reaches them then is connected at once.
+      // At equal times facilities open first: clients that reach them then are connected at once.
       if (!payments_.empty() &&
           (reaches_.empty() || payments_.top().first <= reaches_.top().first)) {
         const auto [time, j] = payments_.top();
@@ -69,10 +69,10 @@ class Growth {
   struct Offers {
     double fixed = 0.0;         // of connected clients
     double costs = 0.0;         // connection costs of the clients whose offers grow
-    std::uint32_t growing = 0;  // how many they are
+    std::uint32_t growing = 0;  // their number
   };
 
-  // When the offers, growing as they do now, will be the opening cost.
+  // The time at which the offers, growing at the current rate, reach the opening cost.
   [[nodiscard]] double payment_time(std::uint32_t j) const {
     const Offers& o = offers_[j];
     if (costs_->opening()[j] == 0.0) return 0.0;
@@ -103,7 +103,7 @@ class Growth {
     opening_order_.push_back(j);
     std::size_t count = 0;
     for (std::uint32_t i = 0; i < duals_.size(); ++i) {
-      // Just those whose offer has been counted: rounding of the time must not miss one.
+      // Exactly those whose offer has been counted: rounding of the time must not miss one.
       if (connected_[i] || !has_reached(i, j)) continue;
       connect(i, time);
       ++count;
@@ -136,7 +136,7 @@ class Growth {
 
   const MatrixRows* costs_;
   const ClientOrder* order_;
-  std::vector<std::uint32_t> reach_;  // per client: how many facilities its offer has reached
+  std::vector<std::uint32_t> reach_;  // per client: number of facilities its offer has reached
   std::vector<char> connected_;
   std::vector<double> duals_;
   std::vector<Offers> offers_;

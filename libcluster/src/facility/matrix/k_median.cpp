@@ -27,7 +27,7 @@ void check_count(std::size_t k, std::size_t facilities, const KMedianOptions& op
 }
 
 struct Connections {
-  std::vector<std::uint32_t> nearest;  // position in the list of facilities, the first of equals
+  std::vector<std::uint32_t> nearest;  // position in the list of facilities, the first on ties
   std::vector<double> cost;
   std::vector<double> second;
 };
@@ -53,7 +53,7 @@ Connections connect(const CostRows& costs, std::span<const std::uint32_t> facili
   return result;
 }
 
-// The dual begins with what each client would pay for its second facility.
+// The duals begin with what each client would pay for its second facility.
 double bound(const CostRows& costs, const Connections& connections, std::size_t k,
              const KMedianOptions& options) {
   if (options.bound_steps == 0) return 0.0;

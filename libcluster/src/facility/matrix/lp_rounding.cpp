@@ -86,7 +86,7 @@ class Relaxation {
   [[nodiscard]] int open(int j) const { return 1 + j; }
   [[nodiscard]] int connected(int j, int i) const { return 1 + m_ + j * n_ + i; }
 
-  // The constraints x_ij <= y_j that do not hold yet. Returns whether there were any.
+  // The constraints x_ij <= y_j that are violated. Returns whether there were any.
   bool add_violated() {
     bool added = false;
     for (int j = 0; j < m_; ++j) {

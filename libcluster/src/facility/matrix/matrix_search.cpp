@@ -9,7 +9,7 @@
 
 namespace terrace::cluster {
 
-// Gains below this share of the cost are rounding: without it a search might go in circles.
+// Gains below this share of the cost are rounding: without this limit a search might cycle.
 constexpr double kLeastGain = 1e-12;
 
 MatrixSearch::MatrixSearch(const CostRows& costs, std::span<const double> opening,
@@ -51,8 +51,8 @@ double MatrixSearch::gain(std::uint32_t candidate) {
     closing[0] += std::min(c, second[i]) - now;
     closing[1] += c - now;
   }
-  // Either one closing, with the second nearest facilities to help, or any number of them, whose
-  // clients all go to the candidate.
+  // Either one closing, using the second nearest facilities, or any number of them, whose clients
+  // all go to the candidate.
   double best_one = 0.0, all = 0.0;
   std::uint32_t one = NearestOpen::kNone;
   for (const std::uint32_t j : state_.facilities()) {
@@ -107,7 +107,7 @@ bool MatrixSearch::drop() {
 void MatrixSearch::descend(std::mt19937_64& random) {
   drop();
   draw_order(order_, random);
-  // Ends when every candidate has been refused since the last change.
+  // Ends when every candidate has been rejected since the last change.
   std::size_t refused = 0;
   for (std::size_t k = 0; refused < order_.size(); k = (k + 1) % order_.size()) {
     const std::uint32_t candidate = order_[k];

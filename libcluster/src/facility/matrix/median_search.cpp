@@ -14,9 +14,9 @@
 namespace terrace::cluster {
 namespace {
 
-constexpr double kLeastExchangeGain = 1e-12;  // of the cost; what is below is rounding
-constexpr std::size_t kTogether = 32;         // exchanges judged on the same solution
-// So many costs per batch are worth a thread.
+constexpr double kLeastExchangeGain = 1e-12;  // of the cost; smaller gains are rounding
+constexpr std::size_t kTogether = 32;         // exchanges evaluated on the same solution
+// A batch with this many costs is worth a thread.
 constexpr std::size_t kWorthThreads = 200000;
 
 }  // namespace
@@ -65,7 +65,7 @@ void MedianSearch::close_least() {
 void MedianSearch::bring_to(std::size_t k, std::span<const std::uint32_t> candidates) {
   while (state_.facilities().size() > k) close_least();
   if (state_.facilities().size() == k) return;
-  // Gains only fall as others open, so that an old one is an upper bound.
+  // Gains only decrease as others open, so an old one is an upper bound.
   struct Entry {
     double gain;
     std::uint32_t facility;
@@ -115,7 +115,7 @@ void MedianSearch::descend(std::mt19937_64& random) {
   draw_order(order_, random);
   std::vector<Exchange> exchanges(kTogether);
   std::vector<std::uint32_t> batch;
-  // Ends when every candidate has been refused since the last exchange.
+  // Ends when every candidate has been rejected since the last exchange.
   std::size_t refused = 0;
   for (std::size_t at = 0; refused < order_.size();) {
     batch.clear();
@@ -133,7 +133,7 @@ void MedianSearch::descend(std::mt19937_64& random) {
     if (!batch.empty() && exchanges[best].gain > kLeastExchangeGain * cost()) {
       state_.open(batch[best]);
       state_.close(exchanges[best].leaving);
-      refused = 0;  // and the batch once more: others of it may be good still
+      refused = 0;  // the batch is repeated, as others in it may still be good
     } else {
       refused += looked;
       at = (at + looked) % order_.size();
@@ -154,8 +154,9 @@ void MedianSearch::replace(std::size_t count, std::mt19937_64& random) {
 
 namespace {
 
-// Facility location at one cost for all after another, each from the last solution, until k are
-// open or the costs are next to each other. Returns the solution with the nearest number.
+// Solves facility location with one opening cost for all, repeatedly, each time from the last
+// solution, until k are open or the costs are adjacent. Returns the solution with the closest
+// number.
 std::vector<std::uint32_t> search_for_cost(const CostRows& costs, std::size_t k,
                                            const std::vector<std::uint32_t>& candidates,
                                            std::mt19937_64& random) {
@@ -184,7 +185,7 @@ std::vector<std::uint32_t> search_for_cost(const CostRows& costs, std::size_t k,
 
 std::vector<std::uint32_t> find_medians(const CostRows& costs, std::size_t k,
                                         const KMedianOptions& options) {
-  constexpr std::size_t kAll = 1000;  // up to so many facilities all are candidates
+  constexpr std::size_t kAll = 1000;  // up to this many facilities, all are candidates
   std::mt19937_64 random(seed_of_run(options.seed, 0));
   std::vector<std::uint32_t> candidates(costs.facilities());
   std::iota(candidates.begin(), candidates.end(), 0u);

@@ -15,14 +15,14 @@ namespace terrace::cluster {
 /// k facilities under exchanges.
 class MedianSearch {
  public:
-  /// threads: for the exchanges that are judged at once.
+  /// threads: for exchanges evaluated concurrently.
   MedianSearch(const CostRows& costs, unsigned threads);
 
   void reset(std::span<const std::uint32_t> open);
-  /// Opens those of `candidates` that save most, or closes those whose closing costs least, until k
+  /// Opens those of `candidates` that save most, or closes those that cost least to close, until k
   /// are open. Requires: enough candidates.
   void bring_to(std::size_t k, std::span<const std::uint32_t> candidates);
-  /// Exchanges until none helps.
+  /// Exchanges facilities until none helps.
   void descend(std::mt19937_64& random);
   /// Replaces `count` random facilities by random others.
   void replace(std::size_t count, std::mt19937_64& random);

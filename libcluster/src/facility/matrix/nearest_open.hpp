@@ -9,7 +9,7 @@
 
 namespace terrace::cluster {
 
-/// For every client the nearest and the second nearest open facility: what a closing costs is then
+/// The nearest and the second nearest open facility of every client: the cost of a closing is then
 /// a sum of differences.
 class NearestOpen {
  public:
@@ -17,7 +17,7 @@ class NearestOpen {
 
   explicit NearestOpen(const CostRows& costs);
 
-  /// These and no others are open. O(clients * open).
+  /// Opens exactly these facilities. O(clients * open).
   void reset(std::span<const std::uint32_t> open);
   /// Requires: closed. O(clients).
   void open(std::uint32_t facility);
@@ -26,7 +26,7 @@ class NearestOpen {
 
   [[nodiscard]] bool is_open(std::uint32_t facility) const { return position_[facility] != kNone; }
   [[nodiscard]] std::span<const std::uint32_t> facilities() const { return open_; }
-  /// Per client; kNone and infinity where too few are open.
+  /// Per client; kNone and infinity if too few are open.
   [[nodiscard]] std::span<const std::uint32_t> first() const { return first_; }
   [[nodiscard]] std::span<const double> first_cost() const { return first_cost_; }
   [[nodiscard]] std::span<const double> second_cost() const { return second_cost_; }
@@ -37,7 +37,7 @@ class NearestOpen {
 
   const CostRows* costs_;
   std::vector<std::uint32_t> open_;
-  std::vector<std::uint32_t> position_;  // in open_, by facility
+  std::vector<std::uint32_t> position_;  // position in open_, by facility
   std::vector<std::uint32_t> first_, second_;
   std::vector<double> first_cost_, second_cost_;
   std::vector<double> scratch_, gathered_;

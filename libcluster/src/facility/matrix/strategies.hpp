@@ -4,11 +4,11 @@
 #include "terrace/cluster/facility_location.hpp"
 
 /// The strategies on a matrix, see FacilityStrategy, and the matrix of other problems. Each fills
-/// in what it knows for the report. Require: check(problem) has passed.
+/// in its part of the report. Requires: check(problem) has passed.
 
 namespace terrace::cluster {
 
-/// Throws: std::invalid_argument without restarts or if `seconds` is not a number.
+/// Throws: std::invalid_argument if restarts is 0 or `seconds` is NaN.
 [[nodiscard]] FacilitySolution interchange(const FacilityMatrix& problem,
                                            const FacilityOptions& options);
 /// Throw: std::invalid_argument if the memory cannot be allocated.
@@ -17,7 +17,7 @@ namespace terrace::cluster {
 /// Throws: std::runtime_error if the library was built without GLPK or GLPK fails.
 [[nodiscard]] FacilitySolution lp_rounding(const FacilityMatrix& problem, FacilityReport& report);
 
-/// All costs of a problem of points or entities, so that strategies on a matrix can take it.
+/// All costs of a problem of points or entities, so that strategies on a matrix can solve it.
 struct CostMatrix {
   std::vector<double> opening, connection;
 
@@ -27,10 +27,9 @@ struct CostMatrix {
 };
 
 /// Each point or entity is a facility and a client. A client whose connection would cost more than
-/// its outlier price pays that price to whatever facility it is connected to. O(n^2) distances.
-/// Throws: std::invalid_argument if the 8 n^2 bytes exceed `memory_limit` (0: no limit), saying how
-/// many they are, or if a cost is beyond the range of double, as check() of a matrix says it;
-/// std::bad_alloc.
+/// its outlier price pays that price to whichever facility it is connected to. O(n^2) distances.
+/// Throws: std::invalid_argument if the 8 n^2 bytes exceed `memory_limit` (0: no limit), naming
+/// them, or if a cost overflows a double, like check() of a matrix; std::bad_alloc.
 [[nodiscard]] CostMatrix cost_matrix(const FacilityPoints& problem, std::uint64_t memory_limit);
 [[nodiscard]] CostMatrix cost_matrix(const FacilityEntities& problem, std::uint64_t memory_limit);
 

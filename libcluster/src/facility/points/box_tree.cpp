@@ -10,7 +10,7 @@
 namespace terrace::cluster {
 namespace {
 
-// Few enough that most clients of a leaf are worth a look when the leaf is.
+// Few enough that most clients of a leaf are worth examining if the leaf is.
 constexpr std::uint32_t kLeaf = 16;
 
 }  // namespace
@@ -22,7 +22,7 @@ BoxTree::BoxTree(Kind kind, std::span<const Point3> points)
   root.box = bounds_of(points);
   root.count = static_cast<std::uint32_t>(points.size());
   nodes_.push_back(root);
-  // Children are appended, so this comes to them.
+  // Children are appended, so the loop reaches them.
   for (std::uint32_t n = 0; n < nodes_.size(); ++n) split(n, kind, points);
   for (std::uint32_t n = 0; n < nodes_.size(); ++n) {
     const Node& node = nodes_[n];
@@ -40,7 +40,7 @@ void BoxTree::split(std::uint32_t node, Kind kind, std::span<const Point3> point
   const Point3 size = difference(parent.box.max, parent.box.min);
   const auto begin = order_.begin() + parent.first;
   const auto end = begin + parent.count;
-  std::array<std::uint32_t, 9> ends{};  // of the parts
+  std::array<std::uint32_t, 9> ends{};  // end of each part
   std::size_t parts = 1;
   ends[0] = parent.first;
   ends[1] = parent.first + parent.count;
@@ -56,12 +56,12 @@ void BoxTree::split(std::uint32_t node, Kind kind, std::span<const Point3> point
     ends[2] = ends[1];
     ends[1] = parent.first + half;
   } else {
-    // The box fits, so both halves of a side that is not 0 have points.
+    // The bounding box is tight, so both halves of a side that is not 0 have points.
     const std::size_t axes = kind == Kind::octree ? 3 : 2;
     if (std::all_of(size.begin(), size.begin() + axes, [](double s) { return s == 0.0; })) return;
     for (std::size_t axis = 0; axis < axes; ++axis) {
       double middle = parent.box.min[axis] + 0.5 * size[axis];
-      if (middle >= parent.box.max[axis]) middle = parent.box.min[axis];  // neighbouring numbers
+      if (middle >= parent.box.max[axis]) middle = parent.box.min[axis];  // adjacent doubles
       for (std::size_t part = parts; part-- > 0;) {
         const auto from = order_.begin() + ends[part];
         const auto to = order_.begin() + ends[part + 1];

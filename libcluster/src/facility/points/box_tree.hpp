@@ -10,10 +10,10 @@
 
 namespace terrace::cluster {
 
-/// Clients in nested boxes, each with the longest connection of the clients in it. The tree is
-/// built once; the connections change. Source: J. Skála, Algorithms for manipulating large
-/// geometric data, 7.3.2, figure 7.9. Departs from it in: boxes are those of the points, not those
-/// of the grid.
+/// Clients in nested boxes, each with the longest connection of its clients. The tree is built
+/// once; the connections change. Source: J. Skála, Algorithms for manipulating large geometric
+/// data, 7.3.2, figure 7.9. It differs from that in: boxes are those of the points, not those of
+/// the grid.
 class BoxTree {
  public:
   enum class Kind : std::uint8_t {
@@ -26,20 +26,21 @@ class BoxTree {
     Bounds box;
     double longest = 0.0;
     std::uint32_t parent = 0;
-    std::uint32_t first_child = 0, child_count = 0;  ///< consecutive nodes; none: a leaf
+    std::uint32_t first_child = 0, child_count = 0;  ///< consecutive nodes; none for a leaf
     std::uint32_t first = 0, count = 0;              ///< in order()
   };
 
-  /// O(n log n); a quadtree or octree may take O(n) levels, as many as the range of the coordinates
-  /// has binary digits.
+  /// O(n log n); a quadtree or octree may take O(n) levels, as many as the binary digits of the
+  /// range of coordinates.
   BoxTree(Kind kind, std::span<const Point3> points);
 
   [[nodiscard]] const std::vector<Node>& nodes() const { return nodes_; }
   [[nodiscard]] const std::vector<std::uint32_t>& order() const { return order_; }
 
-  /// Reads all connections anew.
+  /// Reads all connections.
   void set(std::span<const double> connections);
-  /// Reads those of the changed clients' leaves, and passes what changed up to the root.
+  /// Reads the connections in the leaves of the changed clients, and propagates changes to the
+  /// root.
   void update(std::span<const std::uint32_t> changed, std::span<const double> connections);
 
  private:

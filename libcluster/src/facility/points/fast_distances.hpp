@@ -15,9 +15,9 @@
 
 namespace terrace::cluster {
 
-/// Distances from a facility to clients in a row, and what the facility is paid by them: the sum of
-/// weight * max(0, payment - distance). The sum is kept in two halves, those of the even and of the
-/// odd places in the row, whatever the processor does at once.
+/// Distances from a facility to consecutive clients, and the payments to it: the sum of weight *
+/// max(0, payment - distance). The sum has two halves, those of the even and of the odd positions,
+/// whatever the width of the processor's vectors.
 template <class Space>
 class FastDistances {
  public:
@@ -31,7 +31,7 @@ class FastDistances {
     void fill(std::uint32_t count, double* out) const {
       for (std::uint32_t i = 0; i < count; ++i) out[i] = from_(i);
     }
-    /// Adds what the `count` clients from `first` pay.
+    /// Adds the payments of the `count` clients from `first`.
     void add(std::uint32_t first, std::uint32_t count, const double* payments,
              const double* weights) {
       for (std::uint32_t k = 0; k < count; ++k) {
@@ -50,7 +50,7 @@ class FastDistances {
   const Space* space_;
 };
 
-/// Euclidean distances of positions alone, two at a time.
+/// Euclidean distances of positions only, two at a time.
 template <>
 class FastDistances<NormSpace<EuclideanNorm, false>> {
  public:

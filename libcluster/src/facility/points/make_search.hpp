@@ -9,7 +9,7 @@
 
 namespace terrace::cluster {
 
-/// The local search for a problem that check() has passed. strategy: of a local search, or
+/// The local search for a problem that check() has passed. strategy: that of a local search, or
 /// automatic.
 /// Throws: std::invalid_argument if the problem does not admit the strategy.
 [[nodiscard]] std::unique_ptr<SearchEngine> make_search(
@@ -19,10 +19,11 @@ namespace terrace::cluster {
     const FacilityEntities& problem, FacilityStrategy strategy = FacilityStrategy::automatic,
     unsigned threads = 1);
 
-/// The candidates of a search over so many points; at least one, unless there are no points.
+/// The number of candidates of a search over this many points; at least one, unless there are no
+/// points.
 [[nodiscard]] std::size_t candidate_count(Effort effort, std::size_t points);
 
-/// The whole search that the options ask for.
+/// The complete search requested by the options.
 [[nodiscard]] FacilitySolution run_search(SearchEngine& engine, const FacilityOptions& options,
                                           FacilityReport* report);
 

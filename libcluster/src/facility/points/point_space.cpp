@@ -14,12 +14,12 @@ double greatest(const LinearMap& map) {
   return result;
 }
 
-// How many times longer the products that a mapped vector is a sum of may be than the diagonal of
-// the mapped box.
+// How many times longer the products that add up to a mapped vector may be than the diagonal of the
+// mapped box.
 double stretch_of(LinearMap map, const Bounds& box) {
   const double largest = greatest(map);
   for (double& m : map) m /= largest;
-  // Halves, as the sides of a box may be infinite.
+  // Uses halves, as the sides of a box may be infinite.
   Point3 half{};
   double longest = 0.0;
   for (std::size_t axis = 0; axis < 3; ++axis) {

@@ -14,9 +14,9 @@
 
 namespace terrace::cluster {
 
-/// How far costs of the frame, summed over all clients, may be from those of the given coordinates:
-/// bringing coordinates into range and mapping them rounds by units in the last place of the box,
-/// also where the distance is short.
+/// How far costs of the frame, summed over all clients, may differ from those of the given
+/// coordinates: bringing coordinates into range and mapping them rounds by units in the last place
+/// of the box, even if the distance is short.
 [[nodiscard]] double rounding_of_frame(const FacilityPoints& problem, const SearchFrame& frame);
 
 /// Weighted distances, computed row by row; no client pays more than its outlier price.

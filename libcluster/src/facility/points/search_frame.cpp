@@ -49,9 +49,9 @@ double mapped_diagonal(const LinearMap& map, const Point3& extent) {
 // A channel as an axis: differences in ground units are value * 2^exponent.
 struct Channel {
   double least = 0.0, weight = 0.0;  // weight in [0.5, 1) or 0
-  int shift = 0;                     // of half differences, to below 1
+  int shift = 0;                     // brings half differences below 1
   int exponent = std::numeric_limits<int>::min();
-  double range = 0.0;  // as value() gives it
+  double range = 0.0;  // largest value()
 
   Channel(const Channels& channels, std::size_t c, std::size_t count) {
     double least_half = 0.0, most_half = 0.0;
@@ -76,7 +76,7 @@ struct Channel {
   }
 };
 
-// As the metric measures the box: the positions' diagonal and the channels together.
+// As the metric measures the box: combines the positions' diagonal and the channels.
 double whole_diagonal(const Metric& metric, const Point3& extent, double positions,
                       const std::vector<double>& ranges) {
   const std::vector<double> origin(ranges.size(), 0.0);
@@ -94,13 +94,13 @@ double whole_diagonal(const Metric& metric, const Point3& extent, double positio
   return longest;
 }
 
-// Puts weights and costs in range; unit_exponent is that of a distance of weight 1.
+// Brings weights and costs into range; unit_exponent is that of a distance of weight 1.
 void set_costs(SearchFrame& frame, double facility_cost, double outlier_price, int unit_exponent) {
   const double heaviest = *std::max_element(frame.weights.begin(), frame.weights.end());
   const int weight_exponent = exponent_of(heaviest);
   for (double& w : frame.weights) w = std::ldexp(w, -weight_exponent);
   frame.true_facility_cost = std::ldexp(facility_cost, unit_exponent);
-  // A cost beyond all distances means one facility, however far beyond it is.
+  // Any cost beyond all distances means one facility.
   frame.facility_cost = std::min(std::ldexp(facility_cost, -weight_exponent), 0x1p1000);
   frame.outlier_price = outlier_price;
   frame.cost_exponent = unit_exponent + weight_exponent;
@@ -157,7 +157,7 @@ SearchFrame make_frame(const FacilityPoints& problem) {
     channels.emplace_back(problem.channels, c, count);
     greatest = std::max(greatest, channels.back().exponent);
   }
-  // The caller's function wants the points as they are, hence the unit as it is.
+  // The caller's function needs the original points, hence the original unit.
   if (frame.points.empty() || greatest == std::numeric_limits<int>::min()) greatest = exponent;
   multiply(frame.points, exponent - greatest);
   positions = std::ldexp(positions, exponent - greatest);
@@ -179,7 +179,7 @@ SearchFrame make_frame(const FacilityPoints& problem) {
   frame.weights.assign(problem.weights.begin(), problem.weights.end());
   if (frame.weights.empty()) frame.weights.assign(count, 1.0);
   const bool squared = std::holds_alternative<SquaredEuclidean>(problem.metric);
-  // All points equal: no outlier then, whatever infinity times zero may be.
+  // All points equal: there are no outliers then, whatever infinity times zero is.
   const double price =
       whole > 0.0 ? problem.outlier_price * whole : std::numeric_limits<double>::infinity();
   set_costs(frame, problem.facility_cost * whole, price, squared ? 2 * greatest : greatest);

@@ -9,24 +9,25 @@
 
 namespace terrace::cluster {
 
-/// The data of a facility location problem brought into a range where no square overflows or
-/// vanishes: lengths, weights and costs are divided by powers of two, which rounds nothing.
+/// The data of a facility location problem brought into a range where squares neither overflow nor
+/// underflow: lengths, weights and costs are divided by powers of two, which is exact.
 struct SearchFrame {
-  std::vector<Point3> points;    ///< about within the unit cube; mapped if the metric is linear
+  std::vector<Point3> points;    ///< approximately in the unit cube; mapped if the metric is linear
   std::vector<double> channels;  ///< times their weights, row by row
   std::size_t channel_count = 0;
   std::vector<double> weights;  ///< the greatest in [0.5, 1)
   double facility_cost = 0.0;   ///< finite
   double outlier_price = 0.0;   ///< of a client of weight 1; may be infinite
-  int cost_exponent = 0;        ///< a cost times 2 to this is one in the unit of the metric
+  int cost_exponent = 0;        ///< a cost times 2 to this power is in the unit of the metric
   /// In the unit of the metric, infinite beyond double's range.
   double true_facility_cost = 0.0;
 };
 
-/// The map that makes distances within the box of the points Euclidean, if there is one.
+/// The map that makes distances within the bounding box of the points Euclidean; nullopt if there
+/// is none.
 [[nodiscard]] std::optional<LinearMap> linear_map(const Metric& metric, const Bounds& box);
 
-/// Requires: check(problem) has passed. Of entities it has no points.
+/// Requires: check(problem) has passed. For entities there are no points.
 [[nodiscard]] SearchFrame make_frame(const FacilityPoints& problem);
 [[nodiscard]] SearchFrame make_frame(const FacilityEntities& problem);
 

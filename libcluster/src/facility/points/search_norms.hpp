@@ -9,7 +9,7 @@
 
 /// Lengths of vectors of three coordinates and any number of channels, which are further axes: a
 /// and b are rows of channels, of which only the difference counts. Every norm grows with the
-/// absolute value of each component, also as rounded, but for the powers of PowerNorm.
+/// absolute value of each component, including rounding, except for the powers of PowerNorm.
 
 namespace terrace::cluster {
 
@@ -50,7 +50,7 @@ struct MaximumNorm {
   }
 };
 
-/// Relative to the largest component, so that powers neither overflow nor vanish.
+/// Relative to the largest component, so that powers neither overflow nor underflow.
 struct PowerNorm {
   double p;
   double operator()(double x, double y, double z, const double* a, const double* b,

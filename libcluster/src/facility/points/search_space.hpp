@@ -16,16 +16,16 @@
 #include "facility/points/search_norms.hpp"
 #include "terrace/cluster/metric.hpp"
 
-/// Distances as the search engine takes them, a class for each kind of metric, so that they are
+/// Distances as used by the search engine, a class for each kind of metric, so that they are
 /// inlined. Each has
-///     From from(f)            what measures distances from facility f: double operator()(client)
-///                             order(client) orders as they do, and from_order() makes them of it
+///     From from(f)            measures distances from facility f: double operator()(client)
+///                             order(client) orders like them, and from_order() converts it to them
 ///     box_distance(f, box)    no client in the box is nearer to f, as computed (if kHasBoxes)
 ///     kHasBoxes, has_triangles()   whether cells in space and clusters as cells may be used
 
 namespace terrace::cluster {
 
-/// Excludes rounding: of a bound that says "not nearer" so much is not believed.
+/// Allows for rounding: a bound that says "not nearer" is reduced by this factor.
 inline constexpr double kBelieved = 1.0 - 1e-9;
 
 /// Components of the shortest vector from a point to a box.
@@ -102,7 +102,7 @@ class FieldSpace {
  public:
   static constexpr bool kHasBoxes = true;
 
-  /// original: the points as the regions know them.
+  /// original: the points in the coordinates of the regions.
   FieldSpace(SearchFrame& frame, std::span<const Point3> original, EllipticalField field)
       : points_(std::move(frame.points)),
         channels_(std::move(frame.channels)),
@@ -130,7 +130,7 @@ class FieldSpace {
                                        map[3] * x + map[4] * y + map[5] * z,
                                        map[6] * x + map[7] * y + map[8] * z,
                                        space.channels_of(client), channels, space.channel_count_);
-      return d < 0x1p500 ? d : 0x1p500;  // needles of ellipses may leave the range of double
+      return d < 0x1p500 ? d : 0x1p500;  // very flat ellipses may overflow a double
     }
     [[nodiscard]] double order(std::uint32_t client) const { return (*this)(client); }
   };

@@ -11,7 +11,7 @@
 
 namespace terrace::cluster {
 
-/// The clients of an open facility, ascending, and what the bounds need of them.
+/// The clients of an open facility, ascending, and the values that bounds need.
 struct Cluster {
   std::vector<std::uint32_t> clients;
   double weight = 0.0;   ///< sum
@@ -19,11 +19,11 @@ struct Cluster {
   double longest = 0.0;  ///< the longest connection, unweighted
 };
 
-/// What opening a candidate comes to. Sorted by facility, then client: so sums have one order
+/// The effect of opening a candidate. Sorted by facility, then client: so sums have the same order
 /// whatever strategy found the terms.
 struct Verdict {
   struct Taken {
-    std::uint64_t key;  ///< present facility * 2^32 + client; kOutlier sorts last
+    std::uint64_t key;  ///< current facility * 2^32 + client; kOutlier sorts last
     double spared;
     [[nodiscard]] std::uint32_t facility() const { return static_cast<std::uint32_t>(key >> 32); }
     [[nodiscard]] std::uint32_t client() const { return static_cast<std::uint32_t>(key); }
@@ -47,9 +47,8 @@ struct Verdict {
   }
 };
 
-/// A solution under improvement, whatever the distances. A client that is left out has no facility
-/// and a distance that is the price. No client pays more than that, and each facility is its own
-/// client.
+/// A solution under improvement, for any distances. A client that is left out has no facility and a
+/// distance equal to the price. No client pays more than that, and each facility is its own client.
 class SearchState {
  public:
   explicit SearchState(SearchFrame& frame);
@@ -59,7 +58,7 @@ class SearchState {
   [[nodiscard]] const Cluster& cluster(std::uint32_t facility) const {
     return clusters_[slot_[facility]];
   }
-  /// Number of an open facility, below slot_count(), that lasts as long as it is open.
+  /// Number of an open facility, below slot_count(), valid while it is open.
   [[nodiscard]] std::uint32_t slot(std::uint32_t facility) const { return slot_[facility]; }
   [[nodiscard]] std::size_t slot_count() const { return clusters_.size(); }
   [[nodiscard]] const std::vector<std::uint32_t>& open() const { return open_; }
@@ -73,14 +72,14 @@ class SearchState {
   [[nodiscard]] double cost() const;
   [[nodiscard]] double unscaled(double cost) const;
 
-  /// Sums up a verdict's terms in their order.
+  /// Adds up a verdict's terms in their order.
   void sum(Verdict& verdict) const;
 
-  /// A new solution: the facility of each client, or kOutlier, and its distance.
+  /// Sets a new solution: the facility of each client, or kOutlier, and its distance.
   void assign(std::vector<std::uint32_t> facility, std::vector<double> distance);
 
-  /// Takes a verdict's consequences. moved_distance(client) is that from the candidate. Clients
-  /// whose connection changed are in `changed` after that.
+  /// Applies a verdict. moved_distance(client) is the distance from the candidate. Afterwards
+  /// `changed` holds the clients whose connection changed.
   template <class Distance>
   void apply(const Verdict& verdict, const Distance& moved_distance,
              std::vector<std::uint32_t>& changed);
@@ -101,7 +100,7 @@ class SearchState {
   double facility_cost_, outlier_price_, true_facility_cost_;
   int cost_exponent_;
   std::vector<std::uint32_t> open_, outliers_;  // ascending
-  std::vector<std::uint32_t> slot_;             // by facility: in clusters_
+  std::vector<std::uint32_t> slot_;             // by facility: index in clusters_
   std::vector<Cluster> clusters_;
   std::vector<std::uint32_t> free_slots_;
 };
@@ -123,7 +122,7 @@ void SearchState::apply(const Verdict& verdict, const Distance& moved_distance,
   bool left_out = false;
   for (const Verdict::Closed& closed : verdict.closed) {
     for (const std::uint32_t client : clusters_[slot_[closed.facility]].clients) {
-      if (facility_[client] != closed.facility) continue;  // taken
+      if (facility_[client] != closed.facility) continue;  // already taken
       const double d = moved_distance(client);
       if (d <= outlier_price_) {
         connect(client, candidate, d);
@@ -136,7 +135,7 @@ void SearchState::apply(const Verdict& verdict, const Distance& moved_distance,
     }
     close_facility(closed.facility);
   }
-  // Lists of those who lost clients, each once: taken is sorted by facility.
+  // The lists of facilities that lost clients, each once: taken is sorted by facility.
   std::uint32_t last = candidate;
   bool outliers_taken = former == kOutlier;
   for (const Verdict::Taken& taken : verdict.taken) {

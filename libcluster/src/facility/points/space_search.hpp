@@ -104,7 +104,8 @@ class SpaceSearch final : public SearchEngine {
 
   [[nodiscard]] auto points() const { return space_.points(); }
 
-  // Where an open facility is nearer than `distances` say. A facility stays its own client, at 0.
+  // Finds open facilities that are nearer than `distances`. A facility remains its own client, at
+  // 0.
   void find_nearest(std::vector<std::uint32_t>& facility, std::vector<double>& distances) const {
     for (const std::uint32_t j : state_.open()) {
       const From from = space_.from(j);
@@ -145,7 +146,7 @@ class SpaceSearch final : public SearchEngine {
     verdict.taken.push_back(
         {facility << 32 | client, state_.weight(client) * (state_.distance(client) - d)});
   }
-  // What a client that is not taken loses when its facility closes.
+  // The loss of a client that is not taken when its facility closes.
   [[nodiscard]] double loss(std::uint32_t client, double d) const {
     return state_.weight(client) * (std::min(d, state_.outlier_price()) - state_.distance(client));
   }
@@ -206,7 +207,7 @@ void SpaceSearch<Space>::judge(std::uint32_t candidate, bool parallel, Verdict& 
   state_.sum(verdict);
 }
 
-// Every client, as the literature has it. What the other strategies are compared with.
+// Every client, as in the literature: the reference for the other strategies.
 template <class Space>
 void SpaceSearch<Space>::scan_all(std::uint32_t candidate, const From& from, Verdict& verdict) {
   std::vector<double>& losses = verdict.losses;
@@ -232,7 +233,7 @@ void SpaceSearch<Space>::scan_tree(std::uint32_t candidate, const From& from,
                                    Verdict& verdict) const {
   if constexpr (Space::kHasBoxes) {
     const std::vector<BoxTree::Node>& nodes = tree_->nodes();
-    std::vector<std::uint32_t>& stack = verdict.stack;  // nodes yet to be visited
+    std::vector<std::uint32_t>& stack = verdict.stack;  // nodes still to be visited
     stack.assign(1, 0);
     while (!stack.empty()) {
       const BoxTree::Node& node = nodes[stack.back()];
@@ -274,8 +275,9 @@ void SpaceSearch<Space>::scan_facilities(std::uint32_t candidate, const From& fr
       const Cluster& cluster = state_.cluster(j);
       const double d = kBelieved * from(j);
       ++verdict.inspected;
-      // The triangle inequality: whoever is nearer to the candidate than to j, at most the longest
-      // connection off, has the candidate within twice that of j.
+      // By the triangle inequality, a client that is nearer to the candidate than to j, at a
+      // distance of at most the longest connection, implies that the candidate is within twice that
+      // of j.
       takes = takes && d < 2.0 * cluster.longest;
       // And every client i loses at least d - 2 d(i, j), or price - d(i, j).
       closes = cluster.weight * std::min(d, kBelieved * state_.outlier_price()) <
@@ -289,7 +291,7 @@ void SpaceSearch<Space>::scan_facilities(std::uint32_t candidate, const From& fr
   }
 }
 
-// The clients of one facility: all, if they may be taken, else until they pay for it.
+// The clients of one facility: all of them if they may be taken, otherwise until they pay for it.
 template <class Space>
 void SpaceSearch<Space>::inspect(std::uint32_t facility, const From& from, bool takes,
                                  Verdict& verdict) const {

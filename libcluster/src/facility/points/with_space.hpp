@@ -19,9 +19,9 @@ inline IndexSpace space_of(const FacilityEntities& problem) {
   return {problem.distance, problem.symmetric && problem.triangle_inequality};
 }
 
-/// Calls visit(space) with the distances of the problem among the points of its frame, which
-/// are moved out of it. `original` are the points in the order of the frame's. The space is visit's
-/// to keep: it points to nothing outside.
+/// Calls visit(space) with the distances of the problem among the points of its frame, which are
+/// moved out of it. `original` are the points in the order of the frame's. The space belongs to
+/// visit: it refers to nothing outside.
 template <class Visit>
 auto with_space(const FacilityPoints& problem, SearchFrame& frame, std::span<const Point3> original,
                 const Visit& visit) {
@@ -43,7 +43,7 @@ auto with_space(const FacilityPoints& problem, SearchFrame& frame, std::span<con
         } else if constexpr (std::is_same_v<M, EllipticalField>) {
           return visit(FieldSpace(frame, original, metric));
         } else if constexpr (std::is_same_v<M, CustomMetric>) {
-          // The caller's function on positions as they are; channels join under the root.
+          // The caller's function on original positions; channels are added under the root.
           auto distance = [points = std::vector<Point3>(original.begin(), original.end()),
                            channels = frame.channels, count = frame.channel_count,
                            function = metric.distance](std::uint32_t j, std::uint32_t i) {

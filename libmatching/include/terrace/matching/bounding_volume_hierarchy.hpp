@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-/// Bounding volume hierarchies from binary trees: a box for each node, in one array in the order of
-/// a depth-first walk. What is asked of them is in point_hierarchy.hpp and triangle_hierarchy.hpp.
+/// Bounding volume hierarchies from binary trees: a box per node, in one array in depth-first
+/// order. Queries are in point_hierarchy.hpp and triangle_hierarchy.hpp.
 
 namespace terrace::matching {
 
@@ -18,12 +18,12 @@ struct Box {
 };
 
 /// A row of a binary tree, numbered as in matching_tree.hpp: nodes 0 .. n-1 are the primitives,
-/// node n + r is that which row r makes of two earlier ones.
+/// node n + r is made by row r from two earlier nodes.
 struct TreeChildren {
   std::uint32_t a, b;
 };
 
-/// The children alone, of rows of any kind that have them as a and b: MatchingTree::rows, SciPy's
+/// Extracts the children from rows of any kind with members a and b: MatchingTree::rows, SciPy's
 /// linkage, a dendrogram.
 template <class Rows>
 [[nodiscard]] std::vector<TreeChildren> tree_children(const Rows& rows) {
@@ -35,14 +35,15 @@ template <class Rows>
   return children;
 }
 
-/// The two constants of the surface area heuristic: one step in the tree, one test of a primitive.
+/// The constants of the surface area heuristic: the cost of one step in the tree and of one test of
+/// a primitive.
 struct SurfaceAreaCosts {
   double traversal = 1.0;
   double intersection = 1.0;
 };
 
 struct HierarchyOptions {
-  /// Subtrees of at most so many primitives become one leaf where that lowers the cost.
+  /// Subtrees of at most this many primitives become one leaf where that lowers the cost.
   std::uint32_t leaf_size = 8;
   SurfaceAreaCosts costs{};
 };
@@ -51,18 +52,20 @@ struct HierarchyOptions {
 template <std::size_t D>
 struct HierarchyNode {
   std::array<float, D> lo, hi;  ///< in the frame of the hierarchy, rounded outward
-  std::uint32_t link;   ///< first slot of a leaf; else the second child, the first is the next node
-  std::uint32_t count;  ///< primitives of a leaf; 0: not a leaf
+  /// first slot of a leaf; otherwise the second child (the first is the next node)
+  std::uint32_t link;
+  std::uint32_t count;  ///< primitives of a leaf; 0 for an inner node
 };
 
-/// Boxes are in floats: coordinates times `scale`, a power of two that is 1 unless they are beyond
-/// 2^60 or all below 2^-60, less `centre`, the middle of all. So places on the earth in metres
-/// keep their precision, and coordinates of 1e300 or 1e-300 are fine.
+/// Boxes are stored in floats: coordinates * `scale` - `centre`, where centre is the middle of the
+/// scaled bounding box and scale is a power of two, 1 unless the largest magnitude is beyond 2^60
+/// or below 2^-60. So coordinates on the earth in metres keep their precision, and coordinates of
+/// 1e300 or 1e-300 work.
 template <std::size_t D>
 struct HierarchyFrame {
   double scale = 1.0;
   std::array<double, D> centre{};
-  double reach = 0.0;  ///< the largest coordinate in the frame, in magnitude
+  double reach = 0.0;  ///< the largest magnitude of a coordinate in the frame
 };
 
 /// The tree and its boxes. D: 2 or 3.
@@ -73,24 +76,25 @@ class BoundingVolumeHierarchy {
 
   BoundingVolumeHierarchy() = default;
 
-  /// rows: one less than there are boxes; a tree of any shape.
-  /// Throws: std::invalid_argument for another number of rows, a row that names a node which is not
-  /// there yet or has a parent (the row is named), a box that is not finite or whose lo exceeds its
-  /// hi (its index is named), a leaf size of 0, and costs that are negative or not finite.
-  /// Cost: O(n) time; 80 bytes a box while it builds.
+  /// rows: a tree of any shape, with one row fewer than there are boxes.
+  /// Throws: std::invalid_argument for a wrong number of rows, a row that names a node that does
+  /// not exist yet or already has a parent (the row is named), a box that is not finite or whose lo
+  /// exceeds its hi (its index is named), a leaf size of 0, and costs that are negative or not
+  /// finite.
+  /// Cost: O(n) time; 80 bytes per box while building.
   BoundingVolumeHierarchy(std::span<const TreeChildren> rows, std::span<const Box<D>> boxes,
                           const HierarchyOptions& options = {});
 
   [[nodiscard]] std::span<const Node> nodes() const { return nodes_; }  ///< the root first
-  /// The primitives in the order of the leaves: a leaf's are those in its slots.
+  /// The primitives in the order of the leaves: a leaf holds those in its slots.
   [[nodiscard]] std::span<const std::uint32_t> order() const { return order_; }
   [[nodiscard]] const HierarchyFrame<D>& frame() const { return frame_; }
   [[nodiscard]] std::size_t depth() const { return depth_; }  ///< nodes above the deepest leaf
 
   /// Expected cost of a random ray that meets the root's box: (traversal * sum of the areas of the
   /// inner nodes + intersection * sum of area times primitives of the leaves) / area of the root.
-  /// Area is the surface, in the plane the perimeter. Where the root's is 0 (a point, a line along
-  /// an axis in space) every node counts as if it were as large as the root.
+  /// Area is the surface; in the plane, the perimeter. Where the root's area is 0 (a point, or a
+  /// line along an axis in space) every node counts as if it were as large as the root.
   /// Source: J. D. MacDonald and K. S. Booth, "Heuristics for ray tracing using space subdivision",
   /// 1990; I. Wald, "On fast construction of SAH-based bounding volume hierarchies", 2007.
   [[nodiscard]] double surface_area_cost(const SurfaceAreaCosts& costs = {}) const;
@@ -102,15 +106,15 @@ class BoundingVolumeHierarchy {
   std::size_t depth_ = 0;
 };
 
-/// A tree of less cost over the same boxes: from the leaves upward, where that makes the boxes
-/// smaller, a child changes places with a child of its sibling, or two children of siblings with
-/// one another; again and again until a pass gains less than one part in a thousand, or `passes`
-/// are done. Pairs of primitives stay pairs. A tree of matchings loses 2 to 5 % of its
-/// cost by it on even sets, 23 % on clumps of points (measured).
+/// Lowers the cost of a tree over the same boxes by rotations, from the leaves upward: where it
+/// makes the boxes smaller, a child changes places with a child of its sibling, or two children of
+/// siblings change places. Passes repeat until one gains less than one part in a thousand, or
+/// `passes` are done. Pairs of primitives stay pairs. The cost of a tree of matchings falls by 2 to
+/// 5 % on uniform sets and by 23 % on clumps of points (measured).
 ///
-/// Returns: as many rows, with children before parents.
-/// Throws: std::invalid_argument for rows and boxes as BoundingVolumeHierarchy does.
-/// Cost: O(n) time a pass, 0.5 us a box in all (measured, 100,000 points); 150 bytes a box.
+/// Returns: the same number of rows, children before parents.
+/// Throws: std::invalid_argument for bad rows and boxes, as BoundingVolumeHierarchy does.
+/// Cost: O(n) time per pass, 0.5 us per box in all (measured, 100,000 points); 150 bytes per box.
 /// Source: A. Kensler, "Tree rotations for improving bounding volume hierarchies", 2008.
 template <std::size_t D>
 [[nodiscard]] std::vector<TreeChildren> rotate_tree(std::span<const TreeChildren> rows,

@@ -8,12 +8,12 @@
 
 namespace terrace::matching {
 
-/// Minimum-cost assignment of points to points, the cost being the Euclidean distance; optimal
-/// among all pairs although only near ones are ever looked at.
+/// Minimum-cost assignment of points to points by Euclidean distance: optimal among all pairs,
+/// although only near ones are examined.
 ///
-/// Each row starts with its nearest columns as candidates. Of all other columns a bound is kept on
-/// cost minus label; where a search reaches that bound before it has ended, the row gets the
-/// columns that are next by cost minus label, from a tree of the columns with the largest label
+/// Each row starts with its nearest columns as candidates, and with a lower bound of cost minus
+/// label over all other columns. If a search reaches that bound before it has ended, the row gets
+/// the next columns by cost minus label, from a tree of the columns that holds the largest label
 /// below each node. So no absent pair ever violates the labels. Where both sets are equally large,
 /// labels start from bounded rounds of bidding (D. Bertsekas, "The auction algorithm", 1988).
 ///
@@ -21,9 +21,10 @@ namespace terrace::matching {
 /// the largest coordinate count as 0.
 /// Returns: the assignment of min(rows, columns) rows with labels for all pairs, in the unit of the
 /// coordinates, up to rounding.
-/// Throws: std::invalid_argument if a coordinate is not (the set and the index are named).
-/// Cost: time depends on how far the sets are from each other; memory grows with the candidates; at
-/// worst as for the complete graph: O(n^3) time and 16 bytes a pair.
+/// Throws: std::invalid_argument for a coordinate that violates this (the set and the index are
+/// named).
+/// Cost: time depends on how far apart the sets are; memory grows with the candidates; at worst as
+/// for the complete graph: O(n^3) time and 16 bytes per pair.
 /// Source: J. Skála, 4.3.1; pricing as in R. Jonker and A. Volgenant, 1987 (their sparse code on
 /// dense problems).
 Assignment assign_points(std::span<const Point2> rows, std::span<const Point2> columns);

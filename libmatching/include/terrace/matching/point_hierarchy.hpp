@@ -14,15 +14,15 @@
 
 namespace terrace::matching {
 
-/// A primitive and how far it is.
+/// A primitive and its distance.
 struct Neighbour {
   std::uint32_t index = kNobody;
   double distance = std::numeric_limits<double>::infinity();
   friend bool operator==(const Neighbour&, const Neighbour&) = default;
 };
 
-/// The places origin + t * direction with t_min <= t <= t_max; t counts in lengths of the
-/// direction.
+/// The points origin + t * direction with t_min <= t <= t_max; t counts in multiples of the
+/// direction's length.
 struct Ray {
   Point3 origin, direction;
   double t_min = 0.0;
@@ -36,34 +36,36 @@ struct RayHit {
   friend bool operator==(const RayHit&, const RayHit&) = default;
 };
 
-/// For points, whose own boxes are empty: a test costs a fraction of a step in the tree.
+/// For points, whose boxes are degenerate: a test costs a fraction of a step in the tree.
 inline constexpr HierarchyOptions kPointLeaves{8, {1.0, 0.25}};
 
-/// Queries among points. What they answer depends on the points alone, not on the tree: of what is
-/// equally near the lowest index comes first. Queries may be made by several threads at once.
+/// Queries among points. Results depend on the points alone, not on the tree: ties in distance go
+/// to the lowest index. Safe to query from several threads at once.
 template <std::size_t D>
 class PointHierarchy {
  public:
   using Point = std::array<double, D>;
 
   PointHierarchy() = default;
-  /// rows: of any binary tree over the points, see tree_children(). Keeps a copy of the points.
+  /// rows: a binary tree of any kind over the points, see tree_children(). Keeps a copy of the
+  /// points.
   /// Throws: as BoundingVolumeHierarchy does.
   PointHierarchy(std::span<const TreeChildren> rows, std::span<const Point> points,
                  const HierarchyOptions& options = kPointLeaves);
 
-  /// The nearest point; nullopt without points.
-  /// Throws: std::invalid_argument for a query that is not finite or farther off than 2^400 times
+  /// The nearest point; nullopt if there are no points.
+  /// Throws: std::invalid_argument for a query that is not finite or farther away than 2^400 times
   /// the largest coordinate.
-  /// Cost: O(log n) for non-adversarial points and queries; O(k) among k equal points.
+  /// Cost: O(log n) for non-adversarial points and queries; O(k) among k duplicates.
   [[nodiscard]] std::optional<Neighbour> nearest(const Point& query) const;
 
-  /// The k nearest, nearest first; fewer if there are not so many. Throws and costs as above.
+  /// The k nearest, nearest first; fewer if there are fewer. Throws and costs as above.
   void nearest(const Point& query, std::size_t k, std::vector<Neighbour>& found) const;
 
-  /// The first ball along a ray, each point being one of this radius: the least t in the ray's
-  /// range at which it is in or on a ball; t_min if it begins in one. Throws: std::invalid_argument
-  /// for a ray as TriangleHierarchy::hit() does and a radius that is negative or not finite.
+  /// The first hit of a ray with balls of this radius around the points: the least t in the ray's
+  /// range that is in or on a ball; t_min if the ray begins inside one.
+  /// Throws: std::invalid_argument for a bad ray, as TriangleHierarchy::hit() does, and for a
+  /// radius that is negative or not finite.
   [[nodiscard]] std::optional<RayHit> hit(const Ray& ray, double radius) const requires(D == 3);
 
   [[nodiscard]] const BoundingVolumeHierarchy<D>& tree() const { return tree_; }

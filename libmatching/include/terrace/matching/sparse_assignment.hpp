@@ -9,17 +9,17 @@
 
 namespace terrace::matching {
 
-/// The pairs that may be chosen, with their costs, in compressed rows: those of row i are the
-/// entries [begin[i], begin[i + 1]) of `column` and `cost`. A pair may occur twice; the cheapest
+/// The pairs that may be chosen, with their costs, in compressed rows: row i has the entries
+/// [begin[i], begin[i + 1]) of `column` and `cost`. A pair may occur more than once; the cheapest
 /// counts.
 struct SparseCosts {
   std::size_t columns = 0;
-  std::span<const std::size_t> begin;  ///< rows + 1 offsets, the first 0, none decreasing
+  std::span<const std::size_t> begin;  ///< rows + 1 offsets, the first 0, not decreasing
   std::span<const std::uint32_t> column;
   std::span<const double> cost;
 };
 
-/// One pair that may be chosen, where they come in any order.
+/// One pair that may be chosen, for lists in any order.
 struct CostEdge {
   std::uint32_t row, column;
   double cost;
@@ -29,14 +29,14 @@ struct CostEdge {
 ///
 /// Returns: the assignment of min(rows, columns) rows of least cost, with labels that prove it on
 /// the given pairs (row_dual[i] + column_dual[j] <= cost for each of them).
-/// Throws: std::invalid_argument if offsets, a row or a column are out of range or a cost is not
-/// finite or above kLargestCost (the entry is named), or if there is no such assignment: the
-/// message names a row of a set of rows that reach fewer columns than they are (Hall's theorem),
-/// with rows > columns a column of such a set of columns.
-/// Cost: O(n m log m) time for the shorter side n and m pairs at worst, O(m) memory. Pairs of
+/// Throws: std::invalid_argument if offsets, a row or a column are out of range, or a cost is not
+/// finite or exceeds kLargestCost (the entry is named), or if there is no such assignment: the
+/// message names a row from a set of rows that reach fewer columns than it has rows (Hall's
+/// theorem); with rows > columns, a column from such a set of columns.
+/// Cost: O(n m log m) time at worst for n on the shorter side and m pairs, O(m) memory. Pairs of
 /// near neighbours take far less, as the trees stay small.
-/// Source: J. Skála, 4.3.1, with Dijkstra's algorithm and a heap on the pairs; the proof of
-/// optimality is complementary slackness.
+/// Source: J. Skála, 4.3.1, with Dijkstra's algorithm and a heap on the pairs; optimality is proven
+/// by complementary slackness.
 Assignment assign_sparse(const SparseCosts& costs);
 Assignment assign_sparse(std::span<const CostEdge> edges, std::size_t rows, std::size_t columns);
 

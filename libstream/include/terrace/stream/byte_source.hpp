@@ -12,16 +12,16 @@
 
 namespace terrace::stream {
 
-/// Bytes that can be read at any place: a file, memory, or whatever else a caller has.
+/// Bytes with random access: a file, memory, or anything else.
 class ByteSource {
  public:
   virtual ~ByteSource() = default;
 
-  /// What error messages call it; of a file the path.
+  /// The name in error messages; for a file the path.
   [[nodiscard]] virtual const std::string& name() const = 0;
   [[nodiscard]] virtual std::uint64_t size() const = 0;
   /// Fills `out` with the bytes from `offset` on. Requires offset + out.size() <= size(). Called by
-  /// several threads at once. Throws: Error if they cannot be had.
+  /// several threads at once. Throws: Error if they cannot be read.
   virtual void read(std::uint64_t offset, std::span<std::byte> out) const = 0;
 };
 
@@ -32,13 +32,13 @@ class ByteSource {
 [[nodiscard]] std::unique_ptr<ByteSource> bytes_in_memory(std::string name,
                                                           std::vector<std::byte> bytes);
 
-/// `size` bytes that a function of the caller's reads, under the contract of ByteSource::read().
+/// `size` bytes read by the caller's function, under the contract of ByteSource::read().
 [[nodiscard]] std::unique_ptr<ByteSource> bytes_by_function(
     std::string name, std::uint64_t size,
     std::function<void(std::uint64_t offset, std::span<std::byte> out)> read);
 
-/// Opens a file of a folder, or of what stands for one, by its name ("manifest.json"). Throws:
-/// Error if there is none.
+/// Opens a file of a folder, or of anything that acts as one, by its name ("manifest.json").
+/// Throws: Error if it does not exist.
 using OpenByName = std::function<std::unique_ptr<ByteSource>(const std::string& name)>;
 
 }  // namespace terrace::stream

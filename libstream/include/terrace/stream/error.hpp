@@ -6,8 +6,8 @@
 
 namespace terrace::stream {
 
-/// What is thrown for bad data and failed input or output: never for misuse (that asserts).
-/// `what()` is one line: "FILE: WHERE: cause; remedy". Every part but file and cause may be empty.
+/// Thrown for bad data and failed input or output, never for misuse (which asserts). `what()` is
+/// one line: "FILE: WHERE: cause; remedy". Every part except file and cause may be empty.
 class Error : public std::runtime_error {
  public:
   struct Parts {
@@ -25,13 +25,13 @@ class Error : public std::runtime_error {
   Parts parts_;
 };
 
-/// Thrown where reading or writing ends because the caller's stop token asked for it.
+/// Thrown if reading or writing ends because the caller's stop token requested it.
 class Stopped : public std::runtime_error {
  public:
   Stopped() : std::runtime_error("stopped") {}
 };
 
-/// Thrown by a write to standard output whose reader has gone (EPIPE).
+/// Thrown by a write to standard output whose reader is gone (EPIPE).
 class ClosedPipe : public Error {
  public:
   ClosedPipe();

@@ -5,26 +5,26 @@
 
 namespace terrace::stream {
 
-/// The exclusive right to something on disk: an flock() on a file of its own, which ends with its
-/// holder, however that dies. The file goes when the lock is released; one that a killed holder has
-/// left is taken over by the next.
+/// Exclusive access to something on disk: an flock() on a separate file, which ends with its
+/// holder, however that dies. The file is removed when the lock is released; one left by a killed
+/// holder is taken over by the next.
 class FileLock {
  public:
-  /// Holds nothing.
+  /// Holds no lock.
   FileLock() = default;
-  /// Makes the file if need be and locks it. `held()` is false if somebody else has it, in this
-  /// process or another. Throws: Error if the file cannot be made.
+  /// Creates the file if necessary and locks it. `held()` is false if another holder has it, in
+  /// this process or another. Throws: Error if the file cannot be created.
   explicit FileLock(const std::filesystem::path& path);
   ~FileLock() { release(); }
   FileLock(FileLock&& other) noexcept;
   FileLock& operator=(FileLock&& other) noexcept;
 
-  /// No other holds it. On file systems without locks (some network disks) nobody can tell, and
-  /// work goes on.
+  /// Whether the lock is held. On file systems without locks (some network disks) this is true
+  /// although it cannot be verified, and work continues.
   [[nodiscard]] bool held() const { return descriptor_ >= 0; }
-  /// As held(), and the file system vouches for it.
+  /// As held(), and guaranteed by the file system.
   [[nodiscard]] bool exclusive() const { return held() && exclusive_; }
-  /// Removes the file and lets go.
+  /// Removes the file and releases the lock.
   void release() noexcept;
 
  private:

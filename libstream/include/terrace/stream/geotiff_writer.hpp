@@ -25,10 +25,10 @@ enum class GeoTiffOverviews {
 /// What a GeoTIFF of one band says of itself.
 struct GeoTiffOptions {
   std::uint32_t columns = 0, rows = 0;
-  Channel sample;        ///< type of the samples; scale, offset and unit where not the default
-  WorldTransform world;  ///< from column and row to the sample's place, as in SourceInfo
-  bool pixel_is_point = false;  ///< a sample stands for a point and not for its cell's area
-  Crs crs;                      ///< EPSG codes, else its GeoKeys, and the name as a citation
+  Channel sample;               ///< type of the samples; scale, offset and unit unless default
+  WorldTransform world;         ///< from column and row to the sample's position, as in SourceInfo
+  bool pixel_is_point = false;  ///< a sample represents a point, not its cell's area
+  Crs crs;                      ///< EPSG codes, otherwise its GeoKeys, and the name as a citation
   std::optional<double> nodata;
   GeoTiffCompression compression = GeoTiffCompression::deflate;
   int level = 7;             ///< of the compression: 1 to 12 (libdeflate's), 1 to 22 (zstd)
@@ -56,7 +56,7 @@ class GeoTiffWriter {
   GeoTiffWriter(GeoTiffWriter&&) noexcept;
   GeoTiffWriter& operator=(GeoTiffWriter&&) noexcept;
 
-  /// The next rows from the top: native samples, any number of whole rows.
+  /// The next rows from the top: native samples, any number of complete rows.
   void write_rows(std::span<const std::byte> samples);
   /// One tile, `options.tile` squared native samples by rows; what hangs over the raster's edge is
   /// ignored. Tiles never written are left out of the file: readers take them for nodata, or 0. So

@@ -12,44 +12,44 @@
 
 namespace terrace::stream {
 
-/// The name that stands for standard input, and for standard output where one is written.
+/// The name for standard input, and for standard output in writers.
 inline constexpr std::string_view kStandardStream = "-";
 
 class GzipStream;
 
 /// The bytes of a file, a pipe or standard input ("-") from first to last, through a window that
-/// moves forward. Holds the window, never the file. What begins as gzip is unpacked on the way,
-/// unless it is `as_it_is`: windows and offsets are of the unpacked bytes.
+/// moves forward. Holds the window, never the whole file. Input that begins as gzip is decompressed
+/// on the way, unless it is `as_it_is`: windows and offsets refer to the decompressed bytes.
 ///
-/// Whatever waits for a pipe (its first writer, more bytes) ends with Stopped as soon as `stop` is
-/// asked for, by whichever thread.
+/// Any wait for a pipe (for its first writer, or for more bytes) ends with Stopped as soon as
+/// `stop` is requested, on any thread.
 class Input {
  public:
   /// as_it_is: for bytes that may begin like gzip by chance.
   enum class Packed : std::uint8_t { unpacked, as_it_is };
 
-  /// at_once: bytes that are asked for at a time. Does not wait for the first writer of a pipe.
-  /// Throws: Error if the file cannot be opened.
+  /// at_once: bytes requested at a time. Does not wait for the first writer of a pipe. Throws:
+  /// Error if the file cannot be opened.
   explicit Input(const std::string& file, const std::stop_token& stop = {},
                  std::size_t at_once = std::size_t{256} << 10, Packed packed = Packed::unpacked);
   ~Input();
   Input(const Input&) = delete;
   Input& operator=(const Input&) = delete;
 
-  /// The unread bytes that are in memory. Valid until the next fill() or skip().
+  /// The unread bytes in memory. Valid until the next fill() or skip().
   [[nodiscard]] std::string_view window() const { return {buffer_.data() + begin_, end_ - begin_}; }
   /// Reads until the window has `wanted` bytes or the input ends; returns the window. The window
-  /// grows to what is asked, so callers bound it. Throws: Error, Stopped.
+  /// grows to the requested size, so callers must bound it. Throws: Error, Stopped.
   std::string_view fill(std::size_t wanted);
   /// Moves past the first `count` bytes of the window.
   void consume(std::size_t count);
-  /// Moves past `count` bytes wherever they are; false if the input ends before.
-  /// Throws: Error, Stopped.
+  /// Moves past `count` bytes, read or not; false if the input ends before that. Throws: Error,
+  /// Stopped.
   bool skip(std::uint64_t count);
 
   /// Bytes consumed so far.
   [[nodiscard]] std::uint64_t offset() const { return offset_; }
-  /// Size of a regular file; nothing for pipes and gzip.
+  /// Size of a regular file; nullopt for pipes and gzip.
   [[nodiscard]] std::optional<std::uint64_t> size() const { return size_; }
   /// As the caller named it, "standard input" for "-".
   [[nodiscard]] const std::string& name() const { return name_; }
@@ -64,7 +64,7 @@ class Input {
   std::string name_;
   std::unique_ptr<Descriptor> descriptor_;
   std::unique_ptr<GzipStream> gzip_;
-  bool looked_at_ = false;  ///< for gzip
+  bool looked_at_ = false;  ///< whether it was checked for gzip
   bool ended_ = false;
   std::optional<std::uint64_t> size_;
   std::uint64_t offset_ = 0;

@@ -10,14 +10,14 @@
 #include <string_view>
 #include <vector>
 
-/// The codec of LAZ: LAS point records, packed as LAS stores them, to chunks of LASzip's coding and
-/// back, bit for bit. It knows bytes only; headers and files are the reader's and writer's.
+/// The LAZ codec: encodes LAS point records, packed as in LAS, as LASzip chunks and decodes them,
+/// bit for bit. It handles bytes only; headers and files are up to the reader and the writer.
 ///
 /// A LAZ file (point format byte + 128) has a LASzip VLR among its VLRs. Where the records of a LAS
-/// file begin there are, but for Compressor::pointwise, 8 bytes with the chunk table's position in
-/// the file (int64), then the chunks without gaps, then the table. A position of -1 stands for the
-/// last 8 bytes of the file, which then have it; the field's own position means that the writer
-/// stopped before it wrote a table.
+/// file would begin there are (except with Compressor::pointwise) 8 bytes with the chunk table's
+/// position in the file (int64), then the chunks without gaps, then the table. A position of -1
+/// means that it is in the last 8 bytes of the file instead; the field's own position means that
+/// the writer stopped before writing a table.
 ///
 /// Source: M. Isenburg, LASzip: lossless compression of LiDAR data, PE&RS 79(2), 2013; A. Said,
 /// Introduction to arithmetic coding, HPL-2004-76.
@@ -30,7 +30,7 @@ class Corrupt : public std::runtime_error {
   Corrupt(const std::string& cause, std::uint64_t offset)
       : std::runtime_error(cause), offset_(offset) {}
 
-  /// Where in the bytes given (a chunk, a table, a VLR's payload) this was noticed.
+  /// The position in the given bytes (a chunk, a table, a VLR's payload) where this was noticed.
   [[nodiscard]] std::uint64_t offset() const noexcept { return offset_; }
 
  private:
@@ -41,10 +41,10 @@ enum class Compressor : std::uint16_t {
   none = 0,               ///< records as in LAS
   pointwise = 1,          ///< all points in one chunk, no chunk table
   pointwise_chunked = 2,  ///< point formats 0 to 5
-  layered = 3,            ///< point formats 6 to 10: each attribute is a byte string of its own
+  layered = 3,            ///< point formats 6 to 10: each attribute is a separate byte string
 };
 
-/// A part of the point record that is coded by itself.
+/// A part of the point record that is coded separately.
 enum class ItemType : std::uint16_t {
   byte = 0,
   point10 = 6,
@@ -60,7 +60,7 @@ enum class ItemType : std::uint16_t {
 
 struct Item {
   ItemType type = ItemType::byte;
-  std::uint16_t size = 0;  ///< bytes of the record
+  std::uint16_t size = 0;  ///< bytes in the record
   std::uint16_t version = 0;
 
   friend bool operator==(const Item&, const Item&) = default;
@@ -70,23 +70,24 @@ struct Item {
 struct Vlr {
   static constexpr std::string_view kUserId = "laszip encoded";
   static constexpr std::uint16_t kRecordId = 22204;
-  /// As chunk_size: the table has the points of each chunk.
+  /// As chunk_size: the table has the number of points of each chunk.
   static constexpr std::uint32_t kVariable = 0xffffffff;
-  /// In options: format 6 to 10 kept as format 1 to 5 with extra bytes.
+  /// In options: formats 6 to 10 stored as formats 1 to 5 with extra bytes.
   static constexpr std::uint32_t kCompatibility = 1;
 
   Compressor compressor = Compressor::layered;
   std::uint32_t options = 0;
-  std::uint32_t chunk_size = 50'000;  ///< points per chunk, the last one aside
+  std::uint32_t chunk_size = 50'000;  ///< points per chunk, except the last one
   std::vector<Item> items;            ///< in the order of the record
 
-  /// How LASzip codes a point format by default. Throws: std::invalid_argument unless point_format
-  /// <= 10 and record_length is from the format's to 65,535 (more than the format's: extra bytes).
+  /// LASzip's default coding of a point format. Throws: std::invalid_argument unless point_format
+  /// <= 10 and record_length is between the format's and 65,535 (more than the format's: extra
+  /// bytes).
   static Vlr of(unsigned point_format, std::size_t record_length,
                 std::uint32_t chunk_size = 50'000);
-  /// Reads a VLR's payload (what follows its header of 54 bytes). Throws: Corrupt unless it is one
-  /// that this codec knows and its items are those of the LAS header's point format (0 to 10, bits
-  /// 6 and 7 removed) and record length.
+  /// Reads a VLR's payload (the bytes after its header of 54 bytes). Throws: Corrupt unless this
+  /// codec knows it and its items match the LAS header's point format (0 to 10, with bits 6 and 7
+  /// removed) and record length.
   static Vlr parse(std::span<const std::byte> payload, unsigned point_format,
                    std::size_t record_length);
 
@@ -97,36 +98,36 @@ struct Vlr {
 
 /// A run of points that is coded independently of others.
 struct Chunk {
-  std::uint64_t offset = 0;  ///< of its first byte, from the first chunk's
+  std::uint64_t offset = 0;  ///< position of its first byte relative to the first chunk's
   std::uint64_t bytes = 0;
   std::uint64_t points = 0;
 
   friend bool operator==(const Chunk&, const Chunk&) = default;
 };
 
-/// Reads a chunk table from the bytes at its position (more may follow it). points: how many the
-/// LAS header says; bytes: how many lie between the first chunk and the table. Entries without
-/// points, which some writers append, are left out. Memory: 24 bytes per chunk.
+/// Reads a chunk table from the bytes at its position (more may follow). points: the number in the
+/// LAS header; bytes: the number between the first chunk and the table. Entries without points,
+/// which some writers append, are dropped. Memory: 24 bytes per chunk.
 /// Throws: Corrupt, also unless the chunks add up to exactly these points and bytes.
 std::vector<Chunk> read_chunk_table(std::span<const std::byte> table, const Vlr& vlr,
                                     std::uint64_t points, std::uint64_t bytes);
 
-/// The bytes of a chunk table. With vlr.chunk_size other than kVariable all chunks but the last
-/// must have so many points. Throws: std::invalid_argument if they do not, or for more than 2^32 -
-/// 1 chunks, or points or bytes in one.
+/// The bytes of a chunk table. If vlr.chunk_size is not kVariable all chunks but the last must have
+/// that many points. Throws: std::invalid_argument if they do not, or for more than 2^32 - 1
+/// chunks, or points or bytes in one.
 std::vector<std::byte> write_chunk_table(std::span<const Chunk> chunks, const Vlr& vlr);
 
-/// How many bytes of its beginning layered_chunk() needs. Layered chunks tell their own size, so
-/// they can be read without a table.
+/// The number of leading bytes that layered_chunk() needs. Layered chunks contain their own size,
+/// so they can be read without a table.
 std::size_t layered_head_size(const Vlr& vlr);
 
 /// The points and bytes of the layered chunk that begins with `head`; its offset is 0. The numbers
-/// are not checked against anything. Throws: Corrupt if `head` is too short.
+/// are not validated. Throws: Corrupt if `head` is too short.
 Chunk layered_chunk(const Vlr& vlr, std::span<const std::byte> head);
 
 /// Attributes of layered chunks, as bits of a mask. X, Y, the returns and the scanner channel are
-/// always decoded; an attribute left out has the value of the chunk's first point in all records.
-/// Chunks that are not layered are decoded whole.
+/// always decoded; an omitted attribute has the value of the chunk's first point in all records.
+/// Other chunks are decoded completely.
 enum Attributes : std::uint32_t {
   kZ = 1u << 0,
   kClassification = 1u << 1,
@@ -143,8 +144,8 @@ enum Attributes : std::uint32_t {
   kAllAttributes = 0xffffffff,
 };
 
-/// Decodes chunks one after the other, in any order; each thread takes its own. Time O(points).
-/// Memory: the models that a chunk uses, 0.2 to 2.5 MiB and 1 to 5 KiB per extra byte.
+/// Decodes chunks one after the other, in any order; each thread needs its own. Time O(points).
+/// Memory: the models used by a chunk, 0.2 to 2.5 MiB plus 1 to 5 KiB per extra byte.
 class Decoder {
  public:
   /// Throws: std::invalid_argument for Compressor::none and for items that Vlr::parse() refuses.
@@ -153,23 +154,23 @@ class Decoder {
   Decoder(Decoder&&) noexcept;
   Decoder& operator=(Decoder&&) noexcept;
 
-  /// Decodes a whole chunk of records.size() / record_length points. Throws: Corrupt, also unless
-  /// the chunk's last byte is used up by its last point; `records` then hold anything.
+  /// Decodes a complete chunk of records.size() / record_length points. Throws: Corrupt, also
+  /// unless the chunk's last byte is consumed by its last point; `records` are then unspecified.
   void decode_chunk(std::span<const std::byte> chunk, std::span<std::byte> records);
 
-  /// How far a step has come.
+  /// The progress of a step.
   struct Step {
-    std::size_t bytes = 0;   ///< used up, not to be given again
+    std::size_t bytes = 0;   ///< consumed, not to be passed again
     std::size_t points = 0;  ///< decoded
   };
-  /// Begins a chunk of so many points, to be decoded by step(): a chunk of which not all points are
-  /// wanted at once, or whose end is not known, as when it comes from a pipe.
+  /// Begins a chunk of this many points, to be decoded by step(): a chunk of which not all points
+  /// are wanted at once, or whose end is unknown, as when it comes from a pipe.
   void start(std::uint64_t points);
-  /// Decodes as many of the chunk's points as are left, `records` has room for and `bytes` suffice
-  /// for. bytes: what follows what was used up before; of a layered chunk all of it, where it
-  /// was at the first step, until its last point uses it up. `last`: there are no more; without it
-  /// pointwise chunks leave a point to the next step if fewer than 512 bytes + 4 per extra byte are
-  /// left. Throws: Corrupt, with the offset in the chunk.
+  /// Decodes as many of the chunk's remaining points as `records` has room for and `bytes` suffice
+  /// for. bytes: those after the bytes consumed before; for a layered chunk all of it, at the same
+  /// address as in the first step, until its last point consumes it. `last`: there are no more;
+  /// otherwise pointwise chunks leave a point to the next step if fewer than 512 bytes + 4 per
+  /// extra byte are left. Throws: Corrupt, with the offset in the chunk.
   Step step(std::span<const std::byte> bytes, bool last, std::span<std::byte> records);
 
  private:
@@ -177,8 +178,8 @@ class Decoder {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Encodes chunks; each thread takes its own. Memory as for decoding, and of a layered chunk the
-/// coded bytes once more.
+/// Encodes chunks; each thread needs its own. Memory as for decoding, plus a copy of the coded
+/// bytes of a layered chunk.
 class Encoder {
  public:
   /// Throws: std::invalid_argument as Decoder does.
@@ -187,9 +188,9 @@ class Encoder {
   Encoder(Encoder&&) noexcept;
   Encoder& operator=(Encoder&&) noexcept;
 
-  /// Appends the chunk of `records`, one point or more, to `out`. The bytes are those that LASzip
-  /// writes. Throws: std::invalid_argument if the bytes of records are no multiple of the record
-  /// length, 0, or more than 2^32 - 1 points.
+  /// Appends the chunk of `records`, at least one point, to `out`. The bytes are identical to
+  /// LASzip's. Throws: std::invalid_argument if the bytes of records are not a multiple of the
+  /// record length, are 0, or are more than 2^32 - 1 points.
   void encode_chunk(std::span<const std::byte> records, std::vector<std::byte>& out);
 
  private:

@@ -14,16 +14,16 @@ namespace terrace::stream {
 struct MeshFile {
   SourceInfo info;      ///< of the vertices: their attributes; comments of the file
   PointBlock vertices;  ///< all of them
-  std::vector<TriangleIndices> triangles;  ///< as they turn in the file; corners are vertices
+  std::vector<TriangleIndices> triangles;  ///< oriented as in the file; corners are vertex indices
 };
 
 /// Reads the triangles of a PLY (ASCII, both binaries), OBJ, OFF (text) or STL (text, binary) file:
-/// polygons are cut into fans, the strips of "tristrips" into triangles. Vertices are as
-/// open_source() gives them, but for those of an STL that are at one place, which are one; only a
-/// PLY's have attributes. Formats are told by content, else ending, or by options.format.
+/// polygons are cut into fans, the strips of "tristrips" into triangles. Vertices are as from
+/// open_source(), except that coincident vertices of an STL are merged; only PLY vertices have
+/// attributes. Formats are recognised by content, then by ending, or set by options.format.
 ///
-/// Returns: nullopt if the file is none of them, or has no faces: it may then be a cloud of points.
-/// Cost: memory for the mesh, and 1 MiB. Throws: Error on a damaged file, Stopped.
+/// Returns: nullopt if the file is none of these, or has no faces: it may then be a point cloud.
+/// Cost: memory for the mesh, and 1 MiB. Throws: Error for a damaged file, Stopped.
 std::optional<MeshFile> read_mesh(const std::string& file, const SourceOptions& options = {});
 
 }  // namespace terrace::stream

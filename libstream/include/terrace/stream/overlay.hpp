@@ -11,9 +11,9 @@
 
 #include "terrace/stream/store.hpp"
 
-/// The overlay: a file beside a store with other values for some of its points, smoothed heights
-/// say. The store never changes. A point is named by its cluster (the one that it is a member of)
-/// and its index there; the store by its checksum. FORMAT.md describes the bytes.
+/// The overlay: a file next to a store with other values for some of its points, such as smoothed
+/// heights. The store is never changed. A point is identified by the cluster of which it is a
+/// member and its index there; the store by its checksum. FORMAT.md describes the bytes.
 
 namespace terrace::stream {
 
@@ -25,12 +25,12 @@ struct OverlayValue {
   friend bool operator==(const OverlayValue&, const OverlayValue&) = default;
 };
 
-/// Writes an overlay. It appears under its name, whole and synced, when finish() returns.
-/// Memory: about 4096 values and those of one cluster, and 20 bytes per 4096 values written.
+/// Writes an overlay. It appears under its name, complete and synced, when finish() returns.
+/// Memory: about 4096 values plus those of one cluster, and 20 bytes per 4096 values written.
 class OverlayWriter {
  public:
-  /// `channel` names what the values are of; they are in real units, scale and offset applied.
-  /// The store must outlive the writer. Throws: Error if `path` exists and `replace` is false, or
+  /// `channel` names the quantity; values are in real units, with scale and offset applied. The
+  /// store must outlive the writer. Throws: Error if `path` exists and `replace` is false, or
   /// cannot be written; std::invalid_argument for a name of more than 65,535 bytes.
   OverlayWriter(const std::filesystem::path& path, const Store& store, const std::string& channel,
                 bool replace = false);
@@ -38,14 +38,14 @@ class OverlayWriter {
   OverlayWriter(OverlayWriter&&) noexcept;
   OverlayWriter& operator=(OverlayWriter&&) noexcept;
 
-  /// In ascending order of cluster ids, within a cluster of indices. Throws: std::invalid_argument
-  /// out of order, for a value that is not finite, and for a point that the store does not have;
-  /// Error if the file cannot be written or the store is damaged.
+  /// In ascending order of cluster ids, and of indices within a cluster. Throws:
+  /// std::invalid_argument if out of order, for a value that is not finite, and for a point that
+  /// the store does not have; Error if the file cannot be written or the store is damaged.
   void add(ClusterId cluster, std::uint32_t index, double value);
   /// Values added so far.
   [[nodiscard]] std::uint64_t values() const;
 
-  /// Publishes the file and returns its size in bytes. After that only values() may be called.
+  /// Publishes the file and returns its size in bytes. Afterwards only values() may be called.
   std::uint64_t finish();
 
  private:
@@ -53,27 +53,27 @@ class OverlayWriter {
   std::unique_ptr<Impl> impl_;
 };
 
-/// An overlay opened for reading. One thread at a time; several may each open their own.
-/// Memory: the directory, 24 bytes per page, and the page that was asked for last.
+/// An overlay opened for reading. One thread at a time; several threads may each open their own.
+/// Memory: the directory, 24 bytes per page, and the page last used.
 class Overlay {
  public:
-  /// Throws: Error if there is no overlay, a newer version, a damaged header or directory, or if it
-  /// was made for another store; that one names both checksums.
+  /// Throws: Error if there is no overlay, for a newer version, a damaged header or directory, or
+  /// if it was made for another store (both checksums are named).
   static Overlay open(const std::filesystem::path& path, const Store& store);
   ~Overlay();
   Overlay(Overlay&&) noexcept;
   Overlay& operator=(Overlay&&) noexcept;
 
   [[nodiscard]] const std::filesystem::path& path() const;
-  /// What the values are of.
+  /// The quantity of the values.
   [[nodiscard]] const std::string& channel() const;
   [[nodiscard]] std::uint64_t values() const;
 
-  /// The values of a cluster in ascending order of indices, none if it has none; they live until
-  /// the next call. A binary search over the pages, and reads one if it is not that of the call
-  /// before: clusters in ascending order read every page once. Throws: Error on damage.
+  /// The values of a cluster in ascending order of indices, empty if it has none; valid until the
+  /// next call. A binary search over the pages, which reads one unless it is that of the previous
+  /// call: clusters in ascending order read every page once. Throws: Error for damage.
   [[nodiscard]] std::span<const OverlayValue> find(ClusterId cluster);
-  /// All clusters that have values, in ascending order. Throws: Error on damage.
+  /// Visits all clusters that have values, in ascending order. Throws: Error for damage.
   void for_each(const std::function<void(ClusterId, std::span<const OverlayValue>)>& visit);
 
  private:

@@ -7,8 +7,8 @@
 
 namespace terrace::stream {
 
-/// A point in the frame its owner names. A standard type, so that it is the same type in every
-/// library of the workspace.
+/// A point in the frame that its owner documents. A standard type, so that it is the same type in
+/// every library of the workspace.
 using Point3 = std::array<double, 3>;
 
 /// An axis-aligned box, closed on all sides: a point on the border is inside. The default box is
@@ -23,14 +23,14 @@ struct Box3 {
   [[nodiscard]] bool empty() const {
     return !(min[0] <= max[0] && min[1] <= max[1] && min[2] <= max[2]);
   }
-  /// Grows to hold `p`. NaN coordinates leave the box as it is.
+  /// Extends the box to hold `p`. NaN coordinates leave it unchanged.
   void include(const Point3& p) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       if (p[axis] < min[axis]) min[axis] = p[axis];
       if (p[axis] > max[axis]) max[axis] = p[axis];
     }
   }
-  /// Grows to hold `other`; an empty box changes nothing.
+  /// Extends the box to hold `other`; an empty box changes nothing.
   void include(const Box3& other) {
     if (other.empty()) return;
     include(other.min);

@@ -12,35 +12,36 @@
 
 namespace terrace::stream {
 
-/// What a file of points says before its first point.
+/// The header of a file of points.
 struct PointHeader {
-  /// Columns after the coordinates, as PointBlock::payload has them. Types are kept where
-  /// the format has types. A column whose scale is not 1 or offset not 0 is written as real values
+  /// Columns after the coordinates, as in PointBlock::payload. Types are kept if the format has
+  /// types. A column whose scale is not 1 or whose offset is not 0 is written as real values
   /// (float64).
   std::vector<Channel> attributes{};
-  std::vector<std::string> comments{};  ///< written where the format has comments (PLY)
-  /// The CRS of the coordinates; its WKT is written where the format has a place for it (LAS).
+  std::vector<std::string> comments{};  ///< written if the format has comments (PLY)
+  /// The CRS of the coordinates; its WKT is written if the format has a place for it (LAS).
   Crs crs{};
-  /// What coordinates are rounded sums of: text has its decimals (849393.95, not
-  /// 849393.9500000001), formats whose coordinates are integers (LAS) are written on it. Without
-  /// one those take a power of ten that suits the first points and the bounds.
+  /// The lattice on which coordinates lie: text gets its decimals (849393.95, not
+  /// 849393.9500000001), and formats with integer coordinates (LAS) use it. Without a lattice these
+  /// take a power of ten that suits the first points and the bounds.
   std::optional<Lattice> lattice{};
-  std::optional<Box3> bounds{};  ///< of the points, if known beforehand
+  std::optional<Box3> bounds{};  ///< bounding box of the points, if known beforehand
 };
 
-/// Stored coordinates to the coordinates of the CRS: WorldTransform, then scale and offset of the
-/// third coordinate. Attributes stay.
+/// Converts stored coordinates to the coordinates of the CRS: WorldTransform, then scale and offset
+/// of the third coordinate. Attributes stay unchanged.
 void to_world(const Placement& placement, PointBlock& block);
 
-/// Writes a stream of points to a file, which appears under its name, whole and synced, with
-/// finish(); a writer destroyed before leaves nothing. Bounded memory; same points, same bytes.
+/// Writes a stream of points to a file, which appears under its name, complete and synced, with
+/// finish(); a writer destroyed before that leaves nothing. Bounded memory; the same points give
+/// the same bytes.
 class PointWriter {
  public:
   virtual ~PointWriter() = default;
 
-  /// Appends points. `block.positions` are world coordinates and written as doubles, exactly;
-  /// `block.payload` has records of the header's columns. Throws: Error if the disk is full or the
-  /// like.
+  /// Appends points. `block.positions` are world coordinates and written exactly, as doubles;
+  /// `block.payload` has records of the header's columns. Throws: Error if writing fails, for
+  /// example because the disk is full.
   virtual void append(const PointBlock& block) = 0;
   /// Publishes the file. Nothing may be appended afterwards.
   virtual void finish() = 0;
@@ -57,10 +58,10 @@ class PointWriter {
 struct WriterOptions {
   /// Name of a format; empty: by the file's ending. Points: "xyz" (x y z and attributes, separated
   /// by blanks), "csv" (with a header line), "ply" (binary, little-endian), "ply-ascii", "las" and
-  /// "laz" (LAS 1.4), and "copc" (".copc.laz"; in finish(), through a temporary file beside it).
-  /// Meshes: "ply", "ply-ascii", "obj", "glb".
+  /// "laz" (LAS 1.4), and "copc" (".copc.laz"; written in finish(), through a temporary file next
+  /// to it). Meshes: "ply", "ply-ascii", "obj", "glb".
   std::string format{};
-  bool replace = false;  ///< an existing file is replaced instead of refused
+  bool replace = false;  ///< replace an existing file instead of refusing it
   /// Ends a wait for the reader of standard output, and PointWriter::finish() of "copc", with
   /// Stopped.
   std::stop_token stop{};

@@ -13,31 +13,31 @@
 
 namespace terrace::stream {
 
-/// What is known of a raster before its samples are read.
+/// The properties of a raster, known before its samples are read.
 struct RasterInfo {
   std::string format;  ///< "geotiff", ...
   std::vector<std::string> files;
   std::uint64_t columns = 0, rows = 0;
-  Channel sample;  ///< type of the raw samples, and what they mean
+  Channel sample;  ///< type of the raw samples, and their meaning
   WorldTransform world;
   Crs crs;
-  std::optional<double> nodata;  ///< raw units; of the first file
-  /// The pieces in which the raster is stored: reading in multiples of them, counted from the
-  /// raster's corner, decodes each once.
+  std::optional<double> nodata;  ///< in raw units; from the first file
+  /// The size of the blocks in which the raster is stored: windows that are multiples of them,
+  /// counted from the raster's corner, decode each block once.
   std::uint64_t block_columns = 1, block_rows = 1;
-  /// Most bytes that reading takes beside the caller's window, as long as the raster is open; of a
-  /// mosaic, those of its largest file.
+  /// Maximum memory of reading in bytes, besides the caller's window, while the raster is open; for
+  /// a mosaic, that of its largest file.
   std::uint64_t held_bytes = 0;
   std::vector<std::string> comments;
 };
 
 /// A rectangle of cells.
 struct CellWindow {
-  std::uint64_t column = 0, row = 0;    ///< of its first cell
+  std::uint64_t column = 0, row = 0;    ///< position of its first cell
   std::uint64_t columns = 0, rows = 0;  ///< its size
 };
 
-/// Where `Raster::read_over` puts samples: cell (c, r) of the window is element r * stride + c.
+/// The destination of `Raster::read_over`: cell (c, r) of the window is element r * stride + c.
 /// `valid` is 0 for cells without data and 1 otherwise.
 struct CellBuffer {
   std::byte* samples = nullptr;  ///< native values of RasterInfo::sample.type
@@ -47,17 +47,17 @@ struct CellBuffer {
 
 /// A raster that can be read by windows. Not thread-safe.
 ///
-/// Cells without data are those that equal the file's nodata value, that lie in blocks the file
-/// leaves out although it has a nodata value, and that are NaN or infinite.
+/// Cells without data are those that equal the file's nodata value, those in blocks that a file
+/// with a nodata value omits, and those that are NaN or infinite.
 class Raster {
  public:
   virtual ~Raster() = default;
 
   [[nodiscard]] virtual const RasterInfo& info() const = 0;
-  /// Lays the valid samples of `window` over what `out` holds: writes them, sets their `valid` to 1
-  /// and leaves every other cell alone. Returns whether it wrote any. Windows that go forward
-  /// (down, or to the right in the same rows) are cheap; others may decode blocks again. Throws:
-  /// Error naming file and block.
+  /// Writes the valid samples of `window` over the contents of `out`, sets their `valid` to 1 and
+  /// leaves every other cell alone. Returns whether it wrote any. Windows that move forward (down,
+  /// or to the right in the same rows) are cheap; others may decode blocks again. Throws: Error
+  /// naming file and block.
   virtual bool read_over(const CellWindow& window, const CellBuffer& out) = 0;
   /// Sets how many bytes the open members of a mosaic may hold from now on (see open_mosaic).
   virtual void set_open_bytes(std::uint64_t /*bytes*/) {}
@@ -65,42 +65,41 @@ class Raster {
 
 struct RasterOptions {
   int band = 1;  ///< counted from 1
-  /// No decoded block may be larger than this. Of strips too large for it, and of large ones of the
-  /// usual codecs, a row is decoded at a time.
+  /// Maximum size of a decoded block. Strips too large for it, and large strips of the usual
+  /// codecs, are decoded row by row.
   std::uint64_t memory_bytes = 64u << 20;
-  /// Bytes of decoded blocks, of those that a window has used in part, to keep for the next one.
+  /// Cache size for decoded blocks of which a window has used only a part.
   std::uint64_t cache_bytes = 16u << 20;
   HeightsOfColour heights_of_colour = HeightsOfColour::none;  ///< see SourceOptions
 };
 
-/// Opens a GeoTIFF: strips and tiles, classic and BigTIFF, every codec of the libtiff at hand,
+/// Opens a GeoTIFF: strips and tiles, classic and BigTIFF, every codec of the installed libtiff,
 /// integers and floats of up to 64 bits, any band. Overviews are skipped. Never maps the file.
 ///
-/// `world` maps to the sample's place, that is the centre of the cell for PixelIsArea. A file
-/// without georeferencing is a plain grid of unit cells, y = -row; a comment says so. One that is
-/// referenced by several tie points only is refused.
-/// Throws: Error.
+/// `world` maps to the sample's position, which is the centre of the cell for PixelIsArea. A file
+/// without georeferencing is a plain grid of unit cells, y = -row; a comment reports this. A file
+/// that is referenced only by several tie points is refused. Throws: Error.
 std::unique_ptr<Raster> open_geotiff(const std::string& file, const RasterOptions& options = {});
 
-/// Opens a member of a mosaic anew.
+/// Reopens a member of a mosaic.
 using RasterOpener = std::function<std::unique_ptr<Raster>(const std::string& file)>;
 
 /// Several rasters as one: where they overlap, the valid sample of the last named wins. They must
 /// agree in sample (type, scale, offset), cell size and phase (to 1/1000 cell) and, unless
-/// `ignore_crs`, in CRS. Keeps at most `open_at_once` of them open, and no more than hold
-/// `open_bytes` together (RasterInfo::held_bytes; one may always be open). Throws: Error naming two
-/// files and what differs, or if the union has 2^30 columns or rows.
+/// `ignore_crs`, in CRS. Keeps at most `open_at_once` of them open, which together hold at most
+/// `open_bytes` (RasterInfo::held_bytes; one may always be open). Throws: Error naming two files
+/// and the difference, or if the union has 2^30 columns or rows.
 std::unique_ptr<Raster> open_mosaic(const std::vector<std::string>& files,
                                     const RasterOpener& opener, bool ignore_crs = false,
                                     std::size_t open_at_once = 32,
                                     std::uint64_t open_bytes = 64u << 20);
 
 /// The cells of a raster as points (see SourceInfo::grid): in tiles that are square on the ground,
-/// of at most `options.block_points` cells, one block each. The raster is read in windows of about
-/// 16 x 16 tiles or more, less if they would not fit into three quarters of `options.memory_bytes`;
-/// within a window the tiles follow a Hilbert curve. Of memory beyond 64 MiB the window takes
-/// nothing, so that more memory does not change the order. 64-bit integers have the attribute
-/// "sample".
+/// of at most `options.block_points` cells, one block each. The raster is read in windows of at
+/// least about 16 x 16 tiles, less if they would not fit into three quarters of
+/// `options.memory_bytes`; within a window the tiles follow a Hilbert curve. Memory beyond 64 MiB
+/// does not enlarge the window, so that more memory does not change the order. 64-bit integers have
+/// the attribute "sample".
 std::unique_ptr<PointSource> points_of(std::unique_ptr<Raster> raster,
                                        const SourceOptions& options = {});
 

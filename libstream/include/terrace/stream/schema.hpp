@@ -15,8 +15,8 @@
 
 #include "terrace/stream/point.hpp"
 
-/// What the numbers of a point mean: its coordinates, where they lie in a coordinate reference
-/// system, and the packed record of its attributes. Sources, stores and writers share it.
+/// The meaning of a point's numbers: its coordinates, their place in a coordinate reference system,
+/// and the packed record of its attributes. Shared by sources, stores and writers.
 
 namespace terrace::stream {
 
@@ -27,12 +27,13 @@ enum class ScalarType : std::uint8_t { i8, u8, i16, u16, i32, u32, i64, u64, f32
 std::size_t size_of(ScalarType type);
 /// "int8", "uint8", ..., "float32", "float64": the names in manifests and PLY headers.
 std::string_view name_of(ScalarType type);
-/// The type of that name (also PLY's "char", "uchar", "short", ...); nullopt if there is none.
+/// The type of that name (also PLY's "char", "uchar", "short", ...); nullopt for other names.
 std::optional<ScalarType> scalar_type_of(std::string_view name);
 /// The value of that type at `bytes`, which need not be aligned, rounded to a double.
 double to_double(ScalarType type, const std::byte* bytes);
 
-/// A column of the points: what a stored value means. Real value = stored * scale + offset.
+/// A column of the points with the meaning of its stored values: real value = stored * scale +
+/// offset.
 struct Channel {
   std::string name;
   ScalarType type = ScalarType::f64;
@@ -43,7 +44,7 @@ struct Channel {
   friend bool operator==(const Channel&, const Channel&) = default;
 };
 
-/// A GeoKey of a GeoTIFF that tells of its CRS, as it stands in the file.
+/// A GeoKey of a GeoTIFF that describes its CRS, as in the file.
 struct GeoKey {
   std::uint16_t key = 0;
   std::vector<double> values{};  ///< numbers of any type
@@ -52,12 +53,12 @@ struct GeoKey {
   friend bool operator==(const GeoKey&, const GeoKey&) = default;
 };
 
-/// A coordinate reference system as the file names it. Nothing here interprets it.
+/// A coordinate reference system as the file names it. Not interpreted here.
 struct Crs {
   int epsg = 0;                 ///< EPSG code of the horizontal CRS; 0 if none is given
   int vertical_epsg = 0;        ///< EPSG code of the vertical CRS; 0 if none is given
   std::string name;             ///< citation or name
-  std::string wkt;              ///< WKT where the file has one
+  std::string wkt;              ///< WKT if the file has one
   bool geographic = false;      ///< x, y are longitude and latitude
   std::string horizontal_unit;  ///< "metre", "foot", "US survey foot", "degree"; empty if unknown
   std::string vertical_unit;    ///< likewise for heights
@@ -71,33 +72,33 @@ struct Crs {
 ///   x = xy[0] * c0 + xy[1] * c1 + xy[2]
 ///   y = xy[3] * c0 + xy[4] * c1 + xy[5]
 ///   z = channel[2].scale * c2 + channel[2].offset
-/// For a raster (c0, c1, c2) = (column, row, raw sample) and xy maps to the *sample's* place (the
-/// centre of the cell for PixelIsArea). For points that are stored as they are, xy is the identity.
+/// For a raster (c0, c1, c2) = (column, row, raw sample) and xy maps to the *sample's* position
+/// (the centre of the cell for PixelIsArea). For points stored unchanged, xy is the identity.
 struct WorldTransform {
   std::array<double, 6> xy{1, 0, 0, 0, 1, 0};
 
   friend bool operator==(const WorldTransform&, const WorldTransform&) = default;
 };
 
-/// Where stored coordinates lie: what a source and a store have in common.
+/// The placement of stored coordinates, shared by sources and stores.
 struct Placement {
   WorldTransform world;
   std::array<Channel, 3> coordinates;  ///< of the stored coordinates c0, c1, c2
   Crs crs;
 };
 
-/// A lattice of coordinates in the CRS: integers k stand for k * scale + offset.
+/// A lattice of coordinates in the CRS: an integer k represents k * scale + offset.
 struct Lattice {
   Point3 scale{1, 1, 1};
   Point3 offset{0, 0, 0};
 
   friend bool operator==(const Lattice&, const Lattice&) = default;
 };
-/// The lattice on which stored integers of up to 32 bits lie; nullopt for other types and a rotated
+/// The lattice of stored integers of up to 32 bits; nullopt for other types and for a rotated
 /// transform.
 [[nodiscard]] std::optional<Lattice> lattice_of(const Placement& placement);
 
-/// Coordinates of the CRS for a point in stored coordinates.
+/// Converts a point in stored coordinates to coordinates of the CRS.
 [[nodiscard]] inline Point3 world_point(const Placement& placement, const Point3& stored) {
   const std::array<double, 6>& xy = placement.world.xy;
   return {stored[0] * xy[0] + stored[1] * xy[1] + xy[2],
@@ -107,22 +108,22 @@ struct Lattice {
 /// The axis-aligned box in the CRS around a box in stored coordinates; empty stays empty. Around a
 /// rotated raster it is larger than the rotated box.
 [[nodiscard]] Box3 world_box(const Placement& placement, const Box3& stored);
-/// Stored x, y (column and row of a raster) of a place in the CRS: world_point() back.
+/// Stored x, y (column and row of a raster) of a place in the CRS: the inverse of world_point().
 [[nodiscard]] std::array<double, 2> stored_place(const Placement& placement,
                                                  const std::array<double, 2>& world);
 
-/// What the values of an attribute of some points lie in, scale and offset applied.
+/// The range of an attribute's values over some points, with scale and offset applied.
 struct ValueRange {
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();
-  bool nan = true;  ///< some may be no numbers
+  bool nan = true;  ///< some may be NaN
 };
 
 /// One attribute of packed records, read as values of type T.
 template <class T>
 class AttributeView {
  public:
-  /// records: whole records of record_bytes each, the attribute `offset` bytes into them.
+  /// records: complete records of record_bytes each, with the attribute at byte `offset`.
   AttributeView(std::span<const std::byte> records, std::size_t record_bytes, std::size_t offset)
       : first_(records.empty() ? nullptr : records.data() + offset),
         stride_(record_bytes),
@@ -143,9 +144,8 @@ class AttributeView {
   std::size_t stride_, size_;
 };
 
-/// What a point consists of. The values of its attributes stand side by side in one record, without
-/// gaps, in the order of `attributes` and in the byte order of the machine; records of many points
-/// follow one another.
+/// The components of a point. The values of its attributes are packed into one record without gaps,
+/// in the order of `attributes` and in native byte order; records of many points are contiguous.
 struct Schema : Placement {
   bool grid = false;                    ///< coordinates are integer column, row and a raw sample
   std::vector<Channel> attributes;      ///< further columns, in order
@@ -153,7 +153,7 @@ struct Schema : Placement {
 
   /// Bytes of one record.
   [[nodiscard]] std::size_t payload_size() const { return attribute_offset(attributes.size()); }
-  /// Where an attribute begins in a record.
+  /// Offset of an attribute in a record.
   [[nodiscard]] std::size_t attribute_offset(std::size_t attribute) const;
   /// An attribute of packed records; T is its type.
   template <class T>

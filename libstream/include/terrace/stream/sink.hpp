@@ -16,24 +16,24 @@ namespace terrace::stream {
 
 class StopWaiter;
 
-/// Where a writer's bytes go: to a file that appears when it is complete, or, for "-", to standard
-/// output.
+/// The destination of a writer's bytes: a file that appears when it is complete, or, for "-",
+/// standard output.
 class Sink {
  public:
-  /// replace: of an existing file. stop: ends a wait for the reader of standard output.
-  /// Throws: as AtomicFile.
+  /// replace: an existing file. stop: ends a wait for the reader of standard output. Throws: as
+  /// AtomicFile.
   Sink(const std::string& path, bool replace, const std::stop_token& stop = {});
   ~Sink();
   Sink(const Sink&) = delete;
   Sink& operator=(const Sink&) = delete;
 
-  /// Throws: Error if it cannot be written; of standard output ClosedPipe and Stopped too, here or
-  /// in commit().
+  /// Throws: Error if writing fails; for standard output also ClosedPipe and Stopped, here or in
+  /// commit().
   void write(std::string_view text);
   void write(std::span<const std::byte> bytes) {
     write(std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
   }
-  /// Replaces bytes that were written before; for files only.
+  /// Replaces bytes written before; for files only.
   void write_at(std::uint64_t offset, std::string_view text);
   /// Bytes so far.
   [[nodiscard]] std::uint64_t size() const { return size_; }
@@ -43,9 +43,9 @@ class Sink {
  private:
   void flush();
 
-  std::optional<AtomicFile> file_;      ///< nothing: standard output
+  std::optional<AtomicFile> file_;      ///< nullopt: standard output
   std::string pending_;                 ///< for standard output
-  std::unique_ptr<StopWaiter> waiter_;  ///< where standard output may keep one waiting
+  std::unique_ptr<StopWaiter> waiter_;  ///< if standard output may block
   std::uint64_t size_ = 0;
 };
 

@@ -18,30 +18,30 @@
 
 namespace terrace::stream {
 
-/// The octree in which points lie (COPC, EPT): its nodes down to a depth are a thinned cloud.
+/// The octree of the points (COPC, EPT): its nodes down to a depth are a thinned cloud.
 struct OctreeInfo {
-  double spacing = 0.0;     ///< distance of the root's points, in the CRS; halves with each depth
-  unsigned depths = 0;      ///< depths that have points among the nodes to be read; the root's is 0
-  std::uint64_t nodes = 0;  ///< with points, to be read
+  double spacing = 0.0;     ///< spacing of the root's points, in the CRS; halves with each depth
+  unsigned depths = 0;      ///< depths with points among the nodes to read; the root's is 0
+  std::uint64_t nodes = 0;  ///< nodes with points to read
 };
 
-/// What is known of a source before its first point.
+/// The properties of a source, known before its first point.
 struct SourceInfo : Schema {
   std::string format;                   ///< "geotiff", "xyz", "ply", ...
   std::vector<std::string> files;       ///< as the caller named them
   std::optional<Box3> bounds;           ///< in stored coordinates, if known beforehand
   std::optional<std::uint64_t> points;  ///< number of points if known; for rasters an upper bound
-  std::optional<double> nodata;         ///< of the (first) raster, raw units
-  std::optional<OctreeInfo> octree;     ///< of a single input whose points lie in one
+  std::optional<double> nodata;         ///< of the (first) raster, in raw units
+  std::optional<OctreeInfo> octree;     ///< of a single input organised as an octree
   std::vector<std::string> comments;
-  /// Bytes of temporary files that hold what came through pipes or gzip and is read at any place.
+  /// Bytes in temporary files that hold input from pipes or gzip for random access.
   std::uint64_t spooled_bytes = 0;
 };
 
-/// A block of points in *stored coordinates* (see WorldTransform). Every coordinate type but 64-bit
-/// integers is exact in a double; a raster of 64-bit integers carries its samples once more as the
-/// attribute "sample", which is the value that counts.
-/// A block keeps points together that lie together: consumers cluster a block as a whole.
+/// A block of points in *stored coordinates* (see WorldTransform). Every coordinate type except
+/// 64-bit integers is exact in a double; a raster of 64-bit integers has its samples also as the
+/// attribute "sample", which is the authoritative value.
+/// Points of a block are close together: consumers cluster a block as a whole.
 struct PointBlock {
   std::vector<Point3> positions;
   std::vector<std::byte> payload;  ///< Schema::payload_size() bytes per point: packed attributes
@@ -54,7 +54,7 @@ struct PointBlock {
   }
 };
 
-/// How far a source has come. Bytes are of the input files, where the source knows them.
+/// The progress of a source. Bytes refer to the input files, if the source knows them.
 struct Progress {
   std::uint64_t points = 0;
   std::uint64_t nodata = 0;  ///< cells without data, left out
@@ -64,36 +64,37 @@ struct Progress {
   /// rasters cells that were not read, whatever they hold.
   std::uint64_t excluded = 0;
   std::uint64_t lost = 0;  ///< points of damaged parts, left out (see SourceOptions::on_damage)
-  double fraction = 0.0;   ///< of the work, 0 to 1; 0 if unknown
+  double fraction = 0.0;   ///< share of the work, 0 to 1; 0 if unknown
 };
 
-/// A stream of points, pulled block by block. Bounded memory; never seeks backwards through what it
-/// has delivered. Not thread-safe; `read_ahead` moves the work to a thread of its own.
+/// A stream of points, pulled block by block. Bounded memory; never seeks back to what it has
+/// delivered. Not thread-safe; `read_ahead` moves the work to a separate thread.
 class PointSource {
  public:
   virtual ~PointSource() = default;
 
   [[nodiscard]] virtual const SourceInfo& info() const = 0;
-  /// Fills `block` (cleared first; its capacity is reused). False at the end, the block then empty.
-  /// A block never has more than SourceOptions::block_points points.
-  /// Throws: Error on bad data, naming file, place, cause and remedy; Stopped.
+  /// Fills `block` (cleared first; its capacity is reused). False at the end, with an empty block.
+  /// A block never has more than SourceOptions::block_points points. Throws: Error for bad data,
+  /// naming file, place, cause and remedy; Stopped.
   virtual bool next(PointBlock& block) = 0;
   [[nodiscard]] virtual Progress progress() const = 0;
-  /// What only info() lets a caller know of a raster: the ground's height / width of a cell, so
-  /// that tiles are square on the ground (until then as the transform says), and
-  /// SourceOptions::memory_bytes anew. Before the first next(). Without effect on other sources.
+  /// Sets what a caller of a raster knows only after info(): the height / width of a cell on the
+  /// ground, so that tiles are square there (until then the transform counts), and
+  /// SourceOptions::memory_bytes again. To be called before the first next(). Without effect on
+  /// other sources.
   virtual void refine(double /*cell_aspect*/, std::uint64_t /*memory_bytes*/) {}
-  /// What reading takes at least, in bytes: of a raster the window and what its file holds, which
-  /// its layout decides. 0 where nothing but the blocks counts.
+  /// Minimum memory of reading in bytes: for a raster, the window and what its file holds, which
+  /// depends on its layout. 0 if only the blocks count.
   [[nodiscard]] virtual std::uint64_t reading_bytes() const { return 0; }
 };
 
-/// What of a source is wanted.
+/// Selects a part of a source.
 struct Selection {
-  /// Points that do not meet this condition (see Where) are left out; empty: none is.
+  /// Points that do not meet this condition (see Where) are left out; empty: all points are kept.
   std::string where{};
-  /// Names of the attributes to go on with, in the order of the file; nullopt: all. Conditions see
-  /// all of them.
+  /// Names of the attributes to keep, in the order of the file; nullopt: all. Conditions see all of
+  /// them.
   std::optional<std::vector<std::string>> keep{};
   std::vector<std::string> drop{};  ///< names of attributes to leave out
   /// Points outside of this box, in the source's CRS, are left out; without heights its z are
@@ -108,74 +109,75 @@ struct Selection {
   double resolution = 0.0;
 };
 
-/// How the colours of a PNG mean heights in metres, where R, G, B are 0 to 255:
+/// How the colours of a PNG encode heights in metres, with R, G, B from 0 to 255:
 /// mapbox -10000 + (R * 65536 + G * 256 + B) / 10, terrarium R * 256 + G + B / 256 - 32768.
 enum class HeightsOfColour : std::uint8_t { none, mapbox, terrarium };
 
-/// Is told of a part of a LAS, LAZ, COPC or EPT that is damaged and left out (a chunk, a node, what
-/// a file that is cut off lacks), and of how many points it should have had; 0 where it holds no
-/// points. Called by the thread that reads. Damage of what all points depend on is still thrown.
+/// Called for a damaged part of a LAS, LAZ, COPC or EPT that is left out (a chunk, a node, the
+/// missing end of a truncated file), with the number of points it should have had; 0 if it holds no
+/// points. Called by the reading thread. Damage on which all points depend is still thrown.
 using OnDamage = std::function<void(const Error& damage, std::uint64_t points)>;
 
-/// What a source delivers of a file. Entities of several corners are points as well: the position
-/// is that of the first corner, the attributes are the other corners, of the coordinates' type, to
-/// the last bit. Other attributes are left out.
+/// What a source delivers from a file. Entities of several corners are points too: the position is
+/// that of the first corner, the attributes are the other corners, of the coordinates' type, bit
+/// for bit. Other attributes are left out.
 enum class Entities : std::uint8_t {
   points,  ///< of meshes and GeoJSON: the vertices
   /// The triangles of a mesh (OBJ, OFF, PLY, STL), polygons cut into fans, in the order of the
   /// file: "x2", "y2", "z2", "x3", "y3", "z3".
   triangles,
-  /// The segments of lines (GeoJSON, rings of polygons too), in the order of the file: "x2", "y2",
-  /// "z2"; then "line", numbered from 0 over all files, "part", the segment's number in its line,
-  /// "vertices", 2, and "dimensions", 3 if the line has heights, else 2. Points are left out and
-  /// counted as excluded.
+  /// The segments of lines (GeoJSON, including rings of polygons), in the order of the file: "x2",
+  /// "y2", "z2"; then "line", numbered from 0 over all files, "part", the segment's number in its
+  /// line, "vertices", which is 2, and "dimensions", 3 if the line has heights, otherwise 2. Points
+  /// are left out and counted as excluded.
   segments,
-  /// Lines in pieces of at most kPolylineVertices vertices, the last of each being the first of
-  /// the next: "x2" to "z4" and the columns of segments. Corners that a piece lacks are 0.
+  /// Lines in pieces of at most kPolylineVertices vertices, where the last of each piece is the
+  /// first of the next: "x2" to "z4" and the columns of segments. Missing corners of a piece are 0.
   polylines,
 };
-/// Most vertices of an entity of Entities::polylines.
+/// Maximum number of vertices of an entity of Entities::polylines.
 inline constexpr std::size_t kPolylineVertices = 4;
 /// "points", "triangles", "segments", "polylines".
 std::string_view name_of(Entities entities);
-/// The entities of that name; nullopt if there are none.
+/// The entities of that name; nullopt for other names.
 std::optional<Entities> entities_named(std::string_view name);
 
-/// What a caller may ask of any source.
+/// Options of any source.
 struct SourceOptions {
   std::string format{};  ///< name of a registered format; empty: by content, then ending
   Entities entities = Entities::points;
-  std::size_t block_points = 10000;                           ///< most points per block
-  std::uint64_t memory_bytes = 64u << 20;                     ///< what the source may hold, roughly
-  int band = 1;                                               ///< of rasters, counted from 1
-  HeightsOfColour heights_of_colour = HeightsOfColour::none;  ///< of PNG pictures in colours
+  std::size_t block_points = 10000;        ///< maximum number of points per block
+  std::uint64_t memory_bytes = 64u << 20;  ///< approximate memory limit of the source
+  int band = 1;                            ///< of rasters, counted from 1
+  HeightsOfColour heights_of_colour = HeightsOfColour::none;  ///< of PNG images in colour
   double cell = 0.0;         ///< above 0: side of the cells of rasters without georeferencing
   std::optional<Crs> crs{};  ///< replaces what the file says
-  /// Ends whatever waits for a pipe, in opening the source and in next(), with Stopped.
+  /// Ends any wait for a pipe, in opening the source and in next(), with Stopped.
   std::stop_token stop{};
-  /// Above 0: blocks are read on a thread of their own, at most so many ahead, from the first
-  /// next() on (see read_ahead()). The source's destructor waits for no pipe.
+  /// Above 0: blocks are read on a separate thread, at most this many ahead, from the first next()
+  /// on (see read_ahead()). The source's destructor does not wait for a pipe.
   std::size_t blocks_ahead = 0;
-  unsigned threads = 1;  ///< that decode at once, of formats of which parts can be (LAZ, EPT)
+  unsigned threads = 1;  ///< decoding threads, for formats with independent parts (LAZ, EPT)
   OnDamage on_damage{};  ///< empty: damage is thrown
   Selection selection{};
 };
 
 /// Opens one file, or several as one source: rasters form a mosaic (same CRS, cell size and phase;
-/// where they overlap the last named valid sample wins), other formats follow one another and must
-/// agree in channels and CRS. "-" is standard input (formats that stream only). A folder stands for
-/// all files below whose names end as those of a format (SourceOptions::format, if given), in the
-/// order of their paths, and if it has an ept.json for that; "@LIST" for the names on the lines of
-/// LIST, from its folder on, blank lines and those that begin with # left out; a name with *, ? or
-/// [...] that no file has for those of that pattern. Throws: Error, Stopped.
+/// where they overlap the valid sample last named wins), other formats follow one another and must
+/// agree in channels and CRS. "-" is standard input (streaming formats only). A folder stands for
+/// all files in it, recursively, whose names have an ending of a format (SourceOptions::format, if
+/// given), in the order of their paths; a folder with an ept.json for that dataset. "@LIST" stands
+/// for the names on the lines of LIST, relative to its folder, without blank lines and those that
+/// begin with #; a name with *, ? or [...] that is not an existing file for the files that match
+/// the pattern. Throws: Error, Stopped.
 std::unique_ptr<PointSource> open_source(std::span<const std::string> names,
                                          const SourceOptions& options = {});
 
-/// The same stream, read on a thread of its own, at most `blocks` blocks ahead. An Error thrown
-/// there is thrown by the `next` that would have delivered the block. The thread starts with the
-/// first `next`; where none can be had the caller's reads.
-/// reading: the stop of `source`, asked for by `stop` and when the object goes, so that its
-/// destructor waits for no pipe.
+/// The same stream, read on a separate thread, at most `blocks` blocks ahead. An Error thrown there
+/// is rethrown by the `next` that would have delivered the block. The thread starts with the first
+/// `next`; if none can be started the caller's thread reads.
+/// reading: the stop source of `source`; a stop is requested by `stop` and when the object is
+/// destroyed, so that its destructor does not wait for a pipe.
 std::unique_ptr<PointSource> read_ahead(
     std::unique_ptr<PointSource> source, std::size_t blocks = 8,
     const std::stop_source& reading = std::stop_source(std::nostopstate),
@@ -186,13 +188,14 @@ struct Format {
   std::string name;
   std::vector<std::string> endings;  ///< lower case, with the dot: ".tif"
   bool streams = false;              ///< can be read from a pipe, front to back
-  /// What does not stream can be read from a copy: neither its name nor files beside it matter.
+  /// A format that does not stream can be read from a copy: neither its name nor files next to it
+  /// matter.
   bool self_contained = false;
   bool (*recognise)(std::span<const std::byte> head) = nullptr;
   std::unique_ptr<PointSource> (*open)(std::span<const std::string> files,
                                        const SourceOptions& options) = nullptr;
-  bool triangles = false;  ///< opens as Entities::triangles too
-  bool lines = false;      ///< opens as Entities::segments and polylines too
+  bool triangles = false;  ///< can be opened as Entities::triangles too
+  bool lines = false;      ///< can be opened as Entities::segments and polylines too
 };
 
 /// All readable formats; a new one is one more entry.

@@ -13,31 +13,32 @@
 
 namespace terrace::stream {
 
-/// Whether the points of a source come as they are (`stream`), such that those of a block lie close
-/// together (`spatial`), or the latter only if they do not already (`automatic`).
+/// Whether the points of a source keep their order (`stream`), are reordered so that those of a
+/// block are close together (`spatial`), or are reordered only if they are not close already
+/// (`automatic`).
 enum class Order : std::uint8_t { automatic, stream, spatial };
 
 struct SpatialOrderOptions {
   Order order = Order::automatic;
-  std::size_t block_points = 10000;  ///< most points per block that has been put in order
-  /// Lengths on the ground of a unit of the three stored coordinates, in a box of these. Empty: all
-  /// count alike.
+  std::size_t block_points = 10000;  ///< maximum points per block after reordering
+  /// Lengths on the ground of one unit of each of the three stored coordinates, within this box.
+  /// Empty: all are equal.
   std::function<std::array<double, 3>(const Box3&)> unit_lengths{};
-  std::filesystem::path folder{};  ///< of the temporary file; empty: $TMPDIR or /tmp
+  std::filesystem::path folder{};  ///< folder of the temporary file; empty: $TMPDIR or /tmp
   std::stop_token stop{};          ///< ends next() with Stopped
-  /// Called while points are set aside, with those read so far.
+  /// Called while points are set aside, with the number read so far.
   std::function<void(const Progress&)> reading{};
 };
 
-/// A source whose points may come in another order than they are read.
+/// A source that may deliver points in a different order from that of reading.
 class OrderedSource : public PointSource {
  public:
   struct Report {
     bool reordered = false;
     /// How much wider blocks in the order of the source are than those of a k-d tree over the same
-    /// points, the mean over the axes; of the points that decided, 0 without any.
+    /// points, averaged over the axes; for the points that decided, 0 if there were none.
     double spread = 0;
-    std::uint64_t temporary_bytes = 0;  ///< of disk, at most at one time
+    std::uint64_t temporary_bytes = 0;  ///< maximum disk space used at one time
   };
   [[nodiscard]] virtual Report report() const = 0;
 };

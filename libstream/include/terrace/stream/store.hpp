@@ -18,7 +18,7 @@
 #include "terrace/stream/schema.hpp"
 
 /// The store: a folder that holds every input point exactly once in a hierarchy of clusters, each
-/// readable on its own. FORMAT.md describes the bytes.
+/// of which can be read alone. FORMAT.md describes the bytes.
 ///
 /// Level 0 is full resolution; levels grow coarser upward to the *top*. A cluster of level L has
 /// one *representative*, a point whose highest level is above L, and *members*, the points whose
@@ -28,7 +28,8 @@
 
 namespace terrace::stream {
 
-/// Names a cluster for the life of the store: level in the upper 8 bits, ordinal in the lower 56.
+/// Identifies a cluster for the lifetime of the store: level in the upper 8 bits, ordinal in the
+/// lower 56.
 enum class ClusterId : std::uint64_t {};
 
 constexpr ClusterId cluster_id(unsigned level, std::uint64_t ordinal) {
@@ -41,21 +42,21 @@ constexpr std::uint64_t ordinal_of(ClusterId id) {
   return static_cast<std::uint64_t>(id) & ((std::uint64_t{1} << 56) - 1);
 }
 
-/// What is known of a cluster over all its descendants down to level 0, representative included.
-/// `box` is in stored coordinates; `error` is a bound, never too small, on the ground distance in
-/// metres from the representative to a descendant.
+/// Summary of a cluster over all its descendants down to level 0, including the representative.
+/// `box` is in stored coordinates; `error` is an upper bound of the ground distance in metres from
+/// the representative to a descendant.
 struct ClusterSummary {
   Box3 box;
   double error = 0.0;
-  std::uint64_t descendants = 0;  ///< number of level-0 points below, representative included
+  std::uint64_t descendants = 0;  ///< number of level-0 points below, including the representative
 
   friend bool operator==(const ClusterSummary&, const ClusterSummary&) = default;
 };
 
-/// A clustered block on its way into the store. Points are numbered within the block.
-/// Cluster c has the points order[first[c]] ... order[first[c + 1] - 1], its representative among
-/// them. `children` has `level` ordinals per point, level 0 first. `payload` has the attribute
-/// values of each point, packed in the order of the schema, Schema::payload_size() bytes per point.
+/// A clustered block on its way into the store. Points are numbered within the block. Cluster c has
+/// the points order[first[c]] ... order[first[c + 1] - 1], including its representative. `children`
+/// has `level` ordinals per point, level 0 first. `payload` has the attribute values of each point,
+/// packed in the order of the schema, Schema::payload_size() bytes per point.
 struct ClusteredBlock {
   unsigned level = 0;
   std::span<const Point3> positions;  ///< stored coordinates
@@ -67,7 +68,8 @@ struct ClusteredBlock {
   std::span<const ClusterSummary> summaries;       ///< one per cluster
 };
 
-/// What a store says of its points and how it was made. No time, path or host is ever in it.
+/// The description of a store's points and of how it was made. It never contains a time, path or
+/// host.
 struct StoreSchema : Schema {
   std::string vertical{};    ///< "ellipsoidal", "orthometric", or empty: unknown
   std::uint64_t nodata = 0;  ///< cells left out; see StoreWriter::set_nodata()
@@ -76,7 +78,7 @@ struct StoreSchema : Schema {
   std::vector<std::pair<std::string, std::string>> parameters{};
 };
 
-/// Writes a store. It appears under its name, whole and synced, when finish() returns, and not
+/// Writes a store. It appears under its name, complete and synced, when finish() returns, and not
 /// before: a writer that dies or throws leaves nothing that opens.
 class StoreWriter {
  public:
@@ -96,21 +98,21 @@ class StoreWriter {
   StoreWriter(const StoreWriter&) = delete;
   StoreWriter& operator=(const StoreWriter&) = delete;
 
-  /// The costly half: may be called by several threads at once. Copies what it needs.
+  /// The expensive half: may be called by several threads at once. Copies what it needs.
   [[nodiscard]] EncodedPtr encode(const ClusteredBlock& block) const;
-  /// The ordered half: one thread at a time, blocks of one level in the order that makes the
-  /// ordinals. The first cluster of the block gets ordinal `returned value`, the others follow.
+  /// The ordered half: one thread at a time, blocks of one level in the order that defines the
+  /// ordinals. The first cluster of the block gets the returned ordinal, the others follow.
   std::uint64_t append(EncodedPtr block);
   /// Number of clusters appended to `level` so far.
   [[nodiscard]] std::uint64_t clusters(unsigned level) const;
 
   [[nodiscard]] const StoreSchema& schema() const;
-  /// Cells that the source left out: known when it has ended, to be told before finish().
+  /// Number of cells that the source left out; known at its end, to be set before finish().
   void set_nodata(std::uint64_t cells);
 
   /// Writes the points of the top level (as a block of one cluster whose representative is
-  /// UINT32_MAX), syncs and publishes. Without `publish` it was a trial, and nothing stays. Returns
-  /// the bytes of the store.
+  /// UINT32_MAX), syncs and publishes. Without `publish` it is a trial, and nothing remains.
+  /// Returns the bytes of the store.
   std::uint64_t finish(const ClusteredBlock& root, bool publish = true);
 
  private:
@@ -118,13 +120,13 @@ class StoreWriter {
   std::unique_ptr<Impl> impl_;
 };
 
-/// A cluster read back. `positions` are the members in the order that gives their ids; vectors are
-/// reused from call to call.
+/// A decoded cluster. `positions` are the members in the order that defines their ids; vectors are
+/// reused between calls.
 struct ClusterPoints {
   std::vector<Point3> positions;
   std::vector<std::byte> payload;       ///< Schema::payload_size() bytes per member
   std::vector<std::uint64_t> children;  ///< `level` ordinals per member, level 0 first
-  bool has_representative = false;      ///< false for the root only
+  bool has_representative = false;      ///< false only for the root
   Point3 representative{};
   std::vector<std::byte> representative_payload;
   std::vector<std::uint64_t> representative_children;  ///< its `level` ordinals, level 0 first
@@ -142,8 +144,8 @@ struct ClusterRecord {
 
 struct LevelInfo {
   unsigned level = 0;
-  std::uint64_t points = 0;    ///< whose highest level is this or above
-  std::uint64_t members = 0;   ///< whose highest level is exactly this
+  std::uint64_t points = 0;    ///< points whose highest level is this or above
+  std::uint64_t members = 0;   ///< points whose highest level is exactly this
   std::uint64_t clusters = 0;  ///< stored at this level
   std::uint64_t bytes = 0;     ///< clusters and index
   std::uint64_t index_bytes = 0;
@@ -157,27 +159,27 @@ struct Problem {
 
 /// A store opened for reading. All const members may be called by several threads at once.
 ///
-/// Whatever the files hold, what is read from an open store suits its manifest, so that callers can
-/// size arrays by it: points lie in bounds(), those of a raster on its columns and rows; children
-/// exist; a level that for_each() has gone through has as many members as levels() says, and no
-/// more are visited before it throws. The hierarchy as a whole is for verify() to check.
+/// Whatever the files hold, data read from an open store is consistent with its manifest, so that
+/// callers can size arrays by it: points lie in bounds(), those of a raster on its columns and
+/// rows; children exist; a level that for_each() has completed has as many members as levels()
+/// says, and no more are visited before it throws. The hierarchy as a whole is checked by verify().
 ///
-/// Copies share the files and what was read of their indices; they are cheap.
+/// Copies share the files and the indices read so far; they are cheap.
 class Store {
  public:
-  /// Throws: Error if there is no store, a newer version, or a damaged manifest.
+  /// Throws: Error if there is no store, for a newer version, or a damaged manifest.
   static Store open(const std::filesystem::path& path);
-  /// The same where the files are not in a folder: in memory, in an archive, on a server. `name`
-  /// stands for the folder in messages and as path(). Throws as above, and what `files` throws.
+  /// The same for files that are not in a folder: in memory, in an archive, on a server. `name`
+  /// replaces the folder in messages and in path(). Throws as above, and what `files` throws.
   static Store open(const std::string& name, const OpenByName& files);
-  /// A store that a writer moved aside to replace it gets its name back if the writer died then:
-  /// true if so. open() does it by itself.
+  /// Restores the name of a store that a writer moved aside in order to replace it, if the writer
+  /// died then; returns whether it did. open() calls this.
   static bool recover(const std::filesystem::path& path);
 
-  /// The same store for work that may be given up: once `stop` is asked, all that reads throws
-  /// Stopped. So whoever reads in loops needs no check of its own.
+  /// The same store for cancellable work: once `stop` is requested, every read throws Stopped, so
+  /// loops that read need no check of their own.
   [[nodiscard]] Store with_stop(std::stop_token stop) const;
-  /// Throws: Stopped once that is asked. For loops that go on without reading.
+  /// Throws: Stopped once that is requested. For loops that continue without reading.
   void check_stop() const;
 
   [[nodiscard]] const StoreSchema& schema() const;
@@ -187,7 +189,7 @@ class Store {
   [[nodiscard]] std::span<const LevelInfo> levels() const;  ///< level 0 first
   [[nodiscard]] std::uint64_t points() const;
   [[nodiscard]] std::uint64_t bytes() const;
-  /// The CRC-32 of the manifest, which has those of all files: it names the store.
+  /// The CRC-32 of the manifest, which contains those of all files: it identifies the store.
   [[nodiscard]] std::uint32_t checksum() const;
   /// The bounding box of all points, in stored coordinates.
   [[nodiscard]] const Box3& bounds() const;
@@ -195,20 +197,20 @@ class Store {
   [[nodiscard]] double mean_height() const;
   [[nodiscard]] ClusterId root() const;
 
-  /// Throws: Error on a bad page or an ordinal that is not there.
+  /// Throws: Error for a bad page or an ordinal that does not exist.
   [[nodiscard]] ClusterRecord record(ClusterId id) const;
-  /// One for each attribute: what the values of the cluster's points, representative included, lie
-  /// in, without reading them. It may be wider, by a 32nd of what the clusters around reach. Empty
-  /// if the store does not tell (version 1). Throws: Error on a bad page or an ordinal that is not
-  /// there.
+  /// The range of the values of each attribute over the cluster's points, including the
+  /// representative, without reading them. It may be wider by a 32nd of the range over the
+  /// neighbouring clusters. Empty if the store has no ranges (version 1). Throws: Error for a bad
+  /// page or an ordinal that does not exist.
   [[nodiscard]] std::vector<ValueRange> attribute_ranges(ClusterId id) const;
-  /// Throws: Error on damage (checksum, counts), never a wrong point.
+  /// Throws: Error for damage (checksum, counts), never returns a wrong point.
   void read(ClusterId id, ClusterPoints& out) const;
-  /// Every cluster of `level` in order of ordinals; reads sequentially.
+  /// Visits every cluster of `level` in order of ordinals; reads sequentially.
   void for_each(unsigned level,
                 const std::function<void(ClusterId, const ClusterRecord&, const ClusterPoints&)>&
                     visit) const;
-  /// Checks every byte and invariant and reports each fault; true if there is none.
+  /// Checks every byte and invariant and reports each fault; returns true if there is none.
   bool verify(const std::function<void(const Problem&)>& report) const;
 
  private:

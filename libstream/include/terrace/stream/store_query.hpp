@@ -15,36 +15,36 @@
 namespace terrace::stream {
 
 /// A linear map, row-major. As a metric the length of a vector v is |map v|: the rows of a scale to
-/// metres measure on the ground, a row of zeros leaves a coordinate out of account.
+/// metres measure on the ground, a row of zeros ignores a coordinate.
 using LinearMap = std::array<double, 9>;
 
 inline constexpr LinearMap kIdentityMap{1, 0, 0, 0, 1, 0, 0, 0, 1};
 
-/// A point that a query found: member number `member` of a cluster, so that Store::read() gives its
+/// A point found by a query: member number `member` of a cluster, so that Store::read() gives its
 /// attributes.
 struct FoundPoint {
   Point3 position{};  ///< stored coordinates
   ClusterId cluster{};
   std::uint32_t member = 0;
-  double distance = 0.0;  ///< from the place that was asked for, in the metric; 0 of a box
+  double distance = 0.0;  ///< from the query's place, in the metric; 0 for a box
 };
 
-/// Queries by place: range, radius, nearest points, count; and the ways down the hierarchy that
-/// they and others take. All boxes and places are in stored coordinates.
+/// Queries by place: range, radius, nearest points, count; and the traversals of the hierarchy on
+/// which they and others are built. All boxes and places are in stored coordinates.
 ///
-/// What a query reads is the clusters whose boxes say that they may matter, about 25 ns per point,
-/// and the index entries on the way. The root and 6 MiB of the decoded clusters above level 0 are
-/// kept, so near queries cost a tenth of that.
+/// A query reads the clusters whose boxes may matter, about 25 ns per point, and the index entries
+/// on the way. The root and 6 MiB of the decoded clusters above level 0 are cached, so nearby
+/// queries cost a tenth of that.
 ///
 /// One object per thread; any number of them share a Store, which must outlive them. All functions
-/// throw Error on a damaged store and Stopped if the store is to stop.
+/// throw Error for a damaged store and Stopped if the store is stopped.
 class StoreQuery {
  public:
-  /// A cluster that a point heads, as the index tells of it: all that lies below is in its box.
+  /// A cluster headed by a point, as described by the index: everything below is in its box.
   struct Branch {
     Box3 box;
     std::uint64_t ordinal = 0;
-    std::uint64_t descendants = 0;  ///< points of level 0 below, representative included
+    std::uint64_t descendants = 0;  ///< points of level 0 below, including the representative
   };
   /// A decoded cluster and the clusters that its members head.
   struct Node {
@@ -54,14 +54,14 @@ class StoreQuery {
     std::uint64_t bytes = 0;
 
     [[nodiscard]] unsigned level() const { return level_of(id); }
-    /// What a member heads on a level below this node's.
+    /// The cluster that a member heads on a level below this node's.
     [[nodiscard]] const Branch& branch(std::size_t member, unsigned below) const {
       return branches[member * level() + below];
     }
   };
 
-  /// leaf_bytes: decoded clusters of level 0 to keep, those used last, for callers that ask for
-  /// near places again. Without it, ranges that do not overlap are read fastest.
+  /// leaf_bytes: cache for decoded clusters of level 0 (LRU), for callers that query nearby places
+  /// repeatedly. Without it, ranges that do not overlap are read fastest.
   explicit StoreQuery(const Store& store, std::uint64_t leaf_bytes = 0);
   StoreQuery(const StoreQuery&) = delete;
   StoreQuery& operator=(const StoreQuery&) = delete;
@@ -70,56 +70,56 @@ class StoreQuery {
 
   /// The points of `level` and above in the box: higher levels first, within a level by id.
   [[nodiscard]] std::vector<FoundPoint> in_box(const Box3& box, unsigned level = 0);
-  /// The points of `level` and above whose distance is at most `radius`, the nearest first; of
-  /// equally near ones those with smaller coordinates first. Requires finite arguments.
+  /// The points of `level` and above whose distance is at most `radius`, the nearest first; on ties
+  /// those with smaller coordinates first. Requires finite arguments.
   [[nodiscard]] std::vector<FoundPoint> within(const Point3& place, double radius,
                                                const LinearMap& metric = kIdentityMap,
                                                unsigned level = 0);
   /// The `count` nearest points of `level` and above, all if there are fewer, in the order of
-  /// within(). Distances are those of double arithmetic. O(count + what is read, times log).
+  /// within(). Distances are those of double arithmetic. O((count + points read) log).
   [[nodiscard]] std::vector<FoundPoint> nearest(const Point3& place, std::size_t count,
                                                 const LinearMap& metric = kIdentityMap,
                                                 unsigned level = 0);
-  /// How many points (of level 0 and above) lie in the box. Only clusters that cross its border are
-  /// read.
+  /// The number of points (of level 0 and above) in the box. Only clusters that cross its border
+  /// are read.
   [[nodiscard]] std::uint64_t count(const Box3& box);
-  /// About the same from the index alone: of clusters that cross the border, the share of their
-  /// boxes inside counts. Ends early with any number above `limit` if there are more.
+  /// An estimate of count() from the index alone: of clusters that cross the border, the share of
+  /// their boxes inside counts. Ends early with any number above `limit` if there are more.
   [[nodiscard]] double estimate(const Box3& box,
                                 double limit = std::numeric_limits<double>::infinity());
 
-  /// One cluster, for those that find their own way. Valid until the next call of anything.
+  /// One cluster, for custom traversals. Valid until the next call of any member.
   const Node& node(ClusterId id);
 
   /// Visits the root and then, level by level down to `level` and within a level by id, each
-  /// cluster that wants(level, branch) says is wanted. A branch is asked about only if the one of
-  /// the same point on the level above was wanted, since it lies within that.
+  /// cluster for which wants(level, branch) is true. A branch is tested only if that of the same
+  /// point on the level above was wanted, since it lies within that.
   template <class Wants, class Visit>
   void descend(unsigned level, const Wants& wants, const Visit& visit);
 
-  /// Visits the root and then clusters of `level` and above, the least first by least(box), as long
-  /// as that is not above what the last visit(node) returned. least: never too large for any point
-  /// in the box; infinite: the box need not be looked into.
+  /// Visits the root and then clusters of `level` and above in ascending order of least(box), as
+  /// long as that does not exceed what the last visit(node) returned. least: a lower bound for any
+  /// point in the box; infinite: the box is skipped.
   template <class Least, class Visit>
   void best_first(unsigned level, const Least& least, const Visit& visit);
 
-  /// Cuts what lies below the root at the border of a box: take(head, branch) is called for
-  /// clusters that lie inside as a whole and for those of level 0 on the border, until it returns
-  /// false. Before a cluster on the border is looked into, opens(branch) is asked. Of a store of
-  /// one block every point is such a branch, without descendants but itself.
+  /// Cuts the hierarchy below the root at the border of a box: take(head, branch) is called for
+  /// clusters that lie completely inside and for those of level 0 on the border, until it returns
+  /// false. Before a cluster on the border is opened, opens(branch) is asked. In a store of one
+  /// block every point is such a branch, without other descendants.
   template <class Take, class Opens>
   void cut(const Box3& box, const Take& take, const Opens& opens);
 
  private:
   using Nodes = std::list<Node>;
 
-  /// Nodes up to a number of bytes, the one used last in front.
+  /// Nodes up to a number of bytes, most recently used first.
   struct Cache {
     std::uint64_t most_bytes = 0, held_bytes = 0;
     Nodes nodes{};
     std::unordered_map<std::uint64_t, Nodes::iterator> by_id{};
 
-    /// Takes out the node that was not used for longest and puts it into `to`.
+    /// Moves the least recently used node to `to`.
     void drop(Nodes& to);
   };
   struct Open {
@@ -128,13 +128,13 @@ class StoreQuery {
   };
 
   void fill(Node& node, ClusterId id);
-  /// Each cluster has one head, so no walk looks into more of them than there are: in a damaged
-  /// store it could go on nearly for ever. Throws: Error.
+  /// Each cluster has one head, so no traversal opens more clusters than exist; in a damaged store
+  /// it could otherwise run nearly for ever. Throws: Error.
   void check_looked(std::uint64_t clusters) const;
 
   const Store& store_;
   std::uint64_t clusters_ = 0;  ///< of all levels
-  Node root_, passing_;         ///< passing: what is not kept
+  Node root_, passing_;         ///< passing: the node that is not cached
   Cache leaves_, inner_;
   ClusterPoints points_;
   std::vector<std::vector<std::uint64_t>> wanted_;  ///< per level, ordinals on the way down
@@ -160,9 +160,9 @@ void StoreQuery::descend(unsigned level, const Wants& wants, const Visit& visit)
   if (level > store_.top()) return;
   deliver(root_);
   for (unsigned at = store_.top(); at-- > level;) {
-    // In order of ordinals: so are the bytes in the file.
+    // In order of ordinals, which is the order of the bytes in the file.
     std::sort(wanted_[at].begin(), wanted_[at].end());
-    // Nothing is there twice, unless the store is damaged.
+    // There are no duplicates unless the store is damaged.
     wanted_[at].erase(std::unique(wanted_[at].begin(), wanted_[at].end()), wanted_[at].end());
     for (const std::uint64_t ordinal : wanted_[at]) deliver(node(cluster_id(at, ordinal)));
   }

@@ -13,44 +13,44 @@ namespace terrace::stream {
 
 /// A condition on points, such as `classification == 2 && return_number == last`.
 ///
-/// Operands are numbers, attributes by name (in double quotes where the name is no plain word), x,
-/// y and z in the CRS, `first` (1) and `last` (the attribute number_of_returns). Operators are, the
-/// tightest first: - and !; * and /; + and -; <, <=, > and >=; == and !=; &&; ||; with parentheses
-/// as usual, and `not`, `and`, `or` as words. All is computed in doubles, attributes with their
-/// scale and offset; comparisons give 1 or 0, and a point meets the condition if its value is a
-/// number other than 0.
+/// Operands are numbers, attributes by name (in double quotes if the name is not a plain word), x,
+/// y and z in the CRS, `first` (1) and `last` (the attribute number_of_returns). Operators, from
+/// tightest to loosest: - and !; * and /; + and -; <, <=, > and >=; == and !=; &&; ||; with
+/// parentheses as usual, and `not`, `and`, `or` as words. Everything is computed in doubles,
+/// attributes with their scale and offset; comparisons give 1 or 0, and a point meets the condition
+/// if its value is a number other than 0.
 ///
 /// Const members may be called by several threads at once.
 class Where {
  public:
-  /// text: up to 4096 characters. Throws: Error that names the character for what is no condition
+  /// text: up to 4096 characters. Throws: Error that names the character if it is not a condition
   /// on points of this schema.
   Where(const std::string& text, const Schema& schema);
 
   [[nodiscard]] const std::string& text() const { return text_; }
 
-  /// Sets matches[i] to 1 for points that meet the condition, else to 0. positions: in stored
-  /// coordinates; records: packed, one for each. About 1 ns per operand and point.
+  /// Sets matches[i] to 1 for points that meet the condition, otherwise to 0. positions: in stored
+  /// coordinates; records: packed, one per point. About 1 ns per operand and point.
   void test(std::span<const Point3> positions, std::span<const std::byte> records,
             std::span<std::uint8_t> matches) const;
 
   /// Whether points in `box` (in the CRS) with attributes in these ranges may meet the condition;
-  /// false means that none does. attributes: one for each, or none, of which nothing is known then.
+  /// false means that none does. attributes: one per attribute, or empty if unknown.
   [[nodiscard]] bool possible(const Box3& box, std::span<const ValueRange> attributes) const;
 
  private:
   enum class Operation : std::uint8_t;
   struct Step {
     Operation operation{};
-    double number = 0.0;    ///< of a constant
-    std::size_t index = 0;  ///< of an axis or an attribute
+    double number = 0.0;    ///< for a constant
+    std::size_t index = 0;  ///< for an axis or an attribute
   };
   class Parser;
 
   std::string text_;
   Schema schema_;
   std::vector<Step> steps_;  ///< in postfix order
-  std::size_t depth_ = 0;    ///< operands at most at a time
+  std::size_t depth_ = 0;    ///< maximum number of operands at a time
 };
 
 }  // namespace terrace::stream

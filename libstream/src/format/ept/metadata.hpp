@@ -13,12 +13,12 @@
 
 namespace terrace::stream {
 
-/// The file that makes a folder EPT.
+/// The file that identifies a folder as EPT.
 inline constexpr const char* kEptName = "ept.json";
 
-/// How a node's file has its points.
+/// The encoding of the points in a node's file.
 enum class EptData : std::uint8_t {
-  laszip,    ///< a LAZ file, whose header counts, not the schema
+  laszip,    ///< a LAZ file, whose header overrides the schema
   binary,    ///< records of the schema
   zstandard  ///< the same, compressed
 };
@@ -27,15 +27,15 @@ struct EptMetadata {
   EptData data = EptData::binary;
   std::uint64_t points = 0;
   Octree octree;        ///< without nodes
-  RecordStream stream;  ///< as the schema has it: coordinates, attributes, where they lie
+  RecordStream stream;  ///< from the schema: coordinates, attributes and their positions
   Crs crs;
 };
 
-/// Throws the Error of a damaged data set.
+/// Throws the Error of a damaged dataset.
 [[noreturn]] void fail_ept(const std::string& file, std::string where, std::string cause);
 
-/// Reads ept.json. Attributes that LAS has too are named as there. Throws: Error unless it is one
-/// of version 1, with X, Y and Z of types that are known.
+/// Reads ept.json. Attributes that LAS also has are named as there. Throws: Error unless it has
+/// version 1, with X, Y and Z of known types.
 EptMetadata read_ept_metadata(const std::string& file);
 
 }  // namespace terrace::stream

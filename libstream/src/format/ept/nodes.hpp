@@ -14,7 +14,7 @@ std::filesystem::path ept_node_file(const std::filesystem::path& folder, EptData
                                     const OctreeNode& node);
 
 /// The nodes of `metadata.octree`, in its order. first: the header of a node of LAZ, with which all
-/// others must agree. A reader holds a window of the node's file and what its decoder needs; it
+/// others must agree. A reader holds a window of the node's file and the memory of its decoder; it
 /// refuses a file that does not have exactly the points that the hierarchy counts.
 RecordParts ept_parts(const std::filesystem::path& folder, const EptMetadata& metadata,
                       const LasHeader& first);

@@ -12,27 +12,27 @@
 
 namespace terrace::stream {
 
-/// Cuts GeoJSON (RFC 7946) into the texts of its features, without reading what they hold: those of
-/// a FeatureCollection or GeometryCollection, and of objects that follow one another, as in
-/// newline-delimited GeoJSON and GeoJSON text sequences (RFC 8142). Holds one feature at a time.
+/// Cuts GeoJSON (RFC 7946) into the texts of its features, without parsing them: those of a
+/// FeatureCollection or GeometryCollection, and of consecutive objects, as in newline-delimited
+/// GeoJSON and GeoJSON text sequences (RFC 8142). Holds one feature at a time.
 class GeoJsonItems {
  public:
-  /// input: at its first byte; must outlive the object. most_bytes: of one feature, and of what
-  /// stands before and behind all of them. wants_crs: false leaves crs() empty. Goes to the first
+  /// input: at its first byte; must outlive the object. most_bytes: limit for one feature, and for
+  /// the text before and after all of them. wants_crs: false leaves crs() empty. Moves to the first
   /// feature. Throws: Error, Stopped.
   GeoJsonItems(Input& input, std::size_t most_bytes, bool wants_crs);
 
-  /// The text of the next object; nothing at the end. Valid until the next call.
-  /// Throws: Error naming file and byte, Stopped.
+  /// The text of the next object; nullopt at the end. Valid until the next call. Throws: Error
+  /// naming file and byte, Stopped.
   [[nodiscard]] std::optional<std::string_view> next();
-  /// Where the object that next() gave last begins in the file.
+  /// Offset in the file of the object last returned by next().
   [[nodiscard]] std::uint64_t offset() const { return input_->offset(); }
-  /// As the member "crs" of the collection has it (GeoJSON of 2008), else longitude and latitude of
-  /// WGS 84. What stands behind the features is too late.
+  /// The member "crs" of the collection (GeoJSON of 2008), otherwise longitude and latitude of WGS
+  /// 84. A member after the features comes too late.
   [[nodiscard]] const Crs& crs() const { return crs_; }
 
  private:
-  /// Where a scan ended: at the end of an object, or of the bracket that opens its list.
+  /// Where a scan ended: at the end of an object, or after the bracket that opens its list.
   struct Stop {
     std::size_t at = 0;
     bool in_list = false;
@@ -51,7 +51,7 @@ class GeoJsonItems {
   std::size_t most_bytes_;
   bool wants_crs_;
   std::string_view window_;
-  std::size_t found_ = 0;  ///< bytes of the object at the window's begin; 0 at the end
+  std::size_t found_ = 0;  ///< bytes of the object at the start of the window; 0 at the end
   bool started_ = false, in_list_ = false, first_of_list_ = false;
   Crs crs_;
 };

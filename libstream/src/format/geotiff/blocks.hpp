@@ -17,21 +17,21 @@
 namespace terrace::stream {
 
 /// Reads windows of one band block by block. Blocks that a window has used only in part are kept,
-/// as far as the cache goes, for the window that uses the rest.
+/// within the cache size, for the window that uses the rest.
 class GeoTiffBlocks {
  public:
   /// Throws: Error if a decoded block is larger than `memory_bytes`.
   GeoTiffBlocks(GeoTiffHandle& handle, const GeoTiffLayout& layout, NodataRule nodata,
                 std::uint64_t memory_bytes, std::uint64_t cache_bytes);
 
-  /// Most bytes that are held from one window to the next: see RasterInfo::held_bytes.
+  /// Maximum bytes held between windows: see RasterInfo::held_bytes.
   [[nodiscard]] std::uint64_t held_bytes() const;
 
   /// See Raster::read_over.
   bool read_over(const CellWindow& window, const CellBuffer& out);
 
  private:
-  /// The part of a block that a window covers, and where it goes.
+  /// The part of a block that a window covers, and its destination.
   struct Part {
     std::uint32_t across, down;  // the block
     std::uint32_t column, row;   // of the part, within the block
@@ -61,19 +61,19 @@ class GeoTiffBlocks {
   GeoTiffLayout layout_;
   NodataRule nodata_;
   std::uint64_t memory_bytes_, cache_bytes_;
-  bool by_rows_ = false;                  // strips that are not decoded whole
+  bool by_rows_ = false;                  // strips that are not decoded as a whole
   std::uint64_t most_stored_ = 0;         // bytes of the largest block in the file
   std::uint64_t next_row_ = 0;            // of the raster: the row libtiff decodes next, by rows
   std::vector<std::byte> raw_;            // as stored
   std::vector<std::byte> block_;          // decoded, native byte order
-  std::optional<std::uint32_t> decoded_;  // which block that is
-  std::vector<std::byte> wide_;           // a row of samples that were packed
+  std::optional<std::uint32_t> decoded_;  // the block in block_
+  std::vector<std::byte> wide_;           // an unpacked row of packed samples
 
   struct Cached {
     std::uint32_t block;
     std::vector<std::byte> samples;
   };
-  std::list<Cached> cache_;  // the latest first
+  std::list<Cached> cache_;  // most recent first
   std::unordered_map<std::uint32_t, std::list<Cached>::iterator> cached_;
 };
 

@@ -15,12 +15,12 @@
 
 namespace terrace::stream {
 
-/// A TIFF file opened for reading by libtiff, without memory mapping, without a word to standard
-/// error, with every allocation of libtiff's bounded; positioned at the first directory that is
-/// not an overview or a mask.
+/// A TIFF file opened for reading by libtiff, without memory mapping and without output on standard
+/// error, with bounded allocations; positioned at the first directory that is not an overview or a
+/// mask.
 class GeoTiffHandle {
  public:
-  /// `memory_bytes`: most that libtiff may allocate at once for decoding.
+  /// `memory_bytes`: limit of a single allocation by libtiff for decoding.
   /// Throws: Error if the file cannot be opened or its directory cannot be read.
   GeoTiffHandle(const std::string& file, std::uint64_t memory_bytes);
   ~GeoTiffHandle();
@@ -30,17 +30,17 @@ class GeoTiffHandle {
   [[nodiscard]] TIFF* tiff() const { return tiff_; }
   [[nodiscard]] const std::string& file() const { return file_; }
   [[nodiscard]] std::uint64_t file_bytes() const { return file_bytes_; }
-  /// What libtiff warned of: fields it ignored because they are damaged.
+  /// libtiff's warnings: fields it ignored because they are damaged.
   [[nodiscard]] const std::vector<std::string>& warnings() const { return warnings_; }
 
-  /// Reads exactly `out.size()` bytes at `offset`; false if the file has not so many.
-  /// Throws: Error if reading fails.
+  /// Reads exactly `out.size()` bytes at `offset`; false if the file has fewer. Throws: Error if
+  /// reading fails.
   [[nodiscard]] bool read(std::uint64_t offset, std::span<std::byte> out) const;
-  /// What libtiff last complained of, and forgets it. Empty if it has not.
+  /// Returns and forgets libtiff's last error message. Empty if there is none.
   std::string take_complaint();
 
-  /// Values of a field of GeoTIFF's or GDAL's; empty if it is not there.
-  /// Throws: Error if it has another type.
+  /// Values of a GeoTIFF or GDAL field; empty if it does not exist. Throws: Error if it has another
+  /// type.
   [[nodiscard]] std::vector<double> doubles(std::uint32_t tag) const;
   [[nodiscard]] std::vector<std::uint16_t> shorts(std::uint32_t tag) const;
   [[nodiscard]] std::string text(std::uint32_t tag) const;

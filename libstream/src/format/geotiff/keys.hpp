@@ -13,7 +13,7 @@
 namespace terrace::stream {
 
 /// The GeoKeys of a TIFF: small numbers and texts by key. Entries that point outside their arrays,
-/// or are cut short, are left out and listed in `faults`.
+/// or are truncated, are dropped and listed in `faults`.
 class GeoKeys {
  public:
   GeoKeys(std::span<const std::uint16_t> directory, std::span<const double> doubles,
@@ -35,7 +35,7 @@ class GeoKeys {
   std::vector<std::string> faults_;
 };
 
-/// The coordinate reference system the keys name; codes that are user-defined count as none.
+/// The coordinate reference system named by the keys; user-defined codes count as none.
 Crs crs_of(const GeoKeys& keys);
 
 }  // namespace terrace::stream

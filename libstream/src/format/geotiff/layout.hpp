@@ -11,32 +11,32 @@
 
 namespace terrace::stream {
 
-/// How the samples of one band lie in a TIFF file. A *block* is a tile or a strip.
+/// The layout of the samples of one band in a TIFF file. A *block* is a tile or a strip.
 struct GeoTiffLayout {
   std::uint32_t columns = 0, rows = 0;
   std::uint32_t bands = 1, band = 0;  ///< band counted from 0
   bool tiled = false;
-  bool separate = false;  ///< each band has blocks of its own
+  bool separate = false;  ///< each band has its own blocks
   std::uint32_t block_columns = 0, block_rows = 0;
   std::uint32_t blocks_across = 0, blocks_down = 0;
   std::uint16_t compression = 1;
   std::uint16_t sample_format = 1;
   unsigned bits = 8;                 ///< of a stored sample
   ScalarType type = ScalarType::u8;  ///< of a sample in memory
-  bool plain = false;                ///< uncompressed whole bytes: readable without libtiff
-  bool swapped = false;              ///< byte order is not this machine's
+  bool plain = false;                ///< uncompressed complete bytes: readable without libtiff
+  bool swapped = false;              ///< the byte order is not native
 
-  /// Samples of one pixel that lie side by side in a block.
+  /// Interleaved samples per pixel in a block.
   [[nodiscard]] std::uint32_t samples_per_pixel() const { return separate ? 1 : bands; }
   /// Stored bytes of a row of a block.
   [[nodiscard]] std::uint64_t row_bytes() const {
     return (std::uint64_t{block_columns} * samples_per_pixel() * bits + 7) / 8;
   }
-  /// Rows of the block at `down` that are rows of the raster: the last block may hang over.
+  /// Rows of the block at `down` that are rows of the raster: the last block may extend beyond it.
   [[nodiscard]] std::uint32_t rows_in_image(std::uint32_t down) const {
     return std::min(block_rows, rows - down * block_rows);
   }
-  /// The number of a block in the file's tables.
+  /// The index of a block in the file's tables.
   [[nodiscard]] std::uint32_t block(std::uint32_t across, std::uint32_t down) const {
     return (separate ? band * blocks_across * blocks_down : 0) + down * blocks_across + across;
   }
@@ -44,8 +44,8 @@ struct GeoTiffLayout {
   [[nodiscard]] std::string place(std::uint32_t across, std::uint32_t down) const;
 };
 
-/// Reads and checks the layout of the handle's directory. `band` is counted from 1.
-/// Throws: Error for layouts that are absurd or not supported.
+/// Reads and checks the layout of the handle's directory. `band` is counted from 1. Throws: Error
+/// for invalid or unsupported layouts.
 GeoTiffLayout geotiff_layout(const GeoTiffHandle& handle, int band);
 
 }  // namespace terrace::stream

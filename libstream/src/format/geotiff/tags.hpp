@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-// Numbers of OGC 19-008r4 (GeoTIFF 1.1) and of GDAL's private fields.
+// Tag numbers of OGC 19-008r4 (GeoTIFF 1.1) and of GDAL's private fields.
 namespace terrace::stream {
 
 inline constexpr std::uint32_t kModelPixelScale = 33550;

@@ -9,14 +9,14 @@
 
 namespace terrace::stream {
 
-/// ESRI's binary grids: rows of samples in NAME.flt, .bil, .bip or .bsq, which NAME.hdr describes.
+/// ESRI's binary grids: rows of samples in NAME.flt, .bil, .bip or .bsq, described by NAME.hdr.
 /// Throws: Error.
 std::unique_ptr<Raster> open_binary_grid(const std::string& file,
                                          const RasterOptions& options = {});
 
 /// The keys and values of a header's lines. file: for messages.
 GridHeader read_binary_header(const std::string& file, std::string_view text);
-/// The grid that they describe. floats: samples are 32-bit floats, as in a .flt.
+/// The grid described by the header. floats: samples are 32-bit floats, as in a .flt.
 PlainGrid describe_binary_grid(const std::string& file, const GridHeader& header, bool floats,
                                int band);
 

@@ -12,8 +12,8 @@
 
 namespace terrace::stream {
 
-/// The keys and values at the head of ESRI's grids, or in a file beside them. Keys are in lower
-/// case.
+/// The keys and values in the header of ESRI's grids, or in a separate header file. Keys are in
+/// lower case.
 class GridHeader {
  public:
   /// file: for messages.
@@ -25,14 +25,15 @@ class GridHeader {
   [[nodiscard]] bool has(const std::string& key) const { return values_.contains(key); }
   /// Empty if there is none.
   [[nodiscard]] std::string text(const std::string& key) const;
-  /// A comma may stand for the decimal point. Throws: Error if the value is no finite number.
+  /// Accepts a comma as decimal point. Throws: Error if the value is not a finite number.
   [[nodiscard]] std::optional<double> number(const std::string& key) const;
-  /// Throws: Error if the value is no whole number below 2^53, or missing without `otherwise`.
+  /// Throws: Error if the value is not an integer below 2^53, or if it is missing and there is no
+  /// `otherwise`.
   [[nodiscard]] std::uint64_t count(const std::string& key,
                                     std::optional<std::uint64_t> otherwise = {}) const;
-  /// To the centres of cells, from the lower left corner (xllcorner), the lower left cell
-  /// (xllcenter) or the upper left cell (ulxmap). Without any of them a plain grid, which a comment
-  /// tells. Throws: Error if only x or only y is placed, or cells have no size.
+  /// The transform to the centres of cells, from the lower left corner (xllcorner), the lower left
+  /// cell (xllcenter) or the upper left cell (ulxmap). Without any of them a plain grid, which a
+  /// comment reports. Throws: Error if only x or only y is given, or cells have no size.
   [[nodiscard]] WorldTransform world(std::uint64_t rows, std::vector<std::string>& comments) const;
 
   [[noreturn]] void fail(const std::string& key, const std::string& cause,

@@ -10,12 +10,12 @@
 namespace terrace::stream {
 
 /// A digital elevation model of the USGS in its ASCII form: a record A of fixed columns, then one
-/// profile (record B) a column of the grid, from south to north and west to east. In UTM, in arc
-/// seconds, or in a plane that is not told; heights in feet or metres. Read once, front to back,
-/// into a temporary file. Samples are the whole numbers of the file, scale its vertical resolution.
+/// profile (record B) per column of the grid, from south to north and west to east. In UTM, in arc
+/// seconds, or in an unspecified plane; heights in feet or metres. Read once, front to back, into a
+/// temporary file. Samples are the integers of the file, with its vertical resolution as scale.
 ///
 /// Source: USGS, Standards for Digital Elevation Models, part 2, appendix 2-A and 2-B, 1998.
-/// Throws: Error; Stopped, where the wait for a pipe is ended.
+/// Throws: Error; Stopped if a wait for a pipe is ended.
 std::unique_ptr<Raster> open_usgs_dem(const std::string& file, const std::stop_token& stop = {});
 
 }  // namespace terrace::stream

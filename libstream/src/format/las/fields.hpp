@@ -11,18 +11,18 @@
 namespace terrace::stream {
 
 inline constexpr unsigned kLastLasPointFormat = 10;
-/// Bytes of an entry of the VLR that describes extra bytes.
+/// Bytes per entry of the VLR that describes extra bytes.
 inline constexpr std::size_t kLasExtraBytesDescription = 192;
 
-/// Units of GPS time, of which a bit of the header tells the one.
+/// Units of GPS time; a bit of the header selects one.
 inline constexpr char kGpsWeekTime[] = "second of the GPS week";
 inline constexpr char kAdjustedGpsTime[] = "GPS second less 1e9";
 
-/// Where an attribute lies in a point record.
+/// The position of an attribute in a point record.
 struct LasField {
   Channel channel;
   std::size_t offset = 0;        ///< of its first byte in the record
-  unsigned shift = 0, bits = 0;  ///< of a part of a byte; bits 0: a whole value
+  unsigned shift = 0, bits = 0;  ///< of a part of a byte; bits 0: a complete value
 
   friend bool operator==(const LasField&, const LasField&) = default;
 };
@@ -30,14 +30,14 @@ struct LasField {
 /// Bytes of a record of that format, without extra bytes.
 std::size_t las_record_bytes(unsigned point_format);
 
-/// The fields of a point format behind the coordinates, in the order of the record. Bit fields are
-/// numbers of their own; names are laspy's. The scale of `scan_angle` makes degrees of it.
-/// adjusted_time: of the header.
+/// The fields of a point format after the coordinates, in the order of the record. Bit fields are
+/// separate numbers; names are laspy's. The scale of `scan_angle` converts it to degrees.
+/// adjusted_time: from the header.
 std::vector<LasField> las_fields(unsigned point_format, bool adjusted_time = false);
 
-/// The fields in the extra bytes: those that `descriptions` (the data of the VLR, 192 bytes each)
-/// describe, then each remaining byte as uint8. Names are made distinct from one another
-/// and from those in `taken`. No-data values are listed in `comments`.
+/// The fields in the extra bytes: those described by `descriptions` (the data of the VLR, 192 bytes
+/// each), then each remaining byte as uint8. Names are made different from one another and from
+/// those in `taken`. No-data values are listed in `comments`.
 std::vector<LasField> las_extra_fields(const std::string& descriptions, std::size_t first,
                                        std::size_t record_bytes, std::span<const LasField> taken,
                                        std::vector<std::string>& comments);

@@ -11,12 +11,12 @@
 #include "terrace/stream/input.hpp"
 #include "terrace/stream/source.hpp"
 
-/// The header of LAS 1.0 to 1.4 (ASPRS, "LAS specification 1.4 - R15", 2019) and what stands around
+/// The header of LAS 1.0 to 1.4 (ASPRS, "LAS specification 1.4 - R15", 2019) and the records around
 /// the points.
 
 namespace terrace::stream {
 
-/// A variable length record, before the points or (EVLR) behind them.
+/// A variable length record, before the points or (EVLR) after them.
 struct LasVlr {
   std::string user;  ///< "LASF_Projection", "LASF_Spec", "laszip encoded", ...
   std::uint16_t id = 0;
@@ -39,25 +39,25 @@ struct LasHeader {
   unsigned minor = 0;          ///< of the version 1.minor
   unsigned point_format = 0;   ///< 0 to 10
   bool compressed = false;     ///< LAZ
-  bool wkt = false;            ///< WKT counts, not GeoKeys
+  bool wkt = false;            ///< WKT applies, not GeoKeys
   bool adjusted_time = false;  ///< GPS time is not that of the week
   std::size_t record_bytes = 0;
   std::uint64_t points = 0, points_offset = 0;
   std::array<double, 3> scale{}, offset{};
-  Box3 bounds;               ///< in the CRS, as the writer says
-  std::vector<LasVlr> vlrs;  ///< those that are used here, EVLRs too where they can be reached
+  Box3 bounds;               ///< in the CRS, as stated by the writer
+  std::vector<LasVlr> vlrs;  ///< those used here, including EVLRs that can be reached
   /// There are EVLRs, but the input is a pipe.
   bool unread_evlrs = false;
 };
 
 /// Reads the header and leaves `input` at the first byte of the points. EVLRs are read from `file`
-/// separately, unless it is a pipe. Faults that do not matter are listed in `comments`.
-/// Throws: Error for whatever is not LAS, and if the points do not fit the rest of a regular file.
+/// separately, unless it is a pipe. Harmless faults are listed in `comments`. Throws: Error if it
+/// is not LAS, or if the points exceed the rest of a regular file.
 LasHeader read_las_header(Input& input, const std::string& file, std::vector<std::string>& comments,
                           const OnDamage& on_damage = {});
 
-/// The coordinate reference system that the records name.
-/// Throws: Error if it is out of reach in a pipe.
+/// The coordinate reference system named by the records. Throws: Error if it cannot be reached in a
+/// pipe.
 Crs las_crs(const LasHeader& header, const std::string& name, std::vector<std::string>& comments);
 
 }  // namespace terrace::stream

@@ -9,9 +9,9 @@
 
 namespace terrace::stream {
 
-/// A lattice for coordinates that have none: steps of a power of ten from 1e-9 on, alike for x and
-/// y. They are as small as the decimals of `points` ask for, and large enough that 32 bits reach
-/// all of `bounds`; without bounds, a thousand times as far as the points.
+/// A lattice for coordinates that have none: steps of a power of ten from 1e-9 on, the same for x
+/// and y. They are as small as the decimals of `points` require, and large enough that 32 bits
+/// reach all of `bounds`; without bounds, a thousand times as far as the points.
 Lattice decimal_lattice(std::span<const Point3> points, const std::optional<Box3>& bounds);
 
 }  // namespace terrace::stream

@@ -12,22 +12,22 @@
 
 namespace terrace::stream {
 
-/// How the attributes of a stream lie in the point records of a file.
+/// The positions of a stream's attributes in the point records of a file.
 struct LasLayout {
   unsigned point_format = 6;
   std::size_t record_bytes = 0;
-  std::vector<LasField> fields{};  ///< of each attribute in its order, as the file has it
+  std::vector<LasField> fields{};  ///< for each attribute, in order, as stored in the file
   std::string extra_bytes{};       ///< data of the VLR that describes the extra bytes
 };
 
 /// The point formats to choose from.
 enum class LasFormats : std::uint8_t { all, newer };
 
-/// Attributes go to the field of their name; what has none goes to extra bytes. The point format is
-/// the smallest of 6, 7 and 8, or, where angles are ranks of LAS 1.0 to 1.3, of 0 to 3: either way
-/// records that were read come out as they were. Where only newer ones will do, ranks become scan
-/// angles. Wave packets are extra bytes too, because the waveforms do not travel.
-/// Throws: Error naming `file` for more attributes than fit.
+/// Attributes go to the field of their name; others go to extra bytes. The point format is the
+/// smallest of 6, 7 and 8, or, if angles are ranks of LAS 1.0 to 1.3, of 0 to 3: either way records
+/// that were read are reproduced exactly. If only newer formats are allowed, ranks become scan
+/// angles. Wave packets are extra bytes too, because the waveforms are not copied. Throws: Error
+/// naming `file` for more attributes than fit.
 LasLayout las_layout(std::span<const Channel> attributes, const std::string& file,
                      LasFormats formats = LasFormats::all);
 

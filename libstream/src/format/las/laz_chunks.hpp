@@ -10,18 +10,18 @@
 #include "terrace/stream/byte_source.hpp"
 #include "terrace/stream/laz.hpp"
 
-/// Chunks of LAZ that are read from wherever they lie in a file.
+/// Chunks of LAZ, read from anywhere in a file.
 
 namespace terrace::stream {
 
-/// What is known of a file's chunks before they are read.
+/// The properties of a file's chunks, known before they are read.
 struct LazLayout {
   laz::Vlr vlr;
   std::vector<laz::Chunk> chunks{};  ///< empty without a table
   std::uint64_t first = 0;           ///< byte of the first chunk
 };
 
-/// Throws the Error of a damaged file; `where` names the place in it.
+/// Throws the Error of a damaged file; `where` names the position in it.
 [[noreturn]] void fail_laz(const std::string& file, std::string where, std::string cause);
 [[noreturn]] void fail_chunk(const std::string& file, std::uint64_t chunk, std::uint64_t byte,
                              const std::string& cause);

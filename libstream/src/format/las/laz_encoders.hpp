@@ -17,8 +17,8 @@
 
 namespace terrace::stream {
 
-/// Encodes chunks of LAZ on several threads and hands them on in the order in which they came, on
-/// the caller's. Holds a chunk per thread and one more, their records and coded bytes.
+/// Encodes chunks of LAZ on several threads and passes them on in their original order, on the
+/// caller's thread. Holds a chunk per thread and one more, with their records and coded bytes.
 class LazEncoders {
  public:
   using Write = std::function<void(std::span<const std::byte> coded)>;
@@ -28,9 +28,9 @@ class LazEncoders {
   LazEncoders(const LazEncoders&) = delete;
   LazEncoders& operator=(const LazEncoders&) = delete;
 
-  /// Takes the records of a chunk. Throws: what `write` throws, also for chunks before.
+  /// Takes the records of a chunk. Throws: what `write` throws, possibly for earlier chunks.
   void encode(std::span<const std::byte> records);
-  /// Hands on what is left.
+  /// Passes on the rest.
   void finish();
 
  private:
@@ -42,7 +42,7 @@ class LazEncoders {
 
   void start();
   void run();
-  /// Waits for the oldest job and hands its chunk on.
+  /// Waits for the oldest job and passes its chunk on.
   void hand_on();
 
   laz::Vlr vlr_;
@@ -50,13 +50,13 @@ class LazEncoders {
   Write write_;
   bool started_ = false;
   std::unique_ptr<laz::Encoder> own_;  ///< without threads
-  std::vector<std::byte> coded_;       ///< by it
+  std::vector<std::byte> coded_;       ///< coded by own_
   std::vector<std::unique_ptr<Job>> free_;
 
   std::mutex mutex_;
   std::condition_variable work_, news_;
   std::deque<std::unique_ptr<Job>> jobs_;  ///< the oldest first
-  std::size_t next_ = 0;                   ///< of the jobs that nobody has begun
+  std::size_t next_ = 0;                   ///< the first job that is not yet begun
   bool stop_ = false;
   std::vector<std::thread> threads_;
 };

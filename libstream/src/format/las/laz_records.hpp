@@ -14,10 +14,10 @@
 
 namespace terrace::stream {
 
-/// The records of a LAZ file. input: at the first byte behind the header and VLRs. Chunks of a file
-/// with a chunk table are decoded by options.threads at once, ahead of what is read; from a pipe,
-/// without a table, and where chunks are too large for that, one after the other.
-/// Throws: Error naming chunk and byte for damage, and if the layout cannot be read from a pipe.
+/// The records of a LAZ file. input: at the first byte after the header and VLRs. Chunks of a file
+/// with a chunk table are decoded ahead by options.threads concurrently; from a pipe, without a
+/// table, and if chunks are too large for that, one after the other. Throws: Error naming chunk and
+/// byte for damage, and if the layout cannot be read from a pipe.
 std::unique_ptr<RecordReader> open_laz_records(Input& input, const std::string& file,
                                                const LasHeader& header,
                                                const SourceOptions& options);

@@ -14,27 +14,27 @@
 
 namespace terrace::stream {
 
-/// Makes records of LAS of points, and counts what the header will say of them.
+/// Converts points to LAS records, and collects the statistics for the header.
 class LasRecords {
  public:
-  static constexpr std::size_t kReturns = 15;  ///< that the header counts
+  static constexpr std::size_t kReturns = 15;  ///< counted in the header
 
   /// Throws: Error naming `path` for attributes that LAS has no room for.
   LasRecords(const std::string& path, const PointHeader& header, LasFormats formats);
 
-  /// The records of a block, until the next call. Throws: Error for a coordinate out of the
-  /// lattice's reach and a value that its field cannot have.
+  /// The records of a block, valid until the next call. Throws: Error for a coordinate beyond the
+  /// lattice's range and a value that its field cannot hold.
   std::string_view pack(const PointBlock& block);
 
   [[nodiscard]] const LasLayout& layout() const { return layout_; }
   [[nodiscard]] const std::vector<Channel>& attributes() const { return attributes_; }
-  /// The one that the records are on; before the first point any will do.
+  /// The lattice of the records; arbitrary before the first point.
   [[nodiscard]] Lattice lattice() const { return lattice_.value_or(Lattice{}); }
   /// Whether the point format is one of LAS before 1.4.
   [[nodiscard]] bool legacy() const { return layout_.point_format < 6; }
   [[nodiscard]] std::uint64_t points() const { return points_; }
   [[nodiscard]] double rounding() const { return rounding_; }
-  /// In steps of the lattice; without points the one is more than the other.
+  /// In steps of the lattice; without points least exceeds greatest.
   [[nodiscard]] const std::array<std::int32_t, 3>& least() const { return least_; }
   [[nodiscard]] const std::array<std::int32_t, 3>& most() const { return most_; }
   [[nodiscard]] const std::array<std::uint64_t, kReturns>& returns() const { return returns_; }
@@ -64,7 +64,7 @@ class LasRecords {
   double rounding_ = 0.0;
 };
 
-/// What of a file the header tells beside its points.
+/// The parts of a file that the header describes besides its points.
 struct LasFile {
   bool compressed = false, has_wkt = false;
   std::uint64_t points_offset = 0;
@@ -78,7 +78,7 @@ std::string las_header_text(const LasRecords& records, const LasFile& file);
 
 /// Appends a VLR. Requires data of at most 65,535 bytes.
 void append_vlr(std::string& out, std::string_view user, std::uint16_t id, std::string_view data);
-/// The head of an EVLR with so many bytes of data, which is to follow.
+/// The head of an EVLR with this many bytes of data, which must follow.
 std::string evlr_head(std::string_view user, std::uint16_t id, std::uint64_t bytes);
 /// Appends the VLRs of a CRS and of extra bytes, and counts them in `file`. Throws: Error naming
 /// `path` for WKT that is too long.

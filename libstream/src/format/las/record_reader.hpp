@@ -11,24 +11,24 @@
 
 namespace terrace::stream {
 
-/// The raw point records of a file, in their order.
+/// The raw point records of a file, in order.
 class RecordReader {
  public:
   virtual ~RecordReader() = default;
-  /// The next records, `wanted` or fewer, but one at least; valid until the next call. Asked only
-  /// for records that the header promises, or lost() for. Empty where all that are left are lost.
-  /// Throws: Error if they are not there and nobody wants to be told of damage, Stopped.
+  /// The next records, at most `wanted`, but at least one; valid until the next call. Called only
+  /// for records that the header promises, not counting lost(). Empty if all remaining records are
+  /// lost. Throws: Error if they do not exist and damage is not reported, Stopped.
   virtual std::string_view read(std::uint64_t wanted) = 0;
-  /// How many records were in damaged parts, so far (see SourceOptions::on_damage).
+  /// Number of records in damaged parts so far (see SourceOptions::on_damage).
   [[nodiscard]] virtual std::uint64_t lost() const { return 0; }
-  /// What must be in memory at once, as far as the file decides it.
+  /// Minimum memory, as far as it depends on the file.
   [[nodiscard]] virtual std::uint64_t held_bytes() const { return 0; }
 };
 
-/// The records of LAS, which lie in the file as they are.
+/// The records of LAS, stored as they are.
 class PlainRecords final : public RecordReader {
  public:
-  /// points: as many as there should be.
+  /// points: the expected number.
   PlainRecords(Input& input, std::size_t record_bytes, std::uint64_t points,
                OnDamage on_damage = {})
       : input_(&input),

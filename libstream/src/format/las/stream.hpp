@@ -9,8 +9,9 @@
 
 namespace terrace::stream {
 
-/// What the header says of the points: their lattice, their attributes and where these lie in the
-/// records. `comments` go to the stream's. Throws: Error naming `name` for too many extra bytes.
+/// The header's description of the points: their lattice, their attributes and the positions of
+/// these in the records. `comments` are added to the stream's. Throws: Error naming `name` for too
+/// many extra bytes.
 RecordStream las_stream(const LasHeader& header, const std::string& name,
                         std::vector<std::string> comments);
 

@@ -24,19 +24,20 @@ class MeshParser {
   enum class Item : std::uint8_t { end, vertex, face };
 
   virtual ~MeshParser() = default;
-  /// What comes next; vertex() or face() tells it. Throws: Error naming file and place, Stopped.
+  /// The next item, to be read by vertex() or face(). Throws: Error naming file and position,
+  /// Stopped.
   virtual Item next() = 0;
 
   [[nodiscard]] const Point3& vertex() const { return vertex_; }
-  /// Three corners or more: numbers of vertices, from 0, all of which have come before.
+  /// Three or more corners: vertex indices from 0, all of them already read.
   [[nodiscard]] const std::vector<std::uint32_t>& face() const { return face_; }
   /// The format's name in the registry.
   [[nodiscard]] virtual const char* format() const = 0;
-  /// What is read, for its name and how far it is.
+  /// The input, for its name and progress.
   [[nodiscard]] virtual const Input& input() const = 0;
-  /// True if each face has vertices of its own, so that those at one place are one (STL).
+  /// True if each face has its own vertices, so that coincident ones are merged (STL).
   [[nodiscard]] virtual bool is_soup() const { return false; }
-  /// How many vertices there are, if the file says so in front of them.
+  /// The number of vertices, if the file states it before them.
   [[nodiscard]] virtual std::optional<std::uint64_t> vertices() const { return std::nullopt; }
   [[nodiscard]] virtual ScalarType type() const { return ScalarType::f64; }
   /// So far.
@@ -48,18 +49,19 @@ class MeshParser {
   std::vector<std::string> comments_;
 };
 
-/// The next coordinates of a line, moving past them; false unless there are three finite numbers.
+/// Reads the next coordinates of a line and moves past them; false unless there are three finite
+/// numbers.
 bool read_vertex(std::string_view& text, Point3& vertex);
 
-/// input: at its first byte; must outlive the parser. faces: false leaves them out, unread.
+/// input: at its first byte; must outlive the parser. faces: false skips them.
 std::unique_ptr<MeshParser> obj_parser(Input& input, bool faces);
 std::unique_ptr<MeshParser> off_parser(Input& input, bool faces);
 std::unique_ptr<MeshParser> stl_parser(Input& input, bool faces);
 
-/// As Format::recognise.
+/// See Format::recognise.
 bool recognise_obj(std::span<const std::byte> head);
 bool recognise_off(std::span<const std::byte> head);
-/// The text form alone: the other has no mark.
+/// Only the text form: the binary one has no signature.
 bool recognise_stl(std::span<const std::byte> head);
 
 }  // namespace terrace::stream

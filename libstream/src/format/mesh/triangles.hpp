@@ -11,13 +11,12 @@ namespace terrace::stream {
 
 /// A mesh that is being read.
 struct OpenMesh {
-  std::unique_ptr<Input> input;  ///< what the parser reads, unless that has its own
+  std::unique_ptr<Input> input;  ///< the parser's input, unless it has its own
   std::unique_ptr<MeshParser> parser;
 };
 
-/// The triangles of a mesh as SourceOptions::entities has them; polygons are cut into fans.
-/// Memory: 17 MiB; vertices that faces name by number are set aside in a temporary file of 24 bytes
-/// each.
+/// The triangles of a mesh as described in SourceOptions::entities; polygons are cut into fans.
+/// Memory: 17 MiB; vertices referenced by index are kept in a temporary file, 24 bytes each.
 std::unique_ptr<PointSource> triangles_of(OpenMesh mesh, const SourceOptions& options);
 
 }  // namespace terrace::stream

@@ -12,8 +12,8 @@ namespace terrace::stream {
 std::int64_t to_integer(const std::byte* raw, ScalarType type);
 
 /// Reads the number that starts at `at` as `type` and stores it at `raw`. Integers may be written
-/// like "3.0". Returns the place after it, or null if what stands before the next blank or `end` is
-/// no number of that type's range.
+/// like "3.0". Returns the position after it, or null if the text up to the next blank or `end` is
+/// not a number in that type's range.
 const char* parse_scalar(const char* at, const char* end, ScalarType type, std::byte* raw);
 
 }  // namespace terrace::stream

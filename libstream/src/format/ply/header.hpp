@@ -26,7 +26,7 @@ struct PlyElement {
   std::vector<PlyProperty> properties;
 
   [[nodiscard]] bool has_lists() const;
-  /// Bytes of one item in a binary file, each list taken as empty.
+  /// Bytes of one item in a binary file, with empty lists.
   [[nodiscard]] std::size_t binary_bytes() const;
 };
 
@@ -37,9 +37,9 @@ struct PlyHeader {
   std::uint64_t lines = 0;  ///< of the header
 };
 
-/// Reads the header and leaves `input` at the first byte after it.
-/// Throws: Error with the line for whatever is not PLY 1.0, and if the elements promise more items
-/// than the rest of a regular file can hold.
+/// Reads the header and leaves `input` at the first byte after it. Throws: Error with the line if
+/// it is not PLY 1.0, and if the elements promise more items than the rest of a regular file can
+/// hold.
 PlyHeader read_ply_header(Input& input);
 
 }  // namespace terrace::stream

@@ -8,7 +8,7 @@
 
 namespace terrace::stream {
 
-/// A PLY, of which vertices have attributes. Throws and returns as read_mesh() does.
+/// A PLY, whose vertices have attributes. Throws and returns as read_mesh() does.
 std::optional<MeshFile> read_ply_mesh(const std::string& file, const SourceOptions& options);
 
 }  // namespace terrace::stream

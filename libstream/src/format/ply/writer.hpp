@@ -8,7 +8,7 @@
 
 namespace terrace::stream {
 
-/// The name of a type in the header of a PLY file: the old names, which every reader knows. The
+/// The name of a type in the header of a PLY file: the old names, which every reader supports. The
 /// 64-bit integers, for which PLY has none, are "int64" and "uint64".
 std::string ply_type_name(ScalarType type);
 

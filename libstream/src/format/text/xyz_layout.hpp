@@ -12,7 +12,7 @@
 
 namespace terrace::stream {
 
-/// How the columns of a text of points are written and what they mean.
+/// The layout and meaning of the columns of a text of points.
 struct TextLayout {
   static constexpr std::size_t kMaxColumns = 1000;
 
@@ -32,9 +32,9 @@ bool is_comment(std::string_view line);
 /// True if no field is a number.
 bool is_header(const std::vector<std::string_view>& fields);
 
-/// Reads comments, the header line if there is one, and looks at the first line of numbers, which
-/// `lines` then returns next. `file` is for messages.
-/// Throws: Error if there is no line of at least three columns, or the header does not fit it.
+/// Reads comments and the header line if there is one, and examines the first line of numbers,
+/// which `lines` then returns next. `file` is for messages. Throws: Error if there is no line of at
+/// least three columns, or the header does not match it.
 TextLayout read_text_layout(LineReader& lines, const std::string& file);
 
 }  // namespace terrace::stream

@@ -8,17 +8,17 @@
 #include "raster/nodata.hpp"
 #include "terrace/stream/raster.hpp"
 
-/// GDAL's virtual rasters (VRT) as far as they are mosaics: files whose cells lie on those of the
-/// whole. What would compute samples (resampling, scaling, masks, pixel functions, warping) is
-/// refused by name.
+/// GDAL's virtual rasters (VRT) as far as they are mosaics: files whose cells coincide with those
+/// of the whole. Elements that would compute samples (resampling, scaling, masks, pixel functions,
+/// warping) are refused by name.
 
 namespace terrace::stream {
 
-/// A source of the band, and where its cells go.
+/// A source of the band, and the destination of its cells.
 struct VrtSource {
   std::string file{};
   int band = 1;
-  bool simple = true;  ///< replaces what is below, data or not
+  bool simple = true;  ///< replaces what is below, with or without data
   NodataRule nodata{};
   std::uint64_t from_column = 0, from_row = 0;  ///< of the source
   std::uint64_t column = 0, row = 0, columns = 0, rows = 0;
@@ -27,12 +27,12 @@ struct VrtSource {
 /// One band of a virtual raster.
 struct VrtDocument {
   RasterInfo info{};
-  std::vector<VrtSource> sources{};  ///< those that cover others last
+  std::vector<VrtSource> sources{};  ///< in order of precedence, topmost last
   NodataRule nodata{};               ///< of the whole
 };
 
-/// Reads the description; its sources are not opened. band: counted from 1. Throws: Error for what
-/// is no VRT and for what is not read.
+/// Reads the description; its sources are not opened. band: counted from 1. Throws: Error if it is
+/// not a VRT or not supported.
 VrtDocument read_vrt(const std::string& file, int band);
 
 }  // namespace terrace::stream

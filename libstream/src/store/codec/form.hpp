@@ -10,11 +10,11 @@
 
 namespace terrace::stream::store {
 
-/// Positions by SplitCodec, else in a grid by GridCodec, of other points as three columns.
+/// Positions by SplitCodec; otherwise in a grid by GridCodec, in a cloud as three columns.
 inline constexpr unsigned kSplitForm = 1;
 inline constexpr unsigned kOwnBoxForm = 2;  ///< a smaller box than the entry's follows
 
-/// The box as insets from `outer` on both sides of each axis. Both lie in one frame.
+/// The box as insets from `outer` on both sides of each axis, in the same frame.
 template <class Coder>
 void code_box(Coder& coder, const IntegerBox& outer, IntegerBox& box) {
   for (unsigned axis = 0; axis < 3; ++axis) {

@@ -9,8 +9,9 @@
 #include "store/codec/coding.hpp"
 #include "store/codec/predictor.hpp"
 
-/// Clusters of a raster: which cells they have, as runs row by row, and the heights of the cells in
-/// that order, each predicted from its neighbours within the cluster. A cluster needs no other.
+/// Clusters of a raster: their cells, as runs row by row, and the heights of the cells in that
+/// order, each predicted from its neighbours within the cluster. A cluster does not depend on
+/// others.
 ///
 /// One description serves both directions: the functions are templates over SymbolEncoder and
 /// SymbolDecoder.
@@ -19,14 +20,14 @@ namespace terrace::stream::store {
 
 class GridCodec {
  public:
-  /// Whether a box of this many cells may be coded as runs by a cluster of n points. Beyond, a
-  /// cluster is so thin that the k-d codec is smaller, and the raster would cost memory.
+  /// Whether a box of this many cells may be coded as runs by a cluster of n points. Beyond that, a
+  /// cluster is so sparse that the k-d codec is smaller, and the raster would cost memory.
   static bool fits(std::uint64_t width, std::uint64_t height, std::uint64_t n) {
     const std::uint64_t cells = 8 * n + 1024;
     return width <= cells && height <= cells && (width + kPadX) * (height + kPadY) <= cells;
   }
 
-  /// Encoding: enters the points (cells relative to the box). False if two lie in one cell.
+  /// Encoding: enters the points (cells relative to the box). Returns false if two are in one cell.
   bool place(std::uint32_t width, std::uint32_t height, const std::uint64_t* x,
              const std::uint64_t* y, const std::uint64_t* z, std::uint32_t n) {
     start(width, height);
@@ -101,7 +102,7 @@ class GridCodec {
     if constexpr (Coder::kDecoding) shared = coder;
   }
 
-  /// The heights of the cells, in [0, size). Encoding has them from `place`, decoding fills z.
+  /// The heights of the cells, in [0, size). Encoding takes them from `place`, decoding fills z.
   template <class Coder>
   void heights(Coder& shared, const Predictor& predictor, std::uint64_t size, std::uint64_t* z) {
     if (size == 1) {
@@ -158,14 +159,14 @@ class GridCodec {
     if constexpr (Coder::kDecoding) shared = coder;
   }
 
-  /// Training: enters the cells of `positions` into the least squares.
+  /// Training: adds the cells of `positions` to the least squares.
   void fit(PredictorFit& sums) const;
 
  private:
   static constexpr std::uint32_t kPadX = 4, kPadY = 2;
 
   /// A border of the first run of the rows: coded as the step from the row above, in the context of
-  /// the step before.
+  /// the previous step.
   struct Border {
     unsigned context;
     std::int64_t at = 0, step = 0;
@@ -192,8 +193,8 @@ class GridCodec {
     }
   };
 
-  /// How neighbours' magnitudes make a context: their mean where the pattern has them. Cells that
-  /// have both W and N are kept apart from those at the edges, which are predicted worse.
+  /// How neighbours' magnitudes form a context: their mean, where the pattern has them. Cells that
+  /// have both W and N are separate from those at the edges, which are predicted less well.
   struct Step {
     std::uint16_t scale = 0;
     std::uint8_t base = 0, most = 0;

@@ -15,23 +15,23 @@
 
 namespace terrace::stream::store {
 
-/// More points than this no cluster has, nor more bytes when it is decoded (see Layout): a few
-/// bytes can stand for any number of points, so nothing else limits what a damaged count costs.
+/// Limits of the points of a cluster and of its decoded bytes (see Layout): a few bytes can
+/// represent any number of points, so nothing else limits the cost of a damaged count.
 inline constexpr std::uint32_t kMostPoints = 1u << 20;
 inline constexpr std::uint64_t kMostDecodedBytes = std::uint64_t{1} << 28;
-/// Fewer bytes than this no cluster has that has points.
+/// Minimum bytes of a cluster that has points.
 inline constexpr std::uint32_t kFewestClusterBytes = 4;
-/// More bytes than this no cluster has: every point at its raw size, and as much again.
+/// Maximum bytes of a cluster: every point at its raw size, and as much again.
 inline constexpr std::uint32_t kMostBytes = 1u << 31;
 
-/// Stores of this version and earlier are read. A raster without further attributes is written as
-/// version 1, which says it all.
+/// Stores of this version and earlier can be read. A raster without further attributes is written
+/// as version 1, which suffices for it.
 inline constexpr int kVersion = 2;
 inline int version_to_write(const Schema& schema) {
   return schema.grid && schema.attributes.empty() ? 1 : kVersion;
 }
 
-/// What the clusters of one level have in common.
+/// The common properties of the clusters of one level.
 struct Layout {
   int version = kVersion;
   bool grid = false;
@@ -46,19 +46,20 @@ struct Layout {
         payload_size(schema.payload_size()) {
     for (const Channel& channel : schema.attributes) attributes.push_back(channel.type);
   }
-  /// Most points in a cluster: their coordinates, attributes and children fit kMostDecodedBytes.
+  /// Maximum points of a cluster: their coordinates, attributes and children fit into
+  /// kMostDecodedBytes.
   [[nodiscard]] std::uint64_t most_points() const {
     const std::uint64_t bytes = sizeof(Point3) + payload_size + sizeof(std::uint64_t) * level;
     return std::min<std::uint64_t>(kMostPoints, kMostDecodedBytes / bytes);
   }
-  /// Attributes and, from version 2 on, the three axes: what may be coded as a column.
+  /// Attributes and, from version 2 on, the three axes: everything that may be coded as a column.
   [[nodiscard]] unsigned columns() const {
     return static_cast<unsigned>(attributes.size()) + (version > 1 ? 3 : 0);
   }
   [[nodiscard]] unsigned contexts() const {
     return context::kAttribute + context::kPerAttribute * columns();
   }
-  /// Whether the column may be coded beside the one before: attributes of integers.
+  /// Whether the column may be coded beside the preceding one: both are attributes of integers.
   [[nodiscard]] bool may_lie_beside(unsigned column) const {
     const auto integer = [](ScalarType t) { return t != ScalarType::f32 && t != ScalarType::f64; };
     return column > 0 && column < attributes.size() && integer(attributes[column]) &&
@@ -69,7 +70,7 @@ struct Layout {
 /// A cluster's entry in the index, as integers.
 struct Entry {
   std::uint32_t bytes = 0;
-  std::uint32_t points = 0;  ///< representative included
+  std::uint32_t points = 0;  ///< including the representative
   std::array<NumberForm, 3> forms{};
   std::array<std::int64_t, 3> low{};           ///< of the box, in the form of each axis
   std::array<std::uint64_t, 3> size{1, 1, 1};  ///< of the box: integers per axis
@@ -87,7 +88,7 @@ struct KeyRange {
 constexpr std::uint64_t attribute_key(std::int64_t value) {
   return static_cast<std::uint64_t>(value) ^ std::uint64_t{1} << 63;
 }
-/// NaN lies beyond infinity of its sign.
+/// NaN lies beyond the infinity of its sign.
 constexpr std::uint64_t attribute_key(double value) {
   const auto bits = std::bit_cast<std::uint64_t>(value);
   return bits >> 63 != 0 ? ~bits : bits | std::uint64_t{1} << 63;
@@ -122,7 +123,7 @@ constexpr double error_of(std::uint16_t code) {
   return std::bit_cast<double>(std::uint64_t{code} << kErrorShift);
 }
 
-/// The entry as the reader's callers see it. `root`: all points are members.
+/// The entry as seen by the reader's callers. `root`: all points are members.
 inline ClusterRecord record_of(const Entry& entry, unsigned level, std::uint64_t offset,
                                bool root) {
   ClusterRecord record;

@@ -8,13 +8,13 @@
 
 #include "store/codec/bytes.hpp"
 
-/// Prediction of a height from its neighbours that are known already: a linear combination whose
-/// coefficients (in 1/256, adding up to 256) are fitted by least squares, one set for each of the
-/// 64 patterns of neighbours that can be there.
+/// Prediction of a height from already known neighbours: a linear combination whose coefficients
+/// (in 1/256, adding up to 256) are fitted by least squares, one set for each of the 64 possible
+/// patterns of neighbours.
 
 namespace terrace::stream::store {
 
-/// Neighbours in this order; bit i of a pattern says that neighbour i is there.
+/// Neighbours in this order; bit i of a pattern is set if neighbour i exists.
 enum Neighbour : unsigned { kWest, kNorth, kNorthWest, kNorthEast, kWestWest, kNorthNorth };
 inline constexpr unsigned kNeighbours = 6;
 inline constexpr unsigned kPatterns = 1u << kNeighbours;
@@ -23,7 +23,7 @@ struct Predictor {
   using Coefficients = std::array<std::int32_t, kNeighbours>;
   std::array<Coefficients, kPatterns> coefficients = defaults();
 
-  /// Planes where three neighbours span one, else the nearest neighbour. Pattern 0 predicts
+  /// Planes if three neighbours span one, otherwise the nearest neighbour. Pattern 0 predicts
   /// nothing.
   static std::array<Coefficients, kPatterns> defaults();
 
@@ -32,7 +32,7 @@ struct Predictor {
   static Predictor read(ByteReader& in);
 };
 
-/// Sums up what the least squares need. All arithmetic in one fixed order.
+/// Accumulates the sums of the least squares. All arithmetic is in one fixed order.
 class PredictorFit {
  public:
   PredictorFit() : sums_(kPatterns) {}

@@ -14,17 +14,17 @@
 
 namespace terrace::stream::store {
 
-/// How often each symbol came in each context.
+/// The number of occurrences of each symbol in each context.
 using Counts = std::vector<std::array<std::uint32_t, kSymbols>>;
 
-/// Bits that the symbols of a context take, coded with a table of their own ...
+/// Bits of the symbols of a context, coded with their own table ...
 [[nodiscard]] std::uint64_t entropy_of(const std::array<std::uint32_t, kSymbols>& counts);
-/// ... and what the classes leave open.
+/// ... and the raw bits of their classes.
 [[nodiscard]] std::uint64_t open_bits_of(const std::array<std::uint32_t, kSymbols>& counts);
-/// Frequencies for `counts`, every symbol seen kept codable, the escape too.
+/// Frequencies for `counts` that keep every occurring symbol codable, and the escape.
 Frequencies normalised(const std::array<std::uint32_t, kSymbols>& counts);
 
-/// What a segment of a level's clusters is coded with: height predictor and symbol frequencies.
+/// The tables of a segment of a level's clusters: height predictor and symbol frequencies.
 struct Tables {
   Predictor predictor;
   std::vector<ColumnKind> kinds;         ///< one per column; none in version 1
@@ -33,7 +33,7 @@ struct Tables {
   void write(Bytes& out) const;
   /// Throws: Damage.
   static Tables read(ByteView bytes, const Layout& layout);
-  /// More bytes than this no tables have.
+  /// Maximum bytes of tables.
   static std::uint64_t most_bytes(const Layout& layout) {
     constexpr std::uint64_t kVarint = 10;
     return 8 + kVarint * kPatterns * kNeighbours + layout.columns() +
@@ -41,7 +41,7 @@ struct Tables {
   }
 };
 
-/// Tables made ready for encoding.
+/// Tables prepared for encoding.
 struct EncodingTables {
   Predictor predictor;
   std::vector<ColumnKind> kinds;
@@ -50,7 +50,7 @@ struct EncodingTables {
   explicit EncodingTables(const Tables& from);
 };
 
-/// Tables made ready for decoding; contexts that nothing was seen in share one table.
+/// Tables prepared for decoding; contexts without any symbols share one table.
 struct DecodingTables {
   Predictor predictor;
   std::vector<ColumnKind> kinds;

@@ -10,34 +10,34 @@
 
 namespace terrace::stream::store {
 
-/// Clusters in a page, the last of a level excepted. A page's ordinals follow by arithmetic.
+/// Clusters per page, except the last page of a level. A page's ordinals follow by arithmetic.
 inline constexpr std::uint32_t kPageClusters = 128;
-/// More bytes than this no page has: twelve columns and two for each attribute, each with its base,
-/// shift and width, of 64 bits a cluster.
+/// Maximum bytes of a page: twelve columns and two for each attribute, each with its base, shift
+/// and width, and 64 bits per cluster.
 constexpr std::uint64_t most_page_bytes(std::size_t attributes) {
   return 10 + (12 + 2 * std::uint64_t{attributes}) * (10 + 2 + 8 * kPageClusters) + 4;
 }
 
 /// Appends the page of `entries` (1 to kPageClusters): packed columns, each a base, a shift and a
-/// width, then as many bits per cluster as the width says; and the CRC-32 of it all.
-/// types: of the attributes that have ranges. ranges: of each entry, attribute by attribute; they
-/// are widened to a few bits. offset: of the first cluster in the level's data file.
+/// width, then that many bits per cluster; and the CRC-32 of everything. types: of the attributes
+/// that have ranges. ranges: for each entry, attribute by attribute; they are widened to a few
+/// bits. offset: of the first cluster in the level's data file.
 void write_page(std::span<const Entry> entries, std::span<const ScalarType> types,
                 std::span<const KeyRange> ranges, std::uint64_t offset, Bytes& out);
 
-/// A page as it lies in the file, checked, with any entry at hand.
+/// A checked page in its file format, with random access to entries.
 class IndexPage {
  public:
-  /// attributes: so many have ranges. Throws: Damage.
+  /// attributes: number of attributes with ranges. Throws: Damage.
   IndexPage(Bytes bytes, std::uint32_t clusters, std::size_t attributes);
 
   [[nodiscard]] std::uint32_t clusters() const { return clusters_; }
   [[nodiscard]] Entry entry(std::uint32_t i) const;
-  /// Of an attribute in cluster i, perhaps wider than it is. Requires ranges.
+  /// The range of an attribute in cluster i, possibly widened. Requires ranges.
   [[nodiscard]] KeyRange range(std::uint32_t i, std::size_t attribute) const;
-  /// Offset of cluster i in the data file; i = clusters() is behind the last.
+  /// Offset of cluster i in the data file; i = clusters() is the end of the last.
   [[nodiscard]] std::uint64_t offset(std::uint32_t i) const { return offsets_[i]; }
-  /// Offset of the cluster behind the last.
+  /// End of the last cluster.
   [[nodiscard]] std::uint64_t end() const { return offsets_[clusters_]; }
 
  private:
@@ -62,7 +62,7 @@ class IndexPage {
     std::uint32_t start = 0;  ///< bit position of the first value
   };
 
-  /// Of a column, above its base.
+  /// A value of a column, above its base.
   [[nodiscard]] std::uint64_t steps(std::size_t number, std::uint32_t i) const;
   [[nodiscard]] std::uint64_t value(std::size_t number, std::uint32_t i) const;
   friend void write_page(std::span<const Entry>, std::span<const ScalarType>,

@@ -8,7 +8,7 @@
 
 namespace terrace::stream::store {
 
-/// A file descriptor that closes itself.
+/// A file descriptor that is closed automatically.
 class Descriptor {
  public:
   Descriptor() = default;
@@ -29,14 +29,14 @@ class Descriptor {
   int fd_ = -1;
 };
 
-/// A new file, written front to back through a buffer, its CRC-32 kept along.
-/// Every failed write, also one that shows only at fsync or close, is thrown as an Error.
+/// A new file, written front to back through a buffer, with its CRC-32. Every failed write is
+/// thrown as an Error, including one that appears only at fsync or close.
 class OutputFile {
  public:
   explicit OutputFile(std::filesystem::path path);
 
   void write(ByteView bytes);
-  /// Writes what is buffered, syncs and closes.
+  /// Writes the buffer, syncs and closes.
   void finish();
   [[nodiscard]] std::uint64_t size() const { return size_; }
   [[nodiscard]] std::uint32_t checksum() const { return checksum_; }

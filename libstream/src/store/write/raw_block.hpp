@@ -23,8 +23,9 @@ struct RawBlock {
   [[nodiscard]] ClusteredBlock view() const;
 };
 
-/// The block that was encoded into `bytes` and `entries`; encoded again it gives the same bytes as
-/// the first original would. The boxes of entries may be grown, so the summaries are the caller's.
+/// The block that was encoded into `bytes` and `entries`; encoding it again gives the same bytes as
+/// the first original would. The boxes of entries may be enlarged, so the caller supplies the
+/// summaries.
 RawBlock decoded_block(const Layout& layout, const Tables& tables, const Bytes& bytes,
                        std::span<const Entry> entries, std::vector<ClusterSummary> summaries,
                        bool root);

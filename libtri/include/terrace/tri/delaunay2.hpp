@@ -17,15 +17,15 @@
 /// a symbolic perturbation: points are lifted to the paraboloid and raised infinitesimally, the
 /// lexicographically larger (x, then y) infinitely more (O. Devillers, M. Teillaud, "Perturbations
 /// for Delaunay and weighted Delaunay 3D triangulations", doi:10.1016/j.comgeo.2010.09.010). So
-/// collapse after expand gives back the very triangles, in any order of operations.
+/// collapse after expand restores exactly the same triangles, in any order of operations.
 ///
 /// x grows to the right and y upwards; "left" and "counter-clockwise" refer to this frame.
 
 namespace terrace::tri {
 
-/// 32-bit handles: numbers of slots. A vertex handle stays valid until its vertex is removed, a
+/// 32-bit handles: slot numbers. A vertex handle stays valid until its vertex is removed, a
 /// triangle handle until an operation removes the triangle; slots are then reused, the most
-/// recently freed blocks of 64 first. So data kept in plain arrays indexed by slot stays dense.
+/// recently freed blocks of 64 first. So data in plain arrays indexed by slot stays dense.
 enum class VertexId : std::uint32_t {};
 enum class TriangleId : std::uint32_t {};
 inline constexpr VertexId kNoVertex{0xFFFFFFFFu};
@@ -88,8 +88,8 @@ struct Location {
   VertexId vertex = kNoVertex;
 };
 
-/// The living slots of a triangulation as an input range, in the order of their numbers. Any change
-/// of the triangulation invalidates it.
+/// The slots in use of a triangulation as an input range, in ascending order. Any change of the
+/// triangulation invalidates it.
 template <class Triangulation, class Id>
 class AliveRange {
  public:
@@ -142,7 +142,7 @@ struct Euclidean {};
 
 /// Coord = std::int32_t: exact for coordinates of at most 30 bits (0 <= c < 2^30); integer
 /// arithmetic only, the same on every machine. About 60 bytes per vertex.
-/// Coord = double: any finite coordinates; exact predicates, no point is ever moved. -0.0 and 0.0
+/// Coord = double: any finite coordinates; exact predicates, points are never moved. -0.0 and 0.0
 /// are equal. About 68 bytes per vertex.
 /// Metric = EllipticalMetric2, with doubles: see metric.hpp.
 ///
@@ -162,47 +162,47 @@ class Delaunay2 {
 
   // ---- Changing -------------------------------------------------------------------------------
   // All throw std::invalid_argument naming the index of a coordinate that is not finite or out of
-  // range, and std::length_error beyond 2^29 - 2 vertices; the object is then unchanged.
-  // std::bad_alloc leaves an object that can only be cleared or destroyed.
+  // range, and std::length_error beyond 2^29 - 2 vertices; the object is then unchanged. After
+  // std::bad_alloc the object can only be cleared or destroyed.
 
   struct Insertion {
     VertexId vertex = kNoVertex;
-    bool created = false;  ///< false: a vertex of equal coordinates was there and is `vertex`
+    bool created = false;  ///< false: `vertex` already existed, with the same coordinates
   };
 
-  /// Adds points to an empty triangulation, fast. Returns the vertex of each point, equal points
-  /// the same. O(n log n); besides the result 20 bytes per point for sorting, freed before the
-  /// triangles are made.
+  /// Adds points to an empty triangulation, fast. Returns the vertex of each point, the same one
+  /// for equal points. O(n log n); besides the result 20 bytes per point for sorting, freed before
+  /// the triangles are made.
   std::vector<VertexId> build(std::span<const Point> points);
   /// Adds the complete grid x0, x0 + step, ... (columns x rows) to an empty triangulation, written
-  /// directly in canonical form: O(n), no predicate. The vertex of column i, row j is the returned
+  /// directly in canonical form: O(n), no predicates. The vertex of column i, row j is the returned
   /// one + j * columns + i. step > 0. Doubles: x0 + i * step is computed with one rounding each for
-  /// product and sum; where these would not be exact, std::invalid_argument (use build()).
-  /// In the Euclidean metric only.
+  /// product and sum; if these are not exact, std::invalid_argument (use build()). Euclidean metric
+  /// only.
   VertexId build_grid(Coord x0, Coord y0, Coord step, std::uint32_t columns,
                       std::uint32_t rows) requires std::is_same_v<Metric, Euclidean>;
-  /// hint: a vertex near the point, where the walk starts; kNoVertex: the last one used.
+  /// hint: a vertex near the point, where the walk starts; kNoVertex: the last vertex used.
   Insertion insert(const Point& point, VertexId hint = kNoVertex);
-  /// Inserts a set near the hint, in any order (it is sorted inside). results: one per point, in
-  /// the same order, or empty. Only one of several equal points counts as created. Nothing is
-  /// inserted if one point is invalid.
+  /// Inserts a set near the hint, in any order (it is sorted internally). results: one per point,
+  /// in the same order, or empty. Of equal points only one counts as created. If any point is
+  /// invalid, nothing is inserted.
   void insert(std::span<const Point> points, std::span<Insertion> results,
               VertexId hint = kNoVertex);
   void remove(VertexId vertex);
-  /// Removes a set (all different) by enlarging one hole (J. Skala, thesis, section 8.1); faster
-  /// than one by one where the set is compact. Falls back to one by one where the hole cannot be
+  /// Removes a set (all different) as one hole (J. Skala, thesis, section 8.1); faster than
+  /// removing them one by one if the set is compact. Falls back to one by one if the hole cannot be
   /// filled as a whole.
   void remove(std::span<const VertexId> vertices);
-  /// Removes everything and gives the memory back; a journal goes on.
+  /// Removes everything and releases the memory; a journal continues.
   void clear();
-  /// Room for this many vertices without moving memory.
+  /// Reserves room for this many vertices without moving memory.
   void reserve(std::size_t vertices);
 
   // ---- Reading --------------------------------------------------------------------------------
 
   [[nodiscard]] const Metric& metric() const;
   [[nodiscard]] std::size_t vertex_count() const;
-  /// Finite triangles. 0 while all points are collinear.
+  /// Number of finite triangles: 0 while all points are collinear.
   [[nodiscard]] std::size_t triangle_count() const;
   [[nodiscard]] Point point(VertexId vertex) const;
   [[nodiscard]] std::array<VertexId, 3> vertices(TriangleId triangle) const;  ///< counter-clockwise
@@ -210,17 +210,19 @@ class Delaunay2 {
   [[nodiscard]] std::array<TriangleId, 3> neighbours(TriangleId triangle) const;
   /// A triangle at the vertex; kNoTriangle while there are no triangles. O(1).
   [[nodiscard]] TriangleId triangle_at(VertexId vertex) const;
-  /// Vertices joined to this one by an edge, counter-clockwise, a hull vertex's from its next on
-  /// the hull to its previous. While all points are collinear: those before and after on the line.
+  /// Vertices joined to this one by an edge, counter-clockwise; for a hull vertex from its
+  /// successor on the hull to its predecessor. While all points are collinear: its neighbours on
+  /// the line.
   void adjacent(VertexId vertex, std::vector<VertexId>& result) const;
 
-  /// Handles of vertices and triangles are below these numbers, which shrink only by clear() and
-  /// when an empty triangulation is built. Not every slot below is alive: some are free, and some
-  /// are used by the structure itself.
+  /// Upper bounds of vertex and triangle handles; they shrink only by clear() and when an empty
+  /// triangulation is built. Not every slot below is in use: some are free, and some belong to the
+  /// structure itself.
   [[nodiscard]] std::uint32_t vertex_slots() const;
   [[nodiscard]] std::uint32_t triangle_slots() const;
-  [[nodiscard]] bool alive(VertexId vertex) const;      ///< any handle; false for kNoVertex
-  [[nodiscard]] bool alive(TriangleId triangle) const;  ///< any handle; false for kNoTriangle
+  [[nodiscard]] bool alive(VertexId vertex) const;  ///< accepts any handle; false for kNoVertex
+  /// accepts any handle; false for kNoTriangle
+  [[nodiscard]] bool alive(TriangleId triangle) const;
   [[nodiscard]] AliveRange<Delaunay2, VertexId> all_vertices() const {
     return {*this, vertex_slots()};
   }
@@ -232,36 +234,36 @@ class Delaunay2 {
   /// in a triangulation", doi:10.1142/S0129054102001047) from the hint. The point must be valid as
   /// for insert(). About sqrt(n) steps from afar, a few from nearby.
   [[nodiscard]] Location locate(const Point& point, VertexId hint = kNoVertex) const;
-  /// The vertex nearest to the point, the lexicographically smallest on ties; kNoVertex when
-  /// empty. Exact. Costs a walk.
+  /// The vertex nearest to the point, the lexicographically smallest on ties; kNoVertex if empty.
+  /// Exact. Costs a walk.
   [[nodiscard]] VertexId nearest(const Point& point, VertexId hint = kNoVertex) const;
 
-  /// A hash of the set of triangles by their coordinates, or of the points while there is no
-  /// triangle: the same for equal point sets whatever their history. O(n).
+  /// A hash of the set of triangles by coordinates, or of the points while there are no triangles:
+  /// equal for equal point sets whatever their history. O(n).
   [[nodiscard]] std::uint64_t hash() const;
-  /// Bytes of memory held, unused capacity included.
+  /// Bytes of memory held, including unused capacity.
   [[nodiscard]] std::size_t memory_bytes() const;
 
   // ---- Observing ------------------------------------------------------------------------------
 
-  /// The net difference between two moments: what was there at the first and is not at the second,
-  /// and the reverse. A reused slot appears on both sides: apply removals first.
+  /// The net difference between two moments: what existed at the first and not at the second, and
+  /// vice versa. A reused slot appears on both sides: apply removals first.
   struct Changes {
     std::vector<VertexId> removed_vertices;
-    std::vector<Point> removed_points;  ///< of removed_vertices, in parallel
+    std::vector<Point> removed_points;  ///< positions of removed_vertices, in parallel
     std::vector<VertexId> added_vertices;
     std::vector<TriangleId> removed_triangles;
-    /// The vertices of removed_triangles as they were, in parallel.
+    /// The former vertices of removed_triangles, in parallel.
     std::vector<std::array<VertexId, 3>> removed_corners;
     std::vector<TriangleId> added_triangles;
     void clear();
   };
 
-  /// Starts recording; what was recorded before is dropped. While recording, a change
-  /// costs some nanoseconds per triangle, and 2 bits per vertex beside the records are held.
+  /// Starts recording and drops earlier records. While recording, a change costs some nanoseconds
+  /// per triangle; the journal holds 2 bits per vertex besides the records.
   void start_journal();
   void stop_journal();
-  /// The changes since start_journal() or the last call; recording goes on. `changes` is
+  /// The changes since start_journal() or the last call; recording continues. `changes` is
   /// overwritten and its capacity reused. Requires a started journal. O(number of slots touched).
   void take_changes(Changes& changes);
 

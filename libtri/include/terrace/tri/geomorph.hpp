@@ -11,7 +11,7 @@
 
 namespace terrace::tri {
 
-/// Vertices that slide, in columns: vertices[i] goes from start[i] to end[i].
+/// Vertices that slide, as columns: vertices[i] goes from start[i] to end[i].
 struct Slides {
   std::vector<VertexId> vertices;
   std::vector<Point3> start, end;
@@ -31,14 +31,14 @@ struct Slides {
 
 class HeightPatches;
 
-/// How a terrain slides over a step instead of popping: for each vertex that came or went, or whose
-/// height changed, where it starts and where it ends. x and y stay.
+/// How a terrain slides over a step instead of popping: start and end positions of each vertex that
+/// came or went or whose height changed. x and y do not change.
 ///
-/// A new vertex starts on the surface of before the step and ends at its own height: draw the new
-/// triangles with `added` and `reassigned` going from start to end. A removed one goes from its
-/// height down to the surface of after the step: a renderer that draws the old triangles until the
-/// slide is over moves `removed`, and `reassigned`, likewise. Collapse mirrors expand: a step and
-/// its inverse give the same slides with start and end exchanged.
+/// A new vertex starts on the surface before the step and ends at its own height: draw the new
+/// triangles with `added` and `reassigned` going from start to end. A removed vertex goes from its
+/// height to the surface after the step: a renderer that draws the old triangles until the slide is
+/// over moves `removed`, and `reassigned`, in the same way. Collapse mirrors expand: a step and its
+/// inverse give the same slides with start and end exchanged.
 ///
 /// A vertex outside the other surface (the hull grew, or there were no triangles) stays at its own
 /// height.
@@ -53,14 +53,14 @@ class Geomorph2 {
   Slides added, removed, reassigned;
 
   /// delta: of the model's last step, which needs ModelOptions::old_heights. Replaces the slides.
-  /// O(n log n) in what the delta tells. Throws std::invalid_argument for a delta without heights.
+  /// O(n log n) in the size of the delta. Throws std::invalid_argument for a delta without heights.
   void make(const Model& model, const typename Model::Delta& delta);
 
  private:
   [[nodiscard]] Point3 old_position(const Model& model, VertexId vertex) const;
 
-  // By slot, the positions before the step of vertices that have moved since.
-  std::vector<std::uint32_t> old_index_;  // into old_positions_; kAsNow: as now
+  // By slot: the positions before the step of vertices that have moved since.
+  std::vector<std::uint32_t> old_index_;  // into old_positions_; kAsNow: the current position
   std::vector<Point3> old_positions_;
   std::unique_ptr<HeightPatches> patches_;
 };

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-/// TINs of raster windows, within a bound of every sample.
+/// TINs of raster windows, within an error bound at every sample.
 ///
 /// M. Garland, P. S. Heckbert, "Fast polygonal approximation of terrains and height fields",
 /// CMU-CS-95-181 (greedy insertion), followed by the removal of vertices that later ones made
@@ -19,8 +19,8 @@
 /// its own thread. Nothing here keeps state or starts threads.
 ///
 /// No triangle contains a sample without data, and every sample with data lies in a triangle if its
-/// 8 neighbours (those in the window) have data too. The boundary may run anywhere in between: land
-/// less than three samples wide can vanish.
+/// 8 neighbours (as far as they are in the window) have data too. In between, the boundary may run
+/// anywhere: land less than three samples wide can vanish.
 
 namespace terrace::tri {
 
@@ -40,23 +40,23 @@ struct GridTinCheck {
   std::size_t samples = 0;                  ///< samples with data
   std::size_t covered = 0;                  ///< samples with data in a triangle
   std::size_t uncovered = 0;                ///< samples with data outside all triangles
-  std::vector<std::uint32_t> uncovered_at;  ///< numbers of the latter, counted row by row
-  /// Uncovered samples whose 8 neighbours (those in the window) have data.
+  std::vector<std::uint32_t> uncovered_at;  ///< uncovered samples, numbered row by row
+  /// Uncovered samples whose 8 neighbours (as far as they are in the window) have data.
   std::size_t uncovered_inner = 0;
   std::size_t nodata_covered = 0;  ///< samples without data in a triangle
-  std::size_t turned = 0;          ///< triangles without area or oriented against the first one
+  std::size_t turned = 0;  ///< triangles without area, or oriented opposite to the first one
 };
 
-/// Measures every sample in every triangle, sides and corners included, in double. Points are
+/// Measures every sample in every triangle, including its sides and corners, in double. Points are
 /// column, row and height, not necessarily on the lattice: the values read back from a file, which
-/// may have been rounded. `tolerance`, in cells, is how far they may have moved: a sample that is
-/// no farther outside a triangle counts as covered by it and is measured against its plane; samples
-/// without data count only inside. Time O(samples + triangles + points); memory: one byte per
-/// sample and four per uncovered one.
+/// may have been rounded. `tolerance`, in cells, is how far they may have moved: a sample no
+/// farther than this outside a triangle counts as covered by it and is measured against its plane;
+/// samples without data count only inside. Time O(samples + triangles + points); memory: one byte
+/// per sample and four per uncovered sample.
 ///
-/// Throws std::invalid_argument for `heights` of the wrong length, a corner that is not the number
-/// of a point, a point that is not finite or whose column or row is more than 2^20 outside the
-/// window, and a tolerance that is not in [0, 1].
+/// Throws std::invalid_argument for `heights` of the wrong length, a corner that is not a point's
+/// number, a point that is not finite or whose column or row is more than 2^20 outside the window,
+/// and a tolerance that is not in [0, 1].
 template <class T>
 GridTinCheck check_grid_tin(const GridWindow<T>& window, std::span<const Point3> points,
                             std::span<const std::array<std::uint32_t, 3>> triangles,
@@ -71,7 +71,7 @@ extern template GridTinCheck check_grid_tin(const GridWindow<double>&, std::span
 enum class TinQuality : std::uint8_t {
   kGreedy,   ///< insertion only: a Delaunay triangulation of its vertices, except at settled sides
   kRemoval,  ///< then one pass of removals within the bound: about 0.6 of the triangles
-  kFitted,   ///< then heights moved within the bound, which allows a second pass to remove more
+  kFitted,   ///< then heights are moved within the bound, which allows a second pass to remove more
 };
 
 struct GridTinOptions {
@@ -79,17 +79,18 @@ struct GridTinOptions {
   /// cannot be distinguished from 0; see `max_error` of the result.
   double max_error = 0;
   TinQuality quality = TinQuality::kRemoval;
-  /// Signed distance on the ground from one column and one row to the next, in one unit and not 0:
-  /// east and north are positive, so row_step is negative if the first row is the northernmost.
-  /// Angles and empty circles are those on the ground, with the squares of steps rounded to 1 /
-  /// 1024 of the larger one. Triangles are counter-clockwise on the ground, seen from above.
+  /// Signed distance on the ground from one column and one row to the next, in the same unit and
+  /// not 0: east and north are positive, so row_step is negative if the first row is the
+  /// northernmost. Angles and empty circles are those on the ground, with the squares of steps
+  /// rounded to 1 / 1024 of the larger one. Triangles are counter-clockwise on the ground, seen
+  /// from above.
   double column_step = 1;
   double row_step = -1;
-  /// Measure the errors of the result. Unnecessary for a caller that checks what was written.
+  /// Measures the errors of the result. Unnecessary if the caller checks the written file.
   bool measure = true;
 };
 
-/// The vertices on the sides of a window: ascending numbers of samples, including both ends.
+/// The vertices on the sides of a window: ascending sample numbers, including both ends.
 struct GridSides {
   std::vector<std::uint32_t> first_row;
   std::vector<std::uint32_t> last_row;
@@ -100,7 +101,7 @@ struct GridSides {
 struct GridVertex {
   std::uint32_t column = 0;
   std::uint32_t row = 0;
-  double height = 0;  ///< the sample's, exact for T = float; with kFitted a value of type T
+  double height = 0;  ///< the sample's, exact for T = float; with kFitted, a value of type T
 
   bool operator==(const GridVertex&) const = default;
 };
@@ -108,19 +109,19 @@ struct GridVertex {
 struct GridTin {
   std::vector<GridVertex> vertices;  ///< each in at least one triangle
   std::vector<std::array<std::uint32_t, 3>> triangles;
-  /// By check_grid_tin(); without `measure` only the number of samples with data is set.
+  /// From check_grid_tin(); without `measure` only the number of samples with data is set.
   GridTinCheck check;
 };
 
 /// The vertices on a side of a window, or on any line of samples. The line is simplified to within
 /// slightly less than `max_error`, greatest error first; both ends are vertices. `beside` and
-/// `other_beside` are the lines next to it on either side, equally long, or empty where the raster
+/// `other_beside` are the adjacent lines on either side, equally long, or empty where the raster
 /// ends (or has data everywhere): a sample with data is a vertex if a neighbour on any of the three
 /// lines has no data. Both windows at a side must pass the same three lines; the order of the last
 /// two does not matter. Usually O(n log n).
 ///
 /// Throws std::invalid_argument for lines of different lengths, heights beyond 1e150 and a bound
-/// that is negative or not a number.
+/// that is negative or NaN.
 template <class T>
 std::vector<std::uint32_t> settle_side(std::span<const T> line, std::span<const T> beside,
                                        std::span<const T> other_beside, double max_error);
@@ -129,11 +130,11 @@ std::vector<std::uint32_t> settle_side(std::span<const T> line, std::span<const 
 template <class T>
 GridSides settle_sides(const GridWindow<T>& window, double max_error);
 
-/// A TIN with the vertices `sides` on its sides, within the bound of every sample that it covers.
-/// T is float (which also holds integers of 24 bits) or double. A window of one row or column has
-/// no triangles. About a microsecond per vertex inserted (a third less with kGreedy, half as much
+/// A TIN with the vertices `sides` on its sides, within the bound at every sample that it covers. T
+/// is float (which also holds integers of 24 bits) or double. A window of one row or column has no
+/// triangles. About a microsecond per vertex inserted (a third less with kGreedy, half as much
 /// again with kFitted); about twice as many are inserted as remain. Memory: about 190 bytes per
-/// vertex inserted, and 4 or 8 per sample (7 or 11 where data is missing).
+/// vertex inserted, and 4 or 8 per sample (7 or 11 if data is missing).
 ///
 /// Deterministic: the same bytes on every processor.
 ///
@@ -144,9 +145,9 @@ template <class T>
 GridTin grid_tin(const GridWindow<T>& window, const GridSides& sides,
                  const GridTinOptions& options);
 
-/// A TIN of at most `max_points` vertices, the 4 corners among them: each is inserted where the
+/// A TIN of at most `max_points` vertices, including the 4 corners: each is inserted where the
 /// error is greatest. Its error is `check.max_error` (with options.measure). Insertion stops early
-/// where options.max_error is reached; options.quality is ignored. With too few points to separate
+/// if options.max_error is reached; options.quality is ignored. With too few points to separate
 /// data from missing data, samples with data remain uncovered (check.uncovered_inner). Throws as
 /// grid_tin() does, and for max_points < 4.
 template <class T>

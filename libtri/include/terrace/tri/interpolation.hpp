@@ -30,8 +30,8 @@ template <class T>
 concept HeightFunction = std::is_invocable_r_v<double, const T&, VertexId>;
 
 /// The heights of vertices: an array indexed by slot(vertex), a function, or an object with a
-/// member function height(VertexId). Like std::span it refers to what it was made from, so use it
-/// for parameters only. With several threads the function is called concurrently.
+/// member function height(VertexId). Like std::span it refers to its argument, so use it for
+/// parameters only. With several threads the function is called concurrently.
 class Heights {
  public:
   template <class T>
@@ -64,15 +64,14 @@ class Heights {
 };
 
 enum class Interpolation : std::uint8_t {
-  /// The nearest vertex, also outside the hull; of equally near ones the lexicographically
-  /// smallest.
+  /// The nearest vertex, also outside the hull; the lexicographically smallest on ties.
   kNearest,
   /// Barycentric coordinates in the triangle.
   kLinear,
-  /// R. Sibson, "A vector identity for the Dirichlet tessellation",
-  /// doi:10.1017/S0305004100056589: the areas that the query's Voronoi cell would take from the
-  /// cells of its neighbours. Continuous, smooth except at vertices, and the same for any
-  /// triangulation of cocircular points.
+  /// R. Sibson, "A vector identity for the Dirichlet tessellation", doi:10.1017/S0305004100056589:
+  /// the areas that the query's Voronoi cell would take from the cells of its neighbours.
+  /// Continuous, smooth except at vertices, and independent of how cocircular points are
+  /// triangulated.
   kNaturalNeighbour,
 };
 
@@ -82,15 +81,14 @@ struct VertexWeight {
 };
 
 /// The weights of the vertices that interpolate at a query: they are >= 0, their sum is 1, and
-/// (except with kNearest) the weighted mean of the vertices is the query. There are no weights
-/// outside the hull (kLinear, kNaturalNeighbour) and in an empty triangulation. The hull counts as
-/// inside, decided exactly; if all points are on one line, it is the segment between the outermost.
-/// On a vertex only that vertex has a weight, on a hull edge only its two ends.
+/// (except with kNearest) the weighted mean of the vertices is the query. Empty outside the hull
+/// (kLinear, kNaturalNeighbour) and in an empty triangulation. The hull counts as inside, decided
+/// exactly; if all points are on one line, it is the segment between the outermost. On a vertex
+/// only that vertex has a weight, on a hull edge only its two ends.
 ///
-/// The triangles that a query concerns are found exactly. The weights are computed with doubles;
-/// where the estimated error is above 1e-11 (needles, queries next to the hull, coordinates near
-/// the ends of the range) they are computed again with rational numbers, about a hundred times as
-/// slow.
+/// The triangles that a query affects are found exactly. The weights are computed in double; if the
+/// estimated error is above 1e-11 (needles, queries close to the hull, coordinates near the ends of
+/// the range) they are recomputed with rational numbers, about a hundred times as slow.
 ///
 /// Replaces the contents of `weights`. hint: a vertex near the query, where the walk starts. Throws
 /// std::invalid_argument for a query that is not finite.
@@ -98,10 +96,10 @@ template <class Coord>
 void weights_at(const Delaunay2<Coord>& triangulation, const Point2& query, Interpolation method,
                 std::vector<VertexWeight>& weights, VertexId hint = kNoVertex);
 
-/// Heights at many queries, in their order; NaN where there are no weights or a vertex with a
-/// weight has the height NaN. Queries are sorted along a Hilbert curve internally, so pass many at
-/// once: about 0.4 us each on one core. threads: 0 for one per core; the bytes of the result do not
-/// depend on it. Memory: 16 bytes per query, for at most 2^24 queries at a time.
+/// Heights at many queries, in their order; NaN if there are no weights or a vertex with a weight
+/// has the height NaN. Queries are sorted along a Hilbert curve internally, so pass many at once:
+/// about 0.4 us each on one core. threads: 0 for one per core; the result does not depend on it.
+/// Memory: 16 bytes per query, for at most 2^24 queries at a time.
 ///
 /// Throws std::invalid_argument naming the index of a query that is not finite, or if an array of
 /// heights is shorter than vertex_slots().
@@ -110,23 +108,23 @@ std::vector<double> heights_at(const Delaunay2<Coord>& triangulation, const Heig
                                std::span<const Point2> queries, Interpolation method,
                                unsigned threads = 0);
 
-/// Height gained per unit of length to the east and to the north. NaN where it is undefined.
+/// Height gained per unit of length to the east and to the north. NaN if undefined.
 struct Gradient {
   double x = std::numeric_limits<double>::quiet_NaN();
   double y = std::numeric_limits<double>::quiet_NaN();
 };
 
 enum class GradientFrom : std::uint8_t {
-  /// The gradient of the triangle. On edges and vertices, where triangles differ, it is the mean of
-  /// those that meet there, weighted by area.
+  /// The gradient of the triangle. On edges and vertices, the area-weighted mean over the triangles
+  /// that meet there.
   kTriangles,
-  /// The derivative of natural neighbour interpolation. On a vertex, where there is none, it is the
-  /// mean over the vertex's Voronoi cell by the same formula, which is exact for planes. On hull
-  /// edges and hull vertices, whose cells are unbounded, it is that of kTriangles.
+  /// The derivative of natural neighbour interpolation. On a vertex, where the derivative does not
+  /// exist, the mean over the vertex's Voronoi cell by the same formula, which is exact for planes.
+  /// On hull edges and hull vertices, whose cells are unbounded, the gradient of kTriangles.
   kNaturalNeighbours,
 };
 
-/// Gradients at many queries, otherwise as heights_at(). They are undefined outside the hull, and
+/// Gradients at many queries, otherwise like heights_at(). They are undefined outside the hull, and
 /// everywhere if all points are on one line.
 template <class Coord>
 std::vector<Gradient> gradients_at(const Delaunay2<Coord>& triangulation, const Heights& heights,
@@ -137,8 +135,8 @@ std::vector<Gradient> gradients_at(const Delaunay2<Coord>& triangulation, const 
 /// must have the same unit.
 [[nodiscard]] double slope_degrees(const Gradient& gradient);
 
-/// The direction of steepest descent, in degrees clockwise from north (+y): 90 is east (+x).
-/// 0 <= aspect < 360; NaN where the surface is level.
+/// The direction of steepest descent, in degrees clockwise from north (+y): 90 is east (+x). 0 <=
+/// aspect < 360; NaN if the surface is level.
 [[nodiscard]] double aspect_degrees(const Gradient& gradient);
 
 #define TERRACE_TRI_DECLARE(Coord)                                                                \

@@ -17,16 +17,17 @@
 #include "terrace/tri/point_cloud.hpp"
 
 /// A triangulation of a hierarchy of clusters whose detail is raised and lowered, and the interface
-/// by which it reads that hierarchy, wherever it is stored.
+/// through which it reads that hierarchy, wherever it is stored.
 ///
 /// Level 0 is full resolution; levels grow coarser upward to the top. A cluster of level L is
-/// headed by one point whose highest level is above L and has as members points whose highest level
+/// headed by one point whose highest level is above L; its members are points whose highest level
 /// is exactly L. A point of highest level h heads one cluster on every level below h. The points of
-/// the top level are the members of the root, which no point heads.
+/// the top level are the members of the root, which has no head.
 
 namespace terrace::tri {
 
-/// Names a cluster for the life of its source: level in the upper 8 bits, ordinal in the lower 56.
+/// Identifies a cluster for the lifetime of its source: level in the upper 8 bits, ordinal in the
+/// lower 56.
 enum class ClusterId : std::uint64_t {};
 
 constexpr ClusterId cluster_id(unsigned level, std::uint64_t ordinal) {
@@ -41,30 +42,32 @@ constexpr std::uint64_t ordinal_of(ClusterId id) {
 /// For messages: "cluster 12 of level 3".
 std::string to_string(ClusterId id);
 
-/// Names a point for the life of its source: member `index` of `cluster`. Its highest level is
-/// level_of(cluster).
+/// Identifies a point for the lifetime of its source: member `index` of `cluster`. Its highest
+/// level is level_of(cluster).
 struct PointId {
   ClusterId cluster{};
   std::uint32_t index = 0;
   friend auto operator<=>(const PointId&, const PointId&) = default;
 };
 
-/// Whether `a` stands for a vertex that both lie on: the higher level, then the smaller id.
+/// Whether `a` represents a vertex that both points share: the higher level wins, then the smaller
+/// id.
 constexpr bool stands_before(const PointId& a, const PointId& b) {
   const unsigned la = level_of(a.cluster), lb = level_of(b.cluster);
   return la != lb ? la > lb : a < b;
 }
 
-/// What is known of a cluster before its members are read.
+/// What is known about a cluster before its members are read.
 struct ClusterRecord {
-  Box3 box;                   ///< of all descendants down to level 0, the head included
-  double error = 0.0;         ///< ground metres; no descendant is farther from the head
-  std::uint64_t members = 0;  ///< that read() will deliver
+  Box3 box;  ///< of all descendants down to level 0, including the head
+  /// ground metres; upper bound of the distance of any descendant from the head
+  double error = 0.0;
+  std::uint64_t members = 0;  ///< the number that read() will deliver
 };
 
-/// The members of a cluster, in the order that gives their ids. They are inserted in this order:
-/// one in which neighbours follow each other (row by row for rasters, a k-d tree's for clouds)
-/// is 1.2 to 1.6 times as fast as a random one, and about as fast as a Hilbert curve. A member of
+/// The members of a cluster, in the order that defines their ids. They are inserted in this order:
+/// one in which neighbours follow each other (row by row for rasters, a k-d tree's for clouds) is
+/// 1.2 to 1.6 times as fast as a random order, and about as fast as a Hilbert curve. A member of
 /// level L has L `children`: the ordinals of the clusters that it heads on levels 0, 1, ... L - 1;
 /// those of member i start at children[i * L]. The spans are valid until the next call of read().
 struct ClusterMembers {
@@ -72,24 +75,24 @@ struct ClusterMembers {
   std::span<const std::uint64_t> children;
 };
 
-/// Delivers clusters. Calls come from the thread that uses the model, one at a time. What it throws
-/// passes through the model, which is then unchanged.
+/// Delivers clusters. Calls come from the thread that uses the model, one at a time. Exceptions
+/// pass through the model, which is then unchanged.
 class ClusterSource {
  public:
   virtual ~ClusterSource() = default;
 
-  /// The level of the root, cluster_id(top(), 0); 0 if the points are one level.
+  /// The level of the root, cluster_id(top(), 0); 0 if all points are on one level.
   [[nodiscard]] virtual unsigned top() const = 0;
-  /// Number of clusters of a level below the top. Their ordinals are smaller.
+  /// Number of clusters of a level below the top; their ordinals are 0 .. cluster_count - 1.
   [[nodiscard]] virtual std::uint64_t cluster_count(unsigned level) const = 0;
-  /// Never asked of the root.
+  /// Never called for the root.
   virtual ClusterRecord record(ClusterId id) = 0;
   virtual ClusterMembers read(ClusterId id) = 0;
-  /// The ids that read() will be asked for next, in that order: a chance to fetch them at once.
+  /// The ids for which read() will be called next, in that order: a chance to fetch them at once.
   virtual void announce(std::span<const ClusterId> ids);
 };
 
-/// The source contradicts itself (or the triangulation cannot hold what it delivers). The message
+/// The source contradicts itself (or delivers what the triangulation cannot hold). The message
 /// names the cluster and the member.
 class HierarchyError : public std::runtime_error {
  public:
@@ -101,47 +104,48 @@ class HierarchyError : public std::runtime_error {
   ClusterId cluster_;
 };
 
-/// A part of space that is wanted in finer detail.
+/// A part of space where finer detail is wanted.
 struct Focus {
   Box3 box;
   unsigned level = 0;
 };
 
 /// How much detail is wanted where: all points of `level` and above, and in each focus those of its
-/// level and above (all of them inside the box, and what shares a cluster with one inside).
+/// level and above (all points inside the box, and those that share a cluster with one inside).
 struct Detail {
-  static constexpr unsigned kTop = 255;  ///< any level that is not below the top means the top
+  static constexpr unsigned kTop = 255;  ///< any level at or above the top means the top
   unsigned level = kTop;
   std::vector<Focus> focuses;
-  /// Narrows focuses that are not boxes: whether the focus of that number needs what lies in the
-  /// box, which meets the focus's own. Must also be true of every box that contains one of which it
-  /// is true. Without it a focus needs all that meets its box.
+  /// Narrows focuses that are not boxes: whether the focus with this index needs the contents of
+  /// the box, which meets the focus's own. If true for a box it must be true for every box that
+  /// contains it. Empty: a focus needs everything that meets its box.
   std::function<bool(std::size_t focus, const Box3& box)> needs{};
 };
 
 struct ModelOptions {
   /// false: no deltas are recorded, steps are faster and every Delta is empty.
   bool deltas = true;
-  /// true: a Delta also tells the heights that were there before, for 8 bytes and a bit per vertex.
+  /// true: a Delta also reports the former heights, for 8 bytes and a bit per vertex.
   bool old_heights = false;
 };
 
-/// A triangulation of a hierarchy of clusters that is coarse here and fine there. The points of the
-/// top level are always in it; expanding a cluster adds its members, collapsing it takes them out
-/// again. Source: J. Skala, Algorithms for manipulating large geometric data, chapter 8.
+/// A triangulation of a hierarchy of clusters that is coarse in some places and fine in others. The
+/// points of the top level are always in it; expanding a cluster adds its members, collapsing it
+/// removes them again. Source: J. Skala, Algorithms for manipulating large geometric data, chapter
+/// 8.
 ///
 /// Laws, for clusters a, b that can be expanded:
-///   expand(a), collapse(a)  gives back the very triangulation;
-///   the triangulation is a function of the set of expanded clusters, however it came about.
-/// Collapsing a cluster first collapses what is expanded below it.
+///   expand(a), collapse(a)  restores exactly the same triangulation;
+///   the triangulation is a function of the set of expanded clusters, however it was reached.
+/// Collapsing a cluster first collapses the expanded clusters below it.
 ///
-/// Points of equal coordinates are one vertex, which lives as long as one of them. Of those that
-/// are present the one of the highest level, then the smallest id, stands for it: gives its point
-/// id, level and height.
+/// Points of equal coordinates share one vertex, which lives as long as one of them is present. Of
+/// those present, the point of the highest level, then of the smallest id, represents the vertex:
+/// it determines its point id, level and height.
 ///
 /// Every change is a step: the clusters it needs are all read before the triangulation is touched.
-/// If the source throws, or contradicts itself (HierarchyError), the model is unchanged.
-/// std::bad_alloc during a step leaves a model that can only be destroyed.
+/// If the source throws, or contradicts itself (HierarchyError), the model is unchanged. After
+/// std::bad_alloc during a step the model can only be destroyed.
 ///
 /// Memory, beside the triangulation: 16 bytes per vertex and 4 per member, 48 per expanded cluster;
 /// more for points above level 0. With clusters of 140 members about 21 bytes per
@@ -153,20 +157,21 @@ class MultiresolutionModel {
  public:
   using Point = typename Triangulation::Point;
 
-  /// What a step has changed. Apply removals first: a handle that was used again is on both sides.
+  /// The changes of a step. Apply removals first: a reused handle is on both sides.
   struct Delta {
     /// Vertices and triangles, see Delaunay2::Changes.
     typename Triangulation::Changes changes;
-    /// Vertices that stayed, for which another point stands now: look at their height again.
+    /// Vertices that stayed but are now represented by another point: update their heights.
     std::vector<VertexId> reassigned;
-    /// With ModelOptions::old_heights, else empty: the heights before the step of
+    /// With ModelOptions::old_heights, otherwise empty: the heights before the step of
     /// changes.removed_vertices and of reassigned, in parallel.
     std::vector<double> removed_heights, reassigned_heights;
   };
 
-  /// Starts with the points of the given detail, built in one go. The first delta covers what comes
-  /// after: begin with a look at the triangulation. The source must outlive the model.
-  /// `empty`: the triangulation to fill, which brings the metric.
+  /// Starts with the points of the given detail, built in one go. The first delta covers the
+  /// changes after that: begin by reading the whole triangulation. The source must outlive the
+  /// model.
+  /// `empty`: the triangulation to fill, which supplies the metric.
   /// Throws: what the source throws, HierarchyError, std::length_error.
   explicit MultiresolutionModel(ClusterSource& source, const Detail& start = {},
                                 ModelOptions options = {}, Triangulation empty = Triangulation());
@@ -176,29 +181,31 @@ class MultiresolutionModel {
   MultiresolutionModel& operator=(MultiresolutionModel&&) noexcept;
 
   // ---- Steps ----------------------------------------------------------------------------------
-  // All return the delta, which lives until the next step, and throw what the source throws,
-  // HierarchyError, and std::length_error when there would be more vertices than handles.
+  // All return the delta, which is valid until the next step, and throw what the source throws,
+  // HierarchyError, and std::length_error if there would be more vertices than handles.
 
-  /// Requires that the cluster is expanded or can be (can_expand()), else std::invalid_argument.
-  /// Expanding an expanded cluster changes nothing; so does collapsing a collapsed one.
+  /// Requires that the cluster is expanded or can be (can_expand()), otherwise
+  /// std::invalid_argument. Expanding an expanded cluster changes nothing; nor does collapsing a
+  /// collapsed one.
   const Delta& expand(ClusterId cluster);
   const Delta& collapse(ClusterId cluster);
 
-  /// Expands the clusters of `level` and above that intersect the region: all points inside that
-  /// have that level or a higher one are then present.
+  /// Expands the clusters of `level` and above that intersect the region: afterwards all points
+  /// inside it that have this level or a higher one are present.
   const Delta& refine(const Box3& region, unsigned level);
   /// Collapses the clusters below `level` that lie wholly inside the region: nothing outside is
   /// lost.
   const Delta& coarsen(const Box3& region, unsigned level);
   /// Both in one step.
   const Delta& set_region(const Box3& region, unsigned level);
-  /// Everything: expands and collapses until exactly the clusters wanted are expanded.
+  /// Applies to everything: expands and collapses until exactly the wanted clusters are expanded.
   const Delta& set_detail(const Detail& detail);
   const Delta& set_level(unsigned level) { return set_detail({level, {}}); }
 
-  /// Makes one step of several: until close_step() the functions above change the triangulation at
-  /// once, but what they return means nothing; close_step() returns the delta of them all. Of a
-  /// vertex whose point went and came back in between, `reassigned` may tell though it is the same.
+  /// Combines several steps into one: until close_step() the functions above change the
+  /// triangulation at once, but their return values have no meaning; close_step() returns the
+  /// combined delta. `reassigned` may include an unchanged vertex whose point went and came back in
+  /// between.
   void open_step();
   const Delta& close_step();
 
@@ -206,46 +213,46 @@ class MultiresolutionModel {
 
   [[nodiscard]] const Triangulation& triangulation() const;
   [[nodiscard]] unsigned top() const;
-  /// Points present; more than vertices where some have equal coordinates.
+  /// Points present; more than vertices if some have equal coordinates.
   [[nodiscard]] std::size_t point_count() const;
 
-  /// These tell about the point that stands for a living vertex. O(1).
+  /// Properties of the point that represents a living vertex. O(1).
   [[nodiscard]] PointId point_id(VertexId vertex) const;
   [[nodiscard]] unsigned level(VertexId vertex) const;
   [[nodiscard]] double height(VertexId vertex) const;
-  /// The clusters that the points on a vertex head, those of the standing point first, the coarsest
-  /// first. Replaces `clusters`.
+  /// The clusters that the points on a vertex head, those of the representing point first, the
+  /// coarsest first. Replaces `clusters`.
   void heads(VertexId vertex, std::vector<ClusterId>& clusters) const;
 
   [[nodiscard]] std::size_t expanded_count() const;
-  /// The expanded clusters in ascending order, the root not among them.
+  /// The expanded clusters in ascending order, without the root.
   [[nodiscard]] std::vector<ClusterId> expanded() const;
   [[nodiscard]] bool is_expanded(ClusterId cluster) const;
-  /// Whether it is a child of an expanded cluster and not expanded.
+  /// Whether the cluster is a child of an expanded cluster and not itself expanded.
   [[nodiscard]] bool can_expand(ClusterId cluster) const;
-  /// The clusters below an expanded one (or the root), one level down. Replaces `clusters`.
-  /// Throws: std::invalid_argument if it is not expanded.
+  /// The clusters directly below an expanded one (or the root). Replaces `clusters`. Throws:
+  /// std::invalid_argument if the cluster is not expanded.
   void children(ClusterId cluster, std::vector<ClusterId>& clusters) const;
   /// The vertex of the point that heads a cluster that is expanded or can be.
   [[nodiscard]] VertexId head_vertex(ClusterId cluster) const;
-  /// The record of such a cluster; asks the source once.
+  /// The record of such a cluster; queries the source once.
   [[nodiscard]] const ClusterRecord& record(ClusterId cluster);
 
-  /// Bytes held beside the triangulation.
+  /// Bytes held besides the triangulation.
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
   template <class>
-  friend class ViewControl;  // it decides by the tree
+  friend class ViewControl;  // uses the tree for its decisions
 
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
 
-/// The model of points in the plane: std::int32_t for rasters in column and row, else double.
+/// The model of points in the plane: std::int32_t for rasters in column and row, otherwise double.
 template <class Coord, class Metric = Euclidean>
 using Multiresolution2 = MultiresolutionModel<Delaunay2<Coord, Metric>>;
-/// The model of points in space: tetrahedra in place of triangles; a height is the z of a vertex.
+/// The model of points in space: tetrahedra instead of triangles; a height is the z of a vertex.
 template <class Coord, class Metric = Euclidean>
 using Multiresolution3 = MultiresolutionModel<Delaunay3<Coord, Metric>>;
 

@@ -26,10 +26,10 @@ enum class PointDuplicates : std::uint8_t {
   kMax,
   kMean,
   kAll,    ///< the lowest and the highest are measured, which bounds the error of all others
-  kError,  ///< throws std::invalid_argument naming the first sample at the place of an earlier one
+  kError,  ///< throws std::invalid_argument naming the first sample that repeats a place
 };
 
-/// Vertices on a lattice: at whole x and y, with heights origin + k * step, k whole.
+/// Vertices on a lattice: at integer x and y, with heights origin + k * step, k integer.
 struct TinLattice {
   double height_origin = 0;
   double height_step = 0;  ///< > 0
@@ -42,14 +42,14 @@ struct PointTinOptions {
   TinQuality quality = TinQuality::kRemoval;
   PointDuplicates duplicates = PointDuplicates::kFirst;
   /// At most this many vertices, including those of the frame (or the hull's corners), which are
-  /// never dropped; 0: no limit. If it is reached first, max_error is exceeded and PointTin::errors
-  /// tells by how much.
+  /// never dropped; 0: no limit. If this is reached first, max_error is exceeded and
+  /// PointTin::errors reports by how much.
   std::size_t max_points = 0;
   /// Removal makes no triangle with a smaller angle in the plane, unless it is Delaunay. 0 to 30.
   double min_angle_degrees = 5;
-  /// Rounds a vertex's place to whole numbers (halves up) and its height to the lattice. If several
-  /// samples round to one place, the first one inserted is the vertex. Errors are measured at the
-  /// samples' true places. Requires a frame with whole x, y in [0, 2^30).
+  /// Rounds a vertex's position to integers (halves up) and its height to the lattice. If several
+  /// samples round to one position, the first one inserted is the vertex. Errors are measured at
+  /// the samples' true positions. Requires a frame with integer x, y in [0, 2^30).
   std::optional<TinLattice> lattice;
 };
 
@@ -58,29 +58,29 @@ inline constexpr std::uint32_t kNoSample = 0xFFFFFFFFu;
 
 /// Vertical distances of samples from a surface.
 struct TinErrors {
-  std::size_t covered = 0;    ///< samples in the surface's triangles, borders included
-  std::size_t uncovered = 0;  ///< all other samples, which are not measured
+  std::size_t covered = 0;    ///< samples in the surface's triangles, including borders
+  std::size_t uncovered = 0;  ///< all other samples; they are not measured
   double largest = 0;
   double rms = 0;
   std::uint32_t largest_at = kNoSample;  ///< a sample with the largest error
 };
 
 struct PointTin {
-  std::vector<Point3> vertices;  ///< the frame's come first, in its order
+  std::vector<Point3> vertices;  ///< those of the frame come first, in its order
   /// The sample that each vertex was made from, parallel to `vertices`.
   std::vector<std::uint32_t> sample;
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< vertices, counter-clockwise
   /// Measured at every sample after duplicates were merged; with kAll at the lowest and the highest
-  /// sample of each place. errors.largest <= max_error, unless max_points was reached or samples
+  /// sample of each position. errors.largest <= max_error, unless max_points was reached or samples
   /// are `stuck`.
   TinErrors errors;
-  std::size_t duplicates = 0;  ///< samples that share a place with an earlier one
-  double duplicate_range = 0;  ///< the largest difference of heights at one place
+  std::size_t duplicates = 0;  ///< samples at the position of an earlier one
+  double duplicate_range = 0;  ///< the largest difference of heights at one position
   /// Samples beyond max_error that cannot become vertices: they lie on a side of the frame, their
-  /// place on the lattice is taken or on a side, or their place has a vertex already (with kAll,
-  /// where samples of one place differ by more than max_error).
+  /// lattice position is taken or on a side, or their position already has a vertex (with kAll,
+  /// where samples of one position differ by more than max_error).
   std::size_t stuck = 0;
-  std::size_t inserted = 0;  ///< vertices inserted, without the frame's or the hull's corners
+  std::size_t inserted = 0;  ///< vertices inserted, not counting the frame's or the hull's corners
   std::size_t removed = 0;   ///< inserted vertices that were removed again
 };
 
@@ -90,17 +90,17 @@ struct PointTin {
 /// vertices, of which several may lie on one straight side. Its vertices and sides are kept exactly
 /// as given. Samples inside and on the sides are covered; those outside, however close, are counted
 /// as uncovered and have no influence. Without a frame the region is the samples' convex hull: its
-/// corners are vertices, so that every sample is covered; other samples on the hull's boundary
-/// become vertices only where the error requires it. Fewer than 3 samples, or samples that are all
-/// on one line, have no surface: the result has no vertices and all samples are uncovered.
+/// corners are vertices, so every sample is covered; other samples on the hull's boundary become
+/// vertices only where the error requires it. Fewer than 3 samples, or collinear samples, have no
+/// surface: the result has no vertices and all samples are uncovered.
 ///
 /// The result depends only on the arguments: the same bytes on every machine. The order of samples
-/// at different places hardly matters. One thread. Time about n log n for n samples: on a processor
-/// of 2024, 0.2 us per sample and 1.3 us per vertex inserted, and as much again for removal.
-/// Memory: 36 bytes per sample and about 100 per vertex inserted, including the result.
+/// at different positions hardly matters. One thread. Time about n log n for n samples: on a
+/// processor of 2024, 0.2 us per sample and 1.3 us per vertex inserted, and as much again for
+/// removal. Memory: 36 bytes per sample and about 100 per vertex inserted, including the result.
 ///
-/// With max_points greedy insertion stops there; the other qualities search for the bound that
-/// leaves nearly as many, which takes up to 8 times as long.
+/// With max_points greedy insertion stops there; the other qualities search for the error bound
+/// that leaves nearly that many vertices, which takes up to 8 times as long.
 ///
 /// Throws std::invalid_argument naming the index of a coordinate or height that is not finite or
 /// above 1e100 in absolute value, of a frame vertex where the polygon is not convex, or of a
@@ -110,40 +110,40 @@ struct PointTin {
                                  std::span<const double> z, std::span<const Point3> frame,
                                  const PointTinOptions& options);
 
-/// Samples in rows and columns: number row * x.size() + column is at x[column], y[row].
+/// Samples in rows and columns: sample row * x.size() + column is at x[column], y[row].
 struct SampleRows {
-  std::span<const double> x;  ///< one for each column
-  std::span<const double> y;  ///< one for each row
-  std::span<const double> z;  ///< row by row; NaN: there is no such sample
+  std::span<const double> x;  ///< one per column
+  std::span<const double> y;  ///< one per row
+  std::span<const double> z;  ///< row by row; NaN: no sample
 };
 
-/// Samples on an approximately regular grid, such as a raster in another projection: number
-/// row * columns + column is at x, y of that number.
+/// Samples on an approximately regular grid, such as a raster in another projection: sample row *
+/// columns + column has the x and y with that index.
 struct SampleGrid {
   std::size_t columns = 0;
   std::span<const double> x;  ///< row by row, as are y and z
   std::span<const double> y;
-  std::span<const double> z;  ///< NaN: there is no such sample
+  std::span<const double> z;  ///< NaN: no sample
 };
 
 /// The surface of samples in rows and columns: the same guarantees, but not the same surface.
 ///
-/// Up to 10 times as fast where few samples become vertices, if the frame is an upright rectangle
-/// with coordinates below 2^20, the options have a lattice and no max_points, and there are at most
-/// 65,535 columns and rows. The x and y of SampleRows must ascend at equal spacing (to within a
-/// thousandth of it); the places of SampleGrid must be within 4 spacings of an affine image of
-/// columns and rows, and the closer they are the faster it is. Otherwise this calls the function
-/// above. On a processor of 2024 with AVX-512: 0.02 us per sample and 1 us per vertex inserted, two
-/// thirds as much again for removal, and up to a third more for SampleGrid. Memory: 16 bytes per
-/// sample (SampleGrid: 32) and 200 per vertex inserted.
+/// Up to 10 times as fast where few samples become vertices, if the frame is an axis-parallel
+/// rectangle with coordinates below 2^20, the options have a lattice and no max_points, and there
+/// are at most 65,535 columns and rows. The x and y of SampleRows must ascend at equal spacing (to
+/// within a thousandth of it); the positions of SampleGrid must be within 4 spacings of an affine
+/// image of columns and rows, and the closer the faster. Otherwise this calls the function above.
+/// On a processor of 2024 with AVX-512: 0.02 us per sample and 1 us per vertex inserted, two thirds
+/// as much again for removal, and up to a third more for SampleGrid. Memory: 16 bytes per sample
+/// (SampleGrid: 32) and 200 per vertex inserted.
 [[nodiscard]] PointTin point_tin(const SampleRows& samples, std::span<const Point3> frame,
                                  const PointTinOptions& options);
 [[nodiscard]] PointTin point_tin(const SampleGrid& samples, std::span<const Point3> frame,
                                  const PointTinOptions& options);
 
 /// Measures samples against any surface whose triangles do not overlap, however it was made.
-/// Samples at the same place are each measured. Each sample's triangle is found by a raster of
-/// cells and exact predicates; heights are computed in extended precision. O(n + triangles) for
+/// Samples at the same position are all measured. Each sample's triangle is found through a raster
+/// of cells and exact predicates; heights are computed in extended precision. O(n + triangles) for
 /// well-shaped surfaces. Throws std::invalid_argument for arrays of different lengths and for a
 /// triangle with a vertex that does not exist.
 [[nodiscard]] TinErrors measure_surface(std::span<const double> x, std::span<const double> y,
@@ -153,7 +153,7 @@ struct SampleGrid {
 struct LineVertex {
   double t = 0;
   double height = 0;
-  std::uint32_t sample = 0;  ///< the sample that it was made from
+  std::uint32_t sample = 0;  ///< the sample from which it was made
 };
 
 struct SimplifiedLine {
@@ -162,12 +162,12 @@ struct SimplifiedLine {
 };
 
 /// A chain of few vertices within max_error of each sample along a line: the ends, and then
-/// repeatedly the sample of greatest error (the first of equal ones). It depends only on these
-/// samples, so both sides of a border get the same chain.
+/// repeatedly the sample of greatest error (the first on ties). It depends only on these samples,
+/// so both sides of a border get the same chain.
 ///
-/// t: places along the line, ascending; of samples at one place the first counts. On a lattice t
-/// and heights of vertices are rounded, as in point_tin(); errors are measured at the true places,
-/// and where a place on the lattice is taken the error may stay above max_error.
+/// t: positions along the line, ascending; of samples at one position the first counts. On a
+/// lattice t and heights of vertices are rounded, as in point_tin(); errors are measured at the
+/// true positions, and if a position on the lattice is taken, the error may stay above max_error.
 ///
 /// Throws std::invalid_argument naming the index of a t that descends or of a value that is not
 /// finite; also for max_error < 0 and arrays of different lengths. Without samples there are no

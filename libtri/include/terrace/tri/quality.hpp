@@ -32,7 +32,7 @@ template <class Coord>
 TriangleQuality triangle_quality(const Delaunay2<Coord>& triangulation, const Heights& heights,
                                  TriangleId triangle, double datum = 0);
 
-/// Without triangles all numbers are 0.
+/// All numbers are 0 if there are no triangles.
 struct MeshQuality {
   std::size_t triangles = 0;
   double min_angle_degrees = 0;
@@ -44,7 +44,7 @@ struct MeshQuality {
   double min_edge = 0;
   double max_edge = 0;
   double mean_edge = 0;
-  /// Numbers of edges in equal intervals from min_edge to max_edge.
+  /// Counts of edges in equal intervals from min_edge to max_edge.
   std::vector<std::size_t> edge_histogram;
 
   double area = 0;
@@ -56,7 +56,7 @@ struct MeshQuality {
 };
 
 /// Over all triangles. O(n). Throws std::invalid_argument if an array of heights is shorter than
-/// vertex_slots(), or if there are no bins.
+/// vertex_slots(), or if the number of bins is 0.
 template <class Coord>
 MeshQuality mesh_quality(const Delaunay2<Coord>& triangulation, const Heights& heights,
                          double datum = 0, std::size_t histogram_bins = 16);

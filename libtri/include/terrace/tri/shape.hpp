@@ -12,56 +12,55 @@
 #include "terrace/tri/delaunay3.hpp"
 #include "terrace/tri/metric.hpp"
 
-/// Restoring the non-convex shape of points scanned from a surface: of the Delaunay tetrahedra,
-/// which fill the convex hull, those outside the shape are peeled off, starting from the hull
-/// (J. Skala's thesis, section 8.3). What remains is the inside, its outer facets the surface.
+/// Reconstructs the non-convex shape of points scanned from a surface: from the Delaunay
+/// tetrahedra, which fill the convex hull, those outside the shape are peeled off, starting from
+/// the hull (J. Skala's thesis, section 8.3). The remaining tetrahedra are the inside, their outer
+/// facets the surface.
 ///
-/// restore_surface() goes from points to a surface in one call. BasicShape3 follows a triangulation
-/// that changes. measure() is for surfaces of any origin.
+/// restore_surface() goes from points to a surface in one call. BasicShape3 follows a changing
+/// triangulation. measure() takes surfaces of any origin.
 
 namespace terrace::tri {
 
 struct Surface {
   std::vector<Point3> points;
-  /// Numbers of points, counter-clockwise seen from outside.
+  /// Point indices, counter-clockwise seen from outside.
   std::vector<std::array<std::uint32_t, 3>> faces;
 };
 
 struct SurfaceMeasures {
   std::size_t faces = 0;
-  std::size_t vertices = 0;  ///< points that are in a face
+  std::size_t vertices = 0;  ///< points used by a face
   std::size_t edges = 0;
   double area = 0.0;
-  /// Enclosed by the faces, by the divergence theorem; where the surface is not closed it depends
-  /// on where the openings are.
+  /// The enclosed volume, by the divergence theorem; if the surface is not closed it depends on
+  /// where the openings are.
   double volume = 0.0;
   /// Sets of faces connected by edges.
   std::size_t components = 0;
   /// vertices - edges + faces. 2 for a sphere, 2 - 2g for a closed surface with g handles; each
-  /// vertex or edge where a surface touches itself takes away from that.
+  /// vertex or edge where a surface touches itself lowers it.
   std::int64_t euler_characteristic = 0;
-  std::size_t border_edges = 0;        ///< in one face
-  std::size_t non_manifold_edges = 0;  ///< in three or more
-  /// Every edge is in as many faces one way as the other.
+  std::size_t border_edges = 0;        ///< in one face only
+  std::size_t non_manifold_edges = 0;  ///< in three or more faces
+  /// Every edge is in as many faces in one direction as in the other.
   bool closed = true;
 };
 
-/// O(n log n). Sums are in the order of the faces. Faces with two equal corners are not allowed.
-/// Throws std::invalid_argument naming the face whose corner is not the number of a point, or two
-/// of whose corners are the same.
+/// O(n log n). Sums are in the order of the faces. Throws std::invalid_argument naming a face with
+/// a corner that is not a point's index, or with two equal corners.
 SurfaceMeasures measure(const Surface& surface);
 
-/// Turns the components (faces connected by edges) whose volume is negative inside out. The volume
-/// of a component that is not closed is measured from its first corner. O(n log n). Throws as
-/// measure().
+/// Turns components (faces connected by edges) with negative volume inside out. The volume of a
+/// component that is not closed is measured from its first corner. O(n log n). Throws as measure().
 void turn_outward(Surface& surface);
 
 /// Which facets of a tetrahedron are likely to lie on the surface ("boundary" facets), as seen from
-/// that tetrahedron: those that are small beside it.
+/// that tetrahedron: those that are small compared to it.
 enum class ShapeCriterion : std::uint8_t {
-  /// The smallest sphere that contains the facet does not contain the tetrahedron's fourth corner
-  /// in its inside (K. Gabriel, R. Sokal, doi:10.2307/2412323). Two corners of the facet lie on
-  /// that sphere where the third sees them at an obtuse angle, otherwise all three. Exact.
+  /// The interior of the smallest sphere that contains the facet does not contain the tetrahedron's
+  /// fourth corner (K. Gabriel, R. Sokal, doi:10.2307/2412323). Two corners of the facet lie on
+  /// that sphere if the third sees them at an obtuse angle, otherwise all three. Exact.
   kGabriel,
   /// The facet's perimeter is below edge_factor times the sum of the other three edges. In doubles,
   /// the same for the same points.
@@ -70,15 +69,15 @@ enum class ShapeCriterion : std::uint8_t {
 
 enum class ShapeRule : std::uint8_t {
   /// A tetrahedron beyond an open facet is removed as soon as that facet is not a boundary facet as
-  /// seen from it. Open facets are those of the hull and of what has been removed. So the removed
-  /// ones are what can be reached from outside: a function of the tetrahedra alone. Between
-  /// surfaces that face each other across a gap or round a hole, a few tetrahedra may stay whose
-  /// facets are all boundary facets.
+  /// seen from it. Open facets are those of the hull and of removed tetrahedra. So the removed
+  /// tetrahedra are those reachable from outside: a function of the tetrahedra alone. Between
+  /// surfaces that face each other across a gap or around a hole, a few tetrahedra whose facets are
+  /// all boundary facets may stay.
   kFlood,
   /// As published: a tetrahedron with open facets is removed only if none of them is a boundary
-  /// facet. The result depends on the order; here it goes in rounds (the neighbours of what one
-  /// round has removed are the next), within a round lexicographically by the corners sorted by x,
-  /// y, z. It leaves slivers standing everywhere; for comparison.
+  /// facet. The result depends on the order; here it goes in rounds (the neighbours of the
+  /// tetrahedra removed in one round are next), within a round lexicographically by the corners
+  /// sorted by x, y, z. It leaves slivers everywhere; for comparison.
   kPublished,
 };
 
@@ -89,31 +88,31 @@ struct ShapeOptions {
   /// published rule. The flood rule leaks through the first hole: with 0.5 it empties even a sphere
   /// of regular samples, which 1 restores.
   double edge_factor = 0.5;
-  /// No vertex loses all of its tetrahedra. Published rule: a removal that would take the last one
-  /// is skipped. Flood rule: after the flood tetrahedra are put back until every vertex has one:
-  /// always the one with the shortest longest edge (the lexicographically first on ties, corners
-  /// sorted) among those that have a vertex without tetrahedra and share a facet with what is kept;
-  /// where no such tetrahedron shares a facet, among all that have such a vertex.
+  /// No vertex loses all of its tetrahedra. Published rule: a removal that would take a vertex's
+  /// last one is skipped. Flood rule: after the flood tetrahedra are put back until every vertex
+  /// has one: each time the one with the shortest longest edge (on ties the lexicographically
+  /// first, corners sorted) among those that have a vertex without tetrahedra and share a facet
+  /// with a kept one; if there are none of these, among all that have such a vertex.
   bool keep_vertices = true;
 };
 
 struct ShapeSurface {
   Surface surface;
-  std::vector<VertexId> vertices;  ///< which each point of the surface is; by slot
+  std::vector<VertexId> vertices;  ///< the vertex of each point of the surface; by slot
 };
 
-/// The kept tetrahedra of a triangulation, from scratch or kept up to date with its changes. A
-/// function of the point set and the options, whatever the triangulation's and this object's
-/// history.
+/// The kept tetrahedra of a triangulation, computed from scratch or kept up to date with its
+/// changes. A function of the point set and the options, whatever the history of the triangulation
+/// and of this object.
 ///
 /// One byte per tetrahedron slot and four per vertex slot. Triangulation: any Delaunay3; see
 /// Shape3 below.
 ///
 /// In an elliptical metric the tetrahedra are those of the metric, smallest spheres are its
-/// smallest ellipsoids (exact), and lengths of edges, both those of ShapeCriterion::kEdgeLength and
-/// those that decide which tetrahedron is put back, are its lengths (in doubles, of differences
-/// mapped by the triangulation's map). So it is the shape of the mapped points: samples that are
-/// denser across the long axes than along them are as good as even ones.
+/// smallest ellipsoids (exact), and edge lengths, both for ShapeCriterion::kEdgeLength and for
+/// choosing the tetrahedra to put back, are its lengths (in doubles, of differences mapped by the
+/// triangulation's map). So it is the shape of the mapped points: samples that are denser across
+/// the long axes than along them are as good as uniform ones.
 template <class Triangulation>
 class BasicShape3 {
  public:
@@ -124,37 +123,37 @@ class BasicShape3 {
   BasicShape3(BasicShape3&&) noexcept;
   BasicShape3& operator=(BasicShape3&&) noexcept;
 
-  /// From scratch. Flood: O(n) facet tests, about as many as there are removed tetrahedra times
-  /// two, and O(m log m) for m tetrahedra at vertices that the flood has lost.
+  /// Computes the shape from scratch. Flood: O(n) facet tests, about twice as many as removed
+  /// tetrahedra, and O(m log m) for m tetrahedra at vertices that the flood has lost.
   void restore(const Triangulation& triangulation);
 
-  /// After changes of the triangulation that this object was restored from (or of its first, empty
-  /// state): the same result as restore(), at a cost that depends on the changes. Nothing else may
-  /// have changed since the last call: `changes` is all that take_changes() gives after a journal
-  /// was started before restore().
+  /// Updates the shape after changes of the triangulation that this object was restored from (or
+  /// from its initial, empty state): the same result as restore(), at a cost that depends on the
+  /// changes. `changes` must hold all changes since the last call: everything that take_changes()
+  /// gives after a journal was started before restore().
   ///
-  /// Flood: every removed tetrahedron remembers the facet by which the flood came. What was reached
-  /// through a tetrahedron that is gone, and what was reached through that, is judged again.
-  /// O(changes + judged again), O(m log m) as above, and a walk round the corners of facets that
-  /// came to the hull. Published rule: from scratch, as nothing about it is local.
+  /// Flood: every removed tetrahedron remembers the facet through which the flood came. Tetrahedra
+  /// reached through one that is gone, directly or indirectly, are tested again. O(changes + tested
+  /// again), O(m log m) as above, and a walk around the corners of facets that joined the hull.
+  /// Published rule: from scratch, as it is not local.
   void update(const Triangulation& triangulation, const typename Triangulation::Changes& changes);
 
-  /// Any handle; false for those that are not alive.
+  /// Accepts any handle; false for those not in use.
   [[nodiscard]] bool kept(TetrahedronId tetrahedron) const;
   /// Number of kept tetrahedra. O(1).
   [[nodiscard]] std::size_t kept_count() const;
-  /// Tetrahedra put back after the flood for the sake of a vertex.
+  /// Tetrahedra put back after the flood because of a vertex.
   [[nodiscard]] std::size_t rescued_count() const;
-  /// Vertices that the rule itself leaves without a tetrahedron, by slot: with keep_vertices and
-  /// the flood rule those that have been given one back. Empty while there are no tetrahedra.
+  /// Vertices that the rule by itself leaves without a tetrahedron, by slot: with keep_vertices and
+  /// the flood rule, those that were given one back. Empty while there are no tetrahedra.
   [[nodiscard]] std::vector<VertexId> lost_vertices() const;
   /// Kept tetrahedra by slot. O(slots).
   [[nodiscard]] std::vector<TetrahedronId> kept_tetrahedra() const;
 
-  /// The facets between kept tetrahedra and what is not kept, counter-clockwise seen from outside.
-  /// Every edge is in as many of them one way as the other: the surface is closed. Where kept
-  /// tetrahedra meet in an edge only, that edge is in four or more faces, and where they meet in a
-  /// vertex only, the surface touches itself there. Faces by slot of their tetrahedron. O(slots).
+  /// The facets between kept tetrahedra and the outside, counter-clockwise seen from outside. Every
+  /// edge is in as many of them in one direction as in the other: the surface is closed. Where kept
+  /// tetrahedra meet only in an edge, that edge is in four or more faces; where they meet only in a
+  /// vertex, the surface touches itself there. Faces by slot of their tetrahedron. O(slots).
   [[nodiscard]] ShapeSurface surface(const Triangulation& triangulation) const;
   /// Sum of the volumes of the kept tetrahedra. O(slots).
   [[nodiscard]] double volume(const Triangulation& triangulation) const;
@@ -176,27 +175,27 @@ extern template class BasicShape3<Delaunay3<double, EllipticalMetric3>>;
 
 struct RestoreOptions {
   ShapeOptions shape;
-  /// 0 triangulates the points as they are. 1 to 30: rounded to integers of so many bits over the
-  /// longest side of their box, faster; 24 is finer than a float. The first of several points that
-  /// become one stands for all. The surface has the given coordinates in any case.
+  /// 0 triangulates the points unchanged. 1 to 30: the points are rounded to integers of this many
+  /// bits over the longest side of their bounding box, which is faster; 24 is finer than a float.
+  /// The first of several points that coincide after rounding represents them. The surface has the
+  /// given coordinates in any case.
   unsigned quantise_bits = 0;
-  /// An elliptical metric in which the points are triangulated and the facets judged, see
+  /// An elliptical metric in which the points are triangulated and the facets classified, see
   /// BasicShape3. Not together with quantise_bits.
   std::optional<EllipticalMetric3> metric;
 };
 
 struct RestoredSurface {
   Surface surface;
-  /// The number of the input point that each point of the surface is.
+  /// The input index of each point of the surface.
   std::vector<std::size_t> input;
 };
 
-/// The surface that the points were scanned from. Without faces where all points (after any
-/// rounding) are in one plane; duplicates do not matter. A function of the points, their order and
-/// the options.
+/// The surface from which the points were scanned. No faces if all points (after any rounding) are
+/// in one plane; duplicates do not matter. A function of the points, their order and the options.
 ///
-/// Throws std::invalid_argument naming the index of a point that is not finite, or an option that
-/// is not in its range (a metric together with rounding among them).
+/// Throws std::invalid_argument naming the index of a point that is not finite, or an option out of
+/// range (including a metric together with rounding).
 ///
 /// Cost: a triangulation and a flood, 0.1 to 0.3 s per 100,000 points.
 RestoredSurface restore_surface(std::span<const Point3> points, const RestoreOptions& options = {});

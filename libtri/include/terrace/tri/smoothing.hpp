@@ -33,7 +33,8 @@ struct SmoothingOptions {
   /// kTaubin: the pass band in units of the Laplacian's eigenvalues (0 to 2). Amplitudes below it
   /// grow slightly, those above it shrink. 0 < pass_band < 1.
   double pass_band = 0.1;
-  /// kBilateral: the difference from which on neighbours do not count, > 0, in the unit of heights.
+  /// kBilateral: neighbours with at least this difference do not count, > 0, in the unit of
+  /// heights.
   double edge_height = 0;
 };
 
@@ -46,13 +47,13 @@ struct HeightChange {
 /// the hull or with a neighbour outside the region stay; so does a vertex whose triangles are too
 /// thin for their angles to be computed in double.
 ///
-/// A neighbour's weight is the length of the side between the two Voronoi cells over the distance
-/// in the plane. kLaplacian and kTaubin therefore preserve planes, however irregular the points;
-/// kBilateral does where neighbours lie symmetrically, as on grids. kLaplacian and kBilateral never
-/// leave the range of heights in the region.
+/// A neighbour's weight is the length of the common side of the two Voronoi cells divided by the
+/// distance in the plane. kLaplacian and kTaubin therefore preserve planes, however irregular the
+/// points; kBilateral does so where neighbours lie symmetrically, as on grids. kLaplacian and
+/// kBilateral never leave the range of heights in the region.
 ///
-/// Each step reads only the heights of the step before, so the order of vertices does not matter.
-/// Time O(vertices of the region * iterations); memory: 16 bytes per edge of the region.
+/// Each iteration reads only the heights of the previous one, so the order of vertices does not
+/// matter. Time O(vertices of the region * iterations); memory: 16 bytes per edge of the region.
 ///
 /// Throws std::invalid_argument for options that are out of range or would make heights grow
 /// without bound, for a height in the region that is not finite, and if an array of heights is

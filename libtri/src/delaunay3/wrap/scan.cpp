@@ -8,7 +8,7 @@ constexpr std::size_t kLanes = 2;
 using Lanes = double __attribute__((vector_size(kLanes * sizeof(double))));
 using Mask = std::int64_t __attribute__((vector_size(kLanes * sizeof(double))));
 
-/// A bit for each lane that is true.
+/// A bit for each true lane.
 [[gnu::always_inline]] inline unsigned bits_of(Mask mask) {
   return static_cast<unsigned>((mask[0] & 1) | (mask[1] & 2));
 }

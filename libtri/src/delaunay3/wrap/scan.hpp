@@ -6,40 +6,40 @@
 
 #include "instruction_set.hpp"
 
-/// The inner loop of filling a hole: what a facet makes of every vertex, in double.
+/// The inner loop of filling a hole: the values of every vertex for a facet, in double.
 
 namespace terrace::tri::spatial {
 
 /// A facet, with a normal that points into the hole. For a vertex, relative to the facet's first
 /// corner: volume = its scalar product with the normal; power = its power with respect to the
-/// smallest sphere through the facet's corners. The sphere through the corners and the vertex has
-/// its centre at power / (2 volume) normals from that one's.
+/// smallest sphere through the facet's corners. The centre of the sphere through the corners and
+/// the vertex is offset from that sphere's centre by power / (2 volume) normals.
 struct ScanFacet {
   double corner[3];
   double normal[3];
   double diameter[3];  ///< twice the vector from the corner to the smallest sphere's centre
-  double power_error;  ///< bounds of the absolute errors of the two, for every vertex
+  double power_error;  ///< bounds of the absolute errors of both, for every vertex
   double volume_error;
 };
 
-/// Coordinates of the vertices; the arrays are as long as a multiple of kScanPadding. NaN: no
+/// Coordinates of the vertices; the arrays are padded to a multiple of kScanPadding. NaN: not a
 /// vertex. Memory for a power and a volume of each.
 struct ScanVertices {
   const double* x;
   const double* y;
   const double* z;
-  std::size_t count;  ///< with padding
+  std::size_t count;  ///< including padding
   double* power;
   double* volume;
 };
 inline constexpr std::size_t kScanPadding = 8;
 
-/// Lists the vertices that may have positive volume and, of these, the least power / volume, and
-/// leaves power and volume of all. Returns their number; `near` has room for all vertices.
+/// Lists the vertices that may have positive volume with, among these, the least power / volume,
+/// and leaves power and volume of all. Returns their number; `near` has room for all vertices.
 using ScanFunction = std::size_t (*)(const ScanVertices& vertices, const ScanFacet& facet,
                                      std::uint32_t* near);
 
-/// Requires a supported set. What they list may differ where bounds of errors are met.
+/// Requires a supported instruction set. The lists may differ where error bounds are met.
 ScanFunction scan_function(InstructionSet set);
 
 std::size_t scan_portable(const ScanVertices& vertices, const ScanFacet& facet,

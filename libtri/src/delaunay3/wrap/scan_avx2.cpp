@@ -10,7 +10,7 @@ constexpr std::size_t kLanes = 4;
 using Lanes = double __attribute__((vector_size(kLanes * sizeof(double))));
 using Mask = std::int64_t __attribute__((vector_size(kLanes * sizeof(double))));
 
-/// A bit for each lane that is true.
+/// A bit for each true lane.
 [[gnu::always_inline]] inline unsigned bits_of(Mask mask) {
   return static_cast<unsigned>(_mm256_movemask_pd(reinterpret_cast<__m256d>(mask)));
 }

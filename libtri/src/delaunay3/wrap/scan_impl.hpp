@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Included once for each instruction set, with kLanes and a function bits_of() for masks defined
-// before: what is here must not be shared between objects, so nothing has a name outside its
-// object, and no function of another header is called.
+// Included once for each instruction set, after kLanes and a function bits_of() for masks are
+// defined. This code must not be shared between objects, so all names are local to the object, and
+// no function of another header is called.
 #include "scan.hpp"
 
 namespace terrace::tri::spatial {
 namespace {
 
-// From memory that is aligned for one double only.
+// Loads from memory aligned for one double only.
 [[gnu::always_inline]] inline Lanes load(const double* from) {
   Lanes lanes;
   __builtin_memcpy(&lanes, from, sizeof lanes);
@@ -21,8 +21,9 @@ namespace {
 
 constexpr double kNothing = __builtin_inf();
 
-/// Writes powers and volumes. Returns an upper bound of the least quotient, or infinity: that of
-/// the vertex that has it up to rounding, among those of certainly positive volume.
+/// Writes powers and volumes. Returns an upper bound of the least quotient, or infinity: the
+/// quotient of the vertex that has the least up to rounding, among those of certainly positive
+/// volume.
 [[gnu::always_inline]] inline double measure_all(const ScanVertices& v, const ScanFacet& f) {
   const Lanes volume_error = f.volume_error - Lanes{};
   Lanes best_power = kNothing - Lanes{};

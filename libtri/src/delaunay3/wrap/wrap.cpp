@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // Gift wrapping of a hole. A facet with the hole in front of it determines its tetrahedron: the
-// empty sphere grows along the facet's axis until it meets a vertex. So facets are taken in any
-// order; each new tetrahedron's other facets either meet an open one, which ends both, or become
-// open. No rule of validity, no order, no case of failure.
+// empty sphere grows along the facet's axis until it meets a vertex. So facets can be taken in any
+// order; each of a new tetrahedron's other facets either meets an open one, which closes both, or
+// becomes open. There is no validity rule, no required order and no failure case.
 //
-// Which vertex is met first is found in double with bounds of the error, for all vertices of the
-// hole at once; those that the bounds cannot tell apart meet in exact (and perturbed) sphere tests.
+// The vertex that is met first is found in double with error bounds, for all vertices of the hole
+// at once; those that the bounds cannot separate are compared by exact (and perturbed) sphere
+// tests.
 //
-// Where no vertex is in front of a facet, the hull is there, and the tetrahedron is a ghost. Facets
-// with the ghost are never asked: every new ghost has a finite facet, and finite tetrahedra of a
-// hole hang together by finite facets with one beyond the hole's edge.
+// If no vertex is in front of a facet, it is on the hull, and the tetrahedron is a ghost. Facets
+// with the ghost never need wrapping: every new ghost has a finite facet, and the finite tetrahedra
+// of a hole are connected by finite facets, one of which is on the hole's boundary.
 #include "wrap.hpp"
 
 #include <cmath>
@@ -60,10 +61,11 @@ class Wrapping {
       }
       square += (high - low) * (high - low);
     }
-    // The length of any vector from vertex to vertex, rounded up.
+    // Upper bound of the length of any vector between vertices.
     length_ = std::sqrt(square) * (1 + 0x1p-40);
     if constexpr (kMapped) {
-      // Both ends of a vector are off by 9 u spread() times their distances from the first vertex.
+      // Both ends of a vector have an error of 9 u spread() times their distances from the first
+      // vertex.
       const double spread = EllipticalKernel::form().spread();
       length_ *= 1 + 0x1p-20;
       vector_error_ = spread < 0x1p28 ? 18.5 * kUnit * spread * length_ : kInfinity;
@@ -77,7 +79,7 @@ class Wrapping {
                  padded,         hole_.power.data(), hole_.volume.data()};
   }
 
-  /// Where scan() sees a point: in an elliptical metric mapped to where it is the Euclidean one.
+  /// The point as seen by scan(): in an elliptical metric, mapped to where the metric is Euclidean.
   Point scanned(const Point& p) const {
     if constexpr (kMapped) {
       return EllipticalKernel::mapped(p, hole_.point[1]);
@@ -118,16 +120,17 @@ class Wrapping {
     return inside_sphere<Kernel>(at(best), at(a), at(b), at(c), hole_.point[d], mesh_.lattice);
   }
 
-  /// The facet for scan(); false where bounds of errors could not be trusted.
+  /// The facet for scan(); false if the error bounds could not be trusted.
   ///
   /// With u = 2^-53, edges e and f from the corner, normal n = e x f, b = |e| |f| (|e| + |f|), k =
-  /// |e| |f| / |n|, first order: each coordinate of n is wrong by 4 u |e| |f| at most (differences
-  /// included), n by 7 u |e| |f|. A volume is then wrong by 7 u |e| |f| w + 4 u |e| |f| w, w the
-  /// length of the vertex's vector. r = |e|^2 f - |f|^2 e, of length b at most, is wrong by 8 u b;
-  /// r x n by 25 k u b |n|; |n|^2 relatively by 17 k u; so the diameter, their quotient, by 43 k u
-  /// b / |n|, and its length is at most b / |n|. A power is wrong by that times w, and 6 u w (w + b
-  /// / |n|) for its own operations. The constants below are larger by a tenth at least, for what is
-  /// left out, and cover the operations of those who use the bounds.
+  /// |e| |f| / |n|, to first order: each coordinate of n has an error of at most 4 u |e| |f|
+  /// (including differences), n of 7 u |e| |f|. A volume then has an error of 7 u |e| |f| w + 4 u
+  /// |e| |f| w, with w the length of the vertex's vector. r = |e|^2 f - |f|^2 e, of length at most
+  /// b, has an error of 8 u b; r x n of 25 k u b |n|; |n|^2 a relative error of 17 k u; so the
+  /// diameter, their quotient, has an error of 43 k u b / |n|, and its length is at most b / |n|. A
+  /// power has an error of that times w, plus 6 u w (w + b / |n|) for its own operations. The
+  /// constants below are larger by at least a tenth, which covers omitted terms and the operations
+  /// of code that uses the bounds.
   bool measure(std::uint32_t a, std::uint32_t b, std::uint32_t c, ScanFacet& facet) const {
     const std::array<const double*, 3> axis = {hole_.x.data(), hole_.y.data(), hole_.z.data()};
     std::array<double, 3> e;
@@ -161,16 +164,16 @@ class Wrapping {
     }
     const double diameter = k * (std::sqrt(ee) + std::sqrt(ff));
     facet.power_error = length_ * kUnit * (48 * k * diameter + 12 * (length_ + diameter));
-    // Integers small enough make integers that are exact: 6 w^3 < 2^53.
+    // Integers that are small enough give exact results: 6 w^3 < 2^53.
     const bool exact = std::is_same_v<typename Kernel::Coord, std::int32_t> && length_ < 114'000;
     facet.volume_error = exact ? 0 : 16 * kUnit * lengths * length_;
     return !kMapped || add_vector_errors(std::sqrt(ee) + std::sqrt(ff), lengths, normal, facet);
   }
 
-  /// All vectors are wrong by d, vector_error_, besides. Let s be the sum of the lengths of e and
-  /// f. Then n is wrong by s d; r, of length k s |n| at most, by 1.5 s^2 d; so the diameter by (1.5
-  /// s^2 + 3 k s^2) d / |n|, first order, and k is 1 at least. False where that could be a large
-  /// part.
+  /// In addition all vectors have an error of d, vector_error_. Let s be the sum of the lengths of
+  /// e and f. Then n has an error of s d; r, of length at most k s |n|, of 1.5 s^2 d; so the
+  /// diameter of (1.5 s^2 + 3 k s^2) d / |n|, to first order, and k is at least 1. False if that
+  /// could be a large part.
   bool add_vector_errors(double s, double lengths, double normal, ScanFacet& facet) const {
     const double d = 1.1 * vector_error_;
     if (!(s * d < 0x1p-20 * normal)) return false;
@@ -189,7 +192,7 @@ class Wrapping {
   ScanVertices vertices_{};
   std::size_t count_ = 0;
   double length_ = 0;
-  double vector_error_ = 0;  ///< of vectors from vertex to vertex, where they are mapped
+  double vector_error_ = 0;  ///< error of vectors between vertices, where they are mapped
 };
 
 }  // namespace

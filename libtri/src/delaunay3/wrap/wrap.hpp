@@ -10,9 +10,9 @@
 
 namespace terrace::tri::spatial {
 
-/// What every way to fill a hole does: keeps the open facets, makes a tetrahedron on one, and joins
-/// what meets. Facets may be taken in any order, as long as each gets the tetrahedron that belongs
-/// there.
+/// What all ways of filling a hole share: keeping the open facets, making a tetrahedron on one, and
+/// joining matching facets. Facets may be taken in any order, as long as each gets the tetrahedron
+/// that belongs there.
 template <class Kernel>
 class HoleFilling {
  public:
@@ -33,7 +33,7 @@ class HoleFilling {
     mesh_.finite_count -= gone;
   }
 
-  /// A finite open facet, the last that became one, or kNone.
+  /// The most recently opened finite facet that is still open, or kNone.
   std::uint32_t next_open() {
     while (!hole_.pending.empty()) {
       const std::uint32_t i = hole_.pending.back();
@@ -50,8 +50,8 @@ class HoleFilling {
     return corner[0] != 0 && corner[1] != 0 && corner[2] != 0;
   }
 
-  /// Makes the tetrahedron of an open facet and a vertex, or the ghost. Facets that become open are
-  /// the last ones.
+  /// Makes the tetrahedron of an open facet and a vertex or the ghost. Newly opened facets are the
+  /// last ones.
   void attach(std::uint32_t i, std::uint32_t apex) {
     const auto [a, b, c] = hole_.facets[i].corner;
     if (used_ == hole_.slots.size()) hole_.slots.push_back(mesh_.new_tetrahedron());
@@ -81,7 +81,7 @@ class HoleFilling {
     }
   }
 
-  /// Every vertex of the hole has a new tetrahedron; slots left over are freed.
+  /// Gives every vertex of the hole a new tetrahedron and frees unused slots.
   void finish() {
     for (std::uint32_t k = 1; k < hole_.vertex.size(); ++k)
       mesh_.vertex[hole_.vertex[k]].incident = hole_.incident[k];
@@ -92,15 +92,15 @@ class HoleFilling {
   Mesh<Kernel>& mesh_;
   Hole<Point>& hole_;
   FacetTable table_;
-  std::size_t used_ = 0;  ///< slots that have been used again
+  std::size_t used_ = 0;  ///< slots that have been reused
 };
 
-/// Fills mesh.hole, of which at least one facet is finite and whose vertices are not all vertices
-/// of a plane, see wrap.cpp. Vertices at it get tetrahedra; slots left over are freed.
+/// Fills mesh.hole, at least one facet of which is finite and whose vertices are not coplanar, see
+/// wrap.cpp. Gives its vertices tetrahedra and frees unused slots.
 template <class Kernel>
 void wrap_hole(Mesh<Kernel>& mesh);
 
-/// The same for what another way of filling has left open.
+/// The same for facets that another method of filling has left open.
 template <class Kernel>
 void wrap_rest(Mesh<Kernel>& mesh, HoleFilling<Kernel>& filling);
 

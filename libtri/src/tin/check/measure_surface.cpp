@@ -16,7 +16,7 @@ namespace {
 using planar::DoubleKernel;
 using Corners = std::array<std::uint32_t, 3>;
 
-/// A raster over the surface; every cell lists the triangles that reach into it.
+/// A raster over the surface; every cell lists the triangles that overlap it.
 class Raster {
  public:
   Raster(std::span<const Point3> vertices, std::span<const Corners> triangles)
@@ -66,7 +66,7 @@ class Raster {
   }
 
  private:
-  /// Monotone, so that what lies between two places lies between their cells.
+  /// Monotone, so that a place between two others is in a cell between theirs.
   [[nodiscard]] std::size_t cell_of(double c, std::size_t axis) const {
     const double part = (c - low_[axis]) / (high_[axis] - low_[axis]);
     const double cell = part * static_cast<double>(side_);
@@ -90,7 +90,7 @@ class Raster {
     }
   }
 
-  /// The columns that a triangle reaches in a row of cells, slightly too many.
+  /// The columns that a triangle covers in a row of cells, slightly too many.
   [[nodiscard]] std::array<std::size_t, 2> columns_in(const Corners& corners,
                                                       std::size_t row) const {
     // A band slightly wider than the row.
@@ -128,7 +128,7 @@ class Raster {
   std::vector<std::uint32_t> entries_;
 };
 
-/// By the areas of the three parts, in long double: not by the formula that surfaces are made with.
+/// Uses the areas of the three parts, in long double: a different formula from that of the mesher.
 double height_at(const Point3& a, const Point3& b, const Point3& c, double x, double y) {
   using Long = long double;
   const auto part = [x, y](const Point3& p, const Point3& q) {
@@ -156,7 +156,7 @@ TinErrors measure_surface(std::span<const double> x, std::span<const double> y,
     for (const std::uint32_t v : triangles[t])
       if (v >= vertices.size())
         throw std::invalid_argument("measure_surface: triangle " + std::to_string(t) +
-                                    " names a vertex that is not there");
+                                    " names a vertex that does not exist");
   TinErrors result;
   result.uncovered = x.size();
   if (triangles.empty()) return result;

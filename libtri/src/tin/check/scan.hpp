@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-/// The inner loop of checking TINs of rasters: the samples in a triangle against its plane.
+/// The inner loop of checking TINs of rasters: the samples in a triangle compared with its plane.
 
 namespace terrace::tri::tin {
 
@@ -13,7 +13,7 @@ inline constexpr int kCheckLanes = 8;
 template <class T>
 struct CheckWindow {
   const T* heights;
-  /// One per sample and kCheckLanes more: 1 once the sample was in a triangle.
+  /// One per sample plus kCheckLanes more: 1 if the sample is in some triangle.
   std::uint8_t* flags;
   std::int64_t columns, rows;
   double tolerance;
@@ -29,12 +29,12 @@ struct CheckSums {
 /// A triangle that is counter-clockwise (columns to the right, rows upwards).
 struct CheckTriangle {
   const double *a, *b, *c;  ///< column, row, height
-  double area;              ///< twice
-  double margin[3];         ///< of sides ab, bc, ca: the tolerance times their length
+  double area;              ///< twice the area
+  double margin[3];         ///< for sides ab, bc, ca: the tolerance times their length
 };
 
 /// Adds the samples with data that are in a triangle, on its sides or outside it by no more than
-/// the tolerance. True if there are also samples without data.
+/// the tolerance. Returns true if there are also samples without data.
 template <class T>
 using CheckScan = bool (*)(const CheckWindow<T>& window, const CheckTriangle& triangle,
                            CheckSums& sums);

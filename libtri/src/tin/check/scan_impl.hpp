@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The rules of scan_lanes.hpp hold here.
+// The rules of scan_lanes.hpp apply here.
 #include "scan.hpp"
 #include "tin/scan_lanes.hpp"
 
@@ -42,7 +42,7 @@ struct Taker {
     __builtin_memcpy(&covered, sums.covered, sizeof covered);
   }
 
-  /// Adds the samples of a block, from number `at` on, that are inside. `across`: its columns
+  /// Adds the samples inside from a block that starts at number `at`. `across`: its columns
   /// relative to the first corner; `rise_y`: how far the plane rises from that corner to the row.
   [[gnu::always_inline]] void take(std::int64_t at, Ints8 inside, Reals8 across, double rise_y) {
     const std::int64_t left = window.columns * window.rows - at;
@@ -57,7 +57,7 @@ struct Taker {
     const Ints8 with_data = (Ints8)(height - height == 0.0);
     missing |= inside & ~with_data;
     const Ints8 ok = inside & with_data;
-    // Relative to a corner, which keeps precision where heights are large.
+    // Relative to a corner, which preserves precision if heights are large.
     const Reals8 difference = (height - base) - (rise_y + slope_x * across);
     const Reals8 error = (Reals8)((Ints8)Lanes<double>::absolute(difference) & ok);
     most = error > most ? error : most;

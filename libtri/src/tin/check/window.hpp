@@ -8,7 +8,7 @@
 
 namespace terrace::tri::tin {
 
-/// Throws std::invalid_argument if the window is empty or has another number of heights.
+/// Throws std::invalid_argument if the window is empty or the number of heights does not match.
 template <class T>
 void check_shape(const GridWindow<T>& window, const char* function) {
   const std::size_t samples = static_cast<std::size_t>(window.columns) * window.rows;

@@ -63,8 +63,8 @@ std::uint32_t GridGaps::cure(const GridSamples<T>& samples, const Ground& ground
     for (std::int32_t x = first; x <= last; ++x) {
       const std::uint8_t flags = flags_[index(x, y)];
       if ((flags & kVertex) != 0) continue;
-      // If all corners have data: samples without data, preferably next to data. Otherwise: samples
-      // with data, preferably on the shore.
+      // If all corners have data, it chooses among samples without data, preferably next to data;
+      // otherwise among samples with data, preferably on the shore.
       const bool missing = (flags & kMissing) != 0;
       const int rank = whole                   ? (flags & kCoastal) != 0 ? 2
                                                  : missing               ? 1
@@ -86,7 +86,7 @@ std::uint32_t GridGaps::cure(const GridSamples<T>& samples, const Ground& ground
 }
 
 /// For a triangle whose only samples are its corners and samples on a side of the window: a
-/// neighbour of an inner one of these, as near as possible to a corner without data.
+/// neighbour of an inner one of these, as close as possible to a corner without data.
 template <class T>
 std::uint32_t GridGaps::beside_inner(const GridSamples<T>& samples, const Ground& ground,
                                      const GridCorner<T>* const (&corners)[3]) const {

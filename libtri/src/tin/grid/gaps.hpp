@@ -8,14 +8,14 @@
 #include "tin/ground.hpp"
 #include "tin/mesh.hpp"
 
-/// Where a window lacks data. The whole window is triangulated, including samples without data,
-/// until no triangle is mixed; then triangles that have a corner without data are left out. A
+/// Where data is missing in a window. The whole window is triangulated, including samples without
+/// data, until no triangle is mixed; then triangles that have a corner without data are dropped. A
 /// triangle is mixed if
 /// - its corners have data, but not all samples in it do, or
-/// - a corner has no data, but it contains (perhaps as a corner) an *inner* sample, one with data
+/// - a corner has no data, but it contains (perhaps as a corner) an *inner* sample: one with data
 ///   whose 8 neighbours have data too.
-/// So each inner sample lies only in triangles with data. The other samples with data, the *shore*,
-/// are where the boundary may run.
+/// So each inner sample lies only in triangles with data. The boundary may run through the other
+/// samples with data, the *shore*.
 
 namespace terrace::tri::tin {
 
@@ -25,7 +25,7 @@ class GridGaps {
   template <class T>
   GridGaps(const GridSamples<T>& samples, std::int32_t columns, std::int32_t rows);
 
-  /// Marks a sample as a vertex; samples are named by place_at().
+  /// Marks a sample as a vertex; samples are identified by place_at().
   void take(std::uint32_t place) { flags_[index(place)] |= kVertex; }
   bool taken(std::uint32_t place) const { return (flags_[index(place)] & kVertex) != 0; }
 
@@ -33,8 +33,8 @@ class GridGaps {
   template <class T>
   bool mixed(const GridCorner<T>& a, const GridCorner<T>& b, const GridCorner<T>& c) const;
 
-  /// The sample to insert so that a mixed triangle goes: the one deepest inside it, on the shore or
-  /// next to it if possible. kNone if the samples' range has none.
+  /// The sample to insert in order to resolve a mixed triangle: the one deepest inside it,
+  /// preferably on the shore or next to it. kNone if the samples' range has none.
   template <class T>
   std::uint32_t cure(const GridSamples<T>& samples, const Ground& ground, const GridCorner<T>& a,
                      const GridCorner<T>& b, const GridCorner<T>& c) const;

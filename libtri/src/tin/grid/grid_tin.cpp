@@ -35,7 +35,7 @@ void check_side(const std::vector<std::uint32_t>& side, std::uint32_t count, con
                                 std::to_string(count - 1));
 }
 
-/// The range of heights, which decides about the type to compute in.
+/// The range of heights, which determines the type of the computation.
 struct Range {
   double least = std::numeric_limits<double>::infinity();
   double greatest = -least;
@@ -71,7 +71,7 @@ Range check_window(const GridWindow<T>& window) {
   return range_of(window);
 }
 
-/// Whether floats are precise enough for most triangles; for the others errors are computed again.
+/// Whether floats are precise enough for most triangles; for the others errors are recomputed.
 bool floats_suffice(const Range& range, double bound) {
   return range.floats && std::max(-range.least, range.greatest) <= 1e30 && bound >= 1e-30 &&
          bound <= 1e30 && bound >= (range.greatest - range.least) * 0x1p-17;
@@ -109,7 +109,7 @@ std::vector<GridCorner<T>> frame_of(RasterSamples<T>& samples, const GridSides& 
   return frame;
 }
 
-/// With triangles counter-clockwise on the ground.
+/// Makes triangles counter-clockwise on the ground.
 template <class T>
 GridTin result_of(const LatticeSurface<RasterSamples<T>>& surface, const GridTinOptions& options) {
   GridTin tin;

@@ -6,12 +6,12 @@
 
 namespace terrace::tri::tin {
 
-/// grid_tin() with chosen instructions, for tests.
+/// grid_tin() with a given instruction set, for tests.
 template <class T>
 GridTin make_grid_tin(const GridWindow<T>& window, const GridSides& sides,
                       const GridTinOptions& options, InstructionSet set);
 
-/// check_grid_tin() with chosen instructions, for tests.
+/// check_grid_tin() with a given instruction set, for tests.
 template <class T>
 GridTinCheck check_grid_tin_by(const GridWindow<T>& window, std::span<const Point3> points,
                                std::span<const std::array<std::uint32_t, 3>> triangles,

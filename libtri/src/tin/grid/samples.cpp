@@ -10,12 +10,11 @@
 namespace terrace::tri::tin {
 namespace {
 
-/// Larger triangles are judged coarsely first. Until triangles are small most samples need not be
-/// looked at, and the result has rather fewer triangles than more. Measured: 256 and 1024 are
-/// worse.
+/// Larger triangles are tested coarsely first. Until triangles are small most samples need not be
+/// visited, and the result tends to have fewer triangles. Measured: 256 and 1024 are worse.
 constexpr std::int64_t kCoarseArea = 400;
 
-constexpr double kTangent = 0.08748866352592401;  // of 5 degrees
+constexpr double kTangent = 0.08748866352592401;  // tangent of 5 degrees
 
 constexpr std::size_t round_up(std::size_t n, std::size_t unit) {
   return (n + unit - 1) / unit * unit;
@@ -39,8 +38,8 @@ struct CarefulWorst {
   bool missing = false;  ///< a sample has no data
 };
 
-/// What the scans compute, in double, for triangles whose planes are too steep for floats. Corners
-/// do not count.
+/// The computation of the scans in double, for triangles whose planes are too steep for floats.
+/// Corners do not count.
 template <class T>
 CarefulWorst careful_worst(const GridSamples<T>& samples, const GridCorner<T>& a,
                            const GridCorner<T>& b, const GridCorner<T>& c) {
@@ -204,8 +203,8 @@ bool RasterSamples<T>::fits(const Vertex& a, const Vertex& b, const Vertex& c,
   return within_at(a, b, c, removed, bound_) && within(a, b, c);
 }
 
-/// A sample at which the vertex has weight w allows it to rise by (error - bound) / w to
-/// (error + bound) / w.
+/// A sample at which the vertex has weight w allows it to rise by (error - bound) / w to (error +
+/// bound) / w.
 template <class T>
 void RasterSamples<T>::narrow(const Vertex& v, const Vertex& b, const Vertex& c,
                               Interval& rises) const {

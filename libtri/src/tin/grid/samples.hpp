@@ -26,14 +26,14 @@ class RasterSamples {
   static constexpr bool kBeside = false;
   static constexpr bool kThinDelaunay = false;
 
-  /// `sides_fixed`: samples on the window's sides are not judged.
+  /// `sides_fixed`: samples on the window's sides are not tested.
   template <class Height>
   RasterSamples(const GridWindow<Height>& window, const GridTinOptions& options, bool sides_fixed,
                 InstructionSet set);
   RasterSamples(RasterSamples&&) = default;
 
-  /// From now on a sample of every kGridCoarse-th column and row that is beyond the bound is bad
-  /// enough for large triangles.
+  /// From now on, in large triangles, a sample of every kGridCoarse-th column and row that is
+  /// beyond the bound is good enough to insert.
   void judge_coarsely_first();
 
   std::int32_t columns() const { return columns_; }
@@ -57,7 +57,7 @@ class RasterSamples {
 
  private:
   WorstSample<T> worst(const Vertex& a, const Vertex& b, const Vertex& c) const;
-  /// The worst sample, or one that is bad enough.
+  /// The worst sample, or one that is good enough.
   WorstSample<T> worst_to_insert(const Vertex& a, const Vertex& b, const Vertex& c) const;
 
   std::int32_t columns_, rows_;

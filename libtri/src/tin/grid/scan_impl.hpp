@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The rules of scan_lanes.hpp hold here.
+// The rules of scan_lanes.hpp apply here.
 #include "scan.hpp"
 #include "tin/scan_lanes.hpp"
 
 namespace terrace::tri::tin {
 namespace {
 
-/// The triangle's plane relative to its first corner, the box of the samples to look at, and a
-/// bound of the rounding error of errors. The samples are those of every kStep-th column and row;
-/// the box counts them, corners have columns and rows.
+/// The triangle's plane relative to its first corner, the box of the samples to scan, and a bound
+/// of the rounding error of errors. The samples are those of every kStep-th column and row; the box
+/// is numbered in these, corners in columns and rows.
 template <class T, int kStep>
 struct Plane {
   using Real = T;
@@ -18,7 +18,7 @@ struct Plane {
   T slack;
   std::int32_t min_x, max_x, min_y, max_y;
   bool empty;
-  bool clipped;  ///< the box is not that of the whole triangle
+  bool clipped;  ///< the box does not cover the whole triangle
 
   [[gnu::always_inline]] Plane(const GridSamples<T>& samples, const GridCorner<T>& a,
                                const GridCorner<T>& b, const GridCorner<T>& c, T bound) {
@@ -34,7 +34,7 @@ struct Plane {
     min_y = greatest((top + kStep - 1) / kStep, samples.first_y);
     max_y = least(bottom / kStep, samples.last_y);
     clipped = max_x != right / kStep || max_y != bottom / kStep;
-    // Twice the area 1 or a box of 2 x 2: no samples but the corners.
+    // Twice the area is 1, or the box is 2 x 2: only corners.
     empty = area <= 1 || (right - left <= 1 && bottom - top <= 1) || min_x > max_x || min_y > max_y;
     if (empty) return;
     const double inverse = 1.0 / static_cast<double>(area);
@@ -46,8 +46,7 @@ struct Plane {
     gradient_y = static_cast<T>(slope_y);
     // Rounding: of the gradients, 2 products and 3 sums. In double the gradients are rounded
     // several times, in proportion to the terms of their sums, which are bounded by |difference of
-    // heights|
-    // * extent / area.
+    // heights| * extent / area.
     const double width = right - left, height = bottom - top;
     const double rise = __builtin_fabs(slope_x) * width + __builtin_fabs(slope_y) * height;
     double rounded = Lanes<T>::kRounding * (6.5 * rise + 4.0 * static_cast<double>(bound));
@@ -79,8 +78,8 @@ struct Sides {
   }
 };
 
-/// The samples of a row that lie in a triangle, exactly: quotients differ from integers by half
-/// their unit or more, far more than rounding.
+/// The exact samples of a row that lie in a triangle: quotients differ from integers by at least
+/// half their unit, far more than rounding.
 template <class T, int kStep>
 struct Spans {
   double start[3], step[3], sign[3], scale[3];
@@ -216,8 +215,8 @@ template <class T, int kStep, class Visit>
   }
 }
 
-/// Errors are compared as the integers with their bits, so that NaN is greater than all others.
-/// Nothing branches on errors before the end, as new maxima cannot be predicted.
+/// Errors are compared as the integers with their bits, so that NaN is greater than all others. No
+/// branch depends on errors before the end, as new maxima cannot be predicted.
 ///
 /// Corners are never the worst: their errors are at most `slack`, which is at most `limit`.
 template <class T, int kStep>

@@ -35,9 +35,9 @@ void Fan::finish() {
   }
 }
 
-// A sample is in sector i where it is left of (or on) ray i and right of ray i + 1. Where rounding
-// leaves none or two, next to the apex, any will do: surfaces are equal there. Beside an open fan
-// it is one at that end.
+// A sample is in sector i if it is left of (or on) ray i and right of ray i + 1. If rounding leaves
+// none or two, close to the apex, any of them will do: the surfaces are equal there. Beside an open
+// fan it is the sector at that end.
 std::size_t Fan::sector_of(double dx, double dy) const {
   const std::size_t rays = rays_.size();
   const double* pair = pairs_.data();
@@ -56,8 +56,8 @@ std::size_t Fan::sector_of(double dx, double dy) const {
     for (std::size_t k = 0; k < 2; ++k)
       left |= static_cast<std::uint64_t>(pair[k] * dy >= pair[k + 2] * dx) << (i + k);
 #endif
-  // The ray after the last is the first, in an open fan none. What fills the last pair is left of
-  // everything: its bit must not be taken for a ray's.
+  // The ray after the last is the first; in an open fan there is none. The padding of the last pair
+  // is left of everything: its bit must not be taken for a ray's.
   left &= ~std::uint64_t{0} >> (64 - rays);
   const std::uint64_t next = left >> 1 | (open_ ? 0 : (left & 1) << (rays - 1));
   const std::uint64_t found = left & ~next & (~std::uint64_t{0} >> (64 - sectors_.size()));

@@ -8,24 +8,25 @@
 
 namespace terrace::tri::tin::points {
 
-/// The triangles around a new vertex, as sectors that samples are dealt to.
+/// The triangles around a new vertex, as sectors to which samples are assigned.
 class Fan {
  public:
-  /// `open`: the vertex lies on the border, so there is one ray more than sectors.
+  /// `open`: the vertex lies on the border, so there is one more ray than sectors.
   void start(const Vertex& apex, bool open);
   void add_ray(const Vertex& end);
-  /// All rays are there.
+  /// To be called after the last ray.
   void finish();
 
-  /// Deals the samples of a list, `apart` left out.
+  /// Assigns the samples of a list, except `apart`.
   void deal(Sample* samples, std::uint32_t head, std::uint32_t apart);
-  /// Ends the sectors' lists.
+  /// Terminates the sectors' lists.
   void close();
 
   struct Sector {
-    std::uint32_t* end;  ///< the `next` that the sector's next sample goes to
+    std::uint32_t* end;  ///< where the sector's next sample is linked
     std::uint32_t head;
-    std::uint32_t worst;  ///< of greatest error, kNone: none has any; stuck ones do not count
+    /// sample of greatest error, kNone if there is none; stuck ones do not count
+    std::uint32_t worst;
     double error;
   };
   [[nodiscard]] const std::vector<Sector>& sectors() const { return sectors_; }
@@ -37,10 +38,10 @@ class Fan {
 
   Vertex apex_{};
   bool open_ = false;
-  std::vector<Vertex> rays_;  ///< their ends
-  /// Directions of the rays in pairs, filled up with zeros: 2 x, 2 y.
+  std::vector<Vertex> rays_;  ///< end points of the rays
+  /// Directions of the rays in pairs, padded with zeros: 2 x, 2 y.
   std::vector<double> pairs_;
-  std::vector<Plane> planes_;  ///< of the sectors
+  std::vector<Plane> planes_;  ///< by sector
   std::vector<Sector> sectors_;
 };
 

@@ -9,10 +9,10 @@
 namespace terrace::tri::tin::points {
 namespace {
 
-/// Narrows by what v may rise for a sample in the triangle v, a, b.
+/// Narrows the range by which v may rise for a sample in the triangle v, a, b.
 void narrow(Interval& interval, const Vertex& v, const Vertex& a, const Vertex& b,
             const Sample& sample, double bound) {
-  // Samples where the vertex has less weight are ignored.
+  // Samples where the vertex has a smaller weight are ignored.
   constexpr double kLeast = 1e-9;
   const auto part = [&](const Vertex& p, const Vertex& q) {
     const double area = (p.x - sample.x) * (q.y - sample.y) - (p.y - sample.y) * (q.x - sample.x);
@@ -23,7 +23,7 @@ void narrow(Interval& interval, const Vertex& v, const Vertex& a, const Vertex& 
   const double wb = part(v, a);
   const double sum = wv + wa + wb;
   if (!(wv > kLeast * sum)) return;
-  // Heights relative to the vertex's present one.
+  // Heights relative to the vertex's current one.
   const double others = (wa * (a.z - v.z) + wb * (b.z - v.z)) / sum;
   const double wanted = sample.z - v.z - others;
   interval.low = std::max(interval.low, (wanted - bound) * sum / wv);
@@ -59,7 +59,7 @@ void fit_heights(Mesh& mesh, std::size_t fixed, double bound,
       for (std::uint32_t i = mesh.heads[star.triangle(k)]; i != kNone; i = samples[i].next)
         narrow(interval, vertex, a, b, samples[i], bound);
     }
-    // No compromise where nothing satisfies all: it would break the bound.
+    // If no height satisfies all samples there is no compromise: it would break the bound.
     if (!(interval.low < interval.high && interval.high - interval.low < HUGE_VAL)) continue;
     const double before = vertex.z;
     vertex.z += interval.low / 2 + interval.high / 2;

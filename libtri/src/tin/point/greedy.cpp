@@ -83,7 +83,7 @@ bool Greedy::insert(std::uint32_t index, std::uint32_t triangle) {
   const bool open = spot.zeros == 1 && around.next[spot.edge] == kNone;
   if (open && fixed_border_) return false;
   const std::uint32_t border = around.corner[after(spot.edge)];
-  // Rounding may have dealt it to another list.
+  // Rounding may have assigned it to another list.
   if (!lattice_ && spot.triangle != triangle) move(index, triangle, spot.triangle);
   cavity_.dig(mesh_.triangles, spot.triangle, [&](const Triangle& t) {
     const Place2 a = mesh_.place(t.corner[0]);
@@ -106,7 +106,7 @@ bool Greedy::insert(std::uint32_t index, std::uint32_t triangle) {
     if (!reached) rescan(triangle);
     return true;
   }
-  // If its triangle is still there, it would be tried again, but its place is taken.
+  // If its triangle still exists, the sample would be tried again, but its place is taken.
   return reached;
 }
 

@@ -13,7 +13,7 @@
 
 namespace terrace::tri::tin::points {
 
-/// Where a sample's vertex stands: rounded on a lattice, else as it is.
+/// The vertex of a sample: rounded on a lattice, otherwise at the sample.
 Vertex vertex_of(const Sample& sample, std::uint32_t index,
                  const std::optional<TinLattice>& lattice);
 
@@ -23,11 +23,11 @@ class Greedy {
   Greedy(Mesh& mesh, double max_error, bool fixed_border, const std::optional<TinLattice>& lattice)
       : mesh_(mesh), bound_(max_error), fixed_border_(fixed_border), lattice_(lattice) {}
 
-  /// From now on a new vertex only cuts the triangles that contain it: for meshes that are not
-  /// Delaunay any more.
+  /// From now on a new vertex only splits the triangles that contain it: for meshes that are no
+  /// longer Delaunay.
   void stop_delaunay() { delaunay_ = false; }
-  /// Begins with these triangles, which have an error, of lists made anew. Samples are handled in
-  /// parts of `together` numbers, which are near each other: one after the other they and their
+  /// Begins with these triangles, which have an error, from newly made lists. Samples are handled
+  /// in parts of `together` numbers, which are close to each other: part by part, they and their
   /// triangles stay in the cache, and the result is as good as if all were handled together.
   void start(std::span<const std::uint32_t> triangles, std::size_t together);
   /// Inserts samples until none that can become a vertex exceeds the bound, or there are
@@ -35,15 +35,15 @@ class Greedy {
   void run(std::size_t max_vertices, std::size_t max_triangles);
 
  private:
-  /// False where the sample cannot become a vertex.
+  /// Returns false if the sample cannot become a vertex.
   bool insert(std::uint32_t index, std::uint32_t triangle);
-  /// Deals the samples of the first `old` of the cavity's triangles to the new ones.
+  /// Distributes the samples of the first `old` of the cavity's triangles to the new ones.
   void deal_samples(const Vertex& vertex, std::size_t old, bool open, std::uint32_t apart);
-  /// Puts a sample from one triangle's list into another's.
+  /// Moves a sample from one triangle's list to another's.
   void move(std::uint32_t index, std::uint32_t from, std::uint32_t to);
   void rescan(std::uint32_t triangle);
   void enqueue(std::uint32_t triangle, double worst);
-  /// The next triangle, kNone: none in any part.
+  /// The next triangle; kNone if there is none in any part.
   std::uint32_t next_triangle();
 
   Mesh& mesh_;
@@ -51,8 +51,8 @@ class Greedy {
   bool fixed_border_;
   bool delaunay_ = true;
   std::size_t together_ = 0;
-  std::size_t part_ = 0;  ///< the present one
-  /// Triangles that later parts begin with, by part; some of them may have changed since.
+  std::size_t part_ = 0;  ///< the current part
+  /// Triangles with which later parts begin, by part; some of them may have changed since.
   std::vector<std::vector<std::uint32_t>> later_;
   std::optional<TinLattice> lattice_;
   static constexpr float kLeastError = 1e-30F;

@@ -12,7 +12,7 @@ Measured list_samples(Mesh& mesh, std::uint32_t step, double bound) {
   for (Triangle& triangle : mesh.triangles) triangle.error = 0;
   Measured result;
   double squares = 0;
-  // Neighbours in the order of samples are near each other, so walks are short.
+  // Consecutive samples are close to each other, so walks are short.
   std::uint32_t at = 0;
   while (!mesh.triangles[at].live()) ++at;
   for (std::uint64_t i = 0; i < samples.size(); i += step) {

@@ -13,7 +13,7 @@ struct Measured {
   TinErrors errors;         ///< covered: samples listed and vertices; uncovered: those outside
   std::size_t above = 0;    ///< samples beyond the bound
   std::size_t to_mend = 0;  ///< those of them that may become vertices
-  /// The triangles with samples to mend, neighbours near each other.
+  /// The triangles with samples to insert, neighbours close to each other.
   std::vector<std::uint32_t> waiting;
 };
 

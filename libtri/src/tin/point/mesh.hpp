@@ -22,24 +22,25 @@ struct Vertex {
 
 /// Where a walk ended.
 struct Spot {
-  std::uint32_t triangle = kNone;  ///< that contains the place; kNone: outside
-  unsigned zeros = 0;              ///< on how many of its edges' lines the place lies
+  std::uint32_t triangle = kNone;  ///< contains the place; kNone: outside
+  unsigned zeros = 0;              ///< the number of its edges on whose lines the place lies
   unsigned edge = 0;               ///< one of these
 };
 
 struct Mesh {
   Pool<Sample>* samples = nullptr;
   Pool<Vertex> vertices;
-  Triangles triangles;        ///< `place`: the sample to be inserted next
-  Pool<std::uint32_t> heads;  ///< of the triangles' lists of samples, kNone: empty
+  Triangles triangles;        ///< `place`: the sample to insert next
+  Pool<std::uint32_t> heads;  ///< heads of the triangles' lists of samples, kNone: empty
 
   [[nodiscard]] Place2 place(std::uint32_t v) const { return {vertices[v].x, vertices[v].y}; }
   /// Walks from a triangle to the one that contains p, exactly. The region is convex, so a border
-  /// edge with p beyond it is the proof that p is outside.
+  /// edge with p beyond it proves that p is outside.
   [[nodiscard]] Spot locate(const Place2& p, std::uint32_t start) const {
     std::uint32_t at = start;
     std::uint32_t from = kNone;
-    // Which edge is tried first changes, so that no walk is endless in a mesh that is not Delaunay.
+    // The edge that is tried first varies, so that a walk cannot be endless in a mesh that is not
+    // Delaunay.
     std::uint32_t random = start * 2654435761u + 1;
     for (;;) {
       const Triangle& t = triangles[at];
@@ -68,7 +69,7 @@ struct Mesh {
   }
 };
 
-/// The plane of a triangle about one of its vertices. `sound`: doubles can tell its slope.
+/// The plane of a triangle relative to one of its vertices. `sound`: doubles can resolve its slope.
 struct Plane {
   double gx;
   double gy;
@@ -89,7 +90,7 @@ inline Plane plane_of(const Vertex& p, const Vertex& a, const Vertex& b) {
 }
 
 /// The height of a triangle's surface at a place inside it: a convex combination of its vertices'
-/// whatever rounding does, so that no sliver is an outlier.
+/// heights whatever the rounding, so that slivers give no outliers.
 inline double height_in(const Vertex& a, const Vertex& b, const Vertex& c, double x, double y) {
   const double ax = a.x - x;
   const double ay = a.y - y;
@@ -102,7 +103,7 @@ inline double height_in(const Vertex& a, const Vertex& b, const Vertex& c, doubl
   const double wb = positive(cx * ay - cy * ax);
   const double wc = positive(ax * by - ay * bx);
   const double sum = wa + wb + wc;
-  // All zero: the place is a vertex, or the triangle has no area that doubles can tell.
+  // All zero: the place is a vertex, or the triangle's area is zero in doubles.
   if (!(sum > 0)) {
     const double da = ax * ax + ay * ay;
     const double db = bx * bx + by * by;

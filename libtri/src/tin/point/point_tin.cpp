@@ -40,13 +40,13 @@ using tin::kNone;
 
 constexpr std::size_t kUnlimited = std::numeric_limits<std::size_t>::max();
 
-/// Makes the mesh, for one bound after another.
+/// Makes the mesh for one bound after another.
 class Maker {
  public:
   Maker(Samples& samples, std::span<const Point3> frame, const PointTinOptions& options)
       : samples_(samples.all), frame_(frame), options_(options) {}
 
-  /// False: there is no surface.
+  /// Returns false if there is no surface.
   bool make(double bound, std::size_t max_vertices, TinQuality quality) {
     mesh_ = {};
     mesh_.samples = &samples_;
@@ -61,8 +61,8 @@ class Maker {
     }
     if (mesh_.triangles.empty()) return false;
     const std::size_t fixed = mesh_.vertices.size();
-    // So much that growing, which takes twice the memory for a moment, is rare; what is not used
-    // costs addresses alone.
+    // Reserves so much that growing, which briefly takes twice the memory, is rare; unused capacity
+    // costs only address space.
     mesh_.triangles.reserve(mesh_.triangles.size() + samples_.size());
     Greedy greedy(mesh_, bound, !frame_.empty(), options_.lattice);
     insert_greedily(greedy, bound, max_vertices);
@@ -79,7 +79,7 @@ class Maker {
     };
     remove();
     if (quality == TinQuality::kFitted) {
-      // Moved vertices have errors at their own samples.
+      // Vertices that were moved have errors at their own samples.
       for (Sample& sample : span_of(samples_))
         if (sample.next == kIsVertex) sample.next = kUnlisted;
       list_samples(mesh_, 1, bound);
@@ -93,13 +93,13 @@ class Maker {
   [[nodiscard]] const Measured& measured() const { return measured_; }
   [[nodiscard]] std::size_t vertices() const { return mesh_.vertices.size() - removed_; }
 
-  /// Leaves nothing behind.
+  /// Moves the mesh into the result; nothing is left.
   void publish(PointTin& result) {
     result.errors = measured_.errors;
     result.stuck = measured_.above - measured_.to_mend;
     result.inserted = inserted_;
     result.removed = removed_;
-    // Memory for the result comes after that of the samples is gone.
+    // Memory for the result is allocated after that of the samples is freed.
     for (Vertex& vertex : span_of(mesh_.vertices))
       vertex.sample = vertex.sample == kNone ? kNoSample : number(samples_[vertex.sample]);
     samples_.release();
@@ -123,8 +123,8 @@ class Maker {
   }
 
  private:
-  /// While triangles are large, few of their samples choose the vertices as well as all, and need
-  /// not be dealt anew each time.
+  /// While triangles are large, a few of their samples choose the vertices as well as all would,
+  /// and need not be redistributed each time.
   void insert_greedily(Greedy& greedy, double bound, std::size_t max_vertices) {
     constexpr std::uint32_t kSteps[] = {64, 8, 1};
     constexpr std::size_t kSamplesPerTriangle = 8;
@@ -139,7 +139,7 @@ class Maker {
     }
   }
 
-  /// Measures; and inserts what rounding hid from the lists, next to never.
+  /// Measures, and inserts samples that rounding hid from the lists, which are very rare.
   void mend(Greedy& greedy, double bound, std::size_t max_vertices) {
     measured_ = list_samples(mesh_, 1, bound);
     while (measured_.to_mend > 0 && mesh_.vertices.size() < max_vertices) {
@@ -158,9 +158,9 @@ class Maker {
   std::size_t removed_ = 0;
 };
 
-/// The smallest bound that leaves at most max_points after removal, nearly: where greedy insertion
-/// stops at max_points is too large a bound, as removal then leaves about 0.6 of them; the number
-/// of vertices is about a power of the bound.
+/// The smallest bound that leaves nearly max_points after removal: the bound at which greedy
+/// insertion stops at max_points is too large, as removal then leaves about 0.6 of them; the number
+/// of vertices is approximately a power of the bound.
 bool make_of_points(Maker& maker, const PointTinOptions& options) {
   constexpr int kTries = 6;
   constexpr double kFull = 0.98;
@@ -181,7 +181,8 @@ bool make_of_points(Maker& maker, const PointTinOptions& options) {
     } else {
       too_small = bound;
     }
-    // Vertices go down about as the inverse of the bound; a little to the safe side.
+    // The number of vertices is roughly inversely proportional to the bound; slightly on the safe
+    // side.
     bound = std::max(last * part * 1.01, options.max_error);
     if (!(bound > too_small && bound < best)) bound = (too_small + best) / 2;
   }

@@ -12,8 +12,8 @@
 namespace terrace::tri::tin::points {
 
 /// One pass over the vertices in the order of their numbers, except for the first `fixed`: each is
-/// removed if the hole can be filled so that every sample in it stays within the bound, with the
-/// Delaunay triangles or else with the triangulation of least worst error whose angles are at least
+/// removed if the hole can be filled so that every sample in it stays within the bound, either with
+/// the Delaunay triangles or with the triangulation of least worst error whose angles are at least
 /// min_angle_degrees. Requires complete lists and keeps them complete. Returns the number of
 /// vertices removed, which remain as vertices without triangles.
 std::size_t remove_vertices(Mesh& mesh, std::size_t fixed, double bound, double min_angle_degrees);

@@ -14,7 +14,7 @@
 namespace terrace::tri::tin::points {
 namespace {
 
-/// Every other bit.
+/// Spreads the bits to every other position.
 std::uint32_t spread(std::uint32_t bits) {
   bits = (bits | bits << 8) & 0x00FF00FFu;
   bits = (bits | bits << 4) & 0x0F0F0F0Fu;
@@ -52,7 +52,7 @@ class Cells {
   double extent_ = 0;
 };
 
-/// The same for numbers of samples, as sort_along_curve() asks for it.
+/// The same for sample numbers, as sort_along_curve() requires.
 struct NumberCells {
   const double* x;
   const double* y;
@@ -66,8 +66,8 @@ struct NumberCells {
   [[nodiscard]] std::uint32_t key(std::uint32_t i) const { return cells.key(x[i], y[i]); }
 };
 
-/// Orders so that samples of one place are beside each other, the smaller number first. Samples of
-/// one cell are so few that sorting them by place does not spoil the curve.
+/// Reorders so that samples of one place are adjacent, the smaller number first. A cell has so few
+/// samples that sorting them by place does not spoil the curve.
 void group_places(std::span<Sample> samples) {
   constexpr std::size_t kFew = 3000;
   const auto sort_places = [](std::span<Sample> part) {
@@ -106,7 +106,7 @@ double merged_height(std::span<const Sample> group, PointDuplicates duplicates) 
       height = duplicates == PointDuplicates::kMin ? std::min(height, sample.z)
                                                    : std::max(height, sample.z);
   } else if (duplicates == PointDuplicates::kMean) {
-    // Differences from the first, so that equal ones stay as they are.
+    // Differences from the first height, so that equal heights are preserved exactly.
     double sum = 0;
     for (const Sample& sample : group) sum += sample.z - group[0].z;
     height += sum / static_cast<double>(group.size());
@@ -156,7 +156,7 @@ Samples take_samples(std::span<const double> x, std::span<const double> y,
     while (end < count && all[end].x == first.x && all[end].y == first.y) ++end;
     if (end - begin > 1 && duplicates == PointDuplicates::kError)
       throw std::invalid_argument("point_tin: sample " + std::to_string(all[begin + 1].id) +
-                                  " has the place of sample " + std::to_string(first.id));
+                                  " has the same place as sample " + std::to_string(first.id));
     if (end - begin == 1) {
       all[kept++] = first;
       begin = end;

@@ -15,17 +15,17 @@ inline constexpr std::uint32_t kOutside = 0xFFFFFFFEu;
 inline constexpr std::uint32_t kIsVertex = 0xFFFFFFFDu;
 inline constexpr std::uint32_t kUnlisted = 0xFFFFFFFCu;
 
-/// Below this, no product of coordinates overflows.
+/// Below this, products of coordinates do not overflow.
 inline constexpr double kLargest = 1e100;
 
-/// A sample as a member of its triangle's list. Half a cache line: walking a list brings what is
-/// measured.
+/// A sample as a member of its triangle's list. Half a cache line: following the list also loads
+/// the values to measure.
 struct Sample {
   double x;
   double y;
   double z;
-  std::uint32_t next;  ///< the next of the list, kNone at its end; or why it is in none
-  /// The caller's number; with kStuck set where it can not become a vertex.
+  std::uint32_t next;  ///< the next in the list, kNone at its end; or why it is in no list
+  /// The caller's number, with kStuck set if it cannot become a vertex.
   std::uint32_t id;
 };
 inline constexpr std::uint32_t kStuck = 0x80000000u;
@@ -33,8 +33,8 @@ inline bool stuck(const Sample& sample) { return (sample.id & kStuck) != 0; }
 inline std::uint32_t number(const Sample& sample) { return sample.id & ~kStuck; }
 
 struct Samples {
-  /// Along a curve: neighbours are near each other. Every place once, or, with kAll, twice where
-  /// heights differ.
+  /// Along a curve: consecutive samples are close to each other. Every place occurs once, or, with
+  /// kAll, twice if heights differ.
   Pool<Sample> all;
   std::size_t duplicates = 0;
   double duplicate_range = 0;  ///< the largest difference of heights at one place

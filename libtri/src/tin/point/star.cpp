@@ -109,7 +109,7 @@ void StarSamples::list(Mesh& mesh, const Star& star, const PolygonFill& fill) {
   rest_.assign((count + 63) / 64, ~std::uint64_t{0});
   if (count % 64 != 0) rest_.back() >>= 64 - count % 64;
   for (std::size_t k = 0; k < star.size(); ++k) mesh.heads[star.triangle(k)] = kNone;
-  // Slots are used in the order in which triangles are visited.
+  // Slots are reused in the order in which triangles are visited.
   std::size_t k = 0;
   star.all_of(fill, [&](std::size_t i, std::size_t m, std::size_t j) {
     const Words& first = sides(i, m).left;
@@ -132,7 +132,7 @@ void StarSamples::list(Mesh& mesh, const Star& star, const PolygonFill& fill) {
       list_rest(mesh, star, fill, w * 64 + static_cast<std::size_t>(std::countr_zero(bits)));
 }
 
-// Samples that rounding puts into no triangle go to the one that they are the least outside of.
+// Samples that rounding puts into no triangle go to the triangle they are least outside of.
 void StarSamples::list_rest(Mesh& mesh, const Star& star, const PolygonFill& fill,
                             std::size_t sample) const {
   double best = -kNever;

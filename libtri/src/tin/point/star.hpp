@@ -14,16 +14,16 @@ namespace terrace::tri::tin::points {
 /// relative to the vertex.
 class StarSamples {
  public:
-  /// `extra`: one more sample, kNone: none.
+  /// `extra`: an additional sample, or kNone.
   void gather(const Mesh& mesh, const Star& star, const Vertex& centre, std::uint32_t extra);
 
   /// The largest error of the samples in the triangle of corners i < m < j of the ring, or infinity
-  /// if one is above `limit` or doubles cannot tell the triangle's plane.
+  /// if one is above `limit` or doubles cannot resolve the triangle's plane.
   double worst(std::size_t i, std::size_t m, std::size_t j, double limit);
-  /// Whether the triangle's smallest angle has at least this tangent.
+  /// Whether the tangent of the triangle's smallest angle is at least this.
   [[nodiscard]] bool wide(std::size_t i, std::size_t m, std::size_t j, double tangent) const;
 
-  /// Lists the samples in the triangles that replaced the star by `fill`.
+  /// Lists the samples in the triangles of `fill`, which replaced the star.
   void list(Mesh& mesh, const Star& star, const PolygonFill& fill);
 
  private:

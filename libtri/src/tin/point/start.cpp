@@ -12,7 +12,7 @@
 namespace terrace::tri::tin::points {
 namespace {
 
-/// Triangulates the vertices that are there.
+/// Triangulates the vertices present.
 void triangulate(Mesh& mesh) {
   std::vector<Place2> points;
   for (std::uint32_t v = 0; v < mesh.vertices.size(); ++v) points.push_back(mesh.place(v));
@@ -64,13 +64,13 @@ std::vector<std::uint32_t> hull_of(const std::vector<std::uint32_t>& sorted, Pla
 }  // namespace
 
 void start_with_frame(Mesh& mesh, std::span<const Point3> frame) {
-  if (frame.size() < 3) throw std::invalid_argument("point_tin: a frame of less than 3 vertices");
+  if (frame.size() < 3) throw std::invalid_argument("point_tin: a frame needs at least 3 vertices");
   for (std::size_t i = 0; i < frame.size(); ++i) {
     for (const double c : frame[i])
       if (!(std::abs(c) < kLargest)) refuse_frame(i, "is not finite or too large");
     mesh.vertices.push_back({frame[i][0], frame[i][1], frame[i][2], kNone});
   }
-  // Convex everywhere and once around: along the lexicographic order up once and down once.
+  // Convex everywhere and once around: the lexicographic order rises once and falls once.
   const auto count = static_cast<std::uint32_t>(frame.size());
   std::size_t turns = 0;
   bool bends = false;
@@ -78,12 +78,12 @@ void start_with_frame(Mesh& mesh, std::span<const Point3> frame) {
     const Place2 before = mesh.place(i == 0 ? count - 1 : i - 1);
     const Place2 here = mesh.place(i);
     const Place2 after = mesh.place(i + 1 == count ? 0 : i + 1);
-    if (here == after) refuse_frame(i, "has the place of the next");
+    if (here == after) refuse_frame(i, "coincides with the next");
     const int side = Kernel::orientation(before, here, after);
     const bool turns_back =
         lexicographically_less(before, here) != lexicographically_less(here, after);
     if (side < 0 || (side == 0 && turns_back))
-      refuse_frame(i, "makes it not convex or not counter-clockwise");
+      refuse_frame(i, "makes the frame non-convex or clockwise");
     bends = bends || side > 0;
     turns += turns_back ? 1 : 0;
   }
@@ -100,7 +100,7 @@ void start_with_hull(Mesh& mesh) {
   const auto less = [&](std::uint32_t a, std::uint32_t b) {
     return lexicographically_less(place(a), place(b));
   };
-  // The extremes in 16 directions make a polygon; what is strictly inside is no corner.
+  // The extremes in 16 directions make a polygon; points strictly inside are not corners.
   constexpr std::array<Place2, 8> kDirections{
       {{8, 0}, {7, 3}, {6, 6}, {3, 7}, {0, 8}, {-3, 7}, {-6, 6}, {-7, 3}}};
   std::array<double, 16> best;
@@ -124,7 +124,7 @@ void start_with_hull(Mesh& mesh) {
   candidates.erase(std::unique(candidates.begin(), candidates.end()), candidates.end());
   const std::vector<std::uint32_t> inner = hull_of(candidates, place);
   candidates.clear();
-  // Most are told at once: between four of the extremes, one in each quadrant about them.
+  // Most are recognised at once: between four of the extremes, one in each quadrant around them.
   const Sample& ne = samples[extreme[2]];
   const Sample& nw = samples[extreme[6]];
   const Sample& sw = samples[extreme[10]];

@@ -15,9 +15,9 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
-/// How far columns and rows may be off equal spacing, in spacings.
+/// How far columns and rows may deviate from equal spacing, in spacings.
 constexpr double kRegular = 1e-3;
-/// Samples farther off a lattice would make scans slow.
+/// Samples farther from a lattice would make scans slow.
 constexpr double kFarthestOff = 4.0;
 
 struct Region {
@@ -50,7 +50,7 @@ bool regular(std::span<const double> places) {
   return true;
 }
 
-/// Adds what scans require before and after the places.
+/// Adds the padding that scans require before and after the places.
 std::vector<double> padded(std::span<const double> places) {
   std::vector<double> all{-kInfinity};
   all.reserve(places.size() + 1 + kRowPad);
@@ -78,7 +78,7 @@ std::vector<double> padded_rows(std::span<const double> from, std::size_t column
   return to;
 }
 
-/// Copies the heights of samples inside the frame. `place_of(row, column)` is x and y.
+/// Copies the heights of samples inside the frame. `place_of(row, column)` returns x and y.
 template <class PlaceOf>
 void copy_heights(std::span<const double> from, std::size_t columns, const Region& region,
                   const PlaceOf& place_of, PaddedSamples& out) {
@@ -144,8 +144,8 @@ bool find_lattice(const SampleGrid& samples, std::size_t rows, RowSamples& layou
   return true;
 }
 
-/// How far samples are off the lattice, in columns or rows; infinite if one has a height but no
-/// place.
+/// How far samples deviate from the lattice, in columns or rows; infinite if one has a height but
+/// no place.
 double off_lattice(const SampleGrid& samples, const RowSamples& layout) {
   double off = 0.0;
   for (std::size_t i = 0; i < samples.z.size(); ++i) {

@@ -17,11 +17,11 @@ inline constexpr double kFarthest = 0x1p20;
 /// The most columns or rows that fit into Triangle::place.
 inline constexpr std::size_t kMostRows = 65535;
 
-/// Whether the frame is an upright rectangle with whole coordinates from 0 to kFarthest, its
-/// vertices counter-clockwise along the sides, the corners among them.
+/// Whether the frame is an axis-parallel rectangle with integer coordinates from 0 to kFarthest,
+/// its vertices counter-clockwise along the sides, including the corners.
 bool is_rectangle(std::span<const Point3> frame);
 
-/// Samples with the padding that scans require. Samples outside the frame are left out.
+/// Samples with the padding that scans require. Samples outside the frame are omitted.
 struct PaddedSamples {
   std::vector<double> x, y, z;
   std::size_t known = 0;  ///< number of samples, including those outside the frame

@@ -17,7 +17,7 @@ void check_options(const PointTinOptions& options, std::span<const Point3> frame
 
 namespace rows {
 
-/// point_tin() of SampleRows or SampleGrid, with a given instruction set.
+/// point_tin() for SampleRows or SampleGrid, with a given instruction set.
 template <class Samples>
 PointTin make_tin(const Samples& samples, std::span<const Point3> frame,
                   const PointTinOptions& options, InstructionSet set);

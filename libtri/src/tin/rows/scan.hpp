@@ -6,7 +6,8 @@
 
 #include "tin/scan_results.hpp"
 
-/// The inner loops of TINs of samples in rows and columns whose vertices stand beside the samples.
+/// The inner loops of TINs of samples in rows and columns whose vertices may differ in position
+/// from the samples.
 
 namespace terrace::tri::tin::rows {
 
@@ -17,9 +18,9 @@ struct RowCorner {
 /// Samples row by row, with at least kRowPad values after each row and one more row after the last.
 /// NaN: no sample.
 struct RowSamples {
-  /// Upright: the places of columns and rows, ascending; x[-1] and y[-1] are -infinity, and at
-  /// least kRowPad places at infinity follow the last. Otherwise those of all samples, laid out as
-  /// z.
+  /// If `upright`: the places of columns and rows, ascending; x[-1] and y[-1] are -infinity, and at
+  /// least kRowPad places at infinity follow the last. Otherwise the places of all samples, laid
+  /// out like z.
   const double* x;
   const double* y;
   const double* z;
@@ -27,29 +28,29 @@ struct RowSamples {
   std::int32_t columns, rows;
   bool upright;
   bool mirrored;  ///< columns and rows form a left-handed system
-  /// The approximate column of a place is column_0 + column_x * x + column_y * y. The row likewise.
+  /// The approximate column of a place is column_0 + column_x * x + column_y * y. Likewise the row.
   double column_0, column_x, column_y;
   double row_0, row_x, row_y;
   double off;  ///< the largest error of such a column or row
 };
 inline constexpr std::size_t kRowPad = 8;
 
-/// Errors are those of a triangle's plane at the samples in it, sides included. Samples so close to
-/// a side that rounding decides belong to the triangles on both sides of it. Rounding errors are
+/// Errors are those of a triangle's plane at the samples in it, including sides. Samples so close
+/// to a side that rounding decides belong to the triangles on both sides of it. Rounding errors are
 /// added, never ignored.
 struct RowScan {
-  /// The sample with the greatest error that may be above `bound`; of equal ones the first in the
-  /// first row. Error 0 if there is none.
+  /// The sample with the greatest error that may be above `bound`; on ties the first in the first
+  /// row. Error 0 if there is none.
   WorstSample<double> (*worst)(const RowSamples& samples, const RowCorner& a, const RowCorner& b,
                                const RowCorner& c, double bound);
   /// Whether all errors are certainly at most `bound`.
   bool (*within)(const RowSamples& samples, const RowCorner& a, const RowCorner& b,
                  const RowCorner& c, double bound);
-  /// Raises each sample's entry in `errors`, laid out as the heights, to its error.
+  /// Raises each sample's entry in `errors`, laid out like the heights, to its error.
   void (*measure)(const RowSamples& samples, const RowCorner& a, const RowCorner& b,
                   const RowCorner& c, double* errors);
-  /// Narrows `rises` to what corner a may rise by so that, up to rounding, no error is above
-  /// `bound`.
+  /// Narrows `rises` to the range by which corner a may rise such that, up to rounding, no error is
+  /// above `bound`.
   void (*narrow)(const RowSamples& samples, const RowCorner& a, const RowCorner& b,
                  const RowCorner& c, double bound, Interval& rises);
 };

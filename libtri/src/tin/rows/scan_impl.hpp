@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The rules of scan_lanes.hpp hold here.
+// The rules of scan_lanes.hpp apply here.
 #include "scan.hpp"
 #include "tin/scan_lanes.hpp"
 
@@ -34,7 +34,7 @@ constexpr double kFlat = 1e-6;
   return at;
 }
 
-/// A box of the lattice, slightly too large where samples are only approximately regular.
+/// A box of the lattice, slightly too large if samples are only approximately regular.
 struct Box {
   std::int32_t first_column, last_column, first_row, last_row;
 };
@@ -55,7 +55,7 @@ struct Box {
   return samples.row_0 + (samples.row_x * p.x + samples.row_y * p.y);
 }
 
-/// Rounded up and down to whole numbers from -1 to `count`.
+/// Rounded up and down to integers from -1 to `count`.
 [[gnu::always_inline]] inline std::int32_t whole_from(double low, std::int32_t count) {
   const double kept = least(greatest(low, 0.0), static_cast<double>(count));
   const auto down = static_cast<std::int32_t>(kept);
@@ -80,7 +80,7 @@ struct Box {
 template <bool kUpright>
 struct Face {
   double gradient_x, gradient_y;
-  double inverse;  ///< of twice the area
+  double inverse;  ///< reciprocal of twice the area
   double slack;    ///< bound of the rounding error of an error
   double margin;   ///< bound of the rounding error of an edge function, negated
   double start_x[3], start_y[3], along_x[3], along_y[3];  ///< of the sides
@@ -135,14 +135,14 @@ struct Spans {
     for (int i = 0; i < 3; ++i) {
       const int next = i == 2 ? 0 : i + 1;
       const double down = q[next] - q[i];
-      // A side towards higher rows is on the right unless the lattice is mirrored. For a side
-      // along a row rounding might decide.
+      // A side towards higher rows is on the right unless the lattice is mirrored. For a side along
+      // a row, rounding might decide.
       const bool flat = __builtin_fabs(down) < kFlat;
       left[i] = !flat && (down < 0.0) != samples.mirrored;
       right[i] = !flat && (down > 0.0) != samples.mirrored;
       slope[i] = flat ? 0.0 : (p[next] - p[i]) / down;
       base[i] = p[i] - slope[i] * q[i];
-      // How far samples are off the lattice, and rounding.
+      // The samples' deviation from the lattice, plus rounding.
       const double steep = __builtin_fabs(slope[i]);
       const double margin =
           kColumnMargin + samples.off * (1.0 + steep) +
@@ -326,7 +326,7 @@ void measure_in(const RowSamples& samples, const RowCorner& a, const RowCorner& 
 template <bool kUpright>
 void narrow_in(const RowSamples& samples, const RowCorner& a, const RowCorner& b,
                const RowCorner& c, double bound, Interval& rises) {
-  // Samples where the corner has less weight are ignored.
+  // Samples where the corner has a smaller weight are ignored.
   constexpr double kLeast = 1e-9;
   const Face<kUpright> face(samples, a, b, c);
   if (face.empty) return;
