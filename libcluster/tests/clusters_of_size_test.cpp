@@ -53,14 +53,12 @@ TEST(ClustersOfSize, ClustersAreCompact) {
 
 TEST(ClustersOfSize, ThreadsDoNotMatter) {
   const auto points = uniform_points(45000);
-  EXPECT_EQ(clusters_of_size(points, 1000, 1, 1),
-            clusters_of_size(points, 1000, 1, 3));
+  EXPECT_EQ(clusters_of_size(points, 1000, 1, 1), clusters_of_size(points, 1000, 1, 3));
 }
 
 TEST(ClustersOfSize, FewPointsAreOneCluster) {
   for (const std::size_t n : {1u, 50u, 10000u}) {
-    EXPECT_EQ(clusters_of_size(uniform_points(n), 10000, 1, 1),
-              std::vector<std::uint32_t>(n, 0));
+    EXPECT_EQ(clusters_of_size(uniform_points(n), 10000, 1, 1), std::vector<std::uint32_t>(n, 0));
   }
 }
 

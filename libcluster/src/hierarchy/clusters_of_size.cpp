@@ -89,8 +89,8 @@ std::vector<std::size_t> compact_ranges(std::span<const Point3> points, std::siz
       }
       extent[d] = high - low;
     }
-    const auto axis = static_cast<std::size_t>(
-        std::max_element(extent.begin(), extent.end()) - extent.begin());
+    const auto axis =
+        static_cast<std::size_t>(std::max_element(extent.begin(), extent.end()) - extent.begin());
     // Whole blocks on the left.
     const std::size_t blocks = (end - begin + most - 1) / most;
     const std::size_t middle = begin + blocks / 2 * most;

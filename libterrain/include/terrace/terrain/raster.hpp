@@ -32,8 +32,8 @@ struct RasterOutcome {
 };
 
 /// Writes a Cloud Optimized GeoTIFF, PixelIsArea: the value of a cell is that of the surface in its
-/// centre. Overviews, down to 512 x 512 cells, have the mean of the cells with data below theirs; of
-/// aspect, which has no mean, the first of them.
+/// centre. Overviews, down to 512 x 512 cells, have the mean of the cells with data below theirs;
+/// of aspect, which has no mean, the first of them.
 ///
 /// The grid: without a cell size, at level 0 and in the store's CRS it is a raster's own lattice
 /// (rotated ones have none); else cells of that size from the upper left corner of the region, or
